@@ -11,7 +11,7 @@ from benchmarks import effort
 from benchmarks.effort import format_head, format_row
 from benchmarks.places import LIBRARIES, ROOT, library_folder, read_scenario
 from beyond_mocap.ball.contact import find_striking_surface
-from beyond_mocap.evaluation.report import format_cell, evaluate
+from beyond_mocap.evaluation.report import evaluate, format_cell
 from beyond_mocap.library.build import build_library
 from beyond_mocap.library.library import Library
 from beyond_mocap.motion.motion import compute_pose
@@ -60,9 +60,9 @@ def build_scene_row(name: str, library: Library, label: str) -> str:
     gaps_m, arrival_errors = measure_gaps(result)
     moved = np.concatenate([player.part_shifts for player in result.players])
     return format_row([f"{name}, {label}", str(len(result.plan.strikes)), str(len(gaps_m)),
-                       f"{1000 * np.median(gaps_m):.1f} / {1000 * gaps_m.max():.1f}", f"{1000 * arrival_errors.max():.1f}",
-                       f"{100 * np.nanmax(moved, initial=0.0):.0f}", f"{result.plan.seconds:.1f}", f"{took:.1f}",
-                       str(len(result.warnings))])
+                       f"{1000 * np.median(gaps_m):.1f} / {1000 * gaps_m.max():.1f}",
+                       f"{1000 * arrival_errors.max():.1f}", f"{100 * np.nanmax(moved, initial=0.0):.0f}",
+                       f"{result.plan.seconds:.1f}", f"{took:.1f}", str(len(result.warnings))])
 
 
 def build_take_rows(name: str, library: Library) -> list[str]:
@@ -85,13 +85,13 @@ def build_take_rows(name: str, library: Library) -> list[str]:
 def section() -> list[str]:
     """Build the lines for results.md."""
     lines = format_head(("passing scene, library", "strikes", "with contact", "gap mm (median / worst, target 5)",
-                  "ball off its arrival mm", "part moved cm", "seconds of scene", "processor seconds",
-                  "warnings"))  # fmt: skip
+                         "ball off its arrival mm", "part moved cm", "seconds of scene", "processor seconds",
+                         "warnings"))  # fmt: skip
     with tempfile.TemporaryDirectory() as place:
         own = build_library(SAMPLES / "passes" / "library", cache_dir=Path(place))
         lines += [build_scene_row(name, own, "its own") for name in SCENES]
         lines += ["", *format_head(("take at solved touches", "labels", "requested s", "solved s", "gap mm (target 5)",
-                             "ball moved m", "time error s"))]  # fmt: skip
+                                    "ball moved m", "time error s"))]  # fmt: skip
         for name in LIBRARIES:
             folder = library_folder(name, Path(place))
             lines += build_take_rows(name, build_library(folder, unit=LIBRARIES[name], cache_dir=Path(place) / name))

@@ -21,7 +21,7 @@ from benchmarks.places import DATA, ROOT
 from beyond_mocap.ball.tracked.solve import SolvedBall, solve_ball
 from beyond_mocap.base.errors import InputError
 from beyond_mocap.files.tracking.tracking import Match, MatchPlayer, read_match
-from beyond_mocap.synthetic.ground_truth.planted import Feed, build_match, sample_feed
+from beyond_mocap.synthetic.ground_truth.synthetic_match import Feed, build_match, sample_feed
 
 MATCHES = {"nl2019": "nl2019_half1.dat", "dutch": "dutch_6min.dat"}
 BY_HAND = ROOT / "benchmarks" / "touches_by_hand.csv"
@@ -136,7 +136,8 @@ def compare_events(match: Match) -> FeedResult:
     Events name the player who plays the ball away, so that earlier touches of the same player count neither way.
     """
     solved, reading = solve_ball(match), convert_events()
-    earlier_touches = [AnnotatedTouch(a.time, (a.player,)) for a, b in zip(solved.touches, solved.touches[1:]) if a.player == b.player]
+    earlier_touches = [AnnotatedTouch(a.time, (a.player,)) for a, b in zip(solved.touches, solved.touches[1:])
+                       if a.player == b.player]
     reading = replace(reading, doubts=(*reading.doubts, *earlier_touches))
     times, players = [touch.time for touch in solved.touches], [touch.player for touch in solved.touches]
     return FeedResult("dutch, passes among its events", score_with_offset(times, players, reading), solved, reading)
@@ -179,13 +180,16 @@ COLUMNS = ("feed", "touches", "precision", "recall", "F1 at 0.1 s, right player"
 
 def compare_all(dutch: Match, half: Match, solved: SolvedBall) -> list[FeedResult]:
     """Compare every feed. solved: the whole half."""
-    return [compare_annotation("dutch", dutch), compare_annotation("nl2019", half, solved=solved), compare_annotation("dutch, read later", dutch, LATER),
-            compare_annotation("nl2019, read later", half, LATER, solved), compare_annotation("dutch, no heights", thin_match(dutch, 1, False)),
-            compare_annotation("nl2019, no heights", thin_match(half, 1, False)), compare_annotation("dutch, 12.5 Hz", thin_match(dutch, 2)),
-            compare_annotation("nl2019, 12.5 Hz", thin_match(half, 2)),
-            compare_annotation("dutch, 8.3 Hz, no heights", thin_match(dutch, 3, False)), compare_events(dutch),
-            compare_synthetic("synthetic, 25 Hz, 8 cm"), compare_synthetic("synthetic, 25 Hz, 8 cm, half filled", filled=0.5),
-            compare_synthetic("synthetic, 25 Hz, 8 cm, no heights", find_heights=False), compare_synthetic("synthetic, 10 Hz, 8 cm", fps=10.0),
+    return [compare_annotation("dutch", dutch), compare_annotation("nl2019", half, solved=solved),
+            compare_annotation("dutch, read later", dutch, LATER), compare_annotation("nl2019, read later", half, LATER,
+            solved), compare_annotation("dutch, no heights", thin_match(dutch, 1, False)),
+            compare_annotation("nl2019, no heights", thin_match(half, 1, False)),
+            compare_annotation("dutch, 12.5 Hz", thin_match(dutch, 2)),
+            compare_annotation("nl2019, 12.5 Hz", thin_match(half, 2)), compare_annotation("dutch, 8.3 Hz, no heights",
+            thin_match(dutch, 3, False)), compare_events(dutch), compare_synthetic("synthetic, 25 Hz, 8 cm"),
+            compare_synthetic("synthetic, 25 Hz, 8 cm, half filled", filled=0.5),
+            compare_synthetic("synthetic, 25 Hz, 8 cm, no heights", find_heights=False),
+            compare_synthetic("synthetic, 10 Hz, 8 cm", fps=10.0),
             compare_synthetic("synthetic, 10 Hz, 8 cm, no heights", fps=10.0, find_heights=False)]
 
 
@@ -273,8 +277,8 @@ class Score:
         return 2.0 * self.precision * self.recall / both if both else 0.0
 
 
-def score_touches(times: Sequence[float], players: Sequence[str], reading: TouchAnnotation, tolerance: float = TOLERANCE,
-           offset: float = 0.0) -> Score:
+def score_touches(times: Sequence[float], players: Sequence[str], reading: TouchAnnotation,
+                  tolerance: float = TOLERANCE, offset: float = 0.0) -> Score:
     """Compare found touches with an annotation; those outside its stretches are left out.
 
     Args:
@@ -296,8 +300,8 @@ def score_touches(times: Sequence[float], players: Sequence[str], reading: Touch
                  np.array([times[found] - reading.touches[read].time for read, found in right]), offset)
 
 
-def score_with_offset(times: Sequence[float], players: Sequence[str], reading: TouchAnnotation, tolerance: float = TOLERANCE,
-                     max_offset: float = 4.0) -> Score:
+def score_with_offset(times: Sequence[float], players: Sequence[str], reading: TouchAnnotation,
+                      tolerance: float = TOLERANCE, max_offset: float = 4.0) -> Score:
     """Compare with the one offset, up to `max_offset` seconds either way, that gives the highest F1."""
     coarse = np.arange(-max_offset, max_offset + 1e-9, tolerance / 2.0)
     best = max(coarse, key=lambda offset: _count_matches(times, players, reading, tolerance, offset))

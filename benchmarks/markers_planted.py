@@ -14,7 +14,7 @@ from beyond_mocap.markers.cleaning.clean import clean_trial
 from beyond_mocap.markers.files.marker_set_text import choose_set
 from beyond_mocap.markers.reconstruct import Reconstruction, ReconstructSettings, reconstruct
 from beyond_mocap.motion.motion import Motion
-from beyond_mocap.synthetic.ground_truth.planted_markers import SyntheticTrial, build_trial, measure_trial_error
+from beyond_mocap.synthetic.ground_truth.synthetic_markers import SyntheticTrial, build_trial, measure_trial_error
 from beyond_mocap.synthetic.throws import build_throw
 
 CLIPS = {"walk": ("cmu10/test_walking_1.bvh", 0, 360), "run": ("cmu10/test_running_1.bvh", 0, 360),
@@ -95,9 +95,9 @@ def _build_truth_row(name: str, marker_set: str, static: bool, known: SyntheticT
         return effort.format_row([*begin, f"failed: {problem}"[:160], *[""] * 7])
     solved = result.solved
     return effort.format_row([*begin, f"{np.degrees(error.angle):.2f}", f"{np.degrees(error.raw_angle):.2f}",
-                              f"{1e3 * error.centre:.1f}", f"{1e3 * error.worst_centre:.1f}", _format_rms_mm(solved.residual),
-                              _format_rms_mm(solved.single), _format_worst(error.angles, np.degrees(1.0), 1),
-                              _format_worst(error.centres, 1e3, 0)])
+                              f"{1e3 * error.centre:.1f}", f"{1e3 * error.worst_centre:.1f}",
+                              _format_rms_mm(solved.residual), _format_rms_mm(solved.single),
+                              _format_worst(error.angles, np.degrees(1.0), 1), _format_worst(error.centres, 1e3, 0)])
 
 
 def _format_rms_mm(values: np.ndarray) -> str:
@@ -121,7 +121,8 @@ def filter_table() -> list[str]:
         known = build_trial(read_clip(name), marker_set, seed=2, noise=noise)
         for filter_name in ("none", "butterworth", "kalman"):
             result = reconstruct_trial(known, True, build_settings(marker_set, filter=filter_name, plant=False))
-            error, (found, true, accelerated) = measure_trial_error(known, result.motion), _measure_hand(known, result.motion)
+            error, (found, true, accelerated) = measure_trial_error(known, result.motion), _measure_hand(known,
+                    result.motion)
             lines.append(effort.format_row([f"{name}, noise {1e3 * noise:g} mm", filter_name,
                                             f"{np.degrees(error.angle):.2f}", f"{1e3 * error.centre:.1f}",
                                             f"{found:.2f}", f"{true:.2f}", f"{accelerated:.1f} m/s^2"]))
@@ -173,8 +174,9 @@ def _build_fault_row(name: str, marker_set: str, share: float) -> str:
     return effort.format_row([
         name, marker_set, f"{100 * hidden.mean():.0f} %", f"{100 * filled.sum() / max(hidden.sum(), 1):.0f} %",
         f"{np.sqrt(np.mean(errors_mm**2)):.1f}, {np.percentile(errors_mm, 95):.1f}" if len(errors_mm) else "",
-        *(_count_fixed(known, names, apart, kind) for kind in ("swap", "jump", "unlabeled")), _count_false(known, cleaned.report),
-        f"{1e3 * np.nanpercentile(apart, 99):.1f}", f"{len(trial) / max(took, 1e-9):.0f}",
+        *(_count_fixed(known, names, apart, kind) for kind in ("swap", "jump", "unlabeled")),
+        _count_false(known, cleaned.report), f"{1e3 * np.nanpercentile(apart, 99):.1f}",
+        f"{len(trial) / max(took, 1e-9):.0f}",
     ])  # fmt: skip
 
 
@@ -212,8 +214,9 @@ def speed_table() -> list[str]:
         known = build_trial(read_clip(name), marker_set, seed=3, occlusion=_OCCLUDED)
         result = reconstruct_trial(known, True, build_settings(marker_set))
         rates = [_measure_rate(result, solve_poses, weights) for weights in (True, False)]
-        lines.append(effort.format_row([name, f"{marker_set}, {len(result.model.markers)}", str(len(result.model.skeleton)),
-                                        str(len(result.trial)), *(f"{rate:.0f}" for rate in rates)]))
+        lines.append(effort.format_row([name, f"{marker_set}, {len(result.model.markers)}",
+                                        str(len(result.model.skeleton)), str(len(result.trial)),
+                                        *(f"{rate:.0f}" for rate in rates)]))
     return lines
 
 

@@ -15,8 +15,8 @@ from beyond_mocap.markers.files.marker_set_text import choose_set
 from beyond_mocap.markers.reconstruct import Reconstruction, ReconstructSettings, reconstruct
 from beyond_mocap.markers.release.release import ReleaseSettings, estimate_release
 from beyond_mocap.motion import quaternion
-from beyond_mocap.synthetic.ground_truth.planted_ball import BallRequest
-from beyond_mocap.synthetic.ground_truth.planted_markers import SyntheticTrial, build_trial
+from beyond_mocap.synthetic.ground_truth.synthetic_ball import BallRequest
+from beyond_mocap.synthetic.ground_truth.synthetic_markers import SyntheticTrial, build_trial
 from beyond_mocap.synthetic.throws import build_throw
 
 TRIALS = (("000870_003252_74_195_002_FF_808.c3d", None), ("pitch_biodata.c3d", None),
@@ -70,8 +70,9 @@ def _build_row(trial: str, static: str | None) -> str:
     return effort.format_row([*begin, f"{figures['marker_set']}, {figures['markers']}, {figures['joints']}",
                               f"{near['rms']:.1f}, {near['p95']:.1f}", f"{near['single_rms']:.1f}",
                               f"{near['output_rms']:.1f}", f"{figures['bones_change_m']:.0e} m", feet,
-                              ", ".join(f"{joint} {100 * share:.0f} %" for share, joint in limits), _format_fastest(out),
-                              f"{took:.1f}", ", ".join(f"{label} {far:.0f}" for far, label in worst)])
+                              ", ".join(f"{joint} {100 * share:.0f} %" for share, joint in limits),
+                              _format_fastest(out), f"{took:.1f}",
+                              ", ".join(f"{label} {far:.0f}" for far, label in worst)])
 
 
 def _format_fastest(out: Reconstruction) -> str:

@@ -18,21 +18,21 @@ from benchmarks.places import CMU_UNIT, DATA
 from beyond_mocap.files.tracking.tracking import Match, read_match
 from beyond_mocap.library.build import build_library
 from beyond_mocap.library.library import Library
+from beyond_mocap.match.crowd.collision_avoidance import measure_overlap_depths, resolve_collisions
 from beyond_mocap.match.crowd.correction import ARMS, ROOT, Correction, apply_correction
-from beyond_mocap.match.crowd.crowd import resolve_collisions, measure_overlap_depths
 from beyond_mocap.match.crowd.variety import measure_share_in_step
-from beyond_mocap.match.expand import construct_player
-from beyond_mocap.match.make import synthesize_match
-from beyond_mocap.match.order import MatchRequest
 from beyond_mocap.match.player_edit import read_player
+from beyond_mocap.match.player_motion import construct_player
+from beyond_mocap.match.request import MatchRequest
+from beyond_mocap.match.synthesize_match import synthesize_match
 from beyond_mocap.motion.motion import Motion, forward_kinematics
 from beyond_mocap.motion.track import clean_track, sample_track
 from beyond_mocap.synthesis.plan import Plan
-from beyond_mocap.synthesis.quality.movement import measure_contact_speeds, list_foot_joints, compute_jerk
+from beyond_mocap.synthesis.quality.movement import compute_jerk, list_foot_joints, measure_contact_speeds
 from beyond_mocap.synthesis.resolve_plan import resolve_plan
 from beyond_mocap.synthesis.search.path_costs import balance_weights
 from beyond_mocap.synthesis.search.path_search import PathSearch
-from beyond_mocap.synthesis.search.wanted import build_request
+from beyond_mocap.synthesis.search.request import build_request
 from beyond_mocap.synthesis.search_library import extend_library
 from beyond_mocap.synthesis.synthesize import synthesize
 from beyond_mocap.synthesis.take import Take
@@ -100,7 +100,7 @@ def crowd_section() -> list[str]:
     with tempfile.TemporaryDirectory() as place:
         folder, cache, recordings = Path(place) / "match", Path(place) / "cache", DATA / "mocap" / "cmu10"
         order = MatchRequest(DATA / "tracking" / "match" / "nl2019_half1.dat", recordings, folder, cache=cache,
-                           unit=CMU_UNIT, start=SECONDS[0], end=SECONDS[1], figures=False)
+                             unit=CMU_UNIT, start=SECONDS[0], end=SECONDS[1], figures=False)
         took, result = measure_seconds(lambda: synthesize_match(order), 1)
         library = build_library(recordings, unit=CMU_UNIT, cache_dir=cache)
         summary = f"- {len(result.finished)} players in {took:.1f} s of processor time, {len(result.failed)} failed"
@@ -119,7 +119,8 @@ def build_crowd_lines(folder: Path, library: Library) -> list[str]:
     took, _ = measure_seconds(lambda: resolve_collisions(motions, contacts, firsts, fps), 1)
     return [f"{len(takes)} takes; in step {100 * measure_step_share(library, takes, firsts):.2f}%",
             f"without corrections: {describe_figures(motions, contacts, firsts)}",
-            f"with them: {describe_figures(corrected, contacts, firsts)}", describe_corrections(corrections, takes, firsts),
+            f"with them: {describe_figures(corrected, contacts, firsts)}",
+            describe_corrections(corrections, takes, firsts),
             f"collision avoidance again in {took:.1f} s of processor time"]
 
 
@@ -168,5 +169,6 @@ def speed_section() -> list[str]:
         lines = format_head(("player", "from, s", "mean m/s", "transitions", "search, s per 20 s",
                              "all, s per 20 s (target 0.35)"))
         lines += [build_window_row(library, match, *window) for window in list_windows(match)]
-        lines += ["", *format_head(("player", "min", "clean, s", "sample, s")), build_half_row(match), "", report_peak_memory()]
+        lines += ["", *format_head(("player", "min", "clean, s", "sample, s")), build_half_row(match), "",
+                  report_peak_memory()]
     return lines

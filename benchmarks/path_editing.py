@@ -18,9 +18,9 @@ from benchmarks.places import CMU_UNIT, DATA
 from beyond_mocap.base.errors import InputError
 from beyond_mocap.files.bvh import bvh
 from beyond_mocap.motion.motion import resample
+from beyond_mocap.path_editing.path_edit import PathEditSettings, edit_path, prepare_source
 from beyond_mocap.path_editing.path_line import fit_line
-from beyond_mocap.path_editing.path_ride import measure_path_edit
-from beyond_mocap.path_editing.ride import PathEditSettings, prepare_source, edit_path
+from beyond_mocap.path_editing.path_metrics import measure_path_edit
 
 SECONDS, BUDGET_FRAMES, BUDGET_MS = 10.0, 600, 35.0
 CLIPS = {
@@ -179,7 +179,8 @@ def flatten_figures(value, name: str = "") -> dict[str, float]:
     """Flatten nested figures to dotted names; what is not known is NaN."""
     if isinstance(value, dict):
         return {
-            k: v for key, entry in value.items() for k, v in flatten_figures(entry, f"{name}.{key}" if name else key).items()
+            k: v for key, entry in value.items() for k,
+            v in flatten_figures(entry, f"{name}.{key}" if name else key).items()
         }
     return {name: np.nan if value is None else float(value)}
 
@@ -311,6 +312,6 @@ def measure_cycles(kinds: Iterable[str] = tuple(CLIPS)) -> list[str]:
 def section(kinds: Iterable[str] = tuple(CLIPS), paths: Iterable[str] = tuple(ALL), count: int = 3) -> list[str]:
     """Build the lines of a report: what is kept, by path, by recordings, the worst `count`, cycling."""
     rows = measure_edits(kinds, paths)
-    return [describe_fair_paths(rows), "", measure_timing(), "", *build_table(rows, "path"), "", *build_table(rows, "kind"), "",
-            "Medians; `before` is without planting, `own` the recording's. The worst:", "", *list_worst(rows, count), "",
-            *measure_cycles(kinds)]
+    return [describe_fair_paths(rows), "", measure_timing(), "", *build_table(rows, "path"), "",
+            *build_table(rows, "kind"), "", "Medians; `before` is without planting, `own` the recording's. The worst:",
+            "", *list_worst(rows, count), "", *measure_cycles(kinds)]

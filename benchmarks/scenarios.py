@@ -39,7 +39,8 @@ TARGET = 0.3  # s of an edit
 
 def section() -> list[str]:
     """Build the lines for results.md."""
-    lines = [f"- {effort.report_blas_speed()}", f"- {effort.report_bvh_speed()}", f"- {effort.report_library_speed()}", ""]
+    lines = [f"- {effort.report_blas_speed()}", f"- {effort.report_bvh_speed()}", f"- {effort.report_library_speed()}",
+             ""]
     with tempfile.TemporaryDirectory() as place:
         for name in LIBRARIES:
             lines += measure_library(name, Path(place) / name)
@@ -99,7 +100,8 @@ def measure_edits(library: Library, requests: Iterable[tuple[Track, Timeline]], 
             best, after = _resynthesize_timed(library, plan, before, runs)
             changed = np.flatnonzero(_find_changed(before, after))
             if len(changed):
-                figures.setdefault(kind, []).append((best, len(changed) / after.motion.fps, *_measure_ends(before, after, changed)))
+                figures.setdefault(kind, []).append((best, len(changed) / after.motion.fps,
+                                                     *_measure_ends(before, after, changed)))
     return [
         f"| edit | n | median s | 95 % s | within {TARGET:g} s | regenerated, median s | "
         "jerk at its ends, before -> after | feet slide there, before -> after |",
@@ -170,7 +172,8 @@ def _measure_ends(before: Take, after: Take, changed: np.ndarray) -> tuple[float
     count, hand = len(after.motion), int(0.5 * after.motion.fps)
     starts = [changed[0]] * (changed[0] > 0) + [changed[-1] - hand] * (changed[-1] + 1 < count)
     frames = np.unique(np.clip([np.arange(start - 3, start + hand + 3) for start in starts], 0, count - 4))
-    return tuple(value for pair in zip(_measure_frames(before, frames), _measure_frames(after, frames)) for value in pair)
+    return tuple(value for pair in zip(_measure_frames(before, frames), _measure_frames(after, frames))
+                 for value in pair)
 
 
 def _measure_frames(take: Take, frames: np.ndarray) -> tuple[float, float]:

@@ -19,9 +19,9 @@ from beyond_mocap.throws.networks.generate import Options, generate_motion
 from beyond_mocap.throws.networks.model import ModelSettings, ThrowModel
 from beyond_mocap.throws.networks.network import PhaseNetwork
 from beyond_mocap.throws.networks.phases import weigh_points_at
-from beyond_mocap.throws.planted_examples import generate_example
+from beyond_mocap.throws.synthetic_examples import generate_example
 from beyond_mocap.throws.throw import throw_at
-from beyond_mocap.throws.throw_order import ThrowRequest
+from beyond_mocap.throws.throw_request import ThrowRequest
 
 UNSEEN, EACH = (901, 902, 903), 3
 """Seeds of synthetic performers that no shipped weights were trained on, and movements of each."""
@@ -44,7 +44,8 @@ def section() -> list[str]:
         except BeyondMocapError as error:
             lines += [f"None: {error}", ""]
             continue
-        lines += [f"{model.trained_on}.", "", *build_unseen_table(model, action), "", *build_target_table(model, action), ""]
+        lines += [f"{model.trained_on}.", "", *build_unseen_table(model, action), "",
+                  *build_target_table(model, action), ""]
     lines += ["### What the networks cost", "", *build_speed_tables(), ""]
     return lines
 
@@ -57,8 +58,8 @@ def generate_unseen(action: str, fps: float) -> tuple:
         for order in range(EACH):
             name, movement = generate_example(action, seed, order)
             span = (movement.release - 1.6, movement.release + 1.2)
-            found.append(build_example(f"{name} {order}", name, movement.motion, movement.limb, movement.release, movement.impact, fps=fps,
-                                    span=span))  # fmt: skip
+            found.append(build_example(f"{name} {order}", name, movement.motion, movement.limb, movement.release,
+                                       movement.impact, fps=fps, span=span))  # fmt: skip
     return tuple(found)
 
 
@@ -72,8 +73,8 @@ def build_unseen_table(model, action: str) -> list[str]:
         lines.append(effort.format_row([
             words, _format_centimetres(report["deviation_m"]), _format_centimetres(report["network_deviation_m"]),
             *(_format_number(report[name], form) for name, form in (("impact_m", ".2f"), ("head", ".1f"),
-                                                             ("head_share", ".2f"),
-                                                             ("jerk", ".2f"), ("beyond", ".4f"))),
+                                                                    ("head_share", ".2f"),
+                                                                    ("jerk", ".2f"), ("beyond", ".4f"))),
         ]))  # fmt: skip
     return lines
 
@@ -92,9 +93,9 @@ def build_target_table(model, action: str) -> list[str]:
         except BeyondMocapError as error:
             lines.append(effort.format_row([_format_place(target), f"refused: {error}"[:110], *[""] * 5]))
             continue
-        lines.append(effort.format_row([_format_place(target), f"{thrown.impact_error:.3f}", f"{100 * thrown.displacement:.1f}",
-                                        f"{np.degrees(thrown.rotation):.1f}", f"{thrown.speed:.1f}",
-                                        f"{100 * thrown.network_deviation:.1f}",
+        lines.append(effort.format_row([_format_place(target), f"{thrown.impact_error:.3f}",
+                                        f"{100 * thrown.displacement:.1f}", f"{np.degrees(thrown.rotation):.1f}",
+                                        f"{thrown.speed:.1f}", f"{100 * thrown.network_deviation:.1f}",
                                         f"{took:.2f} for {thrown.motion.duration:.1f}"]))
     return lines
 
@@ -118,7 +119,8 @@ def build_networks_row(kind: str, points: int, layers: int, units: int) -> str:
     """Measure the networks of one size, evaluated frame after frame on a full body."""
     settings = ModelSettings(kind=kind, points=points, layers=layers, units=units)
     random = np.random.default_rng(1)
-    networks = [_build_network(random, *size, settings) for size in count_widths(find_chains(build_adult_skeleton(1.8)), settings).values()]
+    networks = [_build_network(random, *size, settings) for size in count_widths(find_chains(build_adult_skeleton(1.8)),
+                                                                                 settings).values()]
     inputs = [random.normal(size=network.inputs).astype(np.float32) for network in networks]
     thetas = [weigh_points_at(frame / FRAMES, points) for frame in range(FRAMES)]
 
@@ -148,12 +150,13 @@ def build_throw_rows(model: ThrowModel, name: str) -> list[str]:
     movement = build_throw((18.0, 1.0, 1.0), 20.0, "right", skeleton=model.skeleton, fps=120.0)
     begin = max(movement.release - 1.75, 0.0)
     example = build_example("timed", "", movement.motion, "right_hand", movement.release, (18.0, 1.0, 1.0), None,
-                         model.settings.fps, (begin, begin + 3.0))  # fmt: skip
+                            model.settings.fps, (begin, begin + 3.0))  # fmt: skip
     description, rows = build_description(example), []
     for what, options in (("nothing corrected", Options(pose_iterations=0, ik=False, blend=False, limits=False)),
                           ("start pose, inverse kinematics, limits", Options())):  # fmt: skip
         generate_motion(model, description, options=options)
-        seconds, result = effort.measure_seconds(lambda options=options: generate_motion(model, description, options=options), _RUNS)
+        seconds, result = effort.measure_seconds(lambda options=options: generate_motion(model, description,
+                options=options), _RUNS)
         rows.append(effort.format_row([name, str(len(description)), what, str(result.iterations), f"{seconds:.3f}"]))
     return rows
 

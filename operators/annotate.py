@@ -8,14 +8,14 @@ import bpy
 from bpy.props import BoolProperty, FloatProperty, IntProperty, StringProperty
 from bpy_extras.io_utils import ImportHelper
 
-from ..beyond_mocap.annotation import annotating
-from ..beyond_mocap.annotation.annotating import StopAnnotating
+from ..beyond_mocap.annotation import key_commands as annotating
+from ..beyond_mocap.annotation.key_commands import StopAnnotating
 from ..beyond_mocap.base.errors import BeyondMocapError, InputError
 from ..scene.core import popup, window
 from ..scene.timeline import video
-from ..scene.timeline.annotating import run_command, find_combinations, describe_subject, compute_now, type_keys
+from ..scene.timeline.key_annotation import compute_now, describe_subject, find_combinations, run_command, type_keys
 from ..scene.timeline.video import add_driver
-from .verb import BaseOperator
+from .operator_base import BaseOperator
 
 SPACES = {"VIEW_3D": bpy.types.SpaceView3D, "NLA_EDITOR": bpy.types.SpaceNLA, "CLIP_EDITOR": bpy.types.SpaceClipEditor,
           "DOPESHEET_EDITOR": bpy.types.SpaceDopeSheetEditor, "SEQUENCE_EDITOR": bpy.types.SpaceSequenceEditor}
@@ -155,7 +155,8 @@ class BEYOND_MOCAP_OT_annotate(BaseOperator, bpy.types.Operator):
             area, region = _find_largest_editor(context)
         at = (self.pointer[0] - region.x, self.pointer[1] - region.y) if self.state.trail and self.pointer else None
         content = popup.build_content(self.state, self.player_name, self.message, self.is_folded)
-        box = popup.place_menu(content, at, window.find_free_region(area, region), popup.measure_font_size(), popup.measure_text)
+        box = popup.place_menu(content, at, window.find_free_region(area, region), popup.measure_font_size(),
+                               popup.measure_text)
         _menu.update(box=box, region=region.as_pointer(), under=under.as_pointer(), hovered=None)
         window.redraw_editors(*SPACES)
 
@@ -209,7 +210,8 @@ def _has_modifier(event: bpy.types.Event) -> bool:
 
 def _find_editor(context, event) -> tuple[bpy.types.Area | None, bpy.types.Region | None]:
     """Find the editor of `SPACES` and its main region under the pointer."""
-    area = next((area for area in context.window.screen.areas if area.type in SPACES and _contains_pointer(area, event)), None)
+    area = next((area for area in context.window.screen.areas if area.type in SPACES
+                 and _contains_pointer(area, event)), None)
     visible = [region for region in area.regions if min(region.width, region.height) > 1] if area else []
     under_pointer = [region for region in visible if _contains_pointer(region, event)]
     if not under_pointer or any(region.type != "WINDOW" for region in under_pointer):

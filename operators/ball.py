@@ -13,14 +13,21 @@ from ..beyond_mocap.base.errors import InputError
 from ..beyond_mocap.base.settings.aim import TIMES, WAYS
 from ..beyond_mocap.base.settings.setting import BALLS, HOLDS, PARTS, SIDES
 from ..scene.ball import handover, shots
-from ..scene.ball.settings import list_aimed_balls, find_aimed_ball, find_selected_ball, find_selected_body, find_selected_target
+from ..scene.ball.settings import (
+    find_aimed_ball,
+    find_selected_ball,
+    find_selected_body,
+    find_selected_target,
+    list_aimed_balls,
+)
 from ..scene.core import channels
 from ..scene.core.measure import units_per_metre
 from ..scene.core.settings import find_active_player
-from ..scene.passes import hits_shown, possession, tracked
-from ..scene.passes.settings import KEPT, find_ball, parse_hits, find_armature
+from ..scene.passes import hit_analysis as hits_shown
+from ..scene.passes import possession, tracked
+from ..scene.passes.settings import KEPT, find_armature, find_ball, parse_hits
 from ..scene.stage import ball as balls
-from .verb import BackgroundOperator, BaseOperator
+from .operator_base import BackgroundOperator, BaseOperator
 
 TARGET_DISTANCE = 10.0  # m to a new target
 BALL_NAME = "Aimed Ball"  # differs from the takes' ball, which may be in the same collection
@@ -76,8 +83,11 @@ dragged; a missing ball or Empty is created, and without an armature the ball st
         names = ("part", "side", "way", "bounces", "timing", "seconds", "arrival", "ball")
         values = {name: getattr(self, name) for name in names}
         place = shots.measure_position(scene, ball) if ball is not None else (0.0, 0.0, 0.0)
-        request = shots.ShotRequest(body=body, bone="", first=first, last=last, target=(0.0, 0.0, 0.0), place=place, **values)
-        target_position = shots.measure_position(scene, target) if target is not None else shots.find_place_ahead(shots.find_strikes(scene, request), TARGET_DISTANCE)
+        request = shots.ShotRequest(body=body, bone="", first=first, last=last, target=(0.0, 0.0, 0.0), place=place,
+                                    **values)
+        target_position = shots.measure_position(scene,
+                                                 target) if target is not None else shots.find_place_ahead(
+            shots.find_strikes(scene, request), TARGET_DISTANCE)
         request = replace(request, target=target_position)
         solved = shots.solve_request(scene, request, ball.name if ball is not None else BALL_NAME)
         collection = (body or ball).users_collection[0]
@@ -103,7 +113,8 @@ class BEYOND_MOCAP_OT_leave_aim(BaseOperator, bpy.types.Operator):
 
     @classmethod
     def poll(cls, context):
-        cls.poll_message_set("No ball is aimed" if not list_aimed_balls(context.scene) else "Select an aimed ball or its target")
+        cls.poll_message_set("No ball is aimed" if not list_aimed_balls(context.scene)
+                             else "Select an aimed ball or its target")
         ball = find_aimed_ball(context)
         if ball is not None and ball.beyond_mocap_aim.handed:
             cls.poll_message_set("Blender's physics moves the ball: press Ball from Physics first")
@@ -124,10 +135,10 @@ solid ground and against other selected meshes; play from the start to see it"""
     frame: IntProperty(name="Frame", default=0, min=0, description="Frame of the handover; 0: the current one")
     ball: EnumProperty(name="Ball", items=(("OWN", "As Aimed", "The kind it is aimed as"), *BALLS), default="OWN",
                        description="Kind of ball")
-    needs = ("Select a ball that moves",
-             lambda context: (ball := find_selected_ball(context)) is not None and ball.animation_data is not None
-             and ball.animation_data.action is not None,
-             "Blender's physics moves this ball already", lambda context: find_selected_ball(context).rigid_body is None)
+    needs = ("Select a ball that moves", lambda context: (ball := find_selected_ball(context)) is not None
+             and ball.animation_data is not None and ball.animation_data.action is not None,
+             "Blender's physics moves this ball already",
+             lambda context: find_selected_ball(context).rigid_body is None)
 
     def do(self, context):
         ball = find_selected_ball(context)
@@ -179,7 +190,7 @@ on the action; without ball data, the marked frame is the most likely one"""
     def do(self, context):
         body = find_armature(context)
         found = hits_shown.analyse_armature(context.scene, body, self.part, side=self.side, threshold=self.threshold,
-                                   bone=self.bone, markers=self.markers)
+                                            bone=self.bone, markers=self.markers)
         count = len(found.motions)
         what = self.bone or self.part
         if not count:
@@ -240,7 +251,7 @@ smooth transitions; Free Ball restores the ball's own action"""
         bone = self.bone or possession.find_bone(scene, body, self.part, self.side)
         skin = 0.03 if self.bone else possession.SKIN_DISTANCES.get(self.part, 0.03)
         possession.add_hold(scene, ball, body, bone=bone, first=self.first, last=self.last, mode=self.how,
-                        settle=self.settle, skin=skin)
+                            settle=self.settle, skin=skin)
         self.report({"INFO"}, f"{body.name} carries {ball.name} with {bone} on frames {self.first} to {self.last}")
 
 

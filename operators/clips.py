@@ -9,7 +9,7 @@ import bpy
 import numpy as np
 from bpy.props import BoolProperty, EnumProperty, FloatProperty, StringProperty
 
-from ..beyond_mocap.base.errors import UserCancelledError, InputError
+from ..beyond_mocap.base.errors import InputError, UserCancelledError
 from ..beyond_mocap.files.bvh import bvh
 from ..beyond_mocap.library.scan import FOREIGN, find_recordings, is_foreign
 from ..beyond_mocap.motion import humanoid
@@ -19,7 +19,7 @@ from ..beyond_mocap.motion.quaternion import from_up_angle, rotate
 from ..scene.core import action, channels, window
 from ..scene.library import assets, clips, foreign, recordings
 from ..scene.rigs import armature, export
-from .verb import BackgroundOperator, ImportOperator, BaseOperator
+from .operator_base import BackgroundOperator, BaseOperator, ImportOperator
 
 
 class BEYOND_MOCAP_OT_import_clips(ImportOperator, bpy.types.Operator):
@@ -52,7 +52,8 @@ motion is imported, from the hips up and in metres"""
             self.check_bones(armature_to_reuse, clips, context.scene)
         bodies = []
         for name, clip in clips:
-            body = armature_to_reuse or armature.create_armature(context, clip.motion.skeleton, name, context.collection)
+            body = armature_to_reuse or armature.create_armature(context, clip.motion.skeleton, name,
+                                                                 context.collection)
             action.write_motion(body, clip.motion, context.scene, name=name)
             bodies.append(body)
             for note in clip.notes:
@@ -117,9 +118,9 @@ kicks to the other side. The previous motion stays as an action"""
 
     bl_idname = "beyond_mocap.mirror"
     bl_label = "Mirror Motion"
-    needs = ("Select an armature first",
-             lambda context: context.object is not None and context.object.type == "ARMATURE",
-             "The active armature plays no action", lambda context: channels.find_playing_action(context.object)[0] is not None)
+    needs = ("Select an armature first", lambda context: context.object is not None and context.object.type
+             == "ARMATURE", "The active armature plays no action",
+             lambda context: channels.find_playing_action(context.object)[0] is not None)
 
     def do(self, context):
         body = context.object
@@ -138,8 +139,8 @@ def mirror_in_place(motion: Motion) -> Motion:
 
 
 CLIP_CHOICES = (("CHOSEN", "Chosen Clip", "The clip chosen in the library's list"),
-         ("SHOWN", "Listed Clips", "All clips that the library's list currently shows"),
-         ("SELECTED", "Selected Armatures", "The actions that the selected armatures play"))
+                ("SHOWN", "Listed Clips", "All clips that the library's list currently shows"),
+                ("SELECTED", "Selected Armatures", "The actions that the selected armatures play"))
 
 
 @dataclass(frozen=True, eq=False)
@@ -218,7 +219,7 @@ kind, in this file or as a .blend for a folder of asset libraries"""
     def work(order, progress, cancelled, _hurry):
         """Read the motions and render the pictures."""
         from ..beyond_mocap.files.bvh import bvh
-        from ..beyond_mocap.library.keep_words import read_labels
+        from ..beyond_mocap.library.label_files import read_labels
 
         drafts, pictures, total = [], [], len(order.files) + len(order.drafts)
         for number, (path, file, unit, figures) in enumerate(order.files):
@@ -269,7 +270,8 @@ def write_asset_file(target: Path, actions, drafts) -> None:
 
 def _list_playing(context) -> list[bpy.types.Object]:
     """List the selected armatures that play an action of this file; InputError where there are none."""
-    rigs = [thing for thing in context.selected_objects if thing.type == "ARMATURE" and channels.find_playing_action(thing)[0]]
+    rigs = [thing for thing in context.selected_objects if thing.type == "ARMATURE"
+            and channels.find_playing_action(thing)[0]]
     if not rigs:
         raise InputError("assets", "no selected armature plays an action", "armatures with motions", "select some")
     for rig in rigs:

@@ -18,7 +18,7 @@ def run(arguments: list[str]) -> int:
         The exit status.
     """
     from ..beyond_mocap.cli.main import main
-    from ..scene.match import child
+    from ..scene.match import command_process as child
     from ..scene.rigs.deliver import WRITERS
 
     return main(arguments, WRITERS, f"blender --command {NAME}", child.run_command)

@@ -15,7 +15,7 @@ from ..beyond_mocap.base.errors import InputError
 from ..scene.core import preferences, session, window
 from ..scene.core.settings import to_absolute_path, to_setting_path
 from ..scene.library import clips, foreign, recordings
-from .verb import BackgroundOperator, BaseOperator
+from .operator_base import BackgroundOperator, BaseOperator
 
 if TYPE_CHECKING:
     from ..beyond_mocap.library.library import Library
@@ -98,7 +98,8 @@ result is cached, so the next build is quick unless files have changed. FBX, glT
         while queue.remaining:  # called from a script; in a window `modal` has converted them one by one
             queue.convert_next()
         self.notes = queue.notes
-        return BuildOrder(settings.library_folder, folder, unit, self.rebuild, preferences.build_library_options(folder))
+        return BuildOrder(settings.library_folder, folder, unit, self.rebuild,
+                          preferences.build_library_options(folder))
 
     def create_queue(self, context):
         """Create the queue of clips that need a conversion."""
@@ -266,8 +267,9 @@ class BEYOND_MOCAP_OT_relink_library(BaseOperator, bpy.types.Operator):
         if chosen:
             settings.library_folder = to_setting_path(chosen)
         elif not os.path.isdir(to_absolute_path(settings.library_folder)) and not clips.relink_library(context.scene):
-            raise InputError(to_absolute_path(settings.library_folder), "no such folder, and no similar one beside this file",
-                             "the library's folder", "choose it in Relink Library")
+            raise InputError(to_absolute_path(settings.library_folder),
+                             "no such folder, and no similar one beside this file", "the library's folder",
+                             "choose it in Relink Library")
         clips.check_folder(context.scene)
         self.report({"INFO"}, f"Library: {to_absolute_path(settings.library_folder)}")
 

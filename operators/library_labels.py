@@ -13,10 +13,11 @@ from ..scene.core import preferences, session
 from ..scene.core.settings import to_absolute_path
 from ..scene.core.window import clear_status
 from ..scene.library import clips, recordings
-from ..scene.timeline import lanes, proposals
+from ..scene.timeline import label_tracks as lanes
+from ..scene.timeline import proposals
 from .annotate import SPACES
 from .library import ClipOperator, FolderOperator
-from .verb import BaseOperator
+from .operator_base import BaseOperator
 
 
 class OpenClipOperator(BaseOperator):
@@ -35,7 +36,7 @@ the NLA editor. Edit them there or propose labels, then press Save Labels"""
 
     def do(self, context):
         """Read clip and labels, then create armature and strips."""
-        from ..beyond_mocap.library.keep_words import to_timeline, read_sources, read_labels
+        from ..beyond_mocap.library.label_files import read_labels, read_sources, to_timeline
 
         settings, path = context.scene.beyond_mocap, self.find_clip(context)
         motion, _ = recordings.read_recording(settings, path)
@@ -70,7 +71,7 @@ headers, turns, getting up, and acts learned from annotated clips. Review them a
         """Read the recording, then write the strips."""
         from ..beyond_mocap.annotation import Timeline
         from ..beyond_mocap.library.classify import classifier
-        from ..beyond_mocap.library.keep_words import to_timeline
+        from ..beyond_mocap.library.label_files import to_timeline
         from ..beyond_mocap.library.proposals import GAITS, list_gaits, propose_labels
 
         settings, rig = context.scene.beyond_mocap, context.object
@@ -114,11 +115,11 @@ headers, turns, getting up, and acts learned from annotated clips. Review them a
 
 
 REVIEW_ACTIONS = (("ACCEPT", "Accept", "Add this proposal to the clip's labels and go to the next one"),
-        ("REFUSE", "Reject", "Reject this proposal and go to the next one"),
-        ("NEXT", "Next", "Go to the next proposal"),
-        ("PREVIOUS", "Previous", "Go to the previous proposal"),
-        ("ACCEPT_ALL", "Accept All", "Accept all open proposals"),
-        ("REFUSE_ALL", "Reject All", "Reject all open proposals"))
+                  ("REFUSE", "Reject", "Reject this proposal and go to the next one"),
+                  ("NEXT", "Next", "Go to the next proposal"),
+                  ("PREVIOUS", "Previous", "Go to the previous proposal"),
+                  ("ACCEPT_ALL", "Accept All", "Accept all open proposals"),
+                  ("REFUSE_ALL", "Reject All", "Reject all open proposals"))
 KEYS = {"A": "ACCEPT", "RET": "ACCEPT", "NUMPAD_ENTER": "ACCEPT", "X": "REFUSE", "DEL": "REFUSE", "DOWN_ARROW": "NEXT",
         "RIGHT_ARROW": "NEXT", "UP_ARROW": "PREVIOUS", "LEFT_ARROW": "PREVIOUS"}
 STATUS_TEXT = "A, Enter: accept   X: reject   Up, Down: previous, next   Space: play   Esc: finish"
@@ -262,7 +263,7 @@ table. Existing labels are replaced only after you confirm"""
     def invoke(self, context, event):
         """Ask before existing labels are replaced."""
         from ..beyond_mocap.base.errors import InputError
-        from ..beyond_mocap.library.keep_words import has_labels, find_label_file
+        from ..beyond_mocap.library.label_files import find_label_file, has_labels
 
         rig = context.object
         clip, folder = recordings.find_source_file(rig)
@@ -281,13 +282,13 @@ table. Existing labels are replaced only after you confirm"""
 
     def do(self, context):
         """Read the strips, write the file, and update the list."""
-        from ..beyond_mocap.library.keep_words import write_labels
+        from ..beyond_mocap.library.label_files import write_labels
 
         rig = context.object
         rows = recordings.read_labels(rig)
         clip, folder = recordings.find_source_file(rig)
         target = write_labels(clip, folder, rows, fps=rig[recordings.RATE], overwrite=self.overwrite,
-                      sources=proposals.collect_sources(rig))
+                              sources=proposals.collect_sources(rig))
         clips.update_labels(context.window_manager, recordings.find_shown_clip(rig), rows)
         self.report({"INFO"}, f"{len(rows)} rows of labels written to {target}; press Build Library to use them")
 
@@ -325,7 +326,8 @@ others; the result is a file that works with any library"""
         if not settings.library_folder:
             raise InputError("library", "no folder chosen", "a folder of BVH clips", "choose one in step 1")
         folder = to_absolute_path(settings.library_folder)
-        return LearnOrder(folder, settings.library_unit or None, preferences.find_cache_folder(folder), to_absolute_path(self.out))
+        return LearnOrder(folder, settings.library_unit or None, preferences.find_cache_folder(folder),
+                          to_absolute_path(self.out))
 
     @staticmethod
     def work(order, progress, cancelled, _hurry):
@@ -335,11 +337,12 @@ others; the result is a file that works with any library"""
         from ..beyond_mocap.library.classify.examples import read_examples
         from ..beyond_mocap.library.classify.train import train_classifier
 
-        out = Path(order.out) if order.out else cache.find_cache_folder(Path(order.folder), order.cache)[0] / classifier.FILE_NAME
+        out = Path(order.out) if order.out else cache.find_cache_folder(Path(order.folder),
+                                                                        order.cache)[0] / classifier.FILE_NAME
         on_progress = lambda done, text: progress(0.7 * done, text)  # noqa: E731
         notes = []
         examples = read_examples(order.folder, order.unit, on_progress, cache_dir=order.cache, cancelled=cancelled,
-                               on_note=notes.append)
+                                 on_note=notes.append)
         known = train_classifier(examples, lambda done, text: progress(0.7 + 0.3 * done, text), cancelled)
         if not order.out:
             out.parent.mkdir(parents=True, exist_ok=True)

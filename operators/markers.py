@@ -10,12 +10,12 @@ from bpy.props import EnumProperty, FloatProperty, StringProperty
 from bpy_extras.io_utils import ExportHelper
 
 from ..beyond_mocap.base.errors import InputError
-from ..beyond_mocap.files.whole import atomic_write
+from ..beyond_mocap.files.atomic import atomic_write
 from ..scene.core import channels, window
 from ..scene.core.settings import to_setting_path
 from ..scene.markers import cloud, sets, solve
-from ..scene.markers.settings import find_target_cloud, list_clouds, is_cloud
-from .verb import BackgroundOperator, ViewDropHandler, ImportOperator, BaseOperator
+from ..scene.markers.settings import find_target_cloud, is_cloud, list_clouds
+from .operator_base import BackgroundOperator, BaseOperator, ImportOperator, ViewDropHandler
 
 
 class MarkersVerb:
@@ -311,7 +311,7 @@ class BEYOND_MOCAP_OT_reconstruct_markers(MarkersVerb, BackgroundOperator, bpy.t
         from ..beyond_mocap.markers.reconstruct import reconstruct
 
         reconstruction = reconstruct(order.trial, order.static, order.model, settings=order.settings, progress=progress,
-                           cancelled=cancelled)
+                                     cancelled=cancelled)
         return order, reconstruction
 
     def apply(self, scene, result):

@@ -11,10 +11,13 @@ from ..beyond_mocap.base.errors import InputError
 from ..scene.core import channels, session, window
 from ..scene.core.measure import frames_per_second
 from ..scene.core.settings import to_setting_path
-from ..scene.match import cameras, child, load, order, ours, show
+from ..scene.match import cameras, load, show
+from ..scene.match import command_process as child
+from ..scene.match import match_objects as ours
+from ..scene.match import request as order
 from ..scene.match.settings import find_active_player, format_float
 from ..scene.rigs import export, rig
-from .verb import NEEDS_LIBRARY, BackgroundOperator, ViewDropHandler, ExportOperator, BaseOperator
+from .operator_base import NEEDS_LIBRARY, BackgroundOperator, BaseOperator, ExportOperator, ViewDropHandler
 
 SYNTHESIS_SHARE = 0.85
 """Share of the progress bar for the synthesis, before a match is shown."""
@@ -47,7 +50,8 @@ class MatchVerb(BackgroundOperator):
         for line in lines:
             self.report({"WARNING"}, line)
         seconds = scenery.end - scenery.start
-        self.report({"INFO"}, f"{len(scenery.characters)} players, {seconds:.1f} s, shown in {sum(took.values()):.1f} s")
+        self.report(
+            {"INFO"}, f"{len(scenery.characters)} players, {seconds:.1f} s, shown in {sum(took.values()):.1f} s")
 
 
 class BEYOND_MOCAP_OT_read_match(BackgroundOperator, bpy.types.Operator):
@@ -93,8 +97,9 @@ class BEYOND_MOCAP_FH_match(ViewDropHandler, bpy.types.FileHandler):
     bl_file_extensions = ".csv;.json;.jsonl;.xml;.dat"  # dropped texts are labels; tracking as text is chosen by name
 
 
-SELECTION_ITEMS = (("ALL", "All", "Select all"), ("NONE", "None", "Select none"), ("home", "Home", "Select the home team only"),
-        ("away", "Away", "Select the away team only"), ("ONE", "Active", "Select the active player only"))
+SELECTION_ITEMS = (("ALL", "All", "Select all"), ("NONE", "None", "Select none"),
+                   ("home", "Home", "Select the home team only"), ("away", "Away", "Select the away team only"),
+                   ("ONE", "Active", "Select the active player only"))
 
 
 class BEYOND_MOCAP_OT_tick_match(BaseOperator, bpy.types.Operator):
@@ -138,8 +143,8 @@ and pressing the button again resumes with the finished work"""
         """Run the command in its own process, then load the result."""
         arguments, wanted, library = asked
         notes = child.run_command(arguments, lambda done, text: progress(SYNTHESIS_SHARE * done, text), cancelled)
-        shown = load.load_section(wanted, library, lambda done, text: progress(SYNTHESIS_SHARE + (1.0 - SYNTHESIS_SHARE) * done, text),
-                             cancelled)
+        shown = load.load_section(wanted, library, lambda done, text: progress(SYNTHESIS_SHARE + (1.0 - SYNTHESIS_SHARE)
+                                                                               * done, text), cancelled)
         return wanted, shown, notes
 
 
@@ -214,7 +219,7 @@ def _find_last_frame(scene: bpy.types.Scene) -> int:
 
 
 CAMERA_ITEMS = (("STAND", "Broadcast", "Look from the stand, following the ball"),
-         ("EYES", "Eyes", "Look through the eyes of the selected player, or of the active one in the list"))
+                ("EYES", "Eyes", "Look through the eyes of the selected player, or of the active one in the list"))
 
 
 class BEYOND_MOCAP_OT_match_camera(ShownMatchVerb, bpy.types.Operator):
@@ -251,7 +256,8 @@ class BEYOND_MOCAP_OT_match_camera(ShownMatchVerb, bpy.types.Operator):
             if active in shown and active.select_get():
                 return active
         chosen = find_active_player(context.scene.beyond_mocap_match)
-        return _find_body(context.scene, self.player or (chosen.feed_id if chosen else shown[0].get(ours.PLAYER_PROPERTY)))
+        return _find_body(context.scene, self.player
+                          or (chosen.feed_id if chosen else shown[0].get(ours.PLAYER_PROPERTY)))
 
 
 def _look_through(context, area: bpy.types.Area) -> None:

@@ -9,13 +9,16 @@ from bpy.props import BoolProperty, EnumProperty, StringProperty
 from bpy_extras.io_utils import ExportHelper
 
 from ..beyond_mocap.base.errors import InputError
-from ..beyond_mocap.files.whole import atomic_write
+from ..beyond_mocap.files.atomic import atomic_write
 from ..beyond_mocap.passes import scene_json
 from ..beyond_mocap.passes.scene_json import SAMPLES as SCENES
 from ..scene.core.measure import units_per_metre
-from ..scene.passes import hits_shown, make, order, shown
+from ..scene.passes import characters as shown
+from ..scene.passes import generate as make
+from ..scene.passes import hit_analysis as hits_shown
+from ..scene.passes import scene_lists as order
 from ..scene.passes.settings import SAMPLES
-from .verb import BackgroundOperator, ImportOperator, BaseOperator
+from .operator_base import BackgroundOperator, BaseOperator, ImportOperator
 
 ROWS = (("players", "Players", "Players of the scene"), ("passes", "Passes", "Passes in their order"))
 WHAT = (("ADD", "Add", "Add a row at the end"), ("REMOVE", "Remove", "Remove the active row"),

@@ -10,10 +10,12 @@ from bpy.props import BoolProperty, EnumProperty, FloatProperty, IntProperty
 from ..beyond_mocap.base.errors import BeyondMocapError, InputError
 from ..scene.core import channels
 from ..scene.core.measure import units_per_metre
-from ..scene.path_editing import curve, keep_apart, live, riders
-from ..scene.path_editing.settings import select_object, list_target_bodies
+from ..scene.path_editing import collision_avoidance as keep_apart
+from ..scene.path_editing import curve, live
+from ..scene.path_editing import edited_bodies as riders
 from ..scene.path_editing.settings import list_edited_bodies as riders_in
-from .verb import NEEDS_NO_EDITING, BaseOperator
+from ..scene.path_editing.settings import list_target_bodies, select_object
+from .operator_base import NEEDS_NO_EDITING, BaseOperator
 
 
 class EditedBodyVerb(BaseOperator):
@@ -56,8 +58,8 @@ a selected curve"""
                 riders.change_curve(context.scene, body, drawn)
             for body in [body for body in chosen if not body.beyond_mocap_ride.on]:
                 before = body.beyond_mocap_ride.curve
-                created = riders.start_path_edit(context, body, drawn, count=self.count, kind=self.kind, degree=self.degree,
-                                    straight=self.straight)
+                created = riders.start_path_edit(context, body, drawn, count=self.count, kind=self.kind,
+                                                 degree=self.degree, straight=self.straight)
                 started.append((body, before, created if created not in (drawn, before) else None))
                 used = used or created
         except BeyondMocapError:
@@ -97,7 +99,8 @@ points"""
     def do(self, context):
         """Create the curve and make it active."""
         body = list_target_bodies(context)[0]
-        created = riders.create_new_curve(context, body, self.shape, count=self.count, kind=self.kind, degree=self.degree)
+        created = riders.create_new_curve(context, body, self.shape, count=self.count, kind=self.kind,
+                                          degree=self.degree)
         if context.mode == "POSE":
             bpy.ops.object.mode_set(mode="OBJECT")
         select_object(context, created)
@@ -131,7 +134,7 @@ detours of all or of two or more selected bodies"""
     needs = "Let an armature follow a path first (Edit Path)", lambda context: bool(riders_in(context.scene))
 
     def do(self, context):
-        from ..beyond_mocap.path_editing.apart import Limits
+        from ..beyond_mocap.path_editing.collision_avoidance import Limits
         from ..beyond_mocap.path_editing.detour import PathChange
 
         bodies = list_target_bodies(context)
@@ -139,7 +142,8 @@ detours of all or of two or more selected bodies"""
         if self.clear:
             keep_apart.apply_changes(context.scene, bodies, [PathChange()] * len(bodies))
             return
-        result = keep_apart.compute_changes(context, bodies, Limits(self.distance, delay=self.delay, detour=self.detour))
+        result = keep_apart.compute_changes(context, bodies,
+                                            Limits(self.distance, delay=self.delay, detour=self.detour))
         keep_apart.apply_changes(context.scene, bodies, result.changes)
         self.report_result(result)
 

@@ -12,9 +12,10 @@ from ..beyond_mocap.files.tracking.providers import PROVIDERS
 from ..scene.core.settings import find_active_player, to_setting_path
 from ..scene.player import dots, pins, tracks
 from ..scene.result import bake, preview
-from ..scene.timeline import strip_events, strips, word_checks
+from ..scene.timeline import label_checks as word_checks
+from ..scene.timeline import strip_events, strips
 from ..scene.timeline.strips import show_player
-from .verb import ViewDropHandler, ImportOperator, BaseOperator
+from .operator_base import BaseOperator, ImportOperator, ViewDropHandler
 
 SHIRTS = {"home": ((0.75, 0.05, 0.06), (0.80, 0.30, 0.04)), "away": ((0.04, 0.14, 0.70), (0.02, 0.45, 0.60))}
 SECTION_SECONDS = 60.0  # seconds of a whole match that are selected at first
@@ -109,7 +110,8 @@ SkillCorner, Sportec, Second Spectrum, Stats Perform). A text file with the name
         """Add one player to the list; of a whole match only the first is selected."""
         entry = settings.players.add()
         entry.name = find_free_name(found.name, {player.name for player in settings.players})
-        entry.tracking_file, entry.metadata_file = to_setting_path(path), to_setting_path(self.metadata) if self.metadata else ""
+        entry.tracking_file, entry.metadata_file = to_setting_path(path), to_setting_path(
+            self.metadata) if self.metadata else ""
         entry.feed_id, entry.provider = found.feed_id, provider
         same_file = [player for player in settings.players if player.tracking_file == entry.tracking_file]
         entry.use = not found.feed_id or len(same_file) == 1
@@ -182,7 +184,8 @@ versions need this once"""
             if strips.find_dot(player, context.scene) is not None:
                 continue
             try:
-                read.append((player, strips.read_written_labels(player, settings.rate, tracks.read_track(settings, player))))
+                read.append((player, strips.read_written_labels(player, settings.rate,
+                                                                tracks.read_track(settings, player))))
             except InputError as error:
                 errors.append(f"{player.name}: {error}")
         if not read:
@@ -200,7 +203,8 @@ strips"""
 
     bl_idname = "beyond_mocap.player_from_dot"
     bl_label = "Add Player from Dot"
-    needs = "Select a dot that was appended from another file first", lambda context: bool(dots.list_orphan_dots(context))
+    needs = "Select a dot that was appended from another file first", lambda context: bool(
+        dots.list_orphan_dots(context))
 
     def do(self, context):
         """Add a player for each; the strips follow this scene's clock."""
@@ -228,7 +232,8 @@ a preview is applied"""
         settings = context.scene.beyond_mocap
         player = settings.players[settings.active_player]
         if player.result.state == "PREVIEW" and preview.is_shown(context.scene, player):
-            preview.apply_preview(context, player, "ACTION")  # otherwise the data set aside for the preview would be lost
+            preview.apply_preview(context, player,
+                                  "ACTION")  # otherwise the data set aside for the preview would be lost
         elif player.result.state == "PREVIEW":
             preview.drop_preview(player)
         pins.remove_all_pins(player)

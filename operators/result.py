@@ -10,8 +10,8 @@ from ..beyond_mocap.base.settings.synthesis import FORMS
 from ..scene.core import session
 from ..scene.core.settings import find_active_player
 from ..scene.result import preview, quality
-from .turns import update_automatic_strips
-from .verb import BaseOperator
+from .operator_base import BaseOperator
+from .take_queue import update_automatic_strips
 
 
 class ResultVerb(BaseOperator):

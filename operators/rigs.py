@@ -14,12 +14,12 @@ from ..beyond_mocap.files.bvh import bvh
 from ..scene.core import action, channels, session
 from ..scene.core.measure import frames_per_second
 from ..scene.core.settings import find_active_player
-from ..scene.path_editing import riders
+from ..scene.path_editing import edited_bodies as riders
 from ..scene.result import bake
 from ..scene.rigs import armature, bone_maps, export, rig, rig_bake
 from ..scene.rigs.driven import DrivenRig, check_rig
 from ..scene.rigs.fit import BakeOptions, read_source
-from .verb import ExportOperator, BaseOperator
+from .operator_base import BaseOperator, ExportOperator
 
 
 class BoneMapOperator(BaseOperator):
@@ -256,7 +256,8 @@ def reduce_rig_keys(target: bpy.types.Object, table: dict[str, str], settings) -
     """Reduce the keys; returns a message."""
     from ..scene.rigs import key_reduction
 
-    before, after = key_reduction.reduce_keys(target, table, bpy.context.scene, settings.tolerance, settings.turn_tolerance)
+    before, after = key_reduction.reduce_keys(target, table, bpy.context.scene, settings.tolerance,
+                                              settings.turn_tolerance)
     return f"Keys: {after} of {before} remain"
 
 
@@ -289,7 +290,7 @@ stays unchanged"""
         path = self.output_path()
         rigs = self.list_rigs(context)
         options = export.ExportOptions(path, self.format, self.engine, rate=self.find_rate(context), root=self.root,
-                               deform_only=self.deform_only, meshes=self.meshes)
+                                       deform_only=self.deform_only, meshes=self.meshes)
         for line in export.export_motion(context, rigs, options):
             self.report({"INFO"}, line)
         self.report({"INFO"}, f"Written: {path}")

@@ -7,9 +7,9 @@ from bpy.props import BoolProperty, EnumProperty
 
 from ..beyond_mocap.base.errors import InputError
 from ..scene.core import window
-from ..scene.path_editing.settings import list_target_bodies, list_edited_bodies
+from ..scene.path_editing.settings import list_edited_bodies, list_target_bodies
 from ..scene.stage import path_cameras, stage
-from .verb import NEEDS_NO_EDITING, BaseOperator
+from .operator_base import NEEDS_NO_EDITING, BaseOperator
 
 
 class BEYOND_MOCAP_OT_add_stage(BaseOperator, bpy.types.Operator):
@@ -41,12 +41,13 @@ class BEYOND_MOCAP_OT_path_cameras(BaseOperator, bpy.types.Operator):
 
 
 CAMERA_CHOICES = (("NEXT", "Next", "Next camera; after the last one the free view, then the first"),
-         ("ABOVE", "Above", "From above, like a map: X to the right, Y up"),
-         ("SIDE", "Side", "From the side, with the path across the picture"),
-         ("QUARTER", "Quarter", "From three quarters, slightly above"),
-         ("BEHIND", "Behind", "From behind the body, following it"),
-         ("FREE", "Free View", "Previous view and the scene's own camera"))
-VIEW_PROPERTIES = ("view_perspective", "view_location", "view_rotation", "view_distance")  # looking through a camera changes these
+                  ("ABOVE", "Above", "From above, like a map: X to the right, Y up"),
+                  ("SIDE", "Side", "From the side, with the path across the picture"),
+                  ("QUARTER", "Quarter", "From three quarters, slightly above"),
+                  ("BEHIND", "Behind", "From behind the body, following it"),
+                  ("FREE", "Free View", "Previous view and the scene's own camera"))
+VIEW_PROPERTIES = ("view_perspective", "view_location", "view_rotation",
+                   "view_distance")  # looking through a camera changes these
 _earlier_views: dict[int, tuple] = {}  # area pointer -> its VIEW before the first of these cameras
 
 
@@ -56,7 +57,8 @@ class BEYOND_MOCAP_OT_path_camera(BaseOperator, bpy.types.Operator):
     bl_idname = "beyond_mocap.path_camera"
     bl_label = "Path Camera"
     which: EnumProperty(name="Which", items=CAMERA_CHOICES, default="NEXT", description="The camera to look through")
-    needs = "Press Path Cameras in the panel Path Editing first", lambda context: path_cameras.has_cameras(context.scene)
+    needs = "Press Path Cameras in the panel Path Editing first", lambda context: path_cameras.has_cameras(
+        context.scene)
 
     @classmethod
     def description(cls, _context, properties):
@@ -78,7 +80,9 @@ class BEYOND_MOCAP_OT_path_camera(BaseOperator, bpy.types.Operator):
             raise InputError("path cameras", f"no camera {path_cameras.NAMES[kind]}", "all four cameras",
                              "press Path Cameras in the panel Path Editing")
         if kind == "BEHIND" and list_edited_bodies(scene):
-            path_cameras.animate_focus(scene, path_cameras.collect_targets(scene, next(iter(list_target_bodies(context)), None)))
+            path_cameras.animate_focus(scene,
+                                       path_cameras.collect_targets(scene,
+                                                                    next(iter(list_target_bodies(context)), None)))
         if area is not None:
             _look_through(area, scene.camera, camera)
         path_cameras.activate_camera(scene, camera)

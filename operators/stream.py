@@ -7,10 +7,10 @@ from bpy.props import FloatProperty, IntProperty, StringProperty
 
 from ..beyond_mocap.base.errors import InputError
 from ..beyond_mocap.passes.stream.live_hits import build_recording
-from ..scene.passes import make
+from ..scene.passes import generate as make
 from ..scene.passes.settings import find_armature
 from ..scene.stream import follow, play
-from .verb import BackgroundOperator, BaseOperator
+from .operator_base import BackgroundOperator, BaseOperator
 
 
 class BEYOND_MOCAP_OT_stream_start(BaseOperator, bpy.types.Operator):
@@ -98,7 +98,8 @@ motion of the library, to the player chosen with keys 1 to 9 or a click"""
     def order(self, context):
         """Collect the order of the scene, the holder of the ball and the rally's time."""
         settings = context.scene.beyond_mocap_passes
-        return make.build_order(context.scene), self.holder or settings.players[0].name, play.rally_seconds(context.scene)
+        return make.build_order(context.scene), self.holder or settings.players[0].name, play.rally_seconds(
+            context.scene)
 
     @staticmethod
     def work(order, progress, cancelled, _hurry):

@@ -9,13 +9,13 @@ import bpy
 from bpy.props import BoolProperty, EnumProperty, IntProperty, StringProperty
 
 from ..beyond_mocap.base.errors import InputError
+from ..beyond_mocap.files.atomic import atomic_path
 from ..beyond_mocap.files.bvh import bvh
 from ..beyond_mocap.files.tables import read_ball
-from ..beyond_mocap.files.whole import atomic_path
 from ..beyond_mocap.study.form import MOVIES, find_movie
 from ..beyond_mocap.study.order import read_study
 from ..scene import study as filming
-from .verb import BaseOperator
+from .operator_base import BaseOperator
 
 CLIPS = "clips"
 

@@ -10,9 +10,10 @@ from ..beyond_mocap.base.errors import InputError
 from ..beyond_mocap.base.settings import list_settings
 from ..scene.core import background, session
 from ..scene.core.settings import find_active_player
-from ..scene.result import freshness, orders, plans, queue
-from .turns import TakeOperator
-from .verb import NEEDS_LIBRARY
+from ..scene.result import freshness, plans, queue
+from ..scene.result import synthesis_request as orders
+from .operator_base import NEEDS_LIBRARY
+from .take_queue import TakeOperator
 
 
 class BEYOND_MOCAP_OT_synthesize(TakeOperator, bpy.types.Operator):

@@ -5,9 +5,11 @@ from __future__ import annotations
 import bpy
 
 from ..beyond_mocap.base.errors import InputError
-from ..scene.throws import made, order, shown
+from ..scene.throws import generation as made
+from ..scene.throws import preview as shown
+from ..scene.throws import throw_task as order
 from ..scene.throws.settings import find_thrower
-from .verb import BackgroundOperator, BaseOperator
+from .operator_base import BackgroundOperator, BaseOperator
 
 
 class TargetOperator(BackgroundOperator):

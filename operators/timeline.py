@@ -12,10 +12,13 @@ from ..scene.core import window
 from ..scene.core.live import call_soon
 from ..scene.core.settings import find_active_player
 from ..scene.result import bake
-from ..scene.timeline import lanes, lay_strips, moment_names, word_checks
+from ..scene.timeline import label_checks as word_checks
+from ..scene.timeline import label_tracks as lanes
+from ..scene.timeline import moment_names
+from ..scene.timeline import strip_writing as lay_strips
 from ..scene.timeline.strip_lines import parse_labels
-from ..scene.timeline.strips import can_have_timeline, find_target_clock, describe_target, ensure_target, find_target
-from .verb import BaseOperator
+from ..scene.timeline.strips import can_have_timeline, describe_target, ensure_target, find_target, find_target_clock
+from .operator_base import BaseOperator
 
 
 class TimelineVerb(BaseOperator):
@@ -53,7 +56,8 @@ def find_selected_moment(target: bpy.types.Object) -> lanes.PlacedMoment:
     """Find the selected key moment. Raises InputError if there is none."""
     found = next((moment for moment in lanes.list_moments(target) if moment.is_selected), None)
     if found is None:
-        raise InputError(describe_target(target), "no key moment is selected", "one", "click its name in the NLA editor")
+        raise InputError(describe_target(target), "no key moment is selected", "one",
+                         "click its name in the NLA editor")
     return found
 
 
@@ -251,7 +255,8 @@ class BEYOND_MOCAP_OT_pick_moment(BaseOperator, bpy.types.Operator):
         frame = self.frame + round(offset)
         clock = lanes.read_clock(context.scene.objects[self.target])
         is_unmoved = frame == self.frame
-        self.write_key(context, self.before.key if is_unmoved else replace(self.before.key, time=clock.to_seconds(frame)))
+        self.write_key(context, self.before.key if is_unmoved
+                       else replace(self.before.key, time=clock.to_seconds(frame)))
         context.area.header_text_set(f"Frame {frame} ({frame - self.frame:+d})    Esc: Cancel")
 
     def write_key(self, context, key):
@@ -283,7 +288,8 @@ class BEYOND_MOCAP_OT_add_moment(TimelineWritingVerb, bpy.types.Operator):
     def do(self, context):
         parse_labels(self.words, 0.0)
         target = ensure_target(context)
-        lay_strips.add_moment(target, parse_labels(self.words, compute_playhead(context, target)), find_target_clock(context, target))
+        lay_strips.add_moment(target, parse_labels(self.words, compute_playhead(context, target)),
+                              find_target_clock(context, target))
 
 
 class BEYOND_MOCAP_OT_move_moment(MomentVerb, bpy.types.Operator):

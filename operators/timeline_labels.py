@@ -13,11 +13,13 @@ from ..beyond_mocap.base.errors import InputError
 from ..scene.core.settings import find_active_player, to_setting_path
 from ..scene.library import recordings
 from ..scene.player import tracks
-from ..scene.timeline import lanes, lay_strips, strips
-from ..scene.timeline.strip_lines import parse_labels, format_labels
-from ..scene.timeline.strips import find_active_clip, find_target_clock, describe_target, ensure_target, find_target
-from .timeline import TimelineVerb, TimelineWritingVerb, draw_problems, compute_playhead, list_selected_spans
-from .verb import ImportOperator, BaseOperator
+from ..scene.timeline import label_tracks as lanes
+from ..scene.timeline import strip_writing as lay_strips
+from ..scene.timeline import strips
+from ..scene.timeline.strip_lines import format_labels, parse_labels
+from ..scene.timeline.strips import describe_target, ensure_target, find_active_clip, find_target, find_target_clock
+from .operator_base import BaseOperator, ImportOperator
+from .timeline import TimelineVerb, TimelineWritingVerb, compute_playhead, draw_problems, list_selected_spans
 
 
 class BEYOND_MOCAP_OT_add_span(TimelineWritingVerb, bpy.types.Operator):
@@ -101,7 +103,8 @@ class BEYOND_MOCAP_OT_join_spans(TimelineVerb, bpy.types.Operator):
         if len(chosen) < 2:
             found = "fewer than two spans are selected"
             raise InputError(describe_target(target), found, "two or more", "select their strips")
-        inner = [moment.key for moment in lanes.list_moments(target) if moment.strip in {span.strip for span in chosen[1:]}]
+        inner = [moment.key for moment in lanes.list_moments(target)
+                 if moment.strip in {span.strip for span in chosen[1:]}]
         for placed in chosen[1:]:
             lay_strips.remove_span(target, placed.strip)
         end = max(placed.span.end for placed in chosen)

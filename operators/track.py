@@ -6,14 +6,14 @@ import bpy
 import numpy as np
 
 from ..beyond_mocap.base.errors import InputError
-from ..beyond_mocap.motion.track.drawn import MAX_SPEED
+from ..beyond_mocap.motion.track.line_track import MAX_SPEED
 from ..scene.core import channels, window
 from ..scene.core.measure import units_per_metre
 from ..scene.core.settings import find_active_player, is_track
 from ..scene.player import dots, drawn_track, pins
 from ..scene.result import bake
-from .player import find_free_name, choose_shirt
-from .verb import BaseOperator
+from .operator_base import BaseOperator
+from .player import choose_shirt, find_free_name
 
 
 class BEYOND_MOCAP_OT_draw_track(BaseOperator, bpy.types.Operator):
@@ -141,7 +141,8 @@ with G; set time and hold in the list of pins"""
             place = pins.find_part_position(context, player, self.part)
         else:
             place = np.array(scene.cursor.location) / units_per_metre(scene)
-        pins.add_pin(context, player, self.part, seconds=seconds, hold=self.hold, place=place, collection=bake.find_or_create_collection(scene))
+        pins.add_pin(context, player, self.part, seconds=seconds, hold=self.hold, place=place,
+                     collection=bake.find_or_create_collection(scene))
         self.report({"INFO"}, f"{player.name}: {part} pinned at {seconds:.2f} s; move it with G, then press Update")
 
 
@@ -151,7 +152,8 @@ class BEYOND_MOCAP_OT_remove_pin(BaseOperator, bpy.types.Operator):
     bl_idname = "beyond_mocap.remove_pin"
     bl_label = "Remove Pin"
     needs = ("The active player has no pins",
-             lambda context: (player := find_active_player(context.scene.beyond_mocap)) is not None and len(player.pins) > 0)
+             lambda context: (player := find_active_player(context.scene.beyond_mocap)) is not None and len(player.pins)
+             > 0)
 
     def do(self, context):
         """Remove the pin and choose the next one."""

@@ -117,7 +117,8 @@ def complete_manifest(text, packages, platform, wheels):
     ]
     own = next(line for line in text.splitlines() if line.startswith("copyright = "))
     own_holders = own.removeprefix("copyright = [").removesuffix("]")
-    lines = [f"copyright = {_format_list([own_holders, *map(_quote, holders)])}", f"platforms = {_format_list([_quote(platform)])}",
+    lines = [f"copyright = {_format_list([own_holders, *map(_quote, holders)])}",
+             f"platforms = {_format_list([_quote(platform)])}",
              f"wheels = {_format_list(_quote(f'./wheels/{name}') for name in wheels)}"]
     return text.replace(own, "\n".join(lines))
 

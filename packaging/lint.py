@@ -9,7 +9,8 @@ import zipfile
 
 from bundle import normalize_name, parse_wheel_name
 
-BLENDER_PLATFORMS = {f"{system}-{processor}" for system in ("linux", "windows", "macos") for processor in ("x64", "arm64")}
+BLENDER_PLATFORMS = {f"{system}-{processor}" for system in ("linux", "windows", "macos")
+                     for processor in ("x64", "arm64")}
 FORBIDDEN = ("tests/", "benchmarks/", "docs/", "packaging/", "build/", "training/", ".git", ".venv", "shared/")
 
 
@@ -26,8 +27,9 @@ def lint_stage(folder, packages, platform):
     manifest = tomllib.loads((folder / "blender_manifest.toml").read_text("utf-8"))
     listed = [path.removeprefix("./wheels/") for path in manifest["wheels"]]
     existing = {path.name for path in (folder / "wheels").iterdir()}
-    return [*(f"platform {name!r} is not one of Blender's" for name in manifest["platforms"] if name not in BLENDER_PLATFORMS),
-            *(f"wheel {name} is listed but missing" for name in listed if name not in existing),
+    return [*(f"platform {name!r} is not one of Blender's" for name in manifest["platforms"]
+              if name not in BLENDER_PLATFORMS), *(f"wheel {name} is listed but missing" for name in listed
+                                                   if name not in existing),
             *(f"wheel {name} exists but is not listed" for name in sorted(existing) if name not in listed),
             *(f"licence {name!r} has no SPDX name" for name in manifest["license"] if not name.startswith("SPDX:")),
             *_check_copyright(manifest, packages), *_check_coverage(listed, packages, platform)]
@@ -47,7 +49,7 @@ def _check_coverage(listed, packages, platform):
     for python in platform.pythons:
         for package in packages:
             matching = {name for name, w in wheels.items() if w.is_compatible(platform, python)
-                       and (w.name, w.version) == (normalize_name(package.name), package.bundled_version)}
+                        and (w.name, w.version) == (normalize_name(package.name), package.bundled_version)}
             unused -= matching
             if len(matching) != 1:
                 yield f"{len(matching)} wheels of {package.name} for {platform.name}, Python {python}: {sorted(matching)}"

@@ -43,7 +43,8 @@ def build_settings_page() -> str:
 def _build_cells(row) -> list[str]:
     """Build the cells of a setting."""
     option = " ".join(f"`{flag}`" for flag in row.option.split())
-    return [f"`{row.name}`", option, row.title if row.tooltip else "", _format_default(row), _format_limits(row), _format_meaning(row)]
+    return [f"`{row.name}`", option, row.title if row.tooltip else "", _format_default(row), _format_limits(row),
+            _format_meaning(row)]
 
 
 def _format_default(row) -> str:
@@ -70,8 +71,9 @@ def _format_limits(row) -> str:
     limits, option, panel = (row.least, row.most), row.option_more, row.panel_more
     option_limits = (option.get("least", row.least), option.get("most", row.most))
     panel_limits = (panel.get("min", row.least), panel.get("max", row.most))
-    parts = [_format_range(limits), *(f"{place} {_format_range(pair)}" for place, pair in (("option", option_limits), ("Blender", panel_limits))
-                            if pair not in (limits, (None, None)))]  # fmt: skip
+    parts = [_format_range(limits), *(f"{place} {_format_range(pair)}" for place,
+                                      pair in (("option", option_limits), ("Blender", panel_limits))
+                                      if pair not in (limits, (None, None)))]  # fmt: skip
     return "; ".join(filter(None, parts)) + (f" {row.unit}" if row.unit and any(parts) else "")
 
 

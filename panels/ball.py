@@ -7,8 +7,8 @@ from __future__ import annotations
 import bpy
 
 from ..scene.ball.settings import find_aimed_ball
-from ..scene.passes.settings import find_active_row, find_ball, find_picture_icon, find_armature, parse_lines
-from .tab import TabPanel, draw_paragraph, draw_section, create_value_column, draw_table
+from ..scene.passes.settings import find_active_row, find_armature, find_ball, find_picture_icon, parse_lines
+from .tab import TabPanel, create_value_column, draw_paragraph, draw_section, draw_table
 
 LINE = 20.0  # pixels of a line of the interface, at a scale of 1
 
@@ -41,8 +41,10 @@ class BEYOND_MOCAP_PT_ball(TabPanel, bpy.types.Panel):
     def draw(self, context):
         """Draw the sections; most are closed at first."""
         layout = self.layout
-        draw_section(layout, "ball_scene", "Passing Scene", lambda opened: draw_passing_scene(self, opened, context), closed=False)
-        draw_section(layout, "ball_tracked", "Ball from Tracking", lambda opened: draw_tracked_ball(self, opened, context))
+        draw_section(layout, "ball_scene", "Passing Scene", lambda opened: draw_passing_scene(self, opened, context),
+                     closed=False)
+        draw_section(layout, "ball_tracked", "Ball from Tracking", lambda opened: draw_tracked_ball(self, opened,
+                context))
         draw_section(layout, "ball_hits", "Hit Analysis", lambda opened: draw_hit_analysis(opened, context))
         draw_section(layout, "ball_hold", "Carried Ball", lambda opened: draw_carried_ball(opened, context))
         draw_section(layout, "ball_aim", "Aim Ball", lambda opened: draw_aim(opened, context))

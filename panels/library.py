@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import bpy
 
-from .tab import TabPanel, draw_paragraph, draw_header, draw_table
+from .tab import TabPanel, draw_header, draw_paragraph, draw_table
 
 QUALITY_ICONS = ("STRIP_COLOR_04", "STRIP_COLOR_02", "STRIP_COLOR_01", "BLANK1")  # green, orange, red, not measured
 STATE_ICONS = {"OPEN": "RADIOBUT_OFF", "ACCEPTED": "CHECKMARK", "REFUSED": "X"}
@@ -69,7 +69,8 @@ class BEYOND_MOCAP_PT_library(TabPanel, bpy.types.Panel):
         if content:
             if body := draw_header(layout, "library_holds", first):
                 draw_table(body, content)
-        if body := draw_header(layout, "library_clips", f"Clips ({listing.total})" if current and listing.total else "Clips"):
+        if body := draw_header(layout, "library_clips", f"Clips ({listing.total})" if current and listing.total
+                               else "Clips"):
             draw_clips(body, settings, listing, current)
         if context.object is not None and "beyond_mocap_clip" in context.object:
             draw_open_clip(layout, context.object, settings)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import bpy
 
 from ..scene.markers.settings import find_active_label, find_target_cloud
-from .tab import TabPanel, draw_paragraph, draw_section, create_value_column, draw_table
+from .tab import TabPanel, create_value_column, draw_paragraph, draw_section, draw_table
 
 MAX_MESSAGES = 6  # messages that are shown
 ROLE_ICONS = {"OPTIONAL": "CHECKBOX_DEHLT", "STATIC": "ARMATURE_DATA", "BALL": "MESH_UVSPHERE", "OTHER": "CANCEL"}
@@ -49,20 +49,26 @@ class BEYOND_MOCAP_PT_markers(TabPanel, bpy.types.Panel):
         row.prop(settings, "names", text="", icon="FONT_DATA")
         row.prop(properties, "lines", text="", icon="MOD_WIREFRAME")
         row.prop(properties, "size", text="")
-        draw_section(layout, "markers_labels", "Labels & Segments", lambda opened: draw_labels(opened, properties), closed=False)
-        draw_section(layout, "markers_clean", "Clean Up", lambda opened: draw_clean_up(self, opened, context, properties))
+        draw_section(layout, "markers_labels", "Labels & Segments", lambda opened: draw_labels(opened, properties),
+                     closed=False)
+        draw_section(layout, "markers_clean", "Clean Up", lambda opened: draw_clean_up(self, opened, context,
+                properties))
         draw_section(layout, "markers_model", "Static Trial & Model", lambda opened: draw_model(opened, properties))
-        draw_section(layout, "markers_pose", "Reconstruct", lambda opened: draw_pose(self, opened, context, properties), closed=False)
-        draw_section(layout, "markers_release", "Ball & Release", lambda opened: draw_release(self, opened, context, properties))
+        draw_section(layout, "markers_pose", "Reconstruct", lambda opened: draw_pose(self, opened, context, properties),
+                     closed=False)
+        draw_section(layout, "markers_release", "Ball & Release", lambda opened: draw_release(self, opened, context,
+                properties))
 
 
 def draw_labels(layout, properties) -> None:
     """Draw the list and the properties of the active marker."""
     row = layout.row(align=True)
-    row.operator_menu_enum("beyond_mocap.use_marker_set", "which", text=properties.set_name or "Marker Set", icon="PRESET")
+    row.operator_menu_enum("beyond_mocap.use_marker_set", "which", text=properties.set_name or "Marker Set",
+                           icon="PRESET")
     row.operator("beyond_mocap.load_marker_set", text="", icon="FILE_FOLDER")
     row.operator("beyond_mocap.save_marker_set", text="", icon="FILE_TICK")
-    layout.template_list("BEYOND_MOCAP_UL_markers", "", properties, "labels", properties, active_propname="active_label", rows=5)
+    layout.template_list("BEYOND_MOCAP_UL_markers", "", properties, "labels", properties,
+                         active_propname="active_label", rows=5)
     layout.operator_menu_enum("beyond_mocap.assign_markers", "segment", text="Assign to Segment", icon="BONE_DATA")
     label = find_active_label(properties.id_data)
     if label is not None:

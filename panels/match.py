@@ -5,7 +5,7 @@ from __future__ import annotations
 import bpy
 
 from ..scene.match.settings import find_active_player
-from .tab import TabPanel, draw_paragraph, draw_section, create_value_column
+from .tab import TabPanel, create_value_column, draw_paragraph, draw_section
 
 MAX_LINES = 12  # lines of a report shown in the panel
 TEAM_ICONS = {"home": "EVENT_H", "away": "EVENT_A", "referee": "EVENT_R"}

@@ -11,7 +11,7 @@ import bpy
 
 from ..scene.core.settings import find_active_player
 from ..scene.path_editing.settings import list_target_bodies
-from .tab import TabPanel, draw_figures, draw_paragraph, draw_section, create_value_column
+from .tab import TabPanel, create_value_column, draw_figures, draw_paragraph, draw_section
 
 OVERLAYS = {"path_source": "CURVE_PATH", "path_new": "CURVE_NCURVE", "path_trackers": "EMPTY_SINGLE_ARROW",
             "path_residuals": "TRACKING_REFINE_BACKWARDS", "path_ghost": "GHOST_ENABLED"}
@@ -59,13 +59,16 @@ class BEYOND_MOCAP_PT_path(TabPanel, bpy.types.Panel):
             edit = body.beyond_mocap_ride
             draw_armature(layout, body, edit)
             if edit.on:
-                draw_section(layout, "path_curve", "New Curve", lambda opened: draw_new_curve(opened, context.scene.beyond_mocap))
+                draw_section(layout, "path_curve", "New Curve",
+                             lambda opened: draw_new_curve(opened, context.scene.beyond_mocap))
                 draw_section(layout, "path_following", "Path Following", lambda opened: draw_following(opened, edit))
                 draw_section(layout, "path_body", "Body", lambda opened: draw_body(opened, edit))
                 if figure_text := describe_figures(edit.figures):
                     draw_section(layout, "path_figures", "Figures", lambda opened: draw_figures(opened, figure_text))
-        draw_section(layout, "path_cameras", "Cameras & Nudging", lambda opened: draw_cameras(opened, context), closed=False)
-        draw_section(layout, "path_overlays", "Overlays", lambda opened: draw_overlays(opened, context.scene.beyond_mocap.view))
+        draw_section(layout, "path_cameras", "Cameras & Nudging", lambda opened: draw_cameras(opened, context),
+                     closed=False)
+        draw_section(layout, "path_overlays", "Overlays",
+                     lambda opened: draw_overlays(opened, context.scene.beyond_mocap.view))
 
 
 def find_subject(context) -> bpy.types.Object | None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import bpy
 
 from ..scene.core.settings import find_active_player
-from .tab import TabPanel, draw_paragraph, draw_header, create_value_column
+from .tab import TabPanel, create_value_column, draw_header, draw_paragraph
 
 
 class BEYOND_MOCAP_UL_players(bpy.types.UIList):

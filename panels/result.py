@@ -5,7 +5,7 @@ from __future__ import annotations
 import bpy
 
 from ..scene.core.settings import find_active_player
-from .tab import TabPanel, draw_figures, draw_paragraph, draw_header, wrap_text
+from .tab import TabPanel, draw_figures, draw_header, draw_paragraph, wrap_text
 
 STATES = {"NONE": ("Not Shown", "BLANK1"),
           "PREVIEW": ("Preview", "HIDE_OFF"),
@@ -113,7 +113,7 @@ class BEYOND_MOCAP_PT_quality(TabPanel, bpy.types.Panel):
             for line in player.moments.splitlines():
                 text, second, status = (*line.split("\t"), "", "")[:3]
                 self.draw_line(body, player, text, second,
-                          "KEYTYPE_EXTREME_VEC" if status == "missed" else "KEYTYPE_KEYFRAME_VEC")
+                               "KEYTYPE_EXTREME_VEC" if status == "missed" else "KEYTYPE_KEYFRAME_VEC")
         if body := draw_header(layout, "quality_why", "Why This Clip", closed=False):
             self.draw_reasons(body, context.window_manager.beyond_mocap_playhead.draw_reasons)
         if body := draw_header(layout, "quality_figures", "Figures", closed=False):

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import bpy
 
-from .tab import TabPanel, draw_paragraph, draw_header, create_value_column
+from .tab import TabPanel, create_value_column, draw_header, draw_paragraph
 
 
 class BEYOND_MOCAP_UL_bones(bpy.types.UIList):

@@ -5,7 +5,7 @@ from __future__ import annotations
 import bpy
 
 from ..scene.throws.settings import find_thrower
-from .tab import TabPanel, draw_paragraph, draw_section, create_value_column, draw_table
+from .tab import TabPanel, create_value_column, draw_paragraph, draw_section, draw_table
 
 
 class BEYOND_MOCAP_PT_throws(TabPanel, bpy.types.Panel):

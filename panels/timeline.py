@@ -5,7 +5,7 @@ from __future__ import annotations
 import bpy
 
 from ..scene.core.settings import find_active_player
-from .tab import draw_paragraph, draw_header
+from .tab import draw_header, draw_paragraph
 
 MOST = 60  # key moments that the list shows
 

@@ -20,10 +20,10 @@ HERE = Path(__file__).resolve().parent
 if __name__ == "__main__":
     sys.path.insert(0, str(HERE.parent))
 
-from beyond_mocap.appearance.body import MATERIALS, BodyMesh, deform_body, build_body  # noqa: E402
+from beyond_mocap.appearance.body import MATERIALS, BodyMesh, build_body, deform_body  # noqa: E402
 from beyond_mocap.files.bvh import bvh  # noqa: E402
 from beyond_mocap.motion.humanoid import compute_heading  # noqa: E402
-from beyond_mocap.motion.motion import Motion, sample_frames, place_motion, compute_pose  # noqa: E402
+from beyond_mocap.motion.motion import Motion, compute_pose, place_motion, sample_frames  # noqa: E402
 from beyond_mocap.motion.quaternion import rotate_about_up  # noqa: E402
 
 COLOURS = {"skin": (0.60, 0.36, 0.24), "shirt": (0.72, 0.06, 0.05), "shorts": (0.86, 0.86, 0.84),
@@ -191,7 +191,7 @@ def _arrange_grid(tiles: list[np.ndarray], columns: int) -> np.ndarray:
 
 
 def render_strip(motion: Motion, frames: np.ndarray, out_png, *, ball=None, spacing: float = 1.15, samples: int = 12,
-          width: int = 1300) -> None:
+                 width: int = 1300) -> None:
     """Render moments of one motion side by side, seen from the side and (below) half from the front.
 
     Figures face right.

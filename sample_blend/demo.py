@@ -62,7 +62,8 @@ class Steps:
 
     def show_progress(self, fraction: float, text: str) -> None:
         """Show the progress of the part."""
-        self.reporter.show_progress(self.done + fraction * self.shares[self.current_part], f"{self.current_part}: {text}")
+        self.reporter.show_progress(self.done + fraction * self.shares[self.current_part],
+                                    f"{self.current_part}: {text}")
 
 
 @contextlib.contextmanager
@@ -191,7 +192,8 @@ def render_sheet(bpy, load, plans, takes, out: pathlib.Path, steps) -> None:
             bpy.ops.render.render(write_still=True)
             row, column = divmod(number, TILES[0])
             top = (TILES[1] - row) * TILE[1]
-            sheet[top - TILE[1] : top, column * TILE[0] : (column + 1) * TILE[0]] = _load_pixels(bpy, scene.render.filepath)
+            sheet[top - TILE[1] : top, column * TILE[0] : (column + 1) * TILE[0]] = _load_pixels(bpy,
+                    scene.render.filepath)
     _write_picture(bpy, sheet, out)
     bpy.data.cameras.remove(scene.camera.data)
     scene.camera = follow_camera

@@ -18,12 +18,12 @@ from pathlib import Path
 import numpy as np
 
 sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
-from beyond_mocap.appearance.body import deform_body, build_body  # noqa: E402
+from beyond_mocap.appearance.body import build_body, deform_body  # noqa: E402
 from beyond_mocap.base.errors import InputError  # noqa: E402
 from beyond_mocap.base.vectors import unit_vectors  # noqa: E402
 from beyond_mocap.files.bvh import bvh  # noqa: E402
 from beyond_mocap.files.tables import read_ball  # noqa: E402
-from beyond_mocap.motion.motion import Motion, sample_frames, compute_pose  # noqa: E402
+from beyond_mocap.motion.motion import Motion, compute_pose, sample_frames  # noqa: E402
 from beyond_mocap.synthesis.provenance import read_provenance  # noqa: E402
 
 COLOURS = np.array([(190, 140, 110), (200, 40, 35), (235, 235, 230), (40, 60, 150), (30, 30, 34), (40, 28, 22)], float)
@@ -139,8 +139,8 @@ def _draw_grid(draw, view: View, step: float = 0.5) -> None:
         draw.rectangle([0, 0, view.size, horizon], fill=SKY)
 
 
-def write_sheet(motion: Motion, frames, out, *, camera="follow", side=-90.0, ball=None, labels=None, columns=6, tile=220,
-          wide=2.2):
+def write_sheet(motion: Motion, frames, out, *, camera="follow", side=-90.0, ball=None, labels=None, columns=6,
+                tile=220, wide=2.2):
     """Write the contact sheet of some frames.
 
     Args:
@@ -173,7 +173,8 @@ def write_sheet(motion: Motion, frames, out, *, camera="follow", side=-90.0, bal
     page = Image.new("RGB", (min(columns, len(frames)) * tile, rows * tile))
     for i in range(len(frames)):
         view = _build_view(root[i, :2] if camera == "follow" else whole, side, across, 2 * tile)
-        tile_picture = draw_picture(view, skins[i : i + 1], body, balls[i : i + 1]).resize((tile, tile), Image.Resampling.LANCZOS)
+        tile_picture = draw_picture(view, skins[i : i + 1], body, balls[i : i + 1]).resize((tile, tile),
+                Image.Resampling.LANCZOS)
         if labels is not None:
             ImageDraw.Draw(tile_picture).text((4, 2), labels[i], fill=(0, 0, 0))
         page.paste(tile_picture, (i % columns * tile, i // columns * tile))
@@ -229,10 +230,11 @@ def write_requested_sheet(options) -> None:
     if options.provenance:
         provenance = read_provenance(options.provenance)
         marks = [("L" if l else ".") + ("R" if r else ".") for l, r in provenance.contacts[frames]]
-        new = [f > 0 and (provenance.clip[f] != provenance.clip[f - 1] or provenance.mirrored[f] != provenance.mirrored[f - 1]) for f in frames]
+        new = [f > 0 and (provenance.clip[f] != provenance.clip[f - 1]
+                          or provenance.mirrored[f] != provenance.mirrored[f - 1]) for f in frames]
         labels = [f"{a} {m}{'|' if s else ''}" for a, m, s in zip(labels, marks, new)]
     write_sheet(motion, frames, options.out, camera=options.camera, side=options.side, ball=ball, labels=labels,
-          columns=options.columns, tile=options.tile, wide=options.wide)
+                columns=options.columns, tile=options.tile, wide=options.wide)
 
 
 if __name__ == "__main__":

@@ -24,8 +24,8 @@ from beyond_mocap.markers.files.trc import write_trc  # noqa: E402
 from beyond_mocap.markers.trial import MarkerTrial  # noqa: E402
 from beyond_mocap.motion.retargeting.adult import build_adult_skeleton  # noqa: E402
 from beyond_mocap.synthetic.gait import build_gait  # noqa: E402
-from beyond_mocap.synthetic.ground_truth.planted_ball import BallRequest  # noqa: E402
-from beyond_mocap.synthetic.ground_truth.planted_markers import SyntheticTrial, build_trial  # noqa: E402
+from beyond_mocap.synthetic.ground_truth.synthetic_ball import BallRequest  # noqa: E402
+from beyond_mocap.synthetic.ground_truth.synthetic_markers import SyntheticTrial, build_trial  # noqa: E402
 from beyond_mocap.synthetic.throws import build_throw  # noqa: E402
 
 SPEED, TARGET = 28.0, (18.0, 0.0, 1.0)
@@ -37,8 +37,8 @@ _STATIC_FRAMES = 60  # frames of the static trial
 def generate_throw() -> SyntheticTrial:
     """Generate the throw, its static trial and the ground truth of both; the second around the ball's release."""
     movement = build_throw(TARGET, SPEED, fps=_THROW_FPS)
-    return build_trial(movement.motion, "driveline", seed=11, ball=BallRequest(movement.release, spin_rate=18.0, seconds_seen=0.12),
-                   occlusion=0.01)
+    return build_trial(movement.motion, "driveline", seed=11, ball=BallRequest(movement.release, spin_rate=18.0,
+                                                                               seconds_seen=0.12), occlusion=0.01)
 
 
 def generate_walk() -> SyntheticTrial:

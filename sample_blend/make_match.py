@@ -24,7 +24,7 @@ if __name__ == "__main__":
 
 from make_sample import add_tracking_noise  # noqa: E402
 
-from beyond_mocap.ball.aim import solve_launches, solve_ground_launches  # noqa: E402
+from beyond_mocap.ball.aim import solve_ground_launches, solve_launches  # noqa: E402
 from beyond_mocap.ball.flight import Flight, Launch, simulate_flight  # noqa: E402
 from beyond_mocap.ball.physics import FOOTBALL  # noqa: E402
 
@@ -126,7 +126,8 @@ def _launch_ball(time: float, position: np.ndarray, touch: Touch) -> Flight:
         velocity = (np.array(touch.target) - position[:2]) / touch.seconds
         return simulate_flight(Launch(time, position, np.array([*velocity, -0.5])), FOOTBALL, touch.seconds + 6.0)
     target = np.array([*touch.target, FOOTBALL.radius][:3])
-    aimed = (solve_ground_launches if len(touch.target) == 2 else solve_launches)(position, target, FOOTBALL, seconds=touch.seconds)
+    aimed = (solve_ground_launches if len(touch.target) == 2 else solve_launches)(position, target, FOOTBALL,
+                                                                                  seconds=touch.seconds)
     launch = Launch(time, position, aimed.velocity[0], aimed.spin[0])
     return simulate_flight(launch, FOOTBALL, touch.seconds + 6.0)
 
@@ -174,7 +175,8 @@ def simulate_feed() -> tuple[np.ndarray, dict[str, np.ndarray], np.ndarray]:
         Times (N,) s, per player (N, 2) m, and the lowest point of the ball (N, 3) m.
     """
     times = np.arange(round(SECONDS * RATE) + 1) / RATE
-    seen = {player: add_tracking_noise(times, compute_player(player, times), 10 + i) for i, player in enumerate(PLAYERS)}
+    seen = {player: add_tracking_noise(times, compute_player(player, times), 10 + i) for i,
+            player in enumerate(PLAYERS)}
     ball = compute_ball(times)
     ball[:, :2] = add_tracking_noise(times, ball[:, :2], seed=9, slow=0.05)
     ball[:, 2] = np.maximum(ball[:, 2] - FOOTBALL.radius, 0.0)

@@ -22,9 +22,9 @@ from beyond_mocap.annotation import KeyMoment, Span, Timeline, format_timeline  
 from beyond_mocap.files.bvh import bvh  # noqa: E402
 from beyond_mocap.synthetic.volleys import VOLLEYS, build_idle, build_volley  # noqa: E402
 
-REUSED_CLIPS = ("standing_turn_left", "standing_turn_right", "walking_0_8", "walking_1_2", "walking_1_6", "walking_turn_left",
-         "walking_turn_right", "walking_back", "walking_left", "walking_right", "start_stop_walking", "walk_jog_walk",
-         "jogging_2_4", "jogging_3_5", "jogging_back", "header")
+REUSED_CLIPS = ("standing_turn_left", "standing_turn_right", "walking_0_8", "walking_1_2", "walking_1_6",
+                "walking_turn_left", "walking_turn_right", "walking_back", "walking_left", "walking_right",
+                "start_stop_walking", "walk_jog_walk", "jogging_2_4", "jogging_3_5", "jogging_back", "header")
 """Clips of the sample's library that are reused."""
 STOP_FRAME = 186
 """Frames after which the player of start_stop_walking has stopped; the clip continues with half a step."""
@@ -38,7 +38,8 @@ STRIKES = (("toss", "toss", 1.25), ("toss_quick", "toss", 1.5), ("pass", "pass",
 def build_passes_clips() -> list[Clip]:
     """Build all clips of the library."""
     reused = [clip for clip in build_clips() if clip.name in REUSED_CLIPS]
-    reused = [replace(c, motion=c.motion.frames(0, STOP_FRAME)) if c.name == "start_stop_walking" else c for c in reused]
+    reused = [replace(c, motion=c.motion.frames(0, STOP_FRAME)) if c.name == "start_stop_walking" else c
+              for c in reused]
     ready = [Clip(f"ready_{seed}", build_idle(9.0, fps=FPS, seed=60 + seed), ("standing",)) for seed in (1, 2, 3)]
     return [*reused, *ready, *(_build_strike(*row, seed=70 + number) for number, row in enumerate(STRIKES))]
 

@@ -55,16 +55,19 @@ class Clip:
 
 def build_clips() -> list[Clip]:
     """Build all clips of the sample's library, in the order of their kinds."""
-    return [*_build_standing(), *_build_straight(), *_build_curves(), *_build_directions(), *_build_speed_changes(), *_build_moves()]
+    return [*_build_standing(), *_build_straight(), *_build_curves(), *_build_directions(), *_build_speed_changes(),
+            *_build_moves()]
 
 
 def _build_standing() -> list[Clip]:
     """Build clips of standing and turning on the spot."""
     turn = np.concatenate([np.zeros(45), np.full(60, 0.9), np.zeros(60), np.full(75, 0.7), np.zeros(45)])
-    out = [Clip("standing_1", build_gait(0.0, 8.0, FPS, seed=1), None), Clip("standing_2", build_gait(0.0, 6.0, FPS, seed=2), None)]
+    out = [Clip("standing_1", build_gait(0.0, 8.0, FPS, seed=1), None),
+           Clip("standing_2", build_gait(0.0, 6.0, FPS, seed=2), None)]
     for side, sign in (("left", 1.0), ("right", -1.0)):
         words = ("standing", "turning", side)
-        out.append(Clip(f"standing_turn_{side}", build_gait(0.0, None, FPS, turn_rate=sign * _smooth_corners(turn), seed=3), words))
+        out.append(Clip(f"standing_turn_{side}", build_gait(0.0, None, FPS, turn_rate=sign * _smooth_corners(turn),
+                                                            seed=3), words))
     return out
 
 
@@ -73,8 +76,8 @@ def _build_straight() -> list[Clip]:
     table = (("walking", (0.8, 1.2, 1.6), 6.4), ("jogging", (2.4, 2.9, 3.5), 6.0), ("running", (4.2, 4.9), 6.0),
              ("sprinting", (6.0, 7.2, 8.6), 6.0))
     return [
-        Clip(f"{word}_{speed:.1f}".replace(".", "_"), build_gait(speed + _build_unsteadiness(seconds, i), None, FPS, seed=10 + i), None)
-        for word, speeds, seconds in table
+        Clip(f"{word}_{speed:.1f}".replace(".", "_"), build_gait(speed + _build_unsteadiness(seconds, i), None, FPS,
+                                                                 seed=10 + i), None) for word, speeds, seconds in table
         for i, speed in enumerate(speeds)
     ]
 
@@ -88,11 +91,13 @@ def _build_curves() -> list[Clip]:
             times = _clip_times(seconds)
             rates = sign * rate * (0.25 + 1.5 * np.sin(np.pi * times / seconds) ** 2)
             out.append(
-                Clip(f"{word}_turn_{side}", build_gait(speed, None, FPS, turn_rate=rates, seed=20), (word, "turning", side))
+                Clip(f"{word}_turn_{side}", build_gait(speed, None, FPS, turn_rate=rates, seed=20),
+                     (word, "turning", side))
             )
     times = _clip_times(8.0)
     weave = 0.9 * np.sin(2 * np.pi * times / 4.2) + 0.5 * np.sin(2 * np.pi * times / 2.7)
-    out.append(Clip("jogging_weave", build_gait(3.0 + 0.5 * np.sin(0.9 * times), None, FPS, turn_rate=weave, seed=21), None))
+    out.append(Clip("jogging_weave", build_gait(3.0 + 0.5 * np.sin(0.9 * times), None, FPS, turn_rate=weave, seed=21),
+                    None))
     return out
 
 
@@ -100,9 +105,10 @@ def _build_directions() -> list[Clip]:
     """Build clips of locomotion backward and sideways."""
     out = []
     for word, direction, angle, speed in (("walking", "back", np.pi, 1.1), ("jogging", "back", np.pi, 2.3),
-                                    ("walking", "left", np.pi / 2, 0.9), ("walking", "right", -np.pi / 2, 0.9)):
+                                          ("walking", "left", np.pi / 2, 0.9), ("walking", "right", -np.pi / 2, 0.9)):
         speeds = _build_speed_profile(((0, 0), (1.2, speed), (5.2, speed), (6.4, 0), (6.8, 0)))
-        out.append(Clip(f"{word}_{direction}", build_gait(speeds, None, FPS, direction=angle, seed=30), (word, direction)))
+        out.append(Clip(f"{word}_{direction}", build_gait(speeds, None, FPS, direction=angle, seed=30),
+                        (word, direction)))
     return out
 
 
@@ -118,7 +124,8 @@ def _build_speed_changes() -> list[Clip]:
         "run_stop_run": ((0, 4.0), (1.0, 4.0), (3.2, 0.3), (4.0, 0.2), (6.4, 4.4), (7.4, 4.4)),
     }
     return [
-        Clip(name, build_gait(_build_speed_profile(rows), None, FPS, seed=40 + i), None) for i, (name, rows) in enumerate(table.items())
+        Clip(name, build_gait(_build_speed_profile(rows), None, FPS, seed=40 + i), None) for i,
+        (name, rows) in enumerate(table.items())
     ]
 
 
@@ -126,8 +133,9 @@ def _build_moves() -> list[Clip]:
     """Build clips of dribbling, kicks and other moves."""
     weave = 0.8 * np.sin(2 * np.pi * _clip_times(7.0) / 3.5)
     out = [
-        Clip("dribble_jogging", build_dribble(2.7, 7.0, fps=FPS, seed=50, turn_rate=weave), ("dribble", "jogging", "front")),
-        Clip("dribble_walking", build_dribble(1.7, 6.0, fps=FPS, seed=51), ("dribble", "walking", "front")),
+        Clip("dribble_jogging", build_dribble(2.7, 7.0, fps=FPS, seed=50, turn_rate=weave),
+             ("dribble", "jogging", "front")), Clip("dribble_walking", build_dribble(1.7, 6.0, fps=FPS, seed=51),
+                                                    ("dribble", "walking", "front")),
         Clip("dribble_running", build_dribble(4.3, 6.0, fps=FPS, seed=52), ("dribble", "running", "front")),
         Clip("celebration", build_celebration(6.4, fps=FPS, seed=53), ("celebration", "running", "arms", "outside")),
     ]
@@ -149,7 +157,8 @@ def label_clip(clip: Clip) -> Timeline:
     """Return the annotation of a clip."""
     end = clip.motion.duration
     if clip.gesture is None:
-        return Timeline(tuple(_label_by_speed(clip.motion)) if clip.words is None else (Span(0.0, end, clip.words),), ())
+        return Timeline(tuple(_label_by_speed(clip.motion)) if clip.words is None else (Span(0.0, end, clip.words),),
+                        ())
     start, stop = round(clip.gesture.start, 2), round(min(clip.gesture.end, end), 2)
     around = [s for s in _label_by_speed(clip.motion) if s.end <= start + 0.5 or s.start >= stop - 0.5]
     around = [
@@ -317,7 +326,8 @@ def _dribble_ball(times: np.ndarray, path: np.ndarray, begin: float, end: float)
     return np.column_stack([place, np.full(len(times), BALL_RADIUS)])
 
 
-def add_tracking_noise(times: np.ndarray, positions: np.ndarray, seed: int, slow: float = 0.08, fast: float = 0.01) -> np.ndarray:
+def add_tracking_noise(times: np.ndarray, positions: np.ndarray, seed: int, slow: float = 0.08,
+                       fast: float = 0.01) -> np.ndarray:
     """Add the noise of a tracking system.
 
     Optical systems have 8 to 9 cm against truth, and about 1 cm between frames.

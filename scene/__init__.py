@@ -7,7 +7,7 @@ There is one package for each feature, described in its own docstring; docs/arch
 from .core import registration, session
 from .core.live import start_watching, stop_watching
 from .markers import solve
-from .match import child
+from .match import command_process as child
 
 
 def register():

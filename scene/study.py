@@ -12,13 +12,13 @@ import bpy
 import numpy as np
 from mathutils import Vector
 
-from ..beyond_mocap.files.whole import atomic_path, atomic_folder
+from ..beyond_mocap.files.atomic import atomic_folder, atomic_path
 from ..beyond_mocap.motion.motion import Motion
 from ..beyond_mocap.motion.track.ball_path import BallPath
 from .core import action, channels
 from .core.material import get_material
 from .core.measure import frames_per_second, whole_frames
-from .core.set_aside import use_temporary_scene
+from .core.saved_state import use_temporary_scene
 from .rigs import armature
 from .stage import ball, body
 
@@ -62,7 +62,8 @@ def render_motion(path: Path, motion: Motion, ball_path: BallPath | None, look: 
         scene.frame_start, scene.frame_end = 1, 1 + int(motion.duration * look.fps + 1e-4)
         _create_player(scene, motion)
         if ball_path is not None:
-            ball.write_trajectory(ball.create_ball(bpy.context, "Ball", scene.collection), ball_path, scene, float(scene.frame_start))
+            ball.write_trajectory(ball.create_ball(bpy.context, "Ball", scene.collection), ball_path, scene,
+                                  float(scene.frame_start))
         _create_floor(scene, motion)
         _create_light(scene)
         _create_camera(scene, motion)

@@ -10,5 +10,6 @@ import pathlib
 if (os.cpu_count() or 1) <= 4:  # on few cores, waiting threads cost more time than they save
     os.environ.setdefault("XLA_FLAGS", "--xla_cpu_multi_thread_eigen=false intra_op_parallelism_threads=1")
 # Compiling takes longer than a small training, so compiled code is cached.
-_COMPILATION_CACHE = pathlib.Path(os.environ.get("XDG_CACHE_HOME", pathlib.Path.home() / ".cache")) / "beyond-mocap" / "compiled"
+_COMPILATION_CACHE = pathlib.Path(os.environ.get("XDG_CACHE_HOME", pathlib.Path.home()
+                                                 / ".cache")) / "beyond-mocap" / "compiled"
 os.environ.setdefault("JAX_COMPILATION_CACHE_DIR", str(_COMPILATION_CACHE))

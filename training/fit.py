@@ -23,8 +23,8 @@ import jax.numpy as jnp
 import numpy as np
 import optax
 
-from beyond_mocap.base.errors import UserCancelledError, InputError
-from beyond_mocap.files.whole import atomic_path
+from beyond_mocap.base.errors import InputError, UserCancelledError
+from beyond_mocap.files.atomic import atomic_path
 
 from .config import TrainingConfig
 
@@ -149,7 +149,8 @@ def fit(
         if cancelled():
             save_checkpoint()
             raise UserCancelledError(f"cancelled after {epoch} epochs" + ("; --resume continues" if checkpoint else ""))
-        state, parts = _train_epoch(problem, config, steps, state, epoch, problem.count_frames(share), compute_rate(share, config))
+        state, parts = _train_epoch(problem, config, steps, state, epoch, problem.count_frames(share),
+                                    compute_rate(share, config))
         losses, epoch = (*losses, parts["loss"]), epoch + 1
         if not np.isfinite(losses[-1]):
             raise InputError("training", f"the loss is not finite after {epoch} epochs", "a lower learning_rate")
@@ -193,7 +194,8 @@ def _compile_step(problem: Problem, adam):
     @partial(jax.jit, static_argnames="frames", donate_argnums=0)
     def step(state, data, rows, key, rate, frames: int):
         params, optimizer = state
-        (loss, parts), gradient = jax.value_and_grad(problem.compute_loss, has_aux=True)(params, data, rows, key, frames)
+        (loss, parts), gradient = jax.value_and_grad(problem.compute_loss, has_aux=True)(params, data, rows, key,
+                frames)
         updates, optimizer = adam.update(gradient, optimizer, params)
         params = jax.tree.map(lambda p, u: p - rate * u, params, updates)
         return (params, optimizer), {"loss": loss, **parts}
@@ -281,7 +283,8 @@ def read_checkpoint(path: Path, like: object, fits: str) -> Checkpoint:
     if version != VERSION:
         raise InputError(path, f"version {version}", f"version {VERSION}", NEXT_STEP)
     expected_leaves, tree = jax.tree.flatten(like)
-    if trained != fits or [(a.shape, a.dtype) for a in leaves] != [(b.shape, b.dtype) for b in map(np.asarray, expected_leaves)]:
+    if trained != fits or [(a.shape, a.dtype) for a in leaves] != [(b.shape, b.dtype)
+                                                                   for b in map(np.asarray, expected_leaves)]:
         raise InputError(path, "belongs to a training with other settings or recordings", "", NEXT_STEP)
     state = jax.tree.unflatten(tree, [jnp.asarray(leaf) for leaf in leaves])
     return Checkpoint(state, int(epoch), float(seconds), losses, fits)

@@ -13,20 +13,29 @@ import jax.numpy as jnp
 import numpy as np
 
 from beyond_mocap.base.errors import InputError
-from beyond_mocap.throws.networks.answers import apply_output, compute_end_positions, build_output
 from beyond_mocap.throws.networks.chains import LIMB_OF, Chains
 from beyond_mocap.throws.networks.description import Windows
-from beyond_mocap.throws.networks.features import count_guides, build_input, compute_phase
+from beyond_mocap.throws.networks.features import build_input, compute_phase, count_guides
 from beyond_mocap.throws.networks.kinematics import Pose
-from beyond_mocap.throws.networks.limb_reach import reach_limb, find_hinge_axes
+from beyond_mocap.throws.networks.limb_reach import find_hinge_axes, reach_limb
 from beyond_mocap.throws.networks.limits import JointLimits
 from beyond_mocap.throws.networks.model import SINGLE, ModelSettings
 from beyond_mocap.throws.networks.network import forward
+from beyond_mocap.throws.networks.network_output import apply_output, build_output, compute_end_positions
 from beyond_mocap.throws.networks.phases import weigh_points
 
 from .config import TrainingConfig
-from .networks import ARRAYS, RIDGES, LinearOutput, RegressionSums, build_first_weights, fit_linear, compute_scales, compute_sums
-from .recordings import Recordings, disturb_poses, sample_noise, build_single_steps, build_step_arrays
+from .networks import (
+    ARRAYS,
+    RIDGES,
+    LinearOutput,
+    RegressionSums,
+    build_first_weights,
+    compute_scales,
+    compute_sums,
+    fit_linear,
+)
+from .recordings import Recordings, build_single_steps, build_step_arrays, disturb_poses, sample_noise
 
 DROPOUT_NETWORKS = (SINGLE, "hip", "body")
 """Networks that are trained with dropout (section 7.6)."""
@@ -74,7 +83,8 @@ def _compute_mean_square(errors):
 
 def compute_weight_size(params) -> jax.Array:
     """Compute the second term of eq. 7.4 without its lambda: the mean absolute weight, averaged over the networks."""
-    weights = [jnp.mean(jnp.concatenate_motions([jnp.abs(w).ravel() for w in one["weights"]])) for one in params.values()]
+    weights = [jnp.mean(jnp.concatenate_motions([jnp.abs(w).ravel() for w in one["weights"]]))
+               for one in params.values()]
     return jnp.mean(jnp.stack(weights))
 
 
@@ -113,7 +123,8 @@ class TrainingProblem:
         disturbed_steps = None  # the same steps from disturbed poses
         if config.linear_start and config.start_noise:
             noise = sample_noise(chains, len(steps.pose.root), config.start_noise, config.seed)
-            disturbed_steps = steps._replace(pose=disturb_poses(chains, steps.pose, *(one.astype(np.float32) for one in noise)))
+            disturbed_steps = steps._replace(pose=disturb_poses(chains, steps.pose,
+                                                                *(one.astype(np.float32) for one in noise)))
         for name in self.settings.networks:
             x, y, phase = build_step_arrays(name, chains, self.settings, steps, leg_reach)
             (mean_x, scale_x), (mean_y, scale_y) = compute_scales(x), compute_scales(y)
@@ -140,7 +151,7 @@ class TrainingProblem:
         for rows in (~is_held_out, is_held_out):
             every = [
                 compute_sums((x[rows] - scales["input_mean"]) / scales["input_scale"],
-                     (y[rows] - scales["output_mean"]) / scales["output_scale"], theta[rows], guided)
+                             (y[rows] - scales["output_mean"]) / scales["output_scale"], theta[rows], guided)
                 for x, y in parts
             ]  # fmt: skip
             found.append(every[0] if len(every) == 1 else every[0].add_sums(every[1]))

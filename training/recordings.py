@@ -14,13 +14,13 @@ import numpy as np
 from beyond_mocap.base.digest import hex_digest
 from beyond_mocap.base.errors import InputError
 from beyond_mocap.base.vectors import skew_matrix
-from beyond_mocap.throws.networks.answers import build_output
 from beyond_mocap.throws.networks.chains import Chains
 from beyond_mocap.throws.networks.description import Windows, build_windows
 from beyond_mocap.throws.networks.example import Example, build_description, compute_poses
 from beyond_mocap.throws.networks.features import build_input, compute_phase
 from beyond_mocap.throws.networks.kinematics import Pose, compute_world_transforms
 from beyond_mocap.throws.networks.model import ModelSettings
+from beyond_mocap.throws.networks.network_output import build_output
 from beyond_mocap.throws.networks.training_set import Steps
 
 HEADING_NOISE = 5.0
@@ -130,9 +130,11 @@ def disturb_poses(chains: Chains, pose: Pose, vectors, facing, shift, xp=np) -> 
     skeleton, hips = chains.skeleton, pose.positions[..., chains.hips, :]
     about = to_rotations(facing[..., None] * np.array([0.0, 0.0, 1.0], dtype=pose.root.dtype), xp)
     local = xp.matmul(pose.local, to_rotations(vectors, xp))
-    local = xp.concatenate_motions([xp.matmul(about, local[..., 0, :, :])[..., None, :, :], local[..., 1:, :, :]], axis=-3)
+    local = xp.concatenate_motions([xp.matmul(about, local[..., 0, :, :])[..., None, :, :], local[..., 1:, :, :]],
+                                   axis=-3)
     root = hips + xp.matmul(about, (pose.root - hips)[..., None])[..., 0] + shift
-    positions, turns = compute_world_transforms(skeleton.offsets.astype(pose.root.dtype), skeleton.parents, root, local, xp)
+    positions, turns = compute_world_transforms(skeleton.offsets.astype(pose.root.dtype), skeleton.parents, root, local,
+                                                xp)
     return Pose(root, local, positions, turns, pose.moved)
 
 

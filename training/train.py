@@ -13,7 +13,7 @@ from pathlib import Path
 import jax
 import numpy as np
 
-from beyond_mocap.base.errors import UserCancelledError, InputError
+from beyond_mocap.base.errors import InputError, UserCancelledError
 from beyond_mocap.cli.outputs import ProgressReporter, check_outputs
 from beyond_mocap.files.bvh import bvh
 from beyond_mocap.motion.skeleton import Skeleton
@@ -23,11 +23,16 @@ from beyond_mocap.throws.networks.example import Example, build_description
 from beyond_mocap.throws.networks.generate import Options, generate_motion
 from beyond_mocap.throws.networks.limits import JointLimits, estimate_joint_limits
 from beyond_mocap.throws.networks.model import ThrowModel
-from beyond_mocap.throws.networks.training_set import measure_leg_reach, build_reference_curve, find_shared_chains, add_mirror_images
+from beyond_mocap.throws.networks.training_set import (
+    add_mirror_images,
+    build_reference_curve,
+    find_shared_chains,
+    measure_leg_reach,
+)
 from beyond_mocap.throws.throw_examples import read_examples
 
 from .config import TrainingConfig, read_config
-from .fit import TrainingResult, check_checkpoint, build_checkpoint_path, fit
+from .fit import TrainingResult, build_checkpoint_path, check_checkpoint, fit
 from .hierarchy import TrainingProblem
 from .networks import RIDGES, to_phase_network
 from .recordings import build_recordings
@@ -65,22 +70,25 @@ def train(
     training_examples = add_mirror_images(examples) if config.mirrored else list(examples)
     reference = build_reference_curve(training_examples) if settings.phase == "warped" else None
     reach = measure_leg_reach(training_examples)
-    limits = estimate_joint_limits(np.concatenate([one.motion.rotations for one in training_examples]), (0, *chains.above, chains.hips))
+    limits = estimate_joint_limits(np.concatenate([one.motion.rotations for one in training_examples]),
+                                   (0, *chains.above, chains.hips))
     is_held_out = select_held_out(training_examples)
-    problem = TrainingProblem(build_recordings(training_examples, reference), chains, config, reach, JointLimits(chains.skeleton, limits), is_held_out)
+    problem = TrainingProblem(build_recordings(training_examples, reference), chains, config, reach,
+                              JointLimits(chains.skeleton, limits), is_held_out)
 
     def build_model(params: dict, line: str) -> ThrowModel:
         return ThrowModel(
             settings=settings, skeleton=chains.skeleton,
-            networks={name: to_phase_network(params[name], problem.scales[name]) for name in settings.networks}, leg_reach=reach,
-            examples=select_spread(examples, config.examples),
+            networks={name: to_phase_network(params[name], problem.scales[name]) for name in settings.networks},
+            leg_reach=reach, examples=select_spread(examples, config.examples),
             stature=float(np.mean([example.stature for example in examples])), joint_limits=limits, reference=reference,
             trained_on=line,
         )
 
     if config.linear_start and not config.ridge:
         progress(0.0, "choosing the start")
-        problem.ridge = choose_ridge(problem, [one for one, out in zip(training_examples, is_held_out) if out], build_model, cancelled)
+        problem.ridge = choose_ridge(problem, [one for one, out in zip(training_examples, is_held_out) if out],
+                                     build_model, cancelled)
     trained = fit(
         problem, config, checkpoint=checkpoint, resume=resume, minutes=minutes, progress=progress, cancelled=cancelled,
     )
@@ -225,7 +233,8 @@ def _read_selected(options, config: TrainingConfig, report: ProgressReporter, sk
 
     settings = config.settings
     found = read_examples(
-        options.folder, settings.action, settings.fps, skeleton, report.show_note, progress=progress, cancelled=report.is_cancelled,
+        options.folder, settings.action, settings.fps, skeleton, report.show_note, progress=progress,
+        cancelled=report.is_cancelled,
     )
     chosen = [example for example in found if not options.subject or example.subject in options.subject]
     there = sorted({example.subject for example in found})

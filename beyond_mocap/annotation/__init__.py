@@ -18,7 +18,14 @@
 """
 
 from .clips import ClipAnnotation, build_clip_annotations, read_annotation_csv, read_clip_annotations
-from .gaits import LOCOMOTION, LOCOMOTION_LABELS, STANDING_SPEED, choose_gaits, compute_gait_thresholds, estimate_gait_thresholds
+from .gaits import (
+    LOCOMOTION,
+    LOCOMOTION_LABELS,
+    STANDING_SPEED,
+    choose_gaits,
+    compute_gait_thresholds,
+    estimate_gait_thresholds,
+)
 from .text import format_timeline, parse_timeline, read_text, read_timeline
 from .timeline import (
     AVOID_PREFIX,
@@ -26,11 +33,11 @@ from .timeline import (
     Span,
     Timeline,
     avoided_labels_per_frame,
+    check_timeline,
     fill_timeline,
     find_missing_keys,
     find_problems,
     format_labels,
-    check_timeline,
     labels_per_frame,
 )
 from .vocabulary import (
@@ -41,17 +48,17 @@ from .vocabulary import (
     find_nearest_labels,
     find_relatives,
     find_similar_labels,
+    list_labels_below,
+    list_vocabulary,
     sort_labels,
     swap_sides,
-    list_vocabulary,
-    list_labels_below,
 )
 
 __all__ = [
     "CONTINUOUS", "DISCRETE", "LOCOMOTION", "LOCOMOTION_LABELS", "AVOID_PREFIX", "STANDING_SPEED", "TRANSITION",
     "VOCABULARY", "ClipAnnotation", "KeyMoment", "Span", "Timeline", "choose_gaits", "avoided_labels_per_frame",
-    "build_clip_annotations", "fill_timeline", "format_timeline", "compute_gait_thresholds", "find_missing_keys", "find_nearest_labels", "parse_timeline",
-    "find_problems", "estimate_gait_thresholds", "read_annotation_csv", "read_clip_annotations", "read_text", "read_timeline",
-    "find_relatives", "find_similar_labels", "format_labels", "sort_labels", "swap_sides", "check_timeline", "list_vocabulary", "list_labels_below",
-    "labels_per_frame",
+    "build_clip_annotations", "fill_timeline", "format_timeline", "compute_gait_thresholds", "find_missing_keys",
+    "find_nearest_labels", "parse_timeline", "find_problems", "estimate_gait_thresholds", "read_annotation_csv",
+    "read_clip_annotations", "read_text", "read_timeline", "find_relatives", "find_similar_labels", "format_labels",
+    "sort_labels", "swap_sides", "check_timeline", "list_vocabulary", "list_labels_below", "labels_per_frame",
 ]

@@ -18,7 +18,7 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 
 from .labels import list_labels
-from .vocabulary import SIDES, TRANSITION, VOCABULARY, find_nearest_labels, find_relatives, sort_labels, list_vocabulary
+from .vocabulary import SIDES, TRANSITION, VOCABULARY, find_nearest_labels, find_relatives, list_vocabulary, sort_labels
 
 PAGE_SIZE = 9
 """Number keys on one page."""
@@ -102,7 +102,8 @@ def list_options(walk: TreeChoices, available: LibraryCombinations | None = None
     Returns:
         The options by page and digit.
     """
-    return tuple(_build_option(label, place, walk, available) for place, label in enumerate(_place_labels(walk, available)) if label)
+    return tuple(_build_option(label, place, walk, available) for place,
+                 label in enumerate(_place_labels(walk, available)) if label)
 
 
 def count_pages(walk: TreeChoices, available: LibraryCombinations | None = None) -> int:
@@ -178,7 +179,8 @@ def find_alternative(labels: Iterable[str], kind: str, available: LibraryCombina
     """
     requested = frozenset(labels)
     related = requested.union(*(find_relatives(word) for word in requested))
-    found = find_nearest_labels(requested, [combination for combination in available.list_combinations(kind) if combination & related], 1)
+    found = find_nearest_labels(requested, [combination for combination in available.list_combinations(kind)
+                                            if combination & related], 1)
     return sort_labels(found[0]) if found else ()
 
 
@@ -211,7 +213,8 @@ def _place_labels(walk: TreeChoices, available: LibraryCombinations | None) -> l
     next_labels = [word for word in _list_next_labels(walk) if word not in (*SIDES, *last)]
     room = PAGE_SIZE - len(SIDES) - len(last)
     first = [*SIDES, *next_labels[:room], *[None] * (room - len(next_labels)), *last]
-    more = dict.fromkeys((*next_labels[room:], *_MORE_MODIFIERS[walk.kind], *_list_branch_labels(walk), *library_labels))
+    more = dict.fromkeys((*next_labels[room:], *_MORE_MODIFIERS[walk.kind], *_list_branch_labels(walk),
+                          *library_labels))
     return [*first, *(word for word in more if word not in first)]
 
 
@@ -233,7 +236,8 @@ def _list_library_labels(walk: TreeChoices, available: LibraryCombinations | Non
     if available is None:
         return []
     root = {walk.steps[0]} - {None} if walk.steps else set()
-    labels = frozenset().union(*(combination for combination in available.list_combinations(walk.kind) if root <= combination))
+    labels = frozenset().union(*(combination for combination in available.list_combinations(walk.kind) if root
+                                 <= combination))
     return sorted(labels - list_vocabulary() - root)
 
 

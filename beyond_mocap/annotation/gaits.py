@@ -132,7 +132,8 @@ def compute_heading_offset(track: SampledTrack) -> np.ndarray:
     ball_offset = track.ball[:, :2] - track.positions
     known = np.isfinite(ball_offset).all(axis=1)
     distance = np.linalg.norm(np.where(known[:, None], ball_offset, 1.0), axis=1)
-    share = np.where(known, np.clip((distance - _FACING_DISTANCES[0]) / (_FACING_DISTANCES[1] - _FACING_DISTANCES[0]), 0.0, 1.0), 0.0)
+    share = np.where(known, np.clip((distance - _FACING_DISTANCES[0]) / (_FACING_DISTANCES[1] - _FACING_DISTANCES[0]),
+                                    0.0, 1.0), 0.0)
     to_ball = arctan2(ball_offset[:, 1], ball_offset[:, 0])
     offset = np.where(known, quaternion.wrap_angle(to_ball - track.direction), 0.0) * share
     limit = np.interp(track.speed, _SPEEDS, _MAX_OFFSETS)

@@ -119,7 +119,8 @@ def list_labels(**required: object) -> tuple[str, ...]:
     Returns:
         Their names in the table's order.
     """
-    matches = ((label.name, all(getattr(label, key) == value for key, value in required.items())) for label in _list_rows())
+    matches = ((label.name, all(getattr(label, key) == value for key, value in required.items()))
+               for label in _list_rows())
     return tuple(name for name, is_match in matches if is_match)
 
 
@@ -143,9 +144,10 @@ def _parse_label(cells: dict[str, str], place: str) -> Label:
             raise InputError(place, f"{column} {cells[column]!r}", f"one of {', '.join(allowed)}, or blank")
     return Label(
         name=cells["label"], title=cells["title"], kinds=values["kind"], group=cells["group"],
-        parts=tuple("hand" if part == "hands" else part for part in values["part"]), both_hands="hands" in values["part"],
-        part_with=values["part_with"], ball=cells["ball"], gait=float(cells["gait_m_s"]) if cells["gait_m_s"] else None,
-        height=cells["height"], in_flight=bool(cells["flight"]), action=cells["action"], below=_parse_tree(cells["below"]),
+        parts=tuple("hand" if part == "hands" else part for part in values["part"]),
+        both_hands="hands" in values["part"], part_with=values["part_with"], ball=cells["ball"],
+        gait=float(cells["gait_m_s"]) if cells["gait_m_s"] else None, height=cells["height"],
+        in_flight=bool(cells["flight"]), action=cells["action"], below=_parse_tree(cells["below"]),
     )  # fmt: skip
 
 

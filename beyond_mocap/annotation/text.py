@@ -13,7 +13,7 @@ import os
 from pathlib import Path
 
 from ..base.errors import InputError, format_seconds
-from .timeline import LONGEST_TIME, AVOID_PREFIX, NUMBER, KeyMoment, Span, Timeline, format_labels
+from .timeline import AVOID_PREFIX, LONGEST_TIME, NUMBER, KeyMoment, Span, Timeline, format_labels
 
 _EXPECTED_FORM = "'START END labels...' or 'TIME labels...'"
 _LARGEST_FILE = 16 * 1024 * 1024
@@ -72,7 +72,8 @@ def format_timeline(timeline: Timeline) -> str:
     Returns:
         One line per span and key moment, in seconds, by time.
     """
-    lines = [(span.start, f"{_format_exact(span.start)} {_format_exact(span.end)}", format_labels(span)) for span in timeline.spans]
+    lines = [(span.start, f"{_format_exact(span.start)} {_format_exact(span.end)}", format_labels(span))
+             for span in timeline.spans]
     lines += [(key.time, _format_exact(key.time), format_labels(key)) for key in timeline.keys]
     lines.sort(key=lambda line: line[0])
     return "".join(" ".join((times, *words)) + "\n" for _, times, words in lines)

@@ -10,7 +10,15 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from ..base.errors import InputError, format_seconds
-from .vocabulary import CONTINUOUS, DISCRETE, TRANSITION, find_nearest_labels, find_similar_labels, list_vocabulary, list_labels_below
+from .vocabulary import (
+    CONTINUOUS,
+    DISCRETE,
+    TRANSITION,
+    find_nearest_labels,
+    find_similar_labels,
+    list_labels_below,
+    list_vocabulary,
+)
 
 NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)(e[+-]?\d+)?f?", re.IGNORECASE)
 """What the text form reads as a time; no label may look like one."""
@@ -41,7 +49,8 @@ def check_labels(labels: Iterable[str], where: str) -> tuple[str, ...]:
     """
     out = tuple(dict.fromkeys(str(label).lower() for label in labels))
     for label in out:
-        if not label or "#" in label or label.startswith(AVOID_PREFIX) or label.split() != [label] or NUMBER.fullmatch(label):
+        if not label or "#" in label or label.startswith(AVOID_PREFIX) or label.split() != [label] or NUMBER.fullmatch(
+                label):
             expected = f"a label without blanks and '#' that is not a number and does not begin with '{AVOID_PREFIX}'"
             raise InputError(where, f"{label!r} is not a label", expected)
     return out
@@ -194,7 +203,8 @@ def fill_timeline(timeline: Timeline, times: np.ndarray, labels: Sequence[tuple[
     if not len(times):
         return timeline
     labelled = [span for span in timeline.spans if span.words]
-    automatic = [piece for start, end in _find_unlabelled_spans(labelled, times) for piece in _build_spans(start, end, times, labels)]
+    automatic = [piece for start, end in _find_unlabelled_spans(labelled, times) for piece in _build_spans(start, end,
+            times, labels)]
     return Timeline((*labelled, *automatic), timeline.keys)
 
 
@@ -279,7 +289,8 @@ def _find_label_problems(item: Span | KeyMoment, known: frozenset[str], place: s
     """Find what is wrong with the labels of a span or key moment."""
     if TRANSITION in (*item.words, *item.avoid):
         return _find_transition_problems(item, place)
-    out = [_build_unknown_label_error(word, item, known, place) for word in (*item.words, *item.avoid) if word not in known]
+    out = [_build_unknown_label_error(word, item, known, place) for word in (*item.words, *item.avoid)
+           if word not in known]
     out += [_build_contradiction_error(word, place) for word in item.words if word in item.avoid]
     if isinstance(item, KeyMoment) and not item.words:
         out.append(InputError(place, "a key moment without labels", "TIME labels...", "add labels"))
@@ -348,7 +359,8 @@ def _find_overlaps(timeline: Timeline, where: str) -> list[InputError]:
 
 
 def _describe_item(item: Span | KeyMoment) -> str:
-    times = f"{format_seconds(item.start)} {format_seconds(item.end)}" if isinstance(item, Span) else f"{format_seconds(item.time)}"
+    times = f"{format_seconds(item.start)} {format_seconds(item.end)}" if isinstance(item,
+            Span) else f"{format_seconds(item.time)}"
     return f"'{' '.join((times, *format_labels(item)))}'" + ("" if item.line is None else f" (line {item.line})")
 
 

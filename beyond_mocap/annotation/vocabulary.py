@@ -133,7 +133,8 @@ def compute_edit_distance(a: str, b: str) -> int:
     return row[-1]
 
 
-def find_nearest_labels(labels: Iterable[str], choices: Iterable[Iterable[str]], count: int = 3) -> tuple[tuple[str, ...], ...]:
+def find_nearest_labels(labels: Iterable[str], choices: Iterable[Iterable[str]],
+                        count: int = 3) -> tuple[tuple[str, ...], ...]:
     """Find the label combinations nearest to the requested labels; equal sets count once.
 
     They are ordered by the requested labels that a combination lacks (a label that names the action, like "kick",

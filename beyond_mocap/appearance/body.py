@@ -61,7 +61,8 @@ def build_body(skeleton: Skeleton, height: float | None = None, example: Motion 
     neutral = build_neutral_stance(skeleton, example)
     if example is not None and is_rest_upright(skeleton):
         neutral = _level_head(neutral, build_neutral_stance(skeleton))
-    builder = _BodyBuilder(neutral, identify_joints(skeleton), neutral.leg / ADULT_LEG if height is None else height / 1.80)
+    builder = _BodyBuilder(neutral, identify_joints(skeleton), neutral.leg / ADULT_LEG if height is None else height
+                           / 1.80)
     builder.add_torso()
     builder.add_head()
     for side, limb in ((1.0, builder.body.left), (-1.0, builder.body.right)):
@@ -189,7 +190,8 @@ class _BodyBuilder:
                 self.faces.append(tuple(int(v) for v in (face if outward else face[::-1])))
                 self.material.append(material)
 
-    def add_ellipsoid(self, centre, radii, joint: int, material: int, other: int | None = None, sides: int = 10) -> None:
+    def add_ellipsoid(self, centre, radii, joint: int, material: int, other: int | None = None,
+                      sides: int = 10) -> None:
         """Add a closed ellipsoid.
 
         Args:
@@ -303,9 +305,12 @@ class _BodyBuilder:
             self.add_tube(rings, [(joint, joint, 0.0)] * len(rings), [material] * (len(rings) - 1), 14)
         self.add_ellipsoid(base + k * np.array([0.112, 0.0, 0.016]), (0.017, 0.011, 0.020), joint, SKIN, sides=6)
         for side in (1.0, -1.0):
-            self.add_ellipsoid(base + k * np.array([0.010, side * 0.073, 0.022]), (0.016, 0.009, 0.026), joint, SKIN, sides=6)
-            self.add_ellipsoid(base + k * np.array([0.0975, side * 0.028, 0.042]), (0.008, 0.011, 0.006), joint, HAIR, sides=6)
-            self.add_ellipsoid(base + k * np.array([0.0985, side * 0.029, 0.061]), (0.007, 0.017, 0.0045), joint, HAIR, sides=6)
+            self.add_ellipsoid(base + k * np.array([0.010, side * 0.073, 0.022]), (0.016, 0.009, 0.026), joint, SKIN,
+                               sides=6)
+            self.add_ellipsoid(base + k * np.array([0.0975, side * 0.028, 0.042]), (0.008, 0.011, 0.006), joint, HAIR,
+                               sides=6)
+            self.add_ellipsoid(base + k * np.array([0.0985, side * 0.029, 0.061]), (0.007, 0.017, 0.0045), joint, HAIR,
+                               sides=6)
 
     # -- limbs
     # ----------------------------------------------------------------------------------------------------------
@@ -344,8 +349,8 @@ class _BodyBuilder:
         )
         self.add_limb_tube(*bones, table, 12)
         self.add_ellipsoid(
-            self.joint_position(limb.lower_leg) + self.scale * np.array([0.006, 0, 0]), (0.054, 0.050, 0.056), bones[0], SKIN,
-            bones[1],
+            self.joint_position(limb.lower_leg) + self.scale * np.array([0.006, 0, 0]), (0.054, 0.050, 0.056), bones[0],
+            SKIN, bones[1],
         )
         self.add_ellipsoid(self.joint_position(limb.foot), (0.039, 0.036, 0.042), limb.foot, SOCKS)
         shorts = (
@@ -393,8 +398,8 @@ class _BodyBuilder:
         )
         self.add_limb_tube(*bones, table, 10)
         self.add_ellipsoid(
-            self.joint_position(limb.lower_arm) - self.scale * np.array([0.003, 0, 0]), (0.038, 0.036, 0.04), bones[0], SKIN,
-            bones[1],
+            self.joint_position(limb.lower_arm) - self.scale * np.array([0.003, 0, 0]), (0.038, 0.036, 0.04), bones[0],
+            SKIN, bones[1],
         )
         sleeve = (
             (-0.165, 0.0, 0.020 * inner, 0.024, 0.024, SHIRT), (-0.14, 0.0, 0.016 * inner, 0.044, 0.042, SHIRT),

@@ -11,7 +11,7 @@ import numpy as np
 from ..base.vectors import unit_vectors
 from ..motion.humanoid import compute_heading_from_positions
 from ..motion.motion import Motion, forward_kinematics, place_motion
-from .body import MATERIALS, deform_body, build_body
+from .body import MATERIALS, build_body, deform_body
 
 COLOURS = {
     "skin": (0.75, 0.55, 0.43), "shirt": (0.78, 0.16, 0.14), "shorts": (0.92, 0.92, 0.90), "socks": (0.16, 0.24, 0.59),
@@ -47,7 +47,8 @@ def render_pose(motion: Motion, frame: int, size: int = 256) -> np.ndarray:
     pixels = np.stack([both @ across, both @ up], axis=1)
     span = float(np.ptp(pixels, axis=0).max())
     canvas_size = 2 * size
-    pixels = (pixels - pixels.min(axis=0) - 0.5 * np.ptp(pixels, axis=0)) * (canvas_size * (1.0 - 2.0 * _MARGIN) / span) + 0.5 * canvas_size
+    pixels = (pixels - pixels.min(axis=0) - 0.5 * np.ptp(pixels, axis=0)) * (canvas_size * (1.0 - 2.0 * _MARGIN)
+                                                                             / span) + 0.5 * canvas_size
     quads = np.array([face if len(face) == 4 else (*face, face[-1]) for face in body.faces])
     canvas = np.zeros((canvas_size, canvas_size, 4))
     _draw_faces(canvas, skin, pixels, quads=quads, material=np.asarray(body.material), to_camera=to_camera)

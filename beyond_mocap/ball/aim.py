@@ -65,9 +65,10 @@ class AimResult:
     possible: np.ndarray
 
 
-def solve_launches(start: np.ndarray, target: np.ndarray, ball: Ball, seconds: np.ndarray | None = None, bounces: int = 0,
-        spin: np.ndarray | None = None, fastest: float | None = None, initial_velocity: np.ndarray | None = None,
-        ground: float = 0.0, loft: float | None = None, initial_seconds: np.ndarray | None = None) -> AimResult:
+def solve_launches(start: np.ndarray, target: np.ndarray, ball: Ball, seconds: np.ndarray | None = None,
+                   bounces: int = 0, spin: np.ndarray | None = None, fastest: float | None = None,
+                   initial_velocity: np.ndarray | None = None, ground: float = 0.0, loft: float | None = None,
+                   initial_seconds: np.ndarray | None = None) -> AimResult:
     """Solve launches after which the ball's centre is at `target` after exactly `bounces` bounces.
 
     `start`, `target` and `spin` may have the shape (3,): the same for all B. Starts and targets below the height of a
@@ -112,7 +113,7 @@ def solve_launches(start: np.ndarray, target: np.ndarray, ball: Ball, seconds: n
 
 
 def solve_ground_launches(start: np.ndarray, target: np.ndarray, ball: Ball, seconds: np.ndarray | None = None,
-                 arrival_speed: float = 2.0, fastest: float | None = None, ground: float = 0.0) -> AimResult:
+                          arrival_speed: float = 2.0, fastest: float | None = None, ground: float = 0.0) -> AimResult:
     """Solve level launches for balls that slide and roll along the ground to `target`.
 
     Args:
@@ -146,7 +147,7 @@ def solve_ground_launches(start: np.ndarray, target: np.ndarray, ball: Ball, sec
 
 
 def build_reach_error(start: np.ndarray, target: np.ndarray, result: AimResult, index: int, fastest: float,
-                 subject: str) -> InputError:
+                      subject: str) -> InputError:
     """Build the error that explains why a launch is not possible: distance, required speed and human limit.
 
     Args:
@@ -177,7 +178,8 @@ def _solve_problem(problem: _Problem, initial_velocity: np.ndarray | None) -> tu
     Start from the given launches, then from first guesses, then from a search, each only for launches that still miss.
     """
     count = len(problem.start)
-    velocity = np.full((count, 3), np.nan) if initial_velocity is None else np.broadcast_to(initial_velocity, (count, 3)).astype(float)
+    velocity = np.full((count, 3), np.nan) if initial_velocity is None else np.broadcast_to(initial_velocity,
+            (count, 3)).astype(float)
     miss = np.full(count, np.inf)
     known = np.flatnonzero(np.isfinite(velocity).all(axis=1))
     if len(known):
@@ -299,12 +301,14 @@ class _Problem:
         # Scale the level speed until the ball covers the level distance to the target.
         for _ in range(3):
             place, bounces = many.simulate_arrival(np.column_stack([level, upward]))
-            distance_share = np.sum((place - many.start)[:, :2] * offset, axis=1) / np.maximum(np.sum(offset * offset, axis=1), 1e-9)
+            distance_share = np.sum((place - many.start)[:, :2] * offset,
+                                    axis=1) / np.maximum(np.sum(offset * offset, axis=1), 1e-9)
             level = level * np.clip(1.0 / np.maximum(distance_share, 1e-2), 0.3, 3.0)[:, None]
             level /= np.maximum(vector_length(np.column_stack([level, 0.0 * upward])) / MAX_INITIAL_SPEED, 1.0)[:, None]
         place, bounces = many.simulate_arrival(np.column_stack([level, upward]))
         # Launches with the wrong number of bounces cannot win.
-        short = np.where(bounces == self.bounces, vector_length(place - many.target), np.inf).reshape(count, UPWARD_SAMPLES)
+        short = np.where(bounces == self.bounces, vector_length(place - many.target), np.inf).reshape(count,
+                UPWARD_SAMPLES)
         best = np.arange(count) * UPWARD_SAMPLES + np.argmin(short, axis=1)
         return np.column_stack([level, upward])[best]
 
@@ -341,7 +345,8 @@ def _solve_newton(problem: _Problem, guess: np.ndarray) -> tuple[np.ndarray, np.
         slope[now] += _compute_broyden_update(slope[now], step, short[now] - new_short)
         # A launch with the wrong number of bounces has an infinite miss: judge it by its distance instead.
         lost = np.isinf(miss[now])
-        better = np.where(lost, ~np.isinf(new_miss) | (vector_length(new_short) < vector_length(short[now])), new_miss < miss[now])
+        better = np.where(lost, ~np.isinf(new_miss) | (vector_length(new_short) < vector_length(short[now])),
+                          new_miss < miss[now])
         stale[now] = ~better | (new_miss > 0.3 * miss[now])
         stuck[now] = np.where(better & (lost | (new_miss < 0.9 * miss[now])), 0, stuck[now] + 1)
         improved = now[better]
@@ -389,14 +394,17 @@ def _choose_times(problem: _Problem, loft: float | None, initial_seconds: np.nda
 
     Looks at FREE_TIMES (or at `initial_seconds`) first, then at times near the best one.
     """
-    coarse = initial_seconds if initial_seconds is not None else _choose_best_time(problem, np.tile(FREE_TIMES, (len(problem.start), 1)), loft)
+    coarse = initial_seconds if initial_seconds is not None else _choose_best_time(problem,
+                                                                                   np.tile(FREE_TIMES,
+            (len(problem.start), 1)), loft)
     return _choose_best_time(problem, coarse[:, None] * np.linspace(0.9, 1.1, 11), loft)
 
 
 def _choose_best_time(problem: _Problem, times: np.ndarray, loft: float | None) -> np.ndarray:
     """Choose the best (B,) s of each row of `times` (B, N) s."""
     count, each = times.shape
-    launch, found = problem.select_rows(np.repeat(np.arange(count), each)).with_seconds(times.ravel()).estimate_launches()
+    launch, found = problem.select_rows(np.repeat(np.arange(count),
+                                                  each)).with_seconds(times.ravel()).estimate_launches()
     cost = vector_length(launch)
     if loft is not None:
         cost = np.abs(arctan2(launch[:, 2], vector_length(launch * [1.0, 1.0, 0.0])) - loft)
@@ -480,5 +488,6 @@ def _solve_ground_times(ball: Ball, distance: np.ndarray, arrival_speed: float) 
 def _build_ground_table(ball: Ball) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Build times (T,) s, and distances m and remaining speeds m/s (S, T) of level launches with rising speed."""
     times, speeds = np.linspace(0.0, 10.0, 41), np.geomspace(0.3, 60.0, 28)
-    positions, velocities = batch.simulate_trajectories([0.0, 0.0, ball.radius], speeds[:, None] * [1.0, 0.0, 0.0], None, ball, times)
+    positions, velocities = batch.simulate_trajectories([0.0, 0.0, ball.radius], speeds[:, None] * [1.0, 0.0, 0.0],
+                                                        None, ball, times)
     return times, positions[:, :, 0], velocities[:, :, 0]

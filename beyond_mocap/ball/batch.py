@@ -13,7 +13,17 @@ from dataclasses import dataclass
 import numpy as np
 
 from .flight import MIN_HOP_SPEED, MIN_SLIP_SPEED
-from .physics import Ball, compute_bounce, compute_grip, compute_air_acceleration, vector_length, compute_rolling_spin, compute_sliding, compute_slip, compute_deceleration
+from .physics import (
+    Ball,
+    compute_air_acceleration,
+    compute_bounce,
+    compute_deceleration,
+    compute_grip,
+    compute_rolling_spin,
+    compute_sliding,
+    compute_slip,
+    vector_length,
+)
 
 STEP = 0.12
 """s: the longest step of a flight without a closed form."""
@@ -48,7 +58,7 @@ class Balls:
 
 
 def build_balls(position: np.typing.ArrayLike, velocity: np.ndarray, spin: np.ndarray | None, ball: Ball,
-             ground: float = 0.0) -> Balls:
+                ground: float = 0.0) -> Balls:
     """Build balls (B) at their launch.
 
     A ball that is too low is moved onto the ground and bounces at once if it moves down. Every argument may be (3,):
@@ -76,7 +86,7 @@ def build_balls(position: np.typing.ArrayLike, velocity: np.ndarray, spin: np.nd
 
 @np.errstate(over="ignore", invalid="ignore")  # trial launches may overflow
 def simulate_balls(balls: Balls, ball: Ball, seconds: float | np.ndarray, ground: float = 0.0,
-          most_bounces: int | None = None) -> Balls:
+                   most_bounces: int | None = None) -> Balls:
     """Simulate balls for some time.
 
     Args:
@@ -103,7 +113,7 @@ def simulate_balls(balls: Balls, ball: Ball, seconds: float | np.ndarray, ground
 
 
 def simulate_states(position: np.typing.ArrayLike, velocity: np.ndarray, spin: np.ndarray | None, ball: Ball,
-           seconds: np.ndarray, ground: float = 0.0) -> tuple[np.ndarray, np.ndarray]:
+                    seconds: np.ndarray, ground: float = 0.0) -> tuple[np.ndarray, np.ndarray]:
     """Simulate balls to one moment each. Every argument may be (3,) or one number: the same for all.
 
     Args:
@@ -120,8 +130,8 @@ def simulate_states(position: np.typing.ArrayLike, velocity: np.ndarray, spin: n
     return balls.position, balls.velocity
 
 
-def simulate_trajectories(position: np.typing.ArrayLike, velocity: np.ndarray, spin: np.ndarray | None, ball: Ball, times: np.ndarray,
-            ground: float = 0.0) -> tuple[np.ndarray, np.ndarray]:
+def simulate_trajectories(position: np.typing.ArrayLike, velocity: np.ndarray, spin: np.ndarray | None, ball: Ball,
+                          times: np.ndarray, ground: float = 0.0) -> tuple[np.ndarray, np.ndarray]:
     """Simulate balls and sample their trajectories.
 
     Args:
@@ -224,7 +234,8 @@ def _apply_bounce(balls: Balls, which: np.ndarray, ball: Ball) -> None:
     balls.bounces[which] += hops
     stay = which[~hops]
     if len(stay):
-        slides = (vector_length(compute_slip(balls.velocity[stay], balls.spin[stay], ball)) > MIN_SLIP_SPEED) & (ball.friction > 0.0)
+        slides = (vector_length(compute_slip(balls.velocity[stay], balls.spin[stay], ball))
+                  > MIN_SLIP_SPEED) & (ball.friction > 0.0)
         balls.phase[stay] = SLIDE
         _start_rolling(balls, stay[~slides], ball)
 
@@ -242,7 +253,8 @@ def _step_slide(balls: Balls, which: np.ndarray, steps: np.ndarray, ball: Ball, 
     before = compute_slip(velocity, spin, ball)
     faster, turning = compute_sliding(velocity, spin, ball)
     # The slip shrinks at an almost constant rate: its size now gives the time until the ball rolls.
-    shrinks = -np.einsum("bi,bi->b", compute_slip(faster, turning, ball), before) / np.maximum(vector_length(before), 1e-12)
+    shrinks = -np.einsum("bi,bi->b", compute_slip(faster, turning, ball), before) / np.maximum(vector_length(before),
+            1e-12)
     until = vector_length(before) / np.maximum(shrinks, 1e-12)
     taken = np.minimum(np.minimum(steps, SLIDE_STEP), until)
     h = taken[:, None]
@@ -270,7 +282,8 @@ def _step_roll(balls: Balls, which: np.ndarray, steps: np.ndarray, ball: Ball, l
     balls.position[which] += along * (taken * speed - taken**2 * (one + two + three) / 6.0)[:, None]
     balls.velocity[which] = along * slower[:, None]
     decayed = balls.spin[which] * np.exp(-ball.spin_decay * taken)[:, None]
-    balls.spin[which] = compute_rolling_spin(balls.velocity[which], ball) + decayed * [0, 0, 1] if ball.friction else decayed
+    balls.spin[which] = compute_rolling_spin(balls.velocity[which], ball) + decayed * [0, 0,
+            1] if ball.friction else decayed
     stopped = slower <= 1e-4
     balls.velocity[which[stopped]] = 0.0
     balls.phase[which[stopped]] = REST

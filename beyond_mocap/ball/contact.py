@@ -15,7 +15,7 @@ from ..base.errors import InputError
 from ..base.vectors import unit_vector, unit_vectors
 from ..motion import quaternion
 from ..motion.humanoid import compute_heading_from_positions, identify_joints
-from ..motion.motion import Motion, sample_frames, compute_pose
+from ..motion.motion import Motion, compute_pose, sample_frames
 from ..motion.skeleton import Skeleton
 from ..motion.track import BALL_RADIUS
 

@@ -16,7 +16,17 @@ import numpy as np
 
 from ..base.errors import InputError
 from ..motion import quaternion
-from .physics import Ball, compute_bounce, compute_grip, compute_air_acceleration, vector_length, compute_rolling_spin, compute_sliding, compute_slip, compute_deceleration
+from .physics import (
+    Ball,
+    compute_air_acceleration,
+    compute_bounce,
+    compute_deceleration,
+    compute_grip,
+    compute_rolling_spin,
+    compute_sliding,
+    compute_slip,
+    vector_length,
+)
 
 MIN_HOP_SPEED = 0.12
 """m/s: a ball that leaves the ground more slowly stays on it; it would rise 0.7 mm."""
@@ -321,7 +331,7 @@ def find_crossing(flight: Flight, target: np.ndarray) -> np.ndarray:
 
 
 def find_wall_impact(position: np.ndarray, velocity: np.ndarray, ball: Ball, foot: np.ndarray, ahead: np.ndarray,
-               spin: np.ndarray | tuple[float, float, float] = (0.0, 0.0, 0.0)) -> tuple[np.ndarray, float]:
+                     spin: np.ndarray | tuple[float, float, float] = (0.0, 0.0, 0.0)) -> tuple[np.ndarray, float]:
     """Find where and when a ball meets a wall, or the ground if that comes first.
 
     If it meets neither, the result is where it is after 6 s, or after 0.5 s plus four times its flight time without
@@ -340,7 +350,7 @@ def find_wall_impact(position: np.ndarray, velocity: np.ndarray, ball: Ball, foo
     unhindered = np.hypot(*(foot - position[:2])) / max(np.hypot(*velocity[:2]), 1e-9)
     free = position[2] > ball.radius or velocity[2] > MIN_HOP_SPEED  # otherwise it bounces at the launch
     flight = simulate_flight(Launch(0.0, position, velocity, spin), ball, min(_LONGEST_TO_WALL, 0.5 + 4.0 * unhindered),
-                 landing=free)
+                             landing=free)
     touches = [time for time in (*flight.bounces[:1], flight.rolls_from) if time is not None and time > _WALL_STEP]
     last = min(touches, default=flight.end)
     times = np.append(np.arange(0.0, last, _WALL_STEP), last)

@@ -159,7 +159,7 @@ def compute_slip(velocity: np.ndarray, spin: np.ndarray, ball: Ball) -> np.ndarr
 
 
 def compute_sliding(velocity: np.ndarray, spin: np.ndarray, ball: Ball,
-            ahead: np.ndarray | None = None) -> tuple[np.ndarray, np.ndarray]:
+                    ahead: np.ndarray | None = None) -> tuple[np.ndarray, np.ndarray]:
     """Compute the accelerations of balls that slide over the ground.
 
     Args:

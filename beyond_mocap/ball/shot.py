@@ -16,9 +16,9 @@ import numpy as np
 from ..annotation.striking import Surface
 from ..base.errors import InputError
 from ..base.time_series import interpolate_columns
-from ..motion.motion import Motion, sample_frames, compute_pose
+from ..motion.motion import Motion, compute_pose, sample_frames
 from . import batch
-from .aim import HIT_TOLERANCE, AimResult, solve_launches, solve_ground_launches, build_reach_error
+from .aim import HIT_TOLERANCE, AimResult, build_reach_error, solve_ground_launches, solve_launches
 from .contact import StrikeSurface, compute_ball_centre
 from .physics import Ball, vector_length
 
@@ -108,8 +108,8 @@ class Shot:
 
 
 def solve_shot(strikes: Strikes, target: np.ndarray, ball: Ball, seconds: np.ndarray | None = None, bounces: int = 0,
-          spin_turns: tuple[float, float] = (0.0, 0.0), ground: bool = False, fastest: float = np.inf,
-          previous: AimResult | None = None, subject: str = "aim") -> Shot:
+               spin_turns: tuple[float, float] = (0.0, 0.0), ground: bool = False, fastest: float = np.inf,
+               previous: AimResult | None = None, subject: str = "aim") -> Shot:
     """Solve the strike that sends a ball to a target.
 
     Args:
@@ -130,7 +130,8 @@ def solve_shot(strikes: Strikes, target: np.ndarray, ball: Ball, seconds: np.nda
     """
     target = np.asarray(target, float)
     direction = target - 0.5 * (strikes.start + strikes.end)
-    towards = direction + vector_length(direction)[:, None] * [0.0, 0.0, RISE] if previous is None else previous.velocity
+    towards = direction + vector_length(direction)[:, None] * [0.0, 0.0,
+                                                               RISE] if previous is None else previous.velocity
     initial_velocity, initial_seconds = (None, None) if previous is None else (previous.velocity, previous.seconds)
     spin = compute_spins(direction, spin_turns)
     # The ball's position depends on the launch direction: solve twice, the second time from the first directions.
@@ -139,16 +140,19 @@ def solve_shot(strikes: Strikes, target: np.ndarray, ball: Ball, seconds: np.nda
             towards = towards * [1.0, 1.0, 0.0]
         starts = strikes.place_balls(towards, ball.radius)
         if vector_length(starts - target).min() < ball.radius:
-            raise InputError(subject, "the target is where the ball is struck", "a target farther away", "move the target")
-        result = solve_ground_launches(starts, target, ball, seconds, fastest=fastest) if ground else \
-            solve_launches(starts, target, ball, seconds=seconds, bounces=bounces, spin=spin, fastest=fastest, initial_velocity=initial_velocity,
+            raise InputError(subject, "the target is where the ball is struck", "a target farther away",
+                             "move the target")
+        result = solve_ground_launches(starts, target, ball, seconds,
+                                       fastest=fastest) if ground else solve_launches(starts, target, ball,
+                seconds=seconds, bounces=bounces, spin=spin, fastest=fastest, initial_velocity=initial_velocity,
                 initial_seconds=initial_seconds)
         towards, initial_velocity, initial_seconds = result.velocity, result.velocity, result.seconds
     if ground:
         starts[:, 2] = ball.radius
     if not result.possible.any():
         best = int(np.argmin(np.where(result.miss <= HIT_TOLERANCE, vector_length(result.velocity), np.inf)))
-        raise build_reach_error(starts, np.broadcast_to(target, starts.shape), result, index=best, fastest=fastest, subject=subject)
+        raise build_reach_error(starts, np.broadcast_to(target, starts.shape), result, index=best, fastest=fastest,
+                                subject=subject)
     return Shot(strikes.frames, starts, result, _choose_launch(strikes, result))
 
 

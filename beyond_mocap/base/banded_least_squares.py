@@ -34,7 +34,8 @@ class BandedLeastSquares:
         self.band = np.zeros((unknowns * (reach + 1), count * unknowns))
         self.right = np.zeros(count * unknowns if columns is None else (count, columns))
 
-    def add_terms(self, terms: Mapping[int, np.ndarray | float], weight: np.ndarray, goal: np.ndarray | None = None) -> None:
+    def add_terms(self, terms: Mapping[int, np.ndarray | float], weight: np.ndarray, goal: np.ndarray
+                  | None = None) -> None:
         """Add sum_t weight_t (sum_i c_it x[i + unknowns t] - goal_t)^2.
 
         Args:

@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 
-def unit_vectors(vectors: np.ndarray, fallback: np.ndarray | float | None = None, min_length: float = 1e-9) -> np.ndarray:
+def unit_vectors(vectors: np.ndarray, fallback: np.ndarray | float | None = None,
+                 min_length: float = 1e-9) -> np.ndarray:
     """Normalize vectors to length one.
 
     Args:

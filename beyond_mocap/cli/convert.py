@@ -8,7 +8,7 @@ from pathlib import Path
 
 from ..base.errors import InputError
 from ..base.settings.options import add_options
-from .outputs import ProgressReporter, Writer, check_outputs, locate_errors, choose_writer
+from .outputs import ProgressReporter, Writer, check_outputs, choose_writer, locate_errors
 
 
 def add_mirror(verbs) -> argparse.ArgumentParser:
@@ -77,7 +77,7 @@ def run_retarget(options, reporter: ProgressReporter, writers: Mapping[str, Writ
         writers: further output formats, by file suffix (Blender's).
     """
     from ..files.bvh import bvh
-    from ..library.one_skeleton import retarget_clip
+    from ..library.common_skeleton import retarget_clip
 
     check_outputs(options.out, reserved=(options.input, options.to, options.map))
     choose_writer(options.out, {}, hint="")
@@ -126,7 +126,8 @@ def run_stream(options, reporter: ProgressReporter, writers: Mapping[str, Writer
     where = f"port {options.port} of this machine ({transport.upper()}, {options.form})"
     print(f"sending {options.clip.name} to {where}", flush=True)
     count = len(sender.rows)
-    sent = sender.send_file(reporter.is_cancelled, lambda frame: reporter.show_progress((frame - 1) % count / count, "Sending"))
+    sent = sender.send_file(reporter.is_cancelled, lambda frame: reporter.show_progress((frame - 1) % count / count,
+            "Sending"))
     reporter.finish()
     print(f"{sent} frames sent")
     if not options.loop:

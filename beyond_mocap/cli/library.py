@@ -143,7 +143,7 @@ def run_learning(options, reporter: ProgressReporter) -> None:
     model = classifier.read_classifier(options.learned) if options.learned else None
     if options.estimate_joint_limits:
         examples = read_examples(options.library, options.unit, reporter.show_progress, cache_dir=options.cache,
-                               cancelled=reporter.is_cancelled, on_note=reporter.show_note)
+                                 cancelled=reporter.is_cancelled, on_note=reporter.show_note)
         model = train_classifier(examples, reporter.show_progress, reporter.is_cancelled)
         classifier.write_classifier(options.estimate_joint_limits, model)
         reporter.finish()
@@ -157,7 +157,7 @@ def run_learning(options, reporter: ProgressReporter) -> None:
 
 def _write_proposals(options, model, reporter: ProgressReporter) -> tuple[int, int]:
     """Write the table of proposals; return its number of rows and the number of clips without labels."""
-    from ..files.whole import atomic_write
+    from ..files.atomic import atomic_write
     from ..library.classify.examples import iter_unlabelled_clips
     from ..library.proposals import propose_labels
 
@@ -165,13 +165,15 @@ def _write_proposals(options, model, reporter: ProgressReporter) -> tuple[int, i
     writer = csv.writer(out, lineterminator="\n")
     writer.writerow(PROPOSAL_COLUMNS)
     count = clips = 0
-    for name, motion in iter_unlabelled_clips(options.library, options.unit, reporter.show_progress, options.cache, reporter.is_cancelled):
+    for name, motion in iter_unlabelled_clips(options.library, options.unit, reporter.show_progress, options.cache,
+                                              reporter.is_cancelled):
         clips += 1
         for proposal in propose_labels(motion, classifier=model):
             row = proposal.annotation
             if proposal.confidence >= options.least:
                 key = "" if row.key is None else row.key
-                figures = (f"{motion.fps:g}", row.start, row.end, key, " ".join(row.words), f"{proposal.confidence:.2f}")
+                figures = (f"{motion.fps:g}", row.start, row.end, key, " ".join(row.words),
+                           f"{proposal.confidence:.2f}")
                 writer.writerow((name, *figures, proposal.source, proposal.why))
                 count += 1
     atomic_write(options.propose_labels, out.getvalue())

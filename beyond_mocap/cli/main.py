@@ -14,14 +14,14 @@ import threading
 from collections.abc import Callable, Mapping
 
 from .. import __version__
-from ..base.errors import BeyondMocapError, UserCancelledError, InputError
+from ..base.errors import BeyondMocapError, InputError, UserCancelledError
 from .convert import add_mirror, add_retarget, add_stream
 from .library import add_library
 from .matching import add_match, add_touches
 from .outputs import ProgressReporter, Writer
 from .passing import add_passes
+from .path_editing import add_path
 from .reconstructing import add_reconstruct, add_release
-from .ride_path import add_path
 from .study import add_study
 from .synthesize import add_evaluate, add_synthesize
 from .throwing import add_throw
@@ -123,7 +123,8 @@ class _InterruptHandler:
 
     def __enter__(self):
         if threading.current_thread() is threading.main_thread():
-            self._previous_handlers = {kind: signal.signal(kind, self._handle_signal) for kind in (signal.SIGINT, signal.SIGTERM)}
+            self._previous_handlers = {kind: signal.signal(kind, self._handle_signal)
+                                       for kind in (signal.SIGINT, signal.SIGTERM)}
 
     def __exit__(self, *_):
         for kind, before in self._previous_handlers.items():

@@ -57,8 +57,8 @@ def run_match(options, reporter: ProgressReporter, writers: Mapping[str, Writer]
         reporter: progress, notes and cancellation.
         writers: further output formats, by file suffix (Blender's).
     """
-    from ..match.make import synthesize_match, read_result
-    from ..match.order import MatchRequest
+    from ..match.request import MatchRequest
+    from ..match.synthesize_match import read_result, synthesize_match
 
     write = choose_scene_writer(options.scene, writers) if options.scene else None
     order = MatchRequest(
@@ -166,7 +166,8 @@ def run_touches(options, reporter: ProgressReporter, writers: Mapping[str, Write
     started = time.perf_counter()
     check_outputs(options.out, options.ball, options.report, reserved=(options.input, options.meta))
     if options.start is not None and options.end is not None and options.end <= options.start:
-        raise InputError("--to", f"{format_seconds(options.end)} s", f"later than --from {format_seconds(options.start)} s")
+        raise InputError("--to", f"{format_seconds(options.end)} s",
+                         f"later than --from {format_seconds(options.start)} s")
     source = _read_tracking(options)
     loaded = time.perf_counter()
     solved = solve_ball(source, reporter.show_progress, reporter.is_cancelled, options.start, options.end)

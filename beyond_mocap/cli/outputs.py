@@ -11,7 +11,7 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 
-from ..base.errors import UserCancelledError, InputError
+from ..base.errors import InputError, UserCancelledError
 
 Writer = Callable[[object, Path], Sequence[str] | None]
 """Writes a take, or the result of the verb `match`, to a file; returns lines for the user, if any."""
@@ -100,8 +100,8 @@ def locate_errors(path):
         raise InputError(path, str(error)) from None
 
 
-def choose_writer(out: Path, writers: Mapping[str, Writer], hint: str = "run inside Blender to write .blend, .fbx, .glb "
-              "or .usdc") -> Writer:
+def choose_writer(out: Path, writers: Mapping[str, Writer],
+                  hint: str = "run inside Blender to write .blend, .fbx, .glb " "or .usdc") -> Writer:
     """Choose the function that writes an output file.
 
     Args:
@@ -199,7 +199,7 @@ def add_subverbs(verb, dest: str, *adders: Callable):
     subparsers = verb.add_subparsers(dest=dest, required=True, metavar="VERB", parser_class=type(verb))
     for add_one in adders:
         add_one(subparsers).add_argument("--json", action="store_true", default=argparse.SUPPRESS,
-                                  help="progress as JSON lines on stderr")  # fmt: skip
+                                         help="progress as JSON lines on stderr")  # fmt: skip
     return verb
 
 

@@ -12,7 +12,7 @@ import numpy as np
 from .. import __version__
 from ..base.errors import InputError
 from ..base.settings.options import add_options
-from .outputs import ProgressReporter, Writer, parse_folder, locate_errors
+from .outputs import ProgressReporter, Writer, locate_errors, parse_folder
 
 
 def add_passes(verbs):
@@ -56,7 +56,8 @@ def run_passes(options, reporter: ProgressReporter, writers: Mapping[str, Writer
     )
     loaded = time.perf_counter()
     with locate_errors(options.scene):
-        result = synthesize_passes(library, scene, lambda share, text: reporter.show_progress(0.3 + 0.65 * share, text), reporter.is_cancelled)
+        result = synthesize_passes(library, scene, lambda share, text: reporter.show_progress(0.3 + 0.65 * share, text),
+                                   reporter.is_cancelled)
     done = time.perf_counter()
     reporter.check_cancelled()
     table = list_strikes(library, result)

@@ -51,7 +51,7 @@ def run_reconstruct(options, reporter: ProgressReporter, writers: Mapping[str, W
         reporter: progress, notes and cancellation.
         writers: further output formats, by file suffix (Blender's).
     """
-    from ..library.keep_words import parse_labels
+    from ..library.label_files import parse_labels
 
     if options.model and options.static:
         raise InputError("--model", "set with --static", "one of them", "remove one of them")
@@ -75,7 +75,7 @@ def _reconstruct_trial(options, reporter: ProgressReporter, writers: Mapping[str
     check_outputs(options.out, options.report, options.save_model, reserved=inputs)
     write = choose_writer(options.out, writers)
     if options.add_to:
-        from ..library.keep_words import find_free_file
+        from ..library.label_files import find_free_file
 
         check_outputs(options.out, find_free_file(options.add_to, options.trial.stem))
     settings = build_settings(options)
@@ -84,7 +84,8 @@ def _reconstruct_trial(options, reporter: ProgressReporter, writers: Mapping[str
     model = _read_chosen_model(options)
     loaded = time.perf_counter()
     try:
-        result = reconstruct(trial, static, model, settings=settings, progress=reporter.show_progress, cancelled=reporter.is_cancelled)
+        result = reconstruct(trial, static, model, settings=settings, progress=reporter.show_progress,
+                             cancelled=reporter.is_cancelled)
     except InputError as error:
         raise _add_file_name(error, options) from None
     result.seconds.update(load_labels=loaded - started, total=time.perf_counter() - started)
@@ -108,7 +109,8 @@ def _compare_up_axes(options, trial, static) -> list[str]:
     """Describe a difference in the up axes of two files of one kind; no line where there is none."""
     if static is None or options.up or options.trial.suffix.lower() != options.static.suffix.lower():
         return []
-    trial_axes, static_axes = ({line.split(",")[0] for line in one.notes if " is up" in line} for one in (trial, static))
+    trial_axes, static_axes = ({line.split(",")[0] for line in one.notes if " is up" in line}
+                               for one in (trial, static))
     if trial_axes == static_axes:
         return []
     return [f"{options.trial} and {options.static} have different up axes: {', '.join(sorted(trial_axes | static_axes))}; set --up"]
@@ -129,7 +131,7 @@ def _reconstruct_folder(options, reporter: ProgressReporter) -> None:
     Each gets NAME.bvh, NAME.report.json and, with a static trial, NAME.model.json; trials.json and report.html
     summarize all.
     """
-    from ..markers.reconstruct_folder import reconstruct_folder, list_recordings
+    from ..markers.reconstruct_folder import list_recordings, reconstruct_folder
 
     for name in ("static", "report", "save_model"):
         if getattr(options, name):
@@ -144,7 +146,7 @@ def _reconstruct_folder(options, reporter: ProgressReporter) -> None:
     read = partial(read_trial, options=options)
     rows = []
     for result in reconstruct_folder(options.trial, read, settings, model=model, progress=reporter.show_progress,
-                                   cancelled=reporter.is_cancelled):
+                                     cancelled=reporter.is_cancelled):
         rows.append(_write_result(result, options))
         reporter.finish()
         print(rows[-1]["line"])
@@ -170,8 +172,8 @@ def _write_result(result, options) -> dict:
     from ..markers.files.model_json import write_model
 
     name = result.recording.name
-    row = {"trial": name, "file": str(result.recording.path), "session": result.recording.session, "error": result.error,
-           "static": result.static and result.static.name, "bvh": "", "report": ""}  # fmt: skip
+    row = {"trial": name, "file": str(result.recording.path), "session": result.recording.session,
+           "error": result.error, "static": result.static and result.static.name, "bvh": "", "report": ""}  # fmt: skip
     if result.made is None:
         return {**row, "line": f"{name}: {result.error.removeprefix(f'{result.recording.path.stem}: ')}"}
     place = options.out / name
@@ -184,14 +186,15 @@ def _write_result(result, options) -> dict:
     except InputError as error:  # concerns this clip only
         notes = [f"not added: {error}"]
     return {**row, "bvh": f"{name}.bvh", "report": f"{name}.report.json", "subject": result.made.model.subject,
-            "line": "; ".join([f"{name}: {describe_result(result.made)}", *filter(None, [result.note]), *notes])}  # fmt: skip
+            "line": "; ".join([f"{name}: {describe_result(result.made)}", *filter(None, [result.note]),
+                               *notes])}  # fmt: skip
 
 
 def _write_overview(rows, options, reporter: ProgressReporter) -> None:
     """Write trials.json, and report.html if matplotlib is installed."""
     from ..evaluation.plots import require_matplotlib
+    from ..files.atomic import atomic_write
     from ..files.tables import write_report
-    from ..files.whole import atomic_write
     from ..markers.trials_page import build_trials_report
 
     write_report(options.out / "trials.json", {"trials": rows})
@@ -263,8 +266,8 @@ def to_take(result):
     fields = {} if result.release is None else {"ball": result.release.path}
     with suppress(InputError):  # no legs
         fields["contacts"] = detect_contacts(result.motion)
-    return build_take(result.motion, result.raw.name, "reconstruct", start_time=result.trial.start, warnings=result.warnings,
-                      **fields)
+    return build_take(result.motion, result.raw.name, "reconstruct", start_time=result.trial.start,
+                      warnings=result.warnings, **fields)
 
 
 def describe_result(result) -> str:
@@ -294,7 +297,7 @@ def add_to_library(result, name: str, options) -> list[str]:
     Returns:
         Notes for the user.
     """
-    from ..library.keep_words import add_clip
+    from ..library.label_files import add_clip
 
     key = None
     if _names_throw(options.words) and result.release is not None:

@@ -66,7 +66,7 @@ def run_order(options, reporter: ProgressReporter, writers: Mapping[str, Writer]
         reporter: progress, notes and cancellation.
         writers: further output formats, by file suffix (Blender's).
     """
-    from ..files.whole import atomic_folder
+    from ..files.atomic import atomic_folder
     from ..study.form import MOVIES
     from ..study.order import build_study, read_clips, write_study
 
@@ -119,15 +119,16 @@ def run_form(options, reporter: ProgressReporter, writers: Mapping[str, Writer])
         reporter: progress, notes and cancellation.
         writers: further output formats, by file suffix (Blender's).
     """
-    from ..files.whole import atomic_write
-    from ..study.form import find_movie, build_form_page, build_form_table
+    from ..files.atomic import atomic_write
+    from ..study.form import build_form_page, build_form_table, find_movie
     from ..study.order import read_study
 
     study = read_study(options.study)
     movies = {clip.name: find_movie(options.study / CLIPS, clip.name) for clip in study.clips}
     missing_names = [name for name, path in movies.items() if path is None]
     if options.embed and missing_names:
-        raise InputError(options.study / CLIPS, f"{len(missing_names)} clips are missing, such as {missing_names[0]}{_MOVIE}",
+        raise InputError(options.study / CLIPS,
+                         f"{len(missing_names)} clips are missing, such as {missing_names[0]}{_MOVIE}",
                          "a movie for each clip", "render them first")  # fmt: skip
     sources = _embed_movies(options.study, movies) if options.embed else {
         name: f"../{CLIPS}/{path.name if path else name + _MOVIE}" for name, path in movies.items()
@@ -165,12 +166,12 @@ def run_analyse(options, reporter: ProgressReporter, writers: Mapping[str, Write
         reporter: progress, notes and cancellation.
         writers: further output formats, by file suffix (Blender's).
     """
+    from ..files.atomic import atomic_write
     from ..files.tables import write_report
-    from ..files.whole import atomic_write
     from ..study.analysis import analyse_study
     from ..study.answers import list_answer_files, read_answers
     from ..study.order import read_study
-    from ..study.page import format_p, build_study_page, build_study_report
+    from ..study.page import build_study_page, build_study_report, format_p
 
     answers = options.answers or [options.study / ANSWERS]
     check_outputs(options.report, options.html, reserved=(*list_answer_files(answers), options.study / "study.json"))

@@ -44,11 +44,11 @@ def run_synthesize(options, reporter: ProgressReporter, writers: Mapping[str, Wr
         reporter: progress, notes and cancellation.
         writers: further output formats, by file suffix (Blender's).
     """
-    from ..annotation import read_timeline, check_timeline
+    from ..annotation import check_timeline, read_timeline
     from ..files.tables import write_ball, write_report
     from ..files.tracking.tracking import read_track_csv
     from ..motion.track import clean_track
-    from ..synthesis.pins import read_pins
+    from ..synthesis.pin_table import read_pins
     from ..synthesis.plan import Plan
     from ..synthesis.provenance import write_provenance
     from ..synthesis.synthesize import synthesize
@@ -127,17 +127,17 @@ def run_evaluate(options, reporter: ProgressReporter, writers: Mapping[str, Writ
         reporter: progress, notes and cancellation.
         writers: further output formats, by file suffix (Blender's).
     """
-    from ..annotation import read_timeline, check_timeline
+    from ..annotation import check_timeline, read_timeline
     from ..evaluation.html import build_html_report
     from ..evaluation.plots import require_matplotlib
     from ..evaluation.report import evaluate_played
+    from ..files.atomic import atomic_write
     from ..files.bvh import bvh
     from ..files.tables import read_ball, write_report
     from ..files.tracking.tracking import read_track_csv
-    from ..files.whole import atomic_write
     from ..motion.track import clean_track
     from ..synthesis.provenance import read_provenance
-    from ..synthesis.quality.played import playback_from_tables
+    from ..synthesis.quality.playback import playback_from_tables
 
     inputs = (options.motion, options.track, options.annotations, options.provenance, options.ball)
     check_outputs(options.report, options.html, reserved=inputs)
@@ -157,7 +157,7 @@ def run_evaluate(options, reporter: ProgressReporter, writers: Mapping[str, Writ
     write_report(options.report, report)
     if options.html:
         atomic_write(options.html, build_html_report(played, report, track=track, timeline=timeline, library=library,
-                                               title=options.motion.name))  # fmt: skip
+                                                     title=options.motion.name))  # fmt: skip
     reporter.finish()
     if library is not None and (unknown_clips := _find_unknown_clips(played.clips, library)):
         first, count = unknown_clips[0], len(unknown_clips)

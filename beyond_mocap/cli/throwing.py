@@ -14,7 +14,7 @@ import numpy as np
 from .. import __version__
 from ..base.errors import InputError, format_seconds
 from ..base.settings.options import add_options
-from .outputs import ProgressReporter, Writer, add_subverbs, build_take, check_outputs, locate_errors, choose_writer
+from .outputs import ProgressReporter, Writer, add_subverbs, build_take, check_outputs, choose_writer, locate_errors
 
 if TYPE_CHECKING:
     from ..library.library import Library
@@ -86,7 +86,8 @@ def _add_synthesize(verbs):
     place = verb.add_mutually_exclusive_group()
     place.add_argument("--start", type=_parse_ground_point, metavar="X,Y", help="hips in the first frame; default 0,0")
     place.add_argument("--over", type=_parse_ground_point, metavar="X,Y", help="position of the hips at the release")
-    place.add_argument("--ball-place", type=_parse_ground_point, metavar="X,Y", help="position of the ball that is kicked")
+    place.add_argument("--ball-place", type=_parse_ground_point, metavar="X,Y",
+                       help="position of the ball that is kicked")
     add_options(verb, "throw.ball")
     verb.add_argument("--library", type=Path, metavar="L", help="with --track: source of run-up and recovery")
     verb.add_argument("--track", type=Path, metavar="T.csv", help="the player's track; the throw is on it at --time")
@@ -111,9 +112,10 @@ def run_synthesize(options, reporter: ProgressReporter, writers: Mapping[str, Wr
     inputs = (options.model, options.skeleton, options.track, options.annotations)
     check_outputs(options.out, options.ball, options.report, reserved=inputs)
     write = choose_writer(options.out, writers)
-    for option, required, why in (("library", "track", "a player's track"), ("track", "library", "a folder of recordings"),
-                            ("annotations", "track", "a player's track"),
-                            ("track", "time", "the time of the ball's release")):  # fmt: skip
+    for option, required, why in (("library", "track", "a player's track"),
+                                  ("track", "library", "a folder of recordings"),
+                                  ("annotations", "track", "a player's track"),
+                                  ("track", "time", "the time of the ball's release")):  # fmt: skip
         if getattr(options, option) and getattr(options, required) is None:
             raise InputError(f"--{option}", f"set without --{required}", why, f"add --{required}")
     model = _read_chosen_model(options)
@@ -236,8 +238,8 @@ class _Player:
         timeline = Timeline()
         if options.annotations:
             timeline = read_timeline(options.annotations, fps, float(track.times[0]))
-        library = build_library(options.library, cache_dir=options.cache, unit=options.unit, progress=reporter.show_progress,
-                        cancelled=reporter.is_cancelled)
+        library = build_library(options.library, cache_dir=options.cache, unit=options.unit,
+                                progress=reporter.show_progress, cancelled=reporter.is_cancelled)
         plan = Plan(track=track, timeline=timeline, library=str(options.library), fps=fps, seed=options.seed)
         return cls(library, plan, model.settings.action, options.time)
 
@@ -250,16 +252,17 @@ class _Player:
         """Insert the throw into the player's motion; return it with lines for the user."""
         from ..throws.join_throw import join_throw, trim_waiting
         from ..throws.run_up import EDGE, construct_run_up
-        from ..throws.throw_order import place_in_motion
+        from ..throws.throw_request import place_in_motion
 
         motion, release = trim_waiting(result.motion, result.release, EDGE)
         first = round((result.release - release) * result.motion.fps)
         shift = result.shift[first : first + len(motion)]
         result = replace(result, motion=motion, release=release, shift=shift)
         run_up = construct_run_up(self.library, self.plan, result.motion, result.release, self.time, action=self.action,
-                               progress=reporter.show_progress, cancelled=reporter.is_cancelled)
+                                  progress=reporter.show_progress, cancelled=reporter.is_cancelled)
         whole = join_throw(run_up.motion, run_up.start, result.motion, result.release, at=self.time)
-        return place_in_motion(result, whole.motion, whole.start, whole.release, whole.first), [*run_up.warnings, *whole.warnings]
+        return place_in_motion(result, whole.motion, whole.start, whole.release, whole.first), [*run_up.warnings,
+                *whole.warnings]
 
 
 def _add_evaluate(verbs):
@@ -279,8 +282,8 @@ def run_evaluate(options, reporter: ProgressReporter, writers: Mapping[str, Writ
         reporter: progress, notes and cancellation.
         writers: further output formats, by file suffix (Blender's).
     """
+    from ..files.atomic import atomic_write
     from ..files.tables import write_report
-    from ..files.whole import atomic_write
     from ..throws.evaluate_throws import FULL_OPTIONS, RAW_OPTIONS, evaluate_throws, select_of_each
     from ..throws.network_npz import read_model
     from ..throws.throw_examples import TABLE_NAME
@@ -293,8 +296,8 @@ def run_evaluate(options, reporter: ProgressReporter, writers: Mapping[str, Writ
     chosen = select_of_each(_choose_subjects(examples, options.subject, options.examples), options.motions)
     loaded = time.perf_counter()
     evaluation = evaluate_throws(
-        model, chosen, RAW_OPTIONS if options.raw else FULL_OPTIONS, by_height=not options.as_they_are, progress=reporter.show_progress,
-        cancelled=reporter.is_cancelled,
+        model, chosen, RAW_OPTIONS if options.raw else FULL_OPTIONS, by_height=not options.as_they_are,
+        progress=reporter.show_progress, cancelled=reporter.is_cancelled,
     )  # fmt: skip
     for line in evaluation.left_out:
         reporter.show_note(line)
@@ -319,7 +322,8 @@ def _read_examples(folder: Path, model, reporter: ProgressReporter) -> list:
     from ..throws.throw_examples import read_examples
 
     settings = model.settings
-    examples = read_examples(folder, settings.action, settings.fps, report=reporter.show_note, cancelled=reporter.is_cancelled)
+    examples = read_examples(folder, settings.action, settings.fps, report=reporter.show_note,
+                             cancelled=reporter.is_cancelled)
     if all(example.motion.skeleton.names == model.skeleton.names for example in examples):
         return examples
     reporter.show_note(f"{folder}: skeletons differ from the model's; motions are retargeted to it")
@@ -351,12 +355,12 @@ def run_examples(options, reporter: ProgressReporter, writers: Mapping[str, Writ
         reporter: progress, notes and cancellation.
         writers: further output formats, by file suffix (Blender's).
     """
-    from ..throws.planted_examples import write_examples
+    from ..throws.synthetic_examples import write_examples
     from ..throws.throw_examples import TABLE_NAME
 
     started = time.perf_counter()
     count = write_examples(options.out, options.action, options.subjects, count=options.throws, seed=options.seed,
-                          progress=reporter.show_progress, cancelled=reporter.is_cancelled)
+                           progress=reporter.show_progress, cancelled=reporter.is_cancelled)
     reporter.finish()
     seconds = time.perf_counter() - started
     who = "person" if options.subjects == 1 else "people"

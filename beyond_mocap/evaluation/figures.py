@@ -14,14 +14,20 @@ import numpy as np
 
 from ..annotation import Timeline, choose_gaits, fill_timeline, labels_per_frame
 from ..base.errors import InputError
-from ..library.automatic import build_automatic_labels
+from ..library.automatic_locomotion import build_automatic_labels
 from ..library.keys import select_keys
 from ..motion.contacts import measure_floor_height
 from ..motion.track import sample_track, smooth_zero_phase_hann
 from ..synthesis.quality import movement
-from ..synthesis.quality.give_way import report_unmet_constraints, report_jolts
-from ..synthesis.quality.moments import KeyMomentResult, measure_ball_gap, measure_ball_shift, measure_contact, extend_with_synthetic
-from ..synthesis.quality.played import find_replayed, list_warp_rates
+from ..synthesis.quality.moments import (
+    KeyMomentResult,
+    extend_with_synthetic,
+    measure_ball_gap,
+    measure_ball_shift,
+    measure_contact,
+)
+from ..synthesis.quality.playback import find_replayed, list_warp_rates
+from ..synthesis.quality.unmet_constraints import report_jolts, report_unmet_constraints
 from . import realism
 from .reference import View, compute_source_poses
 
@@ -40,13 +46,16 @@ def measure_path_errors(view: View) -> dict:
            "pelvis_error_m": {"mean": None, "own": source_sway, "keys": None},
            "speed_coverage": {"above": None, "below": None}}  # fmt: skip
     if view.target is not None:
-        error, unsmoothed = movement.measure_root_error(pelvis, view.target, fps), movement.measure_pelvis_error(pelvis, view.target)
+        error, unsmoothed = movement.measure_root_error(pelvis, view.target, fps), movement.measure_pelvis_error(pelvis,
+                view.target)
         out["root_error_m"] = _compute_measures(error, ("mean", "p95", "max"))
         at_keys = [float(np.interp(m.requested.resolved_time, view.played.times, unsmoothed)) for m in view.moments]
-        out["pelvis_error_m"] = {"mean": _finite_mean(unsmoothed), "own": source_sway, "keys": _finite_mean(np.array(at_keys))}
+        out["pelvis_error_m"] = {"mean": _finite_mean(unsmoothed), "own": source_sway,
+                                 "keys": _finite_mean(np.array(at_keys))}
     if view.target is not None and view.reference is not None:
         requested_speed = movement.measure_travel_speed(view.target, fps)
-        out["speed_coverage"] = movement.measure_speed_coverage(requested_speed, view.reference.fastest, view.reference.slowest)
+        out["speed_coverage"] = movement.measure_speed_coverage(requested_speed, view.reference.fastest,
+                                                                view.reference.slowest)
     return {**out, **_measure_surge(view)}
 
 
@@ -88,10 +97,11 @@ def _measure_key_moment(view: View, moment: KeyMomentResult) -> dict:
         errors["pelvis_error_m"] = float(np.interp(time, played.times, unsmoothed))
         errors["ball_shift_m"] = measure_ball_shift(played, frame, view.track)
     return {
-        "time_s": moment.requested.time, "solved_time_s": moment.requested.solved, "labels": list(moment.requested.words),
-        "clip": moment.clip, "clip_frame": moment.clip_frame, "time_error_s": moment.played_at - time, **errors,
-        "contact_gap_m": measure_ball_gap(played, moment), "met_s": contact_time, "met_gap_m": contact_gap,
-        "used_instead": None if moment.used_instead is None else list(moment.used_instead),
+        "time_s": moment.requested.time, "solved_time_s": moment.requested.solved,
+        "labels": list(moment.requested.words), "clip": moment.clip, "clip_frame": moment.clip_frame,
+        "time_error_s": moment.played_at - time, **errors, "contact_gap_m": measure_ball_gap(played, moment),
+        "met_s": contact_time, "met_gap_m": contact_gap, "used_instead": None if moment.used_instead is None
+        else list(moment.used_instead),
     }
 
 
@@ -112,20 +122,19 @@ def measure_feet(view: View) -> dict:
     heel_rest = view.reference.heel_rest if known else movement.measure_heel_rest(planted, played.contacts)
     support = movement.measure_support_height(planted, played.contacts, heel_rest)
     return {
-        "skate": {
-            "contact_cm_s": 100.0 * _finite_mean(movement.measure_contact_speeds(planted, played.contacts, fps)),
-            "source_contact_cm_s": 100.0 * _finite_mean(view.source_values("contact_speed")),
-            "stance_mm_median": 1000.0 * _finite_median(travel), "stances_over_21mm": _finite_mean(travel > movement.NOTICED_SLIDE),
-            "gmd_ratio": _finite_mean(skating), "source_gmd_ratio": _finite_mean(view.source_values("skating")),
-            "source_stance_mm_median": 1000.0 * _finite_median(source_travel),
-            "source_stances_over_21mm": _finite_mean(source_travel > movement.NOTICED_SLIDE),
-        },
-        "ground_mm": {
-            "min": 1000.0 * float(played.positions[..., 2].min()), "support_max": 1000.0 * _finite_max(support),
-            "source_support_max": 1000.0 * _finite_max(view.source_values("support")),
-            "tip_min": -1000.0 * _finite_max(-movement.measure_tip_height(played.motion.skeleton, played.positions, played.rotations)),
-            "source_tip_min": -1000.0 * _finite_max(-view.source_values("tip")),
-        },
+        "skate": {"contact_cm_s": 100.0 * _finite_mean(movement.measure_contact_speeds(planted, played.contacts, fps)),
+                  "source_contact_cm_s": 100.0 * _finite_mean(view.source_values("contact_speed")),
+                  "stance_mm_median": 1000.0 * _finite_median(travel),
+                  "stances_over_21mm": _finite_mean(travel > movement.NOTICED_SLIDE),
+                  "gmd_ratio": _finite_mean(skating), "source_gmd_ratio": _finite_mean(view.source_values("skating")),
+                  "source_stance_mm_median": 1000.0 * _finite_median(source_travel),
+                  "source_stances_over_21mm": _finite_mean(source_travel > movement.NOTICED_SLIDE),},
+        "ground_mm": {"min": 1000.0 * float(played.positions[..., 2].min()), "support_max": 1000.0
+                      * _finite_max(support), "source_support_max": 1000.0 * _finite_max(view.source_values("support")),
+                      "tip_min": -1000.0 * _finite_max(-movement.measure_tip_height(played.motion.skeleton,
+                                                                                    played.positions,
+                                                                                    played.rotations)),
+                      "source_tip_min": -1000.0 * _finite_max(-view.source_values("tip")),},
     }
 
 
@@ -145,8 +154,8 @@ def measure_corrections(view: View, ik_miss: np.ndarray | None) -> dict:
     missed = None if ik_miss is None else np.asarray(ik_miss).reshape(view.count, -1).max(axis=1) > 0.005
     bones = None if view.library is None else _measure_bone_change(view)
     return {
-        "foot_correction_m": _compute_measures(shift, ("p95",)), "ik_miss_share": None if missed is None else _finite_mean(missed),
-        "pelvis_drop_m": drop, "bone_change_m": bones,
+        "foot_correction_m": _compute_measures(shift, ("p95",)), "ik_miss_share": None if missed is None
+        else _finite_mean(missed), "pelvis_drop_m": drop, "bone_change_m": bones,
     }
 
 
@@ -192,13 +201,14 @@ def measure_transitions(view: View) -> dict:
         rest = movement.compute_rest_ratios(values, view.transitions, view.speed, view.reference.jerk_p95)
         out["seam_jerk_ratio"] = {
             **_compute_measures(at_seams, ("median", "p95", "max")), "share_above_real": _finite_mean(at_seams > 1.0),
-            "source_share_above_real": _finite_mean(view.source_values("jerk_above_real")), "rest_max": _finite_max(rest),
-            "rest_share_above_real": _finite_mean(rest > 1.0),
+            "source_share_above_real": _finite_mean(view.source_values("jerk_above_real")),
+            "rest_max": _finite_max(rest), "rest_share_above_real": _finite_mean(rest > 1.0),
         }
     known = bool(np.any(view.played.clip >= 0))
     rates = list_warp_rates(*view.source)
     return {
-        **out, "seams": len(view.transitions) if known else None, "warp_rate": {"min": -_finite_max(-rates), "max": _finite_max(rates)},
+        **out, "seams": len(view.transitions) if known else None,
+        "warp_rate": {"min": -_finite_max(-rates), "max": _finite_max(rates)},
         "loop_share": _finite_mean(find_replayed(*view.source, view.fps)) if known else None,
     }
 
@@ -215,7 +225,8 @@ def measure_poses(view: View) -> dict:
     features = realism.build_pose_features(played.motion.skeleton, played.positions, view.fps, played.body.hips)
     curve = realism.measure_smoothness(played.motion.skeleton, played.positions, view.fps)
     source_smoothness = _compute_measures(view.source_values("smoothness"), ("mean", "p95", "max"))
-    smoothness = {**_compute_measures(curve, ("mean", "p95", "max")), **{f"source_{name}": value for name, value in source_smoothness.items()}}
+    smoothness = {**_compute_measures(curve, ("mean", "p95", "max")),
+                  **{f"source_{name}": value for name, value in source_smoothness.items()}}
     out: dict = {"pose_realism": None, "smoothness_m": smoothness}
     if view.reference is not None and np.isfinite(view.reference.pose_p95).all():
         distance = realism.measure_nearest_distance(features / view.scale, view.reference.poses)
@@ -298,8 +309,8 @@ def list_warnings(view: View, ik_miss: np.ndarray | None, requested: Timeline | 
     Returns:
         One line for each warning.
     """
-    lines: list[str] = [*report_unmet_constraints(view.played, track=view.track, timeline=view.timeline, library=view.library,
-                                  ik_miss=ik_miss, user_timeline=requested)]
+    lines: list[str] = [*report_unmet_constraints(view.played, track=view.track, timeline=view.timeline,
+                                                  library=view.library, ik_miss=ik_miss, user_timeline=requested)]
     if view.reference is None:
         return lines
     jerk = movement.compute_jerk(view.played.positions, view.fps)

@@ -18,10 +18,11 @@ from ..library.library import Library
 from ..motion.track import Track
 from ..synthesis.quality import movement
 from ..synthesis.quality.movement import measure_contact_speeds
-from ..synthesis.quality.played import Playback
+from ..synthesis.quality.playback import Playback
 from . import plots
 from .html_page import (
     Html,
+    build_element,
     build_image,
     build_list,
     build_page,
@@ -29,7 +30,6 @@ from .html_page import (
     build_section,
     build_table,
     build_title,
-    build_element,
     join_html,
 )
 from .reference import View
@@ -69,8 +69,9 @@ def build_html_report(
     view = View(played, track, timeline, library)
     over_time = build_image(plots.draw_curves(view), "distance from the track, toe heights, speed, smoothness")
     return build_page(
-        title, _build_head(view, report, title), _build_warnings(report), build_section("Over time", over_time), _build_clips(view),
-        _build_labels(view), _build_moments(view, report), _build_worst(view), _build_figures(report), style=_STYLE,
+        title, _build_head(view, report, title), _build_warnings(report), build_section("Over time", over_time),
+        _build_clips(view), _build_labels(view), _build_moments(view, report), _build_worst(view),
+        _build_figures(report), style=_STYLE,
     )  # fmt: skip
 
 
@@ -113,7 +114,8 @@ def _build_moments(view: View, report: Mapping) -> Html:
     parts = []
     for moment, figures in list(zip(view.moments, report["keys"]))[:MAX_MOMENTS]:
         name = f"{moment.requested.time:.2f} s: {' '.join(moment.requested.words)}"
-        parts += [build_element("h3", name), build_element("p", _describe_key_moment(figures), class_="quiet"), _build_strip(view, moment.frame, name)]
+        parts += [build_element("h3", name), build_element("p", _describe_key_moment(figures), class_="quiet"),
+                  _build_strip(view, moment.frame, name)]
     more = len(view.moments) - MAX_MOMENTS
     if more > 0:
         parts.append(build_element("p", f"and {more} more, in the table below", class_="quiet"))

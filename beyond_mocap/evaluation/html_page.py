@@ -82,8 +82,8 @@ def build_page(title: str, *parts: str, style: str = "") -> str:
         The document as text.
     """
     head = join_html(
-        Html('<meta charset="utf-8"><meta name="viewport" content="width=device-width">'), build_element("title", title),
-        build_element("style", Html(_STYLE + style)),
+        Html('<meta charset="utf-8"><meta name="viewport" content="width=device-width">'),
+        build_element("title", title), build_element("style", Html(_STYLE + style)),
     )  # fmt: skip
     body = join_html(*(part for part in parts if part), separator="\n")
     return f'<!DOCTYPE html>\n<html lang="en"><head>{head}</head>\n<body>\n{body}\n</body></html>\n'
@@ -125,7 +125,8 @@ def build_table(head: Sequence[str], rows: Iterable[Html], **attributes: object)
     """
     cells = [title if isinstance(title, Html) else build_element("th", title) for title in head]
     lines = ([build_element("tr", *cells)] if cells else []) + list(rows)
-    return build_element("div", build_element("table", join_html(*lines, separator="\n"), **attributes), class_="scroll")
+    return build_element("div", build_element("table", join_html(*lines, separator="\n"), **attributes),
+                         class_="scroll")
 
 
 def build_row(*cells: str, class_: str = "") -> Html:
@@ -137,7 +138,8 @@ def build_row(*cells: str, class_: str = "") -> Html:
     Returns:
         The row.
     """
-    return build_element("tr", *(cell if isinstance(cell, Html) else build_element("td", cell) for cell in cells), class_=class_)
+    return build_element("tr", *(cell if isinstance(cell, Html) else build_element("td", cell) for cell in cells),
+                         class_=class_)
 
 
 def build_number_cell(value: float | None, digits: int = 0, scale: float = 1.0, status: str = "") -> Html:

@@ -62,9 +62,9 @@ def compare_differences(differences: np.ndarray) -> Comparison:
     t_p = float(ttest_1samp(values, 0.0, alternative="less").pvalue) if varies else np.nan
     ranks = float(wilcoxon(values, alternative="less").pvalue) if np.any(values != 0.0) else np.nan
     test = "Wilcoxon" if normal < NORMALITY else "t"
-    return Comparison(differences=values, mean=float(values.mean()), spread=float(values.std()), normal=normal, test=test,
-                      p=ranks if test == "Wilcoxon" else t_p, t_p=t_p, wilcoxon_p=ranks,
-                      least_p=2.0 ** -len(values) if test == "Wilcoxon" else 0.0)
+    return Comparison(differences=values, mean=float(values.mean()), spread=float(values.std()), normal=normal,
+                      test=test, p=ranks if test == "Wilcoxon" else t_p, t_p=t_p, wilcoxon_p=ranks, least_p=2.0 **
+                      -len(values) if test == "Wilcoxon" else 0.0)
 
 
 def find_inliers(values: np.ndarray) -> np.ndarray:

@@ -11,9 +11,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..annotation.ball_contact import build_surfaces
-from ..annotation.striking import trace_fastest_surface, find_nearest_point
+from ..annotation.striking import find_nearest_point, trace_fastest_surface
 from ..synthesis.quality import movement
-from ..synthesis.quality.moments import KeyMomentResult, measure_contact, list_contact_labels, find_written_ball
+from ..synthesis.quality.moments import KeyMomentResult, find_written_ball, list_contact_labels, measure_contact
 from .reference import View
 
 
@@ -105,7 +105,8 @@ def measure_per_frame(view: View) -> PerFrame:
     jerk = unknown.copy()
     if view.reference is not None and count > movement.TRANSITION_TO_JERK + 1:
         values = movement.compute_jerk(played.positions, view.fps)
-        jerk[movement.TRANSITION_TO_JERK :][: len(values)] = movement.compute_jerk_ratios(values, view.speed, view.reference.jerk_p95)
+        jerk[movement.TRANSITION_TO_JERK :][: len(values)] = movement.compute_jerk_ratios(values, view.speed,
+                view.reference.jerk_p95)
     return PerFrame(
         times=played.times, track=wanted, slide=slides, correction=corrected, jerk=jerk, speed=view.speed,
         root_error=movement.measure_root_error(played.pelvis, wanted, view.fps) if known else unknown,
@@ -160,11 +161,13 @@ def _find_strike(view: View, moment: KeyMomentResult) -> Strike:
         part = played.positions[moment.frame, played.body.hips]
         if surfaces:
             part = trace_fastest_surface(surfaces, *_list_recent_poses(view, moment.frame))[-1]
-        return Strike(time=moment.requested.resolved_time, words=moment.requested.words, part=part, ball=None, gap=np.nan)
+        return Strike(time=moment.requested.resolved_time, words=moment.requested.words, part=part, ball=None,
+                      gap=np.nan)
     frame = int(np.clip(round((contact_time - played.start_time) * view.fps), 0, view.count - 1))
     ball = find_written_ball(played, frame)
     lines = [surface.compute_line(played.positions[frame], played.rotations[frame]) for surface in surfaces]
-    points = [_find_surface_point(find_nearest_point(line, ball), ball, surface.radius) for line, surface in zip(lines, surfaces)]
+    points = [_find_surface_point(find_nearest_point(line, ball), ball, surface.radius) for line,
+              surface in zip(lines, surfaces)]
     part = min(points, key=lambda point: float(np.linalg.norm(point - ball)))
     return Strike(time=contact_time, words=moment.requested.words, part=part, ball=ball, gap=gap)
 

@@ -17,7 +17,7 @@ from ..motion.humanoid import compute_heading_from_positions, split_joint_name
 from ..motion.quaternion import from_up_angle, rotate
 from ..motion.track import BALL_RADIUS
 from ..synthesis.quality import movement
-from ..synthesis.quality.played import compute_playback_rate
+from ..synthesis.quality.playback import compute_playback_rate
 from . import figures, realism
 from .reference import View
 
@@ -117,7 +117,8 @@ def draw_labels(view: View) -> bytes | None:
     requested = [None] * view.count
     if view.timeline is not None:
         requested = figures.list_requested_labels(figures.fill_automatic_spans(view), view.played.times, view.moments)
-    rows = list(dict.fromkeys(word for pair in zip(requested, played) for words in pair for word in sorted(words or ())))
+    rows = list(dict.fromkeys(word for pair in zip(requested, played) for words in pair
+                              for word in sorted(words or ())))
     for moment in view.moments:
         rows += [word for word in moment.requested.words if word not in rows]
     rows = rows[:_MAX_ROWS]
@@ -220,7 +221,8 @@ def _draw_root(ax, view: View) -> None:
                 color="#777777")
         return
     times, pelvis = view.played.times, view.played.pelvis
-    error, smooth = movement.measure_pelvis_error(pelvis, view.target), movement.measure_root_error(pelvis, view.target, view.fps)
+    error, smooth = movement.measure_pelvis_error(pelvis, view.target), movement.measure_root_error(pelvis, view.target,
+            view.fps)
     ax.plot(times, 100 * error, color="#bbbbbb", lw=1, label="pelvis with its sway")
     ax.plot(times, 100 * smooth, color=LEFT, lw=1.4, label="root (1.5 s window)")
     ax.axhline(1.5, color="#999999", lw=0.8, ls="--", label="target for 95 % of root")
@@ -320,7 +322,8 @@ def _draw_time_axis(ax, view: View) -> None:
 
 def _draw_legend(ax, columns: int) -> None:
     """Draw the legend above the axes at the right, beside the title, where it covers no curve."""
-    ax.choose_clip_colours(loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=columns, fontsize=8, frameon=False, borderpad=0.1)
+    ax.choose_clip_colours(loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=columns, fontsize=8, frameon=False,
+                           borderpad=0.1)
 
 
 def _draw_title(ax, title: str, unit: str = "") -> None:

@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 
 from ..base.time_series import time_derivative
-from ..library.features import select_feature_joints, compute_raw_features
+from ..library.features import compute_raw_features, select_feature_joints
 from ..motion import quaternion
 from ..motion.humanoid import Humanoid, compute_heading_from_positions
 from ..motion.skeleton import Skeleton
@@ -30,7 +30,8 @@ def compute_local_positions(skeleton: Skeleton, positions: np.ndarray, hips: int
     Returns:
         (T, J, 3) m, float32.
     """
-    return rotate_about_up(positions - find_ground_point(positions, hips), -compute_heading_from_positions(skeleton, positions))
+    return rotate_about_up(positions - find_ground_point(positions, hips),
+                           -compute_heading_from_positions(skeleton, positions))
 
 
 def find_ground_point(positions: np.ndarray, joint: int) -> np.ndarray:
@@ -73,7 +74,8 @@ def build_pose_features(skeleton: Skeleton, positions: np.ndarray, fps: float, h
         (T, 6 J) m, float32.
     """
     local = compute_local_positions(skeleton, positions, hips)
-    velocities = rotate_about_up(time_derivative(positions, fps), -compute_heading_from_positions(skeleton, positions)) * VELOCITY_SECONDS
+    velocities = rotate_about_up(time_derivative(positions, fps),
+                                 -compute_heading_from_positions(skeleton, positions)) * VELOCITY_SECONDS
     both = np.concatenate([local, velocities], axis=1).reshape(len(positions), -1)
     return both / np.float32(np.sqrt(len(skeleton)))
 

@@ -21,13 +21,13 @@ from ..annotation.gaits import STANDING
 from ..base.errors import InputError
 from ..library.clip import Clip
 from ..library.library import Library
-from ..motion.humanoid import Humanoid, identify_joints, estimate_stature
-from ..motion.motion import sample_frames, forward_kinematics, compute_pose, resample
+from ..motion.humanoid import Humanoid, estimate_stature, identify_joints
+from ..motion.motion import compute_pose, forward_kinematics, resample, sample_frames
 from ..motion.skeleton import Skeleton
 from ..motion.track import Track
 from ..synthesis.quality import movement
 from ..synthesis.quality.moments import evaluate_moments
-from ..synthesis.quality.played import Playback, find_transitions
+from ..synthesis.quality.playback import Playback, find_transitions
 from . import realism
 
 POSES_PER_SECOND = 10.0  # of a recording that are compared with
@@ -219,19 +219,21 @@ def measure_recording(clip: Clip, fps: float) -> Recording:
     skeleton, hips = motion.skeleton, identify_joints(motion.skeleton).hips
     positions, rotations = forward_kinematics(motion)
     pelvis, feet = positions[:, hips, :2], positions[:, movement.list_foot_joints(skeleton)]
-    source_frames = np.minimum(np.rint(np.arange(len(motion)) * clip.motion.fps / fps).astype(int), len(clip.motion) - 1)
+    source_frames = np.minimum(np.rint(np.arange(len(motion)) * clip.motion.fps / fps).astype(int), len(clip.motion)
+                               - 1)
     contacts = clip.contacts[source_frames]
     spans = movement.list_stances(contacts)
     heel_rest, floor = movement.measure_heel_rest(feet, contacts), float(np.percentile(feet[:, :, 1, 2], 2))
     return Recording(
         path=clip.path, rate=clip.motion.fps, features=realism.build_pose_features(skeleton, positions, fps, hips),
-        sway=movement.measure_sway(pelvis, fps), surge=movement.measure_surge(pelvis, fps), speed=movement.measure_travel_speed(pelvis, fps),
+        sway=movement.measure_sway(pelvis, fps), surge=movement.measure_surge(pelvis, fps),
+        speed=movement.measure_travel_speed(pelvis, fps),
         contact_speed=np.concatenate([movement.measure_contact_speeds(feet, contacts, fps), [[np.nan, np.nan]]]),
         skating=np.append(movement.find_skating_steps(feet[:, :, 1], floor, fps), False), heel_rest=heel_rest,
         support=movement.measure_support_height(feet, contacts, heel_rest),
-        tip=movement.measure_tip_height(skeleton, positions, rotations),
-        jerk=movement.compute_jerk(positions, fps), smoothness=np.append(realism.measure_smoothness(skeleton, positions, fps), np.nan),
-        stances=spans, travel=movement.measure_stance_travel(feet[:, :, 1], spans),
+        tip=movement.measure_tip_height(skeleton, positions, rotations), jerk=movement.compute_jerk(positions, fps),
+        smoothness=np.append(realism.measure_smoothness(skeleton, positions, fps), np.nan), stances=spans,
+        travel=movement.measure_stance_travel(feet[:, :, 1], spans),
     )  # fmt: skip
 
 
@@ -245,7 +247,8 @@ def _flag_high_jerk(recording: Recording, real: np.ndarray) -> np.ndarray:
     return out
 
 
-def _select_poses(measured: list[Recording], twins: np.ndarray, body: Humanoid, fps: float) -> tuple[np.ndarray, np.ndarray]:
+def _select_poses(measured: list[Recording], twins: np.ndarray, body: Humanoid, fps: float) -> tuple[np.ndarray,
+        np.ndarray]:
     """Select the poses to compare with (M, 6 J), and compute the 95th percentile (5,) of the leave-one-clip-out
     distance.
 
@@ -284,7 +287,8 @@ def compute_source_poses(library: Library, clips: tuple[str, ...], clip, mirrore
             continue
         selected = (clip == number) & (mirrored == side)
         positions = compute_pose(motion.skeleton, *sample_frames(motion, clip_frame[selected]))[0]
-        out[selected] = realism.compute_local_positions(motion.skeleton, positions, identify_joints(motion.skeleton).hips)
+        out[selected] = realism.compute_local_positions(motion.skeleton, positions,
+                                                        identify_joints(motion.skeleton).hips)
     return out
 
 

@@ -14,7 +14,7 @@ from ..base.errors import InputError, line_spans
 from ..library.library import Library
 from ..motion.track import Track
 from ..synthesis.quality.moments import measure_dribble_touches
-from ..synthesis.quality.played import Playback, playback_from_take
+from ..synthesis.quality.playback import Playback, playback_from_take
 from ..synthesis.quality.targets import find_target
 from ..synthesis.take import Take
 from . import figures
@@ -75,9 +75,9 @@ def evaluate_played(
     report = {
         "version": VERSION, "seed": None, "fps": played.motion.fps, "frames": len(played.motion),
         "duration_s": played.motion.duration, "seconds": dict.fromkeys(SECONDS), **figures.measure_path_errors(view),
-        "keys": figures.measure_key_moments(view), **figures.measure_feet(view), **figures.measure_corrections(view, ik_miss),
-        **figures.measure_transitions(view), **figures.measure_poses(view),
-        "annotation_similarity": figures.measure_annotation_similarity(view),
+        "keys": figures.measure_key_moments(view), **figures.measure_feet(view),
+        **figures.measure_corrections(view, ik_miss), **figures.measure_transitions(view),
+        **figures.measure_poses(view), "annotation_similarity": figures.measure_annotation_similarity(view),
         "warnings": figures.list_warnings(view, ik_miss, requested),
     }
     return {**round_values(report), "warning_seconds": _list_message_spans(report["warnings"])}
@@ -165,7 +165,8 @@ def _flatten(value, name: str) -> dict[str, Any]:
     if name == "warning_seconds":
         return {}
     if isinstance(value, Mapping):
-        return {k: v for key, entry in value.items() for k, v in _flatten(entry, f"{name}.{key}" if name else key).items()}
+        return {k: v for key, entry in value.items() for k,
+                v in _flatten(entry, f"{name}.{key}" if name else key).items()}
     if isinstance(value, list) and any(isinstance(entry, Mapping) for entry in value):
         pairs = [(f"{name} {i}", entry) for i, entry in enumerate(value, 1)]
         return {k: v for label, entry in pairs for k, v in _flatten(entry, label).items()}

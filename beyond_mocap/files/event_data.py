@@ -10,7 +10,7 @@ import unicodedata
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from ..annotation.event_words import EVENT_KINDS
+from ..annotation.event_labels import EVENT_KINDS
 from ..motion.track.match_data import REFEREE, Match, MatchPlayer
 
 NOT_PLAYED = frozenset(kind.name for kind in EVENT_KINDS if kind.touch == "none")
@@ -111,7 +111,8 @@ class EventPlayer:
         return self.name or f"{self.team} {self.number if self.number >= 0 else self.id}".strip()
 
 
-def assign_players(event_players: Sequence[EventPlayer], match: Match | None) -> tuple[dict[EventPlayer, tuple[str, str]], list[str]]:
+def assign_players(event_players: Sequence[EventPlayer], match: Match
+                   | None) -> tuple[dict[EventPlayer, tuple[str, str]], list[str]]:
     """Assign the players of events to the players of a match.
 
     Feeds may exchange home and away: the assignment that finds more players is used.
@@ -126,7 +127,8 @@ def assign_players(event_players: Sequence[EventPlayer], match: Match | None) ->
         return {}, []
     players = [player for player in match.players if player.team != REFEREE]
     as_named = {who: found for who in event_players if (found := _find_player(who, players, who.team))}
-    exchanged = {who: found for who in event_players if (found := _find_player(who, players, _OTHER_TEAM.get(who.team, "")))}
+    exchanged = {who: found for who in event_players
+                 if (found := _find_player(who, players, _OTHER_TEAM.get(who.team, "")))}
     notes = []
     best = as_named
     if len(exchanged) > len(as_named):
@@ -134,7 +136,8 @@ def assign_players(event_players: Sequence[EventPlayer], match: Match | None) ->
         notes.append("home and away are exchanged in the events")
     missing = [who.display_name for who in event_players if who not in best]
     if missing:
-        notes.append(f"{len(missing)} of {len(event_players)} players of the events are not tracked: {', '.join(missing[:6])}")
+        notes.append(
+            f"{len(missing)} of {len(event_players)} players of the events are not tracked: {', '.join(missing[:6])}")
     return {who: (player.id, player.team) for who, player in best.items()}, notes
 
 
@@ -145,7 +148,8 @@ def _find_player(who: EventPlayer, players: Sequence[MatchPlayer], team: str) ->
     by_number = [player for player in teammates if who.number >= 0 and player.number == who.number] if team else []
     name = _normalize_name(who.name)
     by_name = [player for player in teammates if name and _normalize_name(player.name) == name]
-    by_last = [player for player in teammates if name and _normalize_name(player.name).split()[-1:] == name.split()[-1:]]
+    by_last = [player for player in teammates if name and _normalize_name(player.name).split()[-1:]
+               == name.split()[-1:]]
     return next((found[0] for found in (by_id, by_number, by_name, by_last) if len(found) == 1), None)
 
 

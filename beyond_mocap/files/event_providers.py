@@ -12,11 +12,11 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
-from ..annotation.event_words import KINDS
+from ..annotation.event_labels import KINDS
 from ..annotation.striking import BODY_PARTS
 from ..base.errors import InputError
 from ..motion.track.match_data import Match
-from .event_data import MatchEvent, EventPlayer
+from .event_data import EventPlayer, MatchEvent
 from .tables import parse_number, read_rows
 from .tracking.feed import Provider, find_provider, load_with_kloppy, read_head
 from .tracking.match_arrays import USUAL_PITCH
@@ -97,7 +97,7 @@ def find_second_file(path: Path, provider: EventProvider, meta: str | os.PathLik
         if candidate.is_file() and candidate != path:
             return candidate
     matching = [one for one in sorted(path.parent.glob("*.[xj]*")) if one != path
-               and re.match(provider.second_pattern, read_head(one))]  # fmt: skip
+                and re.match(provider.second_pattern, read_head(one))]  # fmt: skip
     if len(matching) == 1:
         return matching[0]
     expected = f"a file such as {names[0]}" if names[0] != path.name else "the provider's lineups or metadata"
@@ -120,7 +120,7 @@ def load_events(path: Path, provider: EventProvider, meta: Path | None):
     arguments = {key: files[name] for key, name in provider.arguments.items()}
     others = f" and their {meta.name}" if meta else ""
     return load_with_kloppy(path, provider.name, provider.loader, arguments=arguments,
-                               expected=f"{provider.name} events", others=others)
+                            expected=f"{provider.name} events", others=others)
 
 
 def find_pitch_size(match: Match | None) -> tuple[float, float]:
@@ -201,13 +201,15 @@ def read_metrica_events(path: Path, match: Match | None):
         time -= period_starts.setdefault(period, 0.0 if period == 1 else time)
         event_type = f"{row['Type']} {row['Subtype']}".strip().lower()
         type_name = (row["Type"].lower(), "other")[row["Type"].lower() not in (*KINDS, *_TABLE_KINDS)]
-        kind = next((kind for word, kind in _METRICA_SUBTYPES.items() if word in event_type), _TABLE_KINDS.get(type_name, type_name))
+        kind = next((kind for word, kind in _METRICA_SUBTYPES.items() if word in event_type),
+                    _TABLE_KINDS.get(type_name, type_name))
         part = "head" if "head" in event_type else "hand" if "throw in" in event_type else ""
         details = ("throw-in",) * (part == "hand") + ("lost",) * (kind == "aerial" and "lost" in event_type)
         x, y = (parse_number(row[name], name, place, blank=True) for name in ("Start X", "Start Y"))
         team = row["Team"].lower() if row["Team"].lower() in ("home", "away") else ""
         event = MatchEvent(time=time, period=period, player="", team=team, kind=kind, part=part, side="",
-                           details=details, original_text=event_type, success=None, place=((x - 0.5) * length, (0.5 - y) * width))
+                           details=details, original_text=event_type, success=None,
+                           place=((x - 0.5) * length, (0.5 - y) * width))
         rows.append((event, EventPlayer.from_text(row["From"], team) if row["From"] else None))
     return rows
 

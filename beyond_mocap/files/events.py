@@ -12,8 +12,15 @@ import numpy as np
 
 from ..base.errors import InputError
 from ..motion.track.match_data import Match
-from .event_data import MatchEvent, MatchEvents, EventPlayer, assign_players
-from .event_providers import EVENT_PROVIDERS, EventProvider, detect_event_provider, load_events, find_second_file, find_pitch_size
+from .event_data import EventPlayer, MatchEvent, MatchEvents, assign_players
+from .event_providers import (
+    EVENT_PROVIDERS,
+    EventProvider,
+    detect_event_provider,
+    find_pitch_size,
+    find_second_file,
+    load_events,
+)
 from .tracking.match_repairs import find_home_end
 
 _MIN_KNOWN_SHARE = 0.5  # smallest share of the events' players that must be tracked
@@ -85,7 +92,8 @@ def _assign_players(path: Path, rows: list[tuple[MatchEvent, EventPlayer | None]
     event_players = list(dict.fromkeys(who for _, who in rows if who is not None))
     known, notes = assign_players(event_players, match)
     is_mostly_unknown = match is not None and len(known) < _MIN_KNOWN_SHARE * len(event_players)
-    if is_mostly_unknown and all(who.number < 0 and not who.name for who in event_players):  # nothing shows that it is another match
+    if is_mostly_unknown and all(who.number < 0 and not who.name
+                                 for who in event_players):  # nothing shows that it is another match
         ids = ", ".join([who.id for who in event_players if who not in known][:3])
         notes = [
             f"{path.name}: {len(event_players) - len(known)} of {len(event_players)} players cannot be assigned, because the "
@@ -142,7 +150,8 @@ def _build_position_map(dataset, match: Match | None):
         if point is None or size.x_dim.max is None or size.y_dim.max is None or point.x is None or point.y is None:
             return np.nan, np.nan
         x = ((point.x - size.x_dim.min) / (size.x_dim.max - size.x_dim.min) - 0.5) * length
-        y = ((point.y - size.y_dim.min) / (size.y_dim.max - size.y_dim.min) - 0.5) * width * (-1.0 if is_y_down else 1.0)
+        y = ((point.y - size.y_dim.min) / (size.y_dim.max - size.y_dim.min) - 0.5) * width * (-1.0 if is_y_down
+                else 1.0)
         end = ends.get(int(record.period.id) if by_team else 1, -1.0)
         turn = -end if team != "away" or not by_team else end
         return float(turn * x), float(turn * y)

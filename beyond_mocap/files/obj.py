@@ -42,7 +42,8 @@ def read_mesh(path: str | os.PathLike) -> tuple[np.ndarray, np.ndarray]:
         found = f"{len(vertices)} vertices and no faces"
         raise InputError(path, found, "a mesh with faces", "export the ground as a mesh")
     file_vertices = np.array(vertices)
-    return np.stack([file_vertices[:, 0], -file_vertices[:, 2], file_vertices[:, 1]], axis=1), np.array(triangles, dtype=int)
+    return np.stack([file_vertices[:, 0], -file_vertices[:, 2], file_vertices[:, 1]], axis=1), np.array(triangles,
+            dtype=int)
 
 
 def _iter_statements(path) -> Iterator[tuple[str, list[str]]]:

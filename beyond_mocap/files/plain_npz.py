@@ -17,9 +17,9 @@ from ..base.errors import InputError
 HEADER = "header"
 """Name of the array that holds a text as UTF-8 bytes."""
 
-_READ_ERRORS = (zipfile.BadZipFile, zlib.error, struct.error, EOFError, OSError, ValueError, KeyError, IndexError, TypeError,
-           AttributeError, NotImplementedError, RuntimeError, OverflowError, MemoryError, SyntaxError,
-           tokenize.TokenError)  # fmt: skip
+_READ_ERRORS = (zipfile.BadZipFile, zlib.error, struct.error, EOFError, OSError, ValueError, KeyError, IndexError,
+                TypeError, AttributeError, NotImplementedError, RuntimeError, OverflowError, MemoryError, SyntaxError,
+                tokenize.TokenError)  # fmt: skip
 """Errors of zipfile and numpy for truncated, damaged or malicious files."""
 
 

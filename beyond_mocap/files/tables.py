@@ -19,8 +19,8 @@ import numpy as np
 from ..base.errors import InputError
 from ..motion.skeleton import freeze_array
 from ..motion.track.ball_path import BallPath
+from .atomic import atomic_write
 from .content import read_bytes
-from .whole import atomic_write
 
 BALL_COLUMNS = ("time_s", "x_m", "y_m", "z_m", "measured")
 _MAX_METRES = 1e4  # metres; larger coordinates are in a wrong unit
@@ -42,7 +42,8 @@ def write_ball(path: str | os.PathLike, ball: BallPath) -> None:
         ball: the ball's trajectory.
     """
     rows = zip(ball.times, *np.asarray(ball.positions).T, np.asarray(ball.measured).astype(int))
-    text = format_csv(BALL_COLUMNS, ((f"{t:.6f}", _format_metres(x), _format_metres(y), _format_metres(z), m) for t, x, y, z, m in rows))
+    text = format_csv(BALL_COLUMNS, ((f"{t:.6f}", _format_metres(x), _format_metres(y), _format_metres(z), m) for t, x,
+                                     y, z, m in rows))
     atomic_write(path, text)
 
 

@@ -9,10 +9,11 @@ from pathlib import Path
 from typing import Callable, Iterable
 
 from ..annotation import ClipAnnotation
-from ..base.errors import UserCancelledError, InputError
+from ..base.errors import InputError, UserCancelledError
 from ..files.bvh import bvh
 from ..synthetic.landing import ends_in_flight
-from . import cache, landings, one_skeleton, repair
+from . import cache, landings, repair
+from . import common_skeleton as one_skeleton
 from .cache import write_synthetic_clips
 from .clip import Clip
 from .clusters import BLOCK_LENGTHS, cluster_blocks
@@ -84,7 +85,8 @@ def _list_completed(clips: Iterable[Clip]) -> list[Clip]:
 
 def _read_clips(folder, paths, files, annotations, chosen, unit, threads, notes, report, cancelled) -> tuple[Clip, ...]:
     """Read all recordings, repair them, bring them to one skeleton, put each on the floor, and add the twins."""
-    read, without_pops, levelled = zip(*_read_files(paths, files, unit, threads=threads, report=report, cancelled=cancelled))
+    read, without_pops, levelled = zip(*_read_files(paths, files, unit, threads=threads, report=report,
+                                                    cancelled=cancelled))
     notes += _collect_unit_notes(read)
     example = bvh.read_bvh(chosen, unit).motion if chosen is not None else None
     unified = one_skeleton.unify_skeletons(paths, [motion for motion, _ in levelled], example, notes)
@@ -135,7 +137,8 @@ def _read_files(paths, files, unit, threads, report, cancelled) -> list[tuple]:
 def _complete_landings(names: list[str], repaired: list[repair.RepairedClip], rows, notes: list[str]) -> list[Clip]:
     """Build the clips; those that end in flight get a landing and getting up."""
     flying = [ends_in_flight(one.motion) for one in repaired]
-    getting_ups = landings.collect_getting_ups([(one.motion, own, one.heel_toe_contacts) for one, own in zip(repaired, rows)]) if any(flying) else []
+    getting_ups = landings.collect_getting_ups([(one.motion, own, one.heel_toe_contacts) for one,
+                                                own in zip(repaired, rows)]) if any(flying) else []
     clips, ends = [], []
     for name, one, own, flies in zip(names, repaired, rows, flying):
         if flies:
@@ -143,7 +146,8 @@ def _complete_landings(names: list[str], repaired: list[repair.RepairedClip], ro
             clips.append(Clip(path=name, mirrored=False, motion=ends[-1].motion, annotations=ends[-1].rows,
                               heel_toe_contacts=ends[-1].heel_toe_contacts, recorded_count=ends[-1].recorded_count))
         else:
-            clips.append(Clip(path=name, mirrored=False, motion=one.motion, annotations=own, heel_toe_contacts=one.heel_toe_contacts))
+            clips.append(Clip(path=name, mirrored=False, motion=one.motion, annotations=own,
+                              heel_toe_contacts=one.heel_toe_contacts))
     notes += landings.describe_landings(ends, getting_ups)
     return clips
 

@@ -107,10 +107,9 @@ def _build_header(key: str, library) -> dict:
         "key": key, "names": skeleton.names, "parents": skeleton.parents, "end_parents": skeleton.end_parents,
         "vocabulary": library.frames.vocabulary, "fps": library.fps, "notes": library.notes,
         "lengths": list(library.clusters),
-        "clips": [
-            [clip.path, clip.mirrored, clip.motion.fps, len(clip.motion), [asdict(row) for row in clip.annotations],
-             clip.recorded_count, asdict(clip.repair_figures) if clip.repair_figures else None] for clip in library.clips
-        ],
+        "clips": [[clip.path, clip.mirrored, clip.motion.fps, len(clip.motion),
+                   [asdict(row) for row in clip.annotations], clip.recorded_count, asdict(clip.repair_figures)
+                   if clip.repair_figures else None] for clip in library.clips],
     }  # fmt: skip
 
 

@@ -11,7 +11,7 @@ from ..motion.mirror import mirror
 from ..motion.motion import Motion
 from . import repair
 from .landings import LANDING_FOLDER
-from .made import SYNTHETIC_FOLDER
+from .synthetic_clips import SYNTHETIC_FOLDER
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -72,4 +72,5 @@ class Clip:
         rows = tuple(replace(row, words=tuple(swap_sides(row.words))) for row in self.annotations)
         heel_toe_contacts = self.heel_toe_contacts[:, ::-1]
         return Clip(path=self.path, mirrored=not self.mirrored, motion=mirror(self.motion), annotations=rows,
-                    heel_toe_contacts=heel_toe_contacts, recorded_count=self.recorded_count, repair_figures=self.repair_figures)
+                    heel_toe_contacts=heel_toe_contacts, recorded_count=self.recorded_count,
+                    repair_figures=self.repair_figures)

@@ -16,7 +16,7 @@ import numpy as np
 from ..base.time_series import time_derivative
 from ..motion import quaternion
 from ..motion.humanoid import compute_heading_from_positions, identify_joints
-from ..motion.motion import sample_frames, compute_pose
+from ..motion.motion import compute_pose, sample_frames
 from ..motion.skeleton import Skeleton
 from ..motion.track import smooth_zero_phase_hann
 
@@ -175,7 +175,8 @@ def _build_frames(clips, reference: Frames | None) -> Frames:
         for name, column in zip(_COLUMNS, columns):
             parts[name].append(column)
     merged = {name: np.concatenate(columns) for name, columns in parts.items()}
-    mean, basis = (reference.mean, reference.basis) if reference is not None else compute_principal_components(merged["features"])
+    mean, basis = (reference.mean, reference.basis) if reference is not None else compute_principal_components(
+        merged["features"])
     merged["features"] = (merged["features"] - mean) @ basis
     count = np.array(counts)
     return Frames(first=np.cumsum(count) - count, count=count, mean=mean, basis=basis, vocabulary=vocabulary, **merged)

@@ -48,7 +48,8 @@ def collect_keys(clips) -> tuple[Key, ...]:
     for index, clip in enumerate(clips):
         for row in clip.annotations:
             if row.key is not None:
-                found.append(Key(index, float(row.key), float(row.start), float(row.end), _collect_key_labels(clip, row)))
+                found.append(Key(index, float(row.key), float(row.start), float(row.end),
+                                 _collect_key_labels(clip, row)))
     return tuple(found)
 
 
@@ -91,7 +92,8 @@ def select_nearest_keys(keys: tuple[Key, ...], words) -> tuple[Key, ...]:
     requested = frozenset(words)
     actions = _select_actions(requested) | (requested & _SAME_MOVE)
     near = [key for key in keys if actions & key.labels or _score_same_contact(requested, key.labels)]
-    scores = [(len(requested & key.labels) + _score_same_contact(requested, key.labels), -len(key.labels - requested)) for key in near]
+    scores = [(len(requested & key.labels) + _score_same_contact(requested, key.labels), -len(key.labels - requested))
+              for key in near]
     return tuple(key for key, score in zip(near, scores) if score == max(scores))
 
 
@@ -119,7 +121,8 @@ def select_substitutes(choices: tuple[Key, ...], synthetic: tuple[Key, ...], wor
     """
     requested = frozenset(words)
     substituted = {(_select_act(one), requested & one.labels) for one in choices}
-    return tuple(key for key in synthetic if any(act == _select_act(key) and labels <= key.labels for act, labels in substituted))
+    return tuple(key for key in synthetic if any(act == _select_act(key) and labels <= key.labels for act,
+                                                 labels in substituted))
 
 
 def _select_act(key: Key) -> frozenset[str]:

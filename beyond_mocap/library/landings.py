@@ -14,7 +14,7 @@ import numpy as np
 
 from ..annotation import LOCOMOTION, ClipAnnotation
 from ..motion.motion import Motion
-from ..synthetic.landing import ends_in_flight, add_landing
+from ..synthetic.landing import add_landing, ends_in_flight
 from ..synthetic.moves import build_get_up
 from .scan import CACHE_FOLDER
 
@@ -63,9 +63,9 @@ def collect_getting_ups(clips: Sequence[tuple[Motion, tuple[ClipAnnotation, ...]
     A synthetic one is returned where they show none.
     """
     found = [
-        GettingUp(motion.frames(int(row.start), int(row.end) + 1), standing[int(row.start) : int(row.end) + 1], row.words)
-        for motion, rows, standing in clips for row in rows
-        if "getting_up" in row.words and row.end - row.start > motion.fps and not ends_in_flight(motion)
+        GettingUp(motion.frames(int(row.start), int(row.end) + 1), standing[int(row.start) : int(row.end) + 1],
+                  row.words) for motion, rows, standing in clips for row in rows if "getting_up" in row.words
+        and row.end - row.start > motion.fps and not ends_in_flight(motion)
     ]
     return found or [_build_getting_up([(motion, rows) for motion, rows, _ in clips])]
 
@@ -82,7 +82,8 @@ def _build_getting_up(clips) -> GettingUp:
     return GettingUp(gesture, np.zeros((len(gesture), 2, 2), bool), ("getting_up", "back"), is_synthetic=True)
 
 
-def complete_clip(motion: Motion, rows, heel_toe_contacts: np.ndarray, getting_ups: Sequence[GettingUp]) -> CompletedClip:
+def complete_clip(motion: Motion, rows, heel_toe_contacts: np.ndarray,
+                  getting_ups: Sequence[GettingUp]) -> CompletedClip:
     """Complete a clip that ends in flight with landing and getting up.
 
     Args:
@@ -105,7 +106,8 @@ def complete_clip(motion: Motion, rows, heel_toe_contacts: np.ndarray, getting_u
         ClipAnnotation(landing.touch_frame, landing.rise_frame - 1, None, ("ground",)),
         ClipAnnotation(landing.rise_frame, last, None, tuple(getting_up.labels)),
     )
-    recorded_rows = tuple(_extend_row(row, landing.recorded_count, last) for row in rows if row.start < landing.recorded_count)
+    recorded_rows = tuple(_extend_row(row, landing.recorded_count, last) for row in rows if row.start
+                          < landing.recorded_count)
     return CompletedClip(landing.motion, (*recorded_rows, *synthetic_rows), contacts, landing.recorded_count)
 
 

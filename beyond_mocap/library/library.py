@@ -24,7 +24,15 @@ from .clip import Clip
 from .clusters import Clusters
 from .features import FPS, Frames, build_frames, join_frames
 from .keys import Key, collect_keys
-from .made import KICK_LABELS, RECEIVE_LABELS, MIN_RECEIVE_SPEED, find_speed_gaps, select_locomotion, iter_synthetic_clips, measure_touch_speed
+from .synthetic_clips import (
+    KICK_LABELS,
+    MIN_RECEIVE_SPEED,
+    RECEIVE_LABELS,
+    find_speed_gaps,
+    iter_synthetic_clips,
+    measure_touch_speed,
+    select_locomotion,
+)
 
 Progress = Callable[[float, str], None]
 
@@ -101,12 +109,14 @@ class Library:
 
         A body that is played faster or slower than the track drags that foot for as long.
         """
-        return np.concatenate([_measure_stance_seconds(clip, self._select_clip_frames(i)) for i, clip in enumerate(self.clips)])
+        return np.concatenate([_measure_stance_seconds(clip, self._select_clip_frames(i)) for i,
+                               clip in enumerate(self.clips)])
 
     @cached_property
     def feet_in_contact(self) -> np.ndarray:
         """(N, 2) bool: left and right foot on the ground, heel or toe."""
-        contacts = (clip.heel_toe_contacts.any(axis=2)[_round_to_frames(clip, self._select_clip_frames(i))] for i, clip in enumerate(self.clips))
+        contacts = (clip.heel_toe_contacts.any(axis=2)[_round_to_frames(clip, self._select_clip_frames(i))] for i,
+                    clip in enumerate(self.clips))
         return np.concatenate(list(contacts))
 
     def _select_clip_frames(self, clip: int) -> np.ndarray:
@@ -156,7 +166,8 @@ class Library:
             True if it does.
         """
         inside = sum(int(np.sum((speed > low) & (speed < high))) for low, high in self.speed_gaps)
-        kick, take = (measure_touch_speed(self.frames, self.clips, self.keys, act) for act in (KICK_LABELS, RECEIVE_LABELS))
+        kick, take = (measure_touch_speed(self.frames, self.clips, self.keys, act)
+                      for act in (KICK_LABELS, RECEIVE_LABELS))
         too_fast = 1.3 * np.where(takes & np.isfinite(take), max(take, MIN_RECEIVE_SPEED), kick)
         return inside >= 0.2 * self.fps or bool(np.any(key_speeds > too_fast))
 
@@ -176,7 +187,8 @@ def _build_synthetic_library(library: Library) -> Library:
     speeds = {gait.label: gait.speed for gait in library.gaits if gait.label != STANDING}
     clips = []
     for synthetic in iter_synthetic_clips(library.clips, library.frames, library.fps, speeds, library.keys):
-        clip = Clip(path=synthetic.name, mirrored=False, motion=synthetic.motion, annotations=synthetic.rows, heel_toe_contacts=synthetic.heel_toe_contacts)
+        clip = Clip(path=synthetic.name, mirrored=False, motion=synthetic.motion, annotations=synthetic.rows,
+                    heel_toe_contacts=synthetic.heel_toe_contacts)
         clips += [clip, clip.build_twin()]
     if not clips:
         return replace(library, clips=())
@@ -187,7 +199,8 @@ def _build_synthetic_library(library: Library) -> Library:
 def _measure_stance_seconds(clip: Clip, source: np.ndarray) -> np.ndarray:
     """Measure the stance durations (T,) of one clip at its frames `source` (T,)."""
     contacts = clip.heel_toe_contacts.any(axis=2)
-    length = np.stack([_measure_run_lengths(contacts[:, side]) for side in (0, 1)], axis=1).min(axis=1) / clip.motion.fps
+    length = np.stack([_measure_run_lengths(contacts[:, side]) for side in (0, 1)],
+                      axis=1).min(axis=1) / clip.motion.fps
     return length[_round_to_frames(clip, source)]
 
 
@@ -224,7 +237,8 @@ def measure_gaits(library: Library) -> tuple[Gait, ...]:
     frames = library.frames
     step = np.linalg.norm(np.diff(frames.path, axis=0), axis=1)
     chosen = dict(library.chosen_gaits)
-    recorded = {word for clip in library.clips if not clip.is_synthetic for row in clip.annotations for word in row.words}
+    recorded = {word for clip in library.clips if not clip.is_synthetic for row in clip.annotations
+                for word in row.words}
     for index, clip in enumerate(library.clips):
         first, rate = frames.first[index], library.fps / clip.motion.fps
         for row in () if clip.mirrored else clip.annotations:

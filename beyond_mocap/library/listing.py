@@ -67,8 +67,8 @@ def list_clips(library: Library) -> tuple[ListedClip, ...]:
         mark, details = _grade_clip(clip, mean, float(np.median(ratio[part])))
         seconds = clip.recording.duration
         words, keys = collect_labels(clip.annotations)
-        out.append(ListedClip(path=clip.path, labels=words, key_moments=keys, seconds=seconds, speed=mean, max_speed=fastest,
-                          grade=mark, details=details))
+        out.append(ListedClip(path=clip.path, labels=words, key_moments=keys, seconds=seconds, speed=mean,
+                              max_speed=fastest, grade=mark, details=details))
     return tuple(out)
 
 
@@ -101,7 +101,7 @@ def scan_clips(folder: str | Path, cache_dir: str | Path | None = None) -> tuple
         seconds = max(frames - 1, 0) / fps if fps else 0.0
         words, keys = collect_labels(rows)
         out.append(ListedClip(path=path.relative_to(folder).as_posix(), labels=words, key_moments=keys, seconds=seconds,
-                          details=details))
+                              details=details))
     return tuple(out)
 
 
@@ -121,7 +121,8 @@ def _grade_clip(clip: Clip, speed: float, jerk: float) -> tuple[int, tuple[str, 
     if clip.repair_figures is not None:
         figures = clip.repair_figures
         rolling = _SLIDE_SPEED_SHARE * speed
-        marks += [_grade_value(figures.slides, tuple(np.hypot(_SLIDE_LIMITS, (rolling, 2.0 * rolling)))), _grade_value(figures.drift, _DRIFT_LIMITS)]
+        marks += [_grade_value(figures.slides, tuple(np.hypot(_SLIDE_LIMITS, (rolling, 2.0 * rolling)))),
+                  _grade_value(figures.drift, _DRIFT_LIMITS)]
         slid = f" (file: {100 * figures.slid:.0f})" if figures.slid > figures.slides + 0.01 else ""
         details.append(f"feet slide: {100 * figures.slides:.0f} cm/s{slid}")
         if figures.drift > 0.0:

@@ -30,8 +30,8 @@ from ..base.vectors import arctan2
 from ..motion import contacts, quaternion
 from ..motion.humanoid import Humanoid, compute_heading_from_positions, identify_joints, measure_leg_length
 from ..motion.motion import Motion, forward_kinematics
+from .label_sources import Proposal
 from .library import Library
-from .word_sources import Proposal
 
 if TYPE_CHECKING:
     from .classify.classifier import Classifier
@@ -271,7 +271,8 @@ def _propose_ground(seen: _RecordingSignals) -> list[Proposal]:
         risen = np.flatnonzero(up[stop:])
         if len(risen) and risen[0] < seen.to_frames(4.0):
             words = ("getting_up", "front" if _is_prone(seen, start, stop) else "back")
-            out.append(Proposal(seen.build_row(max(start, stop - seen.to_frames(1.0)), stop + risen[0], words), 0.7, "rises"))
+            out.append(Proposal(seen.build_row(max(start, stop - seen.to_frames(1.0)), stop + risen[0], words), 0.7,
+                                "rises"))
     return out
 
 

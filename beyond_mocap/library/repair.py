@@ -138,7 +138,8 @@ def _detect_pops(rotations: np.ndarray, width: int) -> np.ndarray:
     # with the run starting at frame f: outer f - 2, before f - 1, after f + width, beyond f + width + 1
     outer, before = rotations[:count], rotations[1 : count + 1]
     after, beyond = rotations[width + 2 : width + 2 + count], rotations[width + 3 : width + 3 + count]
-    still = np.max([_measure_angles(outer, before), _measure_angles(before, after), _measure_angles(after, beyond)], axis=0)
+    still = np.max([_measure_angles(outer, before), _measure_angles(before, after), _measure_angles(after, beyond)],
+                   axis=0)
     deviation = np.full(still.shape, np.inf)
     for step in range(width):
         here = rotations[2 + step : 2 + step + count]
@@ -152,7 +153,8 @@ def _measure_angles(a: np.ndarray, b: np.ndarray) -> np.ndarray:
     return 2.0 * np.arccos(np.clip(np.abs(np.sum(a * b, axis=-1)), 0.0, 1.0))
 
 
-def repair_floor_and_feet(motion: Motion, heel_toe_contacts: np.ndarray | None = None, always_plant: bool = False) -> RepairedClip:
+def repair_floor_and_feet(motion: Motion, heel_toe_contacts: np.ndarray | None = None,
+                          always_plant: bool = False) -> RepairedClip:
     """Repair floor and feet: a level floor at height 0 under the soles (`contacts.measure_ground_height`), and planted
     feet.
 
@@ -175,8 +177,9 @@ def repair_floor_and_feet(motion: Motion, heel_toe_contacts: np.ndarray | None =
     if was_sliding or always_plant:
         motion = plant_contacts(motion, heel_toe_contacts)
     level = motion.root_positions - [0.0, 0.0, contacts.measure_ground_height(motion)]
-    return RepairedClip(motion=replace(motion, root_positions=level), heel_toe_contacts=heel_toe_contacts, drift=drift, travel=travel,
-                    slide=(before, measure_slide(motion, heel_toe_contacts)), was_sliding=was_sliding)
+    return RepairedClip(motion=replace(motion, root_positions=level), heel_toe_contacts=heel_toe_contacts, drift=drift,
+                        travel=travel, slide=(before, measure_slide(motion, heel_toe_contacts)),
+                        was_sliding=was_sliding)
 
 
 def is_sliding(motion: Motion, heel_toe_contacts: np.ndarray) -> bool:
@@ -188,8 +191,8 @@ def is_sliding(motion: Motion, heel_toe_contacts: np.ndarray) -> bool:
 
 def plant_contacts(motion: Motion, heel_toe_contacts: np.ndarray) -> Motion:
     """Plant the feet where `heel_toe_contacts` (T, 2, 2) marks heels and toes in contact, at their own heights."""
-    planted = plant_feet(motion.skeleton, motion.root_positions, motion.rotations, heel_toe_contacts=heel_toe_contacts, fps=motion.fps,
-                    max_drop=_MAX_PELVIS_DROP, level_feet=False)
+    planted = plant_feet(motion.skeleton, motion.root_positions, motion.rotations, heel_toe_contacts=heel_toe_contacts,
+                         fps=motion.fps, max_drop=_MAX_PELVIS_DROP, level_feet=False)
     return replace(motion, root_positions=planted.root, rotations=planted.rotations)
 
 
@@ -201,7 +204,8 @@ def measure_slide(motion: Motion, heel_toe_contacts: np.ndarray) -> float:
     places, _ = forward_kinematics(motion)
     points = np.stack([places[:, [limb.foot, limb.toe_or_foot], :2] for limb in (body.left, body.right)], axis=1)
     in_contact = heel_toe_contacts[1:] & heel_toe_contacts[:-1]
-    return float(np.linalg.norm(np.diff(points, axis=0), axis=-1)[in_contact].mean() * motion.fps) if in_contact.any() else 0.0
+    return float(np.linalg.norm(np.diff(points, axis=0), axis=-1)[in_contact].mean()
+                 * motion.fps) if in_contact.any() else 0.0
 
 
 def _measure_ball_slide(motion: Motion, heel_toe_contacts: np.ndarray) -> float:
@@ -257,7 +261,8 @@ def _correct_travel(motion: Motion, heel_toe_contacts: np.ndarray) -> tuple[Moti
     velocity = np.diff(_compute_ball_positions(motion)[..., :2], axis=0) * motion.fps
     weight = _weight_stance_middles(heel_toe_contacts[..., 1])
     weights = np.minimum(weight[1:], weight[:-1])
-    change = [-_fit_smooth_curve(velocity[..., axis] * weights, weights, _TRAVEL_SECONDS, motion.fps, _SPEED_WEIGHT) for axis in (0, 1)]
+    change = [-_fit_smooth_curve(velocity[..., axis] * weights, weights, _TRAVEL_SECONDS, motion.fps, _SPEED_WEIGHT)
+              for axis in (0, 1)]
     moved = np.zeros((len(motion), 3))
     moved[1:, :2] = np.cumsum(np.stack(change, axis=1), axis=0) / motion.fps
     return replace(motion, root_positions=motion.root_positions + moved), float(np.linalg.norm(moved[-1]))
@@ -275,7 +280,8 @@ def _weight_stance_middles(contacts: np.ndarray) -> np.ndarray:
     return weight
 
 
-def _fit_smooth_curve(weighted_values: np.ndarray, weight: np.ndarray, seconds: float, fps: float, pull: float) -> np.ndarray:
+def _fit_smooth_curve(weighted_values: np.ndarray, weight: np.ndarray, seconds: float, fps: float,
+                      pull: float) -> np.ndarray:
     """Fit the curve f (T,) of least sum w (f - v)^2 + pull f^2 + stiffness |f''|^2.
 
     Args:

@@ -15,7 +15,7 @@ from pathlib import Path
 
 from ..annotation import ClipAnnotation, read_annotation_csv, read_clip_annotations
 from ..base.errors import InputError
-from ..files.whole import atomic_write
+from ..files.atomic import atomic_write
 
 CACHE_FOLDER = ".beyond_mocap"
 TABLE_NAME = "annotations.csv"
@@ -104,7 +104,8 @@ def find_tables(folder: Path, clips: list[Path]) -> list[Path]:
     """
     folder = Path(folder)
     clip_folders = {clip.parent for clip in clips}
-    folders = {place for home in clip_folders for place in (home, *home.parents) if place == folder or folder in place.parents}
+    folders = {place for home in clip_folders for place in (home, *home.parents) if place == folder
+               or folder in place.parents}
     folders |= {folder, _to_absolute(folder).parent}
     return sorted(place / TABLE_NAME for place in folders if (place / TABLE_NAME).is_file())
 

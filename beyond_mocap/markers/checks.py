@@ -30,7 +30,7 @@ _EMPTY_SECONDS, _EMPTY_SHARE = 0.1, 0.2
 
 
 def check_trial(trial: MarkerTrial, static: MarkerTrial | None, clusters: Mapping[str, Sequence[str]],
-          model: MarkerModel | None = None) -> tuple[str, ...]:
+                model: MarkerModel | None = None) -> tuple[str, ...]:
     """Check a trial and its static or model.
 
     Args:
@@ -57,7 +57,8 @@ def check_trial(trial: MarkerTrial, static: MarkerTrial | None, clusters: Mappin
         lines += _check_static_complete(body, static)
         lines += _check_same_body(body, _UsualDistances(static), clusters, static.name, "the static")
     elif model is not None:
-        lines += _check_same_body(body, _measure_model_distances(model), clusters, model.subject or "the model", "the model")
+        lines += _check_same_body(body, _measure_model_distances(model), clusters, model.subject or "the model",
+                                  "the model")
     return tuple(lines)
 
 
@@ -194,4 +195,5 @@ def _iter_empty_stretches(trial: MarkerTrial):
         if (end - first) / trial.fps >= _EMPTY_SECONDS:
             span = trial.start + first / trial.fps, trial.start + (end - 1) / trial.fps
             count = "hardly any" if trial.seen[first:end].any() else "no"
-            yield TimedMessage(f"{count} markers from {span[0]:.2f} to {span[1]:.2f} s: the pose there is a guess", span)
+            yield TimedMessage(f"{count} markers from {span[0]:.2f} to {span[1]:.2f} s: the pose there is a guess",
+                               span)

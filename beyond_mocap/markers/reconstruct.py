@@ -14,14 +14,14 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from .. import __version__
-from ..base.errors import UserCancelledError, InputError
+from ..base.errors import InputError, UserCancelledError
 from ..base.settings import collect_defaults, find_setting
 from ..motion.motion import Motion
 from .cleaning.clean import CleaningResult, clean_trial
 from .model.model import MarkerModel
 from .pose.pose import HeldBall, PoseSettings, PoseSolution, solve_poses
-from .pose.residuals import measure_floor, collect_markers
-from .trial import MarkerTrial, resample_evenly, list_some
+from .pose.residuals import collect_markers, measure_floor
+from .trial import MarkerTrial, list_some, resample_evenly
 
 _DEFAULTS = collect_defaults("markers")
 FILTERS = find_setting("markers", "filter").choice_names
@@ -150,11 +150,12 @@ def reconstruct(trial: MarkerTrial, static: MarkerTrial | None = None, model: Ma
     from threadpoolctl import threadpool_limits
 
     with threadpool_limits(limits=1):  # same bits on every machine; several threads slow small systems down
-        return _reconstruct_on_one_thread(trial, static, model, settings=settings, monitor=_RunMonitor(progress, cancelled),
-                            cancelled=cancelled)
+        return _reconstruct_on_one_thread(trial, static, model, settings=settings,
+                                          monitor=_RunMonitor(progress, cancelled), cancelled=cancelled)
 
 
-def _reconstruct_on_one_thread(trial, static, model, settings: ReconstructSettings, monitor: _RunMonitor, cancelled) -> Reconstruction:
+def _reconstruct_on_one_thread(trial, static, model, settings: ReconstructSettings, monitor: _RunMonitor,
+                               cancelled) -> Reconstruction:
     """Run `reconstruct` on a single thread."""
     with monitor.time_step("clean", 0.1):
         marker_set = find_marker_set(trial, model, settings)
@@ -178,7 +179,9 @@ def _reconstruct_on_one_thread(trial, static, model, settings: ReconstructSettin
     with monitor.time_step("floor", 0.94):
         floor = _measure_floor(model, clean_markers, settings, monitor)
         down = floor if settings.floor else 0.0
-        motion, clean_markers, visible = move_down(motion, down), _move_trial_down(clean_markers, down), _move_trial_down(visible, down)
+        motion, clean_markers, visible = move_down(motion, down), _move_trial_down(clean_markers,
+                                                                                   down), _move_trial_down(visible,
+                down)
     with monitor.time_step("release", 1.0):
         release = _find_release(visible, motion, model, marker_set=marker_set, settings=settings, monitor=monitor)
     return Reconstruction(motion=motion, model=model, trial=clean_markers, raw=trial, solved=solved, cleaned=cleaned,
@@ -289,7 +292,7 @@ def _check_trial(trial, still, marker_set, model) -> tuple[str, ...]:
 
 
 def build_model(trial: MarkerTrial, static: MarkerTrial | None, settings: ReconstructSettings = ReconstructSettings(),
-             progress: Progress | None = None, cancelled: Callable[[], bool] | None = None) -> MarkerModel:
+                progress: Progress | None = None, cancelled: Callable[[], bool] | None = None) -> MarkerModel:
     """Build the model alone, as `reconstruct` does.
 
     Args:
@@ -306,8 +309,9 @@ def build_model(trial: MarkerTrial, static: MarkerTrial | None, settings: Recons
     marker_set = find_marker_set(trial, None, settings)
     visible, still = (None if one is None else prepare_trial(one, marker_set) for one in (trial, static))
     _check_trial(visible, still, marker_set, None)
-    clean_markers, still = (None if one is None else _clean_trial(one, marker_set, None, None, cancelled).build_pose_trial()
-                   for one in (visible, still))
+    clean_markers, still = (None if one is None else _clean_trial(one, marker_set, None, None,
+                                                                  cancelled).build_pose_trial()
+                            for one in (visible, still))
     return _calibrate_model(marker_set, clean_markers, still, progress, cancelled)
 
 
@@ -343,25 +347,28 @@ def _check_model_fits(model: MarkerModel, trial: MarkerTrial) -> None:
                          "choose another model, or the marker set that has these labels")
 
 
-def _solve_pose(model: MarkerModel, trial: MarkerTrial, marker_set, settings, monitor: _RunMonitor, cancelled) -> PoseSolution:
+def _solve_pose(model: MarkerModel, trial: MarkerTrial, marker_set, settings, monitor: _RunMonitor,
+                cancelled) -> PoseSolution:
     """Solve the poses; with a held ball, first without it to find where it lies in the hand, then with it."""
     pose_settings = PoseSettings(weights=settings.weights, limits=settings.limits, smoothness=settings.smoothness)
     label = _find_ball_label(model, marker_set, trial) if settings.hold_ball else None
-    solved = solve_poses(model, trial, pose_settings, monitor.build_inner_progress(0.45, 0.85 if label is None else 0.65), cancelled)
+    solved = solve_poses(model, trial, pose_settings, monitor.build_inner_progress(0.45, 0.85 if label is None
+                                                                                   else 0.65), cancelled)
     if label is None:
         if settings.hold_ball:
             monitor.add_warnings(["no marker on a ball, so no ball is held"])
         return solved
-    release = _find_release(trial, solved.motion, model, marker_set=marker_set, settings=replace(settings, release="auto"),
-                     monitor=monitor)
+    release = _find_release(trial, solved.motion, model, marker_set=marker_set,
+                            settings=replace(settings, release="auto"), monitor=monitor)
     if release is None or release.method != "ball":
         monitor.add_warnings([f"{label} does not show how the ball is held, so it takes no part in the pose"])
         return solved
     hand = f"{release.side.capitalize()}Hand"
     held = np.arange(len(trial)) < release.frame
-    ball = HeldBall(joint=hand, centre=release.centre, radius=release.radius, seen=trial.positions[:, trial.index_of(label)],
-                    held=held)
-    return solve_poses(model, trial, replace(pose_settings, ball=ball), monitor.build_inner_progress(0.65, 0.85), cancelled)
+    ball = HeldBall(joint=hand, centre=release.centre, radius=release.radius,
+                    seen=trial.positions[:, trial.index_of(label)], held=held)
+    return solve_poses(model, trial, replace(pose_settings, ball=ball), monitor.build_inner_progress(0.65, 0.85),
+                       cancelled)
 
 
 def _describe_poor_fit(solved: PoseSolution, model: MarkerModel) -> list[str]:
@@ -432,7 +439,8 @@ def _has_legs(motion: Motion) -> bool:
     return True
 
 
-def _measure_floor(model: MarkerModel, trial: MarkerTrial, settings: ReconstructSettings, monitor: _RunMonitor) -> float:
+def _measure_floor(model: MarkerModel, trial: MarkerTrial, settings: ReconstructSettings,
+                   monitor: _RunMonitor) -> float:
     """Measure the floor height in metres, and report it where it is not at 0."""
     floor = measure_floor(model, trial)
     if abs(floor) > _REPORTED_FLOOR_HEIGHT:
@@ -455,7 +463,7 @@ def _find_release(trial, motion, model: MarkerModel, marker_set, settings: Recon
     """Find when and how the ball leaves the hand, where the settings ask for it; a model with a ball says where it
     lies.
     """
-    from .release.release import ReleaseSettings, parse_radar_speed, estimate_release
+    from .release.release import ReleaseSettings, estimate_release, parse_radar_speed
 
     label = _find_ball_label(model, marker_set, trial)
     is_throw = label is not None or parse_radar_speed(trial.name) is not None
@@ -464,7 +472,8 @@ def _find_release(trial, motion, model: MarkerModel, marker_set, settings: Recon
     release_settings = ReleaseSettings(label, settings.radius, ball=settings.ball)
     if model.ball is not None and model.ball.label == label:
         side = "left" if model.skeleton.names[model.ball.joint].startswith("Left") else "right"
-        release_settings = replace(release_settings, radius=release_settings.radius or model.ball.radius, hand=side, centre=model.ball.centre)
+        release_settings = replace(release_settings, radius=release_settings.radius or model.ball.radius, hand=side,
+                                   centre=model.ball.centre)
     try:
         return estimate_release(trial, motion, release_settings)
     except InputError as error:

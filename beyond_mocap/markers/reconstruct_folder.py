@@ -14,10 +14,17 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from ..base.errors import BeyondMocapError, UserCancelledError, InputError
+from ..base.errors import BeyondMocapError, InputError, UserCancelledError
 from .checks import check_trial
 from .model.model import MarkerModel
-from .reconstruct import Reconstruction, ReconstructSettings, build_model, apply_set_labels, reconstruct, find_marker_set
+from .reconstruct import (
+    Reconstruction,
+    ReconstructSettings,
+    apply_set_labels,
+    build_model,
+    find_marker_set,
+    reconstruct,
+)
 from .trial import MarkerTrial
 
 SUFFIXES = (".c3d", ".trc")
@@ -110,7 +117,7 @@ def reconstruct_folder(folder: Path, read: ReadTrial, settings: ReconstructSetti
             raise UserCancelledError("cancelled")
         part = _build_trial_progress(progress, number, len(plans), plan.recording.name)
         yield _reconstruct_trial(plan, read, settings, model=model or models.get(plan.static_path), progress=part,
-                    cancelled=cancelled)
+                                 cancelled=cancelled)
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -189,7 +196,8 @@ def _choose_static(one: Recording, trial: MarkerTrial, statics, settings):
         except InputError as error:
             note = f"reconstructed without a static: {error}"
             continue
-        candidates.append((len(os.path.commonprefix([recording.path.stem, one.path.stem])), shared, (recording, static)))
+        candidates.append((len(os.path.commonprefix([recording.path.stem, one.path.stem])), shared,
+                           (recording, static)))
     return (max(candidates, key=lambda row: row[:2])[2], "") if candidates else (None, note)
 
 
@@ -222,7 +230,7 @@ def _reconstruct_trial(plan: _TrialPlan, read: ReadTrial, settings, model, progr
     static, still = plan.static or (None, None)
     try:
         reconstruction = reconstruct(read(plan.recording.path), still, model, settings=settings, progress=progress,
-                           cancelled=cancelled)
+                                     cancelled=cancelled)
     except UserCancelledError:
         raise
     except (BeyondMocapError, OSError) as error:

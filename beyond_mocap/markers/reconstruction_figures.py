@@ -8,7 +8,7 @@ from ..base.errors import InputError
 from ..motion import contacts as foot_contacts
 from ..motion.humanoid import identify_joints
 from ..motion.motion import Motion, forward_kinematics
-from ..synthesis.quality.movement import measure_contact_speeds, list_foot_joints, measure_stance_travel, list_stances
+from ..synthesis.quality.movement import list_foot_joints, list_stances, measure_contact_speeds, measure_stance_travel
 from .pose.residuals import measure_residuals
 
 
@@ -22,15 +22,17 @@ def collect_figures(reconstruction) -> dict:
     """
     solved, motion = reconstruction.solved, reconstruction.motion
     posing = reconstruction.seconds.get("pose") or solved.seconds
-    return {"trial": reconstruction.raw.name, "subject": reconstruction.model.subject, "marker_set": reconstruction.model.set_name,
-            "markers": len(reconstruction.model.markers), "joints": len(reconstruction.model.skeleton), "fps": motion.fps,
-            "frames": len(motion), "duration_s": motion.duration, "seconds": dict(reconstruction.seconds),
+    return {"trial": reconstruction.raw.name, "subject": reconstruction.model.subject,
+            "marker_set": reconstruction.model.set_name, "markers": len(reconstruction.model.markers),
+            "joints": len(reconstruction.model.skeleton), "fps": motion.fps, "frames": len(motion),
+            "duration_s": motion.duration, "seconds": dict(reconstruction.seconds),
             "residual_mm": collect_residual_figures(reconstruction), "weighted_se": measure_weighted_squares(solved),
-            "frames_per_second": len(motion) / posing if posing else None, "bones_change_m": measure_bone_change(motion),
-            "skate": measure_foot_slide(motion), "limits": measure_limit_shares(solved, motion.skeleton.names), "floor_m": reconstruction.floor,
-            "grounded": reconstruction.grounded,
-            "held_share": None if reconstruction.held is None else float(reconstruction.held.any(axis=(1, 2)).mean()),
-            **reconstruction.cleaned.report.as_dict(), "release": None if reconstruction.release is None else reconstruction.release.report(),
+            "frames_per_second": len(motion) / posing if posing else None,
+            "bones_change_m": measure_bone_change(motion), "skate": measure_foot_slide(motion),
+            "limits": measure_limit_shares(solved, motion.skeleton.names), "floor_m": reconstruction.floor,
+            "grounded": reconstruction.grounded, "held_share": None if reconstruction.held is None
+            else float(reconstruction.held.any(axis=(1, 2)).mean()), **reconstruction.cleaned.report.as_dict(),
+            "release": None if reconstruction.release is None else reconstruction.release.report(),
             "warnings": list(reconstruction.warnings)}
 
 
@@ -46,9 +48,11 @@ def collect_residual_figures(reconstruction) -> dict:
     seen = 1000.0 * reconstruction.solved.residual[np.isfinite(reconstruction.solved.residual)]
     single = 1000.0 * reconstruction.solved.single[np.isfinite(reconstruction.solved.single)]
     written = 1000.0 * measure_residuals(reconstruction.model, reconstruction.motion, reconstruction.trial)
-    each = {label: _compute_mean(1000.0 * reconstruction.solved.residual[:, i]) for i, label in enumerate(reconstruction.model.markers)}
-    return {"mean": _compute_mean(seen), "rms": _compute_rms(seen), "p95": _compute_percentile(seen, 95), "max": _compute_percentile(seen, 100),
-            "single_mean": _compute_mean(single), "single_rms": _compute_rms(single), "output_mean": _compute_mean(written),
+    each = {label: _compute_mean(1000.0 * reconstruction.solved.residual[:, i]) for i,
+            label in enumerate(reconstruction.model.markers)}
+    return {"mean": _compute_mean(seen), "rms": _compute_rms(seen), "p95": _compute_percentile(seen, 95),
+            "max": _compute_percentile(seen, 100), "single_mean": _compute_mean(single),
+            "single_rms": _compute_rms(single), "output_mean": _compute_mean(written),
             "output_rms": _compute_rms(written), "per_marker": each}
 
 

@@ -70,10 +70,10 @@ class MarkerTrial:
 
     def __post_init__(self):
         values = {"labels": tuple(self.labels), "positions": _freeze_array(self.positions, self.name, "positions"),
-                "fps": float(self.fps),
-                "residuals": None if self.residuals is None else _freeze_array(self.residuals, self.name, "residuals"),
-                "events": tuple(sorted(self.events, key=lambda event: event.seconds)), "start": float(self.start),
-                "notes": tuple(self.notes)}
+                  "fps": float(self.fps), "residuals": None if self.residuals is None
+                  else _freeze_array(self.residuals, self.name, "residuals"),
+                  "events": tuple(sorted(self.events, key=lambda event: event.seconds)), "start": float(self.start),
+                  "notes": tuple(self.notes)}
         for name, value in values.items():
             object.__setattr__(self, name, value)
         self._check()

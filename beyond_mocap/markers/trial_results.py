@@ -107,7 +107,8 @@ def _parse_report(name: str, report: Mapping) -> TrialResult:
                        squares=(_to_float(squares.get("mean")), _to_float(squares.get("sd"))),
                        residual=_to_float(residual.get("rms", residual.get("mean"))),
                        single=_to_float(residual.get("single_rms", residual.get("single_mean"))),
-                       rate=_to_float(report.get("frames_per_second")), throw=_parse_throw(report.get("release")))  # fmt: skip
+                       rate=_to_float(report.get("frames_per_second")),
+                       throw=_parse_throw(report.get("release")))  # fmt: skip
 
 
 def _parse_throw(release: Mapping | None) -> Throw | None:
@@ -238,7 +239,9 @@ def compare_speeds(estimated: np.ndarray, measured: np.ndarray) -> SpeedComparis
         return SpeedComparison(count=0, mean=nan, sd=nan, share=nan, within=nan, wilcoxon=nan, normal=nan)
     varies = len(difference) > 1 and np.ptp(difference) > 1e-12
     share = np.abs(difference) / base
-    return SpeedComparison(count=len(difference), mean=float(difference.mean()), sd=float(difference.std(ddof=1)) if len(difference) > 1 else np.nan,
-                  share=float(share.mean()), within=float(np.mean(share <= 0.1)),
-                  wilcoxon=float(wilcoxon(difference).pvalue) if len(difference) >= MIN_PAIRS and np.any(difference != 0.0) else np.nan,
-                  normal=float(shapiro(difference).pvalue) if len(difference) >= 3 and varies else np.nan)  # fmt: skip
+    return SpeedComparison(count=len(difference), mean=float(difference.mean()), sd=float(difference.std(ddof=1))
+                           if len(difference) > 1 else np.nan, share=float(share.mean()),
+                           within=float(np.mean(share <= 0.1)), wilcoxon=float(wilcoxon(difference).pvalue)
+                           if len(difference) >= MIN_PAIRS and np.any(difference != 0.0) else np.nan,
+                           normal=float(shapiro(difference).pvalue) if len(difference) >= 3 and varies
+                           else np.nan)  # fmt: skip

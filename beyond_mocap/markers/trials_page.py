@@ -19,7 +19,15 @@ import numpy as np
 
 from ..evaluation import html_page as html
 from ..evaluation.plots import style_axes
-from .trial_results import MIN_PAIRS, TrialResult, align_impacts, compare_speeds, find_dominant_sides, select_near_mean, read_results
+from .trial_results import (
+    MIN_PAIRS,
+    TrialResult,
+    align_impacts,
+    compare_speeds,
+    find_dominant_sides,
+    read_results,
+    select_near_mean,
+)
 
 DOMINANT, OTHER, QUIET = "#2563a8", "#e08a00", "#999999"
 _WIDTH, _DPI = 11.0, 100
@@ -42,8 +50,9 @@ def build_trials_report(folder: Path) -> str:
     parts = [html.build_element("h1", f"{title}: {len(results)} trials")]
     if solved:
         parts.append(_build_section("Markers and time", _describe_fit(solved), draw_residuals_and_time(results),
-                              draw_residuals_by_trial(results)))
-    return html.build_page(title, *parts, *_build_throw_sections(solved), html.build_section("All trials", _build_table(results)))
+                                    draw_residuals_by_trial(results)))
+    return html.build_page(title, *parts, *_build_throw_sections(solved),
+                           html.build_section("All trials", _build_table(results)))
 
 
 def _describe_fit(solved: Sequence[TrialResult]) -> html.Html:
@@ -65,11 +74,12 @@ def _build_throw_sections(solved: Sequence[TrialResult]) -> list[html.Html]:
     if near.any():
         text = f"{int(near.sum())} of {len(throws)} throws; those beyond three standard deviations are left out."
         parts.append(_build_section("Where throws land", html.build_element("p", text), draw_impact_map(points[near]),
-                              draw_impact_scatter(throws, points)))
+                                    draw_impact_scatter(throws, points)))
     pairs = [(r.throw.radar, r.throw.speed) for r in throws if r.throw.radar]
     if pairs:
         measured, estimated = np.array(pairs, float).T
-        parts.append(_build_section("How fast they are", _describe_speeds(estimated, measured), draw_speeds(measured, estimated)))
+        parts.append(_build_section("How fast they are", _describe_speeds(estimated, measured),
+                                    draw_speeds(measured, estimated)))
     return parts
 
 

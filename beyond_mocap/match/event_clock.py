@@ -17,7 +17,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..annotation.event_words import EVENT_KINDS
+from ..annotation.event_labels import EVENT_KINDS
 from ..ball.tracked.kinds import TOUCH_KINDS
 from ..ball.tracked.solve import SolvedTouch
 from ..base.errors import InputError
@@ -191,7 +191,8 @@ def _fit_clock(events, since, touches, start: float, span) -> PeriodClock | None
     spread = 1.48 * float(np.median(np.abs(near - np.median(near)))) if len(near) else np.nan
     matched, chance = right[0, 0] / right[0, 1], wrong[0, 0] / max(wrong[0, 1], 1)
     doubtful = _compute_confidence(right[1, 0], right[1, 1], wrong[1, 0] / max(wrong[1, 1], 1))
-    confidence = _compute_confidence(right[0, 0], right[0, 1], chance) + _DOUBTFUL_WEIGHT * doubtful - _compute_lag_cost(lag)
+    confidence = _compute_confidence(right[0, 0], right[0, 1],
+                                     chance) + _DOUBTFUL_WEIGHT * doubtful - _compute_lag_cost(lag)
     return PeriodClock(lag=float(lag), drift=float(drift), spread=spread, matched=float(matched),
                        by_chance=float(chance), told=int(right[0, 1]), sure=float(confidence))
 
@@ -204,7 +205,8 @@ def _find_commonest_lag(lags: np.ndarray, weights: np.ndarray) -> float:
     counts, _ = np.histogram(lags, edges, weights=weights)
     reach = np.arange(-15, 16) * _LAG_BIN
     middles = 0.5 * (edges[1:] + edges[:-1])
-    smooth = np.convolve(counts, np.exp(-0.5 * (reach / _LAG_SPREAD) ** 2), "same") - _compute_lag_cost(middles) / _PAIR_NATS
+    smooth = np.convolve(counts, np.exp(-0.5 * (reach / _LAG_SPREAD) ** 2),
+                         "same") - _compute_lag_cost(middles) / _PAIR_NATS
     smooth -= smooth.min()
     best = np.flatnonzero(smooth >= smooth.max() * (1.0 - 1e-9))
     return float(middles[best[np.abs(middles[best]).argmin()]])
@@ -301,7 +303,8 @@ def _pair_touches(events: Sequence[MatchEvent], times: np.ndarray, touches: Sequ
     """Pair each player's events with touches at the lowest cost, in order; (E,) touch indices, -1 for none."""
     out = np.full(len(events), -1)
     for player in sorted({event.player for event in events if event.player}):
-        player_events = [i for i, event in enumerate(events) if event.player == player and event.may_be_touch and np.isfinite(times[i])]
+        player_events = [i for i, event in enumerate(events) if event.player == player and event.may_be_touch
+                         and np.isfinite(times[i])]
         player_events.sort(key=lambda i: times[i])
         player_touches = [i for i, touch in enumerate(touches) if touch.player == player]
         for event, touch in _pair_in_order(player_events, player_touches, events, times, touches):
@@ -336,7 +339,8 @@ def _compute_difference(event: MatchEvent, touch: SolvedTouch, time: float) -> f
     distance = abs(touch.time - time)
     if distance > PAIR_WINDOW:
         return np.inf
-    expected = _SENDING_TOUCHES if event.kind in _SENDING else _TAKING_TOUCHES if event.kind in _TAKING else {touch.kind}
+    expected = _SENDING_TOUCHES if event.kind in _SENDING else _TAKING_TOUCHES if event.kind in _TAKING else {
+        touch.kind}
     unlike = touch.kind not in expected
     other_part = event.part in ("head", "hand") and touch.part != event.part
     return distance + _MISMATCH_COST * unlike + 0.5 * _MISMATCH_COST * other_part

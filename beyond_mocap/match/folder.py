@@ -20,18 +20,19 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from ..base.errors import InputError
+from ..files.atomic import atomic_write
 from ..files.content import read_bytes
 from ..files.tables import to_plain
-from ..files.whole import atomic_write
-from .order import compute_digest
+from .request import compute_digest
 
 STATE = "match.json"
 LABELS_FOLDER = "annotations"
 VERSION = 1
 _WORK, _LOCK, _ORDER = ".work", "lock", "order"  # the last file has the request's digest, in case match.json is lost
 _MAX_NAME = 100  # characters of a file name
-_PART = re.compile(r"\..+\.\d+\.\d+\.part")  # temporary files of `files.whole`
-_HEAD_BYTES, _DIGEST = 1000, re.compile(rb'"digest": *"([0-9a-f]+)"')  # first bytes of match.json, which contain its digest
+_PART = re.compile(r"\..+\.\d+\.\d+\.part")  # temporary files of `files.atomic`
+_HEAD_BYTES, _DIGEST = 1000, re.compile(
+    rb'"digest": *"([0-9a-f]+)"')  # first bytes of match.json, which contain its digest
 _RESERVED = re.compile(r"(con|prn|aux|nul|com\d|lpt\d)(\.|$)", re.IGNORECASE)  # names reserved by Windows
 
 
@@ -62,7 +63,8 @@ class MatchFolder:
     def write_state(self, state: Mapping) -> None:
         """Write match.json."""
         whole = {"version": VERSION, "digest": self.digest, **state}
-        atomic_write(self.path / STATE, json.dumps(to_plain(whole), indent=1, ensure_ascii=False, allow_nan=False) + "\n")
+        atomic_write(self.path / STATE, json.dumps(to_plain(whole), indent=1, ensure_ascii=False, allow_nan=False)
+                     + "\n")
 
     def piece_path(self, kind: str, name: str) -> Path:
         """The path of a piece of work, whether it exists or not.

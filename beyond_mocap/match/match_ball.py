@@ -20,9 +20,9 @@ from ..motion.motion import Motion, compute_pose
 from ..motion.track import BALL_RADIUS, Track, clean_track
 from ..motion.track.ball_path import BallPath
 from ..motion.track.match_data import Match
-from ..synthesis.construct.strike_at import FixedStrike, strike_fixed_ball
-from ..synthesis.known_touches import build_trajectory
+from ..synthesis.construct.strike_fixed_ball import FixedStrike, strike_fixed_ball
 from ..synthesis.plan import Plan
+from ..synthesis.resolved_touches import build_trajectory
 from ..synthesis.take import KeyResult, Take
 
 _ROUNDING = 1e-4  # m, positions are rounded to this, as in files
@@ -133,7 +133,8 @@ def _find_free_frames(key: KeyResult, touches: Sequence[KeyResult]) -> tuple[flo
     return min(before, default=np.inf), min(after, default=np.inf)
 
 
-def _build_meeting(motion: Motion, key: KeyResult, ball: np.ndarray, free_frames: tuple[float, float]) -> FixedStrike | None:
+def _build_meeting(motion: Motion, key: KeyResult, ball: np.ndarray,
+                   free_frames: tuple[float, float]) -> FixedStrike | None:
     """Build what moves a part to the ball at one key moment; None if it is there already, or too far away."""
     frame = int(np.clip(np.rint(key.frame), 0, len(motion) - 1))
     parts = build_surfaces(motion.skeleton, key.contact_labels)

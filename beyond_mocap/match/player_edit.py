@@ -17,13 +17,23 @@ import numpy as np
 
 from ..annotation import KeyMoment, Span, Timeline
 from ..base.errors import InputError
+from ..files.atomic import atomic_write
 from ..files.content import read_bytes
-from ..files.json_values import check_names, check_list, check_number, check_numbers, parse_json, describe_value, check_text, check_bool, check_whole_number
-from ..files.plain_npz import HEADER, take_header_text, read_plain_arrays
-from ..files.whole import atomic_write
+from ..files.json_values import (
+    check_bool,
+    check_list,
+    check_names,
+    check_number,
+    check_numbers,
+    check_text,
+    check_whole_number,
+    describe_value,
+    parse_json,
+)
+from ..files.plain_npz import HEADER, read_plain_arrays, take_header_text
 from ..motion.track import Track
-from ..synthesis.known_touches import resolve_touches
-from ..synthesis.plan import METHODS, Pin, Plan, SolvedTrajectory, PlayerTouch
+from ..synthesis.plan import METHODS, Pin, Plan, PlayerTouch, SolvedTrajectory
+from ..synthesis.resolved_touches import resolve_touches
 from .crowd.correction import Correction
 from .pieces.named_edit import NamedEdit, NamedKey
 
@@ -237,10 +247,12 @@ def _parse_player(arrays: dict[str, np.ndarray]) -> PlayerEdit:
     if not isinstance(header, dict) or header.get("format") != FORMAT:
         raise InputError(HEADER, "not a player of a match", _KIND, "choose another file")
     if header.get("version") != VERSION:
-        raise InputError("version", describe_value(header.get("version")), str(VERSION), "run the match again with this version")
+        raise InputError("version", describe_value(header.get("version")), str(VERSION),
+                         "run the match again with this version")
     rows = ("format", "version", "player", "window", "stretches", "correction")
     check_names(header, HEADER, rows, rows)
-    stretches = [_parse_stretch(row, index, arrays) for index, row in enumerate(check_list(header["stretches"], "stretches"))]
+    stretches = [_parse_stretch(row, index, arrays) for index,
+                 row in enumerate(check_list(header["stretches"], "stretches"))]
     correction = _parse_correction(header["correction"], arrays)
     window = check_number(header["window"], "window")
     if window < _MIN_WINDOW:
@@ -306,11 +318,13 @@ def _parse_plan(row, where: str, take_array) -> Plan:
     spans, keys = [], []
     for value in check_list(row["spans"], f"{where}: spans"):
         start, end, words, avoid = _parse_row(value, f"{where}: spans", 4)
-        spans.append(Span(check_number(start, where), check_number(end, where), _parse_labels(words, where), avoid=_parse_labels(avoid, where)))
+        spans.append(Span(check_number(start, where), check_number(end, where), _parse_labels(words, where),
+                          avoid=_parse_labels(avoid, where)))
     for value in check_list(row["keys"], f"{where}: keys"):
         time, words, avoid, solved = _parse_row(value, f"{where}: keys", 4)
         solved = None if solved is None else check_number(solved, where)
-        keys.append(KeyMoment(check_number(time, where), _parse_labels(words, where), None, _parse_labels(avoid, where), solved))
+        keys.append(KeyMoment(check_number(time, where), _parse_labels(words, where), None, _parse_labels(avoid, where),
+                              solved))
     pins = [_parse_pin(value, f"{where}: pins") for value in check_list(row["pins"], f"{where}: pins")]
     return Plan(
         track=track, timeline=Timeline(tuple(spans), tuple(keys)), pins=tuple(pins),
@@ -323,7 +337,8 @@ def _parse_pin(value, where: str) -> Pin:
     names = ("time", "part", "position", "hold")
     check_names(value, where, names, names)
     place = check_numbers(value["position"], where, 3, "[x, y, z] m")
-    return Pin(check_number(value["time"], where), check_text(value["part"], where), place, check_number(value["hold"], where))
+    return Pin(check_number(value["time"], where), check_text(value["part"], where), place,
+               check_number(value["hold"], where))
 
 
 def _parse_settings(value, where: str) -> dict:
@@ -342,7 +357,8 @@ def _parse_settings(value, where: str) -> dict:
 def _parse_texts(value, where: str) -> tuple:
     """Parse texts, or pairs of texts."""
     rows = check_list(value, where)
-    return tuple(check_text(row, where) if isinstance(row, str) else _parse_labels(_parse_row(row, where, 2), where) for row in rows)
+    return tuple(check_text(row, where) if isinstance(row, str) else _parse_labels(_parse_row(row, where, 2), where)
+                 for row in rows)
 
 
 def _parse_track(row, where: str, take_array) -> Track:
@@ -396,5 +412,5 @@ def _parse_named_key(value, clips: int, where: str) -> NamedKey:
     if not 0 <= check_whole_number(clip, where) < clips:
         raise InputError(f"{where}: placed", f"clip {describe_value(clip)}", f"0 to {clips - 1}")
     frame, start, end = (check_number(each, f"{where}: placed") for each in (frame, start, end))
-    return NamedKey(time=check_number(time, where), clip=check_whole_number(clip, where), frame=frame, start=start, end=end,
-                    words=_parse_labels(words, where))
+    return NamedKey(time=check_number(time, where), clip=check_whole_number(clip, where), frame=frame, start=start,
+                    end=end, words=_parse_labels(words, where))

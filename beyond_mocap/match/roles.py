@@ -16,8 +16,8 @@ from ..motion.track import Track, clean_track
 from ..motion.track.match_data import Match, MatchPlayer
 from .crowd.spacing import compute_firmness, compute_spacing
 from .crowd.variety import choose_lags
-from .order import MatchRequest
 from .pieces.units import cut_track
+from .request import MatchRequest
 
 MIN_SECONDS = 1.0
 """s: a player who is present for less is not synthesized."""
@@ -119,7 +119,8 @@ def _build_role(match: Match, number: int, player: MatchPlayer, span: tuple[floa
     except InputError as error:
         return Role(player=player, reason=str(error), number=number)
     cleaned = tuple(tracks)
-    return Role(player=player, measured=cleaned, target_tracks=cleaned, notes=tuple(notes), number=number) if cleaned else None
+    return Role(player=player, measured=cleaned, target_tracks=cleaned, notes=tuple(notes),
+                number=number) if cleaned else None
 
 
 def _limit_to_frames(start: float, end: float, fps: float) -> tuple[float, float]:
@@ -142,8 +143,8 @@ def separate_roles(
     """
     places = np.stack([_sample_positions(role.measured, times) for role in roles])
     step = float(np.median(np.diff(times)))
-    firmness = [compute_firmness(len(times), (np.asarray(touches.get(role.player.id, ())) - times[0]) / step, 1.0 / step)
-            for role in roles]  # fmt: skip
+    firmness = [compute_firmness(len(times), (np.asarray(touches.get(role.player.id, ())) - times[0]) / step,
+                                 1.0 / step) for role in roles]  # fmt: skip
     shifts = compute_spacing(times, places, np.stack(firmness))
     moved = np.linalg.norm(shifts, axis=2)
     is_moved = moved > 1e-3
@@ -167,5 +168,5 @@ def _shift_role(role: Role, times: np.ndarray, shift: np.ndarray) -> Role:
     if not shift.any():
         return role
     tracks = (replace(track, positions=track.positions + interpolate_columns(track.times, times, shift))
-             for track in role.measured)  # fmt: skip
+              for track in role.measured)  # fmt: skip
     return replace(role, target_tracks=tuple(tracks))

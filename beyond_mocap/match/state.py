@@ -11,9 +11,9 @@ from dataclasses import dataclass, field
 from .. import __version__
 from ..motion.track.match_data import Match
 from .folder import MatchFolder
-from .order import MatchRequest
-from .parts import PlayerPlans
 from .pieces.pool import TaskResult, measure_peak_memory
+from .player_plans import PlayerPlans
+from .request import MatchRequest
 
 WRITE_INTERVAL = 1.0
 """s between two writes of a state in which only the number of finished windows has changed."""
@@ -63,8 +63,9 @@ class MatchState:
         rows = [{name: value for name, value in row.items() if value is not None} for row in self.players.values()]
         memory = {"main": round(measure_peak_memory(), 1), "worker": round(self.worker_memory, 1)}
         spent = {stage: round(seconds, 3) for stage, seconds in self.worker_seconds.items()}
-        self.folder.write_state({**self.report, "players": rows, "seconds": self.seconds, "main_cpu_s": self.main_seconds,
-                          "worker_cpu_s": spent, "peak_memory_mb": memory})  # fmt: skip
+        self.folder.write_state({**self.report, "players": rows, "seconds": self.seconds,
+                                 "main_cpu_s": self.main_seconds, "worker_cpu_s": spent,
+                                 "peak_memory_mb": memory})  # fmt: skip
         self._write_time = time.monotonic()
 
     def build_result_counter(self, stage: str) -> Callable[[TaskResult], None]:

@@ -13,7 +13,7 @@ from __future__ import annotations
 import numpy as np
 from scipy.ndimage import grey_opening, maximum_filter1d
 
-from ..base.time_series import number_runs, find_runs
+from ..base.time_series import find_runs, number_runs
 from .humanoid import Humanoid, identify_joints, measure_leg_length
 from .motion import Motion, forward_kinematics
 from .skeleton import Skeleton
@@ -121,7 +121,8 @@ def detect_heel_toe_contacts(motion: Motion) -> np.ndarray:
     return out
 
 
-def _detect_joint_contacts(positions: np.ndarray, joints: tuple[int, int], body: Humanoid, leg: float, fps: float) -> np.ndarray:
+def _detect_joint_contacts(positions: np.ndarray, joints: tuple[int, int], body: Humanoid, leg: float,
+                           fps: float) -> np.ndarray:
     """Detect the contact (T, 2) of the left and right joint of one kind; positions (T, J, 3) metres, leg length in
     metres.
     """

@@ -135,7 +135,7 @@ def plant_feet(
         fps: frames per second.
         max_drop: metres by which the pelvis is lowered at most.
         foot_moves: (T, 2, 4) metres by which each foot is moved first, and radians that its heel is raised about its
-            toe (`synthesis.construct.steps`); None for none.
+            toe (`synthesis.construct.extra_steps`); None for none.
         level_feet: bring feet in contact to the height of the ground and let none go below it. False keeps all heights:
             a recording's own floor is uneven by centimetres, and pressing its feet onto z = 0 costs more jerk than it
             is worth.
@@ -148,9 +148,11 @@ def plant_feet(
     places, world = compute_pose(skeleton, root, rotations)
     scale, spread = 30.0 / fps, int(round(_SPREAD_FRAMES * fps / 30.0))
     foot_moves = np.zeros((len(root), 2, 4)) if foot_moves is None else foot_moves
-    feet = [build_foot(places, world, limb, heel_toe_contacts[:, side]) for side, limb in enumerate((body.left, body.right))]
+    feet = [build_foot(places, world, limb, heel_toe_contacts[:, side]) for side,
+            limb in enumerate((body.left, body.right))]
     feet = [align_flat_foot(foot.move(foot_moves[:, side, :3]), scale) for side, foot in enumerate(feet)]
-    lifts = [lift_to_ground(foot, measure_sole_height(skeleton), scale) if level_feet else np.zeros(len(root)) for foot in feet]
+    lifts = [lift_to_ground(foot, measure_sole_height(skeleton), scale) if level_feet else np.zeros(len(root))
+             for foot in feet]
     weights = [foot.weight for foot in feet]
     # solve with full weights first; stances that the legs cannot reach are relaxed and solved again
     for attempt in range(_RELAX_ROUNDS + 1):
@@ -169,7 +171,8 @@ def plant_feet(
     for side, (foot, (target, foot_rotation)) in enumerate(zip(feet, goals)):
         target = _limit_to_reach(foot, target, drop)
         chain = (foot.limb.upper_leg, foot.limb.lower_leg, foot.limb.foot)
-        reached = solve_two_bone(skeleton, root, out, chain, target, end_rotation=foot_rotation, soft=foot.ease_distance)
+        reached = solve_two_bone(skeleton, root, out, chain, target, end_rotation=foot_rotation,
+                                 soft=foot.ease_distance)
         out, miss[:, side] = reached.rotations, reached.miss
         correction[:, side] = np.linalg.norm(target - places[:, foot.limb.foot], axis=1)
     return PlantResult(root, out, correction, miss)
@@ -293,7 +296,8 @@ def relax_contact_weights(weight: np.ndarray, excess: np.ndarray) -> np.ndarray:
     return weight / (1.0 + worst[label] / 0.02)[:, None] ** 2
 
 
-def solve_shift(velocity: np.ndarray, weight: np.ndarray, scale: float = 1.0, fixed_shifts: np.ndarray | None = None) -> np.ndarray:
+def solve_shift(velocity: np.ndarray, weight: np.ndarray, scale: float = 1.0, fixed_shifts: np.ndarray
+                | None = None) -> np.ndarray:
     """Solve the smooth shift D that cancels velocities where they carry weight.
 
     Minimizes sum w |D' + v|^2 + SMOOTH_WEIGHT |D'''|^2 + PULL_WEIGHT |D|^2, with differences per frame at 30 frames per
@@ -353,7 +357,8 @@ def lift_to_ground(foot: Foot, sole: float, scale: float) -> np.ndarray:
     return lift
 
 
-def fit_smooth_curve(weighted_values: np.ndarray, weight: np.ndarray, scale: float, smooth: float = SMOOTH_WEIGHT) -> np.ndarray:
+def fit_smooth_curve(weighted_values: np.ndarray, weight: np.ndarray, scale: float,
+                     smooth: float = SMOOTH_WEIGHT) -> np.ndarray:
     """Fit the smooth curve (T,) that is `weighted_values` / `weight` where the weight is large, and small elsewhere."""
     squares = BandedLeastSquares(len(weight))
     squares.add_difference(3, smooth / scale**6)

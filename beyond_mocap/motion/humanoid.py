@@ -18,7 +18,7 @@ import numpy as np
 from ..base.errors import InputError
 from ..base.vectors import arctan2
 from . import quaternion
-from .motion import Motion, forward_kinematics, compute_pose
+from .motion import Motion, compute_pose, forward_kinematics
 from .retargeting import structure
 from .skeleton import Skeleton
 
@@ -151,7 +151,8 @@ def identify_posed_joints(motion: Motion) -> Humanoid:
     roles = _find_named_roles(parts)
     if not _has_legs(roles):
         frames = np.unique(np.linspace(0, len(motion) - 1, 64).astype(int))
-        roles = _choose_roles(_find_structural_roles(skeleton, motion.root_positions[frames], motion.rotations[frames]), roles)
+        roles = _choose_roles(_find_structural_roles(skeleton, motion.root_positions[frames], motion.rotations[frames]),
+                              roles)
     return build_humanoid(skeleton.names, skeleton.parents, roles)
 
 
@@ -162,7 +163,8 @@ def _identify_from_arrays(names: tuple[str, ...], parents: tuple[int, ...], offs
     if not _has_legs(roles):
         ends = np.frombuffer(tips[1]).reshape(-1, 3)
         skeleton = Skeleton(names, parents, np.frombuffer(offsets).reshape(-1, 3), tips[0], ends)
-        roles = _choose_roles(_find_structural_roles(skeleton, np.zeros((1, 3)), quaternion.identity(1, len(names))), roles)
+        roles = _choose_roles(_find_structural_roles(skeleton, np.zeros((1, 3)), quaternion.identity(1, len(names))),
+                              roles)
     return build_humanoid(names, parents, roles)
 
 

@@ -18,7 +18,7 @@ from ..base.errors import InputError
 from ..base.vectors import cross_product, unit_vectors
 from . import quaternion
 from .motion import compute_pose
-from .retargeting.structure import list_between, list_ancestors
+from .retargeting.structure import list_ancestors, list_between
 from .skeleton import Skeleton
 
 # below this distance of the knee from the line hip-ankle (share of the limb's length) its direction comes from other
@@ -184,8 +184,9 @@ def solve_posed_limb(
     old_hinge = cross_product(unit_vectors(ankle - top, np.array([0.0, 0.0, -1.0])), old_pole)
     # how much each bone rotates: its new frame (direction, hinge) times the inverse of its old one
     bone_rotations = [
-        quaternion.multiply(_build_frame_for_bone(b - a, new_hinge), quaternion.inverse(_build_frame_for_bone(d - c, old_hinge)))
-        for a, b, c, d in ((top, new_knee, top, knee), (new_knee, new_ankle, knee, ankle))
+        quaternion.multiply(_build_frame_for_bone(b - a, new_hinge),
+                            quaternion.inverse(_build_frame_for_bone(d - c, old_hinge))) for a, b, c,
+        d in ((top, new_knee, top, knee), (new_knee, new_ankle, knee, ankle))
     ]
     new_world = world.copy()
     _rotate_chain(skeleton, new_world, upper, middle, bone_rotations[0])

@@ -222,7 +222,8 @@ def place_motion(motion: Motion, angle: float | np.ndarray = 0.0, offset=(0.0, 0
     rotation = quaternion.from_up_angle(np.broadcast_to(angle, (len(motion),)))
     rotations = motion.rotations.copy()
     rotations[:, 0] = quaternion.multiply(rotation, rotations[:, 0])
-    return replace(motion, root_positions=quaternion.rotate(rotation, motion.root_positions) + offset, rotations=rotations)
+    return replace(motion, root_positions=quaternion.rotate(rotation, motion.root_positions) + offset,
+                   rotations=rotations)
 
 
 def concatenate_motions(motions: list[Motion]) -> Motion:

@@ -17,7 +17,7 @@ from scipy.interpolate import PchipInterpolator
 from ..base.vectors import distances_along
 from . import quaternion
 from .humanoid import compute_heading_from_positions
-from .motion import Motion, sample_frames, forward_kinematics
+from .motion import Motion, forward_kinematics, sample_frames
 from .track import smooth_zero_phase_hann
 
 _SWAY_SECONDS = 0.7
@@ -68,8 +68,8 @@ class Strides:
 
     def remove_first_step(self) -> "Strides":
         """Return the same strides without the first step."""
-        return Strides(motion=self.motion, landings=self.landings[1:], first_side=1 - self.first_side, heel_toe_contacts=self.heel_toe_contacts,
-                       facing=self.facing, path=self.path)
+        return Strides(motion=self.motion, landings=self.landings[1:], first_side=1 - self.first_side,
+                       heel_toe_contacts=self.heel_toe_contacts, facing=self.facing, path=self.path)
 
 
 def find_strides(motion: Motion, heel_toe_contacts: np.ndarray) -> Strides | None:
@@ -90,8 +90,8 @@ def find_strides(motion: Motion, heel_toe_contacts: np.ndarray) -> Strides | Non
     positions, _ = forward_kinematics(motion)
     facing = np.unwrap(compute_heading_from_positions(motion.skeleton, positions))
     path = smooth_zero_phase_hann(positions[:, 0, :2], motion.fps, _SWAY_SECONDS)
-    return Strides(motion=motion, landings=frames[first:last], first_side=int(sides[first]), heel_toe_contacts=heel_toe_contacts,
-                   facing=facing, path=path)
+    return Strides(motion=motion, landings=frames[first:last], first_side=int(sides[first]),
+                   heel_toe_contacts=heel_toe_contacts, facing=facing, path=path)
 
 
 def _detect_landings(heel_toe_contacts: np.ndarray, fps: float) -> tuple[np.ndarray, np.ndarray]:
@@ -130,7 +130,8 @@ def blend_strides(slow: Strides, fast: Strides, speed: float, fps: float) -> tup
     phase = PchipInterpolator(ends, np.arange(steps + 1.0))(times)
     rate = PchipInterpolator(ends, np.arange(steps + 1.0)).derivative()(times)
     slow_samples, fast_samples = (_sample_at_phase(one, phase, steps) for one in (slow, fast))
-    mixed = {name: (1.0 - weight) * slow_samples[name] + weight * fast_samples[name] for name in ("height", "sway", "turn", "way", "inside")}
+    mixed = {name: (1.0 - weight) * slow_samples[name] + weight * fast_samples[name]
+             for name in ("height", "sway", "turn", "way", "inside")}
     facing = _integrate(mixed["turn"] * rate, fps)
     path = _integrate(quaternion.rotate_level(mixed["way"], facing) * rate[:, None], fps)
     rotations = quaternion.slerp(slow_samples["pose"], fast_samples["pose"], np.full((len(times), 1), weight))
@@ -170,8 +171,8 @@ def _sample_at_phase(strides: Strides, phase: np.ndarray, steps: int) -> dict[st
     return {
         "pose": pose, "height": root[:, 2], "sway": quaternion.rotate_level(root[:, :2] - path, -facing),
         "turn": _interpolate_frames(np.gradient(strides.facing), frames) * pace,
-        "way": quaternion.rotate_level(_interpolate_frames(np.gradient(strides.path, axis=0), frames), -facing) * pace[:, None],
-        "inside": _measure_stance_distance(strides.heel_toe_contacts, frames) / pace[:, None, None],
+        "way": quaternion.rotate_level(_interpolate_frames(np.gradient(strides.path, axis=0), frames), -facing)
+        * pace[:, None], "inside": _measure_stance_distance(strides.heel_toe_contacts, frames) / pace[:, None, None],
     }
 
 

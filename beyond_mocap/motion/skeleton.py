@@ -88,7 +88,8 @@ class Skeleton:
                 joint = self.parents[joint]
         selected = sorted(found)
         parents = [-1 if joint == 0 else selected.index(self.parents[joint]) for joint in selected]
-        return Skeleton(tuple(self.names[joint] for joint in selected), tuple(parents), self.offsets[selected]), selected
+        return Skeleton(tuple(self.names[joint] for joint in selected), tuple(parents),
+                        self.offsets[selected]), selected
 
     def scale(self, factor: float) -> "Skeleton":
         """Return the skeleton of a body `factor` times as large."""

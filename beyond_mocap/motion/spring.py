@@ -40,4 +40,5 @@ class Offset:
         c = 0.5 * (self.acceleration + 2.0 * rate * self.speed + rate**2 * a)
         remaining = np.exp(-rate * t)
         value, slope, bend = a + b * t + c * t**2, b + 2.0 * c * t, 2.0 * c
-        return Offset(remaining * value, remaining * (slope - rate * value), remaining * (bend - 2.0 * rate * slope + rate**2 * value))
+        return Offset(remaining * value, remaining * (slope - rate * value),
+                      remaining * (bend - 2.0 * rate * slope + rate**2 * value))

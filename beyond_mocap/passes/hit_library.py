@@ -14,14 +14,14 @@ from typing import Any
 
 import numpy as np
 
-from ..annotation.ball_contact import may_use_several_parts, find_striking_part
+from ..annotation.ball_contact import find_striking_part, may_use_several_parts
 from ..annotation.striking import BODY_PARTS
 from ..ball.contact import Tool
 from ..base.digest import hex_digest
 from ..library.clip import Clip
 from ..library.library import Library
-from . import kept
-from .hits import HitMotion, detect_hits, build_hit_at
+from . import analysis_cache as kept
+from .hits import HitMotion, build_hit_at, detect_hits
 
 KINDS = ("toss", "pass", "attack")
 # m/s of the part between toss and pass, and between pass and attack (section 5 divides them by highest speed)
@@ -124,7 +124,7 @@ class HitLibrary:
         return tuple(KINDS[int(np.searchsorted(_kind_speeds(self.part), speed, "right"))] for speed in self.speeds)
 
     def sort_by_similarity(self, example: HitMotion, weights: MatchWeights = MatchWeights(),
-              side: str | None = None) -> tuple[np.ndarray, np.ndarray]:
+                           side: str | None = None) -> tuple[np.ndarray, np.ndarray]:
         """Compute how much each hit motion differs from an example (eq. 2), and sort them.
 
         Displacements are compared in each body's own frame, so headings do not matter.
@@ -207,12 +207,14 @@ def _build_labelled_hits(clip: Clip, part: str, sides, hits: list[HitMotion], to
     """
     found = []
     for row in clip.annotations:
-        if row.key is None or any(hit.first < row.key < hit.last and _has_touch_label(row.words, part, hit.side) for hit in hits):
+        if row.key is None or any(hit.first < row.key < hit.last and _has_touch_label(row.words, part, hit.side)
+                                  for hit in hits):
             continue
         named = [side for side in sides if _has_touch_label(row.words, part, side)]
         candidates = [build_hit_at(clip.recording, int(round(row.key)), _frames_around(row, clip), part=part, side=side,
-                       tool=tool) for side in named]
-        found += [hit for hit in sorted(candidates, key=lambda hit: -hit.max_speed)[:1] if hit.max_speed > _LEAST_TOUCH_SPEED]
+                                   tool=tool) for side in named]
+        found += [hit for hit in sorted(candidates, key=lambda hit: -hit.max_speed)[:1] if hit.max_speed
+                  > _LEAST_TOUCH_SPEED]
     return found
 
 
@@ -249,8 +251,10 @@ _ARRAY_FIELDS = ("vectors", "times", "velocity", "fasts")
 
 def _to_arrays(hits: tuple[LibraryHit, ...]) -> dict[str, np.ndarray]:
     """Convert hit motions to arrays that can be stored."""
-    arrays = {name: np.array([getattr(one.hit, name) for one in hits]) for name in (*_INTEGER_FIELDS, *_NUMBER_FIELDS, *_ARRAY_FIELDS)}
-    arrays["clip"], arrays["labelled"] = np.array([one.clip for one in hits]), np.array([one.is_labelled for one in hits])
+    arrays = {name: np.array([getattr(one.hit, name) for one in hits]) for name in (*_INTEGER_FIELDS, *_NUMBER_FIELDS,
+                                                                                    *_ARRAY_FIELDS)}
+    arrays["clip"], arrays["labelled"] = np.array([one.clip for one in hits]), np.array([one.is_labelled
+            for one in hits])
     arrays["side"] = np.array([one.hit.side for one in hits], dtype="<U5")
     return arrays
 

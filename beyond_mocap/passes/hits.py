@@ -125,7 +125,7 @@ class Hits:
 
 
 def detect_hits(motion: Motion, part: str = "foot", side: str = "right", threshold: float | None = None,
-            joint: str | None = None, tool: Tool | None = None) -> Hits:
+                joint: str | None = None, tool: Tool | None = None) -> Hits:
     """Detect the hits of one part of the body in a motion.
 
     Args:
@@ -157,9 +157,10 @@ def detect_hits(motion: Motion, part: str = "foot", side: str = "right", thresho
         other = _other_foot_speed(motion.skeleton, positions, side, motion.fps) if part == "foot" else None
         spans = [span for span in spans if _is_hit(span, part, trajectory, body, other)]
     hit_motions = tuple(_build_hit_motion(part, side, span, trajectory, body) for span in spans)
-    return Hits(part=part, side=side, fps=motion.fps, threshold=height_threshold, height=trajectory.height, speed=trajectory.speed, place=place,
-                highs=tuple(sorted({*highs, *(one.high for one in hit_motions)})), fasts=tuple(_find_fast_frames(trajectory.speed, motion.fps)),
-                motions=hit_motions, ball_stretches=tuple(one.ball_stretch for one in hit_motions),
+    return Hits(part=part, side=side, fps=motion.fps, threshold=height_threshold, height=trajectory.height,
+                speed=trajectory.speed, place=place, highs=tuple(sorted({*highs, *(one.high for one in hit_motions)})),
+                fasts=tuple(_find_fast_frames(trajectory.speed, motion.fps)), motions=hit_motions,
+                ball_stretches=tuple(one.ball_stretch for one in hit_motions),
                 links=_find_links(hit_motions, len(motion)))
 
 
@@ -182,7 +183,7 @@ def find_strongest_hit(motion: Motion, part: str, side: str = "", tool: Tool | N
 
 
 def build_hit_at(motion: Motion, frame: int, span: tuple[int, int], part: str = "foot", side: str = "right",
-           tool: Tool | None = None) -> HitMotion:
+                 tool: Tool | None = None) -> HitMotion:
     """Build the hit motion of a strike whose frame is known.
 
     Works also for parts that neither rise nor are fast, such as in a trap, which `detect_hits` does not see.
@@ -207,11 +208,12 @@ def build_hit_at(motion: Motion, frame: int, span: tuple[int, int], part: str = 
     last = int(np.clip(span[1], first + 2, len(motion) - 1))
     key = int(np.clip(frame, first + 1, last - 1))
     side = side if part in _SIDED else ""
-    return _build_hit_motion(part, side, (first, last), trajectory=_PartTrajectory.from_positions(place, body, part, motion.fps), body=body, key=key)
+    return _build_hit_motion(part, side, (first, last), trajectory=_PartTrajectory.from_positions(place, body, part,
+            motion.fps), body=body, key=key)
 
 
 def compute_strike_place(skeleton: Skeleton, positions: np.ndarray, rotations: np.ndarray, part: str, side: str,
-                 tool: Tool | None = None) -> np.ndarray:
+                         tool: Tool | None = None) -> np.ndarray:
     """Compute the middle of the striking part.
 
     Args:
@@ -296,7 +298,7 @@ class _PartTrajectory:
         velocity = _differentiate(smooth, fps)
         relative_velocity = _differentiate(smooth - body.pelvis, fps) if part in ("head", "chest") else velocity
         return _PartTrajectory(place=smooth, velocity=velocity, height=smooth[:, 2] - body.ground,
-                    speed=np.linalg.norm(relative_velocity, axis=1), fps=fps)
+                               speed=np.linalg.norm(relative_velocity, axis=1), fps=fps)
 
 
 def _other_foot_speed(skeleton: Skeleton, positions: np.ndarray, side: str, fps: float) -> np.ndarray:
@@ -381,7 +383,8 @@ def _find_lowest(speed: np.ndarray, high: int, lows: list[int]) -> int:
     return lows[-1]
 
 
-def _is_hit(span: tuple[int, int], part: str, trajectory: _PartTrajectory, body: _Body, other: np.ndarray | None) -> bool:
+def _is_hit(span: tuple[int, int], part: str, trajectory: _PartTrajectory, body: _Body, other: np.ndarray
+            | None) -> bool:
     """Whether the part is faster than a step or an arm's swing at this speed of the body.
 
     Feet that walk reach 2.7 times the body's speed plus half a metre per second, in a run 2.1 times; recorded kicks
@@ -400,7 +403,7 @@ def _is_hit(span: tuple[int, int], part: str, trajectory: _PartTrajectory, body:
 
 
 def _build_hit_motion(part: str, side: str, span: tuple[int, int], trajectory: _PartTrajectory, body: _Body,
-                key: int | None = None) -> HitMotion:
+                      key: int | None = None) -> HitMotion:
     """Build the hit motion of a span of frames; `key` None: the fastest frame."""
     first, last = span
     key = first + int(np.argmax(trajectory.speed[first : last + 1])) if key is None else key

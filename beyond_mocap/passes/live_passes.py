@@ -20,13 +20,13 @@ from ..motion import quaternion
 from ..motion.humanoid import compute_heading
 from ..motion.motion import Motion
 from ..motion.track.ball_path import BallPath
-from .bodies import BodySettings, estimate_least_seconds, build_player_motion
 from .hit_library import classify_hit
 from .hits import HitMotion
 from .pass_plan import PassPlan
 from .pass_scene import GROUND, Example, Pass, PassScene
 from .passes import build_ball, build_ball_path, build_bone_weights, plan_scene
-from .way import Stance
+from .player_motion import BodySettings, build_player_motion, estimate_least_seconds
+from .player_path import Stance
 
 STANDING_SECONDS = 60.0
 """Seconds that all players keep standing if the user does not act."""
@@ -123,7 +123,8 @@ class LivePass:
     warnings: tuple[str, ...]
 
 
-def start_rally(library: Library, scene: PassScene, holder: str, start: float = 0.0, progress=None, cancelled=None) -> Rally:
+def start_rally(library: Library, scene: PassScene, holder: str, start: float = 0.0, progress=None,
+                cancelled=None) -> Rally:
     """Start a rally: all players stand where the scene says, the ball is in front of the holder.
 
     Args:
@@ -142,7 +143,8 @@ def start_rally(library: Library, scene: PassScene, holder: str, start: float = 
     if holder not in names:
         raise InputError("holder", f"{holder!r}", f"one of {', '.join(names)}")
     facing, place, radius = scene.find_facing(holder), scene.find_player(holder).place, build_ball(scene).radius
-    ball_place = np.array([place[0] + BALL_DISTANCE * np.cos(facing), place[1] + BALL_DISTANCE * np.sin(facing), radius])
+    ball_place = np.array([place[0] + BALL_DISTANCE * np.cos(facing), place[1] + BALL_DISTANCE * np.sin(facing),
+                           radius])
     times = np.arange(int(_TAIL * scene.fps) + 1) / scene.fps
     ball = BallPath(times, np.tile(ball_place, (len(times), 1)), np.ones(len(times), bool))
     players = {}
@@ -151,13 +153,15 @@ def start_rally(library: Library, scene: PassScene, holder: str, start: float = 
             progress(number / len(names), f"{player.name} standing")
         stance = Stance(player.place, scene.find_facing(player.name))
         player_motion = build_player_motion(library, stance, (), ball=ball, ball_radius=radius, fps=scene.fps,
-                              settings=_build_settings(scene), cancelled=cancelled)
+                                            settings=_build_settings(scene), cancelled=cancelled)
         players[player.name] = PlayerTimeline(start, _extend_standing(player_motion.take.motion))
-    return Rally(scene=scene, holder=holder, players=players, ball=_continue_ball(None, ball, start), start=start, ready_time=start)
+    return Rally(scene=scene, holder=holder, players=players, ball=_continue_ball(None, ball, start), start=start,
+                 ready_time=start)
 
 
 def build_answer(library: Library, rally: Rally, now: float, hit: HitMotion, target: str, bounces: int = 0,
-           progress: Callable[[float, str], None] | None = None, cancelled: Callable[[], bool] | None = None) -> LivePass:
+                 progress: Callable[[float, str], None] | None = None, cancelled: Callable[[], bool]
+                 | None = None) -> LivePass:
     """Build the pass with which the holder answers a hit of the user: the most similar motion of the library (eq. 2).
 
     Args:
@@ -187,19 +191,21 @@ def build_answer(library: Library, rally: Rally, now: float, hit: HitMotion, tar
             for player in rally.scene.players
         ),
     )
-    plan = _plan_pass(library, scene, stances[rally.holder], ball_place=ball_place, progress=progress, cancelled=cancelled)
+    plan = _plan_pass(library, scene, stances[rally.holder], ball_place=ball_place, progress=progress,
+                      cancelled=cancelled)
     path = build_ball_path(plan)
     path = replace(path, positions=_roll_ball(path, ball_place, plan.strikes[0].order.time))
     motions = {}
     for name in (one.giver, one.receiver):
-        player_motion = build_player_motion(library, stances[name], plan.list_orders(name), ball=path, ball_radius=build_ball(scene).radius,
-                              fps=scene.fps, settings=_build_settings(scene), cancelled=cancelled)
+        player_motion = build_player_motion(library, stances[name], plan.list_orders(name), ball=path,
+                                            ball_radius=build_ball(scene).radius, fps=scene.fps,
+                                            settings=_build_settings(scene), cancelled=cancelled)
         motions[name] = _extend_standing(player_motion.take.motion)
     strikes = plan.strikes
     clip = library.clips[strikes[0].order.clip].path
     seconds = strikes[-1].order.time + _READY_SECONDS
     return LivePass(giver=one.giver, receiver=target, motions=motions, ball=path, strike=strikes[0].order.time,
-                 seconds=seconds, clip=clip, warnings=plan.warnings)
+                    seconds=seconds, clip=clip, warnings=plan.warnings)
 
 
 def _build_settings(scene: PassScene) -> BodySettings:
@@ -208,7 +214,8 @@ def _build_settings(scene: PassScene) -> BodySettings:
     return BodySettings(transition=scene.transition, watch=scene.watch, seed=scene.seed, weights=weights)
 
 
-def _plan_pass(library: Library, scene: PassScene, stance: Stance, ball_place: np.ndarray, progress, cancelled) -> PassPlan:
+def _plan_pass(library: Library, scene: PassScene, stance: Stance, ball_place: np.ndarray, progress,
+               cancelled) -> PassPlan:
     """Plan the pass while the ball stays where it lies: the holder goes to where they strike it.
 
     Where the holder's motion is no kick from the ground, the ball hops up to them.
@@ -281,6 +288,9 @@ def _continue_ball(before: BallPath | None, path: BallPath, at: float) -> BallPa
     if before is None:
         return BallPath(times, places, np.ones(len(times), bool), rotations)
     is_before = before.times < at - 0.5 * step
-    rotations = quaternion.multiply(rotations, before.rotations[is_before][-1] if is_before.any() else quaternion.identity(1)[0])
-    return BallPath(np.concatenate([before.times[is_before], times]), np.concatenate([before.positions[is_before], places]),
-                    np.ones(int(is_before.sum()) + len(times), bool), np.concatenate([before.rotations[is_before], rotations]))
+    rotations = quaternion.multiply(rotations, before.rotations[is_before][-1] if is_before.any()
+                                    else quaternion.identity(1)[0])
+    return BallPath(np.concatenate([before.times[is_before], times]),
+                    np.concatenate([before.positions[is_before], places]),
+                    np.ones(int(is_before.sum()) + len(times), bool),
+                    np.concatenate([before.rotations[is_before], rotations]))

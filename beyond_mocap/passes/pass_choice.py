@@ -18,8 +18,8 @@ from ..ball.contact import convert_to_world
 from ..base.errors import InputError
 from ..base.vectors import arctan2, unit_vectors
 from ..motion import quaternion
-from . import pass_court
-from .pass_court import PassProblem, Link, NaturalFlights, Site
+from . import pass_problem as pass_court
+from .pass_problem import Link, NaturalFlights, PassProblem, Site
 from .pass_scene import GROUND, RECEIVE, Pass
 from .strike_choice import StrikeMoments, compute_natural_launch
 
@@ -127,7 +127,8 @@ def list_travel_times(one: Pass, fps: float) -> np.ndarray:
     return np.unique(np.round(np.geomspace(SHORTEST_TRAVEL, longest, TRAVEL_TIMES) * fps)) / fps
 
 
-def _select_options(problem: PassProblem, number: int, site: Site, use_counts: dict, random: np.random.Generator) -> _Options:
+def _select_options(problem: PassProblem, number: int, site: Site, use_counts: dict,
+                    random: np.random.Generator) -> _Options:
     """Select the moments whose natural trajectories come nearest to the target (steps 2, 3, 5, 6)."""
     toward = problem.find_target(number)
     moments, facing = _combine_headings(problem, _select_possible(problem, number, site), site, toward)
@@ -147,14 +148,16 @@ def _select_options(problem: PassProblem, number: int, site: Site, use_counts: d
     return _Options(moments.only(best), facing[best], cost[best], NaturalFlights(starts, velocities, int(best[0])))
 
 
-def _combine_headings(problem: PassProblem, moments: StrikeMoments, site: Site, toward: np.ndarray) -> tuple[StrikeMoments, np.ndarray]:
+def _combine_headings(problem: PassProblem, moments: StrikeMoments, site: Site,
+                      toward: np.ndarray) -> tuple[StrikeMoments, np.ndarray]:
     """Combine each moment with each heading.
 
     The headings turn the natural trajectory to `toward` (3,) m, and to its sides; with eight directions they are
     rounded.
     """
     velocity = moments.part_states.velocity
-    natural = arctan2(velocity[:, 1], velocity[:, 0]) * (site.requested is not None)  # the last strike only stops its ball
+    natural = arctan2(velocity[:, 1], velocity[:,
+                                               0]) * (site.requested is not None)  # the last strike only stops its ball
     bearing = np.arctan2(*(toward[:2] - site.place)[::-1])
     facing = (bearing - natural)[:, None] + TURNS
     if problem.scene.directions:
@@ -207,7 +210,7 @@ def _choose_link(problem: PassProblem, number: int, options: _Options, after: Li
 
 @np.errstate(over="ignore", invalid="ignore")  # impossible flights may overflow
 def _solve_flights(problem: PassProblem, number: int, options: _Options, after: Link, option: np.ndarray,
-           seconds: np.ndarray) -> _Flights:
+                   seconds: np.ndarray) -> _Flights:
     """Solve flights from `option` (N,) that take `seconds` (N,), and compute their costs."""
     site, one, receiver = problem.sites[number], problem.passes[number], problem.sites[number + 1]
     natural = pass_court.limit_launch(options.compute_velocities(), site.kind)
@@ -215,9 +218,10 @@ def _solve_flights(problem: PassProblem, number: int, options: _Options, after: 
     target = problem.place_ball(number + 1, after, unit_vectors(-natural[0] * [1.0, 1.0, 0.0]))
     spin = pass_court.compute_spin(starts, target, seconds, problem.ball, site.kind)
     aimed = solve_launches(starts, target, problem.ball, seconds=seconds, bounces=one.bounces, spin=spin,
-                fastest=problem.find_fastest(number))
+                           fastest=problem.find_fastest(number))
     flights = (starts, aimed.velocity, spin, seconds)
-    trajectories, arriving = pass_court.simulate_flights(*flights, problem.ball), pass_court.compute_arrivals(*flights, problem.ball)
+    trajectories, arriving = pass_court.simulate_flights(*flights, problem.ball), pass_court.compute_arrivals(*flights,
+            problem.ball)
     cost = options.cost[option] + np.linalg.norm(aimed.velocity - natural[option], axis=1)
     cost += problem.compute_blocked_cost(number, trajectories).max(axis=1, initial=0.0)
     for near in (site, receiver):
@@ -229,7 +233,7 @@ def _solve_flights(problem: PassProblem, number: int, options: _Options, after: 
     # impossible flights, and those that hit the net, cost infinitely much
     cost = np.where(is_possible & problem.clears_net(trajectories), cost, np.inf)
     return _Flights(option=option, starts=starts, target=target, seconds=seconds, velocity=aimed.velocity, cost=cost,
-                  is_reached=bool(is_possible.any()))
+                    is_reached=bool(is_possible.any()))
 
 
 def _push_direction(site: Site, link: Link) -> np.ndarray:
@@ -255,7 +259,8 @@ def _explain_refusal(problem: PassProblem, number: int, flights: _Flights) -> In
     if unlimited.miss[0] <= pass_court.ON_TARGET and speed > fastest:
         found = f"a flight of {far:.1f} m{within} with {bounces} takes {speed:.0f} m/s"
         expected = f"up to {fastest:.0f} m/s by {part}"
-    return InputError(problem.describe_pass(number), found, expected, "move the players nearer, or change bounces or seconds")
+    return InputError(problem.describe_pass(number), found, expected,
+                      "move the players nearer, or change bounces or seconds")
 
 
 def _find_best(cost: np.ndarray, which: np.ndarray) -> np.ndarray:

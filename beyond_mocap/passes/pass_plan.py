@@ -19,9 +19,21 @@ from ..ball.flight import Flight, Launch, simulate_flight
 from ..ball.physics import Ball
 from ..base.vectors import unit_vectors
 from .pass_choice import choose_strikes
-from .pass_court import LONGEST_SERVE, ON_TARGET, HIT_COST, PassProblem, Link, NaturalFlights, Site, compute_arrivals, compute_spin, rotate_about_up, simulate_flights
+from .pass_problem import (
+    HIT_COST,
+    LONGEST_SERVE,
+    ON_TARGET,
+    Link,
+    NaturalFlights,
+    PassProblem,
+    Site,
+    compute_arrivals,
+    compute_spin,
+    rotate_about_up,
+    simulate_flights,
+)
 from .pass_scene import GROUND, PassScene
-from .way import HitOrder, Stance
+from .player_path import HitOrder, Stance
 
 LAST_BALL_SPEEDS = {"received": (0.9, 0.4), "dropped": (1.1, 0.9)}
 """m/s ahead and up with which a ball goes on that was stopped, or that slipped off."""
@@ -60,8 +72,8 @@ def find_first_time(problem: PassProblem, order: HitOrder, need: Need) -> float:
     return float(np.ceil(least * fps - 1e-6) / fps)
 
 
-def lengthen_flights(problem: PassProblem, chain: list[Link], orders: Sequence[HitOrder], places: np.ndarray, first: float,
-            need: Need) -> tuple[list[Link], list[str]]:
+def lengthen_flights(problem: PassProblem, chain: list[Link], orders: Sequence[HitOrder], places: np.ndarray,
+                     first: float, need: Need) -> tuple[list[Link], list[str]]:
     """Lengthen flights until every player has enough time for their strikes.
 
     Args:
@@ -102,7 +114,8 @@ def _time_between(chain: Sequence[Link], before: int | None, number: int, first:
     return sum(link.seconds for link in chain[before or 0 : number]) + (first if before is None else 0.0)
 
 
-def _lengthen_chain(problem: PassProblem, chain: list[Link], which: Iterable[int], missing: float, places: np.ndarray) -> list[Link]:
+def _lengthen_chain(problem: PassProblem, chain: list[Link], which: Iterable[int], missing: float,
+                    places: np.ndarray) -> list[Link]:
     """Lengthen flights by whole frames where possible; passes with a requested time stay as they are.
 
     Args:
@@ -120,7 +133,8 @@ def _lengthen_chain(problem: PassProblem, chain: list[Link], which: Iterable[int
             break
         # longest first, so that the first possible one takes the largest share of the missing time
         tried = chain[number].seconds + np.arange(frames, 0, -max(frames // MOST_LONGER, 1)) / fps
-        aimed, good = problem.solve_launches(number, np.tile(places[number], (len(tried), 1)), places[number + 1], tried)
+        aimed, good = problem.solve_launches(number, np.tile(places[number], (len(tried), 1)), places[number + 1],
+                                             tried)
         if good.any():
             longer = int(np.argmax(good))
             missing -= tried[longer] - chain[number].seconds
@@ -209,7 +223,8 @@ def plan_passes(scene: PassScene, sites: Sequence[Site], ball: Ball, need: Need,
     problem = PassProblem(scene, list(sites), ball, cancelled or (lambda: False))
     chain = choose_strikes(problem, lambda share, text: report(0.8 * share, text))
     places, normals = estimate_ball_places(problem, chain)
-    orders = [_build_order(problem, chain, number, time=0.0, places=places, normals=normals) for number in range(len(chain))]
+    orders = [_build_order(problem, chain, number, time=0.0, places=places, normals=normals)
+              for number in range(len(chain))]
     first = find_first_time(problem, orders[0], need)
     chain, time_warnings = lengthen_flights(problem, chain, orders, places=places, first=first, need=need)
     report(0.9, "Flights")
@@ -231,7 +246,8 @@ def _build_order(problem: PassProblem, chain: Sequence[Link], number: int, time:
                     kind=site.kind, touches=number < problem.last or problem.passes[-1].error != "missed")
 
 
-def _build_strikes(problem: PassProblem, chain: Sequence[Link], flights: SolvedFlights, first: float) -> tuple[Strike, ...]:
+def _build_strikes(problem: PassProblem, chain: Sequence[Link], flights: SolvedFlights, first: float) -> tuple[Strike,
+        ...]:
     """Build all strikes with their times on whole frames."""
     fps = problem.scene.fps
     times = np.round(np.cumsum([first, *(link.seconds for link in chain[:-1])]) * fps) / fps
@@ -247,8 +263,8 @@ def _build_strikes(problem: PassProblem, chain: Sequence[Link], flights: SolvedF
     ]
     # what happens to the ball after the last strike
     last_velocity = _find_last_velocity(outcome, chain[-1], flights.arriving[-1])
-    last = Strike(player=problem.sites[-1].player, order=orders[-1], velocity_in=flights.arriving[-1], velocity_out=last_velocity,
-                  spin=np.zeros(3), outcome=outcome, bounces=0, travel=0.0, natural=None)
+    last = Strike(player=problem.sites[-1].player, order=orders[-1], velocity_in=flights.arriving[-1],
+                  velocity_out=last_velocity, spin=np.zeros(3), outcome=outcome, bounces=0, travel=0.0, natural=None)
     return (*played, last)
 
 
@@ -323,7 +339,8 @@ def estimate_ball_places(problem: PassProblem, chain: Sequence[Link]) -> tuple[n
     return _place_balls(problem, chain, unit_vectors(part_velocities))
 
 
-def fit_flights(problem: PassProblem, chain: list[Link], places: np.ndarray, first: float) -> tuple[list[Link], SolvedFlights]:
+def fit_flights(problem: PassProblem, chain: list[Link], places: np.ndarray, first: float) -> tuple[list[Link],
+        SolvedFlights]:
     """Solve flights and ball places together; some flights may become some frames longer or shorter.
 
     Args:
@@ -339,14 +356,16 @@ def fit_flights(problem: PassProblem, chain: list[Link], places: np.ndarray, fir
     # ball places follow from flights, flights from places; this converges in a few rounds
     for _ in range(ROUNDS):
         leaving, spin, missed = _solve_between(problem, chain, places)
-        _, arriving = _compute_arriving(problem, chain, places, serve_times=(first, serve_seconds), leaving=leaving, spin=spin)
+        _, arriving = _compute_arriving(problem, chain, places, serve_times=(first, serve_seconds), leaving=leaving,
+                                        spin=spin)
         places, _ = _place_balls(problem, chain, unit_vectors(np.concatenate([leaving, np.zeros((1, 3))]) - arriving))
         chain = _adjust_flights(problem, chain, places, missed)
     leaving, spin, missed = _solve_between(problem, chain, places, last=True)
-    serve, arriving = _compute_arriving(problem, chain, places, serve_times=(first, serve_seconds), leaving=leaving, spin=spin)
+    serve, arriving = _compute_arriving(problem, chain, places, serve_times=(first, serve_seconds), leaving=leaving,
+                                        spin=spin)
     normals = unit_vectors(np.concatenate([leaving, np.zeros((1, 3))]) - arriving)
-    return chain, SolvedFlights(serve=serve, places=places, normals=normals, arriving=arriving, leaving=leaving, spin=spin,
-                        missed=missed)
+    return chain, SolvedFlights(serve=serve, places=places, normals=normals, arriving=arriving, leaving=leaving,
+                                spin=spin, missed=missed)
 
 
 def _place_balls(problem: PassProblem, chain: Sequence[Link], normals: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -355,7 +374,8 @@ def _place_balls(problem: PassProblem, chain: Sequence[Link], normals: np.ndarra
     return np.array([problem.place_ball(number, link, normal) for number, (link, normal) in each]), normals
 
 
-def _solve_between(problem: PassProblem, chain, places, last: bool = False) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def _solve_between(problem: PassProblem, chain, places, last: bool = False) -> tuple[np.ndarray, np.ndarray,
+        np.ndarray]:
     """Solve the flights between strikes.
 
     A ball that only a very different flight would bring to the next strike takes that flight in the `last` round only;
@@ -373,8 +393,8 @@ def _solve_between(problem: PassProblem, chain, places, last: bool = False) -> t
     for count in np.unique(bounces):
         same = np.flatnonzero(bounces == count)
         near = np.array([chain[number].velocity for number in same])
-        aimed = solve_launches(places[same], targets[same], problem.ball, seconds=seconds[same], bounces=int(count), spin=spin[same],
-                    initial_velocity=near)
+        aimed = solve_launches(places[same], targets[same], problem.ball, seconds=seconds[same], bounces=int(count),
+                               spin=spin[same], initial_velocity=near)
         # a jump of the launch velocity means another trajectory: keep the old one until the last round
         other = (np.linalg.norm(aimed.velocity - near, axis=1) > LAUNCH_CHANGE) & (not last)
         velocities[same] = np.where(other[:, None], near, aimed.velocity)
@@ -385,7 +405,8 @@ def _solve_between(problem: PassProblem, chain, places, last: bool = False) -> t
 def _compute_spins(problem: PassProblem, chain, places, targets) -> np.ndarray:
     """Compute the spins (K-1, 3) rad/s with which the balls leave."""
     each = zip(places[:-1], targets, chain, problem.sites)
-    return np.array([compute_spin(a[None], b, np.array([link.seconds]), problem.ball, site.kind)[0] for a, b, link, site in each])
+    return np.array([compute_spin(a[None], b, np.array([link.seconds]), problem.ball, site.kind)[0] for a, b, link,
+                     site in each])
 
 
 def _find_target(problem: PassProblem, number: int, places: np.ndarray, chain: Sequence[Link]) -> np.ndarray:
@@ -401,7 +422,8 @@ def _find_target(problem: PassProblem, number: int, places: np.ndarray, chain: S
     return place + side * MISS_DISTANCE * beside
 
 
-def _compute_arriving(problem: PassProblem, chain, places, serve_times: tuple[float, float], leaving, spin) -> tuple[Launch, np.ndarray]:
+def _compute_arriving(problem: PassProblem, chain, places, serve_times: tuple[float, float], leaving,
+                      spin) -> tuple[Launch, np.ndarray]:
     """Compute the serve and the velocities (K, 3) m/s with which all balls arrive.
 
     Args:

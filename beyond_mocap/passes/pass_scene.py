@@ -25,7 +25,8 @@ LEAST_DISTANCE = 0.5
 """Least distance in metres between two players' places."""
 _DEFAULTS = collect_defaults("passes")
 _ROWS = (*(find_setting("passes", name) for name in ("transition", "lead_in", "lead_out", "repeat", "net_height")),
-         *(find_setting("passes.pass", name) for name in ("bounces", "seconds")), find_setting("passes.player", "height"))
+         *(find_setting("passes.pass", name) for name in ("bounces", "seconds")),
+         find_setting("passes.player", "height"))
 LIMITS = {**{row.name: (row.least, row.most) for row in _ROWS}, "weight": (0.0, 1000.0), "fps": (10.0, 240.0),
           "metres": (-1000.0, 1000.0), "seed": (-(2**63), 2**63 - 1)}
 """Lowest and highest value of a scene's numbers."""
@@ -361,7 +362,8 @@ def _check_meetings(scene: PassScene) -> None:
         places[one.receiver] = one.at or places[one.receiver]
         for other, place in places.items():
             if other != one.receiver and math.dist(place, places[one.receiver]) < LEAST_DISTANCE:
-                raise InputError(f"pass {number}: at", f"{other} stands there", f"{LEAST_DISTANCE} m or more between them")
+                raise InputError(f"pass {number}: at", f"{other} stands there",
+                                 f"{LEAST_DISTANCE} m or more between them")
 
 
 def _check_numbers(scene: PassScene) -> None:

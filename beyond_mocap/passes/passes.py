@@ -14,23 +14,23 @@ import numpy as np
 
 from ..ball.contact import Tool
 from ..ball.physics import BALLS, Ball
-from ..base.errors import UserCancelledError, InputError, NotInLibraryError
+from ..base.errors import InputError, NotInLibraryError, UserCancelledError
 from ..base.settings import find_setting
 from ..library.library import Library
 from ..motion.humanoid import estimate_stature
 from ..motion.quaternion import multiply
 from ..motion.track.ball_path import BallPath
-from ..synthesis.own_size import to_player_size
+from ..synthesis.body_size import to_player_size
 from ..synthesis.take import Take
-from .bodies import BodySettings, PlayerMotion, estimate_least_seconds, build_player_motion
 from .hit_library import MatchWeights
 from .hits import HitMotion, find_strongest_hit
-from .links import BoneWeights
-from .pass_court import Site
 from .pass_plan import PassPlan, plan_passes
+from .pass_problem import Site
 from .pass_scene import BONES, Pass, PassScene, Player, Weights
+from .player_motion import BodySettings, PlayerMotion, build_player_motion, estimate_least_seconds
+from .player_path import HitOrder, Stance
+from .pose_distance import BoneWeights
 from .strike_choice import PartStrikes, StrikeMoments, collect_strike_moments, is_unlabelled_strike
-from .way import HitOrder, Stance
 
 MOST_HITS = 24
 """Most hit motions that are tried for one strike; those that suit its kind best come first."""
@@ -91,7 +91,7 @@ class PlayedScene:
 
 
 def synthesize_passes(library: Library, scene: PassScene, progress: Callable[[float, str], None] | None = None,
-           cancelled: Callable[[], bool] | None = None) -> PlayedScene:
+                      cancelled: Callable[[], bool] | None = None) -> PlayedScene:
     """Play a scene with the motions of a library. The same scene and library give the same bits.
 
     Args:
@@ -114,12 +114,14 @@ def synthesize_passes(library: Library, scene: PassScene, progress: Callable[[fl
         if stop():
             raise UserCancelledError("cancelled")
         players.append(_build_motion(library, scene, plan, path=path, player=player,
-                               progress=_split_progress(report, number, scene.players), cancelled=stop))
-    player_warnings = [f"{player.name}: {line}" for player, motion in zip(scene.players, players) for line in motion.warnings]
-    played = tuple(PlayerPasses(who.name, one.take, one.gaps, one.part_shifts) for who, one in zip(scene.players, players))
+                                     progress=_split_progress(report, number, scene.players), cancelled=stop))
+    player_warnings = [f"{player.name}: {line}" for player, motion in zip(scene.players, players)
+                       for line in motion.warnings]
+    played = tuple(PlayerPasses(who.name, one.take, one.gaps, one.part_shifts) for who,
+                   one in zip(scene.players, players))
     report(1.0, "Done")
     return PlayedScene(scene=scene, kind=build_ball(scene), plan=plan, ball=path, players=played,
-                  warnings=(*plan.warnings, *list_unlabelled_strikes(library, plan), *player_warnings))
+                       warnings=(*plan.warnings, *list_unlabelled_strikes(library, plan), *player_warnings))
 
 
 def list_unlabelled_strikes(library: Library, plan: PassPlan) -> list[str]:
@@ -145,7 +147,7 @@ def _split_progress(report, number: int, players: tuple[Player, ...]):
 
 
 def plan_scene(library: Library, scene: PassScene, progress: Callable[[float, str], None] | None = None,
-            cancelled: Callable[[], bool] | None = None) -> PassPlan:
+               cancelled: Callable[[], bool] | None = None) -> PassPlan:
     """Plan the strikes and flights of a scene, without motions, for live editing.
 
     Args:
@@ -161,8 +163,8 @@ def plan_scene(library: Library, scene: PassScene, progress: Callable[[float, st
     scene = _apply_chance(scene)
     ball = build_ball(scene)
     sizes = {player.name: compute_size(player, library) for player in scene.players}
-    return plan_passes(scene, _build_sites(library, scene, sizes), ball, need=_build_need(library, sizes), cancelled=cancelled,
-                       progress=progress)
+    return plan_passes(scene, _build_sites(library, scene, sizes), ball, need=_build_need(library, sizes),
+                       cancelled=cancelled, progress=progress)
 
 
 def build_ball(scene: PassScene) -> Ball:
@@ -204,13 +206,15 @@ def build_ball_path(plan: PassPlan) -> BallPath:
     """Build the ball's path: position and rotation at every frame of the scene."""
     times = np.arange(int(round(plan.seconds * plan.fps)) + 1) / plan.fps
     which = plan.flight_at(times)
-    positions, rotations, last_rotation = np.empty((len(times), 3)), np.empty((len(times), 4)), np.array([1.0, 0.0, 0.0, 0.0])
+    positions, rotations, last_rotation = np.empty((len(times), 3)), np.empty((len(times), 4)), np.array([1.0, 0.0, 0.0,
+            0.0])
     for number, flight in enumerate(plan.flights):
         own = which == number
         positions[own] = flight.at(times[own])
         flight_rotations = flight.rotations(np.append(times[own], flight.end))
         # each flight starts with the rotation that the one before ended with
-        rotations[own], last_rotation = multiply(flight_rotations[:-1], last_rotation), multiply(flight_rotations[-1], last_rotation)
+        rotations[own], last_rotation = multiply(flight_rotations[:-1], last_rotation), multiply(flight_rotations[-1],
+                last_rotation)
     return BallPath(times, positions, np.ones(len(times), bool), rotations)
 
 
@@ -268,7 +272,8 @@ class _StrikeMeans:
         kind = "receive" if one is None else one.kind
         try:
             size, example = self.sizes[name], one.example if one else None
-            moments = self._collect_moments(part, side, tool and tool.scale_to_library(size), size=size, kind=kind, example=example)
+            moments = self._collect_moments(part, side, tool and tool.scale_to_library(size), size=size, kind=kind,
+                                            example=example)
         except InputError as error:
             raise InputError(f"pass {number}, {name}", str(error)) from None
         return Site(player=name, place=place, facing=self.scene.find_facing(name), kind=kind, part=part, tool=tool,
@@ -284,7 +289,8 @@ class _StrikeMeans:
             if example is None:
                 hits = own.select_by_kind(kind, side_wanted)[:MOST_HITS]
             else:
-                order, _ = own.measured.sort_by_similarity(self._find_example(example, part, side, tool), self._build_weights(), side_wanted or None)
+                order, _ = own.measured.sort_by_similarity(self._find_example(example, part, side, tool),
+                                                           self._build_weights(), side_wanted or None)
                 hits = tuple(own.hits[index] for index in order[:1])
             if not hits:
                 with_what = f"the {side} {part}" if side_wanted else part
@@ -297,7 +303,8 @@ class _StrikeMeans:
 
     def _list_parts(self) -> tuple[str, ...]:
         """List the parts with which clips of the library strike."""
-        return tuple(part for part in ("foot", "head", "chest", "hand") if PartStrikes.from_library(self.library, part).hits)
+        return tuple(part for part in ("foot", "head", "chest", "hand") if PartStrikes.from_library(self.library,
+                part).hits)
 
     def _build_weights(self) -> MatchWeights:
         """Build the weights of eq. 2."""
@@ -328,7 +335,8 @@ def _build_need(library: Library, sizes: dict[str, float]):
     """Build the function that gives the seconds a player needs; a larger body moves as the library does, scaled."""
     def estimate_need(player: str, before: Stance | HitOrder, after: HitOrder) -> float:
         """Seconds that a player needs from one strike, or from standing, to the next."""
-        return estimate_least_seconds(library, _to_library_size(before, sizes[player]), _to_library_size(after, sizes[player]))
+        return estimate_least_seconds(library, _to_library_size(before, sizes[player]),
+                                      _to_library_size(after, sizes[player]))
 
     return estimate_need
 
@@ -337,7 +345,7 @@ def _build_need(library: Library, sizes: dict[str, float]):
 
 
 def _build_motion(library: Library, scene: PassScene, plan: PassPlan, path: BallPath, player: Player, progress,
-            cancelled) -> PlayerMotion:
+                  cancelled) -> PlayerMotion:
     """Build one player's motion in their own size; the work is done in the library's size."""
     size = compute_size(player, library)
     orders = [_to_library_size(order, size) for order in plan.list_orders(player.name)]
@@ -345,12 +353,13 @@ def _build_motion(library: Library, scene: PassScene, plan: PassPlan, path: Ball
     ball = path if size == 1.0 else replace(path, positions=path.positions / size)
     settings = BodySettings(scene.transition, scene.watch, scene.seed, build_bone_weights(scene.weights))
     player_motion = build_player_motion(library, stance, orders, ball=ball, ball_radius=build_ball(scene).radius / size,
-                          fps=scene.fps, settings=settings, progress=progress,
-                          cancelled=cancelled)  # fmt: skip
+                                        fps=scene.fps, settings=settings, progress=progress,
+                                        cancelled=cancelled)  # fmt: skip
     if size == 1.0:
         return player_motion
     scaled_take = to_player_size(player_motion.take, size, _scale_plan(player_motion.take.plan, size, player.height))
-    return replace(player_motion, take=replace(scaled_take, ball=path), gaps=player_motion.gaps * size, part_shifts=player_motion.part_shifts * size)
+    return replace(player_motion, take=replace(scaled_take, ball=path), gaps=player_motion.gaps * size,
+                   part_shifts=player_motion.part_shifts * size)
 
 
 def _to_library_size(order, size: float):

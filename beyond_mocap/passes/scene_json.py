@@ -13,9 +13,19 @@ from typing import Any
 
 from ..ball.contact import Tool
 from ..base.errors import InputError
+from ..files.atomic import atomic_write
 from ..files.content import read_utf8
-from ..files.json_values import check_names, check_object, check_number, check_numbers, parse_json, describe_value, check_text, check_bool, check_whole_number
-from ..files.whole import atomic_write
+from ..files.json_values import (
+    check_bool,
+    check_names,
+    check_number,
+    check_numbers,
+    check_object,
+    check_text,
+    check_whole_number,
+    describe_value,
+    parse_json,
+)
 from .pass_scene import BallChoice, Example, Net, Pass, PassScene, Player, Weights
 
 LARGEST = 10_000_000
@@ -161,10 +171,11 @@ def _pass_to_json(one: Pass) -> dict:
 
 def _parse_scene_object(whole) -> PassScene:
     """Build a scene from its JSON object."""
-    read: dict[str, Callable] = {"players": _list_reader(_parse_player), "repeat": check_whole_number, "fps": check_number,
-                                 "seed": check_whole_number, "ball": _parse_ball, "net": _parse_net, "serve": _parse_serve,
-                                 "transition": check_number, "lead_in": check_number, "lead_out": check_number,
-                                 "directions": check_whole_number, "watch": check_bool, "weights": _parse_weights}
+    read: dict[str, Callable] = {"players": _list_reader(_parse_player), "repeat": check_whole_number,
+                                 "fps": check_number, "seed": check_whole_number, "ball": _parse_ball,
+                                 "net": _parse_net, "serve": _parse_serve, "transition": check_number,
+                                 "lead_in": check_number, "lead_out": check_number, "directions": check_whole_number,
+                                 "watch": check_bool, "weights": _parse_weights}
     known = {*read, "passes", "defaults", "errors"}
     check_names(whole, "the scene", known, ("players", "passes"))
     found = {name: of(whole[name], name) for name, of in read.items() if name in whole}
@@ -174,8 +185,8 @@ def _parse_scene_object(whole) -> PassScene:
 
 
 def _parse_player(value, where: str) -> Player:
-    read: dict[str, Callable] = {"name": check_text, "place": _parse_place, "facing": _parse_angle, "part": check_text, "side": check_text,
-                                 "tool": _parse_tool, "height": check_number}
+    read: dict[str, Callable] = {"name": check_text, "place": _parse_place, "facing": _parse_angle, "part": check_text,
+                                 "side": check_text, "tool": _parse_tool, "height": check_number}
     check_names(value, where, read, ("name", "place"))
     return Player(**{name: of(value[name], f"{where}: {name}") for name, of in read.items() if name in value})
 
@@ -189,8 +200,8 @@ def _parse_pass(value, where: str, defaults: Mapping) -> Pass:
 
 def _parse_settings(value, where: str) -> dict:
     """Parse the settings of a pass, without its players."""
-    read = {"kind": check_text, "bounces": check_whole_number, "part": check_text, "side": check_text, "seconds": check_number, "at": _parse_place,
-            "example": _parse_example, "error": check_text}
+    read = {"kind": check_text, "bounces": check_whole_number, "part": check_text, "side": check_text,
+            "seconds": check_number, "at": _parse_place, "example": _parse_example, "error": check_text}
     check_names(value, where, read, ())
     return {name: of(value[name], f"{where}: {name}") for name, of in read.items() if name in value}
 
@@ -203,7 +214,8 @@ def _parse_example(value, where: str) -> Example:
 
 
 def _parse_tool(value, where: str) -> Tool:
-    read: dict[str, Callable] = {"name": check_text, "length": check_number, "radius": check_number, "reach": check_number}
+    read: dict[str, Callable] = {"name": check_text, "length": check_number, "radius": check_number,
+                                 "reach": check_number}
     check_names(value, where, read, ())
     found = {name: of(value[name], f"{where}: {name}") for name, of in read.items() if name in value}
     try:
@@ -222,7 +234,8 @@ def _parse_ball(value, where: str) -> BallChoice:
 
 
 def _parse_ball_number(value, where: str):
-    return tuple(check_number(one, where) for one in value) if isinstance(value, (list, tuple)) else check_number(value, where)
+    return tuple(check_number(one, where) for one in value) if isinstance(value, (list, tuple)) else check_number(value,
+            where)
 
 
 def _parse_net(value, where: str) -> Net:
@@ -248,8 +261,10 @@ def _parse_weights(value, where: str) -> Weights:
     check_names(value, where, names, ())
     bones = value.get("bones", {})
     check_object(bones, f"{where}: bones")
-    factors: dict[str, Any] = {name: check_number(one, f"{where}: {name}") for name, one in value.items() if name != "bones"}
-    return replace(Weights(**factors), bones={name: check_number(one, f"{where}: {name}") for name, one in bones.items()})
+    factors: dict[str, Any] = {name: check_number(one, f"{where}: {name}") for name, one in value.items()
+                               if name != "bones"}
+    return replace(Weights(**factors), bones={name: check_number(one, f"{where}: {name}") for name,
+                                              one in bones.items()})
 
 
 def _list_reader(read: Callable) -> Callable:

@@ -15,14 +15,21 @@ import numpy as np
 
 from ..annotation.ball_contact import find_striking_part
 from ..annotation.labels import list_labels
-from ..ball.contact import StrikeSurface, Tool, compute_ball_centre, convert_to_world, find_striking_surface, sample_strike_surface
+from ..ball.contact import (
+    StrikeSurface,
+    Tool,
+    compute_ball_centre,
+    convert_to_world,
+    find_striking_surface,
+    sample_strike_surface,
+)
 from ..ball.physics import HUMAN_BALL_SPEEDS
 from ..base.vectors import unit_vectors
 from ..library.library import Library
 from ..motion import quaternion
 from .hit_library import HitLibrary, LibraryHit
 from .pass_scene import RECEIVE
-from .way import HitOrder
+from .player_path import HitOrder
 
 TOOL_LABELS = frozenset(list_labels(part="tool"))
 RECEIVE_LABELS = frozenset(list_labels(ball="takes"))
@@ -82,7 +89,8 @@ class PartStrikes:
             The hit motions, best first.
         """
         # labels first: other parts' strikes and other acts are out
-        suitable = self._select_labelled([i for i, one in enumerate(self.hits) if not side or one.hit.side in ("", side)])
+        suitable = self._select_labelled([i for i, one in enumerate(self.hits) if not side
+                                          or one.hit.side in ("", side)])
         stops = [i for i in suitable if self.labels[i] & RECEIVE_LABELS]
         if kind == RECEIVE:
             suitable = stops or suitable
@@ -162,7 +170,8 @@ class StrikeMoments:
         part_states = self.part_states
         return replace(self, which=self.which[which], frame=self.frame[which], lead=self.lead[which],
                        trail=self.trail[which], travel=self.travel[which],
-                       part_states=StrikeSurface(part_states.start[which], part_states.end[which], part_states.radius, part_states.velocity[which]))
+                       part_states=StrikeSurface(part_states.start[which], part_states.end[which], part_states.radius,
+                                                 part_states.velocity[which]))
 
     def place_ball(self, normal: np.ndarray, radius: float) -> np.ndarray:
         """Compute the centre of a ball that touches the part.
@@ -190,7 +199,7 @@ class StrikeMoments:
 
 
 def collect_strike_moments(library: Library, hits: Sequence[LibraryHit], tool: Tool | None = None,
-                   size: float = 1.0) -> StrikeMoments:
+                           size: float = 1.0) -> StrikeMoments:
     """Collect the moments of hit motions, in their order.
 
     Args:
@@ -220,11 +229,12 @@ def collect_strike_moments(library: Library, hits: Sequence[LibraryHit], tool: T
         empty = StrikeSurface(np.zeros((0, 3)), np.zeros((0, 3)), 0.0, np.zeros((0, 3)))
         return StrikeMoments(hits=(), which=nothing.astype(int), frame=nothing, part_states=empty, lead=nothing,
                              trail=nothing, travel=nothing)
-    scaled = (np.concatenate([getattr(one, name) for one in part_states]) * size for name in ("start", "end", "velocity"))
+    scaled = (np.concatenate([getattr(one, name) for one in part_states]) * size
+              for name in ("start", "end", "velocity"))
     start, end, velocity = scaled
     return StrikeMoments(hits=tuple(hits), which=np.concatenate(which), frame=np.concatenate(frames),
-                         part_states=StrikeSurface(start, end, part_states[0].radius * size, velocity), lead=np.concatenate(lead),
-                         trail=np.concatenate(trail), travel=np.concatenate(travel))
+                         part_states=StrikeSurface(start, end, part_states[0].radius * size, velocity),
+                         lead=np.concatenate(lead), trail=np.concatenate(trail), travel=np.concatenate(travel))
 
 
 def compute_natural_launch(moments: StrikeMoments, place: np.ndarray, facing: np.ndarray, radius: float):

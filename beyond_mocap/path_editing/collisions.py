@@ -56,7 +56,7 @@ def find_collisions(times: np.ndarray, places: np.ndarray, distance: float = DIS
     found = []
     for first in range(len(places) - 1):
         found += find_collisions_of(first, range(first + 1, len(places)), times, places=places, distance=distance,
-                               height=height)
+                                    height=height)
     return sorted(found, key=lambda collision: (collision.start, collision.first, collision.second))
 
 
@@ -80,7 +80,8 @@ def find_collisions_of(body: int, others, times, places, distance: float = DISTA
     return find_collisions_at(body, others[rows], steps, times=times, places=places, distance=distance, height=height)
 
 
-def find_collisions_at(body: int, others, steps, times, places, distance: float = DISTANCE, height: float = HEIGHT) -> list:
+def find_collisions_at(body: int, others, steps, times, places, distance: float = DISTANCE,
+                       height: float = HEIGHT) -> list:
     """Find the collisions of one body with others within given steps.
 
     Args:
@@ -108,7 +109,7 @@ def find_collisions_at(body: int, others, steps, times, places, distance: float 
         of = hit & (others == other)
         pair = [min(body, other), max(body, other)]
         found += _join_steps(pair, steps[of], enter[of], leave=leave[of], nearest=nearest[of], gap=gap[of], times=times,
-                         places=places)
+                             places=places)
     return found
 
 

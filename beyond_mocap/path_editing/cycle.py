@@ -20,7 +20,7 @@ import numpy as np
 
 from ..base.errors import InputError
 from ..motion import quaternion
-from ..synthesis.construct.transitions import compute_blend_share, blend_rotations
+from ..synthesis.construct.transitions import blend_rotations, compute_blend_share
 from .loops import Loop, find_loops, smooth_speed
 from .path_frame import Residuals
 
@@ -104,7 +104,8 @@ def _fill_length(residuals: Residuals, loops: tuple[Loop, ...], target: float, m
         messages += (f"the path of {target:.0f} m is too long: {ends}",)
     if exact:
         scale = length / float(repeated.step.sum())
-        return CycledMotion(_scale_strides(repeated, scale), transitions, scale, (*messages, *_report_stride_scale(scale)))
+        return CycledMotion(_scale_strides(repeated, scale), transitions, scale,
+                            (*messages, *_report_stride_scale(scale)))
     # No exact end: cut at the nearest frame, with strides scaled if that is hardly visible.
     arc = np.cumsum(repeated.step)
     count = int(np.argmin(np.abs(arc - length))) + 1
@@ -409,7 +410,8 @@ class _JumpSides:
         ending, beginning = (np.asarray(values[at], dtype=float) for at in self._list_frames())
         if self._recorded_range == (self.around[0], self.around[-1]):
             return ending, beginning
-        apart = self._extrapolate_differences(ending - beginning, *(values[at] - values[at - 1] for at in self._edge_frames))
+        apart = self._extrapolate_differences(ending - beginning,
+                                              *(values[at] - values[at - 1] for at in self._edge_frames))
         first, last = (edge - int(self.around[0]) for edge in self._recorded_range)
         ending[last + 1 :] = beginning[last + 1 :] + apart[last + 1 :]
         beginning[:first] = ending[:first] - apart[:first]
@@ -421,7 +423,8 @@ class _JumpSides:
         if self._recorded_range == (self.around[0], self.around[-1]):
             return ending, beginning
         changes = (_compute_rotation_change(rotations[at - 1], rotations[at]) for at in self._edge_frames)
-        turn = quaternion.from_rotation_vector(self._extrapolate_differences(_compute_rotation_change(beginning, ending), *changes))
+        turn = quaternion.from_rotation_vector(self._extrapolate_differences(_compute_rotation_change(beginning,
+                ending), *changes))
         first, last = (edge - int(self.around[0]) for edge in self._recorded_range)
         ending[last + 1 :] = quaternion.multiply(beginning[last + 1 :], turn[last + 1 :])
         beginning[:first] = quaternion.multiply(ending[:first], quaternion.inverse(turn[:first]))

@@ -266,10 +266,12 @@ class Follower:
         old = sampled_path.compute_offset(arc, change.detours)
         aside = old + sampled_path.compute_offset(arc, train)
         if self.by_arc:
-            arc = arc - sampled_path.compute_extra_length(arc[0], aside) + sampled_path.compute_extra_length(arc[0], old)
+            arc = arc - sampled_path.compute_extra_length(arc[0], aside) + sampled_path.compute_extra_length(arc[0],
+                    old)
             aside = sampled_path.compute_offset(arc, (*change.detours, *train))
         arc, shape = np.broadcast_to(arc, aside.shape).ravel(), (*aside.shape, 3)
-        places = interpolate_columns(arc, sampled_path.arc, sampled_path.places) + aside.reshape(-1, 1) * interpolate_columns(arc, sampled_path.arc, sampled_path.left)
+        places = interpolate_columns(arc, sampled_path.arc, sampled_path.places) + aside.reshape(-1,
+                1) * interpolate_columns(arc, sampled_path.arc, sampled_path.left)
         return places.reshape(shape) + interpolate_columns(times, self.times, self.path_offset)
 
     def arc_at(self, time: float, change: PathChange = PathChange()) -> float:

@@ -18,7 +18,7 @@ from scipy.ndimage import minimum_filter1d
 
 from ..base.easing import quintic_step_by_powers
 from ..base.errors import TimedMessage
-from ..base.time_series import hann_smooth, interpolate_columns, find_runs
+from ..base.time_series import find_runs, hann_smooth, interpolate_columns
 from ..base.vectors import arctan2, cross_on_ground
 from ..motion.path.arc_length import ArcLength
 from ..motion.path.path import Path
@@ -154,7 +154,8 @@ def compute_footing(feet: np.ndarray, standing: np.ndarray, clear: np.ndarray, f
     Returns:
         Height, slope and lift of each foot.
     """
-    sides = [_compute_side(feet[:, side], standing[:, side].any(axis=1), clear[:, side], fps, surface) for side in (0, 1)]
+    sides = [_compute_side(feet[:, side], standing[:, side].any(axis=1), clear[:, side], fps, surface)
+             for side in (0, 1)]
     return Footing(*(np.stack(parts, axis=1) for parts in zip(*sides)))
 
 
@@ -178,7 +179,8 @@ def _compute_side(feet: np.ndarray, stands: np.ndarray, clear: np.ndarray, fps: 
     a, b = (height[at] + np.sum(slope[at] * (toe - mean[at, 1]), axis=1) for at in (before, after))
     found = a + (b - a) * share
     tilt = slope[before] + (slope[after] - slope[before]) * share[:, None]
-    return found, tilt, _compute_lift(feet, found, tilt, clear=clear, time_share=time_share, which=before, surface=surface)
+    return found, tilt, _compute_lift(feet, found, tilt, clear=clear, time_share=time_share, which=before,
+                                      surface=surface)
 
 
 def _compute_swing_share(toe: np.ndarray, here: np.ndarray, there: np.ndarray, time_share: np.ndarray) -> np.ndarray:
@@ -207,7 +209,8 @@ def _find_stances(stands: np.ndarray, fps: float) -> list[tuple[int, int]]:
     return sorted(set(spans))
 
 
-def _fit_planes(heel: np.ndarray, toe: np.ndarray, frames: np.ndarray, surface: Surface) -> tuple[np.ndarray, np.ndarray]:
+def _fit_planes(heel: np.ndarray, toe: np.ndarray, frames: np.ndarray, surface: Surface) -> tuple[np.ndarray,
+        np.ndarray]:
     """Fit the ground under feet with heels and toes (S, 2): height (S,) at the toe and slope (S, 2)."""
     high, slope = surface(np.concatenate([toe, heel]), np.tile(frames, 2))
     (at_toe, at_heel), slope = np.split(high, 2), 0.5 * np.add(*np.split(slope, 2))
@@ -224,7 +227,7 @@ def _fit_planes(heel: np.ndarray, toe: np.ndarray, frames: np.ndarray, surface: 
 
 
 def _compute_lift(feet: np.ndarray, height: np.ndarray, slope: np.ndarray, clear: np.ndarray, time_share: np.ndarray,
-              which: np.ndarray, surface: Surface) -> np.ndarray:
+                  which: np.ndarray, surface: Surface) -> np.ndarray:
     """Compute the lift (T,) m of a foot in the air that keeps heel and toe out of the ground: one bump for each
     swing.
     """

@@ -85,8 +85,9 @@ def find_loops(residuals: Residuals) -> tuple[Loop, ...]:
     usual = float(np.sqrt(2.0 * features[moving].var(axis=0).sum()))
     feet = _locate_feet(residuals.skeleton, features)
     found = [_refine_loop(features, residuals, pair, free=free, least=least, stride=stride, usual=usual,
-                    feet=feet) for pair in tried]
-    found = [loop for loop in found if loop and loop.relative_distance <= _MOST_DISTANCE and _has_strides(residuals.standing, loop)]
+                          feet=feet) for pair in tried]
+    found = [loop for loop in found if loop and loop.relative_distance <= _MOST_DISTANCE
+             and _has_strides(residuals.standing, loop)]
     best: dict[int, Loop] = {}
     for loop in sorted(found, key=lambda loop: (loop.cost, loop.start, loop.end)):
         best.setdefault(max(int(round(loop.strides)), 1), loop)
@@ -127,7 +128,8 @@ def measure_stride(residuals: Residuals, features: np.ndarray | None = None) -> 
     again = _find_period(_compute_features(residuals) if features is None else features, moving, residuals.fps)
     if again is not None:
         return again
-    return _compute_typical_stride(np.concatenate([2.0 * np.abs(pair[0][:, None] - pair[1]).ravel() for pair in at]), residuals.fps)
+    return _compute_typical_stride(np.concatenate([2.0 * np.abs(pair[0][:, None] - pair[1]).ravel() for pair in at]),
+                                   residuals.fps)
 
 
 def _compute_typical_stride(frames: np.ndarray, fps: float) -> float | None:
@@ -207,7 +209,7 @@ def _has_strides(standing: np.ndarray, loop: Loop) -> bool:
 
 
 def _search_coarse(features: np.ndarray, residuals: Residuals, free: np.ndarray, least: int,
-           stride: float) -> list[tuple[int, int]]:
+                   stride: float) -> list[tuple[int, int]]:
     """Search pairs (start, end) of similar frames at a low rate: up to _MOST_CANDIDATES, all well separated."""
     count, fps = len(features), residuals.fps
     every = max(int(round(fps / _COARSE_FPS)), -(-count // _COLUMNS), 1)
@@ -247,7 +249,7 @@ def _select_separated(pairs: np.ndarray, reach: float) -> list[tuple[int, int]]:
 
 
 def _refine_loop(features: np.ndarray, residuals: Residuals, pair: tuple[int, int], free: np.ndarray, least: int,
-           stride: float, usual: float, feet: np.ndarray | None) -> Loop | None:
+                 stride: float, usual: float, feet: np.ndarray | None) -> Loop | None:
     """Refine a coarse pair to the best loop around it, compared over windows at the full rate.
 
     usual: metres between any two moments; feet (T, 2, 2) m: as of `_locate_feet`.
@@ -289,7 +291,7 @@ def _refine_loop(features: np.ndarray, residuals: Residuals, pair: tuple[int, in
 
 
 def _compare_contacts(residuals: Residuals, feet: np.ndarray | None, start: np.ndarray,
-                 end: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+                      end: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Compare contacts of frames `start` (N,) and `end` (M,).
 
     Returns (N, M) the share of soles in contact at one alone, and the metres by which feet in contact at both differ

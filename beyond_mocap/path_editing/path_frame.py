@@ -22,7 +22,7 @@ from ..motion.contacts import estimate_recorded_floor
 from ..motion.humanoid import identify_joints
 from ..motion.motion import Motion, forward_kinematics
 from ..motion.path.path import Path, PolynomialPath, SplinePath
-from ..motion.path.smooth_spline import fit_smoothing_spline, count_spline_pieces
+from ..motion.path.smooth_spline import count_spline_pieces, fit_smoothing_spline
 from ..motion.skeleton import Skeleton
 from ..motion.track import smooth_zero_phase_hann
 
@@ -132,7 +132,8 @@ def check_frame(frame: str) -> None:
         raise InputError("frame", str(frame), f"one of {', '.join(FRAMES)}")
 
 
-def to_moving_frame(frame: str, moving: MovingFrame, root: np.ndarray, rotations: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def to_moving_frame(frame: str, moving: MovingFrame, root: np.ndarray, rotations: np.ndarray) -> tuple[np.ndarray,
+        np.ndarray]:
     """Convert the root from the world to the moving frame.
 
     Args:
@@ -148,7 +149,8 @@ def to_moving_frame(frame: str, moving: MovingFrame, root: np.ndarray, rotations
     return place, quaternion.multiply(quaternion.inverse(body), rotations)
 
 
-def from_moving_frame(frame: str, moving: MovingFrame, place: np.ndarray, rotations: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def from_moving_frame(frame: str, moving: MovingFrame, place: np.ndarray, rotations: np.ndarray) -> tuple[np.ndarray,
+        np.ndarray]:
     """Convert a motion from the moving frame to the world, the inverse of `to_moving_frame`.
 
     Args:
@@ -167,7 +169,7 @@ def from_moving_frame(frame: str, moving: MovingFrame, place: np.ndarray, rotati
 
 
 def build_moving_frame(origin: np.ndarray, tangent: np.ndarray, arc: np.ndarray, fps: float,
-                 default_heading: float | None = None) -> MovingFrame:
+                       default_heading: float | None = None) -> MovingFrame:
     """Build the moving frame along a path.
 
     Args:
@@ -187,7 +189,8 @@ def build_moving_frame(origin: np.ndarray, tangent: np.ndarray, arc: np.ndarray,
                        arctan2(along[:, 2], np.maximum(level, 1e-12)))
 
 
-def compute_heading(along: np.ndarray, speed: np.ndarray, fps: float, default_heading: float | None = None) -> np.ndarray:
+def compute_heading(along: np.ndarray, speed: np.ndarray, fps: float, default_heading: float
+                    | None = None) -> np.ndarray:
     """Compute the heading of travel along a path.
 
     Where the horizontal tangent vanishes (standing still, vertical stretches, cusps) it has no meaning, and a body in
@@ -204,7 +207,8 @@ def compute_heading(along: np.ndarray, speed: np.ndarray, fps: float, default_he
     Returns:
         (T,) radians, unwrapped.
     """
-    mean = smooth_zero_phase_hann(along[:, :2] * speed[:, None], fps, _PROGRESS_SECONDS) if len(along) > 2 else along[:, :2]
+    mean = smooth_zero_phase_hann(along[:, :2] * speed[:, None], fps, _PROGRESS_SECONDS) if len(along) > 2 else along[:,
+            :2]
     speed = np.maximum(np.minimum(np.linalg.norm(mean, axis=1), speed), speed - _SURE_SPEED)
     raw = arctan2(along[:, 1], along[:, 0])
     clear = speed >= min(CLEAR_SPEED, 0.5 * speed.max(initial=0.0))
@@ -314,7 +318,7 @@ def fit_spline(places: np.ndarray, times: np.ndarray, seconds: float = SWAY_SECO
     pieces, rest, coefficients = count_spline_pieces(times[-1] - times[0], seconds), places, 0.0
     for _ in range(_PASSES):
         knots, more = fit_smoothing_spline(rest, times, pieces, stiff=seconds, order=min(_ORDER, len(places)),
-                                       weights=weights)
+                                           weights=weights)
         coefficients = coefficients + more
         path = SplinePath(knots, coefficients)
         rest = places - path.at(times)

@@ -9,7 +9,7 @@ import os
 import numpy as np
 
 from ..base.errors import InputError
-from ..base.time_series import interpolate_columns, find_runs
+from ..base.time_series import find_runs, interpolate_columns
 from ..base.vectors import distances_along, unit_vectors
 from ..files.tables import parse_number, read_rows
 from ..motion.path.arc_length import ArcLength
@@ -56,10 +56,11 @@ def fit_line(line: np.ndarray, name: str, rounding: float = ROUNDING, closed: bo
     pieces = max(int(np.ceil(along[-1] / (rounding * _PIECE))), 8)
     if closed:
         spline = fit_smoothing_spline(sampled[:-1], along[:-1], pieces, rounding, _ORDER, closed=True,
-                                  domain=(0.0, along[-1]))
+                                      domain=(0.0, along[-1]))
     else:
         weights = np.ones(len(along))
-        spline = fit_smoothing_spline(sampled, along, pieces, stiff=rounding, order=_ORDER, weights=weights, keep_ends=True)
+        spline = fit_smoothing_spline(sampled, along, pieces, stiff=rounding, order=_ORDER, weights=weights,
+                                      keep_ends=True)
     return SplinePath(*spline, closed=closed)
 
 

@@ -120,8 +120,8 @@ def build_timing_by_arc_length(residuals: Residuals, speed: float, delay: float)
     return Timing(at, np.interp(at, np.arange(len(residuals)), np.cumsum(residuals.step)))
 
 
-def build_timing_by_profile(residuals: Residuals, own: PathProfile, new: PathProfile, options: StepOptions, speed: float, delay: float,
-           closed: bool) -> Timing:
+def build_timing_by_profile(residuals: Residuals, own: PathProfile, new: PathProfile, options: StepOptions,
+                            speed: float, delay: float, closed: bool) -> Timing:
     """Build the timing by arc length with the steps that the slopes and bends of the new path require.
 
     The length s on the new path, the length S of the motion and its row p at time t follow ds / k(s) = dS / k_own(p),
@@ -195,7 +195,8 @@ def build_profile(path: Path, arc: ArcLength) -> PathProfile:
     bend = np.minimum(turn / np.maximum(level, 1e-9) ** 3, 20.0)
     width = int(np.clip(_SMOOTH / max(s[1], 1e-9), 1, count))
     mode = "wrap" if path.closed else "nearest"
-    return PathProfile(s, *(uniform_filter1d(uniform_filter1d(v, width, mode=mode), width, mode=mode) for v in (slope, bend)))
+    return PathProfile(s, *(uniform_filter1d(uniform_filter1d(v, width, mode=mode), width, mode=mode)
+                            for v in (slope, bend)))
 
 
 def sample_profile(profile: PathProfile, arc: np.ndarray, pace: np.ndarray) -> PathProfile:
@@ -214,7 +215,8 @@ def sample_profile(profile: PathProfile, arc: np.ndarray, pace: np.ndarray) -> P
 
 def _compute_step_shares(profile: PathProfile, options: StepOptions) -> tuple[np.ndarray, np.ndarray]:
     """Compute length and tempo of steps (N,) as shares of those on a level straight path."""
-    shorter = np.maximum(1.0 - SLOPE_SHORTENING * np.abs(profile.slope), LEAST_STEP) if options.slopes else np.ones(len(profile.slope))
+    shorter = np.maximum(1.0 - SLOPE_SHORTENING * np.abs(profile.slope),
+                         LEAST_STEP) if options.slopes else np.ones(len(profile.slope))
     slower = np.ones(len(profile.slope))
     if options.climbs:  # Tobler: 6 exp(-3.5 |m + 0.05|) km/h, over its value on level ground
         slower = slower * np.exp(-3.5 * (np.abs(profile.slope + 0.05) - 0.05))

@@ -84,7 +84,8 @@ def _sort_answers(study: Study, found: Mapping[str, Mapping[str, tuple[str, str]
 def _check_answer(study: Study, place: str, study_id: str, rater: str, question: str, answer: str) -> str:
     """Check that an answer belongs to this study, and return it."""
     if study_id != study.id:
-        raise InputError(place, f"answers to study {study_id or 'without an id'}", study.id, "choose this study's answers")
+        raise InputError(place, f"answers to study {study_id or 'without an id'}", study.id,
+                         "choose this study's answers")
     if rater not in study.orders:
         raise InputError(place, f"rater {rater!r}", f"one of {', '.join(list(study.orders)[:12])}", "correct the name")
     possible = {one.key: [key for key, _ in one.choices] for one in BACKGROUND}

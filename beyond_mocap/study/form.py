@@ -13,7 +13,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
-from ..evaluation.html_page import Html, build_page, build_section, build_element, join_html
+from ..evaluation.html_page import Html, build_element, build_page, build_section, join_html
 from .order import Study
 
 MOVIES = (".mp4", ".webm", ".m4v", ".mov", ".gif")
@@ -203,7 +203,8 @@ def _build_clip_page(study: Study, shown: tuple[str, ...], sources: Mapping[str,
     name = "/".join(shown)
     training = () if study.is_counted(shown) else (" ", build_element("span", "(to get used to it)", class_="quiet"))
     sides = ("Left", "Right") if len(shown) == 2 else ("",)
-    clips = [build_element("div", _build_clip(sources[one]), build_element("p", side, class_="quiet")) for one, side in zip(shown, sides)]
+    clips = [build_element("div", _build_clip(sources[one]), build_element("p", side, class_="quiet")) for one,
+             side in zip(shown, sides)]
     if study.pairs:
         choices = tuple(zip((shown[0], SAME, shown[1]), ("Left", "No difference", "Right")))
     else:

@@ -15,6 +15,7 @@ import numpy as np
 
 from ..evaluation.html_page import (
     Html,
+    build_element,
     build_image,
     build_number_cell,
     build_page,
@@ -22,7 +23,6 @@ from ..evaluation.html_page import (
     build_section,
     build_table,
     build_title,
-    build_element,
     join_html,
 )
 from ..evaluation.plots import create_canvas, render_png, require_matplotlib
@@ -50,15 +50,14 @@ def build_study_report(analysis: Analysis) -> dict:
     answers = analysis.answers.background.values()
     background = {key: dict(Counter(one[key] for one in answers if key in one)) for key in (q.key for q in BACKGROUND)}
     return round_values({
-        "version": 1, "study": analysis.study.id, "pairs": analysis.study.pairs, "raters": list(analysis.answers.raters),
-        "missing": analysis.answers.missing, "background": background,
+        "version": 1, "study": analysis.study.id, "pairs": analysis.study.pairs,
+        "raters": list(analysis.answers.raters), "missing": analysis.answers.missing, "background": background,
         "systems": [_shares_to_dict(row) for row in analysis.by_system],
-        "scenarios": [{"scenario": title, "systems": list(map(_shares_to_dict, rows))} for title, rows in analysis.by_scenario],
-        "findings": [
-            {**{key: value for key, value in vars(one).items() if key != "differences"}, "raters": len(one.differences),
-             "differences": one.differences.tolist(), "better": one.better} for one in analysis.findings
-        ],
-        "notes": list(analysis.notes),
+        "scenarios": [{"scenario": title, "systems": list(map(_shares_to_dict, rows))} for title,
+                      rows in analysis.by_scenario],
+        "findings": [{**{key: value for key, value in vars(one).items() if key != "differences"},
+                      "raters": len(one.differences), "differences": one.differences.tolist(), "better": one.better}
+                     for one in analysis.findings], "notes": list(analysis.notes),
     })  # fmt: skip
 
 
@@ -80,7 +79,8 @@ def build_study_page(analysis: Analysis) -> str:
         *(build_element("p", note) for note in analysis.notes),
         build_section("Is it better?", *(_describe_finding(one, analysis.study.pairs) for one in analysis.findings),
                       _build_findings(analysis), build_image(picture, "raters' differences")),
-        *(_build_systems(analysis) if analysis.by_system else ()), build_section("Who answered", *_build_background(analysis)),
+        *(_build_systems(analysis) if analysis.by_system else ()),
+        build_section("Who answered", *_build_background(analysis)),
     )  # fmt: skip
 
 
@@ -127,7 +127,7 @@ def _describe_finding(finding: Finding, pairs: bool) -> Html:
         return build_element("p", f"Whether {claim} cannot be tested: too few raters, or no differences.")
     unit = "" if pairs else " points"
     figures = (f"{finding.mean:+.2f}{unit} (95 %: {finding.low:+.2f} to {finding.high:+.2f}), t({finding.degrees}) = {finding.t:.2f}, "
-            f"one-sided {format_p(finding.holm_p)}")  # fmt: skip
+               f"one-sided {format_p(finding.holm_p)}")  # fmt: skip
     if finding.better:
         return build_element("p", build_element("b", claim, class_="met"), f": {figures}.")
     return build_element("p", f"Not significant that {claim}: {figures}.")
@@ -139,8 +139,8 @@ def _build_findings(analysis: Analysis) -> Html:
                   *(_build_cell(getattr(one, key), digits) for key, _, digits in _COLUMNS)) for one in analysis.findings
     ]  # fmt: skip
     legend = (f"Difference: mean over raters with its 95 % interval. p: one-sided paired t-test by rater; Holm: adjusted "
-            f"for all hypotheses, at {ALPHA:g}. Wilcoxon: the same by ranks. Pooled: all answers as if each had a "
-            "rater of its own (Faustino §5.1.2). d: Cohen's d of raters' differences. delta: Cliff's.")  # fmt: skip
+              f"for all hypotheses, at {ALPHA:g}. Wilcoxon: the same by ranks. Pooled: all answers as if each had a "
+              "rater of its own (Faustino §5.1.2). d: Cohen's d of raters' differences. delta: Cliff's.")  # fmt: skip
     head = ("hypothesis", build_title("raters"), *(build_title(title) for _, title, _ in _COLUMNS))
     return join_html(build_table(head, rows), build_element("p", legend, class_="quiet"))
 
@@ -161,7 +161,8 @@ def _shares_to_dict(row: Shares) -> dict:
 
 def _build_cell(value: float, digits: int) -> Html:
     """Build a number cell; values with four digits are p values and show "< 0.0001" below that."""
-    return build_element("td", "< 0.0001", class_="n") if digits == 4 and value < 1e-4 else build_number_cell(value, digits)
+    return build_element("td", "< 0.0001", class_="n") if digits == 4 and value < 1e-4 else build_number_cell(value,
+            digits)
 
 
 def draw_ratings(groups: Sequence[tuple[str, Sequence[Shares]]]) -> bytes:
@@ -191,7 +192,8 @@ def draw_ratings(groups: Sequence[tuple[str, Sequence[Shares]]]) -> bytes:
     ax.set_xticks(range(-100, 101, 25), [f"{abs(at)} %" for at in range(-100, 101, 25)])
     ax.axvline(0.0, color="#333333", lw=0.8)
     handles = [ax.barh([-9], [0.0], color=colour, label=text) for colour, text in zip(COLOURS, SCALE)]
-    ax.choose_clip_colours(handles=handles, loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=5, fontsize=8, frameon=False)
+    ax.choose_clip_colours(handles=handles, loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=5, fontsize=8,
+                           frameon=False)
     return render_png(figure)
 
 

@@ -14,7 +14,7 @@ import numpy as np
 
 from ..annotation import Timeline
 from ..base.errors import InputError, format_seconds
-from ..base.settings import collect_defaults, list_settings, find_setting
+from ..base.settings import collect_defaults, find_setting, list_settings
 from ..base.settings.setting import LATER, add_fields, check_limits
 from ..base.time_series import interpolate_columns
 from ..motion.skeleton import freeze_array
@@ -201,7 +201,8 @@ class Plan:
                     raise InputError("pins", found, "one place at a time", "move one, or shorten the earlier hold")
 
 
-def sample_with_trajectory(track: Track, trajectory: SolvedTrajectory | None, fps: float, window: float) -> SampledTrack:
+def sample_with_trajectory(track: Track, trajectory: SolvedTrajectory | None, fps: float,
+                           window: float) -> SampledTrack:
     """Sample a track with its solved ball.
 
     Where the ball is solved, its solved height is used everywhere, and its solved place where the feed has not measured

@@ -9,11 +9,11 @@ from typing import Any
 import numpy as np
 
 from ..annotation import sort_labels
+from ..files.atomic import atomic_write
 from ..files.tables import format_csv, parse_column, parse_flags, read_rows
-from ..files.whole import atomic_write
 from ..library.library import Library
 from ..motion.skeleton import freeze_array
-from .search.footage import SourceFrames
+from .search.source_frames import SourceFrames
 from .take import Take
 
 PROVENANCE_COLUMNS = (

@@ -14,8 +14,8 @@ from dataclasses import replace
 from ..library.library import Library
 from ..motion.humanoid import estimate_stature
 from ..motion.track import Track
-from .known_touches import resolve_touches
 from .plan import Plan, ResolvedPlan, SolvedTrajectory
+from .resolved_touches import resolve_touches
 
 
 def resolve_plan(
@@ -33,7 +33,8 @@ def resolve_plan(
     with_touches = plan if are_touches_resolved else resolve_touches(plan, trajectory)
     size = plan.height / estimate_stature(library.skeleton) if plan.height else 1.0
     return ResolvedPlan(
-        requested=plan, timeline=with_touches.timeline, track=_scale_track(with_touches.track, size), trajectory=with_touches.solved, size=size
+        requested=plan, timeline=with_touches.timeline, track=_scale_track(with_touches.track, size),
+        trajectory=with_touches.solved, size=size
     )
 
 

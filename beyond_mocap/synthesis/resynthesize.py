@@ -25,21 +25,29 @@ from ..library.library import Library
 from ..motion.motion import Motion
 from ..motion.track import SampledTrack
 from ..motion.track.ball_path import BallPath
-from .construct.construction import Construction, find_touches, build_key_results
-from .construct.hand_over import OldMotion, blend_with_old, compute_old_share
+from .body_size import to_library_size
+from .construct.construction import Construction, build_key_results, find_touches
+from .construct.edit_blending import OldMotion, blend_with_old, compute_old_share
 from .construct.transitions import compute_spread_reaches
-from .own_size import to_library_size
 from .plan import Plan, ResolvedPlan
-from .provenance import list_sources, list_labels_shown
+from .provenance import list_labels_shown, list_sources
 from .resolve_plan import resolve_plan
+from .search.affected_frames import (
+    Stretch,
+    find_moved_frames,
+    find_stretches_to_search,
+    find_variant_stretch,
+    list_stretches,
+    list_unchanged_keys,
+    merge_stretches,
+)
+from .search.candidate_index import SLOT
 from .search.edit_list import EditList
-from .search.footage import SourceFrames, fetch_motion, output_index, look_up_frames
-from .search.offer import SLOT
 from .search.path_costs import balance_weights
-from .search.path_search import SearchStretch, PathSearch
+from .search.path_search import PathSearch, SearchStretch
 from .search.preferences import UsedStretch, list_used_stretches
-from .search.touched import Stretch, find_variant_stretch, merge_stretches, list_unchanged_keys, find_moved_frames, list_stretches, find_stretches_to_search
-from .search.wanted import SearchRequest, build_request
+from .search.request import SearchRequest, build_request
+from .search.source_frames import SourceFrames, fetch_motion, look_up_frames, output_index
 from .search_library import extend_library
 from .synthesize import Progress, finish_take, synthesize
 from .take import KeyResult, Take
@@ -137,14 +145,16 @@ def _is_comparable(plan: Plan, before: Take) -> bool:
 
 
 def _update_take(
-    library: Library, requested: Plan, before: Take, report: Progress, *, cancelled, hurry, variant: VariantStretch | None
+    library: Library, requested: Plan, before: Take, report: Progress, *, cancelled, hurry, variant: VariantStretch
+    | None
 ) -> Take | None:
     """Update the take in the library's size, and finish it; None where it has to be synthesized as a whole."""
     old_plan = resolve_plan(before.plan, library, trajectory=before.solved)
     same_ball = _has_same_ball(requested, before.plan)
     plan = resolve_plan(requested, library, trajectory=before.solved if same_ball else None)
     library_take = to_library_size(before, plan.size)
-    found = _update_stretches(library, plan, old_plan, library_take, report, cancelled=cancelled, hurry=hurry, variant=variant)
+    found = _update_stretches(library, plan, old_plan, library_take, report, cancelled=cancelled, hurry=hurry,
+                              variant=variant)
     if found is None:
         return None
     take, request, hurried_from = found
@@ -176,19 +186,22 @@ def _update_stretches(
     stretches_found = find_stretches_to_search(library, before.edit, old_request, request, SLOT)
     if variant is not None:
         frames = [int(round((second - before.start_time) * library.fps)) for second in (variant.start, variant.end)]
-        stretches_found = merge_stretches([*stretches_found, find_variant_stretch(library, before.edit, request, *frames)], int(round(BLEND_SECONDS * library.fps)))
+        stretches_found = merge_stretches([*stretches_found, find_variant_stretch(library, before.edit, request,
+                                                                                  *frames)],
+                                          int(round(BLEND_SECONDS * library.fps)))
     used = variant.used if variant is not None else ()
     if stretches_found == [(0, len(request))]:
         return None
-    edit = replace(before.edit, keys=_select_keys_outside(list_unchanged_keys(before.edit, old_request, request), request, stretches_found))
+    edit = replace(before.edit, keys=_select_keys_outside(list_unchanged_keys(before.edit, old_request, request),
+                                                          request, stretches_found))
     hurried_frames = []
     for number, (first, end) in enumerate(stretches_found):
         def report_progress(fraction, text, number=number):
             report(0.8 * (number + fraction) / len(stretches_found), text)
 
         search = PathSearch(
-            library, request, balance_weights(plan.requested.alpha), report_progress, cancelled, hurry=hurry, stretch=SearchStretch(edit, first, end),
-            used=used,
+            library, request, balance_weights(plan.requested.alpha), report_progress, cancelled, hurry=hurry,
+            stretch=SearchStretch(edit, first, end), used=used,
         )
         edit = search.run()
         hurried_frames += [search.hurried_from] if search.hurried_from is not None else []
@@ -196,7 +209,8 @@ def _update_stretches(
     report(0.8, "Constructing")
     track = request.track if plan.fps == library.fps else plan.sample_track(plan.fps)
     update = _TakeUpdate(library, plan, before, track=track, edit=edit, request=request)
-    moved = np.interp(update.index, np.arange(len(request)), find_moved_frames(old_request, request).astype(float)) > 0.0
+    moved = np.interp(update.index, np.arange(len(request)),
+                      find_moved_frames(old_request, request).astype(float)) > 0.0
     for stretch in update.list_stretches(stretches_found, moved):
         update.construct_stretch(stretch)
     clock.append(time.perf_counter())
@@ -234,7 +248,8 @@ class _TakeUpdate:
     """An update in progress: the old take's arrays, with one stretch after the other replaced."""
 
     def __init__(
-        self, library: Library, plan: ResolvedPlan, before: Take, *, track: SampledTrack, edit: EditList, request: SearchRequest
+        self, library: Library, plan: ResolvedPlan, before: Take, *, track: SampledTrack, edit: EditList,
+        request: SearchRequest
     ):
         """Copy what the old take has, and prepare what the new one shows.
 
@@ -286,7 +301,8 @@ class _TakeUpdate:
 
     def construct_stretch(self, stretch: Stretch) -> None:
         """Construct the output frames of a stretch again, and blend them into the old ones around them."""
-        hand, context = (int(round(seconds * self.plan.fps)) for seconds in (BLEND_SECONDS, BLEND_SECONDS + CONTEXT_SECONDS))
+        hand, context = (int(round(seconds * self.plan.fps))
+                         for seconds in (BLEND_SECONDS, BLEND_SECONDS + CONTEXT_SECONDS))
         low, high = max(0, stretch[0] - context), min(len(self.index), stretch[1] + context)
         inner = stretch[0] - low, stretch[1] - low
         construction = self._build_construction(low, high, inner, compute_old_share(high - low, inner, hand))
@@ -297,7 +313,8 @@ class _TakeUpdate:
         at, share = slice(used.start + low, used.stop + low), construction.old.share[used]
         new, old = (planted.root[used], planted.rotations[used]), (self.root[at], self.rotations[at])
         self.root[at], self.rotations[at] = blend_with_old(
-            self.library.skeleton, new, old, share=share, heel_toe_contacts=steps.heel_toe_contacts[used], fps=self.plan.fps
+            self.library.skeleton, new, old, share=share, heel_toe_contacts=steps.heel_toe_contacts[used],
+            fps=self.plan.fps
         )
         self.ball[at] = _blend_ball(ball[used], self.ball[at], share)
         self.contacts[at], self.stepped[at] = steps.contacts[used], steps.stepped[used]

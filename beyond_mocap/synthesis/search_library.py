@@ -7,7 +7,7 @@ from collections.abc import Callable
 import numpy as np
 
 from ..annotation.ball_contact import takes_with_foot
-from ..library.automatic import apply_chosen_gaits
+from ..library.automatic_locomotion import apply_chosen_gaits
 from ..library.library import Library
 from ..motion.track import sample_track
 from .plan import ResolvedPlan

@@ -25,27 +25,27 @@ from ..library.library import Library
 from ..motion.foot_plant import PlantResult
 from ..motion.motion import Motion, sample_frames
 from ..motion.track.ball_path import BallPath
-from .construct.construction import Construction, find_touches, build_key_results
-from .construct.pins import estimate_look_axis, apply_pins
-from .construct.steps import Steps
+from .body_size import to_player_size
+from .construct.construction import Construction, build_key_results, find_touches
+from .construct.extra_steps import Steps
+from .construct.pins import apply_pins, estimate_look_axis
 from .construct.thesis_methods import construct_blocks
-from .known_touches import report_missing_touches, apply_trajectory
-from .own_size import to_player_size
 from .plan import METHODS, Plan, ResolvedPlan
 from .provenance import build_provenance_fields
-from .quality.give_way import report_unmet_constraints
-from .quality.played import playback_from_take
+from .quality.playback import playback_from_take
+from .quality.unmet_constraints import report_unmet_constraints
 from .resolve_plan import resolve_plan
+from .resolved_touches import apply_trajectory, report_missing_touches
 from .search.blocks import BlockSearch
 from .search.distance import align_keys, build_straight_edit, build_warped_edit
-from .search.dragged import report_left_out
 from .search.edit_list import EditList
-from .search.footage import fetch_motion, output_index
+from .search.foot_drag import report_left_out
 from .search.locomotion import match_distance
 from .search.path_costs import balance_weights
 from .search.path_search import PathSearch
 from .search.preferences import UsedStretch
-from .search.wanted import SearchRequest, build_request
+from .search.request import SearchRequest, build_request
+from .search.source_frames import fetch_motion, output_index
 from .search_library import extend_library
 from .take import PinResult, Take
 
@@ -149,7 +149,8 @@ def construct_take(library: Library, plan: ResolvedPlan, edit: EditList, progres
 
     with threadpool_limits(limits=1):
         request = build_request(library, plan)
-        take, seconds = _construct_motion(library, plan, request, SearchResult(edit), progress or (lambda fraction, text: None))
+        take, seconds = _construct_motion(library, plan, request, SearchResult(edit),
+                                          progress or (lambda fraction, text: None))
         return finish_take(replace(take, seconds=seconds), plan, library, request, report_unmet=False)
 
 
@@ -171,9 +172,10 @@ def _construct_motion(
     planted, steps, ball = _construct_body(construction, result.interpolate_travelled(index))
     motion = Motion(library.skeleton, planted.root, planted.rotations, plan.fps)
     take = Take(
-        **build_provenance_fields(library, source), motion=motion, start_time=float(track.times[0]), contacts=steps.contacts,
-        timeline=request.timeline, keys=keys, ball=ball, method=plan.method, seed=plan.requested.seed,
-        correction=planted.correction, ik_miss=planted.miss, stepped=steps.stepped, plan=plan.requested, edit=edit,
+        **build_provenance_fields(library, source), motion=motion, start_time=float(track.times[0]),
+        contacts=steps.contacts, timeline=request.timeline, keys=keys, ball=ball, method=plan.method,
+        seed=plan.requested.seed, correction=planted.correction, ik_miss=planted.miss, stepped=steps.stepped,
+        plan=plan.requested, edit=edit,
     )
     clock.append(time.perf_counter())
     report(1.0, "Done")
@@ -193,10 +195,12 @@ def _search(
     blocks = search.run()
     if plan.method == "blocks":
         return SearchResult(build_straight_edit(search, blocks))
-    return SearchResult(*build_warped_edit(search, match_distance(search, blocks, plan.requested.delta), plan.requested.catch_up))
+    return SearchResult(*build_warped_edit(search, match_distance(search, blocks, plan.requested.delta),
+                                           plan.requested.catch_up))
 
 
-def _construct_body(construction: Construction, travelled: np.ndarray | None) -> tuple[PlantResult, Steps, BallPath | None]:
+def _construct_body(construction: Construction, travelled: np.ndarray | None) -> tuple[PlantResult, Steps,
+        BallPath | None]:
     """Construct the body, its steps and the ball; travelled: (T,) m by method "distance"."""
     track, ball = construction.track, construction.track.ball
     if construction.plan.method == "path":
@@ -228,7 +232,8 @@ def finish_take(
     take = apply_trajectory(take, plan)
     if plan.trajectory is not None:
         take = replace(take, seconds={**take.seconds, "ball": time.perf_counter() - started})
-    return add_warnings(take, recordings, request, hurried_from, more=report_missing_touches(take, plan), report_unmet=report_unmet)
+    return add_warnings(take, recordings, request, hurried_from, more=report_missing_touches(take, plan),
+                        report_unmet=report_unmet)
 
 
 def add_pins(take: Take, recordings: Library) -> Take:
@@ -318,7 +323,8 @@ def _report_missed_pins(take: Take) -> list[str]:
     """Report each pin that is missed visibly."""
     messages = []
     for result in take.pins:
-        pin, when = f"{format_seconds(result.pin.time)} s: the pin of {result.pin.part}", (result.pin.time, result.pin.end)
+        pin, when = f"{format_seconds(result.pin.time)} s: the pin of {result.pin.part}", (result.pin.time,
+                result.pin.end)
         if not np.isfinite(result.miss):
             messages.append(f"{pin} is outside the track, or the skeleton has no such part; it is ignored")
         elif result.pin.part == "gaze" and result.miss > GAZE_TOLERANCE:
@@ -333,5 +339,6 @@ def _report_unmet(library: Library, plan: Plan, take: Take) -> list[TimedMessage
     """Report what could not be met, and when."""
     played = playback_from_take(take)
     return report_unmet_constraints(
-        played, track=plan.track, timeline=take.timeline, library=library, ik_miss=take.ik_miss, user_timeline=plan.timeline
+        played, track=plan.track, timeline=take.timeline, library=library, ik_miss=take.ik_miss,
+        user_timeline=plan.timeline
     )

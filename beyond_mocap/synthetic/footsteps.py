@@ -116,7 +116,8 @@ def _compute_pitch(share: np.ndarray, speed: np.ndarray, direction: np.ndarray) 
     )
 
 
-def _roll_foot(pitch: np.ndarray, tip_pitch: np.ndarray, neutral: NeutralStance, side: int) -> tuple[np.ndarray, np.ndarray]:
+def _roll_foot(pitch: np.ndarray, tip_pitch: np.ndarray, neutral: NeutralStance, side: int) -> tuple[np.ndarray,
+        np.ndarray]:
     """Compute how far the ankle is ahead of its flat place and above the ground, (T,) m each, when the sole pitches."""
     ball_ahead, drop = neutral.ball[side, 0], -neutral.ball[side, 2]
     ball_up = neutral.ankle_height - drop
@@ -155,7 +156,7 @@ def compute_foot_path(
     if not np.any(is_in_air):
         return stance
     swing = _compute_swing(steps, which[is_in_air], times, air=is_in_air, hip=hip, heading=heading, neutral=neutral,
-                    thigh_shank=thigh_shank)
+                           thigh_shank=thigh_shank)
     out = {}
     for name in ("ankle", "pitch", "yaw", "bend"):
         out[name] = getattr(stance, name).copy()
@@ -186,12 +187,14 @@ def _compute_swing(steps, which, times, air, hip, heading, neutral: NeutralStanc
     step = 0.01
     at_leave, at_land = published_swing(begin, np.zeros_like(share)), published_swing(end, np.ones_like(share))
     # velocities of the published swing at its ends, by one-sided differences
-    free_leave = (published_swing(begin + step * length, np.full_like(share, step)) - at_leave) / (step * length)[:, None]
-    free_land = (at_land - published_swing(end - step * length, np.full_like(share, 1 - step))) / (step * length)[:, None]
+    free_leave = (published_swing(begin + step * length, np.full_like(share, step)) - at_leave) / (step * length)[:,
+            None]
+    free_land = (at_land - published_swing(end - step * length, np.full_like(share, 1 - step))) / (step * length)[:,
+            None]
     wanted_leave = np.concatenate([leave.ankle, leave.pitch[:, None]], axis=-1)
     wanted_land = np.concatenate([land.ankle, land.pitch[:, None]], axis=-1)
     full = now + _bridge_ends(share, length, wanted_leave - at_leave, offset1=wanted_land - at_land,
-                         speed0=leave_speed - free_leave, speed1=land_speed - free_land)
+                              speed0=leave_speed - free_leave, speed1=land_speed - free_land)
     size = steps.compute_step_size(scale)[which]
     small = _compute_small_step(share, wanted_leave, wanted_land, size * 0.05 * scale)
     mixed = full * size[:, None] + small * (1.0 - size[:, None])

@@ -24,9 +24,9 @@ from ..motion.retargeting.neutral import NeutralStance, build_neutral_stance
 from ..motion.retargeting.posture import Posture, compute_hip_positions, to_motion
 from ..motion.skeleton import Skeleton
 from . import gait_tables as tables
-from .course import GaitPlan, GaitStyle, plan_gait, compute_wander
 from .footsteps import Footsteps, compute_foot_path
-from .gait_tables import interpolate_figure, compute_run_share
+from .gait_plan import GaitPlan, GaitStyle, compute_wander, plan_gait
+from .gait_tables import compute_run_share, interpolate_figure
 
 # farthest that a flat foot is ahead of and behind the hips, shares of the leg's length
 _LONGEST_AHEAD, _LONGEST_BEHIND = 0.41, 0.72
@@ -69,7 +69,8 @@ def build_gait(
     return to_motion(build_gait_posture(gait_plan, neutral, style, seed), neutral)
 
 
-def build_gait_posture(gait_plan: GaitPlan, neutral: NeutralStance, style: GaitStyle = GaitStyle(), seed: int = 0) -> Posture:
+def build_gait_posture(gait_plan: GaitPlan, neutral: NeutralStance, style: GaitStyle = GaitStyle(),
+                       seed: int = 0) -> Posture:
     """Build the posture at the requested frames of a plan.
 
     Args:
@@ -113,7 +114,8 @@ def plan_footsteps(gait_plan: GaitPlan, neutral: NeutralStance, style: GaitStyle
     left = sign * 0.5 * (interpolate_figure("width", adult_speed) * scale + style.width)
     # sideways the base is as wide as the body travels in half a stance, so that legs do not cross
     left = (
-        left + sign * 0.5 * np.abs(np.sin(direction)) * np.interp(middle, gait_plan.times, gait_plan.speed) * (off - on) * 0.8
+        left + sign * 0.5 * np.abs(np.sin(direction)) * np.interp(middle, gait_plan.times, gait_plan.speed) * (off - on)
+        * 0.8
     )
     place = interpolate_columns(middle, gait_plan.times, gait_plan.path)
     place = place + np.stack(
@@ -122,7 +124,8 @@ def plan_footsteps(gait_plan: GaitPlan, neutral: NeutralStance, style: GaitStyle
     place = place - _compute_lean_shift(gait_plan, neutral, middle)
     toe_out = sign * (np.radians(interpolate_figure("toe_out", adult_speed)) + style.toe_out)
     on, off = _limit_stances(gait_plan, place, on, off, neutral.leg)
-    return Footsteps(side=side, on=on, off=off, place=place, yaw=heading + toe_out, speed=adult_speed, direction=direction)
+    return Footsteps(side=side, on=on, off=off, place=place, yaw=heading + toe_out, speed=adult_speed,
+                     direction=direction)
 
 
 def _limit_stances(
@@ -134,7 +137,8 @@ def _limit_stances(
     for edge, sign in ((on, -1.0), (off, 1.0)):
         at = 0.5 * (on + off)[:, None] + sign * share * (off - on)[:, None]
         hips = interpolate_columns(at, gait_plan.times, gait_plan.path)
-        is_near = np.linalg.norm(hips - place[:, None], axis=-1) <= (_LONGEST_AHEAD if sign < 0 else _LONGEST_BEHIND) * leg
+        is_near = np.linalg.norm(hips - place[:, None], axis=-1) <= (_LONGEST_AHEAD if sign < 0
+                                                                     else _LONGEST_BEHIND) * leg
         last = np.where(is_near.all(axis=1), len(share) - 1, np.argmin(is_near, axis=1))
         ends.append(
             np.where(is_near.all(axis=1), edge, np.take_along_axis(at, np.maximum(last, 8)[:, None], axis=1)[:, 0])
@@ -192,10 +196,12 @@ def plant_feet(posture: Posture, times: np.ndarray, steps: tuple[Footsteps, ...]
     posture = posture.replace_arrays(hips=hips)
     tops = compute_hip_positions(posture, neutral)
     paths = [compute_foot_path(steps[s], times, tops[:, s], heading=posture.heading, neutral=neutral,
-                    thigh_shank=measure_leg(neutral, s)) for s in (0, 1)]
-    ankles = [limit_leg_reach(paths[s].ankle, tops[:, s], times, steps[s], sum(measure_leg(neutral, s))) for s in (0, 1)]
+                               thigh_shank=measure_leg(neutral, s)) for s in (0, 1)]
+    ankles = [limit_leg_reach(paths[s].ankle, tops[:, s], times, steps[s], sum(measure_leg(neutral, s)))
+              for s in (0, 1)]
     feet = np.stack([np.stack([np.zeros_like(p.pitch), p.pitch, p.yaw], axis=-1) for p in paths], axis=1)
-    return posture.replace_arrays(ankles=np.stack(ankles, axis=1), feet=feet, toes=np.stack([p.bend for p in paths], axis=1))
+    return posture.replace_arrays(ankles=np.stack(ankles, axis=1), feet=feet,
+                                  toes=np.stack([p.bend for p in paths], axis=1))
 
 
 def _compute_longest_reach(steps: Footsteps, times: np.ndarray) -> np.ndarray:
@@ -250,7 +256,7 @@ def _compute_hip_drop(posture: Posture, times: np.ndarray, steps, neutral: Neutr
     drop = np.zeros(len(times))
     for side in (0, 1):
         path = compute_foot_path(steps[side], times, tops[:, side], heading=posture.heading, neutral=neutral,
-                      thigh_shank=measure_leg(neutral, side))
+                                 thigh_shank=measure_leg(neutral, side))
         longest = _compute_longest_reach(steps[side], times) * sum(measure_leg(neutral, side))
         flat = np.sum((tops[:, side, :2] - path.ankle[:, :2]) ** 2, axis=-1)
         highest = path.ankle[:, 2] + np.sqrt(np.maximum(longest**2 - flat, 0.0))
@@ -278,7 +284,8 @@ def pose_trunk(gait_plan: GaitPlan, neutral: NeutralStance, style: GaitStyle, se
     ahead = 1.0 - 0.6 * np.sin(0.5 * gait_plan.direction) ** 2
     idle = style.life * (1.0 - quintic_step(adult_speed / 0.7))
     middle = 0.5 * interpolate_figure("duty", adult_speed)
-    sway = scale * interpolate_figure("sway", adult_speed) * np.cos(turn - 2.0 * np.pi * middle) + idle * 0.014 * compute_wander(
+    sway = scale * interpolate_figure("sway", adult_speed) * np.cos(turn - 2.0 * np.pi
+                                                                    * middle) + idle * 0.014 * compute_wander(
         gait_plan.times, seed + 1, 6.0
     )
     surge = _compute_surge(gait_plan, middle)

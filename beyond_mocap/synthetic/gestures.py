@@ -26,9 +26,9 @@ from ..motion.retargeting.neutral import NeutralStance, build_neutral_stance
 from ..motion.retargeting.posture import Posture, compute_hip_positions, to_motion
 from ..motion.skeleton import Skeleton
 from . import gait_tables as tables
-from .course import GaitPlan, GaitStyle, plan_gait
 from .footsteps import Footsteps, compute_ground_lift
-from .gait import plan_footsteps, limit_leg_reach, build_posture, measure_leg, plant_feet
+from .gait import build_posture, limit_leg_reach, measure_leg, plan_footsteps, plant_feet
+from .gait_plan import GaitPlan, GaitStyle, plan_gait
 
 LEFT, RIGHT = 0, 1
 
@@ -209,7 +209,8 @@ def _find_swing(steps: Footsteps, moment: float) -> tuple[float, float]:
     return float(steps.off[which]), float(steps.on[which + 1])
 
 
-def _blend_strike(posture: Posture, gait_plan: GaitPlan, steps, key: float, recipe: StrikeRecipe, neutral: NeutralStance) -> Posture:
+def _blend_strike(posture: Posture, gait_plan: GaitPlan, steps, key: float, recipe: StrikeRecipe,
+                  neutral: NeutralStance) -> Posture:
     """Blend a strike's trunk, arms and foot over the posture of a run."""
     scale = neutral.leg / tables.LEG
     times = gait_plan.times - key
@@ -228,7 +229,8 @@ def _blend_strike(posture: Posture, gait_plan: GaitPlan, steps, key: float, reci
     return _guide_foot(posture, gait_plan, steps[RIGHT], key=key, rows=recipe.foot, neutral=neutral)
 
 
-def _guide_foot(posture: Posture, gait_plan: GaitPlan, steps: Footsteps, key: float, rows, neutral: NeutralStance) -> Posture:
+def _guide_foot(posture: Posture, gait_plan: GaitPlan, steps: Footsteps, key: float, rows,
+                neutral: NeutralStance) -> Posture:
     """Guide the right foot's swing around `key` seconds through the rows of a Strike; its ends stay as they were."""
     swing = _find_swing(steps, key)
     scale = neutral.leg / tables.LEG
@@ -341,7 +343,8 @@ def build_plan_parts(style, neutral: NeutralStance, times: np.ndarray, frames: f
         return interpolate_rounded(rows, times, frames)
 
     arms = np.zeros((len(times), 2, 5))
-    arms[:, RIGHT, :4], arms[:, LEFT, :4] = np.radians(read_rows(style.right_arm)), np.radians(read_rows(style.left_arm))
+    arms[:, RIGHT, :4], arms[:, LEFT, :4] = np.radians(read_rows(style.right_arm)), np.radians(
+        read_rows(style.left_arm))
     body = identify_joints(neutral.skeleton)
     height = 0.5 * float(neutral.positions[body.left.upper_leg, 2] + neutral.positions[body.right.upper_leg, 2])
     return read_rows, np.radians(read_rows(style.pelvis)), np.radians(read_rows(style.spine)), arms, height

@@ -19,7 +19,7 @@ from ..base.easing import quintic_step
 from ..motion import quaternion
 from ..motion.humanoid import identify_joints
 from ..motion.mirror import mirror
-from ..motion.motion import Motion, sample_frames, place_motion, compute_pose
+from ..motion.motion import Motion, compute_pose, place_motion, sample_frames
 from ..motion.retargeting.neutral import NeutralStance
 from ..motion.retargeting.posture import Posture, compute_hip_positions, to_motion
 from . import gait_tables as tables
@@ -142,8 +142,8 @@ _STEPS = ((-1.30, -0.90), (-1.02, -0.47), (-0.55, -0.11))  # s, off the ground a
 
 
 def build_kick(
-    style: KickStyle, neutral: NeutralStance, foot: str = "right", lift: float = 0.0, loft: float = 0.0, rate: float = 1.0,
-    turn: float = 0.0, fps: float = 120.0,
+    style: KickStyle, neutral: NeutralStance, foot: str = "right", lift: float = 0.0, loft: float = 0.0,
+    rate: float = 1.0, turn: float = 0.0, fps: float = 120.0,
 ) -> Motion:
     """Build a kick along +X, or turned about the vertical.
 
@@ -207,9 +207,9 @@ def _build_base_posture(style: KickStyle, neutral: NeutralStance, times: np.ndar
     look = np.clip(-(pelvis[:, 2] + spine[:, 2]), -1.1, 1.1)
     nod = -0.4 * (pelvis[:, 1] + spine[:, 1]) + np.radians(curve(_NOD)[:, 0])
     posture = Posture(
-        fps=_PLAN_RATE, hips=np.stack([hips[:, 0], hips[:, 1], height - hips[:, 2]], axis=-1), heading=nothing, pelvis=pelvis,
-        spine=spine, head=np.stack([-0.6 * spine[:, 0] - 0.6 * pelvis[:, 0], nod, look], axis=-1), arms=arms,
-        wrists=np.full((len(times), 2), 0.1), ankles=np.stack([foot[:, :3] for foot in feet], axis=1),
+        fps=_PLAN_RATE, hips=np.stack([hips[:, 0], hips[:, 1], height - hips[:, 2]], axis=-1), heading=nothing,
+        pelvis=pelvis, spine=spine, head=np.stack([-0.6 * spine[:, 0] - 0.6 * pelvis[:, 0], nod, look], axis=-1),
+        arms=arms, wrists=np.full((len(times), 2), 0.1), ankles=np.stack([foot[:, :3] for foot in feet], axis=1),
         feet=np.stack([foot[:, 3:6] for foot in feet], axis=1), toes=np.stack([foot[:, 6] for foot in feet], axis=-1),
         knees=np.zeros((len(times), 2)),
     )
@@ -232,8 +232,8 @@ def _plan_footfalls(style: KickStyle) -> dict[str, np.ndarray]:
     left0 = left1 - first * ahead
     end = _HIPS_AT_CONTACT + np.array(style.hips[-1][1:3])
     return {
-        "left0": left0, "right0": left0 - _FOOT_DISTANCE * left, "left1": left1, "right1": right1, "planted": _SUPPORT_FOOT,
-        "right2": end + [-0.02, -0.10], "left2": end + [0.06, 0.11],
+        "left0": left0, "right0": left0 - _FOOT_DISTANCE * left, "left1": left1, "right1": right1,
+        "planted": _SUPPORT_FOOT, "right2": end + [-0.02, -0.10], "left2": end + [0.06, 0.11],
     }  # fmt: skip
 
 
@@ -248,7 +248,8 @@ def _build_hip_rows(style: KickStyle, footfalls: dict[str, np.ndarray]) -> tuple
     begin = 0.5 * (footfalls["left0"] + footfalls["right0"])
     run = (
         (-1.5, *begin, 0.01), (-1.3, *(begin + 0.03 * ahead), 0.03), (-0.9, *place_beside("left1", 0.25, -0.7), 0.05),
-        (-0.68, *place_beside("left1", -0.20, -0.7), 0.05), (-0.47, *place_beside("right1", 0.17 * style.strides[2], 0.7), 0.08),
+        (-0.68, *place_beside("left1", -0.20, -0.7), 0.05),
+        (-0.47, *place_beside("right1", 0.17 * style.strides[2], 0.7), 0.08),
         (-0.30, *place_beside("right1", -0.22 * style.strides[2], 0.7), 0.07),
     )  # fmt: skip
     return run + tuple((t, *(_HIPS_AT_CONTACT + [x, y]), low) for t, x, y, low in style.hips)
@@ -268,12 +269,14 @@ def _build_step_rows(style: KickStyle, footfalls: dict[str, np.ndarray]) -> tupl
     )
     right = (
         *_build_one_step(two, footfalls["right0"], footfalls["right1"], high=0.12, yaw=yaw, later=yaw - 4.0),
-        *_build_one_step((-0.27, _SWING_END[1]), footfalls["right1"], footfalls["right2"], high=0.12, yaw=yaw - 4.0, later=-6.0),
+        *_build_one_step((-0.27, _SWING_END[1]), footfalls["right1"], footfalls["right2"], high=0.12, yaw=yaw - 4.0,
+                         later=-6.0),
     )
     return left, right
 
 
-def _build_one_step(when: tuple[float, float], off: np.ndarray, down: np.ndarray, high: float, yaw: float, later: float) -> tuple:
+def _build_one_step(when: tuple[float, float], off: np.ndarray, down: np.ndarray, high: float, yaw: float,
+                    later: float) -> tuple:
     """Build rows of one step: the heel rises, the foot swings over and lands heel first."""
     begin, end = when
     d, along = end - begin, down - off
@@ -282,8 +285,8 @@ def _build_one_step(when: tuple[float, float], off: np.ndarray, down: np.ndarray
         return (begin + share * d, *(off + travelled * along), raised, pitch, yaw + travelled * (later - yaw))
 
     return (
-        build_row(-min(0.35, 0.12 / d), 0.0, 0.0, 0.0), build_row(0.0, 0.0, 0.0, 38.0), build_row(0.24, 0.08, high, 48.0),
-        build_row(0.62, 0.58, 0.6 * high, 4.0),
+        build_row(-min(0.35, 0.12 / d), 0.0, 0.0, 0.0), build_row(0.0, 0.0, 0.0, 38.0),
+        build_row(0.24, 0.08, high, 48.0), build_row(0.62, 0.58, 0.6 * high, 4.0),
         build_row(0.88, 0.92, 0.12 * high, -12.0), build_row(1.0, 1.0, 0.0, -8.0), build_row(1.12, 1.0, 0.0, 0.0),
     )  # fmt: skip
 

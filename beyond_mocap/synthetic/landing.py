@@ -18,12 +18,12 @@ from ..base.easing import quintic_step
 from ..base.vectors import cross_product, unit_vectors
 from ..motion import quaternion
 from ..motion.humanoid import Humanoid, identify_joints
-from ..motion.motion import Motion, sample_frames, concatenate_motions, compute_pose, resample
+from ..motion.motion import Motion, compute_pose, concatenate_motions, resample, sample_frames
 from ..motion.retargeting.neutral import build_neutral_stance
 from ..motion.skeleton import Skeleton
 from ..motion.spring import Offset
 from .gait_tables import GRAVITY
-from .resting import raise_arms, compute_lowest_root, build_lying_pose, smooth_above
+from .lying import build_lying_pose, compute_lowest_root, raise_arms, smooth_above
 
 FLIGHT_HEIGHT = 0.25
 """Metres between the lowest part of the body and the ground above which a recording's end is a flight."""
@@ -108,7 +108,8 @@ def add_landing(motion: Motion, get_up_motions: Sequence[Motion]) -> Landing:
     goal = sample_frames(get_up, frames_shown)
     rolling = track.blend_toward(goal[1], np.arange(1, len(frames_shown) + 1) / fps, _RATES[2])
     rotations = np.concatenate([poses[: touched + 1], down, rolling])
-    root = _build_root(motion, centre, rotations, flight=touched + 1, settling=len(down), up=get_up, frames_shown=frames_shown)
+    root = _build_root(motion, centre, rotations, flight=touched + 1, settling=len(down), up=get_up,
+                       frames_shown=frames_shown)
     rotations = raise_arms(skeleton, root, rotations, fps)
     root[:, 2] += smooth_above(np.maximum(compute_lowest_root(skeleton, rotations) - root[:, 2], 0.0), fps)
     out = Motion(
@@ -119,8 +120,8 @@ def add_landing(motion: Motion, get_up_motions: Sequence[Motion]) -> Landing:
     get_up_source = get_up_motions[get_up_index]
     begin = _find_start(get_up_source)
     frames = begin + frames_shown[wait:] * (_GET_UP_RATE * get_up_source.fps / fps)
-    return Landing(motion=out, recorded_count=len(motion), touch_frame=first, rise_frame=start, get_up_index=get_up_index,
-                  get_up_frames=np.clip(frames, 0, len(get_up_source) - 1))
+    return Landing(motion=out, recorded_count=len(motion), touch_frame=first, rise_frame=start,
+                   get_up_index=get_up_index, get_up_frames=np.clip(frames, 0, len(get_up_source) - 1))
 
 
 @dataclass(frozen=True, eq=False)
@@ -183,7 +184,8 @@ class _MovingPose:
         rest.
         """
         first = goal if goal.ndim == 2 else goal[0]
-        return quaternion.multiply(goal, quaternion.from_rotation_vector(self._find_offset(first).evaluate_decay(seconds, rate).place))
+        return quaternion.multiply(
+            goal, quaternion.from_rotation_vector(self._find_offset(first).evaluate_decay(seconds, rate).place))
 
     def pose_after(self, goal: np.ndarray, seconds: float, rate: float) -> "_MovingPose":
         """Compute the state after `seconds`."""
@@ -292,7 +294,8 @@ def _align_direction(get_up: Motion, lying: np.ndarray) -> Motion:
     return Motion(get_up.skeleton, root, _rotate_body(get_up.rotations, angle), get_up.fps)
 
 
-def _build_root(motion: Motion, fall: _Fall, rotations, flight: int, settling: int, up: Motion, frames_shown) -> np.ndarray:
+def _build_root(motion: Motion, fall: _Fall, rotations, flight: int, settling: int, up: Motion,
+                frames_shown) -> np.ndarray:
     """Compute the root (N, 3) m after the recording.
 
     Args:

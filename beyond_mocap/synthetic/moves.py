@@ -15,10 +15,10 @@ from ..motion.retargeting.neutral import NeutralStance, build_neutral_stance
 from ..motion.retargeting.posture import to_motion
 from ..motion.skeleton import Skeleton
 from . import gait_tables as tables
-from .course import GaitPlan, GaitStyle, plan_gait
 from .footsteps import Footsteps
-from .gait import plan_footsteps, build_posture, plant_feet
-from .gestures import LEFT, RIGHT, Gesture, compute_envelope, interpolate_rows, blend_arrays
+from .gait import build_posture, plan_footsteps, plant_feet
+from .gait_plan import GaitPlan, GaitStyle, plan_gait
+from .gestures import LEFT, RIGHT, Gesture, blend_arrays, compute_envelope, interpolate_rows
 
 # rows: seconds from the touch, then (hips up, ahead), (list, tilt, turn), spine, arms (flexion, abduction, inward,
 # elbow)
@@ -63,7 +63,8 @@ def build_header(skeleton: Skeleton | None = None, fps: float = 60.0, seed: int 
     gait_plan, steps, posture = build_standing(neutral, key + 1.9, fps, seed, width=0.10)
     times = gait_plan.times - key
     air = _FLIGHT * np.sqrt(scale)
-    trunk, arms = np.radians(interpolate_rows(_HEADER["trunk"], times)), np.radians(interpolate_rows(_HEADER["arms"], times))
+    trunk, arms = np.radians(interpolate_rows(_HEADER["trunk"], times)), np.radians(interpolate_rows(_HEADER["arms"],
+            times))
     ease = compute_envelope(times, -1.1, -0.8, 0.9, 1.4)
     pitch = np.radians(62) * compute_envelope(times, -air - 0.14, -air, air, air + 0.12)
     hips, ankles, feet, toes = posture.hips.copy(), posture.ankles.copy(), posture.feet.copy(), posture.toes.copy()
@@ -197,7 +198,8 @@ def build_throw_in(skeleton: Skeleton | None = None, fps: float = 60.0, seed: in
         build_steps(gait_plan, neutral, LEFT, key, ((-0.72, -0.36, 0.52),)),
         build_steps(gait_plan, neutral, RIGHT, key, ((0.16, 0.62, 0.46),)),
     )
-    trunk, arms = np.radians(interpolate_rows(_THROW["trunk"], times)), np.radians(interpolate_rows(_THROW["arms"], times))
+    trunk, arms = np.radians(interpolate_rows(_THROW["trunk"], times)), np.radians(interpolate_rows(_THROW["arms"],
+            times))
     ease = compute_envelope(times, -2.2, -1.6, 0.8, 1.5)
     nothing = np.zeros_like(times)
     lean = {
@@ -303,15 +305,17 @@ def build_get_up(
         ankles[:, side, 2] = foot[:, 1] * neutral.ankle_height / 0.0732
         feet[:, side] = np.stack([nothing, np.radians(foot[:, 2]), nothing + np.radians((14, -14)[side])], -1)
     posture = posture.replace_arrays(
-        hips=hips, pelvis=np.stack([nothing, trunk[:, 0], nothing], -1),
-        spine=np.stack([nothing, trunk[:, 1], nothing], -1), head=np.stack([nothing, trunk[:, 2], nothing], -1),
-        arms=arms, wrists=np.radians(np.repeat(interpolate_rows(_UP["wrists"], times), 2, axis=1)), ankles=ankles, feet=feet,
+        hips=hips, pelvis=np.stack([nothing, trunk[:, 0], nothing], -1), spine=np.stack([nothing, trunk[:, 1], nothing],
+                                                                                        -1),
+        head=np.stack([nothing, trunk[:, 2], nothing], -1), arms=arms,
+        wrists=np.radians(np.repeat(interpolate_rows(_UP["wrists"], times), 2, axis=1)), ankles=ankles, feet=feet,
         toes=np.zeros_like(posture.toes),
     )
     return Gesture(to_motion(posture.frames(gait_plan.requested), neutral), rest + 1.9, rest + 0.3, rest + _UP_TIME)
 
 
-def build_celebration(duration: float = 6.0, skeleton: Skeleton | None = None, fps: float = 30.0, seed: int = 0) -> Motion:
+def build_celebration(duration: float = 6.0, skeleton: Skeleton | None = None, fps: float = 30.0,
+                      seed: int = 0) -> Motion:
     """Build a run in a curve with both arms spread like wings, leaning into it.
 
     Args:

@@ -18,7 +18,7 @@ from ..base.errors import InputError
 from ..motion import quaternion
 from ..motion.humanoid import identify_joints
 from ..motion.mirror import mirror
-from ..motion.motion import Motion, sample_frames, forward_kinematics, place_motion
+from ..motion.motion import Motion, forward_kinematics, place_motion, sample_frames
 from ..motion.retargeting.adult import build_adult_skeleton
 from ..motion.retargeting.neutral import NeutralStance, build_neutral_stance
 from ..motion.retargeting.posture import Posture, to_motion
@@ -185,8 +185,8 @@ class _Swing:
         motion = place_motion(Motion(self.motion.skeleton, root, rotations, fps), turn)
         spot, velocity = self.find_release(at)
         rotated = quaternion.rotate(quaternion.from_up_angle(np.array(turn)), np.stack([spot, rate * velocity]))
-        return Throw(motion=motion, release=(BEFORE + at) / rate, arm=self.arm, position=rotated[0], velocity=rotated[1],
-                     grip=self.grip)
+        return Throw(motion=motion, release=(BEFORE + at) / rate, arm=self.arm, position=rotated[0],
+                     velocity=rotated[1], grip=self.grip)
 
 
 def _solve_aim(swing: _Swing, target: np.ndarray, speed: float) -> tuple[float, float, float]:
@@ -245,10 +245,11 @@ def _build_posture(style: ThrowStyle, neutral: NeutralStance) -> Posture:
     look = np.clip(-(pelvis[:, 2] + spine[:, 2]), -1.2, 1.2)
     nod = -0.55 * (pelvis[:, 1] + spine[:, 1])
     return Posture(
-        fps=_PLAN_RATE, hips=np.stack([hips[:, 0], nothing, height - hips[:, 1]], axis=-1), heading=nothing, pelvis=pelvis,
-        spine=spine, head=np.stack([-0.5 * spine[:, 0], nod, look], axis=-1), arms=arms,
-        wrists=np.stack([nothing + 0.1, forearm[:, 1]], axis=-1),
-        ankles=np.stack([foot[:, :3] for foot in feet], axis=1), feet=np.stack([foot[:, 3:] for foot in feet], axis=1),
+        fps=_PLAN_RATE, hips=np.stack([hips[:, 0], nothing, height - hips[:, 1]], axis=-1), heading=nothing,
+        pelvis=pelvis, spine=spine, head=np.stack([-0.5 * spine[:, 0], nod, look], axis=-1), arms=arms,
+        wrists=np.stack([nothing + 0.1, forearm[:, 1]], axis=-1), ankles=np.stack([foot[:, :3] for foot in feet],
+                                                                                  axis=1),
+        feet=np.stack([foot[:, 3:] for foot in feet], axis=1),
         toes=np.stack([np.clip(0.8 * foot[:, 4], 0.0, 0.7) * (foot[:, 2] < 0.3) for foot in feet], axis=-1),
         knees=np.zeros((len(times), 2)),
     )

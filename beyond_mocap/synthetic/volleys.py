@@ -17,10 +17,10 @@ from ..motion.retargeting.neutral import NeutralStance, build_neutral_stance
 from ..motion.retargeting.posture import Posture, compute_hip_positions, to_motion
 from ..motion.skeleton import Skeleton
 from . import gait_tables as tables
-from .course import GaitPlan
 from .footsteps import Footsteps, compute_ground_lift
 from .gait import ease_reach, measure_leg, plant_feet
-from .gestures import LEFT, RIGHT, Gesture, compute_envelope, interpolate_rows, blend_arrays
+from .gait_plan import GaitPlan
+from .gestures import LEFT, RIGHT, Gesture, blend_arrays, compute_envelope, interpolate_rows
 from .moves import build_standing, build_steps
 
 BEFORE, AFTER = 1.6, 1.9

@@ -19,9 +19,9 @@ from ..ball import batch
 from ..ball.physics import Ball
 from ..base.errors import InputError
 from ..motion import quaternion
-from ..motion.motion import Motion, sample_frames_cubic, forward_kinematics, place_motion
-from .led_limb import LimitRotations, ShiftedLimb, build_exact_response, solve_shifts
-from .letting_go import AtFoot, InHand, sample_points_and_velocities, sample_points
+from ..motion.motion import Motion, forward_kinematics, place_motion, sample_frames_cubic
+from .ball_release import AtFoot, InHand, sample_points, sample_points_and_velocities
+from .limb_shift import LimitRotations, ShiftedLimb, build_exact_response, solve_shifts
 
 FINE_MISS, SMALL_DISPLACEMENT = 0.02, 0.05
 """m of miss and of wrist displacement up to which the pace is not changed."""
@@ -126,9 +126,11 @@ def correct_motion(
     target = np.maximum(np.asarray(target, float), [-np.inf, -np.inf, ball.radius])
     part.list_joints(motion)
     if not _MIN_FRAMES <= frame <= len(motion) - 1 - _MIN_FRAMES:
-        raise InputError("release", f"frame {frame:.1f} of {len(motion)}", f"at least {_MIN_FRAMES} frames before and after")
+        raise InputError("release", f"frame {frame:.1f} of {len(motion)}",
+                         f"at least {_MIN_FRAMES} frames before and after")
     return _Search(
-        motion, part, float(frame), target=target, ball=ball, freedom=freedom, speed=speed, limit_rotations=limit_rotations,
+        motion, part, float(frame), target=target, ball=ball, freedom=freedom, speed=speed,
+        limit_rotations=limit_rotations,
     ).run()
 
 
@@ -214,7 +216,8 @@ class _Search:
         if far < 4.0 * self.ball.radius:
             found = f"{far:.2f} m from where the ball leaves"
             raise InputError("target", found, "a target some distance away", "move it away")
-        along = max(float(velocity[0] @ direction) / max(np.linalg.norm(direction), 1e-9), 0.3 * np.linalg.norm(velocity[0]), 1.0)
+        along = max(float(velocity[0] @ direction) / max(np.linalg.norm(direction), 1e-9),
+                    0.3 * np.linalg.norm(velocity[0]), 1.0)
         return float(np.clip(1.05 * far / along, 0.05, 4.0))
 
     def _apply_change(self, change: _Change) -> Motion:
@@ -236,11 +239,13 @@ class _Search:
         """
         motion = self._apply_change(change)
         range_frames = self.freedom.release * self.motion.fps
-        sources = np.clip(self.frame + np.linspace(-range_frames, range_frames, _GRID), _MIN_FRAMES, len(self.motion) - 1 - _MIN_FRAMES)
+        sources = np.clip(self.frame + np.linspace(-range_frames, range_frames, _GRID), _MIN_FRAMES, len(self.motion)
+                          - 1 - _MIN_FRAMES)
         points, velocities = sample_points_and_velocities(self.part, motion, sources / (1.0 + change.pace))
         now = _Change(np.concatenate([np.zeros(6), change.row[6:]]))
         cost = self._compute_cost(motion, source / (1.0 + change.pace))
-        rows, cost = self._find_best_changes(points, velocities, now, start=start, cost=cost, response=build_exact_response(points.shape[1]))
+        rows, cost = self._find_best_changes(points, velocities, now, start=start, cost=cost,
+                                             response=build_exact_response(points.shape[1]))
         cost = cost + ((sources - self.frame) / self.motion.fps * _DELAY) ** 2
         best = int(np.argmin(cost))
         return _Change(rows[best]), float(sources[best])
@@ -249,14 +254,15 @@ class _Search:
         """Take Newton steps with the arm or leg as it really follows; return the best of them."""
         motion = self._apply_change(change)
         frame = source / (1.0 + change.pace)
-        limb = ShiftedLimb.from_motion(motion, self.part, solve_shifts(frame, *self._find_frame_range(motion, frame), motion.fps), self.limit_rotations)
+        limb = ShiftedLimb.from_motion(motion, self.part, solve_shifts(frame, *self._find_frame_range(motion, frame),
+                                                                       motion.fps), self.limit_rotations)
         best, base, step = None, change, 1.0
         follows, known = build_exact_response(sample_points(motion, self.part, np.array([frame])).shape[1]), False
         for number in range(_ROUNDS):
             now = limb.shift_motion(change.row[:6])
             points, velocities = sample_points_and_velocities(self.part, now, np.array([frame]))
             found = self._build_result(motion, now, frame, source=source, change=change, start=start, points=points,
-                                 velocities=velocities)
+                                       velocities=velocities)
             better = best is None or found.total_miss < best.total_miss
             slow = best is not None and found.total_miss > 0.1 * best.total_miss
             if better:
@@ -268,7 +274,8 @@ class _Search:
                 follows, known = limb.measure_response(base.row[:6], frame, *best_points), True
             if better or slow:
                 costs = limb.shifts.cost, follows
-                rows, _ = self._find_best_changes(*best_points, base, start, *costs, fixed=self._rigid, stays_near=number >= _FREE_ROUNDS)
+                rows, _ = self._find_best_changes(*best_points, base, start, *costs, fixed=self._rigid,
+                                                  stays_near=number >= _FREE_ROUNDS)
             change = _Change(base.row + step * (rows[0] - base.row))
         return best
 
@@ -337,7 +344,8 @@ class _Search:
             hessian, pull = np.tile(weight, (count, 1, 1)), np.tile(weight @ current.row, (count, 1))
         level = slopes @ current.row - short
         free = [i for i in range(size) if i not in set(fixed) and not (i in (6, 7) and not self.bounds[i - 6])]
-        rows = self._solve_least_cost(hessian, pull, slopes, level=level, rows=np.tile(current.row, (count, 1)), free=free)
+        rows = self._solve_least_cost(hessian, pull, slopes, level=level, rows=np.tile(current.row, (count, 1)),
+                                      free=free)
         over = np.abs(rows[:, 6:8]) > self.bounds + 1e-12
         if over.any() and not len(fixed):
             rows[:, 6:8] = np.clip(rows[:, 6:8], -self.bounds, self.bounds)
@@ -346,7 +354,8 @@ class _Search:
             )
             rows = np.where(over.any(axis=1)[:, None], again, rows)
         displacement_cost = np.einsum("ni,ij,nj->n", rows, weight, rows)
-        return rows, displacement_cost + speed_weight * (speed + np.einsum("ni,ni->n", faster, rows - current.row) - requested_speed) ** 2
+        return rows, displacement_cost + speed_weight * (speed + np.einsum("ni,ni->n", faster, rows - current.row)
+                                                         - requested_speed) ** 2
 
     @staticmethod
     def _solve_least_cost(hessian, pull, slopes, level, rows, free) -> np.ndarray:
@@ -404,12 +413,13 @@ class _Search:
         rest = (start if self.moves_start else start + change.rest)[None]
         position, velocity, spin, gap = self.part.compute_launch(points, velocities, rest, self.ball)
         none = np.zeros(1)
-        there, _, _ = self._predict_arrival(points, velocities, none, pace=none, rest=rest, seconds=np.array([change.seconds]))
+        there, _, _ = self._predict_arrival(points, velocities, none, pace=none, rest=rest,
+                                            seconds=np.array([change.seconds]))
         end = self.part.list_joints(now)[2]
         shift = forward_kinematics(now)[0][:, end] - forward_kinematics(before)[0][:, end]
         return CorrectedMotion(motion=now, frame=frame, position=position[0], velocity=velocity[0], spin=spin[0],
-                         seconds=change.seconds, miss=float(np.linalg.norm(there[0] - self.target)),
-                         displacement=float(np.linalg.norm(shift, axis=-1).max()), shift=shift, rotation=change.rotation,
-                         pace=1.0 + change.pace, release_delay=(source - self.frame) / self.motion.fps / (1.0 + change.pace),
-                         start_offset=float(np.linalg.norm(change.rest)) if self.moves_start else 0.0,
-                         gap=float(np.abs(gap).max(initial=0.0)))  # fmt: skip
+                               seconds=change.seconds, miss=float(np.linalg.norm(there[0] - self.target)),
+                               displacement=float(np.linalg.norm(shift, axis=-1).max()), shift=shift,
+                               rotation=change.rotation, pace=1.0 + change.pace, release_delay=(source - self.frame)
+                               / self.motion.fps / (1.0 + change.pace), start_offset=float(np.linalg.norm(change.rest))
+                               if self.moves_start else 0.0, gap=float(np.abs(gap).max(initial=0.0)))  # fmt: skip

@@ -17,13 +17,13 @@ import numpy as np
 
 from ..ball.flight import Launch, find_crossing, simulate_flight
 from ..ball.physics import BASEBALL, Ball
-from ..base.errors import UserCancelledError, InputError
+from ..base.errors import InputError, UserCancelledError
 from ..evaluation.paired_tests import find_inliers
 from ..files.tables import to_plain
 from ..motion import quaternion
 from ..motion.hand import build_hand, estimate_ball_centre
 from ..motion.humanoid import identify_joints
-from ..motion.motion import Motion, sample_frames_cubic, forward_kinematics, compute_pose
+from ..motion.motion import Motion, compute_pose, forward_kinematics, sample_frames_cubic
 from ..synthesis.quality.movement import compute_jerk
 from .networks.chains import EFFECTORS, find_chains
 from .networks.description import scale_description
@@ -172,7 +172,8 @@ def evaluate_throws(
             raise UserCancelledError("cancelled")
         progress(order / len(examples), example.name)
         try:
-            found.append(_measure_example(model, example, options, model.stature / example.stature if by_height else 1.0))
+            found.append(_measure_example(model, example, options, model.stature / example.stature if by_height
+                                          else 1.0))
         except (ArithmeticError, np.linalg.LinAlgError, InputError) as error:
             left_out.append(f"{example.name}: {error}")
     return ThrowEvaluation(tuple(found), options, tuple(left_out))
@@ -183,18 +184,22 @@ def _measure_example(model: ThrowModel, example: Example, options: Options, rati
     description = scale_description(build_description(example), ratio)
     generated = generate_motion(model, description, options=options)
     effectors = generated.predicted if generated.floating is not None and not options.ik else generated.effectors
-    near, far, own = _measure_impacts(generated.motion, effectors - generated.effectors, example, ratio, description.impact)
+    near, far, own = _measure_impacts(generated.motion, effectors - generated.effectors, example, ratio,
+                                      description.impact)
     head, share = _measure_head(generated.motion, example.motion)
     return ThrowFigures(
         name=example.name, subject=example.subject, deviation=measure_deviations(effectors, description.effectors),
         network=measure_deviations(generated.predicted, description.effectors),
-        body=measure_deviations(generated.effectors, description.effectors), impact=near, far_impact=far, own_impact=own, head=head,
-        head_share=share, jerk=_measure_jerk(generated.motion) / max(ratio * _measure_jerk(example.motion), 1e-9), bones=_measure_bones(model, generated),
-        beyond=_measure_limit_excess(model, generated.motion), seconds=generated.seconds, duration=example.motion.duration,
+        body=measure_deviations(generated.effectors, description.effectors), impact=near, far_impact=far,
+        own_impact=own, head=head, head_share=share, jerk=_measure_jerk(generated.motion)
+        / max(ratio * _measure_jerk(example.motion), 1e-9), bones=_measure_bones(model, generated),
+        beyond=_measure_limit_excess(model, generated.motion), seconds=generated.seconds,
+        duration=example.motion.duration,
     )  # fmt: skip
 
 
-def _measure_impacts(motion: Motion, shift: np.ndarray, example: Example, ratio: float, target) -> tuple[float, float, float]:
+def _measure_impacts(motion: Motion, shift: np.ndarray, example: Example, ratio: float, target) -> tuple[float, float,
+        float]:
     """Measure the impact errors; NaN for kicks.
 
     The requested ball is the example's, scaled, in a hand as large as the model's.
@@ -218,7 +223,8 @@ def _measure_impacts(motion: Motion, shift: np.ndarray, example: Example, ratio:
     place, speed = release_ball(example.motion, example_hand, grip / ratio, example.release)
     requested_ball = ratio * place, ratio * speed
     near, far = np.array([WALL_DISTANCE, 0.0, target[2]]), np.asarray(target)
-    errors = [np.linalg.norm(find_impact(*generated_ball, there) - find_impact(*requested_ball, there)) for there in (near, far)]
+    errors = [np.linalg.norm(find_impact(*generated_ball, there) - find_impact(*requested_ball, there))
+              for there in (near, far)]
     return float(errors[0]), float(errors[1]), float(np.linalg.norm(find_impact(*requested_ball, far) - far))
 
 
@@ -237,7 +243,8 @@ def _measure_head(motion: Motion, truth: Motion) -> tuple[float, float]:
         head_rotations.append(rotations[:, body.head])
         own = quaternion.multiply(quaternion.inverse(rotations[:, body.chest]), head_rotations[-1])
         relative_rotations.append(_compute_angles(own[:-1], own[1:]).sum())
-    return float(np.degrees(_compute_angles(*head_rotations).mean())), float(relative_rotations[0] / max(relative_rotations[1], 1e-9))
+    return float(np.degrees(_compute_angles(*head_rotations).mean())), float(relative_rotations[0]
+                                                                             / max(relative_rotations[1], 1e-9))
 
 
 def _compute_angles(a: np.ndarray, b: np.ndarray) -> np.ndarray:
@@ -247,7 +254,8 @@ def _compute_angles(a: np.ndarray, b: np.ndarray) -> np.ndarray:
 
 def _measure_jerk(motion: Motion) -> float:
     """Measure the 99th percentile of the largest jerk (m/s^3) of any joint."""
-    return float(np.percentile(compute_jerk(forward_kinematics(motion)[0], motion.fps), 99)) if len(motion) > 3 else np.nan
+    return float(np.percentile(compute_jerk(forward_kinematics(motion)[0], motion.fps),
+                               99)) if len(motion) > 3 else np.nan
 
 
 def _measure_bones(model: ThrowModel, generated: GeneratedMotion) -> float:

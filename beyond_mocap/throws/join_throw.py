@@ -18,13 +18,21 @@ from ..base.errors import InputError, TimedMessage
 from ..library.library import Library
 from ..motion import contacts, quaternion
 from ..motion.humanoid import compute_heading_from_positions, identify_joints
-from ..motion.motion import Motion, sample_frames, forward_kinematics, place_motion, compute_pose, resample, compute_world_rotation
+from ..motion.motion import (
+    Motion,
+    compute_pose,
+    compute_world_rotation,
+    forward_kinematics,
+    place_motion,
+    resample,
+    sample_frames,
+)
 from ..motion.retargeting.neutral import build_neutral_stance
 from ..motion.skeleton import Skeleton
-from ..synthesis.construct.carry import Body, LimbReference, leg_chain, move_limb
-from ..synthesis.construct.hand_over import step_over
-from ..synthesis.construct.meeting import ease_in_out
-from ..synthesis.quality.movement import compute_jerk, collect_uncut_windows, compute_window_maxima
+from ..synthesis.construct.contact_geometry import ease_in_out
+from ..synthesis.construct.edit_blending import step_over
+from ..synthesis.construct.move_body_part import Body, LimbReference, leg_chain, move_limb
+from ..synthesis.quality.movement import collect_uncut_windows, compute_jerk, compute_window_maxima
 
 FADE = 0.5
 """Seconds of the blend between a throw and the surrounding motion, at either end."""
@@ -79,7 +87,8 @@ class JoinedThrow:
 
 
 def join_throw(
-    motion_around: Motion, start: float, throw: Motion, release: float, *, at: float, continues: bool = False, fade: float = FADE
+    motion_around: Motion, start: float, throw: Motion, release: float, *, at: float, continues: bool = False,
+    fade: float = FADE
 ) -> JoinedThrow:
     """Join a throw to the motion around it.
 
@@ -100,7 +109,8 @@ def join_throw(
     lead, follow = release, throw.duration - release
     if min(lead, follow) < MIN_UNBLENDED:
         raise InputError(
-            "throw", f"{lead:.2f} s before and {follow:.2f} s after the release", f"at least {MIN_UNBLENDED:g} s of both"
+            "throw", f"{lead:.2f} s before and {follow:.2f} s after the release",
+            f"at least {MIN_UNBLENDED:g} s of both"
         )
     fps = motion_around.fps
     first = int(round((at - release - start) * fps))
@@ -110,7 +120,8 @@ def join_throw(
     fade_in = float(np.clip(max(fade, abs(before) / TURNING_SPEED), 1.0 / fps, max(lead - MIN_UNBLENDED, 1.0 / fps)))
     fade_out = min(fade, follow - MIN_UNBLENDED)
     unblended = first + int(np.ceil(fade_in * fps)), end - int(np.ceil(fade_out * fps))
-    rotation, offset = _compute_continuation(motion_around, throw, unblended[1] - first, unblended[1], end) if continues else (0.0, np.zeros(3))
+    rotation, offset = _compute_continuation(motion_around, throw, unblended[1] - first, unblended[1],
+                                             end) if continues else (0.0, np.zeros(3))
     old = _move_rest(motion_around, unblended[1], rotation, offset)
     new = motion_around.root_positions.copy(), motion_around.rotations.copy()
     new[0][first:end], new[1][first:end] = throw.root_positions, throw.rotations
@@ -127,8 +138,8 @@ def join_throw(
     total_offset = old[0][unblended[1]] - motion_around.root_positions[unblended[1]]
     warnings = _describe_turning(before, start + first / fps, rotation, total_offset, start + end / fps)
     return JoinedThrow(
-        motion=motion, start=start, release=start + first / fps + release, first=first, end=end, unblended=unblended, offset=total_offset,
-        rotation=rotation, warnings=warnings,
+        motion=motion, start=start, release=start + first / fps + release, first=first, end=end, unblended=unblended,
+        offset=total_offset, rotation=rotation, warnings=warnings,
     )
 
 
@@ -183,7 +194,8 @@ def _measure_heading_difference(own: Motion, frame: int, throw: Motion, throw_fr
     return float(quaternion.wrap_angle(angles[1] - angles[0]))
 
 
-def _compute_continuation(own: Motion, throw: Motion, throw_frame: int, frame: int, end: int) -> tuple[float, np.ndarray]:
+def _compute_continuation(own: Motion, throw: Motion, throw_frame: int, frame: int, end: int) -> tuple[float,
+        np.ndarray]:
     """Compute rotation (rad) and offset (3,) m that move `own` to the throw in the middle of the blend."""
     middle = (end - frame) // 2
     at, there = min(frame + middle, len(own) - 1), min(throw_frame + middle, len(throw) - 1)
@@ -236,7 +248,8 @@ def _describe_turning(before: float, begin: float, rotation: float, offset: np.n
     return tuple(warnings)
 
 
-def build_standing_motion(skeleton: Skeleton, seconds: float, fps: float, spot=(0.0, 0.0), facing: float = 0.0) -> Motion:
+def build_standing_motion(skeleton: Skeleton, seconds: float, fps: float, spot=(0.0, 0.0),
+                          facing: float = 0.0) -> Motion:
     """Build a motion of a body that stands upright at `spot` (2,) m with heading `facing` rad for `seconds` s."""
     stance = build_neutral_stance(skeleton)
     local = stance.rotations.copy()

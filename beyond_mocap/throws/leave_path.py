@@ -15,7 +15,7 @@ from ..library.library import Library
 from ..motion.humanoid import estimate_stature
 from ..motion.motion import Motion, forward_kinematics, resample
 from ..motion.track import Track, smooth_zero_phase_hann
-from ..synthesis.construct.meeting import ease_in_out
+from ..synthesis.construct.contact_geometry import ease_in_out
 from ..synthesis.plan import Plan
 from .join_throw import FADE, blend_bodies, hold_ends
 from .run_up import SMOOTHING_WINDOW, RunUpResult, construct_run_up
@@ -74,15 +74,15 @@ def leave_path(
     stretch = _find_stretch(own, start, throw, release, at)
     motion_around = stretch.own_motion.frames(stretch.low, stretch.high)
     run_up = construct_run_up(
-        library, _build_plan(library, stretch), throw, release, at, action=action, progress=progress, cancelled=cancelled,
-        between=motion_around,
+        library, _build_plan(library, stretch), throw, release, at, action=action, progress=progress,
+        cancelled=cancelled, between=motion_around,
     )  # fmt: skip
     left, returned = _find_edges(stretch, run_up.motion, motion_around)
     root, rotations = _blend_stretch(stretch, run_up.motion, left, returned)
     seams = np.array([stretch.low + left, *(run_up.transitions + stretch.low), stretch.low + returned])
     return RunUpResult(
-        motion=Motion(stretch.own_motion.skeleton, root, rotations, stretch.own_motion.fps), start=stretch.start, transitions=seams,
-        warnings=(*run_up.warnings, *_list_warnings(stretch, library, root)),
+        motion=Motion(stretch.own_motion.skeleton, root, rotations, stretch.own_motion.fps), start=stretch.start,
+        transitions=seams, warnings=(*run_up.warnings, *_list_warnings(stretch, library, root)),
     )
 
 
@@ -103,7 +103,8 @@ def _build_plan(library: Library, part: _Stretch) -> Plan:
     fps = part.own_motion.fps
     times = part.start + np.arange(part.low, part.high) / fps
     path = smooth_zero_phase_hann(part.own_motion.root_positions[part.low : part.high, :2], fps, SMOOTHING_WINDOW)
-    return Plan(track=Track(times, path, None), library=library.folder, fps=fps, height=estimate_stature(part.own_motion.skeleton))
+    return Plan(track=Track(times, path, None), library=library.folder, fps=fps,
+                height=estimate_stature(part.own_motion.skeleton))
 
 
 def _find_edges(part: _Stretch, new: Motion, old: Motion) -> tuple[int, int]:

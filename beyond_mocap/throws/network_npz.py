@@ -15,10 +15,19 @@ from pathlib import Path
 import numpy as np
 
 from ..base.errors import InputError
+from ..files.atomic import atomic_write
 from ..files.content import read_bytes
-from ..files.json_values import check_names, check_list, check_number, check_numbers, parse_json, describe_value, check_text, check_whole_number
-from ..files.plain_npz import HEADER, take_header_text, read_plain_arrays
-from ..files.whole import atomic_write
+from ..files.json_values import (
+    check_list,
+    check_names,
+    check_number,
+    check_numbers,
+    check_text,
+    check_whole_number,
+    describe_value,
+    parse_json,
+)
+from ..files.plain_npz import HEADER, read_plain_arrays, take_header_text
 from ..motion.motion import Motion
 from ..motion.skeleton import Skeleton
 from .networks.chains import EFFECTORS
@@ -55,7 +64,8 @@ def read_model(path: str | os.PathLike) -> ThrowModel:
     try:
         arrays = read_plain_arrays(data, _KIND, _FLOATS, MAX_UNPACKED_SIZE, _OTHER_KINDS)
         half = np.dtype("<f2")
-        return _build_model({name: one.astype(np.float32) if one.dtype == half else one for name, one in arrays.items()})
+        return _build_model({name: one.astype(np.float32) if one.dtype == half else one for name,
+                             one in arrays.items()})
     except InputError as error:
         raise InputError(path, str(error)) from None
 
@@ -160,11 +170,14 @@ def _build_model(arrays: dict[str, np.ndarray]) -> ThrowModel:
     skeleton = _build_skeleton(header["skeleton"], arrays)
     networks = {name: _build_network(name, settings.layers + 1, arrays) for name in settings.networks}
     rows = check_list(header["examples"], "examples")
-    model = ThrowModel(settings=settings, skeleton=skeleton, networks=networks, leg_reach=_parse_reach(header["leg_reach"]),
-                       examples=tuple(_build_example(i, row, skeleton, settings.fps, arrays) for i, row in enumerate(rows)),
-                       stature=check_number(header["stature"], "stature"), joint_limits=arrays.pop("joint_limits", None),
-                       reference=arrays.pop("reference", None), trained_on=check_text(header["trained_on"], "trained_on"),
-                       notes=tuple(check_text(one, "notes") for one in check_list(header["notes"], "notes")))  # fmt: skip
+    model = ThrowModel(settings=settings, skeleton=skeleton, networks=networks,
+                       leg_reach=_parse_reach(header["leg_reach"]),
+                       examples=tuple(_build_example(i, row, skeleton, settings.fps, arrays) for i,
+                                      row in enumerate(rows)), stature=check_number(header["stature"], "stature"),
+                       joint_limits=arrays.pop("joint_limits", None), reference=arrays.pop("reference", None),
+                       trained_on=check_text(header["trained_on"], "trained_on"),
+                       notes=tuple(check_text(one, "notes") for one in check_list(header["notes"],
+                                                                                  "notes")))  # fmt: skip
     if arrays:
         raise InputError("the arrays", f"an unknown array {next(iter(arrays))[:40]!r}", f"the arrays of {_PAGE}")
     return model
@@ -176,17 +189,20 @@ def _build_skeleton(row, arrays: dict[str, np.ndarray]) -> Skeleton:
     check_names(row, "skeleton", known, known)
     names = [check_text(one, "skeleton: names") for one in check_list(row["names"], "skeleton: names")]
     parents = [check_whole_number(one, "skeleton: parents") for one in check_list(row["parents"], "skeleton: parents")]
-    ends = [check_whole_number(one, "skeleton: end_parents") for one in check_list(row["end_parents"], "skeleton: end_parents")]
+    ends = [check_whole_number(one, "skeleton: end_parents") for one in check_list(row["end_parents"],
+                                                                                   "skeleton: end_parents")]
     if not all(0 <= end < len(names) for end in ends):
         raise InputError("skeleton: end_parents", describe_value(ends), f"joints 0 to {len(names) - 1}")
-    offsets, end_offsets = _take_array(arrays, "offsets", (len(names), 3)), _take_array(arrays, "end_offsets", (len(ends), 3))
+    offsets, end_offsets = _take_array(arrays, "offsets", (len(names), 3)), _take_array(arrays, "end_offsets",
+            (len(ends), 3))
     return Skeleton(tuple(names), tuple(parents), offsets, tuple(ends), end_offsets)
 
 
 def _parse_reach(row) -> dict[str, tuple]:
     """Parse the leg reach of both legs."""
     check_names(row, "leg_reach", ("left", "right"), ("left", "right"))
-    return {side: check_numbers(pair, f"leg_reach: {side}", 2, "[shortest, longest] metres") for side, pair in row.items()}
+    return {side: check_numbers(pair, f"leg_reach: {side}", 2, "[shortest, longest] metres") for side,
+            pair in row.items()}
 
 
 def _build_network(name: str, layers: int, arrays: dict[str, np.ndarray]) -> PhaseNetwork:
@@ -217,8 +233,8 @@ def _build_example(i: int, row, skeleton: Skeleton, fps: float, arrays: dict[str
     return Example(
         name=check_text(row["name"], f"{where}: name"), subject=check_text(row["subject"], f"{where}: subject"),
         motion=Motion(skeleton, root, turns, fps), limb=limb, release=check_number(row["release"], f"{where}: release"),
-        impact=np.array(check_numbers(row["impact"], f"{where}: impact", 3, "[x, y, z] in metres")),
-        launch=None if launch is None else np.array(check_numbers(launch, f"{where}: launch", 3, "[x, y, z] in m/s or null")),
+        impact=np.array(check_numbers(row["impact"], f"{where}: impact", 3, "[x, y, z] in metres")), launch=None
+        if launch is None else np.array(check_numbers(launch, f"{where}: launch", 3, "[x, y, z] in m/s or null")),
         stature=check_number(row["stature"], f"{where}: stature"), **beyond,
     )  # fmt: skip
 

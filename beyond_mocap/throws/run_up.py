@@ -26,15 +26,15 @@ from ..motion.humanoid import compute_heading
 from ..motion.motion import Motion, resample
 from ..motion.retargeting.retarget import Retargeter
 from ..motion.track import SampledTrack, Track, smooth_zero_phase_hann
-from ..synthesis.construct.construction import Construction, find_touches, build_key_results
-from ..synthesis.known_touches import resolve_touches
+from ..synthesis.construct.construction import Construction, build_key_results, find_touches
 from ..synthesis.plan import Plan, ResolvedPlan
 from ..synthesis.resolve_plan import resolve_plan
+from ..synthesis.resolved_touches import resolve_touches
 from ..synthesis.search.edit_list import EditList
-from ..synthesis.search.footage import SourceMotion, fetch_motion, output_index
 from ..synthesis.search.path_costs import balance_weights
 from ..synthesis.search.path_search import PathSearch
-from ..synthesis.search.wanted import SearchRequest, build_request
+from ..synthesis.search.request import SearchRequest, build_request
+from ..synthesis.search.source_frames import SourceMotion, fetch_motion, output_index
 from ..synthesis.search_library import extend_library
 
 OWN_LABEL = "generated"
@@ -110,10 +110,12 @@ def construct_run_up(
     library_with_throw = add_throw_clip(extend_library(library, resolved, report), throw_clip, release, action)
     with threadpool_limits(limits=1):
         order = _build_search_request(library_with_throw, resolved)
-        search = PathSearch(library_with_throw, order, balance_weights(plan.alpha), lambda done, text: report(0.8 * done, text), cancelled)
+        search = PathSearch(library_with_throw, order, balance_weights(plan.alpha), lambda done,
+                            text: report(0.8 * done, text), cancelled)
         edit = search.run()
         report(0.8, "Constructing")
-        construction = _build_construction(library_with_throw, resolved, order, edit, _build_heading_function(throw_clip, at - release, between))
+        construction = _build_construction(library_with_throw, resolved, order, edit,
+                                           _build_heading_function(throw_clip, at - release, between))
         planted, _ = construction.construct_body()
     motion = Motion(skeleton, planted.root * size, planted.rotations, plan.fps)
     if not has_same_bones:
@@ -187,7 +189,8 @@ def add_throw_clip(library: Library, motion: Motion, release: float, action: str
     words = (*ACTIONS[action], OWN_LABEL)
     key = float(np.clip(release * motion.fps, edge, len(motion) - 1 - edge))
     row = ClipAnnotation(edge, len(motion) - 1 - edge, key, words)
-    clip = Clip(path=_CLIP, mirrored=False, motion=motion, annotations=(row,), heel_toe_contacts=contacts.detect_heel_toe_contacts(motion))
+    clip = Clip(path=_CLIP, mirrored=False, motion=motion, annotations=(row,),
+                heel_toe_contacts=contacts.detect_heel_toe_contacts(motion))
     frames = joined_frames(library.frames, build_frames([clip], library.frames))
     return replace(library, clips=(*library.clips, clip), frames=frames, clusters={}, cache_location=None)
 
@@ -209,7 +212,7 @@ def _insert_in_timeline(
     kept = [key for key in timeline.keys if not begin < key.resolved_time < finish]
     warnings: list[str] = [
         TimedMessage(f"{format_seconds(key.time)} s: '{' '.join(key.words)}' overlaps the throw and is left out",
-                  (key.time, key.time))
+                     (key.time, key.time))
         for key in timeline.keys if key not in kept
     ]  # fmt: skip
     spans = [part for span in timeline.spans for part in _cut_span(span, begin, finish)]

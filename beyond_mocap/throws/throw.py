@@ -16,23 +16,23 @@ import numpy as np
 
 from ..ball.flight import Launch, find_crossing, simulate_flight
 from ..ball.physics import HUMAN_BALL_SPEEDS, Ball
-from ..ball.shot import solve_arcs, is_out_of_reach
-from ..base.errors import UserCancelledError, InputError
+from ..ball.shot import is_out_of_reach, solve_arcs
+from ..base.errors import InputError, UserCancelledError
 from ..base.vectors import arctan2
 from ..motion import quaternion
-from ..motion.humanoid import identify_joints, estimate_stature
+from ..motion.humanoid import estimate_stature, identify_joints
 from ..motion.mirror import mirror
-from ..motion.motion import Motion, sample_frames_cubic, place_motion
+from ..motion.motion import Motion, place_motion, sample_frames_cubic
 from ..motion.retargeting.retarget import Retargeter
 from ..motion.skeleton import Skeleton
 from ..synthetic.throws import FASTEST as FASTEST_HAND
+from .ball_release import AtFoot, InHand, compute_launch
 from .correction import FINE_MISS, SMALL_DISPLACEMENT, CorrectedMotion, correct_motion
-from .letting_go import AtFoot, InHand, compute_launch
 from .networks.chains import EFFECTORS
 from .networks.limits import LimbLimits
 from .networks.model import ThrowModel
-from .networks.plan import PlannedMotion, LaunchRequest, plan_motion, compute_dissimilarity
-from .throw_order import KINDS, ThrowRequest, ThrowResult, build_ball_path, build_release_part
+from .networks.plan import LaunchRequest, PlannedMotion, compute_dissimilarity, plan_motion
+from .throw_request import KINDS, ThrowRequest, ThrowResult, build_ball_path, build_release_part
 
 MIN_TARGET_DISTANCE = 1.5
 """Metres over the ground from body to target, at least."""
@@ -215,7 +215,8 @@ class _ThrowGenerator:
         self._check_speed(fastest)
         self._check_elevation(own, min(self.max_speed, _MAX_SPEED_RATIO * fastest))
         wishes, seed = self._rank_launch_requests(own, ahead), self.request.seed
-        return [(wish, seed) for wish in wishes] if len(wishes) > 1 else [(wishes[0], seed + n) for n in range(_MAX_PLANS)]
+        return [(wish, seed) for wish in wishes] if len(wishes) > 1 else [(wishes[0], seed + n)
+                                                                          for n in range(_MAX_PLANS)]
 
     def _find_anchor(self, example, place: np.ndarray) -> np.ndarray:
         """Return the point (2,) m of an example, normalised frame, that the request positions."""
@@ -288,14 +289,18 @@ class _ThrowGenerator:
         faster than the distance requires.
         """
         thrown = np.linalg.norm(self.launches[own], axis=1)
-        speeds = np.array([self.request.speed]) if self.request.speed else np.maximum(thrown, _MIN_SPEED_RATIO * self.arcs.slowest)
+        speeds = np.array([self.request.speed]) if self.request.speed else np.maximum(thrown, _MIN_SPEED_RATIO
+                * self.arcs.slowest)
         requests = [self._build_launch_request(float(speed), ahead) for speed in speeds]
         impacts = np.array([self.model.examples[n].impact for n in own])
-        dissimilarity = [float(np.sort(compute_dissimilarity(self.launches[own], impacts, wish))[:3].mean()) for wish in requests]
+        dissimilarity = [float(np.sort(compute_dissimilarity(self.launches[own], impacts, wish))[:3].mean())
+                         for wish in requests]
         preferred_speed = np.clip(_PREFERRED_SPEED_RATIO * self.arcs.slowest, thrown.min(), thrown.max())
         chosen: list[LaunchRequest] = []
-        for number in np.argsort(dissimilarity + (np.log(speeds / preferred_speed) / _SPEED_TOLERANCE) ** 2, kind="stable"):
-            if all(abs(np.log(speeds[number] / wish.speed)) > _MIN_SPEED_DIFFERENCE for wish in chosen) and len(chosen) < _MAX_PLANS:
+        for number in np.argsort(dissimilarity + (np.log(speeds / preferred_speed) / _SPEED_TOLERANCE) ** 2,
+                                 kind="stable"):
+            if all(abs(np.log(speeds[number] / wish.speed)) > _MIN_SPEED_DIFFERENCE
+                   for wish in chosen) and len(chosen) < _MAX_PLANS:
                 chosen.append(requests[number])
         return chosen
 
@@ -303,7 +308,7 @@ class _ThrowGenerator:
         """Build the launch request of a speed (m/s) for a target `ahead` m away."""
         launch = self.arcs.at(speed)
         return LaunchRequest(speed=speed, elevation=float(np.arctan2(launch[2], launch[0])), distance=ahead,
-                    height=float(self.target[2]), limb=self.own_limb)
+                             height=float(self.target[2]), limb=self.own_limb)
 
     # Generating, and placing the motion where it is requested.
 
@@ -321,8 +326,9 @@ class _ThrowGenerator:
             motion = Retargeter(motion, self.skeleton).retarget(motion)
         part = build_release_part(self.skeleton, self.limb, self.ball)
         limits = LimbLimits.from_motions(
-            prepare_stepper(self.model).limits, own, build_release_part(own.skeleton, self.own_limb, self.ball).list_joints(own), target_motion=motion,
-            joints=part.list_joints(motion), mirrored=self.mirrored,
+            prepare_stepper(self.model).limits, own, build_release_part(own.skeleton, self.own_limb,
+                                                                        self.ball).list_joints(own),
+            target_motion=motion, joints=part.list_joints(motion), mirrored=self.mirrored,
         )
         frame = release * motion.fps
         hips = motion.root_positions[0, :2]
@@ -336,7 +342,7 @@ class _ThrowGenerator:
             anchor = sample_frames_cubic(motion, np.array([frame]))[0][0, :2]
         begin, turn = self._place_frame(anchor)
         return _PlacedMotion(plan=plan, motion=place_motion(motion, turn, (*begin, 0.0)), release=release,
-                     network_deviation=float(np.mean(generated.network_deviation)), limits=limits)
+                             network_deviation=float(np.mean(generated.network_deviation)), limits=limits)
 
     def _resample(self, motion: Motion) -> Motion:
         fps = self.request.fps or motion.fps
@@ -357,8 +363,9 @@ class _ThrowGenerator:
     def correct_motion(self, placed: _PlacedMotion) -> CorrectedMotion:
         """Correct the motion so that the ball hits, or passes as near as possible."""
         order, frame = self.request, placed.release * placed.motion.fps
-        return correct_motion(placed.motion, self._build_part(), frame, target=self.target, ball=self.ball, freedom=order.freedom,
-                         speed=order.speed, limit_rotations=placed.limits.limit_rotations)  # fmt: skip
+        return correct_motion(placed.motion, self._build_part(), frame, target=self.target, ball=self.ball,
+                              freedom=order.freedom, speed=order.speed,
+                              limit_rotations=placed.limits.limit_rotations)  # fmt: skip
 
     def build_result(self, placed: _PlacedMotion, correction: CorrectedMotion) -> ThrowResult:
         """Build the result, with flight, ball path and warnings."""
@@ -373,13 +380,14 @@ class _ThrowGenerator:
         self._collect_warnings(correction, impact, beyond)
         return ThrowResult(
             motion=correction.motion, start_time=start, release=release, limb=EFFECTORS[self.limb], ball=self.ball,
-            grip=getattr(part, "grip", None),
-            path=build_ball_path(correction.motion, part, flight, start, correction.seconds + _FOLLOW_THROUGH), launch=launch, flight=flight,
-            target=self.target, impact=impact, displacement=correction.displacement, shift=correction.shift, rotation=correction.rotation,
-            pace=correction.pace, release_delay=correction.release_delay, start_offset=correction.start_offset, min_speed=self.arcs.slowest,
-            requested_speed=self.request.speed or float(np.linalg.norm(correction.velocity)), network_deviation=placed.network_deviation,
-            limit_excess=beyond, examples=tuple(zip(placed.plan.names, map(float, placed.plan.weights))),
-            warnings=tuple(self.warnings),
+            grip=getattr(part, "grip", None), path=build_ball_path(correction.motion, part, flight, start,
+                                                                   correction.seconds + _FOLLOW_THROUGH), launch=launch,
+            flight=flight, target=self.target, impact=impact, displacement=correction.displacement,
+            shift=correction.shift, rotation=correction.rotation, pace=correction.pace,
+            release_delay=correction.release_delay, start_offset=correction.start_offset, min_speed=self.arcs.slowest,
+            requested_speed=self.request.speed or float(np.linalg.norm(correction.velocity)),
+            network_deviation=placed.network_deviation, limit_excess=beyond,
+            examples=tuple(zip(placed.plan.names, map(float, placed.plan.weights))), warnings=tuple(self.warnings),
         )  # fmt: skip
 
     def _check_correction(self, correction: CorrectedMotion) -> None:

@@ -16,13 +16,20 @@ import numpy as np
 
 from ..ball.flight import find_wall_impact
 from ..ball.physics import BASEBALL, FOOTBALL
-from ..base.errors import BeyondMocapError, UserCancelledError, InputError
+from ..base.errors import BeyondMocapError, InputError, UserCancelledError
 from ..files.bvh import bvh
 from ..library.scan import TABLE_NAME as ANNOTATIONS_NAME
 from ..library.scan import Annotations, find_clips
 from ..motion import quaternion
 from ..motion.humanoid import Humanoid, identify_joints
-from ..motion.motion import Motion, sample_frames_cubic, compute_end_positions, forward_kinematics, place_motion, compute_pose
+from ..motion.motion import (
+    Motion,
+    compute_end_positions,
+    compute_pose,
+    forward_kinematics,
+    place_motion,
+    sample_frames_cubic,
+)
 from ..motion.retargeting.retarget import Retargeter
 from ..motion.skeleton import Skeleton
 from ..synthetic.throws import find_grip
@@ -83,15 +90,15 @@ def read_examples(
             unannotated.append(name)
             continue
         try:
-            found += _read_clip(path, name, ACTIONS[action], annotations=annotations, rows=table.get(name), fps=fps, retarget=retarget,
-                              report=report)
+            found += _read_clip(path, name, ACTIONS[action], annotations=annotations, rows=table.get(name), fps=fps,
+                                retarget=retarget, report=report)
         except InputError as error:
             report(f"{name}: left out, {error}")
     if len(unannotated) == len(clips):
         raise _describe_missing(folder, action, clips, annotations)
     if unannotated:
         report(f"{folder}: {len(unannotated)} of {len(clips)} recordings left out because no {action} is annotated in them, "
-             f"for example {unannotated[0]}")  # fmt: skip
+               f"for example {unannotated[0]}")  # fmt: skip
     if not found:
         raise InputError(folder, f"every {action} in it is left out", "at least one readable example",
                          f"see the notes, and {_PAGE}")  # fmt: skip
@@ -132,7 +139,8 @@ def _describe_missing(folder: Path, action: str, clips: list[Path], annotations:
     )
 
 
-def _read_clip(path, name: str, action: Action, annotations: Annotations, rows, fps: float, retarget, report) -> list[Example]:
+def _read_clip(path, name: str, action: Action, annotations: Annotations, rows, fps: float, retarget,
+               report) -> list[Example]:
     """Read all examples of one recording."""
     motion = bvh.read_bvh(path).motion
     every = read_known(path, motion.fps, action, annotations, rows)
@@ -142,7 +150,8 @@ def _read_clip(path, name: str, action: Action, annotations: Annotations, rows, 
     for order, known in enumerate(every):
         own = name if len(every) == 1 else f"{name} {order + 1}"
         try:
-            out.append(_build_example(own, motion, known, action=action, fps=fps, retarget=retarget, subject=known.subject or usual))
+            out.append(_build_example(own, motion, known, action=action, fps=fps, retarget=retarget,
+                                      subject=known.subject or usual))
         except BeyondMocapError as error:
             report(f"{own}: left out, {error}")
     return out
@@ -180,14 +189,16 @@ def _build_example(
     limb = _find_fastest_limb(cut, release, action) if known.limb is None else known.limb
     position, launch = _compute_launch(cut, release, limb, known)
     if np.linalg.norm(launch) < _MIN_LAUNCH_SPEED:
-        raise InputError("ball", f"{np.linalg.norm(launch):.1f} m/s at the release", f"at least {_MIN_LAUNCH_SPEED:g} m/s")
-    impact = _find_wall_impact(position, launch, action) if known.target is None else _check_target(known.target, position, launch)
+        raise InputError("ball", f"{np.linalg.norm(launch):.1f} m/s at the release",
+                         f"at least {_MIN_LAUNCH_SPEED:g} m/s")
+    impact = _find_wall_impact(position, launch, action) if known.target is None else _check_target(known.target,
+            position, launch)
     retargeted = retarget(cut)
     if retargeted is not cut:  # the same launch from the position of the retargeted hand
         impact = impact + _compute_ball_position(retargeted, release, limb) - _compute_ball_position(cut, release, limb)
     begin, end = _find_span(motion, known, action)
     return build_example(name, subject, retargeted, limb=limb, release=release, impact=impact, launch=launch, fps=fps,
-                      span=(begin - first, end - first))
+                         span=(begin - first, end - first))
 
 
 def _check_target(target: np.ndarray, position: np.ndarray, launch: np.ndarray) -> np.ndarray:

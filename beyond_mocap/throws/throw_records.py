@@ -167,8 +167,9 @@ def _parse_row(row: dict[str, str], where: str) -> KnownThrow:
         if fast is not None and not 0.0 < fast <= _MAX_SPEED:
             expected = f"more than 0, at most {_MAX_SPEED:g} m/s"
             raise InputError(where, f"{name} {fast:g} m/s", expected, "correct the cell or leave it empty")
-    return KnownThrow(release=parse_value("release_s"), limb=LIMBS.index(limb) if limb else None, target=parse_vector(TARGET),
-                      launch=launch, speed=speed, subject=(row.get("subject") or "").strip() or None)
+    return KnownThrow(release=parse_value("release_s"), limb=LIMBS.index(limb) if limb else None,
+                      target=parse_vector(TARGET), launch=launch, speed=speed,
+                      subject=(row.get("subject") or "").strip() or None)
 
 
 def _build_report_path(path: Path) -> Path:

@@ -12,13 +12,13 @@ import numpy as np
 
 from ..evaluation.html_page import (
     Html,
+    build_element,
     build_number_cell,
     build_page,
     build_row,
     build_section,
     build_table,
     build_title,
-    build_element,
     join_html,
 )
 from .evaluate_throws import MAX_VALID_DEVIATION
@@ -36,7 +36,7 @@ _FIGURES = (
     ("impact_m", 1.0, 2, "m", "impact error on a wall 4 m away"),
     ("far_impact", 1.0, 2, "m", "impact error at the distance of the target"),
     ("own_impact", 1.0, 2, "m", "from the impact of the requested ball to its target (effect of scaling by height on "
-                                "the flight)"),
+     "the flight)"),
     ("impacts_culled", 1.0, 0, "", "impacts excluded from these means, beyond three standard deviations"),
     ("head", 1.0, 1, "°", "between the head's rotation and the recorded one"),
     ("head_share", 1.0, 2, "×", "rotation of the head relative to the chest, divided by the recording's"),
@@ -64,11 +64,12 @@ def build_throws_page(report: Mapping) -> str:
     title = PurePath(model or "Throws").name
     left_out = [build_element("p", str(line)) for line in report["left_out"]]
     return build_page(
-        title, build_element("h1", title), build_element("p", f"{model}: {report.get('trained_on', '')}", class_="quiet"),
-        *_describe_report(report), build_section("Distance of hands and feet from their targets, cm",
-                                      _build_deviation_table(report), _build_plot(report)),
-        build_section("All figures", _build_figures_table(report)), build_section("All motions", _build_motions_table(report)),
-        build_section("Left out", *left_out) if left_out else "",
+        title, build_element("h1", title), build_element("p", f"{model}: {report.get('trained_on', '')}",
+                                                         class_="quiet"), *_describe_report(report),
+        build_section("Distance of hands and feet from their targets, cm", _build_deviation_table(report),
+                      _build_plot(report)), build_section("All figures", _build_figures_table(report)),
+        build_section("All motions", _build_motions_table(report)), build_section("Left out", *left_out) if left_out
+        else "",
     )  # fmt: skip
 
 
@@ -77,7 +78,8 @@ def _describe_report(report: Mapping) -> list[Html]:
     lost, people = report["lost"], ", ".join(map(str, report["subjects"]))
     of = f" of {report['examples']}" if report.get("examples") else ""
     motions_text = f"{report['motions']} motions{of}, by {people}." if people else "No motions."
-    method_text = "with inverse kinematics, limits and pose iterations" if _is_corrected(report) else "by the networks alone"
+    method_text = "with inverse kinematics, limits and pose iterations" if _is_corrected(
+        report) else "by the networks alone"
     failures_text = f"{lost} failed (a hand or foot {MAX_VALID_DEVIATION:g} m off on average) and are excluded from all means" if lost else \
         "none failed"
     return [build_element("p", motions_text), build_element("p", f"Generated {method_text}; {failures_text}.")]
@@ -119,7 +121,8 @@ def _build_plot(report: Mapping) -> Html:
             rows.append((f"{effector}, {title}", key, dots))
     if not any(dots for _, _, dots in rows):
         return Html()
-    return draw_strip(rows, 100.0 * TARGET_DEVIATION, "cm; each dot is a motion, the line is the target for the networks alone")
+    return draw_strip(rows, 100.0 * TARGET_DEVIATION,
+                      "cm; each dot is a motion, the line is the target for the networks alone")
 
 
 def _build_figures_table(report: Mapping) -> Html:
@@ -142,7 +145,8 @@ def _build_motions_table(report: Mapping) -> Html:
         name = str(one["name"]).removeprefix(subject + "/")
         cells = [build_number_cell(value, 2, 100.0) for value in one["deviation"]]
         cells += [build_number_cell(one[key], digits, scale) for key, scale, digits, *_ in columns]
-        rows.append(build_row(build_element("td", subject, class_="name"), build_element("td", name, class_="name"), *cells))
+        rows.append(build_row(build_element("td", subject, class_="name"), build_element("td", name, class_="name"),
+                              *cells))
     return build_table(("subject", "motion", *(build_title(*title) for title in titles)), rows)
 
 
@@ -172,13 +176,13 @@ def draw_strip(rows: Sequence[tuple[str, str, Sequence[tuple[float, str]]]], aim
         return _LABEL + _WIDTH * min(value, end) / end
 
     parts = [_draw_mark(to_x(value), bottom, f"{value:g}") for value in np.arange(0.0, end + 0.5 * step, step).round(6)]
-    parts.append(build_element("line", x1=f"{to_x(aim):.1f}", x2=f"{to_x(aim):.1f}", y1=_TOP, y2=bottom, stroke="#23703a",
-                         stroke_dasharray="4 3"))  # fmt: skip
+    parts.append(build_element("line", x1=f"{to_x(aim):.1f}", x2=f"{to_x(aim):.1f}", y1=_TOP, y2=bottom,
+                               stroke="#23703a", stroke_dasharray="4 3"))  # fmt: skip
     for order, (title, kind, dots) in enumerate(rows):
         y = _TOP + _LINE * (order + 0.5)
         parts.append(build_element("text", title, x=_LABEL - 10, y=y + 4, text_anchor="end", fill="#444"))
-        parts += [build_element("circle", build_element("title", f"{what}: {value:.2f}"), cx=f"{to_x(value):.1f}", cy=y, r=4.5,
-                          fill=_COLOURS[kind], fill_opacity=".45") for value, what in dots]  # fmt: skip
+        parts += [build_element("circle", build_element("title", f"{what}: {value:.2f}"), cx=f"{to_x(value):.1f}", cy=y,
+                                r=4.5, fill=_COLOURS[kind], fill_opacity=".45") for value, what in dots]  # fmt: skip
     parts.append(build_element("text", unit, x=_LABEL, y=bottom + 34, fill="#666"))
     width, height = _LABEL + _WIDTH + _RIGHT, bottom + 42
     return build_element("svg", *parts, viewBox=f"0 0 {width} {height}", width=width, height=height, role="img")

@@ -92,7 +92,8 @@ def _transfer_stored(other_ball: bpy.types.Object, stored: dict) -> None:
     """Transfer the stored values to another ball that is handed over, which restores them when it is the last one."""
     other_stored = json.loads(other_ball.beyond_mocap_aim.handed_before or "{}")
     if not stored.get("others"):
-        other_stored.update({name: stored[name] for name in ("world", "gravity", *WORLD_QUALITY, *CACHE_RANGE) if name in stored}, others=False)
+        other_stored.update({name: stored[name] for name in ("world", "gravity", *WORLD_QUALITY, *CACHE_RANGE)
+                             if name in stored}, others=False)
     other_stored["solid"] = [*stored.get("solid", ()), *other_stored.get("solid", ())]
     other_ball.beyond_mocap_aim.handed_before = json.dumps(other_stored)
 

@@ -22,7 +22,8 @@ def update_balls(scene: bpy.types.Scene) -> int:
         aim = ball.beyond_mocap_aim
         if aim.live and not aim.handed and ball.library is None:
             message = f"{ball.name}: aiming failed"
-            count += call_or_describe(lambda: update_ball(scene, ball), lambda text: report_problem(ball, text), message)
+            count += call_or_describe(lambda: update_ball(scene, ball), lambda text: report_problem(ball, text),
+                                      message)
     if count:
         window.redraw_editors()
     return count
@@ -71,5 +72,5 @@ def detect_changes(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> No
             WATCHER.mark_dirty()
 
 
-WATCHER = Watcher(name="Aimed balls", changed=detect_changes, follow=update_balls, restored=shots.clear_strikes, loaded=shots.clear_all,
-                  ends=shots.clear_all)
+WATCHER = Watcher(name="Aimed balls", changed=detect_changes, follow=update_balls, restored=shots.clear_strikes,
+                  loaded=shots.clear_all, ends=shots.clear_all)

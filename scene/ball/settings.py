@@ -70,7 +70,8 @@ def find_selected_ball(context: bpy.types.Context) -> bpy.types.Object | None:
     mesh.
     """
     selected = [thing for thing in context.selected_objects if thing.type == "MESH"]
-    marked = [thing for thing in selected if thing.beyond_mocap_aim.on or thing.get(KEPT) or "ball" in thing.name.lower()]
+    marked = [thing for thing in selected if thing.beyond_mocap_aim.on or thing.get(KEPT)
+              or "ball" in thing.name.lower()]
     if marked:
         return marked[0]
     active = context.view_layer.objects.active

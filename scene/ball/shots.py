@@ -14,8 +14,8 @@ from ...beyond_mocap.motion import quaternion
 from ..core import channels
 from ..core.material import get_material
 from ..core.measure import frames_per_second, units_per_metre
-from ..core.set_aside import restore_playback, save_playback
-from ..passes.hits_shown import read_motion
+from ..core.saved_state import restore_playback, save_playback
+from ..passes.hit_analysis import read_motion
 from ..passes.possession import curves_before, sample_property
 from ..passes.settings import KEPT
 from ..path_editing.curve import remove_curve
@@ -78,7 +78,8 @@ class ShotRequest:
     def build_key(self) -> tuple:
         """Build plain values that distinguish requests, except for the body's motion; Blender keeps seven digits."""
         values = (getattr(self, field.name) for field in fields(self))
-        return tuple(value.session_uid if isinstance(value, bpy.types.Object) else _round_values(value) for value in values)
+        return tuple(value.session_uid if isinstance(value, bpy.types.Object) else _round_values(value)
+                     for value in values)
 
 
 def _round_values(value):
@@ -155,7 +156,8 @@ def build_request(scene: bpy.types.Scene, ball: bpy.types.Object) -> ShotRequest
     if aim.body is None and ball.get(KEPT):
         step = "pick a body, or press Revert Aim"  # a ball created for a strike has no own position
         raise InputError(f"ball {ball.name}", "no body strikes it", "a body", step)
-    same = {field.name: getattr(aim, field.name) for field in fields(ShotRequest) if field.name not in ("target", "place")}
+    same = {field.name: getattr(aim, field.name) for field in fields(ShotRequest)
+            if field.name not in ("target", "place")}
     return ShotRequest(**same, target=measure_position(scene, aim.target), place=tuple(aim.place))
 
 
@@ -187,7 +189,8 @@ def find_strikes(scene: bpy.types.Scene, request: ShotRequest) -> "Strikes":
         position = np.array([request.place])
         return Strikes(frames=frames[:1], start=position, end=position, radius=-BALLS[request.ball].radius,
                        velocity=np.zeros((1, 3)))
-    key = (request.body.session_uid, request.part, request.side, request.bone, request.first, request.last, frames_per_second(scene))
+    key = (request.body.session_uid, request.part, request.side, request.bone, request.first, request.last,
+           frames_per_second(scene))
     if key not in _strikes:
         motion, first = read_motion(scene, request.body)
         last = first + len(motion) - 1
@@ -198,7 +201,8 @@ def find_strikes(scene: bpy.types.Scene, request: ShotRequest) -> "Strikes":
         surface = find_striking_surface(motion.skeleton, request.bone or request.part, request.side)
         found = Strikes.from_motion(motion, surface, inside - first, inside)
         if not (np.isfinite(found.start).all() and np.isfinite(found.velocity).all()):
-            raise InputError(f"armature {request.body.name}", "NaN values in its pose", "a valid pose", "check its keys")
+            raise InputError(f"armature {request.body.name}", "NaN values in its pose", "a valid pose",
+                             "check its keys")
         _strikes[key] = found
     return _strikes[key]
 
@@ -226,15 +230,17 @@ def solve_request(scene: bpy.types.Scene, request: ShotRequest, name: str) -> So
     target = np.array(request.target)
     target[2] = max(target[2], kind.radius)
     fastest = HUMAN_BALL_SPEEDS.get("foot" if request.bone else request.part, np.inf) if request.human else np.inf
-    shot = solve_shot(strikes, target, kind, seconds=seconds, bounces=request.bounces, spin_turns=(request.back, request.left),
-                 ground=request.way == "GROUND", fastest=fastest, subject=f"ball {name}")
+    shot = solve_shot(strikes, target, kind, seconds=seconds, bounces=request.bounces,
+                      spin_turns=(request.back, request.left), ground=request.way == "GROUND", fastest=fastest,
+                      subject=f"ball {name}")
     spin = shot.launches.spin[shot.chosen_index]
     flight = simulate_flight(Launch(0.0, shot.start, shot.velocity, spin), kind, shot.seconds + request.follow)
     possible = np.flatnonzero(shot.launches.possible)
     times = np.linspace(0.0, shot.seconds, CANDIDATE_POINTS)
-    trajectories, _ = simulate_trajectories(shot.starts[possible], shot.launches.velocity[possible], shot.launches.spin[possible], kind, times)
+    trajectories, _ = simulate_trajectories(shot.starts[possible], shot.launches.velocity[possible],
+                                            shot.launches.spin[possible], kind, times)
     return SolvedShot(shot_digest, shot, strikes, flight=flight, strike=int(strikes.frames[shot.chosen_index]), fps=fps,
-                  target=tuple(target), candidate_trajectories=trajectories)
+                      target=tuple(target), candidate_trajectories=trajectories)
 
 
 def compute_digest(request: ShotRequest, strikes: "Strikes") -> str:
@@ -245,7 +251,8 @@ def compute_digest(request: ShotRequest, strikes: "Strikes") -> str:
     return hashed.hexdigest()[:16]
 
 
-def _select_timely_strikes(strikes: "Strikes", request: ShotRequest, fps: float) -> tuple["Strikes", np.ndarray | float | None]:
+def _select_timely_strikes(strikes: "Strikes", request: ShotRequest, fps: float) -> tuple["Strikes", np.ndarray | float
+        | None]:
     """Select the strikes that are early enough, and the seconds from each to the target."""
     if request.timing != "FRAME":
         return strikes, request.seconds if request.timing == "SECONDS" else None
@@ -341,7 +348,8 @@ def find_radius(request: ShotRequest) -> float:
     return BALLS[request.ball].radius
 
 
-def build_keys(scene: bpy.types.Scene, ball: bpy.types.Object, solved: SolvedShot) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def build_keys(scene: bpy.types.Scene, ball: bpy.types.Object, solved: SolvedShot) -> tuple[np.ndarray, np.ndarray,
+        np.ndarray]:
     """Build the keys of an aimed ball.
 
     Args:
@@ -430,7 +438,8 @@ def describe_shot(solved: SolvedShot) -> list[str]:
     texts.append(f"Flight, miss: {shot.seconds:.2f} s, {1000.0 * launches.miss[shot.chosen_index]:.1f} mm")
     before = solved.flight.bounces[solved.flight.bounces < shot.seconds - 1e-3]
     if len(before):
-        texts.append("Bounces on frame: " + ", ".join(f"{solved.strike + second * solved.fps:.1f}" for second in before))
+        texts.append("Bounces on frame: " + ", ".join(f"{solved.strike + second * solved.fps:.1f}"
+                                                      for second in before))
     if len(shot.frames) > 1:
         texts.append(f"Possible frames: {int(launches.possible.sum())} of {len(shot.frames)}")
     return texts

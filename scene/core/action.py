@@ -23,7 +23,7 @@ follow the body when it is moved."""
 
 
 def write_motion(body: bpy.types.Object, motion: Motion, scene: bpy.types.Scene, start: float | None = None,
-          name: str | None = None, generated: bool = False) -> bpy.types.Action:
+                 name: str | None = None, generated: bool = False) -> bpy.types.Action:
     """Write a motion as a new action with a key on every whole scene frame.
 
     Args:
@@ -78,7 +78,8 @@ def build_keys(body: bpy.types.Object, motion: Motion, scene: bpy.types.Scene, s
     return frames, curves
 
 
-def read_motion(body: bpy.types.Object, scene: bpy.types.Scene, action: bpy.types.Action | None = None, slot=None) -> Motion:
+def read_motion(body: bpy.types.Object, scene: bpy.types.Scene, action: bpy.types.Action | None = None,
+                slot=None) -> Motion:
     """Read the motion that an action plays on an armature, at the scene's frame rate, from the first to the last key.
 
     Curves of any rotation mode are read; what has no curve keeps its present pose. Constraints and drivers are not part
@@ -100,7 +101,8 @@ def read_motion(body: bpy.types.Object, scene: bpy.types.Scene, action: bpy.type
         raise InputError(f"armature {body.name}", "it plays no action", "an action with keys")
     slot = slot or next((s for s in action.slots if s.target_id_type == "OBJECT"), None)
     curves = channels.collect_curves(action, slot) if slot is not None else {}
-    key_range = channels.find_key_range({key: curve for key, curve in curves.items() if key[0].startswith("pose.bones")})
+    key_range = channels.find_key_range({key: curve for key, curve in curves.items()
+                                         if key[0].startswith("pose.bones")})
     if key_range is None:
         raise InputError(f"action {action.name}", "no key on any bone", "an action with keys on bones")
     frames = np.arange(key_range[0], key_range[1] + 1)
@@ -129,8 +131,8 @@ def _build_path(bone: str, name: str) -> str:
 def _sample_property(bone: bpy.types.PoseBone, name: str, curves: dict, frames: np.ndarray) -> np.ndarray:
     """Sample a pose bone's property over frames: (F, n)."""
     path, current = _build_path(bone.name, name), getattr(bone, name)
-    columns = [channels.sample_curve(curves[path, i], frames) if (path, i) in curves else np.full(len(frames), value) for i,
-               value in enumerate(current)]
+    columns = [channels.sample_curve(curves[path, i], frames) if (path, i) in curves else np.full(len(frames), value)
+               for i, value in enumerate(current)]
     return np.stack(columns, axis=1)
 
 

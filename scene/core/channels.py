@@ -22,7 +22,7 @@ FIGURES = {  # other properties of a key, with the type that foreach_get returns
 
 
 def create_action(target: bpy.types.Object, name: str, frames: np.ndarray, channels: dict[str, tuple[str, np.ndarray]],
-            generated: bool = False):
+                  generated: bool = False):
     """Create a new action and assign it to an object; the earlier action stays in the file.
 
     Args:

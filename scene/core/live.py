@@ -102,14 +102,16 @@ class Watcher:
         """
         action = getattr(self, event)
         if action is not None:
-            call_guarded(self.name, lambda: action(*arguments), clears_failure=not (self.look or self.follow or self.settle))
+            call_guarded(self.name, lambda: action(*arguments),
+                         clears_failure=not (self.look or self.follow or self.settle))
         if event in STATE_EVENTS:
             self.mark_dirty()
 
     def run_tick(self) -> float:
         """Poll once; return the seconds until the next poll."""
         act = self.look or (self._run_follow if self.follow else self._run_settle)
-        return call_guarded(self.name, act, IDLE, clears_failure=bool(self.look))  # the others clear failures after work
+        return call_guarded(self.name, act, IDLE,
+                            clears_failure=bool(self.look))  # the others clear failures after work
 
     def _mark_if_watched(self, _scene, depsgraph) -> None:
         if any(isinstance(update.id, self.watched_types) for update in depsgraph.updates):

@@ -12,8 +12,8 @@ from dataclasses import dataclass
 
 import bpy
 
-from ...beyond_mocap.annotation.annotating import AnnotationState
 from ...beyond_mocap.annotation.decision import can_skip, find_alternative, is_available
+from ...beyond_mocap.annotation.key_commands import AnnotationState
 
 Rect = tuple[float, float, float, float]
 
@@ -99,8 +99,8 @@ def build_content(state: AnnotationState, player: str, message: str = "", folded
     Returns:
         The contents.
     """
-    rows = tuple(Row(str(option.digit), option.word, f"{_ARROW} {' '.join(option.alternative)}" if option.alternative else "",
-                     word=option.word, faint=not option.is_available, chosen=option.is_chosen)
+    rows = tuple(Row(str(option.digit), option.word, f"{_ARROW} {' '.join(option.alternative)}" if option.alternative
+                     else "", word=option.word, faint=not option.is_available, chosen=option.is_chosen)
                  for option in state.page_options)
     more = [f"= more ({state.page + 1}/{state.page_count})"] if state.page_count > 1 else []
     if not state.trail:
@@ -120,7 +120,7 @@ def build_content(state: AnnotationState, player: str, message: str = "", folded
 
 
 def place_menu(content: Content, at: tuple[float, float] | None, free: Rect, size: float,
-             width_of: Callable[[str], float]) -> Box:
+               width_of: Callable[[str], float]) -> Box:
     """Place the menu within a free rectangle.
 
     Args:

@@ -12,8 +12,8 @@ from bpy.props import BoolProperty, EnumProperty, FloatProperty, FloatVectorProp
 from ...beyond_mocap.base.settings import list_settings
 from ...beyond_mocap.base.settings.setting import Setting, collect_values
 
-_PROPERTY_TYPES = {bool: BoolProperty, int: IntProperty, float: FloatProperty, str: StringProperty, Path: StringProperty,
-           tuple: StringProperty}
+_PROPERTY_TYPES = {bool: BoolProperty, int: IntProperty, float: FloatProperty, str: StringProperty,
+                   Path: StringProperty, tuple: StringProperty}
 
 
 def with_settings(*groups: str, **callbacks: Callable) -> Callable[[type], type]:
@@ -36,7 +36,8 @@ def build_property(row: Setting, **more):
         "max": row.most, "precision": row.precision, "unit": "TIME_ABSOLUTE" if row.unit == "seconds" else None,
         **row.panel_more, **more,
     }  # fmt: skip
-    maker = _PROPERTY_TYPES[type(arguments["default"])] if arguments["default"] is not None else _PROPERTY_TYPES[row.kind]
+    maker = _PROPERTY_TYPES[type(arguments["default"])] if arguments["default"] is not None else _PROPERTY_TYPES[
+        row.kind]
     if row.choices:
         maker, arguments["items"] = EnumProperty, row.choices
     elif row.kind is tuple and row.default:

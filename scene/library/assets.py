@@ -17,7 +17,7 @@ import numpy as np
 
 from ...beyond_mocap.annotation import DISCRETE, LOCOMOTION
 from ...beyond_mocap.base.errors import InputError
-from ...beyond_mocap.files.whole import atomic_write
+from ...beyond_mocap.files.atomic import atomic_write
 from ..core import action
 from ..rigs import armature, export
 
@@ -88,7 +88,7 @@ def compute_catalog_id(catalog: str) -> str:
 
 
 def create_assets(context: bpy.types.Context, drafts: list[AssetDraft], pictures: list,
-         copy_actions: bool = False) -> list[bpy.types.Action]:
+                  copy_actions: bool = False) -> list[bpy.types.Action]:
     """Create assets from drafts: their own actions are marked, or new ones created.
 
     Args:
@@ -154,11 +154,13 @@ def define_catalogs(folder: str | Path, catalogs: Iterable[str]) -> Path:
     new = [name for name in sorted({ROOT_CATALOG, *catalogs}) if compute_catalog_id(name) not in text]
     if not new:
         return target
-    text = text.rstrip("\n") + "\n" + "".join(f"{compute_catalog_id(name)}:{name}:{name.replace('/', '-')}\n" for name in new)
+    text = text.rstrip("\n") + "\n" + "".join(f"{compute_catalog_id(name)}:{name}:{name.replace('/', '-')}\n"
+                                              for name in new)
     atomic_write(target, text)
     return target
 
 
 def write_library(path: Path, actions: list[bpy.types.Action]) -> None:
     """Write actions to a .blend of their own, completely or not at all; InputError where that fails."""
-    export.write_whole_file(path, lambda part: bpy.data.libraries.write(part, set(actions), fake_user=True, compress=True))
+    export.write_whole_file(path, lambda part: bpy.data.libraries.write(part, set(actions), fake_user=True,
+                                                                        compress=True))

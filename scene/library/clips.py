@@ -294,7 +294,8 @@ def _start_scan(folder: str) -> None:
 def _apply_scan(manager: bpy.types.WindowManager, setting: str) -> None:
     """Write the scan's result if it is new, and redraw."""
     listing = manager.beyond_mocap_clips
-    if _scan_state["folder"] != to_absolute_path(setting) or "files" not in _scan_state["saw"]:  # stale, or the scan failed
+    if _scan_state["folder"] != to_absolute_path(setting) or "files" not in _scan_state[
+            "saw"]:  # stale, or the scan failed
         return
     files_now = _scan_state["saw"]["files"]
     missing = files_now is None

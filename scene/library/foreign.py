@@ -19,7 +19,7 @@ from ...beyond_mocap.motion import quaternion
 from ...beyond_mocap.motion.motion import Motion
 from ...beyond_mocap.motion.skeleton import Skeleton
 from ..core import channels
-from ..core.set_aside import use_temporary_scene
+from ..core.saved_state import use_temporary_scene
 
 if TYPE_CHECKING:
     from ...beyond_mocap.files.bvh.bvh import BvhClip

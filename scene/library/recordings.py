@@ -19,7 +19,8 @@ from ..core.measure import Clock, frames_per_second
 from ..core.settings import to_absolute_path
 from ..rigs import armature
 from ..stage import body
-from ..timeline import lanes, lay_strips
+from ..timeline import label_tracks as lanes
+from ..timeline import strip_writing as lay_strips
 
 if TYPE_CHECKING:
     from ...beyond_mocap.motion.motion import Motion
@@ -51,7 +52,9 @@ def find_clip_file(settings, path: str, folder: str = "") -> tuple[Path, float |
 
     library_folder = Path(to_absolute_path(folder)) if folder else find_library_folder(settings)
     file = library_folder / path
-    conversions = Conversions(library_folder, cache.find_cache_folder(library_folder, preferences.find_cache_folder(str(library_folder)))[0])
+    conversions = Conversions(library_folder,
+                              cache.find_cache_folder(library_folder,
+                                                      preferences.find_cache_folder(str(library_folder)))[0])
     if not file.is_file():
         raise InputError(file, "no such file", "a clip of the library", "press Build Library to update the list")
     if not conversions.is_current(file):
@@ -107,7 +110,7 @@ def read_labels(rig: bpy.types.Object) -> tuple[ClipAnnotation, ...]:
 
 def read_labels_at(rig: bpy.types.Object, fps: float, count: int) -> tuple[ClipAnnotation, ...]:
     """Read an armature's strips in frames of a motion of `count` frames at `fps`; InputError as `read_labels`."""
-    from ...beyond_mocap.library.keep_words import limit_rows
+    from ...beyond_mocap.library.label_files import limit_rows
 
     timeline = lanes.read_timeline(rig, f"strips of {rig.name}")
     rows = limit_rows(build_clip_annotations(timeline, fps), count) if timeline is not None else ()

@@ -51,7 +51,8 @@ def create_cloud(
     scene, units, target_collection = context.scene, units_per_metre(context.scene), collection or context.collection
     check_visible(trial)
     if target_collection.library is not None:
-        raise InputError(target_collection.name, "a linked collection", "one of this file", "choose another in the Outliner")
+        raise InputError(target_collection.name, "a linked collection", "one of this file",
+                         "choose another in the Outliner")
     mesh = bpy.data.meshes.new(name or trial.name)
     mesh.vertices.add(len(trial.labels))
     _write_attribute(mesh, nodes.MARKER, "INT", np.arange(len(trial.labels), dtype=np.int32))
@@ -102,7 +103,8 @@ def write_trial(cloud: bpy.types.Object, trial: "MarkerTrial", scene: bpy.types.
         mesh = before.data
         bpy.data.objects.remove(before)
         bpy.data.meshes.remove(mesh)
-    cloud.data.attributes["position"].data.foreach_set("vector", places[0, read_marker_indices(cloud)].astype(np.float32).ravel())
+    cloud.data.attributes["position"].data.foreach_set("vector",
+                                                       places[0, read_marker_indices(cloud)].astype(np.float32).ravel())
     nodes.draw_lines(cloud)
 
 
@@ -118,7 +120,9 @@ def read_trial(cloud: bpy.types.Object, scene: bpy.types.Scene) -> "MarkerTrial"
     mesh = _find_samples(modifier)
     if mesh is None:
         raise InputError(cloud.name, "no trajectories", "a cloud of markers", "import the recording again")
-    properties, count, samples = cloud.beyond_mocap_cloud, nodes.get_input(modifier, "Markers"), nodes.get_input(modifier, "Samples")
+    properties, count, samples = cloud.beyond_mocap_cloud, nodes.get_input(modifier,
+                                                                           "Markers"), nodes.get_input(modifier,
+            "Samples")
     if len(mesh.vertices) != count * samples or len(properties.labels) != count or not samples:
         found = f"{len(mesh.vertices)} places for {count} markers and {samples} samples"
         raise InputError(cloud.name, found, "one per marker and sample", "import the recording again")
@@ -129,8 +133,8 @@ def read_trial(cloud: bpy.types.Object, scene: bpy.types.Scene) -> "MarkerTrial"
     places[~seen.reshape(samples, count)] = np.nan
     events = tuple(MarkerEvent(row.seconds, row.name, row.side) for row in properties.events)
     names = tuple(label.name.strip() for label in properties.labels)
-    trial = MarkerTrial(labels=names, positions=places, fps=properties.fps, residuals=None, events=events, start=properties.start,
-                        name=cloud.name, subject=properties.subject)
+    trial = MarkerTrial(labels=names, positions=places, fps=properties.fps, residuals=None, events=events,
+                        start=properties.start, name=cloud.name, subject=properties.subject)
     marked = np.unique(read_marker_indices(cloud))
     if not len(marked):
         raise InputError(cloud.name, "no vertex of a marker", "one vertex per marker", "import the recording again")
@@ -225,7 +229,8 @@ def hold_last_places(positions: np.ndarray) -> np.ndarray:
         if not len(visible_rows):
             out[:, marker] = positions[seen].mean(axis=0)
         elif len(visible_rows) < len(out):
-            out[:, marker] = out[visible_rows[np.maximum(np.searchsorted(visible_rows, rows, side="right") - 1, 0)], marker]
+            out[:, marker] = out[visible_rows[np.maximum(np.searchsorted(visible_rows, rows, side="right") - 1, 0)],
+                                 marker]
     return out
 
 

@@ -127,12 +127,14 @@ class _Builder:
         """Build the whole group."""
         points, seen = self.build_sampling()
         moved = self.add_output("GeometryNodeSetPosition", self.inputs["Geometry"], None, points)
-        stored = self.add_output("GeometryNodeStoreNamedAttribute", moved, None, SEEN, seen, data_type="BOOLEAN", domain="POINT")
+        stored = self.add_output("GeometryNodeStoreNamedAttribute", moved, None, SEEN, seen, data_type="BOOLEAN",
+                                 domain="POINT")
         visible = self.add_output("GeometryNodeInputNamedAttribute", SEEN, data_type="BOOLEAN")
         hidden = self.add_boolean_math("NOT", self.add_boolean_math("AND", visible, self.inputs["Lines"]))
         lines = self.add_output("GeometryNodeDeleteGeometry", stored, hidden, domain="EDGE", mode="EDGE_FACE")
         joined = self.add_node("GeometryNodeJoinGeometry")
-        for source in (*reversed([self.build_spheres(stored, visible, number) for number in range(len(COLOURS))]), lines):
+        for source in (*reversed([self.build_spheres(stored, visible, number) for number in range(len(COLOURS))]),
+                       lines):
             self.tree.links.new(source, joined.inputs[0])
         self.add_node("NodeGroupOutput", joined.outputs[0])
 
@@ -147,7 +149,8 @@ class _Builder:
         after = self.add_integer_math("MINIMUM", self.add_integer_math("ADD", before, 1), end)
         (place, saw), (then, sees) = self.build_sample(before), self.build_sample(after)
         late = self.add_math("GREATER_THAN", share, 0.5)
-        share = self.add_output("GeometryNodeSwitch", self.add_boolean_math("AND", saw, sees), sees, share, input_type="FLOAT")
+        share = self.add_output("GeometryNodeSwitch", self.add_boolean_math("AND", saw, sees), sees, share,
+                                input_type="FLOAT")
         points = self.add_output("ShaderNodeMix", share, place, then, data_type="VECTOR", clamp_factor=True)
         return points, self.add_output("GeometryNodeSwitch", late, saw, sees, input_type="BOOLEAN")
 
@@ -159,8 +162,10 @@ class _Builder:
         position = self.add_output("GeometryNodeInputPosition")
         sight = self.add_output("GeometryNodeInputNamedAttribute", SEEN, data_type="BOOLEAN")
         geometry = about.outputs["Geometry"]
-        place = self.add_output("GeometryNodeSampleIndex", geometry, position, at, data_type="FLOAT_VECTOR", domain="POINT")
-        return place, self.add_output("GeometryNodeSampleIndex", geometry, sight, at, data_type="BOOLEAN", domain="POINT")
+        place = self.add_output("GeometryNodeSampleIndex", geometry, position, at, data_type="FLOAT_VECTOR",
+                                domain="POINT")
+        return place, self.add_output("GeometryNodeSampleIndex", geometry, sight, at, data_type="BOOLEAN",
+                                      domain="POINT")
 
     def build_spheres(self, points, visible, number: int):
         """Return spheres on the visible markers of one colour."""
@@ -169,7 +174,8 @@ class _Builder:
         ball = self.add_output("GeometryNodeMeshIcoSphere", self.inputs["Radius"], 2)
         name, rgb = COLOURS[number]
         ball = self.add_output("GeometryNodeSetMaterial", ball, None, get_material(name, rgb))
-        return self.add_output("GeometryNodeInstanceOnPoints", points, self.add_boolean_math("AND", visible, is_own_colour), ball)
+        return self.add_output("GeometryNodeInstanceOnPoints", points,
+                               self.add_boolean_math("AND", visible, is_own_colour), ball)
 
 
 @contextmanager
@@ -195,7 +201,8 @@ def draw_lines(cloud: bpy.types.Object) -> None:
     colours = shape.verts.layers.int.get(SIDE) or shape.verts.layers.int.new(SIDE)
     marker_layer = shape.verts.layers.int[MARKER]
     shape.verts.ensure_lookup_table()
-    segments = [labels[vertex[marker_layer]].segment if vertex[marker_layer] < len(labels) else "" for vertex in shape.verts]
+    segments = [labels[vertex[marker_layer]].segment if vertex[marker_layer] < len(labels) else ""
+                for vertex in shape.verts]
     for vertex, segment in zip(shape.verts, segments):
         thing = vertex[marker_layer] < len(labels) and labels[vertex[marker_layer]].role in ("BALL", "OTHER")
         vertex[colours] = 0 if thing else find_colour_index(segment)

@@ -38,10 +38,12 @@ def build_marker_set(cloud: bpy.types.Object, name: str = "") -> "MarkerSet":
     if not any(segment for segment, *_ in rows.values()):
         raise InputError(cloud.name, "no marker has a segment", "markers with segments",
                          "load a marker set, or select markers in Edit Mode and press Assign")
-    applied = parse_marker_set(properties.set_text, cloud.name) if properties.set_text else None  # the set that was applied last
+    applied = parse_marker_set(properties.set_text,
+                               cloud.name) if properties.set_text else None  # the set that was applied last
     if is_cloud(properties.static):
-        rows = {row.name: (row.segment.strip(), row.landmark, "STATIC") for row in properties.static.beyond_mocap_cloud.labels
-                if row.role not in ("BALL", "OTHER") and row.segment.strip()} | rows  # fmt: skip
+        rows = {row.name: (row.segment.strip(), row.landmark, "STATIC")
+                for row in properties.static.beyond_mocap_cloud.labels if row.role not in ("BALL", "OTHER")
+                and row.segment.strip()} | rows  # fmt: skip
     rows = _list_rows(applied) | rows if applied is not None else rows
     segments, landmarks = {}, {}
     for label, (segment, landmark, role_name) in rows.items():
@@ -50,9 +52,10 @@ def build_marker_set(cloud: bpy.types.Object, name: str = "") -> "MarkerSet":
             for point in filter(None, (part.strip() for part in landmark.split(","))):
                 landmarks.setdefault(point, []).append(label)
     on_body = [label for labels in segments.values() for label in labels]
-    by_role = {role_name: [label for label, row in rows.items() if row[2] == role_name] for role_name in ("STATIC", "OPTIONAL")}
-    return MarkerSet(name or properties.set_name or OWN, segments, landmarks, applied.aliases if applied is not None else {},
-                     static=frozenset(by_role["STATIC"]) & frozenset(on_body),
+    by_role = {role_name: [label for label, row in rows.items() if row[2] == role_name]
+               for role_name in ("STATIC", "OPTIONAL")}
+    return MarkerSet(name or properties.set_name or OWN, segments, landmarks, applied.aliases if applied is not None
+                     else {}, static=frozenset(by_role["STATIC"]) & frozenset(on_body),
                      optional=frozenset(by_role["OPTIONAL"]) & frozenset(on_body),
                      ball=tuple(label for label, row in rows.items() if row[2] == "BALL"),
                      other=tuple(label for label, row in rows.items() if row[2] == "OTHER"))

@@ -81,9 +81,9 @@ def build_request(scene: bpy.types.Scene, cloud: bpy.types.Object) -> Reconstruc
     clouds.compute_playback_rate(cloud, scene)
     static = _find_static(cloud, scene)
     words = tuple(scene_settings.words.split()) if scene_settings.add else ()
-    return ReconstructionRequest(cloud.name, trial, static and clouds.read_trial(static, scene),
-                 model=read_model(cloud) if properties.use_model else None, settings=build_settings(cloud, scene_settings, words),
-                 add=find_clip_path(scene, cloud.name) if scene_settings.add else None, words=words)
+    return ReconstructionRequest(cloud.name, trial, static and clouds.read_trial(static, scene), model=read_model(cloud)
+                                 if properties.use_model else None, settings=build_settings(cloud, scene_settings,
+            words), add=find_clip_path(scene, cloud.name) if scene_settings.add else None, words=words)
 
 
 def _find_static(cloud: bpy.types.Object, scene: bpy.types.Scene) -> bpy.types.Object | None:
@@ -114,7 +114,7 @@ def find_clip_path(scene: bpy.types.Scene, name: str) -> Path:
     """Find a free path for the clip in the library folder; raise InputError without a folder, or where the name is
     taken.
     """
-    from ...beyond_mocap.library.keep_words import find_free_file
+    from ...beyond_mocap.library.label_files import find_free_file
 
     folder = scene.beyond_mocap.library_folder
     if not folder:
@@ -122,7 +122,8 @@ def find_clip_path(scene: bpy.types.Scene, name: str) -> Path:
     return find_free_file(Path(to_absolute_path(folder)), bpy.path.clean_name(name))
 
 
-def show_reconstruction(context: bpy.types.Context, cloud: bpy.types.Object, reconstruction: "Reconstruction") -> bpy.types.Object:
+def show_reconstruction(context: bpy.types.Context, cloud: bpy.types.Object,
+                        reconstruction: "Reconstruction") -> bpy.types.Object:
     """Show the result beside the cloud: an armature that moves with it, and messages in the panel; return the
     armature.
     """
@@ -130,18 +131,22 @@ def show_reconstruction(context: bpy.types.Context, cloud: bpy.types.Object, rec
     thing = properties.body
     if thing is None or not has_own_object(cloud, scene, "body") or not can_reuse_body(thing, reconstruction, scene):
         collection = cloud.users_collection[0] if cloud.users_collection else context.collection
-        thing = properties.body = armature.create_armature(context, reconstruction.motion.skeleton, f"{cloud.name} body", collection)
+        thing = properties.body = armature.create_armature(context, reconstruction.motion.skeleton,
+                                                           f"{cloud.name} body", collection)
     if scene.beyond_mocap_markers.dressed and not any(child.type == "MESH" for child in thing.children):
-        body.create_character(thing, thing.name, SKIN, collection=thing.users_collection[0], scene=scene, example=reconstruction.motion)
+        body.create_character(thing, thing.name, SKIN, collection=thing.users_collection[0], scene=scene,
+                              example=reconstruction.motion)
     thing.matrix_world = Matrix()
     context.view_layer.update()
     speed = clouds.compute_playback_rate(cloud, scene) / properties.fps
     played = replace(reconstruction.motion, fps=reconstruction.motion.fps * speed)
     channels.remove_marked_action(thing, RECONSTRUCTED)
-    action.write_motion(thing, played, scene, clouds.find_start_frame(cloud), cloud.name, generated=True)[RECONSTRUCTED] = True
+    action.write_motion(thing, played, scene, clouds.find_start_frame(cloud), cloud.name,
+                        generated=True)[RECONSTRUCTED] = True
     thing.matrix_world = cloud.matrix_world
     bake.extend_scene(scene, clouds.find_start_frame(cloud) + played.duration * frames_per_second(scene))
-    properties.made, properties.figures, properties.told = store_reconstruction(reconstruction), "\n".join(list_figures(reconstruction)), "\n".join(reconstruction.warnings)
+    properties.made, properties.figures, properties.told = store_reconstruction(reconstruction), "\n".join(
+        list_figures(reconstruction)), "\n".join(reconstruction.warnings)
     store_model(cloud, reconstruction.model)
     properties.release = ""
     if reconstruction.release is not None:
@@ -160,7 +165,8 @@ def list_figures(reconstruction: "Reconstruction") -> list[str]:
     """List lines "name: value" for the panel."""
     residual = reconstruction.solved.residual
     away = 1000.0 * residual[np.isfinite(residual)]
-    lines = [f"Frames: {len(reconstruction.motion)} at {reconstruction.motion.fps:g}/s", f"Joints: {len(reconstruction.motion.skeleton)}"]
+    lines = [f"Frames: {len(reconstruction.motion)} at {reconstruction.motion.fps:g}/s",
+             f"Joints: {len(reconstruction.motion.skeleton)}"]
     lines.append(f"Markers: {len(reconstruction.model.markers)}")
     if len(away):
         lines += [f"Mean residual: {away.mean():.1f} mm", f"95 % below: {np.percentile(away, 95.0):.1f} mm"]
@@ -173,7 +179,7 @@ def add_to_library(request: ReconstructionRequest, reconstruction: "Reconstructi
     """Write the clip and its labels to the library, if requested; return messages."""
     if request.add is None:
         return []
-    from ...beyond_mocap.library.keep_words import add_clip
+    from ...beyond_mocap.library.label_files import add_clip
 
     throw = reconstruction.release is not None and any(word.startswith("throw") for word in request.words)
     key = reconstruction.release.time if throw else None
@@ -218,9 +224,11 @@ def build_release_request(
     reconstruction = find_reconstruction(properties.made)
     if reconstruction is None:
         raise InputError(cloud.name, "not reconstructed in this session", "a body", "press Reconstruct first")
-    ball_labels = [row.name for row in properties.labels if row.role == "BALL" and row.name in reconstruction.raw.labels]
+    ball_labels = [row.name for row in properties.labels if row.role == "BALL"
+                   and row.name in reconstruction.raw.labels]
     hand = None if scene_settings.hand == "AUTO" else scene_settings.hand
-    release_settings = ReleaseSettings(ball_labels[0] if ball_labels else None, scene_settings.radius or None, hand, scene_settings.thrown)
+    release_settings = ReleaseSettings(ball_labels[0] if ball_labels else None, scene_settings.radius or None, hand,
+                                       scene_settings.thrown)
     trial = reconstruction.raw.with_positions(reconstruction.raw.positions - [0.0, 0.0, reconstruction.lowered_by])
     return cloud.name, trial, reconstruction.motion, release_settings
 
@@ -240,10 +248,12 @@ def show_release(context: bpy.types.Context, cloud: bpy.types.Object, release: "
     world = properties.body.matrix_world if properties.body is not None else cloud.matrix_world
     matrix, units = np.array(world), units_per_metre(scene)
     places = release.path.positions @ matrix[:3, :3].T + matrix[:3, 3] / units
-    rotations = quaternion.from_rotation_vector(np.maximum(release.path.times - release.time, 0.0)[:, None] * release.spin)
+    rotations = quaternion.from_rotation_vector(np.maximum(release.path.times - release.time, 0.0)[:, None]
+                                                * release.spin)
     path = replace(release.path, times=release.path.times / speed, positions=places, rotations=rotations)
     balls.write_trajectory(thing, path, scene, clouds.find_start_frame(cloud))[THROWN_BALL] = True
-    name, frame = f"{cloud.name} release", clouds.find_start_frame(cloud) + release.time / speed * frames_per_second(scene)
+    name, frame = f"{cloud.name} release", clouds.find_start_frame(cloud) + release.time / speed * frames_per_second(
+        scene)
     for old_marker in [marker for marker in scene.timeline_markers if marker.name == name]:
         scene.timeline_markers.remove(old_marker)
     scene.timeline_markers.new(name, frame=round(frame))
@@ -254,8 +264,8 @@ def show_release(context: bpy.types.Context, cloud: bpy.types.Object, release: "
 def list_release_figures(release: "Release") -> list[str]:
     """List lines "name: value" for the panel."""
     lines = [f"Speed: {release.speed:.1f} ± {release.speed_sigma:.1f} m/s", f"In km/h: {3.6 * release.speed:.0f} km/h",
-            f"Release: {release.time:.3f} s ± {1000.0 * release.time_sigma:.0f} ms", f"Hand: {release.side}",
-            f"Estimated from: {release.method}"]
+             f"Release: {release.time:.3f} s ± {1000.0 * release.time_sigma:.0f} ms", f"Hand: {release.side}",
+             f"Estimated from: {release.method}"]
     if release.radar is not None:
         lines.append(f"Radar: {release.radar:.1f} m/s, {100.0 * (release.speed / release.radar - 1.0):+.1f} %")
     return [*lines, *release.notes]

@@ -18,7 +18,7 @@ from ...beyond_mocap.motion.humanoid import identify_joints
 from ...beyond_mocap.motion.motion import Motion, forward_kinematics
 from ..core import action, channels
 from ..core.measure import frames_per_second, units_per_metre
-from . import ours
+from . import match_objects as ours
 
 STAND, EYES = "Match Broadcast", "Match Eyes"
 STAND_POSITION = (0.0, 26.0, 17.0)  # m: along the pitch, behind the touch line, above the ground
@@ -30,7 +30,8 @@ CLIP_START = 0.1  # m from the eyes that are clipped: brows and nose
 EYES_LENS = 18.0  # mm, the player's lens: 90 degrees
 MAX_EYE_ANGLE = np.radians(35.0)  # rad, how far eyes rotate in the head
 GAZE_SMOOTHING = 0.12  # s, Gaussian smoothing of the gaze
-MAX_GAZE_SLOPE = np.tan(np.radians(18.0))  # steepest rise of a gaze: higher objects are in the upper half of the picture
+MAX_GAZE_SLOPE = np.tan(
+    np.radians(18.0))  # steepest rise of a gaze: higher objects are in the upper half of the picture
 REST_ANGLE = np.radians(12.0)  # rad, how far a gaze without a ball points below the face's axis
 
 
@@ -73,7 +74,8 @@ def find_broadcast_camera(scene: bpy.types.Scene) -> bpy.types.Object | None:
     return next((thing for thing in ours.find_objects(scene, "cameras") if thing.get(ours.MARK) == STAND), None)
 
 
-def create_eyes_camera(scene: bpy.types.Scene, body: bpy.types.Object, ball: bpy.types.Object | None) -> bpy.types.Object:
+def create_eyes_camera(scene: bpy.types.Scene, body: bpy.types.Object, ball: bpy.types.Object
+                       | None) -> bpy.types.Object:
     """Create the camera in a player's head, or move the existing one there.
 
     Args:
@@ -158,7 +160,8 @@ def _build_rotations(gaze: np.ndarray) -> np.ndarray:
 
 def _sample_ball_keys(scene: bpy.types.Scene, ball: bpy.types.Object | None, frames: np.ndarray) -> np.ndarray | None:
     """Sample the ball's keys, (F, 3) m; None if there is no ball with keys."""
-    found = channels.collect_curves(*channels.find_playing_action(ball)) if ball is not None and channels.find_playing_action(ball)[0] else {}
+    found = channels.collect_curves(
+        *channels.find_playing_action(ball)) if ball is not None and channels.find_playing_action(ball)[0] else {}
     if not all(("location", axis) in found for axis in range(3)):
         return None
     places = [channels.sample_curve(found["location", axis], frames) for axis in range(3)]

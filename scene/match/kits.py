@@ -8,9 +8,9 @@ from dataclasses import dataclass
 import bpy
 import numpy as np
 
-from ..core.material import get_material, create_material
+from ..core.material import create_material, get_material
 from ..stage.body import COLOURS
-from . import ours
+from . import match_objects as ours
 from .load import TEAMS, Character
 
 DEFAULT_COLOURS = {"home": "#C8102E", "away": "#1D4ED8", "referee": "#15171A"}

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ...beyond_mocap.base.errors import UserCancelledError, InputError, format_seconds
+from ...beyond_mocap.base.errors import InputError, UserCancelledError, format_seconds
 from ...beyond_mocap.motion.motion import Motion
 from ...beyond_mocap.motion.track.ball_path import BallPath
 
@@ -90,7 +90,7 @@ class DisplayRequest:
 
 
 def load_section(request: DisplayRequest, library: "Library | None", progress: Callable[[float, str], None],
-            cancelled: Callable[[], bool]) -> tuple["Library", MatchSection, tuple[str, ...]]:
+                 cancelled: Callable[[], bool]) -> tuple["Library", MatchSection, tuple[str, ...]]:
     """Load a section of a match.
 
     Args:
@@ -109,19 +109,19 @@ def load_section(request: DisplayRequest, library: "Library | None", progress: C
 
     state = _read_state(request.folder)
     if library is None:
-        library = build_library(request.library, unit=request.unit, **request.build, cancelled=cancelled, progress=lambda done,
-                        text: progress(LIBRARY_SHARE * done, text))
+        library = build_library(request.library, unit=request.unit, **request.build, cancelled=cancelled,
+                                progress=lambda done, text: progress(LIBRARY_SHARE * done, text))
     start, end = _resolve_span(request, state)
     ball_file = Path(request.folder) / "ball.csv"
     ball = read_ball(ball_file) if ball_file.is_file() else None
     characters, lines = _construct_characters(request, state, library, ball=ball, span=(start, end), progress=progress,
-                            cancelled=cancelled)
+                                              cancelled=cancelled)
     if not characters:
         found = f"no player is present from {format_seconds(start)} to {format_seconds(end)} s"
         raise InputError(request.folder, found, "a time of play", *lines[:1])
     length, width = map(float, state["pitch_m"])
     section = MatchSection(start, end, length, width=width, colours=request.colours, characters=tuple(characters),
-                   ball=_cut_ball(ball, start, end))
+                           ball=_cut_ball(ball, start, end))
     return library, section, tuple(lines)
 
 
@@ -150,10 +150,11 @@ def _resolve_span(request: DisplayRequest, state: dict) -> tuple[float, float]:
     return start, end
 
 
-def _construct_characters(request, state, library, ball, span, progress, cancelled) -> tuple[list[Character], list[str]]:
+def _construct_characters(request, state, library, ball, span, progress, cancelled) -> tuple[list[Character],
+        list[str]]:
     """Construct all players who are present and finished; return them and messages about the others."""
+    from ...beyond_mocap.match.displayed_motion import construct_displayed_player
     from ...beyond_mocap.match.player_edit import read_player
-    from ...beyond_mocap.match.shown import construct_displayed_player
 
     characters, lines, last_error = [], [], None
     selected = [player for player in state["players"] if not request.players or player["id"] in request.players]
@@ -165,7 +166,9 @@ def _construct_characters(request, state, library, ball, span, progress, cancell
             lines.append(f"{player['id']} is not finished: {player.get('reason') or player.get('status')}")
             continue
         try:
-            takes = construct_displayed_player(library, read_player(Path(request.folder) / f"{player['file']}.take.npz"), ball, *span)
+            takes = construct_displayed_player(library,
+                                               read_player(Path(request.folder) / f"{player['file']}.take.npz"), ball,
+                                               *span)
         except InputError as error:  # this player's file, or the library, which then fails for all
             last_error = error
             lines.append(f"{player['id']} cannot be shown: {error}")

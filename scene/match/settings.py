@@ -11,13 +11,14 @@ from bpy.props import CollectionProperty, EnumProperty, FloatProperty, FloatVect
 from ...beyond_mocap.files.event_providers import EVENT_PROVIDERS
 from ...beyond_mocap.files.tracking.providers import PROVIDERS
 from ..core.properties import with_settings
-from .kits import DEFAULT_COLOURS, to_linear, update_materials, to_hex
+from .kits import DEFAULT_COLOURS, to_hex, to_linear, update_materials
 
 FILE = {"subtype": "FILE_PATH", "options": {"PATH_SUPPORTS_BLEND_RELATIVE"}}
 AUTO = "AUTO"
 DETECT_ITEM = (AUTO, "Automatic", "Detect the provider from the file")
 PROVIDER_ITEMS = [DETECT_ITEM, *((one.name, one.title, one.files.replace("`", "")) for one in PROVIDERS.values())]
-EVENT_PROVIDER_ITEMS = [DETECT_ITEM, *((one.name, one.title, one.files.replace("`", "")) for one in EVENT_PROVIDERS.values())]
+EVENT_PROVIDER_ITEMS = [DETECT_ITEM, *((one.name, one.title, one.files.replace("`", ""))
+                                       for one in EVENT_PROVIDERS.values())]
 COLOUR = {"subtype": "COLOR", "size": 3, "min": 0.0, "max": 1.0}
 TEAM_ITEMS = (("home", "Home", "The home team"), ("away", "Away", "The away team"), ("referee", "Referee", "Referees"))
 FIRST_SECONDS = 60.0
@@ -56,19 +57,20 @@ class BeyondMocapMatch(bpy.types.PropertyGroup):
         name="Events Metadata", description="Lineups or metadata of the events; empty: a matching file beside them",
         **FILE,
     )
-    events_provider: EnumProperty(name="Events Provider", items=EVENT_PROVIDER_ITEMS, description="Format of the events")
+    events_provider: EnumProperty(name="Events Provider", items=EVENT_PROVIDER_ITEMS,
+                                  description="Format of the events")
     provider: EnumProperty(name="Provider", items=PROVIDER_ITEMS, description="Format of the files")
     folder: StringProperty(
         name="Folder", subtype="DIR_PATH", options={"PATH_SUPPORTS_BLEND_RELATIVE"},
         description="Where results are stored, some megabytes per match; empty: a folder per selection "
         "beside the saved file or the tracking file",
     )
-    home_colour: FloatVectorProperty(name="Home Shirts", default=to_linear(DEFAULT_COLOURS["home"]), update=update_colours,
-                                     description="Colour of the home team's shirts", **COLOUR)
-    away_colour: FloatVectorProperty(name="Away Shirts", default=to_linear(DEFAULT_COLOURS["away"]), update=update_colours,
-                                     description="Colour of the away team's shirts", **COLOUR)
-    referee_colour: FloatVectorProperty(name="Referees", default=to_linear(DEFAULT_COLOURS["referee"]), update=update_colours,
-                                        description="Colour of the referees' shirts", **COLOUR)
+    home_colour: FloatVectorProperty(name="Home Shirts", default=to_linear(DEFAULT_COLOURS["home"]),
+                                     update=update_colours, description="Colour of the home team's shirts", **COLOUR)
+    away_colour: FloatVectorProperty(name="Away Shirts", default=to_linear(DEFAULT_COLOURS["away"]),
+                                     update=update_colours, description="Colour of the away team's shirts", **COLOUR)
+    referee_colour: FloatVectorProperty(name="Referees", default=to_linear(DEFAULT_COLOURS["referee"]),
+                                        update=update_colours, description="Colour of the referees' shirts", **COLOUR)
     players: CollectionProperty(type=BeyondMocapMatchPlayer, description="Players of the match")
     active: IntProperty(name="Player", min=0, description="Active player in the list")
     read_of: StringProperty(options={"HIDDEN"}, description="Tracking file the list was read from")

@@ -17,8 +17,9 @@ from ..core import action, channels
 from ..core.measure import frames_per_second, units_per_metre
 from ..result import bake
 from ..stage import ball, stage
-from . import cameras, ours
-from .bodies import CharacterBuilder
+from . import cameras
+from . import match_objects as ours
+from .characters import CharacterBuilder
 from .load import Character, MatchSection
 
 VISIBILITY_GROUP = "Shown"  # group of curves
@@ -49,7 +50,8 @@ def show_match(context: bpy.types.Context, section: MatchSection, first: int) ->
             bake_ball(context, section.ball, section.start, first, last)
     with _measure_seconds(durations, "cameras"):
         frames, size = np.arange(first, last + 1), (section.length, section.width)
-        camera = cameras.create_broadcast_camera(scene, size, frames, _compute_camera_targets(scene, section, frames, first))
+        camera = cameras.create_broadcast_camera(scene, size, frames, _compute_camera_targets(scene, section, frames,
+                first))
     if scene.camera is None:  # none, or one that has just been removed
         scene.camera = camera
     bake.extend_scene(scene, last)
@@ -66,8 +68,8 @@ def compute_frame(scene: bpy.types.Scene, start: float, first: int, seconds: flo
     return first + (seconds - start) * frames_per_second(scene)
 
 
-def bake_character(scene: bpy.types.Scene, character: Character, objects: list[bpy.types.Object], start: float, first: int,
-                last: int) -> None:
+def bake_character(scene: bpy.types.Scene, character: Character, objects: list[bpy.types.Object], start: float,
+                   first: int, last: int) -> None:
     """Bake a character's motion to its armature, and hide its objects outside its stretches.
 
     Args:
@@ -118,7 +120,8 @@ def bake_ball(context: bpy.types.Context, path: BallPath, start: float, first: i
     """
     scene, home = context.scene, ours.create_collection(context.scene, "ball")
     thing = ours.mark_object(ball.create_ball(context, "Match ball", home))
-    ours.mark_object(ball.write_trajectory(thing, path, scene, compute_frame(scene, start, first, float(path.times[0]))))
+    ours.mark_object(ball.write_trajectory(thing, path, scene,
+                                           compute_frame(scene, start, first, float(path.times[0]))))
     home.objects.link(ours.mark_object(_create_trajectory_curve(scene, path)))
     return thing
 
@@ -145,10 +148,12 @@ def _create_pitch(scene: bpy.types.Scene, section: MatchSection) -> None:
 def _create_characters(context: bpy.types.Context, section: MatchSection):
     """Create all characters with their objects."""
     wardrobe = CharacterBuilder(context, section.colours)
-    return [(person, wardrobe.create_character(person, ours.create_collection(context.scene, person.team))) for person in section.characters]
+    return [(person, wardrobe.create_character(person, ours.create_collection(context.scene, person.team)))
+            for person in section.characters]
 
 
-def _compute_camera_targets(scene: bpy.types.Scene, section: MatchSection, frames: np.ndarray, first: int) -> np.ndarray:
+def _compute_camera_targets(scene: bpy.types.Scene, section: MatchSection, frames: np.ndarray,
+                            first: int) -> np.ndarray:
     """Compute what the stand's camera follows, (F, 2) m: the ball, or the mean position of all players."""
     seconds = section.start + (frames - first) / frames_per_second(scene)
     if section.ball is not None:

@@ -16,10 +16,10 @@ from mathutils import Matrix
 from ..ball import shots
 from ..ball.settings import list_aimed_balls
 from ..core.measure import frames_per_second, units_per_metre
-from ..passes import make
+from ..passes import generate as make
 from . import colours, shapes
-from .prepare import Mesh, build_line_mesh, build_uniform_mesh, build_segments_mesh
-from .rides import DrawItem
+from .path_overlays import DrawItem
+from .prepare import Mesh, build_line_mesh, build_segments_mesh, build_uniform_mesh
 
 if TYPE_CHECKING:
     from ..ball.shots import SolvedShot
@@ -34,7 +34,8 @@ STEP = 0.02  # s
 def list_items(scene: bpy.types.Scene) -> list[DrawItem]:
     """List everything to draw at the current frame."""
     world, rally = Matrix.Scale(units_per_metre(scene), 4), find_rally(scene)
-    found = [DrawItem((solved, "shot"), lambda solved=solved: build_shot_meshes(solved), world) for solved in list_shots(scene)]
+    found = [DrawItem((solved, "shot"), lambda solved=solved: build_shot_meshes(solved), world)
+             for solved in list_shots(scene)]
     if rally is not None:
         now = rally.flight_at((scene.frame_current_final - rally.start) / frames_per_second(scene))
         found += [DrawItem((rally, "all"), lambda: build_rally_meshes(rally), world),
@@ -52,7 +53,8 @@ def list_shots(scene: bpy.types.Scene) -> list["SolvedShot"]:
     view = scene.beyond_mocap.view
     if not view.show or not view.shots or not shots.has_solved_shots():
         return []
-    found = [shots.find_solved(ball) for ball in list_aimed_balls(scene) if ball.visible_get() and not ball.beyond_mocap_aim.handed]
+    found = [shots.find_solved(ball) for ball in list_aimed_balls(scene) if ball.visible_get()
+             and not ball.beyond_mocap_aim.handed]
     return [solved for solved in found if solved is not None]
 
 
@@ -67,10 +69,12 @@ def build_shot_meshes(solved: "SolvedShot") -> list[Mesh]:
     shot, strikes, flight = solved.shot, solved.strikes, solved.flight
     end = flight.rests_from if flight.rests_from is not None else flight.end
     arrives = shot.seconds
-    found = [_build_candidates(solved.candidate_trajectories[:: max(1, -(-len(solved.candidate_trajectories) // MOST))])]
+    found = [_build_candidates(solved.candidate_trajectories[:: max(1,
+                                                                    -(-len(solved.candidate_trajectories) // MOST))])]
     found.append(build_line_mesh(flight.at(_sample_times(0.0, arrives, flight.bounces)), colours.WHITE, WIDE))
     if end > arrives:
-        found.append(build_line_mesh(flight.at(_sample_times(arrives, end, flight.bounces)), colours.VERMILION, THIN, 0.9))
+        found.append(build_line_mesh(flight.at(_sample_times(arrives, end, flight.bounces)), colours.VERMILION, THIN,
+                                     0.9))
     middle = 0.5 * (strikes.start + strikes.end)
     found.append(build_segments_mesh(middle, middle + SPEED * strikes.velocity, colours.SKY, THIN, 0.9))
     found.append(_build_points(shot.starts, colours.SKY))

@@ -18,7 +18,8 @@ from mathutils import Matrix, Vector
 from ..core import window
 from ..core.live import Watcher
 from ..core.settings import find_active_player
-from . import ball_paths, colours, rides, shapes, store
+from . import ball_paths, colours, shapes, store
+from . import path_overlays as rides
 from .prepare import Mesh, PreparedTake
 
 BIAS = 1e-5
@@ -171,7 +172,8 @@ def _draw_overlay(context, view, name: str, shown: DrawnTake) -> None:
         _draw_contacts(shown)
     elif name == "ghosts":
         for frame in _ghost_frames(view, shown):
-            _draw_batches(context, _build_batches((shown.take, "ghost", frame), lambda: [_build_figure(shown.prepared, frame)]))
+            _draw_batches(context, _build_batches((shown.take, "ghost", frame),
+                                                  lambda: [_build_figure(shown.prepared, frame)]))
     else:
         _draw_batches(context, _build_batches((shown.take, name), lambda: shown.prepared.meshes.get(name, ())))
 
@@ -238,7 +240,8 @@ def _draw_texts():
     """Draw all texts of the view and the legend."""
     context = bpy.context
     found, over = _list_takes(context), context.space_data.overlay.show_overlays
-    has_paths, has_balls = over and rides.list_visible_edits(context.scene), over and ball_paths.has_items(context.scene)
+    has_paths, has_balls = over and rides.list_visible_edits(context.scene), over and ball_paths.has_items(
+        context.scene)
     if not found and not has_paths and not has_balls:
         return
     view = context.scene.beyond_mocap.view
@@ -250,7 +253,8 @@ def _draw_texts():
                 _draw_labels(context, view, shown)
             if "seams" in on:
                 _draw_reasons(context, view, shown)
-        draw_legend(context, [*(on if found else ()), *(["rides"] if has_paths else ()), *(["shots"] if has_balls else ())])
+        draw_legend(context, [*(on if found else ()), *(["rides"] if has_paths else ()),
+                              *(["shots"] if has_balls else ())])
     finally:
         gpu.state.blend_set("NONE")
 
@@ -332,16 +336,18 @@ def _draw_line(x: float, y: float, text: str, size: float) -> None:
     blf.draw(FONT, text)
 
 
-WATCHER = Watcher(name="Drawing of overlays", ends=clear_batches, draws=((bpy.types.SpaceView3D, _draw_shapes, "POST_VIEW"),
-                                                                (bpy.types.SpaceView3D, _draw_texts, "POST_PIXEL")))
+WATCHER = Watcher(name="Drawing of overlays", ends=clear_batches,
+                  draws=((bpy.types.SpaceView3D, _draw_shapes, "POST_VIEW"),
+                         (bpy.types.SpaceView3D, _draw_texts, "POST_PIXEL")))
 ROWS = {
     "track": _build_scale_row("Distance to track", colours.ROOT_STOPS, 100.0, "cm"),
     "footprints": _build_scale_row("Foot slide", colours.SLIDE_STOPS, 1000.0, "mm"),
-    "speed": _build_key_row(("track speed", colours.TRACK_SPEED), ("body speed", colours.BODY_SPEED), ("1 m high: 5 m/s", colours.GREY)),
-    "contacts": _build_key_row(("left", colours.LEFT), ("right", colours.RIGHT)),
+    "speed": _build_key_row(("track speed", colours.TRACK_SPEED), ("body speed", colours.BODY_SPEED),
+                            ("1 m high: 5 m/s", colours.GREY)), "contacts": _build_key_row(("left", colours.LEFT),
+                                                                                           ("right", colours.RIGHT)),
     "rides": _build_key_row(("original", colours.SKY), ("new path", colours.ORANGE), ("tick: 1 s", colours.GREY)),
     "shots": _build_key_row(("ball trajectory", colours.WHITE), ("other candidates", colours.BLACK),
-                   ("after the target", colours.VERMILION), ("striking part", colours.SKY),
-                   ("strike", colours.STRIKE), ("bounce", colours.ORANGE)),
+                            ("after the target", colours.VERMILION), ("striking part", colours.SKY),
+                            ("strike", colours.STRIKE), ("bounce", colours.ORANGE)),
     "moments": _build_key_row(("strike point", colours.STRIKE), ("ball", colours.BALL), ("gap", colours.GAP)),
 }

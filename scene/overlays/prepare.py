@@ -13,7 +13,7 @@ if TYPE_CHECKING:  # the core's modules are slow to import, and enabling the ext
     from ...beyond_mocap.evaluation.per_frame import Footprint, PerFrame, Strike
     from ...beyond_mocap.library.library import Library
     from ...beyond_mocap.synthesis.plan import Plan
-    from ...beyond_mocap.synthesis.search.why import ChoiceReason
+    from ...beyond_mocap.synthesis.search.explanation import ChoiceReason
     from ...beyond_mocap.synthesis.take import Take
 
 RAIL, SOLE, SOLE_EDGE, TRANSITION = 0.020, 0.024, 0.027, 0.030  # metres above the ground, each above the one before
@@ -143,9 +143,9 @@ def prepare_take(plan: "Plan", take: "Take", library: "Library | None") -> Prepa
     Returns:
         Meshes and texts.
     """
-    from ...beyond_mocap.evaluation.per_frame import find_footprints, measure_per_frame, find_strikes
+    from ...beyond_mocap.evaluation.per_frame import find_footprints, find_strikes, measure_per_frame
     from ...beyond_mocap.evaluation.reference import View
-    from ...beyond_mocap.synthesis.quality.played import playback_from_take
+    from ...beyond_mocap.synthesis.quality.playback import playback_from_take
 
     view = View(playback_from_take(take), plan.track, take.timeline, library)
     figures, strike_list = measure_per_frame(view), find_strikes(view)
@@ -159,12 +159,13 @@ def prepare_take(plan: "Plan", take: "Take", library: "Library | None") -> Prepa
               "moments": _build_moments(strike_list, take),
               "speed": _build_speed(ground, figures)}
     return PreparedTake(start=float(take.start_time), fps=float(take.motion.fps), count=len(take.motion),
-                    meshes={name: found for name, found in meshes.items() if found},
-                    pelvis=positions[:, view.played.body.hips], toes=view.played.feet[:, :, 1].astype(np.float32),
-                    contacts=view.played.contacts, figures=positions, pairs=pairs,
-                    pair_colours=_build_pair_colours(skeleton.names, pairs), transitions=tuple(int(seam) for seam in take.seams),
-                    pieces=_build_pieces(plan, take, library, view.played.pelvis),
-                    labels=tuple(_build_label(strike) for strike in strike_list))
+                        meshes={name: found for name, found in meshes.items() if found},
+                        pelvis=positions[:, view.played.body.hips], toes=view.played.feet[:, :, 1].astype(np.float32),
+                        contacts=view.played.contacts, figures=positions, pairs=pairs,
+                        pair_colours=_build_pair_colours(skeleton.names, pairs),
+                        transitions=tuple(int(seam) for seam in take.seams),
+                        pieces=_build_pieces(plan, take, library, view.played.pelvis),
+                        labels=tuple(_build_label(strike) for strike in strike_list))
 
 
 def _build_track(figures: "PerFrame") -> tuple[Mesh, ...]:
@@ -267,7 +268,7 @@ def _iter_pieces(plan: "Plan", take: "Take", library: "Library | None"):
 
 def _explain_pieces(plan: "Plan", take: "Take", library: "Library") -> list["ChoiceReason"]:
     from ...beyond_mocap.synthesis.resolve_plan import resolve_plan
-    from ...beyond_mocap.synthesis.search.why import explain_choices
+    from ...beyond_mocap.synthesis.search.explanation import explain_choices
 
     return explain_choices(library, resolve_plan(plan, library, trajectory=take.solved), take.edit)
 
@@ -285,14 +286,16 @@ def describe_reason(reason: "ChoiceReason", name: str) -> tuple[str, ...]:
 
     lines = [name, f"frames {reason.clip_range[0]:.0f} to {reason.clip_range[1]:.0f}, played at {reason.rate:.2f} x"]
     lines.append(
-        f"cost {reason.cost:.2f}" + (f", {sum(reason.cut_costs.values()):.2f} of it for the cut" if reason.cut_costs else "")
+        f"cost {reason.cost:.2f}" + (f", {sum(reason.cut_costs.values()):.2f} of it for the cut" if reason.cut_costs
+                                     else "")
     )
     both = {part: reason.costs.get(part, 0.0) + reason.cut_costs.get(part, 0.0) for part in TERMS}
     costliest = sorted((p for p in both.items() if abs(p[1]) >= 0.005), key=lambda part: -abs(part[1]))[:MOST_PARTS]
     lines += [f"{value:.2f}  {TERMS[part]}" for part, value in costliest]
     if reason.others:
         lines.append("next candidates:")
-        lines += [f"{other.extra_cost:+.2f}  {shorten_clip_name(other.path, other.mirrored)}" for other in reason.others]
+        lines += [f"{other.extra_cost:+.2f}  {shorten_clip_name(other.path, other.mirrored)}"
+                  for other in reason.others]
     return tuple(lines)
 
 

@@ -104,13 +104,15 @@ def _frame_changed(scene) -> None:
 def _list_missing(scene: bpy.types.Scene) -> list[tuple]:
     """List (name, plan, take, library) of takes to show that are not prepared."""
     settings = scene.beyond_mocap
-    players = [*list_shown_players(settings), *filter(None, [find_active_row(settings.players, settings.active_player)])]
+    players = [*list_shown_players(settings),
+               *filter(None, [find_active_row(settings.players, settings.active_player)])]
     names = dict.fromkeys(player.take for player in players if player.take)
     missing = []
     for name in names:
         session_take = session.find_take(name)
         if name not in _prepared and name not in _refused and session_take is not None:
-            library = session.find_library(session_take.plan.find_library, settings.library_unit or None) if session_take.plan.find_library else None
+            library = session.find_library(session_take.plan.find_library, settings.library_unit
+                                           or None) if session_take.plan.find_library else None
             missing.append((name, session_take.plan, session_take.take, library))
     return missing
 

@@ -13,7 +13,7 @@ import bpy
 from ...beyond_mocap.base.errors import BeyondMocapError
 from ..core import background, window
 from ..core.live import Watcher, is_playing
-from . import make
+from . import generate as make
 from .settings import PLAYED
 
 KIND = "flights"
@@ -101,5 +101,5 @@ def clear_updates() -> None:
     make.clear_trajectories()
 
 
-WATCHER = Watcher(name="Passing scene", changed=mark_edit, settle=settle_edit, dragged=_update_drag, loaded=make.clear_trajectories,
-                  ends=clear_updates)
+WATCHER = Watcher(name="Passing scene", changed=mark_edit, settle=settle_edit, dragged=_update_drag,
+                  loaded=make.clear_trajectories, ends=clear_updates)

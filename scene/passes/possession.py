@@ -23,8 +23,8 @@ from ...beyond_mocap.base.errors import InputError
 from ...beyond_mocap.motion.humanoid import identify_joints
 from ..core import channels
 from ..core.measure import frames_per_second, units_per_metre
-from ..core.set_aside import restore_playback, save_playback
-from ..path_editing.rig_look import create_private_scene, find_rotation_channel, to_rotations
+from ..core.saved_state import restore_playback, save_playback
+from ..path_editing.rig_sampling import create_private_scene, find_rotation_channel, to_rotations
 from ..result.result import BeyondMocapBefore
 from ..rigs import armature
 from .settings import KEPT, BeyondMocapHold
@@ -117,14 +117,15 @@ def rebuild_action(scene: bpy.types.Scene, ball: bpy.types.Object) -> None:
 
     Stretches whose armature, bone or constraint no longer exists are ignored; at least one is left.
     """
-    holds = sorted((hold for hold in ball.beyond_mocap_ball.holds if _is_valid_hold(ball, hold)), key=lambda hold: hold.first)
+    holds = sorted((hold for hold in ball.beyond_mocap_ball.holds if _is_valid_hold(ball, hold)),
+                   key=lambda hold: hold.first)
     frames, own_places, ends = sample_own_path(scene, ball, holds)
     own, releases = list(own_places), []
     for hold in holds:
         a, b = hold.first - frames[0], hold.last - frames[0]
         bones = _sample_bone(scene, hold)
         carried = _compute_carried(scene, hold, bones, start=own[a],
-                        end=own[b] if ends is not None and ends[1] > hold.last else None, ball=ball)
+                                   end=own[b] if ends is not None and ends[1] > hold.last else None, ball=ball)
         # the constraint's inverse is that of the bone on the first frame, so there is no jump there
         inverse = bones[0]
         ball.constraints[hold.name].inverse_matrix = inverse.inverted()
@@ -183,7 +184,8 @@ def sample_places(curves: dict, stance: list, frames: np.ndarray) -> list[Matrix
     """Sample the ball's matrix on frames (F,), units, from its curves and its transform without them."""
     mode, paths = stance[0], ("location", "rotation_quaternion", "rotation_euler", "rotation_axis_angle")
     still = dict(zip(paths, stance[1:]))
-    places, rotations = (sample_property(curves, path, frames, still[path]) for path in ("location", find_rotation_channel(mode)))
+    places, rotations = (sample_property(curves, path, frames, still[path])
+                         for path in ("location", find_rotation_channel(mode)))
     return [Matrix.LocRotScale(place, Quaternion(to_rotations(mode, turn[None])[0]), None)
             for place, turn in zip(places, rotations)]
 

@@ -12,12 +12,14 @@ import numpy as np
 from ...beyond_mocap.ball.tracked.kinds import TOUCH_KINDS
 from ...beyond_mocap.base.errors import InputError
 from ..core import channels
-from ..core.measure import frames_per_second, build_scene_clock
-from ..core.settings import BeyondMocapPlayer, to_absolute_path, find_active_player
+from ..core.measure import build_scene_clock, frames_per_second
+from ..core.settings import BeyondMocapPlayer, find_active_player, to_absolute_path
 from ..player import dots, tracks
 from ..result import bake
 from ..stage import ball
-from ..timeline import lanes, lay_strips, strips
+from ..timeline import label_tracks as lanes
+from ..timeline import strip_writing as lay_strips
+from ..timeline import strips
 from ..timeline.strip_lines import parse_labels
 from . import possession
 from .settings import KEPT
@@ -157,7 +159,8 @@ def accept_touches(context: bpy.types.Context, only: str = "") -> tuple[int, lis
         if line:
             messages.append(line)
             continue
-        lay_strips.add_moment(player.dot, parse_labels(touch.words, round(touch.time, 3)), build_scene_clock(context.scene))
+        lay_strips.add_moment(player.dot, parse_labels(touch.words, round(touch.time, 3)),
+                              build_scene_clock(context.scene))
         touch.use = False
         count += 1
     return count, messages

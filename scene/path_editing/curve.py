@@ -65,7 +65,7 @@ class DrawnCurve:
 
     def sample_line(self) -> np.ndarray:
         """Sample the curve: places (N, 3) m, dense where it bends."""
-        from ...beyond_mocap.motion.track.drawn import sample_nurbs
+        from ...beyond_mocap.motion.track.line_track import sample_nurbs
 
         points = self.points
         if self.kind == "BEZIER":
@@ -119,7 +119,7 @@ def read_curve(scene: bpy.types.Scene, drawn: bpy.types.Object | None) -> DrawnC
     order = spline.order_u if kind == "NURBS" else 0
     static_bytes = points.tobytes() + repr(units).encode() if animated else values.tobytes()
     return DrawnCurve(drawn.name, kind, values, order=order, clamped=spline.use_endpoint_u, closed=spline.use_cyclic_u,
-                 static_bytes=static_bytes, notes=tuple(notes))
+                      static_bytes=static_bytes, notes=tuple(notes))
 
 
 def create_curve(
@@ -327,7 +327,8 @@ def _fit_bezier_chain(path: Path) -> tuple[np.ndarray, tuple[np.ndarray, np.ndar
     third = np.diff(nodes)[:, None] / 3.0
     before, after = np.concatenate([third[:1], third]), np.concatenate([third, third[-1:]])
     if path.closed:  # the first point is the last one too
-        return places[:-1], ((places - tangents * np.concatenate([third[-1:], third]))[:-1], (places + tangents * after)[:-1])
+        return places[:-1], ((places - tangents * np.concatenate([third[-1:], third]))[:-1],
+                             (places + tangents * after)[:-1])
     return places, (places - tangents * before, places + tangents * after)
 
 

@@ -84,7 +84,8 @@ class ActionPair:
     @classmethod
     def from_actions(cls, action, slot, original, original_slot) -> ActionPair:
         """Build the sheet of two actions and their slots."""
-        return cls(action, slot, channels.collect_curves(action, slot), channels.collect_curves(original, original_slot))
+        return cls(action, slot, channels.collect_curves(action, slot),
+                   channels.collect_curves(original, original_slot))
 
     def has_added(self, path: str) -> bool:
         """Return whether a property has curves here that the original does not have."""
@@ -120,7 +121,8 @@ def write_channels(sheet: ActionPair, first: int, targets: dict[Place, np.ndarra
     known.written, known.first, known.digest = targets, first, digest
 
 
-def sample_channels(sheet: ActionPair, places: list[Place], whole: np.ndarray, frames: np.ndarray) -> dict[Place, np.ndarray]:
+def sample_channels(sheet: ActionPair, places: list[Place], whole: np.ndarray, frames: np.ndarray) -> dict[Place,
+        np.ndarray]:
     """Sample the original's channels at fractional frames; channels with whole numbers only, such as switches, stay
     stepped.
 

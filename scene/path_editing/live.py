@@ -20,8 +20,8 @@ from ...beyond_mocap.base.errors import BeyondMocapError
 from ..core import background
 from ..core.live import Watcher, call_or_describe
 from . import curve
-from . import riders as rides
-from .carrier import invalidate_sources
+from . import edited_bodies as rides
+from .armature_adapter import invalidate_sources
 from .settings import list_edited_bodies
 
 MATTERS = (bpy.types.Object, bpy.types.Curve, bpy.types.Mesh, bpy.types.Armature, bpy.types.Action, bpy.types.Scene)
@@ -41,7 +41,8 @@ def update_all(scene: bpy.types.Scene) -> int:
         if not body.beyond_mocap_ride.live or body.mode == "EDIT" or body.library is not None:
             continue
         failed = f"{body.name}: the motion cannot be computed"
-        count += bool(call_or_describe(lambda: rides.update_motion(scene, body), partial(rides.store_messages, body.beyond_mocap_ride), failed))
+        count += bool(call_or_describe(lambda: rides.update_motion(scene, body),
+                                       partial(rides.store_messages, body.beyond_mocap_ride), failed))
     return count
 
 
@@ -53,7 +54,7 @@ def measure_body(scene: bpy.types.Scene, body: bpy.types.Object) -> None:
 
 
 def _measure_edit(computed, ground) -> dict:
-    from ...beyond_mocap.path_editing.path_ride import measure_path_edit
+    from ...beyond_mocap.path_editing.path_metrics import measure_path_edit
 
     return measure_path_edit(computed.source, computed.edited, computed.path, ground)
 
@@ -75,7 +76,8 @@ def _run_timer() -> float:
         return LOOK
     if _running:
         return _collect_result()
-    window, waiting = next(((window, body) for window, body in _list_visible_bodies() if _is_waiting(body)), (None, None))
+    window, waiting = next(((window, body) for window, body in _list_visible_bodies() if _is_waiting(body)),
+                           (None, None))
     if waiting is None:
         return LOOK
     computed = rides.find_computed_edit(waiting)
@@ -85,13 +87,15 @@ def _run_timer() -> float:
     except BeyondMocapError:  # reported where the body is updated
         _failed[waiting.session_uid] = computed.number
         return LOOK
-    _running.append((background.Job(KIND, lambda *_: _measure_edit(computed, ground)), waiting.session_uid, computed.number))
+    _running.append((background.Job(KIND, lambda *_: _measure_edit(computed, ground)), waiting.session_uid,
+                     computed.number))
     return WAIT
 
 
 def _list_visible_bodies() -> list[tuple[bpy.types.Window, bpy.types.Object]]:
     """List the edited bodies of the scenes of all windows."""
-    return [(window, body) for window in bpy.context.window_manager.windows for body in list_edited_bodies(window.scene)]
+    return [(window, body) for window in bpy.context.window_manager.windows
+            for body in list_edited_bodies(window.scene)]
 
 
 def _is_waiting(body: bpy.types.Object) -> bool:

@@ -17,8 +17,8 @@ from ...beyond_mocap.motion import quaternion
 from ...beyond_mocap.motion.motion import Motion, compute_pose
 from ...beyond_mocap.motion.skeleton import Skeleton
 from ..rigs import bone_maps
-from ..rigs.driven import list_followers, compute_upright_rotation
-from .rig_look import RigSamples
+from ..rigs.driven import compute_upright_rotation, list_followers
+from .rig_sampling import RigSamples
 
 _SAME, _ALONG = 0.01, 0.94  # of the rig's size; cosine
 _STRETCH, _OFF = 1e-3, 3e-4  # metres
@@ -121,7 +121,8 @@ def _is_upright(rig: bpy.types.Object, visible_bones: dict[str, str]) -> bool:
 
 def compute_rig_upright(rig: bpy.types.Object, visible_bones: dict[str, str]) -> np.ndarray:
     """Compute the rotation (4,), by quarter turns, that makes the armature's space upright along Z and facing +X."""
-    return compute_upright_rotation({part: np.array(rig.data.bones[bone].head_local) for part, bone in visible_bones.items()})
+    return compute_upright_rotation({part: np.array(rig.data.bones[bone].head_local) for part,
+                                     bone in visible_bones.items()})
 
 
 def build_motion(rig: bpy.types.Object, parts: RigParts, samples: RigSamples, units: float, fps: float) -> Motion:
@@ -136,7 +137,9 @@ def build_motion(rig: bpy.types.Object, parts: RigParts, samples: RigSamples, un
     Returns:
         The motion in metres, world frame, with the core's joint names.
     """
-    places, rotations_now = compute_world_places(samples, [samples.find_bone(bone) for bone in parts.visible_bones.values()], units)
+    places, rotations_now = compute_world_places(samples,
+                                                 [samples.find_bone(bone) for bone in parts.visible_bones.values()],
+                                                 units)
     rest = np.array([rig.data.bones[bone].matrix_local.to_3x3() for bone in parts.visible_bones.values()])
     upright_rotation = compute_rig_upright(rig, parts.visible_bones) if parts.humanoid else quaternion.identity()
     rest = quaternion.multiply(upright_rotation, quaternion.from_matrix(rest))
@@ -216,7 +219,8 @@ def _find_tips(rig, parts: RigParts, parents: list[int], rest: np.ndarray, sampl
         tip = quaternion.rotate(rest[joint], [0.0, rig.data.bones[bone].length * size, 0.0])
         toward = np.array([0.0, 0.0, 1.0]) if kind == "head" else np.array([1.0, 0.0, 0.0])
         if kind == "hand":
-            heads = [np.array(rig.data.bones[parts.visible_bones[names[i]]].head_local) for i in (joint, parents[joint])]
+            heads = [np.array(rig.data.bones[parts.visible_bones[names[i]]].head_local)
+                     for i in (joint, parents[joint])]
             toward = quaternion.rotate(compute_rig_upright(rig, parts.visible_bones), heads[0] - heads[1])
         if tip @ toward > 0.5 * np.linalg.norm(tip) * np.linalg.norm(toward) > 0.0:
             ends.append(joint)

@@ -13,11 +13,12 @@ from ..core import channels
 from ..core.measure import frames_per_second, units_per_metre
 from ..rigs import control_study
 from ..rigs.control_study import CHANNELS
-from . import rig_look, rig_parts
-from .carrier import build_no_motion_error
+from . import rig_parts
+from . import rig_sampling as rig_look
+from .armature_adapter import build_no_motion_error
 from .keys import split_channels
-from .rig_look import find_rotation_channel
-from .rig_ride import OBJECT, RigTransfer, SourceRows, to_channel_values
+from .rig_sampling import find_rotation_channel
+from .rig_transfer import OBJECT, RigTransfer, SourceRows, to_channel_values
 
 _OBJECT = {*CHANNELS, *(f"delta_{name}" for name in CHANNELS)}
 BONE = re.compile(r'^pose\.bones\["((?:[^"\\]|\\.)*)"\]\.(\w+)$')
@@ -38,19 +39,22 @@ class RigSource:
         transferred.
         """
         played = PlayedAnimation(rig, scene)
-        self.rig, self.start, self.played, self.messages = rig.name, int(played.frames[0]), played, list(played.messages)
+        self.rig, self.start, self.played, self.messages = rig.name, int(played.frames[0]), played, list(
+            played.messages)
         self.units = units_per_metre(scene)
         with rig_look.create_private_scene(rig, scene) as side:
             samples = rig_look.sample_rig(rig, side, played.frames, sorted(played.others))
-            parts = rig_parts.identify_parts(rig) or rig_parts.build_single_part(rig, samples, played.object_keyed, self.units)
+            parts = rig_parts.identify_parts(rig) or rig_parts.build_single_part(rig, samples, played.object_keyed,
+                                                                                 self.units)
             self.motion = rig_parts.build_motion(rig, parts, samples, self.units, frames_per_second(scene))
             controls = _list_controls(rig, side, parts, played)
             dependencies = control_study.find_carriers(rig, side, controls, list(parts.visible_bones.values()))
         self._rows: SourceRows | None = None
         self._parent_matrices = samples.world_matrices @ np.linalg.inv(samples.basis)
         self._has_moving_parent = bool(np.ptp(self._parent_matrices, axis=0).max() > 1e-6)
-        self.samples, self.transfer = samples, RigTransfer(rig, parts, samples, dependencies=dependencies, object_keyed=played.object_keyed,
-                                                motion=self.motion, units=self.units)
+        self.samples, self.transfer = samples, RigTransfer(rig, parts, samples, dependencies=dependencies,
+                                                           object_keyed=played.object_keyed, motion=self.motion,
+                                                           units=self.units)
 
     def compute_channels(self, edited, rig: bpy.types.Object) -> dict[tuple[str, int], np.ndarray]:
         """Compute the channel values that show an edited motion.
@@ -64,8 +68,10 @@ class RigSource:
             other frames than the source's own are displayed.
         """
         rows, above = self.build_rows(edited), self._compute_parent_matrices(len(edited.motion), rig)
-        moves = self.transfer.compute_group_motions(edited.motion, edited.rigid, rows, above @ rows.sample_numbers("basis", self.samples.basis))
-        found = {} if rows.same and not self.played.is_layered else {p: self.sample_channel(*p, rows) for p in self.played.places}
+        moves = self.transfer.compute_group_motions(edited.motion, edited.rigid, rows,
+                                                    above @ rows.sample_numbers("basis", self.samples.basis))
+        found = {} if rows.same and not self.played.is_layered else {p: self.sample_channel(*p, rows)
+                                                                     for p in self.played.places}
         for (bone, what), values in self.transfer.compute_changes(moves, rows).items():
             number = self.samples.find_bone(bone)
             mode = self.samples.modes[number]
@@ -109,10 +115,12 @@ class RigSource:
         if count > len(self._parent_matrices):
             with rig_look.create_private_scene(rig, bpy.context.scene) as side:
                 more = rig_look.sample_rig(rig, side, self.start + np.arange(len(self._parent_matrices), count))
-            self._parent_matrices = np.concatenate([self._parent_matrices, more.world_matrices @ np.linalg.inv(more.basis)])
+            self._parent_matrices = np.concatenate([self._parent_matrices, more.world_matrices
+                                                    @ np.linalg.inv(more.basis)])
         return self._parent_matrices[:count]
 
-    def _compute_object_channels(self, moves, rows: SourceRows, above: np.ndarray, rig: bpy.types.Object) -> dict[tuple[str, int], np.ndarray]:
+    def _compute_object_channels(self, moves, rows: SourceRows, above: np.ndarray,
+                                 rig: bpy.types.Object) -> dict[tuple[str, int], np.ndarray]:
         """Compute the object's own location and rotation channels where the object itself travels."""
         now = rows.sample_numbers("lies", self.samples.world_matrices).copy()
         now[:, :3, :3] = quaternion.to_matrix(moves.rotation[OBJECT]) @ now[:, :3, :3]
@@ -122,10 +130,13 @@ class RigSource:
         delta = quaternion.from_matrix(np.array(
             rig.delta_rotation_quaternion.to_matrix() if mode == "QUATERNION"
             else rig.delta_rotation_euler.to_matrix()))
-        rotations = quaternion.unify_signs(quaternion.multiply(quaternion.inverse(delta), rig_parts.to_rotations(basis)))
-        table = self.samples.others.get(find_rotation_channel(mode), np.array([list(getattr(rig, find_rotation_channel(mode)))]))
+        rotations = quaternion.unify_signs(quaternion.multiply(quaternion.inverse(delta),
+                                                               rig_parts.to_rotations(basis)))
+        table = self.samples.others.get(find_rotation_channel(mode),
+                                        np.array([list(getattr(rig, find_rotation_channel(mode)))]))
         location = basis[:, :3, 3] - np.array(rig.delta_location)
-        return split_channels("location", location) | split_channels(find_rotation_channel(mode), to_channel_values(mode, rotations, table[0]))
+        return split_channels("location", location) | split_channels(find_rotation_channel(mode),
+                                                                     to_channel_values(mode, rotations, table[0]))
 
 
 class PlayedAnimation:
@@ -227,7 +238,8 @@ def _list_controls(rig: bpy.types.Object, side: bpy.types.Scene, parts, played: 
     if not played.switches:
         shown = [bone.name for bone in rig.data.bones if bone.use_deform] or list(rig.data.bones.keys())
         unkeyed = [name for name in names if name not in played.bones]
-        still_bones = {name for name, moves in zip(unkeyed, control_study.list_moving(rig, side, unkeyed, shown)) if not moves}
+        still_bones = {name for name, moves in zip(unkeyed, control_study.list_moving(rig, side, unkeyed, shown))
+                       if not moves}
         names = [name for name in names if name not in still_bones]
     return sorted(names, key=lambda name: len(rig.data.bones[name].parent_recursive))
 

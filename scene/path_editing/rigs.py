@@ -18,12 +18,12 @@ from ...beyond_mocap.base.errors import InputError
 from ..core import channels
 from ..core.action import PLACEMENT
 from ..core.measure import frames_per_second, units_per_metre
-from ..core.set_aside import restore_nla, save_playback, read_stance, apply_stance
+from ..core.saved_state import apply_stance, read_stance, restore_nla, save_playback
 from ..rigs import armature
 from ..rigs.bone_curves import is_carried
 from ..rigs.control_study import CHANNELS
 from . import keys, rig_parts
-from .carrier import MARK, ArmatureAdapter, PlainAdapter, ReadMotion, check_finite, build_no_motion_error
+from .armature_adapter import MARK, ArmatureAdapter, PlainAdapter, ReadMotion, build_no_motion_error, check_finite
 from .rig_source import BONE, RigSource, is_layered, list_playing_strips
 
 KIND = "beyond_mocap_ride_kind"
@@ -151,7 +151,7 @@ class RigAdapter(ArmatureAdapter):
             return
         data, now = body.animation_data, read_stance(body)
         saved_state = (data.action, data.action_slot, data.use_nla, data.action_influence, data.action_blend_type,
-                data.action_extrapolation)
+                       data.action_extrapolation)
         try:
             original, slot = self.find_source()
             data.action = original
@@ -177,7 +177,8 @@ def is_edited_as_rig(body: bpy.types.Object) -> bool:
     if body.beyond_mocap_ride.on:
         playing = channels.find_playing_action(body)[0]
         return playing is not None and bool(playing.get(KIND))
-    return body.type == "ARMATURE" and bool(list_playing_strips(body) or channels.find_playing_action(body)[0]) and not is_plain(body)
+    return body.type == "ARMATURE" and bool(list_playing_strips(body)
+                                            or channels.find_playing_action(body)[0]) and not is_plain(body)
 
 
 def is_plain(body: bpy.types.Object) -> bool:

@@ -57,12 +57,13 @@ class BeyondMocapRide(bpy.types.PropertyGroup):
 
 def collect_options(edit: BeyondMocapRide) -> dict:
     """Collect the settings as arguments of the core's `PathEditSettings`."""
-    from ...beyond_mocap.path_editing.ride import PathEditSettings
+    from ...beyond_mocap.path_editing.path_edit import PathEditSettings
 
     options = read_property_values(PathEditSettings, edit, "path_editing")
     options["speed"], options["delay"] = (round(options[name], 6) for name in ("speed", "delay"))  # single precision
     try:
-        options["detours"] = tuple(tuple(float(value) for value in detour) for detour in json.loads(edit.detours or "[]"))
+        options["detours"] = tuple(tuple(float(value) for value in detour)
+                                   for detour in json.loads(edit.detours or "[]"))
     except (TypeError, ValueError):
         options["detours"] = ()
     return options

@@ -16,7 +16,7 @@ from ...beyond_mocap.base.errors import InputError
 from ...beyond_mocap.base.vectors import distances_along
 from ...beyond_mocap.motion.humanoid import identify_joints
 from ...beyond_mocap.motion.track import Track
-from ...beyond_mocap.motion.track.drawn import build_line_track, build_moving_track, sample_nurbs
+from ...beyond_mocap.motion.track.line_track import build_line_track, build_moving_track, sample_nurbs
 from ..core import channels
 from ..core.live import Watcher
 from ..core.measure import build_scene_clock, units_per_metre
@@ -72,7 +72,8 @@ def read_drawn_track(scene: bpy.types.Scene, drawn: bpy.types.Object, start: flo
         line = build_line(scene, drawn)
         level = line.line[:, :2]
         distances = distances_along(level)
-        return build_line_track(level, distances[line.point_indices], line.speeds, waits=line.waits, start=start, name=f"curve {drawn.name}")
+        return build_line_track(level, distances[line.point_indices], line.speeds, waits=line.waits, start=start,
+                                name=f"curve {drawn.name}")
     if drawn.type == "CURVES":
         raise InputError(f"object {drawn.name}", "hair curves", "a curve (Add > Curve)", "convert it: Object > Convert")
     frames, places = _read_moving_object(scene, drawn, still)
@@ -173,7 +174,8 @@ def _compute_stamp(scene: bpy.types.Scene, moving: bpy.types.Object) -> tuple:
     """Compute a value that changes when an object's own keys or the frames in which it moves change."""
     action, slot = channels.find_playing_action(moving)
     keys = (
-        [channels.read_keys(curve)["co"].tobytes() for curve in channels.collect_curves(action, slot).values()] if action else []
+        [channels.read_keys(curve)["co"].tobytes() for curve in channels.collect_curves(action, slot).values()]
+        if action else []
     )
     return *_find_frame_range(scene, moving), hash(tuple(keys))
 

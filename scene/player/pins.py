@@ -45,7 +45,8 @@ def read_pins(scene: bpy.types.Scene, player) -> tuple[Pin, ...]:
     return tuple(found)
 
 
-def add_pin(context: bpy.types.Context, player, part: str, seconds: float, hold: float, place, collection) -> bpy.types.Object:
+def add_pin(context: bpy.types.Context, player, part: str, seconds: float, hold: float, place,
+            collection) -> bpy.types.Object:
     """Add a pin at `place` (3,) metres, world; returns its Empty, which is selected and active."""
     units = units_per_metre(context.scene)
     target = bpy.data.objects.new(f"{player.name} {part.replace('_', ' ')}", None)

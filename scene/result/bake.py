@@ -49,7 +49,7 @@ def write_take(context: bpy.types.Context, owner: BeyondMocapPlayer, result: Sto
         owner.body = target
     if settings.make_bodies and not any(child.type == "MESH" for child in target.children):
         body.create_character(target, owner.name, tuple(owner.shirt), collection=room, scene=scene,
-                    example=take.motion)[MARK] = True
+                              example=take.motion)[MARK] = True
     channels.remove_marked_action(target, MARK)
     start = compute_frame(scene, take.start_time)
     action.write_motion(target, take.motion, scene, start, f"{owner.name} take", generated=True)[MARK] = True

@@ -17,8 +17,9 @@ from ...beyond_mocap.synthesis.take import Take
 from ..core import channels
 from ..core.action import PLACEMENT
 from ..core.measure import frames_per_second
-from ..core.set_aside import remove_unused_action
-from . import bake, hand_keys
+from ..core.saved_state import remove_unused_action
+from . import bake
+from . import manual_keys as hand_keys
 from .bake import MARK
 
 TRACK = "Beyond Mocap"

@@ -29,7 +29,8 @@ from ...beyond_mocap.synthesis.plan import Plan
 from ..core import background, channels, session, window
 from ..core.live import Watcher, is_playing
 from ..core.settings import BeyondMocapPlayer, to_absolute_path
-from . import bake, blocks, hand_keys, plans, queue
+from . import bake, blocks, plans, queue
+from . import manual_keys as hand_keys
 
 SECONDS = 1.0  # between two checks
 LIBRARY_SECONDS = 10.0  # between two checks of the library's folder
@@ -104,7 +105,8 @@ def compute_parts(plan: Plan, folder: str, library: str = "") -> dict[str, str]:
 def compute_plan_parts(plan: Plan) -> dict[str, str]:
     """Compute the same without the library, which needs a walk over the disk."""
     rest = replace(plan, track=None, timeline=Timeline(), library="")
-    return {"track": compute_fingerprint(plan.track), "words": compute_fingerprint(plan.timeline), "choices": compute_fingerprint(rest)}
+    return {"track": compute_fingerprint(plan.track), "words": compute_fingerprint(plan.timeline),
+            "choices": compute_fingerprint(rest)}
 
 
 def compute_library_stamp(folder: str) -> str:
@@ -247,7 +249,8 @@ def _has_entry(scene: bpy.types.Scene, player: BeyondMocapPlayer) -> bool:
 def _check_files(scene: bpy.types.Scene) -> None:
     """Detect changes of tracking files, label files and the library on disk."""
     settings = scene.beyond_mocap
-    paths = {to_absolute_path(path) for player in settings.players for path in (player.tracking_file, player.annotation_file)}
+    paths = {to_absolute_path(path) for player in settings.players
+             for path in (player.tracking_file, player.annotation_file)}
     found = {path: _read_change_time(path) for path in paths if path}
     if found != _now["files"]:
         _now["files"] = found
@@ -255,7 +258,8 @@ def _check_files(scene: bpy.types.Scene) -> None:
     folder, thread = to_absolute_path(settings.library_folder), _now["thread"]
     if folder and (thread is None or not thread.is_alive()) and time.monotonic() > _now["looked"] + LIBRARY_SECONDS:
         _now["looked"] = time.monotonic()
-        _now["thread"] = threading.Thread(target=_update_stamp, args=(folder,), name="beyond-mocap library", daemon=True)
+        _now["thread"] = threading.Thread(target=_update_stamp, args=(folder,), name="beyond-mocap library",
+                                          daemon=True)
         _now["thread"].start()
 
 

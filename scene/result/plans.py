@@ -10,10 +10,11 @@ from ...beyond_mocap.motion.track import Track, clean_track
 from ...beyond_mocap.synthesis.plan import Plan
 from ..core.measure import build_scene_clock
 from ..core.properties import read_property_values
-from ..core.settings import BeyondMocapPlayer, BeyondMocapSettings, to_absolute_path, find_active_player
+from ..core.settings import BeyondMocapPlayer, BeyondMocapSettings, find_active_player, to_absolute_path
 from ..player import pins
 from ..player.tracks import read_track
-from ..timeline import lanes, strips
+from ..timeline import label_tracks as lanes
+from ..timeline import strips
 from . import blocks
 
 
@@ -26,7 +27,7 @@ def list_selected_players(settings: BeyondMocapSettings) -> list[BeyondMocapPlay
 
 
 def build_plan(settings: BeyondMocapSettings, player: BeyondMocapPlayer,
-            still: bool = False) -> tuple[Plan, tuple[str, ...]]:
+               still: bool = False) -> tuple[Plan, tuple[str, ...]]:
     """Build the plan of one player.
 
     Args:
@@ -53,7 +54,9 @@ def read_timeline(player: BeyondMocapPlayer, fps: float, track: Track) -> Timeli
 
 def describe_label_source(player: BeyondMocapPlayer) -> str:
     """Describe where the player's labels are written, for messages."""
-    return strips.describe_label_source(player) if strips.find_dot(player, player.id_data) is None else strips.describe_strips(player)
+    return strips.describe_label_source(player) if strips.find_dot(player,
+                                                                   player.id_data) is None else strips.describe_strips(
+        player)
 
 
 def find_selected_range(scene: bpy.types.Scene) -> tuple[BeyondMocapPlayer, float, float]:
@@ -90,7 +93,8 @@ def _find_label_range(player: BeyondMocapPlayer, scene: bpy.types.Scene) -> tupl
     dot = strips.find_dot(player, scene)
     if dot is None or not player.take or not dot.select_get():
         return None
-    chosen = [strip for _, strip in lanes.iter_strips(dot) if strip.select and strip.action.beyond_mocap.kind != "moments"]
+    chosen = [strip for _, strip in lanes.iter_strips(dot) if strip.select
+              and strip.action.beyond_mocap.kind != "moments"]
     if not chosen:
         return None
     return min(strip.frame_start for strip in chosen), max(strip.frame_end for strip in chosen)

@@ -12,12 +12,13 @@ import numpy as np
 from ...beyond_mocap.base.errors import InputError
 from ..core import channels, session
 from ..core.measure import build_scene_clock
-from ..core.set_aside import restore_playback, discard_saved_state, restore_nla, save_playback
+from ..core.saved_state import discard_saved_state, restore_nla, restore_playback, save_playback
 from ..core.settings import BeyondMocapPlayer
 from ..passes import possession
-from ..path_editing import riders
+from ..path_editing import edited_bodies as riders
 from ..stage import stage
-from . import bake, blocks, hand_keys, quality
+from . import bake, blocks, quality
+from . import manual_keys as hand_keys
 from .bake import MARK
 
 STEPS = ("recipe", "made_of")
@@ -43,7 +44,8 @@ def revert_path_edit(player: BeyondMocapPlayer) -> list[str]:
     return riders.revert_path_edits(player.body)
 
 
-def show_preview(context: bpy.types.Context, player: BeyondMocapPlayer, take: str, lines: dict[str, str]) -> bpy.types.Object:
+def show_preview(context: bpy.types.Context, player: BeyondMocapPlayer, take: str,
+                 lines: dict[str, str]) -> bpy.types.Object:
     """Preview a take of the session on the player's armature, created if missing; the previous state is stored.
 
     Args:
@@ -207,7 +209,8 @@ def _with_free_ball(context: bpy.types.Context, change) -> None:
 def _apply_shared_objects(context: bpy.types.Context) -> None:
     """Let ball and camera stay with applied results: that is the state to which other previews revert."""
     shared, players = context.scene.beyond_mocap.shared, context.scene.beyond_mocap.players
-    has_other_previews, takes = any(player.result.state == "PREVIEW" for player in players), _list_takes(players, "ACCEPTED")
+    has_other_previews, takes = any(player.result.state == "PREVIEW" for player in players), _list_takes(players,
+            "ACCEPTED")
     if not has_other_previews or bake.find_ball(takes, context.scene.beyond_mocap) is not None:
         discard_saved_state(shared.ball, MARK)
     discard_saved_state(shared.camera, stage.MARK)

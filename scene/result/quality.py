@@ -69,8 +69,8 @@ def describe_quality(report: Mapping) -> str:
         least, most = target.bounds(table) if target else (None, None)
         limits_text = [form.format(_scale_value(limit, factor)) for limit in (least, most) if limit is not None]
         target_text = (("≥ " if (least is not None) == (factor > 0) else "≤ ") + limits_text[0]
-               if len(limits_text) == 1
-               else " .. ".join(limits_text))
+                       if len(limits_text) == 1
+                       else " .. ".join(limits_text))
         status = "" if is_met is None else ("met" if is_met else "missed")
         lines.append("\t".join((f"{name}: {form.format(_scale_value(value, factor))}{unit}", target_text, status)))
     return "\n".join(lines)
@@ -163,7 +163,7 @@ def _compute_errors(scene: bpy.types.Scene, result: session.StoredTake) -> np.nd
     """Compute (C, T) values in the order of CURVES; 0 where unknown, since a key needs a number."""
     from ...beyond_mocap.evaluation.per_frame import measure_per_frame
     from ...beyond_mocap.evaluation.reference import View
-    from ...beyond_mocap.synthesis.quality.played import playback_from_take
+    from ...beyond_mocap.synthesis.quality.playback import playback_from_take
 
     take, unit = result.take, scene.beyond_mocap.library_unit or None
     library = session.find_library(result.plan.find_library, unit) if result.plan.find_library else None

@@ -13,7 +13,7 @@ from ...beyond_mocap.motion import quaternion
 from ...beyond_mocap.motion.motion import Motion, forward_kinematics
 from ..core.measure import frames_per_second, units_per_metre
 from ..path_editing import keys
-from ..path_editing.rig_look import find_rotation_channel
+from ..path_editing.rig_sampling import find_rotation_channel
 from . import armature, bone_maps
 from .driven import DrivenRig, compute_upright_axes
 
@@ -35,7 +35,8 @@ def compute_bone_poses(driven: DrivenRig, motion: Motion, frames: np.ndarray, ro
     hips = heads[:, driven.parts.index("hips")]
     messages = []
     if root != "KEEP":
-        root_rotation, root_place = _compute_root_path(driven, motion, heads, "straight" if root == "STRAIGHT" else "smooth")
+        root_rotation, root_place = _compute_root_path(driven, motion, heads, "straight" if root == "STRAIGHT"
+                                                       else "smooth")
     if root == "IN_PLACE":  # the root's path is removed from everything: the body stays where it started
         back = quaternion.multiply(root_rotation[:1], quaternion.inverse(root_rotation))
         world = quaternion.multiply(back[:, None], world)
@@ -48,12 +49,14 @@ def compute_bone_poses(driven: DrivenRig, motion: Motion, frames: np.ndarray, ro
 
     def to_bone_rotations(turn: np.ndarray, bone: str) -> np.ndarray:
         to_rest = quaternion.multiply(turn, driven.upright)
-        return quaternion.to_matrix(quaternion.multiply(quaternion.inverse(object_rotation), to_rest)) @ driven.rest_rotations[bone]
+        return quaternion.to_matrix(quaternion.multiply(quaternion.inverse(object_rotation),
+                                                        to_rest)) @ driven.rest_rotations[bone]
 
     def to_armature_space(points: np.ndarray) -> np.ndarray:
         return quaternion.rotate(quaternion.inverse(object_rotation), points - object_origin) / scale
 
-    rotations = {driven.bone_of(part): to_bone_rotations(world[:, i], driven.bone_of(part)) for i, part in enumerate(driven.parts)}
+    rotations = {driven.bone_of(part): to_bone_rotations(world[:, i], driven.bone_of(part)) for i,
+                 part in enumerate(driven.parts)}
     places = {driven.bone_of("hips"): to_armature_space(hips)}
     if "root" in driven.table:
         bone = driven.bone_of("root")
@@ -104,7 +107,8 @@ def _compute_heads(motion: Motion, world: np.ndarray, hips: np.ndarray) -> np.nd
     return heads
 
 
-def sample_placements(rig: bpy.types.Object, scene: bpy.types.Scene, frames: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def sample_placements(rig: bpy.types.Object, scene: bpy.types.Scene, frames: np.ndarray) -> tuple[np.ndarray,
+        np.ndarray]:
     """Sample the armature object's placement at each frame: rotations (F, 4) and origins (F, 3) metres."""
     still = armature.find_placement(rig, scene)
     if not is_carried(rig):
@@ -142,7 +146,9 @@ def build_bone_curves(rig: bpy.types.Object, basis: dict) -> dict[str, tuple[str
         if mode == "QUATERNION":
             values = -rotation if rotation[0, 0] < 0 else rotation
         else:
-            values = keys.to_rotation_channel(mode, rotation) if mode == "AXIS_ANGLE" else _compute_euler_curves(rotation, mode)
+            values = keys.to_rotation_channel(mode,
+                                              rotation) if mode == "AXIS_ANGLE" else _compute_euler_curves(rotation,
+                    mode)
         found[f"{path}.{find_rotation_channel(mode)}"] = (name, values)
     return found
 
@@ -202,7 +208,7 @@ def compute_root_motion(rig: bpy.types.Object, sampled, options, messages: list[
     facing = np.unwrap(np.arctan2(-across[:, 0], across[:, 1]))
     units, rate = units_per_metre(bpy.context.scene), options.rate or frames_per_second(bpy.context.scene)
     place, yaw = compute_root_path(legs.mean(axis=1)[:, :2] / units, facing, rate,
-                             "straight" if options.root == "STRAIGHT" else "smooth")
+                                   "straight" if options.root == "STRAIGHT" else "smooth")
     path = np.tile(np.eye(4), (len(yaw), 1, 1))
     path[:, :3, :3] = quaternion.to_matrix(quaternion.from_up_angle(yaw))
     path[:, :2, 3] = place * units

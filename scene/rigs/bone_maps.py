@@ -15,7 +15,7 @@ import numpy as np
 
 from ...beyond_mocap.base.digest import hex_digest
 from ...beyond_mocap.base.errors import InputError
-from ...beyond_mocap.files.whole import atomic_write
+from ...beyond_mocap.files.atomic import atomic_write
 from ...beyond_mocap.motion.humanoid import Humanoid, identify_joints, list_roles, split_joint_name
 from ...beyond_mocap.motion.skeleton import Skeleton
 from ..core.preferences import EXTENSION
@@ -157,7 +157,8 @@ def check_bone_map(rig: bpy.types.Object, table: dict[str, str]) -> None:
                          "choose them in the list, or press Map Bones")
     unknown = [bone for bone in table.values() if bone not in rig.data.bones]
     if unknown:
-        raise InputError(where, f"no bone {', '.join(unknown[:3])}", "bones of this armature", "choose them in the list")
+        raise InputError(where, f"no bone {', '.join(unknown[:3])}", "bones of this armature",
+                         "choose them in the list")
     seen: dict[str, str] = {}
     for part, bone in table.items():
         if bone in seen:
@@ -204,7 +205,8 @@ def load_stored_map(rig: bpy.types.Object) -> dict[str, str] | None:
 
 def write_bone_map(path: Path, rig: bpy.types.Object, table: dict[str, str]) -> None:
     """Write a map as a JSON file, completely or not at all; InputError where that fails."""
-    text = json.dumps({"skeleton": compute_rig_fingerprint(rig), "rig": rig.name, "bones": table}, indent=1, ensure_ascii=False)
+    text = json.dumps({"skeleton": compute_rig_fingerprint(rig), "rig": rig.name, "bones": table}, indent=1,
+                      ensure_ascii=False)
     atomic_write(path, text + "\n")
 
 

@@ -240,7 +240,7 @@ def find_carriers(rig: bpy.types.Object, side: bpy.types.Scene, controls: list[s
     parent_of, _ = find_steadiest_carriers(compute_rotation_spread(carried, parents), 0)
     place_of, off = find_steadiest_carriers(compute_position_spread(carried, origin, rests), len(controls))
     return Carriers(list(controls), carriers, turn_of, position_carrier=place_of, parent_carrier=parent_of,
-                 is_reliable=(worst < 10 * CARRIER_TOLERANCE) & (off < CARRIER_TOLERANCE * size))
+                    is_reliable=(worst < 10 * CARRIER_TOLERANCE) & (off < CARRIER_TOLERANCE * size))
 
 
 def list_moving(rig: bpy.types.Object, side: bpy.types.Scene, controls: list[str], shown: list[str]) -> list[bool]:

@@ -16,7 +16,16 @@ import numpy as np
 
 from ...beyond_mocap.base.errors import InputError
 from ...beyond_mocap.motion import quaternion
-from .control_study import CARRIER_TOLERANCE, STATIC, TRIALS, PosedRig, find_nearest_carrier, compute_position_spread, split_poses, compute_rotation_spread
+from .control_study import (
+    CARRIER_TOLERANCE,
+    STATIC,
+    TRIALS,
+    PosedRig,
+    compute_position_spread,
+    compute_rotation_spread,
+    find_nearest_carrier,
+    split_poses,
+)
 
 _TRIAL_ANGLE = 0.7
 _IK_TO_FK, _FK_TO_IK = re.compile(r"(?i)ik.*fk"), re.compile(r"(?i)fk.*ik")
@@ -169,7 +178,8 @@ class Controls:
         turn = np.zeros((count, len(self.bones), 3, 3))
         heads = np.zeros((count, len(self.bones), 3))
         for i, (bone, ride) in enumerate(zip(self.bones, self.carriers)):
-            turn[:, i] = self._get_rotation(turn, ride.rotation_carrier) @ ride.rotation @ quaternion.to_matrix(turns[bone])
+            turn[:, i] = self._get_rotation(turn,
+                                            ride.rotation_carrier) @ ride.rotation @ quaternion.to_matrix(turns[bone])
             origin = heads[:, ride.position_carrier] if ride.position_carrier >= 0 else 0.0
             heads[:, i] = self._get_rotation(turn, ride.position_carrier) @ ride.position + origin
             if locations[bone] is not None and ride.axes is not None:

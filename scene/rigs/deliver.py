@@ -21,7 +21,7 @@ from ..stage import ball, body
 from . import armature, export
 
 if TYPE_CHECKING:
-    from ...beyond_mocap.match.make import MatchResult
+    from ...beyond_mocap.match.synthesize_match import MatchResult
 
 NAME = "Player"
 SHIRT = (0.75, 0.05, 0.06)
@@ -33,7 +33,7 @@ def write_result(result: "Take | MatchResult", out: Path) -> tuple[str, ...]:
     Returns:
         Messages about players of a match that could not be shown.
     """
-    from ...beyond_mocap.match.make import MatchResult  # imports scipy, which is slow
+    from ...beyond_mocap.match.synthesize_match import MatchResult  # imports scipy, which is slow
 
     lines = create_match_scene(result) if isinstance(result, MatchResult) else create_take_scene(result)
     export.write_whole_file(out, EXPORTERS[out.suffix.lower()])
@@ -87,5 +87,6 @@ def _build_exporter(format: str):
     return lambda path: export.EXPORTERS[format](path, "BLENDER", False)
 
 
-EXPORTERS = {".blend": _write_blend, ".fbx": _build_exporter("FBX"), ".glb": _build_exporter("GLB"), ".usdc": _build_exporter("USD")}
+EXPORTERS = {".blend": _write_blend, ".fbx": _build_exporter("FBX"), ".glb": _build_exporter("GLB"),
+             ".usdc": _build_exporter("USD")}
 WRITERS = dict.fromkeys(EXPORTERS, write_result)

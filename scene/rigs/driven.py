@@ -20,10 +20,10 @@ from . import armature, bone_maps
 from .controls import Controls, Override, list_overrides
 
 _TARGET_NAMES = ((re.compile(r"(?i)^(.*:)?(ik_foot|foot_ik)(?=[_\-. ]?[lr]$|[_\-. ](left|right)$)"), "foot"),
-          (re.compile(r"(?i)^(.*:)?(ik_hand|hand_ik)(?=[_\-. ]?[lr]$|[_\-. ](left|right)$)"), "hand"),
-          (re.compile(r"(?i)^(.*:)?toe_ik(?=[_\-. ]?[lr]$|[_\-. ](left|right)$)"), "toe"),
-          (re.compile(r"(?i)^(.*:)?thigh_ik_target(?=[_\-. ]?[lr]$)"), "upper_leg"),
-          (re.compile(r"(?i)^(.*:)?upper_arm_ik_target(?=[_\-. ]?[lr]$)"), "upper_arm"))
+                 (re.compile(r"(?i)^(.*:)?(ik_hand|hand_ik)(?=[_\-. ]?[lr]$|[_\-. ](left|right)$)"), "hand"),
+                 (re.compile(r"(?i)^(.*:)?toe_ik(?=[_\-. ]?[lr]$|[_\-. ](left|right)$)"), "toe"),
+                 (re.compile(r"(?i)^(.*:)?thigh_ik_target(?=[_\-. ]?[lr]$)"), "upper_leg"),
+                 (re.compile(r"(?i)^(.*:)?upper_arm_ik_target(?=[_\-. ]?[lr]$)"), "upper_arm"))
 _LEFT = re.compile(r"(?i)(l|left)$")
 _WHOLE_CHAIN = 99
 
@@ -120,7 +120,8 @@ class DrivenRig:
         bone = self.rig.data.bones[self.bone_of(part)]
         fingers = [np.array(child.head_local) for child in bone.children if not re.search(r"(?i)twist|ik", child.name)]
         at = np.array(bone.head_local)
-        tip = self.to_metres((np.mean(fingers, axis=0) if fingers and kind == "hand" else np.array(bone.tail_local)) - at)
+        tip = self.to_metres((np.mean(fingers, axis=0) if fingers and kind == "hand" else np.array(bone.tail_local))
+                             - at)
         if kind == "hand":
             toward = self.to_metres(np.subtract(*self.rest_heads(part, f"{part.partition(' ')[0]} lower_arm"))) \
                 if f"{part.partition(' ')[0]} lower_arm" in self.table else tip
@@ -254,14 +255,16 @@ def _list_ik_bones(rig: bpy.types.Object) -> set[str]:
     """List the bones that inverse kinematics pose."""
     chains = [(bone, one) for bone in rig.pose.bones for one in bone.constraints if one.type in ("IK", "SPLINE_IK")]
     return {
-        up.name for bone, one in chains for up in (bone, *bone.parent_recursive[: (one.chain_count or _WHOLE_CHAIN) - 1])
+        up.name for bone, one in chains for up in (bone, *bone.parent_recursive[: (one.chain_count or _WHOLE_CHAIN)
+                                                                                - 1])
     }
 
 
 def _find_part_at(rig: bpy.types.Object, name: str, shown: dict[str, str], tolerance: float) -> str | None:
     """Find the part that rests at a helper bone's position."""
     at = rig.data.bones[name].head_local
-    return next((part for part, bone in shown.items() if (rig.data.bones[bone].head_local - at).length < tolerance), None)
+    return next((part for part, bone in shown.items() if (rig.data.bones[bone].head_local - at).length < tolerance),
+                None)
 
 
 def _iter_free_ancestors(rig: bpy.types.Object, name: str, used: set[str]) -> Iterator[str]:

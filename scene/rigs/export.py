@@ -17,20 +17,21 @@ import bpy
 import numpy as np
 
 from ...beyond_mocap.base.errors import InputError
-from ...beyond_mocap.files.whole import atomic_path
+from ...beyond_mocap.files.atomic import atomic_path
 from ...beyond_mocap.motion import quaternion
 from ..core import channels
 from ..core.measure import frames_per_second
-from ..core.set_aside import use_temporary_scene
+from ..core.saved_state import use_temporary_scene
 from .bone_curves import ROOT_BONE, compute_root_motion
-from .fit import sample_motion, find_common_extent
+from .fit import find_common_extent, sample_motion
 
 SUFFIXES = {"FBX": ".fbx", "GLB": ".glb", "USD": ".usdc", "BVH": ".bvh"}
 _OPERATORS = {"FBX": ("export_scene", "fbx"), "GLB": ("export_scene", "gltf"), "USD": ("wm", "usd_export")}
 _FBX_AXES = {"BLENDER": ("-Z", "Y"), "UNITY": ("-Z", "Y"), "GODOT": ("-Z", "Y"), "UNREAL": ("Y", "Z")}
 _USD_AXES = {"UNITY": ("NEGATIVE_Z", "Y"), "GODOT": ("NEGATIVE_Z", "Y")}
 _SCALE_TOLERANCE = 1e-4  # deviation of a scale from 1 that is ignored
-VISIBILITY_CHANNELS = {"hide_viewport", "hide_render"}  # keyed channels of a mesh that is visible for a part of the time only
+VISIBILITY_CHANNELS = {
+    "hide_viewport", "hide_render"}  # keyed channels of a mesh that is visible for a part of the time only
 
 
 @dataclass(frozen=True)
@@ -65,7 +66,8 @@ class _SampledPoses:
 
 
 def export_motion(
-    context: bpy.types.Context, rigs: list[bpy.types.Object], options: ExportOptions, things: list[bpy.types.Object] = ()
+    context: bpy.types.Context, rigs: list[bpy.types.Object], options: ExportOptions,
+    things: list[bpy.types.Object] = ()
 ) -> list[str]:
     """Export the rigs' motions.
 
@@ -92,11 +94,13 @@ def export_motion(
         frames_per_second(scene) / rate)
     things = [] if options.format == "BVH" else list(things)
     sampled = _sample_poses(scene, rigs, times, things)
-    meshes_by_rig = {rig.name: _list_meshes(scene, rig) for rig in rigs} if options.meshes and options.format != "BVH" else {}
+    meshes_by_rig = {rig.name: _list_meshes(scene, rig)
+                     for rig in rigs} if options.meshes and options.format != "BVH" else {}
     messages = []
     with _export_scene(context, rate, len(times)) as stage:
         copies = [_copy_armature(stage, rig, sampled[rig.name], options, messages) for rig in rigs]
-        meshes = [_copy_mesh(stage, thing, rig, copy) for rig, copy in zip(rigs, copies) for thing in meshes_by_rig.get(rig.name, ())]
+        meshes = [_copy_mesh(stage, thing, rig, copy) for rig, copy in zip(rigs, copies)
+                  for thing in meshes_by_rig.get(rig.name, ())]
         free_meshes = [_copy_free_mesh(stage, thing, sampled[thing.name].object_matrices) for thing in things]
         if options.format == "GLB" and not meshes:
             messages.append("no mesh on the armature: glTF then stores its bones as plain nodes")
@@ -104,8 +108,8 @@ def export_motion(
         with _original_names([*rigs, *dressed, *things], [*copies, *meshes, *free_meshes]):
             _save_file(stage, copies, options)
     messages.insert(0, f"{len(times)} frames at {rate:g} per second, {len(rigs)} armature{'s' * (len(rigs) > 1)}, "
-                   f"{len(meshes)} mesh{'es' * (len(meshes) != 1)}"
-                   + (f", {len(things)} object{'s' * (len(things) > 1)} beside them" if things else ""))
+                    f"{len(meshes)} mesh{'es' * (len(meshes) != 1)}"
+                    + (f", {len(things)} object{'s' * (len(things) > 1)} beside them" if things else ""))
     return messages
 
 
@@ -140,7 +144,8 @@ def _sample_poses(
     scene.frame_set(now, subframe=subframe)
     ordered = {rig.name: [bone.name for bone in rig.pose.bones] for rig in rigs}
     none = np.empty((len(times), 0, 4, 4), np.float32)
-    return {name: _SampledPoses(ordered.get(name, []), poses.get(name, none).astype(float), lies[name]) for name in lies}
+    return {name: _SampledPoses(ordered.get(name, []), poses.get(name, none).astype(float), lies[name])
+            for name in lies}
 
 
 @contextmanager
@@ -165,7 +170,8 @@ def _export_scene(context: bpy.types.Context, rate: float, frames: int):
             bpy.ops.object.mode_set(mode=mode)
 
 
-def _copy_armature(stage: bpy.types.Scene, rig: bpy.types.Object, shown: _SampledPoses, wanted: ExportOptions, told: list[str]):
+def _copy_armature(stage: bpy.types.Scene, rig: bpy.types.Object, shown: _SampledPoses, wanted: ExportOptions,
+                   told: list[str]):
     """Copy a rig to a plain armature that plays its displayed motion."""
     data = rig.data.copy()
     copy = bpy.data.objects.new(rig.name, data)
@@ -178,7 +184,8 @@ def _copy_armature(stage: bpy.types.Scene, rig: bpy.types.Object, shown: _Sample
         poses = {name: in_place @ pose for name, pose in poses.items()}
     if line is not None:
         poses[root or ROOT_BONE] = line
-    parents = _simplify_bones(stage, copy, rig, kept=bones, hips=hips if line is not None and root is None else None, told=told)
+    parents = _simplify_bones(stage, copy, rig, kept=bones, hips=hips if line is not None and root is None else None,
+                              told=told)
     _create_action(copy, poses, parents, shown.object_matrices, wanted)
     return copy
 
@@ -238,7 +245,8 @@ def _find_parent(rig: bpy.types.Object, name: str, kept: set[str]) -> str | None
     return None
 
 
-def _create_action(copy, poses: dict[str, np.ndarray], parents: dict[str, str | None], lies: np.ndarray, wanted: ExportOptions) -> None:
+def _create_action(copy, poses: dict[str, np.ndarray], parents: dict[str, str | None], lies: np.ndarray,
+                   wanted: ExportOptions) -> None:
     """Create one action of the copy: its bones as `poses` (F, 4, 4) in its space, the object as `lies` (F, 4, 4)."""
     rest = {name: np.array(copy.data.bones[name].matrix_local) for name in parents}
     curves: dict[str, tuple[str, np.ndarray]] = {}
@@ -285,7 +293,8 @@ def _compute_channels(matrices: np.ndarray) -> dict[str, np.ndarray]:
     """Compute location, rotation and, where it is not 1, scale of matrices (F, 4, 4)."""
     size = np.linalg.norm(matrices[:, :3, :3], axis=1)
     turn = matrices[:, :3, :3] / np.maximum(size, 1e-12)[:, None, :]
-    found = {"location": matrices[:, :3, 3], "rotation_quaternion": quaternion.unify_signs(quaternion.from_matrix(turn))}
+    found = {"location": matrices[:, :3, 3],
+             "rotation_quaternion": quaternion.unify_signs(quaternion.from_matrix(turn))}
     return found | ({"scale": size} if np.abs(size - 1.0).max() > _SCALE_TOLERANCE else {})
 
 

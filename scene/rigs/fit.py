@@ -78,16 +78,19 @@ class FittedMotion:
         motion = _raise_motion(motion, -ground)
         retargeter = Retargeter(motion, skeleton, standing=foot_contacts)
         self.scale = retargeter.target.leg / retargeter.source.leg
-        keeps_travel = SIMILAR_LEGS[0] <= self.scale <= SIMILAR_LEGS[1] if options.keeps_travel is None else options.keeps_travel
+        keeps_travel = SIMILAR_LEGS[0] <= self.scale <= SIMILAR_LEGS[
+            1] if options.keeps_travel is None else options.keeps_travel
         retargeter.keeps_travel = keeps_travel
         retargeted = retargeter.retarget(motion)
         is_level = _measure_height_spread(motion, heel_toe_contacts) < 0.05
-        planted = plant_feet(skeleton, retargeted.root_positions, retargeted.rotations, heel_toe_contacts, motion.fps, level_feet=is_level)
+        planted = plant_feet(skeleton, retargeted.root_positions, retargeted.rotations, heel_toe_contacts, motion.fps,
+                             level_feet=is_level)
         fitted = Motion(skeleton, planted.root, planted.rotations, motion.fps) if options.plants_feet else retargeted
         self.slides = tuple(measure_slide(m, foot_contacts) for m in (source.motion, retargeted, fitted))
         self.lift = driven.sole - contacts.measure_sole_height(skeleton)
         self.motion = _raise_motion(fitted, floor + self.lift)
-        self.messages = self._build_messages(driven, planted.miss if options.plants_feet else None, heel_toe_contacts, keeps_travel)
+        self.messages = self._build_messages(driven, planted.miss if options.plants_feet else None, heel_toe_contacts,
+                                             keeps_travel)
 
     def _build_messages(self, driven: DrivenRig, miss: np.ndarray | None, points: np.ndarray, keeps: bool) -> list[str]:
         """Build messages about size, sliding feet, floor, and legs that are too short."""

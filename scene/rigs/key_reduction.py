@@ -15,7 +15,7 @@ import numpy as np
 from ...beyond_mocap.base.errors import InputError
 from ...beyond_mocap.motion import quaternion
 from ..core import channels
-from ..path_editing.rig_look import find_rotation_channel, to_rotations
+from ..path_editing.rig_sampling import find_rotation_channel, to_rotations
 from . import rig_bake
 from .driven import DrivenRig
 
@@ -157,7 +157,8 @@ def _build_end_function(driven: DrivenRig, dense: dict[str, np.ndarray]):
         for name in controls.bones:
             path = f'pose.bones["{bpy.utils.escape_identifier(name)}"]'
             mode = rig.pose.bones[name].rotation_mode
-            values = changed.get(f"{path}.{find_rotation_channel(mode)}", dense.get(f"{path}.{find_rotation_channel(mode)}"))
+            values = changed.get(f"{path}.{find_rotation_channel(mode)}",
+                                 dense.get(f"{path}.{find_rotation_channel(mode)}"))
             turned[name] = quaternion.identity(count) if values is None else to_rotations(mode, values)
             locations[name] = changed.get(f"{path}.location", dense.get(f"{path}.location"))
         return controls.compute_heads(turned, locations)[:, ends] * driven.placement.scale

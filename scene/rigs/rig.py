@@ -38,8 +38,8 @@ ENGINES = (("BLENDER", "Blender", "Axes of Blender's exporters: Y up, -Z forward
            ("UNITY", "Unity", "For Unity: FBX with its scale as units, Y up, -Z forward"),
            ("GODOT", "Godot", "For Godot: Y up, -Z forward, in USD too"))
 EXPORT_CHOICES = (("ACTIVE", "Active", "The active player's rig or body; without players the active armature"),
-       ("SELECTED", "Selected", "All selected armatures"),
-       ("PLAYERS", "All Players", "The rig or body of every selected player"))
+                  ("SELECTED", "Selected", "All selected armatures"),
+                  ("PLAYERS", "All Players", "The rig or body of every selected player"))
 
 
 class BeyondMocapRigBone(bpy.types.PropertyGroup):

@@ -17,7 +17,7 @@ import numpy as np
 from ...beyond_mocap.base.digest import hex_digest
 from ...beyond_mocap.base.errors import InputError
 from ..core import channels
-from ..path_editing import riders
+from ..path_editing import edited_bodies as riders
 from .bone_curves import build_bone_curves, build_setting_curves, compute_bone_poses
 from .control_study import CHANNELS
 from .driven import DrivenRig
@@ -82,7 +82,7 @@ def prepare_bake(
     basis, heads = driven.controls.compute_channels(turns, places)
     curves = build_bone_curves(rig, basis) | build_setting_curves(driven, options.bakes_ik)
     return PreparedBake(source.name, driven, fit, frames=frames, curves=curves, heads=heads,
-                  messages=[*_describe_rig(driven, options), *messages, *fit.messages])
+                        messages=[*_describe_rig(driven, options), *messages, *fit.messages])
 
 
 def apply_bake(prepared: PreparedBake) -> BakeResult:
@@ -96,7 +96,8 @@ def apply_bake(prepared: PreparedBake) -> BakeResult:
     record_keys(rig)
     for switch in driven.controls.switches:
         rig.pose.bones[switch.bone][switch.name] = switch.value
-    messages = [*reverted, *prepared.messages, *kept_messages, *_describe_deviation(driven, prepared.frames, prepared.heads, driven.scene)]
+    messages = [*reverted, *prepared.messages, *kept_messages, *_describe_deviation(driven, prepared.frames,
+                                                                                    prepared.heads, driven.scene)]
     return BakeResult(action, prepared.frames, prepared.fit.scale, prepared.fit.slides, messages)
 
 

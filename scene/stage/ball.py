@@ -54,7 +54,8 @@ def write_trajectory(ball: bpy.types.Object, path: BallPath, scene: bpy.types.Sc
     places = interpolate_columns(at, seconds, path.positions)
     group = "Object Transforms"
     curves = {"location": (group, places * units_per_metre(scene)),
-              "rotation_quaternion": (group, compute_roll(places) if path.rotations is None else _sample_rotations(path, at))}
+              "rotation_quaternion": (group, compute_roll(places) if path.rotations is None
+                                      else _sample_rotations(path, at))}
     return channels.create_action(ball, f"{ball.name} path", frames, curves)
 
 
@@ -75,7 +76,8 @@ def compute_roll(places: np.ndarray) -> np.ndarray:
         (F, 4) quaternions.
     """
     step = np.diff(places, axis=0)
-    rotation_steps = np.stack([-step[:, 1], step[:, 0], np.zeros(len(step))], axis=1) / RADIUS  # up x step: rotation vectors
+    rotation_steps = np.stack([-step[:, 1], step[:, 0], np.zeros(len(step))],
+                              axis=1) / RADIUS  # up x step: rotation vectors
     for i in np.flatnonzero(places[1:, 2] > ROLLING_BELOW):
         rotation_steps[i] = rotation_steps[i - 1] if i else rotation_steps[i]
     out = quaternion.identity(len(places))

@@ -18,7 +18,7 @@ from ...beyond_mocap.base.errors import InputError
 from ...beyond_mocap.base.time_series import gaussian_smooth
 from ..core import channels
 from ..core.measure import frames_per_second, units_per_metre
-from ..path_editing import riders as rides
+from ..path_editing import edited_bodies as rides
 from ..path_editing.settings import list_edited_bodies
 
 KINDS = ("ABOVE", "SIDE", "QUARTER", "BEHIND")
@@ -120,8 +120,9 @@ def smooth_focus(targets: CameraTargets, fps: float) -> tuple[np.ndarray, np.nda
     """Smooth place (T, 3) metres and rotation (T,) radians of the focus."""
     step = np.linalg.norm(np.diff(targets.origin, axis=0), axis=1)
     starts = np.flatnonzero(step > RESTART_DISTANCE) + 1
-    pieces = [(gaussian_smooth(place, SMOOTHING_SECONDS * fps / 2.0), gaussian_smooth(turn, SMOOTHING_SECONDS * fps)) for place,
-              turn in zip(np.split(targets.origin, starts), np.split(np.unwrap(targets.heading)[:, None], starts))]
+    pieces = [(gaussian_smooth(place, SMOOTHING_SECONDS * fps / 2.0), gaussian_smooth(turn, SMOOTHING_SECONDS * fps))
+              for place, turn in zip(np.split(targets.origin, starts), np.split(np.unwrap(targets.heading)[:, None],
+                                                                                starts))]
     return np.concatenate([place for place, _ in pieces]), np.concatenate([turn[:, 0] for _, turn in pieces])
 
 
@@ -195,7 +196,8 @@ def _create_camera(collection: bpy.types.Collection, kind: str) -> bpy.types.Obj
     return camera
 
 
-def _frame_corners(scene: bpy.types.Scene, camera: bpy.types.Object, kind: str, corners: np.ndarray, side: float) -> None:
+def _frame_corners(scene: bpy.types.Scene, camera: bpy.types.Object, kind: str, corners: np.ndarray,
+                   side: float) -> None:
     """Place a camera so that all corners (N, 3) metres are in its frame; `side` is the yaw of the side view."""
     units = units_per_metre(scene)
     if kind == "ABOVE":
@@ -254,7 +256,8 @@ def _find_side_yaw(places: np.ndarray) -> float:
 def _build_corners(places: np.ndarray) -> np.ndarray:
     """Return the corners of the boxes that a body needs at the places."""
     some = places[np.linspace(0, len(places) - 1, min(len(places), MAX_PLACES)).astype(int)]
-    box = np.array([(x, y, z) for x in (-BODY_HALF_WIDTH, BODY_HALF_WIDTH) for y in (-BODY_HALF_WIDTH, BODY_HALF_WIDTH) for z in (0.0, BODY_HEIGHT)])
+    box = np.array([(x, y, z) for x in (-BODY_HALF_WIDTH, BODY_HALF_WIDTH) for y in (-BODY_HALF_WIDTH, BODY_HALF_WIDTH)
+                    for z in (0.0, BODY_HEIGHT)])
     return (some[:, None] + box).reshape(-1, 3)
 
 

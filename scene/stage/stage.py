@@ -200,7 +200,8 @@ def _create_camera(stage, units: float) -> bpy.types.Object:
 def _build_strokes(length: float, width: float) -> list:
     """Build the centre lines of all markings, each a list of points (x, y) in metres."""
     x, y, spot = length / 2, width / 2, LINE_WIDTH / 2
-    strokes = [_build_box(-x, -y, x, y), [(0, -y), (0, y)], _build_arc((0, 0), 9.15, 0, 360), _build_arc((0, 0), spot, 0, 360)]
+    strokes = [_build_box(-x, -y, x, y), [(0, -y), (0, y)], _build_arc((0, 0), 9.15, 0, 360),
+               _build_arc((0, 0), spot, 0, 360)]
     for side in (-1, 1):
         goal, mark, inward = side * x, side * (x - 11.0), 180 if side > 0 else 0
         for half_width, depth in ((20.16, 16.5), (9.16, 5.5)):

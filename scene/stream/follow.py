@@ -199,7 +199,7 @@ def start_listening(settings) -> Listener:
     one = Listener(settings.port, settings.protocol, hierarchy, settings.unit or None).start()
     _session["listener"] = one
     _session["hits"] = LiveHits(one, settings.part, "" if settings.side == "either" else settings.side,
-                             settings.threshold or None)
+                                settings.threshold or None)
     return one
 
 
@@ -250,7 +250,8 @@ def pose_body(
         root: (3,) m, root position.
         local: (J, 4) local rotations.
     """
-    placement, rest = armature.find_current_placement(thing, scene), armature.compute_rest_rotations(thing, skeleton.names)
+    placement, rest = armature.find_current_placement(thing, scene), armature.compute_rest_rotations(thing,
+            skeleton.names)
     # the object's rotation about the vertical turns the streamed motion with it
     turn = quaternion.from_up_angle(quaternion.to_yaw(placement.rotation))
     root, local = placement.origin + quaternion.rotate(turn, root), np.array(local)

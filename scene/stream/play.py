@@ -17,7 +17,7 @@ from ...beyond_mocap.passes.hits import HitMotion
 from ..core import action, background, channels
 from ..core.live import Watcher
 from ..core.measure import frames_per_second
-from ..passes import make
+from ..passes import generate as make
 from ..passes.settings import PLAYED
 from ..result import bake
 from . import follow
@@ -52,8 +52,8 @@ def start_rally(order: make.Order, holder: str, start: float, progress, cancelle
     library = order.library
     if library is None:
         library = build_library(order.folder, unit=order.unit, **order.build, progress=progress, cancelled=cancelled)
-    return NewRally(order, library, live_passes.start_rally(library, order.scene, holder, start=start, progress=progress,
-                                                   cancelled=cancelled))
+    return NewRally(order, library, live_passes.start_rally(library, order.scene, holder, start=start,
+                                                            progress=progress, cancelled=cancelled))
 
 
 def apply_rally(scene: bpy.types.Scene, new_rally: NewRally) -> None:
@@ -115,7 +115,8 @@ def find_shown_strike(scene: bpy.types.Scene, body: bpy.types.Object) -> HitMoti
     settings, motion = scene.beyond_mocap_stream, action.read_motion(body, scene)
     sided = settings.part in ("foot", "hand", "tool")
     sides = (("left", "right") if settings.side == "either" else (settings.side,)) if sided else ("",)
-    hits = [hit for side in sides for hit in detect_hits(motion, settings.part, side, settings.threshold or None).motions]
+    hits = [hit for side in sides for hit in detect_hits(motion, settings.part, side, settings.threshold
+                                                         or None).motions]
     if not hits:
         raise InputError(f"armature {body.name}", f"no strike with the {settings.part}", "at least one",
                          "choose the part under Live Stream")
@@ -141,7 +142,8 @@ def update_rally(scene: bpy.types.Scene) -> None:
             order = _collect_request(scene, _session.pop("pending"))
         except InputError as error:
             return _end_rally(str(error))
-        _session["job"] = background.Job("live", lambda progress, cancelled, _hurry: _build_answer(*order, progress, cancelled))
+        _session["job"] = background.Job("live", lambda progress, cancelled,
+                                         _hurry: _build_answer(*order, progress, cancelled))
 
 
 def answer_now(scene: bpy.types.Scene, hit: HitMotion) -> LivePass:

@@ -50,7 +50,8 @@ class BeyondMocapThrow(bpy.types.PropertyGroup):
 def find_thrower(context: bpy.types.Context) -> bpy.types.Object | None:
     """Find the armature to animate: the active object, a selected one, or the one whose ball or target is active."""
     active = context.view_layer.objects.active
-    selected = [thing for thing in (active, *context.selected_objects) if thing is not None and thing.type == "ARMATURE"]
+    selected = [thing for thing in (active, *context.selected_objects) if thing is not None and thing.type
+                == "ARMATURE"]
     if selected or active is None:
         return selected[0] if selected else None
     bodies = [thing for thing in context.scene.objects if thing.type == "ARMATURE" and thing.beyond_mocap_throw.made]

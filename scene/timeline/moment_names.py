@@ -11,7 +11,7 @@ import bpy
 
 from ..core import window
 from ..core.live import Watcher
-from . import lanes
+from . import label_tracks as lanes
 from .strips import find_target
 
 TEXT, ROW, PAD, GAP = 11, 18, 5, 4  # points: letters, height of a row, around the text, between two names
@@ -74,8 +74,8 @@ def list_names(context: bpy.types.Context, region: bpy.types.Region) -> list[Dra
         rows[row].append((left - GAP * scale, left + width + GAP * scale))
         bottom = (BOTTOM + row * ROW) * scale
         box = (left, bottom, left + width, bottom + (ROW - 2) * scale)
-        found.append(DrawnName(text, target, strip, index=index, frame=frame, x=x, box=box, is_selected=is_selected, is_muted=is_muted,
-                          has_problem=(target, frame) in problem_frames))
+        found.append(DrawnName(text, target, strip, index=index, frame=frame, x=x, box=box, is_selected=is_selected,
+                               is_muted=is_muted, has_problem=(target, frame) in problem_frames))
     return found
 
 

@@ -15,10 +15,11 @@ from bpy.props import CollectionProperty, EnumProperty, FloatProperty, IntProper
 from ...beyond_mocap.annotation import ClipAnnotation, Timeline
 from ...beyond_mocap.base.errors import InputError
 from ..library.recordings import RATE
-from . import lanes, lay_strips
+from . import label_tracks as lanes
+from . import strip_writing as lay_strips
 
 if TYPE_CHECKING:
-    from ...beyond_mocap.library.word_sources import Proposal, Sources
+    from ...beyond_mocap.library.label_sources import Proposal, Sources
 
 SAME_SECONDS = 0.1
 """Seconds within which two key moments are the same one."""
@@ -57,7 +58,8 @@ class BeyondMocapProposals(bpy.types.PropertyGroup):
     active: IntProperty(name="Proposal", min=0, update=_go_to_proposal, description="The proposal under review")
 
 
-def store_proposals(target: bpy.types.Object, found: Iterable["Proposal"], state: str = "OPEN", keep_accepted: bool = True) -> None:
+def store_proposals(target: bpy.types.Object, found: Iterable["Proposal"], state: str = "OPEN",
+                    keep_accepted: bool = True) -> None:
     """List proposals in place of the previous ones, and activate the first.
 
     Args:
@@ -77,7 +79,7 @@ def store_proposals(target: bpy.types.Object, found: Iterable["Proposal"], state
 
 
 def add_proposal(target: bpy.types.Object, row: ClipAnnotation, source: str, confidence: float, state: str,
-        why: str = "") -> None:
+                 why: str = "") -> None:
     """Add one proposal to the list."""
     one = target.beyond_mocap_proposals.listed.add()
     one.name, one.source, one.why = " ".join(row.words), source, why
@@ -92,7 +94,8 @@ def has_labels(timeline: Timeline, row: ClipAnnotation, fps: float) -> bool:
     labels over half of a row without a key.
     """
     if row.key is not None:
-        return any(key.words[:1] == row.words[:1] and abs(key.time - row.key / fps) <= SAME_SECONDS for key in timeline.keys)
+        return any(key.words[:1] == row.words[:1] and abs(key.time - row.key / fps) <= SAME_SECONDS
+                   for key in timeline.keys)
     start, end = row.start / fps, row.end / fps
     equal_spans = (span for span in timeline.spans if span.words == row.words)
     return any(min(span.end, end) - max(span.start, start) >= 0.5 * (end - start) for span in equal_spans)
@@ -111,7 +114,7 @@ def to_row(one: BeyondMocapProposal) -> ClipAnnotation:
 
 def accept_proposal(target: bpy.types.Object, index: int) -> str:
     """Add a proposal to the clip's labels, unless it was accepted before. Returns a line for the user."""
-    from ...beyond_mocap.library.keep_words import to_timeline
+    from ...beyond_mocap.library.label_files import to_timeline
 
     one = _find_proposal(target, index)
     if one.state != "ACCEPTED":

@@ -12,16 +12,37 @@ import bpy
 
 from ...beyond_mocap.annotation import Span
 from ...beyond_mocap.base.errors import InputError
-from ..core.live import Watcher, is_running, call_soon
+from ..core.live import Watcher, call_soon, is_running
 from ..core.measure import Clock, build_scene_clock
 from ..player import dots
-from . import moment_names, word_checks
-from .lanes import AUTOMATIC, WORDS, has_label_tracks, is_label_track, compute_marker_frame, is_marker_visible, iter_strips, read_clock
-from .lay_strips import find_free_track, place_strip, place_strips, move_to_clock
-from .strip_lines import remove_name_suffix, compute_frames, read_key_moment, format_line, read_recorded_span, store_span, read_span, store_key_moment, format_labels
+from . import label_checks as word_checks
+from . import moment_names
+from .label_tracks import (
+    AUTOMATIC,
+    WORDS,
+    compute_marker_frame,
+    has_label_tracks,
+    is_label_track,
+    is_marker_visible,
+    iter_strips,
+    read_clock,
+)
+from .strip_lines import (
+    compute_frames,
+    format_labels,
+    format_line,
+    read_key_moment,
+    read_recorded_span,
+    read_span,
+    remove_name_suffix,
+    store_key_moment,
+    store_span,
+)
+from .strip_writing import find_free_track, move_to_clock, place_strip, place_strips
 
 DELAY = 0.1  # seconds after an edit
-RUNNING_OPERATORS = ("TRANSFORM_OT_", "NLA_OT_", "ACTION_OT_", "ANIM_OT_", "MARKER_OT_")  # operators that must end first
+RUNNING_OPERATORS = ("TRANSFORM_OT_", "NLA_OT_", "ACTION_OT_", "ANIM_OT_",
+                     "MARKER_OT_")  # operators that must end first
 
 
 def normalize_strips(scene: bpy.types.Scene, only: set[str] | None = None) -> bool:
@@ -99,7 +120,8 @@ def _needs_action(track, strip: bpy.types.NlaStrip, span: Span, clock: Clock) ->
     """Return whether a span's strip needs another action: its line changed, or its action is shared."""
     action = strip.action
     own = action.users - action.use_fake_user == 1
-    if not own or read_recorded_span(action) != span or remove_name_suffix(strip.name) != remove_name_suffix(action.beyond_mocap.shown):
+    if not own or read_recorded_span(action) != span or remove_name_suffix(strip.name) != remove_name_suffix(
+            action.beyond_mocap.shown):
         return True
     is_automatic = action.beyond_mocap.kind == "automatic"
     return action.beyond_mocap.kind == "none" or is_automatic and not (track.name.startswith(AUTOMATIC) and strip.mute)

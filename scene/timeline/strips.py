@@ -12,11 +12,12 @@ from ...beyond_mocap.annotation import Timeline, parse_timeline, read_timeline
 from ...beyond_mocap.base.errors import InputError
 from ...beyond_mocap.motion.track import Track
 from ..core.measure import Clock, build_scene_clock
-from ..core.settings import BeyondMocapPlayer, to_absolute_path, find_active_player
+from ..core.settings import BeyondMocapPlayer, find_active_player, to_absolute_path
 from ..player import dots
 from ..player.tracks import read_track
-from . import lanes, lay_strips
-from .lanes import PlacedMoment, PlacedSpan
+from . import label_tracks as lanes
+from . import strip_writing as lay_strips
+from .label_tracks import PlacedMoment, PlacedSpan
 from .strip_lines import parse_labels
 
 
@@ -102,7 +103,8 @@ def find_target(context: bpy.types.Context) -> bpy.types.Object | None:
 def find_active_clip(context: bpy.types.Context) -> bpy.types.Object | None:
     """Find the active object if it has label tracks and is no player's dot."""
     active = context.view_layer.objects.active
-    return active if active is not None and lanes.has_label_tracks(active) and not active.beyond_mocap_dot.player else None
+    return active if active is not None and lanes.has_label_tracks(
+        active) and not active.beyond_mocap_dot.player else None
 
 
 def can_have_timeline(context: bpy.types.Context) -> bool:

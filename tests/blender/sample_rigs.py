@@ -64,8 +64,8 @@ def _rotate_about(point, pivot, angle):
     return pivot + Matrix.Rotation(angle, 3, "Y") @ (point - pivot)
 
 
-def create_rig(names, name="Rig", arms=0.0, legs=0.0, tails="along", rolls=0.0, units=1.0, y_up=False, root=None, extra=(),
-          size=1.0):
+def create_rig(names, name="Rig", arms=0.0, legs=0.0, tails="along", rolls=0.0, units=1.0, y_up=False, root=None,
+               extra=(), size=1.0):
     """An armature object with the body's bones under `names` (part -> name).
 
     arms, legs: rest pose, see `places`. tails: "along" the limb, or "stray": all to one side, as importers leave them.
@@ -124,8 +124,8 @@ def create_unreal(**options):
               ("ik_foot_r", "ik_foot_root", "right foot"), ("ik_hand_root", "root", None),
               ("ik_hand_gun", "ik_hand_root", "right hand"), ("ik_hand_l", "ik_hand_gun", "left hand"),
               ("ik_hand_r", "ik_hand_gun", "right hand")]
-    return create_rig(UNREAL, "Mannequin", **{"arms": 0.9, "legs": 0.12, "tails": "stray", "units": 100.0, "root": "root",
-                                         "extra": extra, **options})
+    return create_rig(UNREAL, "Mannequin", **{"arms": 0.9, "legs": 0.12, "tails": "stray", "units": 100.0,
+                                              "root": "root", "extra": extra, **options})
 
 
 def create_metahuman(**options):

@@ -23,7 +23,7 @@ import sample_rigs as rigs
 import worlds
 from conftest import EXTENSION
 from throw_models import write_model_file
-from undo import press_operator, collect_state
+from undo import collect_state, press_operator
 
 SMALL = pathlib.Path(__file__).resolve().parents[2] / "sample_blend" / "match" / "small"
 SAYS_NOTHING = re.compile(
@@ -103,7 +103,8 @@ def draw():
 def edit_points():
     """A drawn curve in edit mode, all of its points selected."""
     draw()
-    worlds.select_objects(bpy.context.scene.beyond_mocap.players[bpy.context.scene.beyond_mocap.active_player].drawn_track)
+    worlds.select_objects(
+        bpy.context.scene.beyond_mocap.players[bpy.context.scene.beyond_mocap.active_player].drawn_track)
     bpy.ops.object.mode_set(mode="EDIT")
     bpy.ops.curve.select_all(action="SELECT")
 

@@ -16,28 +16,24 @@ def collect_state():
     scene, layer = bpy.context.scene, bpy.context.view_layer
     return {
         **{kind: sorted(item.name for item in getattr(bpy.data, kind)) for kind in KINDS},
-        "animated": sorted((o.name, o.animation_data.action.name) for o in bpy.data.objects
-                           if o.animation_data and o.animation_data.action),
+        "animated": sorted((o.name, o.animation_data.action.name) for o in bpy.data.objects if o.animation_data
+                           and o.animation_data.action),
         "strips": sorted(strip for thing in bpy.data.objects for strip in iter_strips(thing)),
         "markers": sorted((action.name, marker.name, marker.frame, str(collect_own_properties(marker)))
                           for action in bpy.data.actions for marker in action.pose_markers),
         "drawn": {curve.name: [(*point.co, point.radius) for spline in curve.splines
                                for point in (spline.bezier_points or spline.points)] for curve in bpy.data.curves},
         "keys": {action.name: summarize_keys(action) for action in bpy.data.actions},
-        "owned": {
-            f"{kind} {item.name}": found for kind in KINDS for item in getattr(bpy.data, kind) if (found := collect_own_properties(item))
-        },
-        "camera": scene.camera and scene.camera.name,
+        "owned": {f"{kind} {item.name}": found for kind in KINDS for item in getattr(bpy.data, kind)
+                  if (found := collect_own_properties(item))}, "camera": scene.camera and scene.camera.name,
         "frames": (scene.frame_start, scene.frame_end, scene.render.fps, scene.frame_current),
         "chosen": (layer.objects.active and layer.objects.active.name,
-                   sorted(o.name for o in layer.objects if o.select_get()),
-                   bpy.context.mode),
-        "settings": to_plain(scene.beyond_mocap),
-        "markers of": to_plain(scene.beyond_mocap_markers),
-        "passes": to_plain(scene.beyond_mocap_passes),
-        "match": to_plain(scene.beyond_mocap_match),
-        "stream": to_plain(scene.beyond_mocap_stream),
-        "constraints": sorted((o.name, c.name, round(c.influence, 6)) for o in bpy.data.objects for c in o.constraints),
+                   sorted(o.name for o in layer.objects if o.select_get()), bpy.context.mode),
+        "settings": to_plain(scene.beyond_mocap), "markers of": to_plain(scene.beyond_mocap_markers),
+        "passes": to_plain(scene.beyond_mocap_passes), "match": to_plain(scene.beyond_mocap_match),
+        "stream": to_plain(scene.beyond_mocap_stream), "constraints": sorted((o.name, c.name, round(c.influence, 6))
+                                                                             for o in bpy.data.objects
+                                                                             for c in o.constraints),
         "players": [(p.name, p.tracking_file, p.annotation_file, p.take, p.quality, p.body.name if p.body else None)
                     for p in scene.beyond_mocap.players],
     }

@@ -60,7 +60,7 @@ def write_synthetic_markers():
         return
     core = f"{EXTENSION}.beyond_mocap"
     gait = importlib.import_module(f"{core}.synthetic.gait").build_gait(1.4, 0.6, fps=100.0)
-    known = importlib.import_module(f"{core}.synthetic.ground_truth.planted_markers").build_trial(
+    known = importlib.import_module(f"{core}.synthetic.ground_truth.synthetic_markers").build_trial(
         gait, "plug_in_gait", seed=3, occlusion=0.02, swaps=0, jumps=0, unlabeled=1
     )
     write = importlib.import_module(f"{core}.markers.files.trc").write_trc
@@ -112,8 +112,8 @@ def open_clip(places):
     bpy.ops.beyond_mocap.annotate_clip()
 
 
-STAGES = {"imported": import_tracking, "synthesized": synthesize_players, "accepted": accept_results, "rig": add_rig, "video": add_video,
-          "clip": open_clip}
+STAGES = {"imported": import_tracking, "synthesized": synthesize_players, "accepted": accept_results, "rig": add_rig,
+          "video": add_video, "clip": open_clip}
 
 
 def select_objects(*things):
@@ -262,5 +262,5 @@ def bodies_deleted(places, arguments):
 
 
 FAULTS = (nothing_selected, a_camera_selected, a_linked_armature, a_library_override, a_rig_without_legs, missing_files,
-         nothing_can_be_written, a_film_s_frame_rate, centimetres, edit_mode, pose_mode, everything_hidden,
-         an_excluded_collection, bodies_deleted)
+          nothing_can_be_written, a_film_s_frame_rate, centimetres, edit_mode, pose_mode, everything_hidden,
+          an_excluded_collection, bodies_deleted)

@@ -22,8 +22,8 @@ from beyond_mocap.synthesis.synthesize import synthesize
 from beyond_mocap.synthesis.take import Take
 from beyond_mocap.synthetic.gait import build_gait
 from beyond_mocap.synthetic.gestures import build_strike
+from beyond_mocap.synthetic.lying import build_lying_pose
 from beyond_mocap.synthetic.moves import build_get_up
-from beyond_mocap.synthetic.resting import build_lying_pose
 
 # clip -> metres per second, words
 

@@ -7,21 +7,21 @@ import numpy as np
 
 from beyond_mocap.base.errors import InputError
 from beyond_mocap.synthetic.throws import build_throw
-from beyond_mocap.throws.networks.answers import build_output
 from beyond_mocap.throws.networks.example import Example, build_example
 from beyond_mocap.throws.networks.features import build_input, compute_phase
 from beyond_mocap.throws.networks.limits import estimate_joint_limits
 from beyond_mocap.throws.networks.model import ModelSettings, ThrowModel
 from beyond_mocap.throws.networks.network import PhaseNetwork
+from beyond_mocap.throws.networks.network_output import build_output
 from beyond_mocap.throws.networks.training_set import (
+    add_mirror_images,
+    build_reference_curve,
+    build_steps,
+    find_shared_chains,
     join_steps,
     measure_leg_reach,
-    build_reference_curve,
-    find_shared_chains,
-    build_steps,
-    add_mirror_images,
 )
-from beyond_mocap.throws.planted_examples import generate_kick_at
+from beyond_mocap.throws.synthetic_examples import generate_kick_at
 
 HIDDEN_OFFSET = 1e3  # hidden values are moved by it, so that no unit is ever below 0, where it would bend
 
@@ -37,7 +37,7 @@ def build_throw_examples(count=12, seed=0, fps=30.0):
             continue
         span = (throw_result.release - 1.2, throw_result.release + 0.8)
         found.append(build_example(f"throw{len(found)}", "one", throw_result.motion, "right_hand", throw_result.release,
-                                (far, 0.0, high), throw_result.velocity, fps, span))  # fmt: skip
+                                   (far, 0.0, high), throw_result.velocity, fps, span))  # fmt: skip
     return tuple(found)
 
 
@@ -49,7 +49,8 @@ class TrainingSet(NamedTuple):
     phases: np.ndarray
 
 
-def build_training_set(examples: Iterable[Example], settings: ModelSettings, mirrors: bool = False) -> dict[str, TrainingSet]:
+def build_training_set(examples: Iterable[Example], settings: ModelSettings, mirrors: bool = False) -> dict[str,
+        TrainingSet]:
     """What each network of `settings.networks` learns from. mirrors: with the mirror image of each example too.
 
     All examples have the same skeleton. InputError where there is none or they differ.
@@ -75,8 +76,8 @@ def build_linear_model(examples, action="throw", ridge=1.0):
     settings = ModelSettings(points=1, layers=1, units=units, action=action)
     return ThrowModel(
         settings=settings, skeleton=examples[0].motion.skeleton,
-        networks={name: _build_linear_network(part, units, ridge) for name, part in rows.items()}, leg_reach=measure_leg_reach(examples),
-        examples=tuple(examples),
+        networks={name: _build_linear_network(part, units, ridge) for name, part in rows.items()},
+        leg_reach=measure_leg_reach(examples), examples=tuple(examples),
         joint_limits=estimate_joint_limits(np.concatenate([example.motion.rotations for example in examples])),
     )  # fmt: skip
 
@@ -89,8 +90,8 @@ def _build_linear_network(rows, units, ridge):
     slopes[:output_count] = np.linalg.solve(x.T @ x + ridge * np.eye(x.shape[1]), x.T @ y).T
     selection = np.eye(output_count, units)
     return PhaseNetwork(
-        (slopes[None], selection[None]), (np.full((1, units), HIDDEN_OFFSET), np.full((1, output_count), -HIDDEN_OFFSET)),
-        *scales[0], *scales[1],
+        (slopes[None], selection[None]), (np.full((1, units), HIDDEN_OFFSET),
+                                          np.full((1, output_count), -HIDDEN_OFFSET)), *scales[0], *scales[1],
     )  # fmt: skip
 
 
@@ -105,5 +106,5 @@ def build_kick_examples(count=5, seed=0, fps=30.0):
             continue
         span = (kick_result.contact - 1.1, kick_result.contact + 0.8)
         found.append(build_example(f"kick{len(found)}", "one", kick_result.motion, "right_foot", kick_result.contact,
-                                (far, 0.0, high), kick_result.velocity, fps, span))  # fmt: skip
+                                   (far, 0.0, high), kick_result.velocity, fps, span))  # fmt: skip
     return tuple(found)

@@ -6,7 +6,7 @@ import math
 
 import bpy
 import numpy as np
-from tab import EXTENSION, PICTURES, output, copy_sample, wait_until, window
+from tab import EXTENSION, PICTURES, copy_sample, output, wait_until, window
 
 DIGITS = ("ZERO", "ONE", "TWO", "THREE", "FOUR", "FIVE", "SIX", "SEVEN", "EIGHT", "NINE")
 # what is pressed at which second: a reception, the dribble from there to a kick, the kick, a header, a celebration
@@ -27,7 +27,8 @@ def import_scene_module(name):
 def list_annotations():
     """The active player's words and times, rounded to thousandths."""
     scene = bpy.context.scene
-    timeline = import_scene_module("timeline.strips").read_player_timeline(scene.beyond_mocap.players[scene.beyond_mocap.active_player], scene)
+    timeline = import_scene_module("timeline.strips").read_player_timeline(
+        scene.beyond_mocap.players[scene.beyond_mocap.active_player], scene)
     spans = [(round(s.start, 3), round(s.end, 3), set(s.words)) for s in timeline.spans if s.words]
     return spans, [(round(k.time, 3), set(k.words)) for k in timeline.keys]
 

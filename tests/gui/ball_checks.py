@@ -8,16 +8,16 @@ import numpy as np
 from tab import (
     PICTURES,
     assert_no_errors_since,
-    output,
     click_operator,
-    read_printed_since,
-    import_module,
-    run_operator,
     copy_sample,
     get_settings,
-    wait_until_settled,
-    wait_until,
+    import_module,
+    output,
+    read_printed_since,
+    run_operator,
     wait_for_work,
+    wait_until,
+    wait_until_settled,
     window,
 )  # fmt: skip
 
@@ -86,7 +86,8 @@ def check_hit_analysis_shows_a_graph_and_goes_to_strikes():
     mark = len(output.text())
     bpy.ops.wm.read_homefile(use_empty=True)
     yield 1.0
-    run_operator("beyond_mocap.import_clips", "EXEC_DEFAULT", filepath=str(copy_sample() / "library" / "kick_low_top.bvh"))
+    run_operator("beyond_mocap.import_clips", "EXEC_DEFAULT",
+                 filepath=str(copy_sample() / "library" / "kick_low_top.bvh"))
     body = bpy.context.object.name
     back = yield from isolate_panel("hits")
     yield from click_operator("hit_analysis")
@@ -124,14 +125,16 @@ def check_the_ball_of_a_match_is_solved_and_accepted():
     back = yield from isolate_panel("tracked")
     yield from click_operator("solve_ball")
     yield from wait_for_work()
-    found = [(touch.name, round(touch.time, 1)) for touch in get_passes().touches if touch.kind == "kick" and touch.name]
+    found = [(touch.name, round(touch.time, 1)) for touch in get_passes().touches if touch.kind == "kick"
+             and touch.name]
     output.write_line(f"     kicks solved: {found}")
     assert found == [("player1", 8.5), ("player2", 16.5), ("player1", 24.8)], found
     yield 0.5
     window.save_picture(PICTURES / "ball_solved.png")
     yield from click_operator("accept_touches", "touches()")
     yield from wait_until_settled()
-    found = [moment.key.words for moment in import_module("scene.timeline.lanes").list_moments(get_settings().players["player2"].dot)]
+    found = [moment.key.words for moment in import_module("scene.timeline.label_tracks").list_moments(
+        get_settings().players["player2"].dot)]
     assert found == [("receive", "foot"), ("kick",)], (found, read_printed_since(mark)[-600:])
     back()
     assert_no_errors_since(mark)
@@ -161,7 +164,7 @@ def check_a_passing_scene_is_generated_by_a_button():
     yield from click_operator("passes_make")
     yield from wait_for_work()
     output.write_line(f"     made in {time.monotonic() - start:.0f} s, the library built for the first time: "
-               f"{', '.join(get_passes().figures.splitlines())}")
+                      f"{', '.join(get_passes().figures.splitlines())}")
     assert get_passes().made_of and len(get_passes().strikes.splitlines()) == 4, get_passes().told
     for line in get_passes().strikes.splitlines():
         output.write_line(f"     {line}")
@@ -179,7 +182,8 @@ def check_a_passing_scene_is_generated_by_a_button():
 
 def check_a_dragged_position_updates_the_scene():
     mark = len(output.text())
-    BEFORE.update(ball=list_positions("Passing Ball"), made=get_passes().made_of, place=tuple(find_object("Ann place").location))
+    BEFORE.update(ball=list_positions("Passing Ball"), made=get_passes().made_of,
+                  place=tuple(find_object("Ann place").location))
     select_objects("Ann place")
     bpy.ops.ed.undo_push(message="before the drag")
     area = window.find_area("VIEW_3D")

@@ -14,18 +14,18 @@ from tab import (
     PICTURES,
     TAB,
     assert_no_errors_since,
+    copy_sample,
+    find_errors,
+    get_settings,
     is_moving,
     output,
     press_all_buttons,
     press_button,
     read_printed_since,
-    copy_sample,
-    get_settings,
-    find_errors,
-    wait_until,
-    wait_for_work,
-    window,
     report_time,
+    wait_for_work,
+    wait_until,
+    window,
 )
 from window import draw_unfolded
 
@@ -145,7 +145,8 @@ def check_the_tab_draws():
 def check_every_button():
     """Press each operator's button of the tab once; whatever it opens is closed, whatever it starts is cancelled."""
     mark = len(output.text())
-    fold_again = [draw_unfolded(panel) for panel in bpy.types.Panel.__subclasses__() if panel.__module__.startswith(EXTENSION)]
+    fold_again = [draw_unfolded(panel) for panel in bpy.types.Panel.__subclasses__()
+                  if panel.__module__.startswith(EXTENSION)]
     pressed = yield from press_all_buttons()
     window.save_picture(PICTURES / "unfolded.png")
     for fold in fold_again:

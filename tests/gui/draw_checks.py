@@ -3,7 +3,19 @@
 import time
 
 import bpy
-from tab import PICTURES, TAB, assert_no_errors_since, output, import_module, run_operator, copy_sample, get_settings, wait_until_settled, wait_until, window
+from tab import (
+    PICTURES,
+    TAB,
+    assert_no_errors_since,
+    copy_sample,
+    get_settings,
+    import_module,
+    output,
+    run_operator,
+    wait_until,
+    wait_until_settled,
+    window,
+)
 
 
 def get_player():

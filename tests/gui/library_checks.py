@@ -4,7 +4,21 @@ import shutil
 import time
 
 import bpy
-from tab import PICTURES, TAB, is_moving, output, click_operator, import_module, run_operator, copy_sample, get_settings, wait_until_settled, wait_until, window, report_time
+from tab import (
+    PICTURES,
+    TAB,
+    click_operator,
+    copy_sample,
+    get_settings,
+    import_module,
+    is_moving,
+    output,
+    report_time,
+    run_operator,
+    wait_until,
+    wait_until_settled,
+    window,
+)
 from window import draw_unfolded
 
 
@@ -38,7 +52,8 @@ def check_the_list_and_its_buttons():
     folder = yield from open_sample()
     run_operator("beyond_mocap.build_library")
     yield from wait_until_settled()
-    yield from wait_until(lambda: get_clip_list().total == 43 and not get_clip_list().missing, what=lambda: get_clip_list().total)
+    yield from wait_until(lambda: get_clip_list().total == 43 and not get_clip_list().missing,
+                          what=lambda: get_clip_list().total)
     fold = unfold_step()
     yield from wait_for_drawing()
     window.save_picture(PICTURES / "library-list.png")
@@ -74,7 +89,8 @@ def check_news_are_told_and_nothing_is_built():
     yield 1.0
     for number in range(3):
         shutil.copy(folder / "walking_1_2.bvh", folder / f"new_{number}.bvh")
-    yield from wait_until(lambda: get_clip_list().news == "3 new clips", what=lambda: get_clip_list().news)  # it may be read between two
+    yield from wait_until(lambda: get_clip_list().news == "3 new clips",
+                          what=lambda: get_clip_list().news)  # it may be read between two
     assert get_clip_list().total == 43, get_clip_list().total
     yield 0.5
     window.save_picture(PICTURES / "library-news.png")
@@ -113,7 +129,7 @@ def check_ten_thousand_files_do_not_freeze_the_window():
     fold()
     spent.sort()
     output.write_line(f"     drawn {len(spent)} times, {1000 * spent[len(spent) // 2]:.1f} ms in the median; longest wait "
-               f"{longest:.2f} s")
+                      f"{longest:.2f} s")
     assert get_clip_list().total == 10043
     report_time("the panel, s", spent[len(spent) // 2], 0.005)
     report_time("longest wait, s", longest, 3.0)
@@ -179,7 +195,8 @@ def check_dropped_files():
 
     def spans():
         player = get_settings().players[get_settings().active_player]
-        return [span.words for span in import_module("scene.timeline.strips").read_player_timeline(player, window.window.scene).spans]
+        return [span.words for span in import_module("scene.timeline.strips").read_player_timeline(player,
+                window.window.scene).spans]
 
     yield from wait_until(lambda: spans() == [("running",)], what=spans)
 

@@ -4,18 +4,18 @@ import time
 
 import bpy
 import mathutils
-from ball_checks import select_objects, find_object
+from ball_checks import find_object, select_objects
 from tab import (
     PICTURES,
     assert_no_errors_since,
-    output,
     click_operator,
-    import_module,
-    run_operator,
     copy_sample,
-    wait_until_settled,
-    wait_until,
+    import_module,
+    output,
+    run_operator,
     wait_for_work,
+    wait_until,
+    wait_until_settled,
     window,
 )
 

@@ -9,15 +9,15 @@ from tab import (
     EXTENSION,
     PICTURES,
     assert_no_errors_since,
-    output,
     click_operator,
-    import_module,
-    run_operator,
     copy_sample,
-    wait_until_settled,
-    wait_until,
-    window,
+    import_module,
+    output,
     report_time,
+    run_operator,
+    wait_until,
+    wait_until_settled,
+    window,
 )
 
 
@@ -28,7 +28,7 @@ def get_match_settings():
 
 def list_bodies():
     """The armatures that are shown."""
-    return import_module("scene.match.ours").find_armatures(window.window.scene)
+    return import_module("scene.match.match_objects").find_armatures(window.window.scene)
 
 
 def open_empty_scene():
@@ -75,7 +75,8 @@ def check_match():
     yield from click_operator("match_camera", "STAND")
     yield 1
     window.save_picture(PICTURES / "match-stand.png")
-    get_match_settings().active = next(number for number, player in enumerate(get_match_settings().players) if player.feed_id == "home_4")
+    get_match_settings().active = next(number for number, player in enumerate(get_match_settings().players)
+                                       if player.feed_id == "home_4")
     yield from click_operator("match_camera", "EYES")
     yield 1
     window.save_picture(PICTURES / "match-eyes.png")
@@ -91,9 +92,10 @@ def check_cancel_and_go_on():
     """ESC while it is made changes nothing and ends the process; pressed again it comes to its end."""
     yield from open_empty_scene()
     yield from read_match()
-    get_match_settings().end, get_match_settings().workers, get_match_settings().folder = 8.0, 1, str(PICTURES.resolve() / "cancelled match")
+    get_match_settings().end, get_match_settings().workers, get_match_settings().folder = 8.0, 1, str(PICTURES.resolve()
+            / "cancelled match")
     bpy.ops.beyond_mocap.tick_match(whom="home")
-    child = import_module("scene.match.child")
+    child = import_module("scene.match.command_process")
     yield from click_operator("make_match")
     yield from wait_until(lambda: child._running, what="a process works")
     yield 3.0
@@ -110,7 +112,8 @@ def check_window_stays_alive():
     """While a match is made the window is drawn and hears keys."""
     yield from open_empty_scene()
     yield from read_match()
-    get_match_settings().end, get_match_settings().workers, get_match_settings().folder = 4.0, 1, str(PICTURES.resolve() / "alive match")
+    get_match_settings().end, get_match_settings().workers, get_match_settings().folder = 4.0, 1, str(PICTURES.resolve()
+            / "alive match")
     bpy.ops.beyond_mocap.tick_match(whom="home")
     yield from click_operator("make_match")
     longest, before = 0.0, time.monotonic()

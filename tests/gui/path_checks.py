@@ -5,7 +5,19 @@ import time
 
 import bpy
 import numpy as np
-from tab import PICTURES, assert_no_errors_since, output, click_operator, import_module, run_operator, copy_sample, get_settings, wait_until, window, report_time
+from tab import (
+    PICTURES,
+    assert_no_errors_since,
+    click_operator,
+    copy_sample,
+    get_settings,
+    import_module,
+    output,
+    report_time,
+    run_operator,
+    wait_until,
+    window,
+)
 
 FRAMES = 600
 BUDGET = 66.0
@@ -17,7 +29,7 @@ BEFORE = {}  # curve and body before the hand moved them
 
 def write_long_walk():
     """The sample's walk repeated on a straight line until it has 600 frames, as a BVH file."""
-    bvh, ride = import_module("beyond_mocap.files.bvh.bvh"), import_module("beyond_mocap.path_editing.ride")
+    bvh, ride = import_module("beyond_mocap.files.bvh.bvh"), import_module("beyond_mocap.path_editing.path_edit")
     line = import_module("beyond_mocap.path_editing.path_line")
     clip = bvh.read_bvh(copy_sample() / "library" / "walking_1_2.bvh", 0.01)
     wishes = ride.PathEditSettings(cycle=True, plant=False, lean=False)
@@ -87,7 +99,7 @@ class UpdateCounter:
     """Counts what the riders' module works out, and how long it takes: live's own calls, unchanged."""
 
     def __enter__(self):
-        self.riders, self.spent, self.cpu = import_module("scene.path_editing.riders"), [], []
+        self.riders, self.spent, self.cpu = import_module("scene.path_editing.edited_bodies"), [], []
         self.renew = self.riders.update_motion
 
         def count_call(*arguments, **named):
@@ -137,7 +149,8 @@ def check_edit_path_is_a_button_and_tab_edits_the_curve():
     back = yield from isolate_panel(area)
     yield from click_operator("edit_path")
     yield from wait_until(
-        lambda: find_body().beyond_mocap_ride.on and bpy.context.object == find_curve(), 60.0, "Edit Path does something"
+        lambda: find_body().beyond_mocap_ride.on and bpy.context.object == find_curve(), 60.0,
+        "Edit Path does something"
     )
     yield from wait_until_settled()
     back()
@@ -170,7 +183,7 @@ def grab_point(number, start=0.0):
         point.select_control_point = point.select_left_handle = point.select_right_handle = other == number
     place = np.array(find_curve().matrix_world @ list_points()[number].co)
     scene = window.window.scene
-    shown = import_module("scene.path_editing.riders").find_computed_edit(find_body())
+    shown = import_module("scene.path_editing.edited_bodies").find_computed_edit(find_body())
     scene.frame_set(shown.first + int(np.argmin(np.linalg.norm(shown.edited.origin[:, :2] - place[:2], axis=1))))
     bpy.ops.ed.undo_push(message="before the drag")
     yield 0.5
@@ -229,10 +242,10 @@ def check_the_body_follows_a_dragged_point():
         off.append(measure_distance())
     window.save_picture(PICTURES / "path_drag.png")
     output.write_line(f"     {FRAMES} frames: one update takes {statistics.median(spent):.0f} ms of work (95 % within "
-               f"{spent[int(0.95 * (count - 1))]:.0f}), {statistics.median(updates.spent):.0f} ms of wall clock")
+                      f"{spent[int(0.95 * (count - 1))]:.0f}), {statistics.median(updates.spent):.0f} ms of wall clock")
     output.write_line(f"     {count} updates in {moves} moves, {count / wall:.1f} a second of wall clock, "
-               f"{count / worked:.1f} a second "
-               f"of the main thread's work; without following this machine draws {free:.1f} moves a second")
+                      f"{count / worked:.1f} a second "
+                      f"of the main thread's work; without following this machine draws {free:.1f} moves a second")
     output.write_line(
         f"     the body is {max(off):.3f} m off the curve at most; it went {np.linalg.norm(measure_pelvis() - before):.2f} m"
     )
@@ -377,7 +390,8 @@ def check_bake_and_leave():
             thing.select_set(thing == find_body(name))
         bpy.context.view_layer.objects.active = find_body(name)
         played = collect_keys(name)
-        assert run_operator("beyond_mocap.bake_path" if name == "second" else "beyond_mocap.leave_path", "EXEC_DEFAULT") == {
+        assert run_operator("beyond_mocap.bake_path" if name == "second" else "beyond_mocap.leave_path",
+                            "EXEC_DEFAULT") == {
             "FINISHED"
         }
         yield 0.5

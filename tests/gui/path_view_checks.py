@@ -4,7 +4,18 @@ them."""
 import time
 
 import bpy
-from tab import PICTURES, TAB, output, import_module, run_operator, copy_sample, wait_until_settled, wait_until, window, report_time
+from tab import (
+    PICTURES,
+    TAB,
+    copy_sample,
+    import_module,
+    output,
+    report_time,
+    run_operator,
+    wait_until,
+    wait_until_settled,
+    window,
+)
 from window import ObjectProxy, draw_unfolded
 
 SWITCHES = ("path_source", "path_new", "path_trackers", "path_residuals", "path_ghost")
@@ -32,7 +43,7 @@ class DrawCounter:
     """While a `with` lasts: what each call of the drawing of riders takes, and which shapes are made."""
 
     def __enter__(self):
-        self.draw, self.rides = import_module("scene.overlays.draw"), import_module("scene.overlays.rides")
+        self.draw, self.rides = import_module("scene.overlays.draw"), import_module("scene.overlays.path_overlays")
         self.seconds, self.made = [], []
         self.items, self.making = self.rides.list_items, self.draw._made
         self.draw.rides = ObjectProxy(self.rides, items=self.timed)
@@ -74,7 +85,7 @@ def check_overlays_are_built_once():
         run_operator("beyond_mocap.update_path", "EXEC_DEFAULT")
         yield from redraw_view(6)
     counted.report_times("laid anew once")
-    source = import_module("scene.path_editing.riders").find_computed_edit(find_edited_body()).source
+    source = import_module("scene.path_editing.edited_bodies").find_computed_edit(find_edited_body()).source
     assert 0 < len(counted.made) <= 3, [key[1:] for key, _ in counted.made]
     assert all(key[0] is not source for key, _ in counted.made), "the original's own shapes were made again"
     report_time("shapes made anew, s", sum(seconds for _, seconds in counted.made), 0.02)
@@ -185,8 +196,9 @@ def check_keys_nudge_and_the_body_follows():
         bpy.ops.ed.undo_push(message="selected")
     yield from window.move_pointer(area.x + area.width // 3, area.y + area.height // 2)
     yield 0.5
-    riders, frame = import_module("scene.path_editing.riders"), bpy.context.scene.frame_current
-    start, laid = tuple(bpy.context.object.data.splines[0].points[4].co), riders.find_computed_edit(find_edited_body()).number
+    riders, frame = import_module("scene.path_editing.edited_bodies"), bpy.context.scene.frame_current
+    start, laid = tuple(bpy.context.object.data.splines[0].points[4].co), riders.find_computed_edit(
+        find_edited_body()).number
     for count, key in enumerate(("UP_ARROW", "UP_ARROW", "RIGHT_ARROW", "PAGE_UP"), 1):
         yield from window.press_key(key, alt=True)
         yield from wait_until(lambda: riders.find_computed_edit(find_edited_body()).number - laid >= count, 60.0)

@@ -5,7 +5,7 @@ import pathlib
 
 import bpy
 from mathutils import Euler
-from tab import EXTENSION, TAB, output, import_module, run_operator, copy_sample, window
+from tab import EXTENSION, TAB, copy_sample, import_module, output, run_operator, window
 from window import draw_unfolded
 
 KEPT_PICTURES = pathlib.Path("docs/pictures")
@@ -65,8 +65,8 @@ def save_tab_picture(name, area):
     yield 0.7
     yield from window.move_pointer(region.x - 200, region.y + 100)
     yield 0.5
-    window.save_part(KEPT_PICTURES / f"{name}.png", region.x + 3, region.y + 4, region.width - TABS - 3, region.height - 8,
-                "-fuzz", "2%", "-trim", "+repage", "-bordercolor", "#303030", "-border", "4")
+    window.save_part(KEPT_PICTURES / f"{name}.png", region.x + 3, region.y + 4, region.width - TABS - 3, region.height
+                     - 8, "-fuzz", "2%", "-trim", "+repage", "-bordercolor", "#303030", "-border", "4")
     output.write_line(f"     {name}.png")
 
 
@@ -99,7 +99,8 @@ def create_walk_on_bend():
     bpy.ops.beyond_mocap.import_clips(filepath=str(copy_sample() / "library" / "walk_jog_walk.bvh"))
     walker = bpy.context.object
     motion = import_module("scene.core.action").read_motion(walker, scene)
-    person = import_module("scene.stage.body").create_character(walker, "person", (0.75, 0.05, 0.06), scene.collection, scene, motion)
+    person = import_module("scene.stage.body").create_character(walker, "person", (0.75, 0.05, 0.06), scene.collection,
+                                                                scene, motion)
     for collection in person.users_collection:
         collection.color_tag = "NONE"
     walker.hide_set(False)
@@ -221,4 +222,5 @@ def check_the_preferences():
     bpy.context.window_manager.addon_search = "Beyond Mocap"
     bpy.ops.preferences.addon_expand(module=EXTENSION)
     yield 1.5
-    window.save_part(KEPT_PICTURES / "preferences.png", shown.x + 170, shown.y + 4, shown.width - 180, shown.height * 6 // 10)
+    window.save_part(KEPT_PICTURES / "preferences.png", shown.x + 170, shown.y + 4, shown.width - 180, shown.height
+                     * 6 // 10)

@@ -4,7 +4,7 @@ import statistics
 import time
 
 import bpy
-from tab import EXTENSION, PICTURES, TAB, output, copy_sample, window, report_time
+from tab import EXTENSION, PICTURES, TAB, copy_sample, output, report_time, window
 from window import draw_unfolded
 
 PLAYERS, LIMIT_MS = 22, 5.0
@@ -111,7 +111,8 @@ def check_the_tab_draws_quickly():
     assert len(bpy.context.scene.beyond_mocap.players) == PLAYERS
     yield 1
     sums = {"as it opens": report_medians("as it opens", (yield from measure_redraws("VIEW_3D")))}
-    fold_again = [draw_unfolded(panel) for panel in list_own_classes(bpy.types.Panel) if panel.bl_space_type == "VIEW_3D"]
+    fold_again = [draw_unfolded(panel) for panel in list_own_classes(bpy.types.Panel) if panel.bl_space_type
+                  == "VIEW_3D"]
     sums["unfolded"] = report_medians("unfolded", (yield from measure_redraws("VIEW_3D")))
     window.save_picture(PICTURES / "redraw.png")
     for fold in fold_again:
@@ -121,7 +122,8 @@ def check_the_tab_draws_quickly():
 
 
 def check_the_tabs_of_the_timelines_draw_quickly():
-    kinds = {panel.bl_space_type for panel in list_own_classes(bpy.types.Panel) if getattr(panel, "bl_category", "") == TAB}
+    kinds = {panel.bl_space_type for panel in list_own_classes(bpy.types.Panel) if getattr(panel, "bl_category", "")
+             == TAB}
     area = window.find_area("VIEW_3D")
     for kind in [kind for kind in EDITORS[1:] if kind in kinds]:
         area.type = kind

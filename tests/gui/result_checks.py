@@ -5,7 +5,20 @@ import time
 
 import bpy
 import numpy as np
-from tab import EXTENSION, PICTURES, TAB, output, import_module, run_operator, copy_sample, get_settings, wait_until_settled, wait_until, window, report_time
+from tab import (
+    EXTENSION,
+    PICTURES,
+    TAB,
+    copy_sample,
+    get_settings,
+    import_module,
+    output,
+    report_time,
+    run_operator,
+    wait_until,
+    wait_until_settled,
+    window,
+)
 
 
 def get_work():
@@ -27,7 +40,7 @@ class WorkHolder:
     """Holds back all work until it is let go, one after the other or all, and notices a cancel meanwhile."""
 
     def __enter__(self):
-        self.orders, self.started, self.released = import_module("scene.result.orders"), 0, 0
+        self.orders, self.started, self.released = import_module("scene.result.synthesis_request"), 0, 0
         self.before = self.orders.process_request
 
         def wait_for_release(order, library, progress, cancelled, hurry):
@@ -118,7 +131,7 @@ def check_the_window_is_alive_while_takes_are_made():
     begun = time.monotonic()
     busy, longest = yield from ticks(600.0)
     output.write_line(f"     ticks a second: {quiet:.0f} idle, {busy:.0f} while making ({busy / quiet:.0%}) for "
-               f"{time.monotonic() - begun:.1f} s; longest wait {longest:.2f} s")
+                      f"{time.monotonic() - begun:.1f} s; longest wait {longest:.2f} s")
     assert list_states() == ["PREVIEW", "PREVIEW"]
     report_time("seconds from tick to tick while making", 1.0 / busy, 1.0 / 8.0)
 

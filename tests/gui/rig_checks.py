@@ -6,7 +6,18 @@ import importlib
 import addon_utils
 import bpy
 from mathutils import Euler
-from tab import EXTENSION, PICTURES, TAB, is_moving, output, press_button, copy_sample, wait_until_settled, wait_until, window
+from tab import (
+    EXTENSION,
+    PICTURES,
+    TAB,
+    copy_sample,
+    is_moving,
+    output,
+    press_button,
+    wait_until,
+    wait_until_settled,
+    window,
+)
 
 
 def import_module(name):
@@ -40,7 +51,8 @@ def check_bake_to_a_rigify_rig():
     assert len(import_module("rigs.rig").read_bone_list(settings)) >= 22, settings.told
     bpy.ops.ed.undo_push(message="before the bake")
     yield from press_button("bake_to_rig(targets='CHOSEN'")  # one press is one undo step
-    yield from wait_until(lambda: bpy.data.objects[name].animation_data and bpy.data.objects[name].animation_data.action)
+    yield from wait_until(lambda: bpy.data.objects[name].animation_data
+                          and bpy.data.objects[name].animation_data.action)
     yield from wait_until_settled()
     rig = bpy.data.objects[name]
     output.write_line(f"     {bpy.context.scene.beyond_mocap.rig.messages.splitlines()[-2:]}")

@@ -7,8 +7,18 @@ import time
 
 import bpy
 import mathutils
-from ball_checks import select_objects, isolate_panel, find_object
-from tab import PICTURES, assert_no_errors_since, output, click_operator, import_module, copy_sample, wait_until, window, report_time
+from ball_checks import find_object, isolate_panel, select_objects
+from tab import (
+    PICTURES,
+    assert_no_errors_since,
+    click_operator,
+    copy_sample,
+    import_module,
+    output,
+    report_time,
+    wait_until,
+    window,
+)
 
 PORT = 7361 + os.getpid() % 997  # another session's stream may be on this machine
 SENT = {}
@@ -51,7 +61,8 @@ def check_a_body_does_what_arrives():
     get_scene().beyond_mocap_stream.port = PORT
     back = yield from isolate_panel("stream")
     yield from click_operator("stream_start")
-    yield from wait_until(lambda: get_stream_status().on and get_stream_status().state == "waiting", what=lambda: get_stream_status().state)
+    yield from wait_until(lambda: get_stream_status().on and get_stream_status().state == "waiting",
+                          what=lambda: get_stream_status().state)
     SENT["end"] = start_sending("passes/library/volley_pass.bvh")
     yield from wait_until(lambda: get_scene().beyond_mocap_stream.body is not None)
     set_view((0.0, 0.0, 0.9), 5.0)
@@ -74,7 +85,8 @@ def check_a_body_does_what_arrives():
 def check_a_stopped_stream_is_reported():
     mark = len(output.text())
     SENT.pop("end")()
-    yield from wait_until(lambda: get_stream_status().state == "stalled" and "no frame for" in get_stream_status().line, what=lambda: get_stream_status().line)
+    yield from wait_until(lambda: get_stream_status().state == "stalled" and "no frame for" in get_stream_status().line,
+                          what=lambda: get_stream_status().line)
     assert_no_errors_since(mark)
 
 
@@ -105,7 +117,8 @@ def check_strikes_are_answered_while_the_scene_plays():
         end()
         bpy.ops.screen.animation_cancel(restore_frame=False)
     select_objects(get_scene().beyond_mocap_passes.players["Cho"].body.name)
-    yield from wait_until(lambda: import_module("scene.stream.play").find_target(get_scene()) == "Cho" or rally().holder == "Cho")
+    yield from wait_until(lambda: import_module("scene.stream.play").find_target(get_scene()) == "Cho" or rally().holder
+                          == "Cho")
     yield from click_operator("stream_end")
     yield from wait_until(lambda: rally() is None and not get_stream_status().playing)
     back()

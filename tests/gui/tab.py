@@ -95,9 +95,10 @@ is."""
     busy += [work for work in (manager.beyond_mocap_work.kind, manager.beyond_mocap_work.waiting) if work]
     live = [f"scene.{name}.live" for name in ("path_editing", "ball", "passes")]
     busy += [name for name in live if import_module(name).WATCHER.dirty]
-    busy += ["scene.result.freshness"] if get_settings().live and import_module("scene.result.freshness").LIVE.dirty else []
+    busy += ["scene.result.freshness"] if get_settings().live and import_module(
+        "scene.result.freshness").LIVE.dirty else []
     has_throw = any(one.type == "ARMATURE" and one.beyond_mocap_throw.made for one in window.window.scene.objects)
-    busy += ["scene.throws.shown"] if has_throw and import_module("scene.throws.shown").WATCHER.dirty else []
+    busy += ["scene.throws.preview"] if has_throw and import_module("scene.throws.preview").WATCHER.dirty else []
     waits = import_module("scene.timeline.strip_events")._run_scheduled in import_module("scene.core.live")._timers
     return busy + ["scene.timeline.strip_events"] * waits
 

@@ -5,7 +5,18 @@ import time
 
 import bpy
 import numpy as np
-from tab import EXTENSION, PICTURES, assert_no_errors_since, output, click_operator, copy_sample, wait_until_settled, wait_until, window, report_time
+from tab import (
+    EXTENSION,
+    PICTURES,
+    assert_no_errors_since,
+    click_operator,
+    copy_sample,
+    output,
+    report_time,
+    wait_until,
+    wait_until_settled,
+    window,
+)
 
 
 def find_body():

@@ -1,7 +1,17 @@
 """The timeline in the NLA editor, as an animator uses it: Blender's own keys on strips, names of key moments, undo."""
 
 import bpy
-from tab import PICTURES, TAB, parse_operator, click_operator, import_module, copy_sample, wait_until_settled, wait_until, window
+from tab import (
+    PICTURES,
+    TAB,
+    click_operator,
+    copy_sample,
+    import_module,
+    parse_operator,
+    wait_until,
+    wait_until_settled,
+    window,
+)
 
 
 def find_nla():
@@ -189,14 +199,15 @@ def find_name(text):
     area = find_nla()
     region = next(region for region in area.regions if region.type == "WINDOW")
     with override_nla():
-        found = next(one for one in import_module("scene.timeline.moment_names").list_names(bpy.context, region) if one.text == text)
+        found = next(one for one in import_module("scene.timeline.moment_names").list_names(bpy.context, region)
+                     if one.text == text)
     left, bottom, right, top = found.box
     return found, (int(region.x + (left + right) / 2), int(region.y + (bottom + top) / 2))
 
 
 def list_picked():
     """The words of the picked key moment."""
-    moments = import_module("scene.timeline.lanes").list_moments(bpy.context.scene.beyond_mocap.players[0].dot)
+    moments = import_module("scene.timeline.label_tracks").list_moments(bpy.context.scene.beyond_mocap.players[0].dot)
     moment = next((moment for moment in moments if moment.is_selected), None)
     return " ".join(moment.labels) if moment else ""
 
@@ -271,8 +282,9 @@ def check_the_tab_in_the_nla_editor():
         bpy.ops.nla.view_all()
     area = find_nla()
     yield from window.open_tab(area, TAB)
-    import_module("scene.timeline.strips").show_automatic_spans(bpy.context, bpy.context.scene.beyond_mocap.players[0], import_module(
-        "beyond_mocap.annotation").parse_timeline("0 2.4 standing\n8 17 jogging\n17 19.2 walking\n24.2 26.4 running\n"))
+    import_module("scene.timeline.strips").show_automatic_spans(bpy.context, bpy.context.scene.beyond_mocap.players[0],
+                                                                import_module("beyond_mocap.annotation").parse_timeline(
+        "0 2.4 standing\n8 17 jogging\n17 19.2 walking\n24.2 26.4 running\n"))
     select_strip("jogging dribble")
     with override_nla():
         bpy.ops.beyond_mocap.edit_words("EXEC_DEFAULT", True, words="joging dribble")
@@ -335,7 +347,8 @@ def check_names_in_the_dope_sheet():
 def check_a_dragged_automatic_strip_is_requested():
     yield from open_sample()
     parse, player = import_module("beyond_mocap.annotation").parse_timeline, bpy.context.scene.beyond_mocap.players[0]
-    import_module("scene.timeline.strips").show_automatic_spans(bpy.context, player, parse("0 2.4 standing\n8 17 jogging\n"))
+    import_module("scene.timeline.strips").show_automatic_spans(bpy.context, player,
+                                                                parse("0 2.4 standing\n8 17 jogging\n"))
     bpy.ops.ed.undo_push(message="synthesis")
     before = format_strips()
     select_strip("jogging")

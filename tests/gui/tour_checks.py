@@ -6,7 +6,19 @@ import sys
 
 import addon_utils
 import bpy
-from tab import PICTURES, choose_file, fill_in, is_moving, output, press_button, copy_sample, get_settings, wait_until_settled, wait_until, window
+from tab import (
+    PICTURES,
+    choose_file,
+    copy_sample,
+    fill_in,
+    get_settings,
+    is_moving,
+    output,
+    press_button,
+    wait_until,
+    wait_until_settled,
+    window,
+)
 
 sys.path.insert(0, str(pathlib.Path("tests/blender").resolve()))
 from undo import collect_state  # noqa: E402
@@ -46,7 +58,8 @@ def build_library():
     """The folder is typed, the library built."""
     yield from fill_in("library_folder", str(copy_sample() / "library"))
     yield from wait_until(
-        lambda: get_settings().library_folder == str(copy_sample() / "library"), what=lambda: get_settings().library_folder
+        lambda: get_settings().library_folder == str(copy_sample() / "library"),
+        what=lambda: get_settings().library_folder
     )
     yield from press_button("build_library")
     yield from wait_until_settled()
@@ -123,7 +136,8 @@ def bake_to_rig():
     window.save_picture(PICTURES / "tour-rig.png")
 
 
-STEPS = (import_data, build_library, annotate_kick, cancel_synthesis, synthesize_preview, accept_preview, create_rig, bake_to_rig)
+STEPS = (import_data, build_library, annotate_kick, cancel_synthesis, synthesize_preview, accept_preview, create_rig,
+         bake_to_rig)
 
 
 def check_the_tour():

@@ -5,7 +5,7 @@ import time
 
 import bpy
 from mathutils import Euler, Quaternion
-from tab import PICTURES, TAB, output, import_module, copy_sample, get_settings, wait_until, window, report_time
+from tab import PICTURES, TAB, copy_sample, get_settings, import_module, output, report_time, wait_until, window
 from window import ObjectProxy
 
 OVERLAYS = ("track", "footprints", "contacts", "seams", "moments", "speed", "ghosts")
@@ -21,7 +21,8 @@ def wait_until_prepared():
     """Wait until every player that is shown is prepared."""
     store = import_module("scene.overlays.store")
     yield from wait_until(
-        lambda: all(store.find_prepared(player.take) for player in store.list_shown_players(get_settings())), what="prepared"
+        lambda: all(store.find_prepared(player.take) for player in store.list_shown_players(get_settings())),
+        what="prepared"
     )
 
 
@@ -209,7 +210,8 @@ def check_a_warning_goes_to_its_frame():
     )
     assert bpy.context.scene.frame_current == 1 + 5 * bpy.context.scene.render.fps
     assert bpy.context.view_layer.objects.active == body
-    assert bpy.context.window_manager.beyond_mocap_playhead.draw_reasons or not import_module("scene.overlays.store")._prepared
+    assert bpy.context.window_manager.beyond_mocap_playhead.draw_reasons or not import_module(
+        "scene.overlays.store")._prepared
 
 
 def check_error_curves_are_in_the_graph_editor():

@@ -5,7 +5,7 @@ import json
 import pytest
 
 from beyond_mocap.cli.main import main
-from beyond_mocap.throws.planted_examples import write_examples
+from beyond_mocap.throws.synthetic_examples import write_examples
 from tests.core.throws.test_throw import STICK
 
 

@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 
 from beyond_mocap.synthetic.throws import build_throw
-from beyond_mocap.throws.networks.answers import apply_output, compute_end_positions, build_output
 from beyond_mocap.throws.networks.chains import find_chains
 from beyond_mocap.throws.networks.example import build_example
 from beyond_mocap.throws.networks.features import build_input, compute_phase
 from beyond_mocap.throws.networks.model import ModelSettings
-from beyond_mocap.throws.networks.training_set import measure_leg_reach, build_steps
+from beyond_mocap.throws.networks.network_output import apply_output, build_output, compute_end_positions
+from beyond_mocap.throws.networks.training_set import build_steps, measure_leg_reach
 
 TARGET = (12.0, 3.0, 1.2)
 CASES = [ModelSettings(guided=True, carried=True), ModelSettings(kind="single", wrist="inferred", frame="static")]
@@ -31,7 +31,8 @@ def told(settings, chains, reach, pose, truth, window, xp):
         y = build_output(name, chains, settings, pose, truth, xp)
         x = build_input(name, chains, settings, pose, after, window, xp)
         after = apply_output(name, chains, settings, y, pose, after, window, xp)
-        found[name] = (x, y, compute_end_positions(name, chains, settings, y, xp), compute_phase(name, chains, truth, window, reach, xp))
+        found[name] = (x, y, compute_end_positions(name, chains, settings, y, xp),
+                       compute_phase(name, chains, truth, window, reach, xp))
     return found, after
 
 

@@ -12,9 +12,9 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from beyond_mocap.base.errors import UserCancelledError, InputError
+from beyond_mocap.base.errors import InputError, UserCancelledError
 from training.config import build_config
-from training.fit import split_batches, build_checkpoint_path, fit, compute_rate, list_stretches
+from training.fit import build_checkpoint_path, compute_rate, fit, list_stretches, split_batches
 
 TOP = Path(__file__).resolve().parents[2]
 CONFIG = build_config({"epochs": 12, "macro": 3, "batch": 16, "learning_rate": 0.05, "final_rate": 0.01, "seed": 3})

@@ -14,7 +14,7 @@ from beyond_mocap.throws.networks.example import build_description, build_exampl
 from beyond_mocap.throws.networks.frame_step import Stepper
 from beyond_mocap.throws.networks.limits import JointLimits, estimate_joint_limits
 from beyond_mocap.throws.networks.model import ThrowModel
-from beyond_mocap.throws.networks.training_set import measure_leg_reach, find_shared_chains, build_steps
+from beyond_mocap.throws.networks.training_set import build_steps, find_shared_chains, measure_leg_reach
 from training.config import build_config
 from training.fit import fit
 from training.hierarchy import TrainingProblem
@@ -42,7 +42,8 @@ def problem(examples, told):
     chains = find_shared_chains(examples)
     limits = estimate_joint_limits(np.concatenate([example.motion.rotations for example in examples]))
     config = build_config({**SMALL, **told})
-    return TrainingProblem(build_recordings(examples), chains, config, measure_leg_reach(examples), JointLimits(chains.skeleton, limits))
+    return TrainingProblem(build_recordings(examples), chains, config, measure_leg_reach(examples),
+                           JointLimits(chains.skeleton, limits))
 
 
 @pytest.mark.parametrize("kind", ["hierarchy", "single"])
@@ -65,7 +66,8 @@ def test_training_predicts_what_use_predicts(examples, kind):
 
 
 def test_networks_alone_learn_and_a_model_comes_out(examples, tmp_path):
-    config = build_config({**SMALL, "conditioned": False, "rollout": 1, "epochs": 40, "learning_rate": 0.01, "points": 1})
+    config = build_config({**SMALL, "conditioned": False, "rollout": 1, "epochs": 40, "learning_rate": 0.01,
+                           "points": 1})
     losses = []
     model = train(examples, config, progress=lambda share, text: losses.append(text))
     write_model(model, tmp_path / "w.npz")

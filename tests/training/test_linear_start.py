@@ -6,7 +6,7 @@ import pytest
 
 from beyond_mocap.throws.networks.network import forward
 from beyond_mocap.throws.networks.phases import weigh_points
-from training.networks import RIDGES, build_first_weights, fit_linear, compute_sums
+from training.networks import RIDGES, build_first_weights, compute_sums, fit_linear
 
 ROWS, INPUTS, OUTPUTS = 3000, 6, 3
 

@@ -17,7 +17,18 @@ from ...base.easing import hermite
 from ...base.errors import UserCancelledError
 from ...base.vectors import unit_vectors
 from ..batch import simulate_trajectories
-from ..physics import FOOTBALL, Ball, compute_bounce, compute_grip, compute_air_acceleration, vector_length, compute_rolling_spin, compute_sliding, compute_slip, compute_deceleration
+from ..physics import (
+    FOOTBALL,
+    Ball,
+    compute_air_acceleration,
+    compute_bounce,
+    compute_deceleration,
+    compute_grip,
+    compute_rolling_spin,
+    compute_sliding,
+    compute_slip,
+    vector_length,
+)
 
 GRID = 0.04  # s between the simulated moments of a flight
 LONGEST = 5.0  # s, the longest stretch that is fitted
@@ -113,7 +124,8 @@ def collect_stretches(times, positions, measured, used, spans) -> Stretches:
     points = positions[index]
     weight = np.where(measured[index], 1.0 / _SAMPLE_DEVIATION, 1.0 / _FILLED_DEVIATION) * (inside & used[index])
     high = np.isfinite(points[..., 2])
-    weight_z = np.where(measured[index], 1.0 / _HEIGHT_DEVIATION, 1.0 / _FILLED_DEVIATION) * (inside & used[index] & high)
+    weight_z = np.where(measured[index], 1.0 / _HEIGHT_DEVIATION, 1.0 / _FILLED_DEVIATION) * (inside & used[index]
+            & high)
     start, end, velocity = (np.array([span[place] for span in spans]) for place in (2, 3, 4))
     since = np.where(inside, times[index] - begins[:, None], 0.0)
     return Stretches(ends - begins, start, end, velocity=velocity, since=since, points=np.nan_to_num(points),
@@ -139,7 +151,8 @@ def fit_launches(stretches: Stretches, ball: Ball = FOOTBALL, cancelled: Callabl
         starts = [_build_guess(stretches, stretches.velocity[:, 2])]
     else:
         starts = _choose_starts(stretches, ball, cancelled)
-    fitted = [_fit_batches(stretches, start, ball, rounds=_ROUNDS, simulate=_simulate_coarse, cancelled=cancelled) for start in starts]
+    fitted = [_fit_batches(stretches, start, ball, rounds=_ROUNDS, simulate=_simulate_coarse, cancelled=cancelled)
+              for start in starts]
     best, cost = fitted[0]
     for other, costs in fitted[1:]:
         is_better = costs < _LOFT_COST_SHARE * cost - _LOFT_COST_MARGIN  # when in doubt, keep the lower launch
@@ -157,9 +170,9 @@ def _choose_starts(stretches: Stretches, ball: Ball, cancelled) -> list[np.ndarr
         return [start]
     far_stretches = stretches.take(far)
     most = 0.5 * ball.gravity * far_stretches.seconds + 2.0  # with this speed the ball is down again at the end
-    fits = [_fit_batches(far_stretches, _build_guess(far_stretches, np.minimum(upward, most)), ball, rounds=_COARSE_ROUNDS, simulate=_simulate_coarse,
-                     cancelled=cancelled)
-             for upward in _UPWARD_SPEEDS]  # fmt: skip
+    fits = [_fit_batches(far_stretches, _build_guess(far_stretches, np.minimum(upward, most)), ball,
+                         rounds=_COARSE_ROUNDS, simulate=_simulate_coarse, cancelled=cancelled)
+            for upward in _UPWARD_SPEEDS]  # fmt: skip
     costs, found = np.array([cost for _, cost in fits]), np.stack([unknown for unknown, _ in fits])
     low = np.argmin(costs[:_LOW_COUNT], axis=0)
     high = _LOW_COUNT + np.argmin(costs[_LOW_COUNT:], axis=0)
@@ -197,11 +210,13 @@ def _build_launches(stretches: Stretches, unknown: np.ndarray, ball: Ball) -> tu
     return place, velocity, spin
 
 
-def _simulate_to_samples(stretches: Stretches, unknown: np.ndarray, ball: Ball, simulate) -> tuple[np.ndarray, np.ndarray]:
+def _simulate_to_samples(stretches: Stretches, unknown: np.ndarray, ball: Ball, simulate) -> tuple[np.ndarray,
+        np.ndarray]:
     """Simulate the balls; return positions at the samples (S, K, 3) m and at the end (S, 3) m."""
     count = int(np.ceil(stretches.seconds.max() / GRID))
     places, speeds = simulate(*_build_launches(stretches, unknown, ball), ball, count)
-    return _interpolate_grid(places, speeds, stretches.since), _interpolate_grid(places, speeds, stretches.seconds[:, None])[:, 0]
+    return _interpolate_grid(places, speeds, stretches.since), _interpolate_grid(places, speeds,
+                                                                                 stretches.seconds[:, None])[:, 0]
 
 
 def _interpolate_grid(places, speeds, since) -> np.ndarray:
@@ -232,12 +247,15 @@ def _compute_residuals(stretches: Stretches, unknown: np.ndarray, seen: np.ndarr
     high = offset[..., 2] * stretches.weight_z * even
     known = np.isfinite(stretches.end[:, 2])
     last = (end - np.nan_to_num(stretches.end)) / _TOUCH_DEVIATION
-    over = np.where(known, last[:, 2], end[:, 2] / _USUAL_END_HEIGHT + np.maximum(end[:, 2] - _MAX_END_HEIGHT, 0.0) / _TOUCH_DEVIATION)
+    over = np.where(known, last[:, 2], end[:, 2] / _USUAL_END_HEIGHT + np.maximum(end[:, 2] - _MAX_END_HEIGHT, 0.0)
+                    / _TOUCH_DEVIATION)
     rise = np.where(np.isfinite(stretches.velocity[:, 2]), 0.0, unknown[:, 4] / _USUAL_UPWARD_SPEED)
     speed = np.linalg.norm(unknown[:, 2:4], axis=1)
     rolls = np.where(unknown[:, 4] < _MIN_LOFT_SPEED, np.clip(unknown[:, 5], 0.0, speed / FOOTBALL.radius), 0.0)
-    spin_excess = np.stack([unknown[:, 5] - rolls, unknown[:, 6]])  # rolling: any spin between sliding and rolling is free
-    prior = np.stack([last[:, 0], last[:, 1], over, *(unknown[:, :2] / _TOUCH_DEVIATION).T, rise, *(spin_excess / _USUAL_SPIN)], axis=1)
+    spin_excess = np.stack([unknown[:, 5] - rolls,
+                            unknown[:, 6]])  # rolling: any spin between sliding and rolling is free
+    prior = np.stack([last[:, 0], last[:, 1], over, *(unknown[:, :2] / _TOUCH_DEVIATION).T, rise,
+                      *(spin_excess / _USUAL_SPIN)], axis=1)
     return np.concatenate([_soften_residuals(flat.reshape(len(offset), -1)), _soften_residuals(high), prior], axis=1)
 
 
@@ -250,7 +268,8 @@ def _soften_residuals(off: np.ndarray) -> np.ndarray:
 _DIFFERENCE_STEPS = np.array([0.01, 0.01, 0.02, 0.02, 0.05, 0.5, 0.5])
 
 
-def _fit_batches(stretches: Stretches, unknown, ball: Ball, rounds: int, simulate, cancelled) -> tuple[np.ndarray, np.ndarray]:
+def _fit_batches(stretches: Stretches, unknown, ball: Ball, rounds: int, simulate, cancelled) -> tuple[np.ndarray,
+        np.ndarray]:
     """Fit stretches in batches of about equal length; return unknowns (S, 7) and costs (S,)."""
     order = np.argsort(stretches.seconds, kind="stable")
     out, costs = unknown.copy(), np.zeros(len(unknown))
@@ -262,7 +281,8 @@ def _fit_batches(stretches: Stretches, unknown, ball: Ball, rounds: int, simulat
     return out, costs
 
 
-def _solve_least_squares(stretches: Stretches, unknown, ball: Ball, rounds: int, simulate) -> tuple[np.ndarray, np.ndarray]:
+def _solve_least_squares(stretches: Stretches, unknown, ball: Ball, rounds: int, simulate) -> tuple[np.ndarray,
+        np.ndarray]:
     """Solve the least-squares fit by the Levenberg-Marquardt method, each stretch with its own damping."""
     stretches, count = _crop_columns(stretches), unknown.shape[1]
     off = _compute_residuals(stretches, unknown, *_simulate_to_samples(stretches, unknown, ball, simulate))
@@ -320,7 +340,7 @@ def _crop_columns(stretches: Stretches) -> Stretches:
 
 
 def simulate_coarse_trajectories(place: np.ndarray, velocity: np.ndarray, spin: np.ndarray, ball: Ball, step: float,
-                   count: int) -> tuple[np.ndarray, np.ndarray]:
+                                 count: int) -> tuple[np.ndarray, np.ndarray]:
     """Simulate balls in coarse steps.
 
     Args:

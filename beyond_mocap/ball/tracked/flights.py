@@ -9,9 +9,9 @@ import numpy as np
 from ...base.time_series import interpolate_columns
 from ..batch import simulate_trajectories
 from ..physics import FOOTBALL
-from .fit import LONGEST, Stretches, fit_launches, collect_stretches
-from .path import BallPiece
+from .fit import LONGEST, Stretches, collect_stretches, fit_launches
 from .samples import Samples
+from .trajectory import BallPiece
 
 STEP = 0.02  # s between the stored moments of a flight
 _SHORTEST, _MIN_DISTANCE = 0.25, 2.5  # s, m, the shortest stretch that is fitted
@@ -29,7 +29,7 @@ _MIN_AIR_HEIGHT = 0.35  # m of the centre above its rest: higher is a flight
 
 
 def replace_by_flights(samples: Samples, pieces: list[BallPiece], moments: np.ndarray, heights: bool,
-          cancelled=None) -> list[BallPiece]:
+                       cancelled=None) -> list[BallPiece]:
     """Replace pieces between neighbouring touches by flights, where these fit.
 
     Args:
@@ -147,7 +147,8 @@ def _simulate_pieces(stretches: Stretches, launches, spans) -> tuple[list[BallPi
     for low in range(0, len(order), 64):
         some = order[low : low + 64]
         grid = np.arange(int(np.ceil(stretches.seconds[some].max() / STEP)) + 1) * STEP
-        places, speeds = simulate_trajectories(launches.place[some], launches.velocity[some], launches.spin[some], FOOTBALL, grid)
+        places, speeds = simulate_trajectories(launches.place[some], launches.velocity[some], launches.spin[some],
+                                               FOOTBALL, grid)
         for row, number in enumerate(some):
             piece = _build_piece(grid, places[row], speeds[row], spans[number], launches.spin[number])
             found[number], deviations[number] = piece, _measure_deviation(piece, stretches, number, spans[number])
@@ -211,7 +212,8 @@ def _is_good_fit(group: list[BallPiece], deviation: tuple) -> bool:
     return measured <= limit and high <= _MAX_HEIGHT_RESIDUAL and filled <= _MAX_FILLED_RESIDUAL and end <= _MAX_END_MISS
 
 
-def _align_flight(piece: BallPiece, stretches: Stretches, number: int, ends: tuple[np.ndarray, np.ndarray]) -> BallPiece:
+def _align_flight(piece: BallPiece, stretches: Stretches, number: int,
+                  ends: tuple[np.ndarray, np.ndarray]) -> BallPiece:
     """Align a flight with its touches and samples.
 
     Its ends are moved horizontally onto the touches. A slow horizontal shift stands for wind, pitch and knuckling,
@@ -223,7 +225,8 @@ def _align_flight(piece: BallPiece, stretches: Stretches, number: int, ends: tup
     since = stretches.since[number][measured]
     after = piece.times - piece.start
     there = interpolate_columns(since, after, piece.positions[:, :2])
-    inliers = _find_inliers(np.linalg.norm(there - stretches.points[number][measured, :2], axis=1), np.ones(len(since), bool))
+    inliers = _find_inliers(np.linalg.norm(there - stretches.points[number][measured, :2], axis=1),
+                            np.ones(len(since), bool))
     measured = np.flatnonzero(measured)[inliers]
     since, there = since[inliers], there[inliers]
     waves, _ = _build_shift_shapes(since / seconds, seconds)
@@ -239,7 +242,8 @@ def _align_flight(piece: BallPiece, stretches: Stretches, number: int, ends: tup
     higher = ends[1][2] - places[-1, 2] if np.isfinite(stretches.end[number, 2]) else 0.0
     places[:, 2] = np.maximum(places[:, 2] + shapes[:, 1] * higher, FOOTBALL.radius)
     path = interpolate_columns(since, piece.times - piece.start, places[:, :2])
-    residual = _compute_rms(np.linalg.norm(path - stretches.points[number][measured, :2], axis=1)) if len(measured) else np.nan
+    residual = _compute_rms(np.linalg.norm(path - stretches.points[number][measured, :2],
+                                           axis=1)) if len(measured) else np.nan
     return replace(piece, positions=places, velocities=speeds, residual=residual)
 
 

@@ -114,7 +114,8 @@ def is_from_touch_line(place: np.ndarray, after: np.ndarray, width: float) -> bo
     return bool(abs(place[1]) > width / 2.0 - _THROW_IN_DISTANCE and inward and np.linalg.norm(after[:2]) > 3.0)
 
 
-def choose_keeper_kind(place: np.ndarray, before: np.ndarray, goal: float, known_height: bool) -> tuple[str, str] | None:
+def choose_keeper_kind(place: np.ndarray, before: np.ndarray, goal: float, known_height: bool) -> tuple[str,
+        str] | None:
     """Choose part and kind of a goalkeeper's touch in their penalty area: a save, or a ball taken with the hands.
 
     Args:

@@ -145,7 +145,7 @@ def _fit_group(times, points, weights, cuts, begin, upto) -> PieceFits:
     found = inverse @ right
     cost = 0.5 * (square[row, column] - (found * right).sum(axis=(1, 2)))
     return PieceFits(cuts[begin], cuts[upto] - 1, times[cuts[begin]], coefficients=found, cost=np.maximum(cost, 0.0),
-                inverse=inverse)
+                     inverse=inverse)
 
 
 def find_candidate_cuts(times: np.ndarray, points: np.ndarray, known: np.ndarray, interval: float) -> np.ndarray:

@@ -83,8 +83,8 @@ def build_samples(times: np.ndarray, ball: np.ndarray, where: str = "ball") -> S
     scatter = _estimate_scatter(ball[:, :2], interval)
     outlier = _detect_outliers(times, ball[:, :2], known, scatter)
     known, filled, outlier = (freeze_array(flag, bool) for flag in (known, filled & known, outlier))
-    return Samples(times=freeze_array(times), positions=freeze_array(_shift_to_centre(ball)), known=known, filled=filled,
-                   outlier=outlier, scatter=freeze_array(scatter), interval=interval)
+    return Samples(times=freeze_array(times), positions=freeze_array(_shift_to_centre(ball)), known=known,
+                   filled=filled, outlier=outlier, scatter=freeze_array(scatter), interval=interval)
 
 
 def _shift_to_centre(ball: np.ndarray) -> np.ndarray:

@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ...base.errors import UserCancelledError, InputError
+from ...base.errors import InputError, UserCancelledError
 from ...base.time_series import interpolate_columns
 from ...motion.skeleton import freeze_array
 from ...motion.track import BALL_RADIUS, Track
@@ -21,8 +21,8 @@ from ...motion.track.match_data import REFEREE, Match
 from . import kinds, pieces, touches
 from .flights import replace_by_flights
 from .kinds import BallEnd, find_ball_ends
-from .path import BallPiece, SolvedTrajectory
 from .samples import Samples, build_samples
+from .trajectory import BallPiece, SolvedTrajectory
 
 PITCH = (105.0, 68.0)  # m, the standard pitch
 _MAX_GAP = 1.5  # s without a sample: a longer gap is not solved
@@ -102,9 +102,10 @@ class SolvedBall:
         """The pieces of the trajectory."""
         return self.ball.pieces
 
-def solve_samples(times: np.ndarray, ball: np.ndarray, positions: np.ndarray, players: Sequence[str], teams: Sequence[str] = (),
-          pitch: tuple[float, float] = PITCH, where: str = "ball", progress: Callable[[float, str], None] | None = None,
-          cancelled: Callable[[], bool] | None = None) -> SolvedBall:
+def solve_samples(times: np.ndarray, ball: np.ndarray, positions: np.ndarray, players: Sequence[str],
+                  teams: Sequence[str] = (), pitch: tuple[float, float] = PITCH, where: str = "ball",
+                  progress: Callable[[float, str], None] | None = None, cancelled: Callable[[], bool]
+                  | None = None) -> SolvedBall:
     """Solve the ball of a feed.
 
     Args:
@@ -135,7 +136,8 @@ def solve_samples(times: np.ndarray, ball: np.ndarray, positions: np.ndarray, pl
         if progress is not None:
             progress(0.6 * number / len(windows), "touches")
         found.append(_solve_window(samples, window, positions, untracked_cost))
-    solved = _label_touches(samples, found, positions, players=players, teams=teams, pitch=pitch, untracked_cost=untracked_cost)
+    solved = _label_touches(samples, found, positions, players=players, teams=teams, pitch=pitch,
+                            untracked_cost=untracked_cost)
     curves = [piece for window, cuts in zip(windows, found) for piece in _build_pieces(samples, window, cuts)]
     if progress is not None:
         progress(0.6, "flights")
@@ -191,8 +193,10 @@ def _compute_reach_cost(times, points, positions, cuts, untracked_cost) -> np.nd
     costs = []
     for near in (cuts - 1, cuts):
         index = np.clip(near, 0, len(times) - 1)
-        away = touches.measure_player_distances(times, points[index, :2], positions, times[index]).min(axis=0, initial=np.inf)
-        costs.append(touches.compute_reach_cost(away, points[index, 2] if points.shape[1] == 3 else None, untracked_cost))
+        away = touches.measure_player_distances(times, points[index, :2], positions, times[index]).min(axis=0,
+                initial=np.inf)
+        costs.append(touches.compute_reach_cost(away, points[index, 2] if points.shape[1] == 3 else None,
+                                                untracked_cost))
     return np.minimum(*costs)
 
 
@@ -400,10 +404,11 @@ def solve_ball(source: Match | Track, progress: Callable[[float, str], None] | N
     if isinstance(source, Track):
         unknown = ~source.ball_height_known[:, None] & [False, False, True]
         ball = np.where(unknown, np.nan, source.ball)
-        return solve_samples(source.times[part], ball[part], source.positions[None, part], [source.name], where=source.name,
-                     pitch=PITCH, progress=progress, cancelled=cancelled)
+        return solve_samples(source.times[part], ball[part], source.positions[None, part], [source.name],
+                             where=source.name, pitch=PITCH, progress=progress, cancelled=cancelled)
     playing = [index for index, player in enumerate(source.players) if player.team != REFEREE]
     players = [source.players[index] for index in playing]
     return solve_samples(source.times[part], source.ball[part], source.positions[playing][:, part],
-                 players=[player.id for player in players], teams=[player.team for player in players],
-                 pitch=(source.length, source.width), where=source.provider, progress=progress, cancelled=cancelled)
+                         players=[player.id for player in players], teams=[player.team for player in players],
+                         pitch=(source.length, source.width), where=source.provider, progress=progress,
+                         cancelled=cancelled)

@@ -167,8 +167,8 @@ def _estimate_cuts(pieces: PieceFits, left, right, times, cuts, upto, begin, pla
     free = FREE_COST + _NEAR_COST * np.exp(-near) + joint + _compute_free_cost(before, change, here, speed_var)
     place = (here * place_right[:, None] + there * place_left[:, None]) / (place_left + place_right)[:, None]
     spread = np.sqrt((place_left + place_right) / np.maximum(size**2, 0.25) + (0.1 * step) ** 2)
-    return _CutEstimates(time=time, spread=np.minimum(spread, step), place=place, before=before, after=after, touch_cost=touch,
-                  free_cost=free)
+    return _CutEstimates(time=time, spread=np.minimum(spread, step), place=place, before=before, after=after,
+                         touch_cost=touch, free_cost=free)
 
 
 def _measure_interval(times: np.ndarray) -> float:
@@ -194,7 +194,8 @@ def _compute_free_cost(before, change, place, variance) -> np.ndarray:
     across = change[:, 0] * direction[:, 1] - change[:, 1] * direction[:, 0]
     slower = np.where(along < 0.0, 0.5 + 0.12 * speed, 0.5) ** 2 + variance
     aside = (0.4 + 0.02 * speed) ** 2 + variance
-    cost = 0.5 * (_soften_squares(along**2 / slower) + _soften_squares(across**2 / aside) + np.log(4.0 * np.pi**2 * slower * aside))
+    cost = 0.5 * (_soften_squares(along**2 / slower) + _soften_squares(across**2 / aside)
+                  + np.log(4.0 * np.pi**2 * slower * aside))
     if change.shape[1] == 3:
         upward = change[:, 2]
         bounces = (place[:, 2] < 0.5) & (before[:, 2] < 0.0) & (upward > 0.0)
@@ -214,11 +215,11 @@ def _build_cuts(pieces: PieceFits, times, cuts, player_cost) -> Cuts:
     """Build the cuts between the chosen pieces."""
     upto = np.searchsorted(cuts, pieces.last + 1)
     left = np.arange(len(pieces) - 1)
-    knots = _estimate_cuts(pieces, left, left + 1, times=times, cuts=cuts, upto=upto, begin=np.searchsorted(cuts, pieces.first),
-                   player_cost=player_cost)
+    knots = _estimate_cuts(pieces, left, left + 1, times=times, cuts=cuts, upto=upto,
+                           begin=np.searchsorted(cuts, pieces.first), player_cost=player_cost)
     return Cuts(time=knots.time, spread=knots.spread, touch=knots.touch_cost < knots.free_cost,
-                margin=np.abs(knots.touch_cost - knots.free_cost), place=knots.place, before=knots.before, after=knots.after,
-                pieces=pieces)
+                margin=np.abs(knots.touch_cost - knots.free_cost), place=knots.place, before=knots.before,
+                after=knots.after, pieces=pieces)
 
 
 def measure_player_distances(times: np.ndarray, ball: np.ndarray, positions: np.ndarray, at: np.ndarray) -> np.ndarray:
@@ -242,7 +243,8 @@ def measure_player_distances(times: np.ndarray, ball: np.ndarray, positions: np.
     return out
 
 
-def compute_reach_cost(distance: np.ndarray, height: np.ndarray | None, untracked_cost: float = UNTRACKED_COST) -> np.ndarray:
+def compute_reach_cost(distance: np.ndarray, height: np.ndarray | None,
+                       untracked_cost: float = UNTRACKED_COST) -> np.ndarray:
     """Compute the nats for a player touching the ball at a horizontal distance.
 
     Args:
@@ -258,7 +260,8 @@ def compute_reach_cost(distance: np.ndarray, height: np.ndarray | None, untracke
     return np.minimum(cost, untracked_cost)
 
 
-def choose_players(distances: np.ndarray, times: np.ndarray, between: np.ndarray, untracked_cost: float = UNTRACKED_COST) -> np.ndarray:
+def choose_players(distances: np.ndarray, times: np.ndarray, between: np.ndarray,
+                   untracked_cost: float = UNTRACKED_COST) -> np.ndarray:
     """Choose the player of every touch: the chain with the lowest cost, by dynamic programming over the touches.
 
     Args:

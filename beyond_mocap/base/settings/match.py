@@ -8,35 +8,35 @@ from .setting import Setting
 TABLES = {
     "match.section": (
         Setting(name="start", kind=float, unit="seconds", option="--from", help="start, on the match's clock",
-            title="From", tooltip="Start of the stretch, in seconds of the match's clock", precision=1,
-            panel_more=dict(default=0.0, min=0.0)),
+                title="From", tooltip="Start of the stretch, in seconds of the match's clock", precision=1,
+                panel_more=dict(default=0.0, min=0.0)),
         Setting(name="end", kind=float, unit="seconds", option="--to", help="end, on the match's clock", title="To",
-            tooltip="End of the stretch, in seconds of the match's clock; 0: end of the match", precision=1,
-            panel_more=dict(default=0.0, min=0.0)),
+                tooltip="End of the stretch, in seconds of the match's clock; 0: end of the match", precision=1,
+                panel_more=dict(default=0.0, min=0.0)),
         Setting(name="players", default=(), option="--players", metavar="ID", help="only these, by id; default: all "
-            "players", option_more=dict(nargs="+")),
+                "players", option_more=dict(nargs="+")),
     ),
     "match.work": (
         Setting(name="workers", kind=int, least=1, most=256, option="--workers", metavar="N", help="processes on this "
-            "machine; default: one per core", title="Processes", tooltip="Processes that work besides Blender; 0: "
-            "one for each processor core", panel_more=dict(default=0, min=0)),
+                "machine; default: one per core", title="Processes", tooltip="Processes that work besides Blender; 0: "
+                "one for each processor core", panel_more=dict(default=0, min=0)),
         Setting(name="scheduler", default="", option="--scheduler", metavar="ADDRESS", help="of a Dask cluster that "
-            "does the work", tooltip="Address of a Dask cluster that does the work instead, such as tcp://host:8786"),
+                "does the work", tooltip="Address of a Dask cluster that does the work instead, such as tcp://host:8786"),
     ),
     "match": (
         Setting(name="solve_touches", default=True, option="--no-solve-touches", help="use the ball as in the feed, "
-            "without touches", tooltip="Find from the ball's trajectory who touches it and when, and correct its "
-            "trajectory by physics"),
+                "without touches", tooltip="Find from the ball's trajectory who touches it and when, and correct its "
+                "trajectory by physics"),
         Setting(name="annotations", kind=Path, option="--annotations", metavar="DIR", help="labels of players in "
-            "DIR/ID.txt, instead of automatic ones"),
+                "DIR/ID.txt, instead of automatic ones"),
         Setting(name="bvh", default=False, option="--bvh", help="also write every player as BVH"),
         Setting(name="scene", kind=Path, option="--scene", metavar="FILE", help="write players, ball and pitch to one "
-            "file; inside Blender: .blend, .fbx, .glb, .usdc"),
+                "file; inside Blender: .blend, .fbx, .glb, .usdc"),
         Setting(name="figures", default=True, option="--no-figures", help="write no reports, provenance and page"),
         Setting(name="fps", default=30.0, least=1.0, most=480.0, unit="frames per second", option="--fps"),
         Setting(name="seed", default=0, least=0, most=2**31 - 1, option="--seed"),
         Setting(name="nearest", default=True, option="--exact", help="a player fails if the library lacks labels, "
-            "instead of using the nearest ones"),
+                "instead of using the nearest ones"),
         Setting(name="first_frame", default=1, tooltip="Scene frame on which the stretch starts"),
     ),
     "touches": (

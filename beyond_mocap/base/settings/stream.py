@@ -12,25 +12,25 @@ TABLES = {
     "stream": (
         Setting(name="protocol", default="udp", choices=PROTOCOLS, tooltip="How frames arrive"),
         Setting(name="port", default=7001, least=1024, most=65535, option="--port", tooltip="Port of this machine; "
-            "connections from other machines are refused"),
+                "connections from other machines are refused"),
         Setting(name="unit", default=0.0, least=0.0, most=10.0, unit="metres", tooltip="Metres in one unit of the "
-            "stream; 0 guesses it from the body's size", precision=4),
+                "stream; 0 guesses it from the body's size", precision=4),
         Setting(name="part", default="foot", choices=PARTS, tooltip="Part of the user's body that strikes"),
         Setting(name="side", default="either", choices=EITHER, tooltip="Side of the part, where there are two"),
         Setting(name="threshold", default=0.0, least=0.0, most=5.0, unit="metres", tooltip="Height in metres that "
-            "the part has to exceed in a strike; 0 finds it automatically"),
+                "the part has to exceed in a strike; 0 finds it automatically"),
         Setting(name="bounces", default=0, least=0, most=5, tooltip="Bounces of the ball in each pass of Play Live"),
     ),
     "stream.way": (
         Setting(name="tcp", default=False, option="--tcp", help="connect to a listener (default: UDP datagrams)"),
         Setting(name="serve", default=False, option="--serve", help="wait until a listener connects, as Axis "
-            "Neuron does"),
+                "Neuron does"),
     ),
     "stream.send": (
         Setting(name="form", default="bvh", choices=("bvh", "neuron"), option="--form", help="form of the text; neuron "
-            "has no hierarchy"),
+                "has no hierarchy"),
         Setting(name="fps", kind=float, least=1.0, most=1000.0, option="--fps", metavar="RATE", help="frames per "
-            "second (default: the file's)"),
+                "second (default: the file's)"),
         Setting(name="loop", default=False, option="--loop", help="repeat until Ctrl-C"),
     ),
 }

@@ -24,7 +24,7 @@ from ...motion.humanoid import Humanoid, compute_heading, identify_joints, measu
 from ...motion.motion import Motion, compute_pose
 from ...motion.retargeting.structure import list_descendants
 from ...motion.skeleton import Skeleton
-from ..whole import atomic_path
+from ..atomic import atomic_path
 from . import bvh_text
 from .bvh_text import POSITIONS, ROTATIONS, BvhText
 from .bvh_write import BvhForm, JointAboveHips, format_bvh
@@ -196,12 +196,14 @@ def _fold_root(channels: _Channels, hips: int) -> tuple[np.ndarray, np.ndarray, 
     # Walk up to the file's root and accumulate the transforms.
     while joint >= 0:
         place, local_rotation = channels.compute_position(joint), channels.compute_rotation(joint).T
-        position, rotation = quaternion.rotate(local_rotation, position) + place, quaternion.multiply(local_rotation, rotation)
-        moves = _measure_spread(place) > _STILL_METRES or np.abs(local_rotation @ local_rotation[0]).min() < _STILL_ROTATION
+        position, rotation = quaternion.rotate(local_rotation, position) + place, quaternion.multiply(local_rotation,
+                rotation)
+        moves = _measure_spread(place) > _STILL_METRES or np.abs(local_rotation
+                                                                 @ local_rotation[0]).min() < _STILL_ROTATION
         carries = fixed if joint == parents[hips] else None
         name, channel_names = channels.text.names[joint], channels.text.channels[joint]
-        above.insert(0, JointAboveHips(name=name, channels=channel_names, is_moving=bool(moves), position=place[0], rotation=local_rotation[0],
-                                  hip_offset=carries))
+        above.insert(0, JointAboveHips(name=name, channels=channel_names, is_moving=bool(moves), position=place[0],
+                                       rotation=local_rotation[0], hip_offset=carries))
         joint = parents[joint]
     return position, rotation, tuple(above)
 
@@ -236,7 +238,8 @@ def _check_size(text: BvhText, root: np.ndarray, skeleton: Skeleton) -> None:
         raise InputError(where, "a position beyond 1000 km", "a person's motion", "set the unit, or export again")
 
 
-def _measure_headings(channels: _Channels, above: tuple[JointAboveHips, ...], motion: Motion) -> tuple[JointAboveHips, ...]:
+def _measure_headings(channels: _Channels, above: tuple[JointAboveHips, ...], motion: Motion) -> tuple[JointAboveHips,
+        ...]:
     """Add the mean angle from the body's heading to each moving joint above the hips."""
     if not any(joint.is_moving for joint in above):
         return above
@@ -258,7 +261,8 @@ def _round_rate(frame_time: float) -> float:
     return float(nearest) if abs(nearest - rate) <= 1e-3 * nearest else rate
 
 
-def _list_notes(text: BvhText, body_joints: list[int], above: tuple[JointAboveHips, ...], drift: dict[str, float]) -> list[str]:
+def _list_notes(text: BvhText, body_joints: list[int], above: tuple[JointAboveHips, ...],
+                drift: dict[str, float]) -> list[str]:
     """List what reading changed, one line per kind."""
     notes = [f"joint {old!r} is repeated, the second is renamed {new!r}" for old, new in text.renamed]
     for joint in above:
@@ -362,7 +366,8 @@ def estimate_scale(text: BvhText, unit: float | None) -> FileScale:
     height = _measure_hip_height(skeleton, body, positions[..., 2] if up == "Y" else -positions[..., 1])
     estimated = unit or _estimate_unit(height, measure_leg_length(skeleton))
     origin = "set" if unit else "estimated"
-    return FileScale(estimated, up, body, (f"unit {estimated:.6g} m ({origin}): hips {height * estimated:.2f} m high; {up} up",))
+    return FileScale(estimated, up, body,
+                     (f"unit {estimated:.6g} m ({origin}): hips {height * estimated:.2f} m high; {up} up",))
 
 
 def _sample_poses(text: BvhText, rest: Skeleton) -> tuple[Skeleton, np.ndarray]:

@@ -143,7 +143,8 @@ class _HierarchyParser:
             while words:
                 words = self._parse_statement(words)
         if self.stack:
-            raise self._build_error(f"{len(self.stack)} brackets not closed", "a } for each {", "the hierarchy is truncated")
+            raise self._build_error(f"{len(self.stack)} brackets not closed", "a } for each {",
+                                    "the hierarchy is truncated")
         if not self.names:
             raise self._build_error("no ROOT", "ROOT and a joint's name", _EXPORT_AGAIN)
         for joint, offset in enumerate(self.offsets):
@@ -187,7 +188,8 @@ class _HierarchyParser:
         stop = words.index("{") if "{" in words else len(words)
         name = " ".join(words[1:stop])
         if (keyword == "ROOT") == bool(self.names) or (self.stack == [] and self.names):
-            raise self._build_error(f"{keyword} {name}", "one ROOT with all joints inside it", "export one body per file")
+            raise self._build_error(f"{keyword} {name}", "one ROOT with all joints inside it",
+                                    "export one body per file")
         if self.stack and self.stack[-1] is None:
             raise self._build_error(f"{keyword} {name} inside an End Site", "}")
         parent = self.stack[-1] if self.stack else -1
@@ -229,7 +231,8 @@ class _HierarchyParser:
         count = int(words[1]) if len(words) > 1 and re.fullmatch("[0-6]", words[1]) else None
         names = [_CHANNELS.get(word.lower()) for word in words[2 : 2 + (count or 0)]]
         if count is None or len(names) < count or None in names:
-            raise self._build_error(f"{' '.join(words)[:90]!r}", "CHANNELS, a number (0 to 6), and Xposition ... Zrotation")
+            raise self._build_error(f"{' '.join(words)[:90]!r}",
+                                    "CHANNELS, a number (0 to 6), and Xposition ... Zrotation")
         if len(set(names)) < count:
             raise self._build_error("a channel is repeated", "each channel once per joint")
         if not self.stack or self.stack[-1] is None:
@@ -252,12 +255,13 @@ def _parse_number(word: str) -> float | None:
 def _parse_motion_head(path: Path, data: bytes, start: int, line: int) -> tuple[int, float, int, int]:
     """Parse the two lines after MOTION: frames, seconds per frame, and where the rows start (byte, line)."""
     frames_text, start, line = _parse_labelled_value(path, data, start, line=line, label=rb"Frames\s*:",
-                                         expected="Frames: and their number")
+                                                     expected="Frames: and their number")
     frames = int(frames_text) if re.fullmatch(r"\d{1,12}", frames_text) else 0
     if frames < 1:
         raise InputError(f"{path}:{line - 1}", f"Frames: {frames_text[:40]}", "a whole number above 0", _EXPORT_AGAIN)
     expected = "Frame Time: and seconds per frame"
-    time_text, start, line = _parse_labelled_value(path, data, start, line=line, label=rb"Frame\s*Time\s*:", expected=expected)
+    time_text, start, line = _parse_labelled_value(path, data, start, line=line, label=rb"Frame\s*Time\s*:",
+                                                   expected=expected)
     frame_time = _parse_number(time_text)
     if frame_time is None or not 1e-5 <= frame_time <= 1e3:
         raise InputError(
@@ -267,7 +271,8 @@ def _parse_motion_head(path: Path, data: bytes, start: int, line: int) -> tuple[
     return frames, frame_time, start, line
 
 
-def _parse_labelled_value(path: Path, data: bytes, start: int, line: int, label: bytes, expected: str) -> tuple[str, int, int]:
+def _parse_labelled_value(path: Path, data: bytes, start: int, line: int, label: bytes, expected: str) -> tuple[str,
+        int, int]:
     """Parse the value after `label` on the next line that is not blank; also return where the line after it starts."""
     while True:
         stop = data.find(b"\n", start)

@@ -103,7 +103,8 @@ def format_bvh(motion: Motion, form: BvhForm) -> tuple[Iterator[str], tuple[str,
         position = root if i == 0 else motion.skeleton.offsets[i][None]
         ends = motion.skeleton.end_offsets[[p == i for p in motion.skeleton.end_parents]]
         local_rotation = rotation if i == 0 else motion.rotations[:, i]
-        joints.append(_build_joint(name, len(form.above) + depth, declared, place=position, turn=local_rotation, ends=ends))
+        joints.append(_build_joint(name, len(form.above) + depth, declared, place=position, turn=local_rotation,
+                                   ends=ends))
     notes = tuple(f"{j.name}: {', '.join(j.added)} added, because the motion needs it" for j in joints if j.added)
     return _iter_text(joints, motion.fps), notes
 

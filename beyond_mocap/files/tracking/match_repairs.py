@@ -342,7 +342,8 @@ def check_side_names(times, positions, periods, teams, position_names) -> list[s
         return []
     attack = np.where(np.array(teams) == "home", -end, end)
     across = _compute_mean_across(positions[:, part]) * attack
-    sides = {side: [y for y, name in zip(across, position_names) if side in name.split() and np.isfinite(y)] for side in _SIDES}
+    sides = {side: [y for y, name in zip(across, position_names) if side in name.split() and np.isfinite(y)]
+             for side in _SIDES}
     if min(map(len, sides.values())) < 2 or np.mean(sides["left"]) - np.mean(sides["right"]) > -_WRONG_SIDE:
         return []
     return ["left players are on the right: the file or the lineup may be mirrored side to side"]

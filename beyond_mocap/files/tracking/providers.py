@@ -51,7 +51,7 @@ def load_tracking(feed: Feed, pitch: tuple[float, float]):
     record, files, half = feed.provider, list(map(str, feed.tracking)), len(feed.tracking) // 2
     meta, more, *_ = [*map(str, feed.meta), None, None]
     values = {"raw": files[0], "all": files, "first": files[:half], "second": files[half:], "meta": meta, "more": more,
-             "length": pitch[0], "width": pitch[1]}  # fmt: skip
+              "length": pitch[0], "width": pitch[1]}  # fmt: skip
     arguments = {key: values[name] for key, name in record.arguments.items()}
     if feed.has_team_files:
         arguments = {"home_data": files[0], "away_data": files[1]}
@@ -59,7 +59,7 @@ def load_tracking(feed: Feed, pitch: tuple[float, float]):
     others = f" and its metadata {', '.join(one.name for one in feed.meta) or feed.tracking[-1].name}"
     loader = record.team_loader if feed.has_team_files else record.loader
     return load_with_kloppy(feed.path, record.name, loader, arguments=arguments, expected=f"{record.name} tracking",
-                               others=others)
+                            others=others)
 
 
 def _check_file(path: str | os.PathLike) -> Path:

@@ -76,7 +76,8 @@ def _iter_tracab_json(feed: Feed) -> Samples:
     for frame in json.loads(feed.path.read_bytes()).get("FrameData", ()):
         for person in frame["PlayerPositions"]:
             if person["Team"] == _TRACAB_CODE:
-                yield int(frame["FrameCount"]), f"referee_{person['JerseyNumber']}", float(person["X"]), float(person["Y"])
+                yield int(frame["FrameCount"]), f"referee_{person['JerseyNumber']}", float(person["X"]), float(
+                    person["Y"])
 
 
 def read_sportec_referees(feed: Feed) -> Samples:
@@ -111,7 +112,8 @@ def read_signality_referees(feed: Feed) -> Samples:
         for frame in frames:
             for referee in frame.get("referees") or ():
                 x, y = referee["position"][:2]
-                yield frame["idx"] + first_number, f"referee_{referee.get('role', referee.get('track_id'))}", float(x), float(y)
+                yield frame["idx"] + first_number, f"referee_{referee.get('role', referee.get('track_id'))}", float(
+                    x), float(y)
         first_number = frames[-1]["idx"] + 1 if frames else first_number
 
 

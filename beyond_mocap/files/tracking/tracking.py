@@ -17,8 +17,8 @@ from ...base.errors import InputError
 from ...motion.skeleton import freeze_array
 from ...motion.track import Track
 from ...motion.track.match_data import REFEREE, Match, MatchPlayer, Team, describe_presence
+from ..atomic import atomic_write
 from ..tables import parse_number, read_rows
-from ..whole import atomic_write
 from . import match_arrays
 from .feed import Feed
 from .match_repairs import (
@@ -26,14 +26,14 @@ from .match_repairs import (
     check_players,
     check_rows,
     check_same_match,
+    check_side_names,
+    cut_to_whole_lines,
     repair_ball,
     repair_players,
     repair_sides,
-    check_side_names,
-    cut_to_whole_lines,
 )
 from .providers import find_feed, load_tracking
-from .referees import describe_referee, read_team_colours, read_referee_samples
+from .referees import describe_referee, read_referee_samples, read_team_colours
 
 RATES = (5.0, 100.0)
 """Smallest and largest sampling rate of a track, samples per second."""
@@ -143,7 +143,8 @@ def _build_arrays(dataset, feed: Feed, pitch: tuple[float, float] | None, lines=
     lines += check_players(players, dataset, feed)
     times, periods = match_arrays.build_clock(records)
     length, width, is_default = match_arrays.find_pitch_size(dataset, pitch, feed.provider.has_pitch_size)
-    to_metres = match_arrays.build_metre_map(dataset.metadata.coordinate_system, length, width, upward=feed.has_team_files)
+    to_metres = match_arrays.build_metre_map(dataset.metadata.coordinate_system, length, width,
+                                             upward=feed.has_team_files)
     ball = match_arrays.build_ball_samples(records)
     ball = np.concatenate([to_metres(ball[:, :2]), ball[:, 2:] * match_arrays.find_height_unit(dataset)], axis=1)
     referees, places, referee_lines = read_referee_samples(feed, np.array([frame.frame_id for frame in records]))
@@ -155,9 +156,10 @@ def _build_arrays(dataset, feed: Feed, pitch: tuple[float, float] | None, lines=
     positions, ball, side_messages = repair_sides(times, positions, ball, spans, teams)
     side_messages += check_side_names(times, positions, spans, teams, [one[4] for one in people])
     return {
-        "times": times, "positions": positions, "ball": ball, "players": np.array(people, dtype=str).reshape(len(people), 5),
-        "pitch": np.array([length, width, is_default, float(dataset.metadata.frame_rate)]), "periods": np.array(periods),
-        "teams": np.array(_list_teams(dataset, feed), dtype=str).reshape(-1, 3),
+        "times": times, "positions": positions, "ball": ball,
+        "players": np.array(people, dtype=str).reshape(len(people), 5),
+        "pitch": np.array([length, width, is_default, float(dataset.metadata.frame_rate)]),
+        "periods": np.array(periods), "teams": np.array(_list_teams(dataset, feed), dtype=str).reshape(-1, 3),
         "lines": np.array([*lines, *side_messages, *ball_lines, *player_lines, *referee_lines], dtype=str),
     }
 
@@ -211,7 +213,8 @@ def _load_cache(cache: Path) -> dict[str, np.ndarray] | None:
     except Exception:  # zipfile, zlib and numpy raise many kinds of errors for damaged files
         return None
     count, player_count = arrays["times"].size, arrays["players"].size // 5
-    shapes = {"times": (count,), "positions": (player_count, count, 2), "ball": (count, 3), "pitch": (4,), "players": (player_count, 5)}
+    shapes = {"times": (count,), "positions": (player_count, count, 2), "ball": (count, 3), "pitch": (4,),
+              "players": (player_count, 5)}
     fits = all(arrays[name].shape == shape for name, shape in shapes.items())
     return arrays if fits and arrays["periods"].shape[1:] == (4,) and arrays["teams"].shape[1:] == (3,) else None
 

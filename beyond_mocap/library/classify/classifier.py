@@ -19,9 +19,9 @@ from scipy.signal import find_peaks
 from ...annotation import LOCOMOTION, ClipAnnotation, swap_sides
 from ...base.errors import InputError
 from ...base.time_series import find_runs
-from ...files.whole import atomic_write
+from ...files.atomic import atomic_write
 from ...motion.motion import Motion
-from ..word_sources import LEARNED, Proposal
+from ..label_sources import LEARNED, Proposal
 from .details import Details
 from .kernel import Kernel, compute_confidence
 from .signals import LENGTH, RATE, STRIKES, Signals, Space, build_signals, build_windows
@@ -126,7 +126,8 @@ def find_rule_proposal(ruled: Sequence[Proposal], word: str, moment: bool, time:
     return max(matches, key=lambda one: one.confidence, default=None)
 
 
-def collect_rule_confidences(ruled: Sequence[Proposal], word: str, moment: bool, seconds: np.ndarray, silent: float) -> np.ndarray:
+def collect_rule_confidences(ruled: Sequence[Proposal], word: str, moment: bool, seconds: np.ndarray,
+                             silent: float) -> np.ndarray:
     """Collect the rules' confidences (N,) at each of the times, `silent` where they propose nothing."""
     found = (find_rule_proposal(ruled, word, moment, time) for time in seconds)
     return np.array([silent if one is None else one.confidence for one in found])
@@ -199,8 +200,10 @@ class Classifier:
         seen = build_signals(motion)
         rows, seconds = project_signals(seen, self.space), seen.frames / seen.fps
         rule_proposals = convert_to_seconds(ruled, seen.fps)
-        moments = [one for act in self.acts if act.moment for one in _propose_moments(act, seen, rows, seconds, rule_proposals)]
-        stretches = [one for act in self.acts if not act.moment for one in _propose_stretches(act, seen, rows, seconds, rule_proposals)]
+        moments = [one for act in self.acts if act.moment for one in _propose_moments(act, seen, rows, seconds,
+                rule_proposals)]
+        stretches = [one for act in self.acts if not act.moment for one in _propose_stretches(act, seen, rows, seconds,
+                rule_proposals)]
         own = {(act.word, act.moment) for act in self.acts}
         rest = [one for one in ruled if not any(
             (word, one.annotation.key is not None) in own for word in one.annotation.words)]
@@ -222,9 +225,12 @@ def convert_to_seconds(ruled: Sequence[Proposal], fps: float, mirrored: bool = F
 def _propose_moments(act: Act, seen: Signals, rows, seconds, rule_proposals) -> list[Proposal]:
     """Propose the key moments of one act."""
     at, score = find_candidates(act.kernel, rows, seconds, rule_proposals, act.word)
-    confidences = compute_confidence(act.weights, score, collect_rule_confidences(rule_proposals, act.word, True, seconds[at], act.silence))
-    likely = [(sample, float(confidence)) for sample, confidence in zip(at, confidences) if confidence >= MIN_CONFIDENCE]
-    return [_build_moment(act, seen, rows, seconds=seconds, rule_proposals=rule_proposals, sample=sample, confidence=confidence) for sample, confidence in likely]
+    confidences = compute_confidence(act.weights, score, collect_rule_confidences(rule_proposals, act.word, True,
+                                                                                  seconds[at], act.silence))
+    likely = [(sample, float(confidence)) for sample, confidence in zip(at, confidences) if confidence
+              >= MIN_CONFIDENCE]
+    return [_build_moment(act, seen, rows, seconds=seconds, rule_proposals=rule_proposals, sample=sample,
+                          confidence=confidence) for sample, confidence in likely]
 
 
 def _build_moment(act: Act, seen: Signals, rows, seconds, rule_proposals, sample: int, confidence: float) -> Proposal:
@@ -234,7 +240,8 @@ def _build_moment(act: Act, seen: Signals, rows, seconds, rule_proposals, sample
     samples = np.clip(np.round(key * RATE).astype(int) + np.arange(-1, 2), 0, len(rows) - 1)
     words = (act.word, *act.details.choose_labels(rows[samples], rule))
     row = _build_row(seen, key - act.before, key + act.after, key, words)
-    return Proposal(row, confidence, f"similar to the examples; {rule.why}" if rule else "similar to the examples", LEARNED)
+    return Proposal(row, confidence, f"similar to the examples; {rule.why}" if rule else "similar to the examples",
+                    LEARNED)
 
 
 def _propose_stretches(act: Act, seen: Signals, rows, seconds, rule_proposals) -> list[Proposal]:
@@ -347,8 +354,8 @@ def _restore_act(number: int, header: dict, arrays: dict, components: int) -> Ac
     before, after = (_check_number(header[name], least=0.0) for name in ("before", "after"))
     return Act(word=_check_word(header["word"]), moment=bool(header["moment"]), kernel=kernel,
                weights=_check_array(arrays, f"{number}.sure", (3,)), silence=_check_number(header["silent"]),
-               example_amount=_check_number(header["shown"]), strike=strike, lead=_check_number(header["lead"]), before=before,
-               after=after, details=Details(choices, planes, by_rule))
+               example_amount=_check_number(header["shown"]), strike=strike, lead=_check_number(header["lead"]),
+               before=before, after=after, details=Details(choices, planes, by_rule))
 
 
 def _check_array(arrays: dict, name: str, shape: tuple[int, ...]) -> np.ndarray:

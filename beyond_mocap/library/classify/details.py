@@ -15,7 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ...annotation.labels import GROUPS, list_labels
-from ..word_sources import Proposal
+from ..label_sources import Proposal
 
 EXCLUSIVE = tuple(list_labels(group=group) for group in GROUPS)
 """Groups of labels of which an act has one at most; any other label is present or not."""
@@ -74,7 +74,8 @@ def fit_details(
         examples = np.array([find_in_group(one, group) for one in words])
         kinds = tuple(sorted(set(examples.tolist())))
         if kinds != ("",):
-            from_rules = np.array([find_in_group(one.annotation.words, group) if one is not None else "" for one in ruled])
+            from_rules = np.array([find_in_group(one.annotation.words, group) if one is not None else ""
+                                   for one in ruled])
             choices.append(kinds)
             planes.append(_fit_plane(features, examples, kinds))
             by_rule.append(bool(np.any(from_rules != "")) and not _beats_rules(features, examples, from_rules, clip))

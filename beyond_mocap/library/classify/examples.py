@@ -10,11 +10,11 @@ import numpy as np
 
 from ...annotation import LOCOMOTION, VOCABULARY, ClipAnnotation, sort_labels
 from ...annotation.labels import list_labels
-from ...base.errors import UserCancelledError, InputError
+from ...base.errors import InputError, UserCancelledError
 from ...motion.humanoid import identify_joints
 from ...motion.motion import Motion
+from ..label_sources import Proposal, is_unreviewed
 from ..proposals import GAITS, propose_labels
-from ..word_sources import Proposal, is_unreviewed
 from .signals import Signals, build_signals
 
 _MODIFIERS = frozenset((*LOCOMOTION, *VOCABULARY["modifier"], *list_labels(group="height")))

@@ -93,7 +93,8 @@ def build_signals(motion: Motion) -> Signals:
     strikes = _compute_strikes(places, moving, body, head, facing)
     return Signals(fps=motion.fps, count=len(motion), frames=at, middle=points([body.chest, head]),
                    paired=np.stack([points(one) for one in sides], axis=1),
-                   trunk=_compute_trunk(motion, body, places, moving=moving, facing=facing, leg=leg)[rows], strikes=strikes)
+                   trunk=_compute_trunk(motion, body, places, moving=moving, facing=facing, leg=leg)[rows],
+                   strikes=strikes)
 
 
 def _list_side_joints(body: Humanoid, limb) -> list[int]:

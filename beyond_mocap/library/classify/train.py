@@ -14,11 +14,21 @@ import numpy as np
 from ...annotation import swap_sides
 from ...annotation.labels import find_label
 from ...base.errors import InputError
-from ..word_sources import Proposal
-from .classifier import Act, Classifier, find_candidates, convert_to_seconds, project_signals, find_rule_proposal, collect_rule_confidences, average_score, select_strike
+from ..label_sources import Proposal
+from .classifier import (
+    Act,
+    Classifier,
+    average_score,
+    collect_rule_confidences,
+    convert_to_seconds,
+    find_candidates,
+    find_rule_proposal,
+    project_signals,
+    select_strike,
+)
 from .details import Details, fit_details
 from .examples import Example, find_act
-from .kernel import Kernel, compute_confidence, fit_confidence, fit_kernel, estimate_silence_weight
+from .kernel import Kernel, compute_confidence, estimate_silence_weight, fit_confidence, fit_kernel
 from .signals import Space, build_windows
 
 # components of a window; folds of the clips; most windows of each class for one act
@@ -118,7 +128,8 @@ def _build_sides(example: Example, space: Space) -> list[_Side]:
     ruled, fps = convert_to_seconds(example.rule_proposals, example.signals.fps), example.list_sample_times()
     other = convert_to_seconds(example.rule_proposals, example.signals.fps, mirrored=True)
     return [
-        _Side(example=example, rows=project_signals(example.signals, space), seconds=fps, labels=words, rule_proposals=ruled, is_mirrored=False),
+        _Side(example=example, rows=project_signals(example.signals, space), seconds=fps, labels=words,
+              rule_proposals=ruled, is_mirrored=False),
         _Side(example=example, rows=project_signals(example.signals.mirrored, space), seconds=fps,
               labels=tuple(map(swap_sides, words)), rule_proposals=other, is_mirrored=True),
     ]
@@ -136,13 +147,14 @@ def _train_act(word: str, moment: bool, sides: list[_Side]) -> Act | None:
     details = _collect_details(word, moment, sides)
     strike, lead, before, after = -1, 0.0, 0.0, 0.0
     if moment:
-        keys = [(side.example, row) for side in sides if not side.is_mirrored for row in side.example.select_rows(word, True)]
+        keys = [(side.example, row) for side in sides if not side.is_mirrored for row in side.example.select_rows(word,
+                True)]
         strike, lead = select_strike([(one.signals, row.key / one.signals.fps) for one, row in keys])
         before = float(np.median([(row.key - row.start) / one.signals.fps for one, row in keys]))
         after = float(np.median([(row.end - row.key) / one.signals.fps for one, row in keys]))
     times = _count_acts([side.example for side in sides if not side.is_mirrored])[word, moment]
-    return Act(word=word, moment=moment, kernel=kernel, weights=weights, silence=silence, example_amount=times, strike=strike,
-               lead=lead, before=before, after=after, details=details)
+    return Act(word=word, moment=moment, kernel=kernel, weights=weights, silence=silence, example_amount=times,
+               strike=strike, lead=lead, before=before, after=after, details=details)
 
 
 def _mark_samples(side: _Side, word: str, moment: bool) -> np.ndarray:
@@ -193,7 +205,8 @@ def _estimate_silence(word: str, moment: bool, sides: list[_Side]) -> float:
     for side in sides:
         for row in side.example.select_rows(word, moment):
             middle = row.key if row.key is not None else 0.5 * (row.start + row.end)
-            found.append(find_rule_proposal(side.rule_proposals, word, moment, middle / side.example.signals.fps) is not None)
+            found.append(find_rule_proposal(side.rule_proposals, word, moment,
+                                            middle / side.example.signals.fps) is not None)
     return -estimate_silence_weight(sum(found) // 2, len(found) // 2)
 
 

@@ -12,8 +12,8 @@ from types import MappingProxyType
 
 import numpy as np
 
-from ..frames import RigidFit, fit_rigid, to_model_frame
-from .cluster_shape import ClusterShape, measure_distance_spread, compute_mean_shape, compute_median
+from ..rigid_fit import RigidFit, fit_rigid, to_model_frame
+from .cluster_shape import ClusterShape, compute_mean_shape, compute_median, measure_distance_spread
 
 _MAX_CARRIERS = 5  # carriers of a marker at most
 # metres by which distances between carriers may vary; where too few do, the next value is used
@@ -92,8 +92,8 @@ def measure_softness(positions: np.ndarray, clusters: Iterable[Sequence[int]] = 
 
 
 def find_carriers(positions: np.ndarray, softness: np.ndarray, markers: Iterable[int],
-             known: Mapping[int, CarriedMarker] = MappingProxyType({}), changed: Iterable[int] = (),
-             check_cancelled: Callable[[], None] = lambda: None) -> dict[int, CarriedMarker]:
+                  known: Mapping[int, CarriedMarker] = MappingProxyType({}), changed: Iterable[int] = (),
+                  check_cancelled: Callable[[], None] = lambda: None) -> dict[int, CarriedMarker]:
     """Find how markers are carried.
 
     Args:
@@ -119,7 +119,8 @@ def find_carriers(positions: np.ndarray, softness: np.ndarray, markers: Iterable
     return found
 
 
-def measure_carried_marker(positions: np.ndarray, marker: int, carriers: Sequence[int], shape: ClusterShape | None = None) -> CarriedMarker:
+def measure_carried_marker(positions: np.ndarray, marker: int, carriers: Sequence[int], shape: ClusterShape
+                           | None = None) -> CarriedMarker:
     """Measure how given carriers carry a marker.
 
     Args:
@@ -133,23 +134,26 @@ def measure_carried_marker(positions: np.ndarray, marker: int, carriers: Sequenc
     frames = len(positions)
     nothing = np.full((frames, 3), np.nan)
     alone = CarriedMarker(carriers=(), shape=None, fit=None, is_trusted=np.zeros(frames, dtype=bool), local=nothing,
-                    place=np.full(3, np.nan), sigma=np.inf)
+                          place=np.full(3, np.nan), sigma=np.inf)
     if len(carriers) < 3:
         return alone
     seen = positions[:, list(carriers)]
     shape = shape or compute_mean_shape(seen)
     fit = fit_rigid(shape.places, seen, 1.0 / (shape.sigma**2 + 0.002**2))
-    trusted = fit.is_determined & (np.nan_to_num(fit.rms, nan=np.inf) <= max(_MAX_DEFORMATION, _MAX_DEFORMATION_RATIO * shape.usual_deformation))
+    trusted = fit.is_determined & (np.nan_to_num(fit.rms, nan=np.inf) <= max(_MAX_DEFORMATION, _MAX_DEFORMATION_RATIO
+                                                                             * shape.usual_deformation))
     local = np.where(trusted[:, None], to_model_frame(fit, positions[:, marker, None])[:, 0], np.nan)
     is_known = np.isfinite(local[:, 0])
     if not is_known.any():
         return alone
     place = np.median(local[is_known], axis=0)
     sigma = 1.4826 * compute_median(np.linalg.norm(local - place, axis=-1))
-    return CarriedMarker(carriers=tuple(carriers), shape=shape, fit=fit, is_trusted=trusted, local=local, place=place, sigma=sigma)
+    return CarriedMarker(carriers=tuple(carriers), shape=shape, fit=fit, is_trusted=trusted, local=local, place=place,
+                         sigma=sigma)
 
 
-def choose_carriers(marker: int, softness: np.ndarray, positions: np.ndarray, max_count: int = _MAX_CARRIERS) -> tuple[int, ...]:
+def choose_carriers(marker: int, softness: np.ndarray, positions: np.ndarray,
+                    max_count: int = _MAX_CARRIERS) -> tuple[int, ...]:
     """Choose markers that keep their distances from a marker and from each other, and are not on one line.
 
     Args:

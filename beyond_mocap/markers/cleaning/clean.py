@@ -14,13 +14,13 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ...base.errors import UserCancelledError, InputError, TimedMessage
+from ...base.errors import InputError, TimedMessage, UserCancelledError
 from ...base.time_series import find_runs
 from ..trial import MarkerTrial
 from .carriers import find_carriers, measure_softness
 from .gaps import GapLimits, fill_gaps
-from .pieces import assign_labels, detect_leaps, remove_jumps, find_unlabeled
-from .swaps import correct_swaps, correct_double_leaps
+from .pieces import assign_labels, detect_leaps, find_unlabeled, remove_jumps
+from .swaps import correct_double_leaps, correct_swaps
 
 # A marker is reported whose deviation exceeds so many times its tolerance for so many seconds.
 _STRAY_RATIO, _STRAY_SECONDS = 1.5, 0.1
@@ -83,8 +83,8 @@ class CleanReport:
     def lines(self) -> tuple[str, ...]:
         """Messages for people, the most serious first; each has its seconds (`errors.line_spans`)."""
         return (*(_describe_swap(swap) for swap in self.swaps),
-                *(_build_line(f"{one.labels[0]} labeled as {one.labels[1]} {one.format_time()}", [one]) for one in self.assigned),
-                *_describe_by_label(self.jumps, "jumping frames removed"),
+                *(_build_line(f"{one.labels[0]} labeled as {one.labels[1]} {one.format_time()}", [one])
+                  for one in self.assigned), *_describe_by_label(self.jumps, "jumping frames removed"),
                 *_describe_by_label(self.strayed, "frames far from where the surrounding markers place it"),
                 *_describe_by_label(self.left, "occluded frames left open"),
                 *_summarize(self.gaps, "occluded frames filled"))
@@ -220,12 +220,14 @@ class _CleanUp:
         labeled = [i for i in range(len(self.trial.labels)) if i not in self.unlabeled and self.is_visible(i)]
         self.softness = measure_softness(self.positions, self.clusters)
         self.softness[self.unlabeled], self.softness[:, self.unlabeled] = np.inf, np.inf
-        self.carried_markers = find_carriers(self.positions, self.softness, labeled, check_cancelled=self.check_cancelled)
+        self.carried_markers = find_carriers(self.positions, self.softness, labeled,
+                                             check_cancelled=self.check_cancelled)
 
     def update_carriers(self, changed: Sequence[int]):
         """Update the carriers where a few samples of these markers have changed."""
         labeled = [i for i in self.carried_markers if self.is_visible(i)]
-        self.carried_markers = find_carriers(self.positions, self.softness, labeled, known=self.carried_markers, changed=changed, check_cancelled=self.check_cancelled)
+        self.carried_markers = find_carriers(self.positions, self.softness, labeled, known=self.carried_markers,
+                                             changed=changed, check_cancelled=self.check_cancelled)
 
     def is_visible(self, marker):
         """Return whether a marker is visible in any frame."""
@@ -240,8 +242,8 @@ class _CleanUp:
 
 
 def clean_trial(trial: MarkerTrial, clusters: Mapping[str, Sequence[str]] | None = None,
-          settings: CleanSettings = CleanSettings(), progress: Callable[[float, str], None] | None = None,
-          cancelled: Callable[[], bool] | None = None) -> CleaningResult:
+                settings: CleanSettings = CleanSettings(), progress: Callable[[float, str], None] | None = None,
+                cancelled: Callable[[], bool] | None = None) -> CleaningResult:
     """Clean a trial: remove swaps and jumps, label unlabeled markers and fill gaps.
 
     Args:
@@ -261,8 +263,8 @@ def clean_trial(trial: MarkerTrial, clusters: Mapping[str, Sequence[str]] | None
     known = [label for labels in clusters.values() for label in labels]
     index = {label: i for i, label in enumerate(trial.labels)}
     work = _CleanUp(trial, np.array(trial.positions),
-                 [[index[label] for label in labels if label in index] for labels in clusters.values()],
-                 find_unlabeled(trial.labels, known), lambda: _check_cancelled(cancelled))
+                    [[index[label] for label in labels if label in index] for labels in clusters.values()],
+                    find_unlabeled(trial.labels, known), lambda: _check_cancelled(cancelled))
     work.findings = {name: () for name in ("swaps", "jumps", "assigned", "strayed", "gaps", "left")}
     steps = [("finding carriers", _CleanUp.find_carriers)]
     steps += [("swaps", _correct_swaps)] if settings.swaps else []
@@ -290,8 +292,8 @@ def _correct_swaps(work):
     work.positions, found = correct_double_leaps(work.positions, work.carried)
     _record_swaps(work, found)
     leaping = detect_leaps(work.positions, work.carried, work.trial.fps)
-    work.positions, found = correct_swaps(work.positions, work.carried, leaping, fps=work.trial.fps, opposite=_list_opposite_pairs(work),
-                                 check_cancelled=work.check_cancelled)
+    work.positions, found = correct_swaps(work.positions, work.carried, leaping, fps=work.trial.fps,
+                                          opposite=_list_opposite_pairs(work), check_cancelled=work.check_cancelled)
     _record_swaps(work, found)
 
 
@@ -337,7 +339,7 @@ def _fill_gaps(work, settings):
     longest = GapLimits(settings.longest_gap, settings.longest_soft_gap, settings.longest_spline)
     work.findings["strayed"] = tuple(_find_strayed(work))
     work.positions, found = fill_gaps(work.positions, work.soft, work.trial.fps, limits=longest, known=work.carried,
-                                 check_cancelled=work.check_cancelled)
+                                      check_cancelled=work.check_cancelled)
     for name, is_filled in (("gaps", True), ("left", False)):
         work.findings[name] = tuple(
             work.stretch([gap.marker], gap.first, gap.end, gap.how) for gap in found if bool(gap.how) is is_filled
@@ -356,7 +358,8 @@ def _find_strayed(work):
             continue
         far = np.nan_to_num(one.away) > np.maximum(_STRAY_RATIO * one.tolerance, 0.06)
         for first, end in find_runs(far):
-            edges = broken[first : first + 2 * _BREAK_MARGIN + 1, marker], broken[end : end + 2 * _BREAK_MARGIN + 1, marker]
+            edges = broken[first : first + 2 * _BREAK_MARGIN + 1, marker], broken[end : end + 2 * _BREAK_MARGIN + 1,
+                                                                                  marker]
             if end - first >= _STRAY_SECONDS * work.trial.fps and any(edge.any() for edge in edges):
                 yield work.stretch([marker], first, end, "", float(np.median(one.away[first:end])))
 
@@ -370,9 +373,7 @@ def _build_result(work):
     nameless = {trial.labels[i] for i in work.unlabeled}
     report = CleanReport(
         seen={label: part for label, part in share.items() if label not in nameless},
-        unnamed={
-            trial.labels[i]: float(np.isfinite(work.positions[:, i, 0]).mean()) for i in work.unlabeled if i in remaining
-        },
-        **work.findings,
+        unnamed={trial.labels[i]: float(np.isfinite(work.positions[:, i, 0]).mean()) for i in work.unlabeled
+                 if i in remaining}, **work.findings,
     )
     return CleaningResult(cleaned, report)

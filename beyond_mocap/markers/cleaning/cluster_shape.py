@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..frames import place_points, fit_rigid, to_model_frame
+from ..rigid_fit import fit_rigid, place_points, to_model_frame
 
 _ITERATIONS = 3  # iterations of shape and weights
 _MAX_FRAMES = 100  # frames of a trial that are used

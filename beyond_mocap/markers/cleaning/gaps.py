@@ -11,7 +11,7 @@ import numpy as np
 
 from ...base.easing import hermite
 from ...base.time_series import find_runs
-from .carriers import CarriedMarker, measure_carried_marker, choose_carriers
+from .carriers import CarriedMarker, choose_carriers, measure_carried_marker
 from .cluster_shape import ClusterShape, compute_mean_shape, compute_quantile
 
 # Metres by which a marker deviates from its place among its carriers, from which on they carry it softly: the usual
@@ -72,8 +72,9 @@ def find_gaps(positions: np.ndarray, markers: Iterable[int]) -> list[Gap]:
             for first, end in find_runs(~seen[:, marker])]
 
 
-def fill_gaps(positions: np.ndarray, softness: np.ndarray, fps: float, limits: GapLimits, known: Mapping[int, CarriedMarker],
-         check_cancelled: Callable[[], None] = lambda: None) -> tuple[np.ndarray, list[Gap]]:
+def fill_gaps(positions: np.ndarray, softness: np.ndarray, fps: float, limits: GapLimits,
+              known: Mapping[int, CarriedMarker],
+              check_cancelled: Callable[[], None] = lambda: None) -> tuple[np.ndarray, list[Gap]]:
     """Fill gaps; no visible marker is moved, and no trajectory jumps.
 
     Every gap is filled from visible markers alone, never from another gap's filling.
@@ -115,7 +116,8 @@ def _find_gap_carriers(positions, gap, softness, one, shapes):
 
 def _fill_by_carriers(one, gap, longest):
     """Fill by firm carriers: ("cluster", path (n, 3)), or None."""
-    if one is None or gap.frames > longest or one.sigma > _SOFT_SIGMA or compute_quantile(one.away, 0.95) > _SOFT_QUANTILE:
+    if one is None or gap.frames > longest or one.sigma > _SOFT_SIGMA or compute_quantile(one.away,
+            0.95) > _SOFT_QUANTILE:
         return None
     has_before, has_after = gap.first > 0, gap.end < len(one.local)
     before = one.local[gap.first - 1] if has_before else one.local[gap.end]
@@ -137,7 +139,8 @@ def _fill_by_curve(positions, one, gap, fps, limits):
         trajectories.append(("soft", one.local))
     if gap.frames <= limits.spline * fps:
         trajectories.append(("spline", positions[:, gap.marker]))
-    rated = [(_estimate_curve_error(trajectory, gap.frames, fps), method, trajectory) for method, trajectory in trajectories]
+    rated = [(_estimate_curve_error(trajectory, gap.frames, fps), method, trajectory) for method,
+             trajectory in trajectories]
     for expected, method, trajectory in sorted(rated, key=lambda row: row[0]):
         path = bridge_gap(trajectory, gap.first, gap.end, fps)
         if path is not None and expected < _MAX_CURVE_ERROR:

@@ -144,7 +144,8 @@ class Jump(NamedTuple):
     off: float
 
 
-def remove_jumps(positions: np.ndarray, carried: Mapping[int, CarriedMarker], fps: float) -> tuple[np.ndarray, list[Jump]]:
+def remove_jumps(positions: np.ndarray, carried: Mapping[int, CarriedMarker], fps: float) -> tuple[np.ndarray,
+        list[Jump]]:
     """Remove samples that jump.
 
     Args:
@@ -178,7 +179,8 @@ def _iter_bursts(positions, carried, fps):
         one = carried.get(marker)
         off, allowed = _measure_offset(positions[:, marker], seen[:, marker], piece, most, fps)
         if one is not None and one.carriers:
-            near, near_allowed = _measure_offset(one.local, seen[:, marker] & np.isfinite(one.local[:, 0]), piece, most, fps)
+            near, near_allowed = _measure_offset(one.local, seen[:, marker] & np.isfinite(one.local[:, 0]), piece, most,
+                                                 fps)
             if np.isfinite(near_allowed):
                 # a marker that only seems to jump, because a carrier does, stays on its trajectory in the world
                 off, allowed = (near, near_allowed) if off > _MIN_WORLD_SHARE * near else (0.0, near_allowed)
@@ -220,14 +222,16 @@ def _measure_offset(trajectory, seen, piece, most, fps):
     if curve is None:
         return 0.0, np.inf
     off = np.linalg.norm(trajectory[first:end] - curve[first - low - 1 : end - low - 1], axis=-1)
-    return float(off.min()), max(_MIN_BURST_OFFSET, _MIN_BURST_SHARE * float(np.linalg.norm(trajectory[high] - trajectory[low])))
+    return float(off.min()), max(_MIN_BURST_OFFSET, _MIN_BURST_SHARE
+                                 * float(np.linalg.norm(trajectory[high] - trajectory[low])))
 
 
 def _iter_spikes(positions, carried, fps):
     """Find single samples off the curve through their neighbours."""
     world = _measure_spikes(positions)
     usual = _compute_usual_around(world)
-    local_least, world_least = max(_SPIKE_LOCAL, _SPIKE_SWING_LOCAL / fps**2), max(_SPIKE_WORLD, _SPIKE_SWING_WORLD / fps**2)
+    local_least, world_least = max(_SPIKE_LOCAL, _SPIKE_SWING_LOCAL / fps**2), max(_SPIKE_WORLD, _SPIKE_SWING_WORLD
+                                                                                   / fps**2)
     for marker in range(positions.shape[1]):
         one = carried.get(marker)
         off, around, least = world[:, marker], usual[:, marker], np.full(len(positions), world_least)
@@ -298,7 +302,7 @@ def find_unlabeled(labels: Sequence[str], known: Sequence[str] = ()) -> list[int
 
 
 def assign_labels(positions: np.ndarray, carried: Mapping[int, CarriedMarker], unlabeled: Sequence[int],
-           fps: float) -> tuple[np.ndarray, list[Assignment]]:
+                  fps: float) -> tuple[np.ndarray, list[Assignment]]:
     """Assign pieces of unlabeled markers to the labels that they belong to.
 
     The best match goes first; a label takes at most one piece at a time, and each frame of a piece is used once.
@@ -315,7 +319,8 @@ def assign_labels(positions: np.ndarray, carried: Mapping[int, CarriedMarker], u
     alone = np.ascontiguousarray(positions[:, list(unlabeled)])
     candidates = [
         Piece(unlabeled[piece.marker], piece.first, piece.end)
-        for piece in split_pieces(alone, detect_leaps(alone, {}, fps)) if piece.end - piece.first >= max(2, _MIN_PIECE_SECONDS * fps)
+        for piece in split_pieces(alone, detect_leaps(alone, {}, fps)) if piece.end - piece.first
+        >= max(2, _MIN_PIECE_SECONDS * fps)
     ]
     lacking = [marker for marker in carried if marker not in unlabeled and np.isnan(positions[:, marker, 0]).any()]
     rated = (_rate_match(positions, carried, piece, marker, fps) for piece in candidates for marker in lacking)

@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ...base.time_series import find_runs
-from ..frames import place_points, fit_rigid
+from ..rigid_fit import fit_rigid, place_points
 from .carriers import CarriedMarker
 from .cluster_shape import compute_median
 
@@ -77,7 +77,8 @@ def correct_double_leaps(positions: np.ndarray, carried: Mapping[int, CarriedMar
 
 
 def correct_swaps(positions: np.ndarray, carried: Mapping[int, CarriedMarker], leaping: np.ndarray, fps: float,
-         opposite: Sequence[Pairs] = (), check_cancelled: Callable[[], None] = lambda: None) -> tuple[np.ndarray, list[Swap]]:
+                  opposite: Sequence[Pairs] = (),
+                  check_cancelled: Callable[[], None] = lambda: None) -> tuple[np.ndarray, list[Swap]]:
     """Correct swaps that deform clusters and whose exchange removes the deformation.
 
     The exchange that reduces the deformation the most is made first, and the others are rated again where they are
@@ -96,7 +97,8 @@ def correct_swaps(positions: np.ndarray, carried: Mapping[int, CarriedMarker], l
     out, found, deformation = positions.copy(), [], _Deformation(carried)
     crossings = _find_crossings(positions)
     step = max(1, int(_TEST_INTERVAL * fps))
-    tested = [pairs for pairs in _list_tests(positions, carried, crossings, fps, opposite) if deformation.has_evidence(pairs)]
+    tested = [pairs for pairs in _list_tests(positions, carried, crossings, fps, opposite)
+              if deformation.has_evidence(pairs)]
     candidates = {}
     for pairs in tested:
         check_cancelled()
@@ -181,7 +183,8 @@ class _Deformation:
     def compute_usual(self, pairs: Pairs) -> float:
         """Compute the mean of the usual deformation of the pairs' shapes, in metres."""
         ones = [self._carried[marker] for marker in self._find_affected_shapes(pairs)]
-        return float(np.mean([max(one.shape.usual_deformation, one.sigma / np.sqrt(len(one.carriers) + 1.0)) for one in ones]))
+        return float(np.mean([max(one.shape.usual_deformation, one.sigma / np.sqrt(len(one.carriers) + 1.0))
+                              for one in ones]))
 
     def compare_exchange(self, positions: np.ndarray, pairs: Pairs) -> tuple[np.ndarray, np.ndarray]:
         """Measure the mean deformation of the pairs' shapes, as labeled and with the pairs exchanged.
@@ -260,7 +263,8 @@ def _find_stretches(keep, swap, usual, leaping):
     """Find the (first, end) frames in which an exchange is required, from where it begins to be better."""
     gain = keep - swap
     is_good = (swap < max(_GOOD_DEFORMATION, _GOOD_RATIO * usual)) | (swap < _GOOD_SHARE * keep)
-    clear = (gain > np.maximum(_MIN_REDUCTION, (1.0 - _MAX_REMAINING_SHARE) * keep)) & is_good & (keep > _MIN_DEFORMATION_RATIO * usual)
+    clear = (gain > np.maximum(_MIN_REDUCTION, (1.0 - _MAX_REMAINING_SHARE) * keep)) & is_good & (keep
+            > _MIN_DEFORMATION_RATIO * usual)
     leap = leaping.any(axis=1)
     found = []
     for first, end in find_runs(~(gain <= 0.0)):  # better, or unknown
@@ -270,8 +274,10 @@ def _find_stretches(keep, swap, usual, leaping):
         low, high = int(inside[0]), int(inside[-1]) + 1
         known = np.flatnonzero(gain[first:end] > 0.0) + first
         # the exchange began at a leap if there is one, else where it begins to be better
-        leaps_before, leaps_after = np.flatnonzero(leap[first : low + 1]) + first, np.flatnonzero(leap[high : end + 1]) + high
-        found.append((int(leaps_before[-1] if len(leaps_before) else known[0]), int(leaps_after[0] if len(leaps_after) else known[-1] + 1)))
+        leaps_before, leaps_after = np.flatnonzero(leap[first : low + 1]) + first, np.flatnonzero(leap[high : end
+                + 1]) + high
+        found.append((int(leaps_before[-1] if len(leaps_before) else known[0]),
+                      int(leaps_after[0] if len(leaps_after) else known[-1] + 1)))
     return found
 
 
@@ -307,7 +313,8 @@ def _match_crossing_pairs(now, expected, markers):
     apart = np.linalg.norm(arrow, axis=-1)
     miss = np.linalg.norm(arrow + expected_arrow, axis=-1)
     middle = 0.5 * np.linalg.norm((now - expected)[None] + (now - expected)[:, None], axis=-1)
-    is_reversed = np.triu((apart > _MIN_SWAP_DISTANCE) & (miss < _MAX_MISS_SHARE * apart) & (middle < _MAX_MISS_SHARE * apart), 1)
+    is_reversed = np.triu((apart > _MIN_SWAP_DISTANCE) & (miss < _MAX_MISS_SHARE * apart)
+                          & (middle < _MAX_MISS_SHARE * apart), 1)
     used: set[int] = set()
     pairs = []
     for i, j in sorted(np.argwhere(is_reversed).tolist(), key=lambda pair: miss[tuple(pair)]):

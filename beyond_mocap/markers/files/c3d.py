@@ -18,7 +18,7 @@ import numpy as np
 
 from ...base.errors import InputError
 from ...files.content import open_file
-from ..trial import MIN_FPS, MAX_FPS, MarkerTrial
+from ..trial import MAX_FPS, MIN_FPS, MarkerTrial
 from .raw_markers import RawMarkers, build_trial
 
 BLOCK = 512  # bytes
@@ -221,7 +221,8 @@ def _find_layout(path: Path, parameters: _Parameters, size: int) -> _Layout:
         for data, points, analog, count in itertools.product(*counts.values()) if points
     ]
     remaining_bytes = [size - layout.data - layout.frames * layout.stride for layout in layouts]
-    fitting = [i for i, rest in enumerate(remaining_bytes) if 0 <= rest < BLOCK] or [i for i, rest in enumerate(remaining_bytes) if rest >= 0]
+    fitting = [i for i, rest in enumerate(remaining_bytes) if 0 <= rest < BLOCK] or [i for i,
+            rest in enumerate(remaining_bytes) if rest >= 0]
     if not fitting:
         best = layouts[0]
         present_frames = max(size - best.data, 0) // best.stride
@@ -263,7 +264,7 @@ def _list_frame_counts(parameters: _Parameters) -> tuple[int, list[int]]:
     first = int(start[0] + 65536 * start[1]) if len(start) == 2 else int(header.first_frame)
     counts = [int(end[0] + 65536 * end[1]) - first + 1] if len(end) == 2 else []
     counts += _list_counts(parameters.read_number("POINT:LONG_FRAMES"), header.last_frame - header.first_frame + 1.0,
-                    parameters.read_number("POINT:FRAMES"))  # fmt: skip
+                           parameters.read_number("POINT:FRAMES"))  # fmt: skip
     return first, list(dict.fromkeys(count for count in counts if count > 0))
 
 
@@ -312,8 +313,9 @@ def _build_raw_markers(path: Path, parameters: _Parameters, layout: _Layout, pos
         unit=" ".join(parameters.read_texts("POINT:UNITS")[:1]), residuals=residuals,
         up=_AXES.get("".join(parameters.read_texts("POINT:Y_SCREEN")[:1]).strip().upper()),
         prefixes=tuple(parameters.read_texts("SUBJECTS:LABEL_PREFIXES")),
-        computed=tuple(label for group in _list_computed_groups(parameters) for label in parameters.read_texts(f"POINT:{group}")),
-        events=_read_events(parameters), start=max(layout.first_frame - 1, 0) / rate, notes=notes,
+        computed=tuple(label for group in _list_computed_groups(parameters)
+                       for label in parameters.read_texts(f"POINT:{group}")), events=_read_events(parameters),
+        start=max(layout.first_frame - 1, 0) / rate, notes=notes,
     )
 
 
@@ -322,7 +324,8 @@ def _list_computed_groups(parameters: _Parameters) -> list[str]:
     itself.
     """
     file_groups = [name.upper() for name in parameters.read_texts("POINT:TYPE_GROUPS")]
-    return list(dict.fromkeys([*_COMPUTED_GROUPS, *(name for name in file_groups if name not in ("LABELS", "DESCRIPTIONS"))]))
+    return list(dict.fromkeys([*_COMPUTED_GROUPS,
+                               *(name for name in file_groups if name not in ("LABELS", "DESCRIPTIONS"))]))
 
 
 def _read_events(parameters: _Parameters) -> list[tuple[float, str, str, str]]:
@@ -331,8 +334,8 @@ def _read_events(parameters: _Parameters) -> list[tuple[float, str, str, str]]:
     labels, sides, whose = (parameters.read_texts(f"EVENT:{name}") for name in ("LABELS", "CONTEXTS", "SUBJECTS"))
     used = parameters.read_number("EVENT:USED")
     count = min(len(times) // 2, int(used) if math.isfinite(used) else 0)
-    out = [(60 * times[2 * i] + times[2 * i + 1], _get_text(labels, i), _parse_side(_get_text(sides, i)), _get_text(whose, i))
-           for i in range(count)]  # fmt: skip
+    out = [(60 * times[2 * i] + times[2 * i + 1], _get_text(labels, i), _parse_side(_get_text(sides, i)),
+            _get_text(whose, i)) for i in range(count)]  # fmt: skip
     if not out:
         header = parameters.header
         out = [(float(seconds), " ".join(str(label).split()).strip("\0"), "", "") for seconds, label in header.events]

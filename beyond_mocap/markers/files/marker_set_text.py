@@ -150,8 +150,10 @@ def format_marker_set(marker_set: MarkerSet) -> str:
     """
     lines = [f"marker set: {marker_set.name}"]
     lines += [f"about: {' '.join(marker_set.about.split())}"] if marker_set.about else []
-    lines += ["", *(f"segment {joint}: {_format_labels(labels)}" for joint, labels in marker_set.segments.items() if labels)]
-    lines += ["", *(f"landmark {name}: {_format_labels(labels)}" for name, labels in marker_set.landmarks.items() if labels)]
+    lines += ["", *(f"segment {joint}: {_format_labels(labels)}" for joint, labels in marker_set.segments.items()
+                    if labels)]
+    lines += ["", *(f"landmark {name}: {_format_labels(labels)}" for name, labels in marker_set.landmarks.items()
+                    if labels)]
     lists = {key: getattr(marker_set, key) for key in _LISTS}
     lines += ["", *(f"{key}: {_format_labels(_sort_labels(labels))}" for key, labels in lists.items() if labels)]
     others: dict[str, list[str]] = {}

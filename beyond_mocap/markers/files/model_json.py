@@ -9,9 +9,17 @@ import os
 import numpy as np
 
 from ...base.errors import InputError
+from ...files.atomic import atomic_write
 from ...files.content import read_utf8
-from ...files.json_values import check_names, check_list, check_number, check_numbers, parse_json, check_text, check_bool
-from ...files.whole import atomic_write
+from ...files.json_values import (
+    check_bool,
+    check_list,
+    check_names,
+    check_number,
+    check_numbers,
+    check_text,
+    parse_json,
+)
 from ...motion.skeleton import Skeleton
 from ..model.model import BallMarker, Freedom, MarkerModel
 from ..trial import find_duplicates
@@ -134,8 +142,10 @@ def _build_model(whole) -> MarkerModel:
         edge_sigma=_read_column(markers, "marker", "edge_sigma", math.nan), freedom=_build_freedom(joints),
         stiffness=_read_column(joints, "joint", "stiffness", 0.0),
         centre_sigma=_read_column(joints, "joint", "centre_sigma", math.nan), ball=_read_ball(whole.get("ball"), index),
-        subject=check_text(whole.get("subject", ""), "subject"), sessions=_read_texts(whole.get("sessions", []), "sessions"),
-        set_name=check_text(whole.get("marker_set", ""), "marker_set"), notes=_read_texts(whole.get("notes", []), "notes"),
+        subject=check_text(whole.get("subject", ""), "subject"), sessions=_read_texts(whole.get("sessions", []),
+                                                                                      "sessions"),
+        set_name=check_text(whole.get("marker_set", ""), "marker_set"),
+        notes=_read_texts(whole.get("notes", []), "notes"),
     )
 
 
@@ -165,7 +175,8 @@ def _build_freedom(joints) -> Freedom:
 
     def read_row(i: int, joint: dict) -> tuple:
         order = check_text(joint.get("order", "XYZ"), f"joint {i}: order")
-        free = [check_bool(one, f"joint {i}: free") for one in _check_three(joint.get("free", [True] * 3), f"joint {i}: free")]
+        free = [check_bool(one, f"joint {i}: free") for one in _check_three(joint.get("free", [True] * 3),
+                                                                            f"joint {i}: free")]
         limits = [[usual if one is None else check_number(one, f"joint {i}: {name}")
                    for one in _check_three(joint.get(name, [None] * 3), f"joint {i}: {name}")]
                   for name, usual in (("low", -math.inf), ("high", math.inf))]  # fmt: skip
@@ -198,7 +209,8 @@ def _read_ball(value, index) -> BallMarker | None:
     if not 0.0 < radius < 1.0:
         raise InputError("ball: radius", f"{radius:g} m", "0 to 1 m")
     joint = _find_joint(value["joint"], "ball: joint", index)
-    return BallMarker(check_text(value["label"], "ball: label"), joint, _read_place(value["centre"], "ball: centre"), radius)
+    return BallMarker(check_text(value["label"], "ball: label"), joint, _read_place(value["centre"], "ball: centre"),
+                      radius)
 
 
 def _find_joint(value, where: str, index: dict[str, int]) -> int:

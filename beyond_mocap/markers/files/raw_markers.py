@@ -14,12 +14,12 @@ import numpy as np
 
 from ...base.errors import InputError
 from ..trial import MarkerEvent, MarkerTrial, list_some
-from .unit_and_axes import decide_unit, measure_handedness, check_given_unit, measure_height, detect_up_axis
+from .unit_and_axes import check_given_unit, decide_unit, detect_up_axis, measure_handedness, measure_height
 
 _MAX_COORDINATE = 1e9  # in any unit; a larger coordinate is damage
 _MAX_DISTANCE = 1000.0  # metres from the origin; farther is a code for "not visible", or damage
 _UP_ROTATIONS = {(2, 1): ((0, 1, 2), (1, 1, 1)), (2, -1): ((0, 1, 2), (1, -1, -1)), (1, 1): ((0, 2, 1), (1, -1, 1)),
-       (1, -1): ((0, 2, 1), (1, 1, -1)), (0, 1): ((1, 2, 0), (1, 1, 1)), (0, -1): ((1, 2, 0), (-1, 1, -1))}
+                 (1, -1): ((0, 2, 1), (1, 1, -1)), (0, 1): ((1, 2, 0), (1, 1, 1)), (0, -1): ((1, 2, 0), (-1, 1, -1))}
 """(up axis of the file, sign) -> the file's axes that become X, Y and Z, and their signs: rotations, no reflections."""
 
 MIN_BODY_MARKERS = 10  # markers; a subject of a file with fewer is taken for an object
@@ -64,7 +64,7 @@ class RawMarkers:
 
 
 def build_trial(raw: RawMarkers, path: str | os.PathLike, unit: float | str | None, subject: str | None,
-             up: str | None) -> MarkerTrial:  # fmt: skip
+                up: str | None) -> MarkerTrial:  # fmt: skip
     """Convert raw markers to a trial.
 
     Args:
@@ -88,12 +88,13 @@ def build_trial(raw: RawMarkers, path: str | os.PathLike, unit: float | str | No
     positions[is_damaged] = np.nan
     known = unit is not None
     metres, unit_note = (check_given_unit(path, unit, positions) if known
-                   else decide_unit(path, raw.unit, positions, measure_height(labels, positions)))  # fmt: skip
+                         else decide_unit(path, raw.unit, positions, measure_height(labels, positions)))  # fmt: skip
     notes.insert(0, unit_note)
     positions *= metres
     is_too_far = is_damaged | (np.abs(positions) > _MAX_DISTANCE).any(axis=-1)
     if is_too_far.any():
-        notes.append(f"{is_too_far.sum()} places farther than {_MAX_DISTANCE:.0f} m from the origin, treated as not visible")
+        notes.append(
+            f"{is_too_far.sum()} places farther than {_MAX_DISTANCE:.0f} m from the origin, treated as not visible")
         positions[is_too_far] = np.nan
     positions[~np.isfinite(positions).all(axis=-1)] = np.nan
     labels, positions, residuals = _remove_invisible(path, labels, positions, residuals, notes)
@@ -155,7 +156,7 @@ def _rotate_upright(raw: RawMarkers, labels, positions, requested: str | None, n
     """
     body_up = detect_up_axis(labels, positions)
     candidates = {"as given": None if requested is None else parse_axis(requested), "as the file says": raw.up,
-            "heads above feet": body_up, "as such files usually are": raw.usual_up}
+                  "heads above feet": body_up, "as such files usually are": raw.usual_up}
     why, up = next((why, up) for why, up in candidates.items() if up)
     notes.append(f"{_format_axis(up)} is up, {why}")
     if body_up and body_up != up and requested is None:

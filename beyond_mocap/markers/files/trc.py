@@ -17,9 +17,9 @@ from pathlib import Path
 import numpy as np
 
 from ...base.errors import InputError
+from ...files.atomic import atomic_write
 from ...files.content import read_bytes
-from ...files.whole import atomic_write
-from ..trial import MIN_FPS, MAX_FPS, MarkerTrial
+from ..trial import MAX_FPS, MIN_FPS, MarkerTrial
 from .raw_markers import RawMarkers, build_trial
 
 _MISSING = {"", "nan", "-", "na", "n/a", "null", "none", "inf", "-inf"}
@@ -111,23 +111,25 @@ def _parse_header(path: Path, lines: list[str]) -> _Header:
     if label_line is None:
         raise InputError(f"{path}:1", "no line that starts with Frame#", "a TRC header", "choose a TRC file")
     tabs = "\t" in lines[label_line]
-    axis_line = next((i for i in range(label_line + 1, min(label_line + 4, len(lines))) if re.match(r"\s*[XYZ]\d+(\s|$)", lines[i])), None)
+    axis_line = next((i for i in range(label_line + 1, min(label_line + 4, len(lines)))
+                      if re.match(r"\s*[XYZ]\d+(\s|$)", lines[i])), None)
     label_cells = _split_cells(lines[label_line], tabs)
     labels, starts = _parse_labels(path, label_cells, label_line, tabs)
     if axis_line is not None:
-        labels, starts, order = _parse_axis_line(path, _split_cells(lines[axis_line], tabs), axis_line, labels=labels, starts=starts,
-                                                tabs=tabs)
+        labels, starts, order = _parse_axis_line(path, _split_cells(lines[axis_line], tabs), axis_line, labels=labels,
+                                                 starts=starts, tabs=tabs)
     else:
         order = (0, 1, 2)
     if not labels:
-        raise InputError(f"{path}:{label_line + 1}", "no labels", "Frame#, Time and a label for each marker", _EXPORT_AGAIN)
+        raise InputError(f"{path}:{label_line + 1}", "no labels", "Frame#, Time and a label for each marker",
+                         _EXPORT_AGAIN)
     notes, values = [], _parse_values(lines, label_line, tabs)
     marker_count = values.get("nummarkers", "")
     if marker_count.isdigit() and int(marker_count) != len(labels):
         notes.append(f"{len(labels)} markers, not {marker_count} as in the header")
     columns = np.array(starts)[:, None] + np.array(order)
-    return _Header(labels=labels, columns=columns, first_row=(label_line if axis_line is None else axis_line) + 1, values=values,
-                 tabs=tabs, notes=notes)
+    return _Header(labels=labels, columns=columns, first_row=(label_line if axis_line is None else axis_line) + 1,
+                   values=values, tabs=tabs, notes=notes)
 
 
 def _split_cells(line: str, tabs: bool) -> list[str]:
@@ -252,7 +254,8 @@ def _align_to_rate(path: Path, head: _Header, times: list[str], positions: np.nd
         notes = [] if len(times) < 2 else ["no times in the file: DataRate is used as the frame rate"]
         return header_rate, 0.0 if not np.isfinite(seconds[:1]).all() else float(seconds[0]), positions, notes
     steps = np.diff(seconds)
-    only_coarse = bool((steps >= 0).all()) and header_rate > 0 and 1 / header_rate < resolution  # equal times, written with few digits
+    only_coarse = bool(
+        (steps >= 0).all()) and header_rate > 0 and 1 / header_rate < resolution  # equal times, written with few digits
     if (steps <= 0).any() and not only_coarse:
         frame = int(np.argmax(steps <= 0)) + 2
         found = f"Time of frame {frame} is {times[frame - 1][:20]}, after {times[frame - 2][:20]}"
@@ -285,7 +288,8 @@ def _parse_seconds(times: list[str]) -> tuple[np.ndarray, float]:
     return np.where(np.abs(seconds) < 1e7, seconds, np.nan), 10.0 ** -digits
 
 
-def _choose_rate(header_rate: float, seconds: np.ndarray, steps: np.ndarray, resolution: float) -> tuple[float, list[str]]:
+def _choose_rate(header_rate: float, seconds: np.ndarray, steps: np.ndarray, resolution: float) -> tuple[float,
+        list[str]]:
     """Choose the frame rate: the header's where the times agree, else that of the times, with a message."""
     if header_rate > 0:
         frames = np.rint((seconds - seconds[0]) * header_rate)
@@ -295,8 +299,11 @@ def _choose_rate(header_rate: float, seconds: np.ndarray, steps: np.ndarray, res
     measured_rate = 1 / float(np.median(steps))
     mean = (len(seconds) - 1) / float(seconds[-1] - seconds[0])
     measured_rate = mean if abs(mean / measured_rate - 1) < 0.05 else measured_rate
-    measured_rate = round(measured_rate) if abs(measured_rate - round(measured_rate)) < 0.005 * measured_rate and round(measured_rate) else measured_rate
-    return measured_rate, [f"{measured_rate:g} frames per second by the times; the header says {header_rate:g}"] if header_rate > 0 else []
+    measured_rate = round(measured_rate) if abs(measured_rate
+                                                - round(measured_rate)) < 0.005 * measured_rate and round(
+        measured_rate) else measured_rate
+    return measured_rate, [
+        f"{measured_rate:g} frames per second by the times; the header says {header_rate:g}"] if header_rate > 0 else []
 
 
 def _check_rate(path: Path, fps: float) -> None:

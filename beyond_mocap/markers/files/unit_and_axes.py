@@ -81,7 +81,8 @@ def check_given_unit(path: str | os.PathLike, unit: float | str, positions: np.n
     return metres, note if usual else f"{note}: the markers then span {span * metres:.4g} m, unusual for a body"
 
 
-def decide_unit(path: str | os.PathLike, header_unit: str, positions: np.ndarray, height: float = 0.0) -> tuple[float, str]:
+def decide_unit(path: str | os.PathLike, header_unit: str, positions: np.ndarray, height: float = 0.0) -> tuple[float,
+        str]:
     """Decide the unit of a file.
 
     Args:
@@ -98,11 +99,12 @@ def decide_unit(path: str | os.PathLike, header_unit: str, positions: np.ndarray
     span = measure_span(positions)
     if known is not None:
         if height > 0 and not _HEIGHT_RANGE[0] <= height * known <= _HEIGHT_RANGE[1]:
-            raise InputError(path, f"a body of {height * known:.4g} m in the header's unit {header_unit.strip()!r}", "a body",
-                             _SET_UNIT)  # fmt: skip
-        if span > 0 and not _BODY_RANGE[0] <= span * known <= _BODY_RANGE[1]:
-            raise InputError(path, f"markers that span {span * known:.4g} m in the header's unit {header_unit.strip()!r}",
+            raise InputError(path, f"a body of {height * known:.4g} m in the header's unit {header_unit.strip()!r}",
                              "a body", _SET_UNIT)  # fmt: skip
+        if span > 0 and not _BODY_RANGE[0] <= span * known <= _BODY_RANGE[1]:
+            raise InputError(
+                path, f"markers that span {span * known:.4g} m in the header's unit {header_unit.strip()!r}", "a body",
+                             _SET_UNIT)  # fmt: skip
         return known, f"unit {header_unit.strip()}"
     fitting = [name for name in _GUESSED_UNITS if _GUESS_RANGE[0] <= span * NAMES[name] <= _GUESS_RANGE[1]]
     found = f"unit {header_unit.strip()[:20]!r}" if header_unit.strip() else "no unit"
@@ -167,11 +169,13 @@ def measure_handedness(labels: Sequence[str], positions: np.ndarray) -> float:
     Returns:
         Near +1 for right-handed, near -1 for mirrored, 0 where unknown.
     """
-    ahead, up, sides = _measure_direction(labels, positions, BACK, FRONT), _measure_up(labels, positions), _list_sides(labels)
+    ahead, up, sides = _measure_direction(labels, positions, BACK, FRONT), _measure_up(labels,
+            positions), _list_sides(labels)
     if ahead is None or up is None or not sides:
         return 0.0
     few = _sample_frames(positions)
-    left = unit_vectors(_compute_mean(few[:, [i for i, _ in sides]] - few[:, [j for _, j in sides]], axis=1), np.nan, _MIN_LENGTH)
+    left = unit_vectors(_compute_mean(few[:, [i for i, _ in sides]] - few[:, [j for _, j in sides]], axis=1), np.nan,
+                        _MIN_LENGTH)
     with np.errstate(invalid="ignore"):
         volume = np.einsum("ti,ti->t", np.cross(ahead, left), up)
     clear = volume[np.abs(volume) > _MIN_VOLUME]

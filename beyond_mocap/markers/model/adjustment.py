@@ -87,7 +87,8 @@ class Pull:
 class Adjustment:
     """The adjustment of one body over F frames: damped Gauss-Newton with robust weights."""
 
-    def __init__(self, body: Body, prior: Prior, pull: Pull, seen: np.ndarray, sigma: np.ndarray, effective_frames: float):
+    def __init__(self, body: Body, prior: Prior, pull: Pull, seen: np.ndarray, sigma: np.ndarray,
+                 effective_frames: float):
         """Set up the adjustment.
 
         Args:
@@ -181,7 +182,8 @@ class Adjustment:
                 for axis, tolerance in ((square, _CARRY), (twist, _TWIST)):
                     if axis is not None:
                         own = world[:, joint, :, axis]
-                        out.append((np.einsum("fa,fa->f", above, own) / tolerance, [(joint, np.cross(own, above) / tolerance)]))
+                        out.append((np.einsum("fa,fa->f", above, own) / tolerance,
+                                    [(joint, np.cross(own, above) / tolerance)]))
             if joint in self.pull.tolerance:
                 turn = self._compute_rotation(joint)
                 for axis, tolerance in enumerate(self.pull.tolerance[joint]):

@@ -19,7 +19,7 @@ import numpy as np
 from ...base.errors import InputError
 from ...motion.skeleton import Skeleton
 from ..cleaning.cluster_shape import compute_mean_shape, compute_medians, compute_quantile
-from ..frames import RigidFit, compute_mean_rotation, place_points, fit_rigid, to_model_frame
+from ..rigid_fit import RigidFit, compute_mean_rotation, fit_rigid, place_points, to_model_frame
 from ..trial import MarkerTrial
 from .centres import JointCentres, predict_centres
 from .marker_set import MarkerSet
@@ -52,8 +52,8 @@ def find_landmarks(frame: Mapping[str, np.ndarray], marker_set: MarkerSet) -> di
     return found
 
 
-def build_model_from_frame(frame: Mapping[str, np.ndarray], marker_set: MarkerSet, is_static: bool = True, subject: str = "",
-                     session: str = "") -> MarkerModel:
+def build_model_from_frame(frame: Mapping[str, np.ndarray], marker_set: MarkerSet, is_static: bool = True,
+                           subject: str = "", session: str = "") -> MarkerModel:
     """Build the model of one frame: predicted joint centres, with each marker where it was recorded.
 
     Args:
@@ -123,7 +123,7 @@ def _build_skeleton(centres: JointCentres, names: list[str]):
 
 
 def average_static_frame(trial: MarkerTrial, clusters: Mapping[str, Sequence[str]],
-                 seconds: float = 2.0) -> dict[str, np.ndarray]:
+                         seconds: float = 2.0) -> dict[str, np.ndarray]:
     """Average the stillest part of a static trial into one frame.
 
     Markers of segments with too few markers for a frame of their own are averaged in the frame of the segment they hang
@@ -179,7 +179,8 @@ def find_stillest_frames(trial: MarkerTrial, seconds: float = 2.0) -> tuple[int,
         moved[: len(speed)] = compute_quantile(speed, 0.5, axis=1)
     seen = trial.seen.sum(axis=1)
     starts = np.unique(np.linspace(0, len(trial) - length, 24).astype(int))
-    scores = [(-round(float(seen[a : a + length].mean())), float(compute_medians(moved[a : a + length]))) for a in starts]
+    scores = [(-round(float(seen[a : a + length].mean())), float(compute_medians(moved[a : a + length])))
+              for a in starts]
     best = min(range(len(starts)), key=lambda i: scores[i])
     if scores[best][1] > _MAX_STILL_SPEED:
         raise InputError(trial.name, f"even the stillest {length / trial.fps:.1f} s move at {scores[best][1]:.2f} m/s",
@@ -196,7 +197,8 @@ def _fit_technical_frames(part, groups):
         shape = compute_mean_shape(part[:, group])
         fit = fit_rigid(shape.places, part[:, group], 1.0 / (shape.sigma**2 + 0.001**2))
         if fit.is_determined.mean() > 0.5:
-            frames[name] = RigidFit(*(np.where(_expand_axes(fit.is_determined, each), each, np.nan) for each in fit[:3]), fit.is_determined)
+            frames[name] = RigidFit(*(np.where(_expand_axes(fit.is_determined, each), each, np.nan)
+                                      for each in fit[:3]), fit.is_determined)
     return frames
 
 
@@ -218,11 +220,13 @@ def _compute_mean_frame(own, above, mean_above):
     one.
     """
     if above is None:
-        return RigidFit(compute_mean_rotation(own.rotation), compute_medians(own.shift), np.zeros(()), np.ones((), dtype=bool))
+        return RigidFit(compute_mean_rotation(own.rotation), compute_medians(own.shift), np.zeros(()),
+                        np.ones((), dtype=bool))
     turn = np.einsum("tji,tjk->tik", above.rotation, own.rotation)
     shift = to_model_frame(above, own.shift[:, None])[:, 0]
     rotation = mean_above.rotation @ compute_mean_rotation(turn)
-    return RigidFit(rotation, place_points(mean_above, compute_medians(shift)[None])[0], np.zeros(()), np.ones((), dtype=bool))
+    return RigidFit(rotation, place_points(mean_above, compute_medians(shift)[None])[0], np.zeros(()),
+                    np.ones((), dtype=bool))
 
 
 def merge_session_models(models: Sequence[MarkerModel]) -> tuple[MarkerModel, ...]:
@@ -278,7 +282,8 @@ def _fit_rotation(own: np.ndarray, mean: np.ndarray, weights: np.ndarray) -> np.
     """
     if len(own) < 2:
         return np.eye(3)
-    joint, fit_weights = [[0.0, 0.0, 0.0]], np.r_[weights.max() * 100.0, weights]  # a large weight keeps the joint itself in place
+    joint, fit_weights = [[0.0, 0.0, 0.0]], np.r_[weights.max() * 100.0,
+                                                  weights]  # a large weight keeps the joint itself in place
     fit = fit_rigid(np.vstack([joint, own]), np.vstack([joint, mean]), fit_weights)
     return fit.rotation if fit.is_determined else np.eye(3)
 

@@ -16,17 +16,17 @@ from dataclasses import replace
 
 import numpy as np
 
-from ...base.errors import UserCancelledError, InputError
+from ...base.errors import InputError, UserCancelledError
 from ...base.vectors import arctan2
 from ...motion import quaternion
 from ...motion.motion import Motion, forward_kinematics
-from ..frames import fit_rigid
 from ..pose.chain import build_chain
 from ..pose.pose import PoseSettings, PoseSolution, solve_poses
-from ..pose.residuals import compute_cluster_deviation, measure_edge_deviation, collect_markers
+from ..pose.residuals import collect_markers, compute_cluster_deviation, measure_edge_deviation
+from ..rigid_fit import fit_rigid
 from ..trial import MarkerTrial
 from .adjustment import Adjustment, Body, Prior, Pull
-from .assemble import SIGMA, build_model_from_frame, average_static_frame
+from .assemble import SIGMA, average_static_frame, build_model_from_frame
 from .marker_set import MarkerSet
 from .model import MarkerModel, build_freedom
 
@@ -47,7 +47,7 @@ _LATE_MARKER_FRAMES, _MIN_LATE_FRAMES = 40, 3
 
 
 def add_late_markers(model: MarkerModel, marker_set: MarkerSet, trial: MarkerTrial,
-                      cancelled: Callable[[], bool] | None = None) -> MarkerModel:
+                     cancelled: Callable[[], bool] | None = None) -> MarkerModel:
     """Add the markers of the set that the model lacks and the trial shows, and free the joints that they determine.
 
     Each marker is placed at the median of its positions in its segment's frame, over some frames solved without it.
@@ -266,7 +266,7 @@ def build_from_motion(marker_set: MarkerSet, trial: MarkerTrial) -> MarkerModel:
 
 
 def refine_model(model: MarkerModel, trial: MarkerTrial, static: MarkerTrial | None,
-            cancelled: Callable[[], bool]) -> MarkerModel:
+                 cancelled: Callable[[], bool]) -> MarkerModel:
     """Adjust a model to the motion: joint centres, bone lengths and markers' places, each weighted by its uncertainty.
 
     Args:
@@ -293,8 +293,9 @@ def refine_model(model: MarkerModel, trial: MarkerTrial, static: MarkerTrial | N
         task.sigma = _estimate_scatter(task.compute_residuals())
     skeleton = replace(model.skeleton, offsets=body.offsets)
     deviation = measure_edge_deviation(model.joint, body.places, collect_markers(model, part))
-    return replace(model, skeleton=skeleton, places=body.places, sigma=task.sigma, centre_sigma=task.compute_uncertainty(),
-                   edge_sigma=compute_cluster_deviation(model.joint, deviation))
+    return replace(model, skeleton=skeleton, places=body.places, sigma=task.sigma,
+                   centre_sigma=task.compute_uncertainty(), edge_sigma=compute_cluster_deviation(model.joint,
+            deviation))
 
 
 def _select_frames(model: MarkerModel, trial: MarkerTrial, static: MarkerTrial | None) -> MarkerTrial:

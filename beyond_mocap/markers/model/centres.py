@@ -19,7 +19,7 @@ import numpy as np
 from ...base.errors import InputError
 from ...base.vectors import unit_vector
 from ...motion import quaternion
-from ..frames import compute_mean_rotation, fit_rigid
+from ..rigid_fit import compute_mean_rotation, fit_rigid
 from .template import LANDMARK_PLACES, PLACES, TIPS
 
 MARKER_RADIUS = 0.007  # metres
@@ -272,7 +272,8 @@ def _predict_leg(out: JointCentres, points: Mapping[str, np.ndarray], side: str,
     """Predict knee, ankle and foot of a leg."""
     name, sign = side.capitalize(), 1.0 if side == "left" else -1.0
     hip = out.places[f"{name}UpLeg"]
-    knee = _predict_hinge(out, points, side, joint="knee", above=hip, hint=_estimate_knee_outwards(out, points, side, sign, is_static))
+    knee = _predict_hinge(out, points, side, joint="knee", above=hip, hint=_estimate_knee_outwards(out, points, side,
+            sign, is_static))
     if knee is None:
         raise InputError(f"{side} leg", "no marker on the knee", f"{side}_knee_lateral",
                          "add the leg markers to the marker set")
@@ -351,9 +352,11 @@ def _predict_arm(out: JointCentres, points: Mapping[str, np.ndarray], side: str)
     if marker is not None:
         outwards = _estimate_elbow_outwards(chest, shoulder, marker, sign)
         if wrist is None or radial is not None:
-            elbow = _predict_elbow(out, points, side, sign=sign, shoulder=shoulder, wrist=wrist, radial=radial, default_outwards=outwards)
+            elbow = _predict_elbow(out, points, side, sign=sign, shoulder=shoulder, wrist=wrist, radial=radial,
+                                   default_outwards=outwards)
         else:
-            elbow, wrist = _predict_elbow_and_wrist(out, points, side, sign=sign, shoulder=shoulder, marker=wrist, default_outwards=outwards)
+            elbow, wrist = _predict_elbow_and_wrist(out, points, side, sign=sign, shoulder=shoulder, marker=wrist,
+                                                    default_outwards=outwards)
     if elbow is None:
         out.notes.append(f"{side} arm: no marker on the elbow; left out")
         return
@@ -366,7 +369,7 @@ def _predict_arm(out: JointCentres, points: Mapping[str, np.ndarray], side: str)
     axes = build_axes("Y", along, "Z", up) if radial is None else build_axes("Y", along, "X", radial)
     out.add_joint(f"{name}ForeArm", place, axes, sigma)
     _predict_hand(out, points, side, sign=sign, wrist=wrist, forearm=axes,
-          sigma=SIGMAS["alone"] if radial is None else SIGMAS["both"])
+                  sigma=SIGMAS["alone"] if radial is None else SIGMAS["both"])
 
 
 def _predict_wrist(points, side) -> tuple[np.ndarray | None, np.ndarray | None]:
@@ -393,7 +396,8 @@ def _predict_elbow_and_wrist(out, points, side, sign, shoulder, marker, default_
     outwards = default_outwards
     for _ in range(4):
         wrist = marker - inside * outwards
-        elbow = _predict_elbow(out, points, side, sign=sign, shoulder=shoulder, wrist=wrist, radial=None, default_outwards=default_outwards)
+        elbow = _predict_elbow(out, points, side, sign=sign, shoulder=shoulder, wrist=wrist, radial=None,
+                               default_outwards=default_outwards)
         outwards = elbow[1]
     return elbow, wrist
 

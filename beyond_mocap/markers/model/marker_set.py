@@ -108,7 +108,8 @@ class MarkerSet:
             {label: the set's label}, only for labels that differ (an alias, or another case).
         """
         own = (*self.labels, *self.ball, *self.other)
-        plain = {_normalize_label(label): label for label in own} | {_normalize_label(old): new for old, new in self.aliases.items()}
+        plain = {_normalize_label(label): label for label in own} | {_normalize_label(old): new for old,
+                                                                     new in self.aliases.items()}
         present = set(labels)
         found: dict[str, str] = {}
         for label in labels:
@@ -140,7 +141,8 @@ def choose_marker_set(labels: Sequence[str], sets: Iterable[MarkerSet]) -> Marke
     labeled = [label for label in labels if not UNLABELED.match(label)]
     candidates = [(marker_set, _find_present(marker_set, labeled)) for marker_set in sets]
     share = [len(present & s.required) / max(len(s.required), 1) for s, present in candidates]
-    matching = [(len(present), part, -len(s.labels), s) for (s, present), part in zip(candidates, share) if part >= _MIN_SHARE]
+    matching = [(len(present), part, -len(s.labels), s) for (s, present), part in zip(candidates, share) if part
+                >= _MIN_SHARE]
     if matching:
         return max(matching, key=lambda row: row[:3])[3]
     if not sets:
@@ -185,8 +187,8 @@ def convert_labels(trial: MarkerTrial, marker_set: MarkerSet) -> MarkerTrial:
     for new, old in unlabeled.items():
         twin = _find_twin(new, marker_set, unlabeled)
         if twin and _find_side(marker_set, new) == "Left":
-            distances = [_measure_side_distance(trial, one, marker_set, "Left") + _measure_side_distance(trial, other, marker_set, "Right")
-                    for one, other in ((old, unlabeled[twin]), (unlabeled[twin], old))]
+            distances = [_measure_side_distance(trial, one, marker_set, "Left") + _measure_side_distance(trial, other,
+                    marker_set, "Right") for one, other in ((old, unlabeled[twin]), (unlabeled[twin], old))]
             if distances[1] < distances[0]:
                 names[old], names[unlabeled[twin]] = twin, new
     return trial.rename_labels(names)

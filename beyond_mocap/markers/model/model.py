@@ -17,16 +17,22 @@ from ...motion.skeleton import Skeleton, freeze_array
 _UNLIMITED = (-np.inf, np.inf)
 _FIXED = (0.0, 0.0)
 # joint (left side) -> axis order, limits in degrees of its three angles, pull to the rest pose in metres per radian
-_FREEDOM_TABLE = {"Hips": ("ZYX", (_UNLIMITED, _UNLIMITED, _UNLIMITED), 0.0), "Spine": ("YXZ", (_UNLIMITED, _UNLIMITED, _UNLIMITED), 0.01),
-          "Spine1": ("YXZ", (_UNLIMITED, _UNLIMITED, _UNLIMITED), 0.01), "Chest": ("YXZ", (_UNLIMITED, _UNLIMITED, _UNLIMITED), 0.01),
-          "Neck": ("YXZ", (_UNLIMITED, _UNLIMITED, _UNLIMITED), 0.01), "Neck1": ("YXZ", (_UNLIMITED, _UNLIMITED, _UNLIMITED), 0.01),
-          "Head": ("YXZ", (_UNLIMITED, _UNLIMITED, _UNLIMITED), 0.01), "Shoulder": ("ZXY", ((-45, 45), (-25, 60), _FIXED), 0.004),
-          "Scapula": ("ZXY", ((-45, 45), (-25, 60), (-50, 50)), 0.004), "Arm": ("XZY", (_UNLIMITED, _UNLIMITED, _UNLIMITED), 0.0),
-          "ForeArm": ("ZXY", ((-165, 18), (-18, 18), (-150, 150)), 0.0),
-          "Hand": ("XZY", ((-100, 100), (-60, 60), _FIXED), 0.002),
-          "UpLeg": ("YXZ", ((-160, 75), (-75, 75), (-80, 80)), 0.0),
-          "Leg": ("YXZ", ((-25, 170), (-12, 12), (-60, 60)), 0.0),
-          "Foot": ("YXZ", ((-75, 90), (-60, 60), (-60, 60)), 0.0), "ToeBase": ("YXZ", ((-80, 60), _FIXED, _FIXED), 0.002)}
+_FREEDOM_TABLE = {"Hips": ("ZYX", (_UNLIMITED, _UNLIMITED, _UNLIMITED), 0.0),
+                  "Spine": ("YXZ", (_UNLIMITED, _UNLIMITED, _UNLIMITED), 0.01),
+                  "Spine1": ("YXZ", (_UNLIMITED, _UNLIMITED, _UNLIMITED), 0.01),
+                  "Chest": ("YXZ", (_UNLIMITED, _UNLIMITED, _UNLIMITED), 0.01),
+                  "Neck": ("YXZ", (_UNLIMITED, _UNLIMITED, _UNLIMITED), 0.01),
+                  "Neck1": ("YXZ", (_UNLIMITED, _UNLIMITED, _UNLIMITED), 0.01),
+                  "Head": ("YXZ", (_UNLIMITED, _UNLIMITED, _UNLIMITED), 0.01),
+                  "Shoulder": ("ZXY", ((-45, 45), (-25, 60), _FIXED), 0.004),
+                  "Scapula": ("ZXY", ((-45, 45), (-25, 60), (-50, 50)), 0.004),
+                  "Arm": ("XZY", (_UNLIMITED, _UNLIMITED, _UNLIMITED), 0.0),
+                  "ForeArm": ("ZXY", ((-165, 18), (-18, 18), (-150, 150)), 0.0),
+                  "Hand": ("XZY", ((-100, 100), (-60, 60), _FIXED), 0.002),
+                  "UpLeg": ("YXZ", ((-160, 75), (-75, 75), (-80, 80)), 0.0),
+                  "Leg": ("YXZ", ((-25, 170), (-12, 12), (-60, 60)), 0.0),
+                  "Foot": ("YXZ", ((-75, 90), (-60, 60), (-60, 60)), 0.0),
+                  "ToeBase": ("YXZ", ((-80, 60), _FIXED, _FIXED), 0.002)}
 _WEAK_PULL = 0.004  # pull in metres per radian of a joint with fewer markers than a technical frame needs
 _WEAK_FOOT_PULL = 0.01  # heel, toe and ankle lie nearly on a line: a millimetre of skin would be 2 degrees of roll
 
@@ -157,7 +163,8 @@ class MarkerModel:
         return {int(joint): np.flatnonzero(self.joint == joint) for joint in np.unique(self.joint)}
 
 
-def build_freedom(joints: Sequence[str], parents: Sequence[int], counts: Mapping[str, int]) -> tuple[Freedom, np.ndarray]:
+def build_freedom(joints: Sequence[str], parents: Sequence[int], counts: Mapping[str, int]) -> tuple[Freedom,
+        np.ndarray]:
     """Build freedom and stiffness of joints.
 
     Args:

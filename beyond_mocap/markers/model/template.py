@@ -116,5 +116,6 @@ PLACES = MappingProxyType({name: np.array(place) for name, place in _PLACES.item
 """Joint -> its place (3,) m in the T-pose of the typical body, from the middle between the hips."""
 TIPS = MappingProxyType({name: np.array(place) for name, place in _mirror_table(_TIPS).items()})
 """Joint -> the place (3,) m of the tip that hangs on it, as PLACES."""
-LANDMARK_PLACES = MappingProxyType({name: (row[0], np.array(row[1])) for name, row in _mirror_table(_LANDMARKS).items()})
+LANDMARK_PLACES = MappingProxyType({name: (row[0], np.array(row[1])) for name,
+                                    row in _mirror_table(_LANDMARKS).items()})
 """Landmark -> the joint that carries it and the place (3,) m of a marker on it, as PLACES."""

@@ -205,7 +205,8 @@ def _unwrap_to_limits(chain: Chain, joint: int, angles: np.ndarray) -> np.ndarra
     """Remove full turns, so that the angles lie nearest to the middle of their limits."""
     low, high = chain.low[joint], chain.high[joint]
     is_limited = np.isfinite(low) & np.isfinite(high)
-    middle = np.where(is_limited, 0.5 * (np.where(is_limited, low, 0.0) + np.where(is_limited, high, 0.0)), 0.0)[:, None]
+    middle = np.where(is_limited, 0.5 * (np.where(is_limited, low, 0.0) + np.where(is_limited, high, 0.0)), 0.0)[:,
+            None]
     return middle + quaternion.wrap_angle(angles - middle)
 
 
@@ -282,7 +283,8 @@ def compute_hinge_axes(chain: Chain, joint: int, angles: np.ndarray) -> np.ndarr
         if chain.free[joint, angle]:
             out[:, angle] = rotation[:, AXES[letter]]
         quaternion_of_angle = np.zeros((4, angles.shape[-1]))
-        quaternion_of_angle[0], quaternion_of_angle[1 + AXES[letter]] = np.cos(0.5 * angles[angle]), np.sin(0.5 * angles[angle])
+        quaternion_of_angle[0], quaternion_of_angle[1 + AXES[letter]] = np.cos(0.5 * angles[angle]), np.sin(0.5
+                * angles[angle])
         # the axes of later angles are rotated by the earlier angles
         rotation = np.einsum("abf,bcf->acf", rotation, to_matrices(quaternion_of_angle))
     return out

@@ -12,7 +12,18 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from . import elimination, limits
-from .chain import CONJUGATE, Chain, WorldPoses, Poses, compute_step_axes, cross, to_rotation_vectors, apply_step, multiply, compute_world_poses
+from .chain import (
+    CONJUGATE,
+    Chain,
+    Poses,
+    WorldPoses,
+    apply_step,
+    compute_step_axes,
+    compute_world_poses,
+    cross,
+    multiply,
+    to_rotation_vectors,
+)
 
 MAX_STEPS = 24  # steps at most
 _CURVED_GAIN = 0.1  # a step that gains a smaller share of the cost is near enough for second derivatives to help
@@ -74,8 +85,9 @@ class PoseTask:
     def select_frames(self, chosen) -> "PoseTask":
         """Return the task for these frames only."""
         return replace(self, seen=self.seen[..., chosen], weights=self.weights[:, chosen],
-                       target_poses=self.target_poses and self.target_poses.select_frames(chosen), point=self.point and self.point.select_frames(chosen),
-                       target_strength=None if self.target_strength is None else self.target_strength[:, chosen])
+                       target_poses=self.target_poses and self.target_poses.select_frames(chosen), point=self.point
+                       and self.point.select_frames(chosen), target_strength=None if self.target_strength is None
+                       else self.target_strength[:, chosen])
 
 
 @dataclass(frozen=True, eq=False)
@@ -186,7 +198,8 @@ def compute_state(task: PoseTask, poses: Poses) -> State:
     """Compute everything that follows from poses, and their cost."""
     placed = compute_world_poses(task.chain, poses)
     away = placed.markers + (poses.root - task.seen)
-    bend, uneven, from_target = _measure_bend(task.chain, poses), _measure_unevenness(task, poses), _measure_from_target(task, poses)
+    bend, uneven, from_target = _measure_bend(task.chain, poses), _measure_unevenness(task,
+            poses), _measure_from_target(task, poses)
     cost = np.einsum("mf,maf,maf->f", task.weights, away, away)
     cost += np.einsum("ja,jaf,jaf->f", task.stiffness**2, bend, bend)
     cost += task.run_stiffness**2 * np.einsum("jaf,jaf->f", uneven[:, 0], uneven[:, 0])
@@ -278,13 +291,14 @@ def compute_cross_weight(away: np.ndarray, radius: float) -> np.ndarray:
 
 
 def _take_step(task: PoseTask, best: State, limited_joints: dict, damping: np.ndarray,
-          curved: np.ndarray) -> tuple[np.ndarray, np.ndarray, State]:
+               curved: np.ndarray) -> tuple[np.ndarray, np.ndarray, State]:
     """Take one damped step, with second derivatives where `curved` (F,).
 
     Returns its size (F,), the joints held by limits (J, F), and the new state.
     """
     shift, turns, held = _solve_step(task, best, limited_joints, damping, curved)
-    next_poses = limits.move_along_limits(task.chain, held, best.poses, turns, apply_step(task.chain, best.poses, shift, turns))
+    next_poses = limits.move_along_limits(task.chain, held, best.poses, turns,
+                                          apply_step(task.chain, best.poses, shift, turns))
     next_poses, ahead = limits.apply_limits(task.chain, limited_joints, next_poses)
     for joint in task.chain.hinges:
         ahead[joint] = best.poses.angles[joint] + turns[joint]
@@ -293,10 +307,11 @@ def _take_step(task: PoseTask, best: State, limited_joints: dict, damping: np.nd
     exceeding = np.flatnonzero(outside.any(axis=(0, 1)))
     if len(exceeding):
         part = best.select_frames(exceeding)
-        solution = _solve_step(task.select_frames(exceeding), part, limited_joints, damping=damping[exceeding], curved=curved[exceeding],
-                        ahead=ahead[..., exceeding])
+        solution = _solve_step(task.select_frames(exceeding), part, limited_joints, damping=damping[exceeding],
+                               curved=curved[exceeding], ahead=ahead[..., exceeding])
         shift[:, exceeding], turns[..., exceeding], held[:, exceeding] = solution
-        corrected = limits.move_along_limits(task.chain, solution[2], part.poses, solution[1], apply_step(task.chain, part.poses, *solution[:2]))
+        corrected = limits.move_along_limits(task.chain, solution[2], part.poses, solution[1],
+                                             apply_step(task.chain, part.poses, *solution[:2]))
         next_poses.overwrite_frames(exceeding, limits.apply_limits(task.chain, limited_joints, corrected)[0])
     size = np.maximum(np.abs(turns).max(axis=(0, 1)), np.abs(shift).max(axis=0))
     return size, held, compute_state(task, next_poses)
@@ -313,14 +328,17 @@ def _solve_step(task: PoseTask, best: State, limited_joints: dict, damping: np.n
         x, along, far = measure_distance(task.point, best.placed)
         across = task.point.weight * compute_cross_weight(far, task.point.radius)
         elimination.add_distance_terms(body_terms, task.point.joint, x, along=along, weight=task.point.weight, away=far,
-                                 across=across)
+                                       across=across)
     joint_terms = build_joint_terms(task, best)
     slope = elimination.compute_gradient(task.chain, best.placed, step_axes, body_terms, joint_terms)
-    held = limits.hold_at_limits(task.chain, limited_joints, best.poses, slope=slope, joint_terms=joint_terms, next_angles=ahead)
+    held = limits.hold_at_limits(task.chain, limited_joints, best.poses, slope=slope, joint_terms=joint_terms,
+                                 next_angles=ahead)
     second_derivatives = None
     if curved.any():
-        second_derivatives = elimination.compute_second_derivatives(task.chain, best.placed, step_axes, away=best.away, weights=task.weights, share=curved)
-    return *elimination.solve_step(task.chain, best.placed, step_axes, body_terms=body_terms, joint_terms=joint_terms, damping=damping, second_derivatives=second_derivatives), held
+        second_derivatives = elimination.compute_second_derivatives(task.chain, best.placed, step_axes, away=best.away,
+                                                                    weights=task.weights, share=curved)
+    return *elimination.solve_step(task.chain, best.placed, step_axes, body_terms=body_terms, joint_terms=joint_terms,
+                                   damping=damping, second_derivatives=second_derivatives), held
 
 
 def build_joint_terms(task: PoseTask, best: State) -> elimination.JointTerms:
@@ -337,7 +355,8 @@ def build_joint_terms(task: PoseTask, best: State) -> elimination.JointTerms:
     if task.target_poses is not None:
         pull += task.target_strength[:, None] ** 2 * best.from_target
     for axis in range(3):
-        curvature[:, axis, axis] = strength[:, axis, None] + (0.0 if task.target_poses is None else task.target_strength**2)
+        curvature[:, axis, axis] = strength[:, axis, None] + (0.0 if task.target_poses is None
+                                                              else task.target_strength**2)
         curvature[run_joints, axis, axis] += task.run_stiffness**2
     pull[fixed] = 0.0
     return elimination.JointTerms(curvature, pull)

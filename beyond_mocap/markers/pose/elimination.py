@@ -119,7 +119,8 @@ def add_distance_terms(terms: BodyTerms, joint: int, x: np.ndarray, along: np.nd
     terms.pull[joint] += lever * (weight * away)
 
 
-def compute_gradient(chain: Chain, placed: WorldPoses, axes: np.ndarray, body_terms: BodyTerms, joint_terms: JointTerms) -> np.ndarray:
+def compute_gradient(chain: Chain, placed: WorldPoses, axes: np.ndarray, body_terms: BodyTerms,
+                     joint_terms: JointTerms) -> np.ndarray:
     """Compute the derivative of half the cost by each joint's rotations.
 
     Args:
@@ -139,7 +140,8 @@ def compute_gradient(chain: Chain, placed: WorldPoses, axes: np.ndarray, body_te
     return joint_terms.pull + np.einsum("jacf,jaf->jcf", axes, moment)
 
 
-def compute_second_derivatives(chain: Chain, placed: WorldPoses, axes: np.ndarray, away: np.ndarray, weights: np.ndarray, share) -> SecondDerivatives:
+def compute_second_derivatives(chain: Chain, placed: WorldPoses, axes: np.ndarray, away: np.ndarray,
+                               weights: np.ndarray, share) -> SecondDerivatives:
     """Compute the second derivatives of half the weighted squared distances.
 
     Args:
@@ -175,8 +177,9 @@ def compute_second_derivatives(chain: Chain, placed: WorldPoses, axes: np.ndarra
     return SecondDerivatives(inner, above)
 
 
-def solve_step(chain: Chain, placed: WorldPoses, axes: np.ndarray, body_terms: BodyTerms, joint_terms: JointTerms, damping: np.ndarray,
-         second_derivatives: SecondDerivatives | None = None) -> tuple[np.ndarray, np.ndarray]:
+def solve_step(chain: Chain, placed: WorldPoses, axes: np.ndarray, body_terms: BodyTerms, joint_terms: JointTerms,
+               damping: np.ndarray, second_derivatives: SecondDerivatives | None = None) -> tuple[np.ndarray,
+        np.ndarray]:
     """Solve one damped step.
 
     Args:
@@ -205,7 +208,8 @@ def solve_step(chain: Chain, placed: WorldPoses, axes: np.ndarray, body_terms: B
         inverse = invert_symmetric(inner)
         coupling[joint] = np.einsum("acf,cbf->abf", share, inverse)
         solutions[joint] = np.einsum("abf,bf->af", inverse, right)
-        body_terms.curvature[parents[joint]] += body_terms.curvature[joint] - np.einsum("acf,bcf->abf", coupling[joint], share)
+        body_terms.curvature[parents[joint]] += body_terms.curvature[joint] - np.einsum("acf,bcf->abf", coupling[joint],
+                share)
         body_terms.pull[parents[joint]] += body_terms.pull[joint] - np.einsum("acf,cf->af", coupling[joint], right)
         solutions[joint] = (solutions[joint], lever)
     if second_derivatives is not None:

@@ -16,7 +16,7 @@ import numpy as np
 
 from ...base.vectors import arctan2
 from ...motion import quaternion
-from .chain import AXES, Chain, Poses, read_angles, cross, compute_hinge_axes, limit_angles
+from .chain import AXES, Chain, Poses, compute_hinge_axes, cross, limit_angles, read_angles
 from .elimination import JointTerms
 
 _NEAR_POLE = 0.12  # cosine of the middle angle below which the outer ones are meaningless (7 degrees)
@@ -83,8 +83,8 @@ def _find_valid_angles(angles: np.ndarray) -> np.ndarray:
     return np.stack([away, np.ones_like(away), away])
 
 
-def hold_at_limits(chain: Chain, joints: dict[str, np.ndarray], poses: Poses, slope: np.ndarray, joint_terms: JointTerms,
-         next_angles: np.ndarray | None = None) -> np.ndarray:
+def hold_at_limits(chain: Chain, joints: dict[str, np.ndarray], poses: Poses, slope: np.ndarray,
+                   joint_terms: JointTerms, next_angles: np.ndarray | None = None) -> np.ndarray:
     """Fix the angles that are at a limit and pulled beyond it, and let those that exceeded a limit end at it.
 
     Args:
@@ -110,7 +110,7 @@ def hold_at_limits(chain: Chain, joints: dict[str, np.ndarray], poses: Poses, sl
     for joint in limited_joints:
         if touching[joint].any() or is_fixed[joint].any():
             _hold_joint_at_limits(chain, joint, poses.angles[joint], touching=touching[joint], bound=bound[joint],
-                        slope=slope[joint], is_fixed=is_fixed[joint], joint_terms=joint_terms)
+                                  slope=slope[joint], is_fixed=is_fixed[joint], joint_terms=joint_terms)
     idle = np.setdiff1d(np.arange(len(is_fixed)), limited_joints)
     is_fixed[idle] = False
     return is_fixed.any(axis=1)

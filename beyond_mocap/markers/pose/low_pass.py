@@ -138,7 +138,8 @@ def smooth_kalman(motion: Motion, weights: np.ndarray | None = None, cutoff: flo
     quaternions = quaternion.unify_signs(motion.rotations)
     jerk_cost = compute_jerk_cost(motion.fps, cutoff)
     root = smooth_values(motion.root_positions, weights[:, 0], jerk_cost)
-    rotations = np.stack([smooth_values(quaternions[:, joint], weights[:, joint], jerk_cost) for joint in range(quaternions.shape[1])], axis=1)
+    rotations = np.stack([smooth_values(quaternions[:, joint], weights[:, joint], jerk_cost)
+                          for joint in range(quaternions.shape[1])], axis=1)
     return FilterResult(replace(motion, root_positions=root, rotations=quaternion.normalize(rotations)))
 
 

@@ -49,7 +49,7 @@ class PlantFilterResult:
 
 
 def filter_foot_plants(motion: Motion, window: float = WINDOW, max_drift: float = STILL, ease: float = EASE,
-                 max_distance: float = APART) -> PlantFilterResult:
+                       max_distance: float = APART) -> PlantFilterResult:
     """Hold ankles and toes in place where they are in contact.
 
     Only leg joints change, in frames in which something is held or released.
@@ -78,7 +78,8 @@ def filter_foot_plants(motion: Motion, window: float = WINDOW, max_drift: float 
         points = [places[:, limb.foot], places[:, limb.toe_or_foot]]
         contacts = [detect_contacts(point, *sizes) for point in points]
         held[:, side] = np.stack([_build_mask(spans, len(motion)) for spans in contacts], axis=1)
-        shifts = [compute_hold_shift(point, spans, max(1, round(ease * motion.fps))) for point, spans in zip(points, contacts)]
+        shifts = [compute_hold_shift(point, spans, max(1, round(ease * motion.fps))) for point,
+                  spans in zip(points, contacts)]
         foot = _Foot(limb, places, world, *shifts)
         active = np.flatnonzero(foot.weight > 0)
         if len(active):
@@ -188,4 +189,5 @@ class _Foot:
             foot_rotation = quaternion.multiply(quaternion.rotation_between(along, held_direction), foot_rotation)
         chain = (limb.upper_leg, limb.lower_leg, limb.foot)
         soft = 1e-6 + _SOFT_LENGTH * self.weight[frames]
-        return solve_posed_limb(skeleton, places, world, chain, ankle + self.ankle_shift[frames], end_rotation=foot_rotation, soft=soft)
+        return solve_posed_limb(skeleton, places, world, chain, ankle + self.ankle_shift[frames],
+                                end_rotation=foot_rotation, soft=soft)

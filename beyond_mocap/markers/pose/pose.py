@@ -11,14 +11,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ...base.errors import UserCancelledError, InputError
+from ...base.errors import InputError, UserCancelledError
 from ...motion import quaternion
 from ...motion.motion import Motion
-from ..frames import place_points as carried
-from ..frames import fit_rigid
-from .chain import Chain, Poses, build_chain, compute_world_poses, build_poses
+from ..rigid_fit import fit_rigid
+from ..rigid_fit import place_points as carried
+from .chain import Chain, Poses, build_chain, build_poses, compute_world_poses
 from .descent import HeldPoint, PoseTask, descend
-from .residuals import compute_marker_weights, collect_markers
+from .residuals import collect_markers, compute_marker_weights
 from .smooth import smooth_poses
 from .start import estimate_initial_poses
 
@@ -26,7 +26,8 @@ _CHUNK = 512  # frames solved together
 _COARSE_SECONDS = 1.0 / 60.0  # spacing of the frames that are solved first
 _MIN_MARKER_SHARE = 0.3  # share of the markers that a frame must show to be solved
 _MIN_MARKERS = 4  # markers that it must show at least
-_DOUBTFUL_COST, _DOUBTFUL_ROTATION = 1.5, np.radians(40.0)  # a solution is doubtful at so many times its neighbour's cost, or rotation
+_DOUBTFUL_COST, _DOUBTFUL_ROTATION = 1.5, np.radians(
+    40.0)  # a solution is doubtful at so many times its neighbour's cost, or rotation
 _FLIP, _FLIP_SECONDS = np.radians(45.0), 0.1  # rotation of a jump in one frame; longest stretch between two jumps
 _RUN_STIFFNESS = 0.05  # metres per radian: how strongly joints without a marker between them should turn alike
 _TARGET_STRENGTH = 0.02  # metres per radian: pull of a joint with occluded markers to its poses before and after
@@ -58,7 +59,7 @@ def find_occluded_joints(chain: Chain, visible: np.ndarray) -> np.ndarray:
 
 
 def interpolate_poses(chain: Chain, solved: Poses, known: np.ndarray, determined: np.ndarray,
-            frames: np.ndarray) -> tuple[Poses, np.ndarray]:
+                      frames: np.ndarray) -> tuple[Poses, np.ndarray]:
     """Interpolate poses between solved frames, each joint between the frames that determine it.
 
     Before the first and after the last such frame, a joint stays as it is there.
@@ -172,7 +173,7 @@ def solve_poses(model, trial, settings: PoseSettings = PoseSettings(), progress=
     began = time.perf_counter()
     seen = _collect_positions(model, trial)
     solver = _PoseSolver(_build_chain(model, settings.limits), seen, settings, fps=trial.fps, usual=model.edge_sigma,
-                       progress=progress, cancelled=cancelled)
+                         progress=progress, cancelled=cancelled)
     solver.solve_frames()
     return solver.build_solution(time.perf_counter() - began)
 
@@ -180,8 +181,8 @@ def solve_poses(model, trial, settings: PoseSettings = PoseSettings(), progress=
 def _build_chain(model, has_limits: bool) -> Chain:
     """Build the chain of a model, with or without joint limits."""
     freedom = model.freedom
-    limited_chain = build_chain(model.skeleton, model.joint, model.places, order=freedom.order, free=freedom.free, low=freedom.low,
-                 high=freedom.high, stiffness=model.stiffness)
+    limited_chain = build_chain(model.skeleton, model.joint, model.places, order=freedom.order, free=freedom.free,
+                                low=freedom.low, high=freedom.high, stiffness=model.stiffness)
     return limited_chain if has_limits else limited_chain.without_limits()
 
 
@@ -222,9 +223,11 @@ class _PoseSolver:
     def solve_frames(self) -> None:
         """Solve the frames that show enough markers, and interpolate the others."""
         marker_count = self.visible.any(axis=0).sum()
-        known = np.flatnonzero(self.visible.sum(axis=1) >= max(_MIN_MARKERS, int(np.ceil(_MIN_MARKER_SHARE * marker_count))))
+        known = np.flatnonzero(self.visible.sum(axis=1)
+                               >= max(_MIN_MARKERS, int(np.ceil(_MIN_MARKER_SHARE * marker_count))))
         if not len(known):
-            raise InputError("trial", "no frame shows enough markers", f"{_MIN_MARKER_SHARE:.0%} of {marker_count}", "clean it first")
+            raise InputError("trial", "no frame shows enough markers", f"{_MIN_MARKER_SHARE:.0%} of {marker_count}",
+                             "clean it first")
         # frames solved first: every sixtieth of a second, and the last one
         spacing = max(1, int(round(self.fps * _COARSE_SECONDS)))
         coarse = np.unique(np.append(known[::spacing], known[-1]))
@@ -281,7 +284,8 @@ class _PoseSolver:
             self.progress(self.frame_share + (1.0 - self.frame_share) * part, "smoothing poses")
 
         everything = np.arange(len(self.cost))
-        at, self.held = smooth_poses(self._build_task(everything), self.poses, self.settings.smoothness, self.fps, watch)
+        at, self.held = smooth_poses(self._build_task(everything), self.poses, self.settings.smoothness, self.fps,
+                                     watch)
         self.poses.overwrite_frames(everything, at)
 
     def _solve_between(self, frames: np.ndarray, known: np.ndarray) -> None:
@@ -291,9 +295,11 @@ class _PoseSolver:
         for part in self._iter_chunks(frames):
             here = frames[part]
             target = start.select_frames(part) if strength[:, part].any() else None
-            self._store_result(here, descend(self._build_task(here, target, strength[:, part]), start.select_frames(part)))
+            self._store_result(here, descend(self._build_task(here, target, strength[:, part]),
+                                             start.select_frames(part)))
 
-    def _build_task(self, frames: np.ndarray, target: Poses | None = None, strength: np.ndarray | None = None) -> PoseTask:
+    def _build_task(self, frames: np.ndarray, target: Poses | None = None, strength: np.ndarray
+                    | None = None) -> PoseTask:
         """Build the task of these frames."""
         point, ball = None, self.settings.ball
         if ball is not None:
@@ -301,8 +307,9 @@ class _PoseSolver:
             point = HeldPoint(joint=self.chain.skeleton.index(ball.joint), place=np.asarray(ball.centre, dtype=float),
                               radius=ball.radius, seen=np.where(visible[:, None], ball.seen, 0.0)[frames].T,
                               weight=ball.weight * visible[frames])
-        return PoseTask(chain=self.chain, seen=self.seen[..., frames], weights=self.weights[frames].T, stiffness=self.stiffness,
-                    target_poses=target, target_strength=strength, point=point, run_stiffness=_RUN_STIFFNESS)
+        return PoseTask(chain=self.chain, seen=self.seen[..., frames], weights=self.weights[frames].T,
+                        stiffness=self.stiffness, target_poses=target, target_strength=strength, point=point,
+                        run_stiffness=_RUN_STIFFNESS)
 
     def _iter_chunks(self, frames: np.ndarray):
         """Iterate over slices of a list of frames; report progress and check for cancellation between them."""
@@ -356,8 +363,8 @@ class _PoseSolver:
         away = (world_poses.markers + world_poses.origin).transpose(2, 0, 1) - self.positions
         residual = np.sqrt(np.sum(away**2, axis=-1))
         return PoseSolution(motion=motion, residual=residual, weights=self.weights,
-                      single=measure_single_residuals(self.chain, self.positions), iterations=self.steps,
-                      at_limit=self.held.T.copy(), seconds=seconds, notes=tuple(self.notes))
+                            single=measure_single_residuals(self.chain, self.positions), iterations=self.steps,
+                            at_limit=self.held.T.copy(), seconds=seconds, notes=tuple(self.notes))
 
 
 def measure_single_residuals(chain: Chain, seen: np.ndarray) -> np.ndarray:

@@ -139,7 +139,7 @@ def compute_cluster_deviation(joint: np.ndarray, deviation: np.ndarray) -> np.nd
 
 
 def compute_marker_weights(joint: np.ndarray, places: np.ndarray, seen: np.ndarray,
-                   usual: np.ndarray | None = None) -> np.ndarray:
+                           usual: np.ndarray | None = None) -> np.ndarray:
     """Compute the weight of every marker in every frame (w_i): min(1, sigma_s / sigma_i).
 
     Eq. 5.2 is printed the other way round (sigma_i / sigma_s), which would give a marker more weight the further it is

@@ -13,8 +13,16 @@ from dataclasses import replace
 import numpy as np
 
 from . import limits
-from .chain import CONJUGATE, Chain, Poses, to_rotation_vectors, compute_marker_derivative, apply_step, multiply
-from .descent import State, PoseTask, to_rotation_slope, compute_cross_weight, measure_distance, compute_state, build_joint_terms
+from .chain import CONJUGATE, Chain, Poses, apply_step, compute_marker_derivative, multiply, to_rotation_vectors
+from .descent import (
+    PoseTask,
+    State,
+    build_joint_terms,
+    compute_cross_weight,
+    compute_state,
+    measure_distance,
+    to_rotation_slope,
+)
 
 ARM = 0.1  # metres: a rotation costs as much as the movement of a marker at this distance from the joint
 # Frames of a window, of the look-ahead that is discarded, and of the solved window before that stay fixed.
@@ -23,7 +31,8 @@ _MAX_STEPS = 8
 _CONVERGED_STEP = 1e-4  # radians and metres; a smaller step has converged
 
 
-def smooth_poses(task: PoseTask, start: Poses, seconds: float, fps: float, watch=lambda part: None) -> tuple[Poses, np.ndarray]:
+def smooth_poses(task: PoseTask, start: Poses, seconds: float, fps: float, watch=lambda part: None) -> tuple[Poses,
+        np.ndarray]:
     """Smooth poses of all T frames.
 
     Args:
@@ -57,8 +66,10 @@ def _smooth_window(task: PoseTask, poses: Poses, strength: float, fixed: int) ->
     cost = _compute_cost(best, strength, task.chain, fixed)
     held = np.zeros((len(task.chain.skeleton), poses.root.shape[-1]), dtype=bool)
     for _ in range(_MAX_STEPS):
-        shift, turns, step_held = _solve_step(task, best, limited_joints, strength=strength, fixed=fixed, damping=damping)
-        next_poses = limits.apply_limits(task.chain, limited_joints, apply_step(task.chain, best.poses, shift, turns))[0]
+        shift, turns, step_held = _solve_step(task, best, limited_joints, strength=strength, fixed=fixed,
+                                              damping=damping)
+        next_poses = limits.apply_limits(task.chain, limited_joints,
+                                         apply_step(task.chain, best.poses, shift, turns))[0]
         trial = compute_state(task, next_poses)
         trial_cost = _compute_cost(trial, strength, task.chain, fixed)
         if trial_cost > cost:
@@ -122,7 +133,8 @@ def _solve_step(task: PoseTask, best: State, limited_joints: dict, strength: flo
     slope[3:] += joint_terms.pull.reshape(-1, joint_terms.pull.shape[-1])
     slope += smoothness_slope.reshape(slope.shape)
     pull_before = joint_terms.pull.copy()
-    held = limits.hold_at_limits(chain, limited_joints, best.poses, slope[3:].reshape(joint_terms.pull.shape), joint_terms)
+    held = limits.hold_at_limits(chain, limited_joints, best.poses, slope[3:].reshape(joint_terms.pull.shape),
+                                 joint_terms)
     slope[3:] += (joint_terms.pull - pull_before).reshape(-1, joint_terms.pull.shape[-1])
     slope[3:][~chain.free.ravel()] = 0.0
     blocks = np.matmul(columns.transpose(0, 2, 1), weight[..., None] * columns)
@@ -145,7 +157,8 @@ def _build_columns(task: PoseTask, best: State) -> tuple[np.ndarray, np.ndarray,
         joint, places = np.append(chain.joint, point.joint), np.append(chain.places, point.place[None], axis=0)
         chain = replace(chain, joint=joint, places=places)
     # each frame's own numbers side by side, for the products to come
-    exact = np.ascontiguousarray(compute_marker_derivative(chain, at)) * np.concatenate([np.ones(3), chain.free.ravel()])
+    exact = np.ascontiguousarray(compute_marker_derivative(chain, at)) * np.concatenate([np.ones(3),
+            chain.free.ravel()])
     frames, count = len(exact), len(task.chain.joint)
     columns = exact[:, :count].reshape(frames, 3 * count, -1)
     away, weight = np.moveaxis(best.away, -1, 0).reshape(frames, -1), np.repeat(task.weights.T, 3, axis=1)

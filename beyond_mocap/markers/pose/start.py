@@ -10,7 +10,7 @@ from __future__ import annotations
 import numpy as np
 
 from ...motion import quaternion
-from .chain import CONJUGATE, Chain, Poses, read_angles, to_matrices, multiply, limit_angles
+from .chain import CONJUGATE, Chain, Poses, limit_angles, multiply, read_angles, to_matrices
 
 _BELOW_FACTOR = 0.01  # weight of the next joint's markers relative to a joint's own; again this factor for each joint below
 _PARENT_WEIGHT = 4e-4  # m2, weight of the parent's direction, for angles that markers do not determine

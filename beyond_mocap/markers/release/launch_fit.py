@@ -101,7 +101,8 @@ def fit_launch(marker: np.ndarray, held: HeldMarker, fps: float, guess: float, b
     first, last = max(guess - window, search.times[1]), min(guess + window, search.times[-2])
     release_times = np.arange(np.ceil(first * fps), np.floor(last * fps) + 1) / fps
     rates = np.arange(1, _RATE_COUNT + 1) * (min(MAX_SPIN, 0.9 * np.pi * fps) / _RATE_COUNT)
-    flights = [(flight, t) for t in release_times if (flight := search.fit_flight(t, t + _FIRST_SECONDS, rates)) is not None]
+    flights = [(flight, t) for t in release_times
+               if (flight := search.fit_flight(t, t + _FIRST_SECONDS, rates)) is not None]
     if not flights or not search.has_left_hand(last):
         return None
     best, release_time = min(flights, key=lambda found: found[0].cost + search.compute_later_cost(*found))
@@ -205,7 +206,8 @@ class _LaunchSearch:
 
     def _build_prior(self, t0: float) -> tuple[np.ndarray, np.ndarray]:
         """Build the prior as four rows: where the marker leaves, the hand's speed, and the size of the circle."""
-        place, velocity = _interpolate_at(self.held.marker, self.fps, t0), _interpolate_at(self.held.velocity, self.fps, t0)
+        place, velocity = _interpolate_at(self.held.marker, self.fps, t0), _interpolate_at(self.held.velocity, self.fps,
+                t0)
         speed_sigma = max(_HAND_SPEED_UNCERTAINTY * float(np.linalg.norm(velocity)), 1.0)
         weight = 1.0 / self.held.sigma
         known = np.diag([weight, 1.0 / speed_sigma, 1.0 / self.radius, 1.0 / self.radius])
@@ -232,7 +234,8 @@ class _LaunchSearch:
             # release times are refined in ever smaller steps around the best
             step = (1.0, 0.5, 0.25, _FINE_STEP)[iteration] / self.fps
             candidates = [(self.fit_flight(t, end, np.array([flight.rate])), t) for t in t0 + step * np.arange(-3, 4)]
-            flight, t0 = min(((f, t) for f, t in [*candidates, (flight, t0)] if f is not None), key=lambda ft: ft[0].cost)
+            flight, t0 = min(((f, t) for f, t in [*candidates, (flight, t0)] if f is not None),
+                             key=lambda ft: ft[0].cost)
         return flight, t0
 
     def _compute_spin(self, flight: _Flight, t0: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -261,7 +264,8 @@ class _LaunchSearch:
         sides = []
         for sign in (-1.0, 1.0):
             shifts = sign * np.arange(1, 41) * _FINE_STEP / self.fps
-            worse = [f is None or f.cost > flight.cost + 1.0 for f in (self.fit_flight(t0 + s, end, rate) for s in shifts)]
+            worse = [f is None or f.cost > flight.cost + 1.0
+                     for f in (self.fit_flight(t0 + s, end, rate) for s in shifts)]
             sides.append(abs(shifts[worse.index(True)]) if True in worse else abs(shifts[-1]))
         spin, offset, centre = self._compute_spin(flight, t0)
         sigma = float(np.hypot(np.mean(sides), 0.2 / self.fps))

@@ -23,7 +23,16 @@ from ...motion.motion import Motion, forward_kinematics, resample
 from ...motion.track.ball_path import BallPath
 from ..trial import MarkerTrial, resample_evenly
 from .launch_fit import HeldMarker, fit_launch
-from .throwing_hand import HandBall, fit_hand_ball, find_release_by_distance, find_fastest_frame, place_ball, refine_hand, compute_speeds, compute_steady_speeds
+from .throwing_hand import (
+    HandBall,
+    compute_speeds,
+    compute_steady_speeds,
+    find_fastest_frame,
+    find_release_by_distance,
+    fit_hand_ball,
+    place_ball,
+    refine_hand,
+)
 from .without_ball import HOLD, estimate_hand_release
 
 MIN_FRAMES = 12  # frames that a trial with a throw must have
@@ -176,14 +185,15 @@ def estimate_release(trial: MarkerTrial, motion: Motion, settings: ReleaseSettin
     launch = None
     if marker is not None:
         launch = _fit_ball_launch(hand, marker, hand_ball, ball=ball, settings=settings, notes=notes)
-        launch = _check_launch(launch, hand, marker, label=label, radius=hand_ball.radius, settings=settings, name=even_trial.name,
-                          notes=notes)
+        launch = _check_launch(launch, hand, marker, label=label, radius=hand_ball.radius, settings=settings,
+                               name=even_trial.name, notes=notes)
     launch = launch or _estimate_hand_launch(hand, motion, hand_ball, ball, notes)
     seen = np.zeros(len(hand), bool) if marker is None else np.isfinite(marker).all(axis=-1)
     return _build_release(launch, hand, motion, hand_ball=hand_ball, seen=seen, name=even_trial.name, notes=notes)
 
 
-def _check_launch(launch: _FittedLaunch | None, hand: Hand, marker, label, radius, settings: ReleaseSettings, name: str, notes):
+def _check_launch(launch: _FittedLaunch | None, hand: Hand, marker, label, radius, settings: ReleaseSettings, name: str,
+                  notes):
     """Return the launch fitted to the marker; None where the marker was on no ball in this hand.
 
     Raises InputError where the user chose that marker or hand.
@@ -255,7 +265,8 @@ class _FittedLaunch:
     circle: float = 0.0
 
 
-def _build_release(fitted: _FittedLaunch, hand: Hand, motion: Motion, hand_ball: HandBall, seen, name: str, notes) -> Release:
+def _build_release(fitted: _FittedLaunch, hand: Hand, motion: Motion, hand_ball: HandBall, seen, name: str,
+                   notes) -> Release:
     """Build the release: the launch in the motion's space, with ball path and impact."""
     launch = replace(fitted.launch, position=fitted.launch.position - hand.shift)
     shifted_hand = replace(hand, origin=hand.origin - hand.shift)
@@ -348,14 +359,16 @@ def _guess_release(hand: Hand, marker: np.ndarray) -> float:
     return (find_fastest_frame(knuckles, hand.fps) if frame is None else frame) / hand.fps
 
 
-def _fit_ball_launch(hand: Hand, marker, hand_ball: HandBall, ball: Ball, settings: ReleaseSettings, notes) -> _FittedLaunch | None:
+def _fit_ball_launch(hand: Hand, marker, hand_ball: HandBall, ball: Ball, settings: ReleaseSettings,
+                     notes) -> _FittedLaunch | None:
     """Fit the launch to the marker on the ball; None where it is not visible in flight."""
     held = _find_held_frames(hand, marker)
     is_held_visible = bool(held.sum() >= 3)
     place = np.nanmedian(hand.to_hand(marker)[held], axis=0) if is_held_visible else hand_ball.centre
     centre = hand.to_world(hand_ball.centre)
     velocity = np.gradient(centre, 1.0 / hand.fps, axis=0)
-    hand_evidence = HeldMarker(hand.to_world(place), centre, velocity, _HELD_SIGMA if is_held_visible else _HIDDEN_SIGMA)
+    hand_evidence = HeldMarker(hand.to_world(place), centre, velocity, _HELD_SIGMA if is_held_visible
+                               else _HIDDEN_SIGMA)
     guess = _guess_release(hand, marker)
     # also without air, as in eq. 6.2; the fit with the smaller residual is taken
     without_air = replace(ball, drag=0.0, lift=(0.0, *ball.lift[1:]))
@@ -372,7 +385,7 @@ def _fit_ball_launch(hand: Hand, marker, hand_ball: HandBall, ball: Ball, settin
     speed_sigma = float(np.hypot(fit.speed_sigma, _AIR_UNCERTAINTY * air))
     way_sigma = speed_sigma / max(float(np.linalg.norm(fit.velocity)), 1e-9)
     return _FittedLaunch(launch=launch, ball=ball, method="ball", time_sigma=fit.time_sigma, speed_sigma=speed_sigma,
-                  direction_sigma=way_sigma, residual=fit.residual, frames=fit.frames, circle=fit.circle)
+                         direction_sigma=way_sigma, residual=fit.residual, frames=fit.frames, circle=fit.circle)
 
 
 def _estimate_hand_launch(hand: Hand, motion: Motion, hand_ball: HandBall, ball: Ball, notes) -> _FittedLaunch:
@@ -381,8 +394,8 @@ def _estimate_hand_launch(hand: Hand, motion: Motion, hand_ball: HandBall, ball:
     if not hand.markers:
         notes.append("no markers near the hand: only the filtered motion is used, so the speed comes out too low")
     launch = Launch(hand_release.time, hand_release.position, hand_release.velocity)
-    return _FittedLaunch(launch=launch, ball=ball, method="hand", time_sigma=hand_release.time_sigma, speed_sigma=hand_release.speed_sigma,
-                  direction_sigma=hand_release.direction_sigma)
+    return _FittedLaunch(launch=launch, ball=ball, method="hand", time_sigma=hand_release.time_sigma,
+                         speed_sigma=hand_release.speed_sigma, direction_sigma=hand_release.direction_sigma)
 
 
 def _compute_stride(motion: Motion) -> np.ndarray:
@@ -407,7 +420,7 @@ def parse_radar_speed(name: str) -> float | None:
     if pitch:
         return _limit_to_throws(int(pitch[1]) / 10.0 * MPH)
     speeds = {round(float(re.sub("[,p]", ".", number.lower())) * _UNITS[unit.lower().replace("-", "_")], 6) for number,
-            unit in _WITH_UNIT.findall(name)}
+              unit in _WITH_UNIT.findall(name)}
     return _limit_to_throws(speeds.pop()) if len(speeds) == 1 else None
 
 

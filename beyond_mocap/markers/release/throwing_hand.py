@@ -17,7 +17,7 @@ from ...ball.physics import Ball
 from ...base.easing import smoothstep
 from ...base.time_series import find_runs
 from ...motion.hand import Hand
-from ..frames import fit_rigid
+from ..rigid_fit import fit_rigid
 from ..trial import MarkerTrial
 
 MAX_WRIST_DISTANCE = 0.14  # metres from the wrist within which a marker belongs to the hand
@@ -56,7 +56,8 @@ def refine_hand(hand: Hand, trial: MarkerTrial, excluded: tuple[str, ...] = ()) 
         The hand with origin, rotation and reach from its markers.
     """
     lift = _find_vertical_shift(hand, trial, excluded)
-    names, seen = _select_hand_markers(replace(hand, origin=hand.origin + lift, elbow=hand.elbow + lift), trial, excluded)
+    names, seen = _select_hand_markers(replace(hand, origin=hand.origin + lift, elbow=hand.elbow + lift), trial,
+                                       excluded)
     if not names:
         return hand
     shift = lift
@@ -69,8 +70,10 @@ def refine_hand(hand: Hand, trial: MarkerTrial, excluded: tuple[str, ...] = ()) 
     is_reliable = fit.is_determined & (fit.rms < max(_MAX_MISFIT_RATIO * _compute_median(fit.rms), _MAX_SPREAD))
     known = np.isfinite(seen).all(axis=-1) & ~(fit.is_determined & ~is_reliable)[:, None]
     offset = np.where(known[..., None], seen - _place_markers(hand, shift, places), 0.0).sum(axis=1)
-    offset = offset / np.maximum(known.sum(axis=1), 1)[:, None]  # one or two markers can move the hand, but not rotate it
-    return replace(moved, reach=_estimate_reach(hand, places), origin=np.where(is_reliable[:, None], fit.shift, moved.origin + offset),
+    offset = offset / np.maximum(known.sum(axis=1), 1)[:,
+                                                       None]  # one or two markers can move the hand, but not rotate it
+    return replace(moved, reach=_estimate_reach(hand, places), origin=np.where(is_reliable[:, None], fit.shift,
+                                                                               moved.origin + offset),
                    rotation=np.where(is_reliable[:, None, None], fit.rotation, moved.rotation), markers=names)
 
 
@@ -101,7 +104,8 @@ def _find_vertical_shift(hand: Hand, trial: MarkerTrial, excluded: tuple[str, ..
     if not candidates:
         return np.zeros(3)
     origin = hand.origin[:: max(len(trial) // 300, 1), None, :]
-    near = np.flatnonzero(np.nanmedian(np.linalg.norm(few[..., :2] - origin[..., :2], axis=-1), axis=0) < MAX_WRIST_DISTANCE)
+    near = np.flatnonzero(np.nanmedian(np.linalg.norm(few[..., :2] - origin[..., :2], axis=-1), axis=0)
+                          < MAX_WRIST_DISTANCE)
     best, found = np.inf, 0.0
     for height in _LIFTS if len(near) >= 3 else ():
         away = np.linalg.norm(few[:, near] - origin - [0.0, 0.0, height], axis=-1)
@@ -111,7 +115,8 @@ def _find_vertical_shift(hand: Hand, trial: MarkerTrial, excluded: tuple[str, ..
     return np.array([0.0, 0.0, found])
 
 
-def _select_hand_markers(hand: Hand, trial: MarkerTrial, excluded: tuple[str, ...]) -> tuple[tuple[str, ...], np.ndarray]:
+def _select_hand_markers(hand: Hand, trial: MarkerTrial, excluded: tuple[str, ...]) -> tuple[tuple[str, ...],
+        np.ndarray]:
     """Select the markers that stay with the hand: labels and places (T, M, 3) metres."""
     away = np.linalg.norm(trial.positions - hand.origin[:, None, :], axis=-1)
     forearm = float(np.median(np.linalg.norm(hand.origin - hand.elbow, axis=-1)))

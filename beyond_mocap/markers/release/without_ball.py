@@ -96,7 +96,8 @@ def estimate_hand_release(hand: Hand, radius: float, stride: np.ndarray | None =
     time_sigma = float(np.hypot(max(TIME_SIGMA, 0.5 * roll_time), 0.3 / hand.fps))
     return HandRelease(time=float(times[k]), position=position, velocity=velocity, time_sigma=time_sigma,
                        speed_sigma=SPEED_SIGMA * float(np.linalg.norm(velocity)),
-                       direction_sigma=_compute_sweep(grip[_select_around(times, start, time_sigma)]), roll_time=float(roll_time))  # fmt: skip
+                       direction_sigma=_compute_sweep(grip[_select_around(times, start, time_sigma)]),
+                       roll_time=float(roll_time))  # fmt: skip
 
 
 def _compute_roll_time(angular_speed: float) -> float:
@@ -155,7 +156,8 @@ class _HandPath:
         return self._moves + share * self._swing
 
 
-def _estimate_direction(path: _HandPath, tips: np.ndarray, wrist: int, last: int, stride: np.ndarray | None) -> np.ndarray:
+def _estimate_direction(path: _HandPath, tips: np.ndarray, wrist: int, last: int, stride: np.ndarray
+                        | None) -> np.ndarray:
     """Estimate the direction of the throw, unit (3,): from the fingers' path while they are fast, level also from
     the stride.
     """

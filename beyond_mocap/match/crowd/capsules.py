@@ -13,7 +13,7 @@ from functools import lru_cache
 
 import numpy as np
 
-from ...motion.humanoid import identify_joints, estimate_stature
+from ...motion.humanoid import estimate_stature, identify_joints
 from ...motion.motion import Motion, forward_kinematics
 from ...motion.skeleton import Skeleton
 
@@ -99,7 +99,8 @@ def _build_cached_capsules(key: _SkeletonKey) -> tuple[Capsule, ...]:
     for side, limb in enumerate((body.left, body.right)):
         if None not in (limb.upper_arm, limb.lower_arm, limb.hand):
             found.append(Capsule(limb.upper_arm, limb.lower_arm, radius["upper_arm"], limb="arm", side=side))
-            found.append(Capsule(limb.lower_arm, limb.hand, radius["lower_arm"], size * HAND_LENGTH, limb="arm", side=side))
+            found.append(Capsule(limb.lower_arm, limb.hand, radius["lower_arm"], size * HAND_LENGTH, limb="arm",
+                                 side=side))
         leg = [(limb.upper_leg, limb.lower_leg, "upper_leg", (0.0, 0.5)),
                (limb.lower_leg, limb.foot, "lower_leg", (0.5, 1.0)), (limb.foot, limb.toe, "foot", (1.0, 1.0))]
         for start, end, part, along in leg if limb.toe is not None else leg[:2]:
@@ -151,7 +152,8 @@ class CapsuleContacts:
         return CapsuleContacts(*(getattr(self, field.name)[rows] for field in fields(self)))
 
 
-def find_capsule_contacts(one: np.ndarray, other: np.ndarray, radii: tuple[np.ndarray, ...], min_depth: float = 0.0) -> CapsuleContacts:
+def find_capsule_contacts(one: np.ndarray, other: np.ndarray, radii: tuple[np.ndarray, ...],
+                          min_depth: float = 0.0) -> CapsuleContacts:
     """Find where the capsules of two bodies overlap by at least `min_depth`.
 
     Args:
@@ -173,8 +175,8 @@ def find_capsule_contacts(one: np.ndarray, other: np.ndarray, radii: tuple[np.nd
     depth = both - distance
     keep = np.flatnonzero(depth >= min_depth)
     direction = offset[keep] / np.maximum(distance[keep], 1e-9)[:, None]
-    return CapsuleContacts(frame[keep], a[keep], b[keep], depth=depth[keep], radii=both[keep], direction=direction, share_one=at_a[keep],
-                    share_other=at_b[keep])
+    return CapsuleContacts(frame[keep], a[keep], b[keep], depth=depth[keep], radii=both[keep], direction=direction,
+                           share_one=at_a[keep], share_other=at_b[keep])
 
 
 def _has_near_spheres(one: np.ndarray, other: np.ndarray, reach: np.ndarray) -> np.ndarray:

@@ -206,7 +206,8 @@ def move_leg(
     lengths, goal = (np.linalg.norm(thigh, axis=1), np.linalg.norm(shin, axis=1)), line + shift
     distance, goal_distance = np.linalg.norm(line, axis=1), np.linalg.norm(goal, axis=1)
     # Ease near full length, relative to the given pose: no shift changes nothing.
-    eased = [two_bones.soften_distance(length, lengths[0] + lengths[1], SOFT_KNEE_MARGIN) for length in (distance, goal_distance)]
+    eased = [two_bones.soften_distance(length, lengths[0] + lengths[1], SOFT_KNEE_MARGIN)
+             for length in (distance, goal_distance)]
     reach = np.clip(distance + eased[1] - eased[0], _MIN_LEG_LENGTH, lengths[0] + lengths[1])
     knee_change = two_bones.compute_inner_angle(*lengths, reach) - two_bones.compute_inner_angle(*lengths, distance)
     toes = places[:, limb.toe_or_foot] - ankle if limb.toe is not None else np.zeros(line.shape)

@@ -136,7 +136,8 @@ class SmoothnessTerms:
     arms: tuple[BandedLeastSquares, ...]
 
     @classmethod
-    def from_body(cls, body: CrowdBody, curves: np.ndarray, held_ends: tuple[bool, bool], fps: float) -> SmoothnessTerms:
+    def from_body(cls, body: CrowdBody, curves: np.ndarray, held_ends: tuple[bool, bool],
+                  fps: float) -> SmoothnessTerms:
         """Build the terms of a body.
 
         Args:
@@ -154,12 +155,14 @@ class SmoothnessTerms:
             arms.append(BandedLeastSquares(high - low, 3))
             for axis in range(3):
                 values = curves[low:high, ARMS.start + 3 * side + axis]
-                _add_smoothness(arms[side], axis, ARM_WEIGHT, seconds=ARM_SECONDS, firmness=body.firmness[low:high], fps=fps)
+                _add_smoothness(arms[side], axis, ARM_WEIGHT, seconds=ARM_SECONDS, firmness=body.firmness[low:high],
+                                fps=fps)
                 _hold_ends(arms[side], axis, values, held_ends)
         return cls(body=body, low=low, count=high - low, root_and_feet=root_and_feet, arms=tuple(arms))
 
 
-def solve_curves(smoothness: SmoothnessTerms, contacts: BodyContacts, curves, capsule_lines, arms_too: bool, weight: float) -> np.ndarray:
+def solve_curves(smoothness: SmoothnessTerms, contacts: BodyContacts, curves, capsule_lines, arms_too: bool,
+                 weight: float) -> np.ndarray:
     """Solve the body's curves for its share of these contacts.
 
     Args:
@@ -179,10 +182,11 @@ def solve_curves(smoothness: SmoothnessTerms, contacts: BodyContacts, curves, ca
     for side in (0, 1):
         rows = np.flatnonzero(is_arm & (sides == side))
         if len(rows):
-            shoulder = capsule_lines[:, next(n for n, part in enumerate(parts) if part.limb == "arm" and part.side == side), 0]
+            shoulder = capsule_lines[:, next(n for n, part in enumerate(parts) if part.limb == "arm" and part.side
+                                             == side), 0]
             columns = slice(ARMS.start + 3 * side, ARMS.start + 3 * side + 3)
-            out[span, columns] = _solve_arm(smoothness, side, contacts, rows=rows, shoulder=shoulder, rotations=curves[:, columns],
-                                       weight=weight)
+            out[span, columns] = _solve_arm(smoothness, side, contacts, rows=rows, shoulder=shoulder,
+                                            rotations=curves[:, columns], weight=weight)
     whole = np.flatnonzero(~is_arm | arms_too)
     if len(whole) or curves[span, : ARMS.start].any():
         out[span, : ARMS.start] = _solve_root_and_feet(smoothness, contacts, whole, curves, weight)
@@ -193,7 +197,8 @@ def _build_root_and_feet_smoothness(body: CrowdBody, curves: np.ndarray, held_en
     """Build the terms of root and feet: small, smooth, feet near the root's shift and slow in contact."""
     squares, scale = BandedLeastSquares(len(curves), ARMS.start), BASE_FPS / fps
     for curve in range(ARMS.start):
-        _add_smoothness(squares, curve, SHIFT_WEIGHT, seconds=SHIFT_SECONDS if curve < FEET.start else FOOT_SECONDS, firmness=body.firmness, fps=fps)
+        _add_smoothness(squares, curve, SHIFT_WEIGHT, seconds=SHIFT_SECONDS if curve < FEET.start else FOOT_SECONDS,
+                        firmness=body.firmness, fps=fps)
         _hold_ends(squares, curve, curves[:, curve], held_ends)
     # Unknown number of curve c at frame t: t * 6 + c. Each row couples the unknowns in its index columns.
     frames = np.arange(len(curves)) * ARMS.start
@@ -208,7 +213,8 @@ def _build_root_and_feet_smoothness(body: CrowdBody, curves: np.ndarray, held_en
     return squares
 
 
-def _add_smoothness(squares: BandedLeastSquares, curve: int, value_weight: float, seconds: float, firmness: np.ndarray, fps: float) -> None:
+def _add_smoothness(squares: BandedLeastSquares, curve: int, value_weight: float, seconds: float, firmness: np.ndarray,
+                    fps: float) -> None:
     """Add terms that keep a curve small, and smooth over so many seconds."""
     squares.add_value(value_weight * BASE_FPS / fps * firmness, curve)
     squares.add_smoothness(value_weight * BASE_FPS / fps * (seconds * fps) ** 6 * firmness, curve)
@@ -222,7 +228,8 @@ def _hold_ends(squares: BandedLeastSquares, curve: int, values: np.ndarray, held
             squares.add_rows(index, np.ones(1), np.full(len(index), _HOLD_WEIGHT), values[ends])
 
 
-def _solve_arm(smoothness: SmoothnessTerms, side: int, contacts: BodyContacts, rows, shoulder, rotations, weight: float) -> np.ndarray:
+def _solve_arm(smoothness: SmoothnessTerms, side: int, contacts: BodyContacts, rows, shoulder, rotations,
+               weight: float) -> np.ndarray:
     """Solve the rotation vectors (W, 3) of one arm for its contacts `rows`.
 
     shoulder (T, 3) m; rotations (T, 3) rad, the rotations so far.
@@ -243,7 +250,8 @@ def _limit_rotation(rotations: np.ndarray) -> np.ndarray:
     return rotations * (MAX_ARM_ANGLE * np.tanh(size / MAX_ARM_ANGLE) / size)
 
 
-def _solve_root_and_feet(smoothness: SmoothnessTerms, contacts: BodyContacts, rows, curves, weight: float) -> np.ndarray:
+def _solve_root_and_feet(smoothness: SmoothnessTerms, contacts: BodyContacts, rows, curves,
+                         weight: float) -> np.ndarray:
     """Solve the first six curves (W, 6) for the contacts `rows`."""
     parts, frame, part = smoothness.body.parts, contacts.frame[rows], contacts.part[rows]
     side = np.array([p.side for p in parts])[part]

@@ -31,7 +31,8 @@ REACH = 2.5
 TOUCH_FIRMNESS = 30.0
 """How much more firmly a player keeps their path while they touch the ball."""
 
-_SMOOTH_SECONDS = (1.0, 1.0, 0.8, 0.8, 0.6, 0.6, 0.4, 0.4, 0.2, 0.2, 0.1, 0.1)  # s of smoothing of directions, per round
+_SMOOTH_SECONDS = (1.0, 1.0, 0.8, 0.8, 0.6, 0.6, 0.4, 0.4, 0.2, 0.2, 0.1,
+                   0.1)  # s of smoothing of directions, per round
 _ROUNDS, _STEP = 24, 0.5  # directions change as bodies separate, so shifts go half of the way each round
 _HOLD_WEIGHT = 1e6  # weight that fixes a value: far above all others
 
@@ -115,7 +116,8 @@ def find_episodes(positions: np.ndarray, distance: float, reach: int) -> list[Ep
         near = np.einsum("pnk,pnk->pn", off, off) < distance**2
         for other in np.flatnonzero(near.any(axis=1)):
             pair = (one, one + 1 + int(other))
-            found += [(max(low - reach, 0), min(high + reach, len(near[0])), pair) for low, high in find_runs(near[other])]
+            found += [(max(low - reach, 0), min(high + reach, len(near[0])), pair) for low,
+                      high in find_runs(near[other])]
     return join_spans(found)
 
 
@@ -148,17 +150,17 @@ def find_meetings(spans: list[Span], past_spans: list[Span]) -> list[Episode]:
     while True:
         found = join_spans(spans)
         more = [
-            (max(first, episode.first), min(end, episode.end), pair)
-            for episode in found
-            for first, end, pair in past_spans
-            if first < episode.end and episode.first < end and set(pair) & set(episode.bodies) and pair not in episode.pairs
+            (max(first, episode.first), min(end, episode.end), pair) for episode in found for first, end,
+            pair in past_spans if first < episode.end and episode.first < end and set(pair) & set(episode.bodies)
+            and pair not in episode.pairs
         ]
         if not more:
             return found
         spans += more
 
 
-def _solve_episode(episode: Episode, places: np.ndarray, firmness: np.ndarray, distance: float, fps: float) -> np.ndarray:
+def _solve_episode(episode: Episode, places: np.ndarray, firmness: np.ndarray, distance: float,
+                   fps: float) -> np.ndarray:
     """Solve the shifts (K, T, 2) m of one episode's bodies at `places` (K, T, 2) m with their firmness (K, T)."""
     bodies, count = len(places), places.shape[1]
     smoothness = _build_smoothness(firmness, fps)
@@ -167,7 +169,8 @@ def _solve_episode(episode: Episode, places: np.ndarray, firmness: np.ndarray, d
     shifts = np.zeros(places.shape)
     for round_number in range(_ROUNDS):
         seconds = _SMOOTH_SECONDS[round_number] if round_number < len(_SMOOTH_SECONDS) else 0.0
-        rows = [_build_distance_rows(places, shifts, pair, distance=distance, seconds=seconds, fps=fps) for pair in pairs]
+        rows = [_build_distance_rows(places, shifts, pair, distance=distance, seconds=seconds, fps=fps)
+                for pair in pairs]
         index, values, goal = (np.concatenate(parts) for parts in zip(*rows))
         if not len(index):
             break

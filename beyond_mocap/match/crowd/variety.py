@@ -63,7 +63,8 @@ def find_in_step(clips: np.ndarray, seconds: np.ndarray, positions: np.ndarray) 
     is_in_step = np.zeros(clips.shape, bool)
     for one in range(len(clips) - 1):
         others = slice(one + 1, None)
-        same = (clips[others] == clips[one]) & (clips[one] >= 0) & (np.abs(seconds[others] - seconds[one]) < PHASE_SECONDS)
+        same = (clips[others] == clips[one]) & (clips[one] >= 0) & (np.abs(seconds[others] - seconds[one])
+                                                                    < PHASE_SECONDS)
         near = np.linalg.norm(positions[others] - positions[one], axis=-1) < NEAR_DISTANCE
         is_in_step[others] |= same & near
         is_in_step[one] |= (same & near).any(axis=0)

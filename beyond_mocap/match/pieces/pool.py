@@ -22,7 +22,7 @@ from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, CancelledError, 
 from dataclasses import dataclass
 from typing import NoReturn
 
-from ...base.errors import BeyondMocapError, UserCancelledError, InputError
+from ...base.errors import BeyondMocapError, InputError, UserCancelledError
 
 PIECES_PER_WORKER = 2
 """Pieces that each worker runs or has waiting: enough that none is idle, few enough to save memory."""
@@ -118,14 +118,17 @@ def run_tasks(
     is_cancelled = cancelled or (lambda: False)
     if config.scheduler:
         with _connect_cluster(config.scheduler) as client:
-            yield from _report_results(_run_on_workers(iter(tasks), work, _Cluster(client), is_cancelled), report_result)
+            yield from _report_results(_run_on_workers(iter(tasks), work, _Cluster(client), is_cancelled),
+                                       report_result)
     elif config.workers == 1:
         yield from _report_results(_run_here(tasks, work, is_cancelled), report_result)
     else:
-        yield from _report_results(_run_on_workers(iter(tasks), work, _Processes(config.workers), is_cancelled), report_result)
+        yield from _report_results(_run_on_workers(iter(tasks), work, _Processes(config.workers), is_cancelled),
+                                   report_result)
 
 
-def _report_results(results: Generator[tuple[object, TaskResult], None, None], report_result) -> Iterator[tuple[object, object]]:
+def _report_results(results: Generator[tuple[object, TaskResult], None, None],
+                    report_result) -> Iterator[tuple[object, object]]:
     with contextlib.closing(results):
         for key, one in results:
             if report_result is not None:
@@ -159,14 +162,16 @@ def measure_peak_memory() -> float:
     return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / (1e6 if sys.platform == "darwin" else 1024.0)
 
 
-def _run_here(tasks: Iterable[Task], work: Work, is_cancelled: Callable[[], bool]) -> Generator[tuple[object, TaskResult], None, None]:
+def _run_here(tasks: Iterable[Task], work: Work, is_cancelled: Callable[[], bool]) -> Generator[tuple[object,
+        TaskResult], None, None]:
     for key, arguments in tasks:
         if is_cancelled():
             raise UserCancelledError("cancelled")
         yield key, run_task(work, arguments)
 
 
-def _run_on_workers(tasks: Iterator[Task], work: Work, workers, is_cancelled) -> Generator[tuple[object, TaskResult], None, None]:
+def _run_on_workers(tasks: Iterator[Task], work: Work, workers, is_cancelled) -> Generator[tuple[object, TaskResult],
+        None, None]:
     """Keep workers busy, give results as they end, and run lost pieces again.
 
     After a break all pieces that were running are run again; after several breaks pieces run one by one, so that the
@@ -229,7 +234,8 @@ def _take_result(future: Future) -> TaskResult:
     try:
         return future.result()
     except Exception as error:  # such as a result that cannot be sent
-        return TaskResult(TaskFailure(f"its worker gave no result ({' '.join(f'{type(error).__name__}: {error}'.split())[:200]})"))
+        return TaskResult(
+            TaskFailure(f"its worker gave no result ({' '.join(f'{type(error).__name__}: {error}'.split())[:200]})"))
 
 
 class _Processes:

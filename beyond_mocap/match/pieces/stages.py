@@ -14,20 +14,20 @@ import numpy as np
 
 from ...annotation import Timeline
 from ...base.errors import BeyondMocapError, format_seconds
+from ...files.atomic import atomic_write
 from ...files.tables import to_plain
-from ...files.whole import atomic_write
 from ...library.library import Library
 from ...motion.track.ball_path import BallPath
-from ..crowd.crowd_window import MARGIN_SECONDS, MAX_SECONDS, PlayerCorrection, cut_edit, join_windows, save_parts, load_parts
+from ..crowd.window import MARGIN_SECONDS, MAX_SECONDS, PlayerCorrection, cut_edit, join_windows, load_parts, save_parts
 from ..folder import MatchFolder
-from ..order import FORM, MatchRequest, compute_digest
-from ..parts import PlayerPlans
 from ..player_edit import PlayerEdit, write_player
+from ..player_plans import PlayerPlans
+from ..request import FORM, MatchRequest, compute_digest
 from ..state import MatchState
 from .pool import TaskFailure, WorkerConfig, run_tasks
+from .tasks import FinishRequest, LibrarySource, finish_player, resolve_collision_window, search_unit
 from .units import build_units
-from .windows import Piece, save_piece, load_piece, join_pieces
-from .work import FinishRequest, LibrarySource, finish_player, resolve_collision_window, search_unit
+from .windows import Piece, join_pieces, load_piece, save_piece
 
 SEARCH, CROWD = "search", "crowd"
 """The kinds of pieces that are stored."""
@@ -145,7 +145,7 @@ class _PlayerSearch:
             write_player(file, edit)
             agreed = sum(joint.agreed for joint in joints)
             job.state.update_player(player, status="searched", take=file.name, joints=[len(joints), agreed],
-                             search_s=round(sum(piece.seconds for piece in pieces), 3))  # fmt: skip
+                                    search_s=round(sum(piece.seconds for piece in pieces), 3))  # fmt: skip
 
     def _mark_failed(self, player: str, reason: str) -> None:
         if not self._is_failed(player):
@@ -155,7 +155,8 @@ class _PlayerSearch:
         return self._job.state.players[player]["status"] == "failed"
 
 
-def resolve_player_collisions(job: Job, edits: dict[str, PlayerEdit], span: tuple[float, float]) -> dict[str, PlayerCorrection]:
+def resolve_player_collisions(job: Job, edits: dict[str, PlayerEdit], span: tuple[float, float]) -> dict[str,
+        PlayerCorrection]:
     """Resolve the collisions of the whole span, in windows of all players on the match's clock.
 
     Args:
@@ -203,12 +204,14 @@ def _build_windows(span: tuple[float, float], window: float, fps: float) -> list
 
 def _remove_library_paths(edits: Sequence[PlayerEdit]) -> tuple:
     """Remove the library's path from edit lists, because their motion does not depend on it."""
-    stretches_of_edits = [[replace(one, plan=replace(one.plan, library="")) for one in edit.stretches] for edit in edits]
+    stretches_of_edits = [[replace(one, plan=replace(one.plan, library="")) for one in edit.stretches]
+                          for edit in edits]
     return tuple(replace(edit, stretches=tuple(stretches)) for edit, stretches in zip(edits, stretches_of_edits))
 
 
 def finish_players(
-    job: Job, parts: Sequence[PlayerPlans], edits: dict[str, PlayerEdit], crowd: dict[str, PlayerCorrection], ball: BallPath
+    job: Job, parts: Sequence[PlayerPlans], edits: dict[str, PlayerEdit], crowd: dict[str, PlayerCorrection],
+    ball: BallPath
 ) -> None:
     """Write all players' files: the corrected edit list and, where requested, report, provenance and BVH.
 
@@ -229,8 +232,10 @@ def finish_players(
             edit = replace(edits[player], correction=crowd[player].correction)
             write_player(job.folder.player_path(part.file, "take.npz"), edit)
             order = FinishRequest(edit=edit, measured=part.role.measured, ball=ball, frames=crowd[player].frames,
-                           depth=crowd[player].depth, figures=job.request.figures, bvh=job.request.bvh)  # fmt: skip
-            names[player] = job.build_name(replace(order, edit=_remove_library_paths([edit])[0]), part.role.player, part.role.notes)
+                                  depth=crowd[player].depth, figures=job.request.figures,
+                                  bvh=job.request.bvh)  # fmt: skip
+            names[player] = job.build_name(replace(order, edit=_remove_library_paths([edit])[0]), part.role.player,
+                                           part.role.notes)
             if _is_finished(job, part, names[player]):
                 done += 1
             else:

@@ -16,7 +16,7 @@ from ...base.errors import InputError
 from ...library.features import FPS
 from ...motion.track import Track
 from ...synthesis.plan import Plan, SolvedTrajectory
-from ...synthesis.search.offer import SLOT
+from ...synthesis.search.candidate_index import SLOT
 from ..player_edit import to_stored_plan
 
 WINDOW = 300.0
@@ -83,7 +83,8 @@ def build_units(plan: Plan, stretch: int = 0, window: float = WINDOW, overlap: f
     plan = to_stored_plan(plan)
     begin, count = float(plan.track.times[0]), count_frames(plan)
     edges = build_window_edges(begin, count, window)
-    before, behind = (SLOT * max(1, round(share * overlap * FPS / SLOT)) for share in (OVERLAP_BEFORE, 1.0 - OVERLAP_BEFORE))
+    before, behind = (SLOT * max(1, round(share * overlap * FPS / SLOT))
+                      for share in (OVERLAP_BEFORE, 1.0 - OVERLAP_BEFORE))
     units = []
     for number, (low, high) in enumerate(zip(edges, edges[1:])):
         first, end = max(0, low - before), min(count, high + behind)
@@ -159,7 +160,8 @@ def cut_track(track: Track, start: float, end: float) -> Track:
     )
 
 
-def _interpolate_samples(known: np.ndarray, values: np.ndarray, times: np.ndarray, before: np.ndarray, after: np.ndarray):
+def _interpolate_samples(known: np.ndarray, values: np.ndarray, times: np.ndarray, before: np.ndarray,
+                         after: np.ndarray):
     """Interpolate (K, n) values between the samples `before` (K,) and `after` (K,); exact values at samples.
 
     known: (N,) s; values: (N, n).

@@ -17,8 +17,8 @@ from pathlib import Path
 import numpy as np
 
 from ...base.errors import InputError, TimedMessage, line_spans
-from ...files.whole import atomic_write
-from ...library.automatic import apply_chosen_gaits
+from ...files.atomic import atomic_write
+from ...library.automatic_locomotion import apply_chosen_gaits
 from ...library.features import FPS
 from ...library.library import Library
 from ...synthesis.plan import Plan
@@ -26,10 +26,20 @@ from ...synthesis.resolve_plan import resolve_plan
 from ...synthesis.search.distance import align_keys
 from ...synthesis.search.path_costs import PathCosts, balance_weights
 from ...synthesis.search.path_search import PathSearch
+from ...synthesis.search.request import build_request
 from ...synthesis.search.slots import MIN_KEY_MARGIN
-from ...synthesis.search.wanted import build_request
 from ..player_edit import WINDOW_SECONDS, PlayerEdit, Stretch, to_stored_plan
-from .named_edit import CONTINUITY_TOLERANCE, NamedEdit, NamedKey, to_library_edit, join_named_edits, to_named_edit, cut_named_edit, renumber_clips, list_clips
+from .named_edit import (
+    CONTINUITY_TOLERANCE,
+    NamedEdit,
+    NamedKey,
+    cut_named_edit,
+    join_named_edits,
+    list_clips,
+    renumber_clips,
+    to_library_edit,
+    to_named_edit,
+)
 from .units import Unit, cut_plan
 
 _ARRAYS = ("clip", "first", "rate", "length", "cut")
@@ -69,7 +79,7 @@ class Piece:
 
 
 def search_window(library: Library, unit: Unit, cancelled: Callable[[], bool] | None = None,
-             hurry: Callable[[], bool] | None = None) -> Piece:  # fmt: skip
+                  hurry: Callable[[], bool] | None = None) -> Piece:  # fmt: skip
     """Search the edit list of one window of a player. The same library, unit and numpy give the same bits.
 
     Args:
@@ -91,7 +101,8 @@ def search_window(library: Library, unit: Unit, cancelled: Callable[[], bool] | 
         library = build_search_library(library, unit.plan)
         plan = resolve_plan(unit.plan, library, are_touches_resolved=True)
         order = build_request(library, plan)
-        search = PathSearch(library, order, balance_weights(unit.plan.alpha), cancelled=cancelled, hurry=hurry, on_grid=True)
+        search = PathSearch(library, order, balance_weights(unit.plan.alpha), cancelled=cancelled, hurry=hurry,
+                            on_grid=True)
         edit = align_keys(library, search.run(), order)
     return Piece(player=unit.player, stretch=unit.stretch, number=unit.number, first=unit.first, own=unit.own,
                  edit=to_named_edit(library, edit, plan.timeline.keys), seconds=time.process_time() - started,
@@ -206,7 +217,8 @@ def _find_joint(library: Library, plan: Plan, before: Piece, after: Piece) -> Jo
     at = np.flatnonzero(same[1:] & same[:-1]) + 1
     if len(at):
         return Joint(low + int(at[np.argmin(np.abs(low + at - edge))]), True)
-    return Joint(low + 1 + int(np.argmin(_compute_joint_costs(library, plan, before, after=after, low=low, high=high))), False)
+    return Joint(low + 1 + int(np.argmin(_compute_joint_costs(library, plan, before, after=after, low=low, high=high))),
+                 False)
 
 
 def _compute_joint_costs(library: Library, plan: Plan, before: Piece, after: Piece, low: int, high: int) -> np.ndarray:
@@ -215,7 +227,8 @@ def _compute_joint_costs(library: Library, plan: Plan, before: Piece, after: Pie
     begin = float(plan.track.times[0])
     here = cut_plan(plan, begin + low / FPS, begin + (high - 1) / FPS)
     order = build_request(library, resolve_plan(here, library, are_touches_resolved=True))
-    left_edit, entered_edit = (to_library_edit(library, cut_named_edit(p.edit, low - p.first, high - p.first)) for p in (before, after))
+    left_edit, entered_edit = (to_library_edit(library, cut_named_edit(p.edit, low - p.first, high - p.first))
+                               for p in (before, after))
     costs = PathCosts(library, order, balance_weights(plan.alpha))
     step = np.gradient(left_edit.frame)
     step[np.append(left_edit.transitions, left_edit.transitions - 1)] = 1.0

@@ -14,6 +14,7 @@ import numpy as np
 from ...base.errors import format_seconds
 from ...evaluation.html_page import (
     Html,
+    build_element,
     build_image,
     build_list,
     build_number_cell,
@@ -22,22 +23,21 @@ from ...evaluation.html_page import (
     build_section,
     build_table,
     build_title,
-    build_element,
     join_html,
 )
 from ...evaluation.report import flatten_report
 from ...synthesis.quality.targets import find_target
-from .pictures import render_heat_strip, encode_png
+from .pictures import encode_png, render_heat_strip
 from .results import (
     LIMITS,
     MAX_SECONDS,
     MatchResults,
     PlayerResult,
     WorstSecond,
-    measure_badness,
-    to_number,
-    read_match_results,
     find_worst_seconds,
+    measure_badness,
+    read_match_results,
+    to_number,
 )
 
 Thumbnail = Callable[[str, float], "np.ndarray | None"]
@@ -82,8 +82,8 @@ def build_match_page(folder: Path, thumbnail: Thumbnail | None = None) -> str:
     data = build_list((*match.lines, *shared))
     return build_page(
         match.title, _build_head(match, span), _build_worst_section(match, worst, anchors, thumbnail),
-        *_build_teams(match, span, anchors, shared), build_section("The data", data) if data else "", _build_times(match),
-        _build_players(match, worst, span, anchors, shared), style=_STYLE,
+        *_build_teams(match, span, anchors, shared), build_section("The data", data) if data else "",
+        _build_times(match), _build_players(match, worst, span, anchors, shared), style=_STYLE,
     )  # fmt: skip
 
 
@@ -100,7 +100,8 @@ def _choose_span(match: MatchResults) -> tuple[float, float]:
 
 def _build_head(match: MatchResults, span: tuple[float, float]) -> Html:
     """Build the title and the summary of who is finished."""
-    finished, missing = sum(one.is_finished for one in match.players), [one for one in match.players if not one.is_finished]
+    finished, missing = sum(one.is_finished for one in match.players), [one for one in match.players
+                                                                        if not one.is_finished]
     rate = f", {match.fps:g} frames a second" if math.isfinite(match.fps) else ""
     text = (f"{_format_clock(span[0])} to {_format_clock(span[1])} on the match clock{rate}; {finished} of {len(match.players)} "
             "players finished")  # fmt: skip
@@ -113,7 +114,8 @@ def _build_head(match: MatchResults, span: tuple[float, float]) -> Html:
     return join_html(*parts, separator="\n")
 
 
-def _build_worst_section(match: MatchResults, worst: tuple[WorstSecond, ...], anchors: Mapping[str, str], thumbnail) -> Html:
+def _build_worst_section(match: MatchResults, worst: tuple[WorstSecond, ...], anchors: Mapping[str, str],
+                         thumbnail) -> Html:
     """Build the section with the worst seconds."""
     title = "Worst seconds"
     if not any(player.per_second for player in match.players):
@@ -127,17 +129,19 @@ def _build_worst_section(match: MatchResults, worst: tuple[WorstSecond, ...], an
     return build_section(title, build_element("p", f"Seconds {limits}.", class_="quiet"), *lines)
 
 
-def _build_worst_line(match: MatchResults, place: int, second: WorstSecond, anchors: Mapping[str, str], thumbnail) -> Html:
+def _build_worst_line(match: MatchResults, place: int, second: WorstSecond, anchors: Mapping[str, str],
+                      thumbnail) -> Html:
     """Build one line of the worst seconds, with picture, figures and strip."""
     pose = thumbnail(second.player.id, second.time + 0.5) if thumbnail is not None else None
     strip = _build_strip(second.player, (second.time - _STRIP_SECONDS, second.time + _STRIP_SECONDS + 1.0), "wide")
     other = (" (in ", _build_link(second.other, anchors), ")") if second.other is not None else ()
-    who = (_build_link(second.player, anchors), *other, ", ", build_element("b", _format_clock(second.time)), _describe_frame(match, second.time))
+    who = (_build_link(second.player, anchors), *other, ", ", build_element("b", _format_clock(second.time)),
+           _describe_frame(match, second.time))
     limit = f"{second.times:.1f} times the limit; {_STRIP_SECONDS:g} s before and after. In Blender: "
     return build_element(
         "div", build_element("b", str(place)), _build_pose_image(second.player, pose) if pose is not None else "",
         build_element("div", build_element("p", *who, ": ", "; ".join(_describe_figures(second))), strip,
-                build_element("p", limit, build_element("code", _build_jump_command(second)), class_="quiet")),
+                      build_element("p", limit, build_element("code", _build_jump_command(second)), class_="quiet")),
         class_="worst", id=_build_anchor(second, anchors),
     )  # fmt: skip
 
@@ -188,7 +192,8 @@ def _build_players(match: MatchResults, worst: tuple[WorstSecond, ...], span, an
 
 
 def _build_times(match: MatchResults) -> Html:
-    rows = [build_row(stage, build_element("td", f"{spent:.1f} s", class_="n")) for stage, spent in match.seconds.items()]
+    rows = [build_row(stage, build_element("td", f"{spent:.1f} s", class_="n")) for stage,
+            spent in match.seconds.items()]
     return build_section("Where the time went", build_table((), rows)) if rows else Html()
 
 
@@ -205,7 +210,8 @@ def _build_strip_image(data: bytes, look: str) -> Html:
 
 def _build_pose_image(player: PlayerResult, pose: np.ndarray) -> Html:
     """Build the image of a picture of `appearance.picture`, whose lowest row is the first."""
-    return build_image(encode_png(np.rint(255.0 * np.clip(pose[::-1], 0.0, 1.0)).astype(np.uint8)), player.display_name, "pose")
+    return build_image(encode_png(np.rint(255.0 * np.clip(pose[::-1], 0.0, 1.0)).astype(np.uint8)), player.display_name,
+                       "pose")
 
 
 def _build_link(player: PlayerResult, anchors: Mapping[str, str]) -> Html:
@@ -293,7 +299,8 @@ def build_team_table(
     """
     titles = [build_title(column.title, column.unit) for column in COLUMNS]
     head = ("player", *titles, build_title("warnings"), "second by second")
-    rows = [_build_player_row(player, build_element("td", strips[player.id]), anchors[player.id], shared) for player in players]
+    rows = [_build_player_row(player, build_element("td", strips[player.id]), anchors[player.id], shared)
+            for player in players]
     return build_table(head, [*rows, *_build_summary(players, shared)])
 
 
@@ -305,7 +312,8 @@ def _build_player_row(player: PlayerResult, strip: Html, anchor: str, shared: tu
         return build_row(build_element("td", link, class_="name"), why, strip)
     found = flatten_report({key: value for key, value in player.report.items() if key != "per_second"})
     cells = [_build_cell(column, _find_value(player, column.figure, found), player, found) for column in COLUMNS]
-    note = () if player.is_finished else (build_element("br"), build_element("span", _describe_status(player), class_="missed"))
+    note = () if player.is_finished else (build_element("br"), build_element("span", _describe_status(player),
+                                                                             class_="missed"))
     count = build_number_cell(len(select_own_warnings(player, shared)))
     return build_row(build_element("td", link, *note, class_="name"), *cells, count, strip)
 
@@ -319,11 +327,13 @@ def _build_summary(players: Sequence[PlayerResult], shared: tuple[str, ...]) -> 
     reported = [player for player in players if player.report]
     if len(reported) < 2:
         return []
-    columns = [[_find_value(player, column.figure, flatten_report(player.report)) for player in reported] for column in COLUMNS]
+    columns = [[_find_value(player, column.figure, flatten_report(player.report)) for player in reported]
+               for column in COLUMNS]
     lines = []
     for title, measure in (("mean", lambda known: sum(known) / len(known)), ("worst", max)):
         known = [[value for value in values if math.isfinite(value)] for values in columns]
-        cells = [_build_plain_cell(column, measure(values) if values else math.nan) for column, values in zip(COLUMNS, known)]
+        cells = [_build_plain_cell(column, measure(values) if values else math.nan) for column,
+                 values in zip(COLUMNS, known)]
         counts = [len(select_own_warnings(player, shared)) for player in reported]
         lines.append(build_row(title, *cells, build_number_cell(measure(counts)), "", class_="sum"))
     return lines

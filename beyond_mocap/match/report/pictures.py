@@ -14,9 +14,9 @@ import numpy as np
 from ...appearance.picture import render_pose
 from ...base.errors import BeyondMocapError
 from ...library.library import Library
+from ..displayed_motion import construct_displayed_player
 from ..folder import read_state
 from ..player_edit import read_player
-from ..shown import construct_displayed_player
 
 MAX_CELLS = 900
 """Most cells of a strip; if a match has more seconds, each cell shows the worst of its seconds."""

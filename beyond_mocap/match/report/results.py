@@ -137,8 +137,8 @@ def read_match_results(folder: Path) -> MatchResults:
     return MatchResults(
         title=_to_text(state.get("title")) or (" - ".join(sides) if len(sides) == 2 else Path(folder).resolve().name),
         status=_to_text(state.get("status")), fps=to_number(state.get("fps")), start=_to_time(state.get("from_s")),
-        end=_to_time(state.get("to_s")), teams=(*teams.values(), *map(TeamResult, others)), players=players, seconds=stages,
-        lines=_collect_messages(state),
+        end=_to_time(state.get("to_s")), teams=(*teams.values(), *map(TeamResult, others)), players=players,
+        seconds=stages, lines=_collect_messages(state),
     )  # fmt: skip
 
 
@@ -172,9 +172,9 @@ def _parse_player(folder: Path, row: Mapping, teams: Mapping[str, TeamResult]) -
     ground = _to_text(row.get("team") or report.get("team"))
     start, per_second = _parse_per_second(report.get("per_second"))
     return PlayerResult(id=name, name=_to_text(row.get("name") or report.get("name")),
-                        number=_to_text(row.get("number") or report.get("number")),
-                        team=teams[ground].name if ground in teams else ground, status=status.strip() or "unknown",
-                        reason=problem or _to_text(row.get("reason")) or reason.strip(), data=_collect_messages(row), report=report,
+                        number=_to_text(row.get("number") or report.get("number")), team=teams[ground].name
+                        if ground in teams else ground, status=status.strip() or "unknown", reason=problem
+                        or _to_text(row.get("reason")) or reason.strip(), data=_collect_messages(row), report=report,
                         start=start, per_second=per_second)  # fmt: skip
 
 
@@ -297,7 +297,8 @@ def find_worst_seconds(players: Sequence[PlayerResult], limit: int = MAX_WORST) 
 def _sort_bad_seconds(players: Sequence[PlayerResult]) -> list[tuple[int, int, float]]:
     """Sort (player, row of per_second, badness) of all seconds beyond a limit, the worst first."""
     each = [(index, measure_badness(player)) for index, player in enumerate(players)]
-    rows = [(index, int(row), float(bad[row])) for index, bad in each for row in np.flatnonzero(np.nan_to_num(bad) > 1.0)]
+    rows = [(index, int(row), float(bad[row])) for index, bad in each
+            for row in np.flatnonzero(np.nan_to_num(bad) > 1.0)]
     return sorted(rows, key=lambda entry: (-entry[2], entry[0], entry[1]))
 
 
@@ -316,7 +317,8 @@ def _is_same_second(known: WorstSecond, player: PlayerResult, time: float, figur
     return known.player is player or (figure == known.figure == "overlap_m" and known.other is player)
 
 
-def _find_other_player(players: Sequence[PlayerResult], player: PlayerResult, time: float, value: float) -> PlayerResult | None:
+def _find_other_player(players: Sequence[PlayerResult], player: PlayerResult, time: float,
+                       value: float) -> PlayerResult | None:
     """Find the player with the same overlap in that second, to the millimetre; None if there is none or more than
     one.
     """

@@ -62,12 +62,14 @@ def fit_smoothing_spline(
     roughness, roughness_weights = _build_roughness(knots, order, stiff ** (2 * order) / (high - low))
     count = pieces if closed else pieces + DEGREE
     begins = np.concatenate([left, np.tile(np.arange(pieces), len(roughness) // pieces)])
-    band = _build_band_matrix(np.concatenate([basis, roughness]), begins, np.concatenate([weights, roughness_weights]), count)
+    band = _build_band_matrix(np.concatenate([basis, roughness]), begins, np.concatenate([weights, roughness_weights]),
+                              count)
     right = _build_right_side(basis, left, weights, values - origin, count)
     if closed:
         solved = _solve_cyclic(band, right)[np.arange(pieces + DEGREE) % count]
     else:
-        solved = _solve_pinned(band, right, values[[0, -1]] - origin) if keep_ends else solveh_banded(band, right, lower=True)
+        solved = _solve_pinned(band, right, values[[0, -1]] - origin) if keep_ends else solveh_banded(band, right,
+                lower=True)
     return knots, solved + origin
 
 
@@ -138,7 +140,8 @@ def _smooth_within(values: np.ndarray, fps: float, slack: float) -> np.ndarray:
     if len(values) < 2:
         return values.copy()
     times = np.arange(len(values)) / fps
-    return BSpline(*fit_spline_within(values, times, count_spline_pieces(times[-1], SWAY_SECONDS), SWAY_SECONDS, slack), DEGREE)(times)
+    return BSpline(*fit_spline_within(values, times, count_spline_pieces(times[-1], SWAY_SECONDS), SWAY_SECONDS, slack),
+                   DEGREE)(times)
 
 
 def _build_knots(low: float, high: float, pieces: int, closed: bool) -> np.ndarray:
@@ -200,7 +203,8 @@ def _build_band_matrix(rows: np.ndarray, left: np.ndarray, weights: np.ndarray, 
     return band
 
 
-def _build_right_side(rows: np.ndarray, left: np.ndarray, weights: np.ndarray, values: np.ndarray, count: int) -> np.ndarray:
+def _build_right_side(rows: np.ndarray, left: np.ndarray, weights: np.ndarray, values: np.ndarray,
+                      count: int) -> np.ndarray:
     """Build the sum of w r v: (count, K)."""
     out = np.zeros((count, values.shape[1]))
     for i in range(_WIDTH):

@@ -120,7 +120,8 @@ class _AnatomyEstimator:
         self.trunk_directions = unit_vectors(self._find_trunk_top() - self.pelvis, _UP)
         self.across_hips = unit_vectors(self.places[:, left.upper_leg] - self.places[:, right.upper_leg], _LEFT)
         self.across_chest = self._compute_across_chest()
-        self.weight = (np.maximum(self.trunk_directions[:, 2], 0.1) / max(self.trunk_directions[:, 2].max(), 0.1)) ** _UPRIGHT
+        self.weight = (np.maximum(self.trunk_directions[:, 2], 0.1) / max(self.trunk_directions[:, 2].max(),
+                                                                          0.1)) ** _UPRIGHT
         self.axes = quaternion.identity(len(skeleton))
         self.known_joints: set[int] = set()
 
@@ -183,19 +184,23 @@ class _AnatomyEstimator:
                 self._estimate_arm(limb)
         still = np.stack([_average_rotations(self.local[:, joint], self.weight) for joint in range(len(self.skeleton))])
         return Anatomy(skeleton=self.skeleton, body=self.body, axes=freeze_array(self.axes),
-                       known_joints=frozenset(self.known_joints), mean_rotations=freeze_array(still), leg=self._measure_leg_length(),
-                       ankle=self._measure_ankle_height(), ball=_BALL * self._measure_leg_length())
+                       known_joints=frozenset(self.known_joints), mean_rotations=freeze_array(still),
+                       leg=self._measure_leg_length(), ankle=self._measure_ankle_height(), ball=_BALL
+                       * self._measure_leg_length())
 
     def _estimate_trunk(self) -> None:
         """Estimate hips, spine, neck and head from the trunk's line and the axes across hips and chest."""
         body = self.body
-        self.set_axes(body.hips, self.average_in_joint(body.hips, self.trunk_directions), self.average_in_joint(body.hips, self.across_hips), "left")
+        self.set_axes(body.hips, self.average_in_joint(body.hips, self.trunk_directions),
+                      self.average_in_joint(body.hips, self.across_hips), "left")
         for joint, share in zip(body.spine, compute_spine_shares(self.skeleton, body)):
             across = (1.0 - share) * self.across_hips + share * self.across_chest
-            self.set_axes(joint, self.average_in_joint(joint, self.trunk_directions), self.average_in_joint(joint, across))
+            self.set_axes(joint, self.average_in_joint(joint, self.trunk_directions),
+                          self.average_in_joint(joint, across))
         chain = list_head_chain(self.skeleton, body)
         tip = _find_tip(self.skeleton, chain[-1]) if chain else None
-        crown = self.trunk_directions if tip is None else unit_vectors(quaternion.rotate(self.world[:, chain[-1]], tip), _UP)
+        crown = self.trunk_directions if tip is None else unit_vectors(quaternion.rotate(self.world[:, chain[-1]], tip),
+                                                                       _UP)
         for number, joint in enumerate(chain, 1):
             share = number / len(chain)  # a neck is bent half as far as the head, which its tip shows in every frame
             up = self.average_in_joint(joint, (1.0 - share) * self.trunk_directions + share * crown)
@@ -212,18 +217,23 @@ class _AnatomyEstimator:
         upper = unit_vectors(self.places[:, limb.lower_arm] - self.places[:, limb.upper_arm], -_UP)
         end = limb.hand if limb.hand is not None else limb.lower_arm
         lower = unit_vectors(self.places[:, end] - self.places[:, limb.lower_arm], upper)
-        hinge = -cross_product(upper, lower) + _STRAIGHT_WEIGHT * cross_product(-upper, self.compute_segment_direction(chest, 0))
-        self.set_axes(limb.upper_arm, -self._measure_bone(limb.upper_arm, limb.lower_arm), self.average_in_joint(limb.upper_arm, hinge))
+        hinge = -cross_product(upper, lower) + _STRAIGHT_WEIGHT * cross_product(-upper,
+                                                                                self.compute_segment_direction(chest,
+                0))
+        self.set_axes(limb.upper_arm, -self._measure_bone(limb.upper_arm, limb.lower_arm),
+                      self.average_in_joint(limb.upper_arm, hinge))
         if limb.hand is None:
             self.set_axes_like(limb.lower_arm, self.compute_segment_rotation(limb.upper_arm))
             return
         hinge = -cross_product(upper, lower) + _STRAIGHT_WEIGHT * self.compute_segment_direction(limb.upper_arm, 1)
-        self.set_axes(limb.lower_arm, -self._measure_bone(limb.lower_arm, limb.hand), self.average_in_joint(limb.lower_arm, hinge))
+        self.set_axes(limb.lower_arm, -self._measure_bone(limb.lower_arm, limb.hand),
+                      self.average_in_joint(limb.lower_arm, hinge))
         fingers = _find_finger_direction(self.skeleton, limb.hand)
         if fingers is None:
             self.set_axes_like(limb.hand, self.compute_segment_rotation(limb.lower_arm))
         else:
-            self.set_axes(limb.hand, -fingers, self.average_in_joint(limb.hand, self.compute_segment_direction(limb.lower_arm, 1)))
+            self.set_axes(limb.hand, -fingers,
+                          self.average_in_joint(limb.hand, self.compute_segment_direction(limb.lower_arm, 1)))
 
     def _estimate_collar(self, limb: Limb) -> None:
         """Estimate a collar bone: held as it is on average; sideways where that is implausible (folded-up rest poses).
@@ -243,10 +253,12 @@ class _AnatomyEstimator:
         hinge = cross_product(thigh, shank)
         beside = _STRAIGHT_WEIGHT * self.compute_segment_direction(self.body.hips, 1)
         self.set_axes(
-            limb.upper_leg, -self._measure_bone(limb.upper_leg, limb.lower_leg), self.average_in_joint(limb.upper_leg, hinge + beside)
+            limb.upper_leg, -self._measure_bone(limb.upper_leg, limb.lower_leg),
+            self.average_in_joint(limb.upper_leg, hinge + beside)
         )
         beside = _STRAIGHT_WEIGHT * self.compute_segment_direction(limb.upper_leg, 1)
-        self.set_axes(limb.lower_leg, -self._measure_bone(limb.lower_leg, limb.foot), self.average_in_joint(limb.lower_leg, hinge + beside))
+        self.set_axes(limb.lower_leg, -self._measure_bone(limb.lower_leg, limb.foot),
+                      self.average_in_joint(limb.lower_leg, hinge + beside))
 
     def _measure_bone(self, joint: int, child: int) -> np.ndarray:
         """Measure the vector (3,) from `joint` to a joint below it, in its axes, metres; averaged over joints between.
@@ -284,7 +296,8 @@ class _AnatomyEstimator:
         """Weight the frames (T,) in which the foot is flat on the ground; None where there are none."""
         heights = self.places[:, limb.foot, 2]
         if self.is_single_pose:
-            upright = self.trunk_directions[0, 2] > 0.9 and self.compute_segment_direction(limb.lower_leg, 2)[0, 2] > 0.7
+            upright = self.trunk_directions[0, 2] > 0.9 and self.compute_segment_direction(limb.lower_leg, 2)[0,
+                    2] > 0.7
             return np.ones(len(heights)) if upright else None
         side = 0 if limb is self.body.left else 1
         low = heights <= np.percentile(heights, 40) if self.foot_contacts is None else self.foot_contacts[:, side]
@@ -297,7 +310,8 @@ class _AnatomyEstimator:
         if level is None:
             self.set_axes_like(limb.toe, self.compute_segment_rotation(limb.foot))
             return
-        seen = quaternion.multiply(quaternion.inverse(self.world[:, limb.toe]), self.compute_segment_rotation(limb.foot))
+        seen = quaternion.multiply(quaternion.inverse(self.world[:, limb.toe]),
+                                   self.compute_segment_rotation(limb.foot))
         self.axes[limb.toe] = _average_rotations(seen, level)
         self.known_joints.add(limb.toe)
 

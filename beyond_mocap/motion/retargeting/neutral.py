@@ -13,7 +13,7 @@ import numpy as np
 from ...base.vectors import arctan2, cross_product, unit_vectors
 from .. import quaternion
 from ..humanoid import Humanoid, Limb, compute_heading_from_positions, identify_joints
-from ..motion import Motion, forward_kinematics, compute_local_rotations, compute_pose
+from ..motion import Motion, compute_local_rotations, compute_pose, forward_kinematics
 from ..skeleton import Skeleton, freeze_array
 from .structure import list_descendants
 
@@ -202,7 +202,8 @@ def _compute_world_offset(skeleton: Skeleton, world: np.ndarray, joint: int, bel
     return total
 
 
-def _measure_bone_angle(skeleton: Skeleton, world: np.ndarray, joint: int, child: int | None, target: np.ndarray) -> float:
+def _measure_bone_angle(skeleton: Skeleton, world: np.ndarray, joint: int, child: int | None,
+                        target: np.ndarray) -> float:
     return float(np.arccos(np.clip(np.dot(_compute_bone_direction(skeleton, world, joint, child), target), -1.0, 1.0)))
 
 

@@ -99,7 +99,8 @@ def to_motion(posture: Posture, neutral: NeutralStance) -> Motion:
 
 def compute_pelvis_rotation(posture: Posture) -> np.ndarray:
     """Compute the world rotation (T, 4) of the pelvis relative to the neutral stance."""
-    return quaternion.multiply(quaternion.from_up_angle(posture.heading), quaternion.from_rotation_vector(posture.pelvis))
+    return quaternion.multiply(quaternion.from_up_angle(posture.heading),
+                               quaternion.from_rotation_vector(posture.pelvis))
 
 
 def compute_hip_positions(posture: Posture, neutral: NeutralStance) -> np.ndarray:
@@ -182,7 +183,8 @@ def _solve_leg(posture: Posture, neutral: NeutralStance, joints: Limb, side: int
     top = compute_hip_positions(posture, neutral)[:, side]
     ankle = posture.ankles[:, side]
     pole = compute_knee_pole(posture, top, side)
-    knee, end, hinge = limb.solve_limb_bend(top, ankle, np.array(upper), lower=np.array(lower), pole=pole, soft=_SOFT_DISTANCE)
+    knee, end, hinge = limb.solve_limb_bend(top, ankle, np.array(upper), lower=np.array(lower), pole=pole,
+                                            soft=_SOFT_DISTANCE)
     thigh = limb.build_bone_frame(unit_vectors(knee - top, -_Z), hinge)
     shank = limb.build_bone_frame(unit_vectors(end - knee, -_Z), hinge)
     foot = compute_foot_rotation(posture.feet[:, side])

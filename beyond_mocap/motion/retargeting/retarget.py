@@ -33,9 +33,9 @@ from ...base.errors import InputError
 from ...base.vectors import unit_vectors
 from .. import limb, quaternion
 from ..humanoid import Humanoid, Limb, build_humanoid, identify_joints, identify_posed_joints, list_roles
-from ..motion import Motion, forward_kinematics, compute_local_rotations
+from ..motion import Motion, compute_local_rotations, forward_kinematics
 from ..skeleton import Skeleton
-from .anatomy import Anatomy, list_head_chain, compute_spine_shares, estimate_anatomy
+from .anatomy import Anatomy, compute_spine_shares, estimate_anatomy, list_head_chain
 
 _SOFT_DISTANCE = 0.01  # m below full length from where a limb eases
 _LIMB_PARTS = ("shoulder", "upper_arm", "lower_arm", "hand", "upper_leg", "lower_leg", "foot", "toe")
@@ -109,7 +109,8 @@ class _Transfer:
         self.scale = target.leg / source.leg
         self.travel_scale = 1.0 if keeps_travel else self.scale
         soles = [self.places[:, side.foot, 2] - source.ankle for side in self._list_limbs(source)]
-        soles += [self.places[:, side.toe, 2] - source.ball for side in self._list_limbs(source) if side.toe is not None]
+        soles += [self.places[:, side.toe, 2] - source.ball for side in self._list_limbs(source)
+                  if side.toe is not None]
         self.floor = float(np.percentile(np.min(soles, axis=0), 2))
         self.target_rotations: dict[int, np.ndarray] = {}
 
@@ -124,7 +125,8 @@ class _Transfer:
         places = _compute_positions(self.target.skeleton, world) + root[:, None]
         for mine, theirs in sides:
             self._solve_leg(places, mine, theirs)
-        return Motion(self.target.skeleton, root, compute_local_rotations(self.target.skeleton, self._compute_world_rotations()), self.fps)
+        return Motion(self.target.skeleton, root, compute_local_rotations(self.target.skeleton,
+                                                                          self._compute_world_rotations()), self.fps)
 
     @staticmethod
     def _list_limbs(anatomy: Anatomy) -> tuple[Limb, Limb]:
@@ -161,7 +163,8 @@ class _Transfer:
             joint = getattr(theirs, part)
             if joint in self.target.known_joints:
                 known = [p for p in _list_carriers(part) if getattr(mine, p) in self.source.known_joints]
-                self._set_target_rotation(joint, self._compute_source_rotation(getattr(mine, known[0]) if known else self.source.body.chest))
+                self._set_target_rotation(joint, self._compute_source_rotation(getattr(mine, known[0]) if known
+                                                                               else self.source.body.chest))
 
     def _compute_world_rotations(self) -> np.ndarray:
         """Compute the world rotations (T, J, 4) of all target joints: those that are set, and the others carried along.
@@ -226,7 +229,8 @@ class _Transfer:
         goal = self._scale_positions(self.places[:, mine.foot])
         upper, lower = (np.linalg.norm(b - a, axis=1) for a, b in ((hip, knee), (knee, ankle)))
         goal = _limit_reach(hip, ankle, goal, upper + lower)
-        pole = self._compute_knee_pole(mine, hip, knee, ankle, _compute_bend_height(np.linalg.norm(goal - hip, axis=1), upper, lower))
+        pole = self._compute_knee_pole(mine, hip, knee, ankle, _compute_bend_height(np.linalg.norm(goal - hip, axis=1),
+                                                                                    upper, lower))
         swing = quaternion.rotation_between(ankle - hip, goal - hip)
         new_knee, new_ankle, _ = limb.solve_limb_bend(
             hip, goal, upper, lower=lower, pole=quaternion.rotate(swing, pole), soft=1e-9,
@@ -237,7 +241,8 @@ class _Transfer:
         self.target_rotations[theirs.lower_leg] = quaternion.multiply(shank, self.target_rotations[theirs.lower_leg])
 
 
-    def _compute_knee_pole(self, mine: Limb, hip: np.ndarray, knee: np.ndarray, ankle: np.ndarray, height: np.ndarray) -> np.ndarray:
+    def _compute_knee_pole(self, mine: Limb, hip: np.ndarray, knee: np.ndarray, ankle: np.ndarray,
+                           height: np.ndarray) -> np.ndarray:
         """Compute where a knee points (T, 3).
 
         As the source's, which shows little where it is straighter than the target's will be, `height` (T,) metres off
@@ -277,7 +282,8 @@ def _compute_mid_hips(places: np.ndarray, anatomy: Anatomy) -> np.ndarray:
     return 0.5 * (places[:, anatomy.body.left.upper_leg] + places[:, anatomy.body.right.upper_leg])
 
 
-def _interpolate_rotations(shares: Sequence[float] | np.ndarray, rotations: list[np.ndarray], share: float) -> np.ndarray:
+def _interpolate_rotations(shares: Sequence[float] | np.ndarray, rotations: list[np.ndarray],
+                           share: float) -> np.ndarray:
     """Interpolate the rotation (T, 4) at `share` among `rotations` that are known at rising `shares`."""
     high = min(int(np.searchsorted(shares, share - 1e-9)), len(shares) - 1)
     low = max(high - 1, 0)
@@ -361,11 +367,13 @@ def pair_joints(
     """
     where = str(bone_map) if isinstance(bone_map, (str, Path)) else "bone map"
     table = read_bone_map(bone_map) if isinstance(bone_map, (str, Path)) else dict(bone_map or {})
-    links = {_find_joint(motion.skeleton, mine, where): _find_joint(skeleton, its, where) for mine, its in table.items()}
+    links = {_find_joint(motion.skeleton, mine, where): _find_joint(skeleton, its, where) for mine,
+             its in table.items()}
     found = _find_roles(motion.skeleton, motion), _find_roles(skeleton, example)
     if links:
         found = _apply_links(*found, links)
-    source, target = (build_humanoid(one.names, one.parents, roles) for one, roles in zip((motion.skeleton, skeleton), found))
+    source, target = (build_humanoid(one.names, one.parents, roles) for one,
+                      roles in zip((motion.skeleton, skeleton), found))
     others = _pair_other_joints(motion.skeleton, skeleton, source, target, links)
     return JointPairs(source, target, others, _find_trunk_tops(source, target))
 
@@ -396,7 +404,8 @@ def _apply_links(source: dict[str, int], target: dict[str, int], links: dict[int
     return source, target
 
 
-def _pair_other_joints(source: Skeleton, target: Skeleton, mine: Humanoid, its: Humanoid, links: dict[int, int]) -> dict[int, int]:
+def _pair_other_joints(source: Skeleton, target: Skeleton, mine: Humanoid, its: Humanoid,
+                       links: dict[int, int]) -> dict[int, int]:
     """Pair joints without a meaning, target -> source: mapped ones, and those of the same name."""
     taken = [set(list_roles(body).values()) | set(body.spine) for body in (mine, its)]
     same = {source.names.index(name): joint for joint, name in enumerate(target.names) if name in source.names}

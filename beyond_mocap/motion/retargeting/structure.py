@@ -97,7 +97,8 @@ def _split_legs_and_arms(parents, pairs):
     second = next((pair for pair in pairs[1:] if not taken & {j for limb in pair for j in limb}), None)
     if second is None:
         return first, None
-    depth = [len(list_ancestors(parents, find_common_ancestor(parents, [pair[0][0], pair[1][0]]))) for pair in (first, second)]
+    depth = [len(list_ancestors(parents, find_common_ancestor(parents, [pair[0][0], pair[1][0]])))
+             for pair in (first, second)]
     return (first, second) if depth[0] <= depth[1] else (second, first)
 
 
@@ -149,7 +150,8 @@ def find_mirror_joints(parents, pairs: Iterable[tuple[int, int]]) -> tuple[int, 
     of their descendants.
     """
     out = list(range(len(parents)))
-    pairs = [(a, b) for pair in pairs for a, b in zip(list_ancestors(parents, pair[0]), list_ancestors(parents, pair[1])) if a != b]
+    pairs = [(a, b) for pair in pairs for a,
+             b in zip(list_ancestors(parents, pair[0]), list_ancestors(parents, pair[1])) if a != b]
     known = {joint for pair in pairs for joint in pair}
     while pairs:
         a, b = pairs.pop()

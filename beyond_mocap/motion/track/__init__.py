@@ -7,9 +7,15 @@
 
 from .cleaning import MAX_SPEED, DataReport, clean_track
 from .data import BALL_RADIUS, SampledTrack, Track, is_ball_sentinel
-from .sampling import SMOOTHING_SECONDS, sample_track, smooth_positions, compute_travel_direction, smooth_zero_phase_hann
+from .sampling import (
+    SMOOTHING_SECONDS,
+    compute_travel_direction,
+    sample_track,
+    smooth_positions,
+    smooth_zero_phase_hann,
+)
 
 __all__ = [
-    "BALL_RADIUS", "MAX_SPEED", "SMOOTHING_SECONDS", "DataReport", "SampledTrack", "Track", "is_ball_sentinel", "clean_track",
-    "sample_track", "smooth_positions", "compute_travel_direction", "smooth_zero_phase_hann",
+    "BALL_RADIUS", "MAX_SPEED", "SMOOTHING_SECONDS", "DataReport", "SampledTrack", "Track", "is_ball_sentinel",
+    "clean_track", "sample_track", "smooth_positions", "compute_travel_direction", "smooth_zero_phase_hann",
 ]

@@ -170,7 +170,8 @@ def _detect_outliers(times: np.ndarray, positions: np.ndarray) -> tuple[np.ndarr
         elif np.linalg.norm(excess[place]) > _SNAP_LIMIT:
             too_far.append(float(times[left[jump + 1]]))
         else:
-            wrong[left[_find_coasted_samples(times[left], positions[left], jump, float(np.linalg.norm(excess[place])))]] = True
+            wrong[left[_find_coasted_samples(times[left], positions[left], jump,
+                                             float(np.linalg.norm(excess[place])))]] = True
     return wrong, tuple(too_far)
 
 
@@ -188,7 +189,7 @@ def _detect_spikes(times: np.ndarray, positions: np.ndarray) -> np.ndarray:
     if len(times) < 5:
         return wrong
     off = _measure_line_distance(times[1:-1], positions[1:-1], times[:-2], place_a=positions[:-2], time_b=times[2:],
-                    place_b=positions[2:])
+                                 place_b=positions[2:])
     first, last = (
         _measure_line_distance(
             times[i], positions[i], times[j], place_a=positions[j], time_b=times[k], place_b=positions[k],
@@ -310,8 +311,8 @@ def _build_report(track: Track, notes: list[str], snaps: tuple[float, ...], drop
     gaps = _find_gaps(track)
     warnings = _collect_warnings(track, snaps, gaps)
     return DataReport(
-        lines=(*notes, *_describe_replacements(track), *warnings), rate=1.0 / track.interval, dropped=dropped, merged=merged,
-        filled=int(track.filled.sum()), outliers=int(track.outlier.sum()), gaps=gaps,
+        lines=(*notes, *_describe_replacements(track), *warnings), rate=1.0 / track.interval, dropped=dropped,
+        merged=merged, filled=int(track.filled.sum()), outliers=int(track.outlier.sum()), gaps=gaps,
         ball_unknown=int(np.count_nonzero(_find_missing_ball(track))), warnings=tuple(warnings),
     )
 
@@ -334,10 +335,12 @@ def _collect_warnings(track: Track, snaps: tuple[float, ...], gaps) -> list[Time
     out = []
     if snaps:
         out.append(
-            TimedMessage(f"steps of more than {_SNAP_LIMIT:g} m left as they are: {_describe_times(snaps)}", *zip(snaps, snaps))
+            TimedMessage(f"steps of more than {_SNAP_LIMIT:g} m left as they are: {_describe_times(snaps)}",
+                         *zip(snaps, snaps))
         )
     if len(fast):
-        out.append(TimedMessage(f"faster than {MAX_SPEED:g} m/s in {len(fast)} samples: {_describe_times(fast)}", *zip(fast, fast)))
+        out.append(TimedMessage(f"faster than {MAX_SPEED:g} m/s in {len(fast)} samples: {_describe_times(fast)}",
+                                *zip(fast, fast)))
     return out + [TimedMessage(f"no samples from {a:.2f} to {b:.2f} s", (a, b)) for a, b in gaps if b - a > LONG_GAP]
 
 

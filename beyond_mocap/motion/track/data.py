@@ -130,7 +130,8 @@ def is_ball_sentinel(ball: np.ndarray) -> np.ndarray:
     """
     is_known = np.isfinite(ball[:, :2]).all(axis=1)
     with np.errstate(invalid="ignore"):
-        return is_known & ((np.abs(ball) > _MAX_BALL_DISTANCE).any(axis=1) | (ball[:, 2] < -1.0) | _is_parked_at_origin(ball))
+        return is_known & ((np.abs(ball) > _MAX_BALL_DISTANCE).any(axis=1) | (ball[:, 2] < -1.0)
+                           | _is_parked_at_origin(ball))
 
 
 def _is_parked_at_origin(ball: np.ndarray) -> np.ndarray:

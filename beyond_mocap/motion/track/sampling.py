@@ -42,7 +42,8 @@ def sample_track(track: Track, fps: float, window: float = SMOOTHING_SECONDS) ->
         InputError: with fewer than two measured samples, or for a track longer than six hours.
     """
     times, fine_times, step = _build_time_grids(track, fps)
-    positions = smooth_positions(interpolate_columns(fine_times, track.times, track.positions), fps * step, window)[::step]
+    positions = smooth_positions(interpolate_columns(fine_times, track.times, track.positions), fps * step,
+                                 window)[::step]
     measured = track.measured
     velocity = np.broadcast_to((positions[-1] - positions[0]) * fps, positions.shape)  # of one or two frames
     if len(times) > 2:
@@ -50,8 +51,9 @@ def sample_track(track: Track, fps: float, window: float = SMOOTHING_SECONDS) ->
     speed = np.linalg.norm(velocity, axis=1)
     ball, ball_measured = _sample_ball(track, times)
     return SampledTrack(
-        times=times, positions=positions, raw=interpolate_columns(times, track.times[measured], track.positions[measured]),
-        velocity=velocity, speed=speed, direction=compute_travel_direction(velocity, fps),
+        times=times, positions=positions, raw=interpolate_columns(times, track.times[measured],
+                                                                  track.positions[measured]), velocity=velocity,
+        speed=speed, direction=compute_travel_direction(velocity, fps),
         valid=_is_within_gap(times, track.times[measured], max(GAP_INTERVALS * track.interval, LONG_GAP)), ball=ball,
         ball_measured=ball_measured, fps=float(fps),
     )

@@ -169,7 +169,8 @@ class BvhStream:
         if self._text is None:
             return self._count_invalid("frames before any hierarchy: restart the sender, or choose the suit's BVH file")
         if len(values) != self._columns:
-            return self._count_invalid(f"{len(values)} numbers in a frame; expected {self._columns} as in the hierarchy")
+            return self._count_invalid(
+                f"{len(values)} numbers in a frame; expected {self._columns} as in the hierarchy")
         if not np.all(np.abs(values) < _LARGEST_VALUE):  # true for NaN as well
             return self._count_invalid("NaN, infinite or impossibly large numbers")
         if self.rows is None and not self._build_rows(values):

@@ -182,8 +182,8 @@ class Listener:
         if state == "receiving" and idle > STALL_SECONDS:
             state = "stalled"
         delay = statistics.median(delays) if delays else None
-        return StreamStatus(state=state, frames=count, rate=rate, idle=idle, delay=delay, invalid_count=self.stream.invalid_count,
-                      line=self._describe(state, rate, idle))
+        return StreamStatus(state=state, frames=count, rate=rate, idle=idle, delay=delay,
+                            invalid_count=self.stream.invalid_count, line=self._describe(state, rate, idle))
 
     def _describe(self, state: str, rate: float, idle: float) -> str:
         """Describe the state in one line for the user."""
@@ -205,7 +205,8 @@ class Listener:
     def _receive(self) -> None:
         """Receive until stopped; an error ends in the state "failed"."""
         try:
-            {"udp": self._receive_datagrams, "tcp": self._accept_connections, "call": self._call_sender}[self.protocol]()
+            {"udp": self._receive_datagrams, "tcp": self._accept_connections,
+             "call": self._call_sender}[self.protocol]()
         except Exception as error:  # a thread that ends silently would look like a waiting stream
             self._state, self._reason = "failed", f"{type(error).__name__}: {error}"
         finally:
@@ -288,7 +289,7 @@ class Listener:
                 if self._ring and frame.rows is not self._ring[-1].rows:
                     self._ring.clear()  # another skeleton: frames of the old one do not fit
                 self._ring.append(StreamFrame(number=self._count, time=now, sent=_to_monotonic(frame.sent, now),
-                                          values=frame.values, rows=frame.rows))
+                                              values=frame.values, rows=frame.rows))
                 while now - self._ring[0].time > self.seconds:
                     self._ring.popleft()
             self._state = "receiving"

@@ -12,7 +12,7 @@ import numpy as np
 from ...ball.contact import Tool
 from ...motion.motion import Motion
 from ..hits import HitMotion, detect_hits
-from .listener import StreamFrame, Listener, convert_poses
+from .listener import Listener, StreamFrame, convert_poses
 
 WINDOW = 4.0
 """Seconds of the stream that are analysed."""

@@ -40,7 +40,8 @@ class Sender:
     def __init__(self, path, port: int, connection: str = "udp", form: str = "bvh", rate: float | None = None,
                  loop: bool = False):
         if connection not in CONNECTIONS or form not in FORMS:
-            raise InputError("stream", f"{connection}, {form}", f"one of {', '.join(CONNECTIONS)} and one of {', '.join(FORMS)}")
+            raise InputError("stream", f"{connection}, {form}",
+                             f"one of {', '.join(CONNECTIONS)} and one of {', '.join(FORMS)}")
         text = bvh_text.read_bvh_text(path)
         self.path, self.port, self.connection, self.form, self.loop = Path(path), int(port), connection, form, loop
         self.frame_time = text.frame_time if rate is None else 1.0 / rate

@@ -24,26 +24,26 @@ from ...library.library import Library
 from ...motion import quaternion
 from ...motion.foot_plant import PlantResult, plant_feet
 from ...motion.track import SampledTrack
-from ..own_size import scale_ball
+from ..body_size import scale_ball
 from ..plan import ResolvedPlan
 from ..search.edit_list import EditList
-from ..search.footage import SourceMotion, SourceFrames, fetch_overlap
-from ..search.wanted import SearchRequest, compute_needed_frames
+from ..search.request import SearchRequest, compute_needed_frames
+from ..search.source_frames import SourceFrames, SourceMotion, fetch_overlap
 from ..take import KeyResult
-from .hand_over import OldMotion
-from .on_track import (
+from .edit_blending import OldMotion
+from .extra_steps import Steps, add_steps
+from .strike import Touch, strike_ball
+from .track_following import (
     absorb_foot_slide,
-    fit_heading,
-    lean_into_curves,
-    compute_missing_lean,
-    pull_to_track,
     add_sway,
+    compute_missing_lean,
     compute_turn_to_ball,
     compute_turning_firmness,
+    fit_heading,
+    lean_into_curves,
+    pull_to_track,
 )
-from .steps import Steps, add_steps
-from .strike import Touch, strike_ball
-from .transitions import compute_blend_share, blend_rotations, blend_values
+from .transitions import blend_rotations, blend_values, compute_blend_share
 
 REACH_SECONDS = 0.4  # s on either side of a key moment without a clip, in which the body reaches for the ball and returns
 
@@ -119,8 +119,9 @@ class Construction:
         skeleton, root, ball = self.library.skeleton, planted.root, track.ball
         if size != 1.0:  # solved in the player's size: the ball is the same for tall and short players
             skeleton, root, ball = skeleton.scale(size), root * size, scale_ball(ball, size)
-        contact = strike_ball(skeleton, root, planted.rotations, contacts=steps_taken.heel_toe_contacts.any(axis=2), ball=ball,
-                        touches=self.touches, fps=self.plan.fps, measured=track.ball_measured, height_known=is_height_known)
+        contact = strike_ball(skeleton, root, planted.rotations, contacts=steps_taken.heel_toe_contacts.any(axis=2),
+                              ball=ball, touches=self.touches, fps=self.plan.fps, measured=track.ball_measured,
+                              height_known=is_height_known)
         root, ball = (contact.root, contact.ball) if size == 1.0 else (contact.root / size, contact.ball / size)
         return replace(planted, root=root, rotations=contact.rotations), ball
 
@@ -141,9 +142,10 @@ class Construction:
     def _turn_to_ball(self, heading: np.ndarray) -> np.ndarray:
         """Compute the extra turn (T,) rad to the ball for a heading (T,) rad."""
         ground = add_sway(self.track.positions, self.smooth_source.sway, heading)
-        root, pose = np.column_stack([ground, self.smooth_source.height]), apply_heading(self.smooth_source.pose, heading)
+        root, pose = np.column_stack([ground, self.smooth_source.height]), apply_heading(self.smooth_source.pose,
+                heading)
         return compute_turn_to_ball(self.library.skeleton, root, pose, ball=self.track.ball, touches=self.touches,
-                            fps=self.track.fps)
+                                    fps=self.track.fps)
 
     def _pull_to_track(self, ground: np.ndarray) -> np.ndarray:
         """Remove the slow drift of the root, ground (T, 2) m, from the track."""
@@ -155,8 +157,8 @@ class Construction:
     def _lean_into_curves(self, pose: np.ndarray) -> np.ndarray:
         """Lean the body (T, J, 4) into the track's curves by what its source lacks."""
         track, smooth = self.track, self.smooth_source
-        lean = compute_missing_lean(track.speed, track.direction, smooth.velocity, turn=smooth.turn, transitions=smooth.transitions,
-                            fps=self.plan.fps)
+        lean = compute_missing_lean(track.speed, track.direction, smooth.velocity, turn=smooth.turn,
+                                    transitions=smooth.transitions, fps=self.plan.fps)
         return lean_into_curves(self.library.skeleton, pose, track.direction, lean)
 
     def _plant_feet(self, root: np.ndarray, pose: np.ndarray) -> tuple[PlantResult, Steps]:
@@ -168,12 +170,15 @@ class Construction:
         for touch in self.touches:
             free &= (at < touch.frame - touch.entry) | (at > touch.frame + touch.leave)
         old_steps = None if self.old is None else self.old.select_old_steps()
-        steps_taken = add_steps(skeleton, root, pose, heel_toe_contacts=heel_toe_contacts, fps=fps, steps_taken=old_steps, free=free)
+        steps_taken = add_steps(skeleton, root, pose, heel_toe_contacts=heel_toe_contacts, fps=fps,
+                                steps_taken=old_steps, free=free)
         root = root + np.column_stack([(1.0 - share)[:, None] * steps_taken.sway, np.zeros(len(root))])
         root, pose = self._absorb_foot_slide(root, steps_taken, 1.0 - share)
-        return plant_feet(skeleton, root, pose, steps_taken.heel_toe_contacts, fps, foot_moves=steps_taken.moves), steps_taken
+        return plant_feet(skeleton, root, pose, steps_taken.heel_toe_contacts, fps,
+                          foot_moves=steps_taken.moves), steps_taken
 
-    def _absorb_foot_slide(self, root: np.ndarray, steps_taken: Steps, free: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    def _absorb_foot_slide(self, root: np.ndarray, steps_taken: Steps, free: np.ndarray) -> tuple[np.ndarray,
+            np.ndarray]:
         """Move and turn the body a little where its feet would slide.
 
         Args:
@@ -183,7 +188,8 @@ class Construction:
         Returns:
             Root (T, 3) m and local rotations (T, J, 4).
         """
-        move, turn = absorb_foot_slide(self.library.skeleton, root, steps_taken.rotations, steps_taken.heel_toe_contacts, self.plan.fps)
+        move, turn = absorb_foot_slide(self.library.skeleton, root, steps_taken.rotations,
+                                       steps_taken.heel_toe_contacts, self.plan.fps)
         pulled = pull_to_track(root[:, :2] + move, self.track.raw, self.plan.fps, self.plan.requested.root_window)
         ground = root[:, :2] + free[:, None] * (pulled - root[:, :2])
         return np.concatenate([ground, root[:, 2:]], axis=1), apply_heading(steps_taken.rotations, free * turn)
@@ -246,7 +252,8 @@ def find_touches(library: Library, fps: float, edit: EditList, keys: tuple[KeyRe
     return tuple(found)
 
 
-def build_key_results(library: Library, fps: float, request: SearchRequest, edit: EditList, shown_frames: SourceFrames) -> tuple[KeyResult, ...]:
+def build_key_results(library: Library, fps: float, request: SearchRequest, edit: EditList,
+                      shown_frames: SourceFrames) -> tuple[KeyResult, ...]:
     """Report the result of every key moment of a request.
 
     Args:
@@ -260,7 +267,8 @@ def build_key_results(library: Library, fps: float, request: SearchRequest, edit
                  for number in range(len(request.keys)))
 
 
-def _build_key_result(library: Library, fps: float, request: SearchRequest, edit: EditList, shown_frames: SourceFrames, number: int) -> KeyResult:
+def _build_key_result(library: Library, fps: float, request: SearchRequest, edit: EditList, shown_frames: SourceFrames,
+                      number: int) -> KeyResult:
     """Report one key moment: where its clip's key frame is played, or what is shown in its place."""
     key = request.keys[number]
     at = key.frame * fps / library.fps
@@ -275,5 +283,5 @@ def _build_key_result(library: Library, fps: float, request: SearchRequest, edit
         clip_frame = placed.key.frame
     source = library.clips[clip]
     instead = words if key.used_instead and not key.choices else key.used_instead
-    return KeyResult(requested=key.requested, frame=at, clip=source.path, clip_frame=clip_frame, mirrored=source.mirrored,
-                     words=words, used_instead=instead)
+    return KeyResult(requested=key.requested, frame=at, clip=source.path, clip_frame=clip_frame,
+                     mirrored=source.mirrored, words=words, used_instead=instead)

@@ -14,8 +14,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from ...motion.skeleton import Skeleton
-from .dribble_search import SOONEST, DribblePart, Legs, Push, DribbleSearch
-from .meeting import move_ball_at
+from .contact_geometry import move_ball_at
+from .dribble_search import SOONEST, DribblePart, DribbleSearch, Legs, Push
 
 KEY_SECONDS = 0.5  # s from either end of a stretch within which a key moment begins or ends the dribble
 _BEYOND = 0.3  # s beyond an open end of a part in which the ball is still kept out of the body
@@ -63,8 +63,8 @@ def plan_dribbles(
         for part in _split_at_touches(low, high, held, len(path), fps):
             if not np.isfinite(path[part.low : part.high + 1]).all():
                 continue
-            search = DribbleSearch(skeleton, root, rotations, foot_contacts=foot_contacts, path=path, measured=measured, part=part,
-                            fps=fps)
+            search = DribbleSearch(skeleton, root, rotations, foot_contacts=foot_contacts, path=path, measured=measured,
+                                   part=part, fps=fps)
             found = search.run()
             if found is None:
                 continue
@@ -95,7 +95,8 @@ def _split_at_touches(low: float, high: float, held, count: int, fps: float) -> 
     return out
 
 
-def _lead_open_ends(path, feed, part: DribblePart, first: int, last: int, others: Sequence[float], fps: float) -> np.ndarray:
+def _lead_open_ends(path, feed, part: DribblePart, first: int, last: int, others: Sequence[float],
+                    fps: float) -> np.ndarray:
     """Lead the trajectory to the first touch and away from the last where a part has open ends.
 
     first, last: frames counted from the part's beginning.
@@ -111,7 +112,8 @@ def _lead_open_ends(path, feed, part: DribblePart, first: int, last: int, others
 
 
 def _keep_out_of_body(
-    skeleton: Skeleton, root, rotations, path: np.ndarray, part: DribblePart, held: Sequence[tuple[int, int]], fps: float
+    skeleton: Skeleton, root, rotations, path: np.ndarray, part: DribblePart, held: Sequence[tuple[int, int]],
+    fps: float
 ) -> np.ndarray:
     """Lead the trajectory around the body; where the ball is `held` it stays.
 

@@ -9,15 +9,15 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ...annotation.striking import Surface, find_nearest_point, build_part_surfaces
-from ...ball.roll import simulate_rolls, compute_roll_speeds
+from ...annotation.striking import Surface, build_part_surfaces, find_nearest_point
+from ...ball.roll import compute_roll_speeds, simulate_rolls
 from ...base.time_series import find_runs
 from ...motion.humanoid import compute_heading_from_positions, identify_joints
 from ...motion.motion import compute_pose
 from ...motion.skeleton import Skeleton
 from ...motion.track import BALL_RADIUS, smooth_zero_phase_hann
-from .carry import foot_tip_line
-from .meeting import find_touching_places
+from .contact_geometry import find_touching_places
+from .move_body_part import foot_tip_line
 
 SOONEST, _LATEST = 0.2, 1.3  # s, shortest and longest roll from one touch to the next
 _ANGLES = np.radians([0.0, 35.0, -35.0, 65.0, -65.0])  # sides of the ball that are tried, from straight ahead
@@ -190,7 +190,8 @@ class Legs:
 
 def _smooth_velocity(places: np.ndarray, fps: float) -> np.ndarray:
     """Compute the velocity (W, 2) m/s without the sway of steps (0.6 s Hann window)."""
-    return np.gradient(smooth_zero_phase_hann(places, fps, 0.6), axis=0) * fps if len(places) > 2 else np.zeros_like(places)
+    return np.gradient(smooth_zero_phase_hann(places, fps, 0.6),
+                       axis=0) * fps if len(places) > 2 else np.zeros_like(places)
 
 
 class DribbleSearch:
@@ -268,7 +269,8 @@ class DribbleSearch:
         Where the player hardly moves, frames in contact are added as (frame, frame + 1, number, 1): there the foot may
         touch the ball without a swing. Numbers are unique over both feet.
         """
-        air = [(first, end, 2 * number + side, 0) for number, (first, end) in enumerate(find_runs(~self.foot_contacts[:, side]))]
+        air = [(first, end, 2 * number + side, 0) for number,
+               (first, end) in enumerate(find_runs(~self.foot_contacts[:, side]))]
         step = max(int(_STANDING_STEP * self.fps), 1)
         still = [f for f in range(0, self.count, step) if self.foot_contacts[f, side] and self.body.speed[f] < SLOW]
         return [*air, *((frame, frame + 1, 2 * (self.count + frame) + side, 1) for frame in still)]
@@ -407,7 +409,8 @@ class DribbleSearch:
         starts = np.where((sources == _START)[:, None], self.feed[0], self.place[sources])
         frames = frame - np.where(sources == _START, 0, self.frame[sources])
         speeds = compute_roll_speeds(starts[:, None], ends, frames[:, None] / self.fps)
-        least = np.where(sources == _START, 0.0, self.push_cost[sources])[:, None] + self._evaluate_launch(sources, speeds.start_velocity)
+        least = np.where(sources == _START, 0.0, self.push_cost[sources])[:, None] + self._evaluate_launch(sources,
+                speeds.start_velocity)
         least += _LONG_COST * np.maximum(frames / self.fps - _LONG, 0.0)[:, None]
         if swing is not None:
             least[(self.swing[sources][:, None] == swing) & (sources != _START)[:, None]] = np.inf
@@ -423,7 +426,8 @@ class DribbleSearch:
             target, row = target[hopeful], row[hopeful]
             if not len(row):
                 break
-            whole = least[row, target] + self._evaluate_rolls(starts[row], ends[target], frame - frames[row], frames[row])
+            whole = least[row, target] + self._evaluate_rolls(starts[row], ends[target], frame - frames[row],
+                                                              frames[row])
             # from the most expensive to the cheapest, so that the cheapest is written last
             for one in np.argsort(whole, kind="stable")[::-1]:
                 if whole[one] < costs[target[one]]:
@@ -431,7 +435,8 @@ class DribbleSearch:
                     arrives[target[one]] = speeds.end_velocity[row[one], target[one]]
         return costs, origins, arrives
 
-    def _evaluate_rolls(self, starts: np.ndarray, ends: np.ndarray, since: np.ndarray, frames: np.ndarray) -> np.ndarray:
+    def _evaluate_rolls(self, starts: np.ndarray, ends: np.ndarray, since: np.ndarray,
+                        frames: np.ndarray) -> np.ndarray:
         """Compute the cost (P,) of the trajectories of P rolls.
 
         Args:

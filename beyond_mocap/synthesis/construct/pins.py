@@ -22,7 +22,7 @@ from ...motion.humanoid import Humanoid, compute_heading_from_positions, identif
 from ...motion.limb import solve_two_bone
 from ...motion.motion import Motion, compute_pose
 from ...motion.skeleton import Skeleton
-from .carry import arm_chain, list_joint_chain, leg_chain
+from .move_body_part import arm_chain, leg_chain, list_joint_chain
 
 FADE = 0.3  # s before and after a pin in which the body comes to it and leaves it
 MAX_BEND, MAX_SHIFT = 0.6, 0.25  # largest rad of the spine and m of the pelvis for a pin out of reach
@@ -185,9 +185,11 @@ class _PinSolver:
         """
         # goals of limbs, places of soles and rotations of feet before anything moves
         part = _FrameRange(self.skeleton, self.body, self.root[low:high], self.rotations[low:high])
-        chains = {part: chain for part, chain in _limb_chains(self.body).items() if part in targets and None not in chain}
+        chains = {part: chain for part, chain in _limb_chains(self.body).items() if part in targets
+                  and None not in chain}
         goals = {name: part.compute_goal(chain[-1], targets[name]) for name, chain in chains.items()}
-        soles = {name: part.places[:, chain[-1]].copy() for name, chain in _limb_chains(self.body).items() if "foot" in name}
+        soles = {name: part.places[:, chain[-1]].copy() for name, chain in _limb_chains(self.body).items()
+                 if "foot" in name}
         soles.update({name: goal for name, goal in goals.items() if "foot" in name})
         turns = {name: part.world[:, _limb_chains(self.body)[name][-1]].copy() for name in soles}
         share = {name: targets[name].share for name in goals}
@@ -298,7 +300,8 @@ class _FrameRange:
                 off[gap] = (after + before) * found.share[gap, None]
         return own + off
 
-    def _offset_beside_pin(self, off: np.ndarray, own: np.ndarray, edge: int, gap: np.ndarray, held: bool) -> np.ndarray:
+    def _offset_beside_pin(self, off: np.ndarray, own: np.ndarray, edge: int, gap: np.ndarray,
+                           held: bool) -> np.ndarray:
         """Compute the offset (G, 3) m of a limb in the frames `gap` next to a pin's frame `edge`.
 
         It is that at the pin; next to a pin that holds it glides a little further, so that the limb comes to rest and
@@ -344,7 +347,8 @@ class _FrameRange:
         drop = np.zeros(len(root))
         for side, name in enumerate(("left_foot", "right_foot")):
             # contacts smoothed over 0.3 s, so that the pelvis sinks and rises gradually
-            contact_weight = np.convolve(np.pad(contacts[:, side].astype(float), len(window) // 2, mode="edge"), window, "same")
+            contact_weight = np.convolve(np.pad(contacts[:, side].astype(float), len(window) // 2, mode="edge"), window,
+                                         "same")
             contact_weight = contact_weight[len(window) // 2 : len(window) // 2 + len(root)] / window.sum()
             hip, bones = self.places[:, chains[name][0]], self._limb_length(chains[name])
             own = np.linalg.norm(hip + root - self.root - soles[name], axis=1)
@@ -398,7 +402,7 @@ class _FrameRange:
         if not np.any(share > 0.0):
             return
         found = solve_two_bone(self.skeleton, self.root, self.rotations, chain, goal, end_rotation=turn,
-                         keep_end_rotation=False, soft=_SOFT).rotations
+                               keep_end_rotation=False, soft=_SOFT).rotations
         weight = smoothstep(4.0 * share)
         for joint in list_joint_chain(self.skeleton, chain[0], chain[-1]):
             near = quaternion.match_signs(found[:, joint], self.rotations[:, joint])

@@ -15,29 +15,38 @@ from functools import partial
 
 import numpy as np
 
-from ...annotation.ball_contact import uses_both_hands, measure_contact_gap, find_contact_window, build_surfaces
+from ...annotation.ball_contact import build_surfaces, find_contact_window, measure_contact_gap, uses_both_hands
 from ...annotation.labels import list_labels
-from ...annotation.striking import Surface, measure_ball_gap, build_part_surfaces
+from ...annotation.striking import Surface, build_part_surfaces, measure_ball_gap
 from ...base.vectors import unit_vector
 from ...motion.humanoid import compute_heading_from_positions, identify_joints
 from ...motion.motion import compute_pose
 from ...motion.skeleton import Skeleton
 from ...motion.track import BALL_RADIUS
-from .carry import (
+from .contact_geometry import (
+    Aim,
+    BallRange,
+    add_flight_arc,
+    choose_aim,
+    ease_around,
+    place_between_hands,
+    shift_ball_eased,
+    solve_contacts,
+)
+from .move_body_part import (
     MAX_ANGLE,
     MAX_SWING,
     Body,
     LimbReference,
     Swing,
-    limit_to_ground,
-    hold_foot,
-    move_limb,
-    limb_chain,
     bend_spine,
-    solve_swing,
     compute_swing_shift,
+    hold_foot,
+    limb_chain,
+    limit_to_ground,
+    move_limb,
+    solve_swing,
 )
-from .meeting import Aim, BallRange, choose_aim, ease_around, place_between_hands, add_flight_arc, solve_contacts, shift_ball_eased
 
 BALL_NOISE, FILLED_NOISE = 0.3, 1.0
 """Metres that the ball may be moved from its place, where it was measured and where the feed has filled it in."""
@@ -127,7 +136,7 @@ def strike_ball(
         span = slice(max(moment.low, 0), min(moment.high, count - 1) + 1)
         body = Body.from_pose(skeleton, root[span], rotations[span])
         scene = _build_problem(body, moment, span.start, contacts=contacts[span], path=path, measured=measured,
-                       height_known=height_known, fps=fps)
+                               height_known=height_known, fps=fps)
         reached, moved[number] = _reach_ball(scene, body)
         root[span], rotations[span] = reached.root, reached.rotations
         places = [scene.solve_ball(scene.surface_lines(reached, frame), frame)[0] for frame in moment.held]
@@ -141,7 +150,8 @@ def _move_to_contact(skeleton: Skeleton, root, rotations, feed, touch: Touch, fp
 
     Only where the labels allow for that and the ball is out of reach at the key moment itself.
     """
-    first, last = _nearest_frame(touch.frame, len(root)), _nearest_frame(touch.frame + find_contact_window(touch.words) * fps, len(root))
+    first, last = _nearest_frame(touch.frame, len(root)), _nearest_frame(touch.frame + find_contact_window(touch.words)
+                                                                         * fps, len(root))
     if first == last or not np.isfinite(feed[first : last + 1]).all():
         return touch
     places, world = compute_pose(skeleton, root[first : last + 1], rotations[first : last + 1])
@@ -185,8 +195,8 @@ def _iter_touch_frames(skeleton: Skeleton, touches: Sequence[Touch], count: int,
         before, after = ends[place][1], ends[place + 2][0]
         low = max(int(first - np.clip(touch.entry, shortest, longest)), before)
         high = min(int(np.ceil(last + np.clip(touch.leave, shortest, longest))), after)
-        yield number, _TouchFrames(words=frozenset(touch.words), frame=_nearest_frame(frame, count), held=held[place], low=low,
-                              high=high, bounds=(before, after))
+        yield number, _TouchFrames(words=frozenset(touch.words), frame=_nearest_frame(frame, count), held=held[place],
+                                   low=low, high=high, bounds=(before, after))
 
 
 def _nearest_frame(frame: float, count: int) -> int:
@@ -247,7 +257,8 @@ class _TouchProblem:
         part, ball, room = self.parts[0], self.ball[frame], self.ball_range(frame)
         if len(lines) == 2:
             return place_between_hands(lines, part.radius, ball, room)
-        solved = solve_contacts(lines[0], part.radius, [self.aim], rise=_RISE[part.part], ball=ball, ball_range=room, avoid=self.avoid)
+        solved = solve_contacts(lines[0], part.radius, [self.aim], rise=_RISE[part.part], ball=ball, ball_range=room,
+                                avoid=self.avoid)
         return solved.ball[0], solved.need
 
     def ball_range(self, frame: int) -> BallRange:
@@ -256,14 +267,16 @@ class _TouchProblem:
         return BallRange(whole, BALL_NOISE if self.ball[frame, 2] > _IN_THE_AIR else 0.0)
 
 
-def _build_problem(body: Body, moment: _TouchFrames, origin: int, contacts, path, measured, height_known, fps: float) -> _TouchProblem:
+def _build_problem(body: Body, moment: _TouchFrames, origin: int, contacts, path, measured, height_known,
+                   fps: float) -> _TouchProblem:
     """Build the scene of a touch: choose parts and aim."""
     at, choices = moment.frame - origin, build_surfaces(body.skeleton, moment.words)
     if choices[0].part == "hand" and _use_both_hands(body, choices, at, moment.words):
         parts = choices
     else:
         parts = (_choose_part(body, choices, at, contacts=contacts, ball=path[moment.frame], fps=fps),)
-    shares = tuple(_compute_share(moment, origin, len(body.root), _is_in_contact(contacts, part), fps) for part in parts)
+    shares = tuple(_compute_share(moment, origin, len(body.root), _is_in_contact(contacts, part), fps)
+                   for part in parts)
     line, radius = body.surface_line(parts[0], at), parts[0].radius
     if parts[0].part != "foot" or _HIGH & moment.words:
         # without a measured height the ball flies through the part's height
@@ -271,12 +284,13 @@ def _build_problem(body: Body, moment: _TouchFrames, origin: int, contacts, path
         path = add_flight_arc(path, moment.frame, float(height), ~height_known, fps)
     ahead = _choose_direction(body, parts[0], moment, at=at, path=path, fps=fps)
     avoid = _other_leg_lines(body, parts[0], at) if parts[0].part == "foot" else []
-    scene = _TouchProblem(moment=moment, parts=parts, shares=shares, ball=path, measured=measured, aim=Aim(ahead), avoid=avoid,
-                   origin=origin)
+    scene = _TouchProblem(moment=moment, parts=parts, shares=shares, ball=path, measured=measured, aim=Aim(ahead),
+                          avoid=avoid, origin=origin)
     if len(parts) == 2:
         return scene
     aim = choose_aim(line, radius, ahead, rise=_RISE[parts[0].part], ball=path[moment.frame],
-                   ball_range=scene.ball_range(moment.frame), avoid=avoid, possible=partial(_limit_shift, body, parts[0], at))
+                     ball_range=scene.ball_range(moment.frame), avoid=avoid,
+                     possible=partial(_limit_shift, body, parts[0], at))
     return replace(scene, aim=aim)
 
 
@@ -298,7 +312,8 @@ def _choose_part(body: Body, choices: Sequence[Surface], at: int, contacts, ball
     """Choose the part nearest to the ball, a swinging foot before one in contact."""
     def cost(part: Surface) -> float:
         gap = float(measure_ball_gap(body.surface_line(part, at), part.radius, ball))
-        return gap + 0.3 * _is_in_contact(contacts, part)[at] - 0.05 * np.linalg.norm(_part_velocity(body, part, at, fps))
+        return gap + 0.3 * _is_in_contact(contacts, part)[at] - 0.05 * np.linalg.norm(_part_velocity(body, part, at,
+                fps))
 
     return min(choices, key=cost)
 
@@ -333,7 +348,8 @@ def _part_velocity(body: Body, part: Surface, at: int, fps: float) -> np.ndarray
     return (middle[-1] - middle[0]) * fps / max(len(middle) - 1, 1)
 
 
-def _choose_direction(body: Body, part: Surface, moment: _TouchFrames, at: int, path: np.ndarray, fps: float) -> np.ndarray:
+def _choose_direction(body: Body, part: Surface, moment: _TouchFrames, at: int, path: np.ndarray,
+                      fps: float) -> np.ndarray:
     """Choose the direction (3,) level, unit, in which a part strikes.
 
     A kick drives the ball where the foot moves, corrected towards where it is seen to fly; a player who stops a ball
@@ -372,7 +388,8 @@ def _reach_ball(scene: _TouchProblem, body: Body) -> tuple[Body, float]:
     own = scene.surface_lines(body, scene.moment.frame)
     if np.linalg.norm(scene.solve_ball(own, scene.moment.frame)[1]) < _CLOSE:
         return body, 0.0
-    limbs = [LimbReference.from_body(body, limb_chain(body.skeleton, part)) for part in scene.parts if part.part in MAX_SWING]
+    limbs = [LimbReference.from_body(body, limb_chain(body.skeleton, part)) for part in scene.parts
+             if part.part in MAX_SWING]
     shifts, moved_body, lines = np.zeros((len(scene.parts), 3)), body, own
     for _ in range(_ROUNDS):
         requested = _solve_shifts(scene, body, lines, shifts)
@@ -386,7 +403,8 @@ def _reach_ball(scene: _TouchProblem, body: Body) -> tuple[Body, float]:
     if not np.array_equal(moved_body.root, body.root):  # the pelvis has sunk, the foot that does not strike stays
         human = identify_joints(body.skeleton)
         other = human.right if scene.parts[0].side == "left" else human.left
-        moved_body = Body.from_pose(body.skeleton, moved_body.root, hold_foot(body, other, moved_body.root, moved_body.rotations))
+        moved_body = Body.from_pose(body.skeleton, moved_body.root,
+                                    hold_foot(body, other, moved_body.root, moved_body.rotations))
     return moved_body, float(moved)
 
 
@@ -417,7 +435,8 @@ def _limit_shift(body: Body, part: Surface, at: int, shift: np.ndarray) -> np.nd
     if part.part == "foot":
         shift = limit_to_ground(body, part, at, _limit_pelvis_distance(body, part, at, shift))
     if part.part in MAX_SWING and None not in (chain := limb_chain(body.skeleton, part)):
-        shift = compute_swing_shift(body, chain, _solve_part_swing(body, part, at, shift), np.arange(len(body.root)) == at)[at]
+        shift = compute_swing_shift(body, chain, _solve_part_swing(body, part, at, shift), np.arange(len(body.root))
+                                    == at)[at]
     return shift
 
 

@@ -16,14 +16,15 @@ from ...motion.humanoid import identify_joints
 from ...motion.motion import compute_pose
 from ...motion.track import SampledTrack
 from ..plan import ResolvedPlan
-from ..search.footage import SourceMotion
 from ..search.locomotion import compute_travelled_distance
+from ..search.source_frames import SourceMotion
 from .construction import Construction, apply_heading
-from .on_track import fit_heading, add_sway
-from .steps import Steps
+from .extra_steps import Steps
+from .track_following import add_sway, fit_heading
 from .transitions import spread_rotations, spread_values
 
-UPRIGHT_COSINE = np.cos(np.radians(50.0))  # height of the trunk's unit vector below which a body is not upright (§3.2.6)
+UPRIGHT_COSINE = np.cos(
+    np.radians(50.0))  # height of the trunk's unit vector below which a body is not upright (§3.2.6)
 
 
 def construct_blocks(construction: Construction, travelled: np.ndarray | None) -> tuple[PlantResult, Steps]:
@@ -58,7 +59,8 @@ def _spread_transitions(plan: ResolvedPlan, source: SourceMotion) -> SourceMotio
     )
 
 
-def place_root_at_distance(track: SampledTrack, smooth_source: SourceMotion, travelled: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def place_root_at_distance(track: SampledTrack, smooth_source: SourceMotion, travelled: np.ndarray) -> tuple[np.ndarray,
+        np.ndarray]:
     """Place the root where the track has travelled a given distance.
 
     Args:

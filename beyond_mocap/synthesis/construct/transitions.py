@@ -143,7 +143,8 @@ def spread_values(
         (T, ...) without jumps.
     """
     out = np.array(values, dtype=float)
-    for transition, expected, reach in zip(transitions, ahead, compute_spread_reaches(transitions, len(values), longest)):
+    for transition, expected, reach in zip(transitions, ahead, compute_spread_reaches(transitions, len(values),
+            longest)):
         at, weight = _spread_window(transition, reach, len(values))
         out[at] += weight.reshape(-1, *[1] * (out.ndim - 1)) * (values[transition] - expected)
     return out
@@ -168,7 +169,8 @@ def spread_rotations(
     Source: Faustino 2024, eq. 26.
     """
     out = np.array(rotations, dtype=float)
-    for transition, expected, reach in zip(transitions, ahead, compute_spread_reaches(transitions, len(rotations), longest)):
+    for transition, expected, reach in zip(transitions, ahead, compute_spread_reaches(transitions, len(rotations),
+            longest)):
         at, weight = _spread_window(transition, reach, len(rotations))
         jump = quaternion.to_rotation_vector(quaternion.multiply(quaternion.inverse(expected), rotations[transition]))
         turn = quaternion.from_rotation_vector(weight[:, None, None] * jump)

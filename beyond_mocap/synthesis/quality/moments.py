@@ -8,13 +8,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ...annotation import KeyMoment
-from ...annotation.ball_contact import measure_contact_gap, choose_contact_labels, find_contact_window
+from ...annotation.ball_contact import choose_contact_labels, find_contact_window, measure_contact_gap
 from ...annotation.striking import build_part_surfaces, measure_smallest_gap
 from ...library.library import Library
-from ...library.made import SYNTHETIC_FOLDER
+from ...library.synthetic_clips import SYNTHETIC_FOLDER
 from ...motion.track import Track
 from ..take import DribbleTouch
-from .played import Playback, find_transitions, number_pieces
+from .playback import Playback, find_transitions, number_pieces
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -44,7 +44,8 @@ class KeyMomentResult:
     used_instead: tuple[str, ...] | None
 
 
-def evaluate_moments(played: Playback, keys: tuple[KeyMoment, ...], stride: np.ndarray, library: Library | None) -> list[KeyMomentResult]:
+def evaluate_moments(played: Playback, keys: tuple[KeyMoment, ...], stride: np.ndarray, library: Library
+                     | None) -> list[KeyMomentResult]:
     """Evaluate every requested key moment as it was played.
 
     Args:
@@ -67,7 +68,8 @@ def extend_with_synthetic(library: Library | None, played: Playback) -> Library 
     return library.with_synthetic_clips
 
 
-def _evaluate_moment(played: Playback, key: KeyMoment, number: np.ndarray, result, library: Library | None) -> KeyMomentResult:
+def _evaluate_moment(played: Playback, key: KeyMoment, number: np.ndarray, result, library: Library
+                     | None) -> KeyMomentResult:
     """Evaluate one key moment."""
     frame = _nearest_frame(played, (key.resolved_time - played.start_time) * played.motion.fps)
     run = np.flatnonzero(number == number[frame if result is None else _nearest_frame(played, result.frame)])
@@ -77,14 +79,14 @@ def _evaluate_moment(played: Playback, key: KeyMoment, number: np.ndarray, resul
     if found is None:
         known = played.clip[frame] >= 0
         clip, source = (played.clips[played.clip[frame]], float(played.clip_frame[frame])) if known else (None, None)
-        return KeyMomentResult(requested=key, frame=frame, clip=clip, clip_frame=source, played_at=np.nan, words=words, entry=frame,
-                      exit=frame, used_instead=instead)
+        return KeyMomentResult(requested=key, frame=frame, clip=clip, clip_frame=source, played_at=np.nan, words=words,
+                               entry=frame, exit=frame, used_instead=instead)
     inside = run[(played.clip_frame[run] >= found.start) & (played.clip_frame[run] <= found.end)]
     entry, leave = (inside[0], inside[-1]) if len(inside) else (frame, frame)
     at = find_crossing(played.clip_frame[run], played.times[run], found.frame)
     clip = played.clips[played.clip[run[0]]]
     return KeyMomentResult(requested=key, frame=frame, clip=clip, clip_frame=found.frame, played_at=at, words=words,
-                  entry=int(entry), exit=int(leave), used_instead=instead)
+                           entry=int(entry), exit=int(leave), used_instead=instead)
 
 
 def _nearest_frame(played: Playback, frame: float) -> int:
@@ -158,7 +160,8 @@ def measure_contact(played: Playback, moment: KeyMomentResult) -> tuple[float, f
     Returns:
         Seconds on the track's clock and m, as in `measure_ball_gap`; NaN without ball or part.
     """
-    last = min(moment.frame + int(find_contact_window(list_contact_labels(moment)) * played.motion.fps), len(played.motion) - 1)
+    last = min(moment.frame + int(find_contact_window(list_contact_labels(moment)) * played.motion.fps),
+               len(played.motion) - 1)
     frames = range(moment.frame, last + 1)
     gaps = [measure_ball_gap(played, replace(moment, frame=frame)) for frame in frames]
     if not np.isfinite(gaps).any():
@@ -190,12 +193,10 @@ def measure_dribble_touches(played: Playback, touches: Sequence[DribbleTouch], t
         from its samples where it begins, m.
     """
     return [
-        {
-            "time_s": float(played.times[touch.first]),
-            "side": touch.side,
-            "contact_gap_m": max(_measure_foot_gap(played, frame, touch.side) for frame in range(touch.first, touch.last + 1)),
-            "ball_shift_m": None if track is None else measure_ball_shift(played, touch.first, track),
-        } for touch in touches
+        {"time_s": float(played.times[touch.first]), "side": touch.side,
+         "contact_gap_m": max(_measure_foot_gap(played, frame, touch.side)
+                              for frame in range(touch.first, touch.last + 1)), "ball_shift_m": None if track is None
+         else measure_ball_shift(played, touch.first, track),} for touch in touches
     ]  # fmt: skip
 
 

@@ -16,7 +16,7 @@ from __future__ import annotations
 import numpy as np
 from scipy.ndimage import maximum_filter1d, uniform_filter1d
 
-from ...base.time_series import interpolate_columns, find_runs, time_derivative
+from ...base.time_series import find_runs, interpolate_columns, time_derivative
 from ...base.vectors import unit_vectors
 from ...motion import quaternion
 from ...motion.humanoid import identify_joints
@@ -128,7 +128,8 @@ def fill_from_nearest(values: np.ndarray) -> np.ndarray:
     return np.array([values[known[np.argmin(np.abs(known - k))]] for k in range(len(values))])
 
 
-def measure_speed_coverage(requested: np.ndarray, fastest: float, slowest: float, reach=(0.85, 1.15)) -> dict[str, float]:
+def measure_speed_coverage(requested: np.ndarray, fastest: float, slowest: float, reach=(0.85, 1.15)) -> dict[str,
+        float]:
     """Measure the shares of frames with a speed that the library cannot play within the warp limits.
 
     Args:
@@ -197,7 +198,8 @@ def compute_real_p95(windows: np.ndarray, speed: np.ndarray, least: int = 30) ->
     return fill_from_nearest(np.array([np.percentile(v, 95) if len(v) >= least else np.nan for v in values]))
 
 
-def compute_transition_ratios(values: np.ndarray, transitions: np.ndarray, speed: np.ndarray, real: np.ndarray) -> np.ndarray:
+def compute_transition_ratios(values: np.ndarray, transitions: np.ndarray, speed: np.ndarray,
+                              real: np.ndarray) -> np.ndarray:
     """Compute windowed jerk at each transition over the real p95 at that speed.
 
     Args:

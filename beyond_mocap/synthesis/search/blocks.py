@@ -26,9 +26,9 @@ from ...base.errors import UserCancelledError
 from ...library.clusters import BLOCK_LENGTHS
 from ...library.keys import Key
 from ...library.library import Library
-from .block_costs import AnnotationCost, compute_distances, measure_typical_distance, collect_windows
+from .block_costs import AnnotationCost, collect_windows, compute_distances, measure_typical_distance
 from .preferences import compute_weak_foot_cost
-from .wanted import SearchRequest, compute_needed_frames, library_frame
+from .request import SearchRequest, compute_needed_frames, library_frame
 
 MAX_CANDIDATES = 600  # blocks per slot, besides those next to key moments
 AVOIDED_COST = 1000.0
@@ -179,7 +179,8 @@ class BlockSearch:
                 entry, leave = compute_needed_frames(self.library, choice)
                 if -entry - length / 2 < middle - key.frame < leave + length / 2:
                     clip.append(choice.clip)
-                    start.append(int(round(library_frame(self.library, choice))) + slot * length - int(round(key.frame)))
+                    start.append(int(round(library_frame(self.library, choice))) + slot * length
+                                 - int(round(key.frame)))
         return self._select_inside(BlockCandidates(np.array(clip, int), np.array(start, int)), length)
 
     def _select_inside(self, blocks: BlockCandidates, length: int) -> BlockCandidates:
@@ -268,7 +269,8 @@ class BlockSearch:
                 blocks, which = self._thin_candidates(slot, length, candidates), []
             slots.append(blocks)
             keys.append(which)
-            cost = self.alpha * self.annotation.compute_block_costs(blocks.start, self.list_requested_labels(slot, length))
+            cost = self.alpha * self.annotation.compute_block_costs(blocks.start,
+                                                                    self.list_requested_labels(slot, length))
             cost += self.alpha * self._compute_style_cost(blocks.start)
             if which:
                 cost += np.concatenate([self._compute_foot_cost(*served) for served in which])
@@ -284,7 +286,8 @@ class BlockSearch:
         """Select at most MAX_CANDIDATES blocks, those with the best labels first, plus the ones beside key moments."""
         if len(candidates) > MAX_CANDIDATES:
             cost = self.annotation.compute_block_costs(candidates.start, self.list_requested_labels(slot, length))
-            cost += AVOIDED_COST * self._shows_avoided(candidates.start, slot, length) + self._compute_style_cost(candidates.start)
+            cost += AVOIDED_COST * self._shows_avoided(candidates.start, slot,
+                                                       length) + self._compute_style_cost(candidates.start)
             candidates = candidates.select(np.sort(np.argsort(cost, kind="stable")[:MAX_CANDIDATES]))
         beside = self._blocks_beside_keys(slot, length)
         return BlockCandidates(np.append(candidates.clip, beside.clip), np.append(candidates.start, beside.start))

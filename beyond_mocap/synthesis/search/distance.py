@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 
 from ...library.library import Library
-from .blocks import FINEST_LENGTH, BlockSearch, BlockCandidates
+from .blocks import FINEST_LENGTH, BlockCandidates, BlockSearch
 from .edit_list import EditList, PlacedKey, find_transitions
 from .locomotion import Section, compute_travelled_distance
-from .wanted import library_frame
+from .request import library_frame
 
 CATCH_UP_FRAMES = 60  # output frames over which a distance error is regained
 
@@ -74,7 +74,8 @@ def warp_time(source: np.ndarray, target: np.ndarray, idle: float = 1e-3) -> np.
     return np.interp(share, source_distance, np.arange(m))
 
 
-def build_edit_list(library: Library, clip: np.ndarray, frame: np.ndarray, keys: tuple[PlacedKey, ...], fixed) -> EditList:
+def build_edit_list(library: Library, clip: np.ndarray, frame: np.ndarray, keys: tuple[PlacedKey, ...],
+                    fixed) -> EditList:
     """Build an edit list and move its transitions to the best of +-3 frames.
 
     Args:
@@ -146,7 +147,8 @@ def build_straight_edit(search: BlockSearch, blocks: BlockCandidates) -> EditLis
     return build_edit_list(search.library, clip[:count], frame[:count], list_placed_keys(search), fixed)
 
 
-def build_warped_edit(search: BlockSearch, sections: list[Section], regains_distance: bool) -> tuple[EditList, np.ndarray]:
+def build_warped_edit(search: BlockSearch, sections: list[Section], regains_distance: bool) -> tuple[EditList,
+        np.ndarray]:
     """Play the sections so that locomotion follows the track's speed.
 
     Other sections are played as recorded and travel what the recording did; what they lose or gain against the track is
@@ -164,14 +166,16 @@ def build_warped_edit(search: BlockSearch, sections: list[Section], regains_dist
     piece = np.zeros(len(source), int)
     piece[source.transitions] = 1
     piece = np.cumsum(piece)
-    track_distance, clip_distance = compute_travelled_distance(search.request.track), _compute_clip_distance(search.library, source)
+    track_distance, clip_distance = compute_travelled_distance(search.request.track), _compute_clip_distance(
+        search.library, source)
     places, travelled, low = [], [], 0
     for section in sections:
         # low .. high: the section among the joined source frames; `out`: the section among the output frames
         high = low + FINEST_LENGTH * len(section.blocks)
         out = _section_frames(section, len(track_distance))
         so_far = travelled[-1][-1] if travelled else 0.0
-        at, metres = _warp_section(section, clip_distance[low:high] - clip_distance[low], track_distance[out], so_far, regains_distance)
+        at, metres = _warp_section(section, clip_distance[low:high] - clip_distance[low], track_distance[out], so_far,
+                                   regains_distance)
         places.append(low + at)
         travelled.append(so_far + metres)
         low = high
@@ -215,7 +219,8 @@ def _compute_clip_distance(library: Library, source: EditList) -> np.ndarray:
     return np.concatenate([[0.0], np.cumsum(step[:-1])])
 
 
-def _warp_section(section: Section, clip_distance: np.ndarray, track_distance: np.ndarray, so_far: float, regains_distance: bool):
+def _warp_section(section: Section, clip_distance: np.ndarray, track_distance: np.ndarray, so_far: float,
+                  regains_distance: bool):
     """Compute the source frames (F,) of a section and the distance (F,) m from its start, for its F output frames."""
     count = len(track_distance)
     if not count:

@@ -82,7 +82,8 @@ def replace_stretch(
     # one frame more on either side, so that a jump at an end of the stretch is found
     low, high = max(first - 1, 0), min(end + 1, len(edit))
     found = find_transitions(new_clip[low:high], new_frame[low:high]) + low
-    transitions = np.concatenate([edit.transitions[edit.transitions < first], found, edit.transitions[edit.transitions > end]])
+    transitions = np.concatenate([edit.transitions[edit.transitions < first], found,
+                                  edit.transitions[edit.transitions > end]])
     return EditList(new_clip, new_frame, transitions, tuple(sorted((*edit.keys, *keys), key=lambda key: key.number)))
 
 

@@ -17,9 +17,9 @@ from ...base.vectors import arctan2
 from ...library.keys import Key
 from ...library.library import Library
 from ...motion import quaternion
-from ...motion.motion import sample_frames, compute_pose
+from ...motion.motion import compute_pose, sample_frames
 from ...motion.track import SampledTrack
-from .wanted import library_frame
+from .request import library_frame
 
 HEIGHT_COST = 0.8  # per metre of height beyond the noise
 PLACE_COST = 0.3  # per metre on the ground beyond the noise

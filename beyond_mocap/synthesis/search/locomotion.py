@@ -22,9 +22,9 @@ from ...annotation import LOCOMOTION_LABELS
 from ...base.vectors import distances_along
 from ...library.library import Library
 from ...motion.track import SampledTrack
-from .block_costs import compute_distances, collect_windows
-from .blocks import FINEST_LENGTH, BlockSearch, BlockCandidates
-from .wanted import SearchRequest
+from .block_costs import collect_windows, compute_distances
+from .blocks import FINEST_LENGTH, BlockCandidates, BlockSearch
+from .request import SearchRequest
 
 DISTANCE_TOLERANCE = 0.1  # m from the requested distance within which a sequence fits
 MAX_BLOCKS = 500  # candidates of a section
@@ -113,7 +113,8 @@ def _select_locomotion_blocks(search: BlockSearch, section: Section) -> BlockCan
     Starts lie on a grid of four frames, so that every block's own continuation is there too.
     """
     frames = search.frames
-    requested = {w for slot in range(section.first, section.end) for w in search.list_requested_labels(slot, FINEST_LENGTH) if w}
+    requested = {w for slot in range(section.first, section.end) for w in search.list_requested_labels(slot,
+            FINEST_LENGTH) if w}
     wanted_words = frozenset().union(*requested) & LOCOMOTION_LABELS if requested else frozenset()
     columns = [i for i, word in enumerate(frames.vocabulary) if word in wanted_words]
     # clips with key moments are no locomotion
@@ -123,7 +124,8 @@ def _select_locomotion_blocks(search: BlockSearch, section: Section) -> BlockCan
     start = search.library.clusters[FINEST_LENGTH].start
     inside = (start - frames.first[frames.clip[start]]) % 4 == 0
     fits = inside & search.request.allowed[frames.clip[start]] & ~keyed[start]
-    fits &= frames.words[start][:, columns].any(axis=1) & frames.words[start + FINEST_LENGTH - 1][:, columns].any(axis=1)
+    fits &= frames.words[start][:, columns].any(axis=1) & frames.words[start + FINEST_LENGTH - 1][:,
+            columns].any(axis=1)
     if avoid := search.request.list_avoided(section.first * FINEST_LENGTH, section.end * FINEST_LENGTH):
         running_count = np.append(0, np.cumsum(search.annotation.find_frames_with(avoid)))
         free = fits & (running_count[start + FINEST_LENGTH] == running_count[start])
@@ -152,7 +154,8 @@ def _find_cheapest_chain(search: BlockSearch, section: Section, blocks: BlockCan
     after = collect_windows(search.frames, blocks.clip, blocks.start + FINEST_LENGTH, size)
     before = collect_windows(search.frames, blocks.clip, blocks.start, size)
     first, last = section.blocks.select([0]), section.blocks.select([-1])
-    from_entry = compute_distances(collect_windows(search.frames, first.clip, first.start + FINEST_LENGTH, size), before)[0]
+    from_entry = compute_distances(collect_windows(search.frames, first.clip, first.start + FINEST_LENGTH, size),
+                                   before)[0]
     to_exit = weight * compute_distances(after, collect_windows(search.frames, last.clip, last.start, size))[:, 0]
     between = weight * compute_distances(after, before)
     words = _build_label_cost(search, section, blocks)

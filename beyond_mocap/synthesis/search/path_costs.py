@@ -14,9 +14,9 @@ import numpy as np
 from ...annotation.gaits import compute_heading_offset
 from ...library.library import Library
 from ..plan import Plan
-from .offer import PLAYBACK_RATES, SLOT, CandidateIndex, RatePairs
+from .candidate_index import PLAYBACK_RATES, SLOT, CandidateIndex, RatePairs
 from .preferences import UsedStretch, compute_reuse_cost
-from .wanted import SearchRequest
+from .request import SearchRequest
 
 # Finding the cheapest of many pairs of a playback rate and a library frame without evaluating all.
 #
@@ -169,8 +169,8 @@ class PathCosts:
     """The costs of one request on one library of N frames."""
 
     def __init__(
-        self, library: Library, request: SearchRequest, weights: Weights = Weights(), used: tuple[UsedStretch, ...] = (),
-        bone_distance: BoneDistance | None = None,
+        self, library: Library, request: SearchRequest, weights: Weights = Weights(),
+        used: tuple[UsedStretch, ...] = (), bone_distance: BoneDistance | None = None,
     ):
         """Prepare the costs.
 
@@ -222,7 +222,8 @@ class PathCosts:
     def iter_misfit_terms(self, first: int, end: int, number: np.ndarray, frame: np.ndarray) -> Iterator[Term]:
         """Generate the terms of `compute_misfit`, by name, each (K,)."""
         yield from self._iter_motion_costs(first, end, self.index.build_pairs(number, frame))
-        yield from self._iter_fixed_terms(frame, self._requested_labels(first, end), self.request.list_avoided(first, end))
+        yield from self._iter_fixed_terms(frame, self._requested_labels(first, end),
+                                          self.request.list_avoided(first, end))
 
     def find_cheapest(self, first: int, end: int, considered: int, count: int):
         """Find the pairs of playback rate and library frame with the lowest cost among those nearest in speed.
@@ -237,13 +238,15 @@ class PathCosts:
             number (K,), frame (K,), misfit (K,).
         """
         words, avoid = self._requested_labels(first, end), self.request.list_avoided(first, end)
-        pairs, fixed_cost, (speed, _) = self.index.pairs_by_speed(avoid), self._fixed_costs(words, avoid), self.requested_motion(first, end)
+        pairs, fixed_cost, (speed, _) = self.index.pairs_by_speed(avoid), self._fixed_costs(words,
+                avoid), self.requested_motion(first, end)
 
         def cost_of(part: slice) -> np.ndarray:
             part_pairs = pairs.slice_pairs(part)
             return _sum_terms(self._iter_motion_costs(first, end, part_pairs)) + fixed_cost[part_pairs.frame]
 
-        best, cost = find_cheapest(cost_of, pairs.speed, speed, weight=self.weights.speed, considered=considered, count=count)
+        best, cost = find_cheapest(cost_of, pairs.speed, speed, weight=self.weights.speed, considered=considered,
+                                   count=count)
         return pairs.number[best], pairs.frame[best], cost
 
     def _requested_labels(self, first: int, end: int) -> frozenset[str]:
@@ -255,7 +258,7 @@ class PathCosts:
         # pairs hold the turn over SLOT frames, this slot may be longer or shorter
         turn = pairs.turn * np.float32((end - first) / SLOT)
         yield from self._iter_motion_terms(first, end, pairs.speed, turn=turn, offset=pairs.offset,
-                                      long_stance=pairs.long_stance)
+                                           long_stance=pairs.long_stance)
         yield "rate", self._rate_cost[pairs.number]
         if self.request.lag_preference is not None:
             yield "variety", self.request.lag_preference.compute_cost(first, pairs.frame)
@@ -280,7 +283,8 @@ class PathCosts:
         if avoid:
             yield "avoided", AVOIDED_COST * self.index.shows_labels(avoid)[frame]
 
-    def compute_key_misfit(self, first: int, end: int, clip: np.ndarray, start: np.ndarray, rate: np.ndarray) -> np.ndarray:
+    def compute_key_misfit(self, first: int, end: int, clip: np.ndarray, start: np.ndarray,
+                           rate: np.ndarray) -> np.ndarray:
         """Compute the cost of pieces of key moments in a slot.
 
         Labels have no weight here except avoided ones. A kick that was recorded slower than the player runs is played
@@ -296,12 +300,14 @@ class PathCosts:
         """
         return _sum_terms(self._iter_key_terms_per_slot(first, end, clip, start, rate)) * ((end - first) / SLOT)
 
-    def iter_key_terms(self, first: int, end: int, clip: np.ndarray, start: np.ndarray, rate: np.ndarray) -> Iterator[Term]:
+    def iter_key_terms(self, first: int, end: int, clip: np.ndarray, start: np.ndarray,
+                       rate: np.ndarray) -> Iterator[Term]:
         """Generate the terms of `compute_key_misfit`, by name, each (K,)."""
         for name, values in self._iter_key_terms_per_slot(first, end, clip, start, rate):
             yield name, values * ((end - first) / SLOT)
 
-    def _iter_key_terms_per_slot(self, first: int, end: int, clip: np.ndarray, start: np.ndarray, rate: np.ndarray) -> Iterator[Term]:
+    def _iter_key_terms_per_slot(self, first: int, end: int, clip: np.ndarray, start: np.ndarray,
+                                 rate: np.ndarray) -> Iterator[Term]:
         """Generate the same per SLOT frames."""
         low, high = self.frames.first[clip], self.frames.first[clip] + self.frames.count[clip] - 1
         length = end - first

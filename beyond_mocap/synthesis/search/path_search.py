@@ -15,16 +15,16 @@ from dataclasses import dataclass, fields, replace
 
 import numpy as np
 
-from ...base.errors import UserCancelledError, InputError
+from ...base.errors import InputError, UserCancelledError
 from ...library.library import Library
-from .cheapest_way import SlotCandidates, BeamTransitions
+from .beam_transitions import BeamTransitions, SlotCandidates
+from .candidate_index import PLAYBACK_RATES, SLOT
 from .edit_list import EditList, PlacedKey, find_transitions, replace_stretch
-from .key_fit import measure_ball, compute_key_misfit, measure_strikes
-from .offer import PLAYBACK_RATES, SLOT
+from .key_fit import compute_key_misfit, measure_ball, measure_strikes
 from .path_costs import BoneDistance, PathCosts, Weights
 from .preferences import UsedStretch, compute_weak_foot_cost
+from .request import SearchRequest
 from .slots import build_key_pieces, build_slot_edges, find_slot
-from .wanted import SearchRequest
 
 MEMORY_SLOTS = 15  # slots whose buckets a state remembers (4 s at 30 frames per second)
 _LEAD_IN = 2  # slots ahead of a piece in which frames that lead into it are candidates
@@ -140,7 +140,8 @@ class PathSearch:
         self.frames = library.frames
         self.costs = PathCosts(library, request, weights, used, bone_distance)
         self.index = self.costs.index
-        self.edges = build_slot_edges(library, request, *((stretch.first, stretch.end) if stretch else (0, None)), on_grid)
+        self.edges = build_slot_edges(library, request, *((stretch.first, stretch.end) if stretch else (0, None)),
+                                      on_grid)
         self.pieces = build_key_pieces(library, request, self.edges)
         self.choice_cost = self._choice_costs()
         self._closed_slots = {find_slot(self.edges, request.keys[number].frame) for number in self.pieces.number}
@@ -191,7 +192,8 @@ class PathSearch:
             key, at = self.request.keys[number], self.pieces.number == number
             ball = measure_ball(self.request.track, key.frame, key.ball_height_known)
             costs[at] = compute_key_misfit(measure_strikes(self.library, key.choices), ball)[self.pieces.choice[at]]
-            costs[at] += compute_weak_foot_cost(key.requested.words, key.choices, self.request.weak_foot)[self.pieces.choice[at]]
+            costs[at] += compute_weak_foot_cost(key.requested.words, key.choices,
+                                                self.request.weak_foot)[self.pieces.choice[at]]
         return costs
 
     def _build_first_states(self) -> BeamStates:
@@ -199,7 +201,7 @@ class PathSearch:
         to = self.collect_candidates(0)
         recent = np.full((len(to.clip), MEMORY_SLOTS), -1)
         return self._prune_states(BeamStates(to.clip, to.start, to.rate, cost=to.cost, back=np.zeros(len(to.clip), int),
-                                 piece=to.piece, recent=recent))
+                                             piece=to.piece, recent=recent))
 
     def _build_arrival(self) -> tuple[BeamStates, int]:
         """Build the state from which a stretch starts, the frame before it; and that state's length, 1."""
@@ -209,7 +211,7 @@ class PathSearch:
         recent = self.index.bucket[self.costs.round_frame(frames_shown)][None, :]
         nothing = np.zeros(1, int)
         return BeamStates(edit.clip[at], edit.frame[at], _compute_steps(edit, at), cost=np.zeros(1), back=nothing,
-                      piece=nothing - 1, recent=recent), 1
+                          piece=nothing - 1, recent=recent), 1
 
     def _add_exit_cost(self, states: BeamStates, frames_shown: int) -> BeamStates:
         """Add to the last states the cost of the transition to the frame that stays behind the stretch.
@@ -220,7 +222,8 @@ class PathSearch:
         """
         edit, at = self.stretch.edit, np.array([self.stretch.end])
         goal = SlotCandidates(edit.clip[at], edit.frame[at], _compute_steps(edit, at), np.zeros(1), np.array([-1]))
-        transitions = self.build_transitions(states, np.arange(len(states.cost)), states.start + states.rate * frames_shown)
+        transitions = self.build_transitions(states, np.arange(len(states.cost)), states.start + states.rate
+                                             * frames_shown)
         return replace(states, cost=transitions.compute_all(goal)[:, 0])
 
     def _build_layer(self, slot: int, before: BeamStates, frames_shown: int) -> BeamStates:
@@ -242,13 +245,14 @@ class PathSearch:
             options += [self._find_transitions(slot, before, ends, free, known), *going_on]
         clip, start, rate, cost, back, piece = (np.concatenate(parts) for parts in zip(*options))
         return self._prune_states(BeamStates(clip, start, rate, cost=cost, back=back, piece=piece,
-                                 recent=np.roll(before.recent[back], -1, axis=1)))
+                                             recent=np.roll(before.recent[back], -1, axis=1)))
 
     def _prune_states(self, states: BeamStates) -> BeamStates:
         """Keep the cheapest free and the cheapest bound states, a beam of each, and update their memory."""
         order = np.argsort(states.cost, kind="stable")
         free = states.piece[order] < 0
-        best = states.select(np.concatenate([order[free][: self.width.beam_width], order[~free][: self.width.beam_width]]))
+        best = states.select(np.concatenate([order[free][: self.width.beam_width],
+                                             order[~free][: self.width.beam_width]]))
         best.recent[:, -1] = self.index.bucket[self.costs.round_frame(best.start)]
         return best
 
@@ -311,13 +315,15 @@ class PathSearch:
             known: (L,) costs of other ways to fill the slot.
         """
         to = self.collect_candidates(slot)
-        which, cost, state = self.build_transitions(before, free, ends[free]).find_cheapest(to, known, self.width.beam_width)
+        which, cost, state = self.build_transitions(before, free, ends[free]).find_cheapest(to, known,
+                self.width.beam_width)
         return to.clip[which], to.start[which], to.rate[which], cost, free[state], to.piece[which]
 
     def build_transitions(self, before: BeamStates, free: np.ndarray, ends: np.ndarray) -> BeamTransitions:
         """Build the transitions from the states `free` (B,), which end at library frames `ends` (B,)."""
         seen = self._mark_seen(before.recent[free])
-        return BeamTransitions(self.costs, before.clip[free], ends, rate=before.rate[free], cost=before.cost[free], seen=seen)
+        return BeamTransitions(self.costs, before.clip[free], ends, rate=before.rate[free], cost=before.cost[free],
+                               seen=seen)
 
     def _mark_seen(self, recent: np.ndarray) -> np.ndarray:
         """Return (B, buckets) whether a state has lately shown a bucket of frames or its neighbours; recent (B, M)."""
@@ -331,7 +337,8 @@ class PathSearch:
     def _continue_pieces(self, slot: int, before: BeamStates, ends: np.ndarray, bound: np.ndarray):
         """Continue the pieces of key moments."""
         clip, start, rate = before.clip[bound], ends[bound], before.rate[bound]
-        cost = before.cost[bound] + self.costs.compute_key_misfit(self.edges[slot], self.edges[slot + 1], clip, start, rate)
+        cost = before.cost[bound] + self.costs.compute_key_misfit(self.edges[slot], self.edges[slot + 1], clip, start,
+                                                                  rate)
         return clip, start, rate, cost, bound, before.piece[bound]
 
     def _continue_clips(self, slot: int, before: BeamStates, ends: np.ndarray, free: np.ndarray):
@@ -360,7 +367,7 @@ class PathSearch:
         keys = tuple(placed[number] for number in sorted(placed))
         if self.stretch:
             return replace_stretch(self.stretch.edit, int(self.edges[0]), int(self.edges[-1]), clip=clip, frame=frame,
-                            keys=keys)
+                                   keys=keys)
         return EditList(clip, frame, find_transitions(clip, frame), keys)
 
 

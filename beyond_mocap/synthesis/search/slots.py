@@ -14,9 +14,9 @@ import numpy as np
 
 from ...library.keys import Key
 from ...library.library import Library
-from .dragged import list_slot_ranges
-from .offer import SLOT
-from .wanted import SearchRequest, compute_needed_frames, library_frame
+from .candidate_index import SLOT
+from .foot_drag import list_slot_ranges
+from .request import SearchRequest, compute_needed_frames, library_frame
 
 KEY_PLAYBACK_RATES = np.array([0.7, 0.85, 1.0, 1.15, 1.3])  # playback rates at which a key moment's clip may be played
 MIN_SLOT = 6  # frames of the shortest slot beside an extra edge
@@ -118,7 +118,8 @@ def build_key_pieces(library: Library, request: SearchRequest, edges: np.ndarray
     return KeyPieces(*(np.array(column, dtype=kind) for column, kind in zip(columns, kinds)))
 
 
-def _build_pieces(library: Library, request: SearchRequest, edges: np.ndarray, number: int, low: int, high: int) -> list[tuple]:
+def _build_pieces(library: Library, request: SearchRequest, edges: np.ndarray, number: int, low: int,
+                  high: int) -> list[tuple]:
     """Build the pieces of one key moment, between the edges numbered low and high.
 
     Returns:
@@ -135,8 +136,8 @@ def _build_pieces(library: Library, request: SearchRequest, edges: np.ndarray, n
             end = int(np.searchsorted(edges, key.frame + leave / rate - _TRIMMED))
             first, end = int(np.clip(first, low, here)), int(np.clip(end, here + 1, high))
             around = MIN_KEY_MARGIN / rate - _TRIMMED
-            for a, b in list_slot_ranges(library, request, edges, at=key.frame, key=option, rate=rate, slots=(first, end),
-                                  around=around):
+            for a, b in list_slot_ranges(library, request, edges, at=key.frame, key=option, rate=rate,
+                                         slots=(first, end), around=around):
                 # so that the key frame is played at exactly key.frame
                 start = library_frame(library, option) - rate * (key.frame - edges[a])
                 rows.append((number, choice, option.clip, rate, a, b, start))

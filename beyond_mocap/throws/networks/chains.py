@@ -114,9 +114,10 @@ def find_chains(skeleton: Skeleton) -> Chains:
     chest = structure.find_common_ancestor(parents, [parents[arm] for arm in sockets[:2]])
     head = chest if top is None else top
     return Chains(
-        skeleton=skeleton, hips=body.hips, above=tuple(j for j in _list_joints_between(skeleton, 0, body.hips) if j != body.hips),
-        members=members, references=references, known=_group_by_chain(skeleton, members),
-        effectors=(body.left.hand, body.right.hand, body.left.toe_or_foot, body.right.toe_or_foot), sockets=sockets,
+        skeleton=skeleton, hips=body.hips, above=tuple(j for j in _list_joints_between(skeleton, 0, body.hips)
+                                                       if j != body.hips), members=members, references=references,
+        known=_group_by_chain(skeleton, members), effectors=(body.left.hand, body.right.hand, body.left.toe_or_foot,
+                                                             body.right.toe_or_foot), sockets=sockets,
         middles=(body.left.lower_arm, body.right.lower_arm, body.left.lower_leg, body.right.lower_leg),
         ankles=(body.left.foot, body.right.foot), chest=chest, neck=head if body.neck is None else body.neck, head=head,
     )

@@ -102,10 +102,11 @@ def build_windows(description: Description, reference: np.ndarray | None = None)
     points = interpolate_positions(description, sample_frames)
     hands = description.hands
     return Windows(
-        points=np.swapaxes(points, 1, 2), deltas=np.swapaxes(interpolate_positions(description, sample_frames + 1.0) - points, 1, 2),
-        next=interpolate_positions(description, frames + 1.0),
-        hands_next=None if hands is None else hands[np.minimum(frames + 1, len(hands) - 1)],
-        sides=np.broadcast_to(np.eye(2)[description.limb % 2], (len(frames), 2)),
+        points=np.swapaxes(points, 1, 2), deltas=np.swapaxes(interpolate_positions(description, sample_frames + 1.0)
+                                                             - points, 1, 2),
+        next=interpolate_positions(description, frames + 1.0), hands_next=None if hands is None
+        else hands[np.minimum(frames + 1, len(hands) - 1)], sides=np.broadcast_to(np.eye(2)[description.limb % 2],
+                                                                                  (len(frames), 2)),
         impact=np.broadcast_to(description.impact, (len(frames), 3)), phase=compute_phases(description, reference),
     )
 

@@ -8,13 +8,13 @@ import numpy as np
 
 from ...base.errors import InputError
 from ...motion import quaternion
-from ...motion.humanoid import identify_joints, estimate_stature
+from ...motion.humanoid import estimate_stature, identify_joints
 from ...motion.mirror import mirror
-from ...motion.motion import Motion, sample_frames_cubic, forward_kinematics, place_motion
+from ...motion.motion import Motion, forward_kinematics, place_motion, sample_frames_cubic
 from ...motion.skeleton import freeze_array
 from .chains import EFFECTORS, find_chains
 from .description import AHEAD, BACK, STEP, Description
-from .kinematics import Pose, to_matrices, build_pose
+from .kinematics import Pose, build_pose, to_matrices
 
 _MIN_DISTANCE = 0.05  # metres over the ground from the hips to the impact, below which the direction is undefined
 
@@ -82,14 +82,16 @@ def build_example(
         raise InputError(f"example {name}", f"{last - first:.3f} s", "at least two frames",
                          "include more of the recording")  # fmt: skip
     motion, angle, shift = _normalize(motion, np.asarray(impact, dtype=float), first * motion.fps, name)
-    resampled, before, after = (_resample(motion, frames, first, fps) for frames in _list_frames(motion, first, count, fps))
+    resampled, before, after = (_resample(motion, frames, first, fps) for frames in _list_frames(motion, first, count,
+            fps))
     rotation = quaternion.from_up_angle(np.array(angle))
     return Example(
-        name=name, subject=subject, motion=resampled, limb=EFFECTORS.index(limb) if isinstance(limb, str) else int(limb),
-        release=(release - first) * fps, impact=quaternion.rotate(rotation, np.asarray(impact, dtype=float)) + shift,
-        launch=None if launch is None else quaternion.rotate(rotation, np.asarray(launch, dtype=float)),
-        stature=estimate_stature(motion.skeleton), before=None if before is None else compute_effectors(before),
-        after=None if after is None else compute_effectors(after),
+        name=name, subject=subject, motion=resampled, limb=EFFECTORS.index(limb) if isinstance(limb, str)
+        else int(limb), release=(release - first) * fps,
+        impact=quaternion.rotate(rotation, np.asarray(impact, dtype=float)) + shift, launch=None if launch is None
+        else quaternion.rotate(rotation, np.asarray(launch, dtype=float)), stature=estimate_stature(motion.skeleton),
+        before=None if before is None else compute_effectors(before), after=None if after is None
+        else compute_effectors(after),
     )
 
 
@@ -159,6 +161,6 @@ def mirror_example(example: Example) -> Example:
 
     return replace(
         example, motion=mirror(example.motion), limb=example.limb ^ 1, impact=example.impact * (1.0, -1.0, 1.0),
-        launch=None if example.launch is None else example.launch * (1.0, -1.0, 1.0), before=mirror_effectors(example.before),
-        after=mirror_effectors(example.after),
+        launch=None if example.launch is None else example.launch * (1.0, -1.0, 1.0),
+        before=mirror_effectors(example.before), after=mirror_effectors(example.after),
     )

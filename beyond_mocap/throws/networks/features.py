@@ -39,17 +39,18 @@ from functools import lru_cache
 import numpy as np
 
 from ...base.vectors import cross_on_ground
-from .answers import build_output, compute_origin, list_predicted_joints
 from .chains import LIMB_OF, Chains
 from .description import Windows
-from .kinematics import Pose, flatten, take_joints, build_pose, to_six, update_joints, transpose
-from .limb_reach import reach_limb, find_hinge_axes
+from .kinematics import Pose, build_pose, flatten, take_joints, to_six, transpose, update_joints
+from .limb_reach import find_hinge_axes, reach_limb
 from .model import SINGLE, ModelSettings
+from .network_output import build_output, compute_origin, list_predicted_joints
 from .phases import compute_distance_phase
 
 HIP_GUIDES = 9
 """Number of values that `carry_hips` returns."""
-_EFFECTOR_WEIGHTS = np.array([1.0, 1.0, 3.0, 3.0]) / 8.0  # weights of both hands and both feet: feet are planted, hands swing
+_EFFECTOR_WEIGHTS = np.array([1.0, 1.0, 3.0,
+                              3.0]) / 8.0  # weights of both hands and both feet: feet are planted, hands swing
 _TINY = 1e-12  # m^2; keeps the derivative of the square root finite
 
 
@@ -78,7 +79,8 @@ def build_input(name: str, chains: Chains, settings: ModelSettings, pose: Pose, 
         x = build_leg_input(number, chains, pose, after=after, window=window, xp=xp)
     if not settings.guided:
         return x
-    return xp.concatenate_motions([x, compute_reach_guide(number, chains, settings, pose=pose, after=after, window=window, xp=xp)], axis=-1)
+    return xp.concatenate_motions([x, compute_reach_guide(number, chains, settings, pose=pose, after=after,
+                                                          window=window, xp=xp)], axis=-1)
 
 
 def compute_phase(name: str, chains: Chains, after: Pose, window: Windows, leg_reach, xp=np):
@@ -94,12 +96,14 @@ def compute_phase(name: str, chains: Chains, after: Pose, window: Windows, leg_r
     """
     if name not in LIMB_OF[2:]:
         return window.phase
-    return compute_distance_phase(measure_limb_distance(LIMB_OF.index(name), chains, after, window, xp)[..., 0], leg_reach[name[:-4]], xp)
+    return compute_distance_phase(measure_limb_distance(LIMB_OF.index(name), chains, after, window, xp)[..., 0],
+                                  leg_reach[name[:-4]], xp)
 
 
 def build_hip_input(chains: Chains, settings: ModelSettings, pose: Pose, window: Windows, xp=np):
     """Build (b_l, b_r, i, four trajectories, p_j, a_j), j = 14 (section 7.3)."""
-    parts = [*_build_motion_input(chains, settings, pose, window, xp), *_build_joint_input(chains, settings, pose, chains.hip_inputs, xp)]
+    parts = [*_build_motion_input(chains, settings, pose, window, xp),
+             *_build_joint_input(chains, settings, pose, chains.hip_inputs, xp)]
     if settings.carried:
         parts.append(carry_hips(chains, pose, window, compute_origin(chains, settings, pose), xp))
     return xp.concatenate_motions(parts, axis=-1)
@@ -134,7 +138,8 @@ def build_body_input(chains: Chains, pose: Pose, after: Pose, window: Windows, x
     ], axis=-1)  # fmt: skip
 
 
-def build_arm_input(number: int, chains: Chains, settings: ModelSettings, pose: Pose, after: Pose, window: Windows, xp=np):
+def build_arm_input(number: int, chains: Chains, settings: ModelSettings, pose: Pose, after: Pose, window: Windows,
+                    xp=np):
     """Build (b_l, b_r, t_wrist, o_wrist, δa_o, r_wrist¹, d, r_upper, r_lower, p_i¹, a_k¹) of arm 0 or 1.
 
     Source: Fredriksson section 7.3.
@@ -175,7 +180,8 @@ def build_leg_input(number: int, chains: Chains, pose: Pose, after: Pose, window
     ], axis=-1)  # fmt: skip
 
 
-def compute_reach_guide(number: int, chains: Chains, settings: ModelSettings, pose: Pose, after: Pose, window: Windows, xp=np):
+def compute_reach_guide(number: int, chains: Chains, settings: ModelSettings, pose: Pose, after: Pose, window: Windows,
+                        xp=np):
     """Compute the relative rotations (..., 6 each) with which the limb of frame n would reach its target in n + 1.
 
     They are those of the joints that the limb's network predicts, by two-bone inverse kinematics.
@@ -184,7 +190,7 @@ def compute_reach_guide(number: int, chains: Chains, settings: ModelSettings, po
     local = {joint: pose.local[..., joint, :, :] for joint in chains.members[name]}
     limb = update_joints(chains.skeleton, after, chains.known[name], root=after.root, local=local, given={}, xp=xp)
     bent = reach_limb(number, chains, limb, requested=window.next[..., number, :], share=1.0, axes=_find_hinges(chains),
-                     keeps_rotation=True, xp=xp)
+                      keeps_rotation=True, xp=xp)
     return flatten(to_six(take_joints(bent.local, list_predicted_joints(name, chains, settings), -3, xp), xp), 2)
 
 
@@ -305,7 +311,8 @@ def carry_hips(chains: Chains, pose: Pose, window: Windows, origin, xp=np):
     across = cross_on_ground(a, b).sum(-1)
     turn = _build_vertical_rotation(along, across, xp)
     place = xp.matmul(turn, (pose.positions[..., chains.hips, :] - middle)[..., None])[..., 0] + target_middle
-    return xp.concatenate_motions([place - origin, to_six(xp.matmul(turn, pose.turns[..., chains.hips, :, :]), xp)], axis=-1)
+    return xp.concatenate_motions([place - origin, to_six(xp.matmul(turn, pose.turns[..., chains.hips, :, :]), xp)],
+                                  axis=-1)
 
 
 def _build_vertical_rotation(along, across, xp):

@@ -13,7 +13,8 @@ from typing import NamedTuple
 import numpy as np
 
 from ...base.errors import InputError
-from . import answers, features
+from . import features
+from . import network_output as answers
 from .chains import HIERARCHY, LIMB_OF, Chains, find_chains
 from .description import BACK, SAMPLES, STEP, Windows
 from .kinematics import Pose
@@ -67,7 +68,8 @@ class Stepper:
         self.hierarchy = HierarchyPredictor(model, self.chains) if model.settings.kind == "hierarchy" else None
         self.reach = LimbReach(self.chains, self.limits, model.settings.wrist == "given")
 
-    def predict_step(self, pose: Pose, window: Windows, requested: np.ndarray, share: np.ndarray | None, limited: bool) -> Step:
+    def predict_step(self, pose: Pose, window: Windows, requested: np.ndarray, share: np.ndarray | None,
+                     limited: bool) -> Step:
         """Predict frame n + 1 from the pose and window of frame n.
 
         Args:
@@ -171,7 +173,8 @@ def _compute_fade(fps: float) -> tuple[np.ndarray, np.ndarray, float]:
     def remaining_share(t):
         return 1.0 - np.tanh(np.maximum(t, 0.0) / _SETTLING_TIME)
 
-    return remaining_share(seconds)[:, None], (remaining_share(seconds + 1.0 / fps) - remaining_share(seconds))[:, None], float(remaining_share(1.0 / fps))
+    return remaining_share(seconds)[:, None], (remaining_share(seconds + 1.0 / fps) - remaining_share(seconds))[:,
+            None], float(remaining_share(1.0 / fps))
 
 
 def blend_window(window: Windows, offset: np.ndarray, fps: float) -> Windows:
@@ -223,8 +226,10 @@ class HierarchyPredictor:
         after = Pose(pose.root, pose.local.copy(), pose.positions.copy(), pose.turns.copy(), pose.moved)
         sixes = pose.turns.swapaxes(1, 2)[:, :2].reshape(-1, 6)
         relative = pose.local.swapaxes(1, 2)[:, :2].reshape(-1, 6)
-        after = self._place_hips(after, self._evaluate_network(0, self._build_hip_input(pose, window, sixes), theta, bounded), pose)
-        turns = _from_six(self._evaluate_network(1, self._build_body_input(pose, after, window, relative), theta, bounded))
+        after = self._place_hips(after, self._evaluate_network(0, self._build_hip_input(pose, window, sixes), theta,
+                                                               bounded), pose)
+        turns = _from_six(self._evaluate_network(1, self._build_body_input(pose, after, window, relative), theta,
+                                                 bounded))
         after.local[self.predicted_joints[1]] = turns
         _update_joints(self.plans["body"], after, {})
         turns = _from_six(self._evaluate_limbs(pose, after, window, relative=relative, theta=theta, bounded=bounded))
@@ -272,7 +277,7 @@ class HierarchyPredictor:
         turned = _to_six(pose.turns[joint].T @ axes) - _IDENTITY_SIX
         places = (pose.positions[self.body_inputs] - origin) @ axes
         return _join_row(window.sides, impact, trajectories, toes, turned, relative[self.predicted_joints[1]], places,
-                    _to_six(axes.T @ pose.turns[self.body_inputs]))  # fmt: skip
+                         _to_six(axes.T @ pose.turns[self.body_inputs]))  # fmt: skip
 
     def _evaluate_limbs(
         self, pose: Pose, after: Pose, window: Windows, relative: np.ndarray, theta: np.ndarray, bounded: bool
@@ -282,21 +287,24 @@ class HierarchyPredictor:
         origins, axes = after.positions[self.references][:, None], after.turns[self.references]
         back = axes.swapaxes(1, 2)
         # per limb 9 points, 9 deltas and the next position, in the axes of its reference joint
-        trajectories = np.concatenate([window.points - origins, window.deltas, window.next[:, None] - origins], axis=1) @ axes
+        trajectories = np.concatenate([window.points - origins, window.deltas, window.next[:, None] - origins],
+                                      axis=1) @ axes
         turned = _to_six(pose.turns[self.references].swapaxes(1, 2) @ axes) - _IDENTITY_SIX
         sockets = after.positions[self.sockets]
         stretch = np.sqrt(((window.next - sockets) ** 2).sum(-1))
         trunk = (after.positions[self.trunk] - origins[:2]) @ axes[:2]
         above = np.concatenate([after.positions[self.chains.head][None], sockets[:2]])
         others = *(trunk[arm, self.arm_inputs[arm]] for arm in (0, 1)), *((above - origins[2:]) @ axes[2:])
-        turns = *_to_six(back[:2, None] @ after.turns[self.trunk]), *_to_six(back[2:, None] @ after.turns[self.leg_inputs])
+        turns = *_to_six(back[:2, None] @ after.turns[self.trunk]), *_to_six(back[2:, None]
+                                                                             @ after.turns[self.leg_inputs])
         hands = _to_six(back[:2] @ window.hands_next) if self.has_hand_rotations else ()
         outputs, guides = [], self._build_guides(after, window)
         for number in range(4):
             arm = number < 2
             x = _join_row(*([window.sides] if arm else []), trajectories[number], turned[number],
-                     *([hands[number]] if arm and self.has_hand_rotations else []), stretch[number : number + 1],
-                     relative[self.predicted_joints[2 + number]], others[number], turns[number], *guides[number])  # fmt: skip
+                          *([hands[number]] if arm and self.has_hand_rotations else []), stretch[number : number + 1],
+                          relative[self.predicted_joints[2 + number]], others[number], turns[number],
+                          *guides[number])  # fmt: skip
             outputs.append(self._evaluate_network(
                 2 + number, x, theta if arm else self._weigh_leg_points(number, stretch[number]), bounded))
         return np.concatenate(outputs)

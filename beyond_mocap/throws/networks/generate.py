@@ -17,9 +17,9 @@ from ...base.errors import InputError
 from ...motion import quaternion
 from ...motion.motion import Motion, forward_kinematics
 from .chains import find_chains
-from .description import Description, Windows, compute_phases, build_windows
+from .description import Description, Windows, build_windows, compute_phases
 from .frame_step import Step, Stepper, blend_window, prepare_stepper
-from .kinematics import Pose, to_matrices, to_motion, compute_world_transforms
+from .kinematics import Pose, compute_world_transforms, to_matrices, to_motion
 from .model import ThrowModel
 
 _CONTACT_SPEED, _FREE_SPEED = 0.15, 0.6  # m/s of a toe: slower ones are in contact with the ground, faster ones are not
@@ -175,7 +175,8 @@ def _compute_shares(description: Description, options: Options) -> np.ndarray:
     places = description.effectors
     speed = np.linalg.norm(np.gradient(places, 1.0 / description.fps, axis=0), axis=-1)
     height = places[..., 2] - places[..., 2].min(axis=0)
-    contact = np.clip((_FREE_SPEED - speed) / (_FREE_SPEED - _CONTACT_SPEED), 0.0, 1.0) * np.clip(2.0 - height / _CONTACT_HEIGHT, 0.0, 1.0)
+    contact = np.clip((_FREE_SPEED - speed) / (_FREE_SPEED - _CONTACT_SPEED), 0.0, 1.0) * np.clip(2.0 - height
+            / _CONTACT_HEIGHT, 0.0, 1.0)
     contact[:, :2] = 0.0
     return options.share + (1.0 - options.share) * contact
 
@@ -210,7 +211,8 @@ def _check_pose(step: Step, frame: int) -> None:
                          "choose a target like those of the examples, or train the model longer")  # fmt: skip
 
 
-def _build_result(model, description: Description, steps: list[Step], iterations: int, seconds: float) -> GeneratedMotion:
+def _build_result(model, description: Description, steps: list[Step], iterations: int,
+                  seconds: float) -> GeneratedMotion:
     """Build the result from the predicted frames."""
     root = np.stack([step.pose.root for step in steps])
     local = np.stack([step.pose.local for step in steps])
@@ -266,7 +268,8 @@ def collect_frames(model: ThrowModel) -> ExampleFrames:
     return ExampleFrames(*(np.concatenate(column) for column in zip(*rows)))
 
 
-def find_nearest_frame(model: ThrowModel, places: np.ndarray, velocities: np.ndarray, limb: int) -> tuple[int, int, float]:
+def find_nearest_frame(model: ThrowModel, places: np.ndarray, velocities: np.ndarray, limb: int) -> tuple[int, int,
+        float]:
     """Find the frame of the examples that best fits effectors; frames of the same limb are preferred to all others.
 
     A candidate may be moved over the ground and rotated about the vertical; its heights have to match.
@@ -284,11 +287,13 @@ def find_nearest_frame(model: ThrowModel, places: np.ndarray, velocities: np.nda
     level_positions = candidates.places[..., :2] - candidates.places[..., :2].mean(axis=1, keepdims=True)
     # best rotation of each candidate about the vertical through the middle of the effectors (2D Procrustes)
     turn = np.arctan2(
-        (level_positions[..., 0] * requested[:, 1] - level_positions[..., 1] * requested[:, 0]).sum(-1), (level_positions * requested).sum((-1, -2))
+        (level_positions[..., 0] * requested[:, 1] - level_positions[..., 1] * requested[:, 0]).sum(-1),
+        (level_positions * requested).sum((-1, -2))
     )
     rotated_positions = quaternion.rotate_level(level_positions, turn[:, None])
     rotated_velocities = quaternion.rotate_level(candidates.velocities[..., :2], turn[:, None])
-    cost = ((rotated_positions - requested) ** 2).sum((-1, -2)) + ((candidates.places[..., 2] - places[:, 2]) ** 2).sum(-1)
+    cost = ((rotated_positions - requested) ** 2).sum((-1, -2)) + ((candidates.places[..., 2]
+                                                                    - places[:, 2]) ** 2).sum(-1)
     change = ((rotated_velocities - velocities[:, :2]) ** 2).sum((-1, -2))
     change = change + ((candidates.velocities[..., 2] - velocities[:, 2]) ** 2).sum(-1)
     cost = cost + _VELOCITY_SECONDS**2 * change + (_ROTATION_COST * turn) ** 2 + (_LATE_COST * candidates.progress) ** 2

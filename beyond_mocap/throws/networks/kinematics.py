@@ -136,7 +136,8 @@ def _build_index(joints: tuple[int, ...]) -> np.ndarray:
     return np.array(joints)
 
 
-def update_joints(skeleton: Skeleton, pose: Pose, joints: tuple[int, ...], root, local: dict, given: dict, xp=np) -> Pose:
+def update_joints(skeleton: Skeleton, pose: Pose, joints: tuple[int, ...], root, local: dict, given: dict,
+                  xp=np) -> Pose:
     """Update some joints of a pose with new rotations; all other joints stay as they are.
 
     Args:
@@ -162,7 +163,8 @@ def update_joints(skeleton: Skeleton, pose: Pose, joints: tuple[int, ...], root,
         turns[joint] = xp.matmul(base, changed[joint] if joint in changed else pose.local[..., joint, :, :])
         places[joint] = start + xp.matmul(base, skeleton.offsets[joint])
     return pose._replace(
-        root=root, local=_replace_joints(pose.local, changed, -3, xp), positions=_replace_joints(pose.positions, places, -2, xp),
+        root=root, local=_replace_joints(pose.local, changed, -3, xp), positions=_replace_joints(pose.positions, places,
+                                                                                                 -2, xp),
         turns=_replace_joints(pose.turns, turns, -3, xp),
     )
 
@@ -176,4 +178,5 @@ def _replace_joints(values, replacements: dict, axis: int, xp):
         return changed
     order = np.arange(values.shape[axis])
     order[list(replacements)] = len(order) + np.arange(len(replacements))
-    return xp.take(xp.concatenate_motions([values, xp.stack(list(replacements.values()), axis=axis)], axis=axis), order, axis=axis)
+    return xp.take(xp.concatenate_motions([values, xp.stack(list(replacements.values()), axis=axis)], axis=axis), order,
+                   axis=axis)

@@ -14,7 +14,7 @@ import numpy as np
 from ...base.vectors import unit_vector
 from ...motion.limb import soften_distance
 from .chains import LIMB_OF, Chains
-from .kinematics import Pose, compute_pose_transforms, update_joints, transpose
+from .kinematics import Pose, compute_pose_transforms, transpose, update_joints
 from .limits import JointLimits
 
 _STRETCH = 0.995  # share of a limb's length beyond which the body moves too
@@ -43,7 +43,8 @@ def find_hinge_axes(chains: Chains, limits: JointLimits | None) -> np.ndarray:
     return np.stack([known.get(joint, side) for joint, side in zip(chains.middles, sides)])
 
 
-def reach_limb(number: int, chains: Chains, after: Pose, requested, share, axes: np.ndarray, keeps_rotation: bool, xp) -> Pose:
+def reach_limb(number: int, chains: Chains, after: Pose, requested, share, axes: np.ndarray, keeps_rotation: bool,
+               xp) -> Pose:
     """Move one limb towards its target.
 
     Args:
@@ -71,7 +72,8 @@ def reach_limb(number: int, chains: Chains, after: Pose, requested, share, axes:
     given |= {joint: xp.matmul(second, turns[..., joint, :, :]) for joint in _list_joints_between(chains, middle, end)}
     if keeps_rotation:
         given[end] = turns[..., end, :, :]
-    return update_joints(chains.skeleton, after, chains.known[LIMB_OF[number]], root=after.root, local={}, given=given, xp=xp)
+    return update_joints(chains.skeleton, after, chains.known[LIMB_OF[number]], root=after.root, local={}, given=given,
+                         xp=xp)
 
 
 class LimbReach:
@@ -115,7 +117,8 @@ class LimbReach:
     def _bend_limbs(self, local, places, turns, end, target) -> np.ndarray:
         """Compute local rotations that bring the limbs' ends from `end` (4, 3) m to `target` (4, 3) m."""
         hinge = (turns[self._above_middle] @ self._axes[:, :, None])[..., 0]
-        first, second, _ = solve_two_bones(places[self._upper], places[self._middle], end, target=target, hinge=hinge, xp=np)
+        first, second, _ = solve_two_bones(places[self._upper], places[self._middle], end, target=target, hinge=hinge,
+                                           xp=np)
         local = local.copy()
         local[self._upper] = transpose(turns[self._above_upper]) @ first @ turns[self._upper]
         bent = transpose(first @ turns[self._above_middle])
@@ -211,7 +214,8 @@ def solve_two_bones(top, middle, end, target, hinge, xp, soft: float = 0.01):
     to_target = target - top
     requested = _measure_length(to_target, xp)
     # the limb does not shorten where it is already straighter than the eased reach
-    reach = xp.maximum(_ease_reach(requested, long_upper, long_lower, soft, xp), xp.minimum(requested, _measure_length(end - top, xp)))
+    reach = xp.maximum(_ease_reach(requested, long_upper, long_lower, soft, xp),
+                       xp.minimum(requested, _measure_length(end - top, xp)))
     cosine = (reach * reach - long_upper * long_upper - long_lower * long_lower) / (2.0 * long_upper * long_lower)
     cosine = xp.clip(cosine, -1.0, 1.0)
     # limited after squaring: in float32 no number between 1 - 1e-9 and 1 keeps the derivative of the root finite

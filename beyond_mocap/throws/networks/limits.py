@@ -38,7 +38,8 @@ _MARGIN = np.radians(10.0)  # added to the range of the data on either side
 _SHARE = 0.08  # share of the range, added on either side
 _ROUNDS = 8  # iterations of the mean rotation and of the middle of a range
 _MIN_MEAN_BEND = np.radians(6.0)  # below this mean bend the direction in which a hinge bends is unknown
-_MAX_BACKWARD_BEND = np.radians(5.0)  # allowed backward bend of elbows and knees: people have it, and joint centres are not exact
+_MAX_BACKWARD_BEND = np.radians(
+    5.0)  # allowed backward bend of elbows and knees: people have it, and joint centres are not exact
 _MIN_EXCESS = 1e-9  # radians: smaller excess is ignored
 _MAX_ALTERNATIONS = 6  # alternations between ranges and hinges, until both are satisfied
 _LONG_OFFSET = 2.0  # radians: above this the other sign of the rotation vector is considered too
@@ -145,7 +146,8 @@ class JointLimits:
         part.middle, part._back, part.low, part.high = (
             values[joints] for values in (self.middle, self._back, self.low, self.high)
         )
-        part._set_hinges(tuple(replace(one, joint=joints.index(one.joint)) for one in self.hinges if one.joint in joints))
+        part._set_hinges(tuple(replace(one, joint=joints.index(one.joint)) for one in self.hinges
+                               if one.joint in joints))
         return part
 
     def compute_offsets(self, local: np.ndarray) -> np.ndarray:
@@ -251,7 +253,8 @@ def _build_hinge(skeleton: Skeleton, middle: np.ndarray, lower: int, end: int) -
     across = np.cross(along, unit_vector(middle[lower] @ skeleton.offsets[end], min_length=_TINY))
     if np.linalg.norm(across) < np.sin(_MIN_MEAN_BEND):
         return None
-    return Hinge(joint=lower, end=end, across=unit_vector(across, min_length=_TINY), along=along, bone=skeleton.offsets[end])
+    return Hinge(joint=lower, end=end, across=unit_vector(across, min_length=_TINY), along=along,
+                 bone=skeleton.offsets[end])
 
 
 @dataclass(frozen=True, eq=False)
@@ -272,8 +275,8 @@ class LimbLimits:
 
     @classmethod
     def from_motions(
-        cls, limits: JointLimits, own: Motion, own_joints: tuple[int, ...], target_motion: Motion, joints: tuple[int, ...],
-        mirrored: bool = False,
+        cls, limits: JointLimits, own: Motion, own_joints: tuple[int, ...], target_motion: Motion,
+        joints: tuple[int, ...], mirrored: bool = False,
     ) -> LimbLimits:
         """Estimate the axes of a limb from one motion on two bodies, frame by frame at the same place.
 
@@ -296,10 +299,12 @@ class LimbLimits:
             return left @ right
 
         parents = [
-            [motion.skeleton.parents[joint] for joint in limb] for motion, limb in ((own, own_joints), (target_motion, joints))
+            [motion.skeleton.parents[joint] for joint in limb] for motion,
+            limb in ((own, own_joints), (target_motion, joints))
         ]
         return cls(
-            limits.select_joints(own_joints), tuple(joints), estimate_axes(*parents), estimate_axes(list(own_joints), list(joints))
+            limits.select_joints(own_joints), tuple(joints), estimate_axes(*parents),
+            estimate_axes(list(own_joints), list(joints))
         )
 
     def limit_rotations(self, rotations: np.ndarray, permitted: np.ndarray) -> np.ndarray:

@@ -16,7 +16,7 @@ import numpy as np
 from ...base.errors import InputError
 from ...base.vectors import arctan2
 from ...motion import quaternion
-from ...motion.motion import sample_frames_cubic, compute_pose
+from ...motion.motion import compute_pose, sample_frames_cubic
 from .chains import find_chains
 from .description import Description
 from .example import Example
@@ -72,7 +72,8 @@ class PlannedMotion:
     pace: float
 
 
-def plan_motion(examples: Sequence[Example], launches: np.ndarray, request: LaunchRequest, seed: int = 0) -> PlannedMotion:
+def plan_motion(examples: Sequence[Example], launches: np.ndarray, request: LaunchRequest,
+                seed: int = 0) -> PlannedMotion:
     """Plan the description of a motion that releases the ball as requested.
 
     Args:
@@ -129,7 +130,8 @@ def _blend_examples(examples: list[Example], weights: np.ndarray, pace: float, r
     """Average hands, feet and roots of the aligned examples."""
     fps = examples[0].motion.fps
     steps = np.unique(np.append(np.linspace(0.0, 1.0, _GRID + 1), AT_RELEASE))
-    frames = np.array([np.interp(steps, _compute_progress(example), np.arange(len(example.motion))) for example in examples])
+    frames = np.array([np.interp(steps, _compute_progress(example), np.arange(len(example.motion)))
+                       for example in examples])
     # frames (N, S): frame of each example at each common phase; times (S,): frame of the blend at that phase
     times = weights @ frames / pace
     release = float(weights @ [example.release for example in examples]) / pace
@@ -142,7 +144,7 @@ def _blend_examples(examples: list[Example], weights: np.ndarray, pace: float, r
     description = Description(effectors=effectors, hands=from_six(hands), limb=request.limb, release=release,
                               impact=impact, fps=fps, before=before, after=after)
     return PlannedMotion(description=description, root=root, names=tuple(example.name for example in examples),
-                   weights=weights, pace=pace)
+                         weights=weights, pace=pace)
 
 
 def _compute_progress(example: Example) -> np.ndarray:

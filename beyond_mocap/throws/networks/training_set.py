@@ -10,7 +10,7 @@ import numpy as np
 from ...base.errors import InputError
 from .chains import LIMB_OF, Chains, find_chains
 from .description import Description, Windows, build_windows
-from .example import Example, build_description, mirror_example, compute_poses
+from .example import Example, build_description, compute_poses, mirror_example
 from .features import measure_limb_distance
 from .kinematics import Pose
 from .phases import compute_reference_curve
@@ -83,7 +83,8 @@ def measure_leg_reach(examples: Sequence[Example]) -> dict[str, tuple[float, flo
 def build_reference_curve(examples: Iterable[Example]) -> np.ndarray:
     """Build the speed curve (N,) to which warped phases of these examples are warped (section 9.3)."""
     descriptions: list[Description] = [build_description(example) for example in examples]
-    return compute_reference_curve([(description.effectors[:, description.limb], description.release) for description in descriptions], descriptions[0].fps if descriptions else 1.0)
+    return compute_reference_curve([(description.effectors[:, description.limb], description.release)
+                                    for description in descriptions], descriptions[0].fps if descriptions else 1.0)
 
 
 def _slice_rows(arrays, cut: slice):

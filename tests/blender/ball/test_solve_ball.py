@@ -7,7 +7,7 @@ import bpy
 import numpy as np
 import pytest
 from conftest import EXTENSION
-from undo import assert_one_step, press_operator, collect_state
+from undo import assert_one_step, collect_state, press_operator
 
 MATCH = pathlib.Path(__file__).resolve().parents[3] / "sample_blend" / "match"
 KICKS = {"player1": (8.5, 24.8), "player2": (16.5,)}  # as the sample's words say
@@ -16,7 +16,7 @@ RECEIVED = {"player1": (17.9,), "player2": (10.2,)}
 
 @pytest.fixture
 def lanes():
-    return importlib.import_module(f"{EXTENSION}.scene.timeline.lanes")
+    return importlib.import_module(f"{EXTENSION}.scene.timeline.label_tracks")
 
 
 @pytest.fixture

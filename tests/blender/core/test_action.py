@@ -76,7 +76,8 @@ def test_signs_are_continuous(core, rooms, body):
     curves = rooms["core.channels"].collect_curves(action, body.animation_data.action_slot)
     for bone in made.NAMES:
         path = f'pose.bones["{bone}"].rotation_quaternion'
-        values = np.stack([rooms["core.channels"].sample_curve(curves[path, i], np.arange(1, 160)) for i in range(4)], axis=1)
+        values = np.stack([rooms["core.channels"].sample_curve(curves[path, i], np.arange(1, 160)) for i in range(4)],
+                          axis=1)
         assert np.sum(values[1:] * values[:-1], axis=1).min() > 0
 
 

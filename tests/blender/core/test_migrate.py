@@ -67,7 +67,8 @@ def test_the_words_count_before_and_after_they_are_on_the_timeline(old, rooms):
     assert_one_step(bpy.ops.beyond_mocap.place_players)
     settings = bpy.context.scene.beyond_mocap
     for player in settings.players:
-        assert player.dot is not None and rooms["timeline.strips"].read_player_timeline(player, bpy.context.scene) is not None
+        assert player.dot is not None and rooms["timeline.strips"].read_player_timeline(player,
+                bpy.context.scene) is not None
     assert words() == before
     assert settings.players[1].annotation_text.as_string() == "1.0 3.0 walking\n"
     assert not bpy.ops.beyond_mocap.place_players.poll()

@@ -84,7 +84,7 @@ def test_a_row_is_a_property_and_is_collected(sharpness):
 
 def test_what_is_not_set_is_left_to_the_core(core):
     """0 seconds, 0 processes, the usual ball: the core's own default."""
-    order = core("match.order").MatchRequest
+    order = core("match.request").MatchRequest
     values = import_module(f"{EXTENSION}.scene.core.properties").read_property_values
     match = bpy.context.scene.beyond_mocap_match
     assert not {"start", "end", "workers"} & set(values(order, match, "match.section", "match.work"))

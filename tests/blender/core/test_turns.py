@@ -53,8 +53,8 @@ class Context:
 @pytest.fixture
 def hand(extension, ready, session, monkeypatch):  # noqa: F811
     """Presses the button and lets time pass, as a window does; `hand.pause` holds the work up."""
-    rooms = {name: importlib.import_module(f"{extension.__name__}.{name}")
-             for name in ("operators.turns", "scene.result.orders", "scene.result.queue", "scene.core.background")}
+    rooms = {name: importlib.import_module(f"{extension.__name__}.{name}") for name in ("operators.take_queue",
+            "scene.result.synthesis_request", "scene.result.queue", "scene.core.background")}
     turns, orders, queue, background = rooms.values()
     bpy.ops.beyond_mocap.build_library()
     real, hand = orders.process_request, SimpleNamespace(

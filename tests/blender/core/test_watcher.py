@@ -240,7 +240,7 @@ def test_update_then_a_look_then_undo_is_one_step(room):
 
 def test_what_undo_has_taken_back_is_neither_measured_nor_drawn(room, monkeypatch):
     """Figures that a thread works out while undo comes between are those of another motion."""
-    riders, measure = room("scene.path_editing.riders"), room("scene.path_editing.live")
+    riders, measure = room("scene.path_editing.edited_bodies"), room("scene.path_editing.live")
     body, go = rider(room), threading.Event()
     name = body.name
     body.beyond_mocap_ride.live = False
@@ -275,7 +275,8 @@ def left_over(room):
     found += [f"menu: {function}" for name in dir(bpy.types) for function in drawn_in(getattr(bpy.types, name))
               if function.__module__.startswith(EXTENSION)]
     window, live = room("scene.core.window"), room("scene.core.live")
-    found += [*map(str, (*window._draw_handlers, *window._timers, *live._timers, *room("scene.result.queue").list_players()))]
+    found += [*map(str, (*window._draw_handlers, *window._timers, *live._timers,
+                         *room("scene.result.queue").list_players()))]
     found += [job.kind for job in room("scene.core.background")._newest.values() if not job.is_stale]
     found += ["stream"] if room("scene.stream.follow").current_listener() is not None else []
     found += ["rally"] if room("scene.stream.play").current_rally() is not None else []
@@ -294,7 +295,7 @@ def endless(progress, cancelled, _hurry=None):
 
 def a_background_job(room, context):
     """A button whose work goes on in a thread, as Build Library or Make Match."""
-    button = room("operators.verb").BackgroundOperator()
+    button = room("operators.operator_base").BackgroundOperator()
     button.bl_label, button.kind = "Button", "test"
     button.job = room("scene.core.background").Job("test", endless)
     context.workspace = SimpleNamespace(status_text_set=lambda text: None)
@@ -306,7 +307,7 @@ def a_background_job(room, context):
 def a_match_child(room, _context):
     """The process that makes a match. As the command does, it listens to the signal itself: a shell's background job
     would ignore it."""
-    child, background = room("scene.match.child"), room("scene.core.background")
+    child, background = room("scene.match.command_process"), room("scene.core.background")
     script = ("import signal, sys, time; signal.signal(signal.SIGINT, signal.default_int_handler);"
               "print('{\"progress\": 0.5}', file=sys.stderr, flush=True); time.sleep(60)")
     child.subprocess, kept = SimpleNamespace(**vars(child.subprocess)), child.subprocess
@@ -329,7 +330,7 @@ def a_live_update(room, _context):
     job = room("scene.core.background").Job
     jobs = [job(room(f"scene.{name}").KIND, endless)
             for name in ("throws.shown", "passes.live", "overlays.store", "path_editing.live")]
-    room("scene.throws.shown")._state["job"] = "body", 0, jobs[0]
+    room("scene.throws.preview")._state["job"] = "body", 0, jobs[0]
     room("scene.passes.live")._running.append(jobs[1])
     room("scene.overlays.store")._running.append((jobs[2], "take"))
     room("scene.path_editing.live")._running.append((jobs[3], 0, 0))
@@ -361,7 +362,7 @@ def assert_nothing_is_left(extension, room, windowed):
 def still_at_work(room):
     """Threads and processes of ours: asked to end, they take a moment."""
     threads = [one.name for one in threading.enumerate() if one.name.startswith("beyond-mocap")]
-    return threads + [str(one) for one in room("scene.match.child")._running if one.poll() is None]
+    return threads + [str(one) for one in room("scene.match.command_process")._running if one.poll() is None]
 
 
 @pytest.mark.parametrize("start", STARTS, ids=lambda start: start.__name__)

@@ -7,7 +7,7 @@ from pathlib import Path
 import bpy
 import numpy as np
 import pytest
-from undo import assert_one_step, press_operator, collect_state
+from undo import assert_one_step, collect_state, press_operator
 
 SAMPLE = Path(__file__).resolve().parents[3] / "sample_blend" / "library"
 
@@ -92,7 +92,8 @@ def test_an_asset_of_the_users_stays_his_when_a_file_is_written(assets, library,
     own.asset_data.description, own.asset_data.catalog_id = "mine", assets.compute_catalog_id("Mine")
     own.asset_data.tags.new("precious")
     before, target = collect_state(), tmp_path / "walk.v2"
-    assert press_operator(bpy.ops.beyond_mocap.make_assets, which="SELECTED", apart=True, filepath=str(target)) == {"FINISHED"}
+    assert press_operator(bpy.ops.beyond_mocap.make_assets, which="SELECTED", apart=True,
+                          filepath=str(target)) == {"FINISHED"}
     assert collect_state() == before and own.asset_data.description == "mine" and len(own.asset_data.tags) == 1
     with bpy.data.libraries.load(str(tmp_path / "walk.v2.blend"), assets_only=True) as (there, _):
         assert list(there.actions) == ["kick_low_top"]

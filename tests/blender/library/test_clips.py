@@ -130,7 +130,8 @@ def test_nothing_given_and_nothing_selected():
 
 
 def test_an_armature_without_motion(core, rooms, tmp_path):
-    bpy.context.view_layer.objects.active = rooms["rigs.armature"].create_armature(bpy.context, made.build_skeleton(core), "Still")
+    bpy.context.view_layer.objects.active = rooms["rigs.armature"].create_armature(bpy.context,
+                                                                                   made.build_skeleton(core), "Still")
     with pytest.raises(RuntimeError, match="plays no action"):
         bpy.ops.beyond_mocap.mirror()
     with pytest.raises(RuntimeError, match="plays no action"):

@@ -231,12 +231,13 @@ def test_markers_that_only_the_static_trial_has_are_of_the_set(core):
 
 
 def test_markers_without_names_go_to_the_side_they_are_near_to(core, tmp_path):
-    known = core("synthetic.ground_truth.planted_markers").build_trial(
+    known = core("synthetic.ground_truth.synthetic_markers").build_trial(
         core("synthetic.gait").build_gait(1.4, 0.4, fps=100.0), "sprinter", seed=2, occlusion=0.0, swaps=0, jumps=0,
         unlabeled=0
     )
     path = tmp_path / "run.trc"
-    lost = known.trial.rename_labels({"LHAND": "x53", "RHAND": "x52"})  # the set's own aliases have them the other way round
+    lost = known.trial.rename_labels({"LHAND": "x53",
+                                      "RHAND": "x52"})  # the set's own aliases have them the other way round
     core("markers.files.trc").write_trc(lost, path)
     thing = imported(path)
     assert tuple(row.name for row in thing.beyond_mocap_cloud.labels) == known.trial.labels
@@ -342,7 +343,8 @@ def test_cleaning_is_what_the_core_does_and_one_step(cloud, core, walk):
     thing = imported(walk)
     trial = cloud.read_trial(thing, bpy.context.scene)
     sets = importlib.import_module(f"{EXTENSION}.scene.markers.sets")
-    wanted = core("markers.cleaning.clean").clean_trial(trial, sets.build_marker_set(thing).select_clusters(trial.labels))
+    wanted = core("markers.cleaning.clean").clean_trial(trial,
+                                                        sets.build_marker_set(thing).select_clusters(trial.labels))
     assert_one_step(bpy.ops.beyond_mocap.clean_markers)
     thing = bpy.data.objects["walk"]
     back = cloud.read_trial(thing, bpy.context.scene)

@@ -33,7 +33,7 @@ def made(place, extension):
         player.use = player.feed_id in ("home_7", "home_4")
     match.start, match.end = 2.0, 8.0
     assert press_operator(bpy.ops.beyond_mocap.synthesize_match) == {"FINISHED"}
-    shown = {thing.name for thing in room("ours").find_armatures(bpy.context.scene)}
+    shown = {thing.name for thing in room("match_objects").find_armatures(bpy.context.scene)}
     assert shown == {"Home 4 Ben Back", "Home 7 Cora Wing"}
     return folder
 
@@ -93,7 +93,7 @@ def test_the_command_that_makes_it(place):
     match = a_match(place, place / "out")
     match.start, match.end, match.workers, match.solve_touches = 3.0, 9.5, 3, False
     match.players[0].use = False
-    arguments = room("order").build_command(bpy.context.scene)
+    arguments = room("request").build_command(bpy.context.scene)
     text = " ".join(arguments)
     assert text.startswith(f"match --tracking {TRACKING} --library {place / 'library'}")
     assert f"--out {place / 'out'}" in text
@@ -101,15 +101,15 @@ def test_the_command_that_makes_it(place):
     players = arguments[arguments.index("--players") + 1 :][:8]
     assert "home_1" not in players and set(players) == {player.feed_id for player in match.players if player.use}
     match.scheduler = "tcp://here:8786"
-    assert "--workers" not in room("order").build_command(bpy.context.scene)
+    assert "--workers" not in room("request").build_command(bpy.context.scene)
 
 
 def test_what_goes_with_the_events_is_asked_for_where_there_are_events(place):
     match = a_match(place, "")
     match.events_metadata_file, match.events_provider = str(place / "f7.xml"), "opta"
-    assert "--events-meta" not in room("order").build_command(bpy.context.scene)
+    assert "--events-meta" not in room("request").build_command(bpy.context.scene)
     match.events_file = str(place / "f24.xml")
-    text = " ".join(room("order").build_command(bpy.context.scene))
+    text = " ".join(room("request").build_command(bpy.context.scene))
     assert f"--events-meta {place / 'f7.xml'} --events-provider opta" in text
 
 
@@ -117,7 +117,7 @@ def test_no_digit_of_a_late_time_is_lost(place, core):
     match = a_match(place, "")
     match.start, match.end = 1234.567, 2700.04
     bpy.context.scene.beyond_mocap.rate = 30000 / 1001
-    order = room("order")
+    order = room("request")
     text = " ".join(order.build_command(bpy.context.scene))
     assert "--from 1234.567 --to 2700.04" in text and "--fps 29.97003" in text
     assert " 1234.567-2700.04 s " in order.choose_output_folder(bpy.context.scene)
@@ -132,7 +132,7 @@ def test_what_is_made_is_shown_where_the_ball_is(place, made):
     """Ball and players of the made match are where the planted truth has them: at every touch of the two players."""
     match = shown_again(place, made)
     scene = bpy.context.scene
-    ball, bodies = room("show").find_ball(scene), room("ours").find_armatures(scene)
+    ball, bodies = room("show").find_ball(scene), room("match_objects").find_armatures(scene)
     touches = [line.split(",") for line in (TRACKING.with_name("small_touches.csv")).read_text().splitlines()[1:]]
     looked = 0
     for time, who, *_, x, y, z in touches:
@@ -141,7 +141,7 @@ def test_what_is_made_is_shown_where_the_ball_is(place, made):
             scene.frame_set(int(frame), subframe=frame % 1.0)
             away = (ball.matrix_world.translation - _vector(x, y, z)).length
             assert away < 0.5, time  # it is led to where his foot is
-            body = next(thing for thing in bodies if thing[room("ours").PLAYER_PROPERTY] == who)
+            body = next(thing for thing in bodies if thing[room("match_objects").PLAYER_PROPERTY] == who)
             hips = body.matrix_world @ body.pose.bones[0].head
             assert (hips.xy - _vector(x, y, z).xy).length < 1.0, time
             looked += 1
@@ -164,7 +164,7 @@ def test_shown_it_is_one_step_of_undo(place, made):
 
 def test_without_a_folder_each_choice_has_its_own(place):
     match = a_match(place, "")
-    folder = room("order").choose_output_folder
+    folder = room("request").choose_output_folder
     scene, seen = bpy.context.scene, set()
     for change in ({}, {"end": 12.0}, {"solve_touches": False}, {"workers": 7}):
         for name, value in change.items():
@@ -173,7 +173,7 @@ def test_without_a_folder_each_choice_has_its_own(place):
     assert len(seen) == 3  # the number of processes changes nothing
     assert all(pathlib.Path(one).parent == TRACKING.parent and "small 0-" in one for one in seen)
     match.folder = str(place)
-    assert folder(scene) == room("order").choose_display_folder(scene) == str(place)
+    assert folder(scene) == room("request").choose_display_folder(scene) == str(place)
 
 
 def test_a_match_made_while_another_scene_is_shown_is_not_lost(place, made):
@@ -181,7 +181,7 @@ def test_a_match_made_while_another_scene_is_shown_is_not_lost(place, made):
     match = a_match(place, "")
     match.start, match.end = 2.0, 8.0
     scene, other = bpy.context.scene, bpy.data.scenes.new("Other")
-    wanted = room("order").build_display_request(scene, str(made))
+    wanted = room("request").build_display_request(scene, str(made))
     seen = room("load").load_section(wanted, None, lambda done, text: None, lambda: False)
     verb = importlib.import_module(f"{EXTENSION}.operators.match").MatchVerb
     bpy.context.window.scene = other
@@ -189,7 +189,7 @@ def test_a_match_made_while_another_scene_is_shown_is_not_lost(place, made):
         verb.apply(None, scene, (wanted, seen, ()))
     assert not other.objects and not scene.objects
     bpy.context.window.scene = scene
-    assert bpy.ops.beyond_mocap.show_match() == {"FINISHED"} and room("ours").find_armatures(scene)
+    assert bpy.ops.beyond_mocap.show_match() == {"FINISHED"} and room("match_objects").find_armatures(scene)
 
 
 def test_an_end_before_the_start_is_told_before_anything_is_made(place, tmp_path):
@@ -199,7 +199,7 @@ def test_an_end_before_the_start_is_told_before_anything_is_made(place, tmp_path
         bpy.ops.beyond_mocap.synthesize_match()
     assert not (tmp_path / "out").exists()
     match.end = 0.0
-    assert "--to" not in room("order").build_command(bpy.context.scene)
+    assert "--to" not in room("request").build_command(bpy.context.scene)
 
 
 def test_what_was_chosen_before_the_first_reading_stays(place):
@@ -231,7 +231,8 @@ def test_one_whose_file_is_gone_leaves_the_others(place, made, tmp_path):
     shutil.copytree(made, tmp_path / "copy")
     (tmp_path / "copy" / "home_4.take.npz").unlink()
     match = shown_again(place, tmp_path / "copy")
-    assert {thing[room("ours").PLAYER_PROPERTY] for thing in room("ours").find_armatures(bpy.context.scene)} == {"home_7"}
+    assert {thing[room("match_objects").PLAYER_PROPERTY]
+            for thing in room("match_objects").find_armatures(bpy.context.scene)} == {"home_7"}
     assert "home_4 cannot be shown" in match.told and "no such file" in match.told
     (tmp_path / "copy" / "home_7.take.npz").write_bytes(b"no take")
     with pytest.raises(RuntimeError, match="take.npz"):
@@ -257,7 +258,8 @@ def test_cameras_by_their_buttons(place, made):
     assert press_operator(bpy.ops.beyond_mocap.match_camera, which="EYES", player="home_7") == {"FINISHED"}
     eyes = scene.camera
     scene.frame_set(60)
-    seven = next(thing for thing in room("ours").find_armatures(scene) if thing[room("ours").PLAYER_PROPERTY] == "home_7")
+    seven = next(thing for thing in room("match_objects").find_armatures(scene)
+                 if thing[room("match_objects").PLAYER_PROPERTY] == "home_7")
     head = next(bone for bone in seven.pose.bones if bone.name.lower() == "head")
     assert (eyes.matrix_world.translation - seven.matrix_world @ head.head).length < 0.25
     assert press_operator(bpy.ops.beyond_mocap.match_camera, which="STAND") == {"FINISHED"}
@@ -283,7 +285,7 @@ def test_a_saved_file_shows_it_without_its_folder(place, made, tmp_path):
     shown_again(place, made)
     bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "match.blend"))
     bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "match.blend"))
-    assert len(room("ours").find_armatures(bpy.context.scene)) == 2
+    assert len(room("match_objects").find_armatures(bpy.context.scene)) == 2
     assert press_operator(bpy.ops.beyond_mocap.match_camera, which="EYES", player="home_4") == {"FINISHED"}
 
 

@@ -84,7 +84,7 @@ def test_who_is_excluded_is_left_out_and_that_is_told(room, scenery, tmp_path): 
     next(layer for layer in layers if layer.name == "Match Home").exclude = True
     path = tmp_path / "match.fbx"
     bpy.ops.beyond_mocap.match_export(filepath=str(path), format="FBX", pitch=False)
-    assert len(room("ours").find_armatures(scene)) == 4
+    assert len(room("match_objects").find_armatures(scene)) == 4
     bpy.ops.wm.read_homefile(use_empty=True)
     READERS[".fbx"](str(path))
     assert len([thing for thing in bpy.context.scene.objects if thing.type == "ARMATURE"]) == 2

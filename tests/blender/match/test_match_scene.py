@@ -53,7 +53,7 @@ def scenery(room, core, walk):
 def shown(room, scenery, first=11, fps=(FPS, 1.0)):
     scene = bpy.context.scene
     scene.render.fps, scene.render.fps_base = fps
-    room("show_match").show_match(bpy.context, scenery, first)
+    room("show").show_match(bpy.context, scenery, first)
     return scene
 
 
@@ -68,7 +68,8 @@ def test_everybody_is_where_he_is_in_the_match(room, scenery, fps, scale):
     bpy.context.scene.unit_settings.scale_length = scale
     scene = shown(room, scenery, fps=fps)
     rate = fps[0] / fps[1]
-    bodies = {thing[room("ours").PLAYER_PROPERTY]: thing for thing in room("ours").find_armatures(scene)}
+    bodies = {thing[room("match_objects").PLAYER_PROPERTY]: thing
+              for thing in room("match_objects").find_armatures(scene)}
     assert set(bodies) == {"h1", "h10", "a7", "r"}
     assert bodies["h10"].name == "Home 10 Dan"
     for person in scenery.characters:
@@ -86,7 +87,8 @@ def test_everybody_is_where_he_is_in_the_match(room, scenery, fps, scale):
 
 def test_who_is_away_is_hidden(room, scenery):
     scene = shown(room, scenery)
-    late = next(thing for thing in room("ours").find_armatures(scene) if thing[room("ours").PLAYER_PROPERTY] == "a7")
+    late = next(thing for thing in room("match_objects").find_armatures(scene)
+                if thing[room("match_objects").PLAYER_PROPERTY] == "a7")
     hidden = {}
     for frame in (11, 11 + 44, 11 + 45, 11 + 45 + 120, 11 + 45 + 121):
         scene.frame_set(frame)
@@ -98,7 +100,8 @@ def test_who_is_away_is_hidden(room, scenery):
 
 def test_meshes_are_shared_and_wear_the_kit(room, scenery):
     scene = shown(room, scenery)
-    bodies = {thing[room("ours").PLAYER_PROPERTY]: thing for thing in room("ours").find_armatures(scene)}
+    bodies = {thing[room("match_objects").PLAYER_PROPERTY]: thing
+              for thing in room("match_objects").find_armatures(scene)}
     assert len({thing.data for thing in bodies.values()}) == 1
     worn = {who: next(one for one in thing.children if one.name.endswith("body")) for who, thing in bodies.items()}
     meshes = {who: thing.data for who, thing in worn.items()}
@@ -118,7 +121,8 @@ def test_meshes_are_shared_and_wear_the_kit(room, scenery):
 def test_numbers_ride_the_back(room, scenery):
     """In a walk every corner of the number stays within a centimetre of the shirt, and before it."""
     scene = shown(room, scenery)
-    ten = next(thing for thing in room("ours").find_armatures(scene) if thing[room("ours").PLAYER_PROPERTY] == "h10")
+    ten = next(thing for thing in room("match_objects").find_armatures(scene)
+               if thing[room("match_objects").PLAYER_PROPERTY] == "h10")
     number, body = (next(one for one in ten.children if one.name.endswith(part)) for part in ("number", "body"))
     from mathutils.bvhtree import BVHTree
 
@@ -158,50 +162,52 @@ def _posed(core, laid, neutral, skeleton):
 def test_shown_again_it_takes_its_own_place_and_leaves_the_users_things(room, scenery):
     scene = shown(room, scenery)
     own = bpy.data.objects.new("Mine", None)
-    room("ours").create_collection(scene, "home").objects.link(own)
+    room("match_objects").create_collection(scene, "home").objects.link(own)
     kinds = ("objects", "meshes", "actions", "armatures", "collections", "cameras", "lights", "curves")
     before = {kind: len(getattr(bpy.data, kind)) for kind in kinds}
     shown(room, scenery)
     assert before == {kind: len(getattr(bpy.data, kind)) for kind in before}
     assert own.name in scene.objects
-    room("ours").clear_match(scene)
-    assert own.name in scene.objects and not room("ours").find_armatures(scene)
+    room("match_objects").clear_match(scene)
+    assert own.name in scene.objects and not room("match_objects").find_armatures(scene)
     assert len(bpy.data.armatures) == 0 and len(bpy.data.actions) == 0
 
 
 def test_shown_again_where_its_collections_were_excluded(room, scenery):
     scene = shown(room, scenery)
-    room("ours").create_collection(scene, "home").objects.link(bpy.data.objects.new("Mine", None))
+    room("match_objects").create_collection(scene, "home").objects.link(bpy.data.objects.new("Mine", None))
     layers = bpy.context.view_layer.layer_collection.children
     layers["Match"].exclude = True
     shown(room, scenery)
-    body = room("ours").find_armatures(scene)[0]
+    body = room("match_objects").find_armatures(scene)[0]
     assert body.visible_get() and body.animation_data.action_slot is not None
 
 
 def test_it_takes_its_own_place_below_another_collection(room, scenery):
     scene = shown(room, scenery)
-    room("ours").create_collection(scene, "home").objects.link(bpy.data.objects.new("Mine", None))  # so that it stays
-    above, whole = bpy.data.collections.new("Above"), room("ours").find_root(scene)
+    room("match_objects").create_collection(scene, "home").objects.link(bpy.data.objects.new("Mine",
+            None))  # so that it stays
+    above, whole = bpy.data.collections.new("Above"), room("match_objects").find_root(scene)
     scene.collection.children.link(above)
     scene.collection.children.unlink(whole)
     above.children.link(whole)
     bpy.context.view_layer.layer_collection.children["Above"].exclude = True
     shown(room, scenery)
     assert len([thing for thing in scene.objects if thing.type == "ARMATURE"]) == 4
-    assert room("ours").find_root(scene) in above.children[:] and room("ours").find_armatures(scene)[0].visible_get()
+    assert room("match_objects").find_root(scene) in above.children[:] and room("match_objects").find_armatures(scene)[
+        0].visible_get()
 
 
 def test_actions_that_somebody_keeps_stay(room, scenery):
     """His own, which gets a shield, and one of ours that he has given a shield; others go."""
     scene = shown(room, scenery)
-    first, second, *_ = room("ours").find_armatures(scene)
+    first, second, *_ = room("match_objects").find_armatures(scene)
     own = bpy.data.actions.new("Mine")
     own.slots.new(id_type="OBJECT", name="Mine")
     first.animation_data.action, first.animation_data.action_slot = own, own.slots[0]
     second.animation_data.action.name, second.animation_data.action.use_fake_user = "Kept", True
     shown(room, scenery)
-    room("ours").clear_match(scene)
+    room("match_objects").clear_match(scene)
     kept = {action.name for action in bpy.data.actions if action.use_fake_user}
     assert kept == {"Mine", "Kept"}
 
@@ -216,13 +222,13 @@ def second_scene(name="Second"):
 def shirt_colours(room, scene):
     """Team -> rounded colour of what its first player wears, number and shirt."""
     out = {}
-    for body in room("ours").find_armatures(scene):
+    for body in room("match_objects").find_armatures(scene):
         for mesh in (thing.data for thing in body.children):
             for material in mesh.materials:
                 if "shirt" in material.name or "number" in material.name:
                     shader = next(node for node in material.node_tree.nodes if node.type == "BSDF_PRINCIPLED")
                     rgb = tuple(round(share, 2) for share in shader.inputs["Base Color"].default_value[:3])
-                    out[body[room("ours").PLAYER_PROPERTY], material.name.split(".")[0].split()[-1]] = rgb
+                    out[body[room("match_objects").PLAYER_PROPERTY], material.name.split(".")[0].split()[-1]] = rgb
     return out
 
 
@@ -246,7 +252,7 @@ def test_two_matches_in_one_file_wear_their_own_colours(room, scenery):
 @pytest.mark.parametrize("linked", ["whole", "part", "player"])
 def test_what_another_scene_shows_too_stays_there(room, scenery, linked):
     first = shown(room, scenery)
-    ours, second = room("ours"), bpy.data.scenes.new("Second")
+    ours, second = room("match_objects"), bpy.data.scenes.new("Second")
     home = next(one for one in ours.root(first).children if one[ours.MARK] == "home")
     if linked == "player":
         second.collection.objects.link(ours.find_armatures(first)[0])
@@ -262,7 +268,7 @@ def test_what_another_scene_shows_too_stays_there(room, scenery, linked):
 
 def test_a_collection_of_the_users_that_two_scenes_have_is_told(room, core, scenery):
     first = shown(room, scenery)
-    ours, second = room("ours"), bpy.data.scenes.new("Second")
+    ours, second = room("match_objects"), bpy.data.scenes.new("Second")
     above, whole = bpy.data.collections.new("Above"), ours.root(first)
     first.find_or_create_collection.children.unlink(whole)
     above.children.link(whole)
@@ -281,11 +287,13 @@ def test_a_match_linked_from_another_file_is_left_alone(room, scenery, tmp_path)
         linked.collections = ["Match"]
     scene = bpy.context.scene
     scene.collection.children.link(linked.collections[0])
-    assert not room("ours").find_armatures(scene)
+    assert not room("match_objects").find_armatures(scene)
     shown(room, scenery)
-    assert len(room("ours").find_armatures(scene)) == 4 and all(not thing.library for thing in room("ours").find_armatures(scene))
+    assert len(room("match_objects").find_armatures(scene)) == 4 and all(not thing.library
+                                                                         for thing in room(
+        "match_objects").find_armatures(scene))
     assert linked.collections[0] in scene.collection.children[:] and len(linked.collections[0].all_objects) > 10
-    worn = room("ours").find_armatures(scene)[0].children[0].data.materials
+    worn = room("match_objects").find_armatures(scene)[0].children[0].data.materials
     assert all(cloth.library is None for cloth in worn)  # a linked one would not take a new colour
 
 
@@ -329,7 +337,8 @@ def test_the_stands_camera_keeps_the_ball_in_its_picture(room, scenery):
 
 def test_eyes_see_what_the_player_sees_but_not_his_own_head(room, scenery):
     scene = shown(room, scenery)
-    ten = next(thing for thing in room("ours").find_armatures(scene) if thing[room("ours").PLAYER_PROPERTY] == "h10")
+    ten = next(thing for thing in room("match_objects").find_armatures(scene)
+               if thing[room("match_objects").PLAYER_PROPERTY] == "h10")
     camera = room("cameras").create_eyes_camera(scene, ten, None)
     for frame in (20, 60, 120):
         scene.frame_set(frame)

@@ -10,7 +10,7 @@ from conftest import EXTENSION
 @pytest.fixture
 def shown():
     """Two players of a match that is shown from 60 s on, its first frame being 11, at 25 frames a second."""
-    ours = importlib.import_module(f"{EXTENSION}.scene.match.ours")
+    ours = importlib.import_module(f"{EXTENSION}.scene.match.match_objects")
     scene = bpy.context.scene
     scene.render.fps, scene.frame_end = 25, 11 + 250
     match = scene.beyond_mocap_match

@@ -8,7 +8,7 @@ import bpy
 import numpy as np
 import pytest
 from conftest import EXTENSION
-from undo import press_operator, collect_state
+from undo import collect_state, press_operator
 
 LIBRARY = pathlib.Path(__file__).resolve().parents[3] / "sample_blend" / "passes" / "library"
 USED = ("volley_pass", "volley_toss", "volley_attack", "volley_receive", "ready", "walking_1_2", "standing_turn",
@@ -52,7 +52,7 @@ def first():
 
 def asked(room):
     bpy.context.view_layer.update()
-    return room("passes.order").build_scene(bpy.context.scene)
+    return room("passes.scene_lists").build_scene(bpy.context.scene)
 
 
 def test_its_strongest_strike_is_the_example(actor, room, core):
@@ -79,7 +79,7 @@ def test_a_stretch_of_it_is_in_scene_frames(actor, room):
 
 def test_an_edited_action_is_another_example(actor, room):
     before, live = asked(room).passes[0].example.hit, room("passes.live")
-    settings().made_of = room("passes.make").build_order(bpy.context.scene).digest
+    settings().made_of = room("passes.generate").build_order(bpy.context.scene).digest
     assert not live.find_edit(bpy.context.scene)
     bpy.ops.beyond_mocap.import_clips(filepath=str(LIBRARY / "volley_attack.bvh"))
     other = bpy.context.object
@@ -168,6 +168,6 @@ def test_a_file_says_that_it_is_left_out(actor, room, core, tmp_path):
     press_operator(bpy.ops.beyond_mocap.passes_to_json, filepath=str(tmp_path / "out.json"))
     read = core("passes.scene_json").read_scene(tmp_path / "out.json")
     assert read.passes[0].example is None and read.passes[1].example.clip == "volley_pass.bvh"
-    assert "pass 1" in room("passes.order").list_lost_examples(settings())
+    assert "pass 1" in room("passes.scene_lists").list_lost_examples(settings())
     first().actor = None
-    assert not room("passes.order").list_lost_examples(settings())
+    assert not room("passes.scene_lists").list_lost_examples(settings())

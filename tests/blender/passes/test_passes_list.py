@@ -24,7 +24,7 @@ def settings():
 
 def asked(room):
     bpy.context.view_layer.update()
-    return room("order").build_scene(bpy.context.scene)
+    return room("scene_lists").build_scene(bpy.context.scene)
 
 
 def test_every_sample_can_be_chosen(core, room):
@@ -68,7 +68,7 @@ def test_weights_of_bones_are_typed(core, room):
     settings().weights.bones, settings().weights.velocity = "left foot 2, head=0.5,", 3.0
     found = asked(room).weights
     assert dict(found.bones) == {"left foot": 2.0, "head": 0.5} and found.velocity == 3.0
-    room("order").fill_lists(bpy.context, asked(room))
+    room("scene_lists").fill_lists(bpy.context, asked(room))
     assert dict(asked(room).weights.bones) == {"left foot": 2.0, "head": 0.5}
     settings().weights.bones = "left foot"
     with pytest.raises(core("base.errors").InputError, match="bone weights"):

@@ -129,7 +129,8 @@ def test_laid_twice_leaves_one_action(cameras):
 def test_a_way_that_is_one_point_and_one_that_is_vertical_have_their_cameras(cameras):
     for places in (np.zeros((3, 3)), np.stack([np.zeros(9), np.zeros(9), np.linspace(0.0, 3.0, 9)], axis=1)):
         cameras.place_cameras(
-            bpy.context.scene, cameras.CameraTargets(places, np.arange(len(places)) + 1.0, places, np.zeros(len(places)))
+            bpy.context.scene, cameras.CameraTargets(places, np.arange(len(places)) + 1.0, places,
+                                                     np.zeros(len(places)))
         )
         for kind in cameras.KINDS:
             assert np.isfinite(cameras.found(bpy.context.scene, kind).matrix_world).all()

@@ -7,7 +7,7 @@ import pathlib
 import bpy
 import numpy as np
 import pytest
-from undo import assert_one_step, press_operator, collect_state
+from undo import assert_one_step, collect_state, press_operator
 
 SAMPLE = pathlib.Path(__file__).resolve().parents[3] / "sample_blend"
 CLIPS = ("standing_1", "walking_1_2", "walk_jog_walk", "jogging_2_9", "jogging_turn_left", "running_4_2",

@@ -67,7 +67,8 @@ def test_words(renew, made, ready, session, scene):  # noqa: F811
     strips.add_moment(bpy.context, made, 9.0, ("kick",))
     assert "labels" in renew().lines
     bpy.ops.beyond_mocap.update()
-    assert renew().lines == "" and session.find_take(made.take).plan.timeline == plans.build_plan(ready, made)[0].timeline
+    assert renew().lines == "" and session.find_take(made.take).plan.timeline == plans.build_plan(ready,
+            made)[0].timeline
 
 
 def test_the_library_on_disk(renew, made, ready, tmp_path):  # noqa: F811
@@ -132,7 +133,8 @@ def test_a_stretch_by_what_is_selected(made, session):  # noqa: F811
     ]
     assert bpy.ops.beyond_mocap.resynthesize_stretch() == {"FINISHED"}
     off = (
-        np.any(before.motion.rotations != session.find_take(made.take).take.motion.rotations, axis=(1, 2)).nonzero()[0] / 30
+        np.any(before.motion.rotations != session.find_take(made.take).take.motion.rotations, axis=(1, 2)).nonzero()[0]
+        / 30
     )
     assert len(off) and off.min() > seconds[0] - 2.0 and off.max() < seconds[1] + 2.0
     assert made.result.state == "PREVIEW"

@@ -37,7 +37,7 @@ def at(table, frame):
 
 
 def found(room, body):
-    return room("result.hand_keys").find_manual_keys(*room("core.channels").find_playing_action(body))
+    return room("result.manual_keys").find_manual_keys(*room("core.channels").find_playing_action(body))
 
 
 def test_nothing_is_found_on_what_was_made(room, accepted):
@@ -155,4 +155,4 @@ def test_an_update_keeps_them_and_tells(room, accepted, one):  # noqa: F811
 def test_an_action_of_the_user_s_own_is_no_concern(room, accepted):
     own = bpy.data.actions.new("own")
     own.slots.new("OBJECT", "own")
-    assert len(room("result.hand_keys").find_manual_keys(own, own.slots[0])) == 0
+    assert len(room("result.manual_keys").find_manual_keys(own, own.slots[0])) == 0

@@ -6,7 +6,7 @@ import bpy
 import numpy as np
 import pytest
 from test_players import library_folder, match, ready, refused, session  # noqa: F401  (fixtures)
-from undo import assert_one_step, press_operator, collect_state
+from undo import assert_one_step, collect_state, press_operator
 
 
 def look(player):
@@ -43,7 +43,8 @@ def one(ready, session):  # noqa: F811
 
 
 def kinds():
-    return {kind: collect_state()[kind] for kind in ("objects", "armatures", "actions", "meshes", "curves", "materials")}
+    return {kind: collect_state()[kind] for kind in ("objects", "armatures", "actions", "meshes", "curves",
+                                                     "materials")}
 
 
 def test_a_preview_of_a_new_player_leaves_nothing_when_discarded(one):
@@ -104,7 +105,7 @@ def test_strips_play_what_the_action_plays(one, session):  # noqa: F811
 
 
 def test_a_strip_that_was_split_becomes_part_of_the_action_once(one, extension):
-    hand_keys = importlib.import_module(f"{extension.__name__}.scene.result.hand_keys")
+    hand_keys = importlib.import_module(f"{extension.__name__}.scene.result.manual_keys")
     bpy.ops.beyond_mocap.synthesize()
     bpy.ops.beyond_mocap.accept(form="STRIPS")
     frames = np.arange(1, 360, 7.7)

@@ -63,7 +63,8 @@ def test_scaled_object(core, armature):
     skeleton = made.build_skeleton(core)
     body = armature.create_armature(bpy.context, skeleton, "Body")
     body.scale = (2, 2, 2)
-    np.testing.assert_allclose(armature.build_skeleton(body, bpy.context.scene).offsets, 2 * skeleton.offsets, atol=1e-6)
+    np.testing.assert_allclose(armature.build_skeleton(body, bpy.context.scene).offsets, 2 * skeleton.offsets,
+                               atol=1e-6)
     body.scale = (2, 1, 1)
     with pytest.raises(core("base.errors").InputError, match="Ctrl-A"):
         armature.build_skeleton(body, bpy.context.scene)

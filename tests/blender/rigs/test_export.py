@@ -136,7 +136,8 @@ def baked(rooms, rig, body, **wishes):
     source = rooms["rigs.fit"].read_source(body, bpy.context.scene)
     table = rooms["rigs.bone_maps"].find_bone_map(rig)
     options = rooms["rigs.fit"].BakeOptions(**wishes)
-    return rooms["rigs.rig_bake"].apply_bake(rooms["rigs.rig_bake"].prepare_bake(rig, table, source, bpy.context.scene, options))
+    return rooms["rigs.rig_bake"].apply_bake(rooms["rigs.rig_bake"].prepare_bake(rig, table, source, bpy.context.scene,
+                                                                                 options))
 
 
 @pytest.mark.parametrize("format", SUFFIXES)
@@ -189,14 +190,16 @@ def test_in_place_stays(rooms, body, tmp_path):
 def test_another_rate(rooms, body, tmp_path):
     skin(body)
     bpy.context.scene.render.fps, bpy.context.scene.render.fps_base = 24, 1.001
-    rooms["rigs.export"].export_motion(bpy.context, [body], rooms["rigs.export"].ExportOptions(tmp_path / "out.glb", "GLB", rate=30.0))
+    rooms["rigs.export"].export_motion(bpy.context, [body], rooms["rigs.export"].ExportOptions(tmp_path / "out.glb",
+            "GLB", rate=30.0))
     seconds = (FRAMES - 1) / (24 / 1.001)
     found = read_back(tmp_path / "out.glb", int(np.floor(seconds * 30 + 1e-6)) + 1)
     assert len(found) >= 15
 
 
 def test_a_control_rig_goes_out_with_its_deform_bones(rooms, body, tmp_path):
-    rig = rigs.create_rig(rigs.MIXAMO, "Controls", extra=[("control", None, "head"), ("helper", "mixamorig:Head", "head")])
+    rig = rigs.create_rig(rigs.MIXAMO, "Controls",
+                          extra=[("control", None, "head"), ("helper", "mixamorig:Head", "head")])
     for name in ("control", "helper"):
         rig.data.bones[name].use_deform = False
     baked(rooms, rig, body)

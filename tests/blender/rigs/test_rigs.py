@@ -12,7 +12,7 @@ import bpy
 import numpy as np
 import pytest
 import sample_rigs as rigs
-from undo import assert_one_step, press_operator, collect_state
+from undo import assert_one_step, collect_state, press_operator
 
 SAMPLE = pathlib.Path(__file__).resolve().parents[3] / "sample_blend" / "library"
 START = 5
@@ -62,7 +62,8 @@ def bake(rooms, rig, body, **wishes):
     table = rooms["rigs.bone_maps"].find_bone_map(rig)
     source = rooms["rigs.fit"].read_source(body, scene)
     options = rooms["rigs.fit"].BakeOptions(**wishes)
-    return table, rooms["rigs.rig_bake"].apply_bake(rooms["rigs.rig_bake"].prepare_bake(rig, table, source, scene, options))
+    return table, rooms["rigs.rig_bake"].apply_bake(rooms["rigs.rig_bake"].prepare_bake(rig, table, source, scene,
+            options))
 
 
 def directions(rig, table, frames=range(START, START + 60, 6)):
@@ -136,7 +137,8 @@ def test_a_generated_rigify_rig(rooms, body, rigify):
     limbs = [pair for pair in LIMBS if pair[0] in shown]
     frames = range(START, START + 60, 6)
     points = rigs.read_heads(rig, [shown[p] for pair in limbs for p in pair], frames)
-    source = rigs.read_heads(body, [rooms["rigs.bone_maps"].find_bone_map(body)[p] for pair in limbs for p in pair], frames)
+    source = rigs.read_heads(body, [rooms["rigs.bone_maps"].find_bone_map(body)[p] for pair in limbs for p in pair],
+                             frames)
     a, b = (p[:, 1::2] - p[:, 0::2] for p in (points, source))
     off = degrees(a / np.linalg.norm(a, axis=-1, keepdims=True), b / np.linalg.norm(b, axis=-1, keepdims=True))
     assert off[:, :4].max() < 1.5 and off.max() < 12.0, off.max(axis=0)
@@ -221,7 +223,8 @@ def test_helper_bones_are_left_alone_or_follow(rooms, body):
     keyed = {path.split('"')[1] for path, _ in curves}
     assert keyed == set(table.values())
     _, baked = bake(rooms, rig, body, bakes_ik=True)
-    pairs = rigs.read_heads(rig, ["ik_foot_l", "foot_l", "ik_hand_r", "hand_r", "ik_hand_l", "hand_l"], (START, START + 30))
+    pairs = rigs.read_heads(rig, ["ik_foot_l", "foot_l", "ik_hand_r", "hand_r", "ik_hand_l", "hand_l"],
+                            (START, START + 30))
     np.testing.assert_allclose(pairs[:, 0::2], pairs[:, 1::2], atol=1e-4)
     assert any("ik_foot_l" in line for line in baked.messages)
 
@@ -229,7 +232,7 @@ def test_helper_bones_are_left_alone_or_follow(rooms, body):
 @pytest.mark.parametrize("bakes_ik", (False, True))
 def test_inverse_kinematics_on_the_rig(rooms, body, bakes_ik):
     plain, rig = (rigs.create_rig(rigs.MIXAMO, name, root="root",
-                             extra=[("target.L", "root", "left foot")] if name == "IK" else ())
+                                  extra=[("target.L", "root", "left foot")] if name == "IK" else ())
                   for name in ("Plain", "IK"))
     constraint = rig.pose.bones["mixamorig:LeftLeg"].constraints.new("IK")
     constraint.target, constraint.subtarget, constraint.chain_count = rig, "target.L", 2
@@ -373,7 +376,8 @@ def test_all_players_get_a_rig_each(rooms, body, clip):
     press_operator(bpy.ops.beyond_mocap.bake_to_rig, targets="PLAYERS")
     first, second = (player.rig for player in settings.players)
     assert first == rig and second not in (None, rig) and second.children[0].modifiers[0].object == second
-    assert rooms["core.channels"].find_playing_action(second)[0] and rooms["core.channels"].find_playing_action(first)[0]
+    assert rooms["core.channels"].find_playing_action(second)[0] and rooms["core.channels"].find_playing_action(first)[
+        0]
 
 
 def test_a_strip_in_tweak_mode_is_told(rooms, body):

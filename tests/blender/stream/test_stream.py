@@ -10,7 +10,7 @@ import bpy
 import numpy as np
 import pytest
 from conftest import EXTENSION
-from undo import assert_one_step, press_operator, collect_state
+from undo import assert_one_step, collect_state, press_operator
 
 CLIP = pathlib.Path(__file__).resolve().parents[3] / "sample_blend" / "library" / "kick_low_top.bvh"
 OPS = bpy.ops.beyond_mocap

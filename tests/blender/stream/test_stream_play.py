@@ -66,7 +66,8 @@ def places(scene, frames):
 
 def test_all_stand_and_the_ball_lies(playing, room):
     assert (
-        room("stream.play").current_rally().holder == "Ann" and told().playing and told().played.startswith("Ann has the ball")
+        room("stream.play").current_rally().holder == "Ann" and told().playing
+        and told().played.startswith("Ann has the ball")
     )
     assert all(row.body is not None for row in playing.beyond_mocap_passes.players)
     assert playing.frame_end >= 5 + 60 * 24

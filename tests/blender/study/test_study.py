@@ -41,7 +41,8 @@ def pixels(path):
 
 def test_pictures_show_the_same_wherever_a_body_is(study):
     folder, names = study
-    before, things = collect_state(), {kind: len(getattr(bpy.data, kind)) for kind in ("objects", "scenes", "meshes", "worlds")}
+    before, things = collect_state(), {kind: len(getattr(bpy.data, kind)) for kind in ("objects", "scenes", "meshes",
+            "worlds")}
     assert bpy.ops.beyond_mocap.study_render(directory=f"{folder}/", pictures=True, **SMALL) == {"FINISHED"}
     assert collect_state() == before
     assert {kind: len(getattr(bpy.data, kind)) for kind in things} == things

@@ -13,7 +13,7 @@ import sample_rigs as rigs
 import worlds
 from conftest import EXTENSION
 from throw_models import write_model_file
-from undo import assert_one_step, press_operator, collect_state
+from undo import assert_one_step, collect_state, press_operator
 
 SAMPLE = pathlib.Path(__file__).resolve().parents[3] / "sample_blend" / "library"
 TARGET = (18.0, 1.0, 1.2)
@@ -572,7 +572,7 @@ def test_a_ball_that_a_hand_has_put_down_is_kicked_there(room):
 
 
 def test_what_is_shown_follows_its_target(room):
-    live, scene = room("throws.shown"), bpy.context.scene
+    live, scene = room("throws.preview"), bpy.context.scene
     body = a_body()
     assert live.find_outdated(scene) is None
     press_operator(bpy.ops.beyond_mocap.throw_at_target)
@@ -618,7 +618,7 @@ def followed(live, scene):
 
 @pytest.mark.parametrize("act", ["throw", "kick"])
 def test_undo_after_a_throw_has_followed(act, room):
-    live, scene = room("throws.shown"), bpy.context.scene
+    live, scene = room("throws.preview"), bpy.context.scene
     a_body()
     press_operator(getattr(bpy.ops.beyond_mocap, f"{act}_at_target"))
     for message in ("deselected", "target selected"):  # nothing of the armature changes between two steps
@@ -645,7 +645,7 @@ def test_undo_after_a_throw_has_followed(act, room):
 
 @pytest.mark.parametrize("hidden", ["hide_viewport", "excluded"])
 def test_a_hidden_target_stays_where_it_is_over_undo(hidden, room):
-    targets, scene, hangs = room("throws.order"), bpy.context.scene, an_empty((1.0, 0.0, 0.5))
+    targets, scene, hangs = room("throws.throw_task"), bpy.context.scene, an_empty((1.0, 0.0, 0.5))
     hangs.rotation_euler.z = 0.5
     target = an_empty((4.0, 2.0, 0.3))
     target.parent = hangs
@@ -675,7 +675,7 @@ def test_a_hidden_target_stays_where_it_is_over_undo(hidden, room):
 
 def test_a_deleted_thrower_does_not_keep_the_ball(room):
     body, other, ball = a_body(), a_body(), a_ball((0.3, 0.2, 0.11))
-    wish, earlier = body.beyond_mocap_throw, room("throws.order")
+    wish, earlier = body.beyond_mocap_throw, room("throws.throw_task")
     wish.made, wish.flown = "throw", ball
     bone = room("passes.possession").find_bone(bpy.context.scene, body, "hand", "right")
     room("passes.possession").add_hold(bpy.context.scene, ball, body, bone, 5, 30)

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import bpy
 import pytest
-from undo import assert_one_step, press_operator, collect_state
+from undo import assert_one_step, collect_state, press_operator
 
 SAMPLE = Path(__file__).resolve().parents[3] / "sample_blend" / "library"
 
@@ -147,7 +147,8 @@ def test_a_text_of_words_is_dropped_on_a_clip_and_on_a_player(core, rooms, libra
     bpy.ops.beyond_mocap.import_tracking(filepath=str(track))
     assert_one_step(bpy.ops.beyond_mocap.import_words, filepath=str(words))
     settings = bpy.context.scene.beyond_mocap
-    timeline = rooms["timeline.strips"].read_player_timeline(rooms["core.settings"].find_active_player(settings), bpy.context.scene)
+    timeline = rooms["timeline.strips"].read_player_timeline(rooms["core.settings"].find_active_player(settings),
+                                                             bpy.context.scene)
     assert [key.words for key in timeline.keys] == [("kick", "left")]
     (tmp_path / "words.txt").write_text("nonsense\n")
     before = collect_state()

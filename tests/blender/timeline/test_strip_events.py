@@ -27,7 +27,8 @@ def dot(room, parse):
     made = bpy.data.objects.new("dot", None)
     bpy.context.scene.collection.objects.link(made)
     timeline = parse("1.013 3.007 running\n3.007 5 walking\n2.222 kick\n4.444 header\n")
-    room("timeline.lay_strips").write_timeline(made, timeline, room("core.measure").Clock(1.0, 0.0, 25.0), (0.0, 8.0))
+    room("timeline.strip_writing").write_timeline(made, timeline, room("core.measure").Clock(1.0, 0.0, 25.0),
+                                                  (0.0, 8.0))
     return made
 
 
@@ -35,10 +36,10 @@ def dot(room, parse):
 def tidied(room, core, dot):
     """What the strips say once they are in order; it is the same as before, and nothing more is to be done then."""
     def put():
-        before = room("timeline.lanes").read_timeline(dot)
+        before = room("timeline.label_tracks").read_timeline(dot)
         assert room("timeline.strip_events").normalize_object(dot)
         assert not room("timeline.strip_events").normalize_object(dot)
-        assert room("timeline.lanes").read_timeline(dot) == before
+        assert room("timeline.label_tracks").read_timeline(dot) == before
         for track in dot.animation_data.nla_tracks:
             ends = [
                 (strip.frame_start, strip.frame_end) for strip in sorted(track.strips, key=lambda one: one.frame_start)
@@ -130,7 +131,7 @@ def test_duplicated(dot, tidied):
 def test_linked_duplicates_of_the_lane_of_moments_count_once(dot, room):
     track = dot.animation_data.nla_tracks.new()
     track.strips.new("Moments", 1, strip_of(dot, "Moments").action.copy())
-    assert [moment.labels for moment in room("timeline.lanes").list_moments(dot)] == [("kick",), ("header",)]
+    assert [moment.labels for moment in room("timeline.label_tracks").list_moments(dot)] == [("kick",), ("header",)]
 
 
 def test_renamed(dot, tidied, room):
@@ -146,12 +147,12 @@ def test_muted_and_heard_again(dot, room, core):
     strip_of(dot, "running").mute = True
     assert not room("timeline.strip_events").normalize_object(dot)
     strip_of(dot, "running").mute = False
-    assert room("timeline.lanes").read_timeline(dot).spans[0].start == 1.013
+    assert room("timeline.label_tracks").read_timeline(dot).spans[0].start == 1.013
 
 
 def test_an_automatic_strip_that_is_touched_becomes_asked_for(dot, tidied, room, parse):
-    laid = room("timeline.lanes").read_clock(dot)
-    room("timeline.lay_strips").show_automatic_spans(dot, parse("0 1.013 standing\n5 6 walking\n"), laid)
+    laid = room("timeline.label_tracks").read_clock(dot)
+    room("timeline.strip_writing").show_automatic_spans(dot, parse("0 1.013 standing\n5 6 walking\n"), laid)
     assert not room("timeline.strip_events").normalize_object(dot)
     standing = strip_of(dot, "standing")
     standing.frame_start_raw = standing.action_frame_start = 11
@@ -164,18 +165,18 @@ def test_put_onto_the_lane_of_automatic_ones_it_is_still_asked_for(dot, room):
     action = strip_of(dot, "running").action
     lane(dot, "Words").strips.remove(strip_of(dot, "running"))
     lane(dot, "Automatic").strips.new("running", 26, action)
-    assert room("timeline.lanes").read_timeline(dot).spans[0].words == ("running",)
+    assert room("timeline.label_tracks").read_timeline(dot).spans[0].words == ("running",)
     room("timeline.strip_events").normalize_object(dot)
-    assert room("timeline.lanes").read_timeline(dot).spans[0].start == 1.013
+    assert room("timeline.label_tracks").read_timeline(dot).spans[0].start == 1.013
 
 
 def test_deleted(dot, room):
     lane(dot, "Words").strips.remove(strip_of(dot, "running"))
     assert not room("timeline.strip_events").normalize_object(dot)
-    assert len(room("timeline.lanes").read_timeline(dot).spans) == 1
+    assert len(room("timeline.label_tracks").read_timeline(dot).spans) == 1
     for track in list(dot.animation_data.nla_tracks):
         dot.animation_data.nla_tracks.remove(track)
-    assert room("timeline.lanes").read_timeline(dot).spans == ()
+    assert room("timeline.label_tracks").read_timeline(dot).spans == ()
 
 
 def test_no_strip_is_touched_while_one_is_edited(dot, room):
@@ -200,15 +201,17 @@ def test_another_frame_rate_of_the_scene(room, tmp_path, core):
     assert room("timeline.strips").read_player_timeline(player, scene) == before
     assert room("timeline.strip_events").normalize_strips(scene)
     assert room("timeline.strips").read_player_timeline(player, scene) == before
-    assert room("timeline.lanes").list_moments(player.dot)[0].frame == round(101 + 6.022 * 24 / 1.001)
+    assert room("timeline.label_tracks").list_moments(player.dot)[0].frame == round(101 + 6.022 * 24 / 1.001)
     scene.render.fps = 30
-    strip = next(strip for track, strip in room("timeline.lanes").iter_strips(player.dot) if strip.name == "running")
+    strip = next(strip for track, strip in room("timeline.label_tracks").iter_strips(player.dot) if strip.name
+                 == "running")
     strip.name = "take 5 #"  # which nobody can read: all of it waits, and says so
     stands = strip.frame_start, player.dot.beyond_mocap_lanes.clock
     room("timeline.strip_events").normalize_strips(scene)
     assert (strip.frame_start, player.dot.beyond_mocap_lanes.clock) == stands
     strip.name = "running"
-    assert room("timeline.strip_events").normalize_strips(scene) and room("timeline.strips").read_player_timeline(player, scene) == before
+    assert room("timeline.strip_events").normalize_strips(scene) and room("timeline.strips").read_player_timeline(
+        player, scene) == before
     scene.render.fps = 24
     room("timeline.strip_events").normalize_strips(scene)
     scene.frame_set(101 + 120)

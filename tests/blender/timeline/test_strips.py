@@ -67,9 +67,9 @@ def test_there_and_back_to_the_bit(room, core, text, dot, seed):
         float(dice.integers(-100, 100)), dice.uniform(-50, 50), dice.choice([23.976, 24.0, 25.0, 60.0])
     )
     timeline = random_timeline(core, dice)
-    room("timeline.lay_strips").write_timeline(dot, timeline, clock)
-    assert room("timeline.lanes").read_timeline(dot) == timeline
-    assert text.format_timeline(room("timeline.lanes").read_timeline(dot)) == text.format_timeline(timeline)
+    room("timeline.strip_writing").write_timeline(dot, timeline, clock)
+    assert room("timeline.label_tracks").read_timeline(dot) == timeline
+    assert text.format_timeline(room("timeline.label_tracks").read_timeline(dot)) == text.format_timeline(timeline)
     for track in dot.animation_data.nla_tracks:
         for strip in track.strips:
             assert strip.frame_start == int(strip.frame_start) and strip.frame_end == int(strip.frame_end)
@@ -79,7 +79,7 @@ def test_there_and_back_to_the_bit(room, core, text, dot, seed):
 @pytest.mark.parametrize("seed", range(3))
 def test_another_clock_lays_the_strips_anew_and_says_the_same(room, core, dot, seed):
     dice = np.random.default_rng(seed)
-    Clock, lanes, lay_strips = room("core.measure").Clock, room("timeline.lanes"), room("timeline.lay_strips")
+    Clock, lanes, lay_strips = room("core.measure").Clock, room("timeline.label_tracks"), room("timeline.strip_writing")
     timeline = random_timeline(core, dice)
     lay_strips.write_timeline(dot, timeline, Clock(1.0, 0.0, 25.0))
     for clock in (Clock(1.0, 0.0, 120.0), Clock(101.0, -3.3, 23.976), Clock(-40.0, 7.0, 10.0), Clock(1.0, 0.0, 25.0)):
@@ -87,7 +87,8 @@ def test_another_clock_lays_the_strips_anew_and_says_the_same(room, core, dot, s
         assert lanes.read_timeline(dot) == timeline
         for placed in lanes.list_spans(dot):
             assert (placed.first, placed.last) == room("timeline.strip_lines").compute_frames(placed.span, clock)
-        assert [placed.frame for placed in lanes.list_moments(dot)] == [clock.to_whole_frame(key.time) for key in timeline.keys]
+        assert [placed.frame for placed in lanes.list_moments(dot)] == [clock.to_whole_frame(key.time)
+                                                                        for key in timeline.keys]
     assert not lay_strips.relay(dot, Clock(1.0, 0.0, 25.0))
 
 
@@ -96,8 +97,8 @@ def strip_of(dot, name):
 
 
 def test_each_end_is_exact_until_it_is_moved_by_a_frame(room, core, text, dot, clock):
-    room("timeline.lay_strips").write_timeline(dot, text.parse_timeline("2.413 4.107 running\n3.333 kick\n"), clock)
-    read, strip = room("timeline.lanes").read_timeline, strip_of(dot, "running")
+    room("timeline.strip_writing").write_timeline(dot, text.parse_timeline("2.413 4.107 running\n3.333 kick\n"), clock)
+    read, strip = room("timeline.label_tracks").read_timeline, strip_of(dot, "running")
     assert (strip.frame_start, strip.frame_end) == (61, 104)
     strip.frame_start_raw = 61.6  # less than a frame
     assert read(dot).spans[0].start == 2.413
@@ -114,8 +115,9 @@ def test_each_end_is_exact_until_it_is_moved_by_a_frame(room, core, text, dot, c
 
 
 def test_names_are_words(room, core, text, dot, clock):
-    room("timeline.lay_strips").write_timeline(dot, text.parse_timeline("2 4 running\n5 6 running\n7 9\n3 kick\n"), clock)
-    read, InputError = room("timeline.lanes").read_timeline, core("base.errors").InputError
+    room("timeline.strip_writing").write_timeline(dot, text.parse_timeline("2 4 running\n5 6 running\n7 9\n3 kick\n"),
+                                                  clock)
+    read, InputError = room("timeline.label_tracks").read_timeline, core("base.errors").InputError
     assert strip_of(dot, "running ") and strip_of(dot, "(automatic)")
     strip_of(dot, "running ").name = "Jogging dribble.002"
     strip_of(dot, "(automatic)").name = "walking"
@@ -134,15 +136,15 @@ def test_names_are_words(room, core, text, dot, clock):
 
 
 def test_muted_is_off(room, text, dot, clock):
-    room("timeline.lay_strips").write_timeline(dot, text.parse_timeline("2 4 running\n3 kick\n"), clock)
+    room("timeline.strip_writing").write_timeline(dot, text.parse_timeline("2 4 running\n3 kick\n"), clock)
     strip_of(dot, "running").mute = True
-    assert text.format_timeline(room("timeline.lanes").read_timeline(dot)) == "3 kick\n"
+    assert text.format_timeline(room("timeline.label_tracks").read_timeline(dot)) == "3 kick\n"
     dot.animation_data.nla_tracks["Moments"].mute = True
-    assert text.format_timeline(room("timeline.lanes").read_timeline(dot)) == ""
+    assert text.format_timeline(room("timeline.label_tracks").read_timeline(dot)) == ""
 
 
 def test_automatic_strips_are_asked_for_once_touched(room, text, dot, clock):
-    lanes, lay_strips, parse = room("timeline.lanes"), room("timeline.lay_strips"), text.parse_timeline
+    lanes, lay_strips, parse = room("timeline.label_tracks"), room("timeline.strip_writing"), text.parse_timeline
     lay_strips.write_timeline(dot, parse("2 4 running\n"), clock)
     lay_strips.show_automatic_spans(dot, parse("0 2 walking\n2 4 running\n4 6 walking\n6 9 jogging\n"), clock)
     strips = [strip for strip in dot.animation_data.nla_tracks["Automatic"].strips]
@@ -162,7 +164,7 @@ def test_automatic_strips_are_asked_for_once_touched(room, text, dot, clock):
 
 
 def test_one_by_one(room, core, text, dot, clock):
-    lanes, lay_strips, annotation = room("timeline.lanes"), room("timeline.lay_strips"), core("annotation")
+    lanes, lay_strips, annotation = room("timeline.label_tracks"), room("timeline.strip_writing"), core("annotation")
     first = lay_strips.add_span(dot, annotation.Span(2.0, 4.0, ("running",)), clock)
     second = lay_strips.add_span(dot, annotation.Span(3.0, 5.0, ("dribble",)), clock)
     assert (first.track, second.track) == ("Words", "Words 2")
@@ -174,7 +176,8 @@ def test_one_by_one(room, core, text, dot, clock):
     lay_strips.change_moment(dot, header.strip, header.index, annotation.KeyMoment(60.0, ("header", "jump")))
     assert [moment.time for moment in lanes.list_moments(dot)] == [30.123, 60.0]
     lay_strips.change_span(dot, second.strip, annotation.Span(4.0, 5.0, ("dribble", "walking")))
-    assert text.format_timeline(lanes.read_timeline(dot)) == "2 4 running\n4 5 dribble walking\n30.123 kick\n60 header jump\n"
+    assert text.format_timeline(
+        lanes.read_timeline(dot)) == "2 4 running\n4 5 dribble walking\n30.123 kick\n60 header jump\n"
     assert lanes.find_span(dot, 4.5).span.words == ("dribble", "walking") and lanes.find_span(dot, 5.0) is None
     lay_strips.remove_moment(dot, kick.strip, lanes.list_moments(dot)[0].index)
     lay_strips.remove_span(dot, "running")
@@ -196,12 +199,13 @@ def test_import_tracking_makes_dot_ball_and_strips(room, player):
     plans = room("result.plans")
     assert plans.build_plan(scene.beyond_mocap, player)[0].timeline == asked
     assert plans.describe_label_source(player) == "strips of player1"
-    lanes, lay_strips = room("timeline.lanes"), room("timeline.lay_strips")
+    lanes, lay_strips = room("timeline.label_tracks"), room("timeline.strip_writing")
     moment, = lanes.list_moments(dot)
     assert moment.time == 6.02
     lay_strips.remove_moment(dot, moment.strip, moment.index)
     lay_strips.remove_span(dot, lanes.find_span(dot, 3.0).strip)
-    assert strips.read_player_timeline(player, scene).spans == () and strips.read_player_timeline(player, scene).keys == ()
+    assert strips.read_player_timeline(player, scene).spans == () and strips.read_player_timeline(player,
+            scene).keys == ()
 
 
 def test_the_dot_goes_with_its_player(player):
@@ -252,13 +256,13 @@ def test_the_track_is_read_once(room, tmp_path, player, monkeypatch):
 
 @pytest.mark.parametrize("how", ["linked", "override"])
 def test_what_another_file_owns_is_left_alone(room, core, text, dot, clock, tmp_path, how):
-    room("timeline.lay_strips").write_timeline(dot, text.parse_timeline("2 4 running\n"), clock)
+    room("timeline.strip_writing").write_timeline(dot, text.parse_timeline("2 4 running\n"), clock)
     bpy.data.libraries.write(str(tmp_path / "dot.blend"), {dot})
     with bpy.data.libraries.load(str(tmp_path / "dot.blend"), link=True) as (_, wanted):
         wanted.objects = ["dot"]
     linked = wanted.objects[0]
     if how == "override":
         linked = linked.override_create()
-    assert text.format_timeline(room("timeline.lanes").read_timeline(linked)) == "2 4 running\n"
+    assert text.format_timeline(room("timeline.label_tracks").read_timeline(linked)) == "2 4 running\n"
     with pytest.raises(core("base.errors").InputError, match="make it local"):
-        room("timeline.lay_strips").write_timeline(linked, text.parse_timeline("2 4 walking\n"), clock)
+        room("timeline.strip_writing").write_timeline(linked, text.parse_timeline("2 4 walking\n"), clock)

@@ -33,7 +33,8 @@ def asked(room, core):
     """What the first player's strips ask for, as text."""
     def read():
         scene = bpy.context.scene
-        return core("annotation").format_timeline(room("timeline.strips").read_player_timeline(scene.beyond_mocap.players[0], scene))
+        return core("annotation").format_timeline(
+            room("timeline.strips").read_player_timeline(scene.beyond_mocap.players[0], scene))
     return read
 
 
@@ -155,7 +156,7 @@ def test_a_dot_appended_to_another_file(player, asked, tmp_path, room):
     new = bpy.context.scene.beyond_mocap.players[0]
     assert (new.name, new.dot.name) == ("player1", "player1 dot") and pathlib.Path(new.tracking_file).is_file()
     assert asked() == before
-    assert room("timeline.lanes").list_moments(new.dot)[0].frame == round(11 + 6.02 * 60)
+    assert room("timeline.label_tracks").list_moments(new.dot)[0].frame == round(11 + 6.02 * 60)
     bpy.context.scene.frame_set(11 + 60)
     assert new.dot.matrix_world.translation.x == pytest.approx(3.0, abs=1e-3)
     refused("appended from another file", ops.player_from_dot)
@@ -180,7 +181,7 @@ def test_saved_in_a_session_without_the_extension(player, asked, tmp_path, exten
 
 
 def test_what_is_wrong_is_told(player, room):
-    scene, checks = bpy.context.scene, room("timeline.word_checks")
+    scene, checks = bpy.context.scene, room("timeline.label_checks")
     select("jogging")
     ops.edit_words(words="joging")
     lines = bpy.context.window_manager.beyond_mocap_problems.lines

@@ -2,20 +2,20 @@
 
 import pytest
 
-from beyond_mocap.annotation.annotating import (
+from beyond_mocap.annotation.decision import LibraryCombinations
+from beyond_mocap.annotation.key_commands import (
     KEYS,
     AddMoment,
     AddSpan,
+    AnnotationState,
     ChangeAtPlayhead,
     GoToNeighbour,
-    StopAnnotating,
     Playhead,
-    AnnotationState,
     ShowMessage,
-    select_label,
+    StopAnnotating,
     handle_key,
+    select_label,
 )
-from beyond_mocap.annotation.decision import LibraryCombinations
 
 
 def typed(keys, state=AnnotationState(), times=None, before=None):

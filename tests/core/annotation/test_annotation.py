@@ -15,27 +15,27 @@ from beyond_mocap.annotation import (
     KeyMoment,
     Span,
     Timeline,
-    choose_gaits,
     avoided_labels_per_frame,
-    fill_timeline,
-    format_timeline,
+    check_timeline,
+    choose_gaits,
     compute_gait_thresholds,
+    estimate_gait_thresholds,
+    fill_timeline,
     find_missing_keys,
     find_nearest_labels,
-    parse_timeline,
     find_problems,
+    find_relatives,
+    find_similar_labels,
+    format_timeline,
+    labels_per_frame,
+    list_labels_below,
+    list_vocabulary,
+    parse_timeline,
     read_annotation_csv,
     read_clip_annotations,
     read_timeline,
-    estimate_gait_thresholds,
-    find_relatives,
-    find_similar_labels,
     sort_labels,
     swap_sides,
-    check_timeline,
-    list_vocabulary,
-    list_labels_below,
-    labels_per_frame,
 )
 from beyond_mocap.base.errors import InputError
 
@@ -143,7 +143,8 @@ TOKENS = "0 1 2.5 9f -3 1e400 nan inf kick walking -walking -kick - transition -
 @given(st.lists(st.sampled_from(TOKENS), max_size=12))
 def test_any_line_of_plausible_tokens_is_read_or_refused(tokens):
     try:
-        check_timeline(parse_timeline(" ".join(tokens[:6]) + "\n" + " ".join(tokens[6:]), "a.txt", fps=30), start=0, end=10)
+        check_timeline(parse_timeline(" ".join(tokens[:6]) + "\n" + " ".join(tokens[6:]), "a.txt", fps=30), start=0,
+                       end=10)
     except InputError as error:
         assert "\n" not in str(error)
 

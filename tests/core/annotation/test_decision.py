@@ -3,12 +3,22 @@
 import pytest
 
 from beyond_mocap.annotation import decision
-from beyond_mocap.annotation.decision import LibraryCombinations, TreeChoices, can_skip, choose_label, find_alternative, list_options, count_pages, is_available, skip_level
+from beyond_mocap.annotation.decision import (
+    LibraryCombinations,
+    TreeChoices,
+    can_skip,
+    choose_label,
+    count_pages,
+    find_alternative,
+    is_available,
+    list_options,
+    skip_level,
+)
 
 KICK = frozenset("kick right low top running front".split())
 JUMP = frozenset("jump high".split())
 HELD = LibraryCombinations((KICK, frozenset("kick left low top running front".split()), JUMP),
-            (frozenset({"walking", "front"}), frozenset({"dribble", "jogging", "juggling"})))
+                           (frozenset({"walking", "front"}), frozenset({"dribble", "jogging", "juggling"})))
 
 
 def down(kind, *words):
@@ -106,7 +116,8 @@ def test_without_a_library_nothing_is_known_to_be_missing():
 
 def test_an_empty_library_serves_nothing_and_offers_nothing():
     empty = LibraryCombinations((), ())
-    assert all(not option.is_available and option.alternative == () for option in list_options(TreeChoices("moment"), empty))
+    assert all(not option.is_available and option.alternative == () for option in list_options(TreeChoices("moment"),
+            empty))
     assert find_alternative(("kick",), "moment", empty) == ()
 
 

@@ -18,15 +18,15 @@ SIDE_POKE = "side_poke,side poke,discrete,,foot,,sends,,low,,,low(running)\n"
 
 SYNTHETIC = {  # builders of motions and matches, each of certain labels
     *(f"beyond_mocap/synthetic/{name}.py" for name in ("gait", "gait_tables", "gestures", "kicks", "moves", "volleys")),
-    "beyond_mocap/synthetic/ground_truth/planted.py", "beyond_mocap/library/made.py",
-    "beyond_mocap/throws/planted_examples.py",
+    "beyond_mocap/synthetic/ground_truth/synthetic_match.py", "beyond_mocap/library/synthetic_clips.py",
+    "beyond_mocap/throws/synthetic_examples.py",
 }  # fmt: skip
 ALLOWED = {
     "beyond_mocap/passes/strike_choice.py": "a volley by hand is a volleyball player's, which no single label says",
     "beyond_mocap/library/landings.py": "is about getting up",
     "beyond_mocap/files/event_providers.py": "providers' kinds of events",
     "beyond_mocap/match/pieces/pool.py": "a cluster that is running",
-    "beyond_mocap/library/one_skeleton.py": "arguments by name",
+    "beyond_mocap/library/common_skeleton.py": "arguments by name",
 }
 DOES = ("act", "action")
 SAID_OTHERWISE = {"pass", "throw", "serve", "catch", "save", "jump"}

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from beyond_mocap.annotation.ball_contact import measure_contact_gap, find_contact_window, find_striking_part
+from beyond_mocap.annotation.ball_contact import find_contact_window, find_striking_part, measure_contact_gap
 from beyond_mocap.motion.humanoid import identify_joints
 from beyond_mocap.motion.motion import compute_pose
 from beyond_mocap.motion.quaternion import identity

@@ -7,10 +7,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from beyond_mocap.appearance.body import MATERIALS, deform_body, build_body
+from beyond_mocap.appearance.body import MATERIALS, build_body, deform_body
 from beyond_mocap.files.bvh import bvh
 from beyond_mocap.motion import quaternion
-from beyond_mocap.motion.motion import forward_kinematics, compute_pose
+from beyond_mocap.motion.motion import compute_pose, forward_kinematics
 from beyond_mocap.motion.retargeting.adult import build_adult_skeleton
 from beyond_mocap.motion.retargeting.neutral import build_neutral_stance
 from beyond_mocap.synthetic.gait import build_gait

@@ -7,9 +7,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from beyond_mocap.ball.aim import _compute_step, solve_launches, solve_ground_launches, build_reach_error
+from beyond_mocap.ball.aim import _compute_step, build_reach_error, solve_ground_launches, solve_launches
 from beyond_mocap.ball.flight import Launch, simulate_flight
-from beyond_mocap.ball.physics import BALLS, HUMAN_BALL_SPEEDS, FOOTBALL, PAPER, TENNIS, vector_length
+from beyond_mocap.ball.physics import BALLS, FOOTBALL, HUMAN_BALL_SPEEDS, PAPER, TENNIS, vector_length
 from beyond_mocap.base.errors import InputError
 
 
@@ -98,7 +98,8 @@ def test_a_launch_nearby_keeps_its_branch():
     if one.possible[0]:
         moved = solve_launches(start, (8.1, 0.05, 0.5), PAPER, seconds, bounces=1, initial_velocity=one.velocity)
         assert np.linalg.norm(moved.velocity - one.velocity) < 0.5
-    unknown = solve_launches(start, (8.0, 0.0, 0.5), PAPER, seconds, bounces=1, initial_velocity=np.full((1, 3), np.nan))
+    unknown = solve_launches(start, (8.0, 0.0, 0.5), PAPER, seconds, bounces=1,
+                             initial_velocity=np.full((1, 3), np.nan))
     assert unknown.possible.all()
 
 

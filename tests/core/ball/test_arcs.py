@@ -3,7 +3,7 @@
 import numpy as np
 
 from beyond_mocap.ball.physics import THROWN_BALLS, Ball
-from beyond_mocap.ball.shot import solve_arcs, is_out_of_reach
+from beyond_mocap.ball.shot import is_out_of_reach, solve_arcs
 
 
 def test_without_air_the_slowest_launch_is_the_known_one():

@@ -21,7 +21,8 @@ def test_each_is_where_it_is_alone(name, seconds):
     position, velocity, spin = launches(8, spin=30.0 if ball.friction else 0.0)
     places, speeds = batch.simulate_states(position, velocity, spin, ball, seconds)
     for i in range(8):
-        alone = simulate_flight(Launch(0.0, position[i], velocity[i], spin[i]), ball, seconds + 1.0).states([seconds])[0]
+        alone = simulate_flight(Launch(0.0, position[i], velocity[i], spin[i]), ball,
+                                seconds + 1.0).states([seconds])[0]
         assert places[i] == pytest.approx(alone[:3], abs=2e-4 if seconds > 3.0 else 1e-4)
         assert speeds[i] == pytest.approx(alone[3:6], abs=1e-3)
 
@@ -41,7 +42,8 @@ def test_courses_pass_through_the_states():
     places, speeds = batch.simulate_trajectories(position, velocity, spin, FOOTBALL, times)
     assert places.shape == speeds.shape == (5, 4, 3)
     for i, seconds in enumerate(times):
-        assert places[:, i] == pytest.approx(batch.simulate_states(position, velocity, spin, FOOTBALL, seconds)[0], abs=1e-4)
+        assert places[:, i] == pytest.approx(batch.simulate_states(position, velocity, spin, FOOTBALL, seconds)[0],
+                                             abs=1e-4)
 
 
 def test_bounces_are_counted_and_can_be_limited():

@@ -4,7 +4,13 @@ import numpy as np
 import pytest
 
 from beyond_mocap.annotation.striking import measure_ball_gap
-from beyond_mocap.ball.contact import Tool, compute_ball_centre, convert_to_world, find_striking_surface, sample_strike_surface
+from beyond_mocap.ball.contact import (
+    Tool,
+    compute_ball_centre,
+    convert_to_world,
+    find_striking_surface,
+    sample_strike_surface,
+)
 from beyond_mocap.base.errors import InputError
 from beyond_mocap.motion.humanoid import compute_heading_from_positions
 from beyond_mocap.motion.motion import forward_kinematics, place_motion
@@ -18,7 +24,8 @@ def kick():
 
 def test_the_frame_does_not_ask_where_the_body_is(kick):
     """A kick put elsewhere and turned strikes from the same place of its own frame, as fast."""
-    surface, frames = find_striking_surface(kick.motion.skeleton, "foot", "right"), np.array([60.0, 60.0 * kick.key, 170.3])
+    surface, frames = find_striking_surface(kick.motion.skeleton, "foot",
+                                            "right"), np.array([60.0, 60.0 * kick.key, 170.3])
     here = sample_strike_surface(kick.motion, frames, surface)
     there = sample_strike_surface(place_motion(kick.motion, 2.1, (5.0, -3.0, 0.0)), frames, surface)
     for name in ("start", "end", "velocity"):

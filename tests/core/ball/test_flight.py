@@ -184,7 +184,8 @@ def test_a_turned_launch_gives_the_turned_flight(velocity, spin, angle):
 
 
 def test_rotations_are_the_spin_summed_up():
-    flight = simulate_flight(launched((5.0, 0.0, 3.0), (0.0, 0.0, 7.0), height=20.0), replace(TENNIS, spin_decay=0.0), 1.0)
+    flight = simulate_flight(launched((5.0, 0.0, 3.0), (0.0, 0.0, 7.0), height=20.0), replace(TENNIS, spin_decay=0.0),
+                             1.0)
     angle = 2.0 * np.arctan2(*flight.rotations([0.4])[0][[3, 0]])
     assert angle == pytest.approx(2.8, abs=1e-9)
 

@@ -5,7 +5,7 @@ import pytest
 
 from beyond_mocap.ball.batch import simulate_trajectories
 from beyond_mocap.ball.physics import FOOTBALL
-from beyond_mocap.ball.tracked.fit import simulate_coarse_trajectories, fit_launches, collect_stretches
+from beyond_mocap.ball.tracked.fit import collect_stretches, fit_launches, simulate_coarse_trajectories
 from beyond_mocap.ball.tracked.solve import solve_samples
 
 STEP = 0.04

@@ -5,7 +5,14 @@ import csv
 import numpy as np
 import pytest
 
-from beyond_mocap.ball.tracked.kinds import find_ball_ends, choose_keeper_kind, find_keepers, choose_touch_kind, is_from_touch_line, choose_part
+from beyond_mocap.ball.tracked.kinds import (
+    choose_keeper_kind,
+    choose_part,
+    choose_touch_kind,
+    find_ball_ends,
+    find_keepers,
+    is_from_touch_line,
+)
 from beyond_mocap.ball.tracked.solve import SolvedTouch, solve_samples
 from beyond_mocap.ball.tracked.touches import choose_players
 from beyond_mocap.files.tables import TOUCH_COLUMNS, write_touches
@@ -34,8 +41,10 @@ def test_goal_and_out_are_told_apart():
     goal = find_ball_ends(times, way([45.0, 1.0, 0.3], [12.0, 0.0, 0.0]), 105.0, 68.0)
     assert [end.kind for end in goal] == ["goal"]
     assert abs(goal[0].time - (52.5 + 0.11 - 45.0) / 12.0) < 1e-6
-    assert [end.kind for end in find_ball_ends(times, way([45.0, 1.0, 3.0], [12.0, 0.0, 0.0]), 105.0, 68.0)] == ["goal line"]
-    assert [end.kind for end in find_ball_ends(times, way([0.0, 30.0, 0.3], [1.0, 3.0, 0.0]), 105.0, 68.0)] == ["touch line"]
+    assert [end.kind for end in find_ball_ends(times, way([45.0, 1.0, 3.0], [12.0, 0.0, 0.0]), 105.0,
+                                               68.0)] == ["goal line"]
+    assert [end.kind for end in find_ball_ends(times, way([0.0, 30.0, 0.3], [1.0, 3.0, 0.0]), 105.0,
+                                               68.0)] == ["touch line"]
     assert find_ball_ends(times, way([0.0, 0.0, 0.3], [1.0, 3.0, 0.0]), 105.0, 68.0) == []
 
 

@@ -5,7 +5,7 @@ import pytest
 
 from beyond_mocap.ball.flight import Launch, simulate_flight
 from beyond_mocap.ball.physics import FOOTBALL, PAPER
-from beyond_mocap.ball.shot import Strikes, solve_shot, compute_spins
+from beyond_mocap.ball.shot import Strikes, compute_spins, solve_shot
 from beyond_mocap.base.errors import InputError
 
 

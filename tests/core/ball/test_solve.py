@@ -5,7 +5,7 @@ import pytest
 
 from beyond_mocap.ball.tracked.solve import solve_samples
 from beyond_mocap.base.errors import InputError
-from beyond_mocap.synthetic.ground_truth.planted import build_match, sample_feed
+from beyond_mocap.synthetic.ground_truth.synthetic_match import build_match, sample_feed
 
 PLACES = np.array([[0.0, 0.0], [14.0, 3.0], [20.0, -9.0], [4.0, -12.0], [-9.0, -3.0]])
 NAMES = [f"home_{number}" for number in range(len(PLACES))]

@@ -26,10 +26,12 @@ def test_a_slanting_wall_and_air():
 
 
 def test_the_ground_comes_first():
-    place, _ = find_wall_impact(np.array([0.0, 0, 1.5]), np.array([10.0, 0, 0.0]), BASEBALL, np.array([40.0, 0.0]), [1.0, 0])
+    place, _ = find_wall_impact(np.array([0.0, 0, 1.5]), np.array([10.0, 0, 0.0]), BASEBALL, np.array([40.0, 0.0]),
+                                [1.0, 0])
     assert abs(place[2] - BASEBALL.radius) < 1e-6 and 4.0 < place[0] < 6.0
 
 
 def test_a_ball_that_rolls_goes_on_to_the_wall():
-    place, _ = find_wall_impact(np.array([0.0, 0, 0.11]), np.array([15.0, 0, 0.0]), FOOTBALL, np.array([11.0, 0.0]), [1.0, 0])
+    place, _ = find_wall_impact(np.array([0.0, 0, 0.11]), np.array([15.0, 0, 0.0]), FOOTBALL, np.array([11.0, 0.0]),
+                                [1.0, 0])
     assert abs(place[0] - 11.0) < 1e-4 and abs(place[2] - 0.11) < 1e-3

@@ -8,7 +8,14 @@ import pytest
 from beyond_mocap.base.digest import byte_digest, hex_digest
 from beyond_mocap.base.easing import hermite, quintic_step, quintic_step_by_powers, smoothstep
 from beyond_mocap.base.time_series import gaussian_smooth, hann_smooth, interpolate_columns, time_derivative
-from beyond_mocap.base.vectors import cross_on_ground, distances_along, find_nearest_axis, skew_matrix, unit_vector, unit_vectors
+from beyond_mocap.base.vectors import (
+    cross_on_ground,
+    distances_along,
+    find_nearest_axis,
+    skew_matrix,
+    unit_vector,
+    unit_vectors,
+)
 
 
 def test_zero_vectors_stay_zero_or_become_what_is_asked():
@@ -54,7 +61,8 @@ def test_values_over_time():
     assert np.array_equal(time_derivative(line, 2.0)[1], [3.0, 5.0]) and not time_derivative(line[:1], 2.0).any()
     held = interpolate_columns(np.array([-1.0, 0.5]), np.arange(3.0), line)
     assert np.array_equal(held, [[0.0, 0.0], [1.5, 2.0]])
-    assert np.isnan(interpolate_columns(np.array([-1.0, 0.5]), np.arange(3.0), line, np.nan)[:, 0]).tolist() == [True, False]
+    assert np.isnan(interpolate_columns(np.array([-1.0, 0.5]), np.arange(3.0), line, np.nan)[:, 0]).tolist() == [True,
+            False]
     flat = np.full((9, 2), 7.0)
     assert gaussian_smooth(flat, 2.0) == pytest.approx(flat) and hann_smooth(flat[:, 0], 3) == pytest.approx(flat[:, 0])
 

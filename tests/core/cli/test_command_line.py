@@ -16,7 +16,7 @@ from beyond_mocap.cli.main import _InterruptHandler, main
 from beyond_mocap.cli.outputs import ProgressReporter
 from beyond_mocap.files.bvh import bvh
 from beyond_mocap.files.tables import read_ball
-from beyond_mocap.library.made import KICK_PREFIX, SYNTHETIC_FOLDER
+from beyond_mocap.library.synthetic_clips import KICK_PREFIX, SYNTHETIC_FOLDER
 from beyond_mocap.motion.humanoid import estimate_stature
 from beyond_mocap.synthesis.provenance import read_provenance
 
@@ -535,7 +535,8 @@ def test_real_recordings(run, tmp_path_factory, scenario):
         assert [(key["time_s"], key["labels"]) for key in report["keys"]] == [(k.time, list(k.words)) for k in asked]
         for key in report["keys"]:
             if {"kick", "foot"} & set(key["labels"]):
-                name = key["clip"].removeprefix(SYNTHETIC_FOLDER)  # by path, a kick on the run is made where it is asked for
+                name = key["clip"].removeprefix(
+                    SYNTHETIC_FOLDER)  # by path, a kick on the run is made where it is asked for
                 assert name.startswith(("10_0", KICK_PREFIX)[: 1 + (method == "path")])
                 assert abs(key["time_error_s"]) <= 0.5 / 30 + 1e-6
             else:  # nothing in the library is near a header, a slide or a ball on the chest

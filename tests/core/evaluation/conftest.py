@@ -9,10 +9,10 @@ from beyond_mocap.annotation import Timeline
 from beyond_mocap.files.bvh import bvh
 from beyond_mocap.library.build import build_library
 from beyond_mocap.library.library import Library
-from beyond_mocap.motion.motion import Motion, sample_frames, concatenate_motions, place_motion
+from beyond_mocap.motion.motion import Motion, concatenate_motions, place_motion, sample_frames
 from beyond_mocap.motion.track import Track, smooth_zero_phase_hann
 from beyond_mocap.motion.track.ball_path import BallPath
-from beyond_mocap.synthesis.quality.played import playback_from_take
+from beyond_mocap.synthesis.quality.playback import playback_from_take
 from beyond_mocap.synthesis.take import KeyResult, Take
 from beyond_mocap.synthetic.gait import build_gait
 

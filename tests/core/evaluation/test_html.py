@@ -17,7 +17,7 @@ from beyond_mocap.evaluation.report import evaluate, evaluate_played
 from beyond_mocap.files.bvh import bvh
 from beyond_mocap.motion.motion import Motion
 from beyond_mocap.synthesis.provenance import write_provenance
-from beyond_mocap.synthesis.quality.played import playback_from_tables, playback_from_take
+from beyond_mocap.synthesis.quality.playback import playback_from_tables, playback_from_take
 from beyond_mocap.synthesis.quality.targets import KEY_TARGETS, TARGETS, Target, find_target
 
 pytest.importorskip("matplotlib")

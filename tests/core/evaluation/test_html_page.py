@@ -1,6 +1,7 @@
 """The shared page: no text becomes markup, and a page needs nothing but itself."""
 
 from beyond_mocap.evaluation.html_page import (
+    build_element,
     build_image,
     build_list,
     build_number_cell,
@@ -8,7 +9,6 @@ from beyond_mocap.evaluation.html_page import (
     build_row,
     build_section,
     build_table,
-    build_element,
     join_html,
 )
 
@@ -31,7 +31,8 @@ def test_joined_html_is_no_longer_trusted():
 
 
 def test_attributes_and_cells():
-    assert build_element("input", type="radio", data_needed=True, hidden=False, id=None) == "<input type=radio data-needed>"
+    assert build_element("input", type="radio", data_needed=True, hidden=False,
+                         id=None) == "<input type=radio data-needed>"
     assert build_element("td", colspan=3, class_="n met") == '<td colspan=3 class="n met">'
     cells = [build_number_cell(value, 2, 100.0, "met") for value in (0.1234, float("nan"), None)]
     assert cells == ['<td class="n met">12.34', "<td class=n>–", "<td class=n>–"]

@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 from beyond_mocap.annotation import KeyMoment, Timeline
-from beyond_mocap.evaluation.per_frame import find_footprints, measure_per_frame, find_strikes
+from beyond_mocap.evaluation.per_frame import find_footprints, find_strikes, measure_per_frame
 from beyond_mocap.evaluation.reference import View
 from beyond_mocap.evaluation.report import evaluate
-from beyond_mocap.synthesis.quality.played import playback_from_take
+from beyond_mocap.synthesis.quality.playback import playback_from_take
 
 
 @pytest.fixture()

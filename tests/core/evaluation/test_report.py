@@ -15,11 +15,11 @@ from beyond_mocap.evaluation.report import evaluate, evaluate_played, flatten_re
 from beyond_mocap.files import tables
 from beyond_mocap.files.bvh import bvh
 from beyond_mocap.library.library import Gait
-from beyond_mocap.library.made import SYNTHETIC_FOLDER
+from beyond_mocap.library.synthetic_clips import SYNTHETIC_FOLDER
 from beyond_mocap.motion.motion import sample_frames
 from beyond_mocap.motion.track import Track
 from beyond_mocap.synthesis.provenance import build_provenance, read_provenance, write_provenance
-from beyond_mocap.synthesis.quality.played import playback_from_tables, playback_from_take
+from beyond_mocap.synthesis.quality.playback import playback_from_tables, playback_from_take
 
 FPS = 30.0
 KEY_FRAME = 300

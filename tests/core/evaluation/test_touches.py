@@ -5,13 +5,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from benchmarks.ball_touches import TouchAnnotation, AnnotatedTouch, read_touches, score_touches, score_with_offset
+from benchmarks.ball_touches import AnnotatedTouch, TouchAnnotation, read_touches, score_touches, score_with_offset
 from beyond_mocap.base.errors import InputError
 
 READ = TouchAnnotation(
-    ((10.0, 20.0), (40.0, 50.0)),
-    (AnnotatedTouch(12.0, ("a",)), AnnotatedTouch(13.0, ("a", "b")), AnnotatedTouch(15.0), AnnotatedTouch(45.0, ("c",))),
-    (AnnotatedTouch(17.0, ("a",), 18.0),),
+    ((10.0, 20.0), (40.0, 50.0)), (AnnotatedTouch(12.0, ("a",)), AnnotatedTouch(13.0, ("a", "b")), AnnotatedTouch(15.0),
+                                   AnnotatedTouch(45.0, ("c",))), (AnnotatedTouch(17.0, ("a",), 18.0),),
 )
 
 

@@ -263,7 +263,8 @@ def test_a_standing_root_above_the_hips_is_folded_and_put_back(tmp_path):
     path = save(tmp_path, document(root, rows))
     clip = bvh.read_bvh(path)
     assert (
-        clip.motion.skeleton.names[0] == "Hips" and clip.form.above[0].name == "World" and not clip.form.above[0].is_moving
+        clip.motion.skeleton.names[0] == "Hips" and clip.form.above[0].name == "World"
+        and not clip.form.above[0].is_moving
     )
     assert any("World" in note and "static" in note for note in clip.notes)
     hips = root.places(iter(rows[2]))["Hips"]

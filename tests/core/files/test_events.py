@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from beyond_mocap.annotation.event_words import KINDS
+from beyond_mocap.annotation.event_labels import KINDS
 from beyond_mocap.annotation.striking import BODY_PARTS
 from beyond_mocap.base.errors import InputError
 from beyond_mocap.files.event_data import EventPlayer, assign_players
@@ -176,7 +176,8 @@ def test_metrica_s_table_of_events_is_read(tmp_path):
 
 def test_players_are_found_by_id_number_or_name_and_teams_may_be_swapped():
     match = made_match()
-    asked = [EventPlayer("h7"), EventPlayer("x", "away", 3), EventPlayer("y", "home", -1, "ana nunez"), EventPlayer("z", "home", 30, "Nobody")]
+    asked = [EventPlayer("h7"), EventPlayer("x", "away", 3), EventPlayer("y", "home", -1, "ana nunez"),
+             EventPlayer("z", "home", 30, "Nobody")]
     found, notes = assign_players(asked, match)
     assert [found.get(who) for who in asked] == [("h7", "home"), ("a3", "away"), ("h7", "home"), None]
     assert "1 of 4 players" in notes[0]

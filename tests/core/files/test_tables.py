@@ -10,8 +10,8 @@ from hypothesis import strategies as st
 
 from beyond_mocap.annotation import Timeline
 from beyond_mocap.base.errors import InputError
+from beyond_mocap.files.atomic import atomic_write
 from beyond_mocap.files.tables import read_ball, write_ball, write_report
-from beyond_mocap.files.whole import atomic_write
 from beyond_mocap.motion.motion import Motion
 from beyond_mocap.motion.skeleton import Skeleton
 from beyond_mocap.motion.track.ball_path import BallPath

@@ -7,7 +7,7 @@ import pytest
 
 from beyond_mocap.base.errors import InputError
 from beyond_mocap.cli.main import main
-from beyond_mocap.files.whole import atomic_write
+from beyond_mocap.files.atomic import atomic_write
 
 
 def test_a_link_stays_one_and_its_file_is_written(tmp_path):

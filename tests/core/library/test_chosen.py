@@ -5,7 +5,7 @@ import pytest
 
 from beyond_mocap.base.errors import InputError
 from beyond_mocap.base.settings.synthesis import parse_gait_clips
-from beyond_mocap.library.automatic import apply_chosen_gaits
+from beyond_mocap.library.automatic_locomotion import apply_chosen_gaits
 from beyond_mocap.synthesis.plan import Plan
 from beyond_mocap.synthesis.synthesize import synthesize
 
@@ -66,7 +66,8 @@ def test_a_wrong_choice_is_told_in_one_line(library, gaits, parts):
 
 
 def test_choices_as_text():
-    assert parse_gait_clips(["walking = a/b.bvh", r"Jogging=c\d.bvh"]) == (("walking", "a/b.bvh"), ("jogging", "c/d.bvh"))
+    assert parse_gait_clips(["walking = a/b.bvh", r"Jogging=c\d.bvh"]) == (("walking", "a/b.bvh"),
+                                                                           ("jogging", "c/d.bvh"))
     for wrong in (["walking"], ["=a.bvh"], ["walking="], ["walking=a", "walking=b"]):
         with pytest.raises(InputError):
             parse_gait_clips(wrong)

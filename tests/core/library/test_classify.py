@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from beyond_mocap.annotation import ClipAnnotation, read_annotation_csv
-from beyond_mocap.base.errors import UserCancelledError, InputError
+from beyond_mocap.base.errors import InputError, UserCancelledError
 from beyond_mocap.files.bvh import bvh
 from beyond_mocap.library.classify import classifier, kernel, train
 from beyond_mocap.library.classify.examples import Example, find_act
@@ -155,7 +155,8 @@ def test_one_clip_with_two_moments_is_enough(examples):
     one = examples[0]
     (row,) = one.rows
     again = replace(row, start=row.start + 1, end=row.end + 1, key=row.key + 1)
-    assert train_classifier([replace(one, rows=(row, again))]).describe() == ("learned from 1 clip", "receive: 2 moments")
+    assert train_classifier([replace(one, rows=(row, again))]).describe() == ("learned from 1 clip",
+                                                                              "receive: 2 moments")
 
 
 def test_words_outside_their_clip_teach_nothing_and_are_told(examples):

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from beyond_mocap.library.build import build_library
-from beyond_mocap.library.clusters import BLOCK_LENGTHS, CLUSTERS, find_block_starts, cluster_blocks
+from beyond_mocap.library.clusters import BLOCK_LENGTHS, CLUSTERS, cluster_blocks, find_block_starts
 
 
 @pytest.mark.parametrize("length", BLOCK_LENGTHS)

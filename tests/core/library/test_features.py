@@ -9,10 +9,10 @@ from beyond_mocap.library.clip import Clip
 from beyond_mocap.library.features import (
     HORIZON,
     build_frames,
-    select_feature_joints,
     compute_principal_components,
     compute_raw_features,
     sample_positions,
+    select_feature_joints,
 )
 from beyond_mocap.motion.humanoid import compute_heading_from_positions
 from beyond_mocap.motion.motion import place_motion

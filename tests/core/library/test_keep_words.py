@@ -6,7 +6,7 @@ import pytest
 
 from beyond_mocap.annotation import ClipAnnotation
 from beyond_mocap.base.errors import InputError
-from beyond_mocap.library import keep_words
+from beyond_mocap.library import label_files as keep_words
 from beyond_mocap.library.scan import Annotations
 
 ROWS = (
@@ -85,7 +85,7 @@ def test_rows_are_cut_to_the_clip():
     rows = (ClipAnnotation(-5, 40, None, ("walking",)), ClipAnnotation(90, 140, 135, ("kick",)),
             ClipAnnotation(80, 140, None, ("jogging",)))
     assert keep_words.limit_rows(rows, 100) == (ClipAnnotation(0, 40, None, ("walking",)),
-                                            ClipAnnotation(80, 99, None, ("jogging",)))
+                                                ClipAnnotation(80, 99, None, ("jogging",)))
 
 
 def test_a_place_that_cannot_be_written(clip, monkeypatch):

@@ -5,7 +5,7 @@ import pytest
 
 from beyond_mocap.annotation import ClipAnnotation, sort_labels
 from beyond_mocap.library.clip import Clip
-from beyond_mocap.library.keys import Key, collect_keys, select_nearest_keys, list_nearest_labels, select_keys
+from beyond_mocap.library.keys import Key, collect_keys, list_nearest_labels, select_keys, select_nearest_keys
 from beyond_mocap.synthetic.gait import build_gait
 
 
@@ -85,7 +85,8 @@ def test_own_words_of_the_user_name_an_action_too():
 
 
 def test_an_empty_library_of_keys():
-    assert select_keys((), ["kick"]) == select_nearest_keys((), ["kick"]) == () and list_nearest_labels((), ["kick"]) == ()
+    assert select_keys((), ["kick"]) == select_nearest_keys((), ["kick"]) == () and list_nearest_labels((),
+            ["kick"]) == ()
 
 
 def test_nearest_words_are_offered_once_each():

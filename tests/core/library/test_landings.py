@@ -93,7 +93,8 @@ def test_own_scores_are_those_of_what_was_recorded(keeper):
     clip = the_dive(keeper)
     row = reference.index[clip.path]
     assert (
-        reference.first[row + 1] - reference.first[row] == int((clip.recorded_count - 1) / clip.motion.fps * 30.0 + 1e-6) + 1
+        reference.first[row + 1] - reference.first[row] == int((clip.recorded_count - 1) / clip.motion.fps * 30.0
+                                                               + 1e-6) + 1
     )
     assert LANDING_FOLDER + clip.path not in reference.index
 

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from beyond_mocap.base.errors import UserCancelledError, InputError
+from beyond_mocap.base.errors import InputError, UserCancelledError
 from beyond_mocap.files.bvh import bvh
 from beyond_mocap.library.build import build_library
 from beyond_mocap.library.features import build_label_matrix
@@ -119,7 +119,8 @@ def test_one_clip_is_a_library(tmp_path, clip_file):
 def test_a_clip_of_one_frame_is_kept(tmp_path, clip_file):
     clip_file(tmp_path / "walk.bvh", 1.4, 1.0)
     motion = build_gait(1.4, 1.0)
-    bvh.write_bvh(tmp_path / "still.bvh", Motion(motion.skeleton, motion.root_positions[:1], motion.rotations[:1], 30.0))
+    bvh.write_bvh(tmp_path / "still.bvh", Motion(motion.skeleton, motion.root_positions[:1], motion.rotations[:1],
+                                                 30.0))
     library = build_library(tmp_path)
     assert library.frames.count.tolist() == [1, 1, 31, 31]
     assert np.all(np.isfinite(library.frames.features))
@@ -156,7 +157,8 @@ def test_clips_of_different_skeletons_are_retargeted(tmp_path, clip_file):
 def test_a_clip_without_legs_is_told_with_its_file(tmp_path, clip_file):
     clip_file(tmp_path / "walk.bvh", 1.4, 2.0)
     stick = Skeleton(("root", "top"), (-1, 0), np.array([[0.0, 0.0, 0.0], [0.0, 0.0, 1.0]]))
-    bvh.write_bvh(tmp_path / "stick.bvh", Motion(stick, np.zeros((4, 3)), np.tile((1.0, 0.0, 0.0, 0.0), (4, 2, 1)), 30.0))
+    bvh.write_bvh(tmp_path / "stick.bvh", Motion(stick, np.zeros((4, 3)), np.tile((1.0, 0.0, 0.0, 0.0), (4, 2, 1)),
+                                                 30.0))
     with pytest.raises(InputError, match=r"stick\.bvh.*no joint found for left upper_leg") as told:
         build_library(tmp_path)
     one_line(told)
@@ -236,7 +238,8 @@ def test_a_link_that_leads_nowhere_is_told(tmp_path, clip_file):
 def test_building_can_be_stopped(clips_folder, tmp_path):
     calls = []
     with pytest.raises(UserCancelledError):
-        build_library(clips_folder, rebuild=True, cache_dir=tmp_path, cancelled=lambda: len(calls) > 4 or calls.append(1))
+        build_library(clips_folder, rebuild=True, cache_dir=tmp_path, cancelled=lambda: len(calls) > 4
+                      or calls.append(1))
     assert list(tmp_path.iterdir()) == []
 
 

@@ -12,12 +12,19 @@ from beyond_mocap.annotation import KeyMoment, Timeline
 from beyond_mocap.files.bvh import bvh
 from beyond_mocap.library.build import build_library
 from beyond_mocap.library.keys import Key, select_substitutes
-from beyond_mocap.library.made import BLEND_PREFIX, MAX_SPEED, KICK_PREFIX, SYNTHETIC_FOLDER, RECEIVE_PREFIX, find_speed_gaps
+from beyond_mocap.library.synthetic_clips import (
+    BLEND_PREFIX,
+    KICK_PREFIX,
+    MAX_SPEED,
+    RECEIVE_PREFIX,
+    SYNTHETIC_FOLDER,
+    find_speed_gaps,
+)
 from beyond_mocap.motion.humanoid import identify_joints
 from beyond_mocap.motion.motion import forward_kinematics
 from beyond_mocap.motion.track import Track
 from beyond_mocap.synthesis.plan import Plan
-from beyond_mocap.synthesis.quality.movement import measure_stance_travel, list_stances
+from beyond_mocap.synthesis.quality.movement import list_stances, measure_stance_travel
 from beyond_mocap.synthesis.synthesize import synthesize
 from beyond_mocap.synthetic.gestures import build_strike
 

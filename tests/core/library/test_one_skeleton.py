@@ -8,7 +8,7 @@ import pytest
 
 from beyond_mocap.cli.main import main
 from beyond_mocap.files.bvh import bvh
-from beyond_mocap.library.one_skeleton import unify_skeletons, retarget_clip
+from beyond_mocap.library.common_skeleton import retarget_clip, unify_skeletons
 from beyond_mocap.library.repair import measure_slide
 from beyond_mocap.motion import contacts, quaternion
 from beyond_mocap.motion.humanoid import measure_leg_length
@@ -39,7 +39,8 @@ def other() -> Motion:
 def test_feet_stand_and_the_floor_stays_on_other_legs(walk, other):
     there = retarget_clip(walk, other)
     assert there.fps == walk.fps and len(there) == len(walk) and there.skeleton is other.skeleton
-    assert measure_slide(there, contacts.detect_heel_toe_contacts(walk)) < measure_slide(walk, contacts.detect_heel_toe_contacts(walk)) + 0.01
+    assert measure_slide(there, contacts.detect_heel_toe_contacts(walk)) < measure_slide(walk,
+            contacts.detect_heel_toe_contacts(walk)) + 0.01
     assert abs(contacts.measure_floor_height(there) - contacts.measure_floor_height(walk)) < 0.015
     scale = measure_leg_length(other.skeleton) / measure_leg_length(walk.skeleton)
     travelled = [np.linalg.norm(m.root_positions[-1] - m.root_positions[0]) for m in (walk, there)]

@@ -8,7 +8,7 @@ import pytest
 from beyond_mocap.annotation import build_clip_annotations, parse_timeline, read_clip_annotations
 from beyond_mocap.annotation.text import format_timeline
 from beyond_mocap.files.bvh import bvh
-from beyond_mocap.library.keep_words import to_timeline
+from beyond_mocap.library.label_files import to_timeline
 from beyond_mocap.library.proposals import GAITS, propose_labels
 from beyond_mocap.motion.mirror import mirror
 from beyond_mocap.motion.motion import place_motion, resample
@@ -123,7 +123,8 @@ def test_kicks_of_real_recordings():
         kicks = [row for row in rows if "kick" in row.words and row.key is not None]
         if not name.startswith(("cmu10/10_", "lmd/Player1/")) or not kicks:
             continue
-        found = [one.annotation for one in propose_labels(bvh.read_bvh(REAL / name).motion) if "kick" in one.annotation.words]
+        found = [one.annotation for one in propose_labels(bvh.read_bvh(REAL / name).motion)
+                 if "kick" in one.annotation.words]
         planted += len(kicks)
         for kick in kicks:
             best = min(found, key=lambda one: abs(one.key - kick.key), default=None)

@@ -91,7 +91,8 @@ def test_holding_feet_on_an_uneven_floor_adds_no_jerk(speed):
 
 def test_a_drifting_floor_is_levelled(walk):
     drift = 0.15 * np.sin(np.linspace(0.0, 1.5, len(walk)))
-    done = repair.repair_floor_and_feet(replace(walk, root_positions=walk.root_positions + drift[:, None] * [0.0, 0.0, 1.0]))
+    done = repair.repair_floor_and_feet(replace(walk, root_positions=walk.root_positions + drift[:, None]
+                                                * [0.0, 0.0, 1.0]))
     assert abs(done.drift - np.ptp(drift)) < 0.03
     inside = slice(40, -40)
     off = (done.motion.root_positions - walk.root_positions)[inside, 2]

@@ -10,7 +10,7 @@ from beyond_mocap.markers.checks import check_trial, report_unused
 from beyond_mocap.markers.files.marker_set_text import choose_set
 from beyond_mocap.markers.model.assemble import build_model_from_frame
 from beyond_mocap.synthetic.gait import build_gait
-from beyond_mocap.synthetic.ground_truth.planted_markers import mirror_trial, build_trial
+from beyond_mocap.synthetic.ground_truth.synthetic_markers import build_trial, mirror_trial
 
 SET = choose_set("plug_in_gait")
 
@@ -96,9 +96,11 @@ def test_stretches_without_markers_are_reported_with_their_seconds(known, cluste
 
 def test_a_static_that_lacks_markers_is_reported_or_refused(known, clusters):
     without = [label for label in known.static.labels if label not in ("LKNE", "RKNE")]
-    assert any("LKNE, RKNE" in line for line in check_trial(known.trial, known.static.select_markers(without), clusters))
+    assert any("LKNE, RKNE" in line for line in check_trial(known.trial, known.static.select_markers(without),
+                                                            clusters))
     with pytest.raises(InputError, match="of the trial's"):
-        check_trial(known.trial, known.static.select_markers(["LASI", "RASI", "LPSI", "RPSI", "C7", "CLAV", "LHEE", "LTOE"]), clusters)
+        check_trial(known.trial, known.static.select_markers(["LASI", "RASI", "LPSI", "RPSI", "C7", "CLAV", "LHEE",
+                                                              "LTOE"]), clusters)
 
 
 def test_markers_of_no_segment_are_reported(known, clusters):

@@ -7,7 +7,7 @@ from beyond_mocap.markers.files.marker_set_text import choose_set
 from beyond_mocap.markers.model.assemble import build_model_from_frame
 from beyond_mocap.markers.pose.residuals import OVER_SOLE, measure_floor
 from beyond_mocap.synthetic.gait import build_gait
-from beyond_mocap.synthetic.ground_truth.planted_markers import build_trial
+from beyond_mocap.synthetic.ground_truth.synthetic_markers import build_trial
 
 
 @pytest.fixture(scope="module")

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from beyond_mocap.markers.trial import MarkerTrial, resample_evenly, estimate_frame_times
+from beyond_mocap.markers.trial import MarkerTrial, estimate_frame_times, resample_evenly
 
 LABELS = tuple(f"M{i}" for i in range(12))
 

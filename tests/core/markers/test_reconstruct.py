@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from beyond_mocap.base.errors import UserCancelledError, InputError
+from beyond_mocap.base.errors import InputError, UserCancelledError
 from beyond_mocap.cli.main import main
 from beyond_mocap.files.bvh import bvh
 from beyond_mocap.markers.files.trc import write_trc
@@ -14,7 +14,7 @@ from beyond_mocap.markers.model.model import BallMarker
 from beyond_mocap.markers.reconstruct import ReconstructSettings, reconstruct
 from beyond_mocap.motion.motion import forward_kinematics
 from beyond_mocap.synthetic.gait import build_gait
-from beyond_mocap.synthetic.ground_truth.planted_markers import BallRequest, build_trial
+from beyond_mocap.synthetic.ground_truth.synthetic_markers import BallRequest, build_trial
 from beyond_mocap.synthetic.throws import build_throw
 
 FPS = 100.0

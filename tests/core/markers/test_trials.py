@@ -12,8 +12,8 @@ from beyond_mocap.markers.trial_results import (
     align_impacts,
     compare_speeds,
     find_dominant_sides,
-    select_near_mean,
     read_results,
+    select_near_mean,
 )
 from beyond_mocap.markers.trials_page import build_trials_report
 

@@ -11,12 +11,12 @@ import numpy as np
 import pytest
 
 from beyond_mocap.annotation import parse_timeline
-from beyond_mocap.match.make import synthesize_match
-from beyond_mocap.match.order import MatchRequest
 from beyond_mocap.match.pieces import pool
 from beyond_mocap.match.pieces.units import build_units
-from beyond_mocap.match.pieces.windows import Piece, search_window, join_pieces
+from beyond_mocap.match.pieces.windows import Piece, join_pieces, search_window
 from beyond_mocap.match.player_edit import PlayerEdit
+from beyond_mocap.match.request import MatchRequest
+from beyond_mocap.match.synthesize_match import synthesize_match
 from beyond_mocap.motion.track import Track
 from beyond_mocap.synthesis.plan import Plan
 from tests.core.match.small_match import LIBRARY, PLAYERS, SECONDS, SMALL, TOP

@@ -4,11 +4,28 @@ import numpy as np
 import pytest
 
 from beyond_mocap.base.errors import InputError
-from beyond_mocap.match.crowd.capsules import find_nearest_points, find_capsule_contacts
-from beyond_mocap.match.crowd.correction import ARMS, CURVES, FEET, ROOT, Correction, apply_correction, apply_curves, join_corrections
-from beyond_mocap.match.crowd.crowd import measure_overlap_depths
-from beyond_mocap.match.crowd.spacing import DISTANCE, TOUCH_FIRMNESS, find_episodes, join_spans, compute_firmness, find_meetings, compute_spacing
-from beyond_mocap.match.shown import add_gaze
+from beyond_mocap.match.crowd.capsules import find_capsule_contacts, find_nearest_points
+from beyond_mocap.match.crowd.collision_avoidance import measure_overlap_depths
+from beyond_mocap.match.crowd.correction import (
+    ARMS,
+    CURVES,
+    FEET,
+    ROOT,
+    Correction,
+    apply_correction,
+    apply_curves,
+    join_corrections,
+)
+from beyond_mocap.match.crowd.spacing import (
+    DISTANCE,
+    TOUCH_FIRMNESS,
+    compute_firmness,
+    compute_spacing,
+    find_episodes,
+    find_meetings,
+    join_spans,
+)
+from beyond_mocap.match.displayed_motion import add_gaze
 from beyond_mocap.motion import quaternion
 from beyond_mocap.motion.humanoid import identify_joints
 from beyond_mocap.motion.motion import forward_kinematics, place_motion

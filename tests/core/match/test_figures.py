@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 from beyond_mocap.evaluation.report import evaluate
-from beyond_mocap.match.pieces.work import merge_reports, measure_per_second, build_player_report, measure_time_lost
+from beyond_mocap.match.pieces.tasks import build_player_report, measure_per_second, measure_time_lost, merge_reports
 from beyond_mocap.motion.track.ball_path import BallPath
-from beyond_mocap.synthesis.quality.played import playback_from_take
+from beyond_mocap.synthesis.quality.playback import playback_from_take
 
 
 def test_time_lost_counts_every_second_once():

@@ -11,7 +11,7 @@ import pytest
 
 from beyond_mocap.base.errors import InputError
 from beyond_mocap.match.folder import build_file_names, open_folder, read_state
-from beyond_mocap.match.order import MatchRequest, compute_digest, build_identity
+from beyond_mocap.match.request import MatchRequest, build_identity, compute_digest
 
 TOP = Path(__file__).resolve().parents[3]
 

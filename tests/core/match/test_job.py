@@ -17,10 +17,10 @@ from beyond_mocap.files.bvh import bvh
 from beyond_mocap.files.tables import read_ball, read_rows
 from beyond_mocap.files.tracking.tracking import read_match
 from beyond_mocap.library.build import build_library
+from beyond_mocap.match.displayed_motion import construct_displayed_player
 from beyond_mocap.match.folder import read_state
-from beyond_mocap.match.make import synthesize_match
 from beyond_mocap.match.player_edit import read_player
-from beyond_mocap.match.shown import construct_displayed_player
+from beyond_mocap.match.synthesize_match import synthesize_match
 from beyond_mocap.motion.track.ball_path import BallPath
 from beyond_mocap.synthesis.provenance import read_provenance
 from tests.core.cli.test_command_line import assert_contract
@@ -92,7 +92,8 @@ def test_a_frame_looks_the_same_whatever_span_is_shown(made, sample_cache, span)
     folder, _ = made
     edit, ball = read_player(folder / "home_7.take.npz"), read_ball(folder / "ball.csv")
     library = build_library(LIBRARY, cache_dir=sample_cache)
-    (whole,), (part,) = construct_displayed_player(library, edit, ball, *SECONDS), construct_displayed_player(library, edit, ball, *span)
+    (whole,), (part,) = construct_displayed_player(library, edit, ball, *SECONDS), construct_displayed_player(library,
+            edit, ball, *span)
     at = slice(round(30.0 * (span[0] - SECONDS[0])), round(30.0 * (span[1] - SECONDS[0])) + 1)
     assert part.start_time == span[0] and part.clip_frame.tolist() == whole.clip_frame[at].tolist()
     assert np.array_equal(part.motion.root_positions, whole.motion.root_positions[at])
@@ -120,8 +121,8 @@ def command(order):
     return [sys.executable, "-c", f"""
 import sys; sys.path.insert(0, {str(TOP)!r})
 from pathlib import Path, PosixPath
-from beyond_mocap.match.make import make_match
-from beyond_mocap.match.order import MatchOrder
+from beyond_mocap.match.synthesize_match import make_match
+from beyond_mocap.match.request import MatchOrder
 if __name__ == "__main__":
     make_match({order!r})
 """]  # fmt: skip
@@ -167,7 +168,8 @@ def test_figures_that_are_made_outlast_a_run_that_ends_before_them(made, order_t
     words, told = text.read_text(), []
     text.write_text(words + "9.5 kick right\n")
     with pytest.raises(UserCancelledError):
-        synthesize_match(order, lambda fraction, line: told.append(line), lambda: any("windows" in line for line in told))
+        synthesize_match(order, lambda fraction, line: told.append(line),
+                         lambda: any("windows" in line for line in told))
     assert read_state(order.out)["status"] == "cancelled"
     text.write_text(words)
     synthesize_match(order)

@@ -97,8 +97,8 @@ def test_words_for_a_time_at_which_nobody_is_there_are_told(match, tmp_path):
 
 
 def test_texts_of_players_who_are_away_are_told_where_everybody_is_asked_for(tmp_path):
-    from beyond_mocap.match.order import MatchRequest
-    from beyond_mocap.match.parts import list_unused_labels
+    from beyond_mocap.match.player_plans import list_unused_labels
+    from beyond_mocap.match.request import MatchRequest
 
     for name in ("home_7", "away_9"):
         (tmp_path / f"{name}.txt").write_text("13 kick right\n")
@@ -113,7 +113,8 @@ def test_the_events_second_file_and_provider_may_be_named(match, tmp_path):
     """One that needs no second file says so; two files that lie apart are read, and are of another match."""
     named = {"events": SMALL / "small_events.csv", "events-meta": SMALL / "small_meta.xml", "events-provider": "csv"}
     status, _, error = match("--no-figures", **named)
-    assert status == 0 and any("small_meta.xml: not used, because events of csv are in one file" in one for one in error)
+    assert status == 0 and any("small_meta.xml: not used, because events of csv are in one file" in one
+                               for one in error)
     kloppy = pytest.importorskip("kloppy")
     folder = Path(kloppy.__file__).parent / "tests" / "files"
     if not (folder / "opta_f24.xml").is_file():

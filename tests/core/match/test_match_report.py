@@ -12,7 +12,7 @@ import pytest
 from beyond_mocap.base.errors import InputError
 from beyond_mocap.match.report.page import build_match_page
 from beyond_mocap.match.report.pictures import compute_colours, render_heat_strip
-from beyond_mocap.match.report.results import LIMITS, read_match_results, find_worst_seconds
+from beyond_mocap.match.report.results import LIMITS, find_worst_seconds, read_match_results
 
 SECONDS, FIRST = 60, 100.0
 

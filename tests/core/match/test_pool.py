@@ -7,7 +7,7 @@ import time
 
 import pytest
 
-from beyond_mocap.base.errors import UserCancelledError, InputError
+from beyond_mocap.base.errors import InputError, UserCancelledError
 from beyond_mocap.match.pieces import pool
 from beyond_mocap.match.pieces.pool import TaskFailure, WorkerConfig, run_tasks
 
@@ -65,7 +65,8 @@ def test_a_piece_that_kills_every_worker_fails_alone(chores, tmp_path):
 def test_cancelling_does_not_wait_for_the_work(chores):
     begun = time.monotonic()
     with pytest.raises(UserCancelledError):
-        list(run_tasks([(n, (60.0,)) for n in range(4)], chores.slow, WorkerConfig(2), lambda: time.monotonic() > begun + 1.0))
+        list(run_tasks([(n, (60.0,)) for n in range(4)], chores.slow, WorkerConfig(2), lambda: time.monotonic() > begun
+                       + 1.0))
     assert time.monotonic() - begun < 10.0
 
 

@@ -6,7 +6,15 @@ import pytest
 from beyond_mocap.match.crowd.capsules import Capsule, find_capsule_contacts
 from beyond_mocap.match.crowd.correction import CURVES, ROOT
 from beyond_mocap.match.crowd.crowd_body import CrowdBody, move_capsules
-from beyond_mocap.match.crowd.pushing import MAX_PRESSURE, PRESSURE_STEP, Pressure, update_pressure, solve_separation, compute_sides, compute_separation
+from beyond_mocap.match.crowd.separation import (
+    MAX_PRESSURE,
+    PRESSURE_STEP,
+    Pressure,
+    compute_separation,
+    compute_sides,
+    solve_separation,
+    update_pressure,
+)
 
 FPS, RADIUS = 30.0, 0.1
 

@@ -13,9 +13,9 @@ from beyond_mocap.annotation import KeyMoment, Span, Timeline
 from beyond_mocap.base.errors import InputError
 from beyond_mocap.match.crowd.correction import CURVES, Correction
 from beyond_mocap.match.pieces.named_edit import NamedEdit, NamedKey
-from beyond_mocap.match.player_edit import PlayerEdit, Stretch, to_stored_plan, read_player, write_player
+from beyond_mocap.match.player_edit import PlayerEdit, Stretch, read_player, to_stored_plan, write_player
 from beyond_mocap.motion.track import Track
-from beyond_mocap.synthesis.plan import Pin, Plan, SolvedTrajectory, PlayerTouch
+from beyond_mocap.synthesis.plan import Pin, Plan, PlayerTouch, SolvedTrajectory
 
 RUNS = ("clip", "first", "rate", "length", "cut")
 ARRAYS = ("positions", "ball", "times", "filled", "outlier", "ball_height_known")

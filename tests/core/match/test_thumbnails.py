@@ -7,11 +7,11 @@ import pytest
 
 from beyond_mocap.appearance.picture import render_pose
 from beyond_mocap.library.build import build_library
-from beyond_mocap.match.make import synthesize_match
-from beyond_mocap.match.order import MatchRequest
+from beyond_mocap.match.displayed_motion import construct_displayed_player
 from beyond_mocap.match.player_edit import read_player
 from beyond_mocap.match.report.pictures import PICTURE_SIZE, build_thumbnail_renderer
-from beyond_mocap.match.shown import construct_displayed_player
+from beyond_mocap.match.request import MatchRequest
+from beyond_mocap.match.synthesize_match import synthesize_match
 
 SAMPLE = Path(__file__).resolve().parents[3] / "sample_blend"
 

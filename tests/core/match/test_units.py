@@ -8,13 +8,13 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from beyond_mocap.annotation import KeyMoment, Span, Timeline
-from beyond_mocap.base.errors import UserCancelledError, InputError
-from beyond_mocap.match.pieces.units import cut_plan, cut_track, count_frames, build_units, build_window_edges
+from beyond_mocap.base.errors import InputError, UserCancelledError
+from beyond_mocap.match.pieces.units import build_units, build_window_edges, count_frames, cut_plan, cut_track
 from beyond_mocap.match.pieces.windows import search_window
 from beyond_mocap.match.player_edit import to_stored_plan
 from beyond_mocap.motion.track import Track, sample_track
-from beyond_mocap.synthesis.plan import Plan, SolvedTrajectory, PlayerTouch
-from beyond_mocap.synthesis.search.offer import SLOT
+from beyond_mocap.synthesis.plan import Plan, PlayerTouch, SolvedTrajectory
+from beyond_mocap.synthesis.search.candidate_index import SLOT
 
 
 @given(st.floats(0.0, 500.0), st.integers(60, 20000), st.sampled_from([10.0, 30.0, 60.0]))

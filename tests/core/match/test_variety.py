@@ -5,12 +5,12 @@ import pytest
 
 from beyond_mocap.base.errors import InputError
 from beyond_mocap.library.build import build_library
-from beyond_mocap.match.crowd.variety import LAG_STEP, find_in_step, choose_lags, measure_share_in_step
+from beyond_mocap.match.crowd.variety import LAG_STEP, choose_lags, find_in_step, measure_share_in_step
 from beyond_mocap.motion.track import Track
 from beyond_mocap.synthesis.plan import Plan
 from beyond_mocap.synthesis.resolve_plan import resolve_plan
-from beyond_mocap.synthesis.search.preferences import PREFERRED_RANGE, PERIOD, build_lag_preference
-from beyond_mocap.synthesis.search.wanted import build_request
+from beyond_mocap.synthesis.search.preferences import PERIOD, PREFERRED_RANGE, build_lag_preference
+from beyond_mocap.synthesis.search.request import build_request
 from beyond_mocap.synthesis.synthesize import synthesize
 
 

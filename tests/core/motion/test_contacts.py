@@ -13,7 +13,7 @@ from beyond_mocap.motion.mirror import mirror
 from beyond_mocap.motion.motion import Motion, forward_kinematics
 from beyond_mocap.motion.retargeting.adult import build_adult_skeleton
 from beyond_mocap.motion.retargeting.neutral import build_neutral_stance
-from beyond_mocap.synthetic.gait import GaitStyle, plan_footsteps, build_gait, plan_gait
+from beyond_mocap.synthetic.gait import GaitStyle, build_gait, plan_footsteps, plan_gait
 
 MOCAP = pathlib.Path(__file__).parents[3] / "../shared/data/mocap"
 
@@ -23,7 +23,8 @@ def planted(speed: float, fps: float, seconds: float = 5.0) -> np.ndarray:
     neutral = build_neutral_stance(build_adult_skeleton())
     course = plan_gait(speed, seconds, fps, neutral)
     times = course.times[course.requested]
-    return np.stack([plan_footsteps(course, neutral, GaitStyle(), side).is_in_contact(times) for side in (0, 1)], axis=1)
+    return np.stack([plan_footsteps(course, neutral, GaitStyle(), side).is_in_contact(times) for side in (0, 1)],
+                    axis=1)
 
 
 def stances(motion: Motion) -> np.ndarray:
@@ -75,7 +76,8 @@ def test_no_contact_in_the_flight_of_a_jump():
     motion = standing(3.0)
     rise = np.zeros(len(motion))
     rise[60:91] = 0.3 * (1.0 - np.linspace(-1, 1, 31) ** 2)
-    found = contacts.detect_contacts(replace(motion, root_positions=motion.root_positions + rise[:, None] * (0.0, 0.0, 1.0)))
+    found = contacts.detect_contacts(replace(motion, root_positions=motion.root_positions + rise[:, None]
+                                             * (0.0, 0.0, 1.0)))
     assert not found[65:86].any() and found[:60].all() and found[92:].all()
 
 

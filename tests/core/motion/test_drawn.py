@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from beyond_mocap.base.errors import InputError
-from beyond_mocap.motion.track.drawn import SAMPLE_RATE, build_line_track, build_moving_track
+from beyond_mocap.motion.track.line_track import SAMPLE_RATE, build_line_track, build_moving_track
 
 STRAIGHT = np.column_stack([np.linspace(0.0, 20.0, 201), np.zeros(201)])
 

@@ -9,7 +9,7 @@ from beyond_mocap.motion import contacts
 from beyond_mocap.motion.foot_plant import MAX_DROP, plant_feet, solve_shift
 from beyond_mocap.motion.humanoid import identify_joints, measure_leg_length
 from beyond_mocap.motion.limb import solve_two_bone
-from beyond_mocap.motion.motion import compute_local_rotations, place_motion, compute_pose
+from beyond_mocap.motion.motion import compute_local_rotations, compute_pose, place_motion
 from beyond_mocap.motion.retargeting.neutral import build_neutral_stance
 from beyond_mocap.synthetic.gait import build_gait
 

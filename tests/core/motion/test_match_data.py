@@ -8,9 +8,9 @@ import pytest
 
 from beyond_mocap.base.errors import InputError
 from beyond_mocap.files.tracking.feed import Feed
-from beyond_mocap.files.tracking.match_repairs import repair_ball, repair_players, repair_sides, check_side_names
+from beyond_mocap.files.tracking.match_repairs import check_side_names, repair_ball, repair_players, repair_sides
 from beyond_mocap.files.tracking.providers import PROVIDERS
-from beyond_mocap.files.tracking.referees import read_team_colours, read_referee_samples
+from beyond_mocap.files.tracking.referees import read_referee_samples, read_team_colours
 from beyond_mocap.files.tracking.tracking import read_match
 from beyond_mocap.motion.track.match_data import Match, MatchPlayer, describe_presence
 
@@ -126,7 +126,8 @@ def test_a_lineup_that_does_not_fit_the_sides_is_told():
     middle = positions[:, times < 100, 1].mean(axis=1) * np.where(np.array(teams) == "home", 1.0, -1.0)
     called = ["left back" if y > 8 else "right back" if y < -8 else "striker" for y in middle]
     assert check_side_names(times, positions, PERIODS, teams, called) == []
-    assert "left players are on the right" in check_side_names(times, positions * [1.0, -1.0], PERIODS, teams, called)[0]
+    assert "left players are on the right" in check_side_names(times, positions * [1.0, -1.0], PERIODS, teams,
+                                                               called)[0]
     assert check_side_names(times, positions * [1.0, -1.0], PERIODS, teams, [""] * 22) == []
 
 

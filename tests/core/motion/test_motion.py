@@ -8,13 +8,13 @@ from beyond_mocap.base.errors import InputError
 from beyond_mocap.motion import quaternion
 from beyond_mocap.motion.motion import (
     Motion,
-    sample_frames,
-    concatenate_motions,
     compute_end_positions,
+    compute_world_rotation,
+    concatenate_motions,
     forward_kinematics,
     place_motion,
     resample,
-    compute_world_rotation,
+    sample_frames,
 )
 from beyond_mocap.motion.skeleton import Skeleton
 
@@ -99,7 +99,8 @@ def test_cutting_and_joining(motion):
 
 def test_one_frame_is_a_motion():
     one = Motion(TREE, np.zeros((1, 3)), quaternion.identity(1, 4), 30.0)
-    assert one.duration == 0.0 and len(resample(one, 60.0)) == 1 and sample_frames(one, np.array([0.3]))[0].shape == (1, 3)
+    assert one.duration == 0.0 and len(resample(one, 60.0)) == 1 and sample_frames(one, np.array([0.3]))[0].shape == (1,
+            3)
 
 
 def test_what_does_not_fit_is_refused():

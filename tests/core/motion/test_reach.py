@@ -169,7 +169,8 @@ def test_a_leg_that_bends_more_than_it_did_keeps_its_knee_steady():
     target = places[:, end] - 0.1 * down
     swings = []
     for clear in (MIN_BEND, np.full(count, 0.2)):
-        local, miss = solve_posed_limb(motion.skeleton, places, world, (upper, middle, end), target, soft=1e-4, min_bend=clear)
+        local, miss = solve_posed_limb(motion.skeleton, places, world, (upper, middle, end), target, soft=1e-4,
+                                       min_bend=clear)
         bone = motion.skeleton.offsets[middle]
         thigh = quaternion.multiply(world[:, motion.skeleton.parents[upper]], local[upper])
         swings.append(np.ptp(quaternion.rotate(thigh, np.tile(bone, (count, 1)))[:, 1]))

@@ -14,7 +14,7 @@ from beyond_mocap.motion import quaternion
 from beyond_mocap.motion.humanoid import compute_heading, identify_joints, measure_leg_length
 from beyond_mocap.motion.motion import Motion, forward_kinematics
 from beyond_mocap.motion.retargeting.adult import build_adult_skeleton
-from beyond_mocap.motion.retargeting.retarget import Retargeter, read_bone_map, pair_joints, write_bone_map
+from beyond_mocap.motion.retargeting.retarget import Retargeter, pair_joints, read_bone_map, write_bone_map
 from beyond_mocap.motion.skeleton import Skeleton
 from beyond_mocap.synthetic.gait import build_gait
 
@@ -132,7 +132,8 @@ def test_a_tilted_hinge_and_other_proportions_keep_directions_and_standing_feet(
 
 
 def test_knees_and_feet_keep_their_way(run):
-    there = retarget(run, other_axes(build_gait(1.5, 1.0, 30.0), 5).skeleton, example=other_axes(build_gait(1.5, 1.0, 30.0), 5))
+    there = retarget(run, other_axes(build_gait(1.5, 1.0, 30.0), 5).skeleton,
+                     example=other_axes(build_gait(1.5, 1.0, 30.0), 5))
     body = identify_joints(there.skeleton)
     ahead = np.stack([np.cos(compute_heading(there)), np.sin(compute_heading(there)), np.zeros(len(there))], axis=1)
     for limb in (body.left, body.right):

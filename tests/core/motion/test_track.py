@@ -9,7 +9,14 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from beyond_mocap.base.errors import InputError
-from beyond_mocap.motion.track import BALL_RADIUS, Track, clean_track, sample_track, compute_travel_direction, smooth_zero_phase_hann
+from beyond_mocap.motion.track import (
+    BALL_RADIUS,
+    Track,
+    clean_track,
+    compute_travel_direction,
+    sample_track,
+    smooth_zero_phase_hann,
+)
 
 DATA = pathlib.Path(__file__).resolve().parents[3] / ".." / "shared" / "data"
 needs_data = pytest.mark.skipif(not DATA.is_dir(), reason="the recordings in ../shared/data are not here")
@@ -357,7 +364,8 @@ def test_real_tracks_stay_on_their_samples(number, rate):
     table = np.array(rows)
     if rate:
         times = np.arange(table[0, 0], table[-1, 0] + 1e-9, 1 / rate)
-        table = np.column_stack([times, *(np.interp(times, table[:, 0], column).find_detour(2) for column in table[:, 1:].T)])
+        table = np.column_stack([times, *(np.interp(times, table[:, 0], column).find_detour(2)
+                                          for column in table[:, 1:].T)])
     cleaned, report = clean_track(Track(table[:, 0], table[:, 1:]))
     sampled = sample_track(cleaned, 30)
     assert report.outliers == 0 and sampled.valid.all()

@@ -80,7 +80,8 @@ def test_links_are_all_that_lies_between():
 
 
 def test_it_does_not_matter_where_the_body_is_and_where_it_faces():
-    here, there = detect_hits(planted()).motions[0], detect_hits(place_motion(planted(), 2.0, (4.0, -3.0, 0.0))).motions[0]
+    here, there = detect_hits(planted()).motions[0], detect_hits(place_motion(planted(), 2.0,
+                                                                              (4.0, -3.0, 0.0))).motions[0]
     assert (here.key, here.first, here.last, here.high) == (there.key, there.first, there.last, there.high)
     np.testing.assert_allclose(here.vectors, there.vectors, atol=1e-9)
     np.testing.assert_allclose(here.velocity, there.velocity, atol=1e-9)
@@ -88,7 +89,8 @@ def test_it_does_not_matter_where_the_body_is_and_where_it_faces():
 
 
 def test_the_mirror_shows_the_other_side():
-    right, left = detect_hits(planted(), "foot", "right").motions[0], detect_hits(mirror(planted()), "foot", "left").motions[0]
+    right, left = detect_hits(planted(), "foot", "right").motions[0], detect_hits(mirror(planted()), "foot",
+                                                                                  "left").motions[0]
     assert right.key == left.key
     np.testing.assert_allclose(left.vectors, right.vectors * [1.0, -1.0, 1.0], atol=1e-6)
 

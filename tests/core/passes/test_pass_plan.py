@@ -9,11 +9,11 @@ import pytest
 from beyond_mocap.annotation.striking import measure_ball_gap
 from beyond_mocap.ball.contact import find_striking_surface
 from beyond_mocap.ball.flight import Launch, simulate_flight
-from beyond_mocap.base.errors import UserCancelledError, InputError, NotInLibraryError
+from beyond_mocap.base.errors import InputError, NotInLibraryError, UserCancelledError
 from beyond_mocap.motion import quaternion
 from beyond_mocap.motion.humanoid import compute_heading_from_positions
-from beyond_mocap.motion.motion import sample_frames, compute_pose
-from beyond_mocap.passes.pass_court import ON_TARGET
+from beyond_mocap.motion.motion import compute_pose, sample_frames
+from beyond_mocap.passes.pass_problem import ON_TARGET
 from beyond_mocap.passes.passes import build_ball, build_ball_path, plan_scene
 from beyond_mocap.passes.scene_json import SAMPLES, parse_scene
 
@@ -60,7 +60,8 @@ def test_times_are_a_chain_of_travels_on_whole_frames(plans, name):
 def test_every_ball_comes_to_the_next_strike_with_its_bounces(plans, name):
     scene, plan = plans(name)
     for before, after in zip(plan.strikes, plan.strikes[1:]):
-        flight = simulate_flight(Launch(0.0, before.order.ball, before.velocity_out, before.spin), build_ball(scene), before.travel)
+        flight = simulate_flight(Launch(0.0, before.order.ball, before.velocity_out, before.spin), build_ball(scene),
+                                 before.travel)
         assert np.linalg.norm(flight.at([before.travel])[0] - after.order.ball) <= ON_TARGET
         assert np.sum(flight.bounces < before.travel - 2e-3) == before.bounces
         assert np.allclose(flight.velocity([before.travel - 2e-3])[0], after.velocity_in, atol=0.1)
@@ -73,7 +74,8 @@ def test_the_ball_is_on_the_surface_that_strikes(plans, strikes_library, name):
         order, motion = one.order, strikes_library.clips[one.order.clip].motion
         surface = find_striking_surface(motion.skeleton, order.part, order.side, order.tool)
         places, world = laid(motion, order)
-        gap = measure_ball_gap(surface.compute_line(places, world), surface.radius, np.array(order.ball), build_ball(scene).radius)
+        gap = measure_ball_gap(surface.compute_line(places, world), surface.radius, np.array(order.ball),
+                               build_ball(scene).radius)
         low = order.ball[2] <= build_ball(scene).radius + 1e-9  # there it lies on the ground
         assert abs(gap) < (0.1 if low else 1e-6)
         assert order.hit.first <= order.strike_frame <= order.hit.last

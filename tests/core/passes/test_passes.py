@@ -9,16 +9,22 @@ import pytest
 
 from beyond_mocap.annotation.striking import measure_ball_gap
 from beyond_mocap.ball.contact import find_striking_surface
-from beyond_mocap.base.errors import UserCancelledError, NotInLibraryError
+from beyond_mocap.base.errors import NotInLibraryError, UserCancelledError
 from beyond_mocap.cli.main import main
 from beyond_mocap.cli.outputs import ProgressReporter
 from beyond_mocap.files.bvh import bvh
 from beyond_mocap.files.tables import read_ball
 from beyond_mocap.motion.humanoid import estimate_stature
 from beyond_mocap.motion.motion import forward_kinematics
-from beyond_mocap.passes.links import BONES, BoneWeights
 from beyond_mocap.passes.pass_scene import Weights
-from beyond_mocap.passes.passes import build_ball, build_bone_weights, list_unlabelled_strikes, synthesize_passes, plan_scene
+from beyond_mocap.passes.passes import (
+    build_ball,
+    build_bone_weights,
+    list_unlabelled_strikes,
+    plan_scene,
+    synthesize_passes,
+)
+from beyond_mocap.passes.pose_distance import BONES, BoneWeights
 from beyond_mocap.passes.scene_json import SAMPLES, parse_scene
 from beyond_mocap.synthesis.provenance import read_provenance
 
@@ -104,7 +110,8 @@ def test_progress_goes_up_and_work_can_be_stopped(strikes_library):
         return bool(shares) and shares[-1] > 0.4
 
     with pytest.raises(UserCancelledError):
-        synthesize_passes(strikes_library, parse_scene(SAMPLES["dropped"]), lambda share, text: shares.append(share), stop)
+        synthesize_passes(strikes_library, parse_scene(SAMPLES["dropped"]), lambda share, text: shares.append(share),
+                          stop)
     assert shares == sorted(shares) and shares[-1] < 0.9
 
 

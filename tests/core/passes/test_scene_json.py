@@ -9,10 +9,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from beyond_mocap.base.errors import InputError
-from beyond_mocap.passes import links
+from beyond_mocap.passes import pose_distance as links
 from beyond_mocap.passes.pass_scene import BONES, GROUND, Example, PassScene, find_server
 from beyond_mocap.passes.scene_json import SAMPLES as KEPT
-from beyond_mocap.passes.scene_json import parse_scene, read_scene, to_json, format_scene
+from beyond_mocap.passes.scene_json import format_scene, parse_scene, read_scene, to_json
 
 SAMPLES = sorted((Path(__file__).resolve().parents[3] / "sample_blend" / "passes").glob("*.json"))
 THREE = {

@@ -59,7 +59,8 @@ def test_a_file_in_pieces_is_the_file(clip, text, size):
         frames += stream.feed(data[start : start + size])
     motion = bvh.read_bvh(clip).motion
     root, rotations = stream.rows.compute_poses(np.array([frame.values for frame in frames]))
-    assert len(frames) == len(motion) and stream.invalid_count == 0 and stream.frame_time == pytest.approx(1 / 60.0, abs=1e-6)
+    assert len(frames) == len(motion) and stream.invalid_count == 0 and stream.frame_time == pytest.approx(1 / 60.0,
+            abs=1e-6)
     assert stream.rows.skeleton.has_same_bones(motion.skeleton)
     np.testing.assert_allclose(root, motion.root_positions, atol=1e-9)
     np.testing.assert_allclose(np.abs(np.sum(rotations * motion.rotations, axis=-1)), 1.0, atol=1e-9)

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from beyond_mocap.path_editing.collisions import find_collisions, compute_least_gaps
+from beyond_mocap.path_editing.collisions import compute_least_gaps, find_collisions
 
 
 def moving(times, start, velocity):

@@ -14,8 +14,8 @@ from beyond_mocap.motion.retargeting.adult import build_adult_skeleton
 from beyond_mocap.path_editing import cycle
 from beyond_mocap.path_editing.cycle import KEPT_SCALE, MOST_SCALE, SAME_LENGTH, cycle_motion
 from beyond_mocap.path_editing.loops import find_loops, measure_stride
+from beyond_mocap.path_editing.path_edit import PathEditSettings, prepare_source
 from beyond_mocap.path_editing.path_frame import Residuals
-from beyond_mocap.path_editing.ride import PathEditSettings, prepare_source
 from beyond_mocap.synthetic.gait import build_gait
 
 PERIOD, FPS = 36, 30.0
@@ -59,7 +59,8 @@ def walk():
 def stop():
     """A made walk that stops after three and a half seconds."""
     seconds = np.arange(300) / 60.0
-    return prepare_source(build_gait(1.4 * np.clip((4.2 - seconds) / 0.7, 0.0, 1.0), fps=60.0, seed=3), PathEditSettings()).residuals
+    return prepare_source(build_gait(1.4 * np.clip((4.2 - seconds) / 0.7, 0.0, 1.0), fps=60.0, seed=3),
+                          PathEditSettings()).residuals
 
 
 @pytest.mark.parametrize("period", [24, 36, 41])

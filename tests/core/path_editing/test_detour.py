@@ -6,7 +6,7 @@ import pytest
 from beyond_mocap.base.errors import InputError
 from beyond_mocap.motion.path.arc_length import ArcLength
 from beyond_mocap.motion.path.path import PolynomialPath
-from beyond_mocap.path_editing.detour import RISE, compute_detour_width, compute_offsets, add_detours
+from beyond_mocap.path_editing.detour import RISE, add_detours, compute_detour_width, compute_offsets
 from beyond_mocap.path_editing.path_line import fit_line
 
 

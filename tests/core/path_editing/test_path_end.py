@@ -13,7 +13,8 @@ ARC = 0.05 * np.arange(100)  # 4.95 m
 def test_a_longer_path_changes_nothing():
     for length in (4.95, 4.9495, 8.0):
         out = find_ending(ARC, length, FPS, "repeat")
-        assert out.count == 100 and np.array_equal(out.displayed, np.arange(100)) and not len(out.restarts) and not out.messages
+        assert out.count == 100 and np.array_equal(out.displayed,
+                                                   np.arange(100)) and not len(out.restarts) and not out.messages
 
 
 def test_stopping_cuts_at_the_path_s_end():

@@ -104,4 +104,5 @@ def test_a_high_degree_does_not_swing_between_few_frames(frames, degree):
     path = fit_path(motion, contacts.detect_heel_toe_contacts(motion), "polynomial", degree)
     places = path.at(np.arange(frames) / 30.0)
     assert ArcLength(path).length < 1.03 * np.linalg.norm(np.diff(places, axis=0), axis=1).sum()
-    assert np.linalg.norm(places - project_to_ground(motion, contacts.detect_heel_toe_contacts(motion)), axis=1).max() < 0.02
+    assert np.linalg.norm(places - project_to_ground(motion, contacts.detect_heel_toe_contacts(motion)),
+                          axis=1).max() < 0.02

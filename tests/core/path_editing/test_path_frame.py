@@ -4,7 +4,13 @@ import numpy as np
 import pytest
 
 from beyond_mocap.motion import quaternion
-from beyond_mocap.path_editing.path_frame import FRAMES, MovingFrame, compute_heading, from_moving_frame, to_moving_frame
+from beyond_mocap.path_editing.path_frame import (
+    FRAMES,
+    MovingFrame,
+    compute_heading,
+    from_moving_frame,
+    to_moving_frame,
+)
 
 FPS = 30.0
 

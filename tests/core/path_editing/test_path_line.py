@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 
 from beyond_mocap.base.errors import InputError
 from beyond_mocap.motion.path.arc_length import ArcLength
-from beyond_mocap.path_editing.path_line import build_b_spline, fit_control_points, build_straight_points, fit_line
+from beyond_mocap.path_editing.path_line import build_b_spline, build_straight_points, fit_control_points, fit_line
 
 ROUND = np.linspace(0.0, 2.0 * np.pi, 400)
 

@@ -10,10 +10,10 @@ from beyond_mocap.path_editing.path_frame import Residuals
 from beyond_mocap.path_editing.path_time import (
     PathProfile,
     StepOptions,
-    compute_required_length,
     build_timing_by_arc_length,
-    build_timing_by_time,
     build_timing_by_profile,
+    build_timing_by_time,
+    compute_required_length,
     compute_step_scale,
     resample_residuals,
 )
@@ -60,19 +60,22 @@ def test_whole_rows_are_the_rows_themselves(residuals):
 
 
 def test_a_level_way_asks_for_nothing(residuals):
-    timing = build_timing_by_profile(residuals, own(residuals), level(30.0), StepOptions(True, True, True), 1.0, 0.0, False)
+    timing = build_timing_by_profile(residuals, own(residuals), level(30.0), StepOptions(True, True, True), 1.0, 0.0,
+                                     False)
     assert np.allclose(timing.at, np.arange(ROWS)) and np.allclose(timing.arc, np.cumsum(residuals.step))
 
 
 def test_slopes_make_steps_shorter_and_quicker_at_one_speed(residuals):
-    timing = build_timing_by_profile(residuals, own(residuals), level(30.0, slope=0.2), StepOptions(slopes=True), 1.0, 0.0, False)
+    timing = build_timing_by_profile(residuals, own(residuals), level(30.0, slope=0.2), StepOptions(slopes=True), 1.0,
+                                     0.0, False)
     pace, tempo = np.diff(timing.arc), np.diff(timing.at)
     assert np.allclose(pace, STEP, rtol=1e-3) and np.allclose(tempo, 1.0 / (1.0 - 0.4 * 0.2), rtol=1e-3)
 
 
 @pytest.mark.parametrize("slope", [0.15, -0.05, -0.2])
 def test_climbs_follow_toblers_function(residuals, slope):
-    timing = build_timing_by_profile(residuals, own(residuals), level(30.0, slope=slope), StepOptions(climbs=True), 1.0, 0.0, False)
+    timing = build_timing_by_profile(residuals, own(residuals), level(30.0, slope=slope), StepOptions(climbs=True), 1.0,
+                                     0.0, False)
     tobler = np.exp(-3.5 * abs(slope + 0.05)) / np.exp(-3.5 * 0.05)
     assert np.diff(timing.arc).mean() == pytest.approx(STEP * tobler, rel=1e-3)
     assert np.diff(timing.at).mean() == pytest.approx(np.sqrt(tobler), rel=1e-3)
@@ -81,7 +84,8 @@ def test_climbs_follow_toblers_function(residuals, slope):
 @pytest.mark.parametrize("radius", [3.0, 1.0, 0.25])
 def test_bends_follow_the_two_thirds_law(residuals, radius):
     """Speed goes with the third root of the radius below 2 m; steps and tempo share it."""
-    timing = build_timing_by_profile(residuals, own(residuals), level(30.0, bend=1.0 / radius), StepOptions(bends=True), 1.0, 0.0, False)
+    timing = build_timing_by_profile(residuals, own(residuals), level(30.0, bend=1.0 / radius), StepOptions(bends=True),
+                                     1.0, 0.0, False)
     law = min((radius / 2.0) ** (1.0 / 3.0), 1.0)
     assert np.diff(timing.arc).mean() == pytest.approx(STEP * law, rel=1e-3)
     assert np.diff(timing.at).mean() == pytest.approx(np.sqrt(law), rel=1e-3)
@@ -104,7 +108,8 @@ def test_what_its_own_path_asked_for_already_is_not_asked_again(residuals):
 
 
 def test_a_closed_way_is_gone_round(residuals):
-    timing = build_timing_by_profile(residuals, own(residuals), level(4.0, slope=0.1), StepOptions(slopes=True), 1.0, 0.0, True)
+    timing = build_timing_by_profile(residuals, own(residuals), level(4.0, slope=0.1), StepOptions(slopes=True), 1.0,
+                                     0.0, True)
     assert timing.arc[-1] > 12.0 and np.allclose(np.diff(timing.arc), STEP, rtol=1e-2)
 
 

@@ -10,11 +10,11 @@ import pytest
 
 from beyond_mocap.base.errors import InputError
 from beyond_mocap.cli.main import main
-from beyond_mocap.study.analysis import analyse_study, compute_cliffs_delta, adjust_holm, compute_welch_p
+from beyond_mocap.study.analysis import adjust_holm, analyse_study, compute_cliffs_delta, compute_welch_p
 from beyond_mocap.study.answers import read_answers
 from beyond_mocap.study.form import build_form_page, build_form_table, list_questions
 from beyond_mocap.study.order import Clip, build_study, read_study, write_study
-from beyond_mocap.study.page import place_bar, build_study_page
+from beyond_mocap.study.page import build_study_page, place_bar
 
 SYSTEMS, SCENARIOS = ("ours", "skating", "theirs"), ("s1", "s2", "s3", "s4", "s5")
 CLIPS = (
@@ -230,7 +230,8 @@ def test_welch_is_scipys():
 
     a, b = np.array([1.0, 4.0, 3.0, 5.0]), np.array([2.0, 2.0, 1.0])
     assert compute_welch_p(a, b) == pytest.approx(ttest_ind(a, b, equal_var=False, alternative="greater").pvalue)
-    assert np.isnan(compute_welch_p(np.ones(4), np.ones(3))) and compute_welch_p(b, a) == pytest.approx(1.0 - compute_welch_p(a, b))
+    assert np.isnan(compute_welch_p(np.ones(4), np.ones(3))) and compute_welch_p(b, a) == pytest.approx(1.0
+            - compute_welch_p(a, b))
 
 
 def test_holm_and_cliff_by_hand():

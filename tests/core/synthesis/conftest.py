@@ -4,7 +4,7 @@ import pytest
 
 from beyond_mocap.synthesis.plan import Plan
 from beyond_mocap.synthesis.resolve_plan import resolve_plan
-from beyond_mocap.synthesis.search.wanted import build_request
+from beyond_mocap.synthesis.search.request import build_request
 
 
 @pytest.fixture(scope="session")

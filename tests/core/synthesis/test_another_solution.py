@@ -5,7 +5,7 @@ import pytest
 
 from beyond_mocap.base.errors import InputError
 from beyond_mocap.synthesis.plan import Plan
-from beyond_mocap.synthesis.resynthesize import BLEND_SECONDS, VariantStretch, resynthesize, list_shown_stretches
+from beyond_mocap.synthesis.resynthesize import BLEND_SECONDS, VariantStretch, list_shown_stretches, resynthesize
 from beyond_mocap.synthesis.search.preferences import REUSE_COST, SAME_CLIP_COST, UsedStretch, compute_reuse_cost
 from beyond_mocap.synthesis.synthesize import synthesize
 
@@ -29,7 +29,8 @@ def test_a_stretch_is_another_one_and_the_rest_is_the_same_to_the_last_bit(libra
     other = resynthesize(library, plan, take, variant=VariantStretch(start, end, used))
     off = np.flatnonzero(changed(take, other)) / fps
     assert len(off) and off.min() < end and off.max() > start
-    reach = BLEND_SECONDS + 0.4 + (1.5 if start == 4.0 else 0.5)  # a kick's own entry and exit; a stretch of some length
+    reach = BLEND_SECONDS + 0.4 + (1.5 if start == 4.0
+                                   else 0.5)  # a kick's own entry and exit; a stretch of some length
     assert start - reach < off.min() and off.max() < end + reach, (off.min(), off.max())
     first, last = int(start * fps), int(end * fps)
     shared = footage(take, first, last) & footage(other, first, last)
@@ -55,7 +56,8 @@ def test_a_whole_take_is_another_one(library, track, asked, take):
 
 def test_the_price_of_footage_is_paid_where_it_was_shown(library):
     clip = library.clips[0]
-    cost = compute_reuse_cost(library, (UsedStretch(clip.path, clip.mirrored, 20.0, 30.0), UsedStretch("nowhere.bvh", False, 0.0, 9.0)))
+    cost = compute_reuse_cost(library, (UsedStretch(clip.path, clip.mirrored, 20.0, 30.0),
+                                        UsedStretch("nowhere.bvh", False, 0.0, 9.0)))
     first = library.frames.first[0]
     assert cost[first + 25] == REUSE_COST and cost[first + 60] == pytest.approx(SAME_CLIP_COST)
     others = [number for number, other in enumerate(library.clips) if other.path != clip.path]
@@ -70,4 +72,5 @@ def test_a_stretch_that_is_none(library, track, asked, take, start, end):
 
 def test_other_methods_have_no_stretches(library, track, asked, take):
     with pytest.raises(InputError, match="method path"):
-        resynthesize(library, Plan(track=track, timeline=asked, method="blocks"), take, variant=VariantStretch(3.0, 4.0))
+        resynthesize(library, Plan(track=track, timeline=asked, method="blocks"), take,
+                     variant=VariantStretch(3.0, 4.0))

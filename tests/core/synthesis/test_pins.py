@@ -3,7 +3,7 @@
 import pytest
 
 from beyond_mocap.base.errors import InputError
-from beyond_mocap.synthesis.pins import read_pins
+from beyond_mocap.synthesis.pin_table import read_pins
 from beyond_mocap.synthesis.plan import Pin, Plan
 
 HEADER = "time_s,part,x_m,y_m,z_m,hold_s\n"

@@ -8,7 +8,7 @@ import pytest
 from beyond_mocap.base.errors import InputError
 from beyond_mocap.evaluation.report import evaluate
 from beyond_mocap.library.build import build_library
-from beyond_mocap.motion.humanoid import identify_joints, estimate_stature
+from beyond_mocap.motion.humanoid import estimate_stature, identify_joints
 from beyond_mocap.motion.motion import forward_kinematics
 from beyond_mocap.synthesis.plan import METHODS, Pin, Plan
 from beyond_mocap.synthesis.resynthesize import resynthesize
@@ -113,7 +113,8 @@ def test_clips_of_a_style_are_taken_rather_than_others(clip_file, track_of, tmp_
 def test_folders_clips_and_patterns_name_clips():
     path = "lmd/Player1/P1_kick.bvh"
     assert all(
-        matches_pattern(path, name) for name in ("lmd", "LMD/player1", "Player1/", "lmd/*", "P1_kick", "*kick.bvh", "p1_*")
+        matches_pattern(path, name) for name in ("lmd", "LMD/player1", "Player1/", "lmd/*", "P1_kick", "*kick.bvh",
+                                                 "p1_*")
     )
     assert not any(matches_pattern(path, name) for name in ("kick", "player", "1", "."))
 

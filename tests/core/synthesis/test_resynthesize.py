@@ -12,7 +12,7 @@ from beyond_mocap.motion.motion import forward_kinematics
 from beyond_mocap.motion.track import Track, sample_track, smooth_zero_phase_hann
 from beyond_mocap.synthesis.plan import Plan
 from beyond_mocap.synthesis.resynthesize import BLEND_SECONDS, resynthesize
-from beyond_mocap.synthesis.search.touched import RUN_UP
+from beyond_mocap.synthesis.search.affected_frames import RUN_UP
 from beyond_mocap.synthesis.synthesize import synthesize
 
 

@@ -6,7 +6,7 @@ import pathlib
 import numpy as np
 import pytest
 
-from beyond_mocap.annotation import read_clip_annotations, read_timeline, list_vocabulary
+from beyond_mocap.annotation import list_vocabulary, read_clip_annotations, read_timeline
 from beyond_mocap.files.bvh import bvh
 from beyond_mocap.files.tracking.tracking import read_track_csv
 

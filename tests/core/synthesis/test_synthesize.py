@@ -11,7 +11,7 @@ import pytest
 
 from beyond_mocap.annotation.ball_contact import build_surfaces
 from beyond_mocap.annotation.striking import HEAD_RADIUS
-from beyond_mocap.base.errors import UserCancelledError, InputError, NotInLibraryError
+from beyond_mocap.base.errors import InputError, NotInLibraryError, UserCancelledError
 from beyond_mocap.library.build import build_library
 from beyond_mocap.motion import quaternion
 from beyond_mocap.motion.humanoid import compute_heading, identify_joints

@@ -12,7 +12,7 @@ from beyond_mocap.motion.motion import Motion, compute_end_positions, forward_ki
 from beyond_mocap.motion.retargeting.adult import build_adult_skeleton
 from beyond_mocap.motion.retargeting.neutral import build_neutral_stance
 from beyond_mocap.synthetic import gestures, moves
-from beyond_mocap.synthetic.gait import GaitStyle, plan_footsteps, build_gait, plan_gait
+from beyond_mocap.synthetic.gait import GaitStyle, build_gait, plan_footsteps, plan_gait
 
 MOCAP = pathlib.Path(__file__).parents[3] / "../shared/data/mocap"
 FPS = 60.0
@@ -99,7 +99,8 @@ def test_walking_has_double_support_and_running_flies():
     neutral = build_neutral_stance(build_adult_skeleton())
     for speed, both, none in ((1.4, True, False), (3.5, False, True)):
         course = plan_gait(speed, 6.0, FPS, neutral)
-        down = [plan_footsteps(course, neutral, GaitStyle(), side).is_in_contact(course.times[course.requested]) for side in (0, 1)]
+        down = [plan_footsteps(course, neutral, GaitStyle(), side).is_in_contact(course.times[course.requested])
+                for side in (0, 1)]
         assert np.any(down[0] & down[1]) == both and np.any(~down[0] & ~down[1]) == none
 
 
@@ -143,7 +144,8 @@ def test_a_child_takes_shorter_quicker_steps():
     strides = [np.ptp(plan_gait(1.2, 5.0, FPS, n, style=GaitStyle(life=0.0)).phase) for n in (child and neutral, grown)]
     assert strides[0] > 1.05 * strides[1]
     assert (
-        build_gait(1.2, 3.0, FPS, child).root_positions[:, 2].mean() < 0.75 * build_gait(1.2, 3.0, FPS).root_positions[:, 2].mean()
+        build_gait(1.2, 3.0, FPS, child).root_positions[:, 2].mean() < 0.75
+        * build_gait(1.2, 3.0, FPS).root_positions[:, 2].mean()
     )
 
 

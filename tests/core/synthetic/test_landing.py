@@ -6,13 +6,13 @@ import pytest
 from beyond_mocap.motion import quaternion
 from beyond_mocap.motion.humanoid import identify_joints
 from beyond_mocap.motion.mirror import mirror
-from beyond_mocap.motion.motion import Motion, forward_kinematics, compute_pose
+from beyond_mocap.motion.motion import Motion, compute_pose, forward_kinematics
 from beyond_mocap.motion.retargeting.adult import build_adult_skeleton
 from beyond_mocap.motion.retargeting.neutral import build_neutral_stance
 from beyond_mocap.motion.spring import Offset
-from beyond_mocap.synthetic.landing import ends_in_flight, add_landing
+from beyond_mocap.synthetic.landing import add_landing, ends_in_flight
+from beyond_mocap.synthetic.lying import build_lying_pose, compute_lowest_root, compute_thickness
 from beyond_mocap.synthetic.moves import build_get_up
-from beyond_mocap.synthetic.resting import compute_lowest_root, build_lying_pose, compute_thickness
 
 FPS = 100.0
 SKELETON = build_adult_skeleton()
@@ -55,7 +55,8 @@ def test_lying_on_the_side_is_low_and_the_same_on_both(settled):
     root = np.zeros((2, 3))
     root[:, 2] = compute_lowest_root(SKELETON, poses)
     places, _ = compute_pose(SKELETON, root, poses)
-    assert (places[..., 2] > 0.0).all() and (places[..., 2] - compute_thickness(SKELETON)).min() == pytest.approx(0.0, abs=0.02)
+    assert (places[..., 2] > 0.0).all() and (places[..., 2] - compute_thickness(SKELETON)).min() == pytest.approx(0.0,
+            abs=0.02)
     assert places[:, BODY.hips, 2].max() < 0.25 and places[:, BODY.neck, 2].max() < 0.35
     across = places[:, BODY.left.upper_leg] - places[:, BODY.right.upper_leg]
     assert across[0, 2] < -0.1 and across[1, 2] > 0.1
@@ -124,11 +125,13 @@ def test_a_mirrored_dive_comes_down_mirrored(dive, whole):
 def test_the_way_up_that_needs_less_turning_is_taken(dive):
     back = build_get_up(SKELETON, 60.0).motion
     lying = add_landing(dive, [back])
-    turn = quaternion.multiply(lying.motion.rotations[lying.rise_frame - 30, 0], quaternion.inverse(back.rotations[0, 0]))
+    turn = quaternion.multiply(lying.motion.rotations[lying.rise_frame - 30, 0],
+                               quaternion.inverse(back.rotations[0, 0]))
     rotations = np.array(back.rotations)
     rotations[:, 0] = quaternion.multiply(turn, rotations[:, 0])
     from_the_side = Motion(SKELETON, back.root_positions, rotations, 60.0)
-    assert add_landing(dive, [back, from_the_side]).get_up_index == 1 and add_landing(dive, [from_the_side, back]).get_up_index == 0
+    assert add_landing(dive, [back, from_the_side]).get_up_index == 1 and add_landing(dive,
+            [from_the_side, back]).get_up_index == 0
 
 
 def test_frames_behind_a_jump_of_markers_near_the_end_are_made_too(dive):

@@ -9,9 +9,9 @@ from beyond_mocap.base.errors import InputError
 from beyond_mocap.motion.humanoid import identify_joints
 from beyond_mocap.motion.motion import forward_kinematics
 from beyond_mocap.synthetic.throws import build_throw
+from beyond_mocap.throws.ball_release import InHand, sample_points
 from beyond_mocap.throws.correction import Freedom, correct_motion
-from beyond_mocap.throws.led_limb import solve_shifts
-from beyond_mocap.throws.letting_go import InHand, sample_points
+from beyond_mocap.throws.limb_shift import solve_shifts
 
 
 def impact(found, target):
@@ -34,7 +34,8 @@ def test_hits_another_target(freedom, speed, arm, aside):
 def test_the_ball_is_where_the_hand_is_and_as_fast():
     made = build_throw((16.0, 0.0, 1.2), 20.0, fps=30.0)
     part = InHand("right", made.grip)
-    found = correct_motion(made.motion, part, made.release * 30.0, np.array([16.0, 0.8, 1.0]), BASEBALL, Freedom.anchored())
+    found = correct_motion(made.motion, part, made.release * 30.0, np.array([16.0, 0.8, 1.0]), BASEBALL,
+                           Freedom.anchored())
     near = found.frame + np.array([-1e-3, 0.0, 1e-3])
     ball = sample_points(found.motion, part, near)[:, 0]
     assert np.allclose(ball[1], found.position, atol=1e-9)

@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from beyond_mocap.base.errors import UserCancelledError, InputError
+from beyond_mocap.base.errors import InputError, UserCancelledError
 from beyond_mocap.files.tables import to_plain
 from beyond_mocap.motion import quaternion
 from beyond_mocap.motion.humanoid import identify_joints
@@ -19,7 +19,7 @@ from beyond_mocap.throws.networks.chains import find_chains
 from beyond_mocap.throws.networks.example import build_example
 from beyond_mocap.throws.networks.generate import GeneratedMotion
 from beyond_mocap.throws.networks.limits import estimate_joint_limits
-from beyond_mocap.throws.throws_page import draw_strip, build_throws_page
+from beyond_mocap.throws.throws_page import build_throws_page, draw_strip
 
 
 class Model:
@@ -53,7 +53,7 @@ def generating(monkeypatch, by):
         places = forward_kinematics(motion)[0][:, list(find_chains(motion.skeleton).effectors)]
         nothing = np.zeros((len(motion), len(motion.skeleton)))
         return GeneratedMotion(motion=motion, effectors=places, predicted=places + off, requested=description.effectors,
-                         over=nothing, floating=None, iterations=3, seconds=0.05)
+                               over=nothing, floating=None, iterations=3, seconds=0.05)
 
     monkeypatch.setattr(recipe, "generate_motion", generate)
 
@@ -127,7 +127,8 @@ def test_some_of_each_subject(examples):
 def test_the_report_and_its_page(examples, monkeypatch):
     named = replace(examples[0], name="<b>one", subject="ann & bob")
     generating(monkeypatch, [(named.motion, 0.01)])
-    report = to_plain({"model": "w<x>.npz", "trained_on": "ann", **evaluate_throws(Model(named), [named], FULL_OPTIONS).build_report()})
+    report = to_plain({"model": "w<x>.npz", "trained_on": "ann",
+                       **evaluate_throws(Model(named), [named], FULL_OPTIONS).build_report()})
     assert report["deviation_m"]["left_hand"] == pytest.approx(0.0, abs=1e-9)
     assert report["network_deviation_m"]["right_foot"] == pytest.approx(0.01 * 3**0.5)
     page = build_throws_page(report)

@@ -9,13 +9,24 @@ from beyond_mocap.motion.motion import Motion, forward_kinematics, place_motion
 from beyond_mocap.motion.skeleton import Skeleton
 from beyond_mocap.synthetic.throws import build_throw
 from beyond_mocap.throws.networks import kinematics
-from beyond_mocap.throws.networks.answers import apply_output, compute_end_positions, split_single_output, build_output
 from beyond_mocap.throws.networks.chains import HIERARCHY, LIMB_OF, find_chains
-from beyond_mocap.throws.networks.description import interpolate_positions, scale_description, build_windows
-from beyond_mocap.throws.networks.example import Example, build_description, build_example, mirror_example, compute_poses
-from beyond_mocap.throws.networks.features import count_guides, build_input, compute_phase, count_widths
+from beyond_mocap.throws.networks.description import build_windows, interpolate_positions, scale_description
+from beyond_mocap.throws.networks.example import (
+    Example,
+    build_description,
+    build_example,
+    compute_poses,
+    mirror_example,
+)
+from beyond_mocap.throws.networks.features import build_input, compute_phase, count_guides, count_widths
 from beyond_mocap.throws.networks.model import ModelSettings
-from beyond_mocap.throws.networks.training_set import measure_leg_reach, build_steps, add_mirror_images
+from beyond_mocap.throws.networks.network_output import (
+    apply_output,
+    build_output,
+    compute_end_positions,
+    split_single_output,
+)
+from beyond_mocap.throws.networks.training_set import add_mirror_images, build_steps, measure_leg_reach
 from tests.core.linear_throws import build_training_set
 
 TARGET = np.array([12.0, 3.0, 1.2])

@@ -16,7 +16,7 @@ from beyond_mocap.throws.networks.example import build_description, build_exampl
 from beyond_mocap.throws.networks.frame_step import blend_window, prepare_stepper
 from beyond_mocap.throws.networks.generate import Options, generate_motion
 from beyond_mocap.throws.networks.kinematics import Pose, to_matrices
-from beyond_mocap.throws.networks.limb_reach import LimbReach, reach_limb, find_hinge_axes
+from beyond_mocap.throws.networks.limb_reach import LimbReach, find_hinge_axes, reach_limb
 from beyond_mocap.throws.networks.limits import estimate_joint_limits
 from beyond_mocap.throws.networks.model import ModelSettings, ThrowModel
 from beyond_mocap.throws.networks.network import PhaseNetwork
@@ -53,7 +53,7 @@ def by_heart(rows, units=2):
 def thrown(y=0.0, stature=1.8, arm="right", fps=30.0):
     made = build_throw((18.0, y, 1.0), 20.0, arm, skeleton=build_adult_skeleton(stature), fps=120.0)
     return build_example(f"y{y}", "one", made.motion, f"{arm}_hand", made.release, (18.0, y, 1.0), made.velocity, fps,
-                      span=(0.4, made.motion.duration - 0.5))
+                         span=(0.4, made.motion.duration - 0.5))
 
 
 def knowing(examples, **settings):
@@ -62,7 +62,8 @@ def knowing(examples, **settings):
     return ThrowModel(settings=settings, skeleton=examples[0].motion.skeleton,
                       networks={name: by_heart(rows[name]) for name in settings.networks},
                       leg_reach=measure_leg_reach(examples), examples=tuple(examples),
-                      joint_limits=estimate_joint_limits(np.concatenate([e.motion.rotations for e in examples])))  # fmt: skip
+                      joint_limits=estimate_joint_limits(np.concatenate([e.motion.rotations
+                                                                         for e in examples])))  # fmt: skip
 
 
 @pytest.fixture(scope="module")

@@ -8,7 +8,7 @@ from beyond_mocap.motion import quaternion
 from beyond_mocap.synthetic.throws import build_throw
 from beyond_mocap.throws.networks.chains import find_chains
 from beyond_mocap.throws.networks.example import build_example
-from beyond_mocap.throws.networks.features import HIP_GUIDES, carry_hips, count_guides, build_input, count_widths
+from beyond_mocap.throws.networks.features import HIP_GUIDES, build_input, carry_hips, count_guides, count_widths
 from beyond_mocap.throws.networks.kinematics import to_six
 from beyond_mocap.throws.networks.model import ModelSettings
 from beyond_mocap.throws.networks.training_set import build_steps

@@ -10,14 +10,21 @@ from beyond_mocap.annotation import KeyMoment, Span, Timeline
 from beyond_mocap.base.errors import InputError
 from beyond_mocap.library.build import build_library
 from beyond_mocap.motion.humanoid import compute_heading, identify_joints
-from beyond_mocap.motion.motion import Motion, sample_frames, forward_kinematics, place_motion
+from beyond_mocap.motion.motion import Motion, forward_kinematics, place_motion, sample_frames
 from beyond_mocap.motion.track import BALL_RADIUS, Track
-from beyond_mocap.synthesis.plan import Plan, SolvedTrajectory, PlayerTouch
+from beyond_mocap.synthesis.plan import Plan, PlayerTouch, SolvedTrajectory
 from beyond_mocap.synthesis.quality.movement import compute_jerk, compute_window_maxima
 from beyond_mocap.synthetic.gait import build_gait
 from beyond_mocap.synthetic.throws import build_throw
-from beyond_mocap.throws.join_throw import FADE_WITHOUT_LIBRARY, join_throw, measure_library_jerk, build_standing_motion, measure_transition_jerk, trim_waiting
-from beyond_mocap.throws.leave_path import is_in_reach, leave_path, find_stopping_position
+from beyond_mocap.throws.join_throw import (
+    FADE_WITHOUT_LIBRARY,
+    build_standing_motion,
+    join_throw,
+    measure_library_jerk,
+    measure_transition_jerk,
+    trim_waiting,
+)
+from beyond_mocap.throws.leave_path import find_stopping_position, is_in_reach, leave_path
 from beyond_mocap.throws.run_up import OWN_LABEL, add_throw_clip, construct_run_up
 
 LIBRARY = pathlib.Path(__file__).resolve().parents[3] / "sample_blend" / "library"
@@ -105,7 +112,8 @@ def test_a_key_moment_within_the_throw_by_its_solved_touch_gives_way_too(library
     motion, release, plan = on_library(library, 0.0)
     asked = AT + motion.duration - release + 0.1  # behind the throw, its touch within
     ball = np.tile([0.4, 0.0, BALL_RADIUS], (len(TIMES), 1))
-    course = SolvedTrajectory(TIMES, ball, np.zeros(len(TIMES), bool), (PlayerTouch(asked - 0.3, True, "foot", "kick"),))
+    course = SolvedTrajectory(TIMES, ball, np.zeros(len(TIMES), bool),
+                              (PlayerTouch(asked - 0.3, True, "foot", "kick"),))
     plan = replace(plan, timeline=Timeline((), (KeyMoment(asked, ("kick", "low")),)), solved=course, solve_touches=True)
     way = construct_run_up(library, plan, motion, release, AT)
     assert any("'kick low' overlaps the throw" in line for line in way.warnings)

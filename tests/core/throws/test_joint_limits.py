@@ -69,7 +69,8 @@ def test_a_joint_past_half_a_turn_from_the_middle_stays_on_its_side():
 
 def test_the_range_lies_about_the_middle():
     angles = np.concatenate([np.full(90, -1.0), np.linspace(-1.0, 2.0, 10)])
-    middle, low, high = estimate_joint_limits(quaternion.from_rotation_vector(np.array([[[0.0, 0.0, a]] for a in angles])), free_joints=())[0]
+    middle, low, high = estimate_joint_limits(quaternion.from_rotation_vector(np.array([[[0.0, 0.0, a]]
+            for a in angles])), free_joints=())[0]
     assert np.allclose(middle, [0, 0, 0.5], atol=1e-6) and np.allclose(low, -high, atol=1e-6)
     assert high[2] == pytest.approx(1.5 + np.radians(10.0) + 0.24, abs=1e-6)
 

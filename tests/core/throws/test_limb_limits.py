@@ -42,7 +42,8 @@ def other_axes(motion):
 def test_on_other_axes_joints_are_as_far_beyond(thrown):
     fast, limits, beyond = thrown
     shown = other_axes(fast)
-    assert np.allclose(LimbLimits.from_motions(limits, fast, RIGHT, shown, RIGHT).measure_excess(shown), beyond, atol=1e-6)
+    assert np.allclose(LimbLimits.from_motions(limits, fast, RIGHT, shown, RIGHT).measure_excess(shown), beyond,
+                       atol=1e-6)
 
 
 def test_the_mirror_image_is_as_far_beyond(thrown):
@@ -64,4 +65,5 @@ def test_what_is_held_is_within_or_as_it_was_given(thrown, bones, limb, mirrored
     rotations[:, list(limb)] = held
     assert np.all(found.measure_excess(replace(shown, rotations=rotations)) <= found.measure_excess(shown)[:1] + 1e-5)
     inside = beyond == 0.0
-    assert np.allclose(held[inside], asked[inside], atol=1e-9) and np.array_equal(found.limit_rotations(asked, asked), asked)
+    assert np.allclose(held[inside], asked[inside], atol=1e-9) and np.array_equal(found.limit_rotations(asked, asked),
+                                                                                  asked)

@@ -22,8 +22,10 @@ def launches(examples):
 
 
 def wish_of(example, launch, **changed):
-    asked = LaunchRequest(speed=float(np.linalg.norm(launch)), elevation=float(np.arctan2(launch[2], np.hypot(*launch[:2]))),
-                 distance=float(example.impact[0]), height=float(example.impact[2]), limb=example.limb)  # fmt: skip
+    asked = LaunchRequest(speed=float(np.linalg.norm(launch)),
+                          elevation=float(np.arctan2(launch[2], np.hypot(*launch[:2]))),
+                          distance=float(example.impact[0]), height=float(example.impact[2]),
+                          limb=example.limb)  # fmt: skip
     return replace(asked, **changed)
 
 
@@ -50,7 +52,8 @@ def test_blends_keep_the_release_and_the_speed_of_the_hand(examples, launches):
     hand = made.effectors[:, made.limb]
     speed = np.linalg.norm(np.diff(hand, axis=0), axis=1) * made.fps
     own = [
-        np.linalg.norm(np.diff(build_description(e).effectors[:, e.limb], axis=0), axis=1).max() * e.motion.fps for e in examples
+        np.linalg.norm(np.diff(build_description(e).effectors[:, e.limb], axis=0), axis=1).max() * e.motion.fps
+        for e in examples
     ]
     assert 0.85 * min(own) < speed.max() < 1.1 * max(own)
     assert abs(int(np.argmax(speed)) - made.release) < 3.0

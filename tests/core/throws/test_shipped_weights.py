@@ -7,7 +7,7 @@ import pytest
 
 from beyond_mocap.base.errors import InputError
 from beyond_mocap.motion.retargeting.adult import build_adult_skeleton
-from beyond_mocap.synthetic.subjects import build_thrower
+from beyond_mocap.synthetic.performers import build_thrower
 from beyond_mocap.throws.evaluate_throws import measure_deviations
 from beyond_mocap.throws.network_npz import WEIGHTS, read_shipped_model
 from beyond_mocap.throws.networks.description import scale_description
@@ -15,9 +15,9 @@ from beyond_mocap.throws.networks.example import build_description, build_exampl
 from beyond_mocap.throws.networks.generate import Options, generate_motion
 from beyond_mocap.throws.networks.kinematics import to_matrices
 from beyond_mocap.throws.networks.limits import JointLimits
-from beyond_mocap.throws.planted_examples import generate_example
+from beyond_mocap.throws.synthetic_examples import generate_example
 from beyond_mocap.throws.throw import throw_at
-from beyond_mocap.throws.throw_order import ThrowRequest
+from beyond_mocap.throws.throw_request import ThrowRequest
 
 ACTIONS = ("throw", "kick")
 TARGETS = {"throw": ((8.0, 0.0, 1.0), (15.0, 4.0, 1.5)), "kick": ((11.0, 0.0, 1.0), (20.0, -3.0, 1.8))}
@@ -73,8 +73,8 @@ def test_no_body_is_bent_out_of_shape_for_a_target(action, order, says):
 
 
 @pytest.mark.parametrize("order, moved", [
-    (ThrowRequest((40.0, 0.0, 1.0)), 0.05), (ThrowRequest((40.0, 0.0, 1.0), limb="left_hand"), 0.05), (ThrowRequest((6.0, 0.0, 4.5)), 0.05),
-    (ThrowRequest((6.0, 0.0, 5.0)), 0.06),
+    (ThrowRequest((40.0, 0.0, 1.0)), 0.05), (ThrowRequest((40.0, 0.0, 1.0), limb="left_hand"), 0.05),
+    (ThrowRequest((6.0, 0.0, 4.5)), 0.05), (ThrowRequest((6.0, 0.0, 5.0)), 0.06),
 ])  # fmt: skip
 def test_no_joint_of_the_arm_leaves_its_limits(order, moved):
     """Targets far from the examples', which are at most 26 m away and 2.4 m high."""
@@ -107,5 +107,5 @@ def test_a_rate_that_shows_no_throw_is_refused():
 def test_a_ball_faster_than_any_human_throws_is_told():
     small = build_adult_skeleton()
     giant = replace(small, offsets=small.offsets * 5.0, end_offsets=small.end_offsets * 5.0)
-    assert any("human limit" in line
-               for line in throw_at(read_shipped_model("throw"), ThrowRequest((30.0, 0.0, 1.0)), giant).warnings)  # fmt: skip
+    assert any("human limit" in line for line in throw_at(read_shipped_model("throw"), ThrowRequest((30.0, 0.0, 1.0)),
+                                                          giant).warnings)  # fmt: skip

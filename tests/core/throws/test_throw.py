@@ -13,12 +13,12 @@ from beyond_mocap.files.bvh import bvh
 from beyond_mocap.files.tables import read_ball
 from beyond_mocap.motion.humanoid import identify_joints
 from beyond_mocap.motion.retargeting.adult import build_adult_skeleton
-from beyond_mocap.throws.join_throw import join_throw, build_standing_motion
-from beyond_mocap.throws.letting_go import InHand, sample_points
+from beyond_mocap.throws.ball_release import InHand, sample_points
+from beyond_mocap.throws.join_throw import build_standing_motion, join_throw
 from beyond_mocap.throws.network_npz import write_model
 from beyond_mocap.throws.throw import throw_at
-from beyond_mocap.throws.throw_order import ThrowRequest, place_in_motion
-from tests.core.linear_throws import build_linear_model, build_throw_examples, build_kick_examples
+from beyond_mocap.throws.throw_request import ThrowRequest, place_in_motion
+from tests.core.linear_throws import build_kick_examples, build_linear_model, build_throw_examples
 
 
 @pytest.fixture(scope="module")
@@ -74,7 +74,8 @@ def kicking():
 
 
 @pytest.mark.parametrize("order", [
-    ThrowRequest((11.0, 2.0, 0.9), ball_place=(1.0, 1.0)), ThrowRequest((-4.0, 10.0, 0.3), limb="left_foot", ball_place=(0.0, 0.0)),
+    ThrowRequest((11.0, 2.0, 0.9), ball_place=(1.0, 1.0)), ThrowRequest((-4.0, 10.0, 0.3), limb="left_foot",
+                                                                        ball_place=(0.0, 0.0)),
     ThrowRequest((12.0, 0.0, 0.8)),
 ], ids=["ball", "left", "free"])  # fmt: skip
 def test_a_kick_hits_and_the_ball_lies_where_it_is_told(kicking, order):

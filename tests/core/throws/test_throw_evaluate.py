@@ -6,7 +6,7 @@ import pytest
 
 from beyond_mocap.cli.main import main
 from beyond_mocap.throws.network_npz import write_model
-from beyond_mocap.throws.planted_examples import write_examples
+from beyond_mocap.throws.synthetic_examples import write_examples
 from tests.core.linear_throws import build_linear_model, build_throw_examples
 
 

@@ -17,7 +17,7 @@ from beyond_mocap.motion import quaternion
 from beyond_mocap.motion.humanoid import identify_joints
 from beyond_mocap.motion.motion import forward_kinematics, place_motion
 from beyond_mocap.motion.skeleton import Skeleton
-from beyond_mocap.throws.planted_examples import COLUMNS, generate_example, write_examples
+from beyond_mocap.throws.synthetic_examples import COLUMNS, generate_example, write_examples
 from beyond_mocap.throws.throw_examples import read_examples
 
 HEAD = ",".join(COLUMNS[:11])
@@ -144,9 +144,9 @@ def test_odd_recordings_are_told_and_left_out(own):
 
 @pytest.mark.parametrize(
     "change", [("limb", "nose"), ("release_s", "soon"), ("target_x_m", ""), ("file", "subject03/none.bvh"),
-     ("file", "subject03/../subject03/subject03_throw001.bvh"), ("speed_m_s", "0"), ("speed_m_s", "-5"),
-     ("speed_m_s", "nan"),
-     ("speed_m_s", "1e9"), ("launch_x_m_s", "1e12"), ("launch_x_m_s", "inf"), ("launch_y_m_s", "1e308")],
+               ("file", "subject03/../subject03/subject03_throw001.bvh"), ("speed_m_s", "0"), ("speed_m_s", "-5"),
+               ("speed_m_s", "nan"),
+               ("speed_m_s", "1e9"), ("launch_x_m_s", "1e12"), ("launch_x_m_s", "inf"), ("launch_y_m_s", "1e308")],
 )
 def test_a_wrong_table_is_told_with_its_line(own, change):
     path = own / "throws.csv"

@@ -8,7 +8,7 @@ from beyond_mocap.ball.physics import BASEBALL, PAPER
 from beyond_mocap.evaluation.paired_tests import compare_differences, find_inliers
 from beyond_mocap.motion.humanoid import identify_joints
 from beyond_mocap.synthetic.throws import build_throw
-from beyond_mocap.throws.evaluate_throws import measure_deviations, find_impact, release_ball
+from beyond_mocap.throws.evaluate_throws import find_impact, measure_deviations, release_ball
 
 # Fredriksson's tables 8.1, 8.2, 8.5, 8.6 (m: left arm, right arm, left leg, right leg, impact; a row for each subject)
 SINGLE = np.array([

@@ -7,7 +7,7 @@ from beyond_mocap.motion import limb, quaternion
 from beyond_mocap.motion.humanoid import identify_joints
 from beyond_mocap.motion.motion import forward_kinematics
 from beyond_mocap.synthetic.throws import build_throw
-from beyond_mocap.throws.networks.limb_reach import solve_two_bones, interpolate_target
+from beyond_mocap.throws.networks.limb_reach import interpolate_target, solve_two_bones
 
 MOTION = build_throw(fps=60.0).motion
 BODY = identify_joints(MOTION.skeleton)
@@ -77,8 +77,8 @@ def test_leading_axes_are_free():
     rows = np.random.default_rng(2).normal(size=(5, 2, 3))
     hinge = np.broadcast_to([0.0, 1.0, 0.0], rows.shape)
     both = solve_two_bones(rows, rows + [0.3, 0, 0], rows + [0.3, 0.25, 0], rows + [0.2, 0.2, 0.1], hinge, np)
-    one = solve_two_bones(rows[3, 1], rows[3, 1] + [0.3, 0, 0], rows[3, 1] + [0.3, 0.25, 0], rows[3, 1] + [0.2, 0.2, 0.1],
-                  hinge[0, 0], np)
+    one = solve_two_bones(rows[3, 1], rows[3, 1] + [0.3, 0, 0], rows[3, 1] + [0.3, 0.25, 0], rows[3, 1]
+                          + [0.2, 0.2, 0.1], hinge[0, 0], np)
     assert all(np.allclose(a[3, 1], b, atol=1e-12) for a, b in zip(both, one))
 
 

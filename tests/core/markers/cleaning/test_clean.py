@@ -5,11 +5,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from beyond_mocap.base.errors import UserCancelledError, InputError, line_spans
+from beyond_mocap.base.errors import InputError, UserCancelledError, line_spans
 from beyond_mocap.markers.cleaning.clean import CleanSettings, clean_trial
 from beyond_mocap.markers.trial import MarkerTrial
 from beyond_mocap.synthetic.gait import build_gait
-from beyond_mocap.synthetic.ground_truth.planted_markers import build_trial
+from beyond_mocap.synthetic.ground_truth.synthetic_markers import build_trial
 
 
 @pytest.fixture(scope="module")
@@ -35,7 +35,8 @@ def spoiled(known, change):
 
 def off(known, trial, label):
     """(T,) m: how far a marker of a cleaned trial is from where it truly was."""
-    return np.linalg.norm(trial.positions[:, trial.index_of(label)] - known.clean[:, known.trial.index_of(label)], axis=-1)
+    return np.linalg.norm(trial.positions[:, trial.index_of(label)] - known.clean[:, known.trial.index_of(label)],
+                          axis=-1)
 
 
 def test_a_clean_trial_comes_back_bit_for_bit(walk):

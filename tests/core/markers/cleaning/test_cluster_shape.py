@@ -4,7 +4,13 @@ tell bodies apart."""
 import numpy as np
 import pytest
 
-from beyond_mocap.markers.cleaning.cluster_shape import measure_distance_spread, compute_mean_shape, compute_median, compute_medians, compute_quantile
+from beyond_mocap.markers.cleaning.cluster_shape import (
+    compute_mean_shape,
+    compute_median,
+    compute_medians,
+    compute_quantile,
+    measure_distance_spread,
+)
 from beyond_mocap.motion import quaternion
 
 CLUSTER = np.array([[0.0, 0.0, 0.0], [0.1, 0.0, 0.02], [0.03, 0.12, 0.0], [-0.05, 0.02, 0.09]])

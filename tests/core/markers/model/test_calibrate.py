@@ -3,13 +3,13 @@
 import numpy as np
 import pytest
 
-from beyond_mocap.base.errors import UserCancelledError, InputError
+from beyond_mocap.base.errors import InputError, UserCancelledError
 from beyond_mocap.markers.files.marker_set_text import choose_set
-from beyond_mocap.markers.model.calibrate import calibrate, build_from_static
+from beyond_mocap.markers.model.calibrate import build_from_static, calibrate
 from beyond_mocap.markers.pose.pose import PoseSettings, solve_poses
 from beyond_mocap.motion.motion import forward_kinematics
 from beyond_mocap.synthetic.gait import build_gait
-from beyond_mocap.synthetic.ground_truth.planted_markers import build_trial
+from beyond_mocap.synthetic.ground_truth.synthetic_markers import build_trial
 
 LIMBS = [side + part for side in ("Left", "Right") for part in ("UpLeg", "Leg", "Foot", "Arm", "ForeArm", "Hand")]
 

@@ -136,7 +136,7 @@ def test_a_trial_that_lacks_an_arm_is_still_of_its_set():
     assert choose_marker_set(labels, sets) is driveline
     assert driveline.list_missing(labels) == ("RELB", "RMELB", "RWRA", "RWRB", "RFIN")
     assert choose_marker_set([label for label in driveline.labels if "MEL" not in label and "MKN" not in label
-                      and "MAN" not in label], sets).name == "plug_in_gait"  # fmt: skip
+                              and "MAN" not in label], sets).name == "plug_in_gait"  # fmt: skip
 
 
 def test_labels_under_other_names_are_not_lacking():

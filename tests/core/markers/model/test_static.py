@@ -8,7 +8,7 @@ from beyond_mocap.markers.model.assemble import average_static_frame, find_still
 from beyond_mocap.markers.trial import MarkerTrial
 from beyond_mocap.motion import quaternion
 from beyond_mocap.synthetic.gait import build_gait
-from beyond_mocap.synthetic.ground_truth.planted_markers import build_trial
+from beyond_mocap.synthetic.ground_truth.synthetic_markers import build_trial
 
 
 @pytest.fixture(scope="module")

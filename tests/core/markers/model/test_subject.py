@@ -11,7 +11,7 @@ from beyond_mocap.markers.model.assemble import build_model_from_frame, merge_se
 from beyond_mocap.motion import quaternion
 from beyond_mocap.motion.skeleton import Skeleton
 from beyond_mocap.synthetic.gait import build_gait
-from beyond_mocap.synthetic.ground_truth.planted_markers import build_trial
+from beyond_mocap.synthetic.ground_truth.synthetic_markers import build_trial
 
 
 @pytest.fixture(scope="module")

@@ -5,10 +5,18 @@ import pytest
 
 from beyond_mocap.base.errors import InputError
 from beyond_mocap.markers.pose import elimination
-from beyond_mocap.markers.pose.chain import WorldPoses, compute_step_axes, build_chain, compute_marker_derivative, apply_step, compute_world_poses, build_poses
+from beyond_mocap.markers.pose.chain import (
+    WorldPoses,
+    apply_step,
+    build_chain,
+    build_poses,
+    compute_marker_derivative,
+    compute_step_axes,
+    compute_world_poses,
+)
 from beyond_mocap.motion import quaternion
 from beyond_mocap.motion.motion import compute_pose
-from tests.core.markers.small_chain import HINGE, SADDLE, SKELETON, sample_poses, build_small_chain
+from tests.core.markers.small_chain import HINGE, SADDLE, SKELETON, build_small_chain, sample_poses
 
 
 def markers_at(made, at):
@@ -45,7 +53,8 @@ def test_no_pole_takes_a_direction_from_a_joint():
     made = build_small_chain()
     turns = quaternion.identity(1, len(SKELETON))
     turns[0, 2] = quaternion.from_euler(np.array([0.3, np.pi / 2, 0.2]), made.order[2])
-    arm = compute_marker_derivative(made, build_poses(made, np.zeros((1, 3)), turns))[0, made.joint == 2].reshape(-1, 3 + 21)
+    arm = compute_marker_derivative(made, build_poses(made, np.zeros((1, 3)), turns))[0, made.joint == 2].reshape(-1,
+            3 + 21)
     assert np.linalg.svd(arm[:, 9:12])[1].min() > 0.02
 
 
@@ -72,8 +81,10 @@ def test_a_step_solves_the_whole_system():
     for axis in range(3):
         own.curvature[:, axis, axis] = 0.05**2
     damping = np.full(4, 1e-3)
-    shift, turns = elimination.solve_step(made, placed, about, elimination.build_body_terms(made, placed, away, weights), own, damping)
-    slope = elimination.compute_gradient(made, placed, about, elimination.build_body_terms(made, placed, away, weights), own)
+    shift, turns = elimination.solve_step(made, placed, about, elimination.build_body_terms(made, placed, away,
+            weights), own, damping)
+    slope = elimination.compute_gradient(made, placed, about, elimination.build_body_terms(made, placed, away, weights),
+                                         own)
     columns = compute_marker_derivative(made, at)
     used = np.concatenate([np.ones(3, dtype=bool), made.free.ravel()])
     for frame in range(4):
@@ -129,7 +140,8 @@ def test_a_distance_pulls_along_its_line_only():
     nothing = np.zeros((len(made.joint), 3, 2)), np.zeros((len(made.joint), 2))
     asked = elimination.build_body_terms(made, placed, *nothing)
     along = np.array([[1.0, 0.0], [0.0, 0.6], [0.0, 0.8]])
-    elimination.add_distance_terms(asked, 4, placed.joints[4], along, np.array([2.0, 1.0]), np.array([0.1, 0.2]), np.zeros(2))
+    elimination.add_distance_terms(asked, 4, placed.joints[4], along, np.array([2.0, 1.0]), np.array([0.1, 0.2]),
+                                   np.zeros(2))
     assert np.linalg.matrix_rank(asked.curvature[4][..., 0]) == 1
     assert asked.pull[4][3:, 1] == pytest.approx([0.0, 0.12, 0.16])
 

@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 
 from beyond_mocap.markers.pose import limits
-from beyond_mocap.markers.pose.chain import read_angles, compute_world_poses
+from beyond_mocap.markers.pose.chain import compute_world_poses, read_angles
 from beyond_mocap.markers.pose.descent import PoseTask, descend
 from beyond_mocap.motion import quaternion
-from tests.core.markers.small_chain import HINGE, SKELETON, sample_poses, build_small_chain
+from tests.core.markers.small_chain import HINGE, SKELETON, build_small_chain, sample_poses
 
 ARM = 2
 
@@ -23,7 +23,7 @@ def task_of(made, truth):
     placed = compute_world_poses(made, truth)
     seen = placed.markers + placed.origin
     return PoseTask(chain=made, seen=seen, weights=np.ones((len(made.joint), seen.shape[-1])),
-                stiffness=np.full((len(SKELETON), 3), 1e-3))
+                    stiffness=np.full((len(SKELETON), 3), 1e-3))
 
 
 def posed(made, joint, angles, count=6):

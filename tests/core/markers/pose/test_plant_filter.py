@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from beyond_mocap.base.errors import InputError
-from beyond_mocap.markers.pose.plant_filter import filter_foot_plants, detect_contacts
+from beyond_mocap.markers.pose.plant_filter import detect_contacts, filter_foot_plants
 from beyond_mocap.motion.humanoid import identify_joints
 from beyond_mocap.motion.motion import Motion, compute_pose
 from beyond_mocap.synthetic.gait import build_gait

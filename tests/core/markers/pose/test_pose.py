@@ -5,14 +5,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from beyond_mocap.base.errors import UserCancelledError, InputError
+from beyond_mocap.base.errors import InputError, UserCancelledError
 from beyond_mocap.markers.model.model import MarkerModel, build_freedom
 from beyond_mocap.markers.pose import pose
 from beyond_mocap.markers.pose.pose import HeldBall, PoseSettings, solve_poses
 from beyond_mocap.motion import quaternion
 from beyond_mocap.motion.motion import forward_kinematics
 from beyond_mocap.synthetic.gait import build_gait
-from beyond_mocap.synthetic.ground_truth.planted_markers import build_trial
+from beyond_mocap.synthetic.ground_truth.synthetic_markers import build_trial
 
 
 def model_of(known):

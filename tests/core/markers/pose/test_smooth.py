@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from beyond_mocap.markers.pose import smooth as module
-from beyond_mocap.markers.pose.chain import compute_world_poses, build_poses
+from beyond_mocap.markers.pose.chain import build_poses, compute_world_poses
 from beyond_mocap.markers.pose.descent import HeldPoint, PoseTask, descend
 from beyond_mocap.markers.pose.smooth import smooth_poses
 from beyond_mocap.motion import quaternion

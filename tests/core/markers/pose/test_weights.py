@@ -3,7 +3,11 @@
 import numpy as np
 import pytest
 
-from beyond_mocap.markers.pose.residuals import compute_cluster_deviation, measure_edge_deviation, compute_marker_weights
+from beyond_mocap.markers.pose.residuals import (
+    compute_cluster_deviation,
+    compute_marker_weights,
+    measure_edge_deviation,
+)
 
 # three markers one metre apart
 PLACES = np.array([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.5, np.sqrt(0.75), 0.0]])

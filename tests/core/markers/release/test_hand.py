@@ -8,7 +8,7 @@ from beyond_mocap.markers.release.throwing_hand import refine_hand
 from beyond_mocap.markers.release.without_ball import estimate_hand_release
 from beyond_mocap.motion.hand import build_hand
 from beyond_mocap.motion.motion import Motion
-from beyond_mocap.synthetic.ground_truth.planted_markers import build_trial
+from beyond_mocap.synthetic.ground_truth.synthetic_markers import build_trial
 from beyond_mocap.synthetic.throws import build_throw
 
 

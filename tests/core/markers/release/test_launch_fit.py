@@ -5,7 +5,7 @@ import pytest
 
 from beyond_mocap.ball.physics import BASEBALL
 from beyond_mocap.markers.release.launch_fit import HeldMarker, fit_launch
-from beyond_mocap.markers.release.throwing_hand import fit_hand_ball, find_release_by_distance, find_fastest_frame
+from beyond_mocap.markers.release.throwing_hand import find_fastest_frame, find_release_by_distance, fit_hand_ball
 from beyond_mocap.motion import quaternion
 
 RADIUS, RELEASE = 0.0366, 0.5037
@@ -25,7 +25,8 @@ def planted(fps, speed, spin, seen=0.3, noise=0.0007, seed=0):
     turn = CubicSpline(fine, 3.0 * angle)
     offset = rng.normal(size=3)
     offset *= RADIUS / np.linalg.norm(offset)
-    held = centre(times) + quaternion.rotate(quaternion.from_up_angle(turn(times)), np.broadcast_to(offset, (len(times), 3)))
+    held = centre(times) + quaternion.rotate(quaternion.from_up_angle(turn(times)),
+                                             np.broadcast_to(offset, (len(times), 3)))
     start, velocity = centre(RELEASE), centre(RELEASE, 1)
     first = quaternion.rotate(quaternion.from_up_angle(turn(RELEASE)), offset)
     since = np.maximum(times - RELEASE, 0.0)[:, None]

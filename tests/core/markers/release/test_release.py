@@ -13,8 +13,8 @@ from beyond_mocap.files.bvh import bvh
 from beyond_mocap.markers.files.trc import write_trc
 from beyond_mocap.markers.release.release import ReleaseSettings, estimate_release
 from beyond_mocap.motion.motion import concatenate_motions, resample
-from beyond_mocap.synthetic.ground_truth.planted_ball import BallRequest
-from beyond_mocap.synthetic.ground_truth.planted_markers import build_trial
+from beyond_mocap.synthetic.ground_truth.synthetic_ball import BallRequest
+from beyond_mocap.synthetic.ground_truth.synthetic_markers import build_trial
 from beyond_mocap.synthetic.throws import build_throw
 
 MARKERS = Path(__file__).resolve().parents[5] / "shared" / "data" / "markers"
@@ -152,7 +152,8 @@ def test_no_throw_is_said(known):
     still = known.motion.frames(0, 1)
     standing = concatenate_motions([still] * len(known.trial))
     with pytest.raises(InputError, match="a throw"):
-        estimate_release(known.trial.with_positions(np.repeat(known.trial.positions[:1], len(known.trial), axis=0)), standing)
+        estimate_release(known.trial.with_positions(np.repeat(known.trial.positions[:1], len(known.trial), axis=0)),
+                         standing)
     with pytest.raises(InputError, match="at least 12"):
         estimate_release(known.trial.select_frames(0, 5), known.motion.frames(0, 5))
 

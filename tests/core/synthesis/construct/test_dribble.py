@@ -8,13 +8,13 @@ import pytest
 
 from beyond_mocap.annotation.ball_contact import build_surfaces
 from beyond_mocap.annotation.striking import measure_ball_gap
-from beyond_mocap.ball.roll import ROLLING, simulate_rolls, compute_roll_speeds
+from beyond_mocap.ball.roll import ROLLING, compute_roll_speeds, simulate_rolls
 from beyond_mocap.motion.contacts import detect_contacts
 from beyond_mocap.motion.humanoid import identify_joints
 from beyond_mocap.motion.motion import compute_pose
 from beyond_mocap.motion.track import BALL_RADIUS
+from beyond_mocap.synthesis.construct.contact_geometry import lead_ball_through, move_ball_at
 from beyond_mocap.synthesis.construct.dribble import plan_dribbles
-from beyond_mocap.synthesis.construct.meeting import move_ball_at, lead_ball_through
 from beyond_mocap.synthetic.gait import build_gait
 
 FPS = 30.0
@@ -40,7 +40,8 @@ def planted_ball(motion, ahead=0.0):
 
 def dribbled(motion, ball, stretches=((15.0, 105.0),), held=(), **known):
     return plan_dribbles(
-        motion.skeleton, motion.root_positions, motion.rotations, detect_contacts(motion), ball, stretches, held, FPS, **known
+        motion.skeleton, motion.root_positions, motion.rotations, detect_contacts(motion), ball, stretches, held, FPS,
+        **known
     )
 
 
@@ -48,7 +49,8 @@ def gaps(motion, ball):
     """(T, 2) m, left and right foot."""
     places, world = compute_pose(motion.skeleton, motion.root_positions, motion.rotations)
     return np.stack(
-        [measure_ball_gap(f.compute_line(places, world), f.radius, ball) for f in build_surfaces(motion.skeleton, {"dribble"})], 1
+        [measure_ball_gap(f.compute_line(places, world), f.radius, ball) for f in build_surfaces(motion.skeleton,
+                                                                                                 {"dribble"})], 1
     )
 
 

@@ -6,7 +6,7 @@ import pytest
 from beyond_mocap.motion import quaternion
 from beyond_mocap.motion.humanoid import identify_joints
 from beyond_mocap.motion.motion import forward_kinematics
-from beyond_mocap.synthesis.construct.gaze import MAX_YAW, follow_with_gaze, compute_head_angles
+from beyond_mocap.synthesis.construct.gaze import MAX_YAW, compute_head_angles, follow_with_gaze
 from beyond_mocap.synthesis.construct.pins import estimate_look_axis
 from beyond_mocap.synthetic.gait import build_gait
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from beyond_mocap.motion import quaternion
-from beyond_mocap.synthesis.construct.thesis_methods import integrate_heading, integrate_path, compute_torso_corrections
+from beyond_mocap.synthesis.construct.thesis_methods import compute_torso_corrections, integrate_heading, integrate_path
 
 UP, AHEAD = np.array([0.0, 0.0, 1.0]), np.array([1.0, 0.0, 0.0])
 

@@ -8,7 +8,7 @@ import pytest
 from beyond_mocap.motion import quaternion
 from beyond_mocap.motion.humanoid import compute_heading, identify_joints
 from beyond_mocap.motion.motion import forward_kinematics
-from beyond_mocap.synthesis.construct.pins import FADE, MAX_SHIFT, estimate_look_axis, apply_pins
+from beyond_mocap.synthesis.construct.pins import FADE, MAX_SHIFT, apply_pins, estimate_look_axis
 from beyond_mocap.synthetic.gait import build_gait
 
 

@@ -9,8 +9,8 @@ from beyond_mocap.motion import quaternion
 from beyond_mocap.synthesis.construct.transitions import (
     LONGEST_SPREAD,
     compute_spread_reaches,
-    spread_rotations,
     compute_spread_share,
+    spread_rotations,
     spread_values,
 )
 

@@ -50,7 +50,8 @@ def natural_ball(gesture, at=0.0):
 def gaps(motion, struck, frame, words):
     """Gap of every part that the words name, at one frame."""
     pose = [values[frame] for values in kinematics(motion, struck)]
-    return [measure_ball_gap(s.compute_line(*pose), s.radius, struck.ball[frame]) for s in build_surfaces(motion.skeleton, words)]
+    return [measure_ball_gap(s.compute_line(*pose), s.radius, struck.ball[frame])
+            for s in build_surfaces(motion.skeleton, words)]
 
 
 def check_whole(motion, struck, changed=slice(None)):
@@ -135,7 +136,8 @@ def test_a_ball_does_not_lie_in_the_other_leg(kick):
     left, _ = build_surfaces(kick.motion.skeleton, ("kick",))
     shin = tuple(pose[0][joint] for joint in (body.left.lower_leg, body.left.foot))
     assert struck.moved[0] > 0.0
-    assert min(measure_ball_gap(line, left.radius, struck.ball[frame]) for line in (left.compute_line(*pose), shin)) > -1e-6
+    assert min(measure_ball_gap(line, left.radius, struck.ball[frame]) for line in (left.compute_line(*pose),
+                                                                                    shin)) > -1e-6
 
 
 @pytest.mark.parametrize("off", [(2.0, 0.0), (-1.5, 1.0), (0.0, -3.0)])
@@ -194,7 +196,8 @@ def test_head_chest_and_hands_meet_a_ball_of_unknown_height(walk, words):
 
 
 def test_a_ball_of_unknown_height_flies_freely(walk):
-    ball = kinematics(walk.motion)[0][30, identify_joints(walk.motion.skeleton).head] * [1.0, 1.0, 0.0] + [0.25, 0.0, 0.11]
+    ball = kinematics(walk.motion)[0][30, identify_joints(walk.motion.skeleton).head] * [1.0, 1.0, 0.0] + [0.25, 0.0,
+            0.11]
     struck = met(walk, ball, touch(walk, ("header",)), is_height_known=np.zeros(len(walk.motion), bool))
     fall = np.diff(struck.ball[30:42, 2], 2) * FPS**2
     assert np.allclose(fall, -9.81, atol=1e-6)

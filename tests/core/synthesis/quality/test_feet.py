@@ -89,7 +89,8 @@ def test_support_height_takes_the_part_of_the_foot_that_is_down():
     planted[:, 0, :, 2] = [[0.08, 0.0], [0.08, 0.06], [0.15, 0.01]]
     planted[:, 1, :, 2] = 0.5
     contacts = np.array([[1, 0]] * 3, bool)
-    np.testing.assert_allclose(movement.measure_support_height(planted, contacts, 0.08)[:, 0], [0.0, 0.0, 0.01], atol=1e-12)
+    np.testing.assert_allclose(movement.measure_support_height(planted, contacts, 0.08)[:, 0], [0.0, 0.0, 0.01],
+                               atol=1e-12)
     assert np.isnan(movement.measure_support_height(planted, contacts, 0.08)[:, 1]).all()
 
 

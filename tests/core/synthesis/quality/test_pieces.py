@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from beyond_mocap.synthesis.quality.played import find_replayed, find_transitions, list_warp_rates
+from beyond_mocap.synthesis.quality.playback import find_replayed, find_transitions, list_warp_rates
 
 FPS = 30.0
 

@@ -9,8 +9,8 @@ from beyond_mocap.synthesis.plan import Plan
 from beyond_mocap.synthesis.resolve_plan import resolve_plan
 from beyond_mocap.synthesis.search.block_costs import AnnotationCost
 from beyond_mocap.synthesis.search.blocks import FINEST_LENGTH, BlockSearch
-from beyond_mocap.synthesis.search.distance import list_block_frames, build_straight_edit
-from beyond_mocap.synthesis.search.wanted import build_request, library_frame
+from beyond_mocap.synthesis.search.distance import build_straight_edit, list_block_frames
+from beyond_mocap.synthesis.search.request import build_request, library_frame
 
 
 def shown(library, order, alpha=0.2):
@@ -87,7 +87,8 @@ def test_the_blocks_chosen_have_the_best_words(library, order):
     asked = order((0.0, 8.0, "jogging front"))
     search = BlockSearch(library, asked, 1.0)
     blocks = search.run()
-    cost = AnnotationCost(library.frames).compute_block_costs(blocks.start[:-2], [frozenset({"jogging", "front"})] * FINEST_LENGTH)
+    cost = AnnotationCost(library.frames).compute_block_costs(blocks.start[:-2], [frozenset({"jogging", "front"})]
+                                                              * FINEST_LENGTH)
     assert np.all(cost == -1.0)
 
 

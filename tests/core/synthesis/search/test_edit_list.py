@@ -5,8 +5,8 @@ import pytest
 
 from beyond_mocap.motion import quaternion
 from beyond_mocap.motion.motion import sample_frames
-from beyond_mocap.synthesis.search.edit_list import EditList, sample_edit, find_transitions
-from beyond_mocap.synthesis.search.footage import fetch_motion
+from beyond_mocap.synthesis.search.edit_list import EditList, find_transitions, sample_edit
+from beyond_mocap.synthesis.search.source_frames import fetch_motion
 
 CLIP = np.array([2, 2, 2, 2, 5, 5, 5, 2, 2, 2])
 FRAME = np.array([10.0, 11, 12, 13, 70, 71, 72, 14, 15, 16])
@@ -20,7 +20,8 @@ def test_seams_are_cuts_jumps_and_steps_back():
     assert find_transitions(CLIP, FRAME).tolist() == [4, 7]
     same = np.zeros(8, int)
     assert find_transitions(same, np.array([0, 1, 2, 4, 5, 5, 6, 5.5])).tolist() == [3, 7]
-    assert find_transitions(same, 1.45 * np.arange(8)).tolist() == find_transitions(same, 0.0 * np.arange(8)).tolist() == []
+    assert find_transitions(same, 1.45 * np.arange(8)).tolist() == find_transitions(same,
+                                                                                    0.0 * np.arange(8)).tolist() == []
     assert edit_of().pieces == [(0, 4), (4, 7), (7, 10)]
 
 

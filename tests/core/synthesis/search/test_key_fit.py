@@ -4,7 +4,13 @@ import numpy as np
 import pytest
 
 from beyond_mocap.motion.track import Track, sample_track
-from beyond_mocap.synthesis.search.key_fit import BallMeasurement, StrikeMeasurements, measure_ball, compute_key_misfit, measure_strikes
+from beyond_mocap.synthesis.search.key_fit import (
+    BallMeasurement,
+    StrikeMeasurements,
+    compute_key_misfit,
+    measure_ball,
+    measure_strikes,
+)
 
 
 @pytest.fixture(scope="module")

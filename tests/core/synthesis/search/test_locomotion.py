@@ -3,9 +3,14 @@
 import numpy as np
 import pytest
 
-from beyond_mocap.synthesis.search.blocks import FINEST_LENGTH, BlockSearch, BlockCandidates
+from beyond_mocap.synthesis.search.blocks import FINEST_LENGTH, BlockCandidates, BlockSearch
 from beyond_mocap.synthesis.search.distance import build_warped_edit
-from beyond_mocap.synthesis.search.locomotion import compute_block_distances, match_distance, split_sections, compute_travelled_distance
+from beyond_mocap.synthesis.search.locomotion import (
+    compute_block_distances,
+    compute_travelled_distance,
+    match_distance,
+    split_sections,
+)
 
 
 def blocks_of(library, path, count):
@@ -23,13 +28,15 @@ def total(library, asked, sections):
 
 def test_blocks_travel_what_their_clip_does(library):
     for path, speed in (("run.bvh", 5.0), ("walk.bvh", 1.4), ("stand.bvh", 0.0)):
-        assert np.allclose(compute_block_distances(library, blocks_of(library, path, 9)), speed * FINEST_LENGTH / 30.0, atol=0.03)
+        assert np.allclose(compute_block_distances(library, blocks_of(library, path, 9)), speed * FINEST_LENGTH / 30.0,
+                           atol=0.03)
 
 
 def test_a_block_beyond_its_clip_travels_to_the_clip_s_end_only(library):
     clip = blocks_of(library, "run.bvh", 1).clip
     last = library.frames.first[clip] + library.frames.count[clip] - 1
-    assert compute_block_distances(library, BlockCandidates(clip, last - 3))[0] == pytest.approx(3 * 5.0 / 30.0, abs=0.03)
+    assert compute_block_distances(library, BlockCandidates(clip, last - 3))[0] == pytest.approx(3 * 5.0 / 30.0,
+            abs=0.03)
     assert compute_block_distances(library, BlockCandidates(clip, last + 30))[0] == 0.0
 
 

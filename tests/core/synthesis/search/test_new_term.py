@@ -19,7 +19,7 @@ from beyond_mocap.library.build import build
 from beyond_mocap.motion.track import Track
 from beyond_mocap.synthesis.plan import Plan
 from beyond_mocap.synthesis.resolve_plan import resolve_plan
-from beyond_mocap.synthesis.search.why import explain_choices
+from beyond_mocap.synthesis.search.explanation import explain_choices
 from beyond_mocap.synthesis.synthesize import synthesize
 import numpy as np, sys
 library = build(sys.argv[1])

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from beyond_mocap.synthesis.search.offer import PLAYBACK_RATES, SLOT
+from beyond_mocap.synthesis.search.candidate_index import PLAYBACK_RATES, SLOT
 from beyond_mocap.synthesis.search.path_costs import PathCosts, Weights
 
 NORMAL = int(np.flatnonzero(PLAYBACK_RATES == 1.0)[0])

@@ -5,12 +5,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from beyond_mocap.base.errors import UserCancelledError, InputError
+from beyond_mocap.base.errors import InputError, UserCancelledError
 from beyond_mocap.library.build import build_library
 from beyond_mocap.synthesis.plan import Plan
 from beyond_mocap.synthesis.resolve_plan import resolve_plan
-from beyond_mocap.synthesis.search.path_search import SearchStretch, PathSearch
-from beyond_mocap.synthesis.search.wanted import build_request
+from beyond_mocap.synthesis.search.path_search import PathSearch, SearchStretch
+from beyond_mocap.synthesis.search.request import build_request
 
 
 def found(library, asked):
@@ -97,7 +97,8 @@ def test_a_stretch_is_searched_between_frames_that_stay(library, order):
     outside = np.r_[0:60, 180:241]
     assert np.array_equal(edit.clip[outside], before.clip[outside])
     assert np.array_equal(edit.frame[outside], before.frame[outside])
-    assert [seam for seam in edit.transitions if not 60 <= seam <= 180] == [s for s in before.transitions if not 60 <= s <= 180]
+    assert [seam for seam in edit.transitions if not 60 <= seam <= 180] == [s for s in before.transitions if not 60 <= s
+                                                                            <= 180]
     key, = edit.keys
     near = int(round(after.keys[0].frame))
     assert edit.clip[near] == key.key.clip

@@ -5,8 +5,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from beyond_mocap.synthesis.search.request import compute_needed_frames, library_frame
 from beyond_mocap.synthesis.search.slots import KEY_PLAYBACK_RATES, build_key_pieces, build_slot_edges, find_slot
-from beyond_mocap.synthesis.search.wanted import compute_needed_frames, library_frame
 
 
 @settings(deadline=None, max_examples=30)

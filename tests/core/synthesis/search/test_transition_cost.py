@@ -3,14 +3,15 @@
 import numpy as np
 import pytest
 
-from beyond_mocap.synthesis.search.block_costs import compute_distances, measure_typical_distance, collect_windows
+from beyond_mocap.synthesis.search.block_costs import collect_windows, compute_distances, measure_typical_distance
 
 
 def test_distances_are_euclidean():
     random = np.random.default_rng(0)
     a, b = random.normal(size=(7, 5)), random.normal(size=(4, 5))
     assert np.allclose(compute_distances(a, b), np.linalg.norm(a[:, None] - b[None], axis=2))
-    assert np.allclose(np.diag(compute_distances(a, a)), 0.0, atol=1e-7) and not np.any(np.isnan(compute_distances(a, a)))
+    assert np.allclose(np.diag(compute_distances(a, a)), 0.0,
+                       atol=1e-7) and not np.any(np.isnan(compute_distances(a, a)))
 
 
 def test_a_window_lies_around_its_centre(library):
@@ -50,7 +51,8 @@ def test_the_typical_distance_is_that_of_frames_taken_at_random(library):
     features = library.frames.features.astype(float)
     random = np.random.default_rng(1)
     a, b = features[random.integers(0, len(features), (2, 20000))]
-    assert measure_typical_distance(library.frames) == pytest.approx(np.sqrt(np.mean(np.sum((a - b) ** 2, axis=1))), rel=0.03)
+    assert measure_typical_distance(library.frames) == pytest.approx(np.sqrt(np.mean(np.sum((a - b) ** 2, axis=1))),
+                                                                     rel=0.03)
 
 
 def test_a_library_that_never_moves_has_a_scale():

@@ -1,0 +1,159 @@
+"""Brings clips of many bodies to one skeleton: the one with most frames, or the one that the user names.
+
+Every rig is analysed once, from frames of all its clips, so that one actor's clips share one neutral posture.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ..base.errors import InputError
+from ..motion import contacts
+from ..motion.humanoid import identify_joints
+from ..motion.motion import Motion
+from ..motion.retargeting.retarget import Retargeter
+from ..motion.skeleton import Skeleton
+from . import repair
+
+BONE_TOLERANCE = 5e-3  # metres between offsets of equal bones
+_SAMPLE_COUNT = 400  # frames from which a rig is analysed
+
+
+def unify_skeletons(
+    paths: Sequence[Path], motions: Sequence[Motion], skeleton_example: Motion | None, notes: list[str]
+) -> Iterator[tuple[Motion, np.ndarray, bool]]:
+    """Bring clips to the library's skeleton.
+
+    Heels and toes are in contact where the recording's own are; where only the new body has toes, contacts are detected
+    on
+    it.
+
+    Args:
+        paths: the files.
+        motions: as read, in the order of `paths`.
+        skeleton_example: a recording with the library's skeleton (default: the skeleton with most frames, the first
+            path's among equals).
+        notes: gets one line about retargeted clips.
+    Returns:
+        For each clip the motion, its contacts (T, 2, 2) bool of heels and toes, and whether it came from another body.
+    Raises:
+        InputError: naming the file, for a clip whose legs cannot be found.
+    """
+    contact_mask = [_run_for_file(path, lambda: contacts.detect_heel_toe_contacts(motion)) for path,
+                    motion in zip(paths, motions)]
+    groups = _group_by_skeleton(motions)
+    skeleton = skeleton_example.skeleton if skeleton_example is not None else _find_commonest_skeleton(motions, groups)
+    own_clips = [i for i, motion in enumerate(motions) if motion.skeleton.has_same_bones(skeleton, BONE_TOLERANCE)]
+    example, example_contacts = _sample_frames([motions[i] for i in own_clips],
+                                               [contact_mask[i]
+                                                for i in own_clips]) if own_clips else (skeleton_example, None)
+    rigs = {}
+    for group in groups:
+        if group[0] not in own_clips:
+            sample, sample_contacts = _sample_frames([motions[i] for i in group], [contact_mask[i] for i in group])
+            known: dict[str, Any] = {"example": example, "standing": sample_contacts,
+                                     "example_standing": example_contacts}
+            rig = _run_for_file(paths[group[0]], lambda: Retargeter(sample, skeleton, **known))
+            rigs.update(dict.fromkeys(group, rig))
+    if rigs:
+        others = sum(group[0] in rigs for group in groups)
+        notes.append(f"{len(rigs)} clips of {others} other skeletons retargeted to the one with {len(skeleton)} joints")
+    return _iter_unified(motions, contact_mask, skeleton, rigs)
+
+
+def retarget_clip(motion: Motion, target: Motion, bone_map: dict[str, str] | str | Path | None = None) -> Motion:
+    """Retarget one motion to the skeleton of `target`, with its feet planted; same rate and floor.
+
+    On its own skeleton a motion is unchanged.
+
+    Args:
+        motion: the motion.
+        target: a recording or pose of the target skeleton.
+        bone_map: see `motion.retargeting.retarget`.
+    Returns:
+        The retargeted motion.
+    Raises:
+        InputError: as `Retargeter`.
+    """
+    contacts, target_contacts = _detect_contacts_if_known(motion), _detect_contacts_if_known(target)
+    rig = Retargeter(
+        motion, target.skeleton, bone_map, example=target,
+        standing=None if contacts is None else contacts.all(axis=2),
+        example_standing=None if target_contacts is None else target_contacts.all(axis=2),
+    )
+    retargeted = rig.retarget(motion)
+    if contacts is None or target_contacts is None or motion.skeleton.has_same_bones(target.skeleton, 1e-6):
+        return retargeted
+    return repair.plant_contacts(retargeted, _choose_contacts(retargeted, motion.skeleton, contacts))
+
+
+def _detect_contacts_if_known(motion: Motion) -> np.ndarray | None:
+    """Detect contacts (T, 2, 2); None for a skeleton whose joints only a bone map identifies."""
+    try:
+        return contacts.detect_heel_toe_contacts(motion)
+    except InputError:
+        return None
+
+
+def _iter_unified(motions, contacts, skeleton: Skeleton, rigs) -> Iterator[tuple[Motion, np.ndarray, bool]]:
+    """Iterate over the clips on the library's skeleton, with contacts and whether they were retargeted."""
+    for number, (motion, points) in enumerate(zip(motions, contacts)):
+        if number in rigs:
+            retargeted = rigs[number].carry(motion)
+            yield retargeted, _choose_contacts(retargeted, motion.skeleton, points), True
+        else:
+            yield replace(motion, skeleton=skeleton), points, False
+
+
+def _choose_contacts(retargeted: Motion, skeleton: Skeleton, points: np.ndarray) -> np.ndarray:
+    """Choose the contacts (T, 2, 2): the recording's own `points`, or new ones where only the new body has toes."""
+    return contacts.detect_heel_toe_contacts(retargeted) if _has_toes(retargeted.skeleton) and not _has_toes(
+        skeleton) else points
+
+
+def _run_for_file(path: Path, work):
+    """Run `work`; an error about its skeleton gets the file's name."""
+    try:
+        return work()
+    except InputError as error:
+        raise InputError(path, str(error)) from None
+
+
+def _has_toes(skeleton: Skeleton) -> bool:
+    body = identify_joints(skeleton)
+    return body.left.toe is not None and body.right.toe is not None
+
+
+def _group_by_skeleton(motions: Sequence[Motion]) -> list[list[int]]:
+    """Group clips by skeleton, in the order of their first."""
+    groups: dict[str, list[int]] = {}
+    for number, motion in enumerate(motions):
+        groups.setdefault(motion.skeleton.fingerprint, []).append(number)
+    return list(groups.values())
+
+
+def _find_commonest_skeleton(motions: Sequence[Motion], groups: list[list[int]]) -> Skeleton:
+    """Find the skeleton with most frames."""
+    best = max(groups, key=lambda group: (sum(len(motions[i]) for i in group), -group[0]))
+    return motions[best[0]].skeleton
+
+
+def _sample_frames(motions: Sequence[Motion], contact_mask: Sequence[np.ndarray]) -> tuple[Motion, np.ndarray]:
+    """Sample frames of all clips of one rig above one floor, and which feet (T, 2) are flat on the ground in them.
+    """
+    ends = np.cumsum([len(motion) for motion in motions])
+    frames = np.unique(np.linspace(0, ends[-1] - 1, _SAMPLE_COUNT).astype(int))
+    roots, rotations, foot_contacts = [], [], []
+    for motion, points, end in zip(motions, contact_mask, ends):
+        here = frames[(frames >= end - len(motion)) & (frames < end)] - (end - len(motion))
+        if len(here):
+            roots.append(motion.root_positions[here] - [0.0, 0.0, contacts.measure_ground_height(motion)])
+            rotations.append(motion.rotations[here])
+            foot_contacts.append(points.all(axis=2)[here])
+    sample = Motion(motions[0].skeleton, np.concatenate(roots), np.concatenate(rotations), motions[0].fps)
+    return sample, np.concatenate(foot_contacts)

@@ -1,0 +1,340 @@
+"""Synthetic clips that complete the recordings: speeds between and above them, kicks and received balls on the run.
+
+Tracked players move at any speed up to 9 m/s; recordings leave gaps (../shared/data/README.md). A clip played at 0.875
+to 1.125 of its rate covers some speeds around its own; a speed that too few seconds reach that way is in a gap.
+
+Between two recordings a gap is filled by blending both in phase (`motion.phase_blend`, Faustino §6.2). This holds
+between a walk and a run, too: judged by eye and figures, such a mixture at 1.7 to 2.3 m/s is a brisk walk with a
+spring, then a shuffling jog, with flight coming in gradually (7 % at 1.7 m/s, 32 % at 2.3 m/s), in the actors' own
+style, and closer to their poses than a synthetic walk or jog.
+
+Above the recordings `synthetic.gait` generates running at any speed from published figures, with the skeleton's own
+upright stance and the recorded runners' elbows and lean: long runs that slowly gain and lose speed, so that few cuts
+are needed, quick ones, and weaving ones. The fastest recording played faster with stretched strides would keep the
+figures and lose the look: knees pop, the body floats.
+
+Recorded kicks are seldom faster than a jog, and players who receive a ball with the foot in a recording hardly move;
+moved along at 8 m/s their supporting foot slides by metres. `synthetic.gestures` generates both on the run at the
+missing speeds; they substitute for recorded ones wherever they carry the labels by which those answer.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from ..annotation import DISCRETE, LOCOMOTION, ClipAnnotation, compute_gait_thresholds
+from ..base.time_series import find_equal_runs, find_runs
+from ..base.vectors import arctan2, cross_product
+from ..motion import contacts, quaternion
+from ..motion.foot_plant import plant_feet
+from ..motion.humanoid import compute_heading_from_positions, identify_joints
+from ..motion.motion import Motion, forward_kinematics, sample_frames
+from ..motion.phase_blend import Strides, blend_strides, find_strides
+from ..synthetic import gestures
+from ..synthetic.gait import build_gait
+from ..synthetic.gait_plan import GaitStyle
+from .features import Frames
+from .scan import CACHE_FOLDER
+
+SYNTHETIC_FOLDER = f"{CACHE_FOLDER}/made-gait/"
+# how the file names of blends, of kicks and of received balls begin, in that folder
+BLEND_PREFIX, KICK_PREFIX, RECEIVE_PREFIX = "blend_", "kick_", "receive_"
+KICK_LABELS, RECEIVE_LABELS = frozenset({"kick"}), frozenset({"receive", "foot"})
+FPS = 60.0  # of synthetic clips
+MAX_SPEED = 9.4  # m/s
+# m/s: lowest speed of synthetic running (blends cover slower speeds), and of receiving a ball on the run
+_MIN_RUN_SPEED, MIN_RECEIVE_SPEED = 2.4, 1.7
+# range of playback rates of a clip
+_WARP = (0.875, 1.125)
+_MIN_SECONDS = 1.5  # seconds of recording at a speed from which on it is no gap
+_GRID = 1.03  # ratio of neighbouring speeds
+# ratios of neighbouring speeds of blends and of touches
+_BLEND_STEP, _TOUCH_STEP = 1.06, 1.4
+_PAIRS = 3  # pairs of recordings blended into each gap, at most
+_MAX_SPEED_SPREAD = 0.15  # standard deviation of a steady stretch's speed, share of its mean
+_GAITS = LOCOMOTION[1:]
+# m/s of gaits without a recording
+_DEFAULT_SPEEDS = {"running": 4.6, "sprinting": 7.3}
+# radians by which a runner's elbow and lean differ from the default, at most
+_MAX_STYLE = np.array([0.35, 0.10])
+# m/s below which a point of a foot is still
+_STILL_SPEED = 0.18
+
+
+@dataclass(frozen=True, eq=False)
+class SyntheticClip:
+    """A synthetic clip.
+
+    Attributes:
+        name: its path below the library's folder.
+        motion: T frames.
+        rows: its annotations.
+        heel_toe_contacts: (T, 2, 2) bool, left and right, heel and toe in contact.
+    """
+
+    name: str
+    motion: Motion
+    rows: tuple[ClipAnnotation, ...]
+    heel_toe_contacts: np.ndarray
+
+
+def find_speed_gaps(speed: np.ndarray, fps: float) -> tuple[tuple[float, float], ...]:
+    """Find the ranges of speed that too few seconds of recorded locomotion reach within the time warp.
+
+    Args:
+        speed: (N,) m/s of frames of locomotion.
+        fps: of those frames.
+    Returns:
+        (from, to) m/s of all gaps, from the slowest recording's speed to a sprint.
+    """
+    grid = np.exp(np.arange(np.log(0.6), np.log(MAX_SPEED), np.log(_GRID)))
+    ordered = np.sort(speed)
+    reached = np.searchsorted(ordered, grid / _WARP[0]) - np.searchsorted(ordered, grid / _WARP[1])
+    lacking = reached < _MIN_SECONDS * fps
+    if lacking.all():
+        return ()
+    lacking[: int(np.argmin(lacking))] = False
+    ends = np.append(grid, MAX_SPEED)
+    return tuple((float(grid[a]), float(ends[b])) for a, b in find_runs(lacking))
+
+
+def select_locomotion(frames: Frames, clips: Sequence) -> np.ndarray:
+    """Select the frames (N,) bool of recordings, twins left out, that show locomotion and no action."""
+    named = {word: frames.words[:, column] for column, word in enumerate(frames.vocabulary)}
+    none = np.zeros(len(frames), bool)
+    moves = np.any([named.get(word, none) for word in _GAITS], axis=0)
+    acts = np.any([none, *(named[word] for word in DISCRETE if word in named)], axis=0)
+    own = np.array([not clip.mirrored and not clip.is_synthetic for clip in clips])
+    return moves & ~acts & own[frames.clip]
+
+
+def measure_touch_speed(frames: Frames, clips: Sequence, keys: Sequence, act: frozenset[str]) -> float:
+    """Measure the fastest approach of a touch.
+
+    Args:
+        frames: of the library.
+        clips: of the library.
+        keys: its key moments.
+        act: labels that the touch carries.
+    Returns:
+        m/s; infinite without any touch.
+    """
+    speed = frames.speed  # computed over all frames at every access
+    found = [
+        speed[frames.first[key.clip] + int(key.frame / clips[key.clip].motion.fps * 30.0 + 0.5)]
+        for key in keys if act <= key.words and not clips[key.clip].made
+    ]
+    return float(max(found)) if found else np.inf
+
+
+def iter_synthetic_clips(
+    clips: Sequence, frames: Frames, fps: float, gait_speeds: dict[str, float], keys: Sequence
+) -> Iterator[SyntheticClip]:
+    """Iterate over all synthetic clips of a library.
+
+    Args:
+        clips: its recordings.
+        frames: their description.
+        fps: of the frames.
+        gait_speeds: m/s of the recorded gaits.
+        keys: the recordings' key moments.
+    Yields:
+        Clips whose names begin with SYNTHETIC_FOLDER: they are stored beside the cache.
+    """
+    speeds = {**{word: v for word, v in _DEFAULT_SPEEDS.items() if v > max(gait_speeds.values())}, **gait_speeds}
+    example = sample_upright_example(clips)
+    style = estimate_runner_style(clips, frames, example)
+    for low, high in find_speed_gaps(frames.speed[select_locomotion(frames, clips)], fps):
+        yield from _iter_blends(clips, frames, fps, low=low, high=high, speeds=speeds)
+        yield from _iter_runs(max(0.93 * low, _MIN_RUN_SPEED), min(1.05 * high, MAX_SPEED), example, style, speeds)
+    kinds = sorted({"inside" if "inside" in key.words else "top" for key in keys if KICK_LABELS <= key.words})
+    fastest = measure_touch_speed(frames, clips, keys, KICK_LABELS)
+    yield from _iter_touches(KICK_PREFIX, _TOUCH_STEP * fastest, ("kick", "low"), kinds=kinds, example=example,
+                             speeds=speeds)
+    fastest = max(_TOUCH_STEP * measure_touch_speed(frames, clips, keys, RECEIVE_LABELS), MIN_RECEIVE_SPEED)
+    yield from _iter_touches(RECEIVE_PREFIX, fastest, ("receive", "foot", "low"), kinds=["inside"], example=example,
+                             speeds=speeds)
+
+
+def sample_upright_example(clips: Sequence) -> Motion:
+    """Sample all recordings, one frame a second, as an example of how this skeleton stands.
+
+    `motion.retargeting.neutral` uses the most upright of them. A single recording of a run leans, and synthetic running
+    would lean twice.
+    """
+    parts = [
+        sample_frames(clip.motion, np.arange(0.0, len(clip.motion), clip.motion.fps)) for clip in clips
+        if not clip.mirrored
+    ]
+    root, rotations = (np.concatenate(column) for column in zip(*parts))
+    return Motion(clips[0].motion.skeleton, root, rotations, 1.0)
+
+
+def estimate_runner_style(clips: Sequence, frames: Frames, example: Motion) -> GaitStyle:
+    """Estimate how far the recorded runners bend their elbows and lean, compared with a synthetic one at their mean
+    speed.
+
+    Returns:
+        The style; the default one where no clip runs.
+    """
+    rows = np.flatnonzero(select_locomotion(frames, clips) & (frames.speed > _MIN_RUN_SPEED))
+    if len(rows) < _MIN_SECONDS * 30.0:
+        return GaitStyle()
+    rows = rows[np.linspace(0, len(rows) - 1, 60).astype(int)]
+    samples = [sample_frames(clips[frames.clip[row]].motion, frames.source[row : row + 1]) for row in rows]
+    root, rotations = (np.concatenate(column) for column in zip(*samples))
+    recorded = Motion(example.skeleton, root, rotations, 30.0)
+    synthetic = build_gait(min(float(frames.speed[rows].mean()), MAX_SPEED), 1.5, 30.0, example.skeleton,
+                           example=example)
+    elbow, lean = np.clip(_measure_elbow_and_lean(recorded) - _measure_elbow_and_lean(synthetic), -_MAX_STYLE,
+                          _MAX_STYLE)
+    return GaitStyle(elbow=float(elbow), lean=float(lean))
+
+
+def _measure_elbow_and_lean(motion: Motion) -> np.ndarray:
+    """Measure (2,) radians, means over all frames: flexion of both elbows, and the trunk's forward lean."""
+    body = identify_joints(motion.skeleton)
+    places, _ = forward_kinematics(motion)
+    bends = [
+        _measure_angles(places[:, arm.lower_arm] - places[:, arm.upper_arm], places[:, arm.hand]
+                        - places[:, arm.lower_arm]) for arm in (body.left, body.right)
+        if None not in (arm.upper_arm, arm.lower_arm, arm.hand)
+    ]
+    facing = compute_heading_from_positions(motion.skeleton, places)
+    trunk = places[:, body.neck_or_chest] - places[:, body.hips]
+    lean = arctan2(quaternion.rotate_level(trunk[:, :2], -facing)[:, 0], trunk[:, 2])
+    return np.array([np.mean(bends) if bends else 0.0, np.mean(lean)])
+
+
+def _measure_angles(a: np.ndarray, b: np.ndarray) -> np.ndarray:
+    """Measure the angles (T,) in radians between vectors (T, 3)."""
+    return arctan2(np.linalg.norm(cross_product(a, b), axis=1), np.sum(a * b, axis=1))
+
+
+def _iter_blends(clips, frames: Frames, fps: float, low: float, high: float,
+                 speeds: dict[str, float]) -> Iterator[SyntheticClip]:
+    """Iterate over blends of the nearest steady recordings below and above a gap; none where one side is missing."""
+    slow, fast = _find_neighbours(clips, frames, fps, low, high)
+    if not slow or not fast:
+        return
+    top = min(high, max(one.speed for one in fast))
+    count = max(1, int(np.ceil(np.log(top / low) / np.log(_BLEND_STEP))))
+    for number, speed in enumerate(low * (top / low) ** ((np.arange(count) + 0.5) / count)):
+        motion, contacts = blend_strides(slow[number % len(slow)], fast[number % len(fast)], float(speed), FPS)
+        rows = _build_gait_rows(np.full(len(motion), speed), speeds)
+        yield _ground_clip(f"{SYNTHETIC_FOLDER}{BLEND_PREFIX}{speed:.2f}.bvh", motion, contacts, rows, plants_feet=True)
+
+
+def _find_neighbours(clips, frames: Frames, fps: float, low: float, high: float) -> tuple[list[Strides], list[Strides]]:
+    """Find steady straight stretches of forward locomotion below and above a gap, nearest in speed first."""
+    slow: list[tuple[float, int, ClipAnnotation]] = []
+    fast: list[tuple[float, int, ClipAnnotation]] = []
+    for index, clip in enumerate(clips):
+        for row in () if clip.mirrored or clip.is_synthetic else clip.annotations:
+            if row.key is not None or not set(row.words) & set(_GAITS) or _has_action(clip, row):
+                continue
+            rate = fps / clip.motion.fps
+            last = min(int(row.end * rate) + 1, frames.count[index])
+            part = frames.first[index] + np.arange(int(np.ceil(row.start * rate)), last)
+            if len(part) < 0.9 * fps or not _is_straight(frames, part, fps):
+                continue
+            mean = float(frames.speed[part].mean())
+            if 0.6 * low < mean < 1.1 * low:
+                slow.append((abs(mean - low), index, row))
+            elif mean > 1.15 * low and mean < 1.45 * high:
+                fast.append((abs(mean - high), index, row))
+    return _find_stretches(clips, slow), _find_stretches(clips, fast)
+
+
+def _is_straight(frames: Frames, part: np.ndarray, fps: float) -> bool:
+    """Whether frames `part` (K,) have one speed, move forward, and hardly turn."""
+    speed, off = frames.speed[part], arctan2(frames.velocity[part, 1], frames.velocity[part, 0])
+    steady = speed.std() < _MAX_SPEED_SPREAD * speed.mean() and np.mean(np.abs(off)) < 0.35
+    return steady and np.ptp(frames.heading[part]) < 0.5 + 0.3 * len(part) / fps
+
+
+def _has_action(clip, row: ClipAnnotation) -> bool:
+    """Whether a key moment's row overlaps the row."""
+    return any(other.key is not None and other.start < row.end and other.end > row.start for other in clip.annotations)
+
+
+def _find_stretches(clips, found) -> list[Strides]:
+    """Find the strides of the best stretches."""
+    out = []
+    for _, index, row in sorted(found, key=lambda one: one[:2])[: 2 * _PAIRS]:
+        clip, span = clips[index], slice(int(row.start), int(row.end) + 1)
+        steps = find_strides(clip.motion.frames(span.start, span.stop), clip.heel_toe_contacts[span])
+        if steps is not None:
+            out.append(steps)
+    return out[:_PAIRS]
+
+
+def _iter_runs(low: float, high: float, example: Motion, style: GaitStyle,
+               speeds: dict[str, float]) -> Iterator[SyntheticClip]:
+    """Iterate over runs from `low` to `high` m/s and back: slow changes, as quick as players change, and weaving."""
+    if high < 1.1 * low:
+        return
+    for name, pace, weaves in (("slow", 0.8, False), ("quick", 2.5, False), ("weave", 1.0, True)):
+        ramp = np.linspace(low, high, max(int((high - low) / pace * FPS), int(1.5 * FPS)))
+        speed = np.concatenate([ramp, ramp[::-1]])
+        # as much sideways acceleration as players show at speed, about 4 m/s^2, alternating left and right
+        turn = np.sin(2.0 * np.pi * np.arange(len(speed)) / (3.0 * FPS)) * np.minimum(1.2, 4.0 / speed) * weaves
+        motion = build_gait(speed, None, FPS, example.skeleton, turn_rate=turn, style=style, example=example)
+        yield _ground_clip(f"{SYNTHETIC_FOLDER}{name}_{low:.1f}.bvh", motion, None, _build_gait_rows(speed, speeds))
+
+
+def _iter_touches(
+    name: str, speed: float, act: tuple[str, ...], kinds: Sequence[str], example: Motion, speeds: dict[str, float]
+) -> Iterator[SyntheticClip]:
+    """Iterate over touches with the right foot on the run, from `speed` m/s to a sprint, of each kind; `act`: their
+    labels.
+    """
+    while speed < MAX_SPEED:
+        for kind in kinds:
+            strike = gestures.build_strike(f"{' '.join(act)} {kind}", example.skeleton, FPS, example=example,
+                                           at_speed=speed)
+            words = (act[0], "right", *act[1:], kind, "running", "front")
+            row = ClipAnnotation(np.ceil(strike.start * FPS), np.floor(strike.end * FPS), strike.key * FPS, words)
+            gait_row = _build_gait_rows(np.full(len(strike.motion), speed), speeds)
+            yield _ground_clip(f"{SYNTHETIC_FOLDER}{name}{kind}_{speed:.1f}.bvh", strike.motion, None, (row, *gait_row))
+        speed *= _TOUCH_STEP
+
+
+def _build_gait_rows(speed: np.ndarray, speeds: dict[str, float]) -> tuple[ClipAnnotation, ...]:
+    """Build rows with the gait of every frame by its speed (T,), with the thresholds by which tracks are annotated."""
+    words = sorted((word for word in speeds if word in _GAITS), key=speeds.get)
+    band = np.searchsorted(compute_gait_thresholds(np.array([speeds[word] for word in words])), speed, side="right")
+    return tuple(ClipAnnotation(a, b - 1, None, (words[band[a]], "front")) for a, b in find_equal_runs(band))
+
+
+def _ground_clip(name: str, motion: Motion, heel_toe_contacts: np.ndarray | None, rows,
+                 plants_feet: bool = False) -> SyntheticClip:
+    """Put a clip's soles on the ground, height 0, as in recordings.
+
+    Args:
+        name: of the clip.
+        motion: T frames.
+        heel_toe_contacts: (T, 2, 2) bool contacts; None detects them.
+        rows: its annotations.
+        plants_feet: plant the feet.
+    Returns:
+        The clip; points that still move are not in contact.
+    """
+    heel_toe_contacts = contacts.detect_heel_toe_contacts(motion) if heel_toe_contacts is None else heel_toe_contacts
+    motion = replace(motion, root_positions=motion.root_positions - [0.0, 0.0, contacts.measure_ground_height(motion)])
+    if plants_feet:
+        planted = plant_feet(motion.skeleton, motion.root_positions, motion.rotations, heel_toe_contacts, motion.fps)
+        motion = replace(motion, root_positions=planted.root, rotations=planted.rotations)
+    return SyntheticClip(name, motion, rows, heel_toe_contacts & _detect_still_points(motion))
+
+
+def _detect_still_points(motion: Motion) -> np.ndarray:
+    """Detect which of left and right, heel and toe move over the ground by less than a stance's creep: (T, 2, 2) bool.
+    """
+    body = identify_joints(motion.skeleton)
+    places, _ = forward_kinematics(motion)
+    points = np.stack([places[:, [limb.foot, limb.toe_or_foot], :2] for limb in (body.left, body.right)], axis=1)
+    return np.linalg.norm(np.gradient(points, axis=0), axis=-1) * motion.fps < _STILL_SPEED

@@ -1,0 +1,355 @@
+"""Label what each player does with the ball and when, from solved touches and from a provider's events.
+
+    labels = label_match(match, solve_ball(match), read_events("events.xml", match=match))
+    timeline = build_timeline(labels.players["home_7"], 0.0, 60.0)
+
+A player's labels are stored as a text file that people may edit: the contract's form, with the source of each line
+after it.
+
+    # labels of home_7: edit freely. An edited file is kept and used, any other is regenerated [5d0c3f2a]
+    12.31 kick running low  # touches 0.93
+    20.5 23.2 dribble  # touches 0.97
+"""
+
+from __future__ import annotations
+
+import os
+import re
+from collections import Counter
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+
+from ..annotation import KeyMoment, Span, Timeline, check_timeline, format_timeline, parse_timeline, read_text
+from ..annotation.ball_contact import takes_with_foot
+from ..annotation.event_labels import EventLabelTable, read_event_labels
+from ..ball.tracked import kinds
+from ..ball.tracked.solve import SolvedBall, SolvedTouch
+from ..base.digest import hex_digest
+from ..files.atomic import atomic_write
+from ..files.event_data import CERTAIN_TOUCHES, MatchEvent, MatchEvents
+from ..motion.track.match_data import Match
+from .event_clock import AlignedEvents, align_events
+
+MIN_CONFIDENCE = 0.3
+"""Touches with less confidence give no key moment."""
+
+MIN_DISTANCE_SECONDS = 0.5
+"""s: of two touches of a player that are closer, one becomes a key moment."""
+
+TOUCHES, EVENTS, BOTH, USER = "touches", "events", "touches and events", "user"
+"""Sources of a moment."""
+
+_RUNNING_SPEED = 2.0  # m/s, from which the player is running at a touch
+_HIGH_FOOT, _HIGH_HAND, _LOW_HAND = 0.45, 1.5, 0.7  # m of the ball's centre
+_JUMP_HEIGHT = 2.05  # m of the ball's centre, too high for a header without a jump
+_CAUGHT_SPEED = 3.0  # m/s of the ball after a save: a slower ball was caught
+_CHAIN_SECONDS = 3.0  # s between touches of one dribble
+_MIN_DRIBBLE = 0.8  # s of a dribble
+_DOUBT_WITH_EVENT = 0.2  # share of a touch's doubt that remains if an event confirms it
+_EVENT_CONFIDENCE = 0.4  # confidence of an event without a touch
+_SAME_MOMENT_SECONDS = 0.5  # s around an event without a touch in which another moment of the player stands for it
+_TOUCH_EVENTS = {kind.name: (kind.event, kind.details) for kind in kinds.TOUCH_KINDS}
+_DRIBBLE = next(kind for kind in kinds.TOUCH_KINDS if kind.name == kinds.DRIBBLE)
+_HEADER = re.compile(r"#.*\[([0-9a-f]{8})\]\s*")
+
+
+@dataclass(frozen=True, kw_only=True)
+class Moment:
+    """What a player does.
+
+    Attributes:
+        time: s on the match's clock.
+        labels: the labels.
+        source: TOUCHES, EVENTS, BOTH or USER.
+        confidence: 0 to 1.
+        end: s, the end of a stretch that starts at `time`; None for a key moment.
+    """
+
+    time: float
+    labels: tuple[str, ...]
+    source: str
+    confidence: float
+    end: float | None = None
+
+
+@dataclass(frozen=True)
+class MatchLabels:
+    """The labels of a match.
+
+    Attributes:
+        players: moments in order of time by id, for all players; () for a player who never touches the ball.
+        notes: messages for people.
+        figures: of the events' clock and how the events fit, {} without events.
+    """
+
+    players: Mapping[str, tuple[Moment, ...]]
+    notes: tuple[str, ...] = ()
+    figures: Mapping[str, object] = field(default_factory=dict)
+
+
+def build_timeline(moments: Iterable[Moment], start: float = -np.inf, end: float = np.inf) -> Timeline:
+    """Build a timeline from moments, cut to a span.
+
+    Args:
+        moments: the moments.
+        start: s.
+        end: s.
+    Returns:
+        The timeline.
+    """
+    spans, keys = [], []
+    for moment in moments:
+        if moment.end is None:
+            keys += [KeyMoment(moment.time, moment.labels)] * (start <= moment.time <= end)
+        elif min(moment.end, end) > max(moment.time, start):
+            spans.append(Span(max(moment.time, start), min(moment.end, end), moment.labels))
+    return Timeline(tuple(spans), tuple(keys))
+
+
+def label_match(
+    match: Match, solved: SolvedBall | None, events: MatchEvents | None = None, table: EventLabelTable | None = None
+) -> MatchLabels:
+    """Label all players of a match.
+
+    A touch becomes a key moment with the labels that the table has for it, or for the event paired with it; its time is
+    the touch's. Consecutive touches of one player are a stretch of dribble. A pass, shot or save without a touch
+    becomes a key moment at its time on the corrected clock. Of two within MIN_DISTANCE_SECONDS the more certain one
+    stays. Unknown details (the foot, a height without heights in the feed) are left out of the labels.
+
+    Args:
+        match: the match.
+        solved: the ball, on the match's clock; None if it cannot be solved.
+        events: the provider's events; None: no events.
+        table: labels by event; None: the built-in table.
+    Returns:
+        The labels.
+    Raises:
+        InputError: if events fit no better than by chance.
+    """
+    table = table or read_event_labels()
+    touches = solved.touches if solved else ()
+    span = (float(solved.times[0]), float(solved.times[-1])) if solved else None
+    aligned = align_events(events, touches, match.halves, span) if events and solved else None
+    event_by_touch = {touch: event for event, touch in enumerate(aligned.touches) if touch >= 0} if aligned else {}
+    heights, left_out, players = has_heights(match), Counter(), {}
+    for player, path in zip(match.players, match.positions):
+        player_touches = [(i, touch) for i, touch in enumerate(touches) if touch.player == player.id]
+        found = [moment for i, touch in player_touches if (moment := build_touch_moment(
+            touch, match.times, path, heights, table, event=aligned.events[event_by_touch[i]] if i in event_by_touch
+            else None,
+        ))]  # fmt: skip
+        confident = [moment for moment in found if moment.confidence >= MIN_CONFIDENCE]
+        if aligned:
+            confident += _label_untouched_events(player.id, aligned, span, times=match.times, path=path, table=table,
+                                                 others=found)
+        selected = select_separate_moments(confident)
+        left_out["doubtful"] += sum(moment.confidence < MIN_CONFIDENCE for moment in found)
+        left_out["close"] += len(confident) - len(selected)
+        players[player.id] = sort_moments([*selected, *find_dribbles([touch for _, touch in player_touches])])
+    notes = (*(events.notes if events else ()), *(aligned.notes if aligned else ()),
+             *_describe_left_out(touches, left_out))
+    return MatchLabels(players, notes, _measure_event_fit(aligned, touches, span) if aligned else {})
+
+
+def write_labels(path: str | os.PathLike, player: str, moments: Iterable[Moment]) -> None:
+    """Write one player's moments.
+
+    Args:
+        path: the text file.
+        player: id.
+        moments: in any order.
+    Raises:
+        InputError: if the file cannot be written.
+    """
+    lines = [f"{_format_moment(moment)}  # {moment.source} {moment.confidence:.2f}\n"
+             for moment in sort_moments(moments)]
+    text = "edit freely. An edited file is kept and used, any other is regenerated"
+    atomic_write(path, f"# labels of {' '.join(player.split())}: {text} [{_compute_digest(lines)}]\n{''.join(lines)}")
+
+
+def is_edited(path: str | os.PathLike) -> bool:
+    """Say whether the file exists and a person wrote it or has changed it since it was written."""
+    if not Path(path).is_file():
+        return False
+    lines = read_text(path).splitlines(keepends=True)
+    head = _HEADER.fullmatch(lines[0]) if lines else None
+    return head is None or head[1] != _compute_digest(lines[1:])
+
+
+def read_labels(
+    path: str | os.PathLike, automatic: Sequence[Moment] = (), known_labels: Iterable[str] = ()
+) -> tuple[Moment, ...]:
+    """Read the moments in a file.
+
+    Args:
+        path: the text file.
+        automatic: moments; a line equal to one of them is that moment, the others are the user's.
+        known_labels: labels beyond the vocabulary.
+    Returns:
+        The moments in order.
+    Raises:
+        InputError: with the line, if it is not a timeline or has unknown labels.
+    """
+    timeline = parse_timeline(read_text(path), str(path))
+    check_timeline(timeline, known_labels, where=str(path))
+    known = {_format_moment(moment): moment for moment in automatic}
+    found = [Moment(time=key.time, labels=key.words, source=USER, confidence=1.0) for key in timeline.keys]
+    found += [Moment(time=span.start, labels=span.words, source=USER, confidence=1.0, end=span.end)
+              for span in timeline.spans]  # fmt: skip
+    return sort_moments(known.get(_format_moment(moment), moment) for moment in found)
+
+
+def _label_untouched_events(player: str, aligned: AlignedEvents, span, times, path, table, others) -> list[Moment]:
+    """Label one player's certain events without a touch, unless another of their moments stands for the event."""
+    out = []
+    for index, event in enumerate(aligned.events):
+        time = float(aligned.times[index])
+        if event.player != player or event.kind not in CERTAIN_TOUCHES or aligned.touches[index] >= 0:
+            continue
+        if not span[0] <= time <= span[1] or any(abs(one.time - time) < _SAME_MOMENT_SECONDS for one in others):
+            continue
+        values = {**find_gait_label(time, times, path), "side": event.side}
+        labels = table.find_labels(event.kind, event.part or "foot", event.details, values)
+        out += [Moment(time=round(time, 3), labels=labels, source=EVENTS, confidence=_EVENT_CONFIDENCE)] * bool(labels)
+    return out
+
+
+def _measure_event_fit(aligned: AlignedEvents, touches, span) -> dict[str, object]:
+    """Measure how the events fit: counts, and each period's clock."""
+    inside = [i for i, time in enumerate(aligned.times) if span[0] <= time <= span[1]
+              and aligned.events[i].may_be_touch]
+    certain = [i for i in inside if aligned.events[i].kind in CERTAIN_TOUCHES]
+    off = [touches[aligned.touches[i]].time - aligned.times[i] for i in inside if aligned.touches[i] >= 0]
+    return {
+        "events": len(inside), "with_touch": len(off), "certain": len(certain),
+        "certain_with_touch": sum(aligned.touches[i] >= 0 for i in certain),
+        "residual_s": {"median": float(np.median(off)), "sd": float(np.std(off))} if off else None,
+        "clocks": {str(number): vars(clock) for number, clock in aligned.clocks.items()},
+    }  # fmt: skip
+
+
+def has_heights(match: Match) -> bool:
+    """Say whether the feed has heights of the ball."""
+    seen = np.isfinite(match.ball[:, :2]).all(axis=1)
+    return bool(seen.any() and np.isfinite(match.ball[seen, 2]).mean() > 0.8)
+
+
+def build_touch_moment(
+    touch: SolvedTouch, times: np.ndarray, path: np.ndarray, heights: bool, table: EventLabelTable,
+    event: MatchEvent | None = None,
+) -> Moment | None:  # fmt: skip
+    """Build the key moment of a touch.
+
+    Args:
+        touch: the solved touch.
+        times: (N,) s of the player's path.
+        path: (N, 2) m of the player.
+        heights: whether the touch's height is known.
+        table: labels by event.
+        event: the event paired with the touch; its labels take precedence.
+    Returns:
+        The key moment, None if the table has no labels for it.
+    """
+    kind, details = _TOUCH_EVENTS[touch.kind]
+    if touch.kind == kinds.SAVE and np.linalg.norm(touch.after) > _CAUGHT_SPEED:
+        details = (*details, "parried")
+    values = {**find_gait_label(touch.time, times, path), **find_height_labels(touch.part, touch.position[2], heights)}
+    if event is None:
+        labels = table.find_labels(kind, touch.part, details, values)
+        return _build_moment(touch, labels, TOUCHES, touch.confidence)
+    part, values = event.part or touch.part, {**values, "side": event.side}
+    if part != touch.part:
+        values.update(find_height_labels(part, touch.position[2], heights))
+    labels = table.find_labels(event.kind, part, event.details, values) or table.find_labels(kind, part, details,
+            values)
+    return _build_moment(touch, labels, BOTH, 1.0 - _DOUBT_WITH_EVENT * (1.0 - touch.confidence))
+
+
+def _build_moment(touch: SolvedTouch, labels: tuple[str, ...], source: str, confidence: float) -> Moment | None:
+    if not labels:
+        return None
+    return Moment(time=round(touch.time, 3), labels=labels, source=source, confidence=round(confidence, 3))
+
+
+def find_gait_label(time: float, times: np.ndarray, path: np.ndarray) -> dict[str, str]:
+    """Find the gait label at a moment, from a player's path (N, 2) m at `times` (N,) s."""
+    near = slice(*np.searchsorted(times, [time - 0.3, time + 0.3]))
+    is_known = np.isfinite(path[near]).all(axis=1)
+    seen, when = path[near][is_known], times[near][is_known]
+    if len(seen) < 2:
+        return {}
+    speed = np.linalg.norm(seen[-1] - seen[0]) / (when[-1] - when[0])
+    return {"gait": "running" if speed > _RUNNING_SPEED else "standing"}
+
+
+def find_height_labels(part: str, height: float, known: bool) -> dict[str, str]:
+    """Find the height and jump labels of a touch with the ball's centre at `height` m."""
+    if not known:
+        return {}
+    if part == "hand":
+        return {"height": "high" if height > _HIGH_HAND else "low" if height < _LOW_HAND else "middle"}
+    return {"height": "high" if height > _HIGH_FOOT else "low", "jump": "jump" if height > _JUMP_HEIGHT else ""}
+
+
+def select_separate_moments(moments: Iterable[Moment]) -> list[Moment]:
+    """Select moments of one player at least MIN_DISTANCE_SECONDS apart, the most certain first: events before
+    touches, sent before received balls.
+    """
+    selected: list[Moment] = []
+    for moment in sorted(moments, key=_compute_weight, reverse=True):
+        if all(abs(moment.time - other.time) >= MIN_DISTANCE_SECONDS for other in selected):
+            selected.append(moment)
+    return selected
+
+
+def _compute_weight(moment: Moment) -> tuple[float, float]:
+    bonus = 0.5 * (moment.source in (EVENTS, BOTH)) + 0.3 * (not takes_with_foot(moment.labels))
+    return moment.confidence + bonus, -moment.time
+
+
+def find_dribbles(touches: list[SolvedTouch]) -> list[Moment]:
+    """Find the stretches in which one player dribbles: consecutive touches, at least one of them a dribble's."""
+    out, first = [], 0
+    for index in range(1, len(touches) + 1):
+        if index < len(touches) and touches[index].time - touches[index - 1].time < _CHAIN_SECONDS:
+            if touches[index - 1].kind in (kinds.DRIBBLE, kinds.RECEIVE):
+                continue
+        chain, first = touches[first:index], index
+        duration = chain[-1].time - chain[0].time
+        if duration >= _MIN_DRIBBLE and any(touch.kind == kinds.DRIBBLE for touch in chain):
+            confidence = float(np.mean([touch.confidence for touch in chain]))
+            out.append(Moment(time=round(chain[0].time, 3), labels=_DRIBBLE.labels, source=TOUCHES,
+                              confidence=round(confidence, 3), end=round(chain[-1].time, 3)))
+    return out
+
+
+def sort_moments(moments: Iterable[Moment]) -> tuple[Moment, ...]:
+    """Sort moments by time, stretches before key moments."""
+    return tuple(sorted(moments, key=lambda moment: (moment.time, moment.end is None)))
+
+
+def _describe_left_out(touches, left_out: Counter) -> list[str]:
+    """Describe how many touches are left out, and why."""
+    untracked = sum(not touch.player for touch in touches)
+    counts = [
+        (untracked, "touches of the ball by untracked players"),
+        (left_out["doubtful"], f"touches are ignored, with confidence below {MIN_CONFIDENCE:g}"),
+        (
+        left_out[
+        "close"], f"touches are ignored, within {MIN_DISTANCE_SECONDS:g} s of a more certain one of the same player"),
+    ]
+    return [f"{count} {what}" for count, what in counts if count]
+
+
+def _format_moment(moment: Moment) -> str:
+    """Format a moment as the contract's line."""
+    return format_timeline(build_timeline([moment])).rstrip("\n")
+
+
+def _compute_digest(lines: Iterable[str]) -> str:
+    """Compute the digest of lines, without their ends."""
+    content = "\n".join(line.rstrip() for line in lines if line.strip())
+    return hex_digest(content, digits=8)

@@ -1,0 +1,305 @@
+"""The three kinds of work of a match, as functions for any process.
+
+Each takes everything it needs except the library, which a worker reads by itself, once, and which is the same
+everywhere. The last kind writes a player's files: with the figures of every report over all stretches, and second by
+second.
+"""
+
+from __future__ import annotations
+
+import tempfile
+import threading
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from ...base.errors import InputError
+from ...evaluation.report import evaluate, round_values
+from ...files.bvh import bvh
+from ...library.build import build_library
+from ...library.library import Library
+from ...motion.track import Track
+from ...motion.track.ball_path import BallPath
+from ...synthesis.provenance import Provenance, build_provenance, write_provenance
+from ...synthesis.quality import movement
+from ...synthesis.quality.playback import Playback, playback_from_take
+from ...synthesis.take import Take
+from ..crowd.window import PlayerCorrection, resolve_window
+from ..displayed_motion import construct_displayed_player
+from ..player_edit import PlayerEdit
+from .units import Unit
+from .windows import Piece, search_window
+
+_MAX_NAMES, _MIN_NAMES, _SUM_NAMES = {"max", "support_max"}, {"min"}, {"frames", "duration_s"}
+
+
+@dataclass(frozen=True)
+class LibrarySource:
+    """Where a library is, and which one it is.
+
+    Attributes:
+        folder: as for `build`.
+        cache: as for `build`.
+        skeleton: as for `build`.
+        unit: as for `build`.
+        seed: it is read with.
+        key: of its content and of what it is read with (`Library.kept`); "" if not known yet.
+    """
+
+    folder: Path
+    cache: Path | None = None
+    skeleton: Path | None = None
+    unit: float | None = None
+    seed: int = 0
+    key: str = ""
+
+
+_lock = threading.RLock()
+_loaded: dict[LibrarySource, Library] = {}
+
+
+def load_library(source: LibrarySource) -> Library:
+    """Load the library, from memory if this process has read it before; one is held at a time.
+
+    Args:
+        source: where it is.
+    Returns:
+        The library.
+    Raises:
+        InputError: if it is not the requested library: clips have changed, or this machine uses another numpy, so that
+            results would differ.
+    """
+    with _lock:  # several threads of one worker may ask at the same time
+        if source not in _loaded:
+            built = build_library(source.folder, cache_dir=source.cache, skeleton=source.skeleton, unit=source.unit,
+                                  seed=source.seed)
+            if source.key and built.cache_location[1] != source.key:
+                raise InputError(source.folder, "a different library from the one of this match",
+                                 "the same clips and the same numpy for all workers", "start the command again")
+            set_library(source, built)
+        return _loaded[source]
+
+
+def set_library(source: LibrarySource, library: Library) -> None:
+    """Set the library that work in this process uses."""
+    with _lock:
+        _loaded.clear()
+        _loaded[source] = library
+
+
+@dataclass(frozen=True, eq=False)
+class PlayerFiles:
+    """A player's files.
+
+    Attributes:
+        report: the player's report, None if no figures are requested.
+        files: content by ending of the file name.
+    """
+
+    report: dict | None
+    files: dict[str, bytes]
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class FinishRequest:
+    """What is needed to finish a player.
+
+    Attributes:
+        edit: the edit list, with its correction.
+        measured: tracks, one per stretch.
+        ball: the match's ball.
+        frames: (K,) frames of the match's clock at which the player overlaps another one.
+        depth: (K,) m of that overlap.
+        figures: write report and provenance.
+        bvh: write BVH.
+    """
+
+    edit: PlayerEdit
+    measured: tuple[Track, ...]
+    ball: BallPath
+    frames: np.ndarray
+    depth: np.ndarray
+    figures: bool
+    bvh: bool
+
+
+def search_unit(source: LibrarySource, unit: Unit) -> Piece:
+    """Search one window of one player (`windows.search_window`)."""
+    return search_window(load_library(source), unit)
+
+
+def resolve_collision_window(source: LibrarySource, edits: Sequence[PlayerEdit], start: float,
+                             end: float) -> tuple[PlayerCorrection, ...]:
+    """Resolve the collisions of all players in one window (`crowd.window.resolve_window`)."""
+    return resolve_window(load_library(source), edits, start, end)
+
+
+def finish_player(source: LibrarySource, request: FinishRequest) -> PlayerFiles:
+    """Construct a player's whole motion, its figures and its files.
+
+    Args:
+        source: where the library is.
+        request: what is needed.
+    Returns:
+        The files.
+    """
+    from threadpoolctl import threadpool_limits
+
+    library = load_library(source)
+    with threadpool_limits(limits=1):
+        plans = [stretch.plan for stretch in request.edit.stretches]
+        span = float(plans[0].track.times[0]), float(plans[-1].track.times[-1])
+        takes = construct_displayed_player(library, request.edit, request.ball, *span)
+        files, report = {}, None
+        if request.figures:
+            overlap = [_build_overlap(take, request) for take in takes]
+            report = build_player_report(library, takes, request.measured, overlap, request.ball)
+            table = _join_provenance([build_provenance(take) for take in takes])
+            files["provenance.csv"] = _write_to_bytes(lambda path: write_provenance(path, table))
+        if request.bvh:
+            for number, take in enumerate(takes, 1):
+                ending = "bvh" if number == 1 else f"{number}.bvh"
+                files[ending] = _write_to_bytes(lambda path, take=take: bvh.write_bvh(path, take.motion))
+    return PlayerFiles(report, files)
+
+
+def build_player_report(
+    library: Library, takes: Sequence[Take], tracks: Sequence[Track], overlap: Sequence[np.ndarray], ball: BallPath
+) -> dict:
+    """Build a player's report over all stretches, in the form of the contract's Report JSON with `time_lost_s` and
+    `per_second` added.
+
+    Args:
+        library: the clips.
+        takes: one per stretch.
+        tracks: measured, one per stretch.
+        overlap: (T,) m of overlap with other bodies, one per stretch.
+        ball: the match's ball, as written.
+    Returns:
+        The report.
+    Raises:
+        InputError: if a take has another skeleton than the library.
+    """
+    reports = [evaluate(take, track, library) for take, track in zip(takes, tracks)]
+    out = merge_reports(reports, [len(take.motion) for take in takes])
+    out["time_lost_s"] = measure_time_lost(out["warning_seconds"])
+    out["per_second"] = measure_per_second([playback_from_take(take) for take in takes], tracks, overlap, ball)
+    return round_values(out)
+
+
+def merge_reports(reports: Sequence[dict], weights: Sequence[float]) -> dict:
+    """Merge the reports of several stretches.
+
+    Means, shares and percentiles are weighted averages; maxima and minima stay so; numbers of frames and seconds are
+    summed; lists are joined. A value that only some reports have is taken from these.
+
+    Args:
+        reports: one per stretch.
+        weights: of each stretch.
+    Returns:
+        One report.
+    """
+    if len(reports) == 1:
+        return dict(reports[0])
+    return {name: _merge_values(name, [one.get(name) for one in reports], weights) for name in reports[0]}
+
+
+def measure_time_lost(warning_seconds: Sequence[Sequence[Sequence[float]]]) -> float:
+    """Measure the seconds in which a request was not met: the spans of the warnings, each second once."""
+    spans = sorted((first, last) for line in warning_seconds for first, last in line)
+    lost, until = 0.0, -np.inf
+    for first, last in spans:
+        lost += max(0.0, last - max(first, until))
+        until = max(until, last)
+    return lost
+
+
+def measure_per_second(
+    played: Sequence[Playback], tracks: Sequence[Track], overlap: Sequence[np.ndarray], ball: BallPath
+) -> dict:
+    """Measure figures for whole seconds of the match's clock.
+
+    Args:
+        played: one per stretch.
+        tracks: one per stretch.
+        overlap: (T,) m, one per stretch.
+        ball: the match's ball.
+    Returns:
+        `start_s`, and lists with None where the player is absent: `root_error_m` (mean), `skate_cm_s` (mean over feet
+        in contact), `overlap_m` (deepest), `ball_m` (least horizontal distance of the hips from the ball).
+    """
+    start = int(np.floor(min(one.start_time for one in played) + 1e-6))
+    end = int(np.floor(max(one.times[-1] for one in played) + 1e-6)) + 1
+    names = ("root_error_m", "skate_cm_s", "overlap_m", "ball_m")
+    rows: dict[str, list] = {name: [None] * (end - start) for name in names}
+    for one, track, deep in zip(played, tracks, overlap):
+        second = np.floor(one.times + 1e-6).astype(int) - start
+        for name, values, over in _compute_curves(one, track, deep, ball):
+            for number in np.unique(second):
+                found = values[second == number]
+                found = found[np.isfinite(found)]
+                rows[name][number] = float(over(found)) if len(found) else None
+    return {"start_s": start, **rows}
+
+
+def _build_overlap(take: Take, request: FinishRequest) -> np.ndarray:
+    """Build (T,) m by which a take's body overlaps others."""
+    out = np.zeros(len(take.motion))
+    at = request.frames - round(take.start_time * take.motion.fps)
+    inside = (at >= 0) & (at < len(out))
+    out[at[inside]] = request.depth[inside]
+    return out
+
+
+def _join_provenance(tables: Sequence[Provenance]) -> Provenance:
+    """Join the provenance of several stretches."""
+    arrays = {name: np.concatenate([getattr(one, name) for one in tables])
+              for name in ("times", "clip_frame", "mirrored", "contacts")}  # fmt: skip
+    return Provenance(clip=tuple(clip for one in tables for clip in one.clip),
+                      words=tuple(words for one in tables for words in one.words), **arrays)
+
+
+def _write_to_bytes(write) -> bytes:
+    """Return what `write(path)` writes."""
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / "content"
+        write(path)
+        return path.read_bytes()
+
+
+def _merge_values(name: str, values: list, weights: Sequence[float]):
+    """Merge one value of several reports by its type and name; dicts are merged key by key."""
+    known = [(value, weight) for value, weight in zip(values, weights) if value is not None]
+    if not known:
+        return None
+    first = known[0][0]
+    if isinstance(first, dict):
+        known_weights = [weight for _, weight in known]
+        return {key: _merge_values(key, [value.get(key) for value, _ in known], known_weights) for key in first}
+    if isinstance(first, list):
+        return [entry for value, _ in known for entry in value]
+    if isinstance(first, (bool, str)) or name in ("version", "seed", "fps"):
+        return first
+    numbers = np.array([value for value, _ in known], dtype=float)
+    if name in _MAX_NAMES or name in _MIN_NAMES or name in _SUM_NAMES:
+        merged = numbers.max() if name in _MAX_NAMES else numbers.min() if name in _MIN_NAMES else numbers.sum()
+    else:
+        merged = np.average(numbers, weights=[weight for _, weight in known])
+    return int(merged) if isinstance(first, int) and name in _SUM_NAMES else float(merged)
+
+
+def _compute_curves(played: Playback, track: Track, overlap: np.ndarray, ball: BallPath):
+    """Compute (name, values (T,) or (T, 2), how a second is summarised)."""
+    targets = movement.interpolate_track(track, played.times)
+    skate = np.full((len(played.motion), 2), np.nan)
+    skate[1:] = 100.0 * movement.measure_contact_speeds(played.feet, played.contacts, played.motion.fps)
+    place = [np.interp(played.times, ball.times, ball.positions[:, axis], np.nan, np.nan) for axis in (0, 1)]
+    ball_distance = np.linalg.norm(played.pelvis - np.stack(place, axis=1), axis=1)
+    return (
+        ("root_error_m", movement.measure_root_error(played.pelvis, targets, played.motion.fps), np.mean),
+        ("skate_cm_s", skate, np.mean),
+        ("overlap_m", np.asarray(overlap, dtype=float), np.max),
+        ("ball_m", ball_distance, np.min),
+    )

@@ -1,0 +1,157 @@
+"""What each player is requested to do: labels from touches, events or texts, and a plan for every stretch of a
+player.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+from ..annotation import Timeline, format_timeline
+from ..ball.tracked.solve import SolvedBall
+from ..base.errors import InputError, format_seconds
+from ..synthesis.plan import Plan
+from ..synthesis.resolved_touches import build_trajectory
+from .folder import MatchFolder
+from .labels import USER, MatchLabels, Moment, build_timeline, is_edited, read_labels, write_labels
+from .player_edit import to_stored_plan
+from .request import MatchRequest
+from .roles import Role
+
+
+@dataclass(frozen=True, eq=False)
+class PlayerPlans:
+    """A role with its plans.
+
+    Attributes:
+        role: the player and their tracks.
+        file: base name of the player's files.
+        plans: one per stretch, as stored in files; () if the player cannot be synthesized (`role.reason`).
+        unused: the user's labels for times at which the player is absent.
+    """
+
+    role: Role
+    file: str
+    plans: tuple[Plan, ...] = ()
+    unused: tuple[Moment, ...] = ()
+
+
+def build_player_plans(
+    roles: tuple[Role, ...], files: Mapping[str, str], labels: MatchLabels, solved: SolvedBall | None,
+    request: MatchRequest, folder: MatchFolder, known_labels: frozenset[str],
+) -> list[PlayerPlans]:
+    """Build the plans of all players.
+
+    Labels are read from the texts of `request.annotations`, else from edited texts in the folder; else they are the
+    automatic ones, which are written there. An error in a player's text is the reason why this player fails.
+
+    Args:
+        roles: the players.
+        files: base name of files by id.
+        labels: automatic labels.
+        solved: the solved ball, None if it is not solved.
+        request: the request.
+        folder: the match's folder.
+        known_labels: labels beyond the vocabulary.
+    Returns:
+        One entry per role.
+    """
+    out = []
+    for role in roles:
+        file = files[role.player.id]
+        try:
+            moments = () if role.reason else _read_moments(file, role, labels, request=request, folder=folder,
+                                                           known_labels=known_labels)
+            plans = tuple(_build_plan(role, number, moments, solved, request)
+                          for number in range(len(role.target_tracks)))
+            unused = tuple(one for one in moments if one.source == USER and not _is_used(one, role))
+            out.append(PlayerPlans(role, file, () if role.reason else plans, unused))
+        except InputError as error:
+            out.append(PlayerPlans(replace(role, reason=str(error)), file))
+    return out
+
+
+def check_label_folder(annotations: Path | None) -> None:
+    """Check that the folder with the user's labels exists, if one is named; InputError otherwise."""
+    if annotations is not None and not annotations.is_dir():
+        found = "is a file" if annotations.exists() else "no such folder"
+        raise InputError(annotations, found, "a folder with a text ID.txt for players", "check the path")
+
+
+def list_unknown_texts(annotations: Path | None, files: Iterable[str]) -> list[str]:
+    """List a message for each of the user's texts that belongs to no player. files: base names of all players'
+    files.
+    """
+    known = {f"{file}.txt" for file in files}
+    texts = [] if annotations is None else sorted(annotations.glob("*.txt"))
+    return [f"{text}: ignored, because no player of the match has this id" for text in texts if text.name not in known]
+
+
+def list_unused_labels(parts: Iterable[PlayerPlans], request: MatchRequest, files: Mapping[str, str]) -> list[str]:
+    """List messages about labels that are not used.
+
+    Args:
+        parts: the players' plans.
+        request: the request.
+        files: base name of files by id.
+    Returns:
+        One line per player with labels for times at which they are absent, and one for texts of players who are absent
+        altogether.
+    """
+    out, present = [], {part.role.player.id for part in parts}
+    absent_files = [] if request.players else [file for player, file in files.items() if player not in present]
+    idle = [f"{file}.txt" for file in absent_files if _find_text(request.annotations, file) is not None]
+    if idle:
+        subject = "the player is" if len(idle) == 1 else "the players are"
+        out.append(f"{', '.join(idle)}: ignored, because {subject} absent in that time")
+    for part in parts:
+        if part.unused:
+            first = format_timeline(build_timeline(part.unused[:1])).strip()
+            edges = [(track.times[0], track.times[-1]) for track in part.role.target_tracks]
+            times = ", ".join(f"{format_seconds(start)} to {format_seconds(end)} s" for start, end in edges)
+            count = len(part.unused)
+            found = f"{count} of your lines {'is' if count == 1 else 'are'} ignored ({first}{' ...' * (count > 1)})"
+            out.append(f"{part.file}.txt: {found}, because {part.role.player.id} is present from {times}")
+    return out
+
+
+def _is_used(moment: Moment, role: Role) -> bool:
+    """Say whether any of the player's stretches contains the moment, or a part of it."""
+    cut = (build_timeline([moment], float(track.times[0]), float(track.times[-1])) for track in role.target_tracks)
+    return any(one.spans or one.keys for one in cut)
+
+
+def _read_moments(
+    file: str, role: Role, labels: MatchLabels, request: MatchRequest, folder: MatchFolder, known_labels: frozenset[str]
+) -> tuple[Moment, ...]:
+    """Read a player's moments from their text, or write the automatic ones and return them."""
+    automatic = labels.players.get(role.player.id, ())
+    text = _find_text(request.annotations, file)
+    if text is None:
+        text = folder.labels_path(file)
+        if not is_edited(text):
+            text.parent.mkdir(exist_ok=True)
+            write_labels(text, role.player.id, automatic)
+            return automatic
+    return read_labels(text, automatic, known_labels)
+
+
+def _find_text(annotations: Path | None, file: str) -> Path | None:
+    """Find the user's text for a player; None if there is none."""
+    text = None if annotations is None else annotations / f"{file}.txt"
+    return text if text is not None and text.is_file() else None
+
+
+def _build_plan(role: Role, number: int, moments, solved: SolvedBall | None, request: MatchRequest) -> Plan:
+    """Build the plan of one stretch, as stored in files."""
+    track = role.target_tracks[number]
+    start, end = float(track.times[0]), float(track.times[-1])
+    timeline: Timeline = build_timeline(moments, start, end)
+    plan = Plan(
+        track=track, timeline=timeline, library=str(request.library), nearest=request.nearest,
+        seed=request.seed + role.number, fps=request.fps, solve_touches=solved is not None, variety=request.variety,
+        lag=role.lag,
+    )
+    return to_stored_plan(plan if solved is None
+                          else replace(plan, solved=build_trajectory(solved, role.player.id, plan)))

@@ -1,0 +1,268 @@
+"""Synthesize a match: files in, a folder out (docs/match/match.md).
+
+    result = synthesize_match(MatchRequest(tracking=Path("match.dat"), library=Path("clips"), out=Path("out"),
+    end=60.0))
+
+Read -> find who is present when -> solve the ball -> labels -> separate tracks -> workers search windows of all players
+-> join them into edit lists -> resolve collisions -> place the ball where it is touched -> reports. However a run ends,
+the same request resumes where it was, with the same bits.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from ..ball.tracked.solve import SolvedBall, solve_ball
+from ..base.errors import BeyondMocapError, InputError, UserCancelledError
+from ..files.atomic import atomic_write
+from ..files.event_data import MatchEvents
+from ..files.events import read_events
+from ..files.tables import write_ball
+from ..files.tracking.tracking import read_match
+from ..library.build import build_library
+from ..library.library import Library
+from ..motion.track.ball_path import BallPath
+from ..motion.track.match_data import Match
+from .folder import build_file_names, check_folder, open_folder, read_state
+from .labels import MatchLabels, label_match
+from .match_ball import apply_led_ball, build_ball_plan, sample_ball
+from .pieces import stages
+from .pieces.pool import WorkerConfig, check_workers, stop_workers
+from .pieces.tasks import LibrarySource, set_library
+from .player_plans import build_player_plans, check_label_folder, list_unknown_texts, list_unused_labels
+from .report.pictures import build_thumbnail_renderer
+from .request import MatchRequest, build_identity
+from .roles import build_roles, list_absent_players, resolve_span, separate_roles
+from .state import build_player_row, build_state, read_clocks
+
+BALL_MARGIN = 5.0
+"""s before and after the span in which the ball is solved too."""
+
+_STAGE_ENDS = {"read": 0.02, "library": 0.07, "ball": 0.12, "search": 0.7, "crowd": 0.8, "figures": 0.98, "page": 1.0}
+"""Progress at the end of each stage."""
+
+Progress = Callable[[float, str], None]
+
+
+@dataclass(frozen=True)
+class PlayerStatus:
+    """How a player ended.
+
+    Attributes:
+        id: of the player.
+        reason: why they could not be synthesized, "" if they were.
+    """
+
+    id: str
+    reason: str = ""
+
+
+@dataclass(frozen=True, kw_only=True)
+class MatchResult:
+    """The result of a match.
+
+    Attributes:
+        request: what was requested.
+        span: (start, end) s.
+        finished: players that were synthesized.
+        failed: players that were not.
+        notes: messages for people.
+    """
+
+    request: MatchRequest
+    span: tuple[float, float]
+    finished: tuple[PlayerStatus, ...]
+    failed: tuple[PlayerStatus, ...]
+    notes: tuple[str, ...]
+
+
+def synthesize_match(
+    request: MatchRequest, progress: Progress | None = None, cancelled: Callable[[], bool] | None = None
+) -> MatchResult:
+    """Synthesize whatever of a request is not in its folder yet.
+
+    A player who fails does not stop the others; match.json and the result give the reason. After a cancellation or an
+    error the next run resumes from what is done.
+
+    Args:
+        request: the request.
+        progress: receives the share done and a text.
+        cancelled: called now and then; True cancels the work.
+    Returns:
+        The result.
+    Raises:
+        InputError: if the request, its files or its cluster are wrong.
+        Cancelled: if `cancelled` returns True.
+    """
+    from threadpoolctl import threadpool_limits
+
+    report = progress or (lambda fraction, text: None)
+    check_folder(request.out)
+    check_label_folder(request.annotations)
+    place = WorkerConfig(request.workers, request.scheduler)
+    check_workers(place)
+    clock = read_clocks()
+    report(0.0, f"Reading {request.tracking.name}")
+    match = read_match(request.tracking, request.meta, request.provider or None)
+    span = resolve_span(match, request)
+    events = None if request.events is None else read_events(request.events, request.events_meta,
+                                                             request.events_provider or None, match)
+    read = read_clocks()
+    library, source = _build_library(request, _scale_progress(report, "library"), cancelled)
+    identity_values = build_identity(request, source.key)
+    with open_folder(request.out, identity_values) as folder:
+        state = build_state(folder, request, identity_values, match, span)
+        state.report["notes"] += folder.notes
+        state.seconds["read"] = round(read[0] - clock[0], 3)
+        state.record_stage("library", read)
+        job = stages.Job(request=request, folder=folder, state=state, source=source, library=library, workers=place,
+                         report=report, cancelled=cancelled)
+        try:
+            with threadpool_limits(limits=1):  # more threads would change the order of sums
+                _run_stages(job, match, events, span, report)
+        except BeyondMocapError as error:
+            if state.players:  # otherwise no work has started
+                state.update_report(status="cancelled" if isinstance(error, UserCancelledError) else "failed",
+                                    reason=str(error))
+            raise
+        finally:
+            if not request.scheduler:
+                stop_workers()
+    return read_result(request)
+
+
+def _build_library(request: MatchRequest, report: Progress, cancelled) -> tuple[Library, LibrarySource]:
+    """Build the library, with everything it derives stored beside its cache, and the source by which workers find
+    it.
+    """
+    library = build_library(request.library, cache_dir=request.cache, skeleton=request.skeleton, unit=request.unit,
+                            seed=request.seed, progress=report, cancelled=cancelled)
+    library.with_synthetic_clips  # computed once, here, instead of by every worker  # noqa: B018
+    source = LibrarySource(request.library, request.cache, skeleton=request.skeleton, unit=request.unit,
+                           seed=request.seed, key=library.cache_location[1])
+    set_library(source, library)
+    return library, source
+
+
+def _run_stages(
+    job: stages.Job, match: Match, events: MatchEvents | None, span: tuple[float, float], report: Progress
+) -> None:
+    """Run all stages after reading."""
+    state, begin = job.state, read_clocks()
+    roles = build_roles(match, job.request, span)
+    state.report["notes"] += list_absent_players(job.request, roles, span)
+    solved = _solve_ball(job, match, span, _scale_progress(report, "ball"))
+    state.record_stage("ball", begin)
+    clock = read_clocks()
+    words = _label_players(job, match, events, solved)
+    inside = (match.times >= span[0] - 1e-6) & (match.times <= span[1] + 1e-6)
+    touches = {player: [one.time for one in moments if one.end is None] for player, moments in words.players.items()}
+    roles, state.report["spacing"] = separate_roles(roles, match.times[inside], touches)
+    names = build_file_names(player.id for player in match.players)
+    parts = build_player_plans(roles, names, words, solved=solved, request=job.request, folder=job.folder,
+                               known_labels=job.library.labels)
+    rows = job.folder.previous_state.get("players", ())
+    finished = {row["id"]: row["finished"] for row in rows if isinstance(row.get("finished"), str)}
+    state.players = {part.role.player.id: build_player_row(part, finished.get(part.role.player.id)) for part in parts}
+    state.report["notes"] += list_unknown_texts(job.request.annotations, names.values())
+    state.report["notes"] += list_unused_labels(parts, job.request, names)
+    state.record_stage("words", clock)
+    state.write_state()
+    clock = read_clocks()
+    edits = stages.search_players(replace(job, report=_scale_progress(report, "search")), parts)
+    state.record_stage("search", clock)
+    clock = read_clocks()
+    crowd = stages.resolve_player_collisions(replace(job, report=_scale_progress(report, "crowd")), edits,
+                                             span) if edits else {}
+    ball = _write_match_ball(job, match, solved, span, crowd)
+    state.record_stage("crowd", clock)
+    clock = read_clocks()
+    stages.finish_players(replace(job, report=_scale_progress(report, "figures")), parts, edits, crowd, ball)
+    state.record_stage("figures", clock)
+    state.record_stage("total", begin)
+    _finish_match(job, crowd)
+
+
+def _solve_ball(job: stages.Job, match: Match, span: tuple[float, float], report: Progress) -> SolvedBall | None:
+    """Solve the ball around the span; None if it is not requested or not possible."""
+    if not job.request.solve_touches:
+        return None
+    try:
+        return solve_ball(match, report, job.cancelled, span[0] - BALL_MARGIN, span[1] + BALL_MARGIN)
+    except InputError as error:
+        job.state.report["notes"].append(f"the ball cannot be solved: {error}")
+        return None
+
+
+def _label_players(job: stages.Job, match: Match, events: MatchEvents | None, solved: SolvedBall | None) -> MatchLabels:
+    """Label all players from touches and, if there are any, events."""
+    report = job.state.report
+    if events is not None and solved is None:
+        report["notes"].append(f"{job.request.events}: ignored, because without ball touches its clock is unknown")
+    labels = label_match(match, solved, events)
+    report["notes"] += labels.notes
+    report["events"] = dict(labels.figures) or None
+    return labels
+
+
+def _write_match_ball(job: stages.Job, match: Match, solved: SolvedBall | None, span, crowd) -> BallPath:
+    """Write the match's ball over the span, if it is known at all, and return it."""
+    fps = job.request.fps
+    first, last = int(np.ceil(span[0] * fps - 1e-6)), int(np.floor(span[1] * fps + 1e-6))
+    times = np.arange(first, last + 1) / fps
+    plan = build_ball_plan(match, solved, span[0], span[1], fps)
+    if plan is None:
+        return BallPath(times, np.full((len(times), 3), np.nan), np.zeros(len(times), bool))
+    ball = apply_led_ball(sample_ball(plan, times), first, ((part.led_frames, part.led) for part in crowd.values()))
+    path = job.folder.path / "ball.csv"
+    write_ball(path, ball)
+    job.state.report["ball"] = {
+        "file": path.name, "touches": len(solved.touches) if solved else 0, "measured_share": ball.measured.mean(),
+        "notes": list(solved.notes) if solved else [],
+    }  # fmt: skip
+    return ball
+
+
+def _finish_match(job: stages.Job, crowd) -> None:
+    """Write the final state and the page."""
+    state = job.state
+    state.report["crowd"] = {
+        "overlap_before_m": max((part.before for part in crowd.values()), default=0.0),
+        "overlap_m": max((float(part.depth.max(initial=0.0)) for part in crowd.values()), default=0.0),
+        "players_corrected": sum(bool(len(part.correction.knots)) for part in crowd.values()),
+    }  # fmt: skip
+    finished = len(state.players) - len(state.failed_rows)
+    state.update_report(status="failed" if not finished else "partial" if state.failed_rows else "done")
+    if job.request.figures:
+        from .report.page import build_match_page
+
+        path = job.folder.path
+        atomic_write(path / "report.html", build_match_page(path, build_thumbnail_renderer(job.library, path)))
+
+
+def read_result(request: MatchRequest) -> MatchResult:
+    """Read the result of a request that has been run.
+
+    Args:
+        request: the request.
+    Returns:
+        The result.
+    Raises:
+        InputError: as for `folder.read_state`.
+    """
+    state = read_state(request.out)
+    players = {status: tuple(PlayerStatus(row["id"], row.get("reason", "")) for row in state["players"]
+                             if row["status"] == status) for status in ("done", "failed")}  # fmt: skip
+    notes = tuple(dict.fromkeys((*state["data"], *state["notes"])))
+    return MatchResult(request=request, span=(state["from_s"], state["to_s"]), finished=players["done"],
+                       failed=players["failed"], notes=notes)
+
+
+def _scale_progress(report: Progress, stage: str) -> Progress:
+    """Scale the progress of one stage to its part of the whole."""
+    names = list(_STAGE_ENDS)
+    low, high = _STAGE_ENDS[names[names.index(stage) - 1]] if stage != names[0] else 0.0, _STAGE_ENDS[stage]
+    return lambda fraction, text: report(low + (high - low) * fraction, text)

@@ -1,0 +1,257 @@
+"""Report of unmet constraints: what could not be met in a take, and at which seconds; these lines become warnings.
+
+The constraints, in the order in which they yield, are those of ../shared/metrics.md ("Where they cannot all hold":
+seconds, seam jerk, warp rate, skate, root error, key time, words, bones and ground).
+
+Every line is about one kind and lists its stretches. It is computed from what was played, without the library's own
+figures, so it costs a synthesis a few milliseconds; jolts need those figures and are reported by `report_jolts`, with
+the evaluation.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+
+import numpy as np
+
+from ...annotation import Timeline, labels_per_frame
+from ...base.errors import TimedMessage, format_seconds
+from ...base.time_series import find_runs
+from ...library.landings import LANDING_FOLDER
+from ...library.library import Library
+from ...library.synthetic_clips import BLEND_PREFIX, KICK_PREFIX, RECEIVE_PREFIX, SYNTHETIC_FOLDER
+from ...motion.track import Track
+from . import movement
+from .moments import KeyMomentResult, evaluate_moments, measure_contact
+from .playback import Playback, compute_playback_rate, find_transitions
+from .targets import KEY_TARGETS, TARGETS
+
+WARP_LIMITS = (TARGETS["warp_rate.min"].least, TARGETS["warp_rate.max"].most)
+ROOT_ERROR_LIMIT = TARGETS["root_error_m.p95"].most
+LEG_MISS_LIMIT = 0.005  # m that a leg may be short without a line
+GROUND_LIMIT = -TARGETS["ground_mm.min"].least / 1000.0
+CONTACT_GAP_LIMIT = KEY_TARGETS["contact_gap_m"].most
+JOIN_SECONDS = 0.4  # stretches closer than this are one
+LABEL_SECONDS = 0.5  # shortest time of a missing label that is reported
+MAX_STRETCHES = 6  # stretches that a line lists
+_TOLERANCE = 1e-3  # of rates and seconds, for rounding
+
+
+def report_unmet_constraints(
+    played: Playback, *, track: Track | None = None, timeline: Timeline | None = None, library: Library | None = None,
+    ik_miss: np.ndarray | None = None, user_timeline: Timeline | None = None,
+) -> list[TimedMessage]:
+    """Report each kind of constraint that is not met, with its seconds on the track's clock.
+
+    What is not known is not reported.
+
+    Args:
+        played: the take as played.
+        track: the player's samples as measured.
+        timeline: the requested timeline, for the key moments.
+        library: the recordings, without synthetic clips.
+        ik_miss: (T, 2) m that each leg was short of where its foot should be.
+        user_timeline: the user's own labels, where `timeline` has automatic ones beside them.
+    Returns:
+        A line for each kind.
+    """
+    stride = played.compute_stride(library)
+    source = played.clip, played.mirrored, played.clip_frame, stride
+    keys = evaluate_moments(played, timeline.keys, stride, library) if timeline is not None else []
+    lines = [
+        *_report_synthetic(played),
+        _report_stretched_strides(played, track, library),
+        _report_warp(played, source),
+        _report_sliding(played),
+        _report_short_legs(played, ik_miss),
+        _report_root_error(played, track),
+        _report_key_times(played, keys),
+        _report_contact_gaps(played, keys),
+        _report_missing_labels(played, user_timeline if user_timeline is not None else timeline, keys, library),
+        _report_below_ground(played),
+    ]
+    return [line for line in lines if line]
+
+
+def report_jolts(times: np.ndarray, starts: np.ndarray, ratios: np.ndarray) -> TimedMessage | None:
+    """Report transitions that are harder than recordings are.
+
+    Args:
+        times: (T,) s.
+        starts: (S,) frames of transitions.
+        ratios: (S,) of `movement.compute_transition_ratios`.
+    Returns:
+        A line, None where there is none.
+    """
+    most, flags = TARGETS["seam_jerk_ratio.max"].most, np.zeros(len(times), bool)
+    hard = ratios > most
+    for start in starts[hard]:
+        flags[max(start - movement.JERK_REACH // 2, 0) : start + movement.JERK_REACH // 2] = True
+    hardest = f"{ratios.max(where=hard, initial=0.0):.2f} times as hard as recordings of that speed"
+    return _build_line(times, flags, f"transitions jolt up to {hardest} (target {most:g})")
+
+
+def format_stretches(times: np.ndarray, flags: np.ndarray) -> str:
+    """Format where flags (T,) hold, such as "4.2-6.0, 7.3 s".
+
+    Stretches less than JOIN_SECONDS apart are one; of more than MAX_STRETCHES the longest are listed.
+    """
+    first, last = _merge_flags(times, flags)
+    longest = np.sort(np.argsort(first - last, kind="stable")[:MAX_STRETCHES])
+    named = ", ".join(_format_span(first[i], last[i]) for i in longest)
+    left = len(first) - len(longest)
+    return f"{named} s" + (f" and {left} shorter" if left else "")
+
+
+def _build_line(times: np.ndarray, flags: np.ndarray, what: str, more: str = "") -> TimedMessage | None:
+    """Build the line "4.2-6.0 s: what", with the stretches in which flags (T,) hold; None where they never do.
+
+    `more` comes before the colon.
+    """
+    if not np.any(flags):
+        return None
+    return TimedMessage(f"{format_stretches(times, flags)}{more}: {what}", *zip(*_merge_flags(times, flags)))
+
+
+def _merge_flags(times: np.ndarray, flags: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return first and last second (S,), (S,) of the stretches in which flags (T,) hold, near ones merged."""
+    first, last = np.array([(times[a], times[b - 1]) for a, b in find_runs(flags)]).T
+    apart = np.flatnonzero(first[1:] - last[:-1] >= JOIN_SECONDS)
+    return first[np.append(0, apart + 1)], last[np.append(apart, len(last) - 1)]
+
+
+def _format_span(first: float, last: float) -> str:
+    """Format a stretch, or a moment."""
+    low, high = f"{first:.1f}", f"{last:.1f}"
+    return low if low == high else f"{low}-{high}"
+
+
+def _frames_of_clips(played: Playback, *begins: str) -> np.ndarray:
+    """Return (T,) bool: frames of clips whose path begins with one of `begins`."""
+    table = np.array([path.startswith(begins) for path in played.clips] + [False])
+    return table[played.clip]
+
+
+def _report_synthetic(played: Playback) -> list[TimedMessage | None]:
+    """Report each kind of synthetic clip: running, two recordings blended, kicks, taken balls, landings."""
+    blends, kicks, receptions = (_frames_of_clips(played, SYNTHETIC_FOLDER + name)
+                                 for name in (BLEND_PREFIX, KICK_PREFIX, RECEIVE_PREFIX))
+    running = _frames_of_clips(played, SYNTHETIC_FOLDER) & ~blends & ~kicks & ~receptions
+    kinds = (
+        (running, "synthetic running: no recording has the speed of the track"),
+        (blends, "blended from a slower and a faster recording: none has the speed of the track"),
+        (kicks, "synthetic kick on the run: no recorded kick is as fast as the player"),
+        (receptions, "synthetic reception on the run: no recorded one is as fast as the player"),
+        (_frames_of_clips(played, LANDING_FOLDER), "synthetic landing and getting up: the recording ends in flight"),
+    )
+    return [_build_line(played.times, there, what, f" ({np.sum(there) / played.motion.fps:.1f} s in all)")
+            for there, what in kinds]
+
+
+def _report_stretched_strides(played: Playback, track: Track | None, library: Library | None) -> TimedMessage | None:
+    """Report recordings stretched to a speed that they do not have, even within the limit of the time warp."""
+    if track is None or library is None:
+        return None
+    speed = movement.measure_travel_speed(movement.interpolate_track(track, played.times), played.motion.fps)
+    fast = (speed > library.max_speed * WARP_LIMITS[1]) & ~_frames_of_clips(played, SYNTHETIC_FOLDER)
+    most = speed.max(where=fast, initial=0.0)
+    return _build_line(
+        played.times, fast,
+        f"the track reaches {most:.1f} m/s, faster than the library's {library.max_speed:.1f} m/s x {WARP_LIMITS[1]:g}: "
+        "strides are stretched",
+    )  # fmt: skip
+
+
+def _report_warp(played: Playback, source) -> TimedMessage | None:
+    """Report clips played too fast or too slow."""
+    rate = compute_playback_rate(*source)
+    rate[find_transitions(*source) - 1] = np.nan
+    beyond = np.append((rate < WARP_LIMITS[0] - _TOLERANCE) | (rate > WARP_LIMITS[1] + _TOLERANCE), False)
+    if not np.any(beyond):
+        return None
+    low, high = np.nanmin(rate), np.nanmax(rate)
+    return _build_line(
+        played.times, beyond,
+        f"clips are played at {low:.2f} to {high:.2f} times their recorded speed (target {WARP_LIMITS[0]:g} to {WARP_LIMITS[1]:g})",
+    )  # fmt: skip
+
+
+def _report_sliding(played: Playback) -> TimedMessage | None:
+    """Report stances whose toe travels visibly."""
+    stances = movement.list_stances(played.contacts)
+    travel = movement.measure_stance_travel(played.feet[:, :, 1], stances)
+    flags = np.zeros(len(played.motion), bool)
+    for first, end, _ in stances[travel > movement.NOTICED_SLIDE]:
+        flags[first:end] = True
+    return _build_line(played.times, flags, f"a planted foot slides by up to {100 * travel.max(initial=0.0):.0f} cm")
+
+
+def _report_short_legs(played: Playback, ik_miss: np.ndarray | None) -> TimedMessage | None:
+    """Report legs that do not reach the place of their foot."""
+    if ik_miss is None:
+        return None
+    miss = np.asarray(ik_miss).reshape(len(played.motion), -1).max(axis=1)
+    what = f"a leg is up to {100 * miss.max(initial=0.0):.1f} cm too short to reach the place of its foot"
+    return _build_line(played.times, miss > LEG_MISS_LIMIT, what)
+
+
+def _report_root_error(played: Playback, track: Track | None) -> TimedMessage | None:
+    """Report a root that is off the track."""
+    if track is None:
+        return None
+    error = movement.measure_root_error(played.pelvis, movement.interpolate_track(track, played.times),
+                                        played.motion.fps)
+    return _build_line(played.times, error > ROOT_ERROR_LIMIT,
+                       f"the body is off the track by up to {error.max(initial=0.0):.2f} m")
+
+
+def _report_key_times(played: Playback, keys: list[KeyMomentResult]) -> TimedMessage | None:
+    """Report key moments that are not played at their time."""
+    half = 0.5 / played.motion.fps + _TOLERANCE
+    errors = [(moment.requested.time, moment.played_at - moment.requested.resolved_time) for moment in keys]
+    late = [(time, error) for time, error in errors if np.isfinite(error) and abs(error) > half]
+    return _build_moment_line("key moments are not at their time", late, "{:+.2f} s")
+
+
+def _report_contact_gaps(played: Playback, keys: list[KeyMomentResult]) -> TimedMessage | None:
+    """Report key moments at which the ball is not reached."""
+    gaps = [(moment.requested.time, measure_contact(played, moment)[1]) for moment in keys]
+    far = [(time, gap) for time, gap in gaps if np.isfinite(gap) and gap > CONTACT_GAP_LIMIT]
+    return _build_moment_line("the body does not reach the ball at key moments", far, "{:.2f} m")
+
+
+def _build_moment_line(what: str, found: list[tuple[float, float]], form: str) -> TimedMessage | None:
+    """Build the line "what: 4.2 s by 0.13 m, ..." for (second, by how much) of key moments; None without any."""
+    listed = ", ".join(f"{format_seconds(time)} s by {form.format(value)}" for time, value in found)
+    return TimedMessage(f"{what}: {listed}", *((time, time) for time, _ in found)) if found else None
+
+
+def _report_missing_labels(
+    played: Playback, timeline: Timeline | None, keys: list[KeyMomentResult], library: Library | None
+) -> TimedMessage | None:
+    """Report labels of the user's spans that clips carry, but that are not shown for LABEL_SECONDS or more.
+
+    Entry and exit of key moments do not count.
+    """
+    if timeline is None or played.words is None or library is None:
+        return None
+    available = [(words or frozenset()) & library.labels for words in labels_per_frame(timeline, played.times)]
+    missing = [want.difference(labels_shown) for want, labels_shown in zip(available, played.words)]
+    for moment in keys:
+        missing[moment.entry : moment.exit + 1] = [frozenset()] * (moment.exit + 1 - moment.entry)
+    # runs of frames with and without missing labels
+    edges = [0, *(i for i in range(1, len(missing)) if bool(missing[i]) != bool(missing[i - 1])), len(missing)]
+    long = [span for span in zip(edges, edges[1:]) if span[1] - span[0] >= LABEL_SECONDS * played.motion.fps]
+    flags = np.zeros(len(missing), bool)
+    for low, high in long:
+        flags[low:high] = bool(missing[low])
+    count = Counter(word for frame in np.flatnonzero(flags) for word in sorted(missing[frame]))
+    words = ", ".join(word for word, _ in count.most_common(3)) + (", ..." if len(count) > 3 else "")
+    return _build_line(played.times, flags, f"requested labels that are not shown: {words}")
+
+
+def _report_below_ground(played: Playback) -> TimedMessage | None:
+    """Report joints below the ground."""
+    lowest = played.positions[..., 2].min(axis=1)
+    depth = -100 * lowest.min(initial=0.0)
+    return _build_line(played.times, lowest < -GROUND_LIMIT, f"the body is below the ground by up to {depth:.1f} cm")

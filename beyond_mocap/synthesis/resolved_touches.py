@@ -1,0 +1,244 @@
+"""Key moments moved to the solved touches of the ball, and the ball's trajectory by physics and by contact.
+
+    plan = resolve_touches(Plan(track=track, timeline=timeline, solve_touches=True))
+
+This is what `synthesize` and `resynthesize` do with a solved ball (`solve_ball`): before the search, key moments move
+to solved touches; when the body is done, the ball passes through the places where it was met, as solved in between, and
+in dribbles step by step from foot to foot (`synthesis.construct.dribble`).
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from ..annotation import KeyMoment, Timeline
+from ..annotation.ball_contact import build_surfaces, find_striking_part
+from ..annotation.labels import list_labels
+from ..ball.tracked.kinds import THROW_IN, TOUCH_KINDS
+from ..ball.tracked.solve import SolvedBall, SolvedTouch
+from ..base.errors import InputError, TimedMessage
+from ..motion.track import BALL_RADIUS
+from .construct.contact_geometry import add_flight_arc, lead_ball_through
+from .construct.dribble import plan_dribbles
+from .construct.strike import held_frames
+from .plan import Plan, PlayerTouch, ResolvedPlan, SolvedTrajectory
+from .take import DribbleTouch, KeyResult, Take
+
+MAX_TOUCH_OFFSET = 0.4
+"""Seconds from a key moment within which its touch is searched."""
+
+_WITHIN = 1.5  # m from the player within which a touch by an unknown player may be this player's
+_UNKNOWN_PLAYER_COST, _OTHER_PART_COST, _OTHER_KIND_COST = 0.15, 0.25, 0.15  # cost in seconds: player unknown, other part, other kind
+_MAX_SAMPLE_GAP = 0.1  # s from the nearest measured sample beyond which the ball counts as filled in
+_STEP = 0.004  # s between the points of a trajectory
+_SENDING, _TAKING = frozenset(list_labels(ball="sends")), frozenset(list_labels(ball="takes"))
+_CARRYING = frozenset(list_labels(ball="carries"))
+_SENDING_KINDS = {kind.name for kind in TOUCH_KINDS if kind.ball in ("sends", "carries")}
+_TAKING_KINDS = {kind.name for kind in TOUCH_KINDS if kind.ball == "takes"}
+
+
+def resolve_touches(plan: Plan, known: SolvedTrajectory | None = None) -> Plan:
+    """Solve the ball's trajectory and move the plan's key moments to its touches.
+
+    Args:
+        plan: the plan.
+        known: the trajectory, where an earlier take of the same track has it.
+    Returns:
+        The plan; without a trajectory where it is not to be solved or the track has no ball.
+    """
+    if not plan.solve_touches:
+        return plan if plan.solved is None else replace(plan, solved=None)
+    trajectory = plan.solved or known or solve_track_ball(plan)
+    return plan if trajectory is None else replace(plan, solved=trajectory,
+                                                   timeline=_match_touches(plan.timeline, trajectory.touches))
+
+
+def solve_track_ball(plan: Plan) -> SolvedTrajectory | None:
+    """Solve the ball's trajectory from the samples of one player's track; None where these are too few."""
+    from ..ball.tracked.solve import solve_ball
+
+    try:
+        solved = solve_ball(plan.track)
+    except InputError:
+        return None
+    return build_trajectory(solved, plan.track.name, plan)
+
+
+def build_trajectory(solved: SolvedBall, player: str, plan: Plan) -> SolvedTrajectory:
+    """Convert a solved ball to the trajectory of one player's plan.
+
+    Args:
+        solved: the solved ball.
+        player: name of the player.
+        plan: the player's plan; its time is covered.
+    Returns:
+        The trajectory, with the player's touches marked.
+    """
+    first, last = plan.track.times[[0, -1]]
+    inside = [touch for touch in solved.touches if first <= touch.time <= last]
+    even = np.linspace(first, last, int(np.ceil((last - first) / _STEP)) + 1)
+    times = np.union1d(even, [touch.time for touch in inside])
+    begins, ends = solved.pieces[0].start, solved.pieces[-1].end
+    pairs = zip(solved.pieces, solved.pieces[1:])
+    # gaps between pieces in which the ball is not known
+    gaps = np.array([[before.end, after.start] for before, after in pairs]).reshape(-1, 2)
+    unknown = (times < begins) | (times > ends)
+    for end, start in gaps[gaps[:, 1] - gaps[:, 0] > _STEP]:
+        unknown |= (times > end) & (times < start)
+    ball = np.maximum(solved.ball.at(times), [-np.inf, -np.inf, BALL_RADIUS])
+    ball = np.where(unknown[:, None], np.nan, ball)
+    seen = solved.times[solved.measured]
+    return SolvedTrajectory(times, ball, _is_far(times, seen),
+                            tuple(_build_touch(touch, player, plan) for touch in inside))
+
+
+def _is_far(times: np.ndarray, seen: np.ndarray) -> np.ndarray:
+    """Return (M,) bool: times more than _MAX_SAMPLE_GAP seconds from the nearest of the times `seen` (K,)."""
+    if len(seen) < 2:
+        return np.ones(len(times), bool)
+    after = np.clip(np.searchsorted(seen, times), 1, len(seen) - 1)
+    return np.minimum(np.abs(times - seen[after - 1]), np.abs(seen[after] - times)) > _MAX_SAMPLE_GAP
+
+
+def _build_touch(touch: SolvedTouch, player: str, plan: Plan) -> PlayerTouch:
+    """Convert a solved touch to this player's view: own touch or not, and the part if the height is known."""
+    is_own: bool | None = touch.player == player
+    if not touch.player:
+        place = [np.interp(touch.time, plan.track.times, plan.track.positions[:, axis]) for axis in (0, 1)]
+        is_own = None if np.linalg.norm(touch.position[:2] - place) <= _WITHIN else False
+    heights = plan.track.ball_height_known[np.abs(plan.track.times - touch.time).argmin()]
+    part = touch.part if heights or touch.kind == THROW_IN else ""
+    return PlayerTouch(touch.time, is_own, part, touch.kind)
+
+
+def _match_touches(timeline: Timeline, touches: tuple[PlayerTouch, ...]) -> Timeline:
+    """Move key moments to the touches that fit them best, each touch for one, in the order of both.
+
+    Key moments and touches are aligned like two lines of text (edit distance): a key moment without a touch costs
+    MAX_TOUCH_OFFSET, one with a touch the seconds between them and what of the touch does not fit its labels.
+    """
+    keys = [replace(key, solved=None) for key in timeline.keys]
+    own_touches = [touch for touch in touches if touch.is_own is not False]
+    best = np.full((len(keys) + 1, len(own_touches) + 1), np.inf)
+    best[0], choices = 0.0, np.zeros((len(keys) + 1, len(own_touches) + 1), int)
+    # best[row, column]: lowest cost of aligning the first `row` key moments with the first `column` touches;
+    # taken: 0 the key moment stays, 1 the touch is skipped, 2 they are matched
+    for row, key in enumerate(keys, 1):
+        for column in range(len(own_touches) + 1):
+            costs = [best[row - 1, column] + MAX_TOUCH_OFFSET]
+            if column:
+                costs += [best[row, column - 1], best[row - 1, column - 1]
+                          + _compute_mismatch(key, own_touches[column - 1])]
+            choices[row, column] = int(np.argmin(costs))
+            best[row, column] = min(costs)
+    row, column, moved = len(keys), len(own_touches), keys[:]
+    # trace back from the last cell: 0 moves up, 1 moves left, 2 moves both
+    while row:
+        choice = choices[row, column]
+        if choice == 2:
+            moved[row - 1] = replace(keys[row - 1], solved=own_touches[column - 1].time)
+        row, column = row - (choice != 1), column - (choice > 0)
+    return replace(timeline, keys=tuple(_restore_order(moved)))
+
+
+def _compute_mismatch(key: KeyMoment, touch: PlayerTouch) -> float:
+    """Compute how far a touch is from a key moment and its labels, in seconds; inf where it cannot be meant."""
+    part, words, off = find_striking_part(key.words), set(key.words), abs(touch.time - key.time)
+    if part is None or off > MAX_TOUCH_OFFSET:
+        return np.inf
+    kinds = _SENDING_KINDS if _SENDING & words else _TAKING_KINDS if _TAKING & words else {touch.kind}
+    unlike = _UNKNOWN_PLAYER_COST * (touch.is_own is None) + _OTHER_KIND_COST * (touch.kind not in kinds)
+    unlike += _OTHER_PART_COST * (touch.part not in ("", part))
+    return off + unlike
+
+
+def _restore_order(keys: list[KeyMoment]) -> list[KeyMoment]:
+    """Restore the requested time of key moments that would pass one another by their solved times."""
+    while True:
+        pairs = list(enumerate(zip(keys, keys[1:])))
+        crossing = [n for n, (a, b) in pairs if a.resolved_time > b.resolved_time or a.resolved_time == b.resolved_time
+                    and a.time < b.time]
+        if not crossing:
+            return keys
+        for number in {m for n in crossing for m in (n, n + 1)}:
+            keys[number] = replace(keys[number], solved=None)
+
+
+def report_missing_touches(take: Take, plan: ResolvedPlan) -> list[str]:
+    """Report key moments that request a touch where the trajectory has none, and dribbles without a touch.
+
+    Args:
+        take: the take of `apply_trajectory`.
+        plan: the resolved plan.
+    """
+    if plan.trajectory is None:
+        message = "the ball's touches are not solved: the track has no ball, or too few samples of it"
+        return [message] if plan.requested.solve_touches else []
+    missing: list[str] = [
+        TimedMessage(
+            f"{key.time:g} s: the ball's trajectory has no touch for '{' '.join(key.words)}' within {MAX_TOUCH_OFFSET:g} s; "
+            "the key moment stays at its time", (key.time, key.time),
+        ) for key in plan.timeline.keys if find_striking_part(key.words) and key.solved is None
+    ]  # fmt: skip
+    touched = np.array([take.start_time + push.first / take.motion.fps for push in take.dribble_touches])
+    return missing + [
+        TimedMessage(
+            f"{span.start:g}-{span.end:g} s: no foot touches the ball in this "
+            f"'{' '.join(sorted(_CARRYING.intersection(span.words)))}': it is too short, or no foot "
+            "is near the ball", (span.start, span.end),
+        ) for span in plan.timeline.spans
+        if _CARRYING.intersection(span.words) and not ((touched >= span.start) & (touched <= span.end)).any()
+    ]  # fmt: skip
+
+
+def apply_trajectory(take: Take, plan: ResolvedPlan) -> Take:
+    """Lead the ball of a take along its solved trajectory, through the places where it was met, and dribble it step by
+    step.
+
+    Args:
+        take: the take with the ball as it was met.
+        plan: the resolved plan.
+    Returns:
+        The take; unchanged where nothing is solved.
+    """
+    if plan.trajectory is None or take.ball is None:
+        return replace(take, solved=plan.trajectory)
+    fps, contact_ball, times = take.motion.fps, take.ball.positions, take.ball.times
+    held = [held_frames(key.frame, len(contact_ball)) for key in _list_ball_keys(take)]
+    course_changes = [(touch.time - take.start_time) * fps for touch in plan.trajectory.touches]
+    trajectory, filled = plan.trajectory.interpolate(times)
+    path = np.where(np.isfinite(trajectory), trajectory, contact_ball)
+    known = np.interp(times, plan.track.times, plan.track.ball_height_known.astype(float)) > 0.5
+    for number, pair in enumerate(held):
+        path = add_flight_arc(path, float(np.mean(pair)), float(contact_ball[list(pair), 2].mean()), ~known, fps)
+        path = lead_ball_through(path, pair, contact_ball[list(pair)],
+                                 _find_course_changes(pair, held[:number] + held[number + 1 :], course_changes, fps))
+    stretches = [
+        ((span.start - take.start_time) * fps, (span.end - take.start_time) * fps)
+        for span in plan.timeline.spans if _CARRYING.intersection(span.words)
+    ]  # fmt: skip
+    foot_contacts = take.contacts if take.stepped is None else take.contacts | take.stepped
+    dribbled = plan_dribbles(take.motion.skeleton, take.motion.root_positions, take.motion.rotations,
+                             foot_contacts=foot_contacts, ball=path, stretches=stretches, held=held, fps=fps,
+                             measured=take.ball.measured & ~filled, course_changes=course_changes)
+    pushes = tuple(DribbleTouch(push.first, push.last, push.side) for push in dribbled.pushes)
+    ball = replace(take.ball, positions=dribbled.ball)
+    return replace(take, ball=ball, solved=plan.trajectory, contact_ball=take.ball, dribble_touches=pushes)
+
+
+def _list_ball_keys(take: Take) -> list[KeyResult]:
+    """List the key moments in which some part meets the ball, in order of time."""
+    skeleton = take.motion.skeleton
+    return sorted((key for key in take.keys if build_surfaces(skeleton, key.contact_labels)), key=lambda key: key.frame)
+
+
+def _find_course_changes(pair: tuple[int, int], others: list[tuple[int, int]], course_changes: list[float],
+                         fps: float) -> tuple[int, int]:
+    """Return the frames before and after a touch at which the ball changes its course for other reasons."""
+    low = [*(p[1] for p in others if p[1] <= pair[0]), *(int(np.floor(turn)) for turn in course_changes if turn
+                                                         < pair[0] - 1.5)]
+    high = [*(p[0] for p in others if p[0] >= pair[1]), *(int(np.ceil(turn)) for turn in course_changes if turn
+                                                          > pair[1] + 1.5)]
+    return max(low, default=pair[0] - int(fps)), min(high, default=pair[1] + int(fps))

@@ -1,0 +1,179 @@
+"""The transitions with the lowest cost from the states of one slot to the candidates of the next.
+
+A beam keeps a few dozen of the hundred thousand pairs of a state and a candidate. The change of pose, which bounds the
+cost of a pair from below, is computed for all of them at once; feet, replayed stretches and playback rates only for
+pairs that may still be kept. The result is the same as if every pair were evaluated.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, fields
+
+import numpy as np
+
+_SAME = 0.05  # library frames: places closer than this are the same, apart from rounding
+
+
+@dataclass(frozen=True, eq=False)
+class SlotCandidates:
+    """K candidates of a slot.
+
+    Attributes:
+        clip: (K,) clip index.
+        start: (K,) fractional library frame.
+        rate: (K,) playback rate.
+        cost: (K,) of what is shown from there on.
+        piece: (K,) piece of a key moment that begins there, or -1.
+    """
+
+    clip: np.ndarray
+    start: np.ndarray
+    rate: np.ndarray
+    cost: np.ndarray
+    piece: np.ndarray
+
+    def select(self, which: np.ndarray) -> "SlotCandidates":
+        """Select candidates by index."""
+        return SlotCandidates(*(getattr(self, field.name)[which] for field in fields(self)))
+
+
+class BeamTransitions:
+    """All transitions from B states to the candidates of the next slot.
+
+    A transition costs a cut, unless the clip shows that frame next anyway, and the change of playback rate. Costs are
+    float32 above `base`, the cost of the cheapest state, so that they stay exact in long searches.
+
+    Attributes:
+        costs: the search's `PathCosts`.
+        clip: (B,) clip that each state shows.
+        end: (B,) library frame at which it ends.
+        rate: (B,) playback rate.
+        seen: (B, buckets) bool, what it has shown lately.
+        base: cost of the cheapest state.
+        above: (B,) float32, cost above the base.
+    """
+
+    def __init__(self, costs, clip: np.ndarray, end: np.ndarray, rate: np.ndarray, cost: np.ndarray, seen: np.ndarray):
+        self.costs, self.clip, self.end, self.seen = costs, clip, end, seen
+        self.rate = rate.astype(np.float32)
+        self.base = float(cost.min())
+        self.above = (cost - self.base).astype(np.float32)
+
+    def compute_all(self, to: SlotCandidates) -> np.ndarray:
+        """Compute the cost (B, K) of each transition, including what the candidate shows."""
+        least = self._compute_lower_bounds(to)
+        pairs = np.arange(least.size)
+        return self.base + self._compute_full_costs(to, least, pairs).reshape(least.shape).T.astype(float)
+
+    def find_cheapest(self, to: SlotCandidates, known: np.ndarray, kept_count: int) -> tuple[np.ndarray, np.ndarray,
+            np.ndarray]:
+        """Find the cheapest transition to each candidate that may be kept.
+
+        Of candidates that begin no piece, those are left out that cannot be among the `kept_count` cheapest of them and
+        of `known`.
+
+        Args:
+            to: K candidates.
+            known: (L,) costs of other ways to fill the slot.
+            kept_count: how many the beam keeps.
+        Returns:
+            Numbers of the candidates (k,), costs (k,), and the states (k,) before them.
+        """
+        limit = np.partition(known, kept_count - 1)[kept_count - 1] - self.base if len(known) >= kept_count else np.inf
+        # drop candidates whose own cost already exceeds the limit set by `known`
+        near = np.flatnonzero((to.piece >= 0) | (to.cost <= limit))
+        to = to.select(near)
+        least = self._compute_lower_bounds(to)
+        count = least.shape[1]
+        # bound[k]: full cost of the pair with the lowest lower bound, so an upper bound of the candidate's cost
+        first = np.arange(len(least)) * count + np.argmin(least, axis=1)
+        bound = self._compute_full_costs(to, least, first)
+        free = to.piece < 0
+        # no free candidate above the `kept_count`-th best of all upper bounds can be kept
+        rivals = np.concatenate([bound[free], known - self.base])
+        if len(rivals) > kept_count:
+            bound[free] = np.minimum(bound[free], np.partition(rivals, kept_count - 1)[kept_count - 1])
+        # only pairs whose lower bound is within the upper bound are evaluated in full; flat index = candidate * B +
+        # state
+        pairs = np.flatnonzero(least <= bound[:, None])
+        candidate = pairs // count
+        cost = self._compute_full_costs(to, least, pairs)
+        # `pairs` is sorted by candidate, so each candidate is one run
+        begins = np.flatnonzero(np.diff(candidate, prepend=-1))
+        at = _find_cheapest_of_runs(cost, begins)
+        at = at[cost[at] <= bound[candidate[at]]]
+        return near[candidate[at]], self.base + cost[at].astype(float), pairs[at] % count
+
+    def _compute_lower_bounds(self, to: SlotCandidates) -> np.ndarray:
+        """Compute the lower bounds (K, B) float32, above the base, of all transitions."""
+        costs = self.costs
+        end, start = costs.round_frame(self.end), costs.round_frame(to.start)
+        lower_bound = costs.apart(start, end)
+        leave, enter = costs.compute_cut_ends(end, start)
+        cost = to.cost.astype(np.float32)
+        lower_bound += (enter + cost)[:, None]
+        lower_bound += leave + self.above
+        # without a cut nothing but the costs of state and candidate remains
+        candidate, state = self._find_uncut_pairs(to)
+        lower_bound[candidate, state] = self.above[state] + cost[candidate]
+        return lower_bound
+
+    def _compute_full_costs(self, to: SlotCandidates, lower_bound: np.ndarray, pairs: np.ndarray) -> np.ndarray:
+        """Compute the full costs of some pairs.
+
+        Args:
+            to: K candidates.
+            lower_bound: (K, B) lower bounds.
+            pairs: (P,) flat indices into `lower_bound`.
+        Returns:
+            (P,) float32, above the base.
+        """
+        costs, weights = self.costs, self.costs.weights
+        candidate, state = np.divmod(pairs, lower_bound.shape[1])
+        start, end = to.start[candidate], self.end[state]
+        frame = costs.round_frame(start)
+        cut = np.float32(weights.feet) * costs.measure_foot_jump(costs.round_frame(end), frame)
+        cut += np.float32(weights.replay) * self.seen[state, costs.index.bucket[frame]]
+        cut[_is_same_frame(start, end) & (to.clip[candidate] == self.clip[state])] = 0.0
+        rate = np.float32(weights.rate_change) * np.abs(to.rate.astype(np.float32)[candidate] - self.rate[state])
+        return lower_bound.ravel()[pairs] + cut + rate
+
+    def _find_uncut_pairs(self, to: SlotCandidates) -> tuple[np.ndarray, np.ndarray]:
+        """Find all pairs that continue without a cut.
+
+        Returns:
+            Candidates (M,) and states (M,).
+        """
+        # states sorted by their end; for each candidate the range low .. high of ends within _SAME
+        by_end = np.argsort(self.end, kind="stable")
+        low, high = (np.searchsorted(self.end[by_end], to.start + off) for off in (-_SAME, _SAME))
+        candidate = np.flatnonzero(high > low)
+        many = high[candidate] - low[candidate]
+        # enumerate all ranges in one array: position in the run of repeats plus the run's own `low`
+        at = np.arange(many.sum()) - np.repeat(np.cumsum(many) - many - low[candidate], many)
+        candidate, state = np.repeat(candidate, many), by_end[at]
+        meets = _is_same_frame(to.start[candidate], self.end[state]) & (to.clip[candidate] == self.clip[state])
+        return candidate[meets], state[meets]
+
+
+def _is_same_frame(start: np.ndarray, end: np.ndarray) -> np.ndarray:
+    """Return (P,) bool: whether library frames are the same, apart from rounding."""
+    return np.abs(start - end) < _SAME
+
+
+def _find_cheapest_of_runs(cost: np.ndarray, begins: np.ndarray) -> np.ndarray:
+    """Find the first cheapest entry of each run.
+
+    Args:
+        cost: (P,), runs one after the other.
+        begins: (k,) where the runs begin.
+    Returns:
+        (k,) indices.
+    """
+    if not len(begins):
+        return begins
+    best = np.minimum.reduceat(cost, begins)
+    equal = np.flatnonzero(cost == np.repeat(best, np.diff(np.append(begins, len(cost)))))
+    # number of the run of each minimum; where it grows is the first minimum of a run
+    run = np.searchsorted(begins, equal, side="right")
+    return equal[np.diff(run, prepend=0) > 0]

@@ -1,0 +1,176 @@
+"""Candidates of the path search that depend only on the library: computed once and cached with it."""
+
+from __future__ import annotations
+
+import weakref
+from dataclasses import dataclass, fields
+
+import numpy as np
+from scipy.ndimage import maximum_filter1d
+
+from ...annotation import DISCRETE
+from ...base.vectors import arctan2
+from ...library.library import Library
+from .block_costs import AnnotationCost
+
+SLOT = 8  # output frames of a usual slot
+PLAYBACK_RATES = np.array([0.875, 0.9375, 1.0, 1.0625, 1.125])  # playback rates that are tried
+BUCKET = 40  # library frames that count as one for replayed stretches
+JERK_REACH = 8  # frames to either side over which the jerk of a transition is measured
+_SPEED_CLASSES = (1.0, 2.0, 3.0, 4.5)  # m/s between the classes in which jerk is compared
+USUAL_STANCE = 0.3  # s with both feet on the ground, in a walk
+_LONGEST_STANCE = 2.0  # s beyond the usual stance at which its cost stops growing
+_SHOWN = 14  # library frames that a long slot shows at the fastest playback rate
+
+
+@dataclass(frozen=True, eq=False)
+class RatePairs:
+    """K pairs of a playback rate and a library frame at which a slot may begin.
+
+    Attributes:
+        number: (K,) index of the playback rate.
+        frame: (K,) library frame.
+        speed: (K,) m/s over the slot.
+        turn: (K,) rad over the slot.
+        offset: (K,) rad from the direction of travel to the facing.
+        long_stance: (K,) s of contact of both feet beyond that of a walk.
+    """
+
+    number: np.ndarray
+    frame: np.ndarray
+    speed: np.ndarray
+    turn: np.ndarray
+    offset: np.ndarray
+    long_stance: np.ndarray
+
+    def slice_pairs(self, which: slice) -> "RatePairs":
+        """Select a slice of the pairs."""
+        return RatePairs(*(getattr(self, field.name)[which] for field in fields(self)))
+
+
+class CandidateIndex:
+    """What N library frames at R playback rates have for a slot that begins there.
+
+    Attributes:
+        frames: the library's frames.
+        annotation: their annotation costs.
+        speed: (R, N) m/s over a slot.
+        turn: (R, N) rad over a slot.
+        valid: (R, N) bool, whether the clip lasts that long and is allowed.
+        by_speed: (K,) the valid pairs, flat indices into (R, N), in order of their speeds.
+        offset, long_stance: (N,), see `RatePairs`.
+        is_synthetic: (N,) bool, frames of synthetic clips.
+        is_in_contact: (N, 2) bool, feet in contact.
+        wild_before, wild_after: (N,), see `measure_wildness`.
+        bucket: (N,) int; frames of one bucket look alike when they are shown twice.
+    """
+
+    _cached: weakref.WeakKeyDictionary[Library, dict[bytes, "CandidateIndex"]] = weakref.WeakKeyDictionary()
+
+    @classmethod
+    def for_library(cls, library: Library, allowed: np.ndarray) -> "CandidateIndex":
+        """Return the cached index of a library for the clips of `allowed` (C,) bool, built on first use."""
+        cached = cls._cached.setdefault(library, {})
+        if allowed.tobytes() not in cached:
+            cached[allowed.tobytes()] = cls(library, allowed)
+        return cached[allowed.tobytes()]
+
+    def __init__(self, library: Library, allowed: np.ndarray):
+        """Build the index; `for_library` does so only once."""
+        self.frames = library.frames
+        self.annotation = AnnotationCost(library.frames)
+        self.is_synthetic = np.array([clip.is_synthetic for clip in library.clips])[library.frames.clip]
+        self.bucket = (np.arange(len(library.frames)) // BUCKET).astype(int)
+        speed, turn, lasts = map(np.stack, zip(*(compute_speed_and_turn(library, rate) for rate in PLAYBACK_RATES)))
+        self.speed, self.turn = speed.astype(np.float32), turn.astype(np.float32)
+        self.valid = lasts & allowed[library.frames.clip]
+        usable = np.flatnonzero(self.valid)
+        self.by_speed = usable[np.argsort(self.speed.ravel()[usable], kind="stable")]
+        self.offset = -arctan2(self.frames.velocity[:, 1], self.frames.velocity[:, 0]).astype(np.float32)
+        self.long_stance = np.clip(library.stance_seconds - USUAL_STANCE, 0.0, _LONGEST_STANCE).astype(np.float32)
+        self.is_in_contact = library.feet_in_contact
+        self.wild_before, self.wild_after = measure_wildness(library)
+        self._by_words: dict[frozenset[str], tuple[np.ndarray, np.ndarray]] = {}
+        self._sorted: dict[frozenset[str], RatePairs] = {}
+        self._showing: dict[frozenset[str], np.ndarray] = {}
+
+    def build_pairs(self, number: np.ndarray, frame: np.ndarray) -> RatePairs:
+        """Build the pairs of PLAYBACK_RATES[number (K,)] and library frame (K,)."""
+        played = self.speed[number, frame], self.turn[number, frame]
+        return RatePairs(number, frame, *played, self.offset[frame], self.long_stance[frame])
+
+    def pairs_by_speed(self, avoid: frozenset[str] = frozenset()) -> RatePairs:
+        """Return all valid pairs in order of their speeds, without those that show a label of `avoid` unless all do."""
+        if avoid not in self._sorted:
+            # flat index = rate * N + frame, so `% N` is the frame
+            fine = ~self.shows_labels(avoid)[self.by_speed % len(self.frames)]
+            selected = self.by_speed[fine] if avoid and fine.any() else self.by_speed
+            number, frame = np.divmod(selected, len(self.frames))
+            self._sorted[avoid] = self.build_pairs(number.astype(np.int8), frame.astype(np.int32))
+        return self._sorted[avoid]
+
+    def shows_labels(self, words: frozenset[str]) -> np.ndarray:
+        """Return (N,) bool: a slot from there on shows one of the labels."""
+        if words not in self._showing:
+            carried = self.annotation.find_frames_with(words)
+            # the filter looks at the frames ahead only, by its origin
+            self._showing[words] = maximum_filter1d(carried, _SHOWN, origin=-(_SHOWN // 2), mode="nearest")
+        return self._showing[words]
+
+    def measure_lacking(self, words: frozenset[str]) -> tuple[np.ndarray, np.ndarray]:
+        """Compute what frames lack of requested labels (none: all will do).
+
+        Args:
+            words: the labels.
+        Returns:
+            (N,) share of them that each frame lacks; (N,) bool, whether a slot from there on shows an action (a kick, a
+            jump) that is not requested, or nothing that is annotated.
+        """
+        if words not in self._by_words:
+            names, frames = self.frames.vocabulary, self.frames
+            missing = self.annotation.compute_missing_share(words) if words else np.zeros(len(frames))
+            actions = [i for i, word in enumerate(names) if word in DISCRETE and word not in words]
+            acts = maximum_filter1d(frames.words[:, actions].any(axis=1), SLOT + 1, origin=-(SLOT // 2), mode="nearest")
+            self._by_words[words] = missing.astype(np.float32), acts | ~frames.words.any(axis=1)
+        return self._by_words[words]
+
+
+def measure_wildness(library: Library) -> tuple[np.ndarray, np.ndarray]:
+    """Compute by how much the largest jerk around each frame exceeds what is usual at its speed.
+
+    The jerk of a transition is measured over such windows (../shared/metrics.md).
+
+    Returns:
+        (N,) and (N,) for the JERK_REACH frames before and after each frame, as a share; 0 where it does not exceed it.
+    """
+    frames = library.frames
+    kind = np.digitize(frames.speed, _SPEED_CLASSES)
+    around = maximum_filter1d(frames.jerk, 2 * JERK_REACH + 1, mode="nearest")
+    # 90th percentile in the speed class; inf where the library has no frame of the class
+    usual = np.array([np.percentile(around[kind == k], 90) if np.any(kind == k) else np.inf for k in range(5)])
+    windows = (maximum_filter1d(frames.jerk, JERK_REACH + 1, mode="nearest", origin=o * (JERK_REACH // 2))
+               for o in (1, -1))
+    return tuple(np.maximum(window / usual[kind] - 1.0, 0.0).astype(np.float32) for window in windows)
+
+
+def compute_speed_and_turn(library: Library, rate: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Compute what a slot plays if it starts at each library frame.
+
+    Args:
+        library: the clips, N frames.
+        rate: playback rate.
+    Returns:
+        (N,) mean speed m/s, (N,) turn of the body rad, (N,) whether the clip lasts that long.
+    """
+    frames = library.frames
+    after = np.arange(len(frames)) + SLOT * rate
+    valid = frames.remaining_in_clip >= SLOT * rate
+    low = np.minimum(np.floor(after).astype(int), len(frames) - 2)
+    weight = after - low
+    # keep indices inside the library where the clip ends too soon; `valid` excludes them
+    weight[~valid] = 0.0
+    low[~valid] = np.minimum(np.arange(len(frames))[~valid], len(frames) - 2)
+    path = frames.path[low] * (1 - weight)[:, None] + frames.path[low + 1] * weight[:, None]
+    heading = frames.heading[low] * (1 - weight) + frames.heading[low + 1] * weight
+    speed = np.linalg.norm(path - frames.path, axis=1) * library.fps / SLOT
+    return speed, heading - frames.heading, valid

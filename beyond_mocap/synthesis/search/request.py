@@ -1,0 +1,242 @@
+"""The request at the library's rate: what every frame has to show, and which clips can serve each key moment."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from ...annotation import (
+    AVOID_PREFIX,
+    STANDING_SPEED,
+    TRANSITION,
+    KeyMoment,
+    Timeline,
+    avoided_labels_per_frame,
+    choose_gaits,
+    compute_gait_thresholds,
+    fill_timeline,
+    labels_per_frame,
+    sort_labels,
+)
+from ...base.errors import NotInLibraryError, TimedMessage, format_seconds
+from ...library.automatic_locomotion import build_automatic_labels
+from ...library.keys import Key, list_nearest_labels, select_keys, select_nearest_keys, select_substitutes
+from ...library.library import Library
+from ...motion.track import SampledTrack
+from ..plan import Plan, ResolvedPlan
+from .preferences import LagPreference, build_lag_preference, compute_style_cost
+
+PAPERS_OMEGA = 4.0  # Faustino 2024, §3.1.1
+
+Labels = frozenset[str] | None
+
+
+@dataclass(frozen=True, kw_only=True)
+class RequestedKey:
+    """A key moment of a request.
+
+    Attributes:
+        requested: the key moment of the timeline.
+        frame: fractional frame at the library's rate.
+        choices: key moments of clips that may serve it; empty: locomotion is shown instead.
+        used_instead: the labels used where the library lacks the requested ones, else None.
+        is_ball_height_known: whether the feed measured the ball's height then.
+        rates: playback rates of its clip; none: `slots.KEY_PLAYBACK_RATES`.
+    """
+
+    requested: KeyMoment
+    frame: float
+    choices: tuple[Key, ...]
+    used_instead: tuple[str, ...] | None
+    is_ball_height_known: bool = False
+    rates: tuple[float, ...] = ()
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class SearchRequest:
+    """A request of T frames at the library's rate.
+
+    Attributes:
+        plan: the plan, with the settings of the costs.
+        track: the player at the library's rate.
+        requested_labels: requested labels per frame, None where continuity alone counts.
+        gait: (T,) index into the library's gaits.
+        timeline: the timeline, filled.
+        keys: the key moments, in order of time.
+        allowed: (C,) bool, clips to use.
+        warnings: what the library lacks of the request.
+        avoided: per frame the labels that must not be shown; empty where all may be shown throughout.
+        style_cost: (N,) float32, cost per slot of library frames without the requested style, None where none is
+            requested.
+        weak_foot: side of the foot that key moments without a side avoid, or "".
+        lag_preference: the player's preference for a lag, None for none.
+    """
+
+    plan: Plan
+    track: SampledTrack
+    requested_labels: tuple[Labels, ...]
+    gait: np.ndarray
+    timeline: Timeline
+    keys: tuple[RequestedKey, ...]
+    allowed: np.ndarray
+    warnings: tuple[str, ...]
+    avoided: tuple[frozenset[str], ...] = ()
+    style_cost: np.ndarray | None = None
+    weak_foot: str = ""
+    lag_preference: LagPreference | None = None
+
+    def __len__(self) -> int:
+        return len(self.track.times)
+
+    def list_avoided(self, first: int, end: int) -> frozenset[str]:
+        """Return all labels that are avoided in any of the frames first .. end."""
+        return frozenset().union(*self.avoided[max(first, 0) : end])
+
+
+def build_request(library: Library, plan: ResolvedPlan) -> SearchRequest:
+    """Convert a plan to frames at the library's rate.
+
+    Args:
+        library: the clips.
+        plan: the resolved plan.
+    Raises:
+        NotInLibrary: for a key moment whose labels no clip carries, unless the plan continues with the nearest.
+    """
+    settings = plan.requested
+    track = plan.sample_track(library.fps)
+    gaits = library.gaits
+    speeds = np.array([gait.speed for gait in gaits])
+    labelled = plan.method == "path" and not settings.omega
+    thresholds = library.gait_thresholds if labelled else compute_gait_thresholds(speeds, settings.omega
+                                                                                  or PAPERS_OMEGA)
+    gait = choose_gaits(track.speed, library.fps, speeds, thresholds)
+    avoided = avoided_labels_per_frame(plan.timeline, track.times)
+    gait = _replace_avoided_gaits(library, gait, track.speed, avoided)
+    automatic = build_automatic_labels(library, gait, track)
+    automatic = [tuple(word for word in words if word not in avoid) for words, avoid in zip(automatic, avoided)]
+    timeline = fill_timeline(plan.timeline, track.times, automatic)
+    allowed = np.array([settings.mirror or not clip.mirrored for clip in library.clips])
+    warnings: list[str] = []
+    keys = tuple(_build_key(
+        library, moment, track, gait=gait, allowed=allowed, use_nearest=settings.nearest, warnings=warnings,
+    ) for moment in timeline.keys)
+    known = plan.track.ball_height_known
+    nearest_sample = [int(np.argmin(np.abs(plan.track.times - key.requested.resolved_time))) for key in keys]
+    keys = tuple(replace(key, is_ball_height_known=bool(known[at])) for key, at in zip(keys, nearest_sample))
+    requested_labels = _clear_around_keys(labels_per_frame(timeline, track.times), keys, library)
+    warnings += _report_missing_labels(library, plan.timeline)
+    avoided = tuple(avoided) if any(avoided) else ()
+    off_style = compute_style_cost(library, settings.style, settings.style_weight, warnings)
+    weak_foot = {"left": "right", "right": "left"}.get(settings.strong_foot, "")
+    lag_preference = build_lag_preference(library, settings.lag, settings.variety, float(track.times[0]))
+    return SearchRequest(plan=settings, track=track, requested_labels=tuple(requested_labels), gait=gait,
+                         timeline=timeline, keys=keys, allowed=allowed, warnings=tuple(warnings), avoided=avoided,
+                         style_cost=off_style, weak_foot=weak_foot, lag_preference=lag_preference)
+
+
+def _replace_avoided_gaits(library: Library, gait: np.ndarray, speed: np.ndarray,
+                           avoided: list[frozenset[str]]) -> np.ndarray:
+    """Replace gaits (T,) with an avoided label by the gait nearest in speed, if there is one.
+
+    Near by ratio, since a walking player rather jogs than stands still; speed (T,) m/s.
+    """
+    out = gait.copy()
+    for frame in [frame for frame, avoid in enumerate(avoided) if library.gaits[gait[frame]].word in avoid]:
+        others = [n for n, other in enumerate(library.gaits) if other.label not in avoided[frame]]
+        away = [
+            abs(np.log((library.gaits[n].speed + STANDING_SPEED) / (speed[frame] + STANDING_SPEED))) for n in others
+        ]
+        out[frame] = others[int(np.argmin(away))] if others else gait[frame]
+    return out
+
+
+def _build_key(library, moment: KeyMoment, track, gait, allowed, use_nearest: bool,
+               warnings: list[str]) -> RequestedKey:
+    """Build one key moment: its frame and the clips that may serve it."""
+    frame = float(np.clip((moment.resolved_time - track.times[0]) * library.fps, 0, len(track.times) - 1))
+    usable = tuple(key for key in library.keys if allowed[key.clip] and not library.clips[key.clip].made)
+    synthetic = tuple(key for key in library.keys if allowed[key.clip] and library.clips[key.clip].made)
+    if moment.avoid:
+        usable, synthetic = _remove_avoided(moment, usable, synthetic, warnings)
+    # recordings that carry the labels first, then synthetic clips
+    choices = select_keys(usable, moment.words)
+    if choices:
+        return RequestedKey(requested=moment, frame=frame,
+                            choices=(*choices, *select_substitutes(choices, synthetic, moment.words)),
+                            used_instead=None)
+    nearest = list_nearest_labels(usable, moment.words)
+    line = f"line {moment.line}, " if moment.line else ""
+    problem = f"the library has no clip for '{' '.join(moment.words)}'"
+    text = f"{line}{format_seconds(moment.time)} s: {problem}; nearest: {_format_labels(nearest)}"
+    if not use_nearest:
+        way_out = "add such a clip, or turn on Nearest Labels"
+        raise NotInLibraryError(f"{text}; use one of these, {way_out}", nearest)
+    choices = select_nearest_keys(usable, moment.words)
+    gait_words = library.gaits[int(gait[int(round(frame))])].words
+    used = sort_labels(choices[0].labels) if choices else gait_words
+    instead = " ".join(used) if choices else "locomotion continues there"
+    warnings.append(TimedMessage(f"{text}; used instead: {instead}", (moment.time, moment.time)))
+    return RequestedKey(requested=moment, frame=frame,
+                        choices=(*choices, *select_substitutes(choices, synthetic, moment.words)), used_instead=used)
+
+
+def _remove_avoided(moment: KeyMoment, usable: tuple[Key, ...], synthetic: tuple[Key, ...], warnings: list[str]):
+    """Remove recorded and synthetic keys with labels that the moment avoids.
+
+    Where no recorded one with its labels would be left, all stay and a warning is added.
+    """
+    remaining = tuple(tuple(key for key in keys if not key.labels.intersection(moment.avoid))
+                      for keys in (usable, synthetic))
+    if select_keys(usable, moment.words) and not select_keys(remaining[0], moment.words):
+        avoided = " ".join(AVOID_PREFIX + word for word in moment.avoid)
+        problem = f"no clip for '{' '.join(moment.words)}' is {avoided}"
+        text = f"{format_seconds(moment.time)} s: {problem}; a clip with an avoided label is used"
+        warnings.append(TimedMessage(text, (moment.time, moment.time)))
+        return usable, synthetic
+    return remaining
+
+
+def _format_labels(labels: tuple[str, ...]) -> str:
+    """Join labels for a message."""
+    return " | ".join(labels) if labels else "the library has no key moments"
+
+
+def _report_missing_labels(library: Library, timeline: Timeline) -> list[str]:
+    """Report each label of a span that no clip carries."""
+    requested = {word for span in timeline.spans for word in span.words} - {TRANSITION}
+    lacking = sorted(requested - library.labels)
+    return [f"no clip carries the label '{word}': spans with it follow their other labels" for word in lacking]
+
+
+def _clear_around_keys(requested_labels: list[Labels], keys: tuple[RequestedKey, ...],
+                       library: Library) -> list[Labels]:
+    """Clear the requested labels around each key moment, for as long as the clips that may serve it need.
+
+    With several clips, the mean of their needs counts.
+
+    Source: Faustino 2024, §3.2.2, where elements of the annotation vector are zero in transitions.
+    """
+    requested_labels = list(requested_labels)
+    for key in keys:
+        if key.choices:
+            entry, leave = np.mean([compute_needed_frames(library, choice) for choice in key.choices], axis=0)
+            low = max(0, int(np.ceil(key.frame - entry)))
+            for frame in range(low, min(len(requested_labels), int(key.frame + leave) + 1)):
+                requested_labels[frame] = None
+    return requested_labels
+
+
+def compute_needed_frames(library: Library, key: Key) -> tuple[float, float]:
+    """Compute how long a key's clip is needed before and after its key frame.
+
+    Returns:
+        Two numbers of frames at the library's rate.
+    """
+    rate = library.fps / library.clips[key.clip].motion.fps
+    return (key.frame - key.start) * rate, (key.end - key.frame) * rate
+
+
+def library_frame(library: Library, key: Key) -> float:
+    """Return a key's place among the library's frames (fractional)."""
+    return float(library.frames.first[key.clip] + key.frame * library.fps / library.clips[key.clip].motion.fps)

@@ -1,0 +1,64 @@
+"""What a foot gives a ball that lies, and kicks made to hit."""
+
+import numpy as np
+import pytest
+
+from beyond_mocap.annotation.striking import FOOT_RADIUS, measure_ball_gap
+from beyond_mocap.ball.flight import Launch, find_crossing, simulate_flight
+from beyond_mocap.ball.physics import FOOTBALL
+from beyond_mocap.motion.humanoid import identify_joints
+from beyond_mocap.motion.motion import forward_kinematics
+from beyond_mocap.synthetic.gestures import build_strike
+from beyond_mocap.throws.ball_release import SPEED_RATIO, AtFoot, compute_launch, strike_ball
+from beyond_mocap.throws.correction import Freedom, correct_motion
+
+R = FOOTBALL.radius
+
+
+def one(ends, velocity, centre):
+    found = strike_ball(np.array([ends], float), np.array([[velocity, velocity]], float), FOOT_RADIUS,
+                        np.array([centre], float), FOOTBALL)  # fmt: skip
+    return found.velocity[0], found.spin[0], found.gap[0]
+
+
+def test_met_square_it_leaves_a_fifth_faster_without_spin():
+    foot = [[-FOOT_RADIUS - R, 0.1, R], [-FOOT_RADIUS - R, -0.1, R]]
+    velocity, spin, gap = one(foot, [20.0, 0.0, 0.0], [0.0, 0.0, R])
+    assert np.allclose(velocity, [20.0 * SPEED_RATIO, 0.0, 0.0]) and np.allclose(spin, 0.0) and abs(gap) < 1e-12
+
+
+def test_met_below_its_middle_it_rises_and_spins_backward():
+    low = np.array([-np.sqrt((FOOT_RADIUS + R) ** 2 - 0.06**2), 0.0, R - 0.06])
+    velocity, spin, _ = one([low + [0.0, 0.1, 0.0], low - [0.0, 0.1, 0.0]], [20.0, 0.0, 0.0], [0.0, 0.0, R])
+    assert 5.0 < np.degrees(np.arctan2(velocity[2], velocity[0])) < 22.0
+    assert spin[1] < -5.0 and np.allclose(spin[[0, 2]], 0.0)
+
+
+def test_friction_has_its_end():
+    # a foot that brushes along the ball hardly moves it
+    foot = [[-FOOT_RADIUS - R, 0.1, R], [-FOOT_RADIUS - R, -0.1, R]]
+    velocity, _, _ = one(foot, [1.0, 20.0, 0.0], [0.0, 0.0, R])
+    assert np.allclose(velocity[0], SPEED_RATIO) and 0.0 < velocity[1] < 0.5 * SPEED_RATIO
+
+
+@pytest.mark.parametrize("lies", [True, False])
+def test_a_kick_hits_another_target(lies):
+    made = build_strike("kick low top", fps=30.0)
+    frame, target = made.key * 30.0, np.array([15.0, 0.0, 0.8])
+    start = compute_launch(made.motion, AtFoot("right"), frame, target, FOOTBALL)[0]
+    target = start + [9.0, 0.6, 0.5]
+    part = AtFoot("right", start if lies else None)
+    found = correct_motion(made.motion, part, frame, target, FOOTBALL, Freedom.anchored())
+    flight = simulate_flight(Launch(0.0, found.position, found.velocity, found.spin), FOOTBALL, 3.0)
+    assert np.linalg.norm(find_crossing(flight, target) - target) < 0.02 and found.displacement < 0.10
+    if lies:
+        assert np.allclose(found.position, start)
+    # the foot touches the ball then, and was not in it a frame before
+    assert found.gap < 1e-3
+    places, turns = forward_kinematics(found.motion)
+    gaps = measure_ball_gap(part.find_surface(found.motion).compute_line(places, turns), FOOT_RADIUS, found.position, R)
+    assert gaps[: int(found.frame)].min() > -0.01
+    legs = identify_joints(found.motion.skeleton).right
+    changed = set(np.argwhere(np.any(found.motion.rotations != made.motion.rotations, axis=2))[:, 1])
+    assert changed <= {legs.upper_leg, legs.lower_leg, legs.foot}
+    assert places[:, legs.toe, 2].min() > -0.02
