@@ -188,9 +188,9 @@ def compare_all(dutch: Match, half: Match, solved: SolvedBall) -> list[FeedResul
             compare_annotation("nl2019, 12.5 Hz", thin_match(half, 2)), compare_annotation("dutch, 8.3 Hz, no heights",
             thin_match(dutch, 3, False)), compare_events(dutch), compare_synthetic("synthetic, 25 Hz, 8 cm"),
             compare_synthetic("synthetic, 25 Hz, 8 cm, half filled", filled=0.5),
-            compare_synthetic("synthetic, 25 Hz, 8 cm, no heights", find_heights=False),
+            compare_synthetic("synthetic, 25 Hz, 8 cm, no heights", heights=False),
             compare_synthetic("synthetic, 10 Hz, 8 cm", fps=10.0),
-            compare_synthetic("synthetic, 10 Hz, 8 cm, no heights", fps=10.0, find_heights=False)]
+            compare_synthetic("synthetic, 10 Hz, 8 cm, no heights", fps=10.0, heights=False)]
 
 
 def section() -> list[str]:

@@ -264,7 +264,7 @@ def _look_through(context, area: bpy.types.Area) -> None:
     """Show the scene's camera in the 3D view, with its whole frame."""
     area.spaces.active.region_3d.view_perspective = "CAMERA"
     region = next(region for region in area.regions if region.type == "WINDOW")
-    with context.temp_override(find_area=area, region=region):
+    with context.temp_override(area=area, region=region):
         bpy.ops.view3d.view_center_camera()
 
 

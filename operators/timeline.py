@@ -170,7 +170,7 @@ def _frame_selection(context) -> None:
     for area in context.screen.areas:
         if area.type == "VIEW_3D":
             region = next(region for region in area.regions if region.type == "WINDOW")
-            with context.temp_override(find_area=area, region=region):
+            with context.temp_override(area=area, region=region):
                 bpy.ops.view3d.view_selected(use_all_regions=False)
 
 

@@ -115,7 +115,7 @@ def synthesize_players(load, settings, steps) -> list[dict]:
         take = recipe.synthesize(clips, plan, progress=steps.progress)
         total = time.perf_counter() - started + library_seconds
         reports.append(load("beyond_mocap.evaluation.report").evaluate(take, plan.track, clips))
-        reports[-1]["seconds"].update(load_labels=load_seconds, library=library_seconds, total=total)
+        reports[-1]["seconds"].update(load=load_seconds, library=library_seconds, total=total)
         player.take = session.store_take(plan, take)
         player.quality, player.moments = quality.describe_quality(reports[-1]), quality.describe_moments(reports[-1])
     return reports

@@ -217,7 +217,7 @@ def write_requested_sheet(options) -> None:
     """Read the files and write the sheet."""
     motion = bvh.read_bvh(options.take, unit=0.01).motion
     last = len(motion) - 1 if options.end is None else min(options.end * motion.fps, len(motion) - 1)
-    step = max(options.compute_all * motion.fps, 1.0)
+    step = max(options.every * motion.fps, 1.0)
     frames = np.unique(
         np.rint(np.arange(options.start * motion.fps, last + 0.5, step)).astype(int).clip(0, len(motion) - 1)
     )

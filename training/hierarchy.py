@@ -83,7 +83,7 @@ def _compute_mean_square(errors):
 
 def compute_weight_size(params) -> jax.Array:
     """Compute the second term of eq. 7.4 without its lambda: the mean absolute weight, averaged over the networks."""
-    weights = [jnp.mean(jnp.concatenate_motions([jnp.abs(w).ravel() for w in one["weights"]]))
+    weights = [jnp.mean(jnp.concatenate([jnp.abs(w).ravel() for w in one["weights"]]))
                for one in params.values()]
     return jnp.mean(jnp.stack(weights))
 
@@ -229,7 +229,7 @@ class TrainingProblem:
             truth, _ = recorded.select_frames(example, start + number + 1)
             return self._predict_frame(params, pose, truth, window, jax.random.fold_in(key, number))
 
-        _, parts = jax.lax.scan_region(predict_frame, pose, jnp.arange(frames))
+        _, parts = jax.lax.scan(predict_frame, pose, jnp.arange(frames))
         return {name: jnp.mean(one) for name, one in parts.items()}
 
     def _predict_frame(self, params, pose: Pose, truth: Pose, window: Windows, key):

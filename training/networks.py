@@ -169,7 +169,7 @@ class _ArrayModule:
         indices = [int(index) for index in indices]
         starts = [i for i, index in enumerate(indices) if i == 0 or index != indices[i - 1] + 1]
         runs = [indices[first:last] for first, last in zip(starts, [*starts[1:], len(indices)])]
-        return jnp.concatenate_motions([jax.lax.slice_in_dim(values, r[0], r[-1] + 1, axis=axis) for r in runs], axis)
+        return jnp.concatenate([jax.lax.slice_in_dim(values, r[0], r[-1] + 1, axis=axis) for r in runs], axis)
 
 
 ARRAYS = _ArrayModule()

@@ -43,7 +43,7 @@ def run_library(options, reporter: ProgressReporter, writers: Mapping[str, Write
         reporter: progress, notes and cancellation.
         writers: further output formats, by file suffix (Blender's).
     """
-    if options.estimate_joint_limits or options.propose_labels or options.learned:
+    if options.learn or options.propose or options.learned:
         return run_learning(options, reporter)
     check_outputs(options.report)
     library = open_library(options, reporter, rebuild=options.rebuild)
@@ -132,27 +132,27 @@ def run_learning(options, reporter: ProgressReporter) -> None:
     from ..library.classify.train import train_classifier
     from ..library.scan import TABLE_NAME
 
-    check_outputs(options.estimate_joint_limits, options.propose_labels, reserved=(options.learned,))
-    if options.estimate_joint_limits and options.learned:
+    check_outputs(options.learn, options.propose, reserved=(options.learned,))
+    if options.learn and options.learned:
         raise InputError("--learned", "set with --learn", "one of them", "remove one of them")
-    if options.learned and not options.propose_labels:
+    if options.learned and not options.propose:
         raise InputError("--learned", "set without --propose", "--propose OUT.csv", "add --propose OUT.csv")
-    if options.propose_labels and options.propose_labels.name == TABLE_NAME and options.propose_labels.exists():
+    if options.propose and options.propose.name == TABLE_NAME and options.propose.exists():
         problem = "already has labels, which would be lost"
-        raise InputError(options.propose_labels, problem, "a new file", "choose another name, then merge the rows")
+        raise InputError(options.propose, problem, "a new file", "choose another name, then merge the rows")
     model = classifier.read_classifier(options.learned) if options.learned else None
-    if options.estimate_joint_limits:
+    if options.learn:
         examples = read_examples(options.library, options.unit, reporter.show_progress, cache_dir=options.cache,
                                  cancelled=reporter.is_cancelled, on_note=reporter.show_note)
         model = train_classifier(examples, reporter.show_progress, reporter.is_cancelled)
-        classifier.write_classifier(options.estimate_joint_limits, model)
+        classifier.write_classifier(options.learn, model)
         reporter.finish()
         for line in model.describe():
             print(line)
-    if options.propose_labels:
+    if options.propose:
         count, clips = _write_proposals(options, model, reporter)
         reporter.finish()
-        print(f"{options.propose_labels}: {count} rows for {clips} clips without labels")
+        print(f"{options.propose}: {count} rows for {clips} clips without labels")
 
 
 def _write_proposals(options, model, reporter: ProgressReporter) -> tuple[int, int]:
@@ -176,5 +176,5 @@ def _write_proposals(options, model, reporter: ProgressReporter) -> tuple[int, i
                            f"{proposal.confidence:.2f}")
                 writer.writerow((name, *figures, proposal.source, proposal.why))
                 count += 1
-    atomic_write(options.propose_labels, out.getvalue())
+    atomic_write(options.propose, out.getvalue())
     return count, clips

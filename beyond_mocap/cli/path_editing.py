@@ -58,11 +58,11 @@ def run_path(options, reporter: ProgressReporter, writers: Mapping[str, Writer])
     inputs = (options.input, options.path, options.ground, *options.avoid)
     check_outputs(options.out, options.report, options.provenance, reserved=inputs)
     write = choose_writer(options.out, writers)
-    if options.control_degree and not options.fit_control_points:
+    if options.control_degree and not options.control_points:
         raise InputError("--control-degree", "set without --control-points", "both", "add --control-points")
     if options.distance and not options.avoid:
         raise InputError("--distance", "set without --avoid", "both", "add --avoid OTHER.bvh")
-    if options.closed and options.fit_control_points:
+    if options.closed and options.control_points:
         raise InputError("--closed", "set with --control-points", "one of them", "remove one: a B-spline is open")
     path, ground = _read_path(options), _read_ground(options)
     clip = bvh.read_bvh(options.input, options.unit)
@@ -75,7 +75,7 @@ def run_path(options, reporter: ProgressReporter, writers: Mapping[str, Writer])
     reporter.show_progress(0.5, "ride")
     edited, take = _edit_motion(source, path, settings, ground, options)
     done = time.perf_counter()
-    take.seconds.update(load_labels=loaded - started, construct=done - loaded, total=done - started)
+    take.seconds.update(load=loaded - started, construct=done - loaded, total=done - started)
     reporter.check_cancelled()
     report = _build_report(source, edited, take, path, ground) if options.report else None
     reporter.check_cancelled()
@@ -124,7 +124,7 @@ def _read_path(options):
 
     points = read_curve(options.path)
     with locate_errors(options.path):
-        if options.fit_control_points:
+        if options.control_points:
             return path_line.build_b_spline(points, options.control_degree or 3)
         return path_line.fit_line(points, str(options.path), closed=options.closed)
 

@@ -88,7 +88,7 @@ def _reconstruct_trial(options, reporter: ProgressReporter, writers: Mapping[str
                              cancelled=reporter.is_cancelled)
     except InputError as error:
         raise _add_file_name(error, options) from None
-    result.seconds.update(load_labels=loaded - started, total=time.perf_counter() - started)
+    result.seconds.update(load=loaded - started, total=time.perf_counter() - started)
     if _names_throw(options.words) and result.release is None:
         raise InputError(options.trial, "no ball release found, but --words name a throw", "a throw", "remove --words")
     notes = add_to_library(result, options.trial.stem, options) if options.add_to else []

@@ -71,7 +71,7 @@ def run_synthesize(options, reporter: ProgressReporter, writers: Mapping[str, Wr
         take = synthesize(library, plan, reporter.show_progress, reporter.is_cancelled)
     except NotInLibraryError as error:
         raise NotInLibraryError(f"{options.annotations}: {error}", error.nearest) from None
-    take.seconds.update(load_labels=loaded - started, library=ready - loaded, total=time.perf_counter() - started)
+    take.seconds.update(load=loaded - started, library=ready - loaded, total=time.perf_counter() - started)
     if options.report:
         from ..evaluation.report import evaluate
 

@@ -164,7 +164,7 @@ def draw_residuals_by_trial(results: Sequence[TrialResult]) -> bytes:
     ax.invert_yaxis()
     ax.set_xlabel("mm, root mean square", fontsize=8)
     ax.set_title("markers against the model", loc="left", fontsize=9.5)
-    ax.choose_clip_colours(fontsize=8, frameon=False)
+    ax.legend(fontsize=8, frameon=False)
     return _render_png(figure)
 
 
@@ -216,7 +216,7 @@ def draw_impact_scatter(results: Sequence[TrialResult], points: np.ndarray) -> b
         ax.set_title(subject or "no name", loc="left", fontsize=9.5)
         _draw_ground_axes(ax)
         if ax.get_legend_handles_labels()[1]:
-            ax.choose_clip_colours(fontsize=8, frameon=False)
+            ax.legend(fontsize=8, frameon=False)
     for ax in axes[len(sides):]:
         ax.axis("off")
     return _render_png(figure)
@@ -239,7 +239,7 @@ def draw_speeds(measured: np.ndarray, estimated: np.ndarray) -> bytes:
     left.set_xlabel("m/s", fontsize=8)
     left.set_ylabel("share of throws")
     left.set_title("ball speeds", loc="left", fontsize=9.5)
-    left.choose_clip_colours(fontsize=8, frameon=False)
+    left.legend(fontsize=8, frameon=False)
     span = np.array([edges[0], edges[-1]])
     right.plot(span, span, color=QUIET, lw=1)
     right.fill_between(span, 0.9 * span, 1.1 * span, color=QUIET, alpha=0.15, lw=0, label="within 10 %")
@@ -247,7 +247,7 @@ def draw_speeds(measured: np.ndarray, estimated: np.ndarray) -> bytes:
     right.set_xlabel("measured, m/s", fontsize=8)
     right.set_ylabel("estimated, m/s")
     right.set_title("pair by pair", loc="left", fontsize=9.5)
-    right.choose_clip_colours(fontsize=8, frameon=False)
+    right.legend(fontsize=8, frameon=False)
     return _render_png(figure)
 
 

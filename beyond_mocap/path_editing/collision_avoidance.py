@@ -204,7 +204,7 @@ class _Search:
 
     def build_children(self, state):
         """Build the states after each remedy for the earliest collision; the state itself if none is open."""
-        collision = state.open()
+        collision = state.find_open_collision()
         if collision is None:
             return [state]
         key, children = state.key(collision), []
@@ -216,7 +216,7 @@ class _Search:
                 changes[who] = change
             left = self.update_collisions(tuple(changes), state.collisions, tuple(changed))
             children.append(_State(tuple(changes), left, state.unsolvable))
-        return children or [replace(state, given_up=state.unsolvable | {key})]
+        return children or [replace(state, unsolvable=state.unsolvable | {key})]
 
     def list_remedies(self, state, collision):
         """List the remedies of a collision with the lowest costs: number of a body -> its change."""

@@ -192,7 +192,7 @@ def draw_ratings(groups: Sequence[tuple[str, Sequence[Shares]]]) -> bytes:
     ax.set_xticks(range(-100, 101, 25), [f"{abs(at)} %" for at in range(-100, 101, 25)])
     ax.axvline(0.0, color="#333333", lw=0.8)
     handles = [ax.barh([-9], [0.0], color=colour, label=text) for colour, text in zip(COLOURS, SCALE)]
-    ax.choose_clip_colours(handles=handles, loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=5, fontsize=8,
+    ax.legend(handles=handles, loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=5, fontsize=8,
                            frameon=False)
     return render_png(figure)
 

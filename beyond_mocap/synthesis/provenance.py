@@ -128,4 +128,4 @@ def list_sources(library: Library, frames_shown: SourceFrames) -> tuple[str, ...
 def list_labels_shown(library: Library, frames_shown: SourceFrames) -> tuple[tuple[str, ...], ...]:
     """List the labels that every shown frame's clip carries there."""
     frames = zip(frames_shown.clip, np.round(frames_shown.clip_frame, 6))
-    return tuple(sort_labels(library.clips[clip].words_at(frame)) for clip, frame in frames)
+    return tuple(sort_labels(library.clips[clip].labels_at(frame)) for clip, frame in frames)

@@ -260,7 +260,7 @@ def _compute_hip_drop(posture: Posture, times: np.ndarray, steps, neutral: Neutr
         longest = _compute_longest_reach(steps[side], times) * sum(measure_leg(neutral, side))
         flat = np.sum((tops[:, side, :2] - path.ankle[:, :2]) ** 2, axis=-1)
         highest = path.ankle[:, 2] + np.sqrt(np.maximum(longest**2 - flat, 0.0))
-        drop = np.maximum(drop, np.where(steps[side].standing(times), tops[:, side, 2] - highest, 0.0))
+        drop = np.maximum(drop, np.where(steps[side].is_in_contact(times), tops[:, side, 2] - highest, 0.0))
     width = max(int(0.06 / (times[1] - times[0])), 1)
     # the greatest need around each frame, then smoothed: never less than needed
     around = np.lib.stride_tricks.sliding_window_view(np.pad(drop, width, mode="edge"), 2 * width + 1)

@@ -29,7 +29,7 @@ def find_preferences() -> "Preferences | None":
 def count_threads() -> int:
     """Return how many threads may be used, at least one."""
     chosen = find_preferences()
-    return (chosen.count_threads if chosen else 0) or os.cpu_count() or 1
+    return (chosen.threads if chosen else 0) or os.cpu_count() or 1
 
 
 def find_cache_folder(library_folder: str) -> str | None:
@@ -37,9 +37,9 @@ def find_cache_folder(library_folder: str) -> str | None:
     from ...beyond_mocap.library import cache  # slow to import, and enabling the extension must be quick
 
     chosen = find_preferences()
-    if not chosen or not chosen.find_cache_folder:
+    if not chosen or not chosen.cache_folder:
         return None
-    return str(cache.find_own_folder(Path(bpy.path.abspath(chosen.find_cache_folder)), Path(library_folder)))
+    return str(cache.find_own_folder(Path(bpy.path.abspath(chosen.cache_folder)), Path(library_folder)))
 
 
 def build_library_options(library_folder: str) -> dict:

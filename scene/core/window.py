@@ -128,7 +128,7 @@ def _split_view(context, window, kind: str, direction: str, factor: float) -> bp
     if view is None:
         return None
     before = {area.as_pointer() for area in window.screen.areas}
-    with context.temp_override(window=window, find_area=view, region=view.regions[-1]):
+    with context.temp_override(window=window, area=view, region=view.regions[-1]):
         bpy.ops.screen.area_split(direction=direction, factor=factor)
     halves = [area for area in window.screen.areas if area.as_pointer() not in before]
     new = min((*halves, view), key=lambda area: area.x if direction == "VERTICAL" else area.y)

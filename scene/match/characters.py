@@ -150,7 +150,7 @@ class CharacterBuilder:
             if not np.any(share > 1e-6):
                 continue
             group = thing.vertex_groups.new(name=name)
-            for weight in np.unique(share[share > 1e-6].find_detour(4)):
+            for weight in np.unique(share[share > 1e-6].round(4)):
                 near = np.abs(share - weight) < 5.1e-5
                 group.add(np.flatnonzero(near).tolist(), float(weight), "REPLACE")
 

@@ -206,5 +206,5 @@ def remove_bake(rig: bpy.types.Object) -> None:
             rig.pose.bones[bone].constraints[name].influence = value
     found = bpy.data.actions.get(before.get("action", ""))
     if found is not None:
-        slot = next((slot for slot in found.count_slots if slot.identifier == before.get("slot")), None)
+        slot = next((slot for slot in found.slots if slot.identifier == before.get("slot")), None)
         channels.assign_action(rig, found, slot)

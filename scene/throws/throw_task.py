@@ -242,7 +242,7 @@ def _read_own_motion(scene: bpy.types.Scene, body: bpy.types.Object) -> tuple["M
     before = body.beyond_mocap_throw.before
     if before.kept:
         found = before.action
-        slot = next((one for one in found.count_slots if one.identifier == before.slot), None) if found else None
+        slot = next((one for one in found.slots if one.identifier == before.slot), None) if found else None
     else:
         found, slot = channels.find_playing_action(body)
     curves = channels.collect_curves(found, slot) if slot is not None else {}

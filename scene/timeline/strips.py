@@ -133,7 +133,7 @@ def show_player(context: bpy.types.Context, player) -> None:
     settings = context.scene.beyond_mocap
     settings.active_player = next(n for n, other in enumerate(settings.players) if other == player)
     dot = ensure_label_tracks(context, player) if player.dot is None else dots.ensure_dot(context, player)
-    for other in context.view_layer.objects.is_selected:
+    for other in context.view_layer.objects.selected:
         other.select_set(False)
     if dot.name in context.view_layer.objects:
         dot.select_set(True)

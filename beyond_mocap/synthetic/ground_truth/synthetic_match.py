@@ -361,7 +361,7 @@ def sample_feed(
     observed = players + _build_slow_noise(rng, players.shape, _PLAYERS_SLOW * fps, _PLAYERS_NOISE, axis=1)
     observed += rng.normal(0.0, _JITTER, observed.shape)
     teams = tuple(TEAMS[i // 11] for i in range(len(match.ids)))
-    return Feed(times=times, ball=measured.find_detour(2), positions=observed.find_detour(2), ids=match.ids,
+    return Feed(times=times, ball=measured.round(2), positions=observed.round(2), ids=match.ids,
                 teams=teams, filled=is_filled, wrong=wrong & ~is_filled, fps=fps)
 
 

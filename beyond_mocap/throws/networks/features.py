@@ -79,7 +79,7 @@ def build_input(name: str, chains: Chains, settings: ModelSettings, pose: Pose, 
         x = build_leg_input(number, chains, pose, after=after, window=window, xp=xp)
     if not settings.guided:
         return x
-    return xp.concatenate_motions([x, compute_reach_guide(number, chains, settings, pose=pose, after=after,
+    return xp.concatenate([x, compute_reach_guide(number, chains, settings, pose=pose, after=after,
                                                           window=window, xp=xp)], axis=-1)
 
 
@@ -106,7 +106,7 @@ def build_hip_input(chains: Chains, settings: ModelSettings, pose: Pose, window:
              *_build_joint_input(chains, settings, pose, chains.hip_inputs, xp)]
     if settings.carried:
         parts.append(carry_hips(chains, pose, window, compute_origin(chains, settings, pose), xp))
-    return xp.concatenate_motions(parts, axis=-1)
+    return xp.concatenate(parts, axis=-1)
 
 
 def build_single_input(chains: Chains, settings: ModelSettings, pose: Pose, window: Windows, xp=np):
@@ -116,7 +116,7 @@ def build_single_input(chains: Chains, settings: ModelSettings, pose: Pose, wind
     """
     parts = _build_joint_input(chains, settings, pose, chains.joints, xp)
     moved = flatten(take_joints(pose.moved, chains.joints, -2, xp), 2)
-    return xp.concatenate_motions([*_build_motion_input(chains, settings, pose, window, xp), *parts, moved], axis=-1)
+    return xp.concatenate([*_build_motion_input(chains, settings, pose, window, xp), *parts, moved], axis=-1)
 
 
 def build_body_input(chains: Chains, pose: Pose, after: Pose, window: Windows, xp=np):
@@ -126,7 +126,7 @@ def build_body_input(chains: Chains, pose: Pose, after: Pose, window: Windows, x
     """
     frame = _ReferenceFrame(chains.references["body"], pose, after, xp)
     seen = chains.body_inputs
-    return xp.concatenate_motions([
+    return xp.concatenate([
         window.sides,
         frame.to_local_position(window.impact),
         *(_build_trajectory(frame, window, number) for number in (0, 1)),
@@ -148,7 +148,7 @@ def build_arm_input(number: int, chains: Chains, settings: ModelSettings, pose: 
     frame = _ReferenceFrame(chains.references[name], pose, after, xp)
     given = settings.wrist == "given"
     wrist = [to_six(frame.to_local_rotation(window.hands_next[..., number, :, :]), xp)] if given else []
-    return xp.concatenate_motions([
+    return xp.concatenate([
         window.sides,
         _build_trajectory(frame, window, number),
         frame.to_local_position(window.next[..., number, :]),
@@ -169,7 +169,7 @@ def build_leg_input(number: int, chains: Chains, pose: Pose, after: Pose, window
     name = LIMB_OF[number]
     frame = _ReferenceFrame(chains.references[name], pose, after, xp)
     others = (chains.head, *chains.sockets[:2])
-    return xp.concatenate_motions([
+    return xp.concatenate([
         _build_trajectory(frame, window, number),
         frame.to_local_position(window.next[..., number, :]),
         frame.axes_change,
@@ -265,14 +265,14 @@ def _build_trajectory(frame: _ReferenceFrame, window: Windows, number: int):
     """Build t of one effector, 54 values, in a chain's frame (eq. 7.1)."""
     points = frame.to_local_positions(window.points[..., number, :, :])
     deltas = frame.to_local_vectors(window.deltas[..., number, :, :])
-    return flatten(frame.xp.concatenate_motions([points, deltas], axis=-2), 2)
+    return flatten(frame.xp.concatenate([points, deltas], axis=-2), 2)
 
 
 def _build_motion_input(chains: Chains, settings: ModelSettings, pose: Pose, window: Windows, xp) -> list:
     """Build x_m of hip and single: b_l, b_r, i and four trajectories, measured from `compute_origin`."""
     start = compute_origin(chains, settings, pose)
     points = window.points - start[..., None, None, :]
-    trajectories = xp.concatenate_motions([points, window.deltas], axis=-2)
+    trajectories = xp.concatenate([points, window.deltas], axis=-2)
     return [window.sides, window.impact - start, flatten(trajectories, 3)]
 
 
@@ -311,7 +311,7 @@ def carry_hips(chains: Chains, pose: Pose, window: Windows, origin, xp=np):
     across = cross_on_ground(a, b).sum(-1)
     turn = _build_vertical_rotation(along, across, xp)
     place = xp.matmul(turn, (pose.positions[..., chains.hips, :] - middle)[..., None])[..., 0] + target_middle
-    return xp.concatenate_motions([place - origin, to_six(xp.matmul(turn, pose.turns[..., chains.hips, :, :]), xp)],
+    return xp.concatenate([place - origin, to_six(xp.matmul(turn, pose.turns[..., chains.hips, :, :]), xp)],
                                   axis=-1)
 
 

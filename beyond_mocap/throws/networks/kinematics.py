@@ -90,7 +90,7 @@ def build_pose(skeleton: Skeleton, root, local, xp=np) -> Pose:
 
 def to_six(turns, xp=np):
     """Convert rotations (..., 3, 3) to their x and y axes: (..., 6)."""
-    return xp.concatenate_motions([turns[..., :, 0], turns[..., :, 1]], axis=-1)
+    return xp.concatenate([turns[..., :, 0], turns[..., :, 1]], axis=-1)
 
 
 def from_six(values, xp=np):
@@ -178,5 +178,5 @@ def _replace_joints(values, replacements: dict, axis: int, xp):
         return changed
     order = np.arange(values.shape[axis])
     order[list(replacements)] = len(order) + np.arange(len(replacements))
-    return xp.take(xp.concatenate_motions([values, xp.stack(list(replacements.values()), axis=axis)], axis=axis), order,
+    return xp.take(xp.concatenate([values, xp.stack(list(replacements.values()), axis=axis)], axis=axis), order,
                    axis=axis)

@@ -235,7 +235,7 @@ def weigh_points(phase, points: int = 4, xp=np):
         return xp.ones_like(phase)
     every = _evaluate_kernel(xp.abs(phase * (points - 1) - xp.arange(-1, points + 1)), xp)
     first, last = every[..., 0:1] + every[..., 1:2], every[..., -2:-1] + every[..., -1:]
-    return xp.concatenate_motions([first, every[..., 2:-2], last], -1)
+    return xp.concatenate([first, every[..., 2:-2], last], -1)
 
 
 def weigh_points_at(phase: float, points: int = 4) -> list[float]:

@@ -96,7 +96,7 @@ def test_solved_again_it_is_the_same_ball_and_still_carried(match):
     press_operator(bpy.ops.beyond_mocap.solve_ball)
     ball, data = bpy.data.objects["Solved Ball"], bpy.data.armatures.new("Stick")
     ball.name, stick = "My Ball", bpy.data.objects.new("Stick", data)
-    match.find_or_create_collection.objects.link(stick)
+    match.collection.objects.link(stick)
     bpy.context.view_layer.objects.active = stick
     bpy.ops.object.mode_set(mode="EDIT")
     data.edit_bones.new("Bone").tail = 0.0, 0.0, 1.0

@@ -36,15 +36,15 @@ def clips(tmp_path):
 def test_a_library_is_kept_where_the_preferences_say(rooms, clips, tmp_path):
     preferences, session = rooms
     chosen, place = preferences.get(), tmp_path / "caches"
-    assert (chosen.find_cache_folder, chosen.count_threads) == ("", 0)
-    chosen.find_cache_folder = str(place)
+    assert (chosen.cache_folder, chosen.threads) == ("", 0)
+    chosen.cache_folder = str(place)
     assert bpy.ops.beyond_mocap.build_library() == {"FINISHED"}
     assert not (clips / ".beyond_mocap").exists()
     own, = place.iterdir()
     assert (own / "library.npz").is_file() and preferences.find_cache_folder(str(clips)) == str(own)
     assert preferences.find_cache_folder(str(tmp_path)) != str(own)
     session.clear_session()
-    chosen.find_cache_folder = ""
+    chosen.cache_folder = ""
     assert bpy.ops.beyond_mocap.build_library() == {"FINISHED"}
     assert (clips / ".beyond_mocap" / "library.npz").is_file()
 
@@ -53,7 +53,7 @@ def test_threads_change_no_bit(rooms, clips):
     preferences, session = rooms
     built = []
     for threads in (1, 3):
-        preferences.get().count_threads = threads
+        preferences.get().threads = threads
         assert preferences.count_threads() == threads
         assert bpy.ops.beyond_mocap.build_library(rebuild=True) == {"FINISHED"}
         built.append(session.find_library(str(clips), None))
@@ -74,6 +74,6 @@ def test_it_works_without_preferences(rooms, clips, monkeypatch):
 def test_a_cache_folder_that_cannot_be_made_is_reported_and_does_no_harm(rooms, clips, tmp_path):
     preferences, session = rooms
     (tmp_path / "file").write_text("")
-    preferences.get().find_cache_folder = str(tmp_path / "file" / "caches")
+    preferences.get().cache_folder = str(tmp_path / "file" / "caches")
     assert bpy.ops.beyond_mocap.build_library() == {"FINISHED"}
     assert any("cannot be written" in note for note in session.find_library(str(clips), None).notes)

@@ -270,7 +270,7 @@ def test_a_collection_of_the_users_that_two_scenes_have_is_told(room, core, scen
     first = shown(room, scenery)
     ours, second = room("match_objects"), bpy.data.scenes.new("Second")
     above, whole = bpy.data.collections.new("Above"), ours.root(first)
-    first.find_or_create_collection.children.unlink(whole)
+    first.collection.children.unlink(whole)
     above.children.link(whole)
     for scene in (first, second):
         scene.collection.children.link(above)

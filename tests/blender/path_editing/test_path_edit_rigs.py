@@ -175,12 +175,12 @@ def half_an_action_over_strips(recorded, part, _):
     rest = ride_rigs.build_bone_path(
         "Spine1" if "Spine1" in rig.pose.bones else rig.pose.bones[1].name, "rotation_quaternion"
     )
-    for curve in part("core.channels").collect_curves(other, other.count_slots[0]).values():
+    for curve in part("core.channels").collect_curves(other, other.slots[0]).values():
         if curve.data_path == rest:
             for point in curve.keyframe_points:
                 point.co.y = 0.5
     data.action, data.action_influence = other, 0.5
-    data.action_slot = other.count_slots[0]
+    data.action_slot = other.slots[0]
     return rig
 
 

@@ -89,11 +89,11 @@ def test_words_of_a_text_count_more_than_those_on_disk(extension, ready, core):
     text.write("3.0 kick right running low inside\n")
     ready.players[0].annotation_text = text
     assert plans.build_plan(ready, ready.players[0])[0].timeline.keys[0].time == 6.0  # strips count more than either
-    bpy.ops.beyond_mocap.read_labels()
+    bpy.ops.beyond_mocap.read_words()
     assert plans.build_plan(ready, ready.players[0])[0].timeline.keys[0].time == 3.0
     text.clear()
     text.write("3.0 kik right\n")
-    bpy.ops.beyond_mocap.read_labels()
+    bpy.ops.beyond_mocap.read_words()
     with pytest.raises(RuntimeError, match="strips of player1: the word 'kik'"):
         bpy.ops.beyond_mocap.synthesize()
     bpy.data.objects.remove(ready.players[0].dot)  # without strips the text itself counts
@@ -172,7 +172,7 @@ def test_update_makes_anew_what_a_changed_word_touches(extension, ready, match, 
     bpy.ops.beyond_mocap.synthesize()
     before = [session.find_take(player.take) for player in ready.players]
     (match / "player1.txt").write_text(WORDS.replace("6.0", "6.2"))
-    bpy.ops.beyond_mocap.read_labels()
+    bpy.ops.beyond_mocap.read_words()
     assert_one_step(bpy.ops.beyond_mocap.update)
     settings = bpy.context.scene.beyond_mocap
     after = [session.find_take(player.take) for player in settings.players]
@@ -297,7 +297,7 @@ def test_bad_tracking(tmp_path, content, found):
 
 def test_words_that_the_library_lacks(ready, match):
     (match / "player1.txt").write_text("6.0 header\n")
-    bpy.ops.beyond_mocap.read_labels()
+    bpy.ops.beyond_mocap.read_words()
     refused(bpy.ops.beyond_mocap.synthesize, "strips of player1: .*6 s: .*header")
     ready.nearest = True
     assert bpy.ops.beyond_mocap.synthesize() == {"FINISHED"}

@@ -38,7 +38,7 @@ def playing(room, cache):
     scene = bpy.context.scene
     scene.render.fps = 24
     chosen = bpy.context.preferences.addons[EXTENSION].preferences
-    chosen.find_cache_folder = str(cache)
+    chosen.cache_folder = str(cache)
     OPS.passes_sample(sample="three")
     scene.beyond_mocap_passes.library_folder, scene.beyond_mocap_passes.start_frame = str(CLIPS), 5
     scene.frame_set(5)

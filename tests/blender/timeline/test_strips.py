@@ -54,7 +54,7 @@ def random_timeline(core, dice, count=12):
     spans = []
     for _ in range(count):
         start = dice.uniform(-30.0, 90.0)
-        spans.append(annotation.Span(start, start + dice.to_quaternions(2.0) + 1e-9, words(0)))
+        spans.append(annotation.Span(start, start + dice.exponential(2.0) + 1e-9, words(0)))
     spans.append(annotation.Span(200.0, 201.0, tuple(f"a_very_long_word_{i}" for i in range(9))))
     keys = [annotation.KeyMoment(dice.uniform(-30.0, 90.0), words(1)) for _ in range(count)]
     return annotation.Timeline(tuple(spans), tuple(keys))

@@ -61,7 +61,7 @@ def test_text_and_file(player, asked, tmp_path):
     assert ops.export_words(filepath=str(tmp_path / "out.txt")) == {"FINISHED"}
     assert (tmp_path / "out.txt").read_text() == before
     text.write("10 11 walking\n")
-    assert_one_step(ops.read_labels)
+    assert_one_step(ops.read_words)
     assert asked() == before + "10 11 walking\n"
 
 
@@ -197,7 +197,7 @@ def test_what_is_wrong_is_told(player, room):
 
 def test_nobody_there():
     for operator in (ops.add_span, ops.add_moment, ops.split_span, ops.words_to_text, ops.choose_player,
-                     ops.read_labels):
+                     ops.read_words):
         refused("Import tracking", operator)
 
 

@@ -34,7 +34,7 @@ def test_the_mirror_has_words_contacts_and_travel_of_the_other_side(library):
         assert np.array_equal(clip.heel_toe_contacts, twin.standing[:, ::-1])
         assert np.allclose(clip.motion.root_positions * [1, -1, 1], twin.motion.root_positions, atol=1e-9)
     assert clip_of(library, "bows/turn.bvh", True).annotations[0].words == ("walking", "right")
-    assert clip_of(library, "kick.bvh", True).words_at(156) == {"kick", "low", "inside", "left"}
+    assert clip_of(library, "kick.bvh", True).labels_at(156) == {"kick", "low", "inside", "left"}
 
 
 def test_clips_stand_on_the_floor(library):

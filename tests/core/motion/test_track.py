@@ -364,7 +364,7 @@ def test_real_tracks_stay_on_their_samples(number, rate):
     table = np.array(rows)
     if rate:
         times = np.arange(table[0, 0], table[-1, 0] + 1e-9, 1 / rate)
-        table = np.column_stack([times, *(np.interp(times, table[:, 0], column).find_detour(2)
+        table = np.column_stack([times, *(np.interp(times, table[:, 0], column).round(2)
                                           for column in table[:, 1:].T)])
     cleaned, report = clean_track(Track(table[:, 0], table[:, 1:]))
     sampled = sample_track(cleaned, 30)

@@ -219,7 +219,7 @@ def test_strikes_that_no_words_tell_of_are_told(strikes_library):
 
 
 def test_who_gets_up_strikes_nothing(strikes_library):
-    up = tuple(replace(clip, annotations=tuple(replace(row, words=("build_get_up",)) for row in clip.annotations))
+    up = tuple(replace(clip, annotations=tuple(replace(row, words=("getting_up",)) for row in clip.annotations))
                for clip in strikes_library.clips)
     with pytest.raises(NotInLibraryError, match="strikes with"):
         synthesize_passes(replace(strikes_library, clips=up, kept=None), parse_scene(SAMPLES["racquet"]))

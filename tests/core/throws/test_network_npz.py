@@ -218,7 +218,7 @@ def test_an_array_that_is_missing_or_too_many_is_told(tmp_path, name):
     (lambda h: h["examples"].pop(), "unknown array"),
     (lambda h: h["examples"][0].update(limb=4), "limb"),
     (lambda h: h["examples"][0].update(impact=[1, 2]), "impact"),
-    (lambda h: h.update(compute_extra_length=1), "extra"),
+    (lambda h: h.update(extra=1), "extra"),
     (lambda h: h.update(notes="abc"), "list"),
 ])
 def test_a_wrong_header_is_told_with_its_place(tmp_path, change, said):

@@ -92,7 +92,7 @@ def test_a_block_beyond_the_library_still_has_a_cost():
 def test_missing_share(library):
     cost = AnnotationCost(library.frames)
     share = cost.compute_missing_share(frozenset({"walking", "left"}))
-    carried = [library.clips[c].words_at(s) for c, s in zip(library.frames.clip, library.frames.source)]
+    carried = [library.clips[c].labels_at(s) for c, s in zip(library.frames.clip, library.frames.source)]
     assert np.allclose(share, [1 - len({"walking", "left"} & words) / 2 for words in carried])
     assert np.all(cost.compute_missing_share(frozenset({"header"})) == 1.0)
     assert np.all(cost.compute_missing_share(frozenset()) == 1.0)

@@ -20,7 +20,7 @@ def shown(library, order, alpha=0.2):
 
 
 def words_shown(library, clip, frame):
-    return [library.clips[c].words_at(library.frames.source[f]) for c, f in zip(clip, frame)]
+    return [library.clips[c].labels_at(library.frames.source[f]) for c, f in zip(clip, frame)]
 
 
 def own_clip(library, clip, frame):

@@ -66,7 +66,7 @@ def test_words_that_the_clip_lacks_are_told(library, order):
     asked = order((0.0, 8.0, "running"))  # at a walk
     edit = PathSearch(library, asked).run()
     found = explain_path_choices(library, asked, edit, Weights())
-    lacking = [r for r in found if "running" not in library.clips[r.clip].words_at(r.clip_range[0])]
+    lacking = [r for r in found if "running" not in library.clips[r.clip].labels_at(r.clip_range[0])]
     assert lacking and all(r.costs.get("words", 0.0) > 0.5 for r in lacking)
 
 
@@ -92,7 +92,7 @@ def test_blocks_tell_words_and_pose(library, order):
     assert [(reason.first, reason.end) for reason in found] == edit.pieces
     assert not found[0].cut_costs and all(reason.cut_costs["pose"] >= 0.0 for reason in found[1:] if reason.cut_costs)
     walking = [
-        r for r in found if all("walking" in library.clips[r.clip].words_at(f) for f in np.linspace(*r.clip_range, 9))
+        r for r in found if all("walking" in library.clips[r.clip].labels_at(f) for f in np.linspace(*r.clip_range, 9))
     ]
     assert walking and all(r.costs["words"] < 0.0 for r in walking)
 
