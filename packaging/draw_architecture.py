@@ -15,7 +15,7 @@ import sys
 import textwrap
 from xml.sax.saxutils import escape
 
-from house import CORE, LAYERS, TOP, build_package_graph, find_layer
+from architecture import CORE, LAYERS, TOP, build_package_graph, find_layer
 
 PICTURE = TOP / "docs" / "pictures" / "architecture.svg"
 COLUMNS = {"annotation": 0, "synthetic": 1, "appearance": 5, "files": 0, "ball": 2, "library": 1, "synthesis": 1,

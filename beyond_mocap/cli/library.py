@@ -69,7 +69,7 @@ def summarize_library(library) -> dict:
 
     originals = [clip for clip in library.clips if not clip.mirrored]
     labels = sorted(library.labels)
-    gaits = [{"word": g.word, "words": list(g.words), "speed_m_s": g.speed} for g in library.gaits]
+    gaits = [{"word": g.label, "words": list(g.words), "speed_m_s": g.speed} for g in library.gaits]
     keys = sorted({" ".join(sort_labels(key.words)) for key in library.keys})
     lines = [
         f"{library.folder}: {len(originals)} clips (and their mirrors), {library.minutes:.1f} minutes, "

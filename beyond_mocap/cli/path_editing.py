@@ -96,7 +96,7 @@ def _describe_remaining_path(source, edited, path, options) -> list[str]:
     from ..motion.path.arc_length import ArcLength
 
     distance, length = float(edited.arc[-1]), ArcLength(path).length
-    if options.cycle or options.end == "repeat" or source.still or distance >= _COMPLETE_SHARE * length:
+    if options.cycle or options.end == "repeat" or source.is_still or distance >= _COMPLETE_SHARE * length:
         return []
     return [f"the motion ends after {distance:.1f} of {length:.1f} m of the path; --cycle repeats it"]
 

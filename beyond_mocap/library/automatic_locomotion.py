@@ -41,7 +41,7 @@ def build_automatic_labels(library: Library, gait: np.ndarray, track: SampledTra
     recorded = {row.words for clip in library.clips for row in clip.annotations}
     words: list[tuple[str, ...]] = []
     for number, direction in zip(gait, choose_directions(compute_heading_offset(track), track.fps)):
-        own = library.gaits[number].words
+        own = library.gaits[number].labels
         in_direction = tuple(direction if word == DIRECTIONS[0] else word for word in own)
         words.append(in_direction if in_direction in recorded else own)
     return words

@@ -104,7 +104,7 @@ def _iter_unified(motions, contacts, skeleton: Skeleton, rigs) -> Iterator[tuple
     """Iterate over the clips on the library's skeleton, with contacts and whether they were retargeted."""
     for number, (motion, points) in enumerate(zip(motions, contacts)):
         if number in rigs:
-            retargeted = rigs[number].carry(motion)
+            retargeted = rigs[number].retarget(motion)
             yield retargeted, _choose_contacts(retargeted, motion.skeleton, points), True
         else:
             yield replace(motion, skeleton=skeleton), points, False

@@ -125,7 +125,7 @@ def measure_touch_speed(frames: Frames, clips: Sequence, keys: Sequence, act: fr
     speed = frames.speed  # computed over all frames at every access
     found = [
         speed[frames.first[key.clip] + int(key.frame / clips[key.clip].motion.fps * 30.0 + 0.5)]
-        for key in keys if act <= key.words and not clips[key.clip].made
+        for key in keys if act <= key.labels and not clips[key.clip].is_synthetic
     ]
     return float(max(found)) if found else np.inf
 
@@ -150,7 +150,7 @@ def iter_synthetic_clips(
     for low, high in find_speed_gaps(frames.speed[select_locomotion(frames, clips)], fps):
         yield from _iter_blends(clips, frames, fps, low=low, high=high, speeds=speeds)
         yield from _iter_runs(max(0.93 * low, _MIN_RUN_SPEED), min(1.05 * high, MAX_SPEED), example, style, speeds)
-    kinds = sorted({"inside" if "inside" in key.words else "top" for key in keys if KICK_LABELS <= key.words})
+    kinds = sorted({"inside" if "inside" in key.labels else "top" for key in keys if KICK_LABELS <= key.labels})
     fastest = measure_touch_speed(frames, clips, keys, KICK_LABELS)
     yield from _iter_touches(KICK_PREFIX, _TOUCH_STEP * fastest, ("kick", "low"), kinds=kinds, example=example,
                              speeds=speeds)

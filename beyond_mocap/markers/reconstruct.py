@@ -286,7 +286,7 @@ def _check_trial(trial, still, marker_set, model) -> tuple[str, ...]:
 
     clusters = collect_clusters(marker_set, model, trial)
     others = () if marker_set is None else (*marker_set.ball, *marker_set.other)
-    lacking = () if marker_set is None or model is not None else marker_set.lacking(trial.labels)
+    lacking = () if marker_set is None or model is not None else marker_set.list_missing(trial.labels)
     missing = [f"markers of the set {marker_set.name} are missing: {list_some(lacking)}"] if lacking else []
     return (*missing, *report_unused(trial, clusters, others), *check_trial(trial, still, clusters, model))
 

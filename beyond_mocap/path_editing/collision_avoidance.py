@@ -392,7 +392,7 @@ def _find_possible_meetings(search):
     limits, followers = search.limits, search.followers
     stride = max(int(round(_BIN * _RATE)), 1)
     begins = np.arange(0, len(search.clock) - 1, stride)
-    tracks = np.stack([search.track(who, PathChange())[:, :2] for who in range(len(followers))])
+    tracks = np.stack([search.compute_track(who, PathChange())[:, :2] for who in range(len(followers))])
     # Each bin of `stride` samples is a disc: its middle sample, and the radius `around` of the movement within the bin.
     middle = tracks[:, np.minimum(begins + stride // 2, len(search.clock) - 1)]
     deviation = [np.abs(tracks[:, np.minimum(begins + step, len(search.clock) - 1)] - middle)

@@ -281,7 +281,7 @@ class _Search:
 
     def _find_frame_range(self, motion: Motion, frame: float) -> tuple[int, int]:
         """Return the first and last frame that may be changed, never the ends of the motion."""
-        first, last = self.part.span(motion, frame)
+        first, last = self.part.find_frame_range(motion, frame)
         return max(first, 1), min(last, len(motion) - 2)
 
     def _compute_cost(self, motion: Motion, frame: float) -> np.ndarray:

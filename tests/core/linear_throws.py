@@ -83,8 +83,8 @@ def build_linear_model(examples, action="throw", ridge=1.0):
 
 
 def _build_linear_network(rows, units, ridge):
-    scales = [(part.mean(0), part.std(0) + 1e-3) for part in (rows.inputs, rows.answers)]
-    x, y = ((part - mean) / scale for part, (mean, scale) in zip((rows.inputs, rows.answers), scales))
+    scales = [(part.mean(0), part.std(0) + 1e-3) for part in (rows.inputs, rows.outputs)]
+    x, y = ((part - mean) / scale for part, (mean, scale) in zip((rows.inputs, rows.outputs), scales))
     output_count = y.shape[1]
     slopes = np.zeros((units, x.shape[1]))
     slopes[:output_count] = np.linalg.solve(x.T @ x + ridge * np.eye(x.shape[1]), x.T @ y).T

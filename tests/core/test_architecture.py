@@ -9,22 +9,22 @@ import tomllib
 
 import pytest
 
-import draw_house
-from house import (
+import draw_architecture
+from architecture import (
     BLENDER,
     CORE,
     LAYERS,
-    MOST_FILES,
+    MAX_FILES,
     TOP,
-    count_side_by_side,
-    file_graph,
-    find_circles,
+    count_files,
+    build_file_graph,
+    find_cycles,
     is_below,
     list_sources,
     may_import,
     parse_source,
     read_imports,
-    room_of,
+    find_package,
 )
 
 ARRAYS = {"numpy", "scipy"}
@@ -50,14 +50,14 @@ PANELS = ("panels", "scene.core.registration", "scene.core.preferences")  # besi
 
 def core_complaint(path, imported):
     """Why this import is not allowed in this core file, or None."""
-    room = room_of(".".join(path.with_suffix("").parts))
+    room = find_package(".".join(path.with_suffix("").parts))
     package = imported.name.split(".")[0]
     if package in BLENDER:
         return "the core knows no Blender"
     if imported.relative:
         if imported.name == f"{CORE}.__version__":
             return None
-        other = room_of(imported.name if imported.name.count(".") > 1 else imported.name + ".")
+        other = find_package(imported.name if imported.name.count(".") > 1 else imported.name + ".")
         return None if not room or may_import(room, other) else f"{room} may not import {other}"
     if package in sys.stdlib_module_names or package in ARRAYS:
         return None
@@ -122,17 +122,17 @@ def test_training_imports_only_what_it_may():
 
 
 def test_no_files_import_one_another_in_a_circle():
-    assert find_circles(file_graph()) == []
-    assert find_circles({"a": {"b"}, "b": {"c"}, "c": {"a"}, "d": {"a"}}) == [["a", "b", "c"]]
+    assert find_cycles(build_file_graph()) == []
+    assert find_cycles({"a": {"b"}, "b": {"c"}, "c": {"a"}, "d": {"a"}}) == [["a", "b", "c"]]
 
 
 def test_no_folder_is_crowded():
-    counts = dict(count_side_by_side(CORE, "scene", "operators", "panels", "training", "benchmarks", "packaging"))
-    assert {folder: count for folder, count in counts.items() if count > MOST_FILES} == {}
+    counts = dict(count_files(CORE, "scene", "operators", "panels", "training", "benchmarks", "packaging"))
+    assert {folder: count for folder, count in counts.items() if count > MAX_FILES} == {}
 
 
 def test_the_picture_of_the_house_is_up_to_date():
-    assert draw_house.PICTURE.read_text("utf-8") == draw_house.draw_architecture()
+    assert draw_architecture.PICTURE.read_text("utf-8") == draw_architecture.draw_architecture()
 
 
 @pytest.mark.parametrize("path, text", [

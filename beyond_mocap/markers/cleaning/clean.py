@@ -289,10 +289,10 @@ def _check_cancelled(cancelled):
 
 def _correct_swaps(work):
     """Exchange swapped labels back: first pairs that leap twice, then those that deform clusters."""
-    work.positions, found = correct_double_leaps(work.positions, work.carried)
+    work.positions, found = correct_double_leaps(work.positions, work.carried_markers)
     _record_swaps(work, found)
-    leaping = detect_leaps(work.positions, work.carried, work.trial.fps)
-    work.positions, found = correct_swaps(work.positions, work.carried, leaping, fps=work.trial.fps,
+    leaping = detect_leaps(work.positions, work.carried_markers, work.trial.fps)
+    work.positions, found = correct_swaps(work.positions, work.carried_markers, leaping, fps=work.trial.fps,
                                           opposite=_list_opposite_pairs(work), check_cancelled=work.check_cancelled)
     _record_swaps(work, found)
 
@@ -312,21 +312,21 @@ def _list_opposite_pairs(work):
     pairs = {}
     for label, i in index.items():
         other = index.get("R" + label[1:]) if label[:1] == "L" else None
-        if other is not None and i in work.carried and other in work.carried:
+        if other is not None and i in work.carried_markers and other in work.carried_markers:
             pairs[i] = (i, other)
     groups = [tuple(pairs[i] for i in cluster if i in pairs) for cluster in work.clusters]
     return [(pair,) for pair in pairs.values()] + [group for group in groups if len(group) > 1]
 
 
 def _remove_jumps(work):
-    work.positions, found = remove_jumps(work.positions, work.carried, work.trial.fps)
+    work.positions, found = remove_jumps(work.positions, work.carried_markers, work.trial.fps)
     work.findings["jumps"] = tuple(work.stretch([j.marker], j.first, j.end, "taken out", j.off) for j in found)
     if found:
         work.update_carriers([jump.marker for jump in found])
 
 
 def _label_unlabeled(work):
-    work.positions, found = assign_labels(work.positions, work.carried, work.unlabeled, work.trial.fps)
+    work.positions, found = assign_labels(work.positions, work.carried_markers, work.unlabeled, work.trial.fps)
     work.findings["assigned"] = tuple(
         work.stretch([one.unlabeled, one.label], one.first, one.end, "assigned", one.off) for one in found
     )
@@ -338,7 +338,7 @@ def _fill_gaps(work, settings):
     """Report markers that stray, fill the gaps, and record which are filled and which stay open."""
     longest = GapLimits(settings.longest_gap, settings.longest_soft_gap, settings.longest_spline)
     work.findings["strayed"] = tuple(_find_strayed(work))
-    work.positions, found = fill_gaps(work.positions, work.soft, work.trial.fps, limits=longest, known=work.carried,
+    work.positions, found = fill_gaps(work.positions, work.soft, work.trial.fps, limits=longest, known=work.carried_markers,
                                       check_cancelled=work.check_cancelled)
     for name, is_filled in (("gaps", True), ("left", False)):
         work.findings[name] = tuple(
@@ -351,9 +351,9 @@ def _find_strayed(work):
 
     They were attached again, or labeled wrongly. A marker that goes there smoothly follows the body.
     """
-    leaping = detect_leaps(work.positions, work.carried, work.trial.fps)
+    leaping = detect_leaps(work.positions, work.carried_markers, work.trial.fps)
     broken = np.pad(leaping | np.isnan(work.positions[..., 0]), ((_BREAK_MARGIN, _BREAK_MARGIN), (0, 0)))
-    for marker, one in work.carried.items():
+    for marker, one in work.carried_markers.items():
         if not one.carriers:
             continue
         far = np.nan_to_num(one.away) > np.maximum(_STRAY_RATIO * one.tolerance, 0.06)
@@ -369,7 +369,7 @@ def _build_result(work):
     trial, seen = work.trial, work.trial.seen
     share = {label: float(seen[:, i].mean()) if len(trial) else 0.0 for i, label in enumerate(trial.labels)}
     remaining = [i for i in range(len(trial.labels)) if i not in work.unlabeled or work.seen(i)]
-    cleaned = trial.with_positions(work.positions).only([trial.labels[i] for i in remaining])
+    cleaned = trial.with_positions(work.positions).select_markers([trial.labels[i] for i in remaining])
     nameless = {trial.labels[i] for i in work.unlabeled}
     report = CleanReport(
         seen={label: part for label, part in share.items() if label not in nameless},

@@ -234,7 +234,7 @@ def _build_body_contacts(found: CapsuleContacts, direction, distance, bodies, ca
     ends = capsule_lines[body][found.frame, part]
     place = ends[:, 0] + at[:, None] * (ends[:, 1] - ends[:, 0])
     # The firmer body moves less. An arm alone takes the whole distance, two arms half each.
-    firm = [bodies[number].firm[found.frame] for number in pair]
+    firm = [bodies[number].firmness[found.frame] for number in pair]
     arms = [np.array([p.limb == "arm" for p in bodies[n].parts])[c] for n,
             c in ((body, part), (other_body, other_part))]
     arm = distance * np.where(arms[0], np.where(arms[1], 0.5, 1.0), 0.0)

@@ -183,7 +183,7 @@ def _run_on_workers(tasks: Iterator[Task], work: Work, workers, is_cancelled) ->
     try:
         while True:
             alone = breaks >= _MAX_BREAKS and bool(repeated or running)
-            while len(running) < (1 if alone else workers.room()) and (task := _take_next(repeated, tasks)) is not None:
+            while len(running) < (1 if alone else workers.find_capacity()) and (task := _take_next(repeated, tasks)) is not None:
                 try:
                     running[workers.submit(work, task[1])] = task
                 except BrokenExecutor:  # a worker ended in the meantime

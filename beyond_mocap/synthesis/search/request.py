@@ -142,7 +142,7 @@ def _replace_avoided_gaits(library: Library, gait: np.ndarray, speed: np.ndarray
     Near by ratio, since a walking player rather jogs than stands still; speed (T,) m/s.
     """
     out = gait.copy()
-    for frame in [frame for frame, avoid in enumerate(avoided) if library.gaits[gait[frame]].word in avoid]:
+    for frame in [frame for frame, avoid in enumerate(avoided) if library.gaits[gait[frame]].label in avoid]:
         others = [n for n, other in enumerate(library.gaits) if other.label not in avoided[frame]]
         away = [
             abs(np.log((library.gaits[n].speed + STANDING_SPEED) / (speed[frame] + STANDING_SPEED))) for n in others

@@ -224,5 +224,5 @@ def _look_up_contacts(library: Library, clip: np.ndarray, frame: np.ndarray) -> 
     out = np.zeros((len(clip), 2, 2), bool)
     for number in np.unique(clip):
         at = clip == number
-        out[at] = library.clips[number].standing[own[at]]
+        out[at] = library.clips[number].heel_toe_contacts[own[at]]
     return out

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import pytest
-from pages import SETTINGS_PAGE, settings_page
+from pages import SETTINGS_PAGE, build_settings_page
 
 from beyond_mocap.ball.physics import THROWN_BALLS
 from beyond_mocap.base import settings
@@ -95,11 +95,11 @@ def test_a_row_is_an_option_with_its_default_and_limits(with_sharpness):
 
 def test_a_row_is_on_the_page_of_settings(with_sharpness):
     line = "| `sharpness` | `--sharpness` | Sharpness | 0.25 | 0 to 1 turns | How sharp corners are |"
-    assert line in settings_page()
+    assert line in build_settings_page()
 
 
 def test_the_page_of_settings_is_up_to_date():
-    assert SETTINGS_PAGE.read_text("utf-8") == settings_page(), "run python packaging/pages.py"
+    assert SETTINGS_PAGE.read_text("utf-8") == build_settings_page(), "run python packaging/pages.py"
 
 
 def test_every_row_makes_sense():

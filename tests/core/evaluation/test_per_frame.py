@@ -63,7 +63,7 @@ def test_a_dragged_stance_tells_its_slide(jog, view_of):
 
 def test_a_strike_is_on_the_foot_and_its_gap_the_reports(cut, library, view_of, still_ball):
     asked = (KeyMoment(15.0, ("kick", "right")),)
-    take = cut(("jog.bvh", 0, 241), asked=asked)
+    take = cut(("jog.bvh", 0, 241), requested=asked)
     foot = playback_from_take(take).feet[150, 1, 1]
     take = replace(take, ball=still_ball(take, foot + [0.0, -0.3, 0.0]), timeline=Timeline(keys=asked))
     only, = find_strikes(view_of(take))
@@ -73,5 +73,5 @@ def test_a_strike_is_on_the_foot_and_its_gap_the_reports(cut, library, view_of, 
 
 
 def test_without_a_ball_the_strike_is_on_the_body(cut, view_of):
-    only, = find_strikes(view_of(cut(("jog.bvh", 0, 241), asked=(KeyMoment(15.0, ("kick", "right")),))))
+    only, = find_strikes(view_of(cut(("jog.bvh", 0, 241), requested=(KeyMoment(15.0, ("kick", "right")),))))
     assert only.ball is None and np.isnan(only.gap) and np.isfinite(only.part).all()

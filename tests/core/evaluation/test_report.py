@@ -146,7 +146,7 @@ def test_a_track_too_fast_is_covered_nowhere_and_told(uncut, library):
 def test_a_key_played_late_has_that_time_error(cut, track_of, library, late):
     # source frame 300 of a 60 fps clip, begun at 150, is played 2.5 s after the start at 10 s
     key = KeyMoment(12.5 - late, ("kick", "right"))
-    take = cut(("jog.bvh", 150, 200), asked=(key,))
+    take = cut(("jog.bvh", 150, 200), requested=(key,))
     for given in (take, replace(take, keys=())):
         told = evaluate(given, track_of(take, shift=(0.0, 0.2)), library)["keys"][0]
         assert told["time_error_s"] == pytest.approx(late, abs=1e-6)
@@ -156,7 +156,7 @@ def test_a_key_played_late_has_that_time_error(cut, track_of, library, late):
 
 
 def test_a_key_whose_words_are_lacking_says_what_was_used(cut, track_of, library):
-    take = replace(cut(("jog.bvh", 150, 200), asked=(KeyMoment(12.5, ("header",)),)), keys=())
+    take = replace(cut(("jog.bvh", 150, 200), requested=(KeyMoment(12.5, ("header",)),)), keys=())
     report = evaluate(take, track_of(take), library)
     assert report["keys"][0]["used_instead"] == ["front", "jogging", "kick", "right"]
     assert report["annotation_similarity"]["keys"] == 1.0 and report["annotation_similarity"]["had_keys"] is None
@@ -177,7 +177,7 @@ def test_a_key_that_no_clip_plays_says_what_is_shown(cut, track_of, library):
 
 
 def test_the_gap_to_the_ball_as_written_out(cut, track_of, still_ball, library):
-    take = cut(("jog.bvh", 150, 200), asked=(KeyMoment(12.5, ("kick", "right")),))
+    take = cut(("jog.bvh", 150, 200), requested=(KeyMoment(12.5, ("kick", "right")),))
     played = playback_from_take(take)
     foot, toe = played.feet[75, 1]
     side = np.cross(toe - foot, [0.0, 0.0, 1.0])
@@ -192,7 +192,7 @@ def test_the_gap_to_the_ball_as_written_out(cut, track_of, still_ball, library):
 def test_similarity_counts_asked_words_and_leaves_entry_and_exit_out(cut, track_of, library):
     # 10 .. 13 asked running but played jogging, except for the kick's own row 4.5 .. 5.6 s of the clip (12.0 .. 13.1)
     timeline = Timeline((Span(10.0, 20.0, ("running",)),), (KeyMoment(12.5, ("kick", "right")),))
-    take = cut(("jog.bvh", 150, 91), ("run.bvh", 0, 210), asked=timeline.keys, timeline=timeline)
+    take = cut(("jog.bvh", 150, 91), ("run.bvh", 0, 210), requested=timeline.keys, timeline=timeline)
     report = evaluate(take, track_of(take), library)
     similarity = report["annotation_similarity"]
     wrong, right = 60, 210
@@ -223,7 +223,7 @@ def test_automatic_words_come_from_made_clips_too_where_one_is_shown(shows, word
 
 def test_files_score_as_the_take_in_memory(cut, track_of, still_ball, library, tmp_path):
     key = KeyMoment(12.5, ("kick", "right"))
-    take = cut(("jog.bvh", 150, 120), ("run.bvh", 40, 120), asked=(key,))
+    take = cut(("jog.bvh", 150, 120), ("run.bvh", 40, 120), requested=(key,))
     take = replace(take, ball=still_ball(take, (3.0, 0.0, 0.11)))
     bvh.write_bvh(tmp_path / "m.bvh", take.motion)
     write_provenance(tmp_path / "p.csv", take)

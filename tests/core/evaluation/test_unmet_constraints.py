@@ -80,7 +80,7 @@ def test_a_track_faster_than_the_library_is_told_but_not_where_running_is_made(j
 def test_key_moments_late_or_out_of_reach_are_told(cut, told, still_ball):
     # source frame 300 of a 60 fps clip, begun at 150, is played 2.5 s after the start at 10 s
     asked = KeyMoment(12.4, ("kick", "right"))
-    take = cut(("jog.bvh", 150, 150), asked=(asked,))
+    take = cut(("jog.bvh", 150, 150), requested=(asked,))
     take = replace(take, ball=still_ball(take, (0.0, 9.0, 0.11)))
     late, far = told(take, timeline=take.timeline)
     assert late == "key moments are not at their time: 12.4 s by +0.10 s"
@@ -95,7 +95,7 @@ def test_words_that_are_not_shown_are_told_but_for_key_moments_and_what_nobody_h
     take = cut(("jog.bvh", 150, 180), ("walk.bvh", 0, 60), timeline=Timeline(spans, (key,)))
     (line,) = [line for line in told(take, timeline=take.timeline) if "labels" in line]
     assert line == "14.0-16.0 s: requested labels that are not shown: walking"
-    assert not any("labels" in line for line in told(take, timeline=take.timeline, asked=Timeline()))
+    assert not any("labels" in line for line in told(take, timeline=take.timeline, user_timeline=Timeline()))
 
 
 def test_a_body_in_the_ground_is_told(jog, told):

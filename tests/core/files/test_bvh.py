@@ -437,7 +437,7 @@ def test_what_stood_at_the_place_stays_until_all_is_written(tmp_path, monkeypatc
 
         return pieces(), ()
 
-    monkeypatch.setattr(bvh, "document", torn)
+    monkeypatch.setattr(bvh, "format_bvh", torn)
     with pytest.raises(InputError, match="no space left"):
         bvh.write_bvh(path, build_gait(1.0, 0.2))
     assert path.read_bytes() == b"precious" and list(tmp_path.iterdir()) == [path]

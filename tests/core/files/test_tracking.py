@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from pages import PROVIDERS_PAGE, with_tables
+from pages import PROVIDERS_PAGE, replace_tables
 
 from beyond_mocap.base.errors import InputError
 from beyond_mocap.cli.main import main
@@ -302,12 +302,12 @@ def test_a_provider_is_one_record(tmp_path, monkeypatch, capsys):
     assert main(touches) == 0 and main([*touches, "--provider", "acne"]) == 2
     assert "hawkeye, acme" in capsys.readouterr().err
     assert main(["match", "--help"]) == 0 and "hawkeye, acme" in " ".join(capsys.readouterr().out.split())
-    assert "| Acme Sports | `.acme` with TRACAB's metadata |\n" in with_tables(PROVIDERS_PAGE.read_text("utf-8"))
+    assert "| Acme Sports | `.acme` with TRACAB's metadata |\n" in replace_tables(PROVIDERS_PAGE.read_text("utf-8"))
 
 
 def test_the_tables_of_providers_come_from_their_records():
     page = PROVIDERS_PAGE.read_text("utf-8")
-    assert with_tables(page) == page, "make tables writes them"
+    assert replace_tables(page) == page, "make tables writes them"
 
 
 @needs_data

@@ -16,7 +16,7 @@ pytest.importorskip("c3d")
 
 @pytest.mark.filterwarnings("ignore:No analog data")
 def test_sample_is_what_its_script_makes(tmp_path):
-    make_markers.make(tmp_path)
+    make_markers.write_recordings(tmp_path)
     for name in ("static.trc", "throw.c3d", "walk.trc"):
         kept, made = read_markers(SAMPLE / "markers" / name), read_markers(tmp_path / name)
         assert kept.labels == made.labels and kept.fps == made.fps
@@ -24,7 +24,7 @@ def test_sample_is_what_its_script_makes(tmp_path):
 
 
 def test_throw_is_read_as_it_was_planted():
-    known = make_markers.thrown()
+    known = make_markers.generate_throw()
     trial = read_markers(SAMPLE / "markers" / "throw.c3d")
     first = int(known.ball.request.release * known.trial.fps) - 230
     truth = known.trial.select_frames(first, first + len(trial))

@@ -84,10 +84,10 @@ def test_a_save_that_holds_the_ball_is_a_catch():
 
 def test_most_planted_touches_come_back_as_words_of_their_player(planted):
     truth, match, solved, words = planted
-    wanted = [one for one in truth.touches if one.word in ("kick", "receive", "header", "throw-in")]
+    wanted = [one for one in truth.touches if one.label in ("kick", "receive", "header", "throw-in")]
     named = {"kick": "kick", "receive": "receive", "header": "header", "throw-in": "throwb"}
     found = sum(
-        any(named[one.word] in m.words and abs(m.time - one.time) < 0.15 for m in words.players[one.player])
+        any(named[one.label] in m.words and abs(m.time - one.time) < 0.15 for m in words.players[one.player])
         for one in wanted
     )
     assert len(wanted) >= 15 and found >= 0.6 * len(wanted)

@@ -105,7 +105,7 @@ def test_a_cluster_does_the_same_though_a_worker_is_killed_midway(chores, cluste
 @pytest.mark.parametrize("gone, told", [([0, 1, 2], "the scheduler has stopped"), ([1, 2], "no worker for 1 s")])
 def test_a_cluster_that_goes_away_is_told(chores, cluster, monkeypatch, gone, told):
     address, processes = cluster
-    monkeypatch.setattr(pool, "PATIENCE", 1.0)
+    monkeypatch.setattr(pool, "MAX_WAIT", 1.0)
     threading.Timer(2.0, lambda: [processes[number].kill() for number in gone]).start()
     with pytest.raises(InputError, match=f"scheduler: {told}"):
         list(run_tasks([(n, (60.0,)) for n in range(4)], chores.slow, WorkerConfig(1, address)))

@@ -128,7 +128,7 @@ def test_weights_of_equation_1_are_so_many_times_the_usual_ones():
 @pytest.fixture
 def run(capfd, tmp_path, strikes_library):
     """run(scene, *more, library=...) -> status, standard output, lines on standard error."""
-    strikes, kept = strikes_library.folder, strikes_library.kept[0]
+    strikes, kept = strikes_library.folder, strikes_library.cache_location[0]
 
     def call(scene, *more, out="out", library=strikes):
         capfd.readouterr()
@@ -200,7 +200,7 @@ def test_other_fouls(run, tmp_path, clips_folder, monkeypatch):
     assert run(SAMPLES["three"], out="no/such/place")[0] == 2
     status, _, error = run({**SAMPLES["three"], "defaults": {"part": "chest"}}, library=clips_folder)
     assert status == 3 and len(error) == 1 and "chest" in error[0] and "add clips" in error[0]
-    monkeypatch.setattr(ProgressReporter, "cancelled", lambda self: True)
+    monkeypatch.setattr(ProgressReporter, "is_cancelled", lambda self: True)
     assert run(SAMPLES["three"])[0] == 130
     assert not (tmp_path / "out").exists()
 

@@ -236,7 +236,7 @@ def test_who_cannot_cycle_is_named_also_where_others_are_avoided(capfd, place, t
 
 
 def test_ctrl_c_ends_it_without_a_file(run, tmp_path, monkeypatch):
-    monkeypatch.setattr(ProgressReporter, "cancelled", lambda self: True)
+    monkeypatch.setattr(ProgressReporter, "is_cancelled", lambda self: True)
     status, said, error = run()
     assert (status, said) == (130, "") and error == ["beyond-mocap: cancelled"]
     assert not list(tmp_path.iterdir())

@@ -88,7 +88,7 @@ def test_the_recording_stays_and_its_speeds_go_on(dive, whole):
 
 def test_the_middle_falls_as_a_stone_until_it_is_down(flight, whole):
     found = middles(whole.motion)[whole.recorded_count : whole.touch_frame]
-    wanted = flight.middle(np.arange(1, len(found) + 1) / FPS)
+    wanted = flight.compute_middle(np.arange(1, len(found) + 1) / FPS)
     assert len(found) > 20
     assert found[:, :2] == pytest.approx(wanted[:, :2], abs=0.01)
     assert found[:-8, 2] == pytest.approx(wanted[:-8, 2], abs=0.02)  # the ground takes it up over the last centimetres

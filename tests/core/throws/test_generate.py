@@ -40,12 +40,12 @@ class ByHeart(PhaseNetwork):
 
 
 def by_heart(rows, units=2):
-    inputs, answers = rows.inputs.shape[1], rows.answers.shape[1]
+    inputs, answers = rows.inputs.shape[1], rows.outputs.shape[1]
     network = ByHeart(
         (np.zeros((1, units, inputs)), np.zeros((1, answers, units))), (np.zeros((1, units)), np.zeros((1, answers))),
         np.zeros(inputs), np.full(inputs, 1e3), np.zeros(answers), np.ones(answers),
     )  # fmt: skip
-    for name, value in (("known", rows.inputs), ("said", rows.answers), ("asked", [])):
+    for name, value in (("known", rows.inputs), ("said", rows.outputs), ("asked", [])):
         object.__setattr__(network, name, value)
     return network
 

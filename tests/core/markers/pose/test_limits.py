@@ -30,7 +30,7 @@ def posed(made, joint, angles, count=6):
     """Random poses with this joint at these angles."""
     at = sample_poses(made, count, size=0.3)
     at.local[joint] = quaternion.from_euler(np.array(angles), made.order[joint])[:, None]
-    at.angles[joint] = np.array(angles)[:, None] * ~np.array(made.turning)[joint]
+    at.angles[joint] = np.array(angles)[:, None] * ~np.array(made.is_fully_free)[joint]
     return at
 
 

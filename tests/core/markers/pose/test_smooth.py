@@ -53,7 +53,7 @@ def test_windows_leave_no_seam(monkeypatch):
     task = task_of(made, truth)
     rough = descend(task, truth).poses
     whole, _ = smooth_poses(task, rough, 0.02, FPS)
-    monkeypatch.setattr(module, "_KEPT", 25)
+    monkeypatch.setattr(module, "_WINDOW_FRAMES", 25)
     monkeypatch.setattr(module, "_AHEAD", 25)
     pieces, _ = smooth_poses(task, rough, 0.02, FPS)
     assert off(whole, pieces) < 0.05

@@ -118,7 +118,7 @@ def test_where_no_foot_comes_near_the_ball_only_rolls(held, moves):
 def test_outside_of_the_stretches_the_ball_only_comes_and_goes():
     motion = build_gait(2.8, 4.0, FPS)
     ball = planted_ball(motion)
-    found = dribbled(motion, ball, stretches=[(45.0, 90.0)], turns=[30.2, 110.0])
+    found = dribbled(motion, ball, stretches=[(45.0, 90.0)], course_changes=[30.2, 110.0])
     assert np.array_equal(found.ball[:30], ball[:30]) and np.array_equal(found.ball[111:], ball[111:])
     assert not np.array_equal(found.ball[40:45], ball[40:45])
 

@@ -188,7 +188,7 @@ def test_head_chest_and_hands_meet_a_ball_of_unknown_height(walk, words):
     places, _ = kinematics(walk.motion)
     near = int(walk.key * FPS)
     ball = np.array([*places[near, identify_joints(walk.motion.skeleton).head, :2] + [0.2, 0.1], 0.11])
-    struck = met(walk, ball, touch(walk, words), is_height_known=np.zeros(len(walk.motion), bool))
+    struck = met(walk, ball, touch(walk, words), height_known=np.zeros(len(walk.motion), bool))
     assert struck.gap[0] < 0.005 and struck.ball[near, 2] > 0.5
     check_whole(walk.motion, struck)
     assert max(map(abs, gaps(walk.motion, struck, near, words))) < 0.005
@@ -198,7 +198,7 @@ def test_head_chest_and_hands_meet_a_ball_of_unknown_height(walk, words):
 def test_a_ball_of_unknown_height_flies_freely(walk):
     ball = kinematics(walk.motion)[0][30, identify_joints(walk.motion.skeleton).head] * [1.0, 1.0, 0.0] + [0.25, 0.0,
             0.11]
-    struck = met(walk, ball, touch(walk, ("header",)), is_height_known=np.zeros(len(walk.motion), bool))
+    struck = met(walk, ball, touch(walk, ("header",)), height_known=np.zeros(len(walk.motion), bool))
     fall = np.diff(struck.ball[30:42, 2], 2) * FPS**2
     assert np.allclose(fall, -9.81, atol=1e-6)
 
