@@ -1,6 +1,6 @@
 """Beyond Mocap's core: full-body animation from tracking data, a folder of motion capture and a few labels.
 
-There is one folder per feature over a small shared base; docs/architecture.md describes each folder and which folders
+There is one folder per feature over a small shared base; docs/explanation/architecture.md describes each folder and which folders
 it may import. The main sequence is `files` and `library` (input), `synthesis` (plan, resolve, search, construct) and
 `evaluation` (output).
 
@@ -10,4 +10,4 @@ Readers and writers convert at the border. Functions do not change their inputs.
 input gives the same output. The core needs numpy, scipy and scikit-learn, and never bpy.
 """
 
-__version__ = "0.1.0"
+__version__ = "0.2.0"

@@ -47,7 +47,8 @@ motion is imported, from the hips up and in metres"""
     def do(self, context):
         """Read all files, then create armatures."""
         clips = [clip for path in self.list_paths() for clip in self.read_file(path)]
-        armature_to_reuse = context.object if self.reuse and context.object and context.object.type == "ARMATURE" else None
+        active = context.object
+        armature_to_reuse = active if self.reuse and active and active.type == "ARMATURE" else None
         if armature_to_reuse is not None:
             self.check_bones(armature_to_reuse, clips, context.scene)
         bodies = []
@@ -238,7 +239,7 @@ kind, in this file or as a .blend for a folder of asset libraries"""
     def apply(self, scene, result):
         """Create the actions; write them to their own file, or leave them here."""
         drafts, pictures = result
-        catalogs = {assets.choose_catalog(one.words) for one in drafts}
+        catalogs = {assets.choose_catalog(one.labels) for one in drafts}
         if self.apart:
             target = self.find_target()
             write_asset_file(target, assets.create_assets(bpy.context, drafts, pictures, copy_actions=True), drafts)

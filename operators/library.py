@@ -176,8 +176,8 @@ result is cached, so the next build is quick unless files have changed. FBX, glT
         clips.store_clips(bpy.context.window_manager, result.setting, result.listing, result.files)
         for note in self.notes:
             self.report({"WARNING"}, note)
-        if result.trouble is not None:
-            raise result.trouble
+        if result.error is not None:
+            raise result.error
         session.store_library(result.library, scene.beyond_mocap.library_unit or None)
         scene.beyond_mocap.library_holds = describe_library(result.library)
         for note in result.library.notes:
@@ -233,7 +233,7 @@ quality"""
         files = clips.list_files(order.folder)
         if files is None:
             raise InputError(order.folder, "no such folder", "the library's folder", "press Relink Library")
-        found = list_clips(order.built) if order.built is not None else scan_clips(order.folder, order.cache_dir)
+        found = list_clips(order.library) if order.library is not None else scan_clips(order.folder, order.cache_dir)
         return order.setting, found, files
 
     def apply(self, _scene, result):

@@ -82,7 +82,7 @@ class BEYOND_MOCAP_OT_import_markers(ImportOperator, bpy.types.Operator):
             messages += sets.apply_marker_set(thing, sets.choose_shipped_set(trial.labels))
         except InputError as error:
             messages.append(str(error))
-        thing.beyond_mocap_cloud.told = "\n".join(messages)
+        thing.beyond_mocap_cloud.messages = "\n".join(messages)
         for line in messages:
             self.report({"INFO"}, f"{thing.name}: {line}")
         seen = f"{100.0 * float(trial.seen.mean()):.0f} % visible"

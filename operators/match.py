@@ -46,7 +46,7 @@ class MatchVerb(BackgroundOperator):
         match.shown, match.shown_start, match.shown_first = wanted.folder, scenery.start, first
         match.shown_rate = frames_per_second(scene)
         known = match.report.splitlines()
-        match.told = "\n".join(line for line in dict.fromkeys((*lines, *notes)) if line not in known)
+        match.messages = "\n".join(line for line in dict.fromkeys((*lines, *notes)) if line not in known)
         for line in lines:
             self.report({"WARNING"}, line)
         seconds = scenery.end - scenery.start

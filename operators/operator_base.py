@@ -148,7 +148,7 @@ class BackgroundOperator(BaseOperator):
         try:
             order = self.order(context)
             callbacks = (lambda done, text: manager.progress_update(int(100 * done)), lambda: False, lambda: False)
-            result = self.total_work(order, *callbacks)
+            result = self.work(order, *callbacks)
         finally:
             manager.progress_end()
         self.apply(context.scene, result)
@@ -162,7 +162,7 @@ class BackgroundOperator(BaseOperator):
 
     def start(self, context):
         """Collect the order and start the thread."""
-        order, work = self.order(context), self.total_work
+        order, work = self.order(context), self.work
         self.scene = context.scene.session_uid
         self.job = background.Job(self.kind, lambda *asking: work(order, *asking))
 

@@ -172,7 +172,7 @@ leads from one player's strike to the next"""
         """Show the error of an update in the panel; the scene that is shown stays."""
         if not self.live:
             return super().failed(message)
-        bpy.context.scene.beyond_mocap_passes.told = message
+        bpy.context.scene.beyond_mocap_passes.messages = message
         return {"CANCELLED"}
 
 

@@ -128,7 +128,7 @@ def choose_shirt(number: int) -> tuple[float, float, float]:
 
 
 def find_free_name(name_base: str, taken: set[str]) -> str:
-    """Return `name_base`, or the first of "wanted 2", "wanted 3" ... that is not taken."""
+    """Return `name_base`, or the first of "NAME 2", "NAME 3" ... that is not taken."""
     number, name = 1, name_base
     while name in taken:
         number += 1

@@ -36,7 +36,7 @@ class BEYOND_MOCAP_OT_map_bones(BoneMapOperator, bpy.types.Operator):
 
     def do(self, context):
         settings = context.scene.beyond_mocap.rig
-        settings.told = f"Bones mapped {rig.fill_bone_map(settings, ignores_stored=True)}"
+        settings.messages = f"Bones mapped {rig.fill_bone_map(settings, ignores_stored=True)}"
 
 
 class BEYOND_MOCAP_OT_keep_bone_map(BoneMapOperator, bpy.types.Operator):
@@ -210,8 +210,8 @@ tolerances"""
     def do(self, context):
         """Reduce the keys and report the numbers."""
         chosen = context.scene.beyond_mocap.rig
-        chosen.told = reduce_rig_keys(chosen.target, find_bone_map(chosen, chosen.target), chosen)
-        self.report({"INFO"}, chosen.told)
+        chosen.messages = reduce_rig_keys(chosen.target, find_bone_map(chosen, chosen.target), chosen)
+        self.report({"INFO"}, chosen.messages)
 
 
 def find_source_body(settings) -> bpy.types.Object | None:

@@ -78,7 +78,7 @@ class BEYOND_MOCAP_OT_study_render(BaseOperator, bpy.types.Operator):
         if look.movie or not target.is_dir():
             filming.render_motion(target, *source, look)
             return
-        replacement = target.with_name(f".{target.name}.anew")
+        replacement = target.with_name(f".{target.name}.new")
         shutil.rmtree(replacement, ignore_errors=True)  # left by an interrupted run
         filming.render_motion(replacement, *source, look)
         shutil.rmtree(target)

@@ -30,7 +30,7 @@ class TargetOperator(BackgroundOperator):
             raise InputError(f"armature {result.order.body}", "it was removed meanwhile", "the same armature",
                              "select an armature and try again")
         shown.show_throw(scene, body, result)
-        for line in body.beyond_mocap_throw.told.splitlines():
+        for line in body.beyond_mocap_throw.messages.splitlines():
             self.report({"WARNING"}, f"{body.name}: {line}")
         self.report({"INFO"}, f"{body.name}: {'; '.join(shown.list_figures(result))}")
 

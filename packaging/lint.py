@@ -52,7 +52,8 @@ def _check_coverage(listed, packages, platform):
                         and (w.name, w.version) == (normalize_name(package.name), package.bundled_version)}
             unused -= matching
             if len(matching) != 1:
-                yield f"{len(matching)} wheels of {package.name} for {platform.name}, Python {python}: {sorted(matching)}"
+                found = f"{len(matching)} wheels of {package.name}"
+                yield f"{found} for {platform.name}, Python {python}: {sorted(matching)}"
     yield from (f"wheel {name} fits no Python version of {platform.name}" for name in sorted(unused))
 
 

@@ -1,4 +1,4 @@
-"""Render the equations of the documents as MathML when the site is built, so that a page needs no script and no network.
+"""Render the equations of the documents as MathML when the site is built: pages need no script and no network.
 
 mkdocs calls `on_page_content` for every page (mkdocs.yml, hooks)."""
 

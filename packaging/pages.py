@@ -1,7 +1,6 @@
-"""Generate pages from the code: docs/settings.md from the settings table, and the tables in docs/match/match-input.md.
+"""Write the pages of docs/reference that come from the code: settings, commands, labels, and the tables of providers.
 
-`make tables` in the project's folder writes both.
-"""
+`make tables` in the project's folder writes them all."""
 
 from __future__ import annotations
 
@@ -11,15 +10,18 @@ from itertools import groupby
 from pathlib import Path
 
 TOP = Path(__file__).resolve().parents[1]
-SETTINGS_PAGE = TOP / "docs" / "settings.md"
-PROVIDERS_PAGE = TOP / "docs" / "match" / "match-input.md"
+REFERENCE = TOP / "docs" / "reference"
+SETTINGS_PAGE = REFERENCE / "settings.md"
+PROVIDERS_PAGE = REFERENCE / "match-input.md"
+COMMANDS_PAGE = REFERENCE / "commands.md"
+LABELS_PAGE = REFERENCE / "labels.md"
 HEAD = """# Settings
 
-All settings, by feature. This page is generated from the table in `beyond_mocap/base/settings` by
-`make tables`; a test checks that it is up to date. Options are those of the command line, panel
-names those in Blender. Files and objects that are only read or written are on each feature's own page.
+*For all who look up a setting: its name in Blender, its option on the command line, its default and limits. This page
+is generated from the table in `beyond_mocap/base/settings` by `make tables`.*
+
+Files and objects that are only read or written are on the pages of [commands](commands.md) and file forms.
 """
-COLUMNS = ("setting", "option", "in Blender", "default", "limits", "meaning")
 
 
 def build_settings_page() -> str:
@@ -35,16 +37,19 @@ def build_settings_page() -> str:
     for feature, groups in groupby(tables, key=lambda table: table[0]):
         parts.append(f"\n## {feature}\n")
         for _, group, rows in groups:
-            parts.append(f"\n`{group}`\n\n" + _format_row(COLUMNS) + _format_row(["---"] * len(COLUMNS)))
-            parts.extend(_format_row(_build_cells(row)) for row in rows)
+            parts.append(f"\nGroup `{group}`:\n\n")
+            parts.extend(_format_setting(row) for row in rows)
     return "".join(parts)
 
 
-def _build_cells(row) -> list[str]:
-    """Build the cells of a setting."""
+def _format_setting(row) -> str:
+    """One setting as a list item: names, meaning, default, limits."""
     option = " ".join(f"`{flag}`" for flag in row.option.split())
-    return [f"`{row.name}`", option, row.title if row.tooltip else "", _format_default(row), _format_limits(row),
-            _format_meaning(row)]
+    title = f"**{row.title}**, " if row.tooltip else ""
+    names = title + f"`{row.name}`" + (f", {option}" if option else "")
+    limits = _format_limits(row)
+    facts = [_format_meaning(row), f"Default: {_format_default(row)}", limits[:1].upper() + limits[1:]]
+    return f"- {names}: {'. '.join(filter(None, facts))}.\n"
 
 
 def _format_default(row) -> str:
@@ -87,10 +92,6 @@ def _format_meaning(row) -> str:
     return row.tooltip or re.sub(r"[;(] ?default %\(default\)[gs]\)?", "", row.help or "").strip()
 
 
-def _format_row(cells) -> str:
-    return "| " + " | ".join(cell.replace("|", "\\|") for cell in cells) + " |\n"
-
-
 def replace_tables(text: str) -> str:
     """Replace both tables of providers in a page, in the order of their records.
 
@@ -110,7 +111,19 @@ def replace_tables(text: str) -> str:
     return re.sub(r"(?m)^(\| provider \|.*\n\|-.*\n)(?:\|.*\n)*", rows, text)
 
 
+def write_pages() -> None:
+    """Write all generated pages."""
+    from command_pages import build_commands_page, build_labels_page
+
+    from beyond_mocap.annotation.labels import TABLE
+    from beyond_mocap.cli.main import build_parser
+
+    SETTINGS_PAGE.write_text(build_settings_page(), "utf-8")
+    COMMANDS_PAGE.write_text(build_commands_page(build_parser()), "utf-8")
+    LABELS_PAGE.write_text(build_labels_page(TABLE), "utf-8")
+    PROVIDERS_PAGE.write_text(replace_tables(PROVIDERS_PAGE.read_text("utf-8")), "utf-8")
+
+
 if __name__ == "__main__":
     sys.path.insert(0, str(TOP))
-    SETTINGS_PAGE.write_text(build_settings_page(), "utf-8")
-    PROVIDERS_PAGE.write_text(replace_tables(PROVIDERS_PAGE.read_text("utf-8")), "utf-8")
+    write_pages()

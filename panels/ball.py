@@ -56,7 +56,7 @@ def draw_tracked_ball(panel, layout, context) -> None:
     """Draw the button, figures of the solved ball, and its touches."""
     settings = context.scene.beyond_mocap_passes
     layout.operator("beyond_mocap.solve_ball", icon="SPHERE")
-    panel.progress(context, "ball")
+    panel.draw_progress(context, "ball")
     if settings.solved:
         draw_table(layout, settings.solved.splitlines())
     if not len(settings.touches):
@@ -163,8 +163,8 @@ def draw_aimed_ball(layout, ball) -> None:
     for name in ("ball", "back", "left", "follow", "human"):
         if settings.way == "AIR" or name not in ("back", "left"):
             column.prop(settings, name)
-    if settings.told:
-        draw_paragraph(layout, settings.told, "ERROR")
+    if settings.messages:
+        draw_paragraph(layout, settings.messages, "ERROR")
     draw_table(layout, settings.figures.splitlines())
 
 
@@ -211,7 +211,7 @@ def draw_play_live(panel, layout, context) -> None:
     row.operator("beyond_mocap.stream_play", icon="OUTLINER_OB_ARMATURE")
     row.operator("beyond_mocap.stream_end", icon="SNAP_FACE")
     layout.operator("beyond_mocap.stream_act", icon="ARMATURE_DATA")
-    panel.progress(context, "live")
+    panel.draw_progress(context, "live")
     for line in status.played.splitlines():
         draw_paragraph(layout, line, "BLANK1")
 
@@ -273,8 +273,8 @@ def draw_passing_scene(panel, layout, context) -> None:
     row.operator("beyond_mocap.passes_make", icon="PLAY")
     row.prop(settings, "live", text="", icon="UV_SYNC_SELECT")
     row.operator("beyond_mocap.passes_clear", text="", icon="X")
-    panel.progress(context, "passes")
-    for line in settings.told.splitlines():
+    panel.draw_progress(context, "passes")
+    for line in settings.messages.splitlines():
         draw_paragraph(layout, line, "INFO")
     if settings.strikes:
         draw_section(layout, "ball_strikes", "Strikes", lambda opened: draw_strikes(opened, settings))

@@ -16,7 +16,7 @@ class BEYOND_MOCAP_UL_clips(bpy.types.UIList):
     def draw_item(self, _context, layout, _data, clip, _icon, _active_data, _active_property):
         row = layout.row(align=True)
         names = row.split(factor=0.66, align=True)
-        names.label(text=clip.name, icon=QUALITY_ICONS[clip.grade])
+        names.label(text=clip.name, icon=QUALITY_ICONS[clip.mark])
         names.label(text=clip.brief)
         row.operator("beyond_mocap.import_clip", text="", icon="IMPORT", emboss=False).path = clip.path
 
@@ -97,7 +97,7 @@ def draw_clips(layout, settings, listing, current) -> None:
     draw_paragraph(column, clip.path, "FILE")
     draw_paragraph(column, clip.words.replace("_", " ") or "No labels: the library does not use this clip", "BOOKMARKS")
     draw_paragraph(column, clip.figures, "TIME")
-    draw_table(column, clip.details.splitlines())
+    draw_table(column, clip.messages.splitlines())
     row = layout.row(align=True)
     row.operator("beyond_mocap.import_clip", text="Import", icon="IMPORT").path = clip.path
     row.operator("beyond_mocap.annotate_clip", text="Annotate", icon="GREASEPENCIL").path = clip.path

@@ -89,7 +89,7 @@ def draw_lines(layout, text: str, icon: str) -> None:
 def draw_clean_up(panel, layout, context, properties) -> None:
     """Draw the clean-up button and its report."""
     layout.operator("beyond_mocap.clean_markers", icon="BRUSH_DATA")
-    panel.progress(context, "clean markers")
+    panel.draw_progress(context, "clean markers")
     draw_lines(layout, properties.cleaned, "DOT")
 
 
@@ -120,9 +120,9 @@ def draw_pose(panel, layout, context, properties) -> None:
     row = layout.row()
     row.scale_y = 1.3
     row.operator("beyond_mocap.reconstruct_markers", icon="PLAY")
-    panel.progress(context, "reconstruct markers")
+    panel.draw_progress(context, "reconstruct markers")
     draw_table(layout, properties.figures.splitlines())
-    draw_lines(layout, properties.told, "INFO")
+    draw_lines(layout, properties.messages, "INFO")
 
 
 def draw_release(panel, layout, context, properties) -> None:
@@ -132,7 +132,7 @@ def draw_release(panel, layout, context, properties) -> None:
     for name in ("hand", "thrown", "radius"):
         column.prop(settings, name)
     layout.operator("beyond_mocap.find_release", icon="FORCE_FORCE")
-    panel.progress(context, "find release")
+    panel.draw_progress(context, "find release")
     draw_table(layout, properties.release.splitlines())
     if properties.ball is not None:
         create_value_column(layout).prop(properties, "ball")

@@ -105,5 +105,5 @@ def draw_display(layout, match) -> None:
     name = f"Eyes of {chosen.name or chosen.feed_id}" if chosen is not None else "Eyes"
     row.operator("beyond_mocap.match_camera", text=name, icon="HIDE_OFF").which = "EYES"
     layout.operator("beyond_mocap.match_export", icon="EXPORT")
-    for line in match.told.splitlines()[:MAX_LINES]:
+    for line in match.messages.splitlines()[:MAX_LINES]:
         draw_paragraph(layout, line, "INFO")

@@ -97,7 +97,7 @@ def draw_armature(layout, body, edit) -> None:
         row = layout.row(align=True)
         row.prop(edit, "live", toggle=True, icon="PLAY")
         row.operator("beyond_mocap.update_path", text="Update", icon="FILE_REFRESH")
-    for line in edit.told.splitlines():
+    for line in edit.messages.splitlines():
         draw_paragraph(layout, line, "INFO")
 
 

@@ -115,7 +115,7 @@ class BEYOND_MOCAP_PT_quality(TabPanel, bpy.types.Panel):
                 self.draw_line(body, player, text, second,
                                "KEYTYPE_EXTREME_VEC" if status == "missed" else "KEYTYPE_KEYFRAME_VEC")
         if body := draw_header(layout, "quality_why", "Why This Clip", closed=False):
-            self.draw_reasons(body, context.window_manager.beyond_mocap_playhead.draw_reasons)
+            self.draw_reasons(body, context.window_manager.beyond_mocap_playhead.why)
         if body := draw_header(layout, "quality_figures", "Figures", closed=False):
             draw_figures(body, player.quality)
 

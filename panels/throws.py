@@ -44,7 +44,7 @@ def draw_preview(layout, settings) -> None:
     if not settings.made:
         return
     draw_table(layout, settings.figures.splitlines())
-    for line in settings.told.splitlines():
+    for line in settings.messages.splitlines():
         draw_paragraph(layout, line, "INFO")
     layout.prop(settings, "live")
     row = layout.row(align=True)

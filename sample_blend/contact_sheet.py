@@ -63,7 +63,7 @@ def create_scene(width: int, height: int, samples: int = 24) -> bpy.types.Scene:
     world.node_tree.nodes["Background"].inputs[1].default_value = 0.75
     scene.world = world
     light = bpy.data.lights.new("sun", "SUN")
-    light.compute_energy, light.angle = 3.2, 0.03
+    light.energy, light.angle = 3.2, 0.03
     sun = bpy.data.objects.new("sun", light)
     sun.rotation_euler = (0.75, 0.15, -0.5)
     scene.collection.objects.link(sun)

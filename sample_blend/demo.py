@@ -21,6 +21,7 @@ import time
 HERE = pathlib.Path(__file__).resolve().parent
 TILES = (4, 2)  # across, down
 TILE = (480, 270)  # pixels
+FILM_SECONDS, FILM_FPS = 4.8, 12.5  # the moving picture: long enough for a kick and what follows, small enough for a page
 
 
 def load_extension():
@@ -102,17 +103,17 @@ def synthesize_players(load, settings, steps) -> list[dict]:
     quality, recipe = load("scene.result.quality"), load("beyond_mocap.synthesis.synthesize")
     steps.enter_part("Library")
     started = time.perf_counter()
-    clips = load("beyond_mocap.library.build").build(settings.library_folder, progress=steps.progress)
+    clips = load("beyond_mocap.library.build").build_library(settings.library_folder, progress=steps.show_progress)
     library_seconds = time.perf_counter() - started
     session.store_library(clips, None)
-    settings.library_holds = load("operators.library").summary(clips)
+    settings.library_holds = load("operators.library").describe_library(clips)
     reports = []
     for player in settings.players:
         steps.enter_part(player.name)
         started = time.perf_counter()
         plan, _ = plans.build_plan(settings, player)
         load_seconds = time.perf_counter() - started
-        take = recipe.synthesize(clips, plan, progress=steps.progress)
+        take = recipe.synthesize(clips, plan, progress=steps.show_progress)
         total = time.perf_counter() - started + library_seconds
         reports.append(load("beyond_mocap.evaluation.report").evaluate(take, plan.track, clips))
         reports[-1]["seconds"].update(load=load_seconds, library=library_seconds, total=total)
@@ -184,7 +185,7 @@ def render_sheet(bpy, load, plans, takes, out: pathlib.Path, steps) -> None:
     sheet = np.ones((TILES[1] * TILE[1], TILES[0] * TILE[0], 4), np.float32)
     with tempfile.TemporaryDirectory() as folder:
         for number, (seconds, player) in enumerate(times):
-            steps.progress(number / len(times), f"frame {number + 1} of {len(times)}")
+            steps.show_progress(number / len(times), f"frame {number + 1} of {len(times)}")
             scene.frame_set(round(frame_at(scene, seconds)))
             aim_camera(load, scene.camera, takes[player], seconds)
             scene.render.stamp_note_text = f"{seconds:.1f} s   {describe_moment(takes[player], seconds)}"
@@ -195,9 +196,49 @@ def render_sheet(bpy, load, plans, takes, out: pathlib.Path, steps) -> None:
             sheet[top - TILE[1] : top, column * TILE[0] : (column + 1) * TILE[0]] = _load_pixels(bpy,
                     scene.render.filepath)
     _write_picture(bpy, sheet, out)
+    scene.render.use_stamp = False
+    render_film(bpy, load, takes[0], out.with_suffix(".webp"), steps)
     bpy.data.cameras.remove(scene.camera.data)
     scene.camera = follow_camera
     scene.render.resolution_x, scene.render.resolution_y, scene.render.use_stamp = 1280, 720, False
+
+
+def render_film(bpy, load, take, out: pathlib.Path, steps) -> None:
+    """Render a moving picture of a player around their first key moment, as animated WebP.
+
+    Args:
+        take: the player's take.
+        out: the file.
+        steps: shows the progress.
+    """
+    import numpy as np
+    from PIL import Image
+
+    scene, frame_at = bpy.context.scene, load("scene.result.bake").compute_frame
+    start = take.keys[0].requested.time - 0.4 * FILM_SECONDS
+    times = start + np.arange(round(FILM_SECONDS * FILM_FPS)) / FILM_FPS
+    pictures = []
+    with tempfile.TemporaryDirectory() as folder:
+        for number, seconds in enumerate(times):
+            steps.show_progress(number / len(times), f"picture {number + 1} of {len(times)}")
+            scene.frame_set(round(frame_at(scene, seconds)))
+            follow_player(scene.camera, take, seconds)
+            scene.render.filepath = str(pathlib.Path(folder, f"{number}.png"))
+            bpy.ops.render.render(write_still=True)
+            pictures.append(Image.open(scene.render.filepath).convert("RGB"))
+    pictures[0].save(out, save_all=True, append_images=pictures[1:], duration=round(1000 / FILM_FPS), loop=0, quality=70)
+
+
+def follow_player(camera, take, seconds: float) -> None:
+    """Place the camera beside the player's path, moving as evenly as the player does over two seconds."""
+    import numpy as np
+    from mathutils import Vector
+
+    near = [locate_hips(take, seconds + shift) * [1.0, 1.0, 0.0] for shift in np.linspace(-1.0, 1.0, 9)]
+    middle = np.mean(near, axis=0)
+    eye = Vector(middle + [-1.5, -6.0, 1.9])
+    camera.location = eye
+    camera.rotation_euler = (Vector(middle + [0.0, 0.0, 0.8]) - eye).to_track_quat("-Z", "Y").to_euler()
 
 
 def create_camera(bpy):
@@ -215,7 +256,7 @@ def aim_camera(load, camera, take, seconds: float) -> None:
 
     hips = locate_hips(take, seconds) * [1.0, 1.0, 0.0]
     frame = min(max(round((seconds - take.start_time) * take.motion.fps), 0), len(take.motion) - 1)
-    angle = load("beyond_mocap.motion.humanoid").heading(take.motion)[frame] - 0.9
+    angle = load("beyond_mocap.motion.humanoid").compute_heading(take.motion)[frame] - 0.9
     eye = Vector(hips + [4.6 * np.cos(angle), 4.6 * np.sin(angle), 1.55])
     camera.location = eye
     camera.rotation_euler = (Vector(hips + [0.0, 0.0, 0.85]) - eye).to_track_quat("-Z", "Y").to_euler()
@@ -258,17 +299,17 @@ def run_demo(out: pathlib.Path) -> None:
 
     reporter = load("beyond_mocap.cli.main").ProgressReporter(False)
     steps = Steps(reporter,
-                  {"Library": 0.2, "player1": 0.05, "player2": 0.05, "Accept": 0.03, "Render": 0.65, "Save": 0.02})
+                  {"Library": 0.2, "player1": 0.05, "player2": 0.05, "Apply": 0.03, "Render": 0.65, "Save": 0.02})
     with silence_blender():
         prepare_scene(bpy)
     settings, session = bpy.context.scene.beyond_mocap, load("scene.core.session")
     reports = synthesize_players(load, settings, steps)
-    steps.enter_part("Accept")
+    steps.enter_part("Apply")
     results = [session.find_take(player.take) for player in settings.players]
     plans, takes = [result.plan for result in results], [result.take for result in results]
     with silence_blender():
         bpy.ops.beyond_mocap.accept()
-    load("beyond_mocap.files.bvh.bvh").write(out / "player.bvh", takes[0].motion)
+    load("beyond_mocap.files.bvh.bvh").write_bvh(out / "player.bvh", takes[0].motion)
     others = dict(zip([player.name for player in settings.players][1:], reports[1:]))
     load("beyond_mocap.files.tables").write_report(out / "report.json", {**reports[0], "others": others})
     steps.enter_part("Render")
@@ -285,7 +326,8 @@ Finished in {time.perf_counter() - steps.start_time:.0f} s:
   {out / "match.blend"}   two players, the ball and a following camera: open it with Blender 4.5 or newer, press Space
   {out / "player.bvh"}    the first player's motion, for any other tool
   {out / "report.json"}   quality figures
-  {out / "preview.encode_png"}   eight rendered frames""")
+  {out / "preview.png"}   eight rendered frames
+  {out / "preview.webp"}  a moving picture""")
 
 
 def main() -> int:

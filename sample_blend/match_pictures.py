@@ -1,4 +1,4 @@
-"""Render the pictures of docs/match/match-panel.md: the small match, from the stand and through a player's eyes.
+"""Render the pictures of docs/how-to/make-a-match.md: the small match, from the stand and through a player's eyes.
 
     .venv/bin/python sample_blend/match_pictures.py [FOLDER]
 
@@ -28,7 +28,7 @@ def synthesize_match(bpy, folder: str) -> None:
     bpy.ops.beyond_mocap.read_match(filepath=str(demo.HERE / "match" / "small" / "small.dat"))
     match = scene.beyond_mocap_match
     match.start, match.end, match.folder = *SPAN, folder
-    bpy.ops.beyond_mocap.synthesize_match()
+    bpy.ops.beyond_mocap.make_match()
 
 
 def render_second(bpy, second: float, path: pathlib.Path) -> None:

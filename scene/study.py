@@ -141,7 +141,7 @@ def _create_floor(scene: bpy.types.Scene, motion: Motion) -> None:
 def _create_light(scene: bpy.types.Scene) -> None:
     """Create a sun that casts shadows, and a pale sky."""
     data = bpy.data.lights.new("Sun", "SUN")
-    data.compute_energy, data.angle = 3.0, 0.03
+    data.energy, data.angle = 3.0, 0.03
     sun = bpy.data.objects.new("Sun", data)
     sun.rotation_euler = (0.75, 0.25, 0.5)
     scene.collection.objects.link(sun)

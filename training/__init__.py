@@ -1,4 +1,4 @@
-"""Training of the networks for throws and kicks; see docs/throws/throws-training.md.
+"""Training of the networks for throws and kicks; see docs/how-to/train-networks.md.
 
 Not part of the extension: it needs jax and optax (`make training`). It writes a file of weights that
 `beyond_mocap.throws.networks` uses with numpy alone.

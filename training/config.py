@@ -1,6 +1,6 @@
 """Configuration of a training, read from a small JSON file.
 
-docs/throws/throws-training.md has a table of all names.
+docs/reference/network-weights.md has a table of all names.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ from beyond_mocap.files import json_values as values
 from beyond_mocap.files.content import read_utf8
 from beyond_mocap.throws.networks.model import ModelSettings
 
-PAGE = "docs/throws/throws-training.md"
+PAGE = "docs/reference/network-weights.md"
 MAX_FILE_SIZE = 1_000_000
 """Largest size of a config file, bytes."""
 LIMITS = {

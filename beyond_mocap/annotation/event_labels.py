@@ -53,7 +53,7 @@ TABLE = Path(__file__).with_name("event_words.csv")
 """The table supplied with the project."""
 
 _COLUMNS = ("kind", "part", "detail", "words")
-_NEXT_STEP = "see docs/match/match-input.md"
+_NEXT_STEP = "see docs/reference/match-input.md"
 
 
 @dataclass(frozen=True)

@@ -50,7 +50,7 @@ def compute_gait_thresholds(speeds: np.ndarray, omega: float = 4.0) -> np.ndarra
         (G-1,) m/s.
     Raises:
         InputError: if speeds do not ascend or omega is below 1.
-    Source: Faustino 2024, section 3.1.1.
+    Source: Faustino 2016, section 3.1.1.
     """
     speeds = np.asarray(speeds, dtype=float)
     if speeds.ndim != 1 or not np.all(np.isfinite(speeds)) or np.any(np.diff(speeds) <= 0):
@@ -108,7 +108,7 @@ def choose_gaits(
             the longer one.
     Returns:
         (T,) index into `speeds`.
-    Source: Faustino 2024, section 3.1.1, pseudo-code; hysteresis and minimum duration added.
+    Source: Faustino 2016, section 3.1.1, pseudo-code; hysteresis and minimum duration added.
     """
     speed = np.asarray(speed, dtype=float)
     margins = np.minimum(hysteresis * np.diff(np.asarray(speeds, dtype=float)), thresholds / 4.0)

@@ -197,7 +197,7 @@ def fill_timeline(timeline: Timeline, times: np.ndarray, labels: Sequence[tuple[
         labels: T tuples, the automatic gait of each frame.
     Returns:
         The filled timeline.
-    Source: Faustino 2024, section 3.1.1.
+    Source: Faustino 2016, section 3.1.1.
     """
     times = np.asarray(times, dtype=float)
     if not len(times):
@@ -320,7 +320,7 @@ def _build_unknown_label_error(label: str, item: Span | KeyMoment, known: frozen
         place,
         f"the label {label!r} is not in the vocabulary",
         f"one like {', '.join(offers)}" if offers else "a label of the vocabulary",
-        "correct it, or add it to your own labels",
+        "correct it, or use it in an annotation of the library",
     )
 
 

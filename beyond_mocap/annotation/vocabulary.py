@@ -63,7 +63,7 @@ def swap_sides(labels: Iterable[str]) -> tuple[str, ...]:
         labels: the labels of a motion.
     Returns:
         The labels of the mirrored motion.
-    Source: Faustino 2024, section 3.1.2.
+    Source: Faustino 2016, section 3.1.2.
     """
     return tuple("_".join(_OPPOSITE_SIDE.get(part, part) for part in label.split("_")) for label in labels)
 

@@ -69,8 +69,8 @@ def summarize_library(library) -> dict:
 
     originals = [clip for clip in library.clips if not clip.mirrored]
     labels = sorted(library.labels)
-    gaits = [{"word": g.label, "words": list(g.words), "speed_m_s": g.speed} for g in library.gaits]
-    keys = sorted({" ".join(sort_labels(key.words)) for key in library.keys})
+    gaits = [{"word": g.label, "words": list(g.labels), "speed_m_s": g.speed} for g in library.gaits]
+    keys = sorted({" ".join(sort_labels(key.labels)) for key in library.keys})
     lines = [
         f"{library.folder}: {len(originals)} clips (and their mirrors), {library.minutes:.1f} minutes, "
         f"{len(library.skeleton)} joints",

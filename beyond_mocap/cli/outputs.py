@@ -78,7 +78,7 @@ class ProgressReporter:
         return self._stop_requested.is_set()
 
     def check_cancelled(self) -> None:
-        """Raise Cancelled if the user requested cancellation."""
+        """Raise UserCancelledError if the user requested cancellation."""
         if self.is_cancelled():
             raise UserCancelledError("cancelled")
 

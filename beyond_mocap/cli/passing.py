@@ -25,7 +25,7 @@ def add_passes(verbs):
     """
     verb = verbs.add_parser("passes", help="several players pass a ball to each other")
     verb.add_argument("scene", type=Path, metavar="SCENE.json",
-                      help="who passes to whom; see docs/passes/passes.md")
+                      help="who passes to whom; see docs/reference/scene-json.md")
     verb.add_argument("--library", type=Path, required=True, help="a folder of clips with ball strikes")
     verb.add_argument("--out", type=parse_folder, required=True, metavar="FOLDER", help="created if missing")
     add_options(verb, "library")
@@ -105,7 +105,7 @@ def list_strikes(library, played) -> list[dict]:
             "speed_in_m_s": float(np.linalg.norm(strike.velocity_in)),
             "speed_out_m_s": float(np.linalg.norm(strike.velocity_out)),
             "travel_s": strike.travel, "bounces": strike.bounces, "facing_deg": float(np.degrees(order.facing)),
-            "contact_gap_m": played.gap(number), "outcome": strike.outcome,
+            "contact_gap_m": played.find_gap(number), "outcome": strike.outcome,
         })  # fmt: skip
     return out
 

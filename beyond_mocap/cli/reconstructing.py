@@ -174,19 +174,20 @@ def _write_result(result, options) -> dict:
     name = result.recording.name
     row = {"trial": name, "file": str(result.recording.path), "session": result.recording.session,
            "error": result.error, "static": result.static and result.static.name, "bvh": "", "report": ""}  # fmt: skip
-    if result.made is None:
+    if result.reconstruction is None:
         return {**row, "line": f"{name}: {result.error.removeprefix(f'{result.recording.path.stem}: ')}"}
     place = options.out / name
     place.parent.mkdir(parents=True, exist_ok=True)
-    bvh.write_bvh(place.parent / f"{place.name}.bvh", result.made.motion)
-    write_report(place.parent / f"{place.name}.report.json", result.made.report())
-    write_model(result.made.model, place.parent / f"{place.name}.model.json")
+    bvh.write_bvh(place.parent / f"{place.name}.bvh", result.reconstruction.motion)
+    write_report(place.parent / f"{place.name}.report.json", result.reconstruction.report())
+    write_model(result.reconstruction.model, place.parent / f"{place.name}.model.json")
     try:
-        notes = add_to_library(result.made, name.replace("/", "_"), options) if options.add_to else []
+        notes = add_to_library(result.reconstruction, name.replace("/", "_"), options) if options.add_to else []
     except InputError as error:  # concerns this clip only
         notes = [f"not added: {error}"]
-    return {**row, "bvh": f"{name}.bvh", "report": f"{name}.report.json", "subject": result.made.model.subject,
-            "line": "; ".join([f"{name}: {describe_result(result.made)}", *filter(None, [result.note]),
+    return {**row, "bvh": f"{name}.bvh", "report": f"{name}.report.json",
+            "subject": result.reconstruction.model.subject,
+            "line": "; ".join([f"{name}: {describe_result(result.reconstruction)}", *filter(None, [result.note]),
                                *notes])}  # fmt: skip
 
 

@@ -197,7 +197,7 @@ def _build_order(options, player):
 
     over = options.over
     if player is not None and not (options.start or options.over or options.ball_place):
-        over = player.place(options.time)
+        over = player.find_position(options.time)
     fps = options.fps or (player.plan.fps if player else None)
     return ThrowRequest(
         target=options.target, limb=options.limb, speed=options.speed, ball=options.kind, start=options.start,

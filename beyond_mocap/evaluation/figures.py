@@ -330,7 +330,7 @@ def compute_eq18(requested: Iterable[str], played: Iterable[str]) -> float:
         played: the labels of the played clip.
     Returns:
         -1 if all labels agree to 1 if none does; NaN if neither has a label.
-    Source: Faustino 2024, section 3.2.2, equation (18).
+    Source: Faustino 2016, section 3.2.2, equation (18).
     """
     requested, played = set(requested), set(played)
     either = requested | played

@@ -79,7 +79,7 @@ def _build_head(view: View, report: Mapping, title: str) -> Html:
     statuses = [row.status for row in judge_figures(report) if row.status]
     method = f"method {report['method']}, " if report.get("method") else ""
     summary = f"{view.count} frames at {view.fps:g} per second, {view.played.motion.duration:.1f} s, {method}"
-    targets = f"{statuses.count('targets')} of {len(statuses)} targets met"
+    targets = f"{statuses.count('met')} of {len(statuses)} targets met"
     return join_html(build_element("h1", title), build_element("p", summary + targets, class_="quiet"), separator="\n")
 
 

@@ -1,6 +1,6 @@
 """The providers of event data, one record each, and readers for tables that kloppy does not support.
 
-These are the project's own table (columns in docs/match/match-input.md) and Metrica's. The second file of a provider's
+These are the project's own table (columns in docs/reference/match-input.md) and Metrica's. The second file of a provider's
 events is found here too.
 """
 

@@ -46,7 +46,7 @@ def build_library(
         The library.
     Raises:
         InputError: for unreadable files, a folder without clips, or clips without legs.
-        Cancelled: if `cancelled` returns True.
+        UserCancelledError: if `cancelled` returns True.
     """
     folder = Path(folder)
     report = progress or (lambda fraction, text: None)
@@ -189,6 +189,6 @@ def _index_clips(folder: str, clips, notes, seed, report, cancelled) -> Library:
 
 
 def _check_cancelled(cancelled) -> None:
-    """Raise Cancelled if the work was cancelled."""
+    """Raise UserCancelledError if the work was cancelled."""
     if cancelled is not None and cancelled():
         raise UserCancelledError("library: cancelled")

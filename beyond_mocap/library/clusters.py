@@ -63,7 +63,7 @@ def cluster_blocks(frames: Frames, length: int, seed: int = 0) -> Clusters:
         seed: of k-means.
     Returns:
         100 clusters (fewer of fewer blocks); empty where no block fits.
-    Source: Faustino 2024, section 3.2.
+    Source: Faustino 2016, section 3.2.
     """
     start = find_block_starts(frames, length)
     if not len(start):

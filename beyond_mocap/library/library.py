@@ -230,7 +230,7 @@ def measure_gaits(library: Library) -> tuple[Gait, ...]:
         The gaits from slow to fast.
     Raises:
         InputError: if no clip shows locomotion.
-    Source: Faustino 2024, section 3.1.1.
+    Source: Faustino 2016, section 3.1.1.
     """
     seconds: dict[str, Any] = {word: Counter() for word in LOCOMOTION}
     metres: dict[str, Any] = {word: Counter() for word in LOCOMOTION}

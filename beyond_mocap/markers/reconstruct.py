@@ -145,7 +145,7 @@ def reconstruct(trial: MarkerTrial, static: MarkerTrial | None = None, model: Ma
     Raises:
         InputError: if the markers belong to no known set, the static or the model is of another body or set, the
             markers are mirrored, or too few markers are visible.
-        Cancelled: if the user stops the job.
+        UserCancelledError: if the user stops the job.
     """
     from threadpoolctl import threadpool_limits
 
@@ -164,7 +164,8 @@ def _reconstruct_on_one_thread(trial, static, model, settings: ReconstructSettin
             _check_model_fits(model, visible)
         monitor.add_warnings(_check_trial(visible, still, marker_set, model))
         cleaned = _clean_trial(visible, marker_set, model, monitor.build_inner_progress(0.0, 0.1), cancelled)
-        clean_markers, evidence = cleaned.trial, cleaned.build_pose_trial()  # long filled gaps are for display, not evidence for the pose
+        # long filled gaps are for display, not evidence for the pose
+        clean_markers, evidence = cleaned.trial, cleaned.build_pose_trial()
         monitor.add_warnings(cleaned.report.lines)
     with monitor.time_step("model", 0.45):
         if model is None:
@@ -224,7 +225,7 @@ class _RunMonitor:
         self.warnings += [line for line in lines if line not in self.warnings]
 
     def check_cancelled(self) -> None:
-        """Raise Cancelled if the user has stopped the job."""
+        """Raise UserCancelledError if the user has stopped the job."""
         if self._cancelled is not None and self._cancelled():
             raise UserCancelledError("cancelled")
 
@@ -304,7 +305,7 @@ def build_model(trial: MarkerTrial, static: MarkerTrial | None, settings: Recons
     Returns:
         The calibrated model.
     Raises:
-        InputError, Cancelled: as `reconstruct`.
+        InputError, UserCancelledError: as `reconstruct`.
     """
     marker_set = find_marker_set(trial, None, settings)
     visible, still = (None if one is None else prepare_trial(one, marker_set) for one in (trial, static))

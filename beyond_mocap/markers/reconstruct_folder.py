@@ -106,7 +106,7 @@ def reconstruct_folder(folder: Path, read: ReadTrial, settings: ReconstructSetti
         The outcome of each trial.
     Raises:
         InputError: if the folder has no trials.
-        Cancelled: if the user stops the job.
+        UserCancelledError: if the user stops the job.
     """
     recordings = list_recordings(folder)
     statics, trials = _split_statics(recordings, read)

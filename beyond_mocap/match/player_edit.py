@@ -1,9 +1,9 @@
 """Everything stored about a player of a match, and its file: what was requested, and which clip is used when. The
-motion is
-constructed from it when needed (`player_motion`).
+motion is constructed from it when needed (`player_motion`).
 
-ID.take.npz (docs/match/match.md) is a zip of plain arrays of whole numbers and some fractions, with one JSON text for
-everything else. Positions are in millimetres and times in microseconds, as second differences, which compress well.
+ID.take.npz (docs/reference/match-folder.md) is a zip of plain arrays of whole numbers and some fractions, with one JSON
+text for everything else. Positions are in millimetres and times in microseconds, as second differences, which compress
+well.
 """
 
 from __future__ import annotations
@@ -52,7 +52,7 @@ MAX_FILE_BYTES = 200_000_000
 MAX_ARRAY_BYTES = 1_000_000_000
 """Bytes of all arrays together: a file with more is rejected."""
 _KIND = "a player of a match (ID.take.npz)"
-_PAGE = "docs/match/match.md"
+_PAGE = "docs/reference/match-folder.md"
 _TYPES = tuple(np.dtype(name) for name in ("<f8", "<i8", "<i4", "<i2", "|i1", "|u1"))
 _MAX_STRETCH = 24 * 3600.0
 """s: a longer stretch is rejected."""

@@ -162,7 +162,7 @@ class _StretchConstructor:
         index = np.minimum(np.arange(len(take.motion)) * (FPS / self.fps), len(edit) - 1)
         what = look_up_frames(self.library, edit, index)
         frame, clips = np.round(what.clip_frame).astype(int), self.library.clips
-        stands = np.array([clips[clip].standing[at].any(axis=1) for clip, at in zip(what.clip, frame)])
+        stands = np.array([clips[clip].heel_toe_contacts[at].any(axis=1) for clip, at in zip(what.clip, frame)])
         return stands & ~take.stepped
 
     def _compute_time(self, frame: int) -> float:

@@ -1,5 +1,5 @@
 """The content of match.json: the request, the players and how far each is, messages, and costs
-(docs/match/match.md).
+(docs/reference/match-folder.md).
 """
 
 from __future__ import annotations

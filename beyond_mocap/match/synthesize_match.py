@@ -1,4 +1,4 @@
-"""Synthesize a match: files in, a folder out (docs/match/match.md).
+"""Synthesize a match: files in, a folder out (docs/reference/match-folder.md).
 
     result = synthesize_match(MatchRequest(tracking=Path("match.dat"), library=Path("clips"), out=Path("out"),
     end=60.0))
@@ -95,7 +95,7 @@ def synthesize_match(
         The result.
     Raises:
         InputError: if the request, its files or its cluster are wrong.
-        Cancelled: if `cancelled` returns True.
+        UserCancelledError: if `cancelled` returns True.
     """
     from threadpoolctl import threadpool_limits
 

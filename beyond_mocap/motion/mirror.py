@@ -54,7 +54,7 @@ def mirror(motion: Motion) -> Motion:
         The mirrored motion on the same skeleton at the same rate: X and heights stay, Y changes its sign.
     Raises:
         InputError: if the skeleton has no legs.
-    Source: Faustino 2024, section 3.1.2.
+    Source: Faustino 2016, section 3.1.2.
     """
     body = identify_joints(motion.skeleton)
     corrections = quaternion.from_matrix(_WORLD_MIRROR @ _solve_correspondence(motion, body))

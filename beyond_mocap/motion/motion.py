@@ -152,7 +152,7 @@ def sample_frames(motion: Motion, frames: np.ndarray) -> tuple[np.ndarray, np.nd
         frames: (N,) fractional frames, clamped to the motion.
     Returns:
         Root positions (N, 3) in metres and local rotations (N, J, 4).
-    Source: Faustino 2024, section 3.3.2.
+    Source: Faustino 2016, section 3.3.2.
     """
     frames = np.clip(np.asarray(frames, dtype=float), 0.0, len(motion) - 1)
     low = np.minimum(np.floor(frames).astype(int), max(len(motion) - 2, 0))

@@ -117,7 +117,7 @@ def blend_strides(slow: Strides, fast: Strides, speed: float, fps: float) -> tup
         fps: frames per second of the result.
     Returns:
         The motion, and the contacts (T, 2, 2) bool of left and right, heel and toe.
-    Source: Faustino 2024, section 6.2; Park, Shin and Shin 2002.
+    Source: Faustino 2016, section 6.2; Park, Shin and Shin 2002.
     """
     slow, fast = _align_first_foot(slow, fast)
     steps = min(slow.steps, fast.steps)

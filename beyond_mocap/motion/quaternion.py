@@ -240,7 +240,7 @@ def slerp(a: np.ndarray, b: np.ndarray, weight: float | np.ndarray) -> np.ndarra
         weight: (...,).
     Returns:
         (..., 4).
-    Source: Faustino 2024, equation (8).
+    Source: Faustino 2016, equation (8).
     """
     a, b = np.asarray(a, dtype=float), np.asarray(b, dtype=float)
     weight = np.asarray(weight, dtype=float)

@@ -22,7 +22,7 @@ def load_arrays(library: Library, name: str) -> dict[str, np.ndarray] | None:
     """Load the arrays stored as `name` for the recordings of a library.
 
     Args:
-        library: the library; its `kept` attribute gives the cache folder and the key of its recordings.
+        library: the library; its `cache_location` gives the cache folder and the key of its recordings.
         name: file name without `.npz`.
     Returns:
         The arrays by name, or None if there is no valid file.

@@ -178,7 +178,7 @@ def build_answer(library: Library, rally: Rally, now: float, hit: HitMotion, tar
     Raises:
         InputError: for a target that is unknown, the holder, or out of reach.
         NotInLibrary: if no clip strikes with that part.
-        Cancelled: if `cancelled` returns True.
+        UserCancelledError: if `cancelled` returns True.
     """
     stances = {name: played.stance_at(now) for name, played in rally.players.items()}
     ball_place = rally.ball.positions[min(int(np.searchsorted(rally.ball.times, now)), len(rally.ball.times) - 1)]

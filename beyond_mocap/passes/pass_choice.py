@@ -100,7 +100,7 @@ def choose_strikes(problem: PassProblem, progress: Callable[[float, str], None])
         The strikes with their flights, in order of time.
     Raises:
         InputError: if no human can send a ball that far, or over the net.
-        Cancelled: if the user cancels.
+        UserCancelledError: if the user cancels.
     """
     random = np.random.default_rng(problem.scene.seed & (2**64 - 1))
     use_counts: dict[tuple, int] = {}

@@ -217,7 +217,7 @@ def plan_passes(scene: PassScene, sites: Sequence[Site], ball: Ball, need: Need,
         The plan.
     Raises:
         InputError: if no human can send a ball that far, or over the net.
-        Cancelled: if `cancelled` returns True.
+        UserCancelledError: if `cancelled` returns True.
     """
     report = progress or (lambda share, text: None)
     problem = PassProblem(scene, list(sites), ball, cancelled or (lambda: False))

@@ -143,7 +143,7 @@ class PassProblem:
         self.others = self._list_others()
 
     def check_cancelled(self) -> None:
-        """Raise Cancelled if the user cancels."""
+        """Raise UserCancelledError if the user cancels."""
         if self.cancelled():
             raise UserCancelledError("cancelled")
 

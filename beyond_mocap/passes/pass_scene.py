@@ -1,6 +1,6 @@
 """The request for a passing scene: who stands where, who passes to whom and how.
 
-docs/passes/passes.md describes its form as a file.
+docs/reference/scene-json.md describes its form as a file.
 """
 
 from __future__ import annotations

@@ -103,8 +103,8 @@ def synthesize_passes(library: Library, scene: PassScene, progress: Callable[[fl
         The scene as it is played.
     Raises:
         InputError: for a part that the skeleton lacks, and for passes that no human can give.
-        NotInLibrary: if no clip of the library strikes with a part.
-        Cancelled: if `cancelled` returns True.
+        NotInLibraryError: if no clip of the library strikes with a part.
+        UserCancelledError: if `cancelled` returns True.
     """
     report, stop = progress or (lambda share, text: None), cancelled or (lambda: False)
     plan = plan_scene(library, scene, lambda share, text: report(PLAN_SHARE * share, text), stop)
@@ -158,7 +158,7 @@ def plan_scene(library: Library, scene: PassScene, progress: Callable[[float, st
     Returns:
         The plan.
     Raises:
-        InputError, NotInLibrary, Cancelled: as `synthesize_passes`.
+        InputError, NotInLibraryError, UserCancelledError: as `synthesize_passes`.
     """
     scene = _apply_chance(scene)
     ball = build_ball(scene)

@@ -112,7 +112,7 @@ def build_player_motion(library: Library, stance: Stance, orders: Sequence[HitOr
         The motion with its gaps and warnings.
     Raises:
         InputError: for orders outside the scene, or two at one time.
-        Cancelled: if `cancelled` returns True.
+        UserCancelledError: if `cancelled` returns True.
     """
     from threadpoolctl import threadpool_limits
 

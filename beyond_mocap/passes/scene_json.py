@@ -1,4 +1,4 @@
-"""Files of a passing scene (docs/passes/passes.md): SCENE.json, samples of it, and the strikes as a table."""
+"""Files of a passing scene (docs/reference/scene-json.md): SCENE.json, samples of it, and the strikes as a table."""
 
 from __future__ import annotations
 
@@ -106,7 +106,7 @@ def parse_scene(content: str | dict, name: str = "scene") -> PassScene:
     Raises:
         InputError: names the place that is wrong.
     """
-    json_object = parse_json(content, name, "docs/passes/passes.md") if isinstance(content, str) else content
+    json_object = parse_json(content, name, "docs/reference/scene-json.md") if isinstance(content, str) else content
     try:
         return _parse_scene_object(json_object)
     except InputError as error:

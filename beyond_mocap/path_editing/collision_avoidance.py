@@ -179,8 +179,8 @@ class _Search:
 
     def compute_score(self, state):
         """Compute the cost of a state, with a lower bound for the cost of its collisions; ties: fewer collisions."""
-        to_come = sum(_UNRESOLVED_COST if state.key(collision) in state.unsolvable else self.estimate_cost(collision)
-                      for collision in state.collisions)
+        to_come = sum(_UNRESOLVED_COST if state.build_key(collision) in state.unsolvable
+                      else self.estimate_cost(collision) for collision in state.collisions)
         return sum(map(self.compute_cost, range(len(state.changes)), state.changes)) + to_come, len(state.collisions)
 
     def estimate_cost(self, collision):
@@ -192,7 +192,7 @@ class _Search:
         if (who, change) not in self.costs:
             limits, cost = self.limits, self.limits.delay_cost * change.delay
             if change.detours:
-                sampled_path = self.followers[who].way
+                sampled_path = self.followers[who].sampled_path
                 aside = np.concatenate([[0.0], sampled_path.compute_offset(sampled_path.arc, change.detours), [0.0]])
                 most = np.abs(aside).max() / limits.detour
                 side_metres = 0.5 * np.abs(np.diff(aside)).sum()
@@ -207,7 +207,7 @@ class _Search:
         collision = state.find_open_collision()
         if collision is None:
             return [state]
-        key, children = state.key(collision), []
+        key, children = state.build_key(collision), []
         if key not in self.remedies:
             self.remedies[key] = self.list_remedies(state, collision) if len(self.remedies) < self.patience else []
         for changed in self.remedies[key]:
@@ -314,8 +314,8 @@ class _Search:
         """Compute (first, last): metres along the original path between which a body must keep aside."""
         follower, change = self.followers[who], state.changes[who]
         first, last = (follower.arc_at(time, change) for time in (collision.start, collision.end))
-        if last < first and follower.way.closed:
-            last += follower.way.length
+        if last < first and follower.sampled_path.closed:
+            last += follower.sampled_path.length
         return first, max(first, last)
 
     def build_train(self, who, cover, offset):
@@ -333,9 +333,9 @@ class _Search:
 
     def is_possible(self, who, change):
         """Return whether a change is within the limits and leaves no loop in a bend."""
-        sampled_path = self.followers[who].way
+        sampled_path = self.followers[who].sampled_path
         aside = sampled_path.compute_offset(sampled_path.arc, change.detours)
-        tight = (1.0 - sampled_path.bend * aside < _TIGHT) & (np.abs(aside) > 0.05)
+        tight = (1.0 - sampled_path.curvature * aside < _TIGHT) & (np.abs(aside) > 0.05)
         waits, goes = change.delay <= self.limits.delay + 1e-9, np.abs(aside).max() <= self.limits.detour + 1e-3
         return waits and goes and not tight.any()
 
@@ -403,7 +403,7 @@ def _find_possible_meetings(search):
     for shift in range(min(late + 1, len(begins))):
         rest = len(begins) - shift
         off = middle[:, None, :rest] - middle[None, :, shift:]
-        reach = search.wanted + 2.0 * limits.detour + around[:, None, :rest] + around[None, :, shift:]
+        reach = search.required_gap + 2.0 * limits.detour + around[:, None, :rest] + around[None, :, shift:]
         near = np.einsum("ijbk,ijbk->ijb", off, off) <= reach**2
         for both in range(shift, late + 1):  # one body waits for `both` bins, the other for both - shift
             last = min(len(begins), rest + both)

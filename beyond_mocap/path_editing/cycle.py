@@ -37,7 +37,8 @@ UNLIKE_DISTANCE = 0.35
 """Relative distance of a loop's ends above which the user gets a warning, and below which the end of the motion counts
 as a step like the others."""
 _COST_TOLERANCE = (1.6, 0.02)  # cost limit of further loops: a factor on the lowest cost, and metres more
-_SCALE_WEIGHT, _DISTANCE_WEIGHT = 3.0, 0.3  # weights of scaled strides, and of loops whose ends differ, against transitions
+# weights of scaled strides, and of loops whose ends differ, against transitions
+_SCALE_WEIGHT, _DISTANCE_WEIGHT = 3.0, 0.3
 _LEAST_SPEED = 0.2  # m/s below which a motion stays in place
 _MOST_SECOND_LOOPS = 3  # repeats of a second loop beside the main one, at most
 

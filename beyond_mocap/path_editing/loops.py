@@ -22,7 +22,8 @@ from .path_frame import Residuals
 WINDOW_SECONDS = 0.12
 """Pairs are compared over this time before and after."""
 _VELOCITY_SECONDS = 0.1  # metres per second count as metres moved in this time
-_COARSE_FPS, _PAIRS, _COLUMNS, _MOST_CANDIDATES = 30.0, 2_500_000, 9000, 24  # coarse rate; limits of pairs, rows, candidates
+# coarse rate; limits of pairs, rows, candidates
+_COARSE_FPS, _PAIRS, _COLUMNS, _MOST_CANDIDATES = 30.0, 2_500_000, 9000, 24
 _STRIDE_SHARE = 0.85  # shortest loop, as a share of the stride's time: strides differ
 _SLOWEST, _SLOW_SHARE = 0.2, 0.5  # m/s, and share of the usual speed, below which no loop starts: a stop is no gait
 _CONTACT_COST = 0.06  # cost in metres of a sole whose contact differs
@@ -30,7 +31,8 @@ _FOOT_COST = 0.5  # cost of each metre between the places of feet in contact at 
 _NO_FADE_COST = 0.05  # cost in metres of having no frames to fade over
 _LENGTH_BONUS = 0.3  # by how much a second stride improves a loop of one stride
 _MOST_DISTANCE = 0.6  # largest relative distance of a loop's ends
-_LEAST_SINGLE_CONTACT = 0.08  # least share of a loop with each foot alone in contact: jumps with both feet are no strides
+# least share of a loop with each foot alone in contact: jumps with both feet are no strides
+_LEAST_SINGLE_CONTACT = 0.08
 _JOINTS = 16  # compared at most, for a body without known joints
 _SHORTEST_STRIDE, _LONGEST_STRIDE = 0.35, 2.5  # seconds
 

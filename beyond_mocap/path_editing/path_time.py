@@ -46,7 +46,8 @@ LENGTH_TOLERANCE = 1e-3
 SHORTEST = 1e-6
 """Metres below which a path has no length."""
 _STEP = 0.5  # metres; a shorter path gets a warning
-_SHORTEST_LAP, _UNNOTICED_SECONDS = 0.5, 0.1  # seconds: shortest lap that is repeated; longest cut end without a warning
+# seconds: shortest lap that is repeated; longest cut end without a warning
+_SHORTEST_LAP, _UNNOTICED_SECONDS = 0.5, 0.1
 
 
 @dataclass(frozen=True)

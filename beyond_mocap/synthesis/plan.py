@@ -135,7 +135,7 @@ class Plan:
         solved: the ball's trajectory where it is known already, such as from a whole match.
     Raises:
         InputError: for a number outside the limits of its setting, and for two pins of one part at one time.
-    Source: Faustino 2024: catch_up §3.3.2, alpha eq. 13 (for "path" `synthesis.search.path_costs`), delta §3.2.4, omega
+    Source: Faustino 2016: catch_up §3.3.2, alpha eq. 13 (for "path" `synthesis.search.path_costs`), delta §3.2.4, omega
         and gaits §3.1.1, seam_window eq. 25 (twice its s; "path" blends over half of it). Others: made in
         `library.synthetic_clips`, track_window in `motion.track.smooth_positions`, solve_touches in
         `resolved_touches`, lag in `match.crowd.variety.choose_lags`; the root error is always measured with a

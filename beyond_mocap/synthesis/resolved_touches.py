@@ -30,7 +30,8 @@ MAX_TOUCH_OFFSET = 0.4
 """Seconds from a key moment within which its touch is searched."""
 
 _WITHIN = 1.5  # m from the player within which a touch by an unknown player may be this player's
-_UNKNOWN_PLAYER_COST, _OTHER_PART_COST, _OTHER_KIND_COST = 0.15, 0.25, 0.15  # cost in seconds: player unknown, other part, other kind
+# cost in seconds: player unknown, other part, other kind
+_UNKNOWN_PLAYER_COST, _OTHER_PART_COST, _OTHER_KIND_COST = 0.15, 0.25, 0.15
 _MAX_SAMPLE_GAP = 0.1  # s from the nearest measured sample beyond which the ball counts as filled in
 _STEP = 0.004  # s between the points of a trajectory
 _SENDING, _TAKING = frozenset(list_labels(ball="sends")), frozenset(list_labels(ball="takes"))
@@ -178,8 +179,8 @@ def report_missing_touches(take: Take, plan: ResolvedPlan) -> list[str]:
         return [message] if plan.requested.solve_touches else []
     missing: list[str] = [
         TimedMessage(
-            f"{key.time:g} s: the ball's trajectory has no touch for '{' '.join(key.words)}' within {MAX_TOUCH_OFFSET:g} s; "
-            "the key moment stays at its time", (key.time, key.time),
+            f"{key.time:g} s: the ball's trajectory has no touch for '{' '.join(key.words)}' within "
+            f"{MAX_TOUCH_OFFSET:g} s; the key moment stays at its time", (key.time, key.time),
         ) for key in plan.timeline.keys if find_striking_part(key.words) and key.solved is None
     ]  # fmt: skip
     touched = np.array([take.start_time + push.first / take.motion.fps for push in take.dribble_touches])

@@ -291,8 +291,8 @@ def _report_crowded_keys(request: SearchRequest, edit: EditList) -> list[str]:
     placed = {key.number for key in edit.keys}
     return [
         TimedMessage(
-            f"{format_seconds(key.requested.time)} s: '{' '.join(key.requested.words)}' is too close to another key moment and is "
-            "not played", (key.requested.time, key.requested.time),
+            f"{format_seconds(key.requested.time)} s: '{' '.join(key.requested.words)}' is too close to another key "
+            "moment and is not played", (key.requested.time, key.requested.time),
         )  # fmt: skip
         for number, key in enumerate(request.keys)
         if key.choices and number not in placed

@@ -1,7 +1,7 @@
 """Correct a throw or kick so that it hits: the smallest change of a motion with which the ball flies to its target.
 
 A held ball has the velocity of the hand when it leaves; a ball at rest gets its velocity from the foot that strikes
-it (`ball_release`). Both follow from the motion alone, between frames too (`motion.motion.cubic_at`), so another
+it (`ball_release`). Both follow from the motion alone, between frames too (`sample_frames_cubic`), so another
 flight needs another motion. Changes that people make when they aim come first and cost little: the body rotates, the
 ball leaves a few milliseconds earlier or later, the whole movement is a little slower or faster. The rest is a small
 smooth shift of the wrist or ankle about that instant (`limb_shift`), which the arm or leg follows by inverse
@@ -165,7 +165,8 @@ class _Search:
 
     def __init__(self, motion, part, frame, target, ball, freedom: Freedom, speed, limit_rotations):
         self.motion, self.part, self.frame = motion, part, frame
-        self.target, self.ball, self.freedom, self.speed, self.limit_rotations = target, ball, freedom, speed, limit_rotations
+        self.target, self.ball, self.freedom = target, ball, freedom
+        self.speed, self.limit_rotations = speed, limit_rotations
         self.pivot = motion.root_positions[0] * [1.0, 1.0, 0.0]
         self.bounds = np.zeros(2)
         self.moves_start = freedom.start_position and not part.free_coordinates and isinstance(part, AtFoot)
@@ -268,7 +269,8 @@ class _Search:
             if better:
                 best, base, best_points = found, change, (points, velocities)
             step = 1.0 if better else 0.4 * step
-            if best.total_miss < HIT_TOLERANCE or step < _MIN_STEP or number >= _LARGE_MISS_ROUNDS and best.total_miss > _LARGE_MISS:
+            is_far = number >= _LARGE_MISS_ROUNDS and best.total_miss > _LARGE_MISS
+            if best.total_miss < HIT_TOLERANCE or step < _MIN_STEP or is_far:
                 break
             if slow and (better or not known):
                 follows, known = limb.measure_response(base.row[:6], frame, *best_points), True

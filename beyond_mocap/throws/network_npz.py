@@ -1,4 +1,4 @@
-"""MODEL.npz: a trained model of throws or kicks as a file (docs/throws/throws-training.md).
+"""MODEL.npz: a trained model of throws or kicks as a file (docs/reference/network-weights.md).
 
 A zip of plain arrays, with one JSON text for everything else. Nothing in it is ever executed.
 """
@@ -44,7 +44,7 @@ MAX_FILE_SIZE = 300_000_000
 MAX_UNPACKED_SIZE = 1_000_000_000
 """Largest size of all arrays together, bytes."""
 _KIND = "a file of weights (.npz)"
-_PAGE = "docs/throws/throws-training.md"
+_PAGE = "docs/reference/network-weights.md"
 _SCALES = ("input_mean", "input_scale", "output_mean", "output_scale")
 _CONTEXT_NAMES = ("before", "after")
 _OTHER_KINDS = {"told": "the checkpoint of a training"}  # array that identifies another kind of file

@@ -250,7 +250,7 @@ def _lead_through(plan: Plan, throw: Motion, release: float, at: float) -> Track
 
 
 def _insert_detour(places: np.ndarray, times: np.ndarray, track: SampledTrack, there: tuple, side: int) -> np.ndarray:
-    """Insert a path from the track to the throw (way -1) or back to the track (1) into the positions (T, 2) m."""
+    """Insert a path from the track to the throw (side -1) or back to the track (1) into the positions (T, 2) m."""
     edge = there[0]
     off = np.linalg.norm([np.interp(edge, times, track.positions[:, axis]) - there[1][axis] for axis in (0, 1)])
     seconds = float(np.clip(2.0 * off / _CATCH_UP, *_DETOUR_RANGE))

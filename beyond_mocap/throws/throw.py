@@ -68,7 +68,7 @@ def throw_at(
     Raises:
         InputError: if the skeleton lacks the limb or the model was not trained for it, or the target is out of reach
             of people or of the model's examples.
-        Cancelled: if `cancelled` returns True.
+        UserCancelledError: if `cancelled` returns True.
     """
     def report_progress(share: float, text: str) -> None:
         if cancelled and cancelled():

@@ -37,7 +37,7 @@ from .networks.chains import find_chains
 from .networks.example import Example, build_example, mirror_example
 from .throw_records import ACTIONS, TABLE_NAME, Action, KnownThrow, is_known, read_known, read_table
 
-_PAGE = "docs/throws/throw-examples.md"
+_PAGE = "docs/reference/throw-examples.md"
 _MIN_LAUNCH_SPEED = 3.0  # m/s; slower balls were not thrown
 _FOOT_SPEED_RATIO = 1.2  # a ball's speed over the foot's: Kellis and Katis 2007, J. Sports Sci. Med. 6, 154-165 (1.06 to 1.3)
 _FLOOR_TOLERANCE = 0.03  # m, height of the lowest point up to which the floor counts as at 0

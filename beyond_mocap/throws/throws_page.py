@@ -80,8 +80,10 @@ def _describe_report(report: Mapping) -> list[Html]:
     motions_text = f"{report['motions']} motions{of}, by {people}." if people else "No motions."
     method_text = "with inverse kinematics, limits and pose iterations" if _is_corrected(
         report) else "by the networks alone"
-    failures_text = f"{lost} failed (a hand or foot {MAX_VALID_DEVIATION:g} m off on average) and are excluded from all means" if lost else \
-        "none failed"
+    failures_text = (
+        f"{lost} failed (a hand or foot {MAX_VALID_DEVIATION:g} m off on average) and are excluded from all means"
+        if lost else "none failed"
+    )
     return [build_element("p", motions_text), build_element("p", f"Generated {method_text}; {failures_text}.")]
 
 

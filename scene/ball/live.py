@@ -47,9 +47,9 @@ def update_ball(scene: bpy.types.Scene, ball: bpy.types.Object) -> bool:
 
 def report_problem(ball: bpy.types.Object, text: str) -> bool:
     """Show a problem at the ball; return whether it is new."""
-    is_new = ball.beyond_mocap_aim.told != text
+    is_new = ball.beyond_mocap_aim.messages != text
     if is_new:
-        ball.beyond_mocap_aim.told = text
+        ball.beyond_mocap_aim.messages = text
     return is_new
 
 

@@ -290,7 +290,7 @@ def write_shot(scene: bpy.types.Scene, ball: bpy.types.Object, solved: SolvedSho
     action[MARK] = solved.digest
     store_solved(ball, solved)
     aim.strike, aim.arrived = solved.strike, solved.strike + solved.shot.seconds * solved.fps
-    aim.figures, aim.told = "\n".join(describe_shot(solved)), ""
+    aim.figures, aim.messages = "\n".join(describe_shot(solved)), ""
     aim.curve = update_trajectory_curve(scene, aim.curve, ball, solved.flight)
 
 
@@ -454,6 +454,6 @@ def remove_aim(ball: bpy.types.Object) -> None:
         remove_curve(aim.curve)
     if aim.before.kept:
         restore_playback(aim.before, ball, MARK)
-    for name in ("on", "body", "target", "curve", "told", "figures", "strike", "arrived"):
+    for name in ("on", "body", "target", "curve", "messages", "figures", "strike", "arrived"):
         aim.property_unset(name)
     _solved.pop(ball.session_uid, None)

@@ -130,7 +130,7 @@ def update_list(manager: bpy.types.WindowManager) -> None:
         row.name, row.path, row.words = Path(clip.path).stem, clip.path, " ".join(clip.labels)
         row.brief = find_label(clip.labels[0]).title if clip.labels else "no labels"
         row.seconds, row.mark = clip.seconds, clip.grade
-        row.figures, row.told = _describe_figures(clip), "\n".join(clip.details)
+        row.figures, row.messages = _describe_figures(clip), "\n".join(clip.details)
     paths = [row.path for row in listing.shown]
     listing.active = paths.index(path) if path in paths else 0
 

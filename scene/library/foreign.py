@@ -202,7 +202,7 @@ def _sample_action(path: Path, scene: bpy.types.Scene, rig: bpy.types.Object, ac
 
 
 def _list_times(action, slot, rate: float) -> tuple[float, np.ndarray]:
-    """List the frames per second of the keys, within LEAST and MOST, and the scene frames (T,) to sample."""
+    """List the frames per second of the keys, within MIN_FPS and MAX_FPS, and the scene frames (T,) to sample."""
     keys = set()
     for (path, _), curve in channels.collect_curves(action, slot).items():
         if path.startswith("pose.bones"):

@@ -145,7 +145,7 @@ def show_reconstruction(context: bpy.types.Context, cloud: bpy.types.Object,
                         generated=True)[RECONSTRUCTED] = True
     thing.matrix_world = cloud.matrix_world
     bake.extend_scene(scene, clouds.find_start_frame(cloud) + played.duration * frames_per_second(scene))
-    properties.made, properties.figures, properties.told = store_reconstruction(reconstruction), "\n".join(
+    properties.made, properties.figures, properties.messages = store_reconstruction(reconstruction), "\n".join(
         list_figures(reconstruction)), "\n".join(reconstruction.warnings)
     store_model(cloud, reconstruction.model)
     properties.release = ""

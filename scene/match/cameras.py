@@ -57,7 +57,7 @@ def create_broadcast_camera(scene: bpy.types.Scene, size: tuple[float, float], f
     camera.location = stand * units
     camera.data.clip_start, camera.data.clip_end, camera.data.sensor_width = units, 400.0 * units, SENSOR
     look = camera.constraints.new("TRACK_TO")
-    look.target, look.track_axis, look.detect_up_axis = aim, "TRACK_NEGATIVE_Z", "UP_Y"
+    look.target, look.track_axis, look.up_axis = aim, "TRACK_NEGATIVE_Z", "UP_Y"
     middle = gaussian_smooth(targets, AIM_SMOOTHING * frames_per_second(scene))
     middle = np.clip(middle, *(np.outer([-1.0, 1.0], np.array(size) / 2.0 - [14.0, 14.0])))
     places = np.column_stack([middle, np.full(len(middle), 0.6)])

@@ -39,7 +39,7 @@ def run_command(arguments: list[str], progress: Callable[[float, str], None],
     Returns:
         Its notes.
     Raises:
-        Cancelled: if `cancelled` returned True and the process has ended; finished work is kept.
+        UserCancelledError: if `cancelled` returned True and the process has ended; finished work is kept.
         BeyondMocapError: with the command's message, if it ended otherwise.
     """
     while _running:  # a cancelled process is still stopping

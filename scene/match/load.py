@@ -102,7 +102,7 @@ def load_section(request: DisplayRequest, library: "Library | None", progress: C
         The library, the section, and messages about players who cannot be displayed.
     Raises:
         InputError: if the folder holds no match, no player is present in that time, or the library is a different one.
-        Cancelled: if `cancelled` returns True.
+        UserCancelledError: if `cancelled` returns True.
     """
     from ...beyond_mocap.files.tables import read_ball
     from ...beyond_mocap.library.build import build_library

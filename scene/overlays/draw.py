@@ -103,7 +103,7 @@ def _list_takes(context) -> list[DrawnTake]:
     """List the takes to draw in this view; [] if overlays are off or nothing is prepared."""
     settings = getattr(context.scene, "beyond_mocap", None)
     space = context.space_data
-    if settings is None or not settings.view.on() or not space.overlay.show_overlays:
+    if settings is None or not settings.view.list_overlays() or not space.overlay.show_overlays:
         return []
     active, seconds = find_active_player(settings), store.seconds_at(context.scene)
     found = []
@@ -155,7 +155,7 @@ def _draw_shapes():
             for drawn in found:
                 with gpu.matrix.push_pop():
                     gpu.matrix.multiply_matrix(drawn.world)
-                    for name in view.on():
+                    for name in view.list_overlays():
                         _draw_overlay(context, view, name, drawn)
             for item in path_items:
                 with gpu.matrix.push_pop():
@@ -245,7 +245,7 @@ def _draw_texts():
     if not found and not has_paths and not has_balls:
         return
     view = context.scene.beyond_mocap.view
-    on = view.on()
+    on = view.list_overlays()
     gpu.state.blend_set("ALPHA")
     try:
         for shown in found:

@@ -258,8 +258,8 @@ def _iter_pieces(plan: "Plan", take: "Take", library: "Library | None"):
         for low, high in zip(edges, edges[1:]):
             name = shorten_clip_name(take.clips[take.clip[low]], bool(take.mirrored[low]))
             clip_frames = take.clip_frame[[low, high - 1]]
-            yield low / take.motion.fps, high / take.motion.fps, name, (name,
-                                                                        f"frames {clip_frames[0]:.0f} to {clip_frames[1]:.0f}")
+            frames_text = f"frames {clip_frames[0]:.0f} to {clip_frames[1]:.0f}"
+            yield low / take.motion.fps, high / take.motion.fps, name, (name, frames_text)
         return
     for reason in _explain_pieces(plan, take, library):
         name = shorten_clip_name(reason.path, reason.mirrored)

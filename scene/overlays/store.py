@@ -69,8 +69,8 @@ def update_reasons(scene: bpy.types.Scene) -> None:
     found = find_prepared(player.take) if player is not None and player.take else None
     piece = found.find_piece(seconds_at(scene)) if found else None
     text = "\n".join(piece.lines) if piece else ""
-    if manager is not None and manager.beyond_mocap_playhead.draw_reasons != text:
-        manager.beyond_mocap_playhead.draw_reasons = text
+    if manager is not None and manager.beyond_mocap_playhead.why != text:
+        manager.beyond_mocap_playhead.why = text
 
 
 def seconds_at(scene: bpy.types.Scene, frame: float | None = None) -> float:
@@ -111,8 +111,8 @@ def _list_missing(scene: bpy.types.Scene) -> list[tuple]:
     for name in names:
         session_take = session.find_take(name)
         if name not in _prepared and name not in _refused and session_take is not None:
-            library = session.find_library(session_take.plan.find_library, settings.library_unit
-                                           or None) if session_take.plan.find_library else None
+            library = session.find_library(session_take.plan.library, settings.library_unit
+                                           or None) if session_take.plan.library else None
             missing.append((name, session_take.plan, session_take.take, library))
     return missing
 

@@ -99,7 +99,7 @@ class Trajectories:
 
 @dataclass(frozen=True, eq=False)
 class Result:
-    """Result of an order; `rally` is what is drawn of it."""
+    """Result of an order; `trajectories` is what is drawn of it."""
 
     order: Order
     library: "Library"
@@ -175,7 +175,7 @@ def apply_result(scene: bpy.types.Scene, result: Result) -> None:
     store_trajectories(result.order.digest, result.trajectories)
     settings.strikes = "\n".join(describe_strikes(scene, played_scene, start))
     settings.figures = "\n".join(list_figures(played_scene))
-    settings.told = "\n".join(list(dict.fromkeys([*messages, *played_scene.warnings]))[:MOST_LINES])
+    settings.messages = "\n".join(list(dict.fromkeys([*messages, *played_scene.warnings]))[:MOST_LINES])
 
 
 def clear_scene(scene: bpy.types.Scene) -> None:
@@ -194,7 +194,7 @@ def clear_scene(scene: bpy.types.Scene) -> None:
     discard_saved_state(settings.ball_before, KEPT)
     if (net := _find_net(scene)) is not None:
         shown.remove_object(net)
-    for name in ("made_of", "strikes", "figures", "told"):
+    for name in ("made_of", "strikes", "figures", "messages"):
         settings.property_unset(name)
 
 

@@ -30,8 +30,8 @@ def find_edit(scene: bpy.types.Scene) -> str:
     try:
         digest = make.build_order(scene).digest
     except BeyondMocapError as error:
-        if settings.told != str(error):
-            settings.told = str(error)
+        if settings.messages != str(error):
+            settings.messages = str(error)
         return ""
     return digest if digest != settings.made_of else ""
 

@@ -169,7 +169,7 @@ def sample_own_path(
 
 
 def find_own_curves(before: BeyondMocapBefore) -> tuple[dict, list]:
-    """Find the curves of the ball's own action, and its rest transform as `set_aside.stance_of` stores it."""
+    """Find the curves of the ball's own action, and its rest transform as `saved_state.read_stance` stores it."""
     return curves_before(before), json.loads(before.stance)[""]
 
 

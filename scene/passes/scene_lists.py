@@ -235,7 +235,8 @@ def _fill_scene(settings: BeyondMocapPasses, passing_scene: PassScene) -> None:
             setattr(settings, name, value)
     settings.net = passing_scene.net is not None
     if passing_scene.net is not None:
-        settings.net_from, settings.net_to, settings.net_height = passing_scene.net.start, passing_scene.net.end, passing_scene.net.height
+        net = passing_scene.net
+        settings.net_from, settings.net_to, settings.net_height = net.start, net.end, net.height
     settings.repeat, settings.turns = passing_scene.repeat, passing_scene.directions == 8
     settings.rate = 0.0 if passing_scene.fps == PassScene.fps else passing_scene.fps
     settings.seed, settings.watch = max(0, passing_scene.seed), passing_scene.watch

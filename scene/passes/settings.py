@@ -87,7 +87,8 @@ class BeyondMocapPass(bpy.types.PropertyGroup):
     at: PointerProperty(name="Meet At", type=bpy.types.Object, update=mark_edited,
                         description="Object to which the receiver goes to meet the ball; leave empty to stay in place")
     actor: PointerProperty(
-        name="Like Armature", type=bpy.types.Object, poll=lambda _own, thing: thing.type == "ARMATURE", update=store_actor_name,
+        name="Like Armature", type=bpy.types.Object, poll=lambda _own, thing: thing.type == "ARMATURE",
+        update=store_actor_name,
         description="Armature whose motion shows the strike; the most similar strike of the library is played, "
         "and Like Clip is ignored",
     )

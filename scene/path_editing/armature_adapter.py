@@ -279,7 +279,7 @@ def read_source(adapter: ArmatureAdapter, scene: bpy.types.Scene, settings) -> O
     """Read an armature's original motion for these settings of the core, from the cache if its inputs are the same.
 
     Args:
-        carrier: adapter of the armature.
+        adapter: adapter of the armature.
         scene: for rate and unit.
         settings: `PathEditSettings` of the core.
     Returns:

@@ -41,7 +41,7 @@ class EditTrial:
     Attributes:
         name: of the body.
         first: scene frame of the first frame.
-        known: `PathEditSource` of the core.
+        source: `PathEditSource` of the core.
         path: the new path.
         settings: `PathEditSettings` of the core.
         ground: the terrain, or None.
@@ -201,7 +201,7 @@ def _find_collisions(followers, limits) -> list:
 
 def _round_to_frames(change, trial):
     """Round the wait of a change up to whole frames, as edited bodies wait."""
-    fps = trial.known.motion.fps
+    fps = trial.source.motion.fps
     return replace(change, delay=float(np.ceil(round(change.delay * fps, 3)) / fps))
 
 

@@ -45,7 +45,7 @@ class DrawnCurve:
         order: of a NURBS curve.
         clamped: whether a NURBS curve reaches its end points.
         closed: whether its end is its start.
-        still: bytes that change with edits only, not with animation.
+        static_bytes: bytes that change with edits only, not with animation.
         notes: messages for the user.
     """
 

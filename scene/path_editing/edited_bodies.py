@@ -370,8 +370,8 @@ def store_messages(edit, lines: str, figures: dict | None = None) -> None:
 
     Only changes are written, since each write changes the object and triggers another check.
     """
-    if edit.told != lines:
-        edit.told = lines
+    if edit.messages != lines:
+        edit.messages = lines
     text = json.dumps(figures) if figures is not None else edit.figures
     if edit.figures != text:
         edit.figures = text
@@ -380,7 +380,7 @@ def store_messages(edit, lines: str, figures: dict | None = None) -> None:
 def _end_edit(edit) -> None:
     """End a path edit; a curve or ground that was deleted is not kept in the file."""
     edit.on = False
-    edit.told = edit.figures = ""
+    edit.messages = edit.figures = ""
     for name in ("curve", "ground"):
         thing = getattr(edit, name)
         if thing is not None and not thing.users_scene:

@@ -132,8 +132,8 @@ def stop_measuring() -> None:
 
 
 WATCHER = Watcher(
-    name="Path editing", watched_types=MATTERS, follow=update_all, restored=invalidate_sources, loaded=rides.clear_caches,
-    ends=rides.clear_caches,
+    name="Path editing", watched_types=MATTERS, follow=update_all, restored=invalidate_sources,
+    loaded=rides.clear_caches, ends=rides.clear_caches,
     framed=lambda _scene: WATCHER.mark_dirty(),  # the only report of edits that take effect with a change of frame
 )
 FIGURES = Watcher(name="Figures of path editing", look=_run_timer, ends=stop_measuring)

@@ -37,7 +37,7 @@ class RigParts:
 
     Attributes:
         controls: part -> the bone that moves it.
-        shown: part -> the bone that shows it, in the order of joints.
+        visible_bones: part -> the bone that shows it, in the order of joints.
         follows: bones that a part follows, or that move with it -> the part.
         trunk: likewise animated controls that bend the spine beside its own ones (Rigify's chest).
         root: the bone that carries everything, "" without one.
@@ -131,7 +131,7 @@ def build_motion(rig: bpy.types.Object, parts: RigParts, samples: RigSamples, un
     Args:
         rig: the armature.
         parts: its parts.
-        seen: its samples.
+        samples: its samples.
         units: Blender units in a metre.
         fps: frames per second.
     Returns:

@@ -124,7 +124,7 @@ class RigSource:
         """Compute the object's own location and rotation channels where the object itself travels."""
         now = rows.sample_numbers("lies", self.samples.world_matrices).copy()
         now[:, :3, :3] = quaternion.to_matrix(moves.rotation[OBJECT]) @ now[:, :3, :3]
-        now[:, :3, 3] = moves.point(OBJECT, now[:, :3, 3] / self.units) * self.units
+        now[:, :3, 3] = moves.transform_point(OBJECT, now[:, :3, 3] / self.units) * self.units
         basis = np.linalg.inv(above) @ now
         mode = rig.rotation_mode
         delta = quaternion.from_matrix(np.array(
@@ -148,7 +148,7 @@ class PlayedAnimation:
         others: data paths other than a bone's place or rotation.
         bones: the animated bones.
         switches: whether further settings are animated.
-        layered: see `is_layered`.
+        is_layered: see `is_layered`.
         object_keyed: whether the object itself is animated.
         messages: lines for the user.
     """
@@ -186,7 +186,7 @@ class PlayedAnimation:
 
 
 def list_playing_strips(rig: bpy.types.Object, include_muted: bool = False) -> list:
-    """List the NLA strips that play; aside: also while all of them are muted."""
+    """List the NLA strips that play; include_muted: also while all of them are muted."""
     data = rig.animation_data
     if data is None or not data.use_nla and not include_muted:
         return []

@@ -110,11 +110,12 @@ class RigAdapter(ArmatureAdapter):
         rig, (original, own) = original_motion.rig, self.find_source()
         sources = {} if action[KIND] == "layers" or original is None else channels.collect_curves(original, own)
         sheet = keys.ActionPair(action, slot, channels.collect_curves(action, slot), sources)
-        targets = rig.values(edited, self.body)
-        rows = rig.rows(edited)
+        targets = rig.compute_channels(edited, self.body)
+        rows = rig.build_rows(edited)
         for place in sheet.curves:  # written before, but now equal to the source again
-            if place not in targets and place not in sources and (values := rig.own(*place, rows)) is not None:
-                targets[place] = values
+            if place not in targets and place not in sources:
+                if (values := rig.sample_channel(*place, rows)) is not None:
+                    targets[place] = values
         if not all(np.isfinite(values).all() for values in targets.values()):
             raise InputError("motion on the path", "a pose with NaN or infinite values", "finite values",
                              "undo the last edit")

@@ -55,7 +55,7 @@ def add_pin(context: bpy.types.Context, player, part: str, seconds: float, hold:
     target.color = (*player.shirt, 1.0)
     target.location = np.asarray(place) * units
     collection.objects.link(target)
-    pin = player.pins.add_pin()
+    pin = player.pins.add()
     pin.name, pin.target, pin.part, pin.time, pin.hold = target.name, target, part, seconds, hold
     player.active_pin = len(player.pins) - 1
     context.view_layer.update()
@@ -67,7 +67,7 @@ def add_pin(context: bpy.types.Context, player, part: str, seconds: float, hold:
 def remove_pin(player, number: int) -> None:
     """Remove a pin and its Empty from the file."""
     target = player.pins[number].target
-    player.pins.remove_pin(number)
+    player.pins.remove(number)
     player.active_pin = max(0, min(player.active_pin, len(player.pins) - 1))
     if target is not None:
         bpy.data.objects.remove(target)

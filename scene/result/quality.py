@@ -166,7 +166,7 @@ def _compute_errors(scene: bpy.types.Scene, result: session.StoredTake) -> np.nd
     from ...beyond_mocap.synthesis.quality.playback import playback_from_take
 
     take, unit = result.take, scene.beyond_mocap.library_unit or None
-    library = session.find_library(result.plan.find_library, unit) if result.plan.find_library else None
+    library = session.find_library(result.plan.library, unit) if result.plan.library else None
     figures = measure_per_frame(View(playback_from_take(take), result.plan.track, take.timeline, library))
     piece = np.zeros(len(take.motion))
     piece[np.asarray(take.seams, int)] = 1.0

@@ -133,7 +133,7 @@ def process_request(request: Request, library: "Library | None", progress, cance
     """Process a request. Never accesses bpy.
 
     Args:
-        order: the request.
+        request: the request.
         library: of clips; None: built first.
         progress: called with a share and a text.
         cancelled: returns whether to stop.

@@ -85,12 +85,12 @@ def read_bone_list(settings: "BeyondMocapRig") -> dict[str, str]:
 def _on_rig_chosen(settings, _context) -> None:
     """Map the bones of a newly chosen rig."""
     settings.bones.clear()
-    settings.told = ""
+    settings.messages = ""
     if settings.target is not None:
         try:
-            settings.told = f"Bones mapped {fill_bone_map(settings)}"
+            settings.messages = f"Bones mapped {fill_bone_map(settings)}"
         except BeyondMocapError as error:
-            settings.told = str(error)
+            settings.messages = str(error)
 
 
 class BeyondMocapRig(bpy.types.PropertyGroup):

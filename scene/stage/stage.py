@@ -95,7 +95,7 @@ def animate_camera(scene: bpy.types.Scene, frames: np.ndarray, places: np.ndarra
 def create_sun(collection) -> bpy.types.Object:
     """Create daylight from above, slightly from the side."""
     light = bpy.data.lights.new("Sun", "SUN")
-    light.compute_energy, light.angle = 2.8, 0.03
+    light.energy, light.angle = 2.8, 0.03
     thing = create_object(collection, "Sun", light)
     thing.rotation_euler = (0.75, 0.25, 0.5)
     return thing
@@ -193,7 +193,7 @@ def _create_camera(stage, units: float) -> bpy.types.Object:
     camera.location = [distance * units for distance in CAMERA_FROM]
     look = camera.constraints.new("TRACK_TO")
     look.target = focus
-    look.track_axis, look.detect_up_axis = "TRACK_NEGATIVE_Z", "UP_Y"
+    look.track_axis, look.up_axis = "TRACK_NEGATIVE_Z", "UP_Y"
     return camera
 
 

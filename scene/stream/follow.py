@@ -121,7 +121,7 @@ def _show_frame(scene, listener: Listener, latest) -> str:
 def _detect_hit(scene) -> HitMotion | None:
     """Detect a strike, show it in the panel and pass it on."""
     try:
-        found = _session["hits"].look()
+        found = _session["hits"].find_new_hit()
     except BeyondMocapError as error:
         bpy.context.window_manager.beyond_mocap_streaming.hit = str(error)
         return None
@@ -148,7 +148,8 @@ def write_status() -> None:
         lines.append(f"{latency_name}: {1000.0 * statistics.median(_latencies):.0f} ms")
     if status.invalid_count:
         lines.append(f"Invalid Pieces: {status.invalid_count}")
-    status_texts.on, status_texts.state, status_texts.line, status_texts.figures = True, status.state, status.line, "\n".join(lines)
+    status_texts.on, status_texts.state, status_texts.line = True, status.state, status.line
+    status_texts.figures = "\n".join(lines)
 
 
 def _give_up(reason: str) -> None:

@@ -61,7 +61,7 @@ def apply_rally(scene: bpy.types.Scene, new_rally: NewRally) -> None:
     stop_rally()
     make.session.store_library(new_rally.library, new_rally.order.unit)
     _session.update(scene=scene.session_uid, library=new_rally.library, rally=new_rally.rally, seen=None, took=0.0)
-    for name in ("strikes", "figures", "told"):
+    for name in ("strikes", "figures", "messages"):
         scene.beyond_mocap_passes.property_unset(name)
     scene.beyond_mocap_passes.made_of = PLAYED
     _apply_players(scene, new_rally.rally, [player.name for player in new_rally.rally.scene.players])

@@ -206,8 +206,8 @@ def build_keys(
         earlier = _compute_earlier(scene, ball, settings, first_motion, first_held - 1)
         distance = float(np.linalg.norm(earlier[1][-1] - hand_keys[1][0]))
         if distance > MAX_JUMP:
-            messages = [f"frame {first_held}: the ball jumps to the hand from {distance:.1f} m away; let the hand take it before "
-                        "(Take Ball), or choose another ball"]
+            messages = [f"frame {first_held}: the ball jumps to the hand from {distance:.1f} m away; let the hand take "
+                        "it before (Take Ball), or choose another ball"]
         hand_keys = _join_arrays(earlier, hand_keys)
     return *_append_flight(hand_keys, flight_keys), (first_held, last), messages
 

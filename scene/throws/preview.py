@@ -31,7 +31,7 @@ if TYPE_CHECKING:
 
 MOST_LINES = 12
 BAKE_PROPERTIES = (BAKE_MARK, PREVIOUS_STATE, KEYS)  # custom properties of a bake that can be removed
-RESULTS = ("made", "made_of", "asked", "rigged", "release", "figures", "told")
+RESULTS = ("made", "made_of", "asked", "rigged", "release", "figures", "messages")
 
 HELD_BY = ("BEYOND_MOCAP_OT_throw_at_target", "BEYOND_MOCAP_OT_kick_at_target")
 MODES = ("OBJECT", "POSE")
@@ -65,7 +65,7 @@ def show_throw(scene: bpy.types.Scene, body: bpy.types.Object, result: "ThrowPre
     settings.made_of, settings.asked = result.order.digest, round(result.order.at * fps)
     settings.figures = "\n".join(list_figures(result))
     all_messages = [*result.thrown.warnings, *joined.warnings, *messages]
-    settings.told = "\n".join(list(dict.fromkeys(str(line) for line in all_messages))[:MOST_LINES])
+    settings.messages = "\n".join(list(dict.fromkeys(str(line) for line in all_messages))[:MOST_LINES])
 
 
 def revert_throw(scene: bpy.types.Scene, body: bpy.types.Object) -> None:
@@ -156,10 +156,10 @@ def finish_update(scene: bpy.types.Scene, job: background.Job) -> None:
     body = scene.objects.get(task.body)
     if body is None or not body.beyond_mocap_throw.made:
         return
-    if order.build_digest(scene, body, task.act) == task.digest:
+    if order.build_digest(scene, body, task.action) == task.digest:
         show_throw(scene, body, job.result)
         _state["ended"].add((body.name, task.digest))
-        bpy.ops.ed.undo_push(message=f"Update {body.name} {task.act}")
+        bpy.ops.ed.undo_push(message=f"Update {body.name} {task.action}")
     elif _state["begun"].get(body.name) == task.digest:  # it may be requested again
         del _state["begun"][body.name]
 
@@ -192,7 +192,7 @@ def _attempt_update(scene: bpy.types.Scene, name: str, call) -> None:
     def show_message(text: str) -> None:
         body = scene.objects.get(name)
         if body is not None:
-            body.beyond_mocap_throw.told = text
+            body.beyond_mocap_throw.messages = text
 
     call_or_describe(call, show_message, f"{name}: the preview cannot be updated")
 

@@ -116,11 +116,11 @@ def _run_command(context: bpy.types.Context, command: Command) -> CommandResult:
 
 def _collect_combinations(library, mirror: bool) -> LibraryCombinations:
     is_allowed = np.array([mirror or not clip.mirrored for clip in library.clips])
-    recorded = [key for key in library.keys if is_allowed[key.clip] and not library.clips[key.clip].made]
+    recorded = [key for key in library.keys if is_allowed[key.clip] and not library.clips[key.clip].is_synthetic]
     frames = library.frames
     rows = np.unique(frames.words[is_allowed[frames.clip]], axis=0)
     spans = (frozenset(word for word, has in zip(frames.vocabulary, row) if has) for row in rows)
-    return LibraryCombinations(tuple(dict.fromkeys(frozenset(key.words) for key in recorded)), tuple(spans))
+    return LibraryCombinations(tuple(dict.fromkeys(frozenset(key.labels) for key in recorded)), tuple(spans))
 
 
 def _list_active_moments(target: bpy.types.Object | None) -> list[PlacedMoment]:

@@ -140,7 +140,7 @@ def _list_conflicts(target: bpy.types.Object, items: list) -> list[tuple[int, st
 def _describe_missing(scene: bpy.types.Scene, timeline: Timeline, library) -> list[str]:
     """Find the nearest labels of the library for key moments that it lacks."""
     mirror = scene.beyond_mocap.mirror
-    choices = [key.words for key in library.keys if mirror or not library.clips[key.clip].mirrored]
+    choices = [key.labels for key in library.keys if mirror or not library.clips[key.clip].mirrored]
     lines = []
     for key, nearest in find_missing_keys(timeline, choices):
         nearest_text = ", ".join(f"'{' '.join(words)}'" for words in nearest)

@@ -66,7 +66,7 @@ def store_proposals(target: bpy.types.Object, found: Iterable["Proposal"], state
         target: the armature.
         found: the proposals.
         state: of all of them.
-        beside: keep accepted ones in the list, as their strips stay.
+        keep_accepted: keep accepted ones in the list, as their strips stay.
     """
     group = target.beyond_mocap_proposals
     for index in reversed(range(len(group.listed))):

@@ -16,9 +16,9 @@ from collections.abc import Callable
 from typing import NamedTuple
 
 import bpy
+import cached_work
 import numpy as np
 import pytest
-import remembered
 import sample_rigs as rigs
 import worlds
 from conftest import EXTENSION
@@ -293,7 +293,7 @@ def marker_model_file(places):
 def saved_map(places):
     """A map in a file: of the rig before its map was taken away."""
     bpy.ops.beyond_mocap.map_bones()
-    bpy.ops.beyond_mocap.write_bone_map(filepath=f"{places.out}/map.json")
+    bpy.ops.beyond_mocap.save_bone_map(filepath=f"{places.out}/map.json")
     unmapped()
     return places.out / "map.json"
 
@@ -315,7 +315,7 @@ def a_made_match():
     a_match()
     match = bpy.context.scene.beyond_mocap_match
     if not pathlib.Path(match.folder, "match.json").exists():
-        bpy.ops.beyond_mocap.synthesize_match()
+        bpy.ops.beyond_mocap.make_match()
     match.end = 4.0
 
 
@@ -501,7 +501,7 @@ def work_once(extension):
     """The same order is worked out once."""
     core = importlib.import_module(f"{extension.__name__}.beyond_mocap.library.library")
     with pytest.MonkeyPatch.context() as monkeypatch:
-        remembered.cache_work(monkeypatch, core.Library)
+        cached_work.cache_work(monkeypatch, core.Library)
         yield
 
 

@@ -12,8 +12,8 @@ SCRIPT = """
 import sys
 sys.path[:0] = [{core!r}, {top!r}]
 from beyond_mocap.throws.network_npz import write_model
-from linear_throws import linear_model, planted_{act}
-write_model(linear_model(planted_{act}(), {action!r}), {out!r})
+from linear_throws import build_linear_model, build_{action_name}_examples
+write_model(build_linear_model(build_{action_name}_examples(), {action!r}), {out!r})
 """
 
 
@@ -21,7 +21,6 @@ write_model(linear_model(planted_{act}(), {action!r}), {out!r})
 def write_model_file(action="throw"):
     """Path of a model of "throw" or "kick"."""
     out = str(pathlib.Path(_folder.name) / f"{action}.npz")
-    act = {"throw": "examples", "kick": "kicks"}[action]
-    script = SCRIPT.format(core=str(TOP / "tests" / "core"), top=str(TOP), out=out, act=act, action=action)
+    script = SCRIPT.format(core=str(TOP / "tests" / "core"), top=str(TOP), out=out, action_name=action, action=action)
     subprocess.run([sys.executable, "-c", script], check=True)
     return out

@@ -16,15 +16,15 @@ from architecture import (
     LAYERS,
     MAX_FILES,
     TOP,
-    count_files,
     build_file_graph,
+    count_files,
     find_cycles,
+    find_package,
     is_below,
     list_sources,
     may_import,
     parse_source,
     read_imports,
-    find_package,
 )
 
 ARRAYS = {"numpy", "scipy"}

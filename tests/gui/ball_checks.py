@@ -40,7 +40,7 @@ def isolate_panel(part):
     kind = next(panel for panel in bpy.types.Panel.__subclasses__() if panel.__name__ == "BEYOND_MOCAP_PT_ball")
     was, draw, drawn = (kind.bl_category, kind.bl_options), kind.draw, getattr(import_module("panels.ball"), part)
     kind.draw = lambda self, context: drawn(
-        *([self] if part in ("passing", "tracked", "live") else []), self.layout, context
+        *([self] if part in ("draw_passing_scene", "draw_tracked_ball", "draw_play_live") else []), self.layout, context
     )
 
     def place_panel(category, options):
@@ -89,7 +89,7 @@ def check_hit_analysis_shows_a_graph_and_goes_to_strikes():
     run_operator("beyond_mocap.import_clips", "EXEC_DEFAULT",
                  filepath=str(copy_sample() / "library" / "kick_low_top.bvh"))
     body = bpy.context.object.name
-    back = yield from isolate_panel("hits")
+    back = yield from isolate_panel("draw_hit_analysis")
     yield from click_operator("hit_analysis")
     yield from wait_until(lambda: has_hit_graph(body), what="the graph of the hits")
     frame = int(find_object(body).beyond_mocap_hits.lines.partition("\t")[0])
@@ -122,7 +122,7 @@ def check_the_ball_of_a_match_is_solved_and_accepted():
         player.annotation_file = ""
         for track in list(player.dot.animation_data.nla_tracks):
             player.dot.animation_data.nla_tracks.remove(track)
-    back = yield from isolate_panel("tracked")
+    back = yield from isolate_panel("draw_tracked_ball")
     yield from click_operator("solve_ball")
     yield from wait_for_work()
     found = [(touch.name, round(touch.time, 1)) for touch in get_passes().touches if touch.kind == "kick"
@@ -156,16 +156,16 @@ def check_a_passing_scene_is_generated_by_a_button():
     bpy.ops.wm.read_homefile(use_empty=True)
     yield 1.0
     bpy.context.scene.render.fps = 30
-    run_operator("beyond_mocap.passes_sample", "EXEC_DEFAULT", copy_sample="three")
+    run_operator("beyond_mocap.passes_sample", "EXEC_DEFAULT", sample="three")
     get_passes().library_folder = copy_few_clips()
     get_passes().repeat = 1
-    back = yield from isolate_panel("passing")
+    back = yield from isolate_panel("draw_passing_scene")
     start = time.monotonic()
     yield from click_operator("passes_make")
     yield from wait_for_work()
     output.write_line(f"     made in {time.monotonic() - start:.0f} s, the library built for the first time: "
                       f"{', '.join(get_passes().figures.splitlines())}")
-    assert get_passes().made_of and len(get_passes().strikes.splitlines()) == 4, get_passes().told
+    assert get_passes().made_of and len(get_passes().strikes.splitlines()) == 4, get_passes().messages
     for line in get_passes().strikes.splitlines():
         output.write_line(f"     {line}")
     scene, names = window.window.scene, [row.body.name for row in get_passes().players]
@@ -228,7 +228,7 @@ def check_bounces_change_and_invalid_values_are_reported():
     yield from wait_until_settled()
     before = get_passes().made_of
     get_passes().passes[0].to = get_passes().passes[0].who
-    yield from wait_until(lambda: "both passer and receiver" in get_passes().told)
+    yield from wait_until(lambda: "both passer and receiver" in get_passes().messages)
     yield from wait_until_settled()
     assert get_passes().made_of == before
     get_passes().passes[0].to = "Ben"
@@ -244,7 +244,7 @@ def check_a_hand_carries_the_ball():
     last = int(get_passes().strikes.splitlines()[-1].partition("\t")[0])
     select_objects("Passing Ball", body)
     get_passes().hold_first, get_passes().hold_last = last + 8, last + 38
-    back = yield from isolate_panel("carried")
+    back = yield from isolate_panel("draw_carried_ball")
     yield from click_operator("take_ball")
     yield from wait_until(lambda: len(find_object("Passing Ball").constraints) == 1)
     ball = find_object("Passing Ball")

@@ -45,9 +45,9 @@ class DrawCounter:
     def __enter__(self):
         self.draw, self.rides = import_module("scene.overlays.draw"), import_module("scene.overlays.path_overlays")
         self.seconds, self.made = [], []
-        self.items, self.making = self.rides.list_items, self.draw._made
-        self.draw.rides = ObjectProxy(self.rides, items=self.timed)
-        self.draw._made = self.watched
+        self.items, self.making = self.rides.list_items, self.draw._build_batches
+        self.draw.rides = ObjectProxy(self.rides, list_items=self.timed)
+        self.draw._build_batches = self.watched
         return self
 
     def timed(self, scene):
@@ -64,7 +64,7 @@ class DrawCounter:
         return found
 
     def __exit__(self, *error):
-        self.draw.rides, self.draw._made = self.rides, self.making
+        self.draw.rides, self.draw._build_batches = self.rides, self.making
 
     def report_times(self, heading):
         each = 1000 * sorted(self.seconds)[len(self.seconds) // 2]

@@ -202,7 +202,7 @@ def check_a_match():
     bpy.ops.beyond_mocap.read_match(filepath=str(copy_sample() / "match" / "small" / "small.dat"))
     match = scene.beyond_mocap_match
     match.start, match.end, match.active = 6.0, 11.0, 3
-    assert bpy.ops.beyond_mocap.synthesize_match() == {"FINISHED"}
+    assert bpy.ops.beyond_mocap.make_match() == {"FINISHED"}
     panel, = (cls for cls in list_panels("VIEW_3D") if "PT_match" in cls.__name__)
     area = window.find_area("VIEW_3D")
     show_only([panel], "VIEW_3D")

@@ -48,7 +48,7 @@ def check_bake_to_a_rigify_rig():
     name = rig.name
     settings = scene.beyond_mocap.rig
     settings.source, settings.target = body, rig
-    assert len(import_module("rigs.rig").read_bone_list(settings)) >= 22, settings.told
+    assert len(import_module("rigs.rig").read_bone_list(settings)) >= 22, settings.messages
     bpy.ops.ed.undo_push(message="before the bake")
     yield from press_button("bake_to_rig(targets='CHOSEN'")  # one press is one undo step
     yield from wait_until(lambda: bpy.data.objects[name].animation_data

@@ -59,7 +59,7 @@ def check_a_body_does_what_arrives():
     mark = len(output.text())
     bpy.data.objects.remove(find_object("Cube"))
     get_scene().beyond_mocap_stream.port = PORT
-    back = yield from isolate_panel("stream")
+    back = yield from isolate_panel("draw_stream")
     yield from click_operator("stream_start")
     yield from wait_until(lambda: get_stream_status().on and get_stream_status().state == "waiting",
                           what=lambda: get_stream_status().state)
@@ -93,11 +93,11 @@ def check_a_stopped_stream_is_reported():
 def check_strikes_are_answered_while_the_scene_plays():
     mark = len(output.text())
     get_scene().sync_mode = "FRAME_DROP"
-    bpy.ops.beyond_mocap.passes_sample(copy_sample="three")
+    bpy.ops.beyond_mocap.passes_sample(sample="three")
     get_scene().beyond_mocap_passes.library_folder = str(copy_sample() / "passes" / "library")
     get_scene().beyond_mocap_stream.body.location = (2.5, 3.5, 0.0)
     set_view((0.0, 0.5, 0.6), 11.0)
-    back = yield from isolate_panel("live")
+    back = yield from isolate_panel("draw_play_live")
     yield from click_operator("stream_play")
     yield from wait_until(lambda: get_stream_status().playing)
     bpy.ops.screen.animation_play()
@@ -127,7 +127,7 @@ def check_strikes_are_answered_while_the_scene_plays():
 
 def check_it_is_stopped():
     mark = len(output.text())
-    back = yield from isolate_panel("stream")
+    back = yield from isolate_panel("draw_stream")
     start = time.monotonic()
     yield from click_operator("stream_stop")
     yield from wait_until(lambda: not get_stream_status().on)

@@ -202,7 +202,7 @@ def choose_file(path):
 def parse_operator(call):
     """The operator's name in a call as Blender writes it.
 
-    >>> operator_of("bpy.ops.beyond_mocap.build_library(rebuild=True)")
+    >>> parse_operator("bpy.ops.beyond_mocap.build_library(rebuild=True)")
     'build_library'
     """
     return call.split("(")[0].rpartition(".")[2]

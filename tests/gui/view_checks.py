@@ -69,7 +69,7 @@ class DrawTimer:
     def __enter__(self):
         names = ("_draw_shapes", "_draw_texts", "_draw_batches", "_draw_contacts")
         self.kept, self.blf = {name: getattr(self.draw, name) for name in names}, None
-        self.draw.free()
+        self.draw.clear_batches()
         for name, when in DRAWN:
             self.window.remove_overlay(self.kept[name])
             setattr(self.draw, name, self.time_function(self.kept[name]))
@@ -89,7 +89,7 @@ class DrawTimer:
         self.kept["_draw_batches"](context, batches)
 
     def __exit__(self, *error):
-        self.draw.free()
+        self.draw.clear_batches()
         for name, when in DRAWN:
             self.window.remove_overlay(getattr(self.draw, name))
             self.window.add_overlay(bpy.types.SpaceView3D, self.kept[name], when)
@@ -159,7 +159,7 @@ def check_the_panels_are_quick_with_22_players():
     for number in range(20):
         more = get_settings().players.add()
         more.name, more.take, more.body = f"player {number + 3}", one.take, one.body
-        more.quality, more.moments, more.warnings = one.quality, one.key_moments, one.warnings
+        more.quality, more.moments, more.warnings = one.quality, one.moments, one.warnings
     area = window.find_area("VIEW_3D")
     yield from window.open_tab(area, TAB)
     spent = {}
@@ -210,7 +210,7 @@ def check_a_warning_goes_to_its_frame():
     )
     assert bpy.context.scene.frame_current == 1 + 5 * bpy.context.scene.render.fps
     assert bpy.context.view_layer.objects.active == body
-    assert bpy.context.window_manager.beyond_mocap_playhead.draw_reasons or not import_module(
+    assert bpy.context.window_manager.beyond_mocap_playhead.why or not import_module(
         "scene.overlays.store")._prepared
 
 

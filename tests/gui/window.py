@@ -43,7 +43,7 @@ class Output:
 
 
 class ScanTask:
-    """What a scout has to do and what it reports. look(): the text of what is under the pointer; wanted(text): whether
+    """What a scout has to do and what it reports. look(): the text of what is under the pointer; is_wanted(text): whether
     to click it. `found`: text -> place, of all that was seen on the way; `clicked`: the text of what was; `back`:
     whether it has come to the end."""
 
@@ -86,10 +86,10 @@ class PointerScanner(bpy.types.Operator):
     def modal(self, context, event):
         """Look at each move; end at F24."""
         if event.type == "F24":
-            PointerScanner.sent.end()
+            PointerScanner.sent.finish_scan()
             return {"FINISHED"}
         if event.type == "MOUSEMOVE":
-            PointerScanner.sent.at((event.mouse_x, event.mouse_y))
+            PointerScanner.sent.report_position((event.mouse_x, event.mouse_y))
         return {"PASS_THROUGH"}
 
 
@@ -206,7 +206,7 @@ class Window:
         return manager.clipboard
 
     def click_first(self, area, region, is_wanted, what, limit=60.0):
-        """Click the first thing that `wanted(text)` is true of, looked for from the top of the region, page by page,
+        """Click the first thing that `is_wanted(text)` is true of, looked for from the top of the region, page by page,
         again and again: what shows it may not be drawn yet. what(area, region): the text of what is under the
         pointer."""
         start = time.monotonic()
@@ -222,7 +222,7 @@ class Window:
         raise AssertionError("not found in the sidebar")
 
     def scan_region(self, area, region, what, is_wanted=lambda text: False):
-        """Move over all that the region shows, and click the first thing there that `wanted(text)` is true of. Return
+        """Move over all that the region shows, and click the first thing there that `is_wanted(text)` is true of. Return
         what is there, its text -> where it is, and what was clicked: its text, or ""."""
         rows = range(region.y + region.height - 8, region.y + 4, -9)
         columns = [region.x + int(region.width * share) for share in (0.2, 0.3, 0.5, 0.6, 0.83)]
@@ -274,13 +274,13 @@ class ObjectProxy:
     """Stands in for an object; what it does not define itself is the object's own."""
 
     def __init__(self, object, **own):
-        vars(self).update(own, _compute_object_channels=object)
+        vars(self).update(own, _object=object)
 
     def __getattr__(self, name):
-        return getattr(self._compute_object_channels, name)
+        return getattr(self._object, name)
 
     def __setattr__(self, name, value):
-        setattr(self._compute_object_channels, name, value)
+        setattr(self._object, name, value)
 
 
 def draw_unfolded(panel):

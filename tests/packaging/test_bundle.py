@@ -7,11 +7,12 @@ import io
 import tomllib
 import zipfile
 
-import build
 import bundle
 import lint
 import pytest
-from wheels import slim
+from wheels import reduce_wheel
+
+import build
 
 LINUX = bundle.read_platforms()["linux-x64"]
 PACKAGES = [bundle.Package("scipy", "1.17.1", "2001 SciPy Developers", "BSD-3-Clause"),
@@ -92,7 +93,7 @@ def test_slimming_keeps_licence_and_metadata_and_rebuilds_the_record(tmp_path):
         archive.writestr("kloppy-3.19.1.dist-info/licenses/LICENSE", "BSD")
         archive.writestr("kloppy-3.19.1.dist-info/RECORD", "stale,,\n")
     (tmp_path / "out").mkdir()
-    target = slim(source, tmp_path / "out", package)
+    target = reduce_wheel(source, tmp_path / "out", package)
     assert target.name == "kloppy-3.19.1+slim-py3-none-any.whl"
     with zipfile.ZipFile(target) as archive:
         files = {name: archive.read(name) for name in archive.namelist()}

@@ -25,7 +25,7 @@ def test_defaults_and_what_a_file_says(tmp_path):
     ('{"epoch": 3}', "epoch"), ('{"epochs": 2.5}', "epochs"), ('{"epochs": -1}', "epochs"),
     ('{"kind": "tree"}', "kind"),
     ('{"conditioned": 1}', "conditioned"), ('{"keep": NaN}', "NaN"), ('{"units": "many"}', "units"), ("[1]", "object"),
-    ('{"seed": 1, "seed": 2}', "twice"), ("{", "JSON"), ('{"learning_rate": -1}', "learning_rate"),
+    ('{"seed": 1, "seed": 2}', "'seed' is repeated"), ("{", "JSON"), ('{"learning_rate": -1}', "learning_rate"),
 ])
 def test_what_is_refused(tmp_path, text, said):
     path = tmp_path / "c.json"

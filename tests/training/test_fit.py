@@ -30,13 +30,13 @@ class Line:
         x = np.random.default_rng(0).normal(size=(3, 31))
         self.data = jax.tree.map(lambda a: jnp.asarray(a, jnp.float32), (x, 3.0 * x - 1.0))
 
-    def frames(self, share):
+    def count_frames(self, share):
         return 2 if share >= 0.5 else 0
 
-    def first(self, key):
+    def build_parameters(self, key):
         return {"line": {"slope": jax.random.normal(key, ()), "offset": jnp.zeros(())}}
 
-    def loss(self, params, data, rows, key, frames):
+    def compute_loss(self, params, data, rows, key, frames):
         x, y = (one[rows[:, 0], rows[:, 1]] for one in data)
         x = x + 0.01 * jax.random.normal(key, x.shape)
         missed = params["line"]["slope"] * x + params["line"]["offset"] - y

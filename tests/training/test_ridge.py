@@ -31,11 +31,11 @@ class Straying:
     def __init__(self, off):
         self.off = dict(zip(RIDGES, off))
 
-    def linear(self, ridge, whole):
-        assert not whole
+    def fit_linear(self, ridge, use_held_out=True):
+        assert not use_held_out
         return self.off[ridge]
 
-    def started(self, key, linear):
+    def build_weights(self, key, linear):
         return linear
 
 
@@ -46,7 +46,7 @@ class Straying:
     ([1, 1, 1, 1, 1, 1], RIDGES[-1]),
 ])
 def test_the_largest_ridge_of_the_best_is_taken(monkeypatch, off, expected):
-    monkeypatch.setattr(train, "_off", lambda model, example: model)
+    monkeypatch.setattr(train, "_measure_error", lambda model, example: model)
     held = examples("a")
     assert train.choose_ridge(Straying(off), held, lambda params, line: params) == expected
 

@@ -77,7 +77,7 @@ def test_inverse_kinematics_as_a_layer_brings_limbs_its_share_of_the_way(example
     """Of hands and feet within reach what is left to go is less by IK_SHARE, and bones keep their lengths."""
     plain, bent = problem(example), problem(example, ik_layer=True)
     params = plain.build_parameters(jax.random.key(3))
-    wanted = np.asarray(plain.data[0].at(ROWS[:, 0], ROWS[:, 1])[1].next[0])
+    wanted = np.asarray(plain.data[0].select_frames(ROWS[:, 0], ROWS[:, 1])[1].next[0])
     effectors, left = list(plain.chains.effectors), []
     with jax.disable_jit():
         for trained in (plain, bent):

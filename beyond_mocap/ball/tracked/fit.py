@@ -38,7 +38,8 @@ _UPWARD_SPEEDS = (0.0, 2.0, 4.5, 7.0, 10.0, 14.0)  # m/s, tried where heights ar
 _LOW_COUNT = 2  # of them the ball hardly leaves the ground
 _LOFT_COST_SHARE, _LOFT_COST_MARGIN = 0.7, 3.0  # a loft must cost less than this share of the low one's cost, less this
 _SHORT_DISTANCE = 6.0  # m, a shorter stretch stays on the ground: no more than a hop
-_SAMPLE_DEVIATION, _FILLED_DEVIATION, _HEIGHT_DEVIATION = 0.08, 0.6, 0.12  # m, deviation of samples, of filled-in samples, of heights
+# m, deviation of samples, of filled-in samples, of heights
+_SAMPLE_DEVIATION, _FILLED_DEVIATION, _HEIGHT_DEVIATION = 0.08, 0.6, 0.12
 _TOUCH_DEVIATION = 0.12  # m, deviation of touch positions
 _USUAL_SPIN = 25.0  # rad/s, usual spin about each axis
 _MIN_LOFT_SPEED = 1.0  # m/s upward, a slower ball stays on the ground
@@ -145,7 +146,7 @@ def fit_launches(stretches: Stretches, ball: Ball = FOOTBALL, cancelled: Callabl
     Returns:
         The launches.
     Raises:
-        Cancelled: if `cancelled` returns True.
+        UserCancelledError: if `cancelled` returns True.
     """
     if np.isfinite(stretches.velocity[:, 2]).all():
         starts = [_build_guess(stretches, stretches.velocity[:, 2])]

@@ -20,7 +20,8 @@ _MAX_HEIGHT_RESIDUAL = 0.25  # m root mean square in height, the worst that is a
 _RESIDUAL_RATIO = 2.5  # times the curves' residual, at most
 _MAX_FILLED_RESIDUAL = 1.2  # m root mean square to filled-in samples, at most
 _MEASURED_WEIGHT = 5.0  # 1/m, weights above this belong to measured samples
-_OUTLIER_RATIO, _MIN_OUTLIER, _MIN_INLIER_SHARE = 3.0, 0.4, 0.85  # times the median, and m: an outlier; least share of inliers
+# times the median, and m: an outlier; least share of inliers
+_OUTLIER_RATIO, _MIN_OUTLIER, _MIN_INLIER_SHARE = 3.0, 0.4, 0.85
 _SHIFT_SECONDS = 0.4  # s in which a shift from the flight may change direction
 _SCATTER, _USUAL_SHIFT = 0.08, 0.3  # m, scatter of samples; m, usual size of a shift
 _MAX_END_MISS = 0.5  # m from the position of the next touch, at most
@@ -41,7 +42,7 @@ def replace_by_flights(samples: Samples, pieces: list[BallPiece], moments: np.nd
     Returns:
         The pieces with flights in place of those they explain.
     Raises:
-        Cancelled: if `cancelled` returns True.
+        UserCancelledError: if `cancelled` returns True.
     """
     groups = _group_pieces(pieces, moments)
     groups = [group for group in groups if _is_worth_fitting(group)]
@@ -209,7 +210,8 @@ def _is_good_fit(group: list[BallPiece], deviation: tuple) -> bool:
     measured, high, filled, end = deviation
     own = [piece.residual for piece in group if np.isfinite(piece.residual)]
     limit = np.clip(_RESIDUAL_RATIO * max(own, default=0.0), _GOOD_RESIDUAL, _MAX_RESIDUAL)
-    return measured <= limit and high <= _MAX_HEIGHT_RESIDUAL and filled <= _MAX_FILLED_RESIDUAL and end <= _MAX_END_MISS
+    return (measured <= limit and high <= _MAX_HEIGHT_RESIDUAL and filled <= _MAX_FILLED_RESIDUAL
+            and end <= _MAX_END_MISS)
 
 
 def _align_flight(piece: BallPiece, stretches: Stretches, number: int,

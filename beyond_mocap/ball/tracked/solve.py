@@ -122,7 +122,7 @@ def solve_samples(times: np.ndarray, ball: np.ndarray, positions: np.ndarray, pl
         Touches, trajectory and exits.
     Raises:
         InputError: if the ball has fewer than five samples, or never so many without a long gap.
-        Cancelled: if `cancelled` returns True.
+        UserCancelledError: if `cancelled` returns True.
     """
     samples = build_samples(times, ball, where)
     unique_times, first = np.unique(np.asarray(times, float), return_index=True)
@@ -287,7 +287,8 @@ def _label_touches(samples, found, positions, players, teams, pitch, untracked_c
 def _describe_feed(samples: Samples, heights: bool) -> tuple[str, ...]:
     """Describe what people should know about the feed."""
     filled, wrong = float(samples.filled.mean()), int(np.count_nonzero(samples.outlier))
-    lines = [f"{filled:.0%} of the ball's samples were filled in at constant velocity"] if filled > _REPORTED_FILLED_SHARE else []
+    lines = ([f"{filled:.0%} of the ball's samples were filled in at constant velocity"]
+             if filled > _REPORTED_FILLED_SHARE else [])
     lines += [f"{wrong} of the ball's samples {'is' if wrong == 1 else 'are'} wrong and ignored"] if wrong else []
     lines += [] if heights else ["the feed has no ball heights: estimates are good to a metre or two at best"]
     return tuple(lines)
@@ -394,7 +395,7 @@ def solve_ball(source: Match | Track, progress: Callable[[float, str], None] | N
         Touches, trajectory and exits.
     Raises:
         InputError: if the source has no ball in that time.
-        Cancelled: if `cancelled` returns True.
+        UserCancelledError: if `cancelled` returns True.
     """
     low, high = -np.inf if start is None else start, np.inf if end is None else end
     part = (source.times >= low) & (source.times <= high)

@@ -319,7 +319,7 @@ def compute_rotations(values: np.ndarray, columns: list[tuple[str, int]], up: st
         up: the file's up axis, "Y" or "Z".
     Returns:
         (4, T), components first.
-    Source: Faustino 2024, section 4.2.1, equations (30) and (31).
+    Source: Faustino 2016, section 4.2.1, equations (30) and (31).
     """
     out = np.zeros((4, len(values)))
     out[0] = 1.0

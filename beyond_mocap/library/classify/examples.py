@@ -75,7 +75,7 @@ def read_examples(
         The examples.
     Raises:
         InputError: if no clip has labels, a file cannot be read or has no legs.
-        Cancelled: if `cancelled` returns True.
+        UserCancelledError: if `cancelled` returns True.
     """
     clips = _ClipReader(folder, cache_dir)
     read = clips.iter_clips(True, unit, progress, cancelled)

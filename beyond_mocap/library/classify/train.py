@@ -74,7 +74,7 @@ def train_classifier(examples: Sequence[Example], progress=None, cancelled=None)
         The classifier.
     Raises:
         InputError: if no act has enough examples.
-        Cancelled: if `cancelled` returns True.
+        UserCancelledError: if `cancelled` returns True.
     """
     from threadpoolctl import threadpool_limits
 

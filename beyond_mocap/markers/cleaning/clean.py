@@ -256,7 +256,7 @@ def clean_trial(trial: MarkerTrial, clusters: Mapping[str, Sequence[str]] | None
     Returns:
         The cleaned trial and the report.
     Raises:
-        Cancelled: if the user stops the job.
+        UserCancelledError: if the user stops the job.
     Source: Fredriksson section 5.1.
     """
     clusters = clusters or {}
@@ -299,11 +299,12 @@ def _correct_swaps(work):
 
 def _record_swaps(work, found):
     work.findings["swaps"] += tuple(
-        work.stretch([i for pair in swap.pairs for i in pair], swap.first, swap.end, "mended" if swap.mended else "")
+        work.build_stretch([i for pair in swap.pairs for i in pair], swap.first, swap.end,
+                           "mended" if swap.is_corrected else "")
         for swap in found
     )
     if found:
-        work.look()
+        work.find_carriers()
 
 
 def _list_opposite_pairs(work):
@@ -320,7 +321,7 @@ def _list_opposite_pairs(work):
 
 def _remove_jumps(work):
     work.positions, found = remove_jumps(work.positions, work.carried_markers, work.trial.fps)
-    work.findings["jumps"] = tuple(work.stretch([j.marker], j.first, j.end, "taken out", j.off) for j in found)
+    work.findings["jumps"] = tuple(work.build_stretch([j.marker], j.first, j.end, "taken out", j.off) for j in found)
     if found:
         work.update_carriers([jump.marker for jump in found])
 
@@ -328,7 +329,7 @@ def _remove_jumps(work):
 def _label_unlabeled(work):
     work.positions, found = assign_labels(work.positions, work.carried_markers, work.unlabeled, work.trial.fps)
     work.findings["assigned"] = tuple(
-        work.stretch([one.unlabeled, one.label], one.first, one.end, "assigned", one.off) for one in found
+        work.build_stretch([one.unlabeled, one.label], one.first, one.end, "assigned", one.off) for one in found
     )
     if found:
         work.update_carriers([one.label for one in found])
@@ -338,11 +339,11 @@ def _fill_gaps(work, settings):
     """Report markers that stray, fill the gaps, and record which are filled and which stay open."""
     longest = GapLimits(settings.longest_gap, settings.longest_soft_gap, settings.longest_spline)
     work.findings["strayed"] = tuple(_find_strayed(work))
-    work.positions, found = fill_gaps(work.positions, work.soft, work.trial.fps, limits=longest, known=work.carried_markers,
-                                      check_cancelled=work.check_cancelled)
+    work.positions, found = fill_gaps(work.positions, work.softness, work.trial.fps, limits=longest,
+                                      known=work.carried_markers, check_cancelled=work.check_cancelled)
     for name, is_filled in (("gaps", True), ("left", False)):
         work.findings[name] = tuple(
-            work.stretch([gap.marker], gap.first, gap.end, gap.how) for gap in found if bool(gap.how) is is_filled
+            work.build_stretch([gap.marker], gap.first, gap.end, gap.how) for gap in found if bool(gap.how) is is_filled
         )
 
 
@@ -356,19 +357,19 @@ def _find_strayed(work):
     for marker, one in work.carried_markers.items():
         if not one.carriers:
             continue
-        far = np.nan_to_num(one.away) > np.maximum(_STRAY_RATIO * one.tolerance, 0.06)
+        far = np.nan_to_num(one.deviation) > np.maximum(_STRAY_RATIO * one.tolerance, 0.06)
         for first, end in find_runs(far):
             edges = broken[first : first + 2 * _BREAK_MARGIN + 1, marker], broken[end : end + 2 * _BREAK_MARGIN + 1,
                                                                                   marker]
             if end - first >= _STRAY_SECONDS * work.trial.fps and any(edge.any() for edge in edges):
-                yield work.stretch([marker], first, end, "", float(np.median(one.away[first:end])))
+                yield work.build_stretch([marker], first, end, "", float(np.median(one.deviation[first:end])))
 
 
 def _build_result(work):
     """Build the cleaned trial and its report."""
     trial, seen = work.trial, work.trial.seen
     share = {label: float(seen[:, i].mean()) if len(trial) else 0.0 for i, label in enumerate(trial.labels)}
-    remaining = [i for i in range(len(trial.labels)) if i not in work.unlabeled or work.seen(i)]
+    remaining = [i for i in range(len(trial.labels)) if i not in work.unlabeled or work.is_visible(i)]
     cleaned = trial.with_positions(work.positions).select_markers([trial.labels[i] for i in remaining])
     nameless = {trial.labels[i] for i in work.unlabeled}
     report = CleanReport(

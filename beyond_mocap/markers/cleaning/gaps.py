@@ -116,7 +116,7 @@ def _find_gap_carriers(positions, gap, softness, one, shapes):
 
 def _fill_by_carriers(one, gap, longest):
     """Fill by firm carriers: ("cluster", path (n, 3)), or None."""
-    if one is None or gap.frames > longest or one.sigma > _SOFT_SIGMA or compute_quantile(one.away,
+    if one is None or gap.frames > longest or one.sigma > _SOFT_SIGMA or compute_quantile(one.deviation,
             0.95) > _SOFT_QUANTILE:
         return None
     has_before, has_after = gap.first > 0, gap.end < len(one.local)

@@ -201,7 +201,7 @@ def _iter_ghosts(positions, carried, fps):
         has_leap = leaping[first, marker] or (end < len(positions) and leaping[end, marker])
         if one is None or not one.carriers or not has_leap or end - first <= most:
             continue
-        away = one.away[first:end]
+        away = one.deviation[first:end]
         near = float(np.nan_to_num(compute_quantile(away, 0.05)))
         is_comparable = np.isfinite(away).mean() > 0.5 and 2 * (end - first) < seen[:, marker].sum()
         if is_comparable and near > max(_MIN_GHOST_OFFSET, 2.0 * one.tolerance):

@@ -17,7 +17,8 @@ from ..rigid_fit import fit_rigid, place_points
 from .carriers import CarriedMarker
 from .cluster_shape import compute_median
 
-_MAX_REMAINING_SHARE, _MIN_REDUCTION = 0.6, 0.008  # an exchange must reduce the deformation to this share and by this many metres
+# an exchange must reduce the deformation to this share and by this many metres
+_MAX_REMAINING_SHARE, _MIN_REDUCTION = 0.6, 0.008
 _MIN_DEFORMATION_RATIO = 2.0  # multiples of the usual deformation that it must exceed before
 # afterwards it must be at most so many metres, or multiples of the usual, or this share of that before
 _GOOD_DEFORMATION, _GOOD_RATIO, _GOOD_SHARE = 0.015, 2.5, 0.25
@@ -130,7 +131,8 @@ def _rate_exchanges(deformation, positions, pairs, leaping, step):
     if not np.any(keep - swap > _MIN_REDUCTION):
         return []
     keep, swap = deformation.compare_exchange(positions, pairs)
-    found = _find_stretches(keep, swap, deformation.usual(pairs), leaping[:, [i for pair in pairs for i in pair]])
+    found = _find_stretches(keep, swap, deformation.compute_usual(pairs),
+                            leaping[:, [i for pair in pairs for i in pair]])
     return [(float(np.nansum((keep - swap)[first:end])) * 2 * len(pairs), first, end) for first, end in found]
 
 
@@ -243,7 +245,7 @@ def _find_strayed_pairs(positions, carried, fps):
     if not markers:
         return []
     frames = np.arange(0, len(positions), max(1, int(_TEST_INTERVAL * fps)))
-    predicted = np.stack([carried[marker].predicted()[frames] for marker in markers], axis=1)
+    predicted = np.stack([carried[marker].predict_places()[frames] for marker in markers], axis=1)
     tolerances = np.array([carried[marker].tolerance for marker in markers])
     places = positions[frames][:, markers]
     off = np.linalg.norm(places - predicted, axis=-1) > tolerances

@@ -1,4 +1,4 @@
-"""Marker sets as short texts (docs/markers/markers.md), including the shipped ones."""
+"""Marker sets as short texts (docs/reference/marker-files.md), including the shipped ones."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from ..model.template import JOINTS, LANDMARKS
 
 SHIPPED = Path(__file__).resolve().parents[2] / "markers" / "sets"
 MAX_BYTES = 1_000_000  # bytes; a larger file is not a marker set
-_FORM = "see docs/markers/markers.md"
+_FORM = "see docs/reference/marker-files.md"
 _LISTS = ("static", "optional", "ball", "other")
 _KEYWORDS = "marker set, about, segment JOINT, landmark NAME, also LABEL, static, optional, ball, other"
 

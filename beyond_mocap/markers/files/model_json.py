@@ -1,4 +1,4 @@
-"""MODEL.json: a reconstructed body with the markers on it, as a file (docs/markers/markers.md)."""
+"""MODEL.json: a reconstructed body with the markers on it, as a file (docs/reference/marker-models.md)."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ from ..trial import find_duplicates
 
 VERSION = 1
 MAX_BYTES = 10_000_000  # bytes; a larger file is not a model
-_PAGE = "docs/markers/markers.md"
+_PAGE = "docs/reference/marker-models.md"
 _TRIPLE = "[x, y, z] in metres"
 _MAX_COORDINATE = 100.0  # metres, largest coordinate within a body
 _MAX_ENTRIES = 10_000  # joints or markers at most

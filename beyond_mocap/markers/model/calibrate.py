@@ -190,7 +190,7 @@ def calibrate(marker_set: MarkerSet, trial: MarkerTrial, static: MarkerTrial | N
         The model, with the name of the trial as its session.
     Raises:
         InputError: if too few landmarks are visible.
-        Cancelled: if the user stops the job.
+        UserCancelledError: if the user stops the job.
     Source: Fredriksson section 5.2.2.
     """
     report = progress or (lambda part, text: None)
@@ -260,7 +260,8 @@ def build_from_motion(marker_set: MarkerSet, trial: MarkerTrial) -> MarkerModel:
     matching = [m for m in found if m.skeleton.names == most.skeleton.names and m.markers == most.markers]
     skeleton = replace(most.skeleton, offsets=np.mean([m.skeleton.offsets for m in matching], axis=0),
                        end_offsets=np.mean([m.skeleton.end_offsets for m in matching], axis=0))
-    note = f"no static trial: started from {len(matching)} upright frame{'s' if len(matching) > 1 else ''} of the motion"
+    note = (f"no static trial: started from {len(matching)} upright frame{'s' if len(matching) > 1 else ''} "
+            "of the motion")
     places = np.mean([m.places for m in matching], axis=0)
     return replace(most, skeleton=skeleton, places=places, notes=(*most.notes, note))
 
@@ -277,7 +278,7 @@ def refine_model(model: MarkerModel, trial: MarkerTrial, static: MarkerTrial | N
     Returns:
         The adjusted model with the uncertainties of its centres and markers.
     Raises:
-        Cancelled: if the user stops the job.
+        UserCancelledError: if the user stops the job.
     """
     part = _select_frames(model, trial, static)
     solved = solve_poses(model, part, PoseSettings(weights=False, limits=False), cancelled=cancelled)

@@ -168,7 +168,7 @@ def solve_poses(model, trial, settings: PoseSettings = PoseSettings(), progress=
         The motion with residuals and weights.
     Raises:
         InputError: if the trial contains hardly any of the model's markers.
-        Cancelled: if the user stops the job.
+        UserCancelledError: if the user stops the job.
     """
     began = time.perf_counter()
     seen = _collect_positions(model, trial)
@@ -218,7 +218,8 @@ class _PoseSolver:
         self.occluded = find_occluded_joints(chain, self.visible)
         self.notes: list[str] = []
         self.work_done, self.total_work = 0, 1
-        self.frame_share = 0.5 if settings.smoothness > 0.0 else 1.0  # share of the progress before all frames are smoothed
+        # share of the progress before all frames are smoothed
+        self.frame_share = 0.5 if settings.smoothness > 0.0 else 1.0
 
     def solve_frames(self) -> None:
         """Solve the frames that show enough markers, and interpolate the others."""

@@ -38,7 +38,8 @@ _MAX_STEPS = 40  # Gauss-Newton steps at most
 _SETTLING_SECONDS = 0.10  # s before the release in which the ball moves from its usual place to where it leaves
 _MAX_FLIGHT = 10.0  # s of flight, bounces and rolling at most
 
-RELEASE_DISTANCE_RATIO = 1.1  # distance from hand to marker, relative to the held one, at which the ball has left (section 6.2)
+# distance from hand to marker, relative to the held one, at which the ball has left (section 6.2)
+RELEASE_DISTANCE_RATIO = 1.1
 _HELD_SECONDS = (0.30, 0.05)  # s before the hand is fastest, between which the ball is held
 _MIN_RELEASED_FRAMES = 3  # frames for which the distance must stay larger
 

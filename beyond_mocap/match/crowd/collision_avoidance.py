@@ -129,7 +129,8 @@ def _find_overlap_spans(bodies, capsule_lines, reach: int, min_depth: float) -> 
                                       (bodies[one].radii, bodies[other].radii), min_depth)
         deep = np.zeros(len(capsule_lines[one]), bool)
         deep[frames[found.frame]] = True
-        low, high = (max(bodies[n].present_span[0] for n in (one, other)), min(bodies[n].present_span[1] for n in (one, other)))
+        low = max(bodies[n].present_span[0] for n in (one, other))
+        high = min(bodies[n].present_span[1] for n in (one, other))
         spans += [(max(a - reach, low), min(b + reach, high), (one, other)) for a, b in find_runs(deep)]
     return spans
 

@@ -112,7 +112,7 @@ def run_tasks(
         An iterator over (key, result); the result is a `TaskFailure` if `work` raises. Closing it, or an error, stops
         the remaining work.
     Raises:
-        Cancelled: soon after `cancelled` returns True.
+        UserCancelledError: soon after `cancelled` returns True.
         InputError: if the cluster does not answer, has no workers, or goes away.
     """
     is_cancelled = cancelled or (lambda: False)
@@ -139,7 +139,7 @@ def _report_results(results: Generator[tuple[object, TaskResult], None, None],
 def run_task(work: Work, arguments: tuple) -> TaskResult:
     """Run `work` with `arguments` and measure it.
 
-    Errors become text, because not every error can be sent to another process. Raises Cancelled.
+    Errors become text, because not every error can be sent to another process. Raises UserCancelledError.
     """
     started = time.process_time()
     try:
@@ -183,7 +183,8 @@ def _run_on_workers(tasks: Iterator[Task], work: Work, workers, is_cancelled) ->
     try:
         while True:
             alone = breaks >= _MAX_BREAKS and bool(repeated or running)
-            while len(running) < (1 if alone else workers.find_capacity()) and (task := _take_next(repeated, tasks)) is not None:
+            while (len(running) < (1 if alone else workers.find_capacity())
+                   and (task := _take_next(repeated, tasks)) is not None):
                 try:
                     running[workers.submit(work, task[1])] = task
                 except BrokenExecutor:  # a worker ended in the meantime
@@ -191,7 +192,7 @@ def _run_on_workers(tasks: Iterator[Task], work: Work, workers, is_cancelled) ->
                     break
             if not running and repeated:
                 breaks += 1
-                workers.renew()
+                workers.restart_workers()
                 continue
             if not running:
                 return
@@ -205,7 +206,7 @@ def _run_on_workers(tasks: Iterator[Task], work: Work, workers, is_cancelled) ->
                 if not _is_broken(future):
                     yield task[0], _take_result(future)
                 elif alone:
-                    workers.renew()
+                    workers.restart_workers()
                     yield task[0], TaskResult(TaskFailure("its worker process ended, possibly for lack of memory"))
                 else:
                     lost.append(task)
@@ -213,7 +214,7 @@ def _run_on_workers(tasks: Iterator[Task], work: Work, workers, is_cancelled) ->
                 repeated.extend([*lost, *running.values()])
                 running.clear()
                 breaks += 1
-                workers.renew()
+                workers.restart_workers()
             elif not repeated and not running:
                 breaks = 0
     finally:

@@ -92,7 +92,7 @@ def search_window(library: Library, unit: Unit, cancelled: Callable[[], bool] | 
         The result.
     Raises:
         InputError: as for `synthesize`.
-        Cancelled: if `cancelled` returns True.
+        UserCancelledError: if `cancelled` returns True.
     """
     from threadpoolctl import threadpool_limits
 

@@ -2,5 +2,5 @@
 
     Path("report.html").write_text(build_match_page(folder), encoding="utf-8")
 
-`folder` is what `beyond-mocap match ... --out FOLDER` wrote; docs/match/match-report.md lists what is read from it.
+`folder` is what `beyond-mocap match ... --out FOLDER` wrote; docs/reference/match-report.md lists what is read from it.
 """

@@ -103,8 +103,8 @@ def _build_head(match: MatchResults, span: tuple[float, float]) -> Html:
     finished, missing = sum(one.is_finished for one in match.players), [one for one in match.players
                                                                         if not one.is_finished]
     rate = f", {match.fps:g} frames a second" if math.isfinite(match.fps) else ""
-    text = (f"{_format_clock(span[0])} to {_format_clock(span[1])} on the match clock{rate}; {finished} of {len(match.players)} "
-            "players finished")  # fmt: skip
+    text = (f"{_format_clock(span[0])} to {_format_clock(span[1])} on the match clock{rate}; {finished} of "
+            f"{len(match.players)} players finished")  # fmt: skip
     parts = [build_element("h1", match.title), build_element("p", text, class_="quiet")]
     if missing:
         names = ", ".join(one.display_name for one in missing)

@@ -119,7 +119,7 @@ def read_match_results(folder: Path) -> MatchResults:
     Returns:
         The results; a player whose report is missing or damaged is included, with the reason.
     Raises:
-        InputError: if match.json is missing or not of the form in docs/match/match-report.md.
+        InputError: if match.json is missing or not of the form in docs/reference/match-report.md.
     """
     path = Path(folder) / "match.json"
     state = _read_object(path)

@@ -200,7 +200,9 @@ class Listener:
             return "Not listening"
         if self.stream.invalid_count:
             return f"{self.stream.invalid_count} invalid pieces on {port_name}: {self.stream.last_error}"
-        return f"Waiting for frames on {port_name} of this machine" if not self._reason else f"{self._reason} ({port_name})"
+        if self._reason:
+            return f"{self._reason} ({port_name})"
+        return f"Waiting for frames on {port_name} of this machine"
 
     def _receive(self) -> None:
         """Receive until stopped; an error ends in the state "failed"."""

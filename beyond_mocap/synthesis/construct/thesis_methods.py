@@ -48,7 +48,7 @@ def construct_blocks(construction: Construction, travelled: np.ndarray | None) -
 def _spread_transitions(plan: ResolvedPlan, source: SourceMotion) -> SourceMotion:
     """Spread the jump at each transition over the frames around it.
 
-    Source: Faustino 2024, §3.3.1, eq. 25.
+    Source: Faustino 2016, §3.3.1, eq. 25.
     """
     reach = 0.5 * plan.requested.seam_window * plan.fps
     return replace(
@@ -86,7 +86,7 @@ def find_places_along(track: SampledTrack, travelled: np.ndarray) -> tuple[np.nd
         travelled: (T,) m.
     Returns:
         Places (T, 2) m and direction (T,) rad of the path there, world.
-    Source: Faustino 2024, eq. 29, which steps from the present place towards the track's place at the next travelled
+    Source: Faustino 2016, eq. 29, which steps from the present place towards the track's place at the next travelled
         distance; since both lie on the same path, the steps add up to the path itself. (As printed the difference
         points backwards.)
     """
@@ -150,7 +150,7 @@ def compute_torso_corrections(up: np.ndarray, transitions: np.ndarray, expected:
         expected: (S, 3) unit, the same for the frame with which the piece before would continue.
     Returns:
         (S,) rad.
-    Source: Faustino 2024, §3.2.6, the extra check on the spine.
+    Source: Faustino 2016, §3.2.6, the extra check on the spine.
     """
     out = np.zeros(len(transitions))
     for number, (after, before) in enumerate(zip(up[transitions], expected)):
@@ -174,7 +174,7 @@ def integrate_path(
         fps: frames per second.
     Returns:
         (T, 2) m, world.
-    Source: Faustino 2024, eq. 24.
+    Source: Faustino 2016, eq. 24.
     """
     turn = quaternion.from_up_angle(facing)
     step, away = (quaternion.rotate(turn, np.pad(flat, ((0, 0), (0, 1))))[:, :2] for flat in (velocity, sway))

@@ -1,7 +1,7 @@
 """Transitions between pieces: blended, or their jump spread over the frames around it.
 
 A blend runs where both recordings continue and one relaxes into the other by a quintic: both are real, so places,
-velocities and accelerations agree at both ends of it. Spreading follows Faustino 2024, §3.3.1, eq. 25, 26 (after Arikan
+velocities and accelerations agree at both ends of it. Spreading follows Faustino 2016, §3.3.1, eq. 25, 26 (after Arikan
 and Forsyth 2002).
 
 Compared on 33 takes of 20 s from three libraries: jerk at transitions over the real 95th percentile (median; share of
@@ -107,7 +107,7 @@ def compute_spread_share(offset: np.ndarray, reach: float) -> np.ndarray:
         reach: frames, s of eq. 25.
     Returns:
         (N,) share.
-    Source: Faustino 2024, eq. 25.
+    Source: Faustino 2016, eq. 25.
     """
     x = (np.asarray(offset, dtype=float) + reach) / max(reach, 1e-9)
     rising = 0.5 * x**2
@@ -166,7 +166,7 @@ def spread_rotations(
         longest: frames, limit of the reach.
     Returns:
         (T, J, 4) without jumps.
-    Source: Faustino 2024, eq. 26.
+    Source: Faustino 2016, eq. 26.
     """
     out = np.array(rotations, dtype=float)
     for transition, expected, reach in zip(transitions, ahead, compute_spread_reaches(transitions, len(rotations),

@@ -108,7 +108,7 @@ class BeamTransitions:
         """Compute the lower bounds (K, B) float32, above the base, of all transitions."""
         costs = self.costs
         end, start = costs.round_frame(self.end), costs.round_frame(to.start)
-        lower_bound = costs.apart(start, end)
+        lower_bound = costs.compute_pose_cost(start, end)
         leave, enter = costs.compute_cut_ends(end, start)
         cost = to.cost.astype(np.float32)
         lower_bound += (enter + cost)[:, None]

@@ -1,4 +1,4 @@
-"""Costs of blocks: other labels (Faustino 2024, §3.2.2, eq. 18), and distance of poses (§3.2.1, eq. 16, 17)."""
+"""Costs of blocks: other labels (Faustino 2016, §3.2.2, eq. 18), and distance of poses (§3.2.1, eq. 16, 17)."""
 
 from __future__ import annotations
 
@@ -105,7 +105,7 @@ def collect_windows(frames: Frames, clip: np.ndarray, centre: np.ndarray, size: 
         size: frames in a window.
     Returns:
         (M, size * D) features.
-    Source: Faustino 2024, §3.2.1, eq. 16, 17, fig. 7b.
+    Source: Faustino 2016, §3.2.1, eq. 16, 17, fig. 7b.
     """
     first, last = frames.first[clip], frames.first[clip] + frames.count[clip] - 1
     start = np.clip(centre - size // 2, first, np.maximum(last - size + 1, first))

@@ -1,4 +1,4 @@
-"""Block search, coarse to fine: blocks of 32, 16 and 8 frames by dynamic programming (Faustino 2024, §3.2).
+"""Block search, coarse to fine: blocks of 32, 16 and 8 frames by dynamic programming (Faustino 2016, §3.2).
 
 The first pass chooses a cluster for every slot of 32 frames, the second a block from each chosen cluster; the slots are
 then halved twice, and each half is searched again among the cluster that the parent's half belongs to. Cost per slot is
@@ -51,7 +51,7 @@ def find_cheapest_path(
         transition: returns for slot s the costs (K_s, K_{s+1}) of each candidate of slot s + 1 after each of slot s.
     Returns:
         The choices (S,) and the total cost; ties go to the first.
-    Source: Faustino 2024, eq. 14, 15.
+    Source: Faustino 2016, eq. 14, 15.
     """
     total = np.asarray(unary[0], dtype=float)
     back: list[np.ndarray] = []
@@ -131,7 +131,7 @@ class BlockSearch:
         Returns:
             The finest blocks, one per slot of 8 frames.
         Raises:
-            Cancelled: when `cancelled` returns true.
+            UserCancelledError: when `cancelled` returns true.
         """
         coarse = self._choose_clusters()
         blocks = self._choose_blocks(BLOCK_LENGTHS[0], coarse)
@@ -192,7 +192,7 @@ class BlockSearch:
     def _choose_clusters(self) -> list[BlockCandidates]:
         """Choose one cluster per slot of 32 frames by the same costs, and return its members as candidates.
 
-        Source: Faustino 2024: "DP is actually performed twice".
+        Source: Faustino 2016: "DP is actually performed twice".
         """
         length = BLOCK_LENGTHS[0]
         clusters = self.library.clusters[length]

@@ -1,4 +1,4 @@
-"""Convert sections of blocks to an edit list and travelled distance (Faustino 2024, §3.2.4, §3.3.2)."""
+"""Convert sections of blocks to an edit list and travelled distance (Faustino 2016, §3.2.4, §3.3.2)."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ def distribute_error(error: float, frames: int, window: int) -> np.ndarray:
         window: frames over which it is regained.
     Returns:
         (frames,) m regained up to each frame.
-    Source: Faustino 2024, §3.3.2, eq. 27, 28.
+    Source: Faustino 2016, §3.3.2, eq. 27, 28.
     """
     window = max(1, min(window, frames))
     at = np.minimum(np.arange(frames), window)
@@ -62,7 +62,7 @@ def warp_time(source: np.ndarray, target: np.ndarray, idle: float = 1e-3) -> np.
         idle: m added per frame on both sides: where the body does not move, time itself passes.
     Returns:
         (F,) fractional source frames.
-    Source: Faustino 2024, §3.3.2.
+    Source: Faustino 2016, §3.3.2.
     """
     m, f = len(source), len(target)
     if m < 2 or f < 2:
@@ -116,7 +116,7 @@ def _measure_pose_gap(library: Library, before, after, shift: int) -> float:
     """Measure the distance between the frame that would follow before a transition and the one after it; inf outside a
     clip.
 
-    Source: Faustino 2024, C of §3.2.5.
+    Source: Faustino 2016, C of §3.2.5.
     """
     frames = library.frames
     places = []

@@ -98,7 +98,7 @@ def _report_clip(library: Library, request: SearchRequest, edit: EditList, key: 
     rate = (edit.frame[high - 1] - edit.frame[low]) / max(high - 1 - low, 1)
     # the whole clip would run from whole[0] to whole[1]; it is shown from low to high
     whole = round(moment.frame - entry / rate), round(moment.frame + leave / rate)
-    start, words = float(request.track.times[0]), " ".join(moment.asked.words)
+    start, words = float(request.track.times[0]), " ".join(moment.requested.words)
     messages = []
     for name, first, end, inside in (("entry", whole[0], low, low > 0), ("exit", high, whole[1], high < len(edit))):
         if inside and end - first >= _REPORTED_FRAMES and drags_feet(library, request, moment.frame, key=key, rate=rate,

@@ -1,4 +1,4 @@
-"""Add or remove cycles of locomotion until the travelled distance fits (Faustino 2024, §3.2.4).
+"""Add or remove cycles of locomotion until the travelled distance fits (Faustino 2016, §3.2.4).
 
 The sequence of 8-frame blocks is split into locomotion and other sections. Each locomotion section keeps its first and
 last block; the blocks between are replaced by as many locomotion blocks as it takes to travel the requested distance.
@@ -146,7 +146,7 @@ def _thin_evenly(start: np.ndarray, clip: np.ndarray) -> np.ndarray:
 def _find_cheapest_chain(search: BlockSearch, section: Section, blocks: BlockCandidates, goal: float) -> np.ndarray:
     """Find the blocks that travel `goal` metres between the section's entry and exit block, by dynamic programming.
 
-    Source: Faustino 2024, eq. 22, 23.
+    Source: Faustino 2016, eq. 22, 23.
     """
     alpha, size = search.alpha, FINEST_LENGTH // 2
     weight = (1.0 - alpha) / (search.scale * np.sqrt(size))

@@ -156,7 +156,7 @@ class PathSearch:
 
         Raises:
             InputError: where no clip is as long as a slot.
-            Cancelled: when `cancelled` returns true.
+            UserCancelledError: when `cancelled` returns true.
         """
         if not len(self.index.by_speed):
             raise InputError(
@@ -179,7 +179,7 @@ class PathSearch:
         return self._trace_path(layers)
 
     def _stop_or_hurry(self, slot: int) -> None:
-        """Raise Cancelled, or narrow the beam, if that is requested."""
+        """Raise UserCancelledError, or narrow the beam, if that is requested."""
         if self._cancelled() or slot == 0 and self._hurry():
             raise UserCancelledError("synthesis: cancelled")
         if self.hurried_from is None and (self._hurry() or self._narrow and slot > 0):
@@ -190,7 +190,7 @@ class PathSearch:
         costs = np.zeros(len(self.pieces.number))
         for number in np.unique(self.pieces.number):
             key, at = self.request.keys[number], self.pieces.number == number
-            ball = measure_ball(self.request.track, key.frame, key.ball_height_known)
+            ball = measure_ball(self.request.track, key.frame, key.is_ball_height_known)
             costs[at] = compute_key_misfit(measure_strikes(self.library, key.choices), ball)[self.pieces.choice[at]]
             costs[at] += compute_weak_foot_cost(key.requested.words, key.choices,
                                                 self.request.weak_foot)[self.pieces.choice[at]]

@@ -27,7 +27,7 @@ from ...motion.track import SampledTrack
 from ..plan import Plan, ResolvedPlan
 from .preferences import LagPreference, build_lag_preference, compute_style_cost
 
-PAPERS_OMEGA = 4.0  # Faustino 2024, §3.1.1
+PAPERS_OMEGA = 4.0  # Faustino 2016, §3.1.1
 
 Labels = frozenset[str] | None
 
@@ -155,8 +155,8 @@ def _build_key(library, moment: KeyMoment, track, gait, allowed, use_nearest: bo
                warnings: list[str]) -> RequestedKey:
     """Build one key moment: its frame and the clips that may serve it."""
     frame = float(np.clip((moment.resolved_time - track.times[0]) * library.fps, 0, len(track.times) - 1))
-    usable = tuple(key for key in library.keys if allowed[key.clip] and not library.clips[key.clip].made)
-    synthetic = tuple(key for key in library.keys if allowed[key.clip] and library.clips[key.clip].made)
+    usable = tuple(key for key in library.keys if allowed[key.clip] and not library.clips[key.clip].is_synthetic)
+    synthetic = tuple(key for key in library.keys if allowed[key.clip] and library.clips[key.clip].is_synthetic)
     if moment.avoid:
         usable, synthetic = _remove_avoided(moment, usable, synthetic, warnings)
     # recordings that carry the labels first, then synthetic clips
@@ -173,7 +173,7 @@ def _build_key(library, moment: KeyMoment, track, gait, allowed, use_nearest: bo
         way_out = "add such a clip, or turn on Nearest Labels"
         raise NotInLibraryError(f"{text}; use one of these, {way_out}", nearest)
     choices = select_nearest_keys(usable, moment.words)
-    gait_words = library.gaits[int(gait[int(round(frame))])].words
+    gait_words = library.gaits[int(gait[int(round(frame))])].labels
     used = sort_labels(choices[0].labels) if choices else gait_words
     instead = " ".join(used) if choices else "locomotion continues there"
     warnings.append(TimedMessage(f"{text}; used instead: {instead}", (moment.time, moment.time)))
@@ -215,7 +215,7 @@ def _clear_around_keys(requested_labels: list[Labels], keys: tuple[RequestedKey,
 
     With several clips, the mean of their needs counts.
 
-    Source: Faustino 2024, §3.2.2, where elements of the annotation vector are zero in transitions.
+    Source: Faustino 2016, §3.2.2, where elements of the annotation vector are zero in transitions.
     """
     requested_labels = list(requested_labels)
     for key in keys:

@@ -1,6 +1,6 @@
 """The output cut into slots of about eight frames, and the pieces that clips of key moments fill among them.
 
-A key moment's clip is played for its own entry and exit (Faustino 2024, §3.2.2): from the last slot edge before the
+A key moment's clip is played for its own entry and exit (Faustino 2016, §3.2.2): from the last slot edge before the
 entry to the first one after the exit, at one playback rate, so that the key frame is on time; where its feet would be
 dragged, also without that part (`foot_drag`). Midway between two key moments that are close together lies an edge
 that neither crosses.

@@ -201,7 +201,7 @@ def solve_two_bones(top, middle, end, target, hinge, xp, soft: float = 0.01):
         hinge: (..., 3) unit, world, bending axis of the middle joint (upper bone x lower bone of a bent limb); it
             only counts where the limb is nearly straight.
         xp: numpy or jax.numpy.
-        soft: metres below full length at which the limb begins to ease (`motion.limb.soft_distance`).
+        soft: metres below full length at which the limb begins to ease (`motion.limb.soften_distance`).
     Returns:
         Rotations of the upper and the lower bone (..., 3, 3), to multiply from the left to the bones' world
         rotations, and the end joint's new position (..., 3) m.

@@ -61,14 +61,14 @@ def test_it_does_what_the_function_says(aimed, room, core):
 def test_a_dragged_target_is_followed_in_the_same_action(aimed, room):
     aim, live = aimed.beyond_mocap_aim, room("ball.live")
     before = aimed.animation_data.action
-    assert live.update_all(bpy.context.scene) == 0
+    assert live.update_balls(bpy.context.scene) == 0
     aim.target.location.y += 1.0
     bpy.context.view_layer.update()
-    assert live.update_all(bpy.context.scene) == 1 and live.update_all(bpy.context.scene) == 0
+    assert live.update_balls(bpy.context.scene) == 1 and live.update_balls(bpy.context.scene) == 0
     assert aimed.animation_data.action == before and len(bpy.data.curves) == 1
     assert np.linalg.norm(place(aimed, aim.arrived) - np.array(aim.target.matrix_world.translation)) < 0.02
     aim.bounces = 0
-    assert live.update_all(bpy.context.scene) == 1
+    assert live.update_balls(bpy.context.scene) == 1
 
 
 def test_the_way_does_not_hang_on_how_the_target_came_there(aimed, room):
@@ -77,7 +77,7 @@ def test_the_way_does_not_hang_on_how_the_target_came_there(aimed, room):
     for step in (2.5, 3.0, -5.5):
         aim.target.location.y += step
         bpy.context.view_layer.update()
-        live.update_all(bpy.context.scene)
+        live.update_balls(bpy.context.scene)
     assert aim.arrived == pytest.approx(before, abs=0.05)
 
 
@@ -85,7 +85,7 @@ def test_a_ball_without_its_body_is_told_and_stays(aimed, room):
     before = [place(aimed, frame) for frame in (60, 100)]
     aimed.beyond_mocap_aim.body = None
     room("ball.live").update_balls(bpy.context.scene)
-    assert "no body strikes it" in aimed.beyond_mocap_aim.told
+    assert "no body strikes it" in aimed.beyond_mocap_aim.messages
     assert np.array_equal([place(aimed, frame) for frame in (60, 100)], before)
 
 
@@ -94,12 +94,12 @@ def test_what_is_out_of_reach_is_told_and_the_way_stays(aimed, room):
     kept = place(aimed, aim.arrived)
     aim.target.location.x += 500.0
     bpy.context.view_layer.update()
-    assert live.update_all(bpy.context.scene) == 1 and live.update_all(bpy.context.scene) == 0
-    assert "m away" in aim.told and place(aimed, aim.arrived) == pytest.approx(kept, abs=1e-5)
+    assert live.update_balls(bpy.context.scene) == 1 and live.update_balls(bpy.context.scene) == 0
+    assert "m away" in aim.messages and place(aimed, aim.arrived) == pytest.approx(kept, abs=1e-5)
     aim.target.location.x -= 500.0
     bpy.context.view_layer.update()
-    live.update_all(bpy.context.scene)
-    assert not aim.told
+    live.update_balls(bpy.context.scene)
+    assert not aim.messages
 
 
 @pytest.mark.parametrize("wanted", [

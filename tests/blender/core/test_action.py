@@ -3,9 +3,9 @@
 import importlib
 
 import bpy
-import made
 import numpy as np
 import pytest
+import synthetic_motion
 
 RATES = {"24": (24, 1.0), "23.976": (24, 1.001), "30": (30, 1.0), "60": (60, 1.0)}
 
@@ -18,7 +18,7 @@ def rooms(extension):
 
 @pytest.fixture
 def body(core, rooms):
-    return rooms["rigs.armature"].create_armature(bpy.context, made.build_skeleton(core), "Body")
+    return rooms["rigs.armature"].create_armature(bpy.context, synthetic_motion.build_skeleton(core), "Body")
 
 
 def set_rate(name):
@@ -38,7 +38,7 @@ def assert_same(a, b, tolerance=2e-6):
 @pytest.mark.parametrize("rate", RATES)
 def test_there_and_back(core, rooms, body, rate):
     fps = set_rate(rate)
-    motion = made.build_motion(core)
+    motion = synthetic_motion.build_motion(core)
     rooms["core.action"].write_motion(body, motion, bpy.context.scene)
     assert_same(rooms["core.action"].read_motion(body, bpy.context.scene), core("motion.motion").resample(motion, fps))
     render = bpy.context.scene.render
@@ -50,19 +50,20 @@ def test_what_blender_poses_is_what_the_core_computes(core, rooms, body):
     set_rate("30")
     scene.unit_settings.scale_length = 0.5  # the armature was made at scale 1: it is now half as large
     body.location, body.rotation_euler, body.scale = (3, -2, 0.5), (0.3, 0.2, 1.1), (2, 2, 2)
-    motion = made.build_motion(core)
+    motion = synthetic_motion.build_motion(core)
     rooms["core.action"].write_motion(body, motion, scene, start=10)
     positions, _ = core("motion.motion").forward_kinematics(motion)
     for frame in (10, 25, 70):
         scene.frame_set(frame)
-        posed = np.array([(body.matrix_world @ body.pose.bones[name].matrix).translation for name in made.NAMES]) * 0.5
+        posed = np.array([(body.matrix_world @ body.pose.bones[name].matrix).translation
+                          for name in synthetic_motion.NAMES]) * 0.5
         np.testing.assert_allclose(posed, positions[frame - 10], atol=2e-5)
     assert_same(rooms["core.action"].read_motion(body, scene), motion, 1e-5)
 
 
 def test_a_fractional_start_keys_whole_frames_only(core, rooms, body):
     set_rate("30")
-    motion = made.build_motion(core)
+    motion = synthetic_motion.build_motion(core)
     action = rooms["core.action"].write_motion(body, motion, bpy.context.scene, start=4.25)
     assert tuple(action.frame_range) == (5, 64)
     read = rooms["core.action"].read_motion(body, bpy.context.scene)
@@ -71,10 +72,10 @@ def test_a_fractional_start_keys_whole_frames_only(core, rooms, body):
 
 
 def test_signs_are_continuous(core, rooms, body):
-    motion = made.build_motion(core, frames=200)
+    motion = synthetic_motion.build_motion(core, frames=200)
     action = rooms["core.action"].write_motion(body, motion, bpy.context.scene)
     curves = rooms["core.channels"].collect_curves(action, body.animation_data.action_slot)
-    for bone in made.NAMES:
+    for bone in synthetic_motion.NAMES:
         path = f'pose.bones["{bone}"].rotation_quaternion'
         values = np.stack([rooms["core.channels"].sample_curve(curves[path, i], np.arange(1, 160)) for i in range(4)],
                           axis=1)
@@ -101,14 +102,16 @@ def test_other_rotation_modes_are_read(core, rooms, body, mode):
 def test_the_action_before_is_kept(core, rooms, body):
     body.keyframe_insert("location", frame=1)
     before = body.animation_data.action
-    rooms["core.action"].write_motion(body, made.build_motion(core), bpy.context.scene)
+    rooms["core.action"].write_motion(body, synthetic_motion.build_motion(core), bpy.context.scene)
     assert before.use_fake_user and before in list(bpy.data.actions)
 
 
 def test_marked_results_do_not_pile_up(core, rooms, body):
     for _ in range(3):
         rooms["core.channels"].remove_marked_action(body, "take")
-        rooms["core.action"].write_motion(body, made.build_motion(core), bpy.context.scene, name="Take")["take"] = True
+        action = rooms["core.action"].write_motion(body, synthetic_motion.build_motion(core), bpy.context.scene,
+                                                   name="Take")
+        action["take"] = True
     assert [action.name for action in bpy.data.actions] == ["Take"]
     body.animation_data.action["take"] = False
     rooms["core.channels"].remove_marked_action(body, "take")
@@ -124,4 +127,4 @@ def test_missing_things_are_named(core, rooms, body):
     with rooms["rigs.armature"]._edit_mode(bpy.context, body):
         body.data.edit_bones.remove(body.data.edit_bones["Neck"])
     with pytest.raises(error, match="bones missing: Neck"):
-        rooms["core.action"].write_motion(body, made.build_motion(core), bpy.context.scene)
+        rooms["core.action"].write_motion(body, synthetic_motion.build_motion(core), bpy.context.scene)

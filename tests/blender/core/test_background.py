@@ -65,13 +65,13 @@ def test_what_keeps_its_results_ends_early_when_asked_and_is_cancelled_when_aske
             time.sleep(0.005)
         raise core("base.errors").UserCancelledError("stopped")
 
-    job = background.Job("test", patient, keeps=True)
+    job = background.Job("test", patient, can_end_early=True)
     background.end_jobs()
     wait(job)
     assert job.is_ending and not job.is_stale and job.result == "half"
-    again = background.Job("test", stubborn, keeps=True)
+    again = background.Job("test", stubborn, can_end_early=True)
     background.end_jobs()
-    assert again.ending and not again.stale
+    assert again.is_ending and not again.is_stale
     background.end_jobs()
     wait(again)
     assert background.is_cancelled(again)
@@ -89,4 +89,4 @@ def test_a_newer_job_makes_the_older_one_stale(background):
     held.set()
     for job in (old, other, new):
         wait(job)
-    assert old.stale and not new.stale and not other.stale
+    assert old.is_stale and not new.is_stale and not other.is_stale

@@ -16,10 +16,10 @@ def rooms(extension):
     """scene.core.preferences and scene.core.session, both as they were afterwards."""
     found = [importlib.import_module(f"{extension.__name__}.scene.core.{name}") for name in ("preferences", "session")]
     yield found
-    chosen = found[0].get()
+    chosen = found[0].find_preferences()
     chosen.property_unset("cache_folder")
     chosen.property_unset("threads")
-    found[1].clear()
+    found[1].clear_session()
 
 
 @pytest.fixture
@@ -35,7 +35,7 @@ def clips(tmp_path):
 
 def test_a_library_is_kept_where_the_preferences_say(rooms, clips, tmp_path):
     preferences, session = rooms
-    chosen, place = preferences.get(), tmp_path / "caches"
+    chosen, place = preferences.find_preferences(), tmp_path / "caches"
     assert (chosen.cache_folder, chosen.threads) == ("", 0)
     chosen.cache_folder = str(place)
     assert bpy.ops.beyond_mocap.build_library() == {"FINISHED"}
@@ -53,7 +53,7 @@ def test_threads_change_no_bit(rooms, clips):
     preferences, session = rooms
     built = []
     for threads in (1, 3):
-        preferences.get().threads = threads
+        preferences.find_preferences().threads = threads
         assert preferences.count_threads() == threads
         assert bpy.ops.beyond_mocap.build_library(rebuild=True) == {"FINISHED"}
         built.append(session.find_library(str(clips), None))
@@ -66,7 +66,7 @@ def test_threads_change_no_bit(rooms, clips):
 
 def test_it_works_without_preferences(rooms, clips, monkeypatch):
     preferences, _ = rooms
-    monkeypatch.setattr(preferences, "get", lambda: None)
+    monkeypatch.setattr(preferences, "find_preferences", lambda: None)
     assert preferences.count_threads() >= 1 and preferences.find_cache_folder(str(clips)) is None
     assert bpy.ops.beyond_mocap.build_library() == {"FINISHED"}
 
@@ -74,6 +74,6 @@ def test_it_works_without_preferences(rooms, clips, monkeypatch):
 def test_a_cache_folder_that_cannot_be_made_is_reported_and_does_no_harm(rooms, clips, tmp_path):
     preferences, session = rooms
     (tmp_path / "file").write_text("")
-    preferences.get().cache_folder = str(tmp_path / "file" / "caches")
+    preferences.find_preferences().cache_folder = str(tmp_path / "file" / "caches")
     assert bpy.ops.beyond_mocap.build_library() == {"FINISHED"}
     assert any("cannot be written" in note for note in session.find_library(str(clips), None).notes)

@@ -80,10 +80,10 @@ def hand(extension, ready, session, monkeypatch):  # noqa: F811
     def press(how=None):
         button = Button()
         if how:
-            button.wanted = lambda context: how
-        for entry in button.entries(hand.context):
+            button.list_requests = lambda context: how
+        for entry in button.build_entries(hand.context):
             queue.add_entry(entry)
-        button.entry, button.job, button.told, button.stored_count = None, None, [], 0
+        button.entry, button.job, button.messages, button.stored_count = None, None, [], 0
         button.seen, button.drawn, button.clock = None, 0.0, "timer"
         return button
 

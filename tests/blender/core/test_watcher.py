@@ -106,7 +106,7 @@ def test_what_has_failed_is_said_until_it_succeeds(live, does):
             watcher.handle_event(what)
             return
         watcher.mark_dirty()
-        watcher.since -= live.IDLE_SECONDS
+        watcher.changed_at -= live.IDLE_SECONDS
         watcher.run_tick()
 
     again()
@@ -122,11 +122,11 @@ def test_what_has_failed_is_said_until_it_succeeds(live, does):
 
 def test_what_could_not_be_updated_is_said_until_it_can(live):
     told, work = [], bpy.context.window_manager.beyond_mocap_work
-    live.attempt(lambda: 1 / 0, told.append, "Ann: could not be updated")
+    live.call_or_describe(lambda: 1 / 0, told.append, "Ann: could not be updated")
     assert told == [work.trouble] == ["Ann: could not be updated; see the system console"]
-    live.attempt(lambda: None, told.append, "Ben: could not be updated")
+    live.call_or_describe(lambda: None, told.append, "Ben: could not be updated")
     assert work.trouble == told[0]
-    assert live.attempt(lambda: 7, told.append, "Ann: could not be updated") == 7
+    assert live.call_or_describe(lambda: 7, told.append, "Ann: could not be updated") == 7
     assert work.trouble == "" and len(told) == 1
 
 
@@ -145,14 +145,14 @@ def test_a_wish_of_meanwhile_is_not_lost(live):
 def test_it_waits_until_the_hand_rests(live, monkeypatch):
     seen, holds = [], [True]
     monkeypatch.setattr(live, "is_running", lambda names: "TRANSFORM_OT" in names and "A_OT_b" in names and holds[0])
-    watcher = planted(live, held_by=("A_OT_b",), settle=lambda scene: seen.append("settle"),
+    watcher = planted(live, busy_operators=("A_OT_b",), settle=lambda scene: seen.append("settle"),
                       dragged=lambda scene: seen.append("drag"))
     watcher.run_tick()
     holds[0] = False
     watcher.mark_dirty()
     watcher.run_tick()
     assert seen == ["drag"]
-    watcher.since -= live.IDLE_SECONDS
+    watcher.changed_at -= live.IDLE_SECONDS
     watcher.run_tick()
     assert seen == ["drag", "settle"]
 
@@ -251,7 +251,7 @@ def test_what_undo_has_taken_back_is_neither_measured_nor_drawn(room, monkeypatc
     riders.update_motion(bpy.context.scene, body)
     bpy.ops.ed.undo_push(message="moved")
     monkeypatch.setattr(measure, "REST", 0.0)
-    monkeypatch.setattr(measure, "_figures", lambda *_: go.wait(10.0) and {"root_error_m": "of what was undone"})
+    monkeypatch.setattr(measure, "_measure_edit", lambda *_: go.wait(10.0) and {"root_error_m": "of what was undone"})
     while not measure._running:
         measure.FIGURES.run_tick()
     job = measure._running[0][0]
@@ -329,7 +329,7 @@ def a_live_update(room, _context):
     """Throws, flights, overlays and figures are worked out in threads of their own."""
     job = room("scene.core.background").Job
     jobs = [job(room(f"scene.{name}").KIND, endless)
-            for name in ("throws.shown", "passes.live", "overlays.store", "path_editing.live")]
+            for name in ("throws.preview", "passes.live", "overlays.store", "path_editing.live")]
     room("scene.throws.preview")._state["job"] = "body", 0, jobs[0]
     room("scene.passes.live")._running.append(jobs[1])
     room("scene.overlays.store")._running.append((jobs[2], "take"))

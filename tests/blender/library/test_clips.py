@@ -4,9 +4,9 @@ import importlib
 import os
 
 import bpy
-import made
 import numpy as np
 import pytest
+import synthetic_motion
 from undo import assert_one_step, collect_state
 
 
@@ -21,7 +21,7 @@ def clip(core, tmp_path):
     """A clip file, and the motion that a reader finds in it."""
     bvh = core("files.bvh.bvh")
     path = tmp_path / "clip.bvh"
-    bvh.write_bvh(path, made.build_motion(core))
+    bvh.write_bvh(path, synthetic_motion.build_motion(core))
     return path, bvh.read_bvh(path).motion
 
 
@@ -30,7 +30,7 @@ def folder(core, tmp_path):
     """A folder with two clips in it and one below it."""
     (tmp_path / "below").mkdir()
     for name in ("a", "b", "below/c"):
-        core("files.bvh.bvh").write_bvh(tmp_path / f"{name}.bvh", made.build_motion(core))
+        core("files.bvh.bvh").write_bvh(tmp_path / f"{name}.bvh", synthetic_motion.build_motion(core))
     return tmp_path
 
 
@@ -130,8 +130,9 @@ def test_nothing_given_and_nothing_selected():
 
 
 def test_an_armature_without_motion(core, rooms, tmp_path):
-    bpy.context.view_layer.objects.active = rooms["rigs.armature"].create_armature(bpy.context,
-                                                                                   made.build_skeleton(core), "Still")
+    bpy.context.view_layer.objects.active = rooms["rigs.armature"].create_armature(
+        bpy.context, synthetic_motion.build_skeleton(core), "Still"
+    )
     with pytest.raises(RuntimeError, match="plays no action"):
         bpy.ops.beyond_mocap.mirror()
     with pytest.raises(RuntimeError, match="plays no action"):

@@ -3,9 +3,9 @@
 import importlib
 
 import bpy
-import made
 import numpy as np
 import pytest
+import synthetic_motion
 from undo import assert_one_step, collect_state
 
 
@@ -27,7 +27,7 @@ EXPORTERS = {
 def exported(core, rooms, path, fps=30, lie=lambda rig: None):
     """A known motion on an armature with a body, written by Blender's exporter; the motion. The file is empty after.
     lie: how the armature object itself is moved, turned and scaled before it gets its motion."""
-    motion = made.build_motion(core, 61, float(fps))
+    motion = synthetic_motion.build_motion(core, 61, float(fps))
     scene = bpy.context.scene
     scene.render.fps = fps
     scene.frame_start, scene.frame_end = 1, 61
@@ -89,7 +89,7 @@ def test_several_animations_of_one_file(core, rooms, tmp_path):
     path = tmp_path / "two.glb"
     scene = bpy.context.scene
     scene.render.fps = 30
-    motion = made.build_motion(core, 61)
+    motion = synthetic_motion.build_motion(core, 61)
     rig = rooms["rigs.armature"].create_armature(bpy.context, motion.skeleton, "Somebody")
     for name, count in (("short", 31), ("long", 61)):
         rooms["core.action"].write_motion(rig, motion.frames(0, count), scene, 1.0, name)
@@ -134,7 +134,7 @@ def mixed(core, rooms, tmp_path):
     """A library of a BVH, an FBX and a GLB clip with words beside them, and a broken FBX."""
     folder = tmp_path / "library"
     (folder / "below").mkdir(parents=True)
-    core("files.bvh.bvh").write_bvh(folder / "walk.bvh", made.build_motion(core, 91))
+    core("files.bvh.bvh").write_bvh(folder / "walk.bvh", synthetic_motion.build_motion(core, 91))
     exported(core, rooms, folder / "below" / "jog.fbx")
     exported(core, rooms, folder / "low.glb")
     (folder / "broken.fbx").write_bytes(b"Kaydara FBX Binary  \0\x1a\0" + b"\1" * 300)

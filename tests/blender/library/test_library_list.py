@@ -4,8 +4,8 @@ import importlib
 import shutil
 
 import bpy
-import made
 import pytest
+import synthetic_motion
 from undo import assert_one_step, collect_state
 
 
@@ -21,7 +21,7 @@ def folder(core, tmp_path):
     top = tmp_path / "project" / "library"
     (top / "kicks").mkdir(parents=True)
     for name, frames in (("walk", 91), ("kicks/low", 61), ("other", 61)):
-        core("files.bvh.bvh").write_bvh(top / f"{name}.bvh", made.build_motion(core, frames))
+        core("files.bvh.bvh").write_bvh(top / f"{name}.bvh", synthetic_motion.build_motion(core, frames))
     (top / "walk.txt").write_text("0 3 walking front\n")
     (top / "kicks/low.txt").write_text("0 2 kick right low\n1.2 kick right low\n")
     return top
@@ -44,7 +44,7 @@ def test_a_folder_is_listed_without_being_built(listed):
     low, other, walk = listed.shown
     assert low.name == "low" and low.words.split()[0] == "kick" and set(low.words.split()) == {"kick", "right", "low"}
     assert "1 key moment" in low.figures and low.figures.startswith("2.0 s") and walk.seconds == pytest.approx(3.0)
-    assert other.words == "" and [clip.grade for clip in listed.shown] == [3, 3, 3]
+    assert other.words == "" and [clip.mark for clip in listed.shown] == [3, 3, 3]
 
 
 @pytest.mark.parametrize("asked, found", [
@@ -71,8 +71,8 @@ def test_order_and_the_chosen_clip_stays_chosen(listed):
 def test_a_build_lists_speeds_and_quality(listed):
     bpy.ops.beyond_mocap.build_library()
     low, other, walk = listed.shown
-    assert "m/s" in walk.figures and walk.mark in (0, 1, 2) and "feet slide: " in walk.told
-    assert "no labels: not used" in other.told.splitlines() and "no labels" not in walk.told
+    assert "m/s" in walk.figures and walk.mark in (0, 1, 2) and "feet slide: " in walk.messages
+    assert "no labels: not used" in other.messages.splitlines() and "no labels" not in walk.messages
 
 
 def test_a_library_without_words_is_listed_all_the_same(listed, folder):
@@ -139,7 +139,7 @@ def test_news_tell_what_is_new_changed_and_gone(folder, rooms, core):
     assert sorted(before) == ["kicks/low.bvh", "kicks/low.txt", "other.bvh", "walk.bvh", "walk.txt"]
     assert news(before, before) == ""
     for name in ("a", "b", "c"):
-        core("files.bvh.bvh").write_bvh(folder / f"{name}.bvh", made.build_motion(core, 20))
+        core("files.bvh.bvh").write_bvh(folder / f"{name}.bvh", synthetic_motion.build_motion(core, 20))
     (folder / "walk.txt").write_text("0 2.5 walking front\n")
     (folder / "kicks/low.bvh").unlink()
     assert news(before, look(str(folder))) == "3 new clips, 1 removed clip, 1 changed label file"
@@ -149,13 +149,13 @@ def test_news_tell_what_is_new_changed_and_gone(folder, rooms, core):
 def test_watching_says_it_and_builds_nothing(listed, folder, rooms, core):
     watch, settings = rooms["library.clips"], bpy.context.scene.beyond_mocap
     assert not settings.library_watch
-    core("files.bvh.bvh").write_bvh(folder / "new.bvh", made.build_motion(core, 20))
-    watch._look_again()
-    assert listed.news == "" and not watch._looking
+    core("files.bvh.bvh").write_bvh(folder / "new.bvh", synthetic_motion.build_motion(core, 20))
+    watch._scan_folder()
+    assert listed.news == "" and not watch._scan_state
     settings.library_watch = True
-    watch._look_again()
-    watch._looking["thread"].join()
-    watch._look_again()
+    watch._scan_folder()
+    watch._scan_state["thread"].join()
+    watch._scan_folder()
     assert listed.news == "1 new clip" and listed.total == 3
     bpy.ops.beyond_mocap.list_clips()
     assert listed.news == "" and listed.total == 4

@@ -165,7 +165,7 @@ def test_a_cloud_whose_player_is_spoilt_says_so(cloud, core, trial, lost):
     else:
         other = bpy.data.objects.new("other", bpy.data.meshes.new("other") if lost == "mesh" else None)
         nodes.set_input(nodes.find_modifier(thing), "Trajectories", other)
-    assert cloud.places_at(thing, 1.0) == []
+    assert cloud.sample_places(thing, 1.0) == []
     with pytest.raises(core("base.errors").InputError, match="no trajectories"):
         cloud.read_trial(thing, bpy.context.scene)
 

@@ -32,7 +32,7 @@ def made(place, extension):
     for player in match.players:
         player.use = player.feed_id in ("home_7", "home_4")
     match.start, match.end = 2.0, 8.0
-    assert press_operator(bpy.ops.beyond_mocap.synthesize_match) == {"FINISHED"}
+    assert press_operator(bpy.ops.beyond_mocap.make_match) == {"FINISHED"}
     shown = {thing.name for thing in room("match_objects").find_armatures(bpy.context.scene)}
     assert shown == {"Home 4 Ben Back", "Home 7 Cora Wing"}
     return folder
@@ -196,7 +196,7 @@ def test_an_end_before_the_start_is_told_before_anything_is_made(place, tmp_path
     match = a_match(place, tmp_path / "out")
     match.start, match.end = 6.0, 3.0
     with pytest.raises(RuntimeError, match="To .3 s. is not after From .6 s."):
-        bpy.ops.beyond_mocap.synthesize_match()
+        bpy.ops.beyond_mocap.make_match()
     assert not (tmp_path / "out").exists()
     match.end = 0.0
     assert "--to" not in room("request").build_command(bpy.context.scene)
@@ -218,7 +218,7 @@ def test_ticks_of_another_file_are_not_asked_for(place):
     match = a_match(place, place / "nowhere")
     match.players[0].use, match.tracking_file = False, str(TRACKING.with_name("small_Home.csv"))
     with pytest.raises(RuntimeError, match="the list belongs to small.dat.*press Read Match"):
-        bpy.ops.beyond_mocap.synthesize_match()
+        bpy.ops.beyond_mocap.make_match()
 
 
 def test_of_files_dropped_together_the_tracking_is_read():
@@ -233,7 +233,7 @@ def test_one_whose_file_is_gone_leaves_the_others(place, made, tmp_path):
     match = shown_again(place, tmp_path / "copy")
     assert {thing[room("match_objects").PLAYER_PROPERTY]
             for thing in room("match_objects").find_armatures(bpy.context.scene)} == {"home_7"}
-    assert "home_4 cannot be shown" in match.told and "no such file" in match.told
+    assert "home_4 cannot be shown" in match.messages and "no such file" in match.messages
     (tmp_path / "copy" / "home_7.take.npz").write_bytes(b"no take")
     with pytest.raises(RuntimeError, match="take.npz"):
         bpy.ops.beyond_mocap.show_match()
@@ -300,14 +300,14 @@ def test_trouble_is_one_line_and_nothing_changes(place, made, tmp_path, trouble,
         verb, arguments = bpy.ops.beyond_mocap.read_match, {"filepath": str(SAMPLE / "match" / "player1.csv")}
     elif trouble == "nobody":
         bpy.ops.beyond_mocap.tick_match(whom="NONE")
-        verb = bpy.ops.beyond_mocap.synthesize_match
+        verb = bpy.ops.beyond_mocap.make_match
     elif trouble == "time":
         match.start, match.end = 12.0, 20.0
     elif trouble == "folder":
         match.folder = str(tmp_path)
     elif trouble == "gone":
         match.tracking_file, match.folder = str(tmp_path / "gone.dat"), str(tmp_path / "out")
-        verb = bpy.ops.beyond_mocap.synthesize_match
+        verb = bpy.ops.beyond_mocap.make_match
     objects = len(bpy.data.objects)
     with pytest.raises(RuntimeError, match=told) as caught:
         verb(**arguments)

@@ -51,7 +51,7 @@ def test_cancelled_it_ends_soon(child, errors, tmp_path):
 def heard(child, script, cancelled=lambda: False):
     """What is heard of a process that runs a Python script."""
     process = subprocess.Popen([sys.executable, "-c", script], stderr=subprocess.PIPE, text=True)
-    return *child._heard(process, lambda done, text: None, cancelled), process.returncode
+    return *child._follow_process(process, lambda done, text: None, cancelled), process.returncode
 
 
 def test_one_that_talks_while_it_ends_has_its_time(child):

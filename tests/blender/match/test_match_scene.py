@@ -253,11 +253,11 @@ def test_two_matches_in_one_file_wear_their_own_colours(room, scenery):
 def test_what_another_scene_shows_too_stays_there(room, scenery, linked):
     first = shown(room, scenery)
     ours, second = room("match_objects"), bpy.data.scenes.new("Second")
-    home = next(one for one in ours.root(first).children if one[ours.MARK] == "home")
+    home = next(one for one in ours.find_root(first).children if one[ours.MARK] == "home")
     if linked == "player":
         second.collection.objects.link(ours.find_armatures(first)[0])
     else:
-        second.collection.children.link(ours.root(first) if linked == "whole" else home)
+        second.collection.children.link(ours.find_root(first) if linked == "whole" else home)
     there = {thing.name for thing in second.objects}
     shown(room, scenery)
     assert {thing.name for thing in second.objects} == there
@@ -269,7 +269,7 @@ def test_what_another_scene_shows_too_stays_there(room, scenery, linked):
 def test_a_collection_of_the_users_that_two_scenes_have_is_told(room, core, scenery):
     first = shown(room, scenery)
     ours, second = room("match_objects"), bpy.data.scenes.new("Second")
-    above, whole = bpy.data.collections.new("Above"), ours.root(first)
+    above, whole = bpy.data.collections.new("Above"), ours.find_root(first)
     first.collection.children.unlink(whole)
     above.children.link(whole)
     for scene in (first, second):
@@ -409,4 +409,4 @@ def test_kits_tell_teams_and_keepers_apart(room):
             kit = kits.choose_kit(person("", "", 9, team, False, ()), colours)
             assert abs(kits.compute_luminance(kit.ink) - kits.compute_luminance(kit.shirt)) > 0.2, (colours, team)
     for text in ("#C8102E", "#000000", "#FFFFFF", "#1D4ED8"):
-        assert kits.written(kits.linear(text)) == text
+        assert kits.to_hex(kits.to_linear(text)) == text

@@ -51,7 +51,7 @@ def shown(tmp_path, library_folder, room):
 
 def prepare_now(store):
     """All that is missing, at once instead of by timer and thread."""
-    store._prepared.update(store._work(store._missing(bpy.context.scene), None, lambda: False, None))
+    store._prepared.update(store._prepare_takes(store._list_missing(bpy.context.scene), None, lambda: False, None))
 
 
 @pytest.fixture

@@ -71,7 +71,7 @@ def test_a_bone_that_is_not_there_is_told(body, arguments, said):
 def test_the_picture_shows_curves_and_stretches(body, room):
     press_operator(bpy.ops.beyond_mocap.hit_analysis)
     graph, found = room("passes.hit_analysis"), json.loads(body.beyond_mocap_hits.found)
-    pixels = graph.picture(found)
+    pixels = graph.build_picture(found)
     assert pixels.shape == (graph.SIZE, graph.SIZE, 4) and np.isfinite(pixels).all()
     rows = np.flatnonzero(np.all(np.abs(pixels[30, :, :3] - graph._STRETCH) < 1e-3, axis=1))
     assert len(rows)

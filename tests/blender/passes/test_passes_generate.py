@@ -88,14 +88,14 @@ def test_what_is_drawn_is_what_is_played(two, room):
             0.0)
     frame = int(lines[0].partition("\t")[0]) + 3
     two.frame_set(frame)
-    meshes = [mesh for item in overlay.items(two) for mesh in item.meshes()]
+    meshes = [mesh for item in overlay.list_items(two) for mesh in item.meshes()]
     assert len(meshes) == 5 and all(
         np.isfinite(mesh.points).all() and len(mesh.points) == len(mesh.colours) for mesh in meshes
     )
     start = next(way[0] for way in shown.flight_paths[1:])
     assert np.allclose(start, shown.strikes[0], atol=1e-3)
     press_operator(bpy.ops.beyond_mocap.passes_clear)
-    assert not overlay.items(two)
+    assert not overlay.list_items(two)
 
 
 def test_an_edit_is_seen_and_its_own_making_is_not(two, room):
@@ -114,7 +114,7 @@ def test_an_edit_is_seen_and_its_own_making_is_not(two, room):
     assert not live.find_edit(two)
     settings().live = True
     settings().passes[0].to = settings().passes[0].who
-    assert not live.find_edit(two) and "both passer and receiver" in settings().told
+    assert not live.find_edit(two) and "both passer and receiver" in settings().messages
 
 
 def test_each_is_one_step_of_undo_and_clear_leaves_the_lists(two):

@@ -3,9 +3,9 @@
 import importlib
 
 import bpy
-import made
 import numpy as np
 import pytest
+import synthetic_motion
 import worlds
 from conftest import EXTENSION
 from undo import assert_one_step, press_operator
@@ -23,7 +23,7 @@ def body(core, room):
     """An armature that waves about, thrice as large as its motion, turned and put aside."""
     scene = bpy.context.scene
     scene.render.fps = FPS
-    motion = made.build_motion(core, 91, 30.0)
+    motion = synthetic_motion.build_motion(core, 91, 30.0)
     body = room("rigs.armature").create_armature(bpy.context, motion.skeleton, "Waver")
     room("core.action").write_motion(body, motion, scene, 1.0)
     body.scale, body.location, body.rotation_euler.z = (0.7, 0.7, 0.7), (1.0, 2.0, 0.5), 0.4

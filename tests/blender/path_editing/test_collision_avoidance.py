@@ -6,7 +6,7 @@ import json
 import bpy
 import numpy as np
 import pytest
-from test_ride import choose, circle, part, pelvis, scene, walker  # noqa: F401
+from test_path_edit import choose, circle, part, pelvis, scene, walker  # noqa: F401
 from undo import assert_one_step
 
 
@@ -65,7 +65,7 @@ def test_head_on_they_pass_each_other_and_clear_takes_it_back(scene, said):  # n
     bodies = two()
     assert nearest(*bodies) < 0.3
     assert bpy.ops.beyond_mocap.path_apart() == {"FINISHED"}
-    assert said[0].before == 1 and said[0].left == ()
+    assert said[0].before == 1 and said[0].unresolved == ()
     assert nearest(*bodies) > 0.59
     sides = [offset for body in bodies for _, _, offset in asked(body)[1]]
     assert sides and all(offset < 0 for offset in sides)
@@ -117,7 +117,7 @@ def test_of_three_the_two_selected_give_way(scene):  # noqa: F811
 def test_what_cannot_be_resolved_is_told_with_names_and_time(scene, said):  # noqa: F811
     bodies = two()
     bpy.ops.beyond_mocap.path_apart(detour=0.1, delay=0.2)
-    [line] = said[0].left
+    [line] = said[0].unresolved
     assert all(body.name in line for body in bodies) and "frames" in line and " s " in line
 
 
@@ -142,7 +142,7 @@ def test_at_a_broken_rate_and_in_centimetres(scene, said):  # noqa: F811
     bodies = rider((0, 0, 0), (300, 0, 0)), rider((300, 0, 0), (0, 0, 0))
     assert nearest(*bodies) < 30.0
     bpy.ops.beyond_mocap.path_apart()
-    assert said[0].before == 1 and said[0].left == ()
+    assert said[0].before == 1 and said[0].unresolved == ()
     assert nearest(*bodies) > 59.0
 
 
@@ -157,7 +157,7 @@ def test_round_a_closed_curve_again_and_again(scene, said):  # noqa: F811
         bpy.ops.beyond_mocap.edit_path()
         bodies.append(body)
     bpy.ops.beyond_mocap.path_apart()
-    assert said[0].before >= 1 and said[0].left == ()
+    assert said[0].before >= 1 and said[0].unresolved == ()
     assert nearest(*bodies) > 0.59
 
 
@@ -198,7 +198,7 @@ def test_who_was_kept_is_not_run_into(scene, said, gone):  # noqa: F811
     scene.frame_set(7)
     bpy.ops.beyond_mocap.path_apart()
     assert scene.frame_current == 7 and len(bpy.data.scenes) == 1
-    assert said[0].before == 1 and said[0].left == ()
+    assert said[0].before == 1 and said[0].unresolved == ()
     assert not bodies[0].beyond_mocap_ride.on and asked(bodies[1]) != (0.0, [])
     assert nearest(*bodies) > 0.59
 
@@ -219,7 +219,7 @@ def test_who_is_hidden_or_shows_a_rider_is_not_counted(scene, said):  # noqa: F8
         same.target, same.subtarget = body, bone.name
     choose(body)
     bpy.ops.beyond_mocap.path_apart()
-    assert said[0].before == 0 and said[0].left == ()
+    assert said[0].before == 0 and said[0].unresolved == ()
 
 
 def test_who_cannot_be_looked_at_in_time_is_told(scene, said, part, monkeypatch):  # noqa: F811
@@ -227,7 +227,7 @@ def test_who_cannot_be_looked_at_in_time_is_told(scene, said, part, monkeypatch)
     module = part("path_editing.collision_avoidance")
     monkeypatch.setattr(module.compute_bystanders, "__defaults__", (0.0,))
     bpy.ops.beyond_mocap.path_apart()
-    [line] = said[0].left
+    [line] = said[0].unresolved
     assert line.startswith(f"{first.name} is left out") and "too long" in line
 
 
@@ -253,16 +253,16 @@ def test_a_rider_that_is_changed_afterwards_says_so_until_it_is_pressed_again(sc
     follow = part("path_editing.live").update_all
     told = [first.beyond_mocap_ride, second.beyond_mocap_ride]
     follow(scene)
-    assert not any("Avoid Collisions" in ride.told for ride in told)
+    assert not any("Avoid Collisions" in ride.messages for ride in told)
     first.beyond_mocap_ride.curve.location.y += 0.2
     bpy.context.view_layer.update()
     follow(scene)
-    assert ["changed since Avoid Collisions" in ride.told for ride in told] == [True, False]
+    assert ["changed since Avoid Collisions" in ride.messages for ride in told] == [True, False]
     bpy.ops.beyond_mocap.path_apart()
-    assert not any("Avoid Collisions" in ride.told for ride in told)
+    assert not any("Avoid Collisions" in ride.messages for ride in told)
     first.beyond_mocap_ride.curve.location.y += 0.2
     bpy.context.view_layer.update()
     follow(scene)
     bpy.ops.beyond_mocap.path_apart(clear=True)
     follow(scene)
-    assert not any("Avoid Collisions" in ride.told for ride in told)
+    assert not any("Avoid Collisions" in ride.messages for ride in told)

@@ -48,7 +48,7 @@ def test_all_of_the_path_is_in_the_frame_and_fills_it(cameras, way, scale, size)
     scene.render.resolution_x, scene.render.resolution_y = size
     cameras.place_cameras(scene, route(cameras, places))
     for kind in cameras.KINDS[:3]:
-        camera = cameras.found(scene, kind)
+        camera = cameras.find_camera(scene, kind)
         picture = seen(camera, np.concatenate([places, places + [0.0, 0.0, 1.9]]) / scale)
         assert (picture[:, :2] > 0.0).all() and (picture[:, :2] < 1.0).all(), kind
         assert np.ptp(picture[:, :2], axis=0).max() > 0.7, (kind, np.ptp(picture, axis=0))
@@ -59,7 +59,7 @@ def test_above_is_a_map_and_the_side_shows_the_length(cameras):
     scene = bpy.context.scene
     line = np.stack([np.zeros(50), np.linspace(0.0, 10.0, 50), np.zeros(50)], axis=1)
     cameras.place_cameras(scene, route(cameras, line))
-    above, side = (seen(cameras.found(scene, kind), line) for kind in ("ABOVE", "SIDE"))
+    above, side = (seen(cameras.find_camera(scene, kind), line) for kind in ("ABOVE", "SIDE"))
     assert np.ptp(above[:, 0]) < 1e-4 and above[-1, 1] > above[0, 1]
     assert side[-1, 0] - side[0, 0] > 0.7 and np.ptp(side[:, 1]) < 0.02
 
@@ -67,7 +67,7 @@ def test_above_is_a_map_and_the_side_shows_the_length(cameras):
 def test_the_last_one_follows_and_looks_along_the_way(cameras):
     scene, places = bpy.context.scene, circle()
     cameras.place_cameras(scene, route(cameras, places))
-    camera = cameras.found(scene, "BEHIND")
+    camera = cameras.find_camera(scene, "BEHIND")
     for frame in (60, 120, 180):
         scene.frame_set(frame)
         place = places[frame - 1]
@@ -82,8 +82,8 @@ def test_the_last_one_follows_and_looks_along_the_way(cameras):
 def test_the_focus_is_smooth_but_goes_along_where_a_motion_starts_again(cameras):
     corner = np.concatenate([np.linspace((0, 0, 0), (5, 0, 0), 100), np.linspace((5, 0, 0), (5, 5, 0), 100)[1:]])
     twice = np.concatenate([corner, corner])
-    place, turn = cameras.followed(route(cameras, twice), 25.0)
-    once, turned = cameras.followed(route(cameras, corner), 25.0)
+    place, turn = cameras.smooth_focus(route(cameras, twice), 25.0)
+    once, turned = cameras.smooth_focus(route(cameras, corner), 25.0)
     assert np.abs(np.diff(turned)).max() < 0.1 and abs(turned[-1] - np.pi / 2) < 0.05
     assert np.allclose(place, np.concatenate([once, once])) and np.abs(once - corner).max() < 0.2
 
@@ -91,20 +91,20 @@ def test_the_focus_is_smooth_but_goes_along_where_a_motion_starts_again(cameras)
 def test_again_only_those_are_laid_that_nobody_has_touched(cameras):
     scene = bpy.context.scene
     cameras.place_cameras(scene, route(cameras, circle()))
-    names = {kind: cameras.found(scene, kind).name for kind in cameras.KINDS}
-    cameras.found(scene, "SIDE").location.x += 0.5
-    cameras.found(scene, "BEHIND").data.lens = 80.0
-    bpy.data.objects.remove(cameras.found(scene, "QUARTER"))
-    before = {kind: cameras.found(scene, kind).matrix_basis.copy() for kind in ("ABOVE", "SIDE", "BEHIND")}
+    names = {kind: cameras.find_camera(scene, kind).name for kind in cameras.KINDS}
+    cameras.find_camera(scene, "SIDE").location.x += 0.5
+    cameras.find_camera(scene, "BEHIND").data.lens = 80.0
+    bpy.data.objects.remove(cameras.find_camera(scene, "QUARTER"))
+    before = {kind: cameras.find_camera(scene, kind).matrix_basis.copy() for kind in ("ABOVE", "SIDE", "BEHIND")}
     kept = cameras.place_cameras(scene, route(cameras, circle(centre=(-20.0, 0.0, 0.0))))
     assert kept == [names["SIDE"], names["BEHIND"]]
-    assert {kind: cameras.found(scene, kind).matrix_basis == before[kind] for kind in before} == {
+    assert {kind: cameras.find_camera(scene, kind).matrix_basis == before[kind] for kind in before} == {
         "ABOVE": False, "SIDE": True, "BEHIND": True}
-    assert cameras.found(scene, "QUARTER") is not None
+    assert cameras.find_camera(scene, "QUARTER") is not None
     scene.frame_set(30)
     bpy.context.view_layer.update()
     assert (
-        cameras.found(scene, "BEHIND").matrix_world.translation.x < -10.0
+        cameras.find_camera(scene, "BEHIND").matrix_world.translation.x < -10.0
     ), "the focus runs along the new path all the same"
     assert len([c for c in bpy.data.collections if c.get(cameras.MARK)]) == 1 and len(scene.objects) == 5
 
@@ -112,7 +112,7 @@ def test_again_only_those_are_laid_that_nobody_has_touched(cameras):
 def test_keys_of_somebody_else_on_the_focus_stay(cameras):
     scene = bpy.context.scene
     cameras.place_cameras(scene, route(cameras, circle()))
-    focus = cameras.found(scene, "BEHIND").parent
+    focus = cameras.find_camera(scene, "BEHIND").parent
     focus.animation_data.action = None
     focus.keyframe_insert("location", frame=1)
     own = focus.animation_data.action
@@ -133,7 +133,7 @@ def test_a_way_that_is_one_point_and_one_that_is_vertical_have_their_cameras(cam
                                                      np.zeros(len(places)))
         )
         for kind in cameras.KINDS:
-            assert np.isfinite(cameras.found(bpy.context.scene, kind).matrix_world).all()
+            assert np.isfinite(cameras.find_camera(bpy.context.scene, kind).matrix_world).all()
 
 
 def test_flicking_goes_through_all_four(cameras):
@@ -147,8 +147,8 @@ def test_flicking_goes_through_all_four(cameras):
         looked.append(scene.camera.get(cameras.MARK))
     assert looked == [*cameras.KINDS, "ABOVE"]
     bpy.ops.beyond_mocap.path_camera(which="QUARTER")
-    assert scene.camera == cameras.found(scene, "QUARTER")
-    bpy.data.objects.remove(cameras.found(scene, "SIDE"))
+    assert scene.camera == cameras.find_camera(scene, "QUARTER")
+    bpy.data.objects.remove(cameras.find_camera(scene, "SIDE"))
     with pytest.raises(RuntimeError, match="no camera Path Side"):
         bpy.ops.beyond_mocap.path_camera(which="SIDE")
 
@@ -167,7 +167,7 @@ def test_the_scene_s_own_camera_comes_back(cameras):
     bpy.ops.beyond_mocap.path_camera(which="SIDE")
     bpy.data.objects.remove(own)
     bpy.ops.beyond_mocap.path_camera(which="FREE")
-    assert scene.camera == cameras.found(scene, "SIDE")
+    assert scene.camera == cameras.find_camera(scene, "SIDE")
 
 
 def test_all_riders_are_in_view_and_the_active_one_is_followed(cameras):
@@ -186,10 +186,10 @@ def test_all_riders_are_in_view_and_the_active_one_is_followed(cameras):
     scene = bpy.context.scene
     ends = np.array([(0.0, 0.0, 0.0), (6.0, 0.0, 0.0), (0.0, 10.0, 0.0), (6.0, 10.0, 1.8)])
     for kind in cameras.KINDS[:3]:
-        picture = seen(cameras.found(scene, kind), ends)
+        picture = seen(cameras.find_camera(scene, kind), ends)
         assert (picture[:, :2] > 0.0).all() and (picture[:, :2] < 1.0).all(), kind
     scene.frame_set(scene.frame_start + 60)
-    assert abs(cameras.found(scene, "BEHIND").matrix_world.translation.y - 10.0) < 1.0
+    assert abs(cameras.find_camera(scene, "BEHIND").matrix_world.translation.y - 10.0) < 1.0
 
 
 def test_looking_from_behind_goes_along_with_a_path_that_was_bent(cameras):

@@ -86,7 +86,7 @@ def test_on_its_own_curve_the_motion_is_nearly_its_own_and_leave_gives_back_ever
     assert (
         drawn.type == "CURVE" and drawn == body.beyond_mocap_ride.curve and len(drawn.data.splines[0].bezier_points) > 3
     )
-    assert body.animation_data.action.name != before[0] and body.beyond_mocap_ride.told == ""
+    assert body.animation_data.action.name != before[0] and body.beyond_mocap_ride.messages == ""
     np.testing.assert_allclose([pelvis(body, frame) for frame in (1, 20, 40)], was, atol=0.06)
     scene.frame_set(1)
     assert bpy.ops.beyond_mocap.leave_path() == {"FINISHED"}
@@ -121,7 +121,7 @@ def test_the_body_goes_where_the_curve_is(scene, part):
             drawn.data.splines[0].bezier_points[1].co.x += 0.3
         bpy.context.view_layer.update()
         assert live.update_all(scene) == 1 and live.update_all(scene) == 0
-        assert body.beyond_mocap_ride.told == ""
+        assert body.beyond_mocap_ride.messages == ""
         assert max(to_path(riders, body, frame) for frame in (1, 15, 30)) < 0.12
     assert pelvis(body, 10)[2] > 1.5
 
@@ -170,7 +170,7 @@ def test_other_channels_are_shown_at_the_frames_that_are_shown(scene, part):
     whole = last()
     ride.speed = 2.0
     live.update_all(scene)
-    assert last() == pytest.approx(whole / 2, abs=1) and ride.told == ""
+    assert last() == pytest.approx(whole / 2, abs=1) and ride.messages == ""
     found = channels.sample_curve(mine()['["slider"]', 0], np.arange(1.0, 20.0))
     np.testing.assert_allclose(found, slider[0:37:2], atol=1e-4)
     switch = channels.sample_curve(mine()['["switch"]', 0], np.arange(1.0, 20.0))
@@ -196,7 +196,7 @@ def test_the_rotation_mode_stays(scene, part, mode):
     round_about = circle()
     choose(body, round_about)
     assert bpy.ops.beyond_mocap.edit_path() == {"FINISHED"}
-    assert body.beyond_mocap_ride.curve == round_about and body.beyond_mocap_ride.told == ""
+    assert body.beyond_mocap_ride.curve == round_about and body.beyond_mocap_ride.messages == ""
     assert [bone.rotation_mode for bone in body.pose.bones] == modes
     steps = [np.abs(np.diff(channels.read_keys(curve)["co"][:, 1])).max() for (path, _),
              curve in channels.collect_curves(*channels.find_playing_action(body)).items() if "rotation" in path]
@@ -294,10 +294,10 @@ def test_a_curve_that_is_no_path_is_told_and_the_last_good_motion_stays(scene, p
     body.beyond_mocap_ride.curve = odd
     bpy.context.view_layer.update()
     assert live.update_all(scene) == 0
-    assert line in body.beyond_mocap_ride.told and "\n" not in body.beyond_mocap_ride.told
+    assert line in body.beyond_mocap_ride.messages and "\n" not in body.beyond_mocap_ride.messages
     assert bits(part, body) == before
     bpy.data.objects.remove(odd)
-    assert live.update_all(scene) == 0 and "its curve is not in the scene" in body.beyond_mocap_ride.told
+    assert live.update_all(scene) == 0 and "its curve is not in the scene" in body.beyond_mocap_ride.messages
     assert bits(part, body) == before
 
 
@@ -349,7 +349,7 @@ def test_a_rider_appended_to_another_file_rides_there(scene, part, tmp_path):
     body, drawn = wanted.objects
     drawn.location.y += 1.0
     bpy.context.view_layer.update()
-    assert live.update_all(bpy.context.scene) == 1 and body.beyond_mocap_ride.told == ""
+    assert live.update_all(bpy.context.scene) == 1 and body.beyond_mocap_ride.messages == ""
     choose(body)
     bpy.ops.beyond_mocap.leave_path()
     assert bits(part, body) == before
@@ -432,11 +432,11 @@ def test_a_deleted_curve_and_ground_are_not_kept_for_who_rode_them(scene, part):
     assert live.update_all(scene) == 1
     was = bits(part, body)[:3]
     bpy.ops.object.delete()
-    assert (live.update_all(scene) == 0 and "Plane is not in the scene" in body.beyond_mocap_ride.told
+    assert (live.update_all(scene) == 0 and "Plane is not in the scene" in body.beyond_mocap_ride.messages
             and bits(part, body)[:3] == was)
     choose(drawn)
     bpy.ops.object.delete()
-    assert (live.update_all(scene) == 0 and "its curve is not in the scene" in body.beyond_mocap_ride.told
+    assert (live.update_all(scene) == 0 and "its curve is not in the scene" in body.beyond_mocap_ride.messages
             and bits(part, body)[:3] == was)
     choose(body)
     assert bpy.ops.beyond_mocap.leave_path() == {"FINISHED"}
@@ -452,7 +452,7 @@ def test_another_curve_takes_the_place_of_one_that_was_made_here(scene, part):
                               ({"shape": "FITTED", "count": 1}, 2), ({"kind": "NURBS", "degree": 5}, 6)):
         assert bpy.ops.beyond_mocap.path_curve(**arguments) == {"FINISHED"}
         spline = bpy.context.object.data.splines[0]
-        assert len(spline.bezier_points or spline.points) >= points and body.beyond_mocap_ride.told == ""
+        assert len(spline.bezier_points or spline.points) >= points and body.beyond_mocap_ride.messages == ""
         assert [curve.name for curve in bpy.data.curves] == [name] == [bpy.context.object.name]
     with pytest.raises(RuntimeError, match="control points"):
         bpy.ops.beyond_mocap.path_curve(kind="NURBS", degree=5, count=4)
@@ -525,7 +525,7 @@ def test_button_and_function_give_the_same(scene, part, core):
     motion = action.read_motion(body, scene)
     recipe = core("path_editing.path_edit")
     settings = recipe.PathEditSettings(speed=1.25, lean=False, cycle=True)
-    wanted = recipe.edit_path(recipe.prepare_source(motion, settings), curve.read_curve(scene, round_about).path(),
+    wanted = recipe.edit_path(recipe.prepare_source(motion, settings), curve.read_curve(scene, round_about).to_path(),
                               settings).motion
     body.beyond_mocap_ride.speed, body.beyond_mocap_ride.lean, body.beyond_mocap_ride.cycle = 1.25, False, True
     choose(body, round_about)
@@ -584,7 +584,7 @@ def test_a_curve_that_moves_with_time_is_ridden_as_it_lay_when_edited(scene, par
         drawn.keyframe_insert("location", frame=frame)
     scene.frame_set(50)
     live.update_all(scene)
-    assert "its animation is ignored" in body.beyond_mocap_ride.told
+    assert "its animation is ignored" in body.beyond_mocap_ride.messages
     before = bits(part, body)[:3]
     scene.frame_set(90)
     assert live.update_all(scene) == 0 and bits(part, body)[:3] == before
@@ -607,7 +607,7 @@ def test_a_curve_that_hangs_on_something_goes_with_it(scene, part):
         thing.location = place
         bpy.context.view_layer.update()
         scene.frame_set(20)
-        assert live.update_all(scene) == 1 and body.beyond_mocap_ride.told == ""
+        assert live.update_all(scene) == 1 and body.beyond_mocap_ride.messages == ""
         np.testing.assert_allclose(riders.find_computed_edit(body).line[0], place, atol=1e-3)
     hook.rotation_euler[2] = 1.0
     bpy.context.view_layer.update()
@@ -622,7 +622,7 @@ def test_nobody_cycles_for_hours(scene, part):
     body.beyond_mocap_ride.cycle = True
     before = bits(part, body)[:3]
     bpy.context.view_layer.update()
-    assert live.update_all(scene) == 0 and "22 minutes or less" in body.beyond_mocap_ride.told
+    assert live.update_all(scene) == 0 and "22 minutes or less" in body.beyond_mocap_ride.messages
     assert bits(part, body)[:3] == before
     body.beyond_mocap_ride.cycle = False
     assert live.update_all(scene) == 1
@@ -655,7 +655,7 @@ def test_a_path_that_ends_early_is_repeated_cycled_or_stops(scene, part):
     ring = circle(1.5)
     ride.curve, ride.cycle = ring, False
     bpy.context.view_layer.update()
-    assert live.update_all(scene) == 1 and ride.told == ""
+    assert live.update_all(scene) == 1 and ride.messages == ""
     ring.data.splines[0].use_cyclic_u = False
     bpy.context.view_layer.update()
     assert live.update_all(scene) == 1
@@ -675,15 +675,15 @@ def test_the_ground_counts_while_it_is_edited(scene, part):
     choose(floor)
     bpy.ops.object.mode_set(mode="EDIT")
     bpy.context.view_layer.update()
-    assert live.update_all(scene) == 0 and "without faces" not in body.beyond_mocap_ride.told
+    assert live.update_all(scene) == 0 and "without faces" not in body.beyond_mocap_ride.messages
     bpy.ops.object.mode_set(mode="OBJECT")
     mesh.clear_geometry()
     bpy.context.view_layer.update()
     before = bits(part, body)[:3]
-    assert live.update_all(scene) == 0 and "without faces" in body.beyond_mocap_ride.told
+    assert live.update_all(scene) == 0 and "without faces" in body.beyond_mocap_ride.messages
     assert bits(part, body)[:3] == before
     body.beyond_mocap_ride.ground = None
-    assert live.update_all(scene) == 1 and body.beyond_mocap_ride.told == ""
+    assert live.update_all(scene) == 1 and body.beyond_mocap_ride.messages == ""
 
 
 def test_what_was_wrong_is_told_no_more_once_all_is_as_before(scene, part):
@@ -696,7 +696,7 @@ def test_what_was_wrong_is_told_no_more_once_all_is_as_before(scene, part):
         body.beyond_mocap_ride.ground = ground
         bpy.context.view_layer.update()
         assert live.update_all(scene) == 0 and (
-            told in body.beyond_mocap_ride.told if told else not body.beyond_mocap_ride.told
+            told in body.beyond_mocap_ride.messages if told else not body.beyond_mocap_ride.messages
         )
 
 
@@ -711,7 +711,7 @@ def test_a_ground_that_moves_with_time_does_not_change_the_motion_with_the_frame
         floor.keyframe_insert("location", frame=frame)
     scene.frame_set(1)
     body.beyond_mocap_ride.ground = floor
-    assert live.update_all(scene) == 1 and "ground Plane: its animation is ignored" in body.beyond_mocap_ride.told
+    assert live.update_all(scene) == 1 and "ground Plane: its animation is ignored" in body.beyond_mocap_ride.messages
     was = bits(part, body)[:3]
     scene.frame_set(30)
     assert live.update_all(scene) == 0 and bits(part, body)[:3] == was
@@ -728,14 +728,14 @@ def test_what_cannot_be_read_is_not_looked_at_again_and_again(scene, part, monke
         looks.append(1)
         raise carrier.InputError("motion", "unreadable")
 
-    monkeypatch.setattr(carrier.PlainAdapter, "read", fails)
+    monkeypatch.setattr(carrier.PlainAdapter, "read_motion", fails)
     body.beyond_mocap_ride.fit = "polynomial"
     for _ in range(3):
-        assert live.update_all(scene) == 0 and body.beyond_mocap_ride.told == "motion: unreadable"
+        assert live.update_all(scene) == 0 and body.beyond_mocap_ride.messages == "motion: unreadable"
     assert len(looks) == 1
     monkeypatch.undo()
     choose(body)
-    assert bpy.ops.beyond_mocap.update_path() == {"FINISHED"} and body.beyond_mocap_ride.told == ""
+    assert bpy.ops.beyond_mocap.update_path() == {"FINISHED"} and body.beyond_mocap_ride.messages == ""
 
 
 def test_a_motion_longer_than_the_scene_is_told_as_long_as_it_is(scene, part):
@@ -744,15 +744,15 @@ def test_a_motion_longer_than_the_scene_is_told_as_long_as_it_is(scene, part):
     choose(body, drawn)
     bpy.ops.beyond_mocap.edit_path()
     ride, follow = body.beyond_mocap_ride, part("path_editing.live").update_all
-    assert "goes on" not in ride.told
+    assert "goes on" not in ride.messages
     ride.cycle = True
     follow(scene)
     last = int(body.animation_data.action.frame_range[1])
-    assert last > 250 and ride.told.endswith(f"ends at frame {last}, after the end of the scene at 250")
+    assert last > 250 and ride.messages.endswith(f"ends at frame {last}, after the end of the scene at 250")
     assert scene.frame_end == 250
     scene.frame_end = last
     follow(scene)
-    assert "goes on" not in ride.told
+    assert "goes on" not in ride.messages
 
 
 def test_a_new_curve_takes_back_the_line_about_the_one_before(scene, part):
@@ -763,7 +763,7 @@ def test_a_new_curve_takes_back_the_line_about_the_one_before(scene, part):
         point.co = point.handle_left = point.handle_right = (0, 0, 0)
     bpy.context.view_layer.update()
     follow(scene)
-    assert "all points are equal" in ride.told
+    assert "all points are equal" in ride.messages
     bpy.ops.beyond_mocap.path_curve(shape="FITTED")
     follow(scene)
-    assert ride.told == ""
+    assert ride.messages == ""

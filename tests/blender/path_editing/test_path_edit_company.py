@@ -9,7 +9,7 @@ import pytest
 import sample_rigs as rigs
 from test_players import library_folder, match, ready, refused, session  # noqa: F401  (fixtures)
 from test_result import look, one, poses  # noqa: F401
-from test_ride import choose, walker
+from test_path_edit import choose, walker
 from undo import assert_one_step
 
 FRAMES = (20, 100.5, 200)
@@ -26,7 +26,7 @@ def ride(body, part, scale=1.3):
     assert bpy.ops.beyond_mocap.edit_path() == {"FINISHED"}
     body.beyond_mocap_ride.curve.scale = (scale, scale, 1.0)
     bpy.context.view_layer.update()
-    assert part("path_editing.live").update_all(bpy.context.scene) == 1 and "Error" not in body.beyond_mocap_ride.told
+    assert part("path_editing.live").update_all(bpy.context.scene) == 1 and "Error" not in body.beyond_mocap_ride.messages
 
 
 @pytest.mark.parametrize("form", ["PREVIEW", "ACTION", "STRIPS"])
@@ -127,7 +127,7 @@ def test_baking_onto_a_rig_that_rides_takes_it_off_its_path(part):
     bpy.ops.beyond_mocap.bake_to_rig()
     ride(rig, part)
     assert bpy.ops.beyond_mocap.bake_to_rig() == {"FINISHED"}
-    assert not rig.beyond_mocap_ride.on and "path edit reverted" in settings.told
+    assert not rig.beyond_mocap_ride.on and "path edit reverted" in settings.messages
     assert bpy.ops.beyond_mocap.unbake() == {"FINISHED"} and rig.animation_data.action is None
 
 
@@ -175,11 +175,11 @@ def test_names_may_change_and_armature_or_curve_may_go(part):
     body.name, body.data.name, body.beyond_mocap_ride.curve.name = "Walker", "Bones", "Way"
     body.beyond_mocap_ride.curve.location.x += 1.0
     bpy.context.view_layer.update()
-    assert part("path_editing.live").update_all(scene) == 1 and body.beyond_mocap_ride.told == ""
+    assert part("path_editing.live").update_all(scene) == 1 and body.beyond_mocap_ride.messages == ""
     was = poses(body, (20,))
     bpy.data.objects.remove(bpy.data.objects["Way"])
     bpy.context.view_layer.update()
-    assert part("path_editing.live").update_all(scene) == 0 and "curve" in body.beyond_mocap_ride.told
+    assert part("path_editing.live").update_all(scene) == 0 and "curve" in body.beyond_mocap_ride.messages
     np.testing.assert_array_equal(poses(body, (20,)), was)
     choose(body)
     assert bpy.ops.beyond_mocap.leave_path() == {"FINISHED"}

@@ -5,10 +5,10 @@ import importlib
 
 import bpy
 import numpy as np
+import path_edit_rigs
 import pytest
-import ride_rigs
 import sample_rigs as rigs
-from test_ride import SAMPLE, bits, choose
+from test_path_edit import SAMPLE, bits, choose
 from test_rigs import rigify  # noqa: F401  (a fixture)
 from undo import assert_one_step
 
@@ -30,7 +30,7 @@ def recorded(part, core):
     def make(onto=None, **wishes):
         scene = bpy.context.scene
         body = part("rigs.armature").create_armature(bpy.context, clip.skeleton, "Body")
-        part("core.action").write_motion(body, clip, scene, ride_rigs.START)
+        part("core.action").write_motion(body, clip, scene, path_edit_rigs.START)
         if onto is None:
             return body
         rig = onto() if callable(onto) else rigs.append_rigify(onto)
@@ -78,17 +78,17 @@ def shown(rig, frames, bones=None):
     for frame in frames:
         scene.frame_set(int(frame))
         posed = rig.evaluated_get(bpy.context.evaluated_depsgraph_get())
-        found.append([np.array(posed.matrix_world @ posed.apply_pose.bones[name].matrix) for name in bones])
+        found.append([np.array(posed.matrix_world @ posed.pose.bones[name].matrix) for name in bones])
     return np.array(found)
 
 
 def off(core, rig, read, ridden):
     """Millimetres between the ridden motion and the bones that show it, the most of each joint."""
     rows = np.arange(0, len(ridden.motion), STEP)
-    bones = list(read.rig.carried.parts.visible_bones.values())
+    bones = list(read.rig.transfer.parts.visible_bones.values())
     places = core("motion.motion").forward_kinematics(ridden.motion)[0][rows]
     seen = shown(rig, read.first + rows, bones)[..., :3, 3]
-    return dict(zip(read.rig.carried.parts.visible_bones, 1000 * np.linalg.norm(seen - places, axis=-1).max(axis=0)))
+    return dict(zip(read.rig.transfer.parts.visible_bones, 1000 * np.linalg.norm(seen - places, axis=-1).max(axis=0)))
 
 
 def tuned(rig, part, path, value=0.0):
@@ -113,15 +113,15 @@ def rigify_ik(recorded, part, file):
 
 
 def hand_rig(recorded, part, _):
-    return ride_rigs.create_ik_rig()
+    return path_edit_rigs.create_ik_rig()
 
 
 def hand_rig_of_few_keys(recorded, part, _):
-    return ride_rigs.create_ik_rig(every=6, interpolation="BEZIER")
+    return path_edit_rigs.create_ik_rig(every=6, interpolation="BEZIER")
 
 
 def without_root(recorded, part, _):
-    return ride_rigs.create_ik_rig(root=False, cog=False)
+    return path_edit_rigs.create_ik_rig(root=False, cog=False)
 
 
 def unreal_root_travels(recorded, part, _):
@@ -145,34 +145,34 @@ def odd_modes(recorded, part, _):
 
 
 def moved_object(recorded, part, _):
-    return ride_rigs.move_to_object(recorded(), part("core.channels"))
+    return path_edit_rigs.move_to_object(recorded(), part("core.channels"))
 
 
 def moved_object_under_moved_empty(recorded, part, _):
-    rig = ride_rigs.move_to_object(recorded(), part("core.channels"))
-    ride_rigs.parent_to_empty(rig)
+    rig = path_edit_rigs.move_to_object(recorded(), part("core.channels"))
+    path_edit_rigs.parent_to_empty(rig)
     rig.delta_location, rig.delta_rotation_euler = (0.3, 0.2, 0.1), (0.0, 0.0, 0.4)
     return rig
 
 
 def under_scaled_empty(recorded, part, _):
     rig = recorded()
-    ride_rigs.parent_to_empty(rig, 2.0)
+    path_edit_rigs.parent_to_empty(rig, 2.0)
     rig.scale = (0.5, 0.5, 0.5)
     return rig
 
 
 def strips(recorded, part, _):
-    return ride_rigs.move_to_strip(recorded(), scale=1.3)
+    return path_edit_rigs.move_to_strip(recorded(), scale=1.3)
 
 
 def half_an_action_over_strips(recorded, part, _):
     rig = recorded()
     data = rig.animation_data
     action = data.action
-    ride_rigs.move_to_strip(rig)
+    path_edit_rigs.move_to_strip(rig)
     other = action.copy()
-    rest = ride_rigs.build_bone_path(
+    rest = path_edit_rigs.build_bone_path(
         "Spine1" if "Spine1" in rig.pose.bones else rig.pose.bones[1].name, "rotation_quaternion"
     )
     for curve in part("core.channels").collect_curves(other, other.slots[0]).values():
@@ -185,8 +185,8 @@ def half_an_action_over_strips(recorded, part, _):
 
 
 def cyclic(recorded, part, _):
-    rig = ride_rigs.create_ik_rig(frames=31)
-    ride_rigs.cycle_curves(rig, part("core.channels"))
+    rig = path_edit_rigs.create_ik_rig(frames=31)
+    path_edit_rigs.cycle_curves(rig, part("core.channels"))
     bpy.context.scene.frame_start, bpy.context.scene.frame_end = 5, 70
     return rig
 
@@ -204,7 +204,7 @@ def test_its_own_path_changes_nothing_and_another_is_gone_to_the_millimetre(
     bpy.context.view_layer.update()
     before = whole(part, rig)
     carrier = part("path_editing.rigs").choose_adapter(rig)
-    assert type(carrier).__name__ == "RigCarrier"
+    assert type(carrier).__name__ == "RigAdapter"
     seen = carrier.read_motion(bpy.context.scene)
     assert whole(part, rig) == before  # looking changes nothing
     count, first = len(seen.motion), seen.first
@@ -238,7 +238,7 @@ def test_a_rig_on_its_path_is_saved_and_opened(part, recorded, tmp_path, kind):
     bpy.ops.wm.open_mainfile(filepath=file)
     rig, scene = bpy.data.objects["Rig"], bpy.context.scene
     assert part("path_editing.live").update_all(scene) == 1  # the original is looked at again
-    assert rig.beyond_mocap_ride.told == ""
+    assert rig.beyond_mocap_ride.messages == ""
     np.testing.assert_allclose(shown(rig, [5, 20, 40]), was, atol=1e-5)
     rig.beyond_mocap_ride.curve.location.z += 0.5
     bpy.context.view_layer.update()
@@ -250,7 +250,7 @@ def test_a_rig_on_its_path_is_saved_and_opened(part, recorded, tmp_path, kind):
 
 
 def test_each_button_is_one_step_with_a_rig_too(part):
-    rig = ride_rigs.create_ik_rig()
+    rig = path_edit_rigs.create_ik_rig()
     choose(rig)
     assert_one_step(bpy.ops.beyond_mocap.edit_path)
     assert_one_step(bpy.ops.beyond_mocap.bake_path)
@@ -298,12 +298,12 @@ def rigid(poses):
 
 
 def test_what_a_body_carries_goes_along_and_what_lies_stays(part, recorded):
-    rig = ride_rigs.add_props(recorded(), "Hips")
+    rig = path_edit_rigs.add_props(recorded(), "Hips")
     frames, scene = np.arange(5, 65), bpy.context.scene
     hips = shown(rig, frames, ["Hips"])[:, 0, :3, 3]
     rest = np.array(rig.data.bones["sword"].matrix_local.to_3x3())
     for index, values in enumerate(((hips - hips[0]) @ rest).T):
-        ride_rigs.add_keys(rig, ride_rigs.build_bone_path("sword", "location"), index, frames, values, "sword")
+        path_edit_rigs.add_keys(rig, path_edit_rigs.build_bone_path("sword", "location"), index, frames, values, "sword")
     was = shown(rig, frames[::STEP], ["Hips", "sword", "bag"])
     stone = shown(rig, [5, 40], ["stone"])
     bend(scene, start(rig, plant=False, lean=False), part)
@@ -316,23 +316,23 @@ def test_what_a_body_carries_goes_along_and_what_lies_stays(part, recorded):
 
 def test_a_dog_rides_as_it_is_and_that_is_told(part):
     bpy.context.scene.render.fps = 30
-    dog, frames = ride_rigs.create_quadruped(), np.arange(5, 65, STEP)
+    dog, frames = path_edit_rigs.create_quadruped(), np.arange(5, 65, STEP)
     was = shown(dog, frames)
     bend(bpy.context.scene, start(dog), part)
     now = shown(dog, frames)
-    assert "no recognizable legs" in dog.beyond_mocap_ride.told
+    assert "no recognizable legs" in dog.beyond_mocap_ride.messages
     assert np.abs(now - was)[..., :3, 3].max() > 1.0
     np.testing.assert_allclose(rigid(now), rigid(was), atol=1e-4)
 
 
 def test_muted_curves_stay_muted_and_half_frames_other_slots_and_drivers_are_kept(part, recorded):
-    scene, rig = bpy.context.scene, ride_rigs.create_ik_rig()
+    scene, rig = bpy.context.scene, path_edit_rigs.create_ik_rig()
     channels = part("core.channels")
     action, slot = channels.find_playing_action(rig)
     other = action.slots.new(id_type="OBJECT", name="Other")
     channels.add_curve(action, other, "location", 0, "").keyframe_points.insert(1, 5.0)
-    ride_rigs.add_keys(rig, ride_rigs.build_bone_path("spine_01", "location"), 1, [5, 40], [0.0, 5.0]).mute = True
-    ride_rigs.add_keys(rig, ride_rigs.build_bone_path("head", "rotation_euler"), 1, [5.5, 20.25, 33.3], [0.0, 0.5, 0.0])
+    path_edit_rigs.add_keys(rig, path_edit_rigs.build_bone_path("spine_01", "location"), 1, [5, 40], [0.0, 5.0]).mute = True
+    path_edit_rigs.add_keys(rig, path_edit_rigs.build_bone_path("head", "rotation_euler"), 1, [5.5, 20.25, 33.3], [0.0, 0.5, 0.0])
     rig.pose.bones["head"].rotation_mode = "XYZ"
     driver = rig.driver_add('pose.bones["neck_01"].rotation_euler', 0).driver
     driver.type, driver.expression = "SCRIPTED", "0.2"
@@ -342,16 +342,16 @@ def test_muted_curves_stay_muted_and_half_frames_other_slots_and_drivers_are_kep
     upper = ["pelvis", "spine_01", "head", "neck_01", "hand_l"]
     was = shown(rig, frames, upper)
     bend(scene, start(rig, plant=False, lean=False), part)
-    assert rig.beyond_mocap_ride.told == ""
+    assert rig.beyond_mocap_ride.messages == ""
     np.testing.assert_allclose(rigid(shown(rig, frames, upper)), rigid(was), atol=1e-4)
     made, slot = channels.find_playing_action(rig)
     assert len(made.slots) == 1 and len(action.slots) == 2
-    assert channels.collect_curves(made, slot)[ride_rigs.build_bone_path("spine_01", "location"), 1].mute
+    assert channels.collect_curves(made, slot)[path_edit_rigs.build_bone_path("spine_01", "location"), 1].mute
 
 
 def test_the_controls_of_inverse_kinematics_stay_with_it(part):
     """No switch is turned: feet are moved by their controls, knees by their poles, the rest by the COG."""
-    rig, scene = ride_rigs.create_ik_rig(), bpy.context.scene
+    rig, scene = path_edit_rigs.create_ik_rig(), bpy.context.scene
     scene.render.fps = 30
     original = set(part("core.channels").collect_curves(*part("core.channels").find_playing_action(rig)))
     bend(scene, start(rig), part)
@@ -375,7 +375,7 @@ def test_one_root_carries_all_where_it_travels(part, recorded):
 
 
 def test_one_that_is_hidden_or_shown_at_rest_rides_as_it_would_be_posed(part, ride):
-    rig = ride_rigs.create_ik_rig()
+    rig = path_edit_rigs.create_ik_rig()
     posed = ride(rig, bent=True)[1].motion.root_positions
     part("path_editing.edited_bodies").revert_path_edit(rig)
     rig.data.pose_position, rig.hide_viewport = "REST", True
@@ -384,7 +384,7 @@ def test_one_that_is_hidden_or_shown_at_rest_rides_as_it_would_be_posed(part, ri
 
 
 def test_motions_that_are_faster_slower_longer_and_shorter(core, part, recorded, ride):
-    rig = ride_rigs.create_ik_rig()
+    rig = path_edit_rigs.create_ik_rig()
     for settings in ({"speed": 0.8}, {"speed": 2.0}, {"delay": 0.5}, {"by_arc_length": False}):
         read, ridden = ride(rig, bent=True, **settings)
         assert max(off(core, rig, read, ridden).values()) < 5.0
@@ -394,7 +394,7 @@ def test_motions_that_are_faster_slower_longer_and_shorter(core, part, recorded,
 
 def test_what_cannot_ride_is_said(part, recorded, tmp_path):
     scene = bpy.context.scene
-    rig = ride_rigs.create_ik_rig()
+    rig = path_edit_rigs.create_ik_rig()
     choose(rig)
     action = rig.animation_data.action
     rig.animation_data.action = None

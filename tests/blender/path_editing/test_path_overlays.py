@@ -131,7 +131,7 @@ def test_only_what_was_laid_anew_is_made_anew(rides, shown, core):
     assert {item.key for item in rides.list_items(bpy.context.scene)} == before
     ride = core("path_editing.path_edit")
     old, = shown
-    shown.append(replace(old, ridden=ride.edit_path(old.source, old.path, ride.PathEditSettings()), number=2))
+    shown.append(replace(old, edited=ride.edit_path(old.source, old.path, ride.PathEditSettings()), number=2))
     changed = before - {item.key for item in rides.list_items(bpy.context.scene)}
     assert changed and all(key[0] is not old.source and key[0] != "" for key in changed)
 

@@ -49,14 +49,14 @@ def test_a_curve_is_gone_along_in_the_world(scene, drawn, kind):
     way.location, way.rotation_euler[2], way.scale = (1, 2, 5), np.pi / 2, (2, 2, 2)
     scene.unit_settings.system, scene.unit_settings.scale_length = "METRIC", 0.5
     bpy.context.view_layer.update()
-    track = drawn.read(scene, way, 3.0)
+    track = drawn.read_drawn_track(scene, way, 3.0)
     assert track.times[0] == 3.0 and track.times[-1] == pytest.approx(3.0 + 10.0 / 2.0, abs=1e-3)
     np.testing.assert_allclose(track.positions[[0, -1]], [[0.5, 1.0], [0.5, 11.0]], atol=1e-5)
 
 
 def test_speeds_are_those_of_the_points(scene, drawn):
     way = curve(LINE, speeds=[0.0, 4.0, 2.0])
-    track = drawn.read(scene, way)
+    track = drawn.read_drawn_track(scene, way)
     assert track.times[-1] == pytest.approx(2 * 4 / 4 + 2 * 6 / 6)
     assert np.interp(2.0, track.times, track.positions[:, 0]) == pytest.approx(4.0, abs=0.01)
 
@@ -70,7 +70,7 @@ def test_set_speed_sets_the_chosen_points_in_one_step(scene, drawn):
     for number, point in enumerate(way.data.splines[0].bezier_points):
         point.select_control_point = number == 1
     assert bpy.ops.beyond_mocap.set_speed(speed=5.0) == {"FINISHED"}
-    assert list(drawn.line_of(scene, way).speeds) == [0, 5, 0]  # also while it is edited
+    assert list(drawn.build_line(scene, way).speeds) == [0, 5, 0]  # also while it is edited
     bpy.ops.object.mode_set(mode="OBJECT")
     assert [point.radius for point in way.data.splines[0].bezier_points] == [0, 5, 0]
 
@@ -88,7 +88,7 @@ def test_what_cannot_be_gone_along_is_told(scene, drawn, core):
         if change:
             setattr(way.data.splines[0], change, True)
         with pytest.raises(trouble, match=part):
-            drawn.read(scene, way)
+            drawn.read_drawn_track(scene, way)
         before = len(bpy.data.objects), len(scene.beyond_mocap.players)
         with pytest.raises(RuntimeError, match=part):
             bpy.ops.beyond_mocap.track_object()
@@ -132,7 +132,7 @@ def test_what_moves_is_a_track_in_its_own_frames(scene, drawn, kind):
     scene.beyond_mocap.start_frame, scene.beyond_mocap.start_time = 10, 5.0
     chosen = moving(kind)
     scene.frame_set(20)
-    track = drawn.read(scene, chosen)
+    track = drawn.read_drawn_track(scene, chosen)
     assert scene.frame_current == 20
     assert track.times[0] == pytest.approx(5.0) and track.times[-1] == pytest.approx(7.0)
     np.testing.assert_allclose(
@@ -148,15 +148,15 @@ def test_what_has_to_be_played_is_left_alone_where_the_scene_must_stand_still(sc
     bpy.app.handlers.frame_change_post.append(lambda *_: seen.append(1))
     try:
         with pytest.raises(core("base.errors").InputError, match="press Update to play it"):
-            drawn.read(scene, chosen, still=True)
+            drawn.read_drawn_track(scene, chosen, still=True)
         assert not seen
-        played = drawn.read(scene, chosen)
+        played = drawn.read_drawn_track(scene, chosen)
         assert seen
         seen.clear()
-        np.testing.assert_array_equal(drawn.read(scene, chosen, still=True).positions, played.positions)
+        np.testing.assert_array_equal(drawn.read_drawn_track(scene, chosen, still=True).positions, played.positions)
         scene.frame_end = 40
         with pytest.raises(core("base.errors").InputError, match="press Update"):
-            drawn.read(scene, chosen, still=True)
+            drawn.read_drawn_track(scene, chosen, still=True)
         assert not seen
     finally:
         bpy.app.handlers.frame_change_post.pop()

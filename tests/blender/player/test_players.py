@@ -94,10 +94,10 @@ def test_words_of_a_text_count_more_than_those_on_disk(extension, ready, core):
     text.clear()
     text.write("3.0 kik right\n")
     bpy.ops.beyond_mocap.read_words()
-    with pytest.raises(RuntimeError, match="strips of player1: the word 'kik'"):
+    with pytest.raises(RuntimeError, match="strips of player1: the label 'kik'"):
         bpy.ops.beyond_mocap.synthesize()
     bpy.data.objects.remove(ready.players[0].dot)  # without strips the text itself counts
-    with pytest.raises(RuntimeError, match="text Words:1: the word 'kik'"):
+    with pytest.raises(RuntimeError, match="text Words:1: the label 'kik'"):
         bpy.ops.beyond_mocap.synthesize()
 
 

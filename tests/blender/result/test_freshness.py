@@ -18,7 +18,7 @@ def scene(extension):
 @pytest.fixture
 def renew(scene):
     freshness = scene("result.freshness")
-    return lambda: freshness.renew(bpy.context.scene, bpy.context.scene.beyond_mocap.players[0])
+    return lambda: freshness.update_entry(bpy.context.scene, bpy.context.scene.beyond_mocap.players[0])
 
 
 @pytest.fixture

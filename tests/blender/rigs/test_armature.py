@@ -3,9 +3,9 @@
 import importlib
 
 import bpy
-import made
 import numpy as np
 import pytest
+import synthetic_motion
 
 
 @pytest.fixture
@@ -20,13 +20,13 @@ def assert_same(a, b, tolerance):
 
 
 def test_there_and_back_is_exact(core, armature):
-    skeleton = made.build_skeleton(core)
+    skeleton = synthetic_motion.build_skeleton(core)
     body = armature.create_armature(bpy.context, skeleton, "Body")
     assert_same(armature.build_skeleton(body, bpy.context.scene), skeleton, 0.0)
 
 
 def test_from_bones_alone(core, armature):
-    skeleton = made.build_skeleton(core)
+    skeleton = synthetic_motion.build_skeleton(core)
     body = armature.create_armature(bpy.context, skeleton, "Body")
     del body.data[armature.SKELETON_PROPERTY]
     derived = armature.build_skeleton(body, bpy.context.scene)
@@ -39,7 +39,7 @@ def test_from_bones_alone(core, armature):
 
 
 def test_edited_bones_count_more_than_what_was_kept(core, armature):
-    body = armature.create_armature(bpy.context, made.build_skeleton(core), "Body")
+    body = armature.create_armature(bpy.context, synthetic_motion.build_skeleton(core), "Body")
     with armature._edit_mode(bpy.context, body):
         body.data.edit_bones["LeftLeg"].head.z -= 0.05
     changed = armature.build_skeleton(body, bpy.context.scene)
@@ -48,7 +48,7 @@ def test_edited_bones_count_more_than_what_was_kept(core, armature):
 
 @pytest.mark.parametrize("scale_length", (0.01, 0.3048, 1.0))
 def test_unit_scale(core, armature, scale_length):
-    skeleton = made.build_skeleton(core)
+    skeleton = synthetic_motion.build_skeleton(core)
     bpy.context.scene.unit_settings.scale_length = scale_length
     body = armature.create_armature(bpy.context, skeleton, "Body")
     knee = body.data.bones["LeftLeg"].head_local - body.data.bones["LeftUpLeg"].head_local
@@ -60,7 +60,7 @@ def test_unit_scale(core, armature, scale_length):
 
 
 def test_scaled_object(core, armature):
-    skeleton = made.build_skeleton(core)
+    skeleton = synthetic_motion.build_skeleton(core)
     body = armature.create_armature(bpy.context, skeleton, "Body")
     body.scale = (2, 2, 2)
     np.testing.assert_allclose(armature.build_skeleton(body, bpy.context.scene).offsets, 2 * skeleton.offsets,
@@ -75,7 +75,7 @@ def test_the_active_object_and_its_mode_stay(core, armature):
     bpy.context.scene.collection.objects.link(mesh)
     bpy.context.view_layer.objects.active = mesh
     bpy.ops.object.mode_set(mode="EDIT")
-    armature.create_armature(bpy.context, made.build_skeleton(core), "Body")
+    armature.create_armature(bpy.context, synthetic_motion.build_skeleton(core), "Body")
     assert bpy.context.view_layer.objects.active == mesh and mesh.mode == "EDIT"
 
 

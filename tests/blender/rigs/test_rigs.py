@@ -82,7 +82,7 @@ def degrees(a, b):
 @pytest.mark.parametrize("family", FAMILIES)
 def test_limbs_point_where_the_sources_do(core, rooms, body, family):
     rig = FAMILIES[family]()
-    table, baked = bake(rooms, rig, body, plants=False)
+    table, baked = bake(rooms, rig, body, plants_feet=False)
     mine, hips = directions(rig, table)
     source, source_hips = directions(body, rooms["rigs.bone_maps"].find_bone_map(body))
     arms = degrees(mine[:, :4], source[:, :4])
@@ -306,7 +306,7 @@ def test_the_button_does_what_the_function_does(rooms, body):
     np.testing.assert_array_equal(
         rigs.read_heads(rig, list(table.values()), frames), rigs.read_heads(plain, list(table.values()), frames)
     )
-    assert "slide" in settings.told
+    assert "slide" in settings.messages
 
 
 def test_baking_is_one_step_for_undo(body):
@@ -341,13 +341,13 @@ def test_work_on_a_bake_is_kept_when_it_is_baked_again(rooms, body):
     press_operator(bpy.ops.beyond_mocap.reduce_keys)
     actions = len(bpy.data.actions)
     press_operator(bpy.ops.beyond_mocap.bake_to_rig)
-    assert len(bpy.data.actions) == actions and "edited keys" not in settings.told
+    assert len(bpy.data.actions) == actions and "edited keys" not in settings.messages
     own = rig.animation_data.action
     curve = next(iter(rooms["core.channels"].collect_curves(own, rig.animation_data.action_slot).values()))
     curve.keyframe_points[7].co.y += 0.1
     value = curve.keyframe_points[7].co.y
     press_operator(bpy.ops.beyond_mocap.bake_to_rig)
-    assert own.name in settings.told and rig.animation_data.action != own
+    assert own.name in settings.messages and rig.animation_data.action != own
     assert own.use_fake_user and curve.keyframe_points[7].co.y == value
     press_operator(bpy.ops.beyond_mocap.unbake)
     assert rig.animation_data.action is None and own.name in bpy.data.actions
@@ -437,12 +437,12 @@ def test_maps_are_kept_by_skeleton_and_written_to_files(rooms, tmp_path):
     settings.bones["left toe"].bone = ""
     press_operator(bpy.ops.beyond_mocap.keep_bone_map)
     settings.target = rigs.create_mixamo()  # another armature with the same bones
-    assert "left toe" not in rooms["rigs.rig"].read_bone_list(settings) and "stored" in settings.told
+    assert "left toe" not in rooms["rigs.rig"].read_bone_list(settings) and "stored" in settings.messages
     assert rooms["rigs.bone_maps"].load_stored_map(rigs.create_unreal()) is None
-    bpy.ops.beyond_mocap.write_bone_map("EXEC_DEFAULT", filepath=str(tmp_path / "map.json"))
+    bpy.ops.beyond_mocap.save_bone_map("EXEC_DEFAULT", filepath=str(tmp_path / "map.json"))
     press_operator(bpy.ops.beyond_mocap.map_bones)
     assert rooms["rigs.rig"].read_bone_list(settings) == table
-    bpy.ops.beyond_mocap.read_bone_map("EXEC_DEFAULT", filepath=str(tmp_path / "map.json"))
+    bpy.ops.beyond_mocap.load_bone_map("EXEC_DEFAULT", filepath=str(tmp_path / "map.json"))
     assert "left toe" not in rooms["rigs.rig"].read_bone_list(settings)
     for path in rooms["rigs.bone_maps"].find_map_folder().iterdir():
         path.unlink()
@@ -480,7 +480,7 @@ def test_wrong_choices_are_told_in_one_line(rooms, body, tmp_path):
     rig.scale = (1, 2, 1)
     assert "Ctrl-A" in complaint(bake_to_rig)
     rig.scale = (0.01,) * 3
-    load, save = bpy.ops.beyond_mocap.read_bone_map, bpy.ops.beyond_mocap.write_bone_map
+    load, save = bpy.ops.beyond_mocap.load_bone_map, bpy.ops.beyond_mocap.save_bone_map
     assert "cannot be read" in complaint(load, filepath=str(tmp_path / "none.json"))
     for text, said in (("{", "not JSON"), ("[]", "no object"), ('{"bones": {"tail": "x"}}', "unknown part 'tail'"),
                        (json.dumps({"bones": {"hips": "mixamorig:Hips"}}), "no bone for left upper_leg")):
@@ -497,7 +497,7 @@ def test_a_rig_without_legs_is_told(body):
             and "toe" not in part}
     rig = rigs.create_rig(arms, "Torso")
     settings = choose(rig, body)
-    assert "no legs" in settings.told and "bone map" in settings.told
+    assert "no legs" in settings.messages and "bone map" in settings.messages
     assert "no legs" in complaint(bpy.ops.beyond_mocap.bake_to_rig)
 
 

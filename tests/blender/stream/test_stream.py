@@ -21,7 +21,7 @@ def room():
     found = lambda name: importlib.import_module(f"{EXTENSION}.scene.{name}")  # noqa: E731
     yield found
     found("stream.follow").stop_listening()
-    found("stream.follow").tell()
+    found("stream.follow").write_status()
 
 
 @pytest.fixture

@@ -22,9 +22,9 @@ OPS = bpy.ops.beyond_mocap
 def room():
     found = lambda name: importlib.import_module(f"{EXTENSION}.scene.{name}")  # noqa: E731
     yield found
-    found("stream.play").stop()
+    found("stream.play").stop_rally()
     found("stream.follow").stop_listening()
-    found("stream.follow").tell()
+    found("stream.follow").write_status()
 
 
 @pytest.fixture(scope="module")

@@ -3,9 +3,9 @@
 import importlib
 
 import bpy
-import made
 import numpy as np
 import pytest
+import synthetic_motion
 from undo import collect_state
 
 SMALL = {"engine": "CYCLES", "width": 48, "height": 28, "fps": 10, "samples": 1}
@@ -15,7 +15,7 @@ SMALL = {"engine": "CYCLES", "width": 48, "height": 28, "fps": 10, "samples": 1}
 def study(core, tmp_path):
     """A folder with a study: two systems show the same motion, one of them four metres away; training is movies."""
     order, files, bvh = core("study.order"), core("study.order"), core("files.bvh.bvh")
-    here = made.build_motion(core, 7)
+    here = synthetic_motion.build_motion(core, 7)
     there = core("motion.motion").Motion(here.skeleton, here.root_positions + [4.0, 2.0, 0.0], here.rotations, here.fps)
     bvh.write_bvh(tmp_path / "a.bvh", here)
     bvh.write_bvh(tmp_path / "b.bvh", there)
@@ -23,7 +23,7 @@ def study(core, tmp_path):
         (tmp_path / f"{name}.mp4").write_bytes(name.encode())
     rows = (("good.mp4", "training"), ("bad.mp4", "training"), ("a.bvh", "ours"), ("b.bvh", "theirs"))
     clips = tuple(order.Clip(f"../{file}", system, "s1" if system != "training" else "") for file, system in rows)
-    found = order.ordered(clips, 2)
+    found = order.build_study(clips, 2)
     (tmp_path / "study").mkdir()
     files.write_study(tmp_path / "study", found)
     return tmp_path / "study", {clip.file[3:]: clip.name for clip in found.clips}

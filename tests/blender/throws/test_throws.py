@@ -5,10 +5,10 @@ import json
 import pathlib
 
 import bpy
+import cached_work
 import numpy as np
+import path_edit_rigs
 import pytest
-import remembered
-import ride_rigs
 import sample_rigs as rigs
 import worlds
 from conftest import EXTENSION
@@ -24,7 +24,7 @@ def work_once(extension):
     """The same order is worked out once."""
     core = importlib.import_module(f"{extension.__name__}.beyond_mocap.library.library")
     with pytest.MonkeyPatch.context() as monkeypatch:
-        remembered.cache_work(monkeypatch, core.Library)
+        cached_work.cache_work(monkeypatch, core.Library)
         yield
 
 
@@ -283,7 +283,7 @@ def test_a_body_without_hands_is_refused(core):
 
 @pytest.mark.parametrize("kind", ["mixamo", "walk_ik"])
 def test_rigs(kind, room):
-    body = rigs.create_mixamo() if kind == "mixamo" else ride_rigs.create_ik_rig()
+    body = rigs.create_mixamo() if kind == "mixamo" else path_edit_rigs.create_ik_rig()
     worlds.select_objects(body)
     wish = body.beyond_mocap_throw
     wish.target, wish.frame = an_empty(TARGET), 60
@@ -320,7 +320,7 @@ def test_a_kicked_ball_that_was_kept_is_not_lost_by_the_next_kick():
 
 
 def test_a_kept_throw_of_a_rig_and_a_bake_are_not_lost_by_the_next_throw():
-    body = ride_rigs.create_ik_rig()
+    body = path_edit_rigs.create_ik_rig()
     worlds.select_objects(body)
     wish = body.beyond_mocap_throw
     wish.target, wish.frame = an_empty(TARGET), 60
@@ -380,15 +380,15 @@ def test_a_throw_that_begins_before_the_scene_is_told_or_waits():
     body = a_body(frame=1)
     wish = body.beyond_mocap_throw
     press_operator(bpy.ops.beyond_mocap.throw_at_target)
-    assert "before the scene's first frame 1: set Release Frame to" in wish.told
-    frame = int(wish.told.split("Release Frame to ")[1].split()[0])
+    assert "before the scene's first frame 1: set Release Frame to" in wish.messages
+    frame = int(wish.messages.split("Release Frame to ")[1].split()[0])
     wish.frame = frame
     press_operator(bpy.ops.beyond_mocap.throw_at_target)
-    assert "first frame" not in wish.told and wish.release == pytest.approx(frame, abs=0.51)
+    assert "first frame" not in wish.messages and wish.release == pytest.approx(frame, abs=0.51)
     wish.frame = 0  # now, or as soon as it fits in
     bpy.context.scene.frame_set(1)
     press_operator(bpy.ops.beyond_mocap.throw_at_target)
-    assert wish.release == pytest.approx(frame, abs=1.51) and "the ball leaves on frame" in wish.told
+    assert wish.release == pytest.approx(frame, abs=1.51) and "the ball leaves on frame" in wish.messages
 
 
 @pytest.mark.parametrize("first", ["throw", "kick"])
@@ -584,35 +584,35 @@ def test_what_is_shown_follows_its_target(room):
     assert live.find_outdated(scene) is None
     wish.live = True
     assert live.find_outdated(scene) == body and live.find_outdated(scene) is None  # once
-    job = live.begin(scene, body)
+    job = live.start_update(scene, body)
     while not job.poll():
         pass
-    live.finish(scene, job)
+    live.finish_update(scene, job)
     first = int(np.floor(wish.release))
     assert closest(wish.flown, np.array(TARGET) + [0.0, 2.0, 0.0], first + 1, first + 60) < 0.10
     assert live.find_outdated(scene) is None
     wish.target.location.y += 1.0
     bpy.context.view_layer.update()
-    late = live.begin(scene, body)
+    late = live.start_update(scene, body)
     while not late.poll():
         pass
     wish.target.location.y -= 1.0  # and back before it was there
     bpy.context.view_layer.update()
-    live.finish(scene, late)
+    live.finish_update(scene, late)
     assert closest(wish.flown, np.array(TARGET) + [0.0, 2.0, 0.0], first + 1, first + 60) < 0.10
     wish.speed = 2.0
-    refused_job = live.begin(scene, body)
+    refused_job = live.start_update(scene, body)
     while not refused_job.poll():
         pass
     with pytest.raises(Exception, match="at least .* m/s"):
-        live.finish(scene, refused_job)
+        live.finish_update(scene, refused_job)
     press_operator(bpy.ops.beyond_mocap.leave_throw)
     assert live.find_outdated(scene) is None
 
 
 def followed(live, scene):
     """What the timer does until there is nothing left to do."""
-    while live.settle(scene):
+    while live.process_updates(scene):
         pass
 
 

@@ -13,7 +13,8 @@ SAMPLE = Path(__file__).resolve().parents[3] / "sample_blend" / "library"
 
 @pytest.fixture
 def rooms(extension):
-    names = ("library.recordings", "timeline.lanes", "timeline.lay_strips", "timeline.strips", "core.settings")
+    names = ("library.recordings", "timeline.label_tracks", "timeline.strip_writing", "timeline.strips",
+             "core.settings")
     return {name: importlib.import_module(f"{extension.__name__}.scene.{name}") for name in names}
 
 
@@ -43,7 +44,7 @@ def test_a_clip_is_opened_with_its_words(core, rooms, library, fps, base):
     assert rooms["library.recordings"].find_shown_clip(rig) == "kick_low_top.bvh"
     assert rooms["library.recordings"].read_labels(rig) == rows_of(core, library / "kick_low_top.bvh")
     assert rig.animation_data.action is not None, "the strips took the motion's place"
-    moment = rooms["timeline.lanes"].list_moments(rig)[0]
+    moment = rooms["timeline.label_tracks"].list_moments(rig)[0]
     assert moment.frame == round(1 + 156 / 60 * fps / base)
 
 
@@ -68,9 +69,9 @@ def test_a_strip_that_is_moved_says_so_when_saved(core, rooms, library):
     bpy.ops.beyond_mocap.annotate_clip(path="kick_low_top.bvh")
     rig = bpy.context.object
     keys = core("annotation")
-    clock = rooms["timeline.lanes"].read_clock(rig)
-    rooms["timeline.lay_strips"].add_span(rig, keys.Span(0.0, 1.0, ("jogging", "front")), clock)
-    rooms["timeline.lay_strips"].add_moment(rig, keys.KeyMoment(2.6, ("kick", "left")), clock)
+    clock = rooms["timeline.label_tracks"].read_clock(rig)
+    rooms["timeline.strip_writing"].add_span(rig, keys.Span(0.0, 1.0, ("jogging", "front")), clock)
+    rooms["timeline.strip_writing"].add_moment(rig, keys.KeyMoment(2.6, ("kick", "left")), clock)
     bpy.ops.beyond_mocap.save_words()
     rows = rows_of(core, library / "kick_low_top.bvh")
     assert [(row.start, row.end, row.key, row.words) for row in rows] == [

@@ -215,24 +215,24 @@ class Library(SimpleNamespace):
 def test_what_the_library_holds_is_known_with_and_without_mirrored_clips(room, scene, tmp_path):
     words = np.array([[1, 0], [1, 0], [0, 1], [1, 1]], bool)
     library = Library(
-        folder=str(tmp_path), clips=[SimpleNamespace(mirrored=False, made=False),
-                                     SimpleNamespace(mirrored=True, made=False),
-                                     SimpleNamespace(mirrored=False, made=True)],
-        keys=[SimpleNamespace(clip=0, words=frozenset({"kick", "right"})),
-              SimpleNamespace(clip=1, words=frozenset({"kick", "left"})),
-              SimpleNamespace(clip=2, words=frozenset({"header"}))],
+        folder=str(tmp_path), clips=[SimpleNamespace(mirrored=False, is_synthetic=False),
+                                     SimpleNamespace(mirrored=True, is_synthetic=False),
+                                     SimpleNamespace(mirrored=False, is_synthetic=True)],
+        keys=[SimpleNamespace(clip=0, labels=frozenset({"kick", "right"})),
+              SimpleNamespace(clip=1, labels=frozenset({"kick", "left"})),
+              SimpleNamespace(clip=2, labels=frozenset({"header"}))],
         frames=SimpleNamespace(words=words, vocabulary=("walking", "dribble"), clip=np.array([0, 0, 1, 2])),
     )
     annotating, settings = room("timeline.key_annotation"), scene.beyond_mocap
-    assert annotating.held(scene) is None
+    assert annotating.find_combinations(scene) is None
     settings.library_folder = str(tmp_path)
     room("core.session").store_library(library, None)
-    found = annotating.held(scene)
+    found = annotating.find_combinations(scene)
     assert set(found.moments) == {frozenset({"kick", "right"}), frozenset({"kick", "left"})}
     assert set(found.spans) == {frozenset({"walking"}), frozenset({"dribble"}), frozenset({"walking", "dribble"})}
-    assert annotating.held(scene) is found
+    assert annotating.find_combinations(scene) is found
     settings.mirror = False
-    assert annotating.held(scene).moments == (frozenset({"kick", "right"}),)
+    assert annotating.find_combinations(scene).moments == (frozenset({"kick", "right"}),)
 
 
 def test_a_clip_with_lanes_of_its_own_is_annotated_while_it_is_the_active_object(room, players):
@@ -290,10 +290,10 @@ def test_the_part_of_an_editor_that_nothing_lies_over(room):
 
 def test_the_list_in_the_corner_can_be_folded(room):
     popup, core = room("core.popup"), import_module(f"{EXTENSION}.beyond_mocap.annotation.key_commands")
-    folded = popup.build_content(core.AnnotationState(), "me", is_folded=True)
+    folded = popup.build_content(core.AnnotationState(), "me", folded=True)
     assert folded.rows == () and popup.build_content(core.AnnotationState(), "me").rows
     assert popup.build_content(core.handle_key(core.AnnotationState(), "2", core.Playhead(1.0))[0], "me",
-                               is_folded=True).rows
+                               folded=True).rows
     box = popup.place_menu(folded, None, (0, 0, 800, 600), 14.0, lambda text: 7.0 * len(text))
     assert box.box[3] - box.box[1] < 100
 

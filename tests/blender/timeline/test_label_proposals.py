@@ -14,7 +14,7 @@ TAUGHT = ("kick_low_inside", "kick_low_inside_slow", "kick_low_top", "jogging_2_
 
 @pytest.fixture
 def rooms(extension):
-    names = ("library.recordings", "timeline.lanes", "timeline.lay_strips", "timeline.proposals")
+    names = ("library.recordings", "timeline.label_tracks", "timeline.strip_writing", "timeline.proposals")
     return {name: importlib.import_module(f"{extension.__name__}.scene.{name}") for name in names}
 
 
@@ -63,16 +63,17 @@ def test_words_are_learned_and_proposed_for_a_new_clip(core, rooms, library):
 
 def test_nothing_is_said_until_it_is_accepted(core, rooms, listed):
     rig = bpy.context.object
-    assert rooms["timeline.lanes"].read_timeline(rig).keys == ()
+    assert rooms["timeline.label_tracks"].read_timeline(rig).keys == ()
     number = place_of(listed, "kick")
     assert bpy.ops.beyond_mocap.judge_proposal(what="ACCEPT", index=number) == {"FINISHED"}
-    (key,) = rooms["timeline.lanes"].read_timeline(rig).keys
+    (key,) = rooms["timeline.label_tracks"].read_timeline(rig).keys
     assert key.words == tuple(listed.listed[number].name.split())
     assert listed.listed[number].state == "ACCEPTED"
     bpy.ops.beyond_mocap.judge_proposal(what="ACCEPT", index=number)
-    assert len(rooms["timeline.lanes"].read_timeline(rig).keys) == 1, "accepted twice it is said once"
+    assert len(rooms["timeline.label_tracks"].read_timeline(rig).keys) == 1, "accepted twice it is said once"
     bpy.ops.beyond_mocap.judge_proposal(what="REFUSE", index=number)
-    assert rooms["timeline.lanes"].read_timeline(rig).keys == rooms["timeline.lanes"].read_timeline(rig).spans == ()
+    timeline = rooms["timeline.label_tracks"].read_timeline(rig)
+    assert timeline.keys == timeline.spans == ()
 
 
 def test_the_playhead_goes_to_what_is_looked_at(listed):
@@ -105,8 +106,8 @@ def test_judging_is_one_step_of_undo(listed):
 def test_words_are_saved_with_who_said_them(core, rooms, library, listed):
     rig = bpy.context.object
     bpy.ops.beyond_mocap.judge_proposal(what="ACCEPT", index=place_of(listed, "kick"))
-    clock = rooms["timeline.lanes"].read_clock(rig)
-    rooms["timeline.lay_strips"].add_span(rig, core("annotation").Span(0.0, 1.0, ("jogging", "front")), clock)
+    clock = rooms["timeline.label_tracks"].read_clock(rig)
+    rooms["timeline.strip_writing"].add_span(rig, core("annotation").Span(0.0, 1.0, ("jogging", "front")), clock)
     press_operator(bpy.ops.beyond_mocap.save_words)
     lines = (library / "new.txt").read_text().splitlines()
     assert all("# rules 0." in line for line in lines if "kick" in line)
@@ -120,7 +121,7 @@ def test_words_are_saved_with_who_said_them(core, rooms, library, listed):
 def test_a_row_that_is_changed_is_the_users_own(rooms, library, listed):
     rig = bpy.context.object
     bpy.ops.beyond_mocap.judge_proposal(what="ACCEPT", index=place_of(listed, "kick"))
-    moment = rooms["timeline.lanes"].list_moments(rig)[0]
+    moment = rooms["timeline.label_tracks"].list_moments(rig)[0]
     bpy.ops.beyond_mocap.go_to_moment(strip=moment.strip, index=moment.index)
     bpy.ops.beyond_mocap.move_moment(frames=3)
     press_operator(bpy.ops.beyond_mocap.save_words)

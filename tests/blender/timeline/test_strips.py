@@ -83,13 +83,13 @@ def test_another_clock_lays_the_strips_anew_and_says_the_same(room, core, dot, s
     timeline = random_timeline(core, dice)
     lay_strips.write_timeline(dot, timeline, Clock(1.0, 0.0, 25.0))
     for clock in (Clock(1.0, 0.0, 120.0), Clock(101.0, -3.3, 23.976), Clock(-40.0, 7.0, 10.0), Clock(1.0, 0.0, 25.0)):
-        assert lay_strips.relay(dot, clock)
+        assert lay_strips.move_to_clock(dot, clock)
         assert lanes.read_timeline(dot) == timeline
         for placed in lanes.list_spans(dot):
             assert (placed.first, placed.last) == room("timeline.strip_lines").compute_frames(placed.span, clock)
         assert [placed.frame for placed in lanes.list_moments(dot)] == [clock.to_whole_frame(key.time)
                                                                         for key in timeline.keys]
-    assert not lay_strips.relay(dot, Clock(1.0, 0.0, 25.0))
+    assert not lay_strips.move_to_clock(dot, Clock(1.0, 0.0, 25.0))
 
 
 def strip_of(dot, name):
@@ -170,7 +170,7 @@ def test_one_by_one(room, core, text, dot, clock):
     assert (first.track, second.track) == ("Words", "Words 2")
     kick = lay_strips.add_moment(dot, annotation.KeyMoment(30.123, ("kick",)), clock)
     header = lay_strips.add_moment(dot, annotation.KeyMoment(-5.0, ("header",)), clock)
-    assert [moment.words for moment in lanes.list_moments(dot)] == [("header",), ("kick",)]
+    assert [moment.labels for moment in lanes.list_moments(dot)] == [("header",), ("kick",)]
     assert [moment.is_selected for moment in lanes.list_moments(dot)] == [True, False]
     lay_strips.select_moment(dot, kick.strip, kick.index)
     lay_strips.change_moment(dot, header.strip, header.index, annotation.KeyMoment(60.0, ("header", "jump")))

@@ -191,7 +191,7 @@ def test_what_is_wrong_is_told(player, room):
     assert not lines
     next(track for track in dot().animation_data.nla_tracks if track.name == "Words").strips[0].name = "4 times"
     ops.add_span(words="walking", start=4.5, end=5.0)
-    assert [line for _, line in checks.lines_of(scene, dot())] == [
+    assert [line for _, line in checks.list_problems(scene, dot())] == [
         "'4 times': labels have no numbers and no '#'; rename it", "'jogging' and 'walking' overlap; shorten one"]
 
 

@@ -88,31 +88,31 @@ def test_a_new_label_is_one_row(tmp_path):
 
 USES = """
 import beyond_mocap
-from beyond_mocap.synthesis import known_touches
-from beyond_mocap.annotation import DISCRETE, KeyMoment, Timeline, parse_timeline, spoken, validate, words_below
-from beyond_mocap.annotation.ball_contact import may_use_foot, surfaces
-from beyond_mocap.annotation.decision import Walk, choose, options
-from beyond_mocap.passes.strike_choice import _rank, _SAID
-from beyond_mocap.library.classify.examples import act_of
-from beyond_mocap.library.keys import Key, nearest_serving
+from beyond_mocap.synthesis import resolved_touches
+from beyond_mocap.annotation import DISCRETE, KeyMoment, Timeline, check_timeline, list_labels_below, parse_timeline, sort_labels
+from beyond_mocap.annotation.ball_contact import build_surfaces, may_use_foot
+from beyond_mocap.annotation.decision import TreeChoices, list_options
+from beyond_mocap.passes.strike_choice import _NAMED, _rank_labels
+from beyond_mocap.library.classify.examples import find_act
+from beyond_mocap.library.keys import Key, select_nearest_keys
 from beyond_mocap.annotation import ClipAnnotation
-from beyond_mocap.motion.retargeting.adult import adult_skeleton
-from beyond_mocap.synthesis.plan import Touched
+from beyond_mocap.motion.retargeting.adult import build_adult_skeleton
+from beyond_mocap.synthesis.plan import PlayerTouch
 
 words = ("side_poke", "right")
 timeline = parse_timeline("2.0 side_poke right low", "a.txt", 30.0)
-validate(timeline, known_words=(), start=0.0, end=4.0, where="a.txt")
-assert "side_poke" in DISCRETE and spoken(("low", "right", "side_poke")) == ("side_poke", "right", "low")
-assert words_below(("side_poke",)) == ("low",) and "side_poke" in {one.word for one in options(Walk("moment"))}
-assert [(one.part, one.side) for one in surfaces(adult_skeleton(), words)] == [("foot", "right")]
-assert may_use_foot(frozenset(words)) and _rank("foot", frozenset(words)) == _SAID
+check_timeline(timeline, known_labels=(), start=0.0, end=4.0, where="a.txt")
+assert "side_poke" in DISCRETE and sort_labels(("low", "right", "side_poke")) == ("side_poke", "right", "low")
+assert list_labels_below(("side_poke",)) == ("low",) and "side_poke" in {one.word for one in list_options(TreeChoices("moment"))}
+assert [(one.part, one.side) for one in build_surfaces(build_adult_skeleton(), words)] == [("foot", "right")]
+assert may_use_foot(frozenset(words)) and _rank_labels("foot", frozenset(words)) == _NAMED
 
-kick, receive = Touched(2.2, True, "foot", "kick"), Touched(2.1, True, "foot", "receive")
-moved = known_touches._moved(Timeline(keys=(KeyMoment(2.0, words),)), (receive, kick))
+kick, receive = PlayerTouch(2.2, True, "foot", "kick"), PlayerTouch(2.1, True, "foot", "receive")
+moved = resolved_touches._match_touches(Timeline(keys=(KeyMoment(2.0, words),)), (receive, kick))
 assert moved.keys[0].solved == 2.2
-assert act_of(ClipAnnotation(0, 9, 5, words)) == "side_poke"
+assert find_act(ClipAnnotation(0, 9, 5, words)) == "side_poke"
 key = Key(0, 5.0, 0.0, 9.0, frozenset(("kick", "right")))
-assert nearest_serving((key,), words) == (key,)
+assert select_nearest_keys((key,), words) == (key,)
 print(beyond_mocap.__file__)
 """
 

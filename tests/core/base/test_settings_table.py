@@ -94,7 +94,7 @@ def test_a_row_is_an_option_with_its_default_and_limits(with_sharpness):
 
 
 def test_a_row_is_on_the_page_of_settings(with_sharpness):
-    line = "| `sharpness` | `--sharpness` | Sharpness | 0.25 | 0 to 1 turns | How sharp corners are |"
+    line = "- **Sharpness**, `sharpness`, `--sharpness`: How sharp corners are. Default: 0.25. 0 to 1 turns."
     assert line in build_settings_page()
 
 

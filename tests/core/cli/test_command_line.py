@@ -246,7 +246,7 @@ def test_a_wrong_command_line_is_status_2(run, arguments):
         ({"seam-window": "wide"}, ["--seam-window", "wide"]),
         ({"track-window": "-1"}, ["--track-window", "-1"]),
         ({"gait": "walking"}, ["gait", "WORD=CLIP"]),
-        ({"gait": "walking=missing.bvh"}, ["--gait", "missing.bvh"]),
+        ({"gait": "walking=missing.bvh"}, ["gaits", "missing.bvh"]),
         ({"seed": "x"}, ["--seed"]),
         ({"method": "magic"}, ["magic", "path"]),
         ({"unit": "0"}, ["--unit"]),

@@ -25,7 +25,7 @@ def test_without_a_choice_the_library_is_the_same(library):
 
 
 def test_the_chosen_clip_says_the_gait(library, chosen):
-    assert [g.words for g in library.gaits if g.label == "walking"] == [("walking",)]
+    assert [g.labels for g in library.gaits if g.label == "walking"] == [("walking",)]
     walking, jogging = chosen.gaits[1:3]
     assert walking.labels == ("walking", "left") and walking.speed == pytest.approx(1.4, abs=0.1)
     assert jogging.labels == ("jogging",) and jogging.speed == pytest.approx(2.8, abs=0.1)

@@ -210,7 +210,7 @@ def test_kicks_of_players_that_were_kept_back():
 
     for rules, aim in ((True, 0.9), (False, 0.8)):
         ruled = (lambda one: one.rule_proposals) if rules else (lambda one: ())
-        known = train_classifier([replace(one, ruled=ruled(one)) for one in list(clips(1, 3))[:10]])
+        known = train_classifier([replace(one, rule_proposals=ruled(one)) for one in list(clips(1, 3))[:10]])
         hit = false = planted = 0
         for one in clips(4, 3):
             motion = bvh.read_bvh(REAL / one.name).motion

@@ -59,8 +59,8 @@ def test_no_locomotion_no_gaps():
 
 
 def test_made_clips_fill_the_gaps_up_to_a_sprint(library, more):
-    speed = np.concatenate([more.frames.speed[more.frames.clip == i] for i, c in enumerate(more.clips) if c.made])
-    for low, high in library.gaps:
+    speed = np.concatenate([more.frames.speed[more.frames.clip == i] for i, c in enumerate(more.clips) if c.is_synthetic])
+    for low, high in library.speed_gaps:
         for wanted in np.linspace(low, min(high, 9.0), 9):
             assert np.sum(np.abs(np.log(speed / wanted)) < 0.12) > 10
     assert made(more, BLEND_PREFIX) and made(more, KICK_PREFIX)
@@ -90,7 +90,7 @@ def test_kept_beside_the_cache_and_read_back_the_same(library, more):
     assert (place / "made.npz").is_file() and list((place / "made-gait").glob("*.bvh"))
     again = build_library(library.folder, cache_dir=place).with_synthetic_clips
     assert np.array_equal(again.frames.features, more.frames.features)
-    assert all(np.array_equal(a.heel_toe_contacts, b.standing) for a, b in zip(again.clips, more.clips))
+    assert all(np.array_equal(a.heel_toe_contacts, b.heel_toe_contacts) for a, b in zip(again.clips, more.clips))
 
 
 def test_made_files_that_were_tidied_away_are_written_again(library, more):

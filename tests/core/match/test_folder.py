@@ -119,8 +119,8 @@ def test_two_runs_at_once_are_told_and_a_dead_one_holds_nothing(order):
     text = f"""
 import sys, os; sys.path.insert(0, {str(TOP)!r})
 from pathlib import Path
-from beyond_mocap.match.folder import opened
-with opened(Path({str(order.out)!r}), {known!r}):
+from beyond_mocap.match.folder import open_folder
+with open_folder(Path({str(order.out)!r}), {known!r}):
     print("in", flush=True)
     sys.stdin.read()
 """

@@ -121,10 +121,10 @@ def command(order):
     return [sys.executable, "-c", f"""
 import sys; sys.path.insert(0, {str(TOP)!r})
 from pathlib import Path, PosixPath
-from beyond_mocap.match.synthesize_match import make_match
-from beyond_mocap.match.request import MatchOrder
+from beyond_mocap.match.synthesize_match import synthesize_match
+from beyond_mocap.match.request import MatchRequest
 if __name__ == "__main__":
-    make_match({order!r})
+    synthesize_match({order!r})
 """]  # fmt: skip
 
 

@@ -146,7 +146,7 @@ def test_an_option_is_taken_out_however_it_is_written(written):
     ({"meta": "no.xml"}, 2, "no.xml"),
     ({"events": str(SMALL / "small_events.csv"), "events-meta": "no.xml"}, 2, "no.xml"),
     ({"events": str(SMALL / "small_events.csv"), "events-provider": "x"}, 2, "events provider: 'x'; expected one of"),
-    ({"events": str(SMALL / "small_events.csv"), "events-provider": "opta"}, 2, "no second file beside it for opta"),
+    ({"events": str(SMALL / "small_events.csv"), "events-provider": "opta"}, 2, "the second file for opta is missing"),
     ({"events-meta": "no.xml"}, 2, "events metadata: no.xml, without an events file"),
     ({"events-provider": "opta"}, 2, "events provider: opta, without an events file"),
     ({"workers": 0}, 2, "'0' is not 1 to 256"),

@@ -87,7 +87,7 @@ def test_most_planted_touches_come_back_as_words_of_their_player(planted):
     wanted = [one for one in truth.touches if one.label in ("kick", "receive", "header", "throw-in")]
     named = {"kick": "kick", "receive": "receive", "header": "header", "throw-in": "throwb"}
     found = sum(
-        any(named[one.label] in m.words and abs(m.time - one.time) < 0.15 for m in words.players[one.player])
+        any(named[one.label] in m.labels and abs(m.time - one.time) < 0.15 for m in words.players[one.player])
         for one in wanted
     )
     assert len(wanted) >= 15 and found >= 0.6 * len(wanted)
@@ -154,7 +154,7 @@ def test_edits_are_seen_and_kept(tmp_path):
     assert not is_edited(file)
     file.write_text("1.0 kcik\n")
     assert is_edited(file)
-    with pytest.raises(InputError, match=r"p\.txt:1: the word 'kcik'.*kick"):
+    with pytest.raises(InputError, match=r"p\.txt:1: the label 'kcik'.*kick"):
         read_labels(file)
 
 
@@ -185,14 +185,14 @@ def test_the_most_telling_row_counts(tmp_path):
 
 
 @pytest.mark.parametrize("text, part", [
-    ("", "no rows"),
+    ("", "the table is empty"),
     ("kind,words\n", ":1: columns 'kind,words'"),
-    ("kind,part,detail,words\n", "no rows"),
+    ("kind,part,detail,words\n", "the table is empty"),
     ("kind,part,detail,words\npasses,,,kick\n", ":2: kind 'passes'"),
     ("kind,part,detail,words\npass,knee,,kick\n", ":2: part 'knee'"),
-    ("kind,part,detail,words\n\n# x\npass,,,kcik\n", ":4: the word 'kcik'"),
+    ("kind,part,detail,words\n\n# x\npass,,,kcik\n", ":4: the label 'kcik'"),
     ("kind,part,detail,words\npass,,,kick {foot}\n", ":2: {foot}"),
-    ("kind,part,detail,words\npass,,,kick\npass,,,header\n", ":3: pass, ,  as in line 2"),
+    ("kind,part,detail,words\npass,,,kick\npass,,,header\n", ":3: pass, ,  is also in line 2"),
     ("kind,part,detail,words\npass,,kick\n", ":2: 3 cells"),
 ])
 def test_mistakes_in_a_table_get_one_line(tmp_path, text, part):

@@ -22,7 +22,7 @@ def small():
 
 
 def test_the_small_match_is_what_its_script_makes(small, tmp_path):
-    small.make(tmp_path)
+    small.write_match_files(tmp_path)
     made = sorted(tmp_path.iterdir())
     assert len(made) == 6
     for path in made:
@@ -37,7 +37,7 @@ def test_the_small_match_could_be_played(small):
         velocity = np.gradient(path[there], times[there], axis=0)
         assert np.linalg.norm(velocity, axis=1).max() < 7.5, player
         assert np.linalg.norm(np.gradient(velocity, times[there], axis=0), axis=1).max() < 6.0, player
-    for one in small.played():
+    for one in small.compute_touches():
         away = one.position[:2] - small.compute_player(one.touch.player, np.array([one.time]))[0]
         assert 0.15 < np.linalg.norm(away) < 0.45, one.time
 
@@ -46,6 +46,6 @@ def test_the_small_match_could_be_played(small):
 def test_every_touch_of_the_small_match_is_found(small, tmp_path, name):
     match = read_match(SAMPLE / "match" / "small" / name, cache_dir=tmp_path)
     found = solve_ball(match).touches
-    planted = small.played()
+    planted = small.compute_touches()
     assert [touch.player for touch in found] == [one.touch.player for one in planted]
     assert max(abs(touch.time - one.time) for touch, one in zip(found, planted)) < 0.05

@@ -161,7 +161,7 @@ def test_a_wrong_text_is_told(tmp_path, whole, change, told):
     ({"length": np.array([5, 0, 5], np.int32)}, "a frame or more"),
     ({"length": np.array([2**31 - 1] * 3, np.int32)}, "a frame or more"),
     ({"first": np.array([0.0, 1e300, 0.0])}, "too large for a clip"),
-    ({"first": np.array([0.0, np.nan, 0.0])}, "no number"),
+    ({"first": np.array([0.0, np.nan, 0.0])}, "NaN or infinite"),
     ({"rate": None}, "no such array"),
     ({"more": np.zeros(3)}, "which is not used"),
     ({"rate": np.array(["a", "b", "c"])}, "values of type"),

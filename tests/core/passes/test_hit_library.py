@@ -86,7 +86,7 @@ def test_each_part_has_its_own(library):
 
 
 def test_it_is_kept_beside_the_cache(library, kicks, monkeypatch):
-    monkeypatch.setattr("beyond_mocap.passes.hit_library.analyse", None)
+    monkeypatch.setattr("beyond_mocap.passes.hit_library.detect_hits", None)
     again = HitLibrary.from_library(library, "foot")
     assert len(again) == len(kicks)
     for a, b in zip(again.hits, kicks.hits):

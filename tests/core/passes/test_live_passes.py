@@ -59,8 +59,8 @@ def test_the_ball_comes_to_the_target_and_stays_there(passed):
     _, after, _, end = passed
     for rally, name in ((after, "Cho"), (end, "Ben")):
         assert rally.holder == name
-        place = rally.ball.positions[int(np.searchsorted(rally.ball.times, rally.free + 1.0))]
-        stands = rally.players[name].at(rally.free + 1.0).place
+        place = rally.ball.positions[int(np.searchsorted(rally.ball.times, rally.ready_time + 1.0))]
+        stands = rally.players[name].stance_at(rally.ready_time + 1.0).place
         assert np.linalg.norm(place[:2] - stands) < 1.5 and place[2] < 0.2
     assert end.passes == 2
 

@@ -62,7 +62,7 @@ def test_every_strike_meets_the_ball(played, name):
             line, ball = surface.compute_line(places[frame], world[frame]), whole.ball.positions[frame]
             gap = measure_ball_gap(line, surface.radius, ball, radius)
             assert abs(gap) < (0.005 if name != "tall" else 0.01)
-    assert max(whole.gap(number) for number in range(len(whole.plan.strikes))) < 0.005
+    assert max(whole.find_gap(number) for number in range(len(whole.plan.strikes))) < 0.005
     assert whole.warnings == ()
 
 
@@ -214,7 +214,7 @@ def test_strikes_that_no_words_tell_of_are_told(strikes_library):
     silent = tuple(
         replace(clip, annotations=tuple(quiet(row) for row in clip.annotations)) for clip in strikes_library.clips
     )
-    told = synthesize_passes(replace(strikes_library, clips=silent, kept=None), scene).warnings
+    told = synthesize_passes(replace(strikes_library, clips=silent, cache_location=None), scene).warnings
     assert any("no labels of the library name strikes with the tool" in line for line in told)
 
 
@@ -222,4 +222,4 @@ def test_who_gets_up_strikes_nothing(strikes_library):
     up = tuple(replace(clip, annotations=tuple(replace(row, words=("getting_up",)) for row in clip.annotations))
                for clip in strikes_library.clips)
     with pytest.raises(NotInLibraryError, match="strikes with"):
-        synthesize_passes(replace(strikes_library, clips=up, kept=None), parse_scene(SAMPLES["racquet"]))
+        synthesize_passes(replace(strikes_library, clips=up, cache_location=None), parse_scene(SAMPLES["racquet"]))

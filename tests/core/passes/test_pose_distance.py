@@ -44,13 +44,13 @@ def test_the_search_pays_for_it(library, costs):
     """A cut's price is eq. 1 where it is given, the mean over the frames around it; and the weights steer it."""
     ends, start = np.array([40.0, 90.0]), np.arange(200.0, 260.0)
     rows = weigh_bones(library)
-    one = dict(costs(alike=BoneDistance(rows)).iter_cut_terms(ends, start))["pose"]
+    one = dict(costs(bone_distance=BoneDistance(rows)).iter_cut_terms(ends, start))["pose"]
     at = ends.astype(int), start.astype(int)
     np.testing.assert_allclose(one, Weights().pose * pose_distance(rows[at[0]], rows[at[1]]), rtol=1e-3, atol=1e-3)
-    around = dict(costs(alike=BoneDistance(rows, (-6, 6))).iter_cut_terms(ends, start))["pose"]
+    around = dict(costs(bone_distance=BoneDistance(rows, (-6, 6))).iter_cut_terms(ends, start))["pose"]
     assert not np.allclose(one, around, rtol=0.02)
     hands = BoneWeights((0.0, 0.0, 8.0, 0.0, 0.0, 0.0), (0.0,) * 6)
-    other = dict(costs(alike=BoneDistance(weigh_bones(library, hands))).iter_cut_terms(ends, start))["pose"]
+    other = dict(costs(bone_distance=BoneDistance(weigh_bones(library, hands))).iter_cut_terms(ends, start))["pose"]
     assert np.any(np.argsort(one[0]) != np.argsort(other[0]))
 
 

@@ -210,7 +210,7 @@ def test_a_sender_that_goes_and_comes_again(clip, port):
 
 
 def test_a_stream_that_stops_is_told(clip, port, monkeypatch):
-    monkeypatch.setattr("beyond_mocap.passes.stream.listener.STALLED", 0.1)
+    monkeypatch.setattr("beyond_mocap.passes.stream.listener.STALL_SECONDS", 0.1)
     listener = Listener(port).start()
     try:
         Sender(clip, port, rate=600.0).send_file(lambda: False)

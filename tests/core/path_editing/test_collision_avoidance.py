@@ -34,7 +34,7 @@ def ridden(follower, change):
 
 def assert_apart(followers, resolution, distance=0.6):
     """The real paths with detours keep them apart, not only the search's own reckoning."""
-    assert resolution.left == ()
+    assert resolution.unresolved == ()
     places = np.stack([ridden(*both) for both in zip(followers, resolution.changes)])
     assert find_collisions(np.arange(places.shape[1]) / FPS, places, distance - 0.005) == []
 

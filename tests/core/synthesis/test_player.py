@@ -56,7 +56,7 @@ def test_pins_come_and_go_and_are_the_same_by_every_way(library, track, take, ti
 
 def test_a_pin_out_of_reach_is_told_and_reported(library, track, take):
     found = resynthesize(
-        library, replace(take.plan, pins=(pin_near(take, 9.0, (0.0, 0.0, 2.0)), Pin(99, "turn_gaze", (0, 0, 1)))), take
+        library, replace(take.plan, pins=(pin_near(take, 9.0, (0.0, 0.0, 2.0)), Pin(99, "gaze", (0, 0, 1)))), take
     )
     assert any("9 s: the pin of left_hand is out of reach by" in line for line in found.warnings)
     assert any("99 s: the pin of gaze is outside the track" in line for line in found.warnings)

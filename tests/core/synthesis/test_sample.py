@@ -59,7 +59,7 @@ def test_what_ships_is_what_the_script_makes(maker, tmp_path):
     maker.write_match(tmp_path)
     for made in tmp_path.iterdir():
         assert made.read_bytes() == (SAMPLE / "match" / made.name).read_bytes()
-    clip = next(c for c in maker.clips() if c.name == "kick_low_top")
+    clip = next(c for c in maker.build_clips() if c.name == "kick_low_top")
     shipped = bvh.read_bvh(SAMPLE / "library" / "kick_low_top.bvh").motion
     assert np.allclose(shipped.root_positions, clip.motion.root_positions, atol=1e-4)
 

@@ -100,12 +100,12 @@ def test_the_same_order_gives_the_same_bits(take_of, method):
 
 REMOTE = """
 import sys, hashlib, numpy as np
-from beyond_mocap.library.build import build
+from beyond_mocap.library.build import build_library
 from beyond_mocap.annotation import KeyMoment, Timeline
 from beyond_mocap.motion.track import Track
 from beyond_mocap.synthesis.plan import METHODS, Plan
 from beyond_mocap.synthesis.synthesize import synthesize
-library = build(sys.argv[1], rebuild=True, cache_dir=sys.argv[2])
+library = build_library(sys.argv[1], rebuild=True, cache_dir=sys.argv[2])
 times = np.arange(0, 6.01, 0.04)
 track = Track(times, np.stack([2.0 * times, np.sin(times)], axis=1))
 for method in METHODS:

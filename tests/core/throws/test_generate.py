@@ -35,7 +35,7 @@ class ByHeart(PhaseNetwork):
         return self.said[np.argmin(((self.known - x) ** 2).sum(axis=1))]
 
     @property
-    def frame(self):
+    def frame_network(self):
         return self.frame_of
 
 

@@ -241,7 +241,7 @@ def test_a_file_too_large_is_told(tmp_path, monkeypatch):
     write_model(made_model(), tmp_path / "x.npz")
     monkeypatch.setattr(network_npz, "MAX_UNPACKED_SIZE", 1000)
     refused(tmp_path / "x.npz", "more than 1,000 bytes")
-    monkeypatch.setattr(network_npz, "LARGEST", 1000)
+    monkeypatch.setattr(network_npz, "MAX_FILE_SIZE", 1000)
     refused(tmp_path / "x.npz", "at most 1000")
 
 

@@ -76,7 +76,7 @@ def test_an_unknown_action_and_cancelling(tmp_path):
 
 def test_a_folder_comes_whole_or_not_at_all(tmp_path, monkeypatch):
     (tmp_path / "mine.txt").write_text("mine")
-    with pytest.raises(InputError, match="mine.txt: a file"):
+    with pytest.raises(InputError, match="mine.txt: is a file"):
         write_examples(tmp_path / "mine.txt", "throw", 1, 1)
     with pytest.raises(InputError, match="cannot be written"):
         write_examples(tmp_path / "mine.txt" / "new", "throw", 1, 1)

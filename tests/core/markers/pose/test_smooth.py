@@ -54,7 +54,7 @@ def test_windows_leave_no_seam(monkeypatch):
     rough = descend(task, truth).poses
     whole, _ = smooth_poses(task, rough, 0.02, FPS)
     monkeypatch.setattr(module, "_WINDOW_FRAMES", 25)
-    monkeypatch.setattr(module, "_AHEAD", 25)
+    monkeypatch.setattr(module, "_LOOK_AHEAD_FRAMES", 25)
     pieces, _ = smooth_poses(task, rough, 0.02, FPS)
     assert off(whole, pieces) < 0.05
 

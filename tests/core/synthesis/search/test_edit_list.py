@@ -82,7 +82,7 @@ def test_footage_laid_back_is_the_recording(library, straight, fps):
     sway = quaternion.rotate(quaternion.from_up_angle(heading), np.pad(footage.sway, ((0, 0), (0, 1))))[:, :2]
     assert np.allclose(path + sway, root[:, :2], atol=1e-9) and np.allclose(footage.height, root[:, 2], atol=1e-9)
     assert np.allclose(footage.clip_frame, own, atol=1e-9)
-    assert np.array_equal(footage.heel_toe_contacts, library.clips[number].standing[np.round(own).astype(int)])
+    assert np.array_equal(footage.heel_toe_contacts, library.clips[number].heel_toe_contacts[np.round(own).astype(int)])
 
 
 @pytest.mark.parametrize("fps", [24.0, 30.0, 60.0])

@@ -49,7 +49,7 @@ def test_who_runs_up_and_stops_keeps_running_and_plays_the_exit(search):
     looked = search(lambda t: np.where(t < KEY, 4.5, 0.0))
     edit, first, last = header_shown(looked)
     assert -0.6 < first < -0.2 and last > ENTRY - 0.15
-    told = report_left_out(looked.library, looked.wanted, edit)
+    told = report_left_out(looked.library, looked.request, edit)
     assert len(told) == 1 and "entry of the clip for 'header standing' is left out" in told[0]
 
 
@@ -57,17 +57,17 @@ def test_who_stands_and_runs_off_plays_the_entry_and_runs(search):
     looked = search(lambda t: np.where(t < KEY, 0.0, 4.5))
     edit, first, last = header_shown(looked)
     assert first < 0.15 - ENTRY and 0.2 < last < 0.6
-    told = report_left_out(looked.library, looked.wanted, edit)
+    told = report_left_out(looked.library, looked.request, edit)
     assert len(told) == 1 and "exit of the clip" in told[0]
 
 
 @pytest.mark.parametrize("speed", [0.0, 0.5])
 def test_who_stands_has_the_whole_clip_and_no_choice(search, speed):
     looked = search(speed)
-    assert len(looked.pieces.number) == len(looked.wanted.keys[0].choices) * len(KEY_PLAYBACK_RATES)
+    assert len(looked.pieces.number) == len(looked.request.keys[0].choices) * len(KEY_PLAYBACK_RATES)
     edit, first, last = header_shown(looked)
     assert first < 0.15 - ENTRY / 1.3 and last > ENTRY / 1.3 - 0.15
-    assert report_left_out(looked.library, looked.wanted, edit) == []
+    assert report_left_out(looked.library, looked.request, edit) == []
 
 
 @pytest.mark.parametrize("method", ["path", "distance"])

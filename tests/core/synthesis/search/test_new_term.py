@@ -1,4 +1,4 @@
-"""A cost term with a setting is one row of the table and one named part of the costs (docs/architecture.md)."""
+"""A cost term with a setting is one row of the table and one named part of the costs (docs/explanation/architecture.md)."""
 
 import os
 import shutil
@@ -10,19 +10,19 @@ TOP = Path(__file__).resolve().parents[4]
 ROW = """        Setting(name="walking_cost", default=0.0, least=0.0, most=10.0, option="--walking-cost", tuning="path",
             help="of missed speed that a walking clip costs", tooltip="Costs of walking"),
 """
-TERM = """        walks = self.offer.showing(frozenset(("walking",)))[frame]
-        yield "walking_cost", np.float32(self.wanted.plan.walking_cost) * walks
+TERM = """        walks = self.index.shows_labels(frozenset(("walking",)))[frame]
+        yield "walking_cost", np.float32(self.request.plan.walking_cost) * walks
 """
 TRY = """
 from beyond_mocap.base.errors import InputError
-from beyond_mocap.library.build import build
+from beyond_mocap.library.build import build_library
 from beyond_mocap.motion.track import Track
 from beyond_mocap.synthesis.plan import Plan
 from beyond_mocap.synthesis.resolve_plan import resolve_plan
 from beyond_mocap.synthesis.search.explanation import explain_choices
 from beyond_mocap.synthesis.synthesize import synthesize
 import numpy as np, sys
-library = build(sys.argv[1])
+library = build_library(sys.argv[1])
 times = np.arange(0.0, 4.0, 0.1)
 track = Track(times, np.stack([1.4 * times, 0.0 * times], axis=1))
 for walking_cost in (0.0, 0.7):

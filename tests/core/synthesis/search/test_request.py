@@ -9,24 +9,24 @@ from beyond_mocap.synthesis.search.request import compute_needed_frames, library
 
 def test_nothing_asked_is_locomotion_by_speed(order, track_of):
     found = order(track=track_of(lambda t: np.where(t < 4, 1.4, 4.8)))
-    words = [set(w) for w in found.asked]
+    words = [set(w) for w in found.requested_labels]
     assert len(words) == len(found) == 8 * 30 + 1
     assert words[30] == {"walking"} and words[-20] == {"running"}
     assert 3.5 < found.timeline.spans[0].end < 4.5
 
 
 def test_a_standing_player_stands(order, track_of):
-    assert {frozenset(w) for w in order(track=track_of(0.0)).asked} == {frozenset({"standing"})}
+    assert {frozenset(w) for w in order(track=track_of(0.0)).requested_labels} == {frozenset({"standing"})}
 
 
 def test_words_of_spans_are_asked_where_they_stand(order):
     found = order((2, 4, "walking left"))
-    assert found.asked[75] == {"walking", "left"} and found.asked[30] == {"walking"} == found.asked[150]
+    assert found.requested_labels[75] == {"walking", "left"} and found.requested_labels[30] == {"walking"} == found.requested_labels[150]
 
 
 def test_an_avoided_gait_gives_its_place_to_the_one_nearest_in_speed(order, track_of):
     found = order((2, 4, "-walking"))
-    assert found.asked[75] == {"jogging"} and found.asked[30] == {"walking"} == found.asked[150]
+    assert found.requested_labels[75] == {"jogging"} and found.requested_labels[30] == {"walking"} == found.requested_labels[150]
     assert found.list_avoided(0, 59) == frozenset() and found.list_avoided(50, 61) == {"walking"}
     assert order((2, 4, "walking")).avoided == ()
 
@@ -36,17 +36,17 @@ def test_a_key_moment_takes_no_clip_with_a_word_that_must_not_be(order, library)
     assert [library.clips[key.clip].mirrored for key in found.keys[0].choices] == [False] and not found.warnings
     only = order((4.0, "kick left -inside"))
     assert only.keys[0].choices and "no clip for 'kick left' is -inside" in only.warnings[0]
-    assert line_spans(only.warnings[0]) == ((only.keys[0].asked.time,) * 2,)
+    assert line_spans(only.warnings[0]) == ((only.keys[0].requested.time,) * 2,)
 
 
 def test_a_transition_asks_for_nothing(order):
     found = order((2, 4, "transition"))
-    assert found.asked[75] is None and found.asked[30] is not None
+    assert found.requested_labels[75] is None and found.requested_labels[30] is not None
 
 
 def test_a_key_moment_is_served_with_room_for_its_entry_and_exit(order, library, kick_seconds):
     key = order((4.0, "kick right")).keys[0]
-    asked = order((4.0, "kick right")).asked
+    asked = order((4.0, "kick right")).requested_labels
     assert key.frame == 120.0 and [library.clips[k.clip].mirrored for k in key.choices] == [False]
     entry, leave = compute_needed_frames(library, key.choices[0])
     assert 10 < entry < 40 and 5 < leave < 40
@@ -80,7 +80,7 @@ def test_the_nearest_is_used_and_told(order):
 def test_where_nothing_is_near_locomotion_stands_in(order):
     found = order((4.0, "header"), nearest=True)
     assert found.keys[0].choices == () and found.keys[0].used_instead == ("walking",)
-    assert found.asked[120] == {"walking"}
+    assert found.requested_labels[120] == {"walking"}
 
 
 @pytest.mark.parametrize("time, frame", [(0.0, 0.0), (8.0, 240.0), (8.04, 240.0), (-0.05, 0.0), (3.21, 96.3)])
@@ -90,7 +90,7 @@ def test_key_frames_lie_on_the_track(order, time, frame):
 
 def test_the_clock_is_the_track_s(order, track_of):
     found = order((104.0, "kick"), (101.0, 102.0, "jogging"), track=track_of(start=100.0))
-    assert found.keys[0].frame == pytest.approx(120.0) and found.asked[45] == {"jogging"}
+    assert found.keys[0].frame == pytest.approx(120.0) and found.requested_labels[45] == {"jogging"}
 
 
 def test_words_that_no_clip_carries_are_told(order):

@@ -1,0 +1,128 @@
+"""Write the reference pages of commands and labels from the parser and the vocabulary, for `pages.py`."""
+
+from __future__ import annotations
+
+import argparse
+import csv
+from collections.abc import Iterator
+from pathlib import Path
+
+COMMANDS_HEAD = """# Commands
+
+*For all who use the command line, batch jobs or farms: every command with its options. This page is generated from the
+program by `make tables`.*
+
+The same commands run as `python -m beyond_mocap COMMAND`, as `blender --command beyond_mocap COMMAND`, and on farms as
+`blender -b FILE --python batch.py -- COMMAND`. Inside Blender, `--out` (of `match`: `--scene`) may also end
+with `.blend`, `.fbx`, `.glb` or `.usdc`; `mirror` and `retarget` write BVH only.
+
+Exit status: 0 done; 2 the command line or an input is wrong; 3 the library lacks what was asked for; 130 cancelled. An
+error is one line: where, what was found, what was expected, what to do.
+"""
+LABELS_HEAD = """# Labels
+
+*For all who annotate clips or matches: every label of the vocabulary. This page is generated from
+`beyond_mocap/annotation/vocabulary.csv` by `make tables`.*
+
+A text file has the short form, panels show the name. How labels combine is [explained here](../explanation/labels.md); how
+they are written is in [the text form](annotation-text.md). A library may add labels of its own.
+"""
+KINDS = {
+    "continuous": ("Stretches", "What a player does for a while."),
+    "discrete": ("Key moments", "What happens at one instant."),
+    "modifier": ("Details", "They stand beside another label and make it more precise."),
+    "": ("Other labels", "They stand below the labels above, or are used by annotations of recordings."),
+}
+
+
+def build_commands_page(parser: argparse.ArgumentParser) -> str:
+    """Build the page of all commands.
+
+    Args:
+        parser: the parser of the command line.
+    Returns:
+        The page as Markdown.
+    """
+    parts = [COMMANDS_HEAD]
+    for name, command in iter_commands(parser):
+        parts.append(f"\n## {name}\n\n{_describe(command)}")
+        parts.append(f"\n```text\n{_format_usage(command)}\n```\n")
+        parts.extend(f"\n- {line}" if i == 0 else f"- {line}" for i, line in enumerate(_list_options(command)))
+    return "\n".join(part.rstrip("\n") for part in parts) + "\n"
+
+
+def iter_commands(parser: argparse.ArgumentParser, prefix: str = "") -> Iterator[tuple[str, argparse.ArgumentParser]]:
+    """Go through all commands and the commands below them.
+
+    Args:
+        parser: a parser.
+        prefix: the words before the command's name.
+    Returns:
+        Names and parsers, in the order of the help.
+    """
+    for action in parser._actions:
+        if isinstance(action, argparse._SubParsersAction):
+            for name, command in action.choices.items():
+                command.description = command.description or _find_help(action, name)
+                below = list(iter_commands(command, f"{prefix}{name} "))
+                yield from below or [(prefix + name, command)]
+
+
+def build_labels_page(vocabulary: Path) -> str:
+    """Build the page of all labels.
+
+    Args:
+        vocabulary: the table of labels.
+    Returns:
+        The page as Markdown.
+    """
+    lines = [line for line in vocabulary.read_text("utf-8").splitlines() if not line.startswith("#")]
+    rows = list(csv.DictReader(lines))
+    parts = [LABELS_HEAD]
+    for kind, (title, text) in KINDS.items():
+        parts.append(f"\n## {title}\n\n{text}\n\n| short form | name | goes with |\n| --- | --- | --- |")
+        parts.extend(_format_label(row) for row in rows if row["kind"] == kind)
+    return "\n".join(part.rstrip("\n") for part in parts) + "\n"
+
+
+def _format_label(row: dict[str, str]) -> str:
+    labels = dict.fromkeys(row["below"].replace("(", " ").replace(")", " ").split())
+    below = " ".join(f"`{label}`" for label in labels)
+    return f"| `{row['label']}` | {row['title']} | {below} |"
+
+
+def _find_help(action: argparse._SubParsersAction, name: str) -> str:
+    return next((choice.help or "" for choice in action._choices_actions if choice.dest == name), "")
+
+
+def _describe(command: argparse.ArgumentParser) -> str:
+    text = " ".join((command.description or "").split())
+    return text[:1].upper() + text[1:] + ("" if text.endswith(".") or not text else ".")
+
+
+def _format_usage(command: argparse.ArgumentParser) -> str:
+    required = [action for action in command._actions if action.option_strings and action.required]
+    positional = [action for action in command._actions if not action.option_strings]
+    words = [_format_action(action) for action in positional + required]
+    return " ".join([command.prog, *words, "[options]"])
+
+
+def _format_action(action: argparse.Action) -> str:
+    """One argument as it is typed."""
+    name = max(action.option_strings, key=len, default="")
+    if action.nargs == 0:
+        return name
+    value = action.metavar or ("|".join(map(str, action.choices)) if action.choices else action.dest.upper())
+    value = " ".join(value) if isinstance(value, tuple) else str(value)
+    return " ".join(filter(None, (name, value + (" ..." if action.nargs in ("+", "*") else ""))))
+
+
+def _list_options(command: argparse.ArgumentParser) -> list[str]:
+    lines = []
+    for action in command._actions:
+        if action.help == argparse.SUPPRESS or isinstance(action, argparse._HelpAction):
+            continue
+        text = " ".join((action.help or "").split())
+        text = text % {"default": action.default, "prog": command.prog} if "%(" in text else text.replace("%%", "%")
+        lines.append(f"`{_format_action(action)}`" + (f": {text}" if text else ""))
+    return lines
