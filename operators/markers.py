@@ -85,7 +85,7 @@ class BEYOND_MOCAP_OT_import_markers(ImportOperator, bpy.types.Operator):
         thing.beyond_mocap_cloud.messages = "\n".join(messages)
         for line in messages:
             self.report({"INFO"}, f"{thing.name}: {line}")
-        seen = f"{100.0 * float(trial.seen.mean()):.0f} % visible"
+        seen = f"{100.0 * float(trial.visibility.mean()):.0f} % visible"
         found = f"{len(trial.labels)} markers, {trial.duration:.2f} s at {trial.fps:g} per second, {seen}"
         self.report({"INFO"}, f"{thing.name}: {found}")
         return thing

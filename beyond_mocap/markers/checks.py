@@ -46,12 +46,12 @@ def check_trial(trial: MarkerTrial, static: MarkerTrial | None, clusters: Mappin
     """
     labels = [label for group in clusters.values() for label in group if label in trial.labels]
     body = trial.select_markers(labels)
-    if not body.seen.any():
+    if not body.visibility.any():
         raise InputError(trial.name, "none of the body's markers is visible", "a recorded body", "choose another file")
     _check_sides(body, static, clusters)
     lines = list(_iter_empty_stretches(body))
     if static is not None:
-        if not static.seen.any():
+        if not static.visibility.any():
             raise InputError(static.name, "no marker is visible", "a static trial with the trial's markers",
                              "choose another static trial, or use none")  # fmt: skip
         lines += _check_static_complete(body, static)
@@ -190,10 +190,10 @@ def _check_same_body(trial: MarkerTrial, known, clusters, name: str, what: str) 
 
 def _iter_empty_stretches(trial: MarkerTrial):
     """Report each stretch in which hardly any marker is visible."""
-    few = trial.seen.mean(axis=1) < _EMPTY_SHARE
+    few = trial.visibility.mean(axis=1) < _EMPTY_SHARE
     for first, end in find_runs(few):
         if (end - first) / trial.fps >= _EMPTY_SECONDS:
             span = trial.start + first / trial.fps, trial.start + (end - 1) / trial.fps
-            count = "hardly any" if trial.seen[first:end].any() else "no"
+            count = "hardly any" if trial.visibility[first:end].any() else "no"
             yield TimedMessage(f"{count} markers from {span[0]:.2f} to {span[1]:.2f} s: the pose there is a guess",
                                span)

@@ -100,7 +100,7 @@ class MarkerTrial:
         return len(self.positions)
 
     @cached_property
-    def seen(self) -> np.ndarray:
+    def visibility(self) -> np.ndarray:
         """(T, M) bool, where a marker is visible."""
         seen = np.isfinite(self.positions).all(axis=-1)
         seen.setflags(write=False)
@@ -278,7 +278,7 @@ def _interpolate_at_even_times(trial: MarkerTrial, times: np.ndarray) -> np.ndar
     from scipy.interpolate import CubicSpline
 
     out = np.array(trial.positions)
-    patterns, which = np.unique(trial.seen, axis=1, return_inverse=True)
+    patterns, which = np.unique(trial.visibility, axis=1, return_inverse=True)
     for number, seen in enumerate(patterns.T):
         if np.count_nonzero(seen) < 4:
             continue

@@ -82,7 +82,7 @@ def build_gait_posture(gait_plan: GaitPlan, neutral: NeutralStance, style: GaitS
         The posture, one row per requested frame.
     """
     steps = tuple(plan_footsteps(gait_plan, neutral, style, side) for side in (0, 1))
-    return build_posture(gait_plan, steps, neutral, style, seed).frames(gait_plan.requested)
+    return build_posture(gait_plan, steps, neutral, style, seed).frames(gait_plan.requested_slice)
 
 
 def plan_footsteps(gait_plan: GaitPlan, neutral: NeutralStance, style: GaitStyle, side: int) -> Footsteps:

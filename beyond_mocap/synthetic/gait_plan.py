@@ -86,7 +86,7 @@ class GaitPlan:
     stride: int
 
     @property
-    def requested(self) -> slice:
+    def requested_slice(self) -> slice:
         """The moments that are frames of the result."""
         return slice(self.pad, len(self.times) - self.pad, self.stride)
 

@@ -173,7 +173,7 @@ def build_strike(
     posture = build_posture(gait_plan, steps, neutral, style, seed)
     posture = _blend_strike(posture, gait_plan, steps, key=key, recipe=recipe, neutral=neutral)
     begin, land = _find_swing(steps[RIGHT], key)
-    return Gesture(to_motion(posture.frames(gait_plan.requested), neutral), key, begin - 0.15, land + 0.1)
+    return Gesture(to_motion(posture.frames(gait_plan.requested_slice), neutral), key, begin - 0.15, land + 0.1)
 
 
 def _adapt_to_run(recipe: StrikeRecipe, speed: float) -> StrikeRecipe:
@@ -292,7 +292,7 @@ def build_dribble(
     feet[:, RIGHT, 2] -= np.radians(22) * touch
     ankles[:, RIGHT, 2] += touch * compute_ground_lift(ankles[:, RIGHT, 2], feet[:, RIGHT, 1], neutral)
     posture = posture.replace_arrays(ankles=ankles, feet=feet)
-    return to_motion(posture.frames(gait_plan.requested), neutral)
+    return to_motion(posture.frames(gait_plan.requested_slice), neutral)
 
 
 def interpolate_rows(rows, times: np.ndarray) -> np.ndarray:

@@ -84,7 +84,7 @@ def build_header(skeleton: Skeleton | None = None, fps: float = 60.0, seed: int 
     posture = posture.replace_arrays(
         hips=hips, ankles=ankles, feet=feet, toes=toes, pelvis=pelvis, spine=spine, head=head, arms=arm_angles
     )
-    return Gesture(to_motion(posture.frames(gait_plan.requested), neutral), key, key - 0.9, key + 0.9)
+    return Gesture(to_motion(posture.frames(gait_plan.requested_slice), neutral), key, key - 0.9, key + 0.9)
 
 
 def _compute_jump(times, air: float, standing: np.ndarray, neutral: NeutralStance) -> tuple[np.ndarray, np.ndarray]:
@@ -210,7 +210,7 @@ def build_throw_in(skeleton: Skeleton | None = None, fps: float = 60.0, seed: in
     for side in (LEFT, RIGHT):
         arm_angles[:, side] = blend_arrays(arm_angles[:, side], arms, ease)
     posture = plant_feet(posture.replace_arrays(hips=hips, arms=arm_angles, **lean), gait_plan.times, steps, neutral)
-    return Gesture(to_motion(posture.frames(gait_plan.requested), neutral), key, key - 1.3, key + 0.8)
+    return Gesture(to_motion(posture.frames(gait_plan.requested_slice), neutral), key, key - 1.3, key + 0.8)
 
 
 def build_steps(gait_plan: GaitPlan, neutral: NeutralStance, side: int, key: float, moves) -> Footsteps:
@@ -311,7 +311,7 @@ def build_get_up(
         wrists=np.radians(np.repeat(interpolate_rows(_UP["wrists"], times), 2, axis=1)), ankles=ankles, feet=feet,
         toes=np.zeros_like(posture.toes),
     )
-    return Gesture(to_motion(posture.frames(gait_plan.requested), neutral), rest + 1.9, rest + 0.3, rest + _UP_TIME)
+    return Gesture(to_motion(posture.frames(gait_plan.requested_slice), neutral), rest + 1.9, rest + 0.3, rest + _UP_TIME)
 
 
 def build_celebration(duration: float = 6.0, skeleton: Skeleton | None = None, fps: float = 30.0,
@@ -344,4 +344,4 @@ def build_celebration(duration: float = 6.0, skeleton: Skeleton | None = None, f
             axis=-1,
         )
     posture = posture.replace_arrays(arms=arms)
-    return to_motion(posture.frames(gait_plan.requested), neutral)
+    return to_motion(posture.frames(gait_plan.requested_slice), neutral)

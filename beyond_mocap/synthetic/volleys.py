@@ -254,7 +254,7 @@ def build_volley(
     if recipe.foot is not None:
         posture = _guide_foot(posture, recipe.foot, times, neutral)
     return Gesture(
-        to_motion(posture.frames(gait_plan.requested), neutral), BEFORE, BEFORE + begin / speed, BEFORE + end / speed
+        to_motion(posture.frames(gait_plan.requested_slice), neutral), BEFORE, BEFORE + begin / speed, BEFORE + end / speed
     )
 
 
@@ -272,7 +272,7 @@ def build_idle(duration: float, skeleton: Skeleton | None = None, fps: float = 3
     neutral = build_neutral_stance(skeleton or build_adult_skeleton())
     gait_plan, posture = _build_ready(neutral, duration, fps, seed)
     posture = plant_feet(posture, gait_plan.times, _build_still_steps(gait_plan, neutral), neutral)
-    return to_motion(posture.frames(gait_plan.requested), neutral)
+    return to_motion(posture.frames(gait_plan.requested_slice), neutral)
 
 
 def _build_ready(neutral: NeutralStance, duration: float, fps: float, seed: int) -> tuple[GaitPlan, Posture]:

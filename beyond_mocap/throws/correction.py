@@ -56,7 +56,7 @@ class Freedom:
     start_position: bool = True
 
     @classmethod
-    def anchored(cls) -> Freedom:
+    def build_anchored(cls) -> Freedom:
         """Return the freedom of a motion that is joined to others: it keeps its position, heading and frames."""
         return cls(0.0, 0.0, 0.02, False)
 

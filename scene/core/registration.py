@@ -73,6 +73,7 @@ def _iter_steps(package: str) -> Iterator[tuple[Callable[[], None], Callable[[],
     modules = list(_iter_modules(import_module(package)))
     classes = sort_classes(cls for module in modules for cls in _list_classes(module))
     for cls in classes:
+        _add_old_name(cls)
         yield partial(bpy.utils.register_class, cls), partial(bpy.utils.unregister_class, cls)
     for cls in classes:
         for place in getattr(cls, "attached_to", ()):
@@ -108,6 +109,12 @@ def _list_requirements(cls: type, classes: list[type]) -> list[type]:
 
 def _attach_property(owner: type, name: str, cls: type) -> None:
     setattr(owner, name, bpy.props.PointerProperty(type=cls))
+
+
+def _add_old_name(cls: type) -> None:
+    """Let scripts of version 0.1 read the status property `messages` by its name of then, for one version."""
+    if "messages" in cls.__dict__.get("__annotations__", {}):
+        cls.told = property(lambda self: self.messages)
 
 
 def _do_nothing() -> None:

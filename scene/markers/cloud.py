@@ -83,7 +83,7 @@ def write_trial(cloud: bpy.types.Object, trial: "MarkerTrial", scene: bpy.types.
     properties = cloud.beyond_mocap_cloud
     if tuple(label.name for label in properties.labels) != trial.labels:
         _replace_labels(cloud, trial.labels)
-    for label, share in zip(properties.labels, trial.seen.mean(axis=0)):
+    for label, share in zip(properties.labels, trial.visibility.mean(axis=0)):
         label.seen = 100.0 * float(share)
     modifier = nodes.find_modifier(cloud)
     default_step = trial.fps / frames_per_second(scene)
@@ -95,7 +95,7 @@ def write_trial(cloud: bpy.types.Object, trial: "MarkerTrial", scene: bpy.types.
         row.name, row.side, row.seconds = event.label, event.side, event.seconds
     places = hold_last_places(trial.positions) * units_per_metre(scene)
     before = nodes.get_input(modifier, "Trajectories")
-    nodes.set_input(modifier, "Trajectories", _create_trajectories(cloud.name, places, trial.seen))
+    nodes.set_input(modifier, "Trajectories", _create_trajectories(cloud.name, places, trial.visibility))
     nodes.set_input(modifier, "Markers", len(trial.labels))
     nodes.set_input(modifier, "Samples", len(trial))
     nodes.set_input(modifier, "Step", step)
@@ -213,7 +213,7 @@ def read_marker_indices(cloud: bpy.types.Object) -> np.ndarray:
 
 def check_visible(trial: "MarkerTrial") -> None:
     """Raise InputError where no marker is visible."""
-    if not len(trial) or not trial.seen.any():
+    if not len(trial) or not trial.visibility.any():
         raise InputError(trial.name, "no marker is ever visible", "a recording with markers", "choose another file")
 
 

@@ -87,7 +87,7 @@ def apply_marker_set(cloud: bpy.types.Object, marker_set: "MarkerSet") -> list[s
             row.segment, row.landmark, row.role = rows.get(row.name, ("", "", "NEEDED"))
     nodes.draw_lines(cloud)
     properties.set_name, properties.set_text = marker_set.name, format_marker_set(marker_set)
-    missing = sorted(marker_set.required - {row.name for row in properties.labels})
+    missing = sorted(marker_set.required_markers - {row.name for row in properties.labels})
     return [f"{marker_set.name}: {', '.join(missing[:8])} missing in {cloud.name}"] if missing else []
 
 

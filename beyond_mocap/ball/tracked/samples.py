@@ -44,14 +44,14 @@ class Samples:
     interval: float
 
     @property
-    def used(self) -> np.ndarray:
+    def is_used(self) -> np.ndarray:
         """(N,) bool: known and no outlier."""
         return self.known & ~self.outlier
 
     @property
-    def measured(self) -> np.ndarray:
+    def is_measured(self) -> np.ndarray:
         """(N,) bool: used and not filled in."""
-        return self.used & ~self.filled
+        return self.is_used & ~self.filled
 
 
 def build_samples(times: np.ndarray, ball: np.ndarray, where: str = "ball") -> Samples:

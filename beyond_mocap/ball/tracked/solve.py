@@ -150,14 +150,14 @@ def solve_samples(times: np.ndarray, ball: np.ndarray, positions: np.ndarray, pl
     residuals = np.where(samples.known, path.residuals(samples.times, samples.positions), np.nan)
     confidence = float(np.mean([touch.confidence for touch in solved])) if solved else 0.0
     return SolvedBall(times=samples.times, touches=tuple(solved), ball=path, filled=samples.filled,
-                      outlier=samples.outlier, measured=freeze_array(samples.measured, bool),
+                      outlier=samples.outlier, measured=freeze_array(samples.is_measured, bool),
                       residuals=freeze_array(residuals), ends=tuple(_add_last_player(end, solved) for end in ends),
                       confidence=confidence, notes=_describe_feed(samples, heights))
 
 
 def _find_windows(samples: Samples, where: str) -> list[slice]:
     """Find the stretches in which the ball is known, with gaps of up to _MAX_GAP; at least one."""
-    there = np.flatnonzero(samples.used)
+    there = np.flatnonzero(samples.is_used)
     breaks = np.flatnonzero(np.diff(samples.times[there]) > _MAX_GAP)
     firsts, lasts = [there[0], *there[breaks + 1]], [*there[breaks], there[-1]]
     spans = [slice(int(first), int(last) + 1) for first, last in zip(firsts, lasts)]
@@ -171,7 +171,7 @@ def _find_windows(samples: Samples, where: str) -> list[slice]:
 
 def _bridge_gaps(samples: Samples, window: slice) -> np.ndarray:
     """Bridge gaps and wrong samples of a window: (n, 2 or 3) m, with heights if the feed has them."""
-    points, used = samples.positions[window], samples.used[window]
+    points, used = samples.positions[window], samples.is_used[window]
     heights = np.isfinite(points[:, 2])
     axes = 3 if np.count_nonzero(heights & used) > _MIN_HEIGHT_SHARE * np.count_nonzero(used) else 2
     there = np.flatnonzero(used & heights) if axes == 3 else np.flatnonzero(used)
@@ -181,8 +181,8 @@ def _bridge_gaps(samples: Samples, window: slice) -> np.ndarray:
 
 def _solve_window(samples: Samples, window: slice, positions: np.ndarray, untracked_cost: float) -> touches.Cuts:
     times, points = samples.times[window], _bridge_gaps(samples, window)
-    weights = samples.used[window] / samples.scatter[window] ** 2 * min(1.0, samples.interval / _CORRELATED_SECONDS)
-    places = pieces.find_candidate_cuts(times, points, samples.used[window], samples.interval)
+    weights = samples.is_used[window] / samples.scatter[window] ** 2 * min(1.0, samples.interval / _CORRELATED_SECONDS)
+    places = pieces.find_candidate_cuts(times, points, samples.is_used[window], samples.interval)
     chosen = pieces.choose_cuts(times, points, weights, places)
     cost = _compute_reach_cost(times, points, positions[:, window], chosen, untracked_cost)
     return touches.solve_cuts(times, points, weights, chosen, cost)
@@ -237,7 +237,7 @@ def _add_heights(places: np.ndarray, speeds: np.ndarray) -> tuple[np.ndarray, np
 def _build_piece(samples: Samples, at: np.ndarray, places: np.ndarray, speeds: np.ndarray) -> BallPiece:
     """Build one piece with its kind and its residual to the measured samples."""
     part = slice(*np.searchsorted(samples.times, [at[0], at[-1]]))
-    seen = samples.measured[part]
+    seen = samples.is_measured[part]
     piece = BallPiece(times=at, positions=places, velocities=speeds, kind="", spin=np.zeros(3), residual=np.nan,
                       bounces=np.zeros(0))
     off = SolvedTrajectory((piece,)).residuals(samples.times[part], samples.positions[part])[seen]
@@ -314,7 +314,7 @@ def _label_throw_ins(solved: list[SolvedTouch], ends: list[BallEnd], width: floa
 
 
 def _has_heights(samples: Samples) -> bool:
-    return bool(np.isfinite(samples.positions[samples.used, 2]).mean() > _MIN_HEIGHT_SHARE)
+    return bool(np.isfinite(samples.positions[samples.is_used, 2]).mean() > _MIN_HEIGHT_SHARE)
 
 
 def _update_touch(touch: SolvedTouch, path: SolvedTrajectory, heights: bool) -> SolvedTouch:

@@ -79,7 +79,7 @@ def _parse_cells(rows, names) -> np.ndarray:
 
 
 def _check_rate(track: Track, path) -> None:
-    known = np.isfinite(track.times) & track.measured
+    known = np.isfinite(track.times) & track.is_measured
     if len(np.unique(track.times[known])) < 2:
         found = f"{np.count_nonzero(known)} samples with a distinct time and a position"
         raise InputError(path, found, "at least two", "export it again")

@@ -65,7 +65,7 @@ class Signals:
         return len(self.frames)
 
     @property
-    def mirrored(self) -> "Signals":
+    def mirror_signals(self) -> "Signals":
         """The same signals with left and right exchanged."""
         across, trunk = np.array([1.0, -1.0, 1.0, 1.0, -1.0, 1.0]), np.array([1, 1, -1, 1, -1, 1, -1, 1.0])
         middle, paired = self.middle * across, self.paired[:, ::-1] * across

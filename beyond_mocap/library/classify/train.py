@@ -104,7 +104,7 @@ def train_classifier(examples: Sequence[Example], progress=None, cancelled=None)
 
 def _build_space(examples: Sequence[Example]) -> Space:
     """Build the space from the windows of all clips, evenly thinned where they are too many."""
-    sides = [side for one in examples for side in (one.signals, one.signals.mirrored)]
+    sides = [side for one in examples for side in (one.signals, one.signals.mirror_signals)]
     step = max(1, -(-sum(map(len, sides)) // _MAX_WINDOWS))
     return Space.from_windows(np.concatenate([build_windows(side)[::step] for side in sides]), _COMPONENTS)
 
@@ -130,7 +130,7 @@ def _build_sides(example: Example, space: Space) -> list[_Side]:
     return [
         _Side(example=example, rows=project_signals(example.signals, space), seconds=fps, labels=words,
               rule_proposals=ruled, is_mirrored=False),
-        _Side(example=example, rows=project_signals(example.signals.mirrored, space), seconds=fps,
+        _Side(example=example, rows=project_signals(example.signals.mirror_signals, space), seconds=fps,
               labels=tuple(map(swap_sides, words)), rule_proposals=other, is_mirrored=True),
     ]
 

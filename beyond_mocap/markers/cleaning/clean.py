@@ -367,7 +367,7 @@ def _find_strayed(work):
 
 def _build_result(work):
     """Build the cleaned trial and its report."""
-    trial, seen = work.trial, work.trial.seen
+    trial, seen = work.trial, work.trial.visibility
     share = {label: float(seen[:, i].mean()) if len(trial) else 0.0 for i, label in enumerate(trial.labels)}
     remaining = [i for i in range(len(trial.labels)) if i not in work.unlabeled or work.is_visible(i)]
     cleaned = trial.with_positions(work.positions).select_markers([trial.labels[i] for i in remaining])

@@ -356,7 +356,7 @@ def format_trc(trial: MarkerTrial, name: str = "") -> str:
             "\t\t" + "\t".join(f"X{i}\tY{i}\tZ{i}" for i in range(1, count + 1)), ""]
     places = 1000.0 * trial.positions[..., [0, 2, 1]] * np.array([1.0, 1.0, -1.0])
     rows = [f"{i}\t{seconds:.7f}\t{_format_row(frame, seen)}"
-            for i, (seconds, frame, seen) in enumerate(zip(trial.seconds, places, trial.seen), 1)]  # fmt: skip
+            for i, (seconds, frame, seen) in enumerate(zip(trial.seconds, places, trial.visibility), 1)]  # fmt: skip
     return "\n".join([*head, *rows, ""])
 
 

@@ -177,7 +177,7 @@ def find_stillest_frames(trial: MarkerTrial, seconds: float = 2.0) -> tuple[int,
     if len(trial) > step:
         speed = np.linalg.norm(positions[step:] - positions[:-step], axis=-1) * trial.fps / step
         moved[: len(speed)] = compute_quantile(speed, 0.5, axis=1)
-    seen = trial.seen.sum(axis=1)
+    seen = trial.visibility.sum(axis=1)
     starts = np.unique(np.linspace(0, len(trial) - length, 24).astype(int))
     scores = [(-round(float(seen[a : a + length].mean())), float(compute_medians(moved[a : a + length])))
               for a in starts]

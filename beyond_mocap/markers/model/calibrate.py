@@ -60,13 +60,13 @@ def add_late_markers(model: MarkerModel, marker_set: MarkerSet, trial: MarkerTri
     Returns:
         The extended model, or the model itself.
     """
-    seen = dict(zip(trial.labels, trial.seen.sum(axis=0)))
+    seen = dict(zip(trial.labels, trial.visibility.sum(axis=0)))
     late = [label for label in marker_set.labels
             if label not in model.markers and seen.get(label, 0) >= _MIN_LATE_FRAMES
             and marker_set.find_segment(label) in model.skeleton.names]
     if not late:
         return model
-    visible_counts = trial.seen[:, [trial.index_of(label) for label in late]].sum(axis=1)
+    visible_counts = trial.visibility[:, [trial.index_of(label) for label in late]].sum(axis=1)
     frames = np.sort(np.argsort(-visible_counts, kind="stable")[: 4 * _LATE_MARKER_FRAMES])
     frames = frames[np.unique(np.linspace(0, len(frames) - 1, _LATE_MARKER_FRAMES).astype(int))]
     part = MarkerTrial(labels=trial.labels, positions=trial.positions[frames], fps=1.0, name=trial.name)
@@ -151,7 +151,7 @@ def select_diverse_frames(trial: MarkerTrial, root: np.ndarray, count: int) -> n
         Frame indices, ascending.
     """
     frames = np.unique(np.linspace(0, len(trial) - 1, min(len(trial), _CANDIDATES)).astype(int))
-    visible_counts = trial.seen[frames].sum(axis=1)
+    visible_counts = trial.visibility[frames].sum(axis=1)
     frames = frames[visible_counts >= 0.67 * visible_counts.max()]
     if len(frames) <= count:
         return frames
@@ -209,7 +209,7 @@ def calibrate(marker_set: MarkerSet, trial: MarkerTrial, static: MarkerTrial | N
 def _describe_left_out(model: MarkerModel, marker_set: MarkerSet, trial: MarkerTrial) -> list[str]:
     """Describe which markers of the set are not on the model, and why."""
     absent = sorted(set(marker_set.labels) - set(model.markers) - marker_set.optional - marker_set.static)
-    visible = {label for label, seen in zip(trial.labels, trial.seen.any(axis=0)) if seen}
+    visible = {label for label, seen in zip(trial.labels, trial.visibility.any(axis=0)) if seen}
     nowhere = [label for label in absent if label not in visible]
     loose = [label for label in absent if label in visible]
     lines = [f"never visible, so not on the model: {', '.join(nowhere)}"] if nowhere else []

@@ -86,14 +86,14 @@ class MarkerSet:
         return tuple(label for group in self.segments.values() for label in group)
 
     @property
-    def required(self) -> frozenset[str]:
+    def required_markers(self) -> frozenset[str]:
         """Markers that every trial of this set must contain."""
         return frozenset(self.labels) - self.static - self.optional
 
     def list_missing(self, labels: Sequence[str]) -> tuple[str, ...]:
         """List the required markers that are not among `labels`, in the set's order."""
         present = {self.map_labels(labels).get(label, label) for label in labels}
-        return tuple(label for label in self.labels if label in self.required and label not in present)
+        return tuple(label for label in self.labels if label in self.required_markers and label not in present)
 
     def find_segment(self, label: str) -> str | None:
         """Find the joint that carries a marker; None where it lies on no segment."""
@@ -140,7 +140,7 @@ def choose_marker_set(labels: Sequence[str], sets: Iterable[MarkerSet]) -> Marke
     sets = list(sets)
     labeled = [label for label in labels if not UNLABELED.match(label)]
     candidates = [(marker_set, _find_present(marker_set, labeled)) for marker_set in sets]
-    share = [len(present & s.required) / max(len(s.required), 1) for s, present in candidates]
+    share = [len(present & s.required_markers) / max(len(s.required_markers), 1) for s, present in candidates]
     matching = [(len(present), part, -len(s.labels), s) for (s, present), part in zip(candidates, share) if part
                 >= _MIN_SHARE]
     if matching:
@@ -148,7 +148,7 @@ def choose_marker_set(labels: Sequence[str], sets: Iterable[MarkerSet]) -> Marke
     if not sets:
         raise InputError("marker sets", "no marker sets", "at least one")
     nearest, present = candidates[share.index(max(share))]
-    missing = sorted(nearest.required - present)
+    missing = sorted(nearest.required_markers - present)
     unknown = sorted(set(labeled) - set(nearest.map_labels(labeled)) - set(nearest.labels))
     raise InputError(
         "markers", f"no marker set fits; nearest is {nearest.name}, of which "

@@ -226,7 +226,7 @@ def _check_hand_speed(hand: Hand, name: str) -> None:
 def _check_same_place(trial: MarkerTrial, motion: Motion) -> None:
     """Raise InputError if the markers are elsewhere than the motion's body."""
     places, _ = forward_kinematics(motion)
-    often = trial.seen.mean(axis=0) > 0.5
+    often = trial.visibility.mean(axis=0) > 0.5
     markers = trial.positions[:, often]
     if not often.any():
         return
@@ -306,7 +306,7 @@ def _find_ball_label(trial: MarkerTrial, requested: str | None) -> str | None:
     candidates = [label for label in trial.labels if _BALL_LABEL.match(label)]
     if requested == "" or not candidates:
         return None
-    return max(candidates, key=lambda label: np.count_nonzero(trial.seen[:, trial.index_of(label)]))
+    return max(candidates, key=lambda label: np.count_nonzero(trial.visibility[:, trial.index_of(label)]))
 
 
 def _choose_hand(hands: list[Hand], marker: np.ndarray | None) -> Hand:

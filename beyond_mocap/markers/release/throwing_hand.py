@@ -99,7 +99,7 @@ def _find_vertical_shift(hand: Hand, trial: MarkerTrial, excluded: tuple[str, ..
 
     With the right shift, the distances of the hand's own markers from the wrist do not change over time.
     """
-    is_frequent = np.count_nonzero(trial.seen[:: max(len(trial) // 300, 1)], axis=0) > 2
+    is_frequent = np.count_nonzero(trial.visibility[:: max(len(trial) // 300, 1)], axis=0) > 2
     candidates = [number for number, label in enumerate(trial.labels) if label not in excluded and is_frequent[number]]
     few = trial.positions[:: max(len(trial) // 300, 1), candidates]
     if not candidates:

@@ -319,7 +319,7 @@ def _build_report(track: Track, notes: list[str], snaps: tuple[float, ...], drop
 
 def _find_gaps(track: Track) -> tuple[tuple[float, float], ...]:
     """Find (start, end) seconds wherever measured samples are more than three intervals apart."""
-    times = track.times[track.measured]
+    times = track.times[track.is_measured]
     wide = np.flatnonzero(np.diff(times) > GAP_INTERVALS * track.interval + 1e-9)
     return tuple((float(times[i]), float(times[i + 1])) for i in wide)
 

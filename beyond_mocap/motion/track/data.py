@@ -65,7 +65,7 @@ class Track:
         return len(self.times)
 
     @property
-    def measured(self) -> np.ndarray:
+    def is_measured(self) -> np.ndarray:
         """(N,) bool: valid positions that the feed itself has."""
         return ~(self.filled | self.outlier) & np.isfinite(self.positions).all(axis=1)
 

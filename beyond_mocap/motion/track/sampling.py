@@ -44,7 +44,7 @@ def sample_track(track: Track, fps: float, window: float = SMOOTHING_SECONDS) ->
     times, fine_times, step = _build_time_grids(track, fps)
     positions = smooth_positions(interpolate_columns(fine_times, track.times, track.positions), fps * step,
                                  window)[::step]
-    measured = track.measured
+    measured = track.is_measured
     velocity = np.broadcast_to((positions[-1] - positions[0]) * fps, positions.shape)  # of one or two frames
     if len(times) > 2:
         velocity = np.gradient(positions, 1.0 / fps, axis=0, edge_order=2)
@@ -142,8 +142,8 @@ def _build_time_grids(track: Track, fps: float) -> tuple[np.ndarray, np.ndarray,
     """
     if not 1.0 <= fps <= 480.0:
         raise InputError("fps", f"{fps}", "1 to 480 frames per second")
-    if np.count_nonzero(track.measured) < 2 or not np.all(np.diff(track.times) > 0):
-        raise InputError(track.name, f"{np.count_nonzero(track.measured)} usable samples", "two or more, cleaned")
+    if np.count_nonzero(track.is_measured) < 2 or not np.all(np.diff(track.times) > 0):
+        raise InputError(track.name, f"{np.count_nonzero(track.is_measured)} usable samples", "two or more, cleaned")
     duration = track.times[-1] - track.times[0]
     if duration > _MAX_SECONDS:
         raise InputError(track.name, f"{duration:.0f} s", "at most six hours", "cut the track")

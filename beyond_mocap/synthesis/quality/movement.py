@@ -47,7 +47,7 @@ def interpolate_track(track: Track, at: np.ndarray) -> np.ndarray:
     Returns:
         (T, 2) m, NaN where no sample is measured.
     """
-    known = track.measured
+    known = track.is_measured
     if not known.any():
         return np.full((len(at), 2), np.nan)
     return interpolate_columns(at, track.times[known], track.positions[known])

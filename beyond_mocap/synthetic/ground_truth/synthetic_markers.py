@@ -183,7 +183,7 @@ class Faults:
         self.trial = trial
         self.labels = list(trial.labels)
         self.positions = trial.positions.copy()
-        self.is_free = trial.seen.copy()
+        self.is_free = trial.visibility.copy()
         self.rng = np.random.default_rng(seed)
         self.added: list[Fault] = []
 

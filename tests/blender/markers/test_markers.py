@@ -82,7 +82,7 @@ def test_it_gives_the_recording_back(cloud, trial, scale):
     back = cloud.read_trial(thing, bpy.context.scene)
     assert back.labels == trial.labels and back.fps == trial.fps and back.start == trial.start
     assert [(event.label, event.side) for event in back.events] == [("Foot Strike", "left")]
-    assert (back.seen == trial.seen).all() and back.subject == "Ann" and back.name == "walk"
+    assert (back.visibility == trial.visibility).all() and back.subject == "Ann" and back.name == "walk"
     assert np.nanmax(np.abs(back.positions - trial.positions)) < 1e-6
     thing.beyond_mocap_cloud.labels[3].name = "LANK"
     assert cloud.read_trial(thing, bpy.context.scene).labels[3] == "LANK"

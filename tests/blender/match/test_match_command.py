@@ -39,7 +39,9 @@ def test_everybody_comes_out_as_one_file(run, order, tmp_path, capfd):
     assert "Traceback" not in capfd.readouterr().err
 
 
-@pytest.mark.parametrize("name, told", [("match.xyz", ".xyz"), ("nowhere/match.blend", "folder"), ("match", "file type ''")])
+@pytest.mark.parametrize("name, told", [
+    ("match.xyz", ".xyz"), ("nowhere/match.blend", "folder"), ("match", "file type ''"),
+])
 def test_a_wrong_name_is_told_before_work_begins(run, order, tmp_path, capfd, name, told):
     assert run([*order, "--out", str(tmp_path / "made"), "--scene", str(tmp_path / name)]) == 2
     error = capfd.readouterr().err.strip()

@@ -109,11 +109,11 @@ def test_why_is_told_for_the_piece_at_the_playhead(prepared, shown, room):
     for piece in prepared.pieces[:3]:
         scene.frame_set(int(np.ceil(1 + piece.start * scene.render.fps)) + 1)
         store.update_reasons(scene)
-        assert bpy.context.window_manager.beyond_mocap_playhead.draw_reasons.splitlines()[0] == piece.name
+        assert bpy.context.window_manager.beyond_mocap_playhead.why.splitlines()[0] == piece.name
     assert any(line.startswith("cost ") for line in prepared.pieces[0].lines)
     scene.frame_set(-500)
     store.update_reasons(scene)
-    assert bpy.context.window_manager.beyond_mocap_playhead.draw_reasons == ""
+    assert bpy.context.window_manager.beyond_mocap_playhead.why == ""
 
 
 @pytest.mark.parametrize("method", ["distance", "blocks"])

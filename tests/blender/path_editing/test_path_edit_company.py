@@ -26,7 +26,8 @@ def ride(body, part, scale=1.3):
     assert bpy.ops.beyond_mocap.edit_path() == {"FINISHED"}
     body.beyond_mocap_ride.curve.scale = (scale, scale, 1.0)
     bpy.context.view_layer.update()
-    assert part("path_editing.live").update_all(bpy.context.scene) == 1 and "Error" not in body.beyond_mocap_ride.messages
+    assert part("path_editing.live").update_all(bpy.context.scene) == 1
+    assert "Error" not in body.beyond_mocap_ride.messages
 
 
 @pytest.mark.parametrize("form", ["PREVIEW", "ACTION", "STRIPS"])

@@ -303,7 +303,9 @@ def test_what_a_body_carries_goes_along_and_what_lies_stays(part, recorded):
     hips = shown(rig, frames, ["Hips"])[:, 0, :3, 3]
     rest = np.array(rig.data.bones["sword"].matrix_local.to_3x3())
     for index, values in enumerate(((hips - hips[0]) @ rest).T):
-        path_edit_rigs.add_keys(rig, path_edit_rigs.build_bone_path("sword", "location"), index, frames, values, "sword")
+        path_edit_rigs.add_keys(
+            rig, path_edit_rigs.build_bone_path("sword", "location"), index, frames, values, "sword"
+        )
     was = shown(rig, frames[::STEP], ["Hips", "sword", "bag"])
     stone = shown(rig, [5, 40], ["stone"])
     bend(scene, start(rig, plant=False, lean=False), part)
@@ -331,8 +333,10 @@ def test_muted_curves_stay_muted_and_half_frames_other_slots_and_drivers_are_kep
     action, slot = channels.find_playing_action(rig)
     other = action.slots.new(id_type="OBJECT", name="Other")
     channels.add_curve(action, other, "location", 0, "").keyframe_points.insert(1, 5.0)
-    path_edit_rigs.add_keys(rig, path_edit_rigs.build_bone_path("spine_01", "location"), 1, [5, 40], [0.0, 5.0]).mute = True
-    path_edit_rigs.add_keys(rig, path_edit_rigs.build_bone_path("head", "rotation_euler"), 1, [5.5, 20.25, 33.3], [0.0, 0.5, 0.0])
+    spine = path_edit_rigs.build_bone_path("spine_01", "location")
+    head = path_edit_rigs.build_bone_path("head", "rotation_euler")
+    path_edit_rigs.add_keys(rig, spine, 1, [5, 40], [0.0, 5.0]).mute = True
+    path_edit_rigs.add_keys(rig, head, 1, [5.5, 20.25, 33.3], [0.0, 0.5, 0.0])
     rig.pose.bones["head"].rotation_mode = "XYZ"
     driver = rig.driver_add('pose.bones["neck_01"].rotation_euler', 0).driver
     driver.type, driver.expression = "SCRIPTED", "0.2"

@@ -180,7 +180,7 @@ def test_short_recordings_bring_no_trouble(known):
 
 def test_windows_of_the_mirrored_body_are_those_of_mirrored_signals():
     motion = build_volley("attack", build_adult_skeleton(1.75), seed=1).motion
-    one, other = build_windows(build_signals(motion).mirrored), build_windows(build_signals(mirror(motion)))
+    one, other = build_windows(build_signals(motion).mirror_signals), build_windows(build_signals(mirror(motion)))
     assert one.shape == other.shape == (len(build_signals(motion)), LENGTH)
     assert np.allclose(one, other, atol=1e-6)
 

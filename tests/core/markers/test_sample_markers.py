@@ -29,5 +29,5 @@ def test_throw_is_read_as_it_was_planted():
     first = int(known.ball.request.release * known.trial.fps) - 230
     truth = known.trial.select_frames(first, first + len(trial))
     assert trial.labels == truth.labels
-    np.testing.assert_array_equal(trial.seen, truth.seen)
+    np.testing.assert_array_equal(trial.visibility, truth.visibility)
     np.testing.assert_allclose(trial.positions, truth.positions, atol=1e-6)

@@ -28,7 +28,7 @@ def test_a_trial_keeps_copies_that_cannot_be_changed():
 
 def test_what_is_seen_and_when():
     one = trial()
-    assert one.seen.sum() == 14 and not one.seen[2, 1]
+    assert one.visibility.sum() == 14 and not one.visibility[2, 1]
     np.testing.assert_allclose(one.seconds, [2, 2.1, 2.2, 2.3, 2.4])
     assert one.duration == pytest.approx(0.4)
     assert [event.label for event in one.events] == ["early", "late"]

@@ -22,7 +22,7 @@ def planted(speed: float, fps: float, seconds: float = 5.0) -> np.ndarray:
     """When the made gait's feet stand: (T, 2)."""
     neutral = build_neutral_stance(build_adult_skeleton())
     course = plan_gait(speed, seconds, fps, neutral)
-    times = course.times[course.requested]
+    times = course.times[course.requested_slice]
     return np.stack([plan_footsteps(course, neutral, GaitStyle(), side).is_in_contact(times) for side in (0, 1)],
                     axis=1)
 

@@ -37,7 +37,7 @@ def standing_toes(motion: Motion, speed, **way) -> np.ndarray:
     """Speeds (N,) m/s over the ground of toe joints in the middle of their foot's stance, both feet together."""
     neutral = build_neutral_stance(motion.skeleton)
     course = plan_gait(speed, None if np.ndim(speed) else motion.duration, motion.fps, neutral, **way)
-    times = course.times[course.requested]
+    times = course.times[course.requested_slice]
     places, _ = forward_kinematics(motion)
     body = identify_joints(motion.skeleton)
     found = []
@@ -91,7 +91,7 @@ def test_knees_bend_as_in_the_books():
 def test_cadence(speed, steps_per_minute):
     neutral = build_neutral_stance(build_adult_skeleton())
     course = plan_gait(speed, 10.0, FPS, neutral, style=GaitStyle(life=0.0))
-    asked = course.phase[course.requested]
+    asked = course.phase[course.requested_slice]
     assert steps_per_minute[0] < 2 * 60 * (asked[-1] - asked[0]) / 10.0 < steps_per_minute[1]
 
 
@@ -99,7 +99,7 @@ def test_walking_has_double_support_and_running_flies():
     neutral = build_neutral_stance(build_adult_skeleton())
     for speed, both, none in ((1.4, True, False), (3.5, False, True)):
         course = plan_gait(speed, 6.0, FPS, neutral)
-        down = [plan_footsteps(course, neutral, GaitStyle(), side).is_in_contact(course.times[course.requested])
+        down = [plan_footsteps(course, neutral, GaitStyle(), side).is_in_contact(course.times[course.requested_slice])
                 for side in (0, 1)]
         assert np.any(down[0] & down[1]) == both and np.any(~down[0] & ~down[1]) == none
 

@@ -116,7 +116,7 @@ def test_same_seed_same_trial(walk):
 
 def test_static_stands_upright_with_all_markers(known):
     at = dict(zip(known.static.labels, known.static.positions.mean(axis=0)))
-    assert known.static.seen.all()
+    assert known.static.visibility.all()
     assert at["LSHO"][1] > at["RSHO"][1] and at["LTOE"][0] > at["LHEE"][0] + 0.1
     assert 0.0 < at["LTOE"][2] < 0.08 and abs(at["C7"][2] - at["LSHO"][2]) < 0.06 and at["LFHD"][2] > at["C7"][2] + 0.15
 
@@ -169,7 +169,7 @@ class TestBall:
 
     def test_is_seen_for_a_while(self, thrown):
         made, known = thrown
-        seen = known.trial.seen[:, known.trial.index_of("BALL")]
+        seen = known.trial.visibility[:, known.trial.index_of("BALL")]
         assert seen[: int((made.release + 0.29) * 240)].all() and not seen[int((made.release + 0.32) * 240) :].any()
 
     def test_air_slows_it(self, thrown):

@@ -48,7 +48,7 @@ def test_a_kick_hits_another_target(lies):
     start = compute_launch(made.motion, AtFoot("right"), frame, target, FOOTBALL)[0]
     target = start + [9.0, 0.6, 0.5]
     part = AtFoot("right", start if lies else None)
-    found = correct_motion(made.motion, part, frame, target, FOOTBALL, Freedom.anchored())
+    found = correct_motion(made.motion, part, frame, target, FOOTBALL, Freedom.build_anchored())
     flight = simulate_flight(Launch(0.0, found.position, found.velocity, found.spin), FOOTBALL, 3.0)
     assert np.linalg.norm(find_crossing(flight, target) - target) < 0.02 and found.displacement < 0.10
     if lies:

@@ -19,7 +19,7 @@ def impact(found, target):
     return float(np.linalg.norm(find_crossing(flight, target) - target))
 
 
-@pytest.mark.parametrize("freedom", [Freedom(), Freedom.anchored()])
+@pytest.mark.parametrize("freedom", [Freedom(), Freedom.build_anchored()])
 @pytest.mark.parametrize("speed, arm, aside", [(15.0, "right", (0.2, -0.6, 0.3)), (24.0, "left", (0.5, 0.5, -0.4))])
 def test_hits_another_target(freedom, speed, arm, aside):
     made = build_throw((0.8 * speed, 0.0, 1.2), speed, arm, fps=30.0)
@@ -35,7 +35,7 @@ def test_the_ball_is_where_the_hand_is_and_as_fast():
     made = build_throw((16.0, 0.0, 1.2), 20.0, fps=30.0)
     part = InHand("right", made.grip)
     found = correct_motion(made.motion, part, made.release * 30.0, np.array([16.0, 0.8, 1.0]), BASEBALL,
-                           Freedom.anchored())
+                           Freedom.build_anchored())
     near = found.frame + np.array([-1e-3, 0.0, 1e-3])
     ball = sample_points(found.motion, part, near)[:, 0]
     assert np.allclose(ball[1], found.position, atol=1e-9)
@@ -46,7 +46,7 @@ def test_only_the_arm_near_the_release_is_changed():
     made = build_throw((16.0, 0.0, 1.2), 20.0, fps=30.0)
     found = correct_motion(
         made.motion, InHand("right", made.grip), made.release * 30.0, np.array([16.0, 0.8, 1.0]), BASEBALL,
-        Freedom.anchored(),
+        Freedom.build_anchored(),
     )  # fmt: skip
     changed = np.argwhere(np.any(found.motion.rotations != made.motion.rotations, axis=2))
     arm = identify_joints(made.motion.skeleton).right
@@ -97,7 +97,7 @@ def test_a_joint_that_may_not_turn_further_does_not_and_the_ball_hits_all_the_sa
         return np.concatenate([rotations[:, :2], given[:, 2:]], axis=1)
 
     free, held = (
-        correct_motion(made.motion, part, made.release * 30.0, target, BASEBALL, Freedom.anchored(), None, hold)
+        correct_motion(made.motion, part, made.release * 30.0, target, BASEBALL, Freedom.build_anchored(), None, hold)
         for hold in (None, stiff)
     )
     assert np.any(free.motion.rotations[:, arm.hand] != made.motion.rotations[:, arm.hand])

@@ -80,12 +80,12 @@ def test_residuals_are_metres_and_only_where_seen(body, read):
 def test_zeros_and_no_numbers_are_not_seen(body, read):
     body.positions[3, 0] = 0.0
     data = bytearray(body.c3d(body.positions, body.labels))
-    assert not read(bytes(data)).seen[3, 0]
+    assert not read(bytes(data)).visibility[3, 0]
     start = 512 * (struct.unpack_from("<H", data, 16)[0] - 1)
     struct.pack_into("<f", data, start + 16, float("nan"))
     struct.pack_into("<f", data, start + 32, 1e38)
     trial = read(bytes(data))
-    assert not trial.seen[0, 1] and not trial.seen[0, 2] and trial.seen[0, 3]
+    assert not trial.visibility[0, 1] and not trial.visibility[0, 2] and trial.visibility[0, 3]
     assert any("farther than" in note for note in trial.notes)
 
 
@@ -328,7 +328,7 @@ def test_any_damage_is_read_or_reported(body, read, changes, kind):
     except InputError as error:
         assert "\n" not in str(error) and len(str(error)) < 600
     else:
-        assert np.isfinite(trial.positions[trial.seen]).all()
+        assert np.isfinite(trial.positions[trial.visibility]).all()
 
 
 def test_without_the_package_one_line_is_said(body, read, monkeypatch):

@@ -37,7 +37,7 @@ def same(trial, body, atol=1e-7):
 
 def test_a_tidy_file(body, lines, read):
     trial = read(lines)
-    assert same(trial, body) and trial.start == 0 and not trial.seen[5, body.index("LKNE")]
+    assert same(trial, body) and trial.start == 0 and not trial.visibility[5, body.index("LKNE")]
     assert trial.notes == ("unit mm", "Y is up, heads above feet")
 
 
@@ -111,7 +111,7 @@ def test_more_markers_than_said_are_reported(body, lines, read):
 
 def test_frames_that_are_left_out_come_back_as_not_seen(body, lines, read):
     trial = read(lines[:10] + lines[13:])
-    assert len(trial) == 12 and not trial.seen[4:7].any() and trial.seen[7:].all()
+    assert len(trial) == 12 and not trial.visibility[4:7].any() and trial.visibility[7:].all()
     assert "3 frames missing in the times, added as not visible" in trial.notes
 
 
@@ -201,4 +201,4 @@ def test_any_damage_is_read_or_reported(lines, read, changes):
     except InputError as error:
         assert "\n" not in str(error)
     else:
-        assert np.isfinite(trial.positions[trial.seen]).all()
+        assert np.isfinite(trial.positions[trial.visibility]).all()
