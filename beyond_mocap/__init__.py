@@ -1,8 +1,8 @@
 """Beyond Mocap's core: full-body animation from tracking data, a folder of motion capture and a few labels.
 
-There is one folder per feature over a small shared base; docs/explanation/architecture.md describes each folder and which folders
-it may import. The main sequence is `files` and `library` (input), `synthesis` (plan, resolve, search, construct) and
-`evaluation` (output).
+There is one folder per feature over a small shared base; docs/explanation/architecture.md describes each folder and
+which folders it may import. The main sequence is `files` and `library` (input), `synthesis` (plan, resolve, search,
+construct) and `evaluation` (output).
 
 Units and frames inside the core: metres, seconds, radians; Z up, X forward along the pitch's length, Y to its left;
 quaternions (w, x, y, z), unit and sign-continuous; arrays (frame, joint, component) with free leading axes.

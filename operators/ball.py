@@ -309,10 +309,10 @@ them"""
         player = find_active_player(context.scene.beyond_mocap)
         if self.active and player is None:
             raise InputError("player", "none in the list", "a player", "import tracking in step 2")
-        count, told = tracked.accept_touches(context, player.name if self.active else "")
-        if not count and not told:
+        count, messages = tracked.accept_touches(context, player.name if self.active else "")
+        if not count and not messages:
             raise InputError("touches", "none selected with labels and a player of the list", "at least one",
                              "select some in the list")
-        for line in told[:5]:
+        for line in messages[:5]:
             self.report({"INFO"}, line)
         self.report({"INFO"}, f"{count} key moments added")

@@ -24,8 +24,8 @@ LABELS_HEAD = """# Labels
 *For all who annotate clips or matches: every label of the vocabulary. This page is generated from
 `beyond_mocap/annotation/vocabulary.csv` by `make tables`.*
 
-A text file has the short form, panels show the name. How labels combine is [explained here](../explanation/labels.md); how
-they are written is in [the text form](annotation-text.md). A library may add labels of its own.
+A text file has the short form, panels show the name. How labels combine is [explained here](../explanation/labels.md);
+how they are written is in [the text form](annotation-text.md). A library may add labels of its own.
 """
 KINDS = {
     "continuous": ("Stretches", "What a player does for a while."),

@@ -21,7 +21,8 @@ import time
 HERE = pathlib.Path(__file__).resolve().parent
 TILES = (4, 2)  # across, down
 TILE = (480, 270)  # pixels
-FILM_SECONDS, FILM_FPS = 4.8, 12.5  # the moving picture: long enough for a kick and what follows, small enough for a page
+# the moving picture: long enough for a kick and what follows, small enough for a page
+FILM_SECONDS, FILM_FPS = 4.8, 12.5
 
 
 def load_extension():
@@ -226,7 +227,8 @@ def render_film(bpy, load, take, out: pathlib.Path, steps) -> None:
             scene.render.filepath = str(pathlib.Path(folder, f"{number}.png"))
             bpy.ops.render.render(write_still=True)
             pictures.append(Image.open(scene.render.filepath).convert("RGB"))
-    pictures[0].save(out, save_all=True, append_images=pictures[1:], duration=round(1000 / FILM_FPS), loop=0, quality=70)
+    pictures[0].save(out, save_all=True, append_images=pictures[1:], duration=round(1000 / FILM_FPS), loop=0,
+                     quality=70)
 
 
 def follow_player(camera, take, seconds: float) -> None:

@@ -1,7 +1,7 @@
 """The Blender side: turns the core's motions, tracks and clips into data of a .blend file. It contains no buttons.
 
-There is one package for each feature, described in its own docstring; docs/explanation/architecture.md has an overview. All use
-`core`: channels, clock, background work, settings, registration, and the one live watcher.
+There is one package for each feature, described in its own docstring; docs/explanation/architecture.md has an overview.
+All use `core`: channels, clock, background work, settings, registration, and the one live watcher.
 """
 
 from .core import registration, session

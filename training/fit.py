@@ -127,7 +127,7 @@ def fit(
         cancelled: returns True to stop.
     Raises:
         InputError: if no example is long enough, the checkpoint is of another training, or the loss is not finite.
-        Cancelled: if `cancelled` returns True.
+        UserCancelledError: if `cancelled` returns True.
     """
     adam = optax.chain(_build_clipping(), optax.scale_by_adam())
     params = problem.build_parameters(jax.random.key(config.seed))

@@ -166,7 +166,7 @@ class TrainingProblem:
         return self.config.rollout if conditioned and share >= self.config.single_frames else 0
 
     def fit_linear(self, ridge: float, use_held_out: bool = True) -> dict[str, LinearOutput]:
-        """Fit the linear outputs by name that networks start from; whole: also use the examples that are held out."""
+        """Fit the linear outputs by name that networks start from; `use_held_out`: from all examples."""
         sums = {name: kept.add_sums(held) if use_held_out else kept for name, (kept, held) in self._sums.items()}
         return {name: fit_linear(one, ridge) for name, one in sums.items()}
 

@@ -131,7 +131,7 @@ def disturb_poses(chains: Chains, pose: Pose, vectors, facing, shift, xp=np) -> 
     about = to_rotations(facing[..., None] * np.array([0.0, 0.0, 1.0], dtype=pose.root.dtype), xp)
     local = xp.matmul(pose.local, to_rotations(vectors, xp))
     local = xp.concatenate([xp.matmul(about, local[..., 0, :, :])[..., None, :, :], local[..., 1:, :, :]],
-                                   axis=-3)
+                           axis=-3)
     root = hips + xp.matmul(about, (pose.root - hips)[..., None])[..., 0] + shift
     positions, turns = compute_world_transforms(skeleton.offsets.astype(pose.root.dtype), skeleton.parents, root, local,
                                                 xp)

@@ -62,7 +62,7 @@ def train(
         cancelled: returns True to stop.
     Raises:
         InputError: if there is no example, skeletons or rates differ, or the checkpoint is of another training.
-        Cancelled: if `cancelled` returns True.
+        UserCancelledError: if `cancelled` returns True.
     """
     _check_rates(examples, config)
     settings = config.settings

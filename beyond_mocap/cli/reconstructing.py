@@ -113,7 +113,8 @@ def _compare_up_axes(options, trial, static) -> list[str]:
                                for one in (trial, static))
     if trial_axes == static_axes:
         return []
-    return [f"{options.trial} and {options.static} have different up axes: {', '.join(sorted(trial_axes | static_axes))}; set --up"]
+    axes = ', '.join(sorted(trial_axes | static_axes))
+    return [f"{options.trial} and {options.static} have different up axes: {axes}; set --up"]
 
 
 def _show_lines(reporter: ProgressReporter, lines: list[str], report: Path | None) -> None:

@@ -184,4 +184,5 @@ def run_analyse(options, reporter: ProgressReporter, writers: Mapping[str, Write
     reporter.finish(analysis.notes)
     for finding in analysis.findings:
         verdict = "more natural" if finding.better else "not significantly more natural"
-        print(f"{finding.new} over {finding.old}: {verdict}, difference {finding.mean:+.2f}, one-sided {format_p(finding.holm_p)}")
+        print(f"{finding.new} over {finding.old}: {verdict}, difference {finding.mean:+.2f}, "
+              f"one-sided {format_p(finding.holm_p)}")

@@ -293,9 +293,12 @@ def measure_annotation_similarity(view: View) -> dict:
     offered = [] if view.library is None else view.library.keys
     available = [m for m in view.moments if select_keys(offered, m.requested.words)]
     return {  # means over the frames that count, as in Faustino Table 2
-        "all": _finite_mean(measure_similarity(requested, played.words)), "keys": _finite_mean(measure_similarity(key_requested, key_played)),
-        "had_keys": _finite_mean(measure_similarity([m.requested.words for m in available], [m.words for m in available])),
-        "eq18_all": _finite_mean(measure_similarity(requested, played.words, compute_eq18)), "eq18_keys": _finite_mean(measure_similarity(key_requested, key_played, compute_eq18)),
+        "all": _finite_mean(measure_similarity(requested, played.words)),
+        "keys": _finite_mean(measure_similarity(key_requested, key_played)),
+        "had_keys": _finite_mean(measure_similarity([m.requested.words for m in available],
+                                                    [m.words for m in available])),
+        "eq18_all": _finite_mean(measure_similarity(requested, played.words, compute_eq18)),
+        "eq18_keys": _finite_mean(measure_similarity(key_requested, key_played, compute_eq18)),
     }
 
 

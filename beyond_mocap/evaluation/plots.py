@@ -323,7 +323,7 @@ def _draw_time_axis(ax, view: View) -> None:
 def _draw_legend(ax, columns: int) -> None:
     """Draw the legend above the axes at the right, beside the title, where it covers no curve."""
     ax.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=columns, fontsize=8, frameon=False,
-                           borderpad=0.1)
+              borderpad=0.1)
 
 
 def _draw_title(ax, title: str, unit: str = "") -> None:

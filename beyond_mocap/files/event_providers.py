@@ -1,7 +1,7 @@
 """The providers of event data, one record each, and readers for tables that kloppy does not support.
 
-These are the project's own table (columns in docs/reference/match-input.md) and Metrica's. The second file of a provider's
-events is found here too.
+These are the project's own table (columns in docs/reference/match-input.md) and Metrica's. The second file of a
+provider's events is found here too.
 """
 
 from __future__ import annotations

@@ -96,13 +96,14 @@ def _assign_players(path: Path, rows: list[tuple[MatchEvent, EventPlayer | None]
                                  for who in event_players):  # nothing shows that it is another match
         ids = ", ".join([who.id for who in event_players if who not in known][:3])
         notes = [
-            f"{path.name}: {len(event_players) - len(known)} of {len(event_players)} players cannot be assigned, because the "
-            f"events have neither shirt numbers nor names, and the tracking has other ids than theirs ({ids} ...): "
-            "their events are ignored"
+            f"{path.name}: {len(event_players) - len(known)} of {len(event_players)} players cannot be assigned, "
+            f"because the events have neither shirt numbers nor names, and the tracking has other ids than theirs "
+            f"({ids} ...): their events are ignored"
         ]
     elif is_mostly_unknown:
         missing = ", ".join(who.display_name for who in event_players if who not in known)
-        found = f"{len(event_players) - len(known)} of {len(event_players)} players ({missing[:80]}) are not in the tracking"
+        found = (f"{len(event_players) - len(known)} of {len(event_players)} players ({missing[:80]}) are not in the "
+                 "tracking")
         raise InputError(path, found, "events of the same match, with ids, numbers or names", "check both files")
     out = []
     for event, who in rows:

@@ -20,7 +20,8 @@ from .model.model import MarkerModel
 from .trial import MarkerTrial, list_some
 
 _MIRRORED_BELOW = -0.5  # handedness below which a body is mirrored (-1: surely, +1: surely not)
-_DISTANCE_TOLERANCE = 0.012  # metres by which a distance may differ, in addition to half of its range in the trial itself
+# metres by which a distance may differ, in addition to half of its range in the trial itself
+_DISTANCE_TOLERANCE = 0.012
 # Shares of differing distances from which on the markers are those of another body, or some markers were moved.
 _OTHER_BODY_SHARE, _MOVED_SHARE = 0.25, 0.1
 _MAX_MISSING_SHARE = 0.3  # share of the trial's markers that a static may lack

@@ -35,7 +35,8 @@ from .skeleton import Skeleton
 
 _FLIPS = np.stack([np.diag(signs) for signs in ((-1.0, 1, 1), (1.0, -1, 1), (1.0, 1, -1), (-1.0, -1, -1))])
 _WORLD_MIRROR = _FLIPS[1]
-_PULL_WEIGHT = 1e-3  # weight of D_j against the bones: decides what bones leave open, and moves them by less than 0.01 degrees
+# weight of D_j against the bones: decides what bones leave open, and moves them by less than 0.01 degrees
+_PULL_WEIGHT = 1e-3
 _SYMMETRIC = 0.1  # squared misfit of the rest pose with its mirror image, over its bones' squared lengths
 _GEOMETRY_WEIGHT = 4.0
 _CHANGE_COST = 3.0  # lower cost that another D than the parent's needs to be chosen

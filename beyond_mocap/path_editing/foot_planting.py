@@ -47,7 +47,8 @@ _PELVIS_SECONDS, _STRIDE = 0.5, 0.5  # seconds; metres between the feet on stair
 _UP = np.array([0.0, 0.0, 1.0])
 _ROUNDS, _SLIDES_FROM = 2, 0.004  # rounds of holding stances less firmly; m of sliding that need none
 _FLOOR, _EVEN = 200.0, 0.003  # smoothness of a recorded floor: half of a half-second wave passes; metres
-_GOAL_TOLERANCE, _FIRMER_ROUNDS = 0.004, 8  # metres off its goal beyond which a foot in contact is held more firmly; rounds of that
+# metres off its goal beyond which a foot in contact is held more firmly; rounds of that
+_GOAL_TOLERANCE, _FIRMER_ROUNDS = 0.004, 8
 _MORE_BENT = 0.5  # share of its new bend from which on a leg's own direction counts fully
 _SPREAD_SECONDS = 0.1  # seconds by which a rise or drop is spread
 

@@ -126,8 +126,8 @@ def _describe_finding(finding: Finding, pairs: bool) -> Html:
     if not math.isfinite(finding.p):
         return build_element("p", f"Whether {claim} cannot be tested: too few raters, or no differences.")
     unit = "" if pairs else " points"
-    figures = (f"{finding.mean:+.2f}{unit} (95 %: {finding.low:+.2f} to {finding.high:+.2f}), t({finding.degrees}) = {finding.t:.2f}, "
-               f"one-sided {format_p(finding.holm_p)}")  # fmt: skip
+    figures = (f"{finding.mean:+.2f}{unit} (95 %: {finding.low:+.2f} to {finding.high:+.2f}), t({finding.degrees}) = "
+               f"{finding.t:.2f}, one-sided {format_p(finding.holm_p)}")  # fmt: skip
     if finding.better:
         return build_element("p", build_element("b", claim, class_="met"), f": {figures}.")
     return build_element("p", f"Not significant that {claim}: {figures}.")
@@ -138,9 +138,10 @@ def _build_findings(analysis: Analysis) -> Html:
         build_row(f"{one.new} over {one.old}", build_number_cell(len(one.differences)),
                   *(_build_cell(getattr(one, key), digits) for key, _, digits in _COLUMNS)) for one in analysis.findings
     ]  # fmt: skip
-    legend = (f"Difference: mean over raters with its 95 % interval. p: one-sided paired t-test by rater; Holm: adjusted "
-              f"for all hypotheses, at {ALPHA:g}. Wilcoxon: the same by ranks. Pooled: all answers as if each had a "
-              "rater of its own (Faustino §5.1.2). d: Cohen's d of raters' differences. delta: Cliff's.")  # fmt: skip
+    legend = (f"Difference: mean over raters with its 95 % interval. p: one-sided paired t-test by rater; Holm: "
+              f"adjusted for all hypotheses, at {ALPHA:g}. Wilcoxon: the same by ranks. Pooled: all answers as if each "
+              "had a rater of its own (Faustino §5.1.2). d: Cohen's d of raters' differences. "
+              "delta: Cliff's.")  # fmt: skip
     head = ("hypothesis", build_title("raters"), *(build_title(title) for _, title, _ in _COLUMNS))
     return join_html(build_table(head, rows), build_element("p", legend, class_="quiet"))
 
@@ -193,7 +194,7 @@ def draw_ratings(groups: Sequence[tuple[str, Sequence[Shares]]]) -> bytes:
     ax.axvline(0.0, color="#333333", lw=0.8)
     handles = [ax.barh([-9], [0.0], color=colour, label=text) for colour, text in zip(COLOURS, SCALE)]
     ax.legend(handles=handles, loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=5, fontsize=8,
-                           frameon=False)
+              frameon=False)
     return render_png(figure)
 
 

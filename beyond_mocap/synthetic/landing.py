@@ -43,7 +43,8 @@ _RATES = (11.0, 11.0, 7.0)  # per second: in the air, landing, turning over and 
 _GET_UP_RATE = 1.25  # playback rate: players get up faster than performers in a studio
 _LEAD_SECONDS = 0.4  # s before the hips rise at which a recording of getting up starts
 _RISE = 0.04  # m above their lowest height that the hips rise before getting up begins
-_SWAP_ACCELERATION, _SWAP_SECONDS = 1500.0, 0.12  # m/s^2 of swapped markers, and s before the end in which they are searched
+# m/s^2 of swapped markers, and s before the end in which they are searched
+_SWAP_ACCELERATION, _SWAP_SECONDS = 1500.0, 0.12
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)

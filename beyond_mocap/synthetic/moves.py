@@ -311,7 +311,8 @@ def build_get_up(
         wrists=np.radians(np.repeat(interpolate_rows(_UP["wrists"], times), 2, axis=1)), ankles=ankles, feet=feet,
         toes=np.zeros_like(posture.toes),
     )
-    return Gesture(to_motion(posture.frames(gait_plan.requested_slice), neutral), rest + 1.9, rest + 0.3, rest + _UP_TIME)
+    return Gesture(to_motion(posture.frames(gait_plan.requested_slice), neutral), rest + 1.9, rest + 0.3,
+                   rest + _UP_TIME)
 
 
 def build_celebration(duration: float = 6.0, skeleton: Skeleton | None = None, fps: float = 30.0,

@@ -254,7 +254,8 @@ def build_volley(
     if recipe.foot is not None:
         posture = _guide_foot(posture, recipe.foot, times, neutral)
     return Gesture(
-        to_motion(posture.frames(gait_plan.requested_slice), neutral), BEFORE, BEFORE + begin / speed, BEFORE + end / speed
+        to_motion(posture.frames(gait_plan.requested_slice), neutral), BEFORE, BEFORE + begin / speed, BEFORE + end
+        / speed
     )
 
 

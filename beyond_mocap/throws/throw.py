@@ -41,7 +41,8 @@ STATURE_RANGE = (0.1, 10.0)
 """Range of the stature, m, of a body that throws."""
 _MAX_SPEED_RATIO = 1.2  # highest speed that may be requested, relative to the fastest example
 _MIN_SPEED_RATIO = 1.04  # lowest planned speed, relative to the slowest launch that reaches the target
-_PREFERRED_SPEED_RATIO, _SPEED_TOLERANCE = 1.6, 0.3  # preferred speed relative to that launch, and log ratio of speeds that costs 1
+# preferred speed relative to that launch, and log ratio of speeds that costs 1
+_PREFERRED_SPEED_RATIO, _SPEED_TOLERANCE = 1.6, 0.3
 _CHECK_RATIO = 0.7  # share of the highest speed below which a target reached without air needs no exact check
 _MAX_EXTRA_ELEVATION = np.radians(35.0)  # elevation that may be requested beyond the steepest example
 _WARN_LIMIT_EXCESS = np.radians(2.0)  # excess over joint limits that is reported
@@ -396,7 +397,8 @@ class _ThrowGenerator:
         if correction.seconds <= 0.0 or correction.total_miss > _MAX_MISS:
             what = "the ball does not reach it"
         elif correction.displacement > _MAX_DISPLACEMENT:
-            what = f"it needs {'an ankle' if self.is_kick else 'a wrist'} moved by {100 * correction.displacement:.0f} cm"
+            joint = "an ankle" if self.is_kick else "a wrist"
+            what = f"it needs {joint} moved by {100 * correction.displacement:.0f} cm"
         else:
             return
         raise InputError("target", what, f"one that a {action} like the examples reaches",

@@ -39,7 +39,8 @@ from .throw_records import ACTIONS, TABLE_NAME, Action, KnownThrow, is_known, re
 
 _PAGE = "docs/reference/throw-examples.md"
 _MIN_LAUNCH_SPEED = 3.0  # m/s; slower balls were not thrown
-_FOOT_SPEED_RATIO = 1.2  # a ball's speed over the foot's: Kellis and Katis 2007, J. Sports Sci. Med. 6, 154-165 (1.06 to 1.3)
+# a ball's speed over the foot's: Kellis and Katis 2007, J. Sports Sci. Med. 6, 154-165 (1.06 to 1.3)
+_FOOT_SPEED_RATIO = 1.2
 _FLOOR_TOLERANCE = 0.03  # m, height of the lowest point up to which the floor counts as at 0
 _HALF_STEP = 0.001  # s before and after the release between which the ball's speed is measured on the joints' splines
 _MARGIN_SECONDS = 0.8  # s beyond an example's ends that are read too, for the networks' windows
@@ -97,8 +98,8 @@ def read_examples(
     if len(unannotated) == len(clips):
         raise _describe_missing(folder, action, clips, annotations)
     if unannotated:
-        report(f"{folder}: {len(unannotated)} of {len(clips)} recordings left out because no {action} is annotated in them, "
-               f"for example {unannotated[0]}")  # fmt: skip
+        report(f"{folder}: {len(unannotated)} of {len(clips)} recordings left out because no {action} is annotated in "
+               f"them, for example {unannotated[0]}")  # fmt: skip
     if not found:
         raise InputError(folder, f"every {action} in it is left out", "at least one readable example",
                          f"see the notes, and {_PAGE}")  # fmt: skip

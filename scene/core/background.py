@@ -18,7 +18,8 @@ Work = Callable[[Callable[[float, str], None], Callable[[], bool], Callable[[], 
 _newest: dict[str, "Job"] = {}
 _working_threads, _count_lock = [0], threading.Lock()
 _default_interval = sys.getswitchinterval()  # seconds for which a thread keeps the interpreter
-WORK_INTERVAL = 0.0005  # the same while work runs: Blender's drawing thread needs the interpreter a dozen times per redraw
+# the same while work runs: Blender's drawing thread needs the interpreter a dozen times per redraw
+WORK_INTERVAL = 0.0005
 
 
 class Job:

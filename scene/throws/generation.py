@@ -19,7 +19,8 @@ if TYPE_CHECKING:
 
 FOLLOW_SECONDS, MAX_FLIGHT_SECONDS = 3.0, 10.0
 """Seconds of the ball's flight shown beyond the target, bouncing and rolling, and the longest flight to the target."""
-_FIRST_ESTIMATE, _ROUNDS = 1.0, 5  # first estimate, s, of the flight to a moving target; largest number of corrections of it
+# first estimate, s, of the flight to a moving target; largest number of corrections of it
+_FIRST_ESTIMATE, _ROUNDS = 1.0, 5
 
 
 @dataclass(frozen=True, eq=False)
@@ -134,8 +135,8 @@ def _describe_timing(original: ThrowTask, order: ThrowTask, joined: "JoinedThrow
     if begins >= first:
         return []
     frame = round(order.at * order.fps) + first - begins
-    return [f"the {order.action} begins on frame {begins}, before the scene's first frame {first}: set Release Frame to "
-            f"{frame} or more to see all of it"]
+    return [f"the {order.action} begins on frame {begins}, before the scene's first frame {first}: set Release Frame "
+            f"to {frame} or more to see all of it"]
 
 
 def _trim_throw(order: ThrowTask, thrown: "ThrowResult", joined: bool) -> tuple["Motion", float]:

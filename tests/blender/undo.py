@@ -8,7 +8,8 @@ import numpy as np
 
 KINDS = ("objects", "armatures", "actions", "meshes", "curves", "materials", "cameras", "lights", "collections",
          "worlds", "texts")
-PROPERTY_PREFIX = "beyond_mocap"  # every group of properties that the extension hangs on Blender's data has a name that begins so
+# every group of properties that the extension hangs on Blender's data has a name that begins so
+PROPERTY_PREFIX = "beyond_mocap"
 
 
 def collect_state():

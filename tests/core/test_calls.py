@@ -7,7 +7,8 @@ import pytest
 
 ROOT = Path(__file__).parents[2]
 MOST = 5
-TAKE_ANY_NUMBER = {"_build_key_row", "_join_row", "build_page", "build_row", "scale_rows", "option_values", "pack", "zip"}
+TAKE_ANY_NUMBER = {"_build_key_row", "_join_row", "build_page", "build_row", "scale_rows", "option_values", "pack",
+                   "zip"}
 """Functions of any number of like parts, which have no names."""
 
 

@@ -1,4 +1,5 @@
-"""The program speaks the terms of the field (docs/glossary.md): no forbidden words, functions named by verb and object."""
+"""The program speaks the terms of the field (docs/glossary.md): no forbidden words, functions named by verb and
+object."""
 
 import ast
 import re
@@ -18,9 +19,9 @@ FORBIDDEN = {
 }
 """Word -> its pattern, and how often it may occur in product code and documents together."""
 PARTICIPLES = {
-    "begun", "bent", "bound", "built", "drawn", "drunk", "fed", "felt", "flown", "found", "given", "gone", "grown", "held",
-    "kept", "known", "laid", "led", "left", "lost", "made", "met", "put", "ridden", "risen", "said",
-    "seen", "sent", "shown", "spent", "spoken", "stood", "taken", "thrown", "told", "torn", "worn", "written",
+    "begun", "bent", "bound", "built", "drawn", "drunk", "fed", "felt", "flown", "found", "given", "gone", "grown",
+    "held", "kept", "known", "laid", "led", "left", "lost", "made", "met", "put", "ridden", "risen", "said", "seen",
+    "sent", "shown", "spent", "spoken", "stood", "taken", "thrown", "told", "torn", "worn", "written",
 }  # fmt: skip
 NOUNS = {"seed", "speed", "feed", "bed", "need"}
 """What ends like a participle and is none."""
@@ -84,8 +85,9 @@ def test_more_than_a_fifth_of_the_core_is_documentation():
 
 
 @pytest.mark.parametrize(("text", "word", "count"), [
-    ("the user is told", "told", 1), ("def told_lines():", "told", 1), ("untold", "told", 0), ("Anew and anew", "anew", 2),
-    ("nobody, Whoever", "nobody", 2), ("the help here", "he", 0), ("He runs his way", "he", 2), ("amended", "mend", 0),
+    ("the user is told", "told", 1), ("def told_lines():", "told", 1), ("untold", "told", 0),
+    ("Anew and anew", "anew", 2), ("nobody, Whoever", "nobody", 2), ("the help here", "he", 0),
+    ("He runs his way", "he", 2), ("amended", "mend", 0),
 ])
 def test_planted_words_are_counted(text, word, count):
     assert count_words(text, word) == count

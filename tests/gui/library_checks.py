@@ -128,8 +128,8 @@ def check_ten_thousand_files_do_not_freeze_the_window():
     panel.draw = drawn
     fold()
     spent.sort()
-    output.write_line(f"     drawn {len(spent)} times, {1000 * spent[len(spent) // 2]:.1f} ms in the median; longest wait "
-                      f"{longest:.2f} s")
+    output.write_line(f"     drawn {len(spent)} times, {1000 * spent[len(spent) // 2]:.1f} ms in the median; longest "
+                      f"wait {longest:.2f} s")
     assert get_clip_list().total == 10043
     report_time("the panel, s", spent[len(spent) // 2], 0.005)
     report_time("longest wait, s", longest, 3.0)

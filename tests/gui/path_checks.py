@@ -247,7 +247,8 @@ def check_the_body_follows_a_dragged_point():
                       f"{count / worked:.1f} a second "
                       f"of the main thread's work; without following this machine draws {free:.1f} moves a second")
     output.write_line(
-        f"     the body is {max(off):.3f} m off the curve at most; it went {np.linalg.norm(measure_pelvis() - before):.2f} m"
+        f"     the body is {max(off):.3f} m off the curve at most; "
+        f"it went {np.linalg.norm(measure_pelvis() - before):.2f} m"
     )
     assert np.linalg.norm(measure_pelvis() - before) > 0.2, "the body stayed where it was"
     assert max(off) < 0.15, off

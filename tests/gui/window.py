@@ -43,9 +43,9 @@ class Output:
 
 
 class ScanTask:
-    """What a scout has to do and what it reports. look(): the text of what is under the pointer; is_wanted(text): whether
-    to click it. `found`: text -> place, of all that was seen on the way; `clicked`: the text of what was; `back`:
-    whether it has come to the end."""
+    """What a scout has to do and what it reports. look(): the text of what is under the pointer; is_wanted(text):
+    whether to click it. `found`: text -> place, of all that was seen on the way; `clicked`: the text of what was;
+    `back`: whether it has come to the end."""
 
     def __init__(self, window, look, is_wanted):
         self.window, self.look, self.is_wanted = window, look, is_wanted
@@ -222,8 +222,8 @@ class Window:
         raise AssertionError("not found in the sidebar")
 
     def scan_region(self, area, region, what, is_wanted=lambda text: False):
-        """Move over all that the region shows, and click the first thing there that `is_wanted(text)` is true of. Return
-        what is there, its text -> where it is, and what was clicked: its text, or ""."""
+        """Move over all that the region shows, and click the first thing there that `is_wanted(text)` is true of.
+        Return what is there, its text -> where it is, and what was clicked: its text, or ""."""
         rows = range(region.y + region.height - 8, region.y + 4, -9)
         columns = [region.x + int(region.width * share) for share in (0.2, 0.3, 0.5, 0.6, 0.83)]
         yield 0.05

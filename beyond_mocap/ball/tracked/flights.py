@@ -65,7 +65,8 @@ def replace_by_flights(samples: Samples, pieces: list[BallPiece], moments: np.nd
 
 
 def _collect_stretches(samples: Samples, spans, heights: bool) -> Stretches:
-    return collect_stretches(samples.times, _mask_heights(samples, heights), samples.is_measured, samples.is_used, spans)
+    return collect_stretches(samples.times, _mask_heights(samples, heights), samples.is_measured, samples.is_used,
+                             spans)
 
 
 def _fit_flights(stretches: Stretches, spans, cancelled) -> tuple[list[BallPiece], list[tuple]]:

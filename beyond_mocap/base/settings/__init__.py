@@ -1,8 +1,8 @@
 """The table of all settings, one row each.
 
-Command-line options, Blender's properties, presets, limits, defaults and docs/reference/settings.md are generated from it. To add
-a setting, add a row here and the code that uses it. Not settings: files and objects that a command reads or writes,
-lists, and values that a panel only stores.
+Command-line options, Blender's properties, presets, limits, defaults and docs/reference/settings.md are generated from
+it. To add a setting, add a row here and the code that uses it. Not settings: files and objects that a command reads or
+writes, lists, and values that a panel only stores.
 """
 
 from __future__ import annotations

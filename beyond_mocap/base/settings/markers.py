@@ -42,7 +42,8 @@ TABLES = {
         Setting(name="weights", default=True, option="--no-weights", help="give all markers the same weight",
                 title="Weigh Markers", tooltip="Give markers less weight while their segment is deformed"),
         Setting(name="smoothness", default=0.0, least=0.0, most=0.2, unit="seconds", option="--smoothness",
-                help="solve the whole sequence as a smooth one: 0.02 for a walk, 0.004 for a throw; default %(default)g",
+                help="solve the whole sequence as a smooth one: 0.02 for a walk, 0.004 for a throw; "
+                "default %(default)g",
                 tooltip="Seconds over which the whole sequence is solved smoothly: 0.003 to 0.005 for throws, 0.02 "
                 "for noisy walks; 0 solves each frame separately", precision=3),
         Setting(name="radius", kind=float, least=0.005, most=0.5, unit="metres", option="--ball-radius",

@@ -72,8 +72,8 @@ TABLES = {
                 tooltip="Weight of the duration of each piece of the movement when two strikes are compared",
                 panel_more=dict(max=100.0)),
         Setting(name="bones", default="",
-                tooltip="Weights of single bones when two poses are compared, such as left foot 2, head 0.5; all others "
-                "are 1"),
+                tooltip="Weights of single bones when two poses are compared, such as left foot 2, head 0.5; all "
+                "others are 1"),
     ),
     "passes": (
         Setting(name="ball", default="paper", choices=BALLS, tooltip="Kind of ball"),

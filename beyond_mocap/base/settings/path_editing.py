@@ -32,8 +32,8 @@ TABLES = {
                 tooltip="Degree of the polynomial that is the original path", option_more=dict(default=None),
                 panel_more=dict(soft_max=60)),
         Setting(name="by_arc_length", default=True, option="--no-arc-length", help="by time: the whole motion "
-                "takes the whole path", title="Keep Speed", tooltip="Move along the path as fast as the original motion; "
-                "off: spread the whole motion over the whole path"),
+                "takes the whole path", title="Keep Speed", tooltip="Move along the path as fast as the original "
+                "motion; off: spread the whole motion over the whole path"),
         Setting(name="cycle", default=False, option="--cycle --loop", help="repeat the best loop of steps until "
                 "the path ends", tooltip="Repeat the best loop of steps until the path ends, with blended transitions"),
         Setting(name="end", default="stop", choices=ENDS, option="--end", help="what happens where the path is "
@@ -42,8 +42,8 @@ TABLES = {
         Setting(name="plant", default=True, option="--no-plant", help="do not plant the feet",
                 title="Plant Feet", tooltip="Hold feet in place while they are in contact in the original motion"),
         Setting(name="speed", default=1.0, least=0.05, most=20.0, expected="a number from {least} to {most}",
-                option="--speed", metavar="FACTOR", help="playback rate; default %(default)g", tooltip="Playback rate of "
-                "the motion: speed and tempo of the steps", option_more=dict(least=0.1, most=10.0),
+                option="--speed", metavar="FACTOR", help="playback rate; default %(default)g", tooltip="Playback rate "
+                "of the motion: speed and tempo of the steps", option_more=dict(least=0.1, most=10.0),
                 panel_more=dict(soft_min=0.25, soft_max=4.0)),
         Setting(name="frame", default="path", choices=FRAMES, option="--frame", help="what the body's offsets from the "
                 "path turn with: the path (default); its full tangent or nothing, for comparison", title="Offsets",

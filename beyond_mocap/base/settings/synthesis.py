@@ -43,7 +43,8 @@ TABLES = {
         Setting(name="method", default="path", choices=METHODS, option="--method", tooltip="How the body follows the "
                 "track", in_preset=True),
         Setting(name="catch_up", default=True, option="--no-catch-up", help="'distance' without regaining lost "
-                "distance", tooltip="Let the body catch up with the track smoothly after each time warp", in_preset=True),
+                "distance", tooltip="Let the body catch up with the track smoothly after each time warp",
+                in_preset=True),
         Setting(name="fps", default=30.0, unit="frames per second", option="--fps", identifier="rate",
                 title="Frame Rate", tooltip="Frames per second of the result; the scene keeps its own rate",
                 in_preset=True, option_more=dict(least=1.0, most=480.0), panel_more=dict(min=10.0, max=240.0)),
@@ -55,19 +56,20 @@ TABLES = {
                 tooltip="Move key moments to the touches found in the ball's samples, within 0.4 s, and let the ball "
                 "follow physics and the dribbling feet", in_preset=True),
         Setting(name="alpha", default=0.2, least=0.0, most=1.0, expected=BETWEEN, option="--alpha", metavar="SHARE",
-                help="weight of labels against continuity; default %(default)g", title="Label Weight", tooltip="Weight of "
-                "labels against smooth transitions: 0 for smooth transitions only, 1 for labels only", in_preset=True,
-                tuning="any"),
+                help="weight of labels against continuity; default %(default)g", title="Label Weight", tooltip="Weight "
+                "of labels against smooth transitions: 0 for smooth transitions only, 1 for labels only",
+                in_preset=True, tuning="any"),
         Setting(name="delta", default=0.5, least=0.0, most=100.0, unit="metres", expected=BETWEEN, option="--delta",
                 help="error of the travelled distance that is accepted ('distance'); default %(default)g",
-                title="Distance Tolerance", tooltip="For Distance: error of a stretch's travelled distance up to which no "
-                "steps are added or removed", in_preset=True, tuning="distance",
+                title="Distance Tolerance", tooltip="For Distance: error of a stretch's travelled distance up to which "
+                "no steps are added or removed", in_preset=True, tuning="distance",
                 panel_more=dict(unit="LENGTH", subtype="DISTANCE")),
         Setting(name="omega", default=0.0, least=0.0, most=100.0, expected=BETWEEN, option="--omega", metavar="NUMBER",
-                help="the faster of two gaits begins at 1/omega of the range between their speeds; 0: as the recordings "
-                "are labelled ('path'), else 4; default %(default)g", title="Gait Threshold", tooltip="The faster of two "
-                "gaits begins at 1 / this value of the range between their speeds; 0 takes it from the recordings' labels "
-                "(Path Following) or a quarter of the range", precision=1, in_preset=True, tuning="any"),
+                help="the faster of two gaits begins at 1/omega of the range between their speeds; 0: as the "
+                "recordings are labelled ('path'), else 4; default %(default)g", title="Gait Threshold",
+                tooltip="The faster of two gaits begins at 1 / this value of the range between their speeds; 0 takes "
+                "it from the recordings' labels (Path Following) or a quarter of the range", precision=1,
+                in_preset=True, tuning="any"),
         Setting(name="seam_window", default=0.8, least=0.0, most=4.0, unit="seconds", expected=BETWEEN,
                 option="--seam-window", help="window over which a transition is blended; default %(default)g",
                 title="Transition Window", tooltip="Time over which the transition between two clips is blended",
@@ -77,8 +79,8 @@ TABLES = {
                 tooltip="Window that removes the jitter of the track", in_preset=True, tuning="any"),
         Setting(name="root_window", default=1.5, least=0.2, most=5.0, unit="seconds", expected=BETWEEN,
                 option="--root-window", help="window through which the body is on the track ('path'); default "
-                "%(default)g", title="Sway Window", tooltip="For Path Following: smoothing window in which body and track "
-                "agree; a shorter one keeps less sway", in_preset=True, tuning="path"),
+                "%(default)g", title="Sway Window", tooltip="For Path Following: smoothing window in which body and "
+                "track agree; a shorter one keeps less sway", in_preset=True, tuning="path"),
         Setting(name="variety", default=0.0, least=0.0, most=10.0, unit="m/s", help="missed speed that is accepted so "
                 "that neighbours in a match are not in step"),
         Setting(name="lag", default=0.0, least=0.0, most=60.0, unit="seconds", help="lag of a player of a match behind "
@@ -90,16 +92,16 @@ TABLES = {
         Setting(name="mirror", default=True, option="--no-mirror", help="do not use mirrored clips",
                 title="Mirrored Clips", tooltip="Use each clip also with left and right exchanged", in_preset=True),
         Setting(name="made", default=True, option="--no-made", help="no synthetic or blended clips where recordings "
-                "lack a speed", title="Synthetic Clips", tooltip="For Path Following: add synthetic or blended clips where "
-                "recordings lack a speed or a kick on the run", in_preset=True, tuning="path"),
+                "lack a speed", title="Synthetic Clips", tooltip="For Path Following: add synthetic or blended clips "
+                "where recordings lack a speed or a kick on the run", in_preset=True, tuning="path"),
         Setting(name="nearest", default=False, option="--nearest", help="continue with the nearest labels that the "
                 "library has", title="Nearest Labels", tooltip="Where the library lacks a key moment's labels, use the "
                 "nearest ones and add a warning", in_preset=True),
     ),
     "player": (
         Setting(name="height", default=0.0, least=0.5, most=3.0, unit="metres", option="--height",
-                help="height of the player; default: the library's", tooltip="Height of the player; 0 for the height of "
-                "the library's skeleton", panel_more=dict(min=0.0)),
+                help="height of the player; default: the library's", tooltip="Height of the player; 0 for the height "
+                "of the library's skeleton", panel_more=dict(min=0.0)),
         Setting(name="strong_foot", default="any", choices=FEET, option="--strong-foot", tooltip="Preferred foot for "
                 "key moments without a side", blank="any", option_more=dict(choices=("left", "right", "any"))),
         Setting(name="style", default=(), option="--style", metavar="NAME", help="a label, or a folder or clip (with * "
@@ -107,7 +109,8 @@ TABLES = {
                 "whose clips are preferred; separate several with ;",
                 option_more=dict(action="append")),
         Setting(name="style_weight", default=0.5, least=0.0, most=10.0, expected=BETWEEN, option="--style-weight",
-                metavar="NUMBER", help="missed speed in m/s that is accepted for a clip of the style; default %(default)g",
+                metavar="NUMBER", help="missed speed in m/s that is accepted for a clip of the style; default "
+                "%(default)g",
                 tooltip="Missed speed in m/s that is accepted for a clip of the style"),
         Setting(name="drawn_start", default=0.0, unit="seconds", title="Begins At", tooltip="Second on the clock at "
                 "which a drawn curve begins; a moving object has its own frames"),

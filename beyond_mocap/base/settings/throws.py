@@ -18,8 +18,8 @@ TABLES = {
         Setting(name="skeleton", kind=Path, option="--skeleton", metavar="S.bvh", help="skeleton of the result; "
                 "default: the model's"),
         Setting(name="speed", kind=float, least=0.5, most=80.0, unit="m/s", option="--speed", help="speed of the ball "
-                "at the release; default: automatic", title="Ball Speed", tooltip="Speed of the ball at the release, m/s; "
-                "0 chooses it from the examples", precision=1, panel_more=dict(default=0.0, min=0.0, max=60.0)),
+                "at the release; default: automatic", title="Ball Speed", tooltip="Speed of the ball at the release, "
+                "m/s; 0 chooses it from the examples", precision=1, panel_more=dict(default=0.0, min=0.0, max=60.0)),
         Setting(name="time", kind=float, least=-1e5, most=1e5, unit="seconds", expected="seconds", option="--time",
                 help="time of the release; default: frame 0 is 0 s"),
         Setting(name="fps", kind=float, least=10.0, most=480.0, expected="{least} to {most} frames per second",
@@ -38,8 +38,8 @@ TABLES = {
         Setting(name="frame", default=0, least=0, title="Release Frame", tooltip="Scene frame on which the ball leaves "
                 "hand or foot, up to half a frame earlier or later; 0 uses the current frame"),
         Setting(name="library", default=True, title="Run-Up from Library", tooltip="Find the motion before and after "
-                "the throw among the clips of the library (step 1); otherwise the throw is blended into the armature's own "
-                "motion"),
+                "the throw among the clips of the library (step 1); otherwise the throw is blended into the armature's "
+                "own motion"),
         Setting(name="live", default=True, title="Live Update", tooltip="Update the preview when the target is moved "
                 "or these settings change, until it is applied"),
     ),

@@ -29,7 +29,8 @@ from .signals import LENGTH, RATE, STRIKES, Signals, Space, build_signals, build
 MIN_CONFIDENCE = 0.2
 """Moments of lower confidence are not proposed."""
 
-_MIN_SEPARATION = 0.35  # seconds between two moments of any acts: of two nearer ones the one of higher confidence counts
+# seconds between two moments of any acts: of two nearer ones the one of higher confidence counts
+_MIN_SEPARATION = 0.35
 _MIN_SECONDS = 0.3  # least duration of a stretch, seconds
 NEAR = 0.15  # seconds within which a rule's moment and a candidate are the same
 _CANDIDATES_APART = 10  # samples between two candidates
@@ -76,7 +77,9 @@ class Act:
 
     def describe(self) -> str:
         """Describe the act and what it was learned from."""
-        return f"{self.word}: {self.example_amount:.0f} moments" if self.moment else f"{self.word}: {self.example_amount:.1f} s"
+        if self.moment:
+            return f"{self.word}: {self.example_amount:.0f} moments"
+        return f"{self.word}: {self.example_amount:.1f} s"
 
 
 def find_candidates(kernel: Kernel, rows: np.ndarray, seconds: np.ndarray, ruled: Sequence[Proposal], word: str):

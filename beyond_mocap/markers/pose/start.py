@@ -12,7 +12,8 @@ import numpy as np
 from ...motion import quaternion
 from .chain import CONJUGATE, Chain, Poses, limit_angles, multiply, read_angles, to_matrices
 
-_BELOW_FACTOR = 0.01  # weight of the next joint's markers relative to a joint's own; again this factor for each joint below
+# weight of the next joint's markers relative to a joint's own; again this factor for each joint below
+_BELOW_FACTOR = 0.01
 _PARENT_WEIGHT = 4e-4  # m2, weight of the parent's direction, for angles that markers do not determine
 
 

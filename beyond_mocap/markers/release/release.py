@@ -341,8 +341,9 @@ def _locate_ball(hand: Hand, marker, settings: ReleaseSettings, ball: Ball) -> t
         return HandBall(usual_place, radius, 0.03), []
     held = _find_held_frames(hand, marker)
     hand_ball = fit_hand_ball(hand.to_hand(marker)[held], radius, usual_place, fit_radius=settings.radius is None)
-    notes = [f"the ball's radius is {1000.0 * hand_ball.radius:.0f} mm, fitted to its marker"] if hand_ball.is_radius_fitted else []
-    return hand_ball, notes
+    if not hand_ball.is_radius_fitted:
+        return hand_ball, []
+    return hand_ball, [f"the ball's radius is {1000.0 * hand_ball.radius:.0f} mm, fitted to its marker"]
 
 
 def _find_held_frames(hand: Hand, marker: np.ndarray) -> np.ndarray:

@@ -45,7 +45,8 @@ from .track_following import (
 )
 from .transitions import blend_rotations, blend_values, compute_blend_share
 
-REACH_SECONDS = 0.4  # s on either side of a key moment without a clip, in which the body reaches for the ball and returns
+# s on either side of a key moment without a clip, in which the body reaches for the ball and returns
+REACH_SECONDS = 0.4
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)

@@ -30,7 +30,8 @@ from .move_body_part import (
     solve_swing,
 )
 
-LONGEST_EASE, SHORTEST_EASE = 0.5, 0.12  # s before and after a strike within which the part comes to the ball and returns
+# s before and after a strike within which the part comes to the ball and returns
+LONGEST_EASE, SHORTEST_EASE = 0.5, 0.12
 MAX_SHIFT = 0.35  # m, largest move of a part
 _ROUNDS, _CLOSE = 6, 2e-4  # most rounds of the iteration, and m at which it ends
 

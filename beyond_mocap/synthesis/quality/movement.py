@@ -27,7 +27,8 @@ ROOT_WINDOW = 1.5  # s, of the root error
 TRAVEL_WINDOW = 1.0  # s, of the travel speed
 STANDING_SPEED = 0.5  # m/s below which a body counts as standing
 SPEED_EDGES = (1.0, 2.0, 3.0, 4.5)  # m/s between the classes of `classify_speed`
-JERK_REACH, TRANSITION_TO_JERK = 8, 2  # jerk indices to either side of a transition, and from its middle index to its frame
+# jerk indices to either side of a transition, and from its middle index to its frame
+JERK_REACH, TRANSITION_TO_JERK = 8, 2
 _WIDTH = 2 * JERK_REACH + 1
 NOTICED_SLIDE = 0.021  # m of foot slide from which on people notice it
 GMD_HEIGHT, GMD_SPEED, GMD_SECONDS = 0.05, 0.5, 0.25  # m, m/s, s of GMD's skating ratio

@@ -157,8 +157,8 @@ def _report_stretched_strides(played: Playback, track: Track | None, library: Li
     most = speed.max(where=fast, initial=0.0)
     return _build_line(
         played.times, fast,
-        f"the track reaches {most:.1f} m/s, faster than the library's {library.max_speed:.1f} m/s x {WARP_LIMITS[1]:g}: "
-        "strides are stretched",
+        f"the track reaches {most:.1f} m/s, faster than the library's {library.max_speed:.1f} m/s x "
+        f"{WARP_LIMITS[1]:g}: strides are stretched",
     )  # fmt: skip
 
 
@@ -172,7 +172,8 @@ def _report_warp(played: Playback, source) -> TimedMessage | None:
     low, high = np.nanmin(rate), np.nanmax(rate)
     return _build_line(
         played.times, beyond,
-        f"clips are played at {low:.2f} to {high:.2f} times their recorded speed (target {WARP_LIMITS[0]:g} to {WARP_LIMITS[1]:g})",
+        f"clips are played at {low:.2f} to {high:.2f} times their recorded speed (target {WARP_LIMITS[0]:g} to "
+        f"{WARP_LIMITS[1]:g})",
     )  # fmt: skip
 
 

@@ -23,7 +23,8 @@ from .request import RequestedKey, SearchRequest, compute_needed_frames
 
 RUN_UP = 1.0  # s around affected frames that are searched too
 MIN_STRETCH = 0.8  # s of the shortest stretch that is searched for another solution
-SPEED_CHANGE, TURN_CHANGE, FACING_CHANGE, PLACE_CHANGE, BALL_CHANGE = 0.05, 0.05, 0.3, 0.001, 0.15  # m/s, rad, rad, m, m: smaller changes do not count
+# m/s, rad, rad, m, m: smaller changes do not count
+SPEED_CHANGE, TURN_CHANGE, FACING_CHANGE, PLACE_CHANGE, BALL_CHANGE = 0.05, 0.05, 0.3, 0.001, 0.15
 TRANSITION_MARGIN = 6  # frames to a transition within which a stretch ends at it
 
 Stretch = tuple[int, int]

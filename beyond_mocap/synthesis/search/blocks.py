@@ -318,7 +318,7 @@ class BlockSearch:
         return after, collect_windows(self.frames, blocks.clip, blocks.start, size)
 
     def _report_step(self, fraction: float | None, text: str) -> None:
-        """Report progress, and raise Cancelled if requested."""
+        """Report progress, and raise UserCancelledError if requested."""
         if self._cancelled():
             raise UserCancelledError("synthesis: cancelled")
         if fraction is not None:

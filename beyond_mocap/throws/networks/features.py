@@ -80,7 +80,7 @@ def build_input(name: str, chains: Chains, settings: ModelSettings, pose: Pose, 
     if not settings.guided:
         return x
     return xp.concatenate([x, compute_reach_guide(number, chains, settings, pose=pose, after=after,
-                                                          window=window, xp=xp)], axis=-1)
+                                                  window=window, xp=xp)], axis=-1)
 
 
 def compute_phase(name: str, chains: Chains, after: Pose, window: Windows, leg_reach, xp=np):
@@ -312,7 +312,7 @@ def carry_hips(chains: Chains, pose: Pose, window: Windows, origin, xp=np):
     turn = _build_vertical_rotation(along, across, xp)
     place = xp.matmul(turn, (pose.positions[..., chains.hips, :] - middle)[..., None])[..., 0] + target_middle
     return xp.concatenate([place - origin, to_six(xp.matmul(turn, pose.turns[..., chains.hips, :, :]), xp)],
-                                  axis=-1)
+                          axis=-1)
 
 
 def _build_vertical_rotation(along, across, xp):

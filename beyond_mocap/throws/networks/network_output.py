@@ -21,7 +21,7 @@ def build_output(name: str, chains: Chains, settings: ModelSettings, pose: Pose,
         joints = list_predicted_joints(name, chains, settings)
         places = take_joints(after.positions, joints, -2, xp) - compute_origin(chains, settings, pose)[..., None, :]
         return xp.concatenate([flatten(places, 2), flatten(to_six(take_joints(after.turns, joints, -3, xp), xp),
-                                                                   2)], axis=-1)
+                                                           2)], axis=-1)
     return flatten(to_six(take_joints(after.local, list_predicted_joints(name, chains, settings), -3, xp), xp), 2)
 
 

@@ -89,7 +89,8 @@ def test_a_new_label_is_one_row(tmp_path):
 USES = """
 import beyond_mocap
 from beyond_mocap.synthesis import resolved_touches
-from beyond_mocap.annotation import DISCRETE, KeyMoment, Timeline, check_timeline, list_labels_below, parse_timeline, sort_labels
+from beyond_mocap.annotation import DISCRETE, KeyMoment, Timeline, check_timeline, list_labels_below
+from beyond_mocap.annotation import parse_timeline, sort_labels
 from beyond_mocap.annotation.ball_contact import build_surfaces, may_use_foot
 from beyond_mocap.annotation.decision import TreeChoices, list_options
 from beyond_mocap.passes.strike_choice import _NAMED, _rank_labels
@@ -103,7 +104,8 @@ words = ("side_poke", "right")
 timeline = parse_timeline("2.0 side_poke right low", "a.txt", 30.0)
 check_timeline(timeline, known_labels=(), start=0.0, end=4.0, where="a.txt")
 assert "side_poke" in DISCRETE and sort_labels(("low", "right", "side_poke")) == ("side_poke", "right", "low")
-assert list_labels_below(("side_poke",)) == ("low",) and "side_poke" in {one.word for one in list_options(TreeChoices("moment"))}
+assert list_labels_below(("side_poke",)) == ("low",)
+assert "side_poke" in {one.word for one in list_options(TreeChoices("moment"))}
 assert [(one.part, one.side) for one in build_surfaces(build_adult_skeleton(), words)] == [("foot", "right")]
 assert may_use_foot(frozenset(words)) and _rank_labels("foot", frozenset(words)) == _NAMED
 

@@ -244,7 +244,8 @@ def test_a_folder_in_the_cache_file_s_place_does_no_harm(folder):
 def test_two_processes_that_build_at_once_both_succeed(folder):
     shutil.rmtree(folder / ".beyond_mocap")
     code = (
-        "import sys; from beyond_mocap.library.build import build_library; print(len(build_library(sys.argv[1], rebuild=True).clips))"
+        "import sys; from beyond_mocap.library.build import build_library; "
+        "print(len(build_library(sys.argv[1], rebuild=True).clips))"
     )
     environment = {**os.environ, "PYTHONPATH": str(TOP), "OMP_NUM_THREADS": "1"}
     running = [

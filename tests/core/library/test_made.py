@@ -59,7 +59,8 @@ def test_no_locomotion_no_gaps():
 
 
 def test_made_clips_fill_the_gaps_up_to_a_sprint(library, more):
-    speed = np.concatenate([more.frames.speed[more.frames.clip == i] for i, c in enumerate(more.clips) if c.is_synthetic])
+    speed = np.concatenate([more.frames.speed[more.frames.clip == i] for i, c in enumerate(more.clips)
+                            if c.is_synthetic])
     for low, high in library.speed_gaps:
         for wanted in np.linspace(low, min(high, 9.0), 9):
             assert np.sum(np.abs(np.log(speed / wanted)) < 0.12) > 10

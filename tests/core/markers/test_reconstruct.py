@@ -179,7 +179,8 @@ def test_how_a_ball_lies_in_the_hand_may_be_known():
     hand, grip = first.model.skeleton.index("RightHand"), tuple(thrown.ball.grip)
     model = replace(first.model, ball=BallMarker(first.trial.labels[-1], hand, grip, 0.0366))
     again = reconstruct(thrown.trial, model=model, settings=ReconstructSettings(plant=False, hold_ball=True))
-    assert first.release.method == again.release.method == "ball" and not np.allclose(first.release.centre, grip, atol=1e-4)
+    assert first.release.method == again.release.method == "ball" and not np.allclose(first.release.centre, grip,
+            atol=1e-4)
     assert np.allclose(again.release.centre, grip) and again.release.radius == 0.0366
     assert abs(again.release.speed / thrown.ball.speed - 1.0) < 0.02
 

@@ -78,7 +78,8 @@ def test_alpha_weighs_words_against_continuity(library, order):
     for alpha in (0.0, 0.2, 1.0):
         clip, frame = shown(library, asked, alpha)
         cuts.append(int(np.sum((np.diff(clip) != 0) | (np.diff(frame) != 1))))
-        agreement.append(np.mean([bool(a & w) for a, w in zip(asked.requested_labels, words_shown(library, clip, frame))]))
+        agreement.append(np.mean([bool(a & w) for a,
+                                  w in zip(asked.requested_labels, words_shown(library, clip, frame))]))
     assert cuts[0] <= cuts[1]
     assert agreement[0] <= agreement[1] <= agreement[2] and agreement[2] > 0.9
 

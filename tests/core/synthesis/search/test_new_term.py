@@ -1,4 +1,5 @@
-"""A cost term with a setting is one row of the table and one named part of the costs (docs/explanation/architecture.md)."""
+"""A cost term with a setting is one row of the table and one named part of the costs
+(docs/explanation/architecture.md)."""
 
 import os
 import shutil

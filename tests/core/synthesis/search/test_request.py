@@ -21,12 +21,15 @@ def test_a_standing_player_stands(order, track_of):
 
 def test_words_of_spans_are_asked_where_they_stand(order):
     found = order((2, 4, "walking left"))
-    assert found.requested_labels[75] == {"walking", "left"} and found.requested_labels[30] == {"walking"} == found.requested_labels[150]
+    assert found.requested_labels[75] == {"walking",
+                                          "left"} and found.requested_labels[30] == {
+        "walking"} == found.requested_labels[150]
 
 
 def test_an_avoided_gait_gives_its_place_to_the_one_nearest_in_speed(order, track_of):
     found = order((2, 4, "-walking"))
-    assert found.requested_labels[75] == {"jogging"} and found.requested_labels[30] == {"walking"} == found.requested_labels[150]
+    assert found.requested_labels[75] == {"jogging"} and found.requested_labels[30] == {
+        "walking"} == found.requested_labels[150]
     assert found.list_avoided(0, 59) == frozenset() and found.list_avoided(50, 61) == {"walking"}
     assert order((2, 4, "walking")).avoided == ()
 
