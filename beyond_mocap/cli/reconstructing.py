@@ -222,7 +222,8 @@ def build_settings(options):
     values = option_values(ReconstructSettings, options, "markers")
     if _names_throw(options.words) and options.release == "auto":
         values["release"] = "yes"
-    return ReconstructSettings(marker_set=options.marker_set and choose_set(options.marker_set), **values)
+    values["marker_set"] = options.marker_set and choose_set(options.marker_set)
+    return ReconstructSettings(**values)
 
 
 def read_trial(path: Path, options):

@@ -7,7 +7,8 @@ import numpy as np
 import pytest
 
 from beyond_mocap.base.errors import InputError, UserCancelledError
-from beyond_mocap.cli.main import main
+from beyond_mocap.cli.main import build_parser, main
+from beyond_mocap.cli.reconstructing import build_settings
 from beyond_mocap.files.bvh import bvh
 from beyond_mocap.markers.files.trc import write_trc
 from beyond_mocap.markers.model.model import BallMarker
@@ -236,3 +237,8 @@ def test_a_folder_is_made_as_a_whole(run, place, tmp_path, known):
 def test_what_is_wrong_is_reported_in_a_line(run, place, tmp_path, words, expected):
     status, _, error = run(*[word.format(place=place, tmp=tmp_path) for word in words])
     assert status == 2 and len(error) == 1 and expected in error[0] and not list(tmp_path.iterdir())
+
+
+def test_the_marker_set_of_the_command_line_is_used():
+    options = build_parser().parse_args(["reconstruct", "a.c3d", "--marker-set", "plug_in_gait", "--out", "a.bvh"])
+    assert build_settings(options).marker_set.name == "plug_in_gait"
