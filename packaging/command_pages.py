@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import argparse
-import csv
-from collections.abc import Iterator
-from pathlib import Path
+from collections.abc import Iterable, Iterator
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from beyond_mocap.annotation.labels import Label
 
 COMMANDS_HEAD = """# Commands
 
@@ -68,27 +70,31 @@ def iter_commands(parser: argparse.ArgumentParser, prefix: str = "") -> Iterator
                 yield from below or [(prefix + name, command)]
 
 
-def build_labels_page(vocabulary: Path) -> str:
+def build_labels_page(labels: Iterable[Label]) -> str:
     """Build the page of all labels.
 
     Args:
-        vocabulary: the table of labels.
+        labels: the vocabulary's labels, as `read_labels` gives them.
     Returns:
         The page as Markdown.
     """
-    lines = [line for line in vocabulary.read_text("utf-8").splitlines() if not line.startswith("#")]
-    rows = list(csv.DictReader(lines))
     parts = [LABELS_HEAD]
     for kind, (title, text) in KINDS.items():
         parts.append(f"\n## {title}\n\n{text}\n\n| short form | name | goes with |\n| --- | --- | --- |")
-        parts.extend(_format_label(row) for row in rows if row["kind"] == kind)
+        parts.extend(_format_label(label) for label in labels if (kind in label.kinds if kind else not label.kinds))
     return "\n".join(part.rstrip("\n") for part in parts) + "\n"
 
 
-def _format_label(row: dict[str, str]) -> str:
-    labels = dict.fromkeys(row["below"].replace("(", " ").replace(")", " ").split())
-    below = " ".join(f"`{label}`" for label in labels)
-    return f"| `{row['label']}` | {row['title']} | {below} |"
+def _format_label(label: Label) -> str:
+    below = " ".join(f"`{name}`" for name in dict.fromkeys(_iter_below(label.below or {})))
+    return f"| `{label.name}` | {label.title} | {below} |"
+
+
+def _iter_below(tree: dict[str, dict]) -> Iterator[str]:
+    """Go through the labels of a tree, each before those below it."""
+    for name, branch in tree.items():
+        yield name
+        yield from _iter_below(branch)
 
 
 def _find_help(action: argparse._SubParsersAction, name: str) -> str:

@@ -113,14 +113,13 @@ def replace_tables(text: str) -> str:
 
 def write_pages() -> None:
     """Write all generated pages."""
-    from command_pages import build_commands_page, build_labels_page
-
-    from beyond_mocap.annotation.labels import TABLE
+    from beyond_mocap.annotation.labels import read_labels
     from beyond_mocap.cli.main import build_parser
+    from command_pages import build_commands_page, build_labels_page
 
     SETTINGS_PAGE.write_text(build_settings_page(), "utf-8")
     COMMANDS_PAGE.write_text(build_commands_page(build_parser()), "utf-8")
-    LABELS_PAGE.write_text(build_labels_page(TABLE), "utf-8")
+    LABELS_PAGE.write_text(build_labels_page(read_labels().values()), "utf-8")
     PROVIDERS_PAGE.write_text(replace_tables(PROVIDERS_PAGE.read_text("utf-8")), "utf-8")
 
 

@@ -234,13 +234,10 @@ def render_film(bpy, load, take, out: pathlib.Path, steps) -> None:
 def follow_player(camera, take, seconds: float) -> None:
     """Place the camera beside the player's path, moving as evenly as the player does over two seconds."""
     import numpy as np
-    from mathutils import Vector
 
     near = [locate_hips(take, seconds + shift) * [1.0, 1.0, 0.0] for shift in np.linspace(-1.0, 1.0, 9)]
     middle = np.mean(near, axis=0)
-    eye = Vector(middle + [-1.5, -6.0, 1.9])
-    camera.location = eye
-    camera.rotation_euler = (Vector(middle + [0.0, 0.0, 0.8]) - eye).to_track_quat("-Z", "Y").to_euler()
+    _place_camera(camera, middle + [-1.5, -6.0, 1.9], middle + [0.0, 0.0, 0.8])
 
 
 def create_camera(bpy):
@@ -254,14 +251,19 @@ def create_camera(bpy):
 def aim_camera(load, camera, take, seconds: float) -> None:
     """Place the camera half in front of the player, at the height of the chest."""
     import numpy as np
-    from mathutils import Vector
 
     hips = locate_hips(take, seconds) * [1.0, 1.0, 0.0]
     frame = min(max(round((seconds - take.start_time) * take.motion.fps), 0), len(take.motion) - 1)
     angle = load("beyond_mocap.motion.humanoid").compute_heading(take.motion)[frame] - 0.9
-    eye = Vector(hips + [4.6 * np.cos(angle), 4.6 * np.sin(angle), 1.55])
+    _place_camera(camera, hips + [4.6 * np.cos(angle), 4.6 * np.sin(angle), 1.55], hips + [0.0, 0.0, 0.85])
+
+
+def _place_camera(camera, eye, target) -> None:
+    """Place the camera at a point of the world and point it at another."""
+    from mathutils import Vector
+
     camera.location = eye
-    camera.rotation_euler = (Vector(hips + [0.0, 0.0, 0.85]) - eye).to_track_quat("-Z", "Y").to_euler()
+    camera.rotation_euler = (Vector(target) - Vector(eye)).to_track_quat("-Z", "Y").to_euler()
 
 
 def _show_stamp(settings) -> None:

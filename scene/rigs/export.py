@@ -171,13 +171,13 @@ def _export_scene(context: bpy.types.Context, rate: float, frames: int):
 
 
 def _copy_armature(stage: bpy.types.Scene, rig: bpy.types.Object, shown: _SampledPoses, wanted: ExportOptions,
-                   told: list[str]):
+                   messages: list[str]):
     """Copy a rig to a plain armature that plays its displayed motion."""
     data = rig.data.copy()
     copy = bpy.data.objects.new(rig.name, data)
     stage.collection.objects.link(copy)
     data.pose_position = "POSE"
-    hips, root, line, in_place = compute_root_motion(rig, shown, wanted, told)
+    hips, root, line, in_place = compute_root_motion(rig, shown, wanted, messages)
     bones = _select_bones(rig, wanted, root)
     poses = {name: shown.poses[:, number] for number, name in enumerate(shown.bones) if name in bones}
     if in_place is not None:
@@ -185,7 +185,7 @@ def _copy_armature(stage: bpy.types.Scene, rig: bpy.types.Object, shown: _Sample
     if line is not None:
         poses[root or ROOT_BONE] = line
     parents = _simplify_bones(stage, copy, rig, kept=bones, hips=hips if line is not None and root is None else None,
-                              told=told)
+                              messages=messages)
     _create_action(copy, poses, parents, shown.object_matrices, wanted)
     return copy
 
@@ -200,7 +200,7 @@ def _select_bones(rig: bpy.types.Object, wanted: ExportOptions, root: str | None
     return deform | ({named} if named else set())
 
 
-def _simplify_bones(stage, copy, rig, kept: set[str], hips: str | None, told: list[str]) -> dict[str, str | None]:
+def _simplify_bones(stage, copy, rig, kept: set[str], hips: str | None, messages: list[str]) -> dict[str, str | None]:
     """Simplify the copy's bones: only the selected ones, each below the nearest selected one, with plain inheritance.
 
     With `hips` a root bone is added above all. Returns bone -> parent.

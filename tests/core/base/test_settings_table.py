@@ -6,7 +6,6 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import pytest
-from pages import SETTINGS_PAGE, build_settings_page
 
 from beyond_mocap.ball.physics import THROWN_BALLS
 from beyond_mocap.base import settings
@@ -17,6 +16,7 @@ from beyond_mocap.base.settings.setting import Setting, check_limits
 from beyond_mocap.cli.main import build_parser
 from beyond_mocap.path_editing.path_frame import FRAMES
 from beyond_mocap.synthesis.plan import Plan
+from pages import SETTINGS_PAGE, build_settings_page
 
 OPTIONS = Path(__file__).resolve().parents[2] / "data" / "options-0.1.txt"
 PROBES = (

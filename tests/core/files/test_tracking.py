@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from pages import PROVIDERS_PAGE, replace_tables
 
 from beyond_mocap.base.errors import InputError
 from beyond_mocap.cli.main import main
@@ -16,6 +15,7 @@ from beyond_mocap.files.tracking import tracking
 from beyond_mocap.files.tracking.feed import TrackingProvider
 from beyond_mocap.files.tracking.providers import PROVIDERS
 from beyond_mocap.files.tracking.tracking import read_match, read_track_csv
+from pages import PROVIDERS_PAGE, replace_tables
 
 DATA = pathlib.Path(__file__).resolve().parents[3] / ".." / "shared" / "data" / "tracking"
 needs_data = pytest.mark.skipif(not DATA.is_dir(), reason="the recordings in ../shared/data are not here")
