@@ -7,12 +7,12 @@ import io
 import tomllib
 import zipfile
 
-import bundle
-import lint
 import pytest
-from wheels import reduce_wheel
 
 import build
+import bundle
+import lint
+from wheels import reduce_wheel
 
 LINUX = bundle.read_platforms()["linux-x64"]
 PACKAGES = [bundle.Package("scipy", "1.17.1", "2001 SciPy Developers", "BSD-3-Clause"),
