@@ -24,6 +24,8 @@ from .clip import Clip
 from .clusters import Clusters
 from .features import FPS, Frames, build_frames, join_frames
 from .keys import Key, collect_keys
+from .posture import NormalPostures, fit_normal_postures
+from .standing_loops import MIN_STAND_SECONDS
 from .synthetic_clips import (
     KICK_LABELS,
     MIN_RECEIVE_SPEED,
@@ -34,6 +36,7 @@ from .synthetic_clips import (
     select_locomotion,
 )
 
+RESTING_SPEED = 0.1  # m/s of a track below which a player stands
 Progress = Callable[[float, str], None]
 
 
@@ -113,6 +116,16 @@ class Library:
                                clip in enumerate(self.clips)])
 
     @cached_property
+    def strangeness(self) -> np.ndarray:
+        """(N,) float32: how far each frame's posture lies from normal locomotion, up to 1 it belongs (`posture`)."""
+        return self.normal_postures.measure_strangeness(self.frames.posture, self.frames.speed)
+
+    @cached_property
+    def normal_postures(self) -> NormalPostures:
+        """How people of this library stand, walk, jog and run."""
+        return fit_normal_postures(self.frames, ~np.array([clip.is_synthetic for clip in self.clips])[self.frames.clip])
+
+    @cached_property
     def feet_in_contact(self) -> np.ndarray:
         """(N, 2) bool: left and right foot on the ground, heel or toe."""
         contacts = (clip.heel_toe_contacts.any(axis=2)[_round_to_frames(clip, self._select_clip_frames(i))] for i,
@@ -169,7 +182,8 @@ class Library:
         kick, take = (measure_touch_speed(self.frames, self.clips, self.keys, act)
                       for act in (KICK_LABELS, RECEIVE_LABELS))
         too_fast = 1.3 * np.where(takes & np.isfinite(take), max(take, MIN_RECEIVE_SPEED), kick)
-        return inside >= 0.2 * self.fps or bool(np.any(key_speeds > too_fast))
+        rests = np.sum(speed < RESTING_SPEED) >= MIN_STAND_SECONDS * self.fps
+        return inside >= 0.2 * self.fps or bool(rests) or bool(np.any(key_speeds > too_fast))
 
     @cached_property
     def max_speed(self) -> float:
@@ -186,7 +200,8 @@ def _build_synthetic_library(library: Library) -> Library:
     """Build the clips that the recordings lack (`library.synthetic_clips`), described like them."""
     speeds = {gait.label: gait.speed for gait in library.gaits if gait.label != STANDING}
     clips = []
-    for synthetic in iter_synthetic_clips(library.clips, library.frames, library.fps, speeds, library.keys):
+    for synthetic in iter_synthetic_clips(library.clips, library.frames, library.fps, speeds, library.keys,
+                                          library.strangeness):
         clip = Clip(path=synthetic.name, mirrored=False, motion=synthetic.motion, annotations=synthetic.rows,
                     heel_toe_contacts=synthetic.heel_toe_contacts)
         clips += [clip, clip.build_twin()]

@@ -26,6 +26,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ..annotation import DISCRETE, LOCOMOTION, ClipAnnotation, compute_gait_thresholds
+from ..annotation.gaits import STANDING
 from ..base.time_series import find_equal_runs, find_runs
 from ..base.vectors import arctan2, cross_product
 from ..motion import contacts, quaternion
@@ -38,10 +39,11 @@ from ..synthetic.gait import build_gait
 from ..synthetic.gait_plan import GaitStyle
 from .features import Frames
 from .scan import CACHE_FOLDER
+from .standing_loops import iter_standing_loops
 
 SYNTHETIC_FOLDER = f"{CACHE_FOLDER}/made-gait/"
 # how the file names of blends, of kicks and of received balls begin, in that folder
-BLEND_PREFIX, KICK_PREFIX, RECEIVE_PREFIX = "blend_", "kick_", "receive_"
+BLEND_PREFIX, KICK_PREFIX, RECEIVE_PREFIX, STAND_PREFIX = "blend_", "kick_", "receive_", "stand_"
 KICK_LABELS, RECEIVE_LABELS = frozenset({"kick"}), frozenset({"receive", "foot"})
 FPS = 60.0  # of synthetic clips
 MAX_SPEED = 9.4  # m/s
@@ -131,7 +133,8 @@ def measure_touch_speed(frames: Frames, clips: Sequence, keys: Sequence, act: fr
 
 
 def iter_synthetic_clips(
-    clips: Sequence, frames: Frames, fps: float, gait_speeds: dict[str, float], keys: Sequence
+    clips: Sequence, frames: Frames, fps: float, gait_speeds: dict[str, float], keys: Sequence,
+    strangeness: np.ndarray
 ) -> Iterator[SyntheticClip]:
     """Iterate over all synthetic clips of a library.
 
@@ -141,6 +144,7 @@ def iter_synthetic_clips(
         fps: of the frames.
         gait_speeds: m/s of the recorded gaits.
         keys: the recordings' key moments.
+        strangeness: (N,) how far each frame lies from normal locomotion (`posture`).
     Yields:
         Clips whose names begin with SYNTHETIC_FOLDER: they are stored beside the cache.
     """
@@ -157,6 +161,10 @@ def iter_synthetic_clips(
     fastest = max(_TOUCH_STEP * measure_touch_speed(frames, clips, keys, RECEIVE_LABELS), MIN_RECEIVE_SPEED)
     yield from _iter_touches(RECEIVE_PREFIX, fastest, ("receive", "foot", "low"), kinds=["inside"], example=example,
                              speeds=speeds)
+    for number, (_, motion) in enumerate(iter_standing_loops(clips, frames, fps, strangeness, FPS)):
+        row = ClipAnnotation(0, len(motion) - 1, None, (STANDING,))
+        contacts = np.ones((len(motion), 2, 2), bool)
+        yield SyntheticClip(f"{SYNTHETIC_FOLDER}{STAND_PREFIX}{number + 1}.bvh", motion, (row,), contacts)
 
 
 def sample_upright_example(clips: Sequence) -> Motion:

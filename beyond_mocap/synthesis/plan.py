@@ -19,6 +19,7 @@ from ..base.settings.setting import LATER, add_fields, check_limits
 from ..base.time_series import interpolate_columns
 from ..motion.skeleton import freeze_array
 from ..motion.track import SampledTrack, Track, sample_track
+from .heading_plan import plan_track
 
 PARTS = ("left_hand", "right_hand", "left_foot", "right_foot", "gaze")
 FEET = ("", "left", "right")
@@ -259,4 +260,5 @@ class ResolvedPlan:
         trajectory = self.trajectory
         if trajectory is not None and self.size != 1.0:
             trajectory = replace(trajectory, ball=trajectory.ball / self.size)
-        return sample_with_trajectory(self.track, trajectory, fps, self.requested.track_window)
+        sampled = sample_with_trajectory(self.track, trajectory, fps, self.requested.track_window)
+        return plan_track(sampled) if self.method == "path" else sampled

@@ -9,7 +9,6 @@ import numpy as np
 from ..annotation.ball_contact import takes_with_foot
 from ..library.automatic_locomotion import apply_chosen_gaits
 from ..library.library import Library
-from ..motion.track import sample_track
 from .plan import ResolvedPlan
 from .search.edit_list import EditList
 
@@ -36,7 +35,7 @@ def extend_library(
 
 def _lacks_speeds(library: Library, plan: ResolvedPlan) -> bool:
     """Return whether the recordings lack speeds of the track, or touches as fast as its key moments."""
-    track = sample_track(plan.track, library.fps, plan.requested.track_window)
+    track = plan.sample_track(library.fps)
     moments = np.array([key.resolved_time for key in plan.timeline.keys])
     takes = np.array([takes_with_foot(key.words) for key in plan.timeline.keys], bool)
     return library.needs_synthetic_clips(track.speed, np.interp(moments, track.times, track.speed), takes)

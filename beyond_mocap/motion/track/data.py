@@ -92,6 +92,7 @@ class SampledTrack:
         ball: (T, 3) metres, NaN where there is no ball at all.
         ball_measured: (T,) bool, False between samples too far apart.
         fps: frames per second.
+        heading: (T,) rad from +x where the body should face, None where that is not planned.
     """
 
     times: np.ndarray
@@ -104,12 +105,15 @@ class SampledTrack:
     ball: np.ndarray
     ball_measured: np.ndarray
     fps: float
+    heading: np.ndarray | None = None
 
     def __post_init__(self):
         for name in ("times", "positions", "raw", "velocity", "speed", "direction", "ball"):
             object.__setattr__(self, name, freeze_array(getattr(self, name)))
         for name in ("valid", "ball_measured"):
             object.__setattr__(self, name, freeze_array(getattr(self, name), bool))
+        if self.heading is not None:
+            object.__setattr__(self, "heading", freeze_array(self.heading))
 
     def __len__(self) -> int:
         return len(self.times)
@@ -117,7 +121,8 @@ class SampledTrack:
     def frames(self, start: int, stop: int) -> "SampledTrack":
         """Return frames start .. stop-1."""
         arrays = {field.name: getattr(self, field.name) for field in fields(self) if field.name != "fps"}
-        return SampledTrack(**{name: values[start:stop] for name, values in arrays.items()}, fps=self.fps)
+        return SampledTrack(**{name: None if values is None else values[start:stop] for name, values in arrays.items()},
+                            fps=self.fps)
 
 
 def is_ball_sentinel(ball: np.ndarray) -> np.ndarray:

@@ -32,6 +32,7 @@ from ..search.source_frames import SourceFrames, SourceMotion, fetch_overlap
 from ..take import KeyResult
 from .edit_blending import OldMotion
 from .extra_steps import Steps, add_steps
+from .settling import SPEEDS, measure_foot_moves, settle_on_track
 from .strike import Touch, strike_ball
 from .track_following import (
     absorb_foot_slide,
@@ -92,6 +93,11 @@ class Construction:
             sway=blend_values(source.sway, over.at, over.sway, weight),
         )
 
+    @cached_property
+    def _foot_moves(self) -> tuple[np.ndarray, np.ndarray]:
+        """How the body has to move and turn so that its feet in contact stay (`measure_foot_moves`)."""
+        return measure_foot_moves(self.library.skeleton, self.smooth_source, self.plan.fps)
+
     def construct_body(self) -> tuple[PlantResult, Steps]:
         """Construct the body on its track with planted feet.
 
@@ -99,8 +105,10 @@ class Construction:
             The planted body (T frames) and the extra steps it takes.
         """
         heading = self.heading if self.is_planned else self._solve_heading()
-        ground = add_sway(self.track.positions, self.smooth_source.sway, heading)
         pose = apply_heading(self.smooth_source.pose, heading)
+        if not self.is_planned and self.track.heading is not None:
+            self = replace(self, track=settle_on_track(self.track, self.smooth_source, self._foot_moves[0], heading))
+        ground = add_sway(self.track.positions, self.smooth_source.sway, heading)
         if not self.is_planned:
             ground, pose = self._pull_to_track(ground), self._lean_into_curves(pose)
         return self._plant_feet(np.column_stack([ground, self.smooth_source.height]), pose)
@@ -129,11 +137,21 @@ class Construction:
     def _solve_heading(self) -> np.ndarray:
         """Solve the heading (T,) rad from given values, track and source, turned to the ball at touches."""
         given = self.heading if self.old is None else self.old.compute_heading(self.smooth_source.pose)
-        heading = solve_heading(self.track, self.smooth_source, given)
+        heading = solve_heading(self.track, self._turning_source, given)
         if self.old is not None:
             track = self.old.match_turning(self.track, heading)
-            heading = heading if track is None else solve_heading(track, self.smooth_source, given)
+            heading = heading if track is None else solve_heading(track, self._turning_source, given)
         return heading + (1.0 - self._old_share) * self._turn_to_ball(heading) if self.turns_to_ball else heading
+
+    @property
+    def _turning_source(self) -> SourceMotion:
+        """The source frames with the turning that keeps feet in contact where the body is slow."""
+        if self.track.heading is None or len(self.track) < 2:
+            return self.smooth_source
+        slow = np.interp(self.track.speed, SPEEDS[1:], (1.0, 0.0))[1:]
+        turn = self.smooth_source.turn.copy()
+        turn[1:] += slow * (self._foot_moves[1] - turn[1:])
+        return replace(self.smooth_source, turn=turn)
 
     @property
     def _old_share(self) -> np.ndarray | float:
@@ -221,8 +239,8 @@ def solve_heading(track: SampledTrack, source: SourceMotion, given: np.ndarray |
         (T,) rad, unwrapped.
     """
     firm = compute_turning_firmness(source.heel_toe_contacts, source.height, track.fps)
-    aim = track.direction + compute_heading_offset(track)
-    return fit_heading(track.direction, track.speed, source.velocity, source.turn, given, firm=firm, aim=aim)
+    aim = track.direction + compute_heading_offset(track) if track.heading is None else track.heading
+    return fit_heading(track.direction, track.speed, source.velocity, source.turn, given, firm=firm, aim=aim, plan=track.heading)
 
 
 def find_touches(library: Library, fps: float, edit: EditList, keys: tuple[KeyResult, ...]) -> tuple[Touch, ...]:

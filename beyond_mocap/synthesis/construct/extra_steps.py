@@ -40,6 +40,7 @@ LAG_DIFFERENCE = 0.3  # difference of lag from which on the foot that lags more 
 MIN_SWING = 0.26  # s of the quickest step
 HEEL_OFF, TOE_ON = 0.06, 0.03  # s that the heel is up before the toe, and that the toe is down before the step ends
 SETTLE_SECONDS = 0.04  # s of contact that a foot needs before the other one is lifted, and after it is down again
+UNWIND_SECONDS = 0.17  # s before a lift in which a foot may lag
 SHORTEST = 0.2  # s of a stance that are left on either side of a step
 FOOT_SEPARATION = 0.11  # m between the ankles of feet that pass each other
 LIFT_HEIGHT = 0.045  # m that a foot is lifted
@@ -249,6 +250,7 @@ class _StepPlan:
         self.swing = np.maximum(np.rint(np.interp(speed, SPEED, SWING) * fps).astype(int), 3)
         least = (max(1, int(round(seconds * fps))) for seconds in (SETTLE_SECONDS, SHORTEST, MIN_SWING))
         self.settled, self.shortest, self.least = least
+        self.unwinding = int(round(UNWIND_SECONDS * fps))
         self.turn = np.interp(speed, SPEED, TURN)
         self.stride = np.minimum(np.interp(speed, SPEED, STRIDE), self._limit_stride())
         self.last_side: int | None = None
@@ -279,7 +281,9 @@ class _StepPlan:
         # distance in strides and turn in turns, as one length
         away = np.abs(foot.middle[at] - foot.middle[first]) / self.stride[at]
         self.lag[at, side] = np.hypot(away, (foot.yaw[at] - foot.yaw[first]) / self.turn[at])
-        return float(self.lag[at, side].max(initial=0.0))
+        # a foot that lifts soon anyway may lag until then
+        counted = slice(first, end if end == len(self.speed) else max(end - self.unwinding, first + 1))
+        return float(self.lag[counted, side].max(initial=0.0))
 
     def run(self) -> None:
         """Break stances until none drags any more, or none can be broken."""
@@ -379,10 +383,11 @@ class _StepPlan:
         lag = self.lag[first:end, side]
         # break a stance of lag n into equal parts, each with at most DRAG_TOLERANCE
         share = lag.max() / np.ceil(lag.max() / DRAG_TOLERANCE)
-        due = np.full(len(lag), share)
+        resting = np.interp(self.speed[first:end], SPEED[:2], (1.0, 0.0))
+        due = np.maximum(share, resting)
         if any(a < end and first < b for a, b in self.dragged_stances[1 - side][:1]):
             # where both lag the same, one steps at half the lag, so that they take turns
-            due *= 0.5 + 0.5 * np.clip(np.abs(lag - self.lag[first:end, 1 - side]) / (0.5 * share), 0.0, 1.0)
+            due *= 0.5 + 0.5 * np.clip(np.abs(lag - self.lag[first:end, 1 - side]) / (0.5 * due), 0.0, 1.0)
         at = int(places[np.argmin(np.abs(places - np.argmax(lag >= due)))])
         return first + at, int(down[at])
 

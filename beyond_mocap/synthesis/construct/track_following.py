@@ -9,6 +9,7 @@ where its feet would slide.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -22,10 +23,12 @@ from ...motion.foot_plant import compute_contact_weights
 from ...motion.humanoid import identify_joints
 from ...motion.motion import compute_pose, compute_world_rotation
 from ...motion.skeleton import Skeleton
-from ...motion.track import smooth_zero_phase_hann
+from ...motion.track import SampledTrack, smooth_zero_phase_hann
 from .strike import Touch
 
 TURN_WEIGHT = 12.0  # weight of the recording's own turning per frame, against the direction of travel
+MAX_OFF_PLAN = np.radians(20.0)
+PLAN_SPEEDS, PLAN_WEIGHTS = (0.1, 0.5, 1.1), (1e-5, 0.02, 0.05)
 AIRBORNE_FIRMNESS = 40.0  # factor on it where the body flies, lies or kneels and so cannot turn at will
 _FLIGHT_SECONDS = 0.3  # s without a foot on the ground that count as flight; the flights of running are shorter
 _LOW = 0.6  # share of the usual height of the hips below which a body lies or kneels
@@ -60,7 +63,7 @@ _ROOT_X, _ROOT_Y, _TURN, _UNKNOWNS = 0, 1, 2, 3
 
 def fit_heading(
     direction: np.ndarray, speed: np.ndarray, velocity: np.ndarray, turn: np.ndarray, given: np.ndarray | None = None,
-    firm: np.ndarray | float = 1.0, aim: np.ndarray | None = None,
+    firm: np.ndarray | float = 1.0, aim: np.ndarray | None = None, plan: np.ndarray | None = None,
 ) -> np.ndarray:
     """Solve the heading: the least squares compromise between travel and the recording's own turning.
 
@@ -82,10 +85,46 @@ def fit_heading(
     # the heading that keeps the recorded angle between travel and facing
     goal = direction - arctan2(velocity[:, 1], velocity[:, 0])
     trust = _motion_weight(speed) ** 2 * _motion_weight(np.linalg.norm(velocity, axis=1)) ** 2
+    if plan is not None:
+        return follow_plan(plan, goal, trust, speed, turn, given, firm)
     goal, trust = _add_aim(goal, trust, speed, aim, turn)
     if given is not None:
         goal, trust = np.where(np.isnan(given), goal, given), np.where(np.isnan(given), trust, GIVEN_HEADING_WEIGHT)
     return follow_turning(_unwrap_to_turn(goal, turn), trust, turn, firm)
+
+
+def follow_plan(
+    plan: np.ndarray, goal: np.ndarray, trust: np.ndarray, speed: np.ndarray, turn: np.ndarray,
+    given: np.ndarray | None, firm: np.ndarray | float,
+) -> np.ndarray:
+    """Solve the heading near a plan: a body at rest turns as its recording does, within the plan's own dead zone.
+
+    Args:
+        plan: (T,) rad, the planned heading, unwrapped.
+        goal: (T,) rad, the heading that keeps the recorded angle between travel and facing.
+        trust: (T,) weight of that goal.
+        speed: (T,) m/s on the track.
+        turn: (T,) rad that the recording turned since the frame before.
+        given: (T,) rad that the heading has to be, NaN where it is free; None for free everywhere.
+        firm: (T,) how many times firmer than usual the recording's turning is followed.
+    Returns:
+        (T,) rad.
+    """
+    off = np.clip(quaternion.wrap_angle(goal - plan), -MAX_OFF_PLAN, MAX_OFF_PLAN)
+    pull = np.interp(speed, PLAN_SPEEDS, PLAN_WEIGHTS)
+    goal, trust = plan + off * trust / (trust + pull), trust + pull
+    if given is not None:
+        turns = 2.0 * np.pi * np.round((np.nan_to_num(given) - plan) / (2.0 * np.pi))
+        goal = np.where(np.isnan(given), goal, given - turns)
+        trust = np.where(np.isnan(given), trust, GIVEN_HEADING_WEIGHT)
+    heading = follow_turning(goal, trust, turn, firm)
+    for _ in range(3):
+        away = heading - plan
+        beyond = (np.abs(away) > MAX_OFF_PLAN) & (trust < GIVEN_HEADING_WEIGHT)
+        goal = np.where(beyond, plan + np.sign(away) * MAX_OFF_PLAN, goal)
+        trust = np.where(beyond, np.maximum(trust, PLAN_WEIGHTS[-1]), trust)
+        heading = follow_turning(goal, trust, turn, firm)
+    return heading
 
 
 def follow_turning(
@@ -308,7 +347,7 @@ def _turn_trunk(skeleton: Skeleton, rotations: np.ndarray, axis: np.ndarray, ang
 
 
 def absorb_foot_slide(
-    skeleton: Skeleton, root: np.ndarray, rotations: np.ndarray, heel_toe_contacts: np.ndarray, fps: float
+    skeleton: Skeleton, root: np.ndarray, rotations: np.ndarray, heel_toe_contacts: np.ndarray, fps: float,
 ) -> tuple[np.ndarray, np.ndarray]:
     """Move the root and turn the body a little so that planted feet slide less.
 
@@ -343,6 +382,6 @@ def absorb_foot_slide(
                 squares.add_terms(stencil, weight, -moves[:, axis])
     for axis, kind in ((_ROOT_X, 0), (_ROOT_Y, 0), (_TURN, 1)):
         squares.add_difference(3, _STIFF[kind] / scale**4, axis)
-        squares.add_value(_STAY[kind] * scale**2, axis)
+        squares.add_value(_STAY[kind] * scale**2 , axis)
     found = squares.solve()
     return found[:, :2], found[:, _TURN]

@@ -21,7 +21,7 @@ from .beam_transitions import SlotCandidates
 from .block_costs import AnnotationCost, collect_windows, compute_distances, measure_typical_distance
 from .candidate_index import PLAYBACK_RATES, SLOT
 from .edit_list import EditList
-from .path_costs import Term, Weights, balance_weights
+from .path_costs import YOUNG_SLOTS, Term, Weights, balance_weights
 from .path_search import MEMORY_SLOTS, BeamStates, PathSearch
 from .request import SearchRequest, build_request
 from .slots import KeyPieces, build_slot_edges
@@ -259,7 +259,7 @@ def _state_before(search: PathSearch, choices: _SlotChoices, slot: int) -> tuple
     recent = np.full(MEMORY_SLOTS, -1)
     recent[MEMORY_SLOTS - len(starts) :] = search.index.bucket[search.costs.round_frame(starts)]
     one, nothing = slice(slot - 1, slot), np.zeros(1, int)
-    state = BeamStates(choices.clip[one], choices.start[one], choices.rate[one], cost=np.zeros(1), back=nothing,
+    state = BeamStates(choices.clip[one], choices.start[one], choices.rate[one], cost=np.zeros(1), age=nothing + YOUNG_SLOTS, back=nothing,
                        piece=choices.piece[one], recent=recent[None])
     return state, state.start + state.rate * (choices.edges[slot] - choices.edges[slot - 1])
 

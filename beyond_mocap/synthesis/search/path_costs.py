@@ -11,6 +11,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from ...annotation import DISCRETE
 from ...annotation.gaits import compute_heading_offset
 from ...library.library import Library
 from ..plan import Plan
@@ -29,7 +30,9 @@ _SAMPLED = 8  # every eighth pair is sampled
 _ABOVE = 1.25
 _ROUNDING = 1e-3  # m/s, for float32 speeds
 
-_CONTINUITY = ("switch", "pose", "rate_change")
+_CONTINUITY = ("switch", "other", "young", "pose", "rate_change")
+RESTING_SPEED = 0.15  # m/s of a track from which on a lifted foot costs nothing
+YOUNG_SLOTS = 6  # slots after a cut in which another one costs more: 1.6 s, since a person keeps a gait for longer
 
 
 def find_cheapest(
@@ -80,10 +83,12 @@ def _find_promising(cost_of, speeds: np.ndarray, speed: float, weight: float, ne
 
 TERMS = {
     "speed": "speed differs from the track",
+    "lift": "lifts a foot where the player stands",
     "turn": "turning differs from the track",
     "facing": "faces another direction",
     "words": "requested labels that the clip lacks",
     "unasked": "an action not requested, or no labels at all",
+    "strange": "not how people stand, walk or run in this library",
     "made": "synthetic clip, not recorded",
     "rate": "played faster or slower than recorded",
     "strike": "does not fit the ball at the strike",
@@ -108,14 +113,18 @@ class Weights:
         speed: per m/s of missed speed.
         drag: per m/s, and per second of contact of both feet beyond that of a walk.
         turn: per radian and slot.
-        facing: per radian between the body and where it should face.
+        lift: for a slot without both feet on the ground where the track rests.
+        facing: per m/s of missed velocity in the body's frame beyond the missed speed.
         words: for lacking all requested labels.
         unasked: for frames of an action that is not requested, or that carry no label.
+        strange: per radius outside of the library's normal locomotion.
         synthetic: for a synthetic clip; it is used only where recordings miss the speed by more.
         synthetic_key: the same at key moments, where a recording is worth more.
         rate: per unit of time warp.
         stretch: per unit of time warp beyond 0.85 to 1.15.
         switch: for any cut.
+        other: for a cut to another recording.
+        young: for a cut just after another one, less by the slot up to YOUNG_SLOTS.
         pose: per metre of joint distance.
         feet: per metre that a foot in contact before and after a cut would jump.
         wild: for cutting where the clips jerk by as much again as is usual.
@@ -126,16 +135,20 @@ class Weights:
 
     speed: float = 1.0
     drag: float = 1.0
-    turn: float = 0.5
-    facing: float = 0.15
-    words: float = 1.0
+    turn: float = 1.0
+    lift: float = 1.0
+    facing: float = 1.0
+    words: float = 0.3
     unasked: float = 2.0
+    strange: float = 0.6
     synthetic: float = 0.2
     synthetic_key: float = 0.8
     rate: float = 0.24
     stretch: float = 4.0
-    switch: float = 0.1
-    pose: float = 2.0
+    switch: float = 0.4
+    other: float = 0.4
+    young: float = 0.6
+    pose: float = 3.0
     feet: float = 1.5
     wild: float = 0.3
     rate_change: float = 0.16
@@ -185,7 +198,8 @@ class PathCosts:
         self.reuse_cost = compute_reuse_cost(library, used) if used else None
         self.bone_distance = bone_distance
         self.frames, self.index = library.frames, CandidateIndex.for_library(library, request.allowed)
-        self.wanted_offset = compute_heading_offset(request.track)
+        track = request.track
+        self.wanted_offset = compute_heading_offset(track) if track.heading is None else track.heading - track.direction
         self._rate_cost = (weights.rate * np.abs(PLAYBACK_RATES - 1.0)).astype(np.float32)
         self._cached_costs: dict[tuple[frozenset[str], frozenset[str]], np.ndarray] = {}
         self._cached_motion: dict[tuple[int, int], tuple[float, float]] = {}
@@ -200,8 +214,11 @@ class PathCosts:
             track = self.request.track
             last = min(end, len(track.times) - 1)
             speed = float(track.speed[first : last + 1].mean())
-            # a slow body turns on the spot: its direction counts less
-            turn = float(track.direction[last] - track.direction[first]) * min(1.0, speed)
+            if track.heading is None:
+                # a slow body turns on the spot: its direction counts less
+                turn = float(track.direction[last] - track.direction[first]) * min(1.0, speed)
+            else:
+                turn = float(track.heading[last] - track.heading[first])
             self._cached_motion[first, end] = speed, turn
         return self._cached_motion[first, end]
 
@@ -258,7 +275,7 @@ class PathCosts:
         # pairs hold the turn over SLOT frames, this slot may be longer or shorter
         turn = pairs.turn * np.float32((end - first) / SLOT)
         yield from self._iter_motion_terms(first, end, pairs.speed, turn=turn, offset=pairs.offset,
-                                           long_stance=pairs.long_stance)
+                                           long_stance=pairs.long_stance, lifted=pairs.lifted)
         yield "rate", self._rate_cost[pairs.number]
         if self.request.lag_preference is not None:
             yield "variety", self.request.lag_preference.compute_cost(first, pairs.frame)
@@ -275,7 +292,10 @@ class PathCosts:
         w, (missing, unasked) = self.weights, self.index.measure_lacking(words)
         yield "words", w.words * missing[frame]
         yield "unasked", np.float32(w.unasked) * unasked[frame]
-        yield "made", np.float32(w.synthetic) * self.index.is_synthetic[frame]
+        # what carries a requested action belongs, whatever it looks like
+        yield "strange", np.float32(w.strange) * np.where(self.index.annotation.find_frames_with(words & DISCRETE), 0.0,
+                                                          self.index.strange)[frame]
+        yield "made", np.float32(w.synthetic) * self.index.is_made_travel[frame]
         if self.request.style_cost is not None:
             yield "style", self.request.style_cost[frame]
         if self.reuse_cost is not None:
@@ -318,7 +338,8 @@ class PathCosts:
         speed = np.linalg.norm(path[1] - path[0], axis=1) * self.library.fps / length
         middle = self.round_frame((a + b) / 2.0)
         yield from self._iter_motion_terms(
-            first, end, speed, turn=turn, offset=self.index.offset[middle], long_stance=self.index.long_stance[middle]
+            first, end, speed, turn=turn, offset=self.index.offset[middle], long_stance=self.index.long_stance[middle],
+            lifted=self.index.lifted[middle],
         )
         # library frames that lie beyond either end of the clip
         held = np.maximum(low - start, 0) + np.maximum(start + rate * length - high, 0)
@@ -343,14 +364,21 @@ class PathCosts:
         running_count = np.append(0, np.cumsum(self.index.annotation.find_frames_with(avoid.difference(*near))))
         return running_count[self.round_frame(b) + 1] > running_count[self.round_frame(a)]
 
-    def _iter_motion_terms(self, first: int, end: int, speed, turn, offset, long_stance) -> Iterator[Term]:
+    def _iter_motion_terms(self, first: int, end: int, speed, turn, offset, long_stance,
+                           lifted) -> Iterator[Term]:
         """Generate the terms of speed, turning and facing against the track."""
         wanted_speed, wanted_turn = self.requested_motion(first, end)
-        w, moving = self.weights, min(1.0, wanted_speed)
-        yield "speed", np.abs(speed - wanted_speed) * (w.speed + w.drag * long_stance)
-        yield "turn", w.turn * (0.3 + 0.7 * moving) * np.abs(turn - wanted_turn)
-        aside = np.abs(offset - float(self.wanted_offset[(first + end) // 2]))
-        yield "facing", w.facing * moving * np.minimum(aside, 2.0 * np.pi - aside)
+        w = self.weights
+        missed = np.abs(speed - wanted_speed)
+        yield "speed", missed * (w.speed + w.drag * long_stance)
+        resting = 1.0 - wanted_speed / RESTING_SPEED
+        if resting > 0.0:
+            yield "lift", np.float32(w.lift * resting) * lifted
+        yield "turn", w.turn * np.abs(turn - wanted_turn)
+        # what the velocity in the body's frame misses beyond its speed: sideways or backward for forward
+        aside = offset - np.float32(self.wanted_offset[(first + end) // 2])
+        across = 2.0 * np.float32(wanted_speed) * speed * (1.0 - np.cos(aside))
+        yield "facing", w.facing * (np.sqrt(missed * missed + across) - missed)
 
     def iter_cut_terms(self, ends: np.ndarray, start: np.ndarray) -> Iterator[Term]:
         """Generate the terms of cuts between library frames, by name, each (B, K) or broadcast to it.
@@ -367,7 +395,12 @@ class PathCosts:
         yield "feet", np.float32(self.weights.feet) * self.measure_foot_jump(ends[:, None], start)
         left, entered = self.compute_cut_ends(ends, start)
         yield "left", left[:, None]
-        yield "cut", entered
+        yield "cut", entered + self.compute_recording_change(ends[:, None], start)
+
+    def compute_recording_change(self, ends: np.ndarray, start: np.ndarray) -> np.ndarray:
+        """Compute the cost of cuts between library frames, broadcast together, for changing the recording."""
+        recording = self.index.recording
+        return np.float32(self.weights.other) * (recording[ends] != recording[start])
 
     def compute_cut_ends(self, ends: np.ndarray, start: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Compute the cost (B,) of leaving library frames ends (B,), and (K,) of cutting to start (K,)."""
