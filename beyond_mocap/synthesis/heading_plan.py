@@ -27,7 +27,7 @@ DEAD_ZONE = np.radians(20.0)  # within which the body does not follow the ball
 BALL_COST = 1.0  # per radian beyond it, half of that from 3 m/s on
 TRAVEL_COST = 6.0  # per radian beyond TRAVEL_LIMITS
 FORWARD_COST = 0.3  # per radian to travel and m/s above 0.6: forward is cheaper
-SIDEWAYS_COST, SIDEWAYS_WIDTH = 1.2, np.radians(35.0)  # at a right angle to travel, and the width of that bell
+SIDEWAYS_COST, SIDEWAYS_WIDTH = 2.5, np.radians(45.0)  # at a right angle to travel, and the width of that bell
 TURN_COST, TURN_RATE_COST, TURN_ANGLE_COST = 0.12, 0.08, 0.7  # per second of turning, per (pi / s)^2, per radian
 GIVEN_COST = 40.0  # per radian and second: given headings hold against all others
 

@@ -168,7 +168,8 @@ def _construct_motion(
     clock.append(time.perf_counter())
     report(0.9, "Polishing")
     touches = find_touches(library, plan.fps, edit, keys)
-    construction = Construction(library=library, plan=plan, track=track, source=source, touches=touches)
+    construction = Construction(library=library, plan=plan, track=track, source=source, touches=touches,
+                                look=estimate_look(library))
     planted, steps, ball = _construct_body(construction, result.interpolate_travelled(index))
     motion = Motion(library.skeleton, planted.root, planted.rotations, plan.fps)
     take = Take(

@@ -23,6 +23,7 @@ from ...annotation.gaits import compute_heading_offset
 from ...library.library import Library
 from ...motion import quaternion
 from ...motion.foot_plant import PlantResult, plant_feet
+from ...motion.motion import Motion
 from ...motion.track import SampledTrack
 from ..body_size import scale_ball
 from ..plan import ResolvedPlan
@@ -32,6 +33,7 @@ from ..search.source_frames import SourceFrames, SourceMotion, fetch_overlap
 from ..take import KeyResult
 from .edit_blending import OldMotion
 from .extra_steps import Steps, add_steps
+from .gaze import follow_with_gaze, twist_shoulders
 from .settling import SPEEDS, measure_foot_moves, settle_on_track
 from .strike import Touch, strike_ball
 from .track_following import (
@@ -63,6 +65,8 @@ class Construction:
         heading: (T,) rad that is given, NaN where it is free; None where nothing is given.
         old: the motion that stays at both ends, None for none.
         turns_to_ball: whether the body turns so that the striking part points at the ball.
+        look: (3,) direction in which the head looks in its own frame, with which the body watches the ball; None: it
+            does not.
         is_planned: whether the track is a planned path: it is kept exactly, the heading is given in all frames, and the
             body does not lean more than its source does.
     """
@@ -76,6 +80,7 @@ class Construction:
     old: OldMotion | None = None
     turns_to_ball: bool = True
     is_planned: bool = False
+    look: np.ndarray | None = None
 
     @cached_property
     def smooth_source(self) -> SourceMotion:
@@ -111,7 +116,21 @@ class Construction:
         ground = add_sway(self.track.positions, self.smooth_source.sway, heading)
         if not self.is_planned:
             ground, pose = self._pull_to_track(ground), self._lean_into_curves(pose)
-        return self._plant_feet(np.column_stack([ground, self.smooth_source.height]), pose)
+        planted, steps_taken = self._plant_feet(np.column_stack([ground, self.smooth_source.height]), pose)
+        return self._watch_ball(planted), steps_taken
+
+    def _watch_ball(self, planted: PlantResult) -> PlantResult:
+        """Turn shoulders and head to the ball, except where the body meets it and where the old motion stays."""
+        if self.look is None or not np.isfinite(self.track.ball).any():
+            return planted
+        fps, at, share = self.plan.fps, np.arange(len(self.track)), 1.0 - np.broadcast_to(self._old_share, len(self.track))
+        for touch in self.touches:
+            away = np.maximum(np.maximum(touch.frame - touch.entry - at, at - touch.frame - touch.leave), 0.0)
+            share = np.minimum(share, np.clip(away / (0.5 * fps), 0.0, 1.0))
+        share = share * share * (3.0 - 2.0 * share)
+        motion = Motion(self.library.skeleton, planted.root, planted.rotations, fps)
+        motion = follow_with_gaze(twist_shoulders(motion, self.track.ball, share), self.track.ball, self.look, share, 0.0)
+        return replace(planted, rotations=motion.rotations)
 
     def solve_ball_contact(self, planted: PlantResult, steps_taken: Steps) -> tuple[PlantResult, np.ndarray]:
         """Bring the striking part to the ball at every touch.

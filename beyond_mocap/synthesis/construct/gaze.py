@@ -23,6 +23,8 @@ MAX_YAW, MAX_UP, MAX_DOWN = np.radians(75.0), np.radians(50.0), np.radians(55.0)
 CHEST_SHARE, NECK_SHARE = 0.12, 0.35  # shares of a turn that chest and neck take; the head takes the rest
 SMOOTHING_SECONDS = 0.4  # s, window over which the head's turning is smoothed
 _OVERHEAD = 0.5  # level length of a unit direction below which its side counts less and less
+_NEAR_PLACE = 2.0  # m from the hips within which a place turns the shoulders less and less
+_TWIST_BEHIND = np.radians(60.0)  # from straight behind within which shoulders do not know the side
 _BEHIND = 0.5  # cosine from straight behind beyond which the head begins to turn back
 
 
@@ -57,6 +59,47 @@ def follow_with_gaze(
     turn = quaternion.to_rotation_vector(quaternion.rotation_between(sight, target))
     eased = np.broadcast_to(share, len(known)) * _ease_in(known, motion.fps)
     return _turn_head(motion, world, head, eased[:, None] * turn, np.broadcast_to(chest, len(known)))
+
+
+MAX_TWIST = np.radians(40.0)
+"""Largest twist of the shoulders against the hips; trunks reach some 45 degrees without effort."""
+
+TWIST_SHARE = 0.6  # of the angle between hips and play that shoulders turn by
+TWIST_LAG, TWIST_SECONDS = 0.15, 0.8  # s that shoulders come after the head, and window that smooths their turning
+
+
+def twist_shoulders(motion: Motion, places: np.ndarray, share: np.ndarray | float = 1.0) -> Motion:
+    """Twist the shoulders of a motion towards a moving place, a little after the head; legs and hips stay.
+
+    Args:
+        motion: T frames.
+        places: (T, 3) m, world, NaN where there is nothing to face.
+        share: (T,) share of the twist that is applied at each frame.
+    Returns:
+        The motion with its spine turned; the motion itself without a spine or a known place.
+    """
+    known = np.isfinite(places[:, :2]).all(axis=1)
+    body = identify_joints(motion.skeleton)
+    spine = [joint for joint in (*body.spine,) if joint not in (body.neck, body.head)]
+    if not known.any() or not spine:
+        return motion
+    joints, world = forward_kinematics(motion)
+    facing = compute_heading_from_positions(motion.skeleton, joints)
+    away = _fill_gaps(places, known)[:, :2] - joints[:, body.hips, :2]
+    seen = quaternion.rotate_level(away, -facing)
+    near = smoothstep(np.linalg.norm(away, axis=1) / _NEAR_PLACE)
+    # behind the body the side is open: the twist fades before it
+    angle = arctan2(seen[:, 1], seen[:, 0])
+    wanted = _limit_softly(TWIST_SHARE * angle, MAX_TWIST) * smoothstep((np.pi - np.abs(angle)) / _TWIST_BEHIND)
+    late = np.maximum(np.arange(len(wanted)) - int(round(TWIST_LAG * motion.fps)), 0)
+    wanted = smooth_zero_phase_hann((near * wanted)[late][:, None], motion.fps, TWIST_SECONDS)[:, 0]
+    turn = np.broadcast_to(share, len(known)) * _ease_in(known, motion.fps) * wanted / len(spine)
+    rotations = np.array(motion.rotations)
+    for joint in spine:
+        above = world[:, motion.skeleton.parents[joint]]
+        axis = quaternion.rotate(quaternion.inverse(above), np.broadcast_to([0.0, 0.0, 1.0], (len(turn), 3)))
+        rotations[:, joint] = quaternion.multiply(quaternion.from_axis_angle(axis, turn), rotations[:, joint])
+    return replace(motion, rotations=rotations)
 
 
 def compute_head_angles(seen: np.ndarray) -> np.ndarray:
