@@ -17,7 +17,7 @@ import numpy as np
 from ...beyond_mocap.base.digest import hex_digest
 from ...beyond_mocap.base.errors import InputError
 from ..core import channels
-from ..path_editing import edited_bodies as riders
+from ..path_editing import edited_bodies
 from .bone_curves import build_bone_curves, build_setting_curves, compute_bone_poses
 from .control_study import CHANNELS
 from .driven import DrivenRig
@@ -88,7 +88,7 @@ def prepare_bake(
 def apply_bake(prepared: PreparedBake) -> BakeResult:
     """Apply a prepared bake to its rig as a new action."""
     rig, driven = prepared.driven.rig, prepared.driven
-    reverted = riders.revert_path_edits(rig)
+    reverted = edited_bodies.revert_path_edits(rig)
     previous_state, kept_messages = record_previous_state(rig, driven), keep_edited_bake(rig)
     channels.remove_marked_action(rig, MARK)
     action = channels.create_action(rig, f"{prepared.name} on {rig.name}", prepared.frames, prepared.curves)

@@ -38,7 +38,7 @@ def shown(rides, ridden, monkeypatch):
     bpy.context.view_layer.update()
     source, motion, path = ridden
     now = [rides.riders.ComputedEdit(1, motion.motion.fps, source, path, motion, 1)]
-    monkeypatch.setattr(rides, "riding", lambda scene: [body])
+    monkeypatch.setattr(rides, "list_edited_bodies", lambda scene: [body])
     monkeypatch.setattr(rides.riders, "find_computed_edit", lambda one: now[-1])
     monkeypatch.setattr(rides.riders, "has_computed_edits", lambda: True)
     return now
