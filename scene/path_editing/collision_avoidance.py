@@ -204,21 +204,8 @@ def _round_to_frames(change, trial):
 
 
 def _describe_change(name, change) -> str:
-    parts = [f"waits {change.delay:.2f} s"] if change.delay else []
-    detours = _join_detours(change.detours)
-    sides = {True: "left", False: "right"}
-    parts += [f"moves {abs(offset):.2f} m to the {sides[offset > 0]} at {arc:.1f} m" for arc, offset in detours]
+    parts = change.describe()
     return f"{name} {', '.join(parts)}" if parts else ""
-
-
-def _join_detours(detours) -> list[tuple[float, float]]:
-    """List (arc, offset) of detours; consecutive ones that form one long detour only once, at its start."""
-    found, end = [], None
-    for arc, width, offset in sorted(detours):
-        if end is None or arc - 0.5 * width > end or not found or found[-1][1] != offset:
-            found.append((max(arc, 0.0), offset))
-        end = arc + 0.5 * width
-    return found
 
 
 def _describe_collision(hit, names, fps) -> str:
