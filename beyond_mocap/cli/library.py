@@ -45,16 +45,16 @@ def run_library(options, reporter: ProgressReporter, writers: Mapping[str, Write
     """
     if options.learn or options.propose or options.learned:
         return run_learning(options, reporter)
-    check_outputs(options.report)
+    check_outputs(options.report, reserved=(options.skeleton,))
     library = open_library(options, reporter, rebuild=options.rebuild)
     summary = summarize_library(library)
-    reporter.finish()
-    for line in summary["lines"]:
-        print(line)
     if options.report:
         from ..files.tables import write_report
 
         write_report(options.report, summary)
+    reporter.finish()
+    for line in summary["lines"]:
+        print(line)
 
 
 def summarize_library(library) -> dict:

@@ -55,7 +55,7 @@ def run_synthesize(options, reporter: ProgressReporter, writers: Mapping[str, Wr
 
     started = time.perf_counter()
     outputs = (options.out, options.provenance, options.ball, options.report)
-    check_outputs(*outputs, reserved=(options.track, options.annotations, options.pins))
+    check_outputs(*outputs, reserved=(options.track, options.annotations, options.pins, options.skeleton))
     write = choose_writer(options.out, writers)
     track, data = clean_track(read_track_csv(options.track))
     timeline = read_timeline(options.annotations, options.fps, float(track.times[0]))

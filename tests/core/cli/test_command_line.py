@@ -205,8 +205,13 @@ def test_mirror(run, clips_folder, tmp_path):
     motions = [bvh.read_bvh(path, 0.01).motion for path in (clips_folder / "walk.bvh", once, twice)]
     assert np.allclose(motions[0].root_positions, motions[2].root_positions, atol=1e-4)
     assert np.allclose(motions[0].root_positions * [1, -1, 1], motions[1].root_positions, atol=1e-4)
-    assert run("mirror", once, once)[0] == 0
-    assert once.read_bytes() == twice.read_bytes()
+
+
+def test_mirror_does_not_overwrite_its_input(run, clips_folder, tmp_path):
+    clip = tmp_path / "walk.bvh"
+    clip.write_bytes(before := (clips_folder / "walk.bvh").read_bytes())
+    assert_told(run("mirror", clip, tmp_path / "." / "walk.bvh"), 2, "walk.bvh", "different files")
+    assert clip.read_bytes() == before
 
 
 def test_a_console_of_another_script_is_written_to_all_the_same(clips_folder, tmp_path, monkeypatch):
@@ -231,6 +236,12 @@ def test_help_and_version(run):
 )
 def test_a_wrong_command_line_is_status_2(run, arguments):
     assert_told(run(*arguments), 2)
+
+
+@pytest.mark.parametrize("command, arguments", [("library", ["L"]), ("throw examples", ["--out", "o"])])
+def test_an_unknown_option_points_to_the_help_of_its_command(run, command, arguments):
+    result = run(*command.split(), *arguments, "--what")
+    assert_told(result, 2, f"beyond-mocap {command}: ", "--what", f"see 'beyond-mocap {command} --help'")
 
 
 @pytest.mark.parametrize(
@@ -455,6 +466,16 @@ def test_python_m_runs_it(clips_folder, library, match, tmp_path):
                       match / "header.txt", "--out", tmp_path / "out.bvh")  # fmt: skip
     out, error = process.communicate(timeout=120)
     assert (process.returncode, out) == (3, "") and len(error.splitlines()) == 1
+
+
+@pytest.mark.skipif(os.name == "nt", reason="Windows has no SIGPIPE")
+@pytest.mark.parametrize("unbuffered", ["", "1"])
+def test_output_that_is_not_read_ends_it_quietly(clips_folder, library, monkeypatch, unbuffered):
+    monkeypatch.setenv("PYTHONUNBUFFERED", unbuffered)
+    process = started("library", clips_folder)
+    process.stdout.close()
+    assert process.stderr.read() == "" and process.wait(120) == 141
+    process.stderr.close()
 
 
 @pytest.mark.skipif(os.name == "nt", reason="Windows sends no SIGINT to one process")
