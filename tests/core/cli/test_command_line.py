@@ -205,8 +205,13 @@ def test_mirror(run, clips_folder, tmp_path):
     motions = [bvh.read_bvh(path, 0.01).motion for path in (clips_folder / "walk.bvh", once, twice)]
     assert np.allclose(motions[0].root_positions, motions[2].root_positions, atol=1e-4)
     assert np.allclose(motions[0].root_positions * [1, -1, 1], motions[1].root_positions, atol=1e-4)
-    assert run("mirror", once, once)[0] == 0
-    assert once.read_bytes() == twice.read_bytes()
+
+
+def test_mirror_does_not_overwrite_its_input(run, clips_folder, tmp_path):
+    clip = tmp_path / "walk.bvh"
+    clip.write_bytes(before := (clips_folder / "walk.bvh").read_bytes())
+    assert_told(run("mirror", clip, tmp_path / "." / "walk.bvh"), 2, "walk.bvh", "different files")
+    assert clip.read_bytes() == before
 
 
 def test_a_console_of_another_script_is_written_to_all_the_same(clips_folder, tmp_path, monkeypatch):
@@ -233,6 +238,12 @@ def test_a_wrong_command_line_is_status_2(run, arguments):
     assert_told(run(*arguments), 2)
 
 
+@pytest.mark.parametrize("command, arguments", [("library", ["L"]), ("throw examples", ["--out", "o"])])
+def test_an_unknown_option_points_to_the_help_of_its_command(run, command, arguments):
+    result = run(*command.split(), *arguments, "--what")
+    assert_told(result, 2, f"beyond-mocap {command}: ", "--what", f"see 'beyond-mocap {command} --help'")
+
+
 @pytest.mark.parametrize(
     "options, parts",
     [
@@ -245,7 +256,7 @@ def test_a_wrong_command_line_is_status_2(run, arguments):
         ({"omega": "0.5"}, ["omega", "0.5", "1 or more"]),
         ({"seam-window": "wide"}, ["--seam-window", "wide"]),
         ({"track-window": "-1"}, ["--track-window", "-1"]),
-        ({"gait": "walking"}, ["gait", "WORD=CLIP"]),
+        ({"gait": "walking"}, ["gait", "LABEL=CLIP"]),
         ({"gait": "walking=missing.bvh"}, ["gaits", "missing.bvh"]),
         ({"seed": "x"}, ["--seed"]),
         ({"method": "magic"}, ["magic", "path"]),
@@ -370,7 +381,7 @@ def test_libraries_that_are_none(run, synthesize, match, clip_file, tmp_path):
 
 
 def test_what_the_library_lacks_is_status_3_and_the_nearest_0(synthesize, match, tmp_path):
-    assert_told(synthesize(annotations=match / "header.txt"), 3, "header", "kick", "Nearest Labels")
+    assert_told(synthesize(annotations=match / "header.txt"), 3, "header", "kick", "or add --nearest")
     assert files_in(tmp_path) == {}
     status, _, error = synthesize("--nearest", annotations=match / "header.txt", report=tmp_path / "r.json")
     assert status == 0 and any("used instead" in line for line in error)
@@ -435,7 +446,7 @@ def test_what_a_library_says_of_itself_is_one_line_to_who_synthesizes(run, synth
     own = [line for line in out.splitlines() if line.startswith("unit ")]
     status, _, error = synthesize()
     assert status == 0 and own and not any(note in line for note in own for line in error)
-    assert sum("the command 'library' prints them" in line for line in error) == 1
+    assert sum("the command 'library' prints all" in line for line in error) == 1
 
 
 def test_no_progress_where_nobody_looks(run, clip_file, tmp_path):
@@ -455,6 +466,16 @@ def test_python_m_runs_it(clips_folder, library, match, tmp_path):
                       match / "header.txt", "--out", tmp_path / "out.bvh")  # fmt: skip
     out, error = process.communicate(timeout=120)
     assert (process.returncode, out) == (3, "") and len(error.splitlines()) == 1
+
+
+@pytest.mark.skipif(os.name == "nt", reason="Windows has no SIGPIPE")
+@pytest.mark.parametrize("unbuffered", ["", "1"])
+def test_output_that_is_not_read_ends_it_quietly(clips_folder, library, monkeypatch, unbuffered):
+    monkeypatch.setenv("PYTHONUNBUFFERED", unbuffered)
+    process = started("library", clips_folder)
+    process.stdout.close()
+    assert process.stderr.read() == "" and process.wait(120) == 141
+    process.stderr.close()
 
 
 @pytest.mark.skipif(os.name == "nt", reason="Windows sends no SIGINT to one process")
@@ -525,7 +546,7 @@ def test_real_recordings(run, tmp_path_factory, scenario):
     written = ("--out", folder / "out.bvh", "--report", folder / "r.json")
     common = ("synthesize", *library, "--track", track, "--annotations", words, *written)
     asked = read_timeline(words, 30.0).keys
-    assert_told(run(*common), 3, "Nearest Labels")
+    assert_told(run(*common), 3, "--nearest")
     assert files_in(folder) == {}
     for method in ("path", "distance", "blocks"):
         status, _, error = run(*common, "--nearest", "--method", method)
