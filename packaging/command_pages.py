@@ -28,8 +28,13 @@ LABELS_HEAD = """# Labels
 `beyond_mocap/annotation/vocabulary.csv` by `make tables`.*
 
 A text file has the short form, panels show the name. How labels combine is [explained here](../explanation/labels.md);
-how they are written is in [the text form](annotation-text.md). A library may add labels of its own.
+how they are written is in [the text form](annotation-text.md). A library may add labels of its own. Faustino's thesis
+lists most of these labels without explaining them; the meanings are our reading.
+
+`transition` is no label of the vocabulary: alone in a line with two times, it asks for nothing, and continuity decides
+what the player does. With nearest labels (`--nearest`), the action itself may change: a reception may become a kick.
 """
+TABLE_HEAD = "| short form | name | meaning | goes with |\n| --- | --- | --- | --- |"
 KINDS = {
     "continuous": ("Spans", "What a player does for a while."),
     "discrete": ("Key moments", "What happens at one instant."),
@@ -83,14 +88,14 @@ def build_labels_page(labels: Iterable[Label]) -> str:
     """
     parts = [LABELS_HEAD]
     for kind, (title, text) in KINDS.items():
-        parts.append(f"\n## {title}\n\n{text}\n\n| short form | name | goes with |\n| --- | --- | --- |")
+        parts.append(f"\n## {title}\n\n{text}\n\n{TABLE_HEAD}")
         parts.extend(_format_label(label) for label in labels if (kind in label.kinds if kind else not label.kinds))
     return "\n".join(part.rstrip("\n") for part in parts) + "\n"
 
 
 def _format_label(label: Label) -> str:
     below = " ".join(f"`{name}`" for name in dict.fromkeys(_iter_below(label.below or {})))
-    return f"| `{label.name}` | {label.title} | {below} |"
+    return f"| `{label.name}` | {label.title} | {label.meaning} | {below} |"
 
 
 def _iter_below(tree: dict[str, dict]) -> Iterator[str]:
