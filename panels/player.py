@@ -100,7 +100,7 @@ def draw_pins(layout, player) -> None:
         row.template_list("BEYOND_MOCAP_UL_pins", "", player, "pins", player, active_propname="active_pin", rows=2)
         row.column(align=True).operator("beyond_mocap.remove_pin", text="", icon="REMOVE")
         row = body.row(align=True)
-        row.operator_menu_enum("beyond_mocap.add_pin", "part", text="Add Pin at Body", icon="PINNED").at = "BODY"
+        row.operator_menu_enum("beyond_mocap.add_pin", "part", text="Pin at Body", icon="PINNED").at = "BODY"
         row.operator_menu_enum("beyond_mocap.add_pin", "part", text="At Cursor", icon="PIVOT_CURSOR").at = "CURSOR"
 
 

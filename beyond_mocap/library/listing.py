@@ -124,7 +124,7 @@ def _grade_clip(clip: Clip, speed: float, jerk: float) -> tuple[int, tuple[str, 
         marks += [_grade_value(figures.slides, tuple(np.hypot(_SLIDE_LIMITS, (rolling, 2.0 * rolling)))),
                   _grade_value(figures.drift, _DRIFT_LIMITS)]
         slid = f" (file: {100 * figures.slid:.0f})" if figures.slid > figures.slides + 0.01 else ""
-        details.append(f"feet slide: {100 * figures.slides:.0f} cm/s{slid}")
+        details.append(f"foot slide: {100 * figures.slides:.0f} cm/s{slid}")
         if figures.drift > 0.0:
             details.append(f"floor levelled: {100 * figures.drift:.0f} cm")
         if figures.pops:

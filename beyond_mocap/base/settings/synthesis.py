@@ -72,7 +72,7 @@ TABLES = {
                 in_preset=True, tuning="any"),
         Setting(name="seam_window", default=0.8, least=0.0, most=4.0, unit="seconds", expected=BETWEEN,
                 option="--seam-window", help="window over which a transition is blended; default %(default)g",
-                title="Transition Window", tooltip="Time over which the transition between two clips is blended",
+                title="Transition", tooltip="Time over which the transition between two clips is blended",
                 in_preset=True, tuning="any"),
         Setting(name="track_window", default=1.2, least=0.2, most=5.0, unit="seconds", expected=BETWEEN,
                 option="--track-window", help="window that removes the track's jitter; default %(default)g",
