@@ -578,3 +578,10 @@ def test_pins_height_foot_and_style_are_a_players_own(synthesize, tmp_path):
     assert_told(synthesize(height=0.1), 2, "--height", "0.5 to 3 metres")
     (tmp_path / "pins.csv").write_text("time_s,part,x_m,y_m,z_m\n2,nose,30,0,1.5\n")
     assert_told(synthesize(pins=tmp_path / "pins.csv"), 2, "pins.csv:2", "'nose'")
+
+
+def test_a_missing_package_of_the_core_is_told_in_one_line():
+    code = "import sys, runpy; sys.modules['numpy'] = None; runpy.run_module('beyond_mocap', run_name='__main__')"
+    done = subprocess.run([sys.executable, "-c", code], cwd=TOP, capture_output=True, text=True)
+    expected = "beyond-mocap: numpy is missing; install the core: pip install . in the project's folder"
+    assert (done.returncode, done.stderr.strip()) == (2, expected)
