@@ -15,7 +15,7 @@ from pathlib import Path
 import numpy as np
 
 from .. import __version__
-from ..base.errors import InputError, format_seconds
+from ..base.errors import InputError, build_read_error, format_seconds
 from ..base.settings import collect_defaults
 from ..files.event_providers import EVENT_PROVIDERS
 from .pieces.units import OVERLAP, WINDOW
@@ -135,7 +135,7 @@ def build_identity(request: MatchRequest, library_key: str) -> dict[str, object]
         try:
             out[name] = None if path is None else compute_file_digest(path)
         except OSError as error:
-            raise InputError(path, error.strerror or str(error), "a file that can be read", "check the path") from None
+            raise build_read_error(path, "a file of the match", error) from None
     out["library"] = library_key
     return out
 

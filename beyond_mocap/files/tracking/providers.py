@@ -12,7 +12,7 @@ import re
 from functools import partial
 from pathlib import Path
 
-from ...base.errors import InputError
+from ...base.errors import InputError, build_read_error
 from .feed import Feed, Files, TrackingProvider, find_provider, load_with_kloppy, read_head
 from .referees import read_signality_referees, read_sportec_referees, read_tracab_referees
 
@@ -33,7 +33,10 @@ def find_feed(path: str | os.PathLike, meta: str | os.PathLike | None, provider:
     if provider and provider.lower() not in PROVIDERS:
         raise InputError("provider", f"{provider.lower()!r}", f"one of {', '.join(PROVIDERS)}")
     record = PROVIDERS[provider.lower()] if provider else _detect_provider(path, notes)
-    second = _check_file(meta) if meta else _find_metadata(path, record, notes) if record.needs_metadata else None
+    if meta:
+        second = _check_file(meta, "a metadata file")
+    else:
+        second = _find_metadata(path, record, notes) if record.needs_metadata else None
     return Feed(record, *record.find_files(path, second, notes)), notes
 
 
@@ -62,10 +65,9 @@ def load_tracking(feed: Feed, pitch: tuple[float, float]):
                             others=others)
 
 
-def _check_file(path: str | os.PathLike) -> Path:
+def _check_file(path: str | os.PathLike, kind: str = "a tracking file") -> Path:
     if not Path(path).is_file():
-        found = "is a folder" if Path(path).is_dir() else "no such file"
-        raise InputError(path, found, "a tracking file", "check the path")
+        raise build_read_error(path, kind)
     return Path(path)
 
 

@@ -29,7 +29,7 @@ from pathlib import Path
 
 import numpy as np
 
-from ...base.errors import InputError
+from ...base.errors import InputError, build_read_error
 from ...base.vectors import unit_vectors
 from .. import limb, quaternion
 from ..humanoid import Humanoid, Limb, build_humanoid, identify_joints, identify_posed_joints, list_roles
@@ -332,7 +332,7 @@ def read_bone_map(path: str | Path) -> dict[str, str]:
     try:
         found = json.loads(Path(path).read_text(encoding="utf-8"))
     except OSError as error:
-        raise InputError(path, f"cannot be read ({error.strerror})", "a bone map (JSON)", "check the path") from None
+        raise build_read_error(path, "a bone map (JSON)", error) from None
     except (ValueError, RecursionError) as error:
         raise InputError(path, f"not JSON ({error})", _MAP_FORM, "correct the file") from None
     if not isinstance(found, dict) or not all(isinstance(name, str) for name in found.values()):

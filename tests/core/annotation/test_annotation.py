@@ -209,7 +209,7 @@ def test_files_that_are_no_text_are_refused(tmp_path, content):
 
 
 def test_a_missing_file_is_told(tmp_path):
-    with pytest.raises(InputError, match="No such file"):
+    with pytest.raises(InputError, match="no such file"):
         read_timeline(tmp_path / "none.txt")
 
 
