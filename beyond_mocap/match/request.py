@@ -93,7 +93,7 @@ class MatchRequest:
                 raise InputError(option, "not a number", "seconds of the match's clock")
         if self.start is not None and self.end is not None and self.end <= self.start:
             raise InputError("end time", f"{format_seconds(self.end)} s",
-                             f"later than the start, {format_seconds(self.start)} s")
+                             f"later than the start, {format_seconds(self.start)} s", "choose a later end")
         if not WINDOW_LIMITS[0] <= self.window <= WINDOW_LIMITS[1]:
             raise InputError("window", f"{self.window:g} s", f"{WINDOW_LIMITS[0]:g} to {WINDOW_LIMITS[1]:g} s")
         if not 1.0 <= self.overlap <= self.window / 2.0:
