@@ -423,4 +423,6 @@ def test_the_scenarios_are_valid_and_what_the_recordings_lack_is_named(number):
 def test_words_are_told_as_one_says_them():
     assert sort_labels({"low", "right", "front", "standing", "kick"}) == ("kick", "right", "standing", "low", "front")
     assert sort_labels({"front", "walking"}) == ("walking", "front")
+    missing = parse_timeline("3 header\n")
+    assert find_missing_keys(missing, [{"low", "right", "kick"}])[0][1] == (("kick", "right", "low"),)
     assert set(sort_labels({"mine", "header"})) == {"mine", "header"}
