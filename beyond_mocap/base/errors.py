@@ -49,19 +49,33 @@ class NotInLibraryError(BeyondMocapError):
 
     Attributes:
         nearest: the nearest label combinations that the library has.
+        line: line of the annotations, None if unknown.
     """
 
     exit_status = 3
 
-    def __init__(self, message: str, nearest: tuple[str, ...] = ()):
+    def __init__(self, message: str, nearest: tuple[str, ...] = (), line: int | None = None):
         """Build the one-line message.
 
         Args:
             message: one line.
             nearest: the nearest label combinations that the library has.
+            line: line of the annotations, None if unknown.
         """
         super().__init__(" ".join(message.split()))
         self.nearest = tuple(nearest)
+        self.line = line
+
+    def locate(self, where: object) -> NotInLibraryError:
+        """Build the same error with its place in front.
+
+        Args:
+            where: the file with the annotations, or what they belong to.
+        Returns:
+            The error.
+        """
+        place = where if self.line is None else f"{where}:{self.line}"
+        return NotInLibraryError(f"{place}: {self}", self.nearest, self.line)
 
 
 class UserCancelledError(BeyondMocapError):
