@@ -143,6 +143,21 @@ class Annotations:
                     return tuple(rows)
         return ()
 
+    def describe_unknown_files(self, folder: Path) -> list[str]:
+        """Describe in a line the rows that name no recording of the library; a table above it serves other folders too.
+        """
+        top = _to_absolute(folder)
+        known = {_to_absolute(path) for path in list_own_recordings(folder)} if self.tables else set()
+        files = [(_to_absolute(place / name), place, name) for place in sorted(self.tables)
+                 for name in self.tables[place]]
+        unknown = [(place, name) for file, place, name in files
+                   if file not in known and top in (place, *place.parents, *file.parents)]
+        if not unknown:
+            return []
+        count = sum(len(self.tables[place][name]) for place, name in unknown)
+        rows = "1 row names a file that is" if count == 1 else f"{count} rows name files that are"
+        return [f"{TABLE_NAME}: {rows} not in the library, such as {unknown[0][1]}"]
+
     def list_sources(self, clips: list[Path]) -> list[Path]:
         """List every file that was or would be read for annotations; the cache depends on them."""
         texts = [clip.with_suffix(".txt") for clip in clips]
