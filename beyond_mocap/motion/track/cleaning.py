@@ -19,6 +19,7 @@ from .sampling import GAP_INTERVALS, LONG_GAP
 MAX_SPEED = 12.0
 """m/s; no player runs faster, so a sample that would need it is wrong."""
 
+_USUAL_SPEEDS = (0.2, 7.0)  # m/s; the median of a player's speed lies between them
 _MAX_ACCELERATION = 12.0  # m/s^2, hardest acceleration of a player
 _SPIKE = 0.2  # metres off its neighbours' line from which a sample is a spike, beyond what acceleration explains
 _EXCURSION = 0.5  # seconds within which a jump away has to return to count as an excursion
@@ -75,7 +76,8 @@ def clean_track(track: Track) -> tuple[Track, DataReport]:
     Returns:
         The cleaned track, and the report.
     Raises:
-        InputError: if fewer than two samples have a position, or a gap is longer than an hour.
+        InputError: if fewer than two samples have a position, a gap is longer than an hour, or the positions are
+            hardly a player's in metres.
     """
     times, positions, ball, notes, dropped, merged = _sort_rows(track)
     ball, notes = _remove_ball_sentinels(ball, notes)
@@ -85,11 +87,30 @@ def clean_track(track: Track) -> tuple[Track, DataReport]:
         raise InputError(track.name, f"{np.count_nonzero(known)} samples with a position", "at least two")
     outlier, snaps = np.zeros(len(times), dtype=bool), ()
     outlier[known], snaps = _detect_outliers(times[known], positions[known])
+    _check_unit(times[known], positions[known], outlier[known], track.name)
     is_valid = known & ~outlier
     positions = _interpolate_gaps(times, positions, is_valid)
     cleaned = Track(times, positions, ball, ball_height_known=np.isfinite(ball[:, 2]), filled=~known, outlier=outlier,
                     name=track.name)
     return cleaned, _build_report(cleaned, notes, snaps, dropped, merged)
+
+
+def _check_unit(times: np.ndarray, positions: np.ndarray, outlier: np.ndarray, name: str) -> None:
+    """Check that most samples are a player's in metres; InputError with the likely unit otherwise.
+
+    Speeds are measured over a second, so that they do not consist of a fast feed's noise.
+    """
+    later = np.minimum(np.searchsorted(times, times + 1.0), len(times) - 1)
+    first = times[later] > times
+    distance = np.linalg.norm(positions[later] - positions, axis=1)
+    speed = float(np.median(distance[first] / (times[later] - times)[first]))
+    if speed <= MAX_SPEED and np.count_nonzero(outlier) <= 0.5 * len(outlier):
+        return
+    found = f"a median speed of {speed:.3g} m/s, {np.count_nonzero(outlier)} outliers in {len(outlier)} samples"
+    for unit, size in (("centimetres", 100.0), ("millimetres", 1000.0)):
+        if size * _USUAL_SPEEDS[0] < speed < size * _USUAL_SPEEDS[1]:
+            raise InputError(name, f"positions look like {unit} ({found})", "metres", f"divide x and y by {size:g}")
+    raise InputError(name, f"positions are not a player's ({found})", "metres and seconds", "check the units")
 
 
 def _sort_rows(track: Track):
