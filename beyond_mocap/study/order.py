@@ -185,7 +185,7 @@ def read_study(folder: Path) -> Study:
             raise ValueError(f"{invalid!r} is not a valid name")
         return Study(id=str(data["study"]), seed=int(data["seed"]), pairs=data["pairs"], clips=clips, orders=orders)
     except (ValueError, KeyError, TypeError, AttributeError, OverflowError, RecursionError) as error:
-        found = f"not a study ({type(error).__name__}: {error})"
+        found = f"not a study ({error})" if type(error) is ValueError else "not a study"  # others are Python's words
         raise InputError(path, found, "a file written by 'study order'", "create the study again") from None
 
 

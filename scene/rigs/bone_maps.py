@@ -217,8 +217,8 @@ def read_bone_map(path: Path) -> dict[str, str]:
         found = json.loads(Path(path).read_text(encoding="utf-8"))
     except OSError as error:
         raise build_read_error(path, "a bone map (.json)", error) from None
-    except (ValueError, RecursionError) as error:
-        raise InputError(path, f"not JSON ({error})", form, "correct the file") from None
+    except (ValueError, RecursionError):
+        raise InputError(path, "not JSON", form, "correct the file") from None
     table = found.get("bones") if isinstance(found, dict) else None
     if not isinstance(table, dict) or not all(isinstance(bone, str) for bone in table.values()):
         raise InputError(path, "no object of bone names", form, "correct the file")

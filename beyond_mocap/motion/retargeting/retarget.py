@@ -333,8 +333,8 @@ def read_bone_map(path: str | Path) -> dict[str, str]:
         found = json.loads(Path(path).read_text(encoding="utf-8"))
     except OSError as error:
         raise build_read_error(path, "a bone map (JSON)", error) from None
-    except (ValueError, RecursionError) as error:
-        raise InputError(path, f"not JSON ({error})", _MAP_FORM, "correct the file") from None
+    except (ValueError, RecursionError):
+        raise InputError(path, "not JSON", _MAP_FORM, "correct the file") from None
     if not isinstance(found, dict) or not all(isinstance(name, str) for name in found.values()):
         raise InputError(path, "not an object of names", _MAP_FORM, "correct the file")
     return found
