@@ -44,7 +44,7 @@ class BEYOND_MOCAP_OT_annotate(BaseOperator, bpy.types.Operator):
     bl_idname = "beyond_mocap.annotate"
     bl_label = "Annotate by Keys"
     keys: StringProperty(name="Keys", options={"SKIP_SAVE"},
-                         description="Keys to press at the playhead, separated by blanks, for scripts: '2 2 3 5 ENTER'")
+                         description="Keys to press at the playhead, separated by spaces, for scripts: '2 2 3 5 ENTER'")
     needs = ("Import tracking data and choose a player in the list first, or open a clip's labels",
              lambda context: bool(describe_subject(context)))
 

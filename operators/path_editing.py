@@ -7,7 +7,7 @@ from contextlib import suppress
 import bpy
 from bpy.props import BoolProperty, EnumProperty, FloatProperty, IntProperty
 
-from ..beyond_mocap.base.errors import BeyondMocapError, InputError
+from ..beyond_mocap.base.errors import BeyondMocapError, InputError, format_count
 from ..scene.core import channels
 from ..scene.core.measure import units_per_metre
 from ..scene.path_editing import collision_avoidance as keep_apart
@@ -150,8 +150,7 @@ detours of all or of two or more selected bodies"""
         if not result.before and not result.unresolved:
             self.report({"INFO"}, f"No bodies come within {self.distance:.2f} m of each other")
             return
-        found = "1 collision" if result.before == 1 else f"{result.before} collisions"
-        lines = "; ".join([found, *keep_apart.describe_result(result)])
+        lines = "; ".join([format_count(result.before, "collision"), *keep_apart.describe_result(result)])
         self.report({"WARNING"} if result.unresolved else {"INFO"}, lines)
 
 

@@ -31,7 +31,7 @@ A text file has the short form, panels show the name. How labels combine is [exp
 how they are written is in [the text form](annotation-text.md). A library may add labels of its own.
 """
 KINDS = {
-    "continuous": ("Stretches", "What a player does for a while."),
+    "continuous": ("Spans", "What a player does for a while."),
     "discrete": ("Key moments", "What happens at one instant."),
     "modifier": ("Details", "They stand beside another label and make it more precise."),
     "": ("Other labels", "They stand below the labels above, or are used by annotations of recordings."),

@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import csv
 import re
+import string
 from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
@@ -107,7 +108,7 @@ def find_label(name: str) -> Label:
     Returns:
         The label; one without any meaning if the table has none.
     """
-    return read_labels().get(name) or Label(name=name, title=name.replace("_", " "))
+    return read_labels().get(name) or Label(name=name, title=string.capwords(name.replace("_", " ")))
 
 
 @lru_cache(maxsize=64)

@@ -52,7 +52,7 @@ def check_labels(labels: Iterable[str], where: str) -> tuple[str, ...]:
     for label in out:
         if not label or "#" in label or label.startswith(AVOID_PREFIX) or label.split() != [label] or NUMBER.fullmatch(
                 label):
-            expected = f"a label without blanks and '#' that is not a number and does not begin with '{AVOID_PREFIX}'"
+            expected = f"a label without spaces and '#' that is not a number and does not begin with '{AVOID_PREFIX}'"
             raise InputError(where, f"{label!r} is not a label", expected)
     return out
 

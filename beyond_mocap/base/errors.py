@@ -136,6 +136,19 @@ def format_seconds(seconds: float) -> str:
     return f"{round(float(seconds), 6):.15g}"
 
 
+def format_count(count: int, noun: str, plural: str = "") -> str:
+    """Format a count with its noun for a message: "1 clip", "2 clips".
+
+    Args:
+        count: how many.
+        noun: the noun for one.
+        plural: the noun for several; "" adds an s.
+    Returns:
+        The text.
+    """
+    return f"{count} {noun if count == 1 else plural or noun + 's'}"
+
+
 def line_spans(line: str) -> tuple[tuple[float, float], ...]:
     """Return the times that a message refers to.
 

@@ -8,7 +8,7 @@ import time
 from collections.abc import Mapping
 from pathlib import Path
 
-from ..base.errors import NotInLibraryError
+from ..base.errors import NotInLibraryError, format_count
 from ..base.settings.options import add_options, option_values
 from .library import open_library
 from .outputs import ProgressReporter, Writer, add_take_files, check_outputs, choose_writer
@@ -55,6 +55,7 @@ def run_synthesize(options, reporter: ProgressReporter, writers: Mapping[str, Wr
     from ..synthesis.pin_table import read_pins
     from ..synthesis.plan import Plan
     from ..synthesis.provenance import write_provenance
+    from ..synthesis.search.request import USE_NEAREST
     from ..synthesis.synthesize import synthesize
 
     started = time.perf_counter()
@@ -75,7 +76,8 @@ def run_synthesize(options, reporter: ProgressReporter, writers: Mapping[str, Wr
     try:
         take = synthesize(library, plan, reporter.show_progress, reporter.is_cancelled)
     except NotInLibraryError as error:
-        raise error.locate(annotations) from None
+        message = str(error.locate(annotations)).replace(USE_NEAREST, "add --nearest")
+        raise NotInLibraryError(message, error.nearest, error.line) from None
     take.seconds.update(load=loaded - started, library=ready - loaded, total=time.perf_counter() - started)
     if options.report:
         from ..evaluation.report import evaluate
@@ -93,8 +95,8 @@ def run_synthesize(options, reporter: ProgressReporter, writers: Mapping[str, Wr
     if annotations and not options.annotations:
         reporter.show_note(f"{options.track}: with the labels of {annotations}")
     if library.notes:
-        notes = f"{len(library.notes)} notes on how its recordings were read and repaired"
-        reporter.show_note(f"{options.library}: {notes}; the command 'library' prints them")
+        notes = f"{format_count(len(library.notes), 'note')} on how its recordings were read and repaired"
+        reporter.show_note(f"{options.library}: {notes}; the command 'library' prints all")
     take_warnings = [line for line in take.warnings if line not in library.notes]
     for line in (*take_warnings, *(f"{options.track}: {line}" for line in data.lines)):
         reporter.show_note(line)
@@ -178,10 +180,9 @@ def run_evaluate(options, reporter: ProgressReporter, writers: Mapping[str, Writ
                                                      title=options.motion.name))  # fmt: skip
     reporter.finish(notes)
     if library is not None and (unknown_clips := _find_unknown_clips(played.clips, library)):
-        first, count = unknown_clips[0], len(unknown_clips)
+        count = format_count(len(unknown_clips), "clip")
         reporter.show_note(
-            f"{options.provenance}: {count} clips, such as {first}, are not in {options.library} and cannot be "
-            "compared"
+            f"{options.provenance}: {count} not in {options.library} and not compared, such as {unknown_clips[0]}"
         )
     print(options.report)
 

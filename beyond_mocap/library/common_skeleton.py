@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from ..base.errors import InputError
+from ..base.errors import InputError, format_count
 from ..motion import contacts
 from ..motion.humanoid import identify_joints
 from ..motion.motion import Motion
@@ -62,7 +62,8 @@ def unify_skeletons(
             rigs.update(dict.fromkeys(group, rig))
     if rigs:
         others = sum(group[0] in rigs for group in groups)
-        notes.append(f"{len(rigs)} clips of {others} other skeletons retargeted to the one with {len(skeleton)} joints")
+        notes.append(f"{format_count(len(rigs), 'clip')} of {format_count(others, 'other skeleton')} retargeted to the "
+                     f"one with {len(skeleton)} joints")
     return _iter_unified(motions, contact_mask, skeleton, rigs)
 
 

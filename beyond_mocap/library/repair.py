@@ -22,6 +22,7 @@ import numpy as np
 from scipy.ndimage import minimum_filter1d
 
 from ..base.banded_least_squares import BandedLeastSquares
+from ..base.errors import format_count
 from ..base.time_series import find_runs
 from ..motion import contacts, quaternion
 from ..motion.foot_plant import plant_feet
@@ -307,15 +308,18 @@ def describe_repairs(repaired: Sequence[tuple[RepairedClip, int]]) -> list[str]:
     lines = []
     pops = [count for _, count in repaired if count]
     if pops:
-        lines.append(f"{sum(pops)} single-frame jumps of joints removed from {len(pops)} clips")
+        lines.append(f"{format_count(sum(pops), 'single-frame jump')} of joints removed from "
+                     f"{format_count(len(pops), 'clip')}")
     drifts = [one.drift for one, _ in repaired if one.drift > 0.0]
     if drifts:
-        lines.append(f"floor levelled in {len(drifts)} clips, by {np.median(drifts) * 100:.0f} cm (median)")
+        lines.append(f"floor levelled in {format_count(len(drifts), 'clip')}, by {np.median(drifts) * 100:.0f} cm "
+                     "(median)")
     sliding = [one for one, _ in repaired if one.was_sliding]
     if sliding:
         before, after = (np.mean([one.slide[i] for one in sliding]) * 100 for i in (0, 1))
         lines.append(
-            f"feet planted in {len(sliding)} clips: mean slide {before:.0f} cm/s before, {after:.0f} cm/s after; "
+            f"feet planted in {format_count(len(sliding), 'clip')}: mean slide {before:.0f} cm/s before, "
+            f"{after:.0f} cm/s after; "
             f"path corrected by {np.median([one.travel for one in sliding]):.2f} m (median)"
         )
     return lines

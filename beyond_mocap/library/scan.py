@@ -14,7 +14,7 @@ from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 
 from ..annotation import ClipAnnotation, read_annotation_csv, read_clip_annotations
-from ..base.errors import InputError
+from ..base.errors import InputError, format_count
 from ..files.atomic import atomic_write
 
 CACHE_FOLDER = ".beyond_mocap"
@@ -228,7 +228,7 @@ def describe_waiting(waiting: Sequence[Path]) -> list[str]:
     if not waiting:
         return []
     count, kinds = len(waiting), ", ".join(sorted({path.suffix.lower() for path in waiting}))
-    return [f"{count} {'clip' if count == 1 else 'clips'} skipped ({kinds}: {waiting[0].name}): not converted; "
+    return [f"{format_count(count, 'clip')} skipped ({kinds}: {waiting[0].name}): not converted; "
             "press Build Library in Blender to convert them"]
 
 

@@ -252,7 +252,7 @@ def _list_notes(study: Study, answers: Answers) -> list[str]:
     if silent:
         notes.append(f"without an answer: {', '.join(silent)}")
     if answers.missing:
-        notes.append(f"{answers.missing} answers are missing; the others are used")
+        notes.append(f"missing answers: {answers.missing}; the others are used")
     if len(answers.raters) < 6:
         notes.append("fewer than six raters: the tests have little power")
     for rater in answers.raters:

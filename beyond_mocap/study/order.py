@@ -17,7 +17,7 @@ from pathlib import Path
 import numpy as np
 
 from ..base.digest import hex_digest
-from ..base.errors import InputError
+from ..base.errors import InputError, format_count
 from ..files.content import read_utf8
 from ..files.tables import read_rows, write_report
 
@@ -215,16 +215,17 @@ def _check_clips(clips: Sequence[Clip]) -> None:
         raise InputError("clips", str(len(clips)), f"{MAX_CLIPS} at most", "remove some")
     training = [clip for clip in clips if clip.system == TRAINING]
     if len(training) != 2:
-        found = f"{len(training)} clips of the system {TRAINING!r}"
+        found = f"{format_count(len(training), 'clip')} of the system {TRAINING!r}"
         raise InputError("clips", found, "two, a good and a bad one", "add or remove rows")
     real = [clip for clip in clips if clip.system != TRAINING]
     systems = list(dict.fromkeys(clip.system for clip in real))
     if len(systems) < 2:
-        raise InputError("clips", f"{len(systems)} systems", "two or more to compare", "add clips of another system")
+        found = format_count(len(systems), "system")
+        raise InputError("clips", found, "two or more to compare", "add clips of another system")
     pairs = [(clip.system, clip.scenario) for clip in real]
     for system, scenario in itertools.product(systems, dict.fromkeys(clip.scenario for clip in real)):
         if (count := pairs.count((system, scenario))) != 1:
-            found = f"{count} clips of scenario {scenario!r} by {system!r}"
+            found = f"{format_count(count, 'clip')} of scenario {scenario!r} by {system!r}"
             raise InputError("clips", found, "one of each scenario by each system", "add or remove rows")
     files = [clip.file for clip in clips]
     if repeated := next((file for file in files if files.count(file) > 1), None):

@@ -206,9 +206,9 @@ def check_unaimed(ball: bpy.types.Object) -> None:
     aim = ball.beyond_mocap_aim
     if aim.handed:
         raise InputError(f"ball {ball.name}", "moved by Blender's physics", "a ball with keys",
-                         "press Take Ball Back first")
+                         "press Ball from Physics first")
     if aim.on:
-        raise InputError(f"ball {ball.name}", "it is aimed", "a ball that is not aimed", "press Leave Aim first")
+        raise InputError(f"ball {ball.name}", "it is aimed", "a ball that is not aimed", "press Revert Aim first")
 
 
 def _check_hold(ball, body, bone: str, first: int, last: int) -> None:

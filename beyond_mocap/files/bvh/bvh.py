@@ -17,7 +17,7 @@ from pathlib import Path
 
 import numpy as np
 
-from ...base.errors import InputError
+from ...base.errors import InputError, format_count
 from ...base.vectors import unit_vectors
 from ...motion import quaternion
 from ...motion.humanoid import Humanoid, compute_heading, identify_joints, measure_leg_length
@@ -274,7 +274,7 @@ def _list_notes(text: BvhText, body_joints: list[int], above: tuple[JointAboveHi
     if drift:
         worst = sorted(drift, key=drift.get, reverse=True)
         moved = ", ".join(f"{name} {drift[name] * 1000:.0f} mm" for name in worst[:5])
-        notes.append(f"{len(drift)} joints change their distance, replaced by its mean: {moved}")
+        notes.append(f"{format_count(len(drift), 'joint')} with a changing distance, replaced by its mean: {moved}")
     return notes
 
 

@@ -15,7 +15,7 @@ from pathlib import Path
 
 import numpy as np
 
-from ...base.errors import InputError
+from ...base.errors import InputError, format_count
 from ..content import read_bytes
 
 POSITIONS = ("Xposition", "Yposition", "Zposition")
@@ -94,7 +94,7 @@ def parse_bvh_text(path: Path, data: bytes) -> BvhText:
     values = _parse_rows(path, data[rows_start - 1 :], columns, line)  # start at the previous line's end
     if len(values) != frames:
         raise InputError(
-            f"{path}:{line}", f"{len(values)} rows of motion", f"{frames}, the number after Frames:",
+            f"{path}:{line}", f"{format_count(len(values), 'row')} of motion", f"{frames}, the number after Frames:",
             f"the file is {'truncated' if len(values) < frames else 'damaged'}; {_EXPORT_AGAIN}",
         )
     _check_angles(path, joints, values, line)

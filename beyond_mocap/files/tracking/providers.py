@@ -12,7 +12,7 @@ import re
 from functools import partial
 from pathlib import Path
 
-from ...base.errors import InputError, build_read_error
+from ...base.errors import InputError, build_read_error, format_count
 from .feed import Feed, Files, TrackingProvider, find_provider, load_with_kloppy, read_head
 from .referees import read_signality_referees, read_sportec_referees, read_tracab_referees
 
@@ -187,7 +187,7 @@ def _find_hawkeye(path: Path, meta: Path | None, notes: list[str]) -> Files:
     players = sorted(path.parent.glob("*.samples.centroids"), key=minute)
     balls = sorted(path.parent.glob("*.samples.ball"), key=minute)
     if not players or [minute(file) for file in players] != [minute(file) for file in balls]:
-        found = f"{len(players)} files of players and {len(balls)} of the ball"
+        found = f"{format_count(len(players), 'file')} of players and {len(balls)} of the ball"
         raise InputError(path.parent, found, "one .samples.ball for every .samples.centroids", "complete the folder")
     notes.append(f"{len(players)} files of players and of the ball in {path.parent.name or path.parent} are used")
     return (*players, *balls), (meta,) if meta else ()

@@ -13,7 +13,7 @@ from pathlib import Path
 
 import numpy as np
 
-from ...base.errors import InputError
+from ...base.errors import InputError, format_count
 from ...motion.skeleton import freeze_array
 from ...motion.track import Track
 from ...motion.track.match_data import REFEREE, Match, MatchPlayer, Team, describe_presence
@@ -81,7 +81,7 @@ def _parse_cells(rows, names) -> np.ndarray:
 def _check_rate(track: Track, path) -> None:
     known = np.isfinite(track.times) & track.is_measured
     if len(np.unique(track.times[known])) < 2:
-        found = f"{np.count_nonzero(known)} samples with a distinct time and a position"
+        found = f"{format_count(np.count_nonzero(known), 'sample')} with a distinct time and a position"
         raise InputError(path, found, "at least two", "export it again")
     rate = 1.0 / track.interval
     if not RATES[0] - 0.01 <= rate <= RATES[1] + 0.5:

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ...base.errors import InputError, TimedMessage, format_seconds
+from ...base.errors import InputError, TimedMessage, format_count, format_seconds
 from ...base.time_series import find_runs
 from .data import Track, is_ball_sentinel
 from .sampling import GAP_INTERVALS, LONG_GAP
@@ -84,7 +84,8 @@ def clean_track(track: Track) -> tuple[Track, DataReport]:
     times, positions, ball = _insert_missing_rows(times, positions, ball, track.name)
     known = np.isfinite(positions).all(axis=1)
     if np.count_nonzero(known) < 2:
-        raise InputError(track.name, f"{np.count_nonzero(known)} samples with a position", "at least two")
+        found = f"{format_count(np.count_nonzero(known), 'sample')} with a position"
+        raise InputError(track.name, found, "at least two")
     outlier, snaps = np.zeros(len(times), dtype=bool), ()
     outlier[known], snaps = _detect_outliers(times[known], positions[known])
     _check_unit(times[known], positions[known], outlier[known], track.name)
@@ -119,7 +120,7 @@ def _sort_rows(track: Track):
     rows = np.column_stack([track.positions, track.ball])[timed]
     rows[~np.isfinite(rows[:, :2]).all(axis=1), :2] = np.nan
     rows[:, 4] = np.where(track.ball_height_known[timed], rows[:, 4], np.nan)
-    notes = [f"{np.count_nonzero(~timed)} rows without a time dropped"] if not timed.all() else []
+    notes = [f"{format_count(np.count_nonzero(~timed), 'row')} without a time dropped"] if not timed.all() else []
     times = track.times[timed]
     if np.any(np.diff(times) < 0):
         late = times[1:][np.diff(times) < 0]
@@ -130,7 +131,7 @@ def _sort_rows(track: Track):
     merged = len(times) - len(starts)
     if merged:
         repeated = times[starts][np.diff(starts, append=len(times)) > 1]
-        notes.append(f"{merged} rows with a repeated time merged: {_describe_times(repeated)}")
+        notes.append(f"{format_count(merged, 'row')} with a repeated time merged: {_describe_times(repeated)}")
         rows = _average_groups(rows, starts)
     return times[starts], rows[:, :2], rows[:, 2:], notes, int(np.count_nonzero(~timed)), merged
 
@@ -147,7 +148,8 @@ def _remove_ball_sentinels(ball: np.ndarray, notes: list[str]) -> tuple[np.ndarr
     """Replace sentinels in ball rows (N, 3) with NaN: z below the ground, far outside, or parked at the origin."""
     seen, wrong = np.isfinite(ball[:, :2]).all(axis=1), is_ball_sentinel(ball)
     if wrong.any():
-        notes = [*notes, f"{np.count_nonzero(wrong)} samples with the ball at a sentinel set to unknown"]
+        count = format_count(np.count_nonzero(wrong), "sample")
+        notes = [*notes, f"{count} with the ball at a sentinel set to unknown"]
     ball = np.where((seen & ~wrong)[:, None], ball, np.nan)
     return ball, notes
 
@@ -360,15 +362,16 @@ def _collect_warnings(track: Track, snaps: tuple[float, ...], gaps) -> list[Time
                          *zip(snaps, snaps))
         )
     if len(fast):
-        out.append(TimedMessage(f"faster than {MAX_SPEED:g} m/s in {len(fast)} samples: {_describe_times(fast)}",
-                                *zip(fast, fast)))
+        out.append(TimedMessage(f"faster than {MAX_SPEED:g} m/s in {format_count(len(fast), 'sample')}: "
+                                f"{_describe_times(fast)}", *zip(fast, fast)))
     return out + [TimedMessage(f"no samples from {a:.2f} to {b:.2f} s", (a, b)) for a, b in gaps if b - a > LONG_GAP]
 
 
 def _describe_replacements(track: Track) -> list[str]:
     """Describe what was inserted and replaced, and how much of the ball is missing."""
-    marked = (("samples filled", track.filled), ("outliers replaced", track.outlier))
-    out = [f"{m.sum()} {what}: {_describe_stretches(track.times[m], track.interval)}" for what, m in marked if m.any()]
+    marked = (("sample", "filled", track.filled), ("outlier", "replaced", track.outlier))
+    out = [f"{format_count(m.sum(), noun)} {change}: {_describe_stretches(track.times[m], track.interval)}"
+           for noun, change, m in marked if m.any()]
     unknown = _find_missing_ball(track)
     if unknown.any() and not unknown.all():
         out.append(f"ball unknown in {unknown.sum()} of {len(track)} samples")

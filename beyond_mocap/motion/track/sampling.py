@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ...base.errors import InputError
+from ...base.errors import InputError, format_count
 from ...base.time_series import interpolate_columns
 from ...base.vectors import arctan2
 from .data import BALL_RADIUS, SampledTrack, Track
@@ -143,7 +143,8 @@ def _build_time_grids(track: Track, fps: float) -> tuple[np.ndarray, np.ndarray,
     if not 1.0 <= fps <= 480.0:
         raise InputError("fps", f"{fps}", "1 to 480 frames per second")
     if np.count_nonzero(track.is_measured) < 2 or not np.all(np.diff(track.times) > 0):
-        raise InputError(track.name, f"{np.count_nonzero(track.is_measured)} usable samples", "two or more, cleaned")
+        raise InputError(track.name, format_count(np.count_nonzero(track.is_measured), "usable sample"),
+                         "two or more, cleaned")
     duration = track.times[-1] - track.times[0]
     if duration > _MAX_SECONDS:
         raise InputError(track.name, f"{duration:.0f} s", "at most six hours", "cut the track")

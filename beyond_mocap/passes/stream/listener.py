@@ -21,7 +21,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ...base.errors import InputError
+from ...base.errors import InputError, format_count
 from ...files.bvh.bvh import BvhRows
 from ...motion.skeleton import Skeleton
 from .bvh_stream import BvhStream
@@ -199,7 +199,8 @@ class Listener:
         if state == "stopped":
             return "Not listening"
         if self.stream.invalid_count:
-            return f"{self.stream.invalid_count} invalid pieces on {port_name}: {self.stream.last_error}"
+            count = format_count(self.stream.invalid_count, "invalid piece")
+            return f"{count} on {port_name}: {self.stream.last_error}"
         if self._reason:
             return f"{self._reason} ({port_name})"
         return f"Waiting for frames on {port_name} of this machine"

@@ -28,6 +28,8 @@ from ..plan import Plan, ResolvedPlan
 from .preferences import LagPreference, build_lag_preference, compute_style_cost
 
 PAPERS_OMEGA = 4.0  # Faustino 2016, §3.1.1
+USE_NEAREST = "turn on Nearest Labels"
+"""Last words of the error for missing labels; the command line names its option instead."""
 
 Labels = frozenset[str] | None
 
@@ -169,7 +171,7 @@ def _build_key(library, moment: KeyMoment, track, gait, allowed, use_nearest: bo
     problem = f"the library has no clip for '{' '.join(moment.words)}'"
     text = f"{format_seconds(moment.time)} s: {problem}; nearest: {_format_labels(nearest)}"
     if not use_nearest:
-        way_out = "add such a clip, or turn on Nearest Labels"
+        way_out = f"add such a clip, or {USE_NEAREST}"
         raise NotInLibraryError(f"{text}; use one of these, {way_out}", nearest, moment.line)
     choices = select_nearest_keys(usable, moment.words)
     gait_words = library.gaits[int(gait[int(round(frame))])].labels

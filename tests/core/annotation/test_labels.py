@@ -57,6 +57,7 @@ def test_the_table_is_the_tree_of_the_appendix():
 def test_labels_say_what_they_do_with_the_ball():
     assert find_label("receive").ball == "takes" and find_label("receive").part == "foot"
     assert find_label("catchb").both_hands and find_label("catchb").title == "Catch, Two Hands"
+    assert find_label("throw_two").title == "Throw Two" and find_label("player's").title == "Player's"
     assert find_label("moonwalk").ball == find_label("moonwalk").part == ""
     assert list_labels(ball="carries") == ("dribble",)
     assert list_gaits() == ("standing", "walking", "jogging", "running", "sprinting")

@@ -280,7 +280,7 @@ def test_an_unknown_option_points_to_the_help_of_its_command(run, command, argum
         ({"omega": "0.5"}, ["omega", "0.5", "1 or more"]),
         ({"seam-window": "wide"}, ["--seam-window", "wide"]),
         ({"track-window": "-1"}, ["--track-window", "-1"]),
-        ({"gait": "walking"}, ["gait", "WORD=CLIP"]),
+        ({"gait": "walking"}, ["gait", "LABEL=CLIP"]),
         ({"gait": "walking=missing.bvh"}, ["gaits", "missing.bvh"]),
         ({"seed": "x"}, ["--seed"]),
         ({"method": "magic"}, ["magic", "path"]),
@@ -405,7 +405,7 @@ def test_libraries_that_are_none(run, synthesize, match, clip_file, tmp_path):
 
 
 def test_what_the_library_lacks_is_status_3_and_the_nearest_0(synthesize, match, tmp_path):
-    assert_told(synthesize(annotations=match / "header.txt"), 3, "header.txt:1: 3 s: ", "kick", "Nearest Labels")
+    assert_told(synthesize(annotations=match / "header.txt"), 3, "header.txt:1: 3 s: ", "kick", "or add --nearest")
     assert files_in(tmp_path) == {}
     status, _, error = synthesize("--nearest", annotations=match / "header.txt", report=tmp_path / "r.json")
     assert status == 0 and any("used instead" in line for line in error)
@@ -470,7 +470,7 @@ def test_what_a_library_says_of_itself_is_one_line_to_who_synthesizes(run, synth
     own = [line for line in out.splitlines() if line.startswith("unit ")]
     status, _, error = synthesize()
     assert status == 0 and own and not any(note in line for note in own for line in error)
-    assert sum("the command 'library' prints them" in line for line in error) == 1
+    assert sum("the command 'library' prints all" in line for line in error) == 1
 
 
 def test_no_progress_where_nobody_looks(run, clip_file, tmp_path):
@@ -570,7 +570,7 @@ def test_real_recordings(run, tmp_path_factory, scenario):
     written = ("--out", folder / "out.bvh", "--report", folder / "r.json")
     common = ("synthesize", *library, "--track", track, "--annotations", words, *written)
     asked = read_timeline(words, 30.0).keys
-    assert_told(run(*common), 3, "Nearest Labels")
+    assert_told(run(*common), 3, "--nearest")
     assert files_in(folder) == {}
     for method in ("path", "distance", "blocks"):
         status, _, error = run(*common, "--nearest", "--method", method)

@@ -98,7 +98,7 @@ def test_a_track_needs_no_ball(tmp_path):
         ("time,x,y\n0,1,2\n", "no column time_s, x_m, y_m"),
         ("time_s;x_m;y_m\n0;1;2\n", "no column time_s"),
         ("time_s,x_m,y_m\n", "0 samples"),
-        ("time_s,x_m,y_m\n0,1,2\n", "1 samples"),
+        ("time_s,x_m,y_m\n0,1,2\n", "1 sample "),
         ("time_s,x_m,y_m\n0,1,2\n0,1,2\n", "2 samples"),
         ("time_s,x_m,y_m\n0,1,2\n0.1,one,2\n", ":3: x_m 'one'"),
         ("time_s,x_m,y_m\n0,1,2\n0.1,1\n", ":3: 2 cells"),

@@ -69,7 +69,7 @@ def test_most_frames_choose_the_skeleton_unless_told(walk, other, tmp_path):
     brought = list(unify_skeletons(paths, [other, walk], None, notes))
     assert [(motion.skeleton is walk.skeleton, moved) for motion, _, moved in brought] == [(True, True), (True, False)]
     assert [motion.fps for motion, _, _ in brought] == [30.0, 60.0]
-    assert notes == ["1 clips of 1 other skeletons retargeted to the one with 22 joints"]
+    assert notes == ["1 clip of 1 other skeleton retargeted to the one with 22 joints"]
     brought = list(unify_skeletons(paths, [other, walk], other, []))
     assert [motion.skeleton.names == other.skeleton.names for motion, _, _ in brought] == [True, True]
     assert brought[1][1].shape == (len(walk), 2, 2)
