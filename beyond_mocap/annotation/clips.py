@@ -36,8 +36,7 @@ def read_clip_annotations(path: str | os.PathLike, fps: float) -> tuple[ClipAnno
     """Read the annotations in a text file beside a clip, in the text form of timelines.
 
     A key line belongs to the shortest span around it that names the same action, and adds its labels to that span; a
-    key
-    line without a span has no extent. Spans may overlap; spans without labels or with `transition` are skipped.
+    key line without a span has no extent. Spans may overlap; spans without labels or with `transition` are skipped.
 
     Args:
         path: the file.
@@ -72,8 +71,7 @@ def read_annotation_csv(
     """Read a table of annotations.
 
     The columns are file, start_frame, end_frame, key_frame and labels; others are ignored. A blank key_frame means no
-    key
-    moment. Rows without labels are skipped.
+    key moment. Rows without labels are skipped.
 
     Args:
         path: the file.

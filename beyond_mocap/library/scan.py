@@ -99,8 +99,7 @@ def find_tables(folder: Path, clips: list[Path]) -> list[Path]:
     """Find the `annotations.csv` files that may apply to `clips`.
 
     From each clip's folder up to the library's top, and in the folder above that, since a library is often one folder
-    of a
-    larger collection.
+    of a larger collection.
     """
     folder = Path(folder)
     clip_folders = {clip.parent for clip in clips}
@@ -121,9 +120,7 @@ class Annotations:
 
     def __init__(self, folder: Path, clips: list[Path], skips: Callable[[Mapping], bool] | None = None):
         """Read every table that may apply, without the rows that `skips` selects (`read_annotation_csv`); InputError
-        for
-        a broken
-        one.
+        for a broken one.
         """
         tables = find_tables(folder, clips)
         self.tables = {_to_absolute(table.parent): read_annotation_csv(table, skips) for table in tables}

@@ -1,6 +1,5 @@
 """What is requested of a match, as plain values, and the digests by which finished work is found again: the same
-content
-has the same digest in every process and on every machine.
+content has the same digest in every process and on every machine.
 """
 
 from __future__ import annotations

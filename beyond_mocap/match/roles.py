@@ -1,6 +1,5 @@
 """Find which players of a match are synthesized, when they are present, and where they have to be: their tracks,
-cleaned,
-on one clock of frames, and separated where two would overlap.
+cleaned, on one clock of frames, and separated where two would overlap.
 """
 
 from __future__ import annotations

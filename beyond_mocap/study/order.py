@@ -1,8 +1,7 @@
 """A study: clips under neutral names, each rater's order (Faustino §5.1.1), and both as a file.
 
 No name reveals which system produced a clip. All raters see other orders, with systems and scenarios mixed; two
-training
-clips come first and do not count. Raters must not see study.json, which lists the systems.
+training clips come first and do not count. Raters must not see study.json, which lists the systems.
 """
 
 from __future__ import annotations
@@ -108,8 +107,7 @@ def build_study(clips: Sequence[Clip], raters: int, seed: int = 0, pairs: bool =
         The study.
     Raises:
         InputError: unless there are exactly two training clips, at least two systems, each with the same scenarios,
-            each
-            clip once, and enough clips for so many different orders.
+            each clip once, and enough clips for so many different orders.
     """
     _check_clips(clips)
     named_clips = _name_clips(clips, seed)

@@ -62,14 +62,10 @@ def clean_track(track: Track) -> tuple[Track, DataReport]:
     """Clean a track: in order of time, with one plausible position per sample, and a report of the changes.
 
     Rows without a time are dropped, repeated times merged to their mean, times sorted. Spikes, excursions and the
-    coasted
-    samples before a snap are marked `outlier`; missing samples, and those of gaps longer than three sample intervals,
-    are
-    inserted and marked `filled`. Both get a cubic between the valid neighbours that starts and ends with their
-    velocities
-    (beyond one second only as curved as the distance allows). Before the first and after the last valid sample the
-    velocity
-    fades (to a third in half a second). A track that is already clean comes back equal.
+    coasted samples before a snap are marked `outlier`; missing samples, and those of gaps longer than three sample
+    intervals, are inserted and marked `filled`. Both get a cubic between the valid neighbours that starts and ends with
+    their velocities (beyond one second only as curved as the distance allows). Before the first and after the last
+    valid sample the velocity fades (to a third in half a second). A track that is already clean comes back equal.
 
     Args:
         track: samples as the feed has them, pitch frame.
@@ -182,8 +178,7 @@ def _detect_outliers(times: np.ndarray, positions: np.ndarray) -> tuple[np.ndarr
         if jump in used:
             continue
         # a jump with a return is an excursion, one near an end a stray, a very long one is only reported, any other is
-        # a snap
-        # after coasting
+        # a snap after coasting
         back = _find_return_jump(times[left], jumps, excess, place)
         if back is not None:
             used.add(back)
@@ -203,8 +198,7 @@ def _detect_spikes(times: np.ndarray, positions: np.ndarray) -> np.ndarray:
     better.
 
     A spike of size d is d off its line and puts its neighbours d/2 off theirs; a step puts the two samples beside it
-    off
-    theirs equally, so neither stands out and steps are left to `_detect_jumps`. The first and last sample have one
+    off theirs equally, so neither stands out and steps are left to `_detect_jumps`. The first and last sample have one
     neighbour only: they are measured against the line of the third and fourth, or their own errors would blame the
     second.
     """
@@ -267,8 +261,7 @@ def _find_coasted_samples(times: np.ndarray, positions: np.ndarray, jump: int, s
     """Find the samples up to `jump` to replace.
 
     As many as making up for `size` metres takes, and further back while they lie on an exact line. The first sample of
-    such
-    a line is where the player was last seen, and is left as it is.
+    such a line is where the player was last seen, and is left as it is.
     """
     before = times[jump] - times[: jump + 1]
     first = int(np.searchsorted(-before, -max(_COAST[0], min(size / _CATCH_UP, _COAST[1]))))
