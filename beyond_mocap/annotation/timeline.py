@@ -18,6 +18,7 @@ from .vocabulary import (
     find_similar_labels,
     list_labels_below,
     list_vocabulary,
+    sort_labels,
 )
 
 NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)(e[+-]?\d+)?f?", re.IGNORECASE)
@@ -278,9 +279,9 @@ def find_missing_keys(
         choices: the labels of every clip's key moment, mirrored clips included.
         count: number of nearest combinations to return.
     Returns:
-        Each such key moment with the `count` nearest combinations.
+        Each such key moment with the `count` nearest combinations, sorted by `sort_labels`.
     """
-    combinations = [tuple(choice) for choice in choices]
+    combinations = [sort_labels(choice) for choice in choices]
     missing = [key for key in timeline.keys if not any(set(key.words) <= set(choice) for choice in combinations)]
     return [(key, find_nearest_labels(key.words, combinations, count)) for key in missing]
 

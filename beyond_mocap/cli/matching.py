@@ -167,7 +167,7 @@ def run_touches(options, reporter: ProgressReporter, writers: Mapping[str, Write
     check_outputs(options.out, options.ball, options.report, reserved=(options.input, options.meta))
     if options.start is not None and options.end is not None and options.end <= options.start:
         raise InputError("--to", f"{format_seconds(options.end)} s",
-                         f"later than --from {format_seconds(options.start)} s")
+                         f"later than --from {format_seconds(options.start)} s", "choose a later end")
     source = _read_tracking(options)
     loaded = time.perf_counter()
     solved = solve_ball(source, reporter.show_progress, reporter.is_cancelled, options.start, options.end)

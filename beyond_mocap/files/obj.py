@@ -26,8 +26,7 @@ def read_mesh(path: str | os.PathLike) -> tuple[np.ndarray, np.ndarray]:
         Vertices (V, 3) m, Z up, and triangles (F, 3) int, their indices.
     Raises:
         InputError: with the line, for an invalid number, a face with an unknown vertex or fewer than three corners, or
-            a
-            file without faces.
+            a file without faces.
     """
     vertices, triangles = [], []
     for place, words in _iter_statements(path):

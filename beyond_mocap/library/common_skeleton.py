@@ -30,8 +30,7 @@ def unify_skeletons(
     """Bring clips to the library's skeleton.
 
     Heels and toes are in contact where the recording's own are; where only the new body has toes, contacts are detected
-    on
-    it.
+    on it.
 
     Args:
         paths: the files.

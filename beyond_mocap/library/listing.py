@@ -107,8 +107,7 @@ def scan_clips(folder: str | Path, cache_dir: str | Path | None = None) -> tuple
 
 def collect_labels(rows: Sequence[ClipAnnotation]) -> tuple[tuple[str, ...], int]:
     """Collect the labels of rows, key moments' first, as they are spoken, then those of the longest rows; and count the
-    key
-    moments.
+    key moments.
     """
     ordered = sorted(rows, key=lambda row: (row.key is None, row.start - row.end))
     words = dict.fromkeys(word for row in ordered for word in sort_labels(row.words))

@@ -88,8 +88,7 @@ def remove_pops(motion: Motion) -> tuple[Motion, int]:
     """Remove rotations that jump for one or two frames and return.
 
     A joint pops where it is more than 12 degrees off the slerp of the frames around the gap, and more than four times
-    as
-    far as these are apart from each other or from their own outer neighbours (a fast swing moves on, a pop returns).
+    as far as these are apart from each other or from their own outer neighbours (a fast swing moves on, a pop returns).
 
     Args:
         motion: T frames.
@@ -111,8 +110,7 @@ def remove_drift(motion: Motion) -> tuple[Motion, float]:
     """Remove a floor drift of more than _DRIFT metres.
 
     The floor is the lowest joint within _LOW_SECONDS (longer than a flight), smoothed. An inertial suit's floor can
-    rise by
-    half a metre in five seconds, and `_level_floor` knows only feet detected as in contact.
+    rise by half a metre in five seconds, and `_level_floor` knows only feet detected as in contact.
 
     Args:
         motion: T frames.
@@ -256,8 +254,7 @@ def _correct_travel(motion: Motion, heel_toe_contacts: np.ndarray) -> tuple[Moti
     metres.
 
     Only the middle of a stance counts: a foot that lands or leaves moves. On recordings without sliding the path comes
-    out
-    unchanged, to half a per cent.
+    out unchanged, to half a per cent.
     """
     velocity = np.diff(_compute_ball_positions(motion)[..., :2], axis=0) * motion.fps
     weight = _weight_stance_middles(heel_toe_contacts[..., 1])

@@ -166,8 +166,7 @@ def _compute_side(feet: np.ndarray, stands: np.ndarray, clear: np.ndarray, fps: 
     middle = (firsts + ends - 1) // 2
     sums = np.concatenate([np.zeros((1, 2, 2)), np.cumsum(feet, axis=0)])
     # `before` and `after` index the stances around each frame; `time_share` is the time of the swing between them, from
-    # 0 to
-    # 1.
+    # 0 to 1.
     mean = (sums[ends] - sums[firsts]) / (ends - firsts)[:, None, None]
     height, slope = _fit_planes(mean[:, 0], mean[:, 1], middle, surface)
     before = np.clip(np.searchsorted(firsts, np.arange(len(feet)), side="right") - 1, 0, len(spans) - 1)

@@ -1,8 +1,7 @@
 """A study: clips under neutral names, each rater's order (Faustino §5.1.1), and both as a file.
 
 No name reveals which system produced a clip. All raters see other orders, with systems and scenarios mixed; two
-training
-clips come first and do not count. Raters must not see study.json, which lists the systems.
+training clips come first and do not count. Raters must not see study.json, which lists the systems.
 """
 
 from __future__ import annotations
@@ -108,8 +107,7 @@ def build_study(clips: Sequence[Clip], raters: int, seed: int = 0, pairs: bool =
         The study.
     Raises:
         InputError: unless there are exactly two training clips, at least two systems, each with the same scenarios,
-            each
-            clip once, and enough clips for so many different orders.
+            each clip once, and enough clips for so many different orders.
     """
     _check_clips(clips)
     named_clips = _name_clips(clips, seed)
@@ -185,7 +183,7 @@ def read_study(folder: Path) -> Study:
             raise ValueError(f"{invalid!r} is not a valid name")
         return Study(id=str(data["study"]), seed=int(data["seed"]), pairs=data["pairs"], clips=clips, orders=orders)
     except (ValueError, KeyError, TypeError, AttributeError, OverflowError, RecursionError) as error:
-        found = f"not a study ({type(error).__name__}: {error})"
+        found = f"not a study ({error})" if type(error) is ValueError else "not a study"  # others are Python's words
         raise InputError(path, found, "a file written by 'study order'", "create the study again") from None
 
 

@@ -2,9 +2,8 @@
 
 The ball's own action is set aside; it plays one that is built from it and from all stretches in which it is carried, so
 that each of them can be changed or removed. Where a stretch begins, the ball is where it was. Where it ends, the ball
-is
-on its own path again if that continues, otherwise it stays where it was released. Between, it is rigid with the bone,
-except for the frames at either end in which it moves to its carried position and back.
+is on its own path again if that continues, otherwise it stays where it was released. Between, it is rigid with the
+bone, except for the frames at either end in which it moves to its carried position and back.
 
 With T the bone's matrix in the world, W the ball's own path and L = T^-1 W the ball in the bone's frame, the constraint
 shows T inv own. Its inverse is that of T on the first frame, so own = T(first) L there, which is W: no jump.

@@ -1,6 +1,5 @@
 """Motions as files of Blender's own exporters: the displayed motion of a rig becomes one action on a plain copy, and
-that is
-exported.
+that is exported.
 
 The copy is in a temporary scene and removed afterwards; the user's scene is unchanged. The copy has no constraints,
 drivers or NLA strips that an exporter could evaluate differently from Blender.

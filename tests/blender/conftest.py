@@ -35,8 +35,7 @@ import addon_utils  # noqa: E402  (bpy brings it)
 @atexit.register
 def without_blenders_own_leak():
     """Blender never frees the properties of pose markers (our words' markers have some) and counts them as an error
-    when
-    it ends; that line alone is left out of what is printed from here on."""
+    when it ends; that line alone is left out of what is printed from here on."""
     left_out = subprocess.Popen(["sed", "/^Error: Not freed memory blocks/d"], stdin=subprocess.PIPE)
     os.dup2(left_out.stdin.fileno(), 1)
 

@@ -62,10 +62,8 @@ def read_bvh(path, unit: float | None = None) -> BvhClip:
     """Read the clip of a BVH file.
 
     Position channels of any joint replace its OFFSET, as Bandai-Namco's and LAFAN1's files mean them; below the hips
-    their
-    mean becomes the bone, and the notes list joints that move by more than 1 mm. Joints above the hips are folded into
-    the
-    hips. Frame rates within 0.1 % of a whole number or an NTSC rate are rounded to it.
+    their mean becomes the bone, and the notes list joints that move by more than 1 mm. Joints above the hips are folded
+    into the hips. Frame rates within 0.1 % of a whole number or an NTSC rate are rounded to it.
 
     Args:
         path: the file.
@@ -97,8 +95,7 @@ def write_bvh(path, motion: Motion, form: BvhForm | None = None) -> tuple[str, .
 
     A joint that needs a channel missing in its form gets all channels of that kind. A root above the hips that did not
     move keeps its place; one that moved is placed on the ground below the hips (or at them, if they have no positions
-    of
-    their own) with the body's heading. The file is written to a temporary place and renamed.
+    of their own) with the body's heading. The file is written to a temporary place and renamed.
 
     Args:
         path: the file.
@@ -344,10 +341,8 @@ def estimate_scale(text: BvhText, unit: float | None) -> FileScale:
     """Estimate a file's up axis, and its unit if it is not set.
 
     Up is the axis, Y or Z, along which feet to head point (within 35 degrees) in more of 64 frames spread over the
-    clip;
-    the rest pose counts too, for clips mostly lying down. The unit is the usual one that puts the hips 0.75 to 1.15 m
-    above
-    the feet, else the one with 0.88 m long legs. Without legs: centimetres, Y up.
+    clip; the rest pose counts too, for clips mostly lying down. The unit is the usual one that puts the hips 0.75 to
+    1.15 m above the feet, else the one with 0.88 m long legs. Without legs: centimetres, Y up.
 
     Args:
         text: the file's content.

@@ -109,7 +109,8 @@ def _read_content(path: Path) -> bytes:
     if data.startswith(b"\xef\xbb\xbf"):
         data = data[3:]
     if b"\0" in data or not re.match(rb"\s*HIERARCHY\b", data, re.I):
-        raise InputError(f"{path}:1", f"starts with {data[:12]!r}", "HIERARCHY at the start", "choose a BVH file")
+        first = "binary content" if b"\0" in data else f"starts with {_decode(data[:12].split()[0])!r}"
+        raise InputError(f"{path}:1", first, "HIERARCHY at the start", "choose a BVH file")
     return data.replace(b"\r\n", b"\n").replace(b"\r", b"\n") if b"\r" in data else data
 
 

@@ -208,8 +208,7 @@ def repair_players(times, positions, length: float, width: float, ids) -> tuple[
         ids: P names.
     Returns:
         (P, N, 2) m, NaN where a player is parked: far beside the pitch, or at exactly one position for half a minute;
-        and
-        messages.
+        and messages.
     """
     out = np.array(positions)
     lines, jumps = [], 0
@@ -246,8 +245,7 @@ def repair_sides(times, positions, ball, periods, teams) -> tuple[np.ndarray, np
 
     Teams change ends at half time. If they do not, the feed rotated one half so that attacks go one way, and the second
     half is rotated back. Players keep their side of the team: if left backs become right backs, the half is mirrored
-    and
-    its y changes sign. The third and fourth periods, of extra time, are a pair too.
+    and its y changes sign. The third and fourth periods, of extra time, are a pair too.
 
     Args:
         times: (N,) s.

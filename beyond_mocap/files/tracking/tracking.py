@@ -48,8 +48,7 @@ def read_track_csv(path: str | os.PathLike) -> Track:
     ignored.
 
     Empty cells (or nan) are unknown. Rows keep the file's order, with repeated times and gaps: `motion.track.clean`
-    repairs
-    them and reports it.
+    repairs them and reports it.
 
     Args:
         path: the file.
@@ -57,8 +56,7 @@ def read_track_csv(path: str | os.PathLike) -> Track:
         The track.
     Raises:
         InputError: with the line, for missing columns, cells that are not numbers or beyond 10 km, fewer than two
-            samples
-            with a position, and rates outside 5 to 100 Hz.
+            samples with a position, and rates outside 5 to 100 Hz.
     """
     rows = list(read_rows(path, ("time_s", "x_m", "y_m")))
     names = rows[0][1] if rows else {}

@@ -1,6 +1,6 @@
 """A classifier of acts: for each act its kernel, confidence, key frame and labels; its proposals for a recording,
-combined
-with the rules; and its file: one `.npz` of plain arrays with a JSON header, never pickled, checked when it is read.
+combined with the rules; and its file: one `.npz` of plain arrays with a JSON header, never pickled, checked when it is
+read.
 """
 
 from __future__ import annotations

@@ -2,8 +2,7 @@
 
 Only the loopback address is bound or called, so nothing from another machine comes in and nothing goes out. Frames stay
 in a ring buffer of some seconds. The thread never waits longer than a fifth of a second, reads a limited number of
-bytes
-per second, and ends with `stop`, which also closes all sockets.
+bytes per second, and ends with `stop`, which also closes all sockets.
 """
 
 from __future__ import annotations

@@ -3,6 +3,7 @@
 import io
 import json
 import os
+import re
 import signal
 import subprocess
 import sys
@@ -151,8 +152,8 @@ def test_what_was_written_can_be_evaluated(synthesize, run, match, clips_folder,
         "--provenance", tmp_path / "p.csv", "--ball", tmp_path / "b.csv", "--library", clips_folder, "--unit", 0.01,
         "--report", tmp_path / "e.json",
     )  # fmt: skip
-    assert (status, error) == (0, [])
     mine, again = (json.loads((tmp_path / name).read_text()) for name in ("r.json", "e.json"))
+    assert (status, error) == (0, [f"note: {line}" for line in again["warnings"]])
     assert_contract(again)
     assert again["root_error_m"]["mean"] == pytest.approx(mine["root_error_m"]["mean"], abs=1e-3)
     assert again["keys"][0]["clip"] == mine["keys"][0]["clip"]
@@ -169,7 +170,30 @@ def test_what_does_not_belong_together_is_told_by_evaluate(synthesize, run, matc
     assert not (tmp_path / "e.json").exists()
     status, _, error = run(*both, "--provenance", tmp_path / "other.csv")
     assert status == 0 and "_x.bvh" in error[-1] and "not in" in error[-1]
-    assert run(*both, "--provenance", tmp_path / "p.csv")[2] == []
+    assert not any("not in" in line for line in run(*both, "--provenance", tmp_path / "p.csv")[2])
+
+
+def test_evaluate_says_what_it_cannot_know_and_what_it_replaces(synthesize, run, match, tmp_path):
+    pytest.importorskip("matplotlib")
+    assert synthesize(report=tmp_path / "r.json")[0] == 0
+    (tmp_path / "far.csv").write_text("time_s,x_m,y_m\n" + "".join(f"{t / 10},{t / 5 + 50},0\n" for t in range(200)))
+    command = ("evaluate", tmp_path / "out.bvh", "--annotations", match / "words.txt", "--report", tmp_path / "r.json")
+    status, _, error = run(*command, "--track", tmp_path / "far.csv", "--html", tmp_path / "r.html")
+    assert status == 0 and "played: unknown" in (tmp_path / "r.html").read_text()
+    for part in ("far.csv 19.9 s; check", "m from .*far.csv on average", "clips that played are unknown",
+                 "r.json: replaces the report of synthesize"):
+        assert any(re.search(part, line) for line in error), part
+    assert not any("replaces" in line for line in run(*command)[2])
+
+
+def test_labels_are_those_beside_the_track_or_automatic(synthesize, match, tmp_path):
+    track = tmp_path / "player.csv"
+    track.write_bytes((match / "track.csv").read_bytes())
+    for expected in (0, 1):
+        status, _, error = synthesize(annotations=None, track=track, report=tmp_path / "r.json")
+        assert status == 0 and len(json.loads((tmp_path / "r.json").read_text())["keys"]) == expected
+        assert any("player.csv: with the labels of" in line for line in error) == bool(expected)
+        (tmp_path / "player.txt").write_text("3 kick right\n")
 
 
 def test_same_seed_same_file(synthesize, tmp_path):
@@ -381,7 +405,7 @@ def test_libraries_that_are_none(run, synthesize, match, clip_file, tmp_path):
 
 
 def test_what_the_library_lacks_is_status_3_and_the_nearest_0(synthesize, match, tmp_path):
-    assert_told(synthesize(annotations=match / "header.txt"), 3, "header", "kick", "or add --nearest")
+    assert_told(synthesize(annotations=match / "header.txt"), 3, "header.txt:1: 3 s: ", "kick", "or add --nearest")
     assert files_in(tmp_path) == {}
     status, _, error = synthesize("--nearest", annotations=match / "header.txt", report=tmp_path / "r.json")
     assert status == 0 and any("used instead" in line for line in error)
@@ -578,3 +602,10 @@ def test_pins_height_foot_and_style_are_a_players_own(synthesize, tmp_path):
     assert_told(synthesize(height=0.1), 2, "--height", "0.5 to 3 metres")
     (tmp_path / "pins.csv").write_text("time_s,part,x_m,y_m,z_m\n2,nose,30,0,1.5\n")
     assert_told(synthesize(pins=tmp_path / "pins.csv"), 2, "pins.csv:2", "'nose'")
+
+
+def test_a_missing_package_of_the_core_is_told_in_one_line():
+    code = "import sys, runpy; sys.modules['numpy'] = None; runpy.run_module('beyond_mocap', run_name='__main__')"
+    done = subprocess.run([sys.executable, "-c", code], cwd=TOP, capture_output=True, text=True)
+    expected = "beyond-mocap: numpy is missing; install the core: pip install . in the project's folder"
+    assert (done.returncode, done.stderr.strip()) == (2, expected)

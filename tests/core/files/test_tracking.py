@@ -233,6 +233,8 @@ def test_wrong_files_get_one_line(tmp_path):
         ((tmp_path / "none.dat",), "no such file"),
         ((tmp_path / "odd.txt",), "unknown format"),
         ((file, tmp_path / "bad_meta.xml"), "not readable as tracab"),
+        ((file, tmp_path / "odd.txt"), "odd.txt: neither XML nor JSON; expected the metadata of tracab"),
+        ((file, None, "metrica"), "not readable as metrica tracking; expected"),
         ((file, None, "fifa"), "one of tracab"),
         ((tmp_path / "lonely.dat",), "choose the metadata file"),
         ((file, tmp_path / "none.xml"), "no such file"),
