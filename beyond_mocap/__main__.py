@@ -2,7 +2,23 @@
 
 import sys
 
-from .cli.main import main
+_CORE_PACKAGES = ("numpy", "scipy", "sklearn")
+
+
+def _run() -> int:
+    """Run the command line; a missing package of the core is one line, as a fresh clone has no installed packages."""
+    try:
+        from .cli.main import main
+
+        return main()
+    except ModuleNotFoundError as error:
+        package = (error.name or "").partition(".")[0]
+        if package not in _CORE_PACKAGES:
+            raise
+        print(f"beyond-mocap: {package} is missing; install the core: pip install . in the project's folder",
+              file=sys.stderr)
+        return 2
+
 
 if __name__ == "__main__":
-    sys.exit(main())
+    sys.exit(_run())

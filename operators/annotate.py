@@ -44,18 +44,20 @@ class BEYOND_MOCAP_OT_annotate(BaseOperator, bpy.types.Operator):
     bl_idname = "beyond_mocap.annotate"
     bl_label = "Annotate by Keys"
     keys: StringProperty(name="Keys", options={"SKIP_SAVE"},
-                         description="Keys to press at the playhead, separated by blanks, for scripts: '2 2 3 5 ENTER'")
+                         description="Keys to press at the playhead, separated by spaces, for scripts: '2 2 3 5 ENTER'")
     needs = ("Import tracking data and choose a player in the list first, or open a clip's labels",
              lambda context: bool(describe_subject(context)))
 
     def do(self, context):
         """Press the keys of a script."""
         keys = self.keys.upper().split()
-        known = {*annotating.KEYS, *"0123456789"}
+        names = sorted(key for key in annotating.KEYS if not key[0].isdigit())
+        known = {*names, *"0123456789"}
         unknown = next((key for key in keys if key not in known), None)
         if unknown or not keys:
             found = f"the key {unknown}" if unknown else "no keys"
-            raise InputError("annotate", found, f"keys of {', '.join(sorted(known))}", "for example '2 2 3 5 ENTER'")
+            raise InputError("annotate", found, f"keys of {', '.join(['0 to 9', *names])}",
+                             "for example '2 2 3 5 ENTER'")
         lines = type_keys(context, keys)
         self.report({"INFO"}, "; ".join(lines) or "Nothing to do")
 

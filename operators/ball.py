@@ -9,7 +9,7 @@ from dataclasses import replace
 import bpy
 from bpy.props import BoolProperty, EnumProperty, FloatProperty, IntProperty, StringProperty
 
-from ..beyond_mocap.base.errors import InputError
+from ..beyond_mocap.base.errors import InputError, format_count
 from ..beyond_mocap.base.settings.aim import TIMES, WAYS
 from ..beyond_mocap.base.settings.setting import BALLS, HOLDS, PARTS, SIDES
 from ..scene.ball import handover, shots
@@ -196,7 +196,7 @@ on the action; without ball data, the marked frame is the most likely one"""
         if not count:
             self.report({"WARNING"}, f"{body.name}: no strike of the {what} found; try the other side, or a threshold")
             return
-        self.report({"INFO"}, f"{body.name}: {count} {'strike' if count == 1 else 'strikes'} of the {what}, "
+        self.report({"INFO"}, f"{body.name}: {format_count(count, 'strike')} of the {what}, "
                     f"above {found.threshold:.2f} m")
 
 
@@ -291,8 +291,8 @@ and its touches are proposals for key moments"""
     def apply(self, scene, solved):
         """Create the ball and the list of touches."""
         tracked.write_ball(scene, solved)
-        self.report({"INFO"},
-                    f"{len(solved.touches)} touches solved, mean confidence {solved.confidence:.0%}")
+        count = format_count(len(solved.touches), "touch", "touches")
+        self.report({"INFO"}, f"{count} solved, mean confidence {solved.confidence:.0%}")
 
 
 class BEYOND_MOCAP_OT_accept_touches(BaseOperator, bpy.types.Operator):
@@ -315,4 +315,4 @@ them"""
                              "select some in the list")
         for line in messages[:5]:
             self.report({"INFO"}, line)
-        self.report({"INFO"}, f"{count} key moments added")
+        self.report({"INFO"}, f"{format_count(count, 'key moment')} added")

@@ -9,7 +9,7 @@ import bpy
 import numpy as np
 from bpy.props import BoolProperty, EnumProperty, FloatProperty, StringProperty
 
-from ..beyond_mocap.base.errors import InputError, UserCancelledError
+from ..beyond_mocap.base.errors import InputError, UserCancelledError, format_count
 from ..beyond_mocap.files.bvh import bvh
 from ..beyond_mocap.library.scan import FOREIGN, find_recordings, is_foreign
 from ..beyond_mocap.motion import humanoid
@@ -23,8 +23,8 @@ from .operator_base import BackgroundOperator, BaseOperator, ImportOperator
 
 
 class BEYOND_MOCAP_OT_import_clips(ImportOperator, bpy.types.Operator):
-    """Import motion clips (BVH, FBX, glTF, USD) as armatures, from files or from all files below a folder. Only the
-motion is imported, from the hips up and in metres"""
+    """Import motion clips (BVH, FBX, glTF, USD) as armatures, from files or from all files below a folder: only the
+motion, from the hips up and in metres"""
 
     bl_idname = "beyond_mocap.import_clips"
     bl_label = "Import Motion Clips"
@@ -115,7 +115,7 @@ class BEYOND_MOCAP_FH_foreign_clips(bpy.types.FileHandler):
 
 class BEYOND_MOCAP_OT_mirror(BaseOperator, bpy.types.Operator):
     """Exchange left and right in the active armature's motion: it starts at the same place and facing, but turns and
-kicks to the other side. The previous motion stays as an action"""
+kicks to the other side; the previous motion stays as an action"""
 
     bl_idname = "beyond_mocap.mirror"
     bl_label = "Mirror Motion"
@@ -244,7 +244,7 @@ kind, in this file or as a .blend for a folder of asset libraries"""
             target = self.find_target()
             write_asset_file(target, assets.create_assets(bpy.context, drafts, pictures, copy_actions=True), drafts)
             assets.define_catalogs(target.parent, catalogs)
-            self.report({"INFO"}, f"{len(drafts)} assets written to {target}")
+            self.report({"INFO"}, f"{format_count(len(drafts), 'asset')} written to {target}")
             return
         if bpy.data.filepath:
             assets.define_catalogs(Path(bpy.data.filepath).parent, catalogs)

@@ -11,7 +11,7 @@ import bpy
 from bpy.props import BoolProperty, StringProperty
 
 from ..beyond_mocap.annotation.labels import find_label
-from ..beyond_mocap.base.errors import InputError
+from ..beyond_mocap.base.errors import InputError, format_count
 from ..scene.core import preferences, session, window
 from ..scene.core.settings import to_absolute_path, to_setting_path
 from ..scene.library import clips, foreign, recordings
@@ -76,8 +76,8 @@ class BuildResult:
 
 
 class BEYOND_MOCAP_OT_build_library(FolderOperator, bpy.types.Operator):
-    """Read all clips of the library folder with their labels and foot contacts, and index them for the search. The
-result is cached, so the next build is quick unless files have changed. FBX, glTF and USD clips are converted first"""
+    """Read all clips of the library folder with their labels and foot contacts, and index them for the search; FBX,
+glTF and USD clips are converted first, and the result is cached"""
 
     bl_idname = "beyond_mocap.build_library"
     bl_label = "Build Library"
@@ -191,10 +191,10 @@ def describe_library(library: "Library") -> str:
     """
     originals = [clip for clip in library.clips if not clip.mirrored]
     keys = Counter(row.words[0] for clip in originals for row in clip.annotations if row.key is not None and row.words)
-    lines = [f"{len(originals)} clips, {library.minutes:.1f} minutes, {len(library.skeleton)} joints"]
-    lines += [f"{gait.label}: {gait.speed:.1f} m/s" for gait in library.gaits]
+    lines = [f"{format_count(len(originals), 'clip')}, {library.minutes:.1f} minutes, {len(library.skeleton)} joints"]
+    lines += [f"{find_label(gait.label).title}: {gait.speed:.1f} m/s" for gait in library.gaits]
     for word, count in keys.most_common():
-        lines.append(f"{find_label(word).title}: {count} {'moment' if count == 1 else 'moments'}")
+        lines.append(f"{find_label(word).title}: {format_count(count, 'moment')}")
     return "\n".join(lines)
 
 
@@ -291,8 +291,8 @@ class BEYOND_MOCAP_OT_import_clip(ClipOperator, bpy.types.Operator):
 
 
 class BEYOND_MOCAP_OT_remove_clip(BaseOperator, bpy.types.Operator):
-    """Remove the active clip from this file: armature, body, strips and actions. The library keeps the clip; unsaved
-labels are lost"""
+    """Remove the active clip from this file, with armature, body, strips, actions and unsaved labels; the library keeps
+the clip"""
 
     bl_idname = "beyond_mocap.remove_clip"
     bl_label = "Remove Clip"

@@ -8,7 +8,7 @@ from pathlib import Path
 import bpy
 from bpy.props import BoolProperty, EnumProperty, FloatProperty, IntProperty, StringProperty
 
-from ..beyond_mocap.base.errors import BeyondMocapError, InputError
+from ..beyond_mocap.base.errors import BeyondMocapError, InputError, format_count
 from ..scene.core import preferences, session
 from ..scene.core.settings import to_absolute_path
 from ..scene.core.window import clear_status
@@ -29,7 +29,7 @@ class OpenClipOperator(BaseOperator):
 
 class BEYOND_MOCAP_OT_annotate_clip(ClipOperator, bpy.types.Operator):
     """Open this clip of the library for annotation: an armature that plays it, with its labels as strips and markers in
-the NLA editor. Edit them there or propose labels, then press Save Labels"""
+the NLA editor; Save Labels writes them to the library"""
 
     bl_idname = "beyond_mocap.annotate_clip"
     bl_label = "Annotate Clip"
@@ -48,12 +48,12 @@ the NLA editor. Edit them there or propose labels, then press Save Labels"""
         recordings.write_labels(rig, context.scene, motion, timeline)
         for row, (source, confidence) in sources.items():
             proposals.add_proposal(rig, row, source, confidence, "ACCEPTED")
-        self.report({"INFO"}, f"{rig.name}: {len(rows)} {'row' if len(rows) == 1 else 'rows'} of labels")
+        self.report({"INFO"}, f"{rig.name}: {format_count(len(rows), 'row')} of labels")
 
 
 class BEYOND_MOCAP_OT_propose_words(OpenClipOperator, bpy.types.Operator):
     """Propose labels for the active clip from its motion: gaits and directions, kicks with foot and key moment, jumps,
-headers, turns, getting up, and acts learned from annotated clips. Review them and add what is missing"""
+headers, turns, getting up, and acts learned from annotated clips"""
 
     bl_idname = "beyond_mocap.propose_words"
     bl_label = "Propose Labels"
@@ -99,7 +99,7 @@ headers, turns, getting up, and acts learned from annotated clips. Review them a
                 self.report({"INFO"}, f"{when} {' '.join(row.words)}: {one.why}, confidence {one.confidence:.0%}")
         keys = sum(one.annotation.key is not None for one in found)
         rest = len(found) - keys
-        counted = f"{rest} stretch{'es' * (rest != 1)} and {keys} key moment{'s' * (keys != 1)}"
+        counted = f"{format_count(rest, 'span')} and {format_count(keys, 'key moment')}"
         self.report({"INFO"}, f"{rig.name}: {counted} proposed")
 
     def list_new_proposals(self, rig, scene, motion, found):
@@ -111,7 +111,7 @@ headers, turns, getting up, and acts learned from annotated clips. Review them a
         timeline = lanes.read_timeline(rig)
         new = [one for one in found if not proposals.has_labels(timeline, one.annotation, motion.fps)]
         proposals.store_proposals(rig, new)
-        self.report({"INFO"}, f"{rig.name}: {len(new)} proposal{'s' * (len(new) != 1)} to review")
+        self.report({"INFO"}, f"{rig.name}: {format_count(len(new), 'proposal')} to review")
 
 
 REVIEW_ACTIONS = (("ACCEPT", "Accept", "Add this proposal to the clip's labels and go to the next one"),
@@ -222,7 +222,7 @@ def review_proposal(target: bpy.types.Object, what: str, index: int = -1) -> str
         group.active = min(group.active, len(group.listed) - 1)
         proposals.go_to_next(target, 1 if what == "NEXT" else -1)
         return proposals.find_active(target).name
-    action = proposals.accept_proposal if what.startswith("ACCEPT") else proposals.refuse_proposal
+    action = proposals.accept_proposal if what.startswith("ACCEPT") else proposals.reject_proposal
     if what.endswith("_ALL"):
         judged_now = [number for number, one in enumerate(group.listed) if one.state == "OPEN"]
         for number in judged_now:
@@ -252,7 +252,7 @@ def _is_over_editor(context, event) -> bool:
 
 class BEYOND_MOCAP_OT_save_words(OpenClipOperator, bpy.types.Operator):
     """Write the labels of the active clip's strips to a text file beside the clip, or to the library's annotation
-table. Existing labels are replaced only after you confirm"""
+table; existing labels are replaced only after you confirm"""
 
     bl_idname = "beyond_mocap.save_words"
     bl_label = "Save Labels"
@@ -290,7 +290,8 @@ table. Existing labels are replaced only after you confirm"""
         target = write_labels(clip, folder, rows, fps=rig[recordings.RATE], overwrite=self.overwrite,
                               sources=proposals.collect_sources(rig))
         clips.update_labels(context.window_manager, recordings.find_shown_clip(rig), rows)
-        self.report({"INFO"}, f"{len(rows)} rows of labels written to {target}; press Build Library to use them")
+        self.report({"INFO"}, f"{format_count(len(rows), 'row')} of labels written to {target}; press Build "
+                    "Library to use the labels")
 
 
 @dataclass(frozen=True)

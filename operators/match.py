@@ -7,7 +7,7 @@ from pathlib import Path
 import bpy
 from bpy.props import BoolProperty, CollectionProperty, EnumProperty, FloatProperty, StringProperty
 
-from ..beyond_mocap.base.errors import InputError
+from ..beyond_mocap.base.errors import InputError, format_count
 from ..scene.core import channels, session, window
 from ..scene.core.measure import frames_per_second
 from ..scene.core.settings import to_setting_path
@@ -51,7 +51,8 @@ class MatchVerb(BackgroundOperator):
             self.report({"WARNING"}, line)
         seconds = scenery.end - scenery.start
         self.report(
-            {"INFO"}, f"{len(scenery.characters)} players, {seconds:.1f} s, shown in {sum(took.values()):.1f} s")
+            {"INFO"}, f"{format_count(len(scenery.characters), 'player')}, {seconds:.1f} s, shown in "
+            f"{sum(took.values()):.1f} s")
 
 
 class BEYOND_MOCAP_OT_read_match(BackgroundOperator, bpy.types.Operator):
@@ -85,7 +86,8 @@ select the first minute"""
         order.update_match(match, asked, read)
         for line in match.report.splitlines()[:6]:
             self.report({"INFO"}, line)
-        self.report({"INFO"}, f"{len(read.players)} players, {match.length_s / 60.0:.1f} minutes, {read.provider}")
+        self.report({"INFO"}, f"{format_count(len(read.players), 'player')}, {match.length_s / 60.0:.1f} minutes, "
+                    f"{read.provider}")
 
 
 class BEYOND_MOCAP_FH_match(ViewDropHandler, bpy.types.FileHandler):
@@ -287,10 +289,11 @@ scene is not changed"""
     def do(self, context):
         path = self.output_path()
         scene = context.scene
-        everybody = ours.find_armatures(scene)
-        bodies = [body for body in everybody if body.name in context.view_layer.objects]
-        if len(bodies) < len(everybody):
-            self.report({"WARNING"}, f"{len(everybody) - len(bodies)} players left out: their collection is excluded")
+        armatures = ours.find_armatures(scene)
+        bodies = [body for body in armatures if body.name in context.view_layer.objects]
+        if len(bodies) < len(armatures):
+            count = format_count(len(armatures) - len(bodies), "player")
+            self.report({"WARNING"}, f"{count} left out: in an excluded collection")
         wanted = export.ExportOptions(path, self.format, self.engine, None, self.root)
         things = ours.find_meshes(scene, "ball") + (ours.find_meshes(scene, "pitch") if self.pitch else [])
         for line in export.export_motion(context, bodies, wanted, things):

@@ -25,8 +25,7 @@ class BaseOperator:
 
     Attributes:
         needs: pairs of a message for the user while the operator is disabled, and a function of the context that
-            returns
-            whether it is enabled; they are checked in order.
+            returns whether it is enabled; they are checked in order.
     """
 
     bl_options = {"REGISTER", "UNDO"}

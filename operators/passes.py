@@ -8,7 +8,7 @@ import bpy
 from bpy.props import BoolProperty, EnumProperty, StringProperty
 from bpy_extras.io_utils import ExportHelper
 
-from ..beyond_mocap.base.errors import InputError
+from ..beyond_mocap.base.errors import InputError, format_count
 from ..beyond_mocap.files.atomic import atomic_write
 from ..beyond_mocap.passes import scene_json
 from ..beyond_mocap.passes.scene_json import SAMPLES as SCENES
@@ -121,7 +121,7 @@ def add_pass(settings) -> None:
     """Add a pass from the receiver of the last one to the next player in the list."""
     names = [row.name for row in settings.players]
     if len(names) < 2:
-        raise InputError("passes", f"{len(names)} players", "two or more", "add players first")
+        raise InputError("passes", format_count(len(names), "player"), "two or more", "add players first")
     last = settings.passes[-1] if len(settings.passes) else None
     row = settings.passes.add()
     row.who = last.to if last is not None and last.to in names else names[0]

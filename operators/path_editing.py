@@ -7,14 +7,12 @@ from contextlib import suppress
 import bpy
 from bpy.props import BoolProperty, EnumProperty, FloatProperty, IntProperty
 
-from ..beyond_mocap.base.errors import BeyondMocapError, InputError
+from ..beyond_mocap.base.errors import BeyondMocapError, InputError, format_count
 from ..scene.core import channels
 from ..scene.core.measure import units_per_metre
 from ..scene.path_editing import collision_avoidance as keep_apart
-from ..scene.path_editing import curve, live
-from ..scene.path_editing import edited_bodies as riders
-from ..scene.path_editing.settings import list_edited_bodies as riders_in
-from ..scene.path_editing.settings import list_target_bodies, select_object
+from ..scene.path_editing import curve, edited_bodies, live
+from ..scene.path_editing.settings import list_edited_bodies, list_target_bodies, select_object
 from .operator_base import NEEDS_NO_EDITING, BaseOperator
 
 
@@ -55,19 +53,19 @@ a selected curve"""
         started, used = [], drawn
         try:
             for body, _ in already_edited if drawn is not None else ():
-                riders.change_curve(context.scene, body, drawn)
+                edited_bodies.change_curve(context.scene, body, drawn)
             for body in [body for body in chosen if not body.beyond_mocap_ride.on]:
                 before = body.beyond_mocap_ride.curve
-                created = riders.start_path_edit(context, body, drawn, count=self.count, kind=self.kind,
-                                                 degree=self.degree, straight=self.straight)
+                created = edited_bodies.start_path_edit(context, body, drawn, count=self.count, kind=self.kind,
+                                                        degree=self.degree, straight=self.straight)
                 started.append((body, before, created if created not in (drawn, before) else None))
                 used = used or created
         except BeyondMocapError:
             for body, before, created in started:
-                riders.undo_start(body, before, created)
+                edited_bodies.undo_start(body, before, created)
             for body, before in already_edited:
                 with suppress(BeyondMocapError):  # a body that could not follow its curve before still cannot
-                    riders.change_curve(context.scene, body, before)
+                    edited_bodies.change_curve(context.scene, body, before)
             raise
         if context.mode == "POSE":
             bpy.ops.object.mode_set(mode="OBJECT")
@@ -99,8 +97,8 @@ points"""
     def do(self, context):
         """Create the curve and make it active."""
         body = list_target_bodies(context)[0]
-        created = riders.create_new_curve(context, body, self.shape, count=self.count, kind=self.kind,
-                                          degree=self.degree)
+        created = edited_bodies.create_new_curve(context, body, self.shape, count=self.count, kind=self.kind,
+                                                 degree=self.degree)
         if context.mode == "POSE":
             bpy.ops.object.mode_set(mode="OBJECT")
         select_object(context, created)
@@ -114,7 +112,7 @@ class BEYOND_MOCAP_OT_update_path(EditedBodyVerb, bpy.types.Operator):
 
     def do(self, context):
         for body in list_target_bodies(context):
-            riders.update_motion(context.scene, body, force=True)
+            edited_bodies.update_motion(context.scene, body, force=True)
             live.measure_body(context.scene, body)
 
 
@@ -131,14 +129,14 @@ detours of all or of two or more selected bodies"""
     detour: FloatProperty(name="Widest Detour", default=0.8, min=0.0, max=20.0, soft_max=3.0, precision=2,
                           description="Largest distance of a detour from the path, in metres")
     clear: BoolProperty(name="Clear", description="Only remove all waits and detours")
-    needs = "Let an armature follow a path first (Edit Path)", lambda context: bool(riders_in(context.scene))
+    needs = "Let an armature follow a path first (Edit Path)", lambda context: bool(list_edited_bodies(context.scene))
 
     def do(self, context):
         from ..beyond_mocap.path_editing.collision_avoidance import Limits
         from ..beyond_mocap.path_editing.detour import PathChange
 
         bodies = list_target_bodies(context)
-        bodies = bodies if len(bodies) > 1 else riders_in(context.scene)
+        bodies = bodies if len(bodies) > 1 else list_edited_bodies(context.scene)
         if self.clear:
             keep_apart.apply_changes(context.scene, bodies, [PathChange()] * len(bodies))
             return
@@ -152,8 +150,7 @@ detours of all or of two or more selected bodies"""
         if not result.before and not result.unresolved:
             self.report({"INFO"}, f"No bodies come within {self.distance:.2f} m of each other")
             return
-        found = "1 collision" if result.before == 1 else f"{result.before} collisions"
-        lines = "; ".join([found, *keep_apart.describe_result(result)])
+        lines = "; ".join([format_count(result.before, "collision"), *keep_apart.describe_result(result)])
         self.report({"WARNING"} if result.unresolved else {"INFO"}, lines)
 
 
@@ -168,9 +165,9 @@ curve stay in the file"""
         """Apply all target bodies; where a motion cannot be updated, its last state."""
         chosen = list_target_bodies(context)
         for body in chosen:
-            riders.check_can_apply(body)
-        applied = [riders.apply_path_edit(context.scene, body) for body in chosen]
-        riders.select_again(context, chosen)
+            edited_bodies.check_can_apply(body)
+        applied = [edited_bodies.apply_path_edit(context.scene, body) for body in chosen]
+        edited_bodies.select_again(context, chosen)
         self.report({"INFO"}, f"applied as {', '.join(action.name for action, _ in applied)}")
         for line in (reason for _, reason in applied if reason):
             self.report({"WARNING"}, f"the motion cannot be updated, so its last state is applied: {line}")
@@ -184,8 +181,8 @@ class BEYOND_MOCAP_OT_leave_path(EditedBodyVerb, bpy.types.Operator):
 
     def do(self, context):
         chosen = list_target_bodies(context)
-        riders.revert_path_edits(*chosen)
-        riders.select_again(context, chosen)
+        edited_bodies.revert_path_edits(*chosen)
+        edited_bodies.select_again(context, chosen)
 
 
 DIRECTIONS = (("LEFT", "Left", "Along -X", "TRIA_LEFT", 0), ("RIGHT", "Right", "Along X", "TRIA_RIGHT", 1),

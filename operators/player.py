@@ -23,7 +23,7 @@ SECTION_SECONDS = 60.0  # seconds of a whole match that are selected at first
 
 class BEYOND_MOCAP_OT_import_tracking(ImportOperator, bpy.types.Operator):
     """Import players' positions: CSV files with time_s, x_m, y_m, or a provider's tracking file (TRACAB, Metrica,
-SkillCorner, Sportec, Second Spectrum, Stats Perform). A text file with the name of a CSV is read as its labels"""
+SkillCorner, Sportec, Second Spectrum, Stats Perform); a text file with the name of a CSV is read as its labels"""
 
     bl_idname = "beyond_mocap.import_tracking"
     bl_label = "Import Tracking"
@@ -91,8 +91,8 @@ SkillCorner, Sportec, Second Spectrum, Stats Perform). A text file with the name
 
     def report_labels(self, scene, player, words):
         """Report the labels of the timeline and their problems."""
-        found = f"{len(words.keys)} key moments, {len(words.spans)} stretches"
-        self.report({"INFO"}, f"{player.name}: labels from {Path(player.annotation_file).name}: {found}")
+        source = Path(player.annotation_file).name
+        self.report({"INFO"}, f"{player.name}: {strips.describe_counts(words)} from {source}")
         for frame, line in word_checks.list_problems(scene, player.dot):
             self.report({"WARNING"}, f"{player.name}, frame {frame}: {line}")
 

@@ -14,7 +14,7 @@ from ..beyond_mocap.files.bvh import bvh
 from ..scene.core import action, channels, session
 from ..scene.core.measure import frames_per_second
 from ..scene.core.settings import find_active_player
-from ..scene.path_editing import edited_bodies as riders
+from ..scene.path_editing import edited_bodies
 from ..scene.result import bake
 from ..scene.rigs import armature, bone_maps, export, rig, rig_bake
 from ..scene.rigs.driven import DrivenRig, check_rig
@@ -224,7 +224,7 @@ def build_contact_lookup(scene: bpy.types.Scene, player):
     """Build a function from scene frames (F,) to foot contacts (F, 2) of the player's take or path edit; None without.
     """
     if player is not None and player.body is not None and player.body.beyond_mocap_ride.on:
-        return riders.build_contact_lookup(player.body)
+        return edited_bodies.build_contact_lookup(player.body)
     stored = session.find_take(player.take) if player is not None and player.take else None
     if stored is None:
         return None

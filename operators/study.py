@@ -8,7 +8,7 @@ from pathlib import Path
 import bpy
 from bpy.props import BoolProperty, EnumProperty, IntProperty, StringProperty
 
-from ..beyond_mocap.base.errors import InputError
+from ..beyond_mocap.base.errors import InputError, format_count
 from ..beyond_mocap.files.atomic import atomic_path
 from ..beyond_mocap.files.bvh import bvh
 from ..beyond_mocap.files.tables import read_ball
@@ -66,7 +66,8 @@ class BEYOND_MOCAP_OT_study_render(BaseOperator, bpy.types.Operator):
                 self.render_clip(out, clip, source, look)
         finally:
             windows.progress_end()
-        self.report({"INFO"}, f"{out}: {len(sources)} clips rendered, {len(study.clips) - len(sources)} existed")
+        rendered = format_count(len(sources), "clip")
+        self.report({"INFO"}, f"{out}: {rendered} rendered, {len(study.clips) - len(sources)} existed")
 
     def render_clip(self, out: Path, clip, source, look) -> None:
         """Render or copy one clip."""

@@ -14,7 +14,7 @@ import bpy
 from bpy.props import StringProperty
 
 from ..beyond_mocap.annotation import Timeline
-from ..beyond_mocap.base.errors import BeyondMocapError, InputError
+from ..beyond_mocap.base.errors import BeyondMocapError, InputError, format_count
 from ..scene.core import background, session
 from ..scene.core.window import start_timer, stop_timer
 from ..scene.player import dots
@@ -277,9 +277,9 @@ class TakeOperator(BaseOperator):
 
 
 def _describe_kept_keys(players) -> str:
-    """Describe how many hand-made keys these players' results have kept."""
+    """Describe how many manual keys these players' results have kept."""
     count = sum(player.result.hand_keys for player in players)
-    return f", {count} hand-made {'key' if count == 1 else 'keys'} kept" if count else ""
+    return f", {format_count(count, 'manual key')} kept" if count else ""
 
 
 def _find_library(entry: queue.QueueEntry):

@@ -36,8 +36,8 @@ class TargetOperator(BackgroundOperator):
 
 
 class BEYOND_MOCAP_OT_throw_at_target(TargetOperator, bpy.types.Operator):
-    """Throw a ball at the target with the selected armature: networks generate the throw, and wrist and release are
-changed only as much as needed. Without a target the 3D cursor is used"""
+    """Throw a ball at the target, or at the 3D cursor without one, with the selected armature: networks generate the
+throw, and wrist and release are changed only as much as needed"""
 
     bl_idname = "beyond_mocap.throw_at_target"
     bl_label = "Throw at Target"
@@ -75,8 +75,8 @@ class BEYOND_MOCAP_OT_keep_throw(ThrowPreviewOperator, bpy.types.Operator):
 
 
 class BEYOND_MOCAP_OT_kick_at_target(TargetOperator, bpy.types.Operator):
-    """Kick a ball at the target with the selected armature: from where it is if one is chosen, else in front of the
-foot. Without a target the 3D cursor is used"""
+    """Kick a ball at the target, or at the 3D cursor without one, with the selected armature: from where the ball is if
+one is chosen, else in front of the foot"""
 
     bl_idname = "beyond_mocap.kick_at_target"
     bl_label = "Kick at Target"

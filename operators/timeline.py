@@ -127,7 +127,7 @@ the body in the view"""
                            description="Time to go to, on the tracking file's clock")
     stops: StringProperty(
         name="Stops", options={"SKIP_SAVE"},
-        description="Several times separated by blanks; each call goes to the next one after the current frame, from "
+        description="Several times separated by spaces; each call goes to the next one after the current frame, from "
         "the last to the first"
     )
     player: StringProperty(name="Player", options={"SKIP_SAVE"}, description="Player whose body is selected; empty: "
@@ -145,7 +145,7 @@ the body in the view"""
         try:
             seconds = [float(text) for text in self.stops.split()] or [self.seconds]
         except ValueError:
-            raise InputError("stops", repr(self.stops), "seconds separated by blanks") from None
+            raise InputError("stops", repr(self.stops), "seconds separated by spaces") from None
         frames = sorted(int(round(bake.compute_frame(scene, second))) for second in seconds)
         return next((frame for frame in frames if frame > scene.frame_current), frames[0])
 

@@ -9,7 +9,7 @@ from bpy.props import FloatProperty, StringProperty
 from bpy_extras.io_utils import ExportHelper
 
 from ..beyond_mocap.annotation import format_timeline, read_timeline, swap_sides
-from ..beyond_mocap.base.errors import InputError
+from ..beyond_mocap.base.errors import InputError, format_count
 from ..scene.core.settings import find_active_player, to_setting_path
 from ..scene.library import recordings
 from ..scene.player import tracks
@@ -182,8 +182,9 @@ def find_selected_item(target: bpy.types.Object):
     if moments:
         return moments[0]
     if len(spans) != 1:
-        found = f"no key moment and {len(spans)} spans are selected"
-        raise InputError(describe_target(target), found, "one of them", "click the name of a key moment, or one strip")
+        found = f"{len(spans)} spans are selected" if spans else "nothing is selected"
+        raise InputError(describe_target(target), found, "one span or key moment",
+                         "click the name of a key moment, or one strip")
     return spans[0]
 
 
@@ -208,8 +209,8 @@ class BEYOND_MOCAP_OT_read_words(BaseOperator, bpy.types.Operator):
         player = find_active_player(settings)
         timeline = strips.read_written_labels(player, settings.rate, tracks.read_track(settings, player))
         strips.write_player_timeline(context, player, timeline)
-        summary = f"{player.name}: {len(timeline.spans)} spans and {len(timeline.keys)} key moments"
-        self.report({"INFO"}, f"{summary} from {strips.describe_label_source(player)}")
+        source = strips.describe_label_source(player)
+        self.report({"INFO"}, f"{player.name}: {strips.describe_counts(timeline)} from {source}")
 
 
 class BEYOND_MOCAP_OT_words_to_text(TimelineVerb, bpy.types.Operator):
@@ -230,7 +231,7 @@ class BEYOND_MOCAP_OT_words_to_text(TimelineVerb, bpy.types.Operator):
         text.write(words)
         if player:
             player.annotation_text = text
-        self.report({"INFO"}, f"{words.count(chr(10))} lines in the text {text.name}")
+        self.report({"INFO"}, f"{format_count(words.count(chr(10)), 'line')} in the text {text.name}")
 
 
 class BEYOND_MOCAP_OT_export_words(TimelineVerb, ExportHelper, bpy.types.Operator):
@@ -249,7 +250,7 @@ class BEYOND_MOCAP_OT_export_words(TimelineVerb, ExportHelper, bpy.types.Operato
         words = format_timeline(lanes.read_timeline(target, describe_target(target)))
         with open(bpy.path.abspath(self.filepath), "w", encoding="utf-8", newline="\n") as file:
             file.write(words)
-        self.report({"INFO"}, f"{words.count(chr(10))} lines in {self.filepath}")
+        self.report({"INFO"}, f"{format_count(words.count(chr(10)), 'line')} in {self.filepath}")
 
 
 class BEYOND_MOCAP_OT_import_words(ImportOperator, bpy.types.Operator):
@@ -279,7 +280,7 @@ of the library clip whose armature is active"""
             timeline, owner = read_timeline(path, settings.rate, start), player.name
             strips.write_player_timeline(context, player, timeline)
             player.annotation_file = to_setting_path(str(path))
-        self.report({"INFO"}, f"{owner}: {len(timeline.spans)} spans and {len(timeline.keys)} key moments")
+        self.report({"INFO"}, f"{owner}: {strips.describe_counts(timeline)}")
 
 
 class BEYOND_MOCAP_FH_words(bpy.types.FileHandler):

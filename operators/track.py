@@ -17,8 +17,8 @@ from .player import choose_shirt, find_free_name
 
 
 class BEYOND_MOCAP_OT_draw_track(BaseOperator, bpy.types.Operator):
-    """Add a player whose track is a curve from the 3D cursor. Set the speed of each point with Set Speed, or its Radius
-in the Item tab (Alt-S); the player waits at points of speed 0"""
+    """Add a player whose track is a curve from the 3D cursor; set the speed of its points with Set Speed, or by their
+radius (Alt-S): the player waits at points of speed 0"""
 
     bl_idname = "beyond_mocap.draw_track"
     bl_label = "Draw Track"
@@ -75,8 +75,8 @@ that moves by keys or constraints (an Empty, a mesh, another armature's hips)"""
 
 
 class BEYOND_MOCAP_OT_set_speed(BaseOperator, bpy.types.Operator):
-    """Set the speed in metres per second at the selected points of the active curve, outside edit mode at all points.
-The player waits at points of speed 0. Radius stores the speed, Weight the wait"""
+    """Set the speed in metres per second at the selected points of the active curve, or at all points outside Edit
+Mode; the player waits at points of speed 0"""
 
     bl_idname = "beyond_mocap.set_speed"
     bl_label = "Set Speed"
@@ -112,8 +112,8 @@ def list_selected_points(drawn: bpy.types.Object) -> list:
 
 
 class BEYOND_MOCAP_OT_add_pin(BaseOperator, bpy.types.Operator):
-    """Add an Empty at which a hand, a foot or the gaze of the active player has to be on the current frame. Move it
-with G; set time and hold in the list of pins"""
+    """Add an Empty at which a hand, a foot or the gaze of the active player has to be on the current frame; move it
+with G, and set time and hold in the list of pins"""
 
     bl_idname = "beyond_mocap.add_pin"
     bl_label = "Add Pin"

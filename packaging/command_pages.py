@@ -18,8 +18,9 @@ The same commands run as `python -m beyond_mocap COMMAND`, as `blender --command
 `blender -b FILE --python batch.py -- COMMAND`. Inside Blender, `--out` (of `match`: `--scene`) may also end
 with `.blend`, `.fbx`, `.glb` or `.usdc`; `mirror` and `retarget` write BVH only.
 
-Exit status: 0 done; 2 the command line or an input is wrong; 3 the library lacks what was asked for; 130 cancelled. An
-error is one line: where, what was found, what was expected, what to do.
+Exit status: 0 done; 2 the command line or an input is wrong; 3 the library lacks what was asked for; 130 cancelled; 141
+the reader of the output ended, as `head` does. An error is one line: where, what was found, what was expected, what to
+do.
 """
 LABELS_HEAD = """# Labels
 
@@ -27,10 +28,15 @@ LABELS_HEAD = """# Labels
 `beyond_mocap/annotation/vocabulary.csv` by `make tables`.*
 
 A text file has the short form, panels show the name. How labels combine is [explained here](../explanation/labels.md);
-how they are written is in [the text form](annotation-text.md). A library may add labels of its own.
+how they are written is in [the text form](annotation-text.md). A library may add labels of its own. Faustino's thesis
+lists most of these labels without explaining them; the meanings are our reading.
+
+`transition` is no label of the vocabulary: alone in a line with two times, it asks for nothing, and continuity decides
+what the player does. With nearest labels (`--nearest`), the action itself may change: a reception may become a kick.
 """
+TABLE_HEAD = "| short form | name | meaning | goes with |\n| --- | --- | --- | --- |"
 KINDS = {
-    "continuous": ("Stretches", "What a player does for a while."),
+    "continuous": ("Spans", "What a player does for a while."),
     "discrete": ("Key moments", "What happens at one instant."),
     "modifier": ("Details", "They stand beside another label and make it more precise."),
     "": ("Other labels", "They stand below the labels above, or are used by annotations of recordings."),
@@ -47,6 +53,8 @@ def build_commands_page(parser: argparse.ArgumentParser) -> str:
     """
     parts = [COMMANDS_HEAD]
     for name, command in iter_commands(parser):
+        if command._subparsers is not None:
+            continue
         parts.append(f"\n## {name}\n\n{_describe(command)}")
         parts.append(f"\n```text\n{_format_usage(command)}\n```\n")
         parts.extend(f"\n- {line}" if i == 0 else f"- {line}" for i, line in enumerate(_list_options(command)))
@@ -54,7 +62,7 @@ def build_commands_page(parser: argparse.ArgumentParser) -> str:
 
 
 def iter_commands(parser: argparse.ArgumentParser, prefix: str = "") -> Iterator[tuple[str, argparse.ArgumentParser]]:
-    """Go through all commands and the commands below them.
+    """Go through all commands, each before the commands below it.
 
     Args:
         parser: a parser.
@@ -66,8 +74,8 @@ def iter_commands(parser: argparse.ArgumentParser, prefix: str = "") -> Iterator
         if isinstance(action, argparse._SubParsersAction):
             for name, command in action.choices.items():
                 command.description = command.description or _find_help(action, name)
-                below = list(iter_commands(command, f"{prefix}{name} "))
-                yield from below or [(prefix + name, command)]
+                yield prefix + name, command
+                yield from iter_commands(command, f"{prefix}{name} ")
 
 
 def build_labels_page(labels: Iterable[Label]) -> str:
@@ -80,14 +88,14 @@ def build_labels_page(labels: Iterable[Label]) -> str:
     """
     parts = [LABELS_HEAD]
     for kind, (title, text) in KINDS.items():
-        parts.append(f"\n## {title}\n\n{text}\n\n| short form | name | goes with |\n| --- | --- | --- |")
+        parts.append(f"\n## {title}\n\n{text}\n\n{TABLE_HEAD}")
         parts.extend(_format_label(label) for label in labels if (kind in label.kinds if kind else not label.kinds))
     return "\n".join(part.rstrip("\n") for part in parts) + "\n"
 
 
 def _format_label(label: Label) -> str:
     below = " ".join(f"`{name}`" for name in dict.fromkeys(_iter_below(label.below or {})))
-    return f"| `{label.name}` | {label.title} | {below} |"
+    return f"| `{label.name}` | {label.title} | {label.meaning} | {below} |"
 
 
 def _iter_below(tree: dict[str, dict]) -> Iterator[str]:

@@ -70,7 +70,7 @@ def draw_tracked_ball(panel, layout, context) -> None:
         row.operator("beyond_mocap.jump_to", text="", icon="PLAY").seconds = touch.time
     row = layout.row(align=True)
     row.operator("beyond_mocap.accept_touches", icon="CHECKMARK")
-    row.operator("beyond_mocap.accept_touches", text="Of Active").active = True
+    row.operator("beyond_mocap.accept_touches", text="Active Player").active = True
 
 
 def draw_hit_analysis(layout, context) -> None:

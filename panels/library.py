@@ -109,8 +109,8 @@ def draw_assets(layout, listing) -> None:
     """Draw buttons that make assets of clips."""
     column = layout.column(align=True)
     column.operator("beyond_mocap.make_assets", text="Chosen Clip, This File", icon="ASSET_MANAGER").which = "CHOSEN"
-    for apart, text, icon in ((False, "Listed, This File", "ASSET_MANAGER"), (True, "Listed, New File", "FILE_BLEND")):
-        button = column.operator("beyond_mocap.make_assets", text=f"{len(listing.shown)} {text}", icon=icon)
+    for apart, text, icon in ((False, "This File", "ASSET_MANAGER"), (True, "New File", "FILE_BLEND")):
+        button = column.operator("beyond_mocap.make_assets", text=f"Listed ({len(listing.shown)}), {text}", icon=icon)
         button.which, button.apart = "SHOWN", apart
     column.operator("beyond_mocap.make_assets", text="Selected Armatures", icon="ARMATURE_DATA").which = "SELECTED"
 
@@ -143,8 +143,8 @@ def draw_proposals(layout, group) -> None:
     column = layout.column(align=True)
     column.operator("beyond_mocap.review_proposals", icon="EVENT_A")
     row = column.row(align=True)
-    row.operator("beyond_mocap.judge_proposal", text="All", icon="CHECKMARK").what = "ACCEPT_ALL"
-    row.operator("beyond_mocap.judge_proposal", text="None", icon="X").what = "REFUSE_ALL"
+    row.operator("beyond_mocap.judge_proposal", text="Accept All", icon="CHECKMARK").what = "ACCEPT_ALL"
+    row.operator("beyond_mocap.judge_proposal", text="Reject All", icon="X").what = "REFUSE_ALL"
 
 
 def draw_tools(body, settings) -> None:

@@ -85,7 +85,7 @@ def draw_messages(layout, lines: str) -> None:
     for line in messages[:MAX_LINES]:
         draw_paragraph(layout, line, "DOT")
     if len(messages) > MAX_LINES:
-        layout.label(text=f"... and {len(messages) - MAX_LINES} more lines")
+        layout.label(text=f"and {len(messages) - MAX_LINES} more")
 
 
 def draw_processing(layout, scene) -> None:

@@ -72,7 +72,7 @@ class BEYOND_MOCAP_UL_pins(bpy.types.UIList):
         row = layout.row(align=True)
         row.prop(item, "part", text="", emboss=False)
         if item.target is None:
-            row.label(text="Empty is missing", icon="ERROR")
+            row.label(text="Missing Empty", icon="ERROR")
             return
         row.prop(item, "time", text="")
         row.prop(item, "hold", text="")
@@ -100,8 +100,8 @@ def draw_pins(layout, player) -> None:
         row.template_list("BEYOND_MOCAP_UL_pins", "", player, "pins", player, active_propname="active_pin", rows=2)
         row.column(align=True).operator("beyond_mocap.remove_pin", text="", icon="REMOVE")
         row = body.row(align=True)
-        row.operator_menu_enum("beyond_mocap.add_pin", "part", text="Add Pin at Body", icon="PINNED").at = "BODY"
-        row.operator_menu_enum("beyond_mocap.add_pin", "part", text="at Cursor", icon="PIVOT_CURSOR").at = "CURSOR"
+        row.operator_menu_enum("beyond_mocap.add_pin", "part", text="Pin at Body", icon="PINNED").at = "BODY"
+        row.operator_menu_enum("beyond_mocap.add_pin", "part", text="At Cursor", icon="PIVOT_CURSOR").at = "CURSOR"
 
 
 class BEYOND_MOCAP_PT_annotate(TabPanel, bpy.types.Panel):

@@ -138,5 +138,5 @@ class BEYOND_MOCAP_PT_quality(TabPanel, bpy.types.Panel):
         """Draw the reasons for the piece at the playhead."""
         column = layout.column(align=True)
         column.scale_y = 0.85
-        for number, line in enumerate(text.splitlines() or ("No take of this session",)):
+        for number, line in enumerate(text.splitlines() or ("No take in this session",)):
             column.label(text=line, icon="SEQUENCE" if number == 0 and text else "BLANK1")

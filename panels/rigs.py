@@ -12,7 +12,7 @@ class BEYOND_MOCAP_UL_bones(bpy.types.UIList):
 
     def draw_item(self, context, layout, _data, item, _icon, _active_data, _active_property):
         row = layout.split(factor=0.42)
-        row.label(text=item.name.replace("_", " ").capitalize())
+        row.label(text=item.name.replace("_", " ").title())
         target = context.scene.beyond_mocap.rig.target
         if target is not None:
             row.prop_search(item, "bone", target.data, "bones", text="", icon="BONE_DATA")

@@ -215,6 +215,10 @@ def main(arguments: list[str] | None = None) -> int:
 
 def write_requested_sheet(options) -> None:
     """Read the files and write the sheet."""
+    try:
+        import PIL  # noqa: F401
+    except ImportError:
+        raise InputError("look.py", "Pillow is not installed", "Pillow for the picture", "pip install pillow") from None
     motion = bvh.read_bvh(options.take, unit=0.01).motion
     last = len(motion) - 1 if options.end is None else min(options.end * motion.fps, len(motion) - 1)
     step = max(options.every * motion.fps, 1.0)

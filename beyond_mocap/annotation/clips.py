@@ -36,8 +36,7 @@ def read_clip_annotations(path: str | os.PathLike, fps: float) -> tuple[ClipAnno
     """Read the annotations in a text file beside a clip, in the text form of timelines.
 
     A key line belongs to the shortest span around it that names the same action, and adds its labels to that span; a
-    key
-    line without a span has no extent. Spans may overlap; spans without labels or with `transition` are skipped.
+    key line without a span has no extent. Spans may overlap; spans without labels or with `transition` are skipped.
 
     Args:
         path: the file.
@@ -72,8 +71,7 @@ def read_annotation_csv(
     """Read a table of annotations.
 
     The columns are file, start_frame, end_frame, key_frame and labels; others are ignored. A blank key_frame means no
-    key
-    moment. Rows without labels are skipped.
+    key moment. Rows without labels are skipped.
 
     Args:
         path: the file.
@@ -93,7 +91,8 @@ def read_annotation_csv(
             if labels and not (skip_row and skip_row(row)):
                 by_file.setdefault(_parse_file(row, place), []).append(_parse_row(row, labels, place))
     except csv.Error as error:
-        raise InputError(f"{path}:{reader.line_num}", str(error), "comma-separated values") from None
+        place = f"{path}:{reader.line_num}"
+        raise InputError(place, str(error), "comma-separated values", "save it as CSV again") from None
     return {file: tuple(annotations) for file, annotations in by_file.items()}
 
 
@@ -122,13 +121,14 @@ def _check_columns(names, path) -> None:
     missing = [name for name in _COLUMNS if name not in (names or ())]
     if missing:
         found = f"no column {', '.join(missing)}" if names else "an empty file"
-        raise InputError(f"{path}:1", found, f"a header with {', '.join(_COLUMNS)}")
+        raise InputError(f"{path}:1", found, f"a header with {', '.join(_COLUMNS)}",
+                         "add the columns, or rename them")
 
 
 def _parse_file(row: dict, place: str) -> str:
     name = (row["file"] or "").strip()
     if not name:
-        raise InputError(place, "the file is blank", "the clip's path, relative to this table")
+        raise InputError(place, "the file is blank", "the clip's path, relative to this table", "add it")
     return name
 
 
@@ -136,9 +136,11 @@ def _parse_row(row: dict, labels: tuple[str, ...], place: str) -> ClipAnnotation
     start, end = (_parse_frame(row[name], name, place) for name in ("start_frame", "end_frame"))
     key = _parse_frame(row["key_frame"], "key_frame", place) if (row["key_frame"] or "").strip() else None
     if end < start:
-        raise InputError(place, f"end_frame {end} before start_frame {start}", "start_frame <= end_frame")
+        raise InputError(place, f"end_frame {end} before start_frame {start}", "start_frame <= end_frame",
+                         "correct the frames")
     if key is not None and not start <= key <= end:
-        raise InputError(place, f"key_frame {key} outside {start} .. {end}", "a key frame within its row")
+        raise InputError(place, f"key_frame {key} outside {start} .. {end}", "a key frame within its row",
+                         "correct the frames")
     return ClipAnnotation(start, end, key, labels)
 
 
@@ -148,5 +150,5 @@ def _parse_frame(text: str | None, name: str, place: str) -> int:
         if not (value >= 0 and value == int(value)):
             raise ValueError
     except (ValueError, OverflowError):
-        raise InputError(place, f"{name} {text!r}", "a whole number from 0") from None
+        raise InputError(place, f"{name} {text!r}", "a whole number from 0", "correct the frame") from None
     return int(value)

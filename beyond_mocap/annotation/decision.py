@@ -120,8 +120,7 @@ def choose_label(walk: TreeChoices, label: str) -> TreeChoices:
     """Choose one more label.
 
     A label of the tree's next level leads down. Another label becomes a modifier and replaces its opposite (left
-    replaces
-    right); a modifier that is chosen again is removed.
+    replaces right); a modifier that is chosen again is removed.
 
     Args:
         walk: the labels chosen so far.

@@ -89,8 +89,7 @@ class EventLabelTable:
         """Find the labels for an event.
 
         Among the rows that match, a row with a part precedes one without, then a row with a detail one without, then
-        the
-        first.
+        the first.
 
         Args:
             kind: a kind of `KINDS`.

@@ -67,9 +67,9 @@ def estimate_gait_thresholds(speeds: np.ndarray, speed: np.ndarray, gait: np.nda
     """Estimate from a library's own annotations the speeds at which one gait changes to the next.
 
     Each threshold is the speed with the fewest frames of the slower gait above it and of the faster gait below it;
-    between
-    gaits that do not overlap it is half way. The threshold above standing is STANDING_SPEED, because a standing body
-    cannot travel. Faustino's omega requests the faster gait a quarter of the way up, where no recording has that label.
+    between gaits that do not overlap it is half way. The threshold above standing is STANDING_SPEED, because a standing
+    body cannot travel. Faustino's omega requests the faster gait a quarter of the way up, where no recording has that
+    label.
 
     Args:
         speeds: (G,) m/s, ascending, the gaits' average speeds.
@@ -104,8 +104,7 @@ def choose_gaits(
             gaits' speeds, at most a quarter of the threshold. The paper has none: at a boundary speed its annotation
             flickers with the noise.
         minimum: minimum duration of a gait in seconds; shorter runs take the gait of the more similar neighbour, then
-            of
-            the longer one.
+            of the longer one.
     Returns:
         (T,) index into `speeds`.
     Source: Faustino 2016, section 3.1.1, pseudo-code; hysteresis and minimum duration added.
@@ -121,8 +120,7 @@ def compute_heading_offset(track: SampledTrack) -> np.ndarray:
     """Compute the angle from the direction of travel to the heading that the body should have.
 
     The heading is the ball's direction, limited to what legs allow at that speed: any angle below 0.8 m/s, none from 6
-    m/s
-    on. It is zero where the ball is unknown, and near the player's own feet, where they follow it along their path.
+    m/s on. It is zero where the ball is unknown, and near the player's own feet, where they follow it along their path.
 
     Args:
         track: the player's track with the ball, T frames.

@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import csv
 import re
+import string
 from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
@@ -30,7 +31,8 @@ _ALLOWED_VALUES = {
     "ball": ("sends", "takes", "carries", "never"), "height": ("low", "middle", "high"), "action": ACTIONS,
 }  # fmt: skip
 _COLUMNS = (
-    "label", "title", "kind", "group", "part", "part_with", "ball", "gait_m_s", "height", "flight", "action", "below",
+    "label", "title", "meaning", "kind", "group", "part", "part_with", "ball", "gait_m_s", "height", "flight", "action",
+    "below",
 )  # fmt: skip
 
 
@@ -41,6 +43,7 @@ class Label:
     Attributes:
         name: as annotations write it.
         title: as interfaces show it.
+        meaning: in a short phrase.
         kinds: of `KINDS`, the trees in which it is a root.
         group: of `GROUPS`; a motion has at most one label of a group; or "".
         parts: body parts that may meet the ball, of `BODY_PARTS` or "tool".
@@ -56,6 +59,7 @@ class Label:
 
     name: str
     title: str = ""
+    meaning: str = ""
     kinds: tuple[str, ...] = ()
     group: str = ""
     parts: tuple[str, ...] = ()
@@ -107,7 +111,7 @@ def find_label(name: str) -> Label:
     Returns:
         The label; one without any meaning if the table has none.
     """
-    return read_labels().get(name) or Label(name=name, title=name.replace("_", " "))
+    return read_labels().get(name) or Label(name=name, title=string.capwords(name.replace("_", " ")))
 
 
 @lru_cache(maxsize=64)
@@ -143,7 +147,7 @@ def _parse_label(cells: dict[str, str], place: str) -> Label:
         if not set(allowed).issuperset(values[column]):
             raise InputError(place, f"{column} {cells[column]!r}", f"one of {', '.join(allowed)}, or blank")
     return Label(
-        name=cells["label"], title=cells["title"], kinds=values["kind"], group=cells["group"],
+        name=cells["label"], title=cells["title"], meaning=cells["meaning"], kinds=values["kind"], group=cells["group"],
         parts=tuple("hand" if part == "hands" else part for part in values["part"]),
         both_hands="hands" in values["part"], part_with=values["part_with"], ball=cells["ball"],
         gait=float(cells["gait_m_s"]) if cells["gait_m_s"] else None, height=cells["height"],

@@ -12,7 +12,7 @@ from __future__ import annotations
 import os
 from pathlib import Path
 
-from ..base.errors import InputError, format_seconds
+from ..base.errors import InputError, build_read_error, format_seconds
 from .timeline import AVOID_PREFIX, LONGEST_TIME, NUMBER, KeyMoment, Span, Timeline, format_labels
 
 _EXPECTED_FORM = "'START END labels...' or 'TIME labels...'"
@@ -93,8 +93,8 @@ def read_text(path: str | os.PathLike) -> str:
         if Path(path).stat().st_size > _LARGEST_FILE:
             raise InputError(path, "the file is larger than 16 MiB", "a text file")
         data = Path(path).read_bytes()
-    except OSError as error:
-        raise InputError(path, error.strerror or "cannot be read", "a text file", "check the path") from None
+    except (OSError, ValueError) as error:
+        raise build_read_error(path, "a text file", error) from None
     if b"\0" in data:
         raise InputError(path, "binary content", "a text file", "save it as plain UTF-8 text")
     try:

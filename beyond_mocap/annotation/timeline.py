@@ -18,6 +18,7 @@ from .vocabulary import (
     find_similar_labels,
     list_labels_below,
     list_vocabulary,
+    sort_labels,
 )
 
 NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)(e[+-]?\d+)?f?", re.IGNORECASE)
@@ -51,7 +52,7 @@ def check_labels(labels: Iterable[str], where: str) -> tuple[str, ...]:
     for label in out:
         if not label or "#" in label or label.startswith(AVOID_PREFIX) or label.split() != [label] or NUMBER.fullmatch(
                 label):
-            expected = f"a label without blanks and '#' that is not a number and does not begin with '{AVOID_PREFIX}'"
+            expected = f"a label without spaces and '#' that is not a number and does not begin with '{AVOID_PREFIX}'"
             raise InputError(where, f"{label!r} is not a label", expected)
     return out
 
@@ -278,9 +279,9 @@ def find_missing_keys(
         choices: the labels of every clip's key moment, mirrored clips included.
         count: number of nearest combinations to return.
     Returns:
-        Each such key moment with the `count` nearest combinations.
+        Each such key moment with the `count` nearest combinations, sorted by `sort_labels`.
     """
-    combinations = [tuple(choice) for choice in choices]
+    combinations = [sort_labels(choice) for choice in choices]
     missing = [key for key in timeline.keys if not any(set(key.words) <= set(choice) for choice in combinations)]
     return [(key, find_nearest_labels(key.words, combinations, count)) for key in missing]
 

@@ -138,10 +138,9 @@ def find_nearest_labels(labels: Iterable[str], choices: Iterable[Iterable[str]],
     """Find the label combinations nearest to the requested labels; equal sets count once.
 
     They are ordered by the requested labels that a combination lacks (a label that names the action, like "kick",
-    weighs
-    more than all modifiers together), then by how many labels it has that are related to the missing ones in the tree
-    (so
-    that "header", if there is none, leads to "jump"), then by labels that were not requested, then by the tree's order.
+    weighs more than all modifiers together), then by how many labels it has that are related to the missing ones in the
+    tree (so that "header", if there is none, leads to "jump"), then by labels that were not requested, then by the
+    tree's order.
 
     Args:
         labels: the requested labels.

@@ -51,8 +51,7 @@ def build_body(skeleton: Skeleton, height: float | None = None, example: Motion 
         skeleton: a humanoid skeleton, J joints.
         height: stature in metres for the girths; None derives it from the legs' length.
         example: any recording on the skeleton; it shows how bones are twisted if the rest pose does not stand. Without
-            it,
-            feet and hands of such skeletons may be rotated (see `neutral.neutral_stance`).
+            it, feet and hands of such skeletons may be rotated (see `neutral.neutral_stance`).
     Returns:
         The mesh.
     Raises:
@@ -321,8 +320,8 @@ class _BodyBuilder:
         Args:
             upper, lower, end: the joints at both ends of the two bones.
             table: rows (position, metres forward, metres left, two radii, material). Positions 0 to 1 run down the
-                upper bone,
-                1 to 2 down the lower one. Rings near the middle joint follow both bones, the last ones the lower bone.
+                upper bone, 1 to 2 down the lower one. Rings near the middle joint follow both bones, the last ones the
+                lower bone.
             sides: vertices per ring.
         """
         a, b, c = self.joint_position(upper), self.joint_position(lower), self.joint_position(end)

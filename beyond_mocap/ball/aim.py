@@ -238,8 +238,7 @@ class _Problem:
         """Simulate the balls to their time.
 
         More than the requested bounces are not simulated, and a bounce within REBOUND_MARGIN does not count. A ball on
-        the
-        ground cannot be struck into it: -1 bounces.
+        the ground cannot be struck into it: -1 bounces.
 
         Args:
             velocity: (B, 3) m/s, launch velocities.

@@ -6,6 +6,8 @@ stderr, an operator puts it into Blender's report; no caller formats it again.
 
 from __future__ import annotations
 
+import os
+
 
 class BeyondMocapError(Exception):
     """An error that the user can do something about.
@@ -47,19 +49,33 @@ class NotInLibraryError(BeyondMocapError):
 
     Attributes:
         nearest: the nearest label combinations that the library has.
+        line: line of the annotations, None if unknown.
     """
 
     exit_status = 3
 
-    def __init__(self, message: str, nearest: tuple[str, ...] = ()):
+    def __init__(self, message: str, nearest: tuple[str, ...] = (), line: int | None = None):
         """Build the one-line message.
 
         Args:
             message: one line.
             nearest: the nearest label combinations that the library has.
+            line: line of the annotations, None if unknown.
         """
         super().__init__(" ".join(message.split()))
         self.nearest = tuple(nearest)
+        self.line = line
+
+    def locate(self, where: object) -> NotInLibraryError:
+        """Build the same error with its place in front.
+
+        Args:
+            where: the file with the annotations, or what they belong to.
+        Returns:
+            The error.
+        """
+        place = where if self.line is None else f"{where}:{self.line}"
+        return NotInLibraryError(f"{place}: {self}", self.nearest, self.line)
 
 
 class UserCancelledError(BeyondMocapError):
@@ -89,6 +105,26 @@ class TimedMessage(str):
         return line
 
 
+def build_read_error(path: str | os.PathLike, kind: str, error: Exception | None = None) -> InputError:
+    """Build the error for a file that cannot be opened or read.
+
+    Args:
+        path: the file.
+        kind: what it should be, such as "a C3D file".
+        error: the exception that opening it raised; None after a failed `is_file`.
+    Returns:
+        The error: no such file, a folder, or the exception's reason.
+    """
+    if isinstance(error, ValueError):  # a path that no file can have
+        return InputError(path, f"cannot be read ({error})", f"{kind} that is readable")
+    if os.path.isdir(path):  # Windows reports a folder as a permission error
+        return InputError(path, "is a folder", kind, "choose a file in it")
+    if isinstance(error, FileNotFoundError) or not os.path.exists(path):
+        return InputError(path, "no such file", kind, "check the path")
+    reason = getattr(error, "strerror", None) or error or "not a regular file"
+    return InputError(path, f"cannot be read ({reason})", f"{kind} that is readable")
+
+
 def format_seconds(seconds: float) -> str:
     """Format seconds for a message: to the microsecond, without trailing zeros.
 
@@ -98,6 +134,19 @@ def format_seconds(seconds: float) -> str:
         The shortest decimal text of the rounded number.
     """
     return f"{round(float(seconds), 6):.15g}"
+
+
+def format_count(count: int, noun: str, plural: str = "") -> str:
+    """Format a count with its noun for a message: "1 clip", "2 clips".
+
+    Args:
+        count: how many.
+        noun: the noun for one.
+        plural: the noun for several; "" adds an s.
+    Returns:
+        The text.
+    """
+    return f"{count} {noun if count == 1 else plural or noun + 's'}"
 
 
 def line_spans(line: str) -> tuple[tuple[float, float], ...]:

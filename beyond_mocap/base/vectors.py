@@ -12,8 +12,7 @@ def unit_vectors(vectors: np.ndarray, fallback: np.ndarray | float | None = None
     Args:
         vectors: (..., K), any unit.
         fallback: (..., K), replaces vectors no longer than `min_length`; None divides them by `min_length`, so that
-            zero
-            vectors stay zero.
+            zero vectors stay zero.
         min_length: length up to which a vector is not normalized, in its unit.
     Returns:
         (..., K).

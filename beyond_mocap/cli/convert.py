@@ -56,7 +56,7 @@ def run_mirror(options, reporter: ProgressReporter, writers: Mapping[str, Writer
     from ..files.bvh import bvh
     from ..motion.mirror import mirror
 
-    check_outputs(options.output)
+    check_outputs(options.output, reserved=(options.input,))
     choose_writer(options.output, {}, hint="")
     clip = bvh.read_bvh(options.input, options.unit)
     with locate_errors(options.input):

@@ -9,7 +9,7 @@ from collections.abc import Mapping
 from pathlib import Path
 
 from .. import __version__
-from ..base.errors import InputError
+from ..base.errors import InputError, format_count
 from ..base.settings.options import add_options
 from .outputs import ProgressReporter, Writer, check_outputs
 
@@ -45,16 +45,16 @@ def run_library(options, reporter: ProgressReporter, writers: Mapping[str, Write
     """
     if options.learn or options.propose or options.learned:
         return run_learning(options, reporter)
-    check_outputs(options.report)
+    check_outputs(options.report, reserved=(options.skeleton,))
     library = open_library(options, reporter, rebuild=options.rebuild)
     summary = summarize_library(library)
-    reporter.finish()
-    for line in summary["lines"]:
-        print(line)
     if options.report:
         from ..files.tables import write_report
 
         write_report(options.report, summary)
+    reporter.finish()
+    for line in summary["lines"]:
+        print(line)
 
 
 def summarize_library(library) -> dict:
@@ -72,7 +72,7 @@ def summarize_library(library) -> dict:
     gaits = [{"word": g.label, "words": list(g.labels), "speed_m_s": g.speed} for g in library.gaits]
     keys = sorted({" ".join(sort_labels(key.labels)) for key in library.keys})
     lines = [
-        f"{library.folder}: {len(originals)} clips (and their mirrors), {library.minutes:.1f} minutes, "
+        f"{library.folder}: {format_count(len(originals), 'clip')} (and their mirrors), {library.minutes:.1f} minutes, "
         f"{len(library.skeleton)} joints",
         "labels: " + " ".join(labels),
         "gaits: " + ", ".join(f"{g['word']} {g['speed_m_s']:.1f} m/s" for g in gaits),
@@ -152,7 +152,7 @@ def run_learning(options, reporter: ProgressReporter) -> None:
     if options.propose:
         count, clips = _write_proposals(options, model, reporter)
         reporter.finish()
-        print(f"{options.propose}: {count} rows for {clips} clips without labels")
+        print(f"{options.propose}: {format_count(count, 'row')} for {format_count(clips, 'clip')} without labels")
 
 
 def _write_proposals(options, model, reporter: ProgressReporter) -> tuple[int, int]:

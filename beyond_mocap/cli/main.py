@@ -1,12 +1,14 @@
 """The command line: `python -m beyond_mocap VERB ...`; Blender's command and batch script use the same parser.
 
-Exit status: 0 done; 2 the command line or an input is wrong; 3 the library lacks what was requested; 130 cancelled.
-Errors are one line on stderr. See the project's README for examples.
+Exit status: 0 done; 2 the command line or an input is wrong; 3 the library lacks what was requested; 130 cancelled;
+141 the reader of the output ended, as `head` does. Errors are one line on stderr. See the project's README for
+examples.
 """
 
 from __future__ import annotations
 
 import argparse
+import os
 import re
 import signal
 import sys
@@ -31,6 +33,7 @@ VERBS = (add_library, add_synthesize, add_path, add_touches, add_stream, add_pas
 """Functions that add a verb, in the order of `--help`; each takes the sub-parsers and returns its parser."""
 IsolatedRunner = Callable[[list[str], Callable[[float, str], None], Callable[[], bool]], object]
 """Runs a command line in another process: (arguments, progress callback, cancellation callback)."""
+_UNREAD = 141  # exit status that shells give to a program that SIGPIPE ended
 
 
 class OneLineParser(argparse.ArgumentParser):
@@ -49,6 +52,22 @@ class OneLineParser(argparse.ArgumentParser):
             InputError: always.
         """
         raise InputError(self.prog, message, "", f"see '{self.prog} --help'")
+
+    def parse_known_args(self, args=None, namespace=None):
+        """Parse arguments, and raise an InputError for unknown ones here, where the command that lacks them is known.
+
+        Args:
+            args: the arguments; None for `sys.argv`.
+            namespace: takes the values; None for a new one.
+        Returns:
+            The namespace, and an empty list.
+        Raises:
+            InputError: for unknown or wrong arguments.
+        """
+        namespace, unknown = super().parse_known_args(args, namespace)
+        if unknown:
+            self.error(f"unrecognized arguments: {' '.join(unknown)}")
+        return namespace, unknown
 
 
 def build_parser(prog: str = "beyond-mocap") -> argparse.ArgumentParser:
@@ -81,6 +100,17 @@ def main(
     Returns:
         The exit status, see the module.
     """
+    try:
+        status = _run_command(argv, writers or {}, prog, run_isolated)
+    except BrokenPipeError:
+        status = _UNREAD
+    _discard_unwritable()
+    return status
+
+
+def _run_command(argv: list[str] | None, writers: Mapping[str, Writer], prog: str,
+                 run_isolated: IsolatedRunner | None) -> int:
+    """Run one command, print its error, and return its exit status; BrokenPipeError if nothing reads the output."""
     reporter = None
     _escape_unencodable(sys.stdout)
     try:
@@ -89,12 +119,15 @@ def main(
         options.argv, options.apart = argv, run_isolated
         reporter = ProgressReporter(options.json)
         with _InterruptHandler(reporter):
-            options.run(options, reporter, writers or {})
+            options.run(options, reporter, writers)
+        print(end="", flush=True)
         return 0
     except BeyondMocapError as error:
         status, text = error.exit_status, str(error)
     except KeyboardInterrupt:
         status, text = UserCancelledError.exit_status, "cancelled"
+    except BrokenPipeError:
+        raise
     except OSError as error:
         path = error.filename or prog
         status, text = 2, f"{path}: {error.strerror or error}; check that the file can be read and its folder written"
@@ -104,6 +137,15 @@ def main(
         reporter.finish()
     print(text if text.startswith(prog) else f"{prog}: {text}", file=sys.stderr)
     return status
+
+
+def _discard_unwritable() -> None:
+    """Discard output that cannot be written, of which Python would report an error when it ends."""
+    for stream in filter(None, (sys.stdout, sys.stderr)):
+        try:
+            stream.flush()
+        except OSError:
+            os.dup2(os.open(os.devnull, os.O_WRONLY), stream.fileno())
 
 
 def _escape_unencodable(stream) -> None:

@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 
 from .. import __version__
-from ..base.errors import BeyondMocapError, InputError, format_seconds
+from ..base.errors import BeyondMocapError, InputError, format_count, format_seconds
 from ..base.settings.options import add_options, option_values
 from .outputs import ProgressReporter, Writer, check_outputs, parse_folder
 
@@ -167,7 +167,7 @@ def run_touches(options, reporter: ProgressReporter, writers: Mapping[str, Write
     check_outputs(options.out, options.ball, options.report, reserved=(options.input, options.meta))
     if options.start is not None and options.end is not None and options.end <= options.start:
         raise InputError("--to", f"{format_seconds(options.end)} s",
-                         f"later than --from {format_seconds(options.start)} s")
+                         f"later than --from {format_seconds(options.start)} s", "choose a later end")
     source = _read_tracking(options)
     loaded = time.perf_counter()
     solved = solve_ball(source, reporter.show_progress, reporter.is_cancelled, options.start, options.end)
@@ -179,7 +179,8 @@ def run_touches(options, reporter: ProgressReporter, writers: Mapping[str, Write
         seconds = {"load": loaded - started, "solve": done - loaded}
         write_report(options.report, {**_build_touch_report(solved), "seconds": seconds})
     reporter.finish(f"{options.input}: {note}" for note in solved.notes)
-    print(f"{options.out}: {len(solved.touches)} touches in {solved.times[-1] - solved.times[0]:.1f} s")
+    count = format_count(len(solved.touches), "touch", "touches")
+    print(f"{options.out}: {count} in {solved.times[-1] - solved.times[0]:.1f} s")
 
 
 def _read_tracking(options):

@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from .. import __version__
-from ..base.errors import InputError
+from ..base.errors import InputError, format_count
 from ..base.settings.options import add_options
 from .outputs import ProgressReporter, Writer, locate_errors, parse_folder
 
@@ -69,8 +69,8 @@ def run_passes(options, reporter: ProgressReporter, writers: Mapping[str, Writer
     if others:
         reporter.show_note(f"{options.out}: files of another scene: {', '.join(others)}")
     gaps = [row["contact_gap_m"] for row in table if row["outcome"] != "missed"]
-    print(f"{options.out}: {len(result.players)} players, {len(table)} strikes in {result.plan.seconds:.1f} s, "
-          f"widest gap {1000.0 * max(gaps, default=0.0):.1f} mm")  # fmt: skip
+    print(f"{options.out}: {len(result.players)} players, {format_count(len(table), 'strike')} in "
+          f"{result.plan.seconds:.1f} s, widest gap {1000.0 * max(gaps, default=0.0):.1f} mm")  # fmt: skip
 
 
 def _check_folder(folder: Path) -> None:

@@ -68,11 +68,11 @@ def run_path(options, reporter: ProgressReporter, writers: Mapping[str, Writer])
     clip = bvh.read_bvh(options.input, options.unit)
     loaded = time.perf_counter()
     reporter.check_cancelled()
-    reporter.show_progress(0.2, "path")
+    reporter.show_progress(0.2, "Fitting the original path")
     source, settings = _prepare_source(clip.motion, options)
     settings, changes = _avoid_others(source, path, settings, ground, options)
     reporter.check_cancelled()
-    reporter.show_progress(0.5, "ride")
+    reporter.show_progress(0.5, "Moving onto the path")
     edited, take = _edit_motion(source, path, settings, ground, options)
     done = time.perf_counter()
     take.seconds.update(load=loaded - started, construct=done - loaded, total=done - started)
@@ -238,7 +238,8 @@ def _avoid_collisions(
         limits = replace(limits, distance=limits.distance + distance - min(hit.gap for hit in collisions) + 0.01)
     remaining = (f"still comes within {hit.gap:.2f} m of {others[hit.second - 1].name} at {hit.time:.1f} s"
                  for hit in collisions)
-    return changed, tuple(f"{name} {line}" for line in (*_describe_changes(changed, settings), *remaining))
+    lines = replace(change, delay=changed.delay - settings.delay).describe(follower.sampled_path.length)
+    return changed, tuple(f"{name} {line}" for line in (*lines, *remaining))
 
 
 def _build_follower(name: str, edited: EditedMotion) -> Follower:
@@ -263,9 +264,3 @@ def _find_collisions(followers: list[Follower], distance: float) -> list:
     places = np.stack([follower.at(times) for follower in followers])
     return [hit for hit in find_collisions(times, places, distance) if hit.first == 0]
 
-
-def _describe_changes(changed: PathEditSettings, settings: PathEditSettings) -> list[str]:
-    delay = changed.delay - settings.delay
-    detours = (f"goes {abs(offset):.2f} m to the {'left' if offset > 0 else 'right'} {arc:.1f} m along the path"
-               for arc, _, offset in changed.detours)  # fmt: skip
-    return [*([f"waits {delay:.2f} s"] if delay else []), *detours]

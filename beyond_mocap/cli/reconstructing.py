@@ -16,7 +16,7 @@ from pathlib import Path
 import numpy as np
 
 from .. import __version__
-from ..base.errors import InputError
+from ..base.errors import InputError, format_count
 from ..base.settings.options import add_options, option_values
 from .outputs import ProgressReporter, Writer, build_take, check_outputs, choose_writer
 
@@ -122,8 +122,8 @@ def _show_lines(reporter: ProgressReporter, lines: list[str], report: Path | Non
     for line in lines[:_MAX_LINES]:
         reporter.show_note(line)
     if len(lines) > _MAX_LINES:
-        more = len(lines) - _MAX_LINES
-        reporter.show_note(f"{more} more lines: {f'see {report}' if report else 'write them with --report R.json'}")
+        more = format_count(len(lines) - _MAX_LINES, "more line")
+        reporter.show_note(f"{more}: {f'see {report}' if report else 'write them with --report R.json'}")
 
 
 def _reconstruct_folder(options, reporter: ProgressReporter) -> None:

@@ -9,7 +9,7 @@ from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
 
-from ..base.errors import InputError
+from ..base.errors import InputError, format_count
 from ..base.settings.options import add_options
 from .outputs import ProgressReporter, Writer, add_subverbs, check_outputs
 
@@ -92,7 +92,7 @@ def run_order(options, reporter: ProgressReporter, writers: Mapping[str, Writer]
         reporter.show_note(f"{len(study.clips) - len(movies)} of {len(study.clips)} clips are not movies; render them")
     pages = len(next(iter(study.orders.values())))
     print(f"{options.out}: study {study.id}, {len(study.clips)} clips of {len(study.systems)} systems, "
-          f"{len(study.orders)} raters with {pages} pages each")  # fmt: skip
+          f"{format_count(len(study.orders), 'rater')}, pages for each: {pages}")  # fmt: skip
 
 
 def _relative_path(folder: Path, path: Path) -> str:
@@ -128,7 +128,7 @@ def run_form(options, reporter: ProgressReporter, writers: Mapping[str, Writer])
     missing_names = [name for name, path in movies.items() if path is None]
     if options.embed and missing_names:
         raise InputError(options.study / CLIPS,
-                         f"{len(missing_names)} clips are missing, such as {missing_names[0]}{_MOVIE}",
+                         f"{format_count(len(missing_names), 'clip')} missing, such as {missing_names[0]}{_MOVIE}",
                          "a movie for each clip", "render them first")  # fmt: skip
     sources = _embed_movies(options.study, movies) if options.embed else {
         name: f"../{CLIPS}/{path.name if path else name + _MOVIE}" for name, path in movies.items()
@@ -141,9 +141,9 @@ def run_form(options, reporter: ProgressReporter, writers: Mapping[str, Writer])
         reporter.show_progress(number / len(study.orders), rater)
     reporter.finish()
     if missing_names:
-        missing = f"{len(missing_names)} of {len(movies)} clips are missing, such as {missing_names[0]}{_MOVIE}"
+        missing = f"missing: {len(missing_names)} of {len(movies)} clips, such as {missing_names[0]}{_MOVIE}"
         reporter.show_note(f"{options.study / CLIPS}: {missing}")
-    print(f"{options.study / FORMS}: {len(study.orders)} forms")
+    print(f"{options.study / FORMS}: {format_count(len(study.orders), 'form')}")
 
 
 def _embed_movies(folder: Path, movies: Mapping[str, Path]) -> dict[str, str]:

@@ -3,14 +3,17 @@
 from __future__ import annotations
 
 import argparse
+import json
 import time
 from collections.abc import Mapping
 from pathlib import Path
 
-from ..base.errors import NotInLibraryError
+from ..base.errors import NotInLibraryError, format_count
 from ..base.settings.options import add_options, option_values
 from .library import open_library
 from .outputs import ProgressReporter, Writer, add_take_files, check_outputs, choose_writer
+
+_OTHER_LENGTH, _OTHER_PLACE = 1.0, 2.0  # s and m by which a motion differs from its track at most
 
 
 def add_synthesize(verbs) -> argparse.ArgumentParser:
@@ -24,7 +27,8 @@ def add_synthesize(verbs) -> argparse.ArgumentParser:
     verb = verbs.add_parser("synthesize", help="synthesize a player's motion from track, annotations and library")
     verb.add_argument("--library", type=Path, required=True)
     verb.add_argument("--track", type=Path, required=True, metavar="T.csv")
-    verb.add_argument("--annotations", type=Path, required=True, metavar="A.txt")
+    verb.add_argument("--annotations", type=Path, metavar="A.txt",
+                      help="the labels; default: the text T.txt beside the track, else all automatic")
     verb.add_argument("--out", type=Path, required=True, metavar="OUT.bvh")
     add_take_files(verb)
     verb.add_argument("--report", type=Path, metavar="R.json")
@@ -44,24 +48,26 @@ def run_synthesize(options, reporter: ProgressReporter, writers: Mapping[str, Wr
         reporter: progress, notes and cancellation.
         writers: further output formats, by file suffix (Blender's).
     """
-    from ..annotation import check_timeline, read_timeline
+    from ..annotation import Timeline, check_timeline, read_timeline
     from ..files.tables import write_ball, write_report
     from ..files.tracking.tracking import read_track_csv
     from ..motion.track import clean_track
     from ..synthesis.pin_table import read_pins
     from ..synthesis.plan import Plan
     from ..synthesis.provenance import write_provenance
+    from ..synthesis.search.request import USE_NEAREST
     from ..synthesis.synthesize import synthesize
 
     started = time.perf_counter()
     outputs = (options.out, options.provenance, options.ball, options.report)
-    check_outputs(*outputs, reserved=(options.track, options.annotations, options.pins))
+    annotations = options.annotations or _find_annotations(options.track)
+    check_outputs(*outputs, reserved=(options.track, annotations, options.pins, options.skeleton))
     write = choose_writer(options.out, writers)
     track, data = clean_track(read_track_csv(options.track))
-    timeline = read_timeline(options.annotations, options.fps, float(track.times[0]))
+    timeline = read_timeline(annotations, options.fps, float(track.times[0])) if annotations else Timeline()
     loaded = time.perf_counter()
     library = open_library(options, reporter, seed=options.seed)
-    check_timeline(timeline, library.labels, float(track.times[0]), float(track.times[-1]), str(options.annotations))
+    check_timeline(timeline, library.labels, float(track.times[0]), float(track.times[-1]), str(annotations))
     ready = time.perf_counter()
     plan = Plan(
         track=track, timeline=timeline, library=str(options.library),
@@ -70,7 +76,8 @@ def run_synthesize(options, reporter: ProgressReporter, writers: Mapping[str, Wr
     try:
         take = synthesize(library, plan, reporter.show_progress, reporter.is_cancelled)
     except NotInLibraryError as error:
-        raise NotInLibraryError(f"{options.annotations}: {error}", error.nearest) from None
+        message = str(error.locate(annotations)).replace(USE_NEAREST, "add --nearest")
+        raise NotInLibraryError(message, error.nearest, error.line) from None
     take.seconds.update(load=loaded - started, library=ready - loaded, total=time.perf_counter() - started)
     if options.report:
         from ..evaluation.report import evaluate
@@ -85,15 +92,23 @@ def run_synthesize(options, reporter: ProgressReporter, writers: Mapping[str, Wr
     if options.report:
         write_report(options.report, report)
     reporter.finish()
+    if annotations and not options.annotations:
+        reporter.show_note(f"{options.track}: with the labels of {annotations}")
     if library.notes:
-        notes = f"{len(library.notes)} notes on how its recordings were read and repaired"
-        reporter.show_note(f"{options.library}: {notes}; the command 'library' prints them")
+        notes = f"{format_count(len(library.notes), 'note')} on how its recordings were read and repaired"
+        reporter.show_note(f"{options.library}: {notes}; the command 'library' prints all")
     take_warnings = [line for line in take.warnings if line not in library.notes]
     for line in (*take_warnings, *(f"{options.track}: {line}" for line in data.lines)):
         reporter.show_note(line)
     if options.ball and take.ball is None:
         reporter.show_note(f"{options.track} has no ball, so {options.ball} is not written")
     print(f"{options.out}: {len(take.motion)} frames, {take.motion.duration:.1f} s")
+
+
+def _find_annotations(track: Path) -> Path | None:
+    """Find the text beside a track that has its labels; None if there is none."""
+    text = track.with_suffix(".txt")
+    return text if text.is_file() and text != track else None
 
 
 def add_evaluate(verbs) -> argparse.ArgumentParser:
@@ -154,18 +169,46 @@ def run_evaluate(options, reporter: ProgressReporter, writers: Mapping[str, Writ
     if timeline is not None and track is not None and library is not None:  # otherwise some labels or times are unknown
         check_timeline(timeline, library.labels, start, float(track.times[-1]), str(options.annotations))
     report = evaluate_played(played, track=track, timeline=timeline, library=library)
+    notes = [*report["warnings"], *_describe_fit(report, motion, track, options)]
+    if provenance is None and report["keys"]:
+        notes.append("the clips that played are unknown; name them with --provenance")
+    if _is_synthesis_report(options.report):
+        notes.append(f"{options.report}: replaces the report of synthesize, which knew more, such as the clips")
     write_report(options.report, report)
     if options.html:
         atomic_write(options.html, build_html_report(played, report, track=track, timeline=timeline, library=library,
                                                      title=options.motion.name))  # fmt: skip
-    reporter.finish()
+    reporter.finish(notes)
     if library is not None and (unknown_clips := _find_unknown_clips(played.clips, library)):
-        first, count = unknown_clips[0], len(unknown_clips)
+        count = format_count(len(unknown_clips), "clip")
         reporter.show_note(
-            f"{options.provenance}: {count} clips, such as {first}, are not in {options.library} and cannot be "
-            "compared"
+            f"{options.provenance}: {count} not in {options.library} and not compared, such as {unknown_clips[0]}"
         )
     print(options.report)
+
+
+def _describe_fit(report: dict, motion, track, options) -> list[str]:
+    """Describe why a motion is hardly this track's: it has another length, or is far away."""
+    if track is None:
+        return []
+    seconds, lines = float(track.times[-1] - track.times[0]), []
+    if abs(motion.duration - seconds) > _OTHER_LENGTH:
+        lines.append(f"{options.motion} lasts {motion.duration:.1f} s, {options.track} {seconds:.1f} s; check that "
+                     "they belong together")
+    away = report["root_error_m"]["mean"]
+    if away is not None and away > _OTHER_PLACE:
+        lines.append(f"{options.motion} is {away:.1f} m from {options.track} on average; check that they belong "
+                     "together")
+    return lines
+
+
+def _is_synthesis_report(path: Path) -> bool:
+    """Whether a file is a report that `synthesize` wrote: only that one knows the method."""
+    try:
+        found = json.loads(path.read_text("utf-8"))
+    except (OSError, ValueError, RecursionError):
+        return False
+    return isinstance(found, dict) and "method" in found
 
 
 def _find_unknown_clips(clips: tuple[str, ...], library) -> list[str]:

@@ -111,11 +111,11 @@ def _build_labels(view: View) -> Html:
 def _build_moments(view: View, report: Mapping) -> Html:
     if not view.moments:
         return Html()
-    parts = []
+    parts, is_known = [], bool(np.any(view.played.clip >= 0))
     for moment, figures in list(zip(view.moments, report["keys"]))[:MAX_MOMENTS]:
         name = f"{moment.requested.time:.2f} s: {' '.join(moment.requested.words)}"
-        parts += [build_element("h3", name), build_element("p", _describe_key_moment(figures), class_="quiet"),
-                  _build_strip(view, moment.frame, name)]
+        line = build_element("p", _describe_key_moment(figures, is_known), class_="quiet")
+        parts += [build_element("h3", name), line, _build_strip(view, moment.frame, name)]
     more = len(view.moments) - MAX_MOMENTS
     if more > 0:
         parts.append(build_element("p", f"and {more} more, in the table below", class_="quiet"))
@@ -128,9 +128,11 @@ def _build_strip(view: View, frame: int, name: str) -> Html:
     return build_image(plots.draw_strip(view, around, frame), f"stick figures at {name}")
 
 
-def _describe_key_moment(key: Mapping) -> str:
-    """Describe one key moment in a line."""
-    source = f"{key['clip']}, frame {key['clip_frame']:.1f}" if key["clip_frame"] is not None else "no key moment"
+def _describe_key_moment(key: Mapping, is_known: bool) -> str:
+    """Describe one key moment in a line; is_known: whether the played clips are known."""
+    source = "no key moment" if is_known else "unknown"
+    if key["clip_frame"] is not None:
+        source = f"{key['clip']}, frame {key['clip_frame']:.1f}"
     out = [f"played: {source}"]
     if key.get("used_instead"):
         out.append("used instead: " + " ".join(key["used_instead"]))

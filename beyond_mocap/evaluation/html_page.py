@@ -41,8 +41,7 @@ def build_element(name: str, /, *content: str, **attributes: object) -> Html:
         name: name of the element, such as "p".
         content: its content in order; text is escaped, Html is not.
         attributes: `class_` stands for class, an underscore for a hyphen; True gives an attribute without a value;
-            None,
-            False and "" are left out.
+            None, False and "" are left out.
     Returns:
         The element.
     """

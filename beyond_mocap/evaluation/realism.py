@@ -62,8 +62,7 @@ def build_pose_features(skeleton: Skeleton, positions: np.ndarray, fps: float, h
     """Build features of poses: positions, then 0.12 s of velocity, both divided by sqrt(J).
 
     Velocities are world velocities rotated into the heading frame, so travel counts. The Euclidean distance of two rows
-    is
-    the root mean square over joints.
+    is the root mean square over joints.
 
     Args:
         skeleton: the skeleton, J joints.
@@ -149,10 +148,9 @@ def measure_smoothness(skeleton: Skeleton, positions: np.ndarray, fps: float) ->
     """Measure the distance between the features of consecutive frames, the curves of Faustino's App. D (§5.2.1).
 
     Peaks of the curve are what counts. The features are those of Faustino's §3.2: position, velocity and acceleration
-    of
-    all joints relative to the root, in the scale of `library.features`. Faustino reduces them by PCA to 98 % of their
-    energy, which hardly changes the curve (on a take from five folders of recordings 96 % of its height, correlation
-    0.999). Without that reduction a motion has one curve, whatever library it comes from.
+    of all joints relative to the root, in the scale of `library.features`. Faustino reduces them by PCA to 98 % of
+    their energy, which hardly changes the curve (on a take from five folders of recordings 96 % of its height,
+    correlation 0.999). Without that reduction a motion has one curve, whatever library it comes from.
 
     Args:
         skeleton: the skeleton, J joints.

@@ -116,8 +116,7 @@ def format_table(reports: Mapping[str, dict]) -> str:
         reports: name -> report.
     Returns:
         One column per report, one row per figure, in the reports' order. Nested figures are named with dots, key
-        moments
-        are numbered from 1, texts (warnings) are counted.
+        moments are numbered from 1, texts (warnings) are counted.
     """
     columns = {name: flatten_report(report) for name, report in reports.items()}
     rows = dict.fromkeys(figure for column in columns.values() for figure in column)

@@ -4,10 +4,9 @@
 from __future__ import annotations
 
 import os
-from pathlib import Path
 from typing import BinaryIO
 
-from ..base.errors import InputError
+from ..base.errors import InputError, build_read_error
 
 
 def open_file(path: str | os.PathLike, kind: str, max_bytes: int | None = None) -> BinaryIO:
@@ -25,10 +24,8 @@ def open_file(path: str | os.PathLike, kind: str, max_bytes: int | None = None) 
     try:
         handle = open(path, "rb")
         size = os.fstat(handle.fileno()).st_size
-    except FileNotFoundError:
-        raise InputError(path, "no such file", kind, "check the path") from None
     except (OSError, ValueError) as error:
-        raise _build_read_error(path, kind, error) from None
+        raise build_read_error(path, kind, error) from None
     if max_bytes is not None and size > max_bytes:
         handle.close()
         raise InputError(path, f"has {size} bytes", f"{kind} of at most {max_bytes}", "choose another file")
@@ -49,7 +46,7 @@ def read_bytes(path: str | os.PathLike, kind: str, max_bytes: int | None = None)
         try:
             return handle.read()
         except OSError as error:
-            raise _build_read_error(path, kind, error) from None
+            raise build_read_error(path, kind, error) from None
 
 
 def read_utf8(path: str | os.PathLike, kind: str, max_bytes: int | None = None) -> str:
@@ -66,9 +63,3 @@ def read_utf8(path: str | os.PathLike, kind: str, max_bytes: int | None = None) 
         return read_bytes(path, kind, max_bytes).decode("utf-8-sig")
     except UnicodeDecodeError:
         raise InputError(path, "is not UTF-8 text", kind, "choose another file, or save it as UTF-8") from None
-
-
-def _build_read_error(path: str | os.PathLike, kind: str, error: OSError | ValueError) -> InputError:
-    if Path(path).is_dir():  # Windows reports a folder as a permission error
-        return InputError(path, "is a folder", kind, "choose a file in it")
-    return InputError(path, f"cannot be read ({getattr(error, 'strerror', None) or error})", f"{kind} that is readable")

@@ -137,7 +137,7 @@ def assign_players(event_players: Sequence[EventPlayer], match: Match
     missing = [who.display_name for who in event_players if who not in best]
     if missing:
         notes.append(
-            f"{len(missing)} of {len(event_players)} players of the events are not tracked: {', '.join(missing[:6])}")
+            f"not tracked: {len(missing)} of {len(event_players)} players of the events: {', '.join(missing[:6])}")
     return {who: (player.id, player.team) for who, player in best.items()}, notes
 
 

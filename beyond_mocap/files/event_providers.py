@@ -14,7 +14,7 @@ from pathlib import Path
 
 from ..annotation.event_labels import KINDS
 from ..annotation.striking import BODY_PARTS
-from ..base.errors import InputError
+from ..base.errors import InputError, build_read_error
 from ..motion.track.match_data import Match
 from .event_data import EventPlayer, MatchEvent
 from .tables import parse_number, read_rows
@@ -88,7 +88,7 @@ def find_second_file(path: Path, provider: EventProvider, meta: str | os.PathLik
         return None
     if meta is not None:
         if not Path(meta).is_file():
-            raise InputError(meta, "no such file", "lineups or metadata of the events", "check the path")
+            raise build_read_error(meta, "lineups or metadata of the events")
         return Path(meta)
     names = [re.sub(re.escape(old), new, path.name, flags=re.IGNORECASE) for old, new in provider.renamed]
     folders = [path.parent, path.parent.parent / "lineups"]

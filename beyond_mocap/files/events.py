@@ -10,7 +10,7 @@ from pathlib import Path
 
 import numpy as np
 
-from ..base.errors import InputError
+from ..base.errors import InputError, build_read_error
 from ..motion.track.match_data import Match
 from .event_data import EventPlayer, MatchEvent, MatchEvents, assign_players
 from .event_providers import (
@@ -68,8 +68,7 @@ def read_events(
             match.
     """
     if not Path(path).is_file():
-        found = "is a folder" if Path(path).is_dir() else "no such file"
-        raise InputError(path, found, "a file of events", "check the path")
+        raise build_read_error(path, "a file of events")
     path, name = Path(path), (provider or "").lower()
     if name and name not in EVENT_PROVIDERS:
         raise InputError("provider", f"{name!r}", f"one of {', '.join(EVENT_PROVIDERS)} for events")

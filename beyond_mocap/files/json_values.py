@@ -23,7 +23,8 @@ def parse_json(text: str, name: str, page: str):
     try:
         return json.loads(text, object_pairs_hook=_build_unique_object, parse_constant=_reject_constant)
     except json.JSONDecodeError as error:
-        raise InputError(f"{name}:{error.lineno}:{error.colno}", error.msg, "JSON", f"see {page}") from None
+        place = f"{name}:{error.lineno}:{error.colno}"
+        raise InputError(place, "not JSON from here on", "JSON", f"see {page}") from None
     except (ValueError, RecursionError) as error:
         raise InputError(name, str(error) or "nested too deeply", "JSON", f"see {page}") from None
 
@@ -51,7 +52,7 @@ def check_object(value, where: str) -> None:
         InputError: if it is not.
     """
     if not isinstance(value, dict):
-        raise InputError(where, describe_value(value), "an object {...}")
+        raise InputError(where, describe_value(value), "an object {...}", "correct the value")
 
 
 def check_names(value, where: str, known, needed) -> None:
@@ -68,7 +69,7 @@ def check_names(value, where: str, known, needed) -> None:
     check_object(value, where)
     for name in needed:
         if name not in value:
-            raise InputError(where, f"no {name!r}", f"{', '.join(needed)}")
+            raise InputError(where, f"no {name!r}", f"the names {', '.join(needed)}", f"add {name!r}")
     for name in value:
         if name not in known:
             raise InputError(where, describe_value(name), f"one of {', '.join(sorted(known))}", "check the spelling")
@@ -90,7 +91,7 @@ def check_number(value, where: str) -> float:
     except OverflowError:
         is_valid = False
     if not is_valid:
-        raise InputError(where, describe_value(value), "a number")
+        raise InputError(where, describe_value(value), "a number", "correct the value")
     return float(value)
 
 
@@ -106,7 +107,7 @@ def check_whole_number(value, where: str) -> int:
         InputError: if it is not.
     """
     if isinstance(value, bool) or not isinstance(value, int) and check_number(value, where) != int(value):
-        raise InputError(where, describe_value(value), "a whole number")
+        raise InputError(where, describe_value(value), "a whole number", "correct the value")
     return int(value)
 
 
@@ -122,7 +123,7 @@ def check_bool(value, where: str) -> bool:
         InputError: if it is not.
     """
     if not isinstance(value, bool):
-        raise InputError(where, describe_value(value), "true or false")
+        raise InputError(where, describe_value(value), "true or false", "correct the value")
     return value
 
 
@@ -138,7 +139,7 @@ def check_text(value, where: str) -> str:
         InputError: if it is not.
     """
     if not isinstance(value, str):
-        raise InputError(where, describe_value(value), "a text")
+        raise InputError(where, describe_value(value), "a text", "correct the value")
     return value
 
 
@@ -156,7 +157,7 @@ def check_numbers(value, where: str, count: int, expected: str) -> tuple:
         InputError: if it is not.
     """
     if not isinstance(value, (list, tuple)) or len(value) != count:
-        raise InputError(where, describe_value(value), expected)
+        raise InputError(where, describe_value(value), expected, "correct the value")
     return tuple(check_number(one, where) for one in value)
 
 
@@ -172,7 +173,7 @@ def check_list(value, where: str) -> list:
         InputError: if it is not.
     """
     if not isinstance(value, (list, tuple)):
-        raise InputError(where, describe_value(value), "a list [...]")
+        raise InputError(where, describe_value(value), "a list [...]", "correct the value")
     return list(value)
 
 

@@ -11,7 +11,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from ..base.errors import InputError
+from ..base.errors import InputError, format_count
 from .content import read_bytes
 
 _MAX_METRES = 1e5  # metres; larger coordinates are in a wrong unit
@@ -26,8 +26,7 @@ def read_mesh(path: str | os.PathLike) -> tuple[np.ndarray, np.ndarray]:
         Vertices (V, 3) m, Z up, and triangles (F, 3) int, their indices.
     Raises:
         InputError: with the line, for an invalid number, a face with an unknown vertex or fewer than three corners, or
-            a
-            file without faces.
+            a file without faces.
     """
     vertices, triangles = [], []
     for place, words in _iter_statements(path):
@@ -39,7 +38,7 @@ def read_mesh(path: str | os.PathLike) -> tuple[np.ndarray, np.ndarray]:
                 raise InputError(place, f"a face of {len(corners)} corners", "at least three", "export it again")
             triangles += [(corners[0], b, c) for b, c in zip(corners[1:], corners[2:])]
     if not triangles:
-        found = f"{len(vertices)} vertices and no faces"
+        found = f"{format_count(len(vertices), 'vertex', 'vertices')} and no faces"
         raise InputError(path, found, "a mesh with faces", "export the ground as a mesh")
     file_vertices = np.array(vertices)
     return np.stack([file_vertices[:, 0], -file_vertices[:, 2], file_vertices[:, 1]], axis=1), np.array(triangles,

@@ -120,8 +120,7 @@ def read_rows(
         required: the columns that it must have.
         others: alternative column name -> required or further column.
         separators: allowed separators; the first that gives the required header is used. Without a comma as separator,
-            a
-            comma in a number is its decimal point.
+            a comma in a number is its decimal point.
     Returns:
         (place, row) of each row; place is `file:line`.
     Raises:

@@ -28,8 +28,7 @@ def build_automatic_labels(library: Library, gait: np.ndarray, track: SampledTra
     """Build the labels of each frame's gait.
 
     Where the library has the gait in the direction in which a body that faces the ball would move (`annotation.gaits`),
-    the
-    labels have that direction.
+    the labels have that direction.
 
     Args:
         library: the library.

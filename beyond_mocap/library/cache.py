@@ -1,6 +1,5 @@
 """The results of building a library, saved in one `.npz` (never pickled) that depends on the content of every file
-read;
-and the synthetic clips beside it, as BVH.
+read; and the synthetic clips beside it, as BVH.
 
 A damaged or stale cache is not used but written again. The file is written under another name and renamed, so two
 processes that build at once do no harm: the later one wins with the same content.
@@ -8,9 +7,9 @@ processes that build at once do no harm: the later one wins with the same conten
 
 from __future__ import annotations
 
+import io
 import json
 import os
-import tempfile
 from dataclasses import asdict, fields
 from pathlib import Path
 from typing import Iterable
@@ -20,6 +19,7 @@ import numpy as np
 from ..annotation import ClipAnnotation
 from ..base.digest import byte_digest
 from ..base.errors import InputError
+from ..files.atomic import atomic_write
 from ..files.bvh import bvh
 from ..motion.motion import Motion
 from ..motion.skeleton import Skeleton
@@ -87,16 +87,11 @@ def save_library(place: Path, key: str, library, name: str = "library") -> bool:
     arrays["header"] = np.frombuffer(json.dumps(_build_header(key, library)).encode(), np.uint8)
     try:
         place.mkdir(parents=True, exist_ok=True)
-        handle, partial_file = tempfile.mkstemp(suffix=".part", dir=place)
-    except OSError:
-        return False
-    try:
-        with os.fdopen(handle, "wb") as file:
-            np.savez(file, **arrays)
-        os.replace(partial_file, place / f"{name}.npz")
+        content = io.BytesIO()  # on a full disk, an archive that is written there reports an error of its own
+        np.savez(content, **arrays)
+        atomic_write(place / f"{name}.npz", content.getvalue())
         return True
-    except OSError:
-        Path(partial_file).unlink(missing_ok=True)
+    except (OSError, InputError):
         return False
 
 
@@ -175,5 +170,5 @@ def write_synthetic_clips(place: Path, clips: Iterable[Clip], missing_only: bool
             if not clip.mirrored and not (missing_only and file.exists()):
                 file.parent.mkdir(parents=True, exist_ok=True)
                 bvh.write_bvh(file, clip.motion)
-    except OSError:
+    except (OSError, InputError):
         return

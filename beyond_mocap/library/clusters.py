@@ -9,7 +9,9 @@ same information, and the clusters come out within a percent of those in all dim
 
 from __future__ import annotations
 
+import io
 import warnings
+from contextlib import redirect_stderr
 from dataclasses import dataclass
 
 import numpy as np
@@ -77,6 +79,18 @@ def cluster_blocks(frames: Frames, length: int, seed: int = 0) -> Clusters:
     return Clusters(length, start, label, medoid)
 
 
+def _count_cores_quietly() -> None:
+    """Have joblib count the cores, for scikit-learn; where it finds none, it prints a warning with stack lines, once.
+
+    LOKY_MAX_CPU_COUNT would only silence it with fewer than all cores.
+    """
+    from joblib import cpu_count
+
+    with warnings.catch_warnings(), redirect_stderr(io.StringIO()):
+        warnings.simplefilter("ignore")
+        cpu_count(only_physical_cores=True)
+
+
 def _run_kmeans(points: np.ndarray, count: int, seed: int) -> tuple[np.ndarray, np.ndarray]:
     """Run k-means: labels (M,) and the point nearest to each centre (count,); empty clusters are dropped.
 
@@ -86,6 +100,7 @@ def _run_kmeans(points: np.ndarray, count: int, seed: int) -> tuple[np.ndarray, 
     from sklearn.exceptions import ConvergenceWarning
     from threadpoolctl import threadpool_limits
 
+    _count_cores_quietly()
     step = -(-len(points) // MAX_FITTED)
     with threadpool_limits(limits=1), warnings.catch_warnings():
         warnings.simplefilter("ignore", ConvergenceWarning)  # fewer different blocks than clusters give fewer clusters

@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from ..base.errors import InputError
+from ..base.errors import InputError, format_count
 from ..motion import contacts
 from ..motion.humanoid import identify_joints
 from ..motion.motion import Motion
@@ -30,8 +30,7 @@ def unify_skeletons(
     """Bring clips to the library's skeleton.
 
     Heels and toes are in contact where the recording's own are; where only the new body has toes, contacts are detected
-    on
-    it.
+    on it.
 
     Args:
         paths: the files.
@@ -62,7 +61,8 @@ def unify_skeletons(
             rigs.update(dict.fromkeys(group, rig))
     if rigs:
         others = sum(group[0] in rigs for group in groups)
-        notes.append(f"{len(rigs)} clips of {others} other skeletons retargeted to the one with {len(skeleton)} joints")
+        notes.append(f"{format_count(len(rigs), 'clip')} of {format_count(others, 'other skeleton')} retargeted to the "
+                     f"one with {len(skeleton)} joints")
     return _iter_unified(motions, contact_mask, skeleton, rigs)
 
 

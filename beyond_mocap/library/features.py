@@ -97,8 +97,7 @@ def compute_raw_features(positions: np.ndarray, heading: np.ndarray, fps: float)
     """Compute one clip's features before PCA.
 
     The root's own position is left out except for its height (Faustino: "the position being the world center"). Divided
-    by
-    the square root of K, so that a distance is the root mean square over joints.
+    by the square root of K, so that a distance is the root mean square over joints.
 
     Args:
         positions: (T, K, 3) joint positions, metres, world, the root first.

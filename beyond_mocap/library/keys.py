@@ -41,8 +41,7 @@ def collect_keys(clips) -> tuple[Key, ...]:
     """Collect the key moments of all clips, in their order.
 
     A key's labels are its row's and those of every other row that covers its frame, except for their sides: a kick with
-    the
-    right foot while the body turns left is no left kick.
+    the right foot while the body turns left is no left kick.
     """
     found = []
     for index, clip in enumerate(clips):
@@ -80,8 +79,7 @@ def select_nearest_keys(keys: tuple[Key, ...], words) -> tuple[Key, ...]:
     """Select the keys whose labels are nearest to the requested ones: most shared labels, then fewest extra ones.
 
     None where the action itself is not shared (a kick is no answer to a slide, and a right kick none to a right
-    header),
-    except that any foot on the ball can replace a foot on the ball, and a dive a dive.
+    header), except that any foot on the ball can replace a foot on the ball, and a dive a dive.
 
     Args:
         keys: of the library.

@@ -1,6 +1,5 @@
 """Writing into a library's folder: clips, and labels where the library reads them: `NAME.txt` beside the clip, or the
-rows
-of an `annotations.csv`.
+rows of an `annotations.csv`.
 
 Files are written under another name and renamed, so that none is ever half-written. Existing files are replaced only
 at the caller's request.

@@ -13,6 +13,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ..annotation import LOCOMOTION, ClipAnnotation
+from ..base.errors import format_count
 from ..motion.motion import Motion
 from ..synthetic.landing import add_landing, ends_in_flight
 from ..synthetic.moves import build_get_up
@@ -126,4 +127,4 @@ def describe_landings(completed_clips: Sequence[CompletedClip], getting_ups: Seq
     seconds = np.median([(len(one.motion) - one.recorded_count) / one.motion.fps for one in completed_clips])
     by = "synthetic, since no clip shows it" if getting_ups[0].is_synthetic else "from the library's own clips"
     what = f"landing and getting up ({by}) added, {seconds:.1f} s each"
-    return [f"{len(completed_clips)} clips end in flight: {what}"]
+    return [f"{format_count(len(completed_clips), 'clip')} ending in flight: {what}"]

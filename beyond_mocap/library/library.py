@@ -141,8 +141,7 @@ class Library:
         """The recordings followed by the synthetic clips of `library.synthetic_clips`.
 
         These add the speeds between and above the recordings, and kicks and received balls on the run. They are
-        generated on
-        first use and cached. The result has no clusters. InputError where no recording shows locomotion.
+        generated on first use and cached. The result has no clusters. InputError where no recording shows locomotion.
         """
         measure_gaits(self)  # a library without locomotion raises InputError
         cached = cache.load_library(*self.cache_location, "made") if self.cache_location else None
@@ -168,8 +167,7 @@ class Library:
         """Whether a track needs the synthetic clips.
 
         It does if it stays in a speed gap for a fifth of a second or more, or has key moments that are faster than any
-        recorded
-        kick or, for received balls, any recorded receiving with the foot can be played without sliding.
+        recorded kick or, for received balls, any recorded receiving with the foot can be played without sliding.
 
         Args:
             speed: (T,) m/s of the track at the library's rate.
@@ -236,8 +234,7 @@ def measure_gaits(library: Library) -> tuple[Gait, ...]:
 
     A gait without a direction in its labels counts like one with. Rows of key moments and dribbles do not count, nor do
     synthetic clips of a gait that is recorded, nor clips other than the chosen one. A gait whose mean speed is not
-    above
-    that of every slower gait is dropped, since thresholds need an order.
+    above that of every slower gait is dropped, since thresholds need an order.
 
     Args:
         library: the library.

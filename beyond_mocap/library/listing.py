@@ -107,8 +107,7 @@ def scan_clips(folder: str | Path, cache_dir: str | Path | None = None) -> tuple
 
 def collect_labels(rows: Sequence[ClipAnnotation]) -> tuple[tuple[str, ...], int]:
     """Collect the labels of rows, key moments' first, as they are spoken, then those of the longest rows; and count the
-    key
-    moments.
+    key moments.
     """
     ordered = sorted(rows, key=lambda row: (row.key is None, row.start - row.end))
     words = dict.fromkeys(word for row in ordered for word in sort_labels(row.words))
@@ -124,7 +123,7 @@ def _grade_clip(clip: Clip, speed: float, jerk: float) -> tuple[int, tuple[str, 
         marks += [_grade_value(figures.slides, tuple(np.hypot(_SLIDE_LIMITS, (rolling, 2.0 * rolling)))),
                   _grade_value(figures.drift, _DRIFT_LIMITS)]
         slid = f" (file: {100 * figures.slid:.0f})" if figures.slid > figures.slides + 0.01 else ""
-        details.append(f"feet slide: {100 * figures.slides:.0f} cm/s{slid}")
+        details.append(f"foot slide: {100 * figures.slides:.0f} cm/s{slid}")
         if figures.drift > 0.0:
             details.append(f"floor levelled: {100 * figures.drift:.0f} cm")
         if figures.pops:

@@ -22,6 +22,7 @@ import numpy as np
 from scipy.ndimage import minimum_filter1d
 
 from ..base.banded_least_squares import BandedLeastSquares
+from ..base.errors import format_count
 from ..base.time_series import find_runs
 from ..motion import contacts, quaternion
 from ..motion.foot_plant import plant_feet
@@ -87,8 +88,7 @@ def remove_pops(motion: Motion) -> tuple[Motion, int]:
     """Remove rotations that jump for one or two frames and return.
 
     A joint pops where it is more than 12 degrees off the slerp of the frames around the gap, and more than four times
-    as
-    far as these are apart from each other or from their own outer neighbours (a fast swing moves on, a pop returns).
+    as far as these are apart from each other or from their own outer neighbours (a fast swing moves on, a pop returns).
 
     Args:
         motion: T frames.
@@ -110,8 +110,7 @@ def remove_drift(motion: Motion) -> tuple[Motion, float]:
     """Remove a floor drift of more than _DRIFT metres.
 
     The floor is the lowest joint within _LOW_SECONDS (longer than a flight), smoothed. An inertial suit's floor can
-    rise by
-    half a metre in five seconds, and `_level_floor` knows only feet detected as in contact.
+    rise by half a metre in five seconds, and `_level_floor` knows only feet detected as in contact.
 
     Args:
         motion: T frames.
@@ -255,8 +254,7 @@ def _correct_travel(motion: Motion, heel_toe_contacts: np.ndarray) -> tuple[Moti
     metres.
 
     Only the middle of a stance counts: a foot that lands or leaves moves. On recordings without sliding the path comes
-    out
-    unchanged, to half a per cent.
+    out unchanged, to half a per cent.
     """
     velocity = np.diff(_compute_ball_positions(motion)[..., :2], axis=0) * motion.fps
     weight = _weight_stance_middles(heel_toe_contacts[..., 1])
@@ -307,15 +305,18 @@ def describe_repairs(repaired: Sequence[tuple[RepairedClip, int]]) -> list[str]:
     lines = []
     pops = [count for _, count in repaired if count]
     if pops:
-        lines.append(f"{sum(pops)} single-frame jumps of joints removed from {len(pops)} clips")
+        lines.append(f"{format_count(sum(pops), 'single-frame jump')} of joints removed from "
+                     f"{format_count(len(pops), 'clip')}")
     drifts = [one.drift for one, _ in repaired if one.drift > 0.0]
     if drifts:
-        lines.append(f"floor levelled in {len(drifts)} clips, by {np.median(drifts) * 100:.0f} cm (median)")
+        lines.append(f"floor levelled in {format_count(len(drifts), 'clip')}, by {np.median(drifts) * 100:.0f} cm "
+                     "(median)")
     sliding = [one for one, _ in repaired if one.was_sliding]
     if sliding:
         before, after = (np.mean([one.slide[i] for one in sliding]) * 100 for i in (0, 1))
         lines.append(
-            f"feet planted in {len(sliding)} clips: mean slide {before:.0f} cm/s before, {after:.0f} cm/s after; "
+            f"feet planted in {format_count(len(sliding), 'clip')}: mean slide {before:.0f} cm/s before, "
+            f"{after:.0f} cm/s after; "
             f"path corrected by {np.median([one.travel for one in sliding]):.2f} m (median)"
         )
     return lines

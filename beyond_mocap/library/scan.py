@@ -14,7 +14,7 @@ from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 
 from ..annotation import ClipAnnotation, read_annotation_csv, read_clip_annotations
-from ..base.errors import InputError
+from ..base.errors import InputError, format_count
 from ..files.atomic import atomic_write
 
 CACHE_FOLDER = ".beyond_mocap"
@@ -99,8 +99,7 @@ def find_tables(folder: Path, clips: list[Path]) -> list[Path]:
     """Find the `annotations.csv` files that may apply to `clips`.
 
     From each clip's folder up to the library's top, and in the folder above that, since a library is often one folder
-    of a
-    larger collection.
+    of a larger collection.
     """
     folder = Path(folder)
     clip_folders = {clip.parent for clip in clips}
@@ -121,9 +120,7 @@ class Annotations:
 
     def __init__(self, folder: Path, clips: list[Path], skips: Callable[[Mapping], bool] | None = None):
         """Read every table that may apply, without the rows that `skips` selects (`read_annotation_csv`); InputError
-        for
-        a broken
-        one.
+        for a broken one.
         """
         tables = find_tables(folder, clips)
         self.tables = {_to_absolute(table.parent): read_annotation_csv(table, skips) for table in tables}
@@ -142,6 +139,21 @@ class Annotations:
                 if rows:
                     return tuple(rows)
         return ()
+
+    def describe_unknown_files(self, folder: Path) -> list[str]:
+        """Describe in a line the rows that name no recording of the library; a table above it serves other folders too.
+        """
+        top = _to_absolute(folder)
+        known = {_to_absolute(path) for path in list_own_recordings(folder)} if self.tables else set()
+        files = [(_to_absolute(place / name), place, name) for place in sorted(self.tables)
+                 for name in self.tables[place]]
+        unknown = [(place, name) for file, place, name in files
+                   if file not in known and top in (place, *place.parents, *file.parents)]
+        if not unknown:
+            return []
+        count = sum(len(self.tables[place][name]) for place, name in unknown)
+        rows = "1 row names a file that is" if count == 1 else f"{count} rows name files that are"
+        return [f"{TABLE_NAME}: {rows} not in the library, such as {unknown[0][1]}"]
 
     def list_sources(self, clips: list[Path]) -> list[Path]:
         """List every file that was or would be read for annotations; the cache depends on them."""
@@ -213,7 +225,7 @@ def describe_waiting(waiting: Sequence[Path]) -> list[str]:
     if not waiting:
         return []
     count, kinds = len(waiting), ", ".join(sorted({path.suffix.lower() for path in waiting}))
-    return [f"{count} {'clip' if count == 1 else 'clips'} skipped ({kinds}: {waiting[0].name}): not converted; "
+    return [f"{format_count(count, 'clip')} skipped ({kinds}: {waiting[0].name}): not converted; "
             "press Build Library in Blender to convert them"]
 
 

@@ -90,7 +90,7 @@ def report_unused(trial: MarkerTrial, clusters: Mapping[str, Sequence[str]], oth
     """
     known = {label for group in clusters.values() for label in group} | set(others)
     left = [label for label in trial.labels if label not in known and not UNLABELED.match(label)]
-    return [f"{len(left)} markers belong to no segment and are not used: {list_some(left)}"] if left else []
+    return [f"markers without a segment are not used: {list_some(left)}"] if left else []
 
 
 def _check_sides(trial: MarkerTrial, static: MarkerTrial | None, clusters) -> None:

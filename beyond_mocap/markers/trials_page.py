@@ -17,6 +17,7 @@ from pathlib import Path
 
 import numpy as np
 
+from ..base.errors import format_count
 from ..evaluation import html_page as html
 from ..evaluation.plots import style_axes
 from .trial_results import (
@@ -47,7 +48,7 @@ def build_trials_report(folder: Path) -> str:
     results = read_results(Path(folder))
     solved = [result for result in results if not result.error]
     title = Path(folder).resolve().name
-    parts = [html.build_element("h1", f"{title}: {len(results)} trials")]
+    parts = [html.build_element("h1", f"{title}: {format_count(len(results), 'trial')}")]
     if solved:
         parts.append(_build_section("Markers and time", _describe_fit(solved), draw_residuals_and_time(results),
                                     draw_residuals_by_trial(results)))

@@ -1,6 +1,5 @@
 """Construct a player of a match as displayed: the motion from their edit list, with collision avoidance, gaze at the
-ball,
-and ball contact restored.
+ball, and ball contact restored.
 
 Heads that follow one ball do not all turn together. Each player looks at it slightly late, not always fully, and ahead
 while sprinting unless the ball is close. The variation is a slow function of the match's clock and of the player's

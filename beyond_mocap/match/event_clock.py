@@ -1,6 +1,5 @@
 """Align events with the tracking's clock: events are noted by people and software seconds late, and their clock may
-drift
-against the cameras'.
+drift against the cameras'.
 
 Touches are solved from tracking (`solve_ball`); an event of a player belongs to one of their touches. Over all pairs of
 an event and a touch of the same player, the most frequent time difference is the lag of a period; a line through the

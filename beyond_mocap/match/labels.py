@@ -28,6 +28,7 @@ from ..annotation.event_labels import EventLabelTable, read_event_labels
 from ..ball.tracked import kinds
 from ..ball.tracked.solve import SolvedBall, SolvedTouch
 from ..base.digest import hex_digest
+from ..base.errors import format_count
 from ..files.atomic import atomic_write
 from ..files.event_data import CERTAIN_TOUCHES, MatchEvent, MatchEvents
 from ..motion.track.match_data import Match
@@ -335,13 +336,11 @@ def _describe_left_out(touches, left_out: Counter) -> list[str]:
     """Describe how many touches are left out, and why."""
     untracked = sum(not touch.player for touch in touches)
     counts = [
-        (untracked, "touches of the ball by untracked players"),
-        (left_out["doubtful"], f"touches are ignored, with confidence below {MIN_CONFIDENCE:g}"),
-        (
-        left_out[
-        "close"], f"touches are ignored, within {MIN_DISTANCE_SECONDS:g} s of a more certain one of the same player"),
+        (untracked, "of the ball by untracked players"),
+        (left_out["doubtful"], f"ignored, with confidence below {MIN_CONFIDENCE:g}"),
+        (left_out["close"], f"ignored, within {MIN_DISTANCE_SECONDS:g} s of a more certain one of the same player"),
     ]
-    return [f"{count} {what}" for count, what in counts if count]
+    return [f"{format_count(count, 'touch', 'touches')} {what}" for count, what in counts if count]
 
 
 def _format_moment(moment: Moment) -> str:

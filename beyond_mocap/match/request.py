@@ -1,6 +1,5 @@
 """What is requested of a match, as plain values, and the digests by which finished work is found again: the same
-content
-has the same digest in every process and on every machine.
+content has the same digest in every process and on every machine.
 """
 
 from __future__ import annotations
@@ -15,7 +14,7 @@ from pathlib import Path
 import numpy as np
 
 from .. import __version__
-from ..base.errors import InputError, format_seconds
+from ..base.errors import InputError, build_read_error, format_seconds
 from ..base.settings import collect_defaults
 from ..files.event_providers import EVENT_PROVIDERS
 from .pieces.units import OVERLAP, WINDOW
@@ -93,7 +92,7 @@ class MatchRequest:
                 raise InputError(option, "not a number", "seconds of the match's clock")
         if self.start is not None and self.end is not None and self.end <= self.start:
             raise InputError("end time", f"{format_seconds(self.end)} s",
-                             f"later than the start, {format_seconds(self.start)} s")
+                             f"later than the start, {format_seconds(self.start)} s", "choose a later end")
         if not WINDOW_LIMITS[0] <= self.window <= WINDOW_LIMITS[1]:
             raise InputError("window", f"{self.window:g} s", f"{WINDOW_LIMITS[0]:g} to {WINDOW_LIMITS[1]:g} s")
         if not 1.0 <= self.overlap <= self.window / 2.0:
@@ -135,7 +134,7 @@ def build_identity(request: MatchRequest, library_key: str) -> dict[str, object]
         try:
             out[name] = None if path is None else compute_file_digest(path)
         except OSError as error:
-            raise InputError(path, error.strerror or str(error), "a file that can be read", "check the path") from None
+            raise build_read_error(path, "a file of the match", error) from None
     out["library"] = library_key
     return out
 

@@ -1,6 +1,5 @@
 """Find which players of a match are synthesized, when they are present, and where they have to be: their tracks,
-cleaned,
-on one clock of frames, and separated where two would overlap.
+cleaned, on one clock of frames, and separated where two would overlap.
 """
 
 from __future__ import annotations
@@ -58,7 +57,7 @@ def resolve_span(match: Match, request: MatchRequest) -> tuple[float, float]:
     if end - start < MIN_SECONDS:
         low, high = (format_seconds(value) if value is not None else "" for value in (request.start, request.end))
         expected = f"a second or more within {format_seconds(first)} to {format_seconds(last)} s"
-        raise InputError("time range", f"{low} to {high} s", expected)
+        raise InputError("time range", f"{low} to {high} s", expected, "choose other times")
     return start, end
 
 
@@ -77,13 +76,15 @@ def build_roles(match: Match, request: MatchRequest, span: tuple[float, float]) 
     known = {player.id: player for player in match.players}
     for player_id in request.players:
         if player_id not in known:
-            raise InputError("players", f"{player_id!r}", f"some of {', '.join(known)}")
+            raise InputError("players", f"{player_id!r}", f"some of {', '.join(known)}",
+                             "correct the player's id")
     lags = choose_lags(match.positions[:, _select_samples(match, span)])
     found = [_build_role(match, number, player, span, request.fps) for number, player in enumerate(match.players)
              if not request.players or player.id in request.players]  # fmt: skip
     roles = [replace(role, lag=float(lags[role.number])) for role in found if role is not None]
     if not roles:
-        raise InputError("time range", f"no player is present {_describe_span(span)}", "a time of play")
+        found = f"no player is present {_describe_span(span)}"
+        raise InputError("time range", found, "a time of play", "choose other times")
     return tuple(roles)
 
 

@@ -52,8 +52,7 @@ def measure_sole_height(skeleton: Skeleton) -> float:
         skeleton: the body.
     Returns:
         Metres: 0 where that joint is a toe, which defines the floor; an ankle's usual height (as `neutral` has it)
-        where
-        there are no toes.
+        where there are no toes.
     """
     body = identify_joints(skeleton)
     return 0.0 if body.left.toe is not None or body.right.toe is not None else _ANKLE * measure_leg_length(skeleton)
@@ -68,8 +67,7 @@ def estimate_recorded_floor(motion: Motion) -> tuple[float, float]:
     """Estimate the floor of a recording, and how high above it the foremost joint of a flat foot is.
 
     The floor is at height 0 where the soles are as near to 0 as soles and toe joints of recordings are (toe joints are
-    4
-    to 6 cm above it in CMU, 4 in Bandai, 2 in the synthetic gait); else it is `measure_ground_height`.
+    4 to 6 cm above it in CMU, 4 in Bandai, 2 in the synthetic gait); else it is `measure_ground_height`.
 
     Args:
         motion: T frames, world, Z up.

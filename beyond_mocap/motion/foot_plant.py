@@ -124,8 +124,7 @@ def plant_feet(
     """Plant the feet of a motion on the ground, z = 0, where they are in contact.
 
     The feet keep their own rotation except for a rotation about the vertical that holds a flat foot's direction, and
-    for
-    heels that rise where a leg could not reach. The pelvis is lowered where that is not enough.
+    for heels that rise where a leg could not reach. The pelvis is lowered where that is not enough.
 
     Args:
         skeleton: J joints.

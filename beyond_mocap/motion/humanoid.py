@@ -279,8 +279,7 @@ def compute_heading_from_positions(skeleton: Skeleton, positions: np.ndarray) ->
     """Compute the heading of a body about Z.
 
     The axis across the body is the sum of the vectors from right to left upper legs and from right to left upper arms,
-    so
-    that neither a twisted pelvis nor twisted shoulders alone decide; the heading is across x up.
+    so that neither a twisted pelvis nor twisted shoulders alone decide; the heading is across x up.
 
     Args:
         skeleton: J joints.

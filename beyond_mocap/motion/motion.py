@@ -168,10 +168,8 @@ def sample_frames_cubic(motion: Motion, frames: np.ndarray) -> tuple[np.ndarray,
     """Sample a motion at fractional frames on cubic splines through its frames.
 
     Linear steps (`sample_frames`) have a corner at every frame. Joints that rotate fast are followed much better by
-    splines
-    of their rotations than by splines of their positions: a hand that throws at 20 m/s, sampled 30 times a second, has
-    its
-    velocity within 1 %; by positions it would lose 10 %.
+    splines of their rotations than by splines of their positions: a hand that throws at 20 m/s, sampled 30 times a
+    second, has its velocity within 1 %; by positions it would lose 10 %.
 
     Args:
         motion: T frames.

@@ -152,8 +152,7 @@ class HitLibrary:
         """Sort the hits by how well they suit a toss, a pass or an attack.
 
         First come those whose speed lies within the kind's range, then those nearest to it. Within the range come first
-        those
-        that labels name, then those nearest to its middle (for attacks the fastest).
+        those that labels name, then those nearest to its middle (for attacks the fastest).
 
         Args:
             kind: "toss", "pass" or "attack".

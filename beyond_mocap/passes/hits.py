@@ -388,8 +388,8 @@ def _is_hit(span: tuple[int, int], part: str, trajectory: _PartTrajectory, body:
     """Whether the part is faster than a step or an arm's swing at this speed of the body.
 
     Feet that walk reach 2.7 times the body's speed plus half a metre per second, in a run 2.1 times; recorded kicks
-    more
-    than 4 times. A striking foot is also faster than the supporting one (`other`, (T,) m/s): in a jump both are alike.
+    more than 4 times. A striking foot is also faster than the supporting one (`other`, (T,) m/s): in a jump both are
+    alike.
     """
     key = span[0] + int(np.argmax(trajectory.speed[span[0] : span[1] + 1]))
     if key in span or trajectory.speed[key] < _LEAST_SPEED.get(part, 1.0):

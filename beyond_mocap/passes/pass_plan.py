@@ -290,7 +290,7 @@ def _simulate_all(problem: PassProblem, serve: Launch, strikes: Sequence[Strike]
 def _list_misses(problem: PassProblem, flown: SolvedFlights) -> list[str]:
     """List a warning for each flight that does not reach the next strike."""
     return [
-        f"{problem.describe_pass(number)}: the ball passes the next strike at {100 * miss:.0f} cm"
+        f"{problem.describe_pass(number)}: the ball misses the next strike by {100 * miss:.0f} cm"
         for number, miss in enumerate(flown.missed) if miss > ON_TARGET
     ]  # fmt: skip
 

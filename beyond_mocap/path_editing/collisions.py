@@ -145,8 +145,7 @@ def compute_gaps(off: np.ndarray, move: np.ndarray, distance: float, span: float
         span: metres of the vertical segments.
     Returns:
         Shares (M,) of the step at which the gap falls below and rises above `distance` (meaningless if it stays above),
-        at
-        which it is smallest, and the smallest gap (M,) metres.
+        at which it is smallest, and the smallest gap (M,) metres.
     """
     if not len(off) or max(np.abs(off[:, 2]).max(), np.abs(off[:, 2] + move[:, 2]).max()) <= span:  # all on one level
         level, always = np.array([1.0, 1.0, 0.0]), np.zeros(len(off))

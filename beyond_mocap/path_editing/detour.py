@@ -193,6 +193,25 @@ class PathChange:
     delay: float = 0.0
     detours: tuple[tuple[float, float, float], ...] = ()
 
+    def describe(self, length: float = np.inf) -> list[str]:
+        """Describe the change in words.
+
+        Args:
+            length: metres of the path, beyond which no detour is described.
+        Returns:
+            A phrase for the wait, and one for each detour; detours of one offset that overlap count as one.
+        """
+        spans: list[list[float]] = []  # start, end, offset
+        for middle, width, offset in sorted(self.detours):
+            start, end = max(middle - 0.5 * width, 0.0), min(middle + 0.5 * width, length)
+            if spans and spans[-1][2] == offset and start <= spans[-1][1]:
+                spans[-1][1] = end
+            else:
+                spans.append([start, end, offset])
+        moves = [f"moves {abs(offset):.2f} m to the {'left' if offset > 0 else 'right'} from {start:.1f} to "
+                 f"{end:.1f} m of the path" for start, end, offset in spans]
+        return [*([f"waits {self.delay:.2f} s"] if self.delay else []), *moves]
+
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Follower:

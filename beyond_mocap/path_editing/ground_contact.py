@@ -17,7 +17,7 @@ import numpy as np
 from scipy.ndimage import minimum_filter1d
 
 from ..base.easing import quintic_step_by_powers
-from ..base.errors import TimedMessage
+from ..base.errors import TimedMessage, format_count
 from ..base.time_series import find_runs, hann_smooth, interpolate_columns
 from ..base.vectors import arctan2, cross_on_ground
 from ..motion.path.arc_length import ArcLength
@@ -166,8 +166,7 @@ def _compute_side(feet: np.ndarray, stands: np.ndarray, clear: np.ndarray, fps: 
     middle = (firsts + ends - 1) // 2
     sums = np.concatenate([np.zeros((1, 2, 2)), np.cumsum(feet, axis=0)])
     # `before` and `after` index the stances around each frame; `time_share` is the time of the swing between them, from
-    # 0 to
-    # 1.
+    # 0 to 1.
     mean = (sums[ends] - sums[firsts]) / (ends - firsts)[:, None, None]
     height, slope = _fit_planes(mean[:, 0], mean[:, 1], middle, surface)
     before = np.clip(np.searchsorted(firsts, np.arange(len(feet)), side="right") - 1, 0, len(spans) - 1)
@@ -314,7 +313,7 @@ def report_strain(tight: np.ndarray, steep: np.ndarray, fps: float) -> tuple[Tim
                         (steep, f"the path is steeper than {STEEP_DEGREES:g} degrees")):
         spans = [(first / fps, (end - 1) / fps) for first, end in find_runs(which)]
         if spans:
-            more = f" and {len(spans) - 1} more times" if len(spans) > 1 else ""
+            more = f" and {format_count(len(spans) - 1, 'more time')}" if len(spans) > 1 else ""
             when = f"from {spans[0][0]:.1f} s to {spans[0][1]:.1f} s{more}"
             lines.append(TimedMessage(f"{what} {when}: feet are not planted there; smooth the path", *spans))
     return tuple(lines)

@@ -8,7 +8,7 @@ import os
 
 import numpy as np
 
-from ..base.errors import InputError
+from ..base.errors import InputError, format_count
 from ..base.time_series import find_runs, interpolate_columns
 from ..base.vectors import distances_along, unit_vectors
 from ..files.tables import parse_number, read_rows
@@ -273,7 +273,7 @@ def read_curve(path: str | os.PathLike) -> np.ndarray:
     if points:
         line[:, : len(names)] = points
     if not len(line) or np.ptp(line, axis=0).max() < _LEAST_METRES:
-        what = f"{len(line)} points, all at one place" if len(line) > 1 else f"{len(line)} points"
+        what = format_count(len(line), "point") + (", all at one place" if len(line) > 1 else "")
         raise InputError(path, what, "at least two rows under x_m,y_m[,z_m] with different places", "add points")
     if (length := np.linalg.norm(np.diff(line, axis=0), axis=1).sum()) > _MOST_METRES:
         most = f"at most {_MOST_METRES / 1000:.0f} km"

@@ -43,8 +43,7 @@ class Finding:
     Attributes:
         new, old: the two systems.
         differences: (N,) each rater's mean of new - old over the scenarios in which they answered to both: points of
-            the
-            scale or, in a study of pairs, 1 for new chosen, -1 for old, 0 for neither.
+            the scale or, in a study of pairs, 1 for new chosen, -1 for old, 0 for neither.
         mean, low, high: mean of the differences with its 95 % interval (Student).
         t, degrees: the paired statistic and its degrees of freedom.
         p: one-sided p that new is no better.
@@ -252,7 +251,7 @@ def _list_notes(study: Study, answers: Answers) -> list[str]:
     if silent:
         notes.append(f"without an answer: {', '.join(silent)}")
     if answers.missing:
-        notes.append(f"{answers.missing} answers are missing; the others are used")
+        notes.append(f"missing answers: {answers.missing}; the others are used")
     if len(answers.raters) < 6:
         notes.append("fewer than six raters: the tests have little power")
     for rater in answers.raters:

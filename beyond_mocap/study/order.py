@@ -1,8 +1,7 @@
 """A study: clips under neutral names, each rater's order (Faustino §5.1.1), and both as a file.
 
 No name reveals which system produced a clip. All raters see other orders, with systems and scenarios mixed; two
-training
-clips come first and do not count. Raters must not see study.json, which lists the systems.
+training clips come first and do not count. Raters must not see study.json, which lists the systems.
 """
 
 from __future__ import annotations
@@ -17,7 +16,7 @@ from pathlib import Path
 import numpy as np
 
 from ..base.digest import hex_digest
-from ..base.errors import InputError
+from ..base.errors import InputError, format_count
 from ..files.content import read_utf8
 from ..files.tables import read_rows, write_report
 
@@ -108,8 +107,7 @@ def build_study(clips: Sequence[Clip], raters: int, seed: int = 0, pairs: bool =
         The study.
     Raises:
         InputError: unless there are exactly two training clips, at least two systems, each with the same scenarios,
-            each
-            clip once, and enough clips for so many different orders.
+            each clip once, and enough clips for so many different orders.
     """
     _check_clips(clips)
     named_clips = _name_clips(clips, seed)
@@ -185,7 +183,7 @@ def read_study(folder: Path) -> Study:
             raise ValueError(f"{invalid!r} is not a valid name")
         return Study(id=str(data["study"]), seed=int(data["seed"]), pairs=data["pairs"], clips=clips, orders=orders)
     except (ValueError, KeyError, TypeError, AttributeError, OverflowError, RecursionError) as error:
-        found = f"not a study ({type(error).__name__}: {error})"
+        found = f"not a study ({error})" if type(error) is ValueError else "not a study"  # others are Python's words
         raise InputError(path, found, "a file written by 'study order'", "create the study again") from None
 
 
@@ -215,16 +213,17 @@ def _check_clips(clips: Sequence[Clip]) -> None:
         raise InputError("clips", str(len(clips)), f"{MAX_CLIPS} at most", "remove some")
     training = [clip for clip in clips if clip.system == TRAINING]
     if len(training) != 2:
-        found = f"{len(training)} clips of the system {TRAINING!r}"
+        found = f"{format_count(len(training), 'clip')} of the system {TRAINING!r}"
         raise InputError("clips", found, "two, a good and a bad one", "add or remove rows")
     real = [clip for clip in clips if clip.system != TRAINING]
     systems = list(dict.fromkeys(clip.system for clip in real))
     if len(systems) < 2:
-        raise InputError("clips", f"{len(systems)} systems", "two or more to compare", "add clips of another system")
+        found = format_count(len(systems), "system")
+        raise InputError("clips", found, "two or more to compare", "add clips of another system")
     pairs = [(clip.system, clip.scenario) for clip in real]
     for system, scenario in itertools.product(systems, dict.fromkeys(clip.scenario for clip in real)):
         if (count := pairs.count((system, scenario))) != 1:
-            found = f"{count} clips of scenario {scenario!r} by {system!r}"
+            found = f"{format_count(count, 'clip')} of scenario {scenario!r} by {system!r}"
             raise InputError("clips", found, "one of each scenario by each system", "add or remove rows")
     files = [clip.file for clip in clips]
     if repeated := next((file for file in files if files.count(file) > 1), None):

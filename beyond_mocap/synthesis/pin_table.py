@@ -30,10 +30,12 @@ def read_pins(path: str | os.PathLike) -> tuple[Pin, ...]:
     try:
         missing = [name for name in COLUMNS[:-1] if name not in (reader.fieldnames or ())]
         if missing:
-            raise InputError(f"{path}:1", f"no column {', '.join(missing)}", f"a header with {','.join(COLUMNS)}")
+            raise InputError(f"{path}:1", f"no column {', '.join(missing)}", f"a header with {','.join(COLUMNS)}",
+                             "add the columns, or rename them")
         return tuple(_build_pin(row, f"{path}:{reader.line_num}") for row in reader)
     except csv.Error as error:
-        raise InputError(f"{path}:{reader.line_num}", str(error), "comma-separated values") from None
+        place = f"{path}:{reader.line_num}"
+        raise InputError(place, str(error), "comma-separated values", "save it as CSV again") from None
 
 
 def _build_pin(row: dict, place: str) -> Pin:
@@ -51,4 +53,4 @@ def _parse_number(row: dict, name: str, place: str) -> float:
     try:
         return float(text) if text or name != "hold_s" else 0.0
     except ValueError:
-        raise InputError(place, f"{name} {text!r}", "a number") from None
+        raise InputError(place, f"{name} {text!r}", "a number", "correct the cell") from None

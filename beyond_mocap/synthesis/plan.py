@@ -48,16 +48,15 @@ class Pin:
 
     def __post_init__(self):
         if self.part not in PARTS:
-            raise InputError("pin", f"part {self.part!r}", f"one of {', '.join(PARTS)}")
+            raise InputError("pin", f"part {self.part!r}", f"one of {', '.join(PARTS)}", "correct the part")
         object.__setattr__(self, "time", float(self.time))
         object.__setattr__(self, "hold", float(self.hold))
         object.__setattr__(self, "position", tuple(float(value) for value in self.position))
         if len(self.position) != 3 or not all(map(math.isfinite, (*self.position, self.time, self.hold))):
-            raise InputError(
-                "pin", f"{self.time:g} s, {self.position}, {self.hold:g} s", "a finite time, position and hold"
-            )
+            found = f"{self.time:g} s, {self.position}, {self.hold:g} s"
+            raise InputError("pin", found, "a finite time, position and hold", "correct the pin")
         if self.hold < 0.0:
-            raise InputError("pin", f"a hold of {self.hold:g} s", "0 s or more")
+            raise InputError("pin", f"a hold of {self.hold:g} s", "0 s or more", "correct the pin")
 
     @property
     def end(self) -> float:

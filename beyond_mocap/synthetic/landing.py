@@ -1,10 +1,9 @@
 """Synthetic continuation of a recording that ends in flight: free fall, landing, lying still, and getting up.
 
 Goalkeepers' dives are recorded on hard floors and stop before the landing. Held there, or cut to the next clip, the
-body
-hangs in the air. Here it keeps falling: its centre by gravity, its limbs and its spin from their last state toward the
-pose of landing. The ground stops the fall and friction the sliding; the body settles, turns to the start of the nearest
-way of getting up, and gets up.
+body hangs in the air. Here it keeps falling: its centre by gravity, its limbs and its spin from their last state toward
+the pose of landing. The ground stops the fall and friction the sliding; the body settles, turns to the start of the
+nearest way of getting up, and gets up.
 """
 
 from __future__ import annotations

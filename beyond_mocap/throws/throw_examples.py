@@ -16,7 +16,7 @@ import numpy as np
 
 from ..ball.flight import find_wall_impact
 from ..ball.physics import BASEBALL, FOOTBALL
-from ..base.errors import BeyondMocapError, InputError, UserCancelledError
+from ..base.errors import BeyondMocapError, InputError, UserCancelledError, format_count
 from ..files.bvh import bvh
 from ..library.scan import TABLE_NAME as ANNOTATIONS_NAME
 from ..library.scan import Annotations, find_clips
@@ -118,7 +118,8 @@ def _report_missing(annotations: Annotations, action: Action, folder: Path, repo
         missing = [name for name in named if not (table / name).is_file()]
         if missing:
             report(
-                f"{table / ANNOTATIONS_NAME}: names {len(missing)} missing recordings, for example {missing[0]}"
+                f"{table / ANNOTATIONS_NAME}: names "
+                f"{format_count(len(missing), 'missing recording')}, for example {missing[0]}"
             )
 
 

@@ -105,7 +105,7 @@ def build_content(state: AnnotationState, player: str, message: str = "", folded
     more = [f"= more ({state.page + 1}/{state.page_count})"] if state.page_count > 1 else []
     if not state.trail:
         start_hint = [f"in {state.start:.2f} s, O: out"] if state.start is not None else ["I in  O out"]
-        hints = "   ".join([*start_hint, *more, "Esc leave"])
+        hints = "   ".join([*start_hint, *more, "Esc close"])
         visible_rows = () if folded else rows
         return Content(f"{player}: key moment at the playhead", visible_rows, (hints, message) if message else (hints,))
     walk = state.walk

@@ -42,7 +42,7 @@ class BeyondMocapPlayer(bpy.types.PropertyGroup):
     """One player: tracking data, labels, and the generated body."""
 
     name: StringProperty(name="Name", update=update_dot, description="Name of the player")
-    use: BoolProperty(name="Use", default=True, description="Include this player in Synthesize and Accept")
+    use: BoolProperty(name="Use", default=True, description="Include this player in Synthesize and Apply")
     tracking_file: StringProperty(name="Tracking", description="The file with this player's positions", **FILE)
     metadata_file: StringProperty(name="Metadata", **FILE,
                                   description="The provider's second file, where there is one (pitch, teams)")

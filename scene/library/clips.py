@@ -21,6 +21,7 @@ import bpy
 from bpy.props import BoolProperty, CollectionProperty, EnumProperty, FloatProperty, IntProperty, StringProperty
 
 from ...beyond_mocap.annotation.labels import find_label
+from ...beyond_mocap.base.errors import format_count
 from ..core import window
 from ..core.live import Watcher
 from ..core.settings import to_absolute_path
@@ -174,7 +175,7 @@ def describe_changes(before: dict, now: dict) -> str:
         changed = [name for name in now if name in before and now[name] != before[name] and is_kind(name)]
         for names, what in ((new, "new"), (changed, "changed"), (removed, "removed")):
             if names:
-                parts.append(f"{len(names)} {what} {kind}{'' if len(names) == 1 else 's'}")
+                parts.append(format_count(len(names), f"{what} {kind}"))
     return ", ".join(parts)
 
 
@@ -228,7 +229,7 @@ def _describe_figures(clip: "ListedClip") -> str:
     if not math.isnan(clip.speed):
         text += f", {clip.speed:.1f} m/s (to {clip.max_speed:.1f})"
     if clip.key_moments:
-        text += f", {clip.key_moments} key {'moment' if clip.key_moments == 1 else 'moments'}"
+        text += f", {format_count(clip.key_moments, 'key moment')}"
     return text
 
 

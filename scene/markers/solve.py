@@ -118,7 +118,7 @@ def find_clip_path(scene: bpy.types.Scene, name: str) -> Path:
 
     folder = scene.beyond_mocap.library_folder
     if not folder:
-        raise InputError("library", "no folder", "a library folder", "choose it in the panel Library")
+        raise InputError("library", "no folder", "a library folder", "choose one in step 1")
     return find_free_file(Path(to_absolute_path(folder)), bpy.path.clean_name(name))
 
 

@@ -1,6 +1,5 @@
 """The collections and objects of a displayed match, each with a mark. When the match is displayed again or removed,
-only
-these are removed; other objects of the user stay.
+only these are removed; other objects of the user stay.
 """
 
 from __future__ import annotations

@@ -18,8 +18,7 @@ from mathutils import Matrix, Vector
 from ..core import window
 from ..core.live import Watcher
 from ..core.settings import find_active_player
-from . import ball_paths, colours, shapes, store
-from . import path_overlays as rides
+from . import ball_paths, colours, path_overlays, shapes, store
 from .prepare import Mesh, PreparedTake
 
 BIAS = 1e-5
@@ -126,11 +125,11 @@ def _free_unused(now: dict[str, PreparedTake]) -> None:
     _owners.update(now)
 
 
-def _list_path_items(context) -> list[rides.DrawItem]:
+def _list_path_items(context) -> list[path_overlays.DrawItem]:
     """List the path and ball overlays of this view, and free the batches of those no longer drawn."""
     items = []
     if context.space_data.overlay.show_overlays and getattr(context.scene, "beyond_mocap", None) is not None:
-        items = [*rides.list_items(context.scene), *ball_paths.list_items(context.scene)]
+        items = [*path_overlays.list_items(context.scene), *ball_paths.list_items(context.scene)]
     now = {item.key for item in items}
     for key in [key for key in _batches if not isinstance(key[0], str) and key not in now]:
         del _batches[key]
@@ -240,7 +239,7 @@ def _draw_texts():
     """Draw all texts of the view and the legend."""
     context = bpy.context
     found, over = _list_takes(context), context.space_data.overlay.show_overlays
-    has_paths, has_balls = over and rides.list_visible_edits(context.scene), over and ball_paths.has_items(
+    has_paths, has_balls = over and path_overlays.list_visible_edits(context.scene), over and ball_paths.has_items(
         context.scene)
     if not found and not has_paths and not has_balls:
         return
@@ -253,7 +252,7 @@ def _draw_texts():
                 _draw_labels(context, view, shown)
             if "seams" in on:
                 _draw_reasons(context, view, shown)
-        draw_legend(context, [*(on if found else ()), *(["rides"] if has_paths else ()),
+        draw_legend(context, [*(on if found else ()), *(["paths"] if has_paths else ()),
                               *(["shots"] if has_balls else ())])
     finally:
         gpu.state.blend_set("NONE")
@@ -345,7 +344,7 @@ ROWS = {
     "speed": _build_key_row(("track speed", colours.TRACK_SPEED), ("body speed", colours.BODY_SPEED),
                             ("1 m high: 5 m/s", colours.GREY)), "contacts": _build_key_row(("left", colours.LEFT),
                                                                                            ("right", colours.RIGHT)),
-    "rides": _build_key_row(("original", colours.SKY), ("new path", colours.ORANGE), ("tick: 1 s", colours.GREY)),
+    "paths": _build_key_row(("original", colours.SKY), ("new path", colours.ORANGE), ("tick: 1 s", colours.GREY)),
     "shots": _build_key_row(("ball trajectory", colours.WHITE), ("other candidates", colours.BLACK),
                             ("after the target", colours.VERMILION), ("striking part", colours.SKY),
                             ("strike", colours.STRIKE), ("bounce", colours.ORANGE)),

@@ -14,8 +14,8 @@ import numpy as np
 from mathutils import Matrix
 
 from ..core.measure import units_per_metre
-from ..path_editing import edited_bodies as riders
-from ..path_editing.settings import list_edited_bodies as riding
+from ..path_editing import edited_bodies
+from ..path_editing.settings import list_edited_bodies
 from . import colours, shapes
 from .prepare import Mesh, build_line_mesh, build_segments_mesh, build_uniform_mesh
 
@@ -52,15 +52,15 @@ def list_items(scene: bpy.types.Scene) -> list[DrawItem]:
     return [item for shown in found for item in _build_items(on, shown, scene.frame_current_final, world)]
 
 
-def list_visible_edits(scene: bpy.types.Scene) -> list[riders.ComputedEdit]:
+def list_visible_edits(scene: bpy.types.Scene) -> list[edited_bodies.ComputedEdit]:
     """List the edited bodies to draw."""
-    if not riders.has_computed_edits() or not scene.beyond_mocap.view.list_path_overlays():
+    if not edited_bodies.has_computed_edits() or not scene.beyond_mocap.view.list_path_overlays():
         return []
-    found = [riders.find_computed_edit(body) for body in riding(scene) if body.visible_get()]
+    found = [edited_bodies.find_computed_edit(body) for body in list_edited_bodies(scene) if body.visible_get()]
     return [shown for shown in found if shown is not None]
 
 
-def _build_items(on: list[str], computed: riders.ComputedEdit, frame: float, world: Matrix) -> list[DrawItem]:
+def _build_items(on: list[str], computed: edited_bodies.ComputedEdit, frame: float, world: Matrix) -> list[DrawItem]:
     """Build the items of one edited body for the switched-on overlays."""
     source, edited, found = computed.source, computed.edited, []
     row, source_row = computed.find_frames(frame)  # rows of the edited motion and of the original

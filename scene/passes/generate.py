@@ -20,7 +20,7 @@ from ..core import action, channels, preferences, session
 from ..core.measure import frames_per_second, units_per_metre
 from ..core.saved_state import discard_saved_state, restore_playback, save_playback
 from ..core.settings import to_absolute_path
-from ..path_editing import edited_bodies as riders
+from ..path_editing import edited_bodies
 from ..path_editing.armature_adapter import check_editable_override
 from ..result import bake
 from ..rigs import armature
@@ -163,7 +163,7 @@ def apply_result(scene: bpy.types.Scene, result: Result) -> None:
     settings, played_scene = scene.beyond_mocap_passes, result.passes
     session.store_library(result.library, result.order.unit)
     rows = {row.name: row for row in settings.players}
-    messages = [line for one in played_scene.players for line in riders.revert_path_edits(rows[one.name].body)]
+    messages = [line for one in played_scene.players for line in edited_bodies.revert_path_edits(rows[one.name].body)]
     start = result.order.start
     for one in played_scene.players:
         apply_motion(scene, rows[one.name], one.take, start)

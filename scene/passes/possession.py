@@ -2,9 +2,8 @@
 
 The ball's own action is set aside; it plays one that is built from it and from all stretches in which it is carried, so
 that each of them can be changed or removed. Where a stretch begins, the ball is where it was. Where it ends, the ball
-is
-on its own path again if that continues, otherwise it stays where it was released. Between, it is rigid with the bone,
-except for the frames at either end in which it moves to its carried position and back.
+is on its own path again if that continues, otherwise it stays where it was released. Between, it is rigid with the
+bone, except for the frames at either end in which it moves to its carried position and back.
 
 With T the bone's matrix in the world, W the ball's own path and L = T^-1 W the ball in the bone's frame, the constraint
 shows T inv own. Its inverse is that of T on the first frame, so own = T(first) L there, which is W: no jump.
@@ -206,9 +205,9 @@ def check_unaimed(ball: bpy.types.Object) -> None:
     aim = ball.beyond_mocap_aim
     if aim.handed:
         raise InputError(f"ball {ball.name}", "moved by Blender's physics", "a ball with keys",
-                         "press Take Ball Back first")
+                         "press Ball from Physics first")
     if aim.on:
-        raise InputError(f"ball {ball.name}", "it is aimed", "a ball that is not aimed", "press Leave Aim first")
+        raise InputError(f"ball {ball.name}", "it is aimed", "a ball that is not aimed", "press Revert Aim first")
 
 
 def _check_hold(ball, body, bone: str, first: int, last: int) -> None:

@@ -18,14 +18,12 @@ from ...beyond_mocap.base.errors import BeyondMocapError, InputError
 from ..core import channels
 from ..core.measure import frames_per_second, units_per_metre
 from ..rigs.bone_curves import is_carried
-from . import curve, rig_parts
-from . import edited_bodies as riders
+from . import curve, edited_bodies, rig_parts
 from . import rig_sampling as rig_look
 from .armature_adapter import MARK, invalidate_sources, read_source
 from .rig_source import PlayedAnimation, list_playing_strips
 from .rigs import choose_adapter, is_edited_as_rig
-from .settings import collect_options
-from .settings import list_edited_bodies as all_riders
+from .settings import collect_options, list_edited_bodies
 
 _ROUNDS = 2  # the second with a larger distance, for what the search does not compute exactly
 
@@ -141,7 +139,7 @@ def apply_changes(scene: bpy.types.Scene, bodies: list[bpy.types.Object], change
             edit.delay, edit.added, edit.agreed = _own_delay(edit) + change.delay, change.delay, ""
             edit.detours = json.dumps([list(detour) for detour in change.detours])
         for body in bodies:
-            riders.update_motion(scene, body)
+            edited_bodies.update_motion(scene, body)
     except BeyondMocapError:
         for edit, (delay, added, detours, agreed) in zip(edits, before):
             edit.delay, edit.added, edit.detours, edit.agreed = delay, added, detours, agreed
@@ -179,7 +177,7 @@ def _compute_other_bodies(scene, bodies) -> list:
     from ...beyond_mocap.path_editing.detour import PathChange
 
     found = []
-    for body in all_riders(scene):
+    for body in list_edited_bodies(scene):
         if body not in bodies:
             try:
                 trial = _build_trial(scene, body)
@@ -206,21 +204,8 @@ def _round_to_frames(change, trial):
 
 
 def _describe_change(name, change) -> str:
-    parts = [f"waits {change.delay:.2f} s"] if change.delay else []
-    detours = _join_detours(change.detours)
-    sides = {True: "left", False: "right"}
-    parts += [f"moves {abs(offset):.2f} m to the {sides[offset > 0]} at {arc:.1f} m" for arc, offset in detours]
+    parts = change.describe()
     return f"{name} {', '.join(parts)}" if parts else ""
-
-
-def _join_detours(detours) -> list[tuple[float, float]]:
-    """List (arc, offset) of detours; consecutive ones that form one long detour only once, at its start."""
-    found, end = [], None
-    for arc, width, offset in sorted(detours):
-        if end is None or arc - 0.5 * width > end or not found or found[-1][1] != offset:
-            found.append((max(arc, 0.0), offset))
-        end = arc + 0.5 * width
-    return found
 
 
 def _describe_collision(hit, names, fps) -> str:

@@ -19,8 +19,7 @@ import bpy
 from ...beyond_mocap.base.errors import BeyondMocapError
 from ..core import background
 from ..core.live import Watcher, call_or_describe
-from . import curve
-from . import edited_bodies as rides
+from . import curve, edited_bodies
 from .armature_adapter import invalidate_sources
 from .settings import list_edited_bodies
 
@@ -41,14 +40,14 @@ def update_all(scene: bpy.types.Scene) -> int:
         if not body.beyond_mocap_ride.live or body.mode == "EDIT" or body.library is not None:
             continue
         failed = f"{body.name}: the motion cannot be computed"
-        count += bool(call_or_describe(lambda: rides.update_motion(scene, body),
-                                       partial(rides.store_messages, body.beyond_mocap_ride), failed))
+        count += bool(call_or_describe(lambda: edited_bodies.update_motion(scene, body),
+                                       partial(edited_bodies.store_messages, body.beyond_mocap_ride), failed))
     return count
 
 
 def measure_body(scene: bpy.types.Scene, body: bpy.types.Object) -> None:
     """Measure an edited body at once; nothing happens if this session has not computed it."""
-    computed = rides.find_computed_edit(body)
+    computed = edited_bodies.find_computed_edit(body)
     if computed is not None:
         _store_figures(body, _measure_edit(computed, _load_ground(scene, body)))
 
@@ -80,7 +79,7 @@ def _run_timer() -> float:
                            (None, None))
     if waiting is None:
         return LOOK
-    computed = rides.find_computed_edit(waiting)
+    computed = edited_bodies.find_computed_edit(waiting)
     try:
         with bpy.context.temp_override(window=window):  # a timer has none, and the ground is the window's
             ground = _load_ground(window.scene, waiting)
@@ -100,7 +99,7 @@ def _list_visible_bodies() -> list[tuple[bpy.types.Window, bpy.types.Object]]:
 
 def _is_waiting(body: bpy.types.Object) -> bool:
     """Return whether an edited body has been at rest for a while and is not measured."""
-    computed, uid = rides.find_computed_edit(body), body.session_uid
+    computed, uid = edited_bodies.find_computed_edit(body), body.session_uid
     if computed is None or KNOWN in body.beyond_mocap_ride.figures or _failed.get(uid) == computed.number:
         return False
     if _since.get(uid, (0, 0.0))[0] != computed.number:
@@ -115,7 +114,7 @@ def _collect_result() -> float:
         return WAIT
     _running.clear()
     body = next((body for _, body in _list_visible_bodies() if body.session_uid == uid), None)
-    computed = rides.find_computed_edit(body) if body is not None else None
+    computed = edited_bodies.find_computed_edit(body) if body is not None else None
     if job.error is not None:
         _failed[uid] = number
         print(f"Beyond Mocap: cannot measure a path edit: {job.error}")
@@ -133,7 +132,7 @@ def stop_measuring() -> None:
 
 WATCHER = Watcher(
     name="Path editing", watched_types=MATTERS, follow=update_all, restored=invalidate_sources,
-    loaded=rides.clear_caches, ends=rides.clear_caches,
+    loaded=edited_bodies.clear_caches, ends=edited_bodies.clear_caches,
     framed=lambda _scene: WATCHER.mark_dirty(),  # the only report of edits that take effect with a change of frame
 )
 FIGURES = Watcher(name="Figures of path editing", look=_run_timer, ends=stop_measuring)

@@ -64,8 +64,7 @@ class RigSource:
             rig: the armature.
         Returns:
             (data path, index) -> (N,) values from `start` on: all that differ from the source, and all animated
-            channels where
-            other frames than the source's own are displayed.
+            channels where other frames than the source's own are displayed.
         """
         rows, above = self.build_rows(edited), self._compute_parent_matrices(len(edited.motion), rig)
         moves = self.transfer.compute_group_motions(edited.motion, edited.rigid, rows,

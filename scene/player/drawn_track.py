@@ -59,10 +59,8 @@ def read_drawn_track(scene: bpy.types.Scene, drawn: bpy.types.Object, start: flo
         drawn: a curve, or an object that moves.
         start: seconds on the track's clock at which a curve begins.
         still: do not change the scene's frame. An object moved by more than its own keys has to be played frame by
-            frame,
-            which takes time and discards a pose without a key; with `still` the last such result is used, InputError
-            where
-            there is none.
+            frame, which takes time and discards a pose without a key; with `still` the last such result is used,
+            InputError where there is none.
     Returns:
         The track.
     Raises:

@@ -7,7 +7,7 @@ from functools import lru_cache
 from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
-from ...beyond_mocap.base.errors import InputError
+from ...beyond_mocap.base.errors import InputError, build_read_error
 from ...beyond_mocap.files.tracking import tracking
 from ..core.settings import BeyondMocapPlayer, BeyondMocapSettings, to_absolute_path
 from . import drawn_track
@@ -65,7 +65,7 @@ def is_plain_csv(path: str) -> bool:
         with open(path, "rb") as file:
             return b"time_s" in file.readline(4096)
     except OSError as error:
-        raise InputError(path, error.strerror or "cannot be read", "a tracking file", "check the path") from None
+        raise build_read_error(path, "a tracking file", error) from None
 
 
 def _read_plain_track(path: str) -> "Track":

@@ -24,7 +24,7 @@ import numpy as np
 from bpy.props import IntProperty, StringProperty
 
 from ...beyond_mocap.annotation import Timeline
-from ...beyond_mocap.base.errors import BeyondMocapError
+from ...beyond_mocap.base.errors import BeyondMocapError, format_count
 from ...beyond_mocap.synthesis.plan import Plan
 from ..core import background, channels, session, window
 from ..core.live import Watcher, is_playing
@@ -198,8 +198,7 @@ def _describe_notes(player: BeyondMocapPlayer) -> list[str]:
     if bpy.app.background or key not in _now["hand"]:  # without a window no handler reports changes
         _now["hand"][key] = len(hand_keys.find_in_body(body)[0])
     count = _now["hand"][key]
-    keys = "manual key" if count == 1 else "manual keys"
-    return [f"{count} {keys}: kept by Update"] if count else []
+    return [f"{format_count(count, 'manual key')}: kept by Update"] if count else []
 
 
 def mark_dirty(*_) -> None:

@@ -15,7 +15,7 @@ from ..core.measure import build_scene_clock
 from ..core.saved_state import discard_saved_state, restore_nla, restore_playback, save_playback
 from ..core.settings import BeyondMocapPlayer
 from ..passes import possession
-from ..path_editing import edited_bodies as riders
+from ..path_editing import edited_bodies
 from ..stage import stage
 from . import bake, blocks, quality
 from . import manual_keys as hand_keys
@@ -41,7 +41,7 @@ def check_body(player: BeyondMocapPlayer) -> None:
 
 def revert_path_edit(player: BeyondMocapPlayer) -> list[str]:
     """Revert the path edit of a player's body before its result changes; returns messages."""
-    return riders.revert_path_edits(player.body)
+    return edited_bodies.revert_path_edits(player.body)
 
 
 def show_preview(context: bpy.types.Context, player: BeyondMocapPlayer, take: str,

@@ -31,10 +31,10 @@ FIGURES = (  # name, key path in the report, factor (a negative one counts from 
     ("Feet out of reach", "ik_miss_share", 100, "{:.1f}", " %"),
     ("Rough transitions", "seam_jerk_ratio.share_above_real", 100, "{:.0f}", " %"),
     ("Worst transition", "seam_jerk_ratio.max", 1, "{:.2f}", " x"),
-    ("Worst within clips", "seam_jerk_ratio.rest_max", 1, "{:.2f}", " x"),
+    ("Worst elsewhere", "seam_jerk_ratio.rest_max", 1, "{:.2f}", " x"),
     ("Labels matched", "annotation_similarity.all", -50, "{:.1f}", " %"),  # -1 is all, +1 none
-    ("Lowest playback rate", "warp_rate.min", 1, "{:.2f}", " x"),
-    ("Highest playback rate", "warp_rate.max", 1, "{:.2f}", " x"),
+    ("Slowest playback", "warp_rate.min", 1, "{:.2f}", " x"),
+    ("Fastest playback", "warp_rate.max", 1, "{:.2f}", " x"),
     ("Unusual poses", "pose_realism", 100, "{:.1f}", " %"),
     ("Repeated frames", "loop_share", 100, "{:.1f}", " %"),
     ("Lowest point", "ground_mm.min", 1, "{:.1f}", " mm"),

@@ -153,7 +153,7 @@ def process_request(request: Request, library: "Library | None", progress, cance
                                      *callbacks) if request.mode.kind == "variants" else (_synthesize_single(request,
                 clips, *callbacks),)
     except NotInLibraryError as error:
-        raise NotInLibraryError(f"{request.where}: {error}", error.nearest) from None
+        raise error.locate(request.where) from None
     return RequestResult(clips, freshness.compute_parts(plan, request.folder), takes)
 
 

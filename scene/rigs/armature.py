@@ -93,8 +93,7 @@ def build_skeleton(body: bpy.types.Object, scene: bpy.types.Scene) -> Skeleton:
     """Build the skeleton of an armature object, in metres, at rest in the armature's own space.
 
     An armature from `create_armature` returns exactly its original skeleton while its bones are unedited. Any other is
-    read
-    from its rest pose: one joint per bone of the largest tree, a tip on every bone without children.
+    read from its rest pose: one joint per bone of the largest tree, a tip on every bone without children.
 
     Raises:
         InputError: if the object is no armature with bones.

@@ -14,7 +14,7 @@ import bpy
 import numpy as np
 
 from ...beyond_mocap.base.digest import hex_digest
-from ...beyond_mocap.base.errors import InputError
+from ...beyond_mocap.base.errors import InputError, build_read_error
 from ...beyond_mocap.files.atomic import atomic_write
 from ...beyond_mocap.motion.humanoid import Humanoid, identify_joints, list_roles, split_joint_name
 from ...beyond_mocap.motion.skeleton import Skeleton
@@ -216,9 +216,9 @@ def read_bone_map(path: Path) -> dict[str, str]:
     try:
         found = json.loads(Path(path).read_text(encoding="utf-8"))
     except OSError as error:
-        raise InputError(path, f"cannot be read ({error.strerror})", "a bone map (.json)", "check the path") from None
-    except (ValueError, RecursionError) as error:
-        raise InputError(path, f"not JSON ({error})", form, "correct the file") from None
+        raise build_read_error(path, "a bone map (.json)", error) from None
+    except (ValueError, RecursionError):
+        raise InputError(path, "not JSON", form, "correct the file") from None
     table = found.get("bones") if isinstance(found, dict) else None
     if not isinstance(table, dict) or not all(isinstance(bone, str) for bone in table.values()):
         raise InputError(path, "no object of bone names", form, "correct the file")

@@ -1,8 +1,7 @@
 """World poses as values of a rig's channels: plain arithmetic, without evaluating the rig for each frame.
 
 The arithmetic's parameters are found once (`control_study`): the carrier of each driven bone, and the direction in
-which
-each of its location channels moves it.
+which each of its location channels moves it.
 """
 
 from __future__ import annotations

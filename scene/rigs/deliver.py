@@ -2,8 +2,7 @@
 line.
 
 It is put into an empty file at its own rate: a take with its armature, body and ball, a match as shown in the scene.
-The
-open file is discarded without asking, since a command has nothing open that it could lose.
+The open file is discarded without asking, since a command has nothing open that it could lose.
 """
 
 from __future__ import annotations

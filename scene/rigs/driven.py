@@ -1,6 +1,5 @@
 """A rig's driven bones as a skeleton of the core, upright and facing +X whatever the rig's orientation; and the bones
-that
-belong to a part of the body without carrying it: IK targets, poles, helper bones.
+that belong to a part of the body without carrying it: IK targets, poles, helper bones.
 """
 
 from __future__ import annotations

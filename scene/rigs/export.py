@@ -1,6 +1,5 @@
 """Motions as files of Blender's own exporters: the displayed motion of a rig becomes one action on a plain copy, and
-that is
-exported.
+that is exported.
 
 The copy is in a temporary scene and removed afterwards; the user's scene is unchanged. The copy has no constraints,
 drivers or NLA strips that an exporter could evaluate differently from Blender.
@@ -16,7 +15,7 @@ from pathlib import Path
 import bpy
 import numpy as np
 
-from ...beyond_mocap.base.errors import InputError
+from ...beyond_mocap.base.errors import InputError, format_count
 from ...beyond_mocap.files.atomic import atomic_path
 from ...beyond_mocap.motion import quaternion
 from ..core import channels
@@ -107,9 +106,9 @@ def export_motion(
         dressed = [thing for rig in rigs for thing in meshes_by_rig.get(rig.name, ())]
         with _original_names([*rigs, *dressed, *things], [*copies, *meshes, *free_meshes]):
             _save_file(stage, copies, options)
-    messages.insert(0, f"{len(times)} frames at {rate:g} per second, {len(rigs)} armature{'s' * (len(rigs) > 1)}, "
-                    f"{len(meshes)} mesh{'es' * (len(meshes) != 1)}"
-                    + (f", {len(things)} object{'s' * (len(things) > 1)} beside them" if things else ""))
+    messages.insert(0, f"{len(times)} frames at {rate:g} per second, {format_count(len(rigs), 'armature')}, "
+                    f"{format_count(len(meshes), 'mesh', 'meshes')}"
+                    + (f", {format_count(len(things), 'object')} beside them" if things else ""))
     return messages
 
 

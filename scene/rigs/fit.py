@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import bpy
 import numpy as np
 
-from ...beyond_mocap.base.errors import InputError
+from ...beyond_mocap.base.errors import InputError, format_count
 from ...beyond_mocap.base.vectors import find_nearest_axis
 from ...beyond_mocap.motion import quaternion
 from ...beyond_mocap.motion.motion import Motion, forward_kinematics
@@ -108,7 +108,7 @@ class FittedMotion:
         for side, name in enumerate(("left", "right")):
             if short[:, side].max(initial=0.0) > _REPORTED_MISS:
                 lines.append(f"the {name} leg is up to {1000 * short[:, side].max():.0f} mm short of its target in "
-                             f"{int(np.sum(short[:, side] > _REPORTED_MISS))} frames")
+                             f"{format_count(int(np.sum(short[:, side] > _REPORTED_MISS)), 'frame')}")
         return lines
 
 

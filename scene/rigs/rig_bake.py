@@ -15,9 +15,9 @@ import bpy
 import numpy as np
 
 from ...beyond_mocap.base.digest import hex_digest
-from ...beyond_mocap.base.errors import InputError
+from ...beyond_mocap.base.errors import InputError, format_count
 from ..core import channels
-from ..path_editing import edited_bodies as riders
+from ..path_editing import edited_bodies
 from .bone_curves import build_bone_curves, build_setting_curves, compute_bone_poses
 from .control_study import CHANNELS
 from .driven import DrivenRig
@@ -88,7 +88,7 @@ def prepare_bake(
 def apply_bake(prepared: PreparedBake) -> BakeResult:
     """Apply a prepared bake to its rig as a new action."""
     rig, driven = prepared.driven.rig, prepared.driven
-    reverted = riders.revert_path_edits(rig)
+    reverted = edited_bodies.revert_path_edits(rig)
     previous_state, kept_messages = record_previous_state(rig, driven), keep_edited_bake(rig)
     channels.remove_marked_action(rig, MARK)
     action = channels.create_action(rig, f"{prepared.name} on {rig.name}", prepared.frames, prepared.curves)
@@ -106,10 +106,10 @@ def _describe_rig(driven: DrivenRig, options: BakeOptions) -> list[str]:
     lines = []
     if driven.controls.switches:
         names = sorted({switch.name for switch in driven.controls.switches})
-        lines.append(f"set to FK on {len(driven.controls.switches)} bones: {', '.join(names)}")
+        lines.append(f"set to FK on {format_count(len(driven.controls.switches), 'bone')}: {', '.join(names)}")
     if driven.overrides and not options.bakes_ik:
         names = ", ".join(f"{one.bone} ({one.kind})" for one in driven.overrides[:4])
-        lines.append(f"{len(driven.overrides)} constraints switched off (influence 0): {names}")
+        lines.append(f"{format_count(len(driven.overrides), 'constraint')} switched off (influence 0): {names}")
     if driven.followers:
         lines.append(f"IK targets baked too: {', '.join(driven.followers)}")
     bones = driven.rig.pose.bones

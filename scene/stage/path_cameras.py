@@ -18,7 +18,7 @@ from ...beyond_mocap.base.errors import InputError
 from ...beyond_mocap.base.time_series import gaussian_smooth
 from ..core import channels
 from ..core.measure import frames_per_second, units_per_metre
-from ..path_editing import edited_bodies as rides
+from ..path_editing import edited_bodies
 from ..path_editing.settings import list_edited_bodies
 
 KINDS = ("ABOVE", "SIDE", "QUARTER", "BEHIND")
@@ -66,10 +66,10 @@ def collect_targets(scene: bpy.types.Scene, first: bpy.types.Object | None = Non
     Raises:
         InputError: if no path is edited.
     """
-    edits = {body: rides.find_computed_edit(body) for body in list_edited_bodies(scene)}
+    edits = {body: edited_bodies.find_computed_edit(body) for body in list_edited_bodies(scene)}
     for body in [body for body, edit in edits.items() if edit is None]:
-        rides.update_motion(scene, body)
-        edits[body] = rides.find_computed_edit(body)
+        edited_bodies.update_motion(scene, body)
+        edits[body] = edited_bodies.find_computed_edit(body)
     if not edits:
         raise InputError("path cameras", "no edited path", "an armature with an edited path",
                          "select one and press Edit Path")

@@ -1,4 +1,4 @@
-"""Proposed labels for a clip, on the armature that shows it: reviewed one by one, accepted or refused.
+"""Proposed labels for a clip, on the armature that shows it: reviewed one by one, accepted or rejected.
 
 Each is listed with its confidence and reason. An accepted proposal becomes an ordinary strip or key moment; the list
 stores its source, which is written with the labels while they stay unchanged.
@@ -26,7 +26,7 @@ SAME_SECONDS = 0.1
 
 STATES = (("OPEN", "Open", "Not reviewed yet"),
           ("ACCEPTED", "Accepted", "Among the clip's labels"),
-          ("REFUSED", "Refused", "Not what the clip shows"))
+          ("REFUSED", "Rejected", "Not what the clip shows"))
 
 
 def _go_to_proposal(group, context):
@@ -127,13 +127,13 @@ def accept_proposal(target: bpy.types.Object, index: int) -> str:
     return f"{one.name} accepted"
 
 
-def refuse_proposal(target: bpy.types.Object, index: int) -> str:
-    """Refuse a proposal; labels that it had added are removed if they are unchanged. Returns a line for the user."""
+def reject_proposal(target: bpy.types.Object, index: int) -> str:
+    """Reject a proposal; labels that it had added are removed if they are unchanged. Returns a line for the user."""
     one = _find_proposal(target, index)
     if one.state == "ACCEPTED":
         _remove_labels(target, to_row(one))
     one.state = "REFUSED"
-    return f"{one.name} refused"
+    return f"{one.name} rejected"
 
 
 def go_to_next(target: bpy.types.Object, step: int, open_only: bool = False) -> bool:
@@ -167,7 +167,7 @@ def collect_sources(target: bpy.types.Object) -> "Sources":
 def _find_proposal(target: bpy.types.Object, index: int) -> BeyondMocapProposal:
     listed = target.beyond_mocap_proposals.listed
     if not 0 <= index < len(listed):
-        raise InputError(target.name, f"has no proposal {index}", "one of the list", "press Look Through")
+        raise InputError(target.name, f"has no proposal {index}", "one of the list", "press Review")
     return listed[index]
 
 

@@ -9,7 +9,7 @@ from __future__ import annotations
 import bpy
 
 from ...beyond_mocap.annotation import Timeline, parse_timeline, read_timeline
-from ...beyond_mocap.base.errors import InputError
+from ...beyond_mocap.base.errors import InputError, format_count
 from ...beyond_mocap.motion.track import Track
 from ..core.measure import Clock, build_scene_clock
 from ..core.settings import BeyondMocapPlayer, find_active_player, to_absolute_path
@@ -148,6 +148,11 @@ def read_written_labels(player: BeyondMocapPlayer, fps: float, track: Track) -> 
     if player.annotation_file:
         return read_timeline(describe_label_source(player), fps, start)
     return Timeline()
+
+
+def describe_counts(timeline: Timeline) -> str:
+    """Describe how many spans and key moments a timeline has, for messages."""
+    return f"{format_count(len(timeline.spans), 'span')} and {format_count(len(timeline.keys), 'key moment')}"
 
 
 def describe_label_source(player: BeyondMocapPlayer) -> str:

@@ -8,6 +8,7 @@ name `beyond_mocap` is blocked, because the same class under two names fails `is
 import atexit
 import os
 import pathlib
+import socket
 import subprocess
 import sys
 import tempfile
@@ -34,10 +35,16 @@ import addon_utils  # noqa: E402  (bpy brings it)
 @atexit.register
 def without_blenders_own_leak():
     """Blender never frees the properties of pose markers (our words' markers have some) and counts them as an error
-    when
-    it ends; that line alone is left out of what is printed from here on."""
+    when it ends; that line alone is left out of what is printed from here on."""
     left_out = subprocess.Popen(["sed", "/^Error: Not freed memory blocks/d"], stdin=subprocess.PIPE)
     os.dup2(left_out.stdin.fileno(), 1)
+
+
+def find_free_port():
+    """Find a port that no other run of the tests on this machine listens to: two Blenders are tested side by side."""
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as one:
+        one.bind(("127.0.0.1", 0))
+        return one.getsockname()[1]
 
 
 @pytest.fixture(scope="session", autouse=True)

@@ -21,7 +21,7 @@ import numpy as np
 import pytest
 import sample_rigs as rigs
 import worlds
-from conftest import EXTENSION
+from conftest import EXTENSION, find_free_port
 from throw_models import write_model_file
 from undo import collect_state, press_operator
 
@@ -208,13 +208,6 @@ def show_how():
     """The same, and an armature that kicks is active."""
     play_live()
     bpy.ops.beyond_mocap.import_clips(filepath=str(worlds.SAMPLE / "kick_low_inside.bvh"))
-
-
-def free_port():
-    """A port that no other run of the tests on this machine listens to."""
-    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as one:
-        one.bind(("127.0.0.1", 0))
-        return one.getsockname()[1]
 
 
 def listen():
@@ -526,7 +519,7 @@ def begin(stages):
         (places.clips / ".beyond_mocap").is_file() and (places.clips / ".beyond_mocap").unlink()
         row = ROWS[name]
         bpy.ops.wm.open_mainfile(filepath=str(top / f"{row.begin}.blend"))
-        bpy.context.scene.beyond_mocap_stream.port = free_port()
+        bpy.context.scene.beyond_mocap_stream.port = find_free_port()
         row.prepare()
         return places, row.arguments(places)
 

@@ -34,7 +34,7 @@ DRAWERS = {"util", "utils", "helper", "helpers", "common", "misc"}
 # What a room may import from outside beside numpy and scipy, and only inside the function that needs it.
 LAZY = {
     "files": ["kloppy"],
-    "library": ["sklearn", "threadpoolctl"],
+    "library": ["joblib", "sklearn", "threadpoolctl"],
     "synthesis": ["threadpoolctl"],
     "evaluation": ["matplotlib"],
     "markers": ["c3d", "matplotlib", "threadpoolctl"],

@@ -46,7 +46,7 @@ class DrawCounter:
         self.draw, self.rides = import_module("scene.overlays.draw"), import_module("scene.overlays.path_overlays")
         self.seconds, self.made = [], []
         self.items, self.making = self.rides.list_items, self.draw._build_batches
-        self.draw.rides = ObjectProxy(self.rides, list_items=self.timed)
+        self.draw.path_overlays = ObjectProxy(self.rides, list_items=self.timed)
         self.draw._build_batches = self.watched
         return self
 
@@ -64,7 +64,7 @@ class DrawCounter:
         return found
 
     def __exit__(self, *error):
-        self.draw.rides, self.draw._build_batches = self.rides, self.making
+        self.draw.path_overlays, self.draw._build_batches = self.rides, self.making
 
     def report_times(self, heading):
         each = 1000 * sorted(self.seconds)[len(self.seconds) // 2]

@@ -2,6 +2,7 @@
 others, so that an error in drawing is told. Look at them before they are kept."""
 
 import pathlib
+from functools import cache
 
 import bpy
 from mathutils import Euler
@@ -10,12 +11,17 @@ from window import draw_unfolded
 
 KEPT_PICTURES = pathlib.Path("docs/pictures")
 NAMES = {"players": "track", "synthesis": "synthesize"}  # panels whose page has another name
+NOT_SHOWN = ("throws",)  # no page shows them
 TABS = 22  # pixels of a sidebar's right edge that are its tabs
 FRAME = 190
 
 
+@cache
 def list_panels(kind, parent=""):
-    """Our panels in this kind of editor, in their order; parent: those within that one."""
+    """List the registered panels in this kind of editor, in their order; parent: those within that one.
+
+    Listed once, since `show_only` leaves few of them registered.
+    """
     found = [cls for cls in bpy.types.Panel.__subclasses__() if cls.__module__.startswith(EXTENSION)
              and cls.is_registered
              and cls.bl_space_type == kind and getattr(cls, "bl_category", "") == TAB
@@ -82,6 +88,8 @@ def check_each_panel_of_the_3d_view():
     area = window.find_area("VIEW_3D")
     tops = [(cls, list_panels("VIEW_3D", cls.__name__)) for cls in list_panels("VIEW_3D")]
     for top, within in tops:
+        if top.__name__.endswith(NOT_SHOWN):
+            continue
         show_only([top, *within], "VIEW_3D")
         fold_again = [draw_unfolded(cls) for cls in (top, *within)]
         name = top.__name__.partition("_PT_")[2]

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ...base.errors import InputError
+from ...base.errors import InputError, format_count
 from ...base.time_series import find_runs
 from ...motion.skeleton import freeze_array
 from ...motion.track import BALL_RADIUS
@@ -76,7 +76,7 @@ def build_samples(times: np.ndarray, ball: np.ndarray, where: str = "ball") -> S
     times, ball = times[keep], ball[keep]
     known = np.isfinite(ball[:, :2]).all(axis=1)
     if np.count_nonzero(known) < 5:
-        raise InputError(where, f"{np.count_nonzero(known)} samples of the ball", "at least five",
+        raise InputError(where, f"{format_count(np.count_nonzero(known), 'sample')} of the ball", "at least five",
                          "choose a feed with a ball and ascending times, or a longer part of it")
     interval = float(np.median(np.diff(times)))
     filled = _detect_filled(ball[:, :2], known, interval)

@@ -10,7 +10,7 @@ FILTERS = (
     ("kalman", "Kalman", "Smoothing with a motion model, forwards and backwards"), ("none", "None", "No filter"),
 )
 _BALLS = ("baseball", "tennis", "handball", "volleyball", "football")
-BALL_CHOICES = tuple((name, name.capitalize(), f"A {name}") for name in _BALLS)
+BALL_CHOICES = tuple((name, name.capitalize(), f"A {name.removesuffix('ball')}ball") for name in _BALLS)
 HANDS = (
     ("AUTO", "Detect", "The hand that throws"), ("left", "Left", "The left hand"), ("right", "Right", "The right hand"),
 )
@@ -58,8 +58,8 @@ TABLES = {
                 "library folder"),
         Setting(name="add_to", kind=Path, option="--add-to", metavar="LIBRARY", help="add the motion to a library as "
                 "NAME.bvh"),
-        Setting(name="words", default=(), option="--words", metavar="WORD", help="labels of the added clip; a "
-                "throw's key: release", tooltip="Labels of the clip that is added", option_more=dict(nargs="+"),
+        Setting(name="words", default=(), option="--words", metavar="LABEL", title="Labels", help="labels of the added "
+                "clip; a throw's key: release", tooltip="Labels of the clip that is added", option_more=dict(nargs="+"),
                 panel_more=dict(default="throwb")),
         Setting(name="dressed", default=True, title="Add Body Mesh", tooltip="Give the armature a simple body mesh"),
         Setting(name="names", default=True, tooltip="Show the labels of the active marker cloud in the 3D view"),

@@ -57,7 +57,7 @@ TABLES = {
                 tooltip="Use only a range of frames of the armature's motion"),
         Setting(name="actor_first", default=1, title="From Frame", tooltip="First scene frame of the range"),
         Setting(name="actor_last", default=60, title="To Frame", tooltip="Last scene frame of the range"),
-        Setting(name="error", default="none", choices=ERRORS, title="Then", tooltip="How the pass ends"),
+        Setting(name="error", default="none", choices=ERRORS, title="Outcome", tooltip="How the pass ends"),
     ),
     "passes.weights": (
         Setting(name="position", default=1.0, least=0.0, most=1000.0, title="Positions",

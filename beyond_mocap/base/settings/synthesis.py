@@ -22,7 +22,7 @@ FORMS = (
 
 
 def parse_gait_clips(texts: Iterable[str]) -> tuple[tuple[str, str], ...]:
-    """Parse texts of the form "WORD=CLIP" to (gait label, clip) pairs; blanks around either are removed.
+    """Parse texts of the form "LABEL=CLIP" to (gait label, clip) pairs; blanks around either are removed.
 
     Raises:
         InputError: for any other text, and for a label that comes twice.
@@ -31,7 +31,7 @@ def parse_gait_clips(texts: Iterable[str]) -> tuple[tuple[str, str], ...]:
     for text in texts:
         label, _, clip = (part.strip() for part in text.partition("="))
         if not label or not clip:
-            raise InputError("gait clips", f"{text!r}", "WORD=CLIP, such as walking=folder/walk.bvh")
+            raise InputError("gait clips", f"{text!r}", "LABEL=CLIP, such as walking=folder/walk.bvh")
         if label.lower() in dict(pairs):
             raise InputError("gait clips", f"{label!r} twice", "one clip for each gait")
         pairs.append((label.lower(), clip.replace("\\", "/")))
@@ -72,7 +72,7 @@ TABLES = {
                 in_preset=True, tuning="any"),
         Setting(name="seam_window", default=0.8, least=0.0, most=4.0, unit="seconds", expected=BETWEEN,
                 option="--seam-window", help="window over which a transition is blended; default %(default)g",
-                title="Transition Window", tooltip="Time over which the transition between two clips is blended",
+                title="Transition", tooltip="Time over which the transition between two clips is blended",
                 in_preset=True, tuning="any"),
         Setting(name="track_window", default=1.2, least=0.2, most=5.0, unit="seconds", expected=BETWEEN,
                 option="--track-window", help="window that removes the track's jitter; default %(default)g",
@@ -85,8 +85,8 @@ TABLES = {
                 "that neighbours in a match are not in step"),
         Setting(name="lag", default=0.0, least=0.0, most=60.0, unit="seconds", help="lag of a player of a match behind "
                 "the clock, so that neighbours differ"),
-        Setting(name="gaits", default=(), option="--gait", metavar="WORD=CLIP", help="the clip that represents a gait, "
-                "such as walking=folder/walk.bvh; once for each gait", title="Gait Clips", tuning="any",
+        Setting(name="gaits", default=(), option="--gait", metavar="LABEL=CLIP", help="the clip that represents a "
+                "gait, such as walking=folder/walk.bvh; once for each gait", title="Gait Clips", tuning="any",
                 tooltip="Clips that represent the gaits, such as walking=folder/walk.bvh; jogging=folder/jog.bvh",
                 convert=parse_gait_clips, option_more=dict(action="append")),
         Setting(name="mirror", default=True, option="--no-mirror", help="do not use mirrored clips",

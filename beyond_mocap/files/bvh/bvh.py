@@ -17,7 +17,7 @@ from pathlib import Path
 
 import numpy as np
 
-from ...base.errors import InputError
+from ...base.errors import InputError, format_count
 from ...base.vectors import unit_vectors
 from ...motion import quaternion
 from ...motion.humanoid import Humanoid, compute_heading, identify_joints, measure_leg_length
@@ -62,10 +62,8 @@ def read_bvh(path, unit: float | None = None) -> BvhClip:
     """Read the clip of a BVH file.
 
     Position channels of any joint replace its OFFSET, as Bandai-Namco's and LAFAN1's files mean them; below the hips
-    their
-    mean becomes the bone, and the notes list joints that move by more than 1 mm. Joints above the hips are folded into
-    the
-    hips. Frame rates within 0.1 % of a whole number or an NTSC rate are rounded to it.
+    their mean becomes the bone, and the notes list joints that move by more than 1 mm. Joints above the hips are folded
+    into the hips. Frame rates within 0.1 % of a whole number or an NTSC rate are rounded to it.
 
     Args:
         path: the file.
@@ -97,8 +95,7 @@ def write_bvh(path, motion: Motion, form: BvhForm | None = None) -> tuple[str, .
 
     A joint that needs a channel missing in its form gets all channels of that kind. A root above the hips that did not
     move keeps its place; one that moved is placed on the ground below the hips (or at them, if they have no positions
-    of
-    their own) with the body's heading. The file is written to a temporary place and renamed.
+    of their own) with the body's heading. The file is written to a temporary place and renamed.
 
     Args:
         path: the file.
@@ -274,7 +271,7 @@ def _list_notes(text: BvhText, body_joints: list[int], above: tuple[JointAboveHi
     if drift:
         worst = sorted(drift, key=drift.get, reverse=True)
         moved = ", ".join(f"{name} {drift[name] * 1000:.0f} mm" for name in worst[:5])
-        notes.append(f"{len(drift)} joints change their distance, replaced by its mean: {moved}")
+        notes.append(f"{format_count(len(drift), 'joint')} with a changing distance, replaced by its mean: {moved}")
     return notes
 
 
@@ -344,10 +341,8 @@ def estimate_scale(text: BvhText, unit: float | None) -> FileScale:
     """Estimate a file's up axis, and its unit if it is not set.
 
     Up is the axis, Y or Z, along which feet to head point (within 35 degrees) in more of 64 frames spread over the
-    clip;
-    the rest pose counts too, for clips mostly lying down. The unit is the usual one that puts the hips 0.75 to 1.15 m
-    above
-    the feet, else the one with 0.88 m long legs. Without legs: centimetres, Y up.
+    clip; the rest pose counts too, for clips mostly lying down. The unit is the usual one that puts the hips 0.75 to
+    1.15 m above the feet, else the one with 0.88 m long legs. Without legs: centimetres, Y up.
 
     Args:
         text: the file's content.

@@ -15,7 +15,7 @@ from pathlib import Path
 
 import numpy as np
 
-from ...base.errors import InputError
+from ...base.errors import InputError, format_count
 from ..content import read_bytes
 
 POSITIONS = ("Xposition", "Yposition", "Zposition")
@@ -94,7 +94,7 @@ def parse_bvh_text(path: Path, data: bytes) -> BvhText:
     values = _parse_rows(path, data[rows_start - 1 :], columns, line)  # start at the previous line's end
     if len(values) != frames:
         raise InputError(
-            f"{path}:{line}", f"{len(values)} rows of motion", f"{frames}, the number after Frames:",
+            f"{path}:{line}", f"{format_count(len(values), 'row')} of motion", f"{frames}, the number after Frames:",
             f"the file is {'truncated' if len(values) < frames else 'damaged'}; {_EXPORT_AGAIN}",
         )
     _check_angles(path, joints, values, line)
@@ -109,7 +109,8 @@ def _read_content(path: Path) -> bytes:
     if data.startswith(b"\xef\xbb\xbf"):
         data = data[3:]
     if b"\0" in data or not re.match(rb"\s*HIERARCHY\b", data, re.I):
-        raise InputError(f"{path}:1", f"starts with {data[:12]!r}", "HIERARCHY at the start", "choose a BVH file")
+        first = "binary content" if b"\0" in data else f"starts with {_decode(data[:12].split()[0])!r}"
+        raise InputError(f"{path}:1", first, "HIERARCHY at the start", "choose a BVH file")
     return data.replace(b"\r\n", b"\n").replace(b"\r", b"\n") if b"\r" in data else data
 
 

@@ -113,10 +113,8 @@ def compute_euler_degrees(rotations: np.ndarray, letters: str) -> np.ndarray:
     """Compute Euler angles in the order of `letters`, completed to a permutation of XYZ.
 
     With three letters, the middle angle is within +-90 degrees. With fewer, two triples give the rotation, (a, b, c)
-    and
-    (a + 180, 180 - b, c + 180); the one whose angles beyond `letters` are nearer to zero is used, so that they can be
-    left
-    out.
+    and (a + 180, 180 - b, c + 180); the one whose angles beyond `letters` are nearer to zero is used, so that they can
+    be left out.
 
     Args:
         rotations: (T, 4).

@@ -159,5 +159,6 @@ def load_with_kloppy(path: Path, provider: str, loader: str, arguments: Mapping,
             warnings.simplefilter("ignore")
             return getattr(module, loader)(**arguments)
     except Exception as error:  # kloppy's parsers raise many kinds of errors
-        found = f"not readable as {expected} ({type(error).__name__}: {str(error)[:120]})"
+        is_plain = type(error).__module__.startswith("kloppy")  # others are of use to kloppy's developers only
+        found = f"not readable as {expected}" + f" ({str(error)[:120]})" * is_plain
         raise InputError(path, found, f"{expected}{others}", "check the files, and the provider") from None

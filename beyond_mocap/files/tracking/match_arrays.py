@@ -76,8 +76,7 @@ def build_clock(records) -> tuple[np.ndarray, list[tuple[float, float, int, floa
         records: N of kloppy's frames.
     Returns:
         (N,) seconds of every frame; and for each period its start and end on that clock, its number, and the seconds
-        that
-        had passed at its first frame.
+        that had passed at its first frame.
     """
     period = np.array([frame.period.id for frame in records])
     seconds = np.array([frame.timestamp.total_seconds() for frame in records])
@@ -154,8 +153,7 @@ def build_metre_map(system, length: float, width: float, upward: bool):
         length, width: m, of the pitch.
         upward: whether y grows upward whatever the system says. kloppy flips the y of Metrica's CSV while reading but
             still calls it downward; Metrica's documentation (and the same match in TRACAB's format) shows that the
-            file's
-            own y is.
+            file's own y is.
     Returns:
         A function of (..., 2) coordinates: metres from the pitch's centre, y to the left of +x.
     """

@@ -15,7 +15,7 @@ from pathlib import Path
 
 import numpy as np
 
-from ...base.errors import InputError
+from ...base.errors import InputError, format_count
 from ...base.time_series import find_runs
 from ...motion.track import MAX_SPEED, is_ball_sentinel
 from .feed import Feed
@@ -118,7 +118,7 @@ def check_players(players, dataset, feed: Feed) -> list[str]:
     if known and len(unknown) > _MAX_UNKNOWN_SHARE * len(players) and len(absent) >= len(unknown) // 2:
         found = f"{len(unknown)} of {len(players)} tracked players ({names}) are not in {feed.meta[0].name}"
         raise InputError(feed.path, found, "tracking and metadata of one match", _ONE_MATCH)
-    return [f"{len(unknown)} of {len(players)} players are not in the metadata: {names}"]
+    return [f"not in the metadata: {len(unknown)} of {len(players)} players ({names})"]
 
 
 def check_periods(records, dataset, feed: Feed) -> list[str]:
@@ -134,7 +134,7 @@ def check_periods(records, dataset, feed: Feed) -> list[str]:
         InputError: if the metadata's periods contain none of the frames.
     """
     if len(records) < 2:
-        found = f"{len(records)} frames with players"
+        found = f"{format_count(len(records), 'frame')} with players"
         if feed.meta:
             found += f" within the periods in {feed.meta[0].name}"
             raise InputError(feed.path, found, "a match", _ONE_MATCH)
@@ -187,9 +187,12 @@ def repair_ball(ball: np.ndarray, length: float, width: float) -> tuple[np.ndarr
     out = np.where(is_impossible[:, None], np.nan, ball)
     out[is_too_high, 2] = np.nan
     known = np.isfinite(out[:, :2]).all(axis=1)
-    counts = np.count_nonzero(is_impossible), np.count_nonzero(is_too_high)
-    lines = [f"{counts[0]} samples with an impossible position of the ball, set to unknown"] * bool(counts[0])
-    lines += [f"{counts[1]} heights of the ball above {_MAX_HEIGHT:g} m, set to unknown"] * bool(counts[1])
+    impossible, too_high = np.count_nonzero(is_impossible), np.count_nonzero(is_too_high)
+    lines = []
+    if impossible:
+        lines.append(f"{format_count(impossible, 'sample')} with an impossible position of the ball, set to unknown")
+    if too_high:
+        lines.append(f"{format_count(too_high, 'height')} of the ball above {_MAX_HEIGHT:g} m, set to unknown")
     heights = np.isfinite(out[known, 2]).mean() if known.any() else 0.0
     coverage = f"the ball is known in {known.mean():.0%} of the samples, its height in {heights:.0%} of these"
     return out, [*lines, coverage]
@@ -205,8 +208,7 @@ def repair_players(times, positions, length: float, width: float, ids) -> tuple[
         ids: P names.
     Returns:
         (P, N, 2) m, NaN where a player is parked: far beside the pitch, or at exactly one position for half a minute;
-        and
-        messages.
+        and messages.
     """
     out = np.array(positions)
     lines, jumps = [], 0
@@ -223,7 +225,8 @@ def repair_players(times, positions, length: float, width: float, ids) -> tuple[
             speed = np.linalg.norm(np.diff(out[index], axis=0), axis=1) / np.maximum(np.diff(times), 1e-6)
             jumps += np.count_nonzero(speed > MAX_SPEED)
     if jumps:
-        lines.append(f"{jumps} steps of players faster than {MAX_SPEED:g} m/s, repaired when their tracks are cleaned")
+        lines.append(f"{format_count(jumps, 'step')} of players faster than {MAX_SPEED:g} m/s, repaired when their "
+                     "tracks are cleaned")
     return out, lines
 
 
@@ -242,8 +245,7 @@ def repair_sides(times, positions, ball, periods, teams) -> tuple[np.ndarray, np
 
     Teams change ends at half time. If they do not, the feed rotated one half so that attacks go one way, and the second
     half is rotated back. Players keep their side of the team: if left backs become right backs, the half is mirrored
-    and
-    its y changes sign. The third and fourth periods, of extra time, are a pair too.
+    and its y changes sign. The third and fourth periods, of extra time, are a pair too.
 
     Args:
         times: (N,) s.

@@ -12,7 +12,7 @@ import re
 from functools import partial
 from pathlib import Path
 
-from ...base.errors import InputError
+from ...base.errors import InputError, build_read_error, format_count
 from .feed import Feed, Files, TrackingProvider, find_provider, load_with_kloppy, read_head
 from .referees import read_signality_referees, read_sportec_referees, read_tracab_referees
 
@@ -33,7 +33,10 @@ def find_feed(path: str | os.PathLike, meta: str | os.PathLike | None, provider:
     if provider and provider.lower() not in PROVIDERS:
         raise InputError("provider", f"{provider.lower()!r}", f"one of {', '.join(PROVIDERS)}")
     record = PROVIDERS[provider.lower()] if provider else _detect_provider(path, notes)
-    second = _check_file(meta) if meta else _find_metadata(path, record, notes) if record.needs_metadata else None
+    if meta:
+        second = _check_file(meta, "a metadata file")
+    else:
+        second = _find_metadata(path, record, notes) if record.needs_metadata else None
     return Feed(record, *record.find_files(path, second, notes)), notes
 
 
@@ -48,6 +51,7 @@ def load_tracking(feed: Feed, pitch: tuple[float, float]):
     Raises:
         InputError: if kloppy is not installed or cannot read the files.
     """
+    _check_second_file(feed)
     record, files, half = feed.provider, list(map(str, feed.tracking)), len(feed.tracking) // 2
     meta, more, *_ = [*map(str, feed.meta), None, None]
     values = {"raw": files[0], "all": files, "first": files[:half], "second": files[half:], "meta": meta, "more": more,
@@ -62,10 +66,21 @@ def load_tracking(feed: Feed, pitch: tuple[float, float]):
                             others=others)
 
 
-def _check_file(path: str | os.PathLike) -> Path:
+def _check_second_file(feed: Feed) -> None:
+    """Check the form of the metadata, or of the two teams' files, so that an error does not blame the tracking file."""
+    for path in feed.tracking if feed.has_team_files else ():
+        if not any(re.match(form, read_head(path)) for form in feed.provider.patterns):
+            raise InputError(path, "not a team's positions", f"the CSV file of a team by {feed.provider.name}",
+                             "choose the other team's file")
+    for path in feed.meta[:1]:
+        if read_head(path).lstrip()[:1] not in (b"<", b"{", b"[", b"\xff", b"\xfe"):  # the last two: UTF-16
+            raise InputError(path, "neither XML nor JSON", f"the metadata of {feed.provider.name}",
+                             "choose the metadata file")
+
+
+def _check_file(path: str | os.PathLike, kind: str = "a tracking file") -> Path:
     if not Path(path).is_file():
-        found = "is a folder" if Path(path).is_dir() else "no such file"
-        raise InputError(path, found, "a tracking file", "check the path")
+        raise build_read_error(path, kind)
     return Path(path)
 
 
@@ -74,10 +89,14 @@ def _detect_provider(path: Path, notes: list[str]) -> TrackingProvider:
     if record is not None:
         notes.append(f"{path.name} is read as {record.name}")
         return record
-    if not read_head(path).strip():
+    head, providers = read_head(path), ", ".join(PROVIDERS)
+    if not head.strip():
         raise InputError(path, "the file is empty", "positions", "export it again")
-    expected = f"a CSV file with time_s,x_m,y_m, or one of {', '.join(PROVIDERS)}"
-    raise InputError(path, "unknown format", expected, "rename the columns, or choose the provider")
+    if b"time_s" in head.partition(b"\n")[0]:
+        expected = f"a match's tracking data from one of {providers}"
+        raise InputError(path, "one player's track", expected, "use synthesize for one player")
+    raise InputError(path, "unknown format", f"one of {providers}, or for one player a CSV file with time_s,x_m,y_m",
+                     "choose the provider, or rename the columns")
 
 
 def _find_metadata(path: Path, record: TrackingProvider, notes: list[str]) -> Path:
@@ -168,7 +187,7 @@ def _find_hawkeye(path: Path, meta: Path | None, notes: list[str]) -> Files:
     players = sorted(path.parent.glob("*.samples.centroids"), key=minute)
     balls = sorted(path.parent.glob("*.samples.ball"), key=minute)
     if not players or [minute(file) for file in players] != [minute(file) for file in balls]:
-        found = f"{len(players)} files of players and {len(balls)} of the ball"
+        found = f"{format_count(len(players), 'file')} of players and {len(balls)} of the ball"
         raise InputError(path.parent, found, "one .samples.ball for every .samples.centroids", "complete the folder")
     notes.append(f"{len(players)} files of players and of the ball in {path.parent.name or path.parent} are used")
     return (*players, *balls), (meta,) if meta else ()

@@ -37,8 +37,8 @@ def read_referee_samples(feed: Feed, frames: np.ndarray) -> tuple[list[str], np.
         for frame, referee, x, y in feed.provider.read_referees(feed):
             if frame in row:
                 samples.setdefault(referee, np.full((len(frames), 2), np.nan))[row[frame]] = x, y
-    except (ValueError, TypeError, LookupError, AttributeError, SyntaxError) as error:  # SyntaxError: from XML
-        lines = [f"referees are read up to frame {frame} only ({type(error).__name__}: {str(error)[:60]})"]
+    except (ValueError, TypeError, LookupError, AttributeError, SyntaxError):  # SyntaxError: from XML
+        lines = [f"referees are read up to frame {frame} only: the file is damaged there"]
     names = sorted(samples)
     return names, np.stack([samples[name] for name in names]) if names else np.empty((0, len(frames), 2)), lines
 

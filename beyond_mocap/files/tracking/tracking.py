@@ -13,7 +13,7 @@ from pathlib import Path
 
 import numpy as np
 
-from ...base.errors import InputError
+from ...base.errors import InputError, format_count
 from ...motion.skeleton import freeze_array
 from ...motion.track import Track
 from ...motion.track.match_data import REFEREE, Match, MatchPlayer, Team, describe_presence
@@ -48,8 +48,7 @@ def read_track_csv(path: str | os.PathLike) -> Track:
     ignored.
 
     Empty cells (or nan) are unknown. Rows keep the file's order, with repeated times and gaps: `motion.track.clean`
-    repairs
-    them and reports it.
+    repairs them and reports it.
 
     Args:
         path: the file.
@@ -57,8 +56,7 @@ def read_track_csv(path: str | os.PathLike) -> Track:
         The track.
     Raises:
         InputError: with the line, for missing columns, cells that are not numbers or beyond 10 km, fewer than two
-            samples
-            with a position, and rates outside 5 to 100 Hz.
+            samples with a position, and rates outside 5 to 100 Hz.
     """
     rows = list(read_rows(path, ("time_s", "x_m", "y_m")))
     names = rows[0][1] if rows else {}
@@ -81,7 +79,7 @@ def _parse_cells(rows, names) -> np.ndarray:
 def _check_rate(track: Track, path) -> None:
     known = np.isfinite(track.times) & track.is_measured
     if len(np.unique(track.times[known])) < 2:
-        found = f"{np.count_nonzero(known)} samples with a distinct time and a position"
+        found = f"{format_count(np.count_nonzero(known), 'sample')} with a distinct time and a position"
         raise InputError(path, found, "at least two", "export it again")
     rate = 1.0 / track.interval
     if not RATES[0] - 0.01 <= rate <= RATES[1] + 0.5:

@@ -1,6 +1,6 @@
 """A classifier of acts: for each act its kernel, confidence, key frame and labels; its proposals for a recording,
-combined
-with the rules; and its file: one `.npz` of plain arrays with a JSON header, never pickled, checked when it is read.
+combined with the rules; and its file: one `.npz` of plain arrays with a JSON header, never pickled, checked when it is
+read.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from scipy.ndimage import uniform_filter1d
 from scipy.signal import find_peaks
 
 from ...annotation import LOCOMOTION, ClipAnnotation, swap_sides
-from ...base.errors import InputError
+from ...base.errors import InputError, format_count
 from ...base.time_series import find_runs
 from ...files.atomic import atomic_write
 from ...motion.motion import Motion
@@ -185,7 +185,7 @@ class Classifier:
 
     def describe(self) -> tuple[str, ...]:
         """Describe what it has learned, one line each."""
-        first = f"learned from {self.clips} {'clip' if self.clips == 1 else 'clips'}"
+        first = f"learned from {format_count(self.clips, 'clip')}"
         return (first, *(act.describe() for act in self.acts))
 
     def propose_labels(self, motion: Motion, ruled: Sequence[Proposal]) -> tuple[Proposal, ...]:

@@ -1,6 +1,5 @@
 """The labels beside an act: its side, height, surface, pace and direction, and any other label that annotators used
-with
-it.
+with it.
 
 Of labels that exclude each other one is chosen, or none: the rules' where they have one, unless a linear classifier on
 the moment's window is clearly better on clips that it has not seen. A few examples show few of the ways of kicking, and

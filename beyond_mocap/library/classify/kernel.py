@@ -34,8 +34,7 @@ class Kernel:
     """A support vector machine with a Gaussian kernel.
 
     f(z) = sum_i weights_i k_i + shift with k_i = exp(-gamma |z - supports_i|^2); with m = min(1, max_i k_i / 0.25) the
-    score
-    is m f(z) + m - 1.
+    score is m f(z) + m - 1.
 
     Attributes:
         supports: (S, K) float32.
@@ -82,8 +81,7 @@ def estimate_silence_weight(found: int, total: int) -> float:
     """Estimate how much it counts against an act that the rules propose none.
 
     Half of -log of the rules' share of misses, by Laplace's estimate: 1 where they have found all examples, near 0
-    where
-    they have found none.
+    where they have found none.
 
     Args:
         found: examples that the rules have found.

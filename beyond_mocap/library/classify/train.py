@@ -13,7 +13,7 @@ import numpy as np
 
 from ...annotation import swap_sides
 from ...annotation.labels import find_label
-from ...base.errors import InputError
+from ...base.errors import InputError, format_count
 from ..label_sources import Proposal
 from .classifier import (
     Act,
@@ -82,7 +82,7 @@ def train_classifier(examples: Sequence[Example], progress=None, cancelled=None)
 
     acts_to_learn = _count_acts(examples)
     if not acts_to_learn:
-        found = f"{len(examples)} clips with too few key moments"
+        found = f"{format_count(len(examples), 'clip')} with too few key moments"
         raise InputError("examples", found, "at least two moments of an act", "annotate more clips, for example kicks")
     with threadpool_limits(limits=1):  # with more threads, sums of products have another order and other bits
         space = _build_space(examples)
@@ -97,8 +97,8 @@ def train_classifier(examples: Sequence[Example], progress=None, cancelled=None)
     learned = tuple(act for act in acts if act is not None)
     if not learned:
         words = ", ".join(word for word, _ in acts_to_learn)
-        found = f"only {words}, which the rules detect equally well or which lies outside its clips"
-        raise InputError("examples", found, "other acts too", "annotate kicks")
+        found = f"only {words}: the rules detect them equally well, or their key moments are outside the clips"
+        raise InputError("examples", found, "other acts too, such as kicks", "annotate more clips")
     return Classifier(space, learned, len(examples))
 
 

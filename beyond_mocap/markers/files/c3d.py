@@ -159,9 +159,8 @@ def _parse_parameters(path: Path, section: bytes):
 
     try:
         return Reader(io.BytesIO(section))
-    except Exception as error:  # any error of the parser means that the parameters are damaged
-        found = f"damaged parameters ({type(error).__name__}: {str(error)[:60]})"
-        raise InputError(path, found, "a C3D file", _EXPORT_AGAIN) from None
+    except Exception:  # any error of the parser means that the parameters are damaged
+        raise InputError(path, "damaged parameters", "a C3D file", _EXPORT_AGAIN) from None
 
 
 # -- the samples

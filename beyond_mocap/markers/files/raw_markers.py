@@ -12,7 +12,7 @@ from pathlib import Path
 
 import numpy as np
 
-from ...base.errors import InputError
+from ...base.errors import InputError, format_count
 from ..trial import MarkerEvent, MarkerTrial, list_some
 from .unit_and_axes import check_given_unit, decide_unit, detect_up_axis, measure_handedness, measure_height
 
@@ -94,7 +94,8 @@ def build_trial(raw: RawMarkers, path: str | os.PathLike, unit: float | str | No
     is_too_far = is_damaged | (np.abs(positions) > _MAX_DISTANCE).any(axis=-1)
     if is_too_far.any():
         notes.append(
-            f"{is_too_far.sum()} places farther than {_MAX_DISTANCE:.0f} m from the origin, treated as not visible")
+            f"{format_count(is_too_far.sum(), 'place')} farther than {_MAX_DISTANCE:.0f} m from the origin, treated as "
+            "not visible")
         positions[is_too_far] = np.nan
     positions[~np.isfinite(positions).all(axis=-1)] = np.nan
     labels, positions, residuals = _remove_invisible(path, labels, positions, residuals, notes)
@@ -120,7 +121,7 @@ def _choose_subject(raw: RawMarkers, path, subject, notes) -> tuple[list[int], l
     points = [i for i, (name, label) in enumerate(split_labels) if label not in dropped[name]]
     if len(points) < len(split_labels):
         some = list(dict.fromkeys(label for name, label in split_labels if label in dropped[name]))
-        notes.append(f"{len(split_labels) - len(points)} computed points left out: {list_some(some)}")
+        notes.append(f"{format_count(len(split_labels) - len(points), 'computed point')} left out: {list_some(some)}")
     if not points:
         raise InputError(path, "no markers", "points that are markers", "export the trial with its markers")
     counts: dict[str, int] = {}
@@ -236,7 +237,7 @@ def choose_subject(path, counts: dict[str, int], requested: str | None) -> str:
     Raises:
         InputError: if there are several bodies, or not the requested one; the message lists them.
     """
-    listed = ", ".join(f"{name!r} ({count} markers)" for name, count in counts.items() if name)
+    listed = ", ".join(f"{name!r} ({format_count(count, 'marker')})" for name, count in counts.items() if name)
     if requested is not None and requested.strip():
         if not listed:
             found = f"no subject {requested.strip()[:60]!r}"

@@ -16,7 +16,7 @@ from pathlib import Path
 
 import numpy as np
 
-from ...base.errors import InputError
+from ...base.errors import InputError, format_count
 from ...files.atomic import atomic_write
 from ...files.content import read_bytes
 from ..trial import MAX_FPS, MIN_FPS, MarkerTrial
@@ -207,13 +207,13 @@ def _split_row(path: Path, index: int, line: str, head: _Header, width: int) -> 
         cells.pop()
     place = f"{path}:{index + 1}"
     if len(cells) > width:
-        found = f"{len(cells) - 2} coordinates"
+        found = format_count(len(cells) - 2, "coordinate")
         raise InputError(place, found, f"{width - 2} for {len(head.labels)} markers", "one recording per file")
     while head.tabs and cells and not cells[-1].strip():
         cells.pop()
     short = width - len(cells)
     if short and (not head.tabs or len(cells) < 2 or (len(cells) - 2) % 3):
-        found = f"{max(len(cells) - 2, 0)} coordinates"
+        found = format_count(max(len(cells) - 2, 0), "coordinate")
         raise InputError(place, found, f"{width - 2} for {len(head.labels)} markers",
                          f"the row is cut off; {_EXPORT_AGAIN}")  # fmt: skip
     return cells + [""] * short
@@ -323,7 +323,7 @@ def _insert_gaps(path: Path, frames: np.ndarray, positions: np.ndarray, notes: l
         raise InputError(path, f"times that skip {missing} frames of {count}", "one recording", "split it in two")
     whole = np.full((count, *positions.shape[1:]), np.nan)
     whole[frames] = positions
-    return whole, [*notes, f"{missing} frames missing in the times, added as not visible"]
+    return whole, [*notes, f"{format_count(missing, 'frame')} missing in the times, added as not visible"]
 
 
 def write_trc(trial: MarkerTrial, path: str | os.PathLike) -> None:

@@ -1,6 +1,5 @@
 """Low-pass filters of a solved motion (Fredriksson section 5.4): Butterworth of fourth order, forwards and backwards,
-and
-Kalman smoothing, the alternative (section 10.2; De Groote et al. 2008).
+and Kalman smoothing, the alternative (section 10.2; De Groote et al. 2008).
 
 Butterworth: two passes of a second-order filter form one of fourth order without delay. Each pass alone lets half of
 the power through at its own cutoff, both together only a quarter, so each gets a somewhat higher one (Winter 2009,

@@ -355,7 +355,7 @@ class _PoseSolver:
         if len(blind):
             determined = np.ones((len(known), len(self.chain.skeleton)), dtype=bool)
             self.poses.overwrite_frames(blind, interpolate_poses(self.chain, self.poses, known, determined, blind)[0])
-            self.notes.append(f"{len(blind)} of {len(self.cost)} frames show too few markers and are interpolated")
+            self.notes.append(f"too few markers in {len(blind)} of {len(self.cost)} frames, which are interpolated")
 
     def build_solution(self, seconds: float) -> PoseSolution:
         """Return the solution of all frames."""

@@ -1,6 +1,5 @@
 """Find which bodies come close to each other and when, and separate tracks that come closer than two trunks allow,
-before
-motions are constructed from them.
+before motions are constructed from them.
 
 The shifts are the least and smoothest ones: they minimise sum SHIFT_WEIGHT (|s|^2 + SHIFT_SECONDS^6 |s'''|^2) over all
 bodies, plus the square of the missing distance while two are too close. The direction in which they are pushed turns
@@ -197,8 +196,7 @@ def _build_distance_rows(
     places: np.ndarray, shifts: np.ndarray, pair: tuple[int, int], distance: float, seconds: float, fps: float
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Build the rows of one pair for `BandedLeastSquares.add_rows`: where it is too close, in which direction and how
-    far it
-    has to separate; directions are smoothed over `seconds`.
+    far it has to separate; directions are smoothed over `seconds`.
     """
     one, other = pair
     bodies = len(places)

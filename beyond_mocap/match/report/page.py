@@ -194,7 +194,7 @@ def _build_players(match: MatchResults, worst: tuple[WorstSecond, ...], span, an
 def _build_times(match: MatchResults) -> Html:
     rows = [build_row(stage, build_element("td", f"{spent:.1f} s", class_="n")) for stage,
             spent in match.seconds.items()]
-    return build_section("Where the time went", build_table((), rows)) if rows else Html()
+    return build_section("Computing time", build_table((), rows)) if rows else Html()
 
 
 def _build_strip(player: PlayerResult, span: tuple[float, float], look: str = "") -> Html:

@@ -1,6 +1,5 @@
 """Read what a folder of a match has about its players, from match.json and the players' reports, complete or not; find
-the
-worst seconds of all players.
+the worst seconds of all players.
 """
 
 from __future__ import annotations

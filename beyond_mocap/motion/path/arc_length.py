@@ -31,8 +31,7 @@ def _build_series_matrix() -> np.ndarray:
 
 def _build_integral_matrix() -> np.ndarray:
     """Build the matrix (ORDER + 1, ORDER) from values at the nodes to coefficients of 1, x, x^2, ... of the integral
-    from -1
-    to x.
+    from -1 to x.
     """
     legendre = np.polynomial.legendre
     columns = [legendre.leg2poly(legendre.legint(unit, lbnd=-1)) for unit in np.eye(_ORDER)]

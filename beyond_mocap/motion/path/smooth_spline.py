@@ -177,8 +177,8 @@ def _build_roughness(knots: np.ndarray, order: int, factor: float) -> tuple[np.n
     """Build rows (M, 4) over each piece's coefficients and weights (M,) of the penalty.
 
     Their weighted squares add up to factor times the integral of the squared derivative. The third derivative is
-    constant
-    on a piece; the second runs evenly from a to b: the integral of its square is h ((a + b) / 2)^2 + h (b - a)^2 / 12.
+    constant on a piece; the second runs evenly from a to b: the integral of its square is
+    h ((a + b) / 2)^2 + h (b - a)^2 / 12.
     """
     piece = np.arange(len(knots) - 2 * DEGREE - 1)[:, None]
     rows = np.broadcast_to(np.eye(_WIDTH), (len(piece), _WIDTH, _WIDTH))

@@ -62,9 +62,8 @@ def build_neutral_stance(skeleton: Skeleton, example: Motion | None = None) -> N
     Args:
         skeleton: J joints.
         example: a recording on the skeleton. Its most upright frames show how bones are twisted about their own length
-            and
-            how a flat foot lies, which bone directions alone leave open. Needed where synthetic and recorded motion are
-            blended, and where a skeleton's rest pose does not stand (LAFAN1, Bandai).
+            and how a flat foot lies, which bone directions alone leave open. Needed where synthetic and recorded motion
+            are blended, and where a skeleton's rest pose does not stand (LAFAN1, Bandai).
     Returns:
         The stance.
     Raises:
@@ -156,8 +155,7 @@ def _measure_sole_slope(skeleton: Skeleton, limb: Limb, world: np.ndarray, examp
     """Measure how steeply, in radians, the line from ankle to toe joint falls while the sole is flat.
 
     In the example: where the ankle is in its lowest quarter. Else as the skeleton rests, or a usual slope where that
-    pose
-    shows no flat foot.
+    pose shows no flat foot.
     """
     if example is not None and limb.toe is not None:
         places, _ = forward_kinematics(example)

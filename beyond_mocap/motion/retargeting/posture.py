@@ -32,8 +32,7 @@ class Posture:
         hips: (T, 3) the middle between the hip joints.
         heading: (T,) the body's facing about Z.
         pelvis: (T, 3) rotation vector of the pelvis relative to the heading about (X forward, Y left, Z up): list,
-            forward
-            tilt, rotation.
+            forward tilt, rotation.
         spine: (T, 3) rotation vector of the chest relative to the pelvis, shared by the joints of the spine.
         head: (T, 3) of the head relative to the chest, shared with the neck.
         arms: (T, 2, 5), left and right: flexion (arm forward positive), abduction (sideways), inward rotation about the
@@ -41,8 +40,7 @@ class Posture:
         wrists: (T, 2) hand flexion towards the palm.
         ankles: (T, 2, 3) positions of the ankles.
         feet: (T, 2, 3) rotation of each foot in the world: roll (sole outwards-in, about the foot's length), pitch
-            (toes
-            down positive), yaw.
+            (toes down positive), yaw.
         toes: (T, 2) the toes' bend against the foot, up positive.
         knees: (T, 2) extra outward rotation of the knees.
     """

@@ -29,7 +29,7 @@ from pathlib import Path
 
 import numpy as np
 
-from ...base.errors import InputError
+from ...base.errors import InputError, build_read_error
 from ...base.vectors import unit_vectors
 from .. import limb, quaternion
 from ..humanoid import Humanoid, Limb, build_humanoid, identify_joints, identify_posed_joints, list_roles
@@ -51,8 +51,7 @@ class Retargeter:
     """Retargets recordings of one rig to another, at their own rate: both rigs are analysed once.
 
     Root positions are metres, world, Z up; heights stay above the same floor. A skeleton given as its own target
-    returns
-    the same motion.
+    returns the same motion.
     """
 
     def __init__(
@@ -66,14 +65,11 @@ class Retargeter:
             sample: frames of the recordings (their order does not matter).
             skeleton: the target.
             bone_map: source joint -> target joint, or the path of a JSON file with such an object (`read_bone_map`);
-                its pairs
-                override those found by names and structure.
+                its pairs override those found by names and structure.
             example: a recording on `skeleton`, which shows how its rig twists its bones and holds its trunk; without it
-                the
-                rest pose does.
+                the rest pose does.
             standing, example_standing: (T, 2) bool, left and right foot on the ground in `sample` and in `example`,
-                which shows
-                how soles lie; without it low feet count as in contact.
+                which shows how soles lie; without it low feet count as in contact.
             keeps_travel: footprints and the path over the ground stay where they are, whatever the legs' length.
         Raises:
             InputError: if either skeleton has no legs or the map names an unknown joint.
@@ -246,8 +242,7 @@ class _Transfer:
         """Compute where a knee points (T, 3).
 
         As the source's, which shows little where it is straighter than the target's will be, `height` (T,) metres off
-        the line
-        hip-ankle; the rest of the bend is about the thigh's own hinge.
+        the line hip-ankle; the rest of the bend is about the thigh's own hinge.
         """
         line = unit_vectors(ankle - hip, -_UP)
         ahead = quaternion.rotate(self._compute_source_rotation(mine.upper_leg), np.array([1.0, 0.0, 0.0]))
@@ -332,9 +327,9 @@ def read_bone_map(path: str | Path) -> dict[str, str]:
     try:
         found = json.loads(Path(path).read_text(encoding="utf-8"))
     except OSError as error:
-        raise InputError(path, f"cannot be read ({error.strerror})", "a bone map (JSON)", "check the path") from None
-    except (ValueError, RecursionError) as error:
-        raise InputError(path, f"not JSON ({error})", _MAP_FORM, "correct the file") from None
+        raise build_read_error(path, "a bone map (JSON)", error) from None
+    except (ValueError, RecursionError):
+        raise InputError(path, "not JSON", _MAP_FORM, "correct the file") from None
     if not isinstance(found, dict) or not all(isinstance(name, str) for name in found.values()):
         raise InputError(path, "not an object of names", _MAP_FORM, "correct the file")
     return found

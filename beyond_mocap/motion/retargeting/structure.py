@@ -146,8 +146,7 @@ def _list_chain(parents, start: int) -> list[int]:
 
 def find_mirror_joints(parents, pairs: Iterable[tuple[int, int]]) -> tuple[int, ...]:
     """Find for each joint the one on the other side: of `pairs`, of their ancestors up to the common one, and, child by
-    child,
-    of their descendants.
+    child, of their descendants.
     """
     out = list(range(len(parents)))
     pairs = [(a, b) for pair in pairs for a,

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ...base.errors import InputError, TimedMessage, format_seconds
+from ...base.errors import InputError, TimedMessage, format_count, format_seconds
 from ...base.time_series import find_runs
 from .data import Track, is_ball_sentinel
 from .sampling import GAP_INTERVALS, LONG_GAP
@@ -19,6 +19,7 @@ from .sampling import GAP_INTERVALS, LONG_GAP
 MAX_SPEED = 12.0
 """m/s; no player runs faster, so a sample that would need it is wrong."""
 
+_USUAL_SPEEDS = (0.2, 7.0)  # m/s; the median of a player's speed lies between them
 _MAX_ACCELERATION = 12.0  # m/s^2, hardest acceleration of a player
 _SPIKE = 0.2  # metres off its neighbours' line from which a sample is a spike, beyond what acceleration explains
 _EXCURSION = 0.5  # seconds within which a jump away has to return to count as an excursion
@@ -61,35 +62,52 @@ def clean_track(track: Track) -> tuple[Track, DataReport]:
     """Clean a track: in order of time, with one plausible position per sample, and a report of the changes.
 
     Rows without a time are dropped, repeated times merged to their mean, times sorted. Spikes, excursions and the
-    coasted
-    samples before a snap are marked `outlier`; missing samples, and those of gaps longer than three sample intervals,
-    are
-    inserted and marked `filled`. Both get a cubic between the valid neighbours that starts and ends with their
-    velocities
-    (beyond one second only as curved as the distance allows). Before the first and after the last valid sample the
-    velocity
-    fades (to a third in half a second). A track that is already clean comes back equal.
+    coasted samples before a snap are marked `outlier`; missing samples, and those of gaps longer than three sample
+    intervals, are inserted and marked `filled`. Both get a cubic between the valid neighbours that starts and ends with
+    their velocities (beyond one second only as curved as the distance allows). Before the first and after the last
+    valid sample the velocity fades (to a third in half a second). A track that is already clean comes back equal.
 
     Args:
         track: samples as the feed has them, pitch frame.
     Returns:
         The cleaned track, and the report.
     Raises:
-        InputError: if fewer than two samples have a position, or a gap is longer than an hour.
+        InputError: if fewer than two samples have a position, a gap is longer than an hour, or the positions are
+            hardly a player's in metres.
     """
     times, positions, ball, notes, dropped, merged = _sort_rows(track)
     ball, notes = _remove_ball_sentinels(ball, notes)
     times, positions, ball = _insert_missing_rows(times, positions, ball, track.name)
     known = np.isfinite(positions).all(axis=1)
     if np.count_nonzero(known) < 2:
-        raise InputError(track.name, f"{np.count_nonzero(known)} samples with a position", "at least two")
+        found = f"{format_count(np.count_nonzero(known), 'sample')} with a position"
+        raise InputError(track.name, found, "at least two")
     outlier, snaps = np.zeros(len(times), dtype=bool), ()
     outlier[known], snaps = _detect_outliers(times[known], positions[known])
+    _check_unit(times[known], positions[known], outlier[known], track.name)
     is_valid = known & ~outlier
     positions = _interpolate_gaps(times, positions, is_valid)
     cleaned = Track(times, positions, ball, ball_height_known=np.isfinite(ball[:, 2]), filled=~known, outlier=outlier,
                     name=track.name)
     return cleaned, _build_report(cleaned, notes, snaps, dropped, merged)
+
+
+def _check_unit(times: np.ndarray, positions: np.ndarray, outlier: np.ndarray, name: str) -> None:
+    """Check that most samples are a player's in metres; InputError with the likely unit otherwise.
+
+    Speeds are measured over a second, so that they do not consist of a fast feed's noise.
+    """
+    later = np.minimum(np.searchsorted(times, times + 1.0), len(times) - 1)
+    first = times[later] > times
+    distance = np.linalg.norm(positions[later] - positions, axis=1)
+    speed = float(np.median(distance[first] / (times[later] - times)[first]))
+    if speed <= MAX_SPEED and np.count_nonzero(outlier) <= 0.5 * len(outlier):
+        return
+    found = f"a median speed of {speed:.3g} m/s, {np.count_nonzero(outlier)} outliers in {len(outlier)} samples"
+    for unit, size in (("centimetres", 100.0), ("millimetres", 1000.0)):
+        if size * _USUAL_SPEEDS[0] < speed < size * _USUAL_SPEEDS[1]:
+            raise InputError(name, f"positions look like {unit} ({found})", "metres", f"divide x and y by {size:g}")
+    raise InputError(name, f"positions are not a player's ({found})", "metres and seconds", "check the units")
 
 
 def _sort_rows(track: Track):
@@ -98,7 +116,7 @@ def _sort_rows(track: Track):
     rows = np.column_stack([track.positions, track.ball])[timed]
     rows[~np.isfinite(rows[:, :2]).all(axis=1), :2] = np.nan
     rows[:, 4] = np.where(track.ball_height_known[timed], rows[:, 4], np.nan)
-    notes = [f"{np.count_nonzero(~timed)} rows without a time dropped"] if not timed.all() else []
+    notes = [f"{format_count(np.count_nonzero(~timed), 'row')} without a time dropped"] if not timed.all() else []
     times = track.times[timed]
     if np.any(np.diff(times) < 0):
         late = times[1:][np.diff(times) < 0]
@@ -109,7 +127,7 @@ def _sort_rows(track: Track):
     merged = len(times) - len(starts)
     if merged:
         repeated = times[starts][np.diff(starts, append=len(times)) > 1]
-        notes.append(f"{merged} rows with a repeated time merged: {_describe_times(repeated)}")
+        notes.append(f"{format_count(merged, 'row')} with a repeated time merged: {_describe_times(repeated)}")
         rows = _average_groups(rows, starts)
     return times[starts], rows[:, :2], rows[:, 2:], notes, int(np.count_nonzero(~timed)), merged
 
@@ -126,7 +144,8 @@ def _remove_ball_sentinels(ball: np.ndarray, notes: list[str]) -> tuple[np.ndarr
     """Replace sentinels in ball rows (N, 3) with NaN: z below the ground, far outside, or parked at the origin."""
     seen, wrong = np.isfinite(ball[:, :2]).all(axis=1), is_ball_sentinel(ball)
     if wrong.any():
-        notes = [*notes, f"{np.count_nonzero(wrong)} samples with the ball at a sentinel set to unknown"]
+        count = format_count(np.count_nonzero(wrong), "sample")
+        notes = [*notes, f"{count} with the ball at a sentinel set to unknown"]
     ball = np.where((seen & ~wrong)[:, None], ball, np.nan)
     return ball, notes
 
@@ -159,8 +178,7 @@ def _detect_outliers(times: np.ndarray, positions: np.ndarray) -> tuple[np.ndarr
         if jump in used:
             continue
         # a jump with a return is an excursion, one near an end a stray, a very long one is only reported, any other is
-        # a snap
-        # after coasting
+        # a snap after coasting
         back = _find_return_jump(times[left], jumps, excess, place)
         if back is not None:
             used.add(back)
@@ -180,8 +198,7 @@ def _detect_spikes(times: np.ndarray, positions: np.ndarray) -> np.ndarray:
     better.
 
     A spike of size d is d off its line and puts its neighbours d/2 off theirs; a step puts the two samples beside it
-    off
-    theirs equally, so neither stands out and steps are left to `_detect_jumps`. The first and last sample have one
+    off theirs equally, so neither stands out and steps are left to `_detect_jumps`. The first and last sample have one
     neighbour only: they are measured against the line of the third and fourth, or their own errors would blame the
     second.
     """
@@ -244,8 +261,7 @@ def _find_coasted_samples(times: np.ndarray, positions: np.ndarray, jump: int, s
     """Find the samples up to `jump` to replace.
 
     As many as making up for `size` metres takes, and further back while they lie on an exact line. The first sample of
-    such
-    a line is where the player was last seen, and is left as it is.
+    such a line is where the player was last seen, and is left as it is.
     """
     before = times[jump] - times[: jump + 1]
     first = int(np.searchsorted(-before, -max(_COAST[0], min(size / _CATCH_UP, _COAST[1]))))
@@ -339,15 +355,16 @@ def _collect_warnings(track: Track, snaps: tuple[float, ...], gaps) -> list[Time
                          *zip(snaps, snaps))
         )
     if len(fast):
-        out.append(TimedMessage(f"faster than {MAX_SPEED:g} m/s in {len(fast)} samples: {_describe_times(fast)}",
-                                *zip(fast, fast)))
+        out.append(TimedMessage(f"faster than {MAX_SPEED:g} m/s in {format_count(len(fast), 'sample')}: "
+                                f"{_describe_times(fast)}", *zip(fast, fast)))
     return out + [TimedMessage(f"no samples from {a:.2f} to {b:.2f} s", (a, b)) for a, b in gaps if b - a > LONG_GAP]
 
 
 def _describe_replacements(track: Track) -> list[str]:
     """Describe what was inserted and replaced, and how much of the ball is missing."""
-    marked = (("samples filled", track.filled), ("outliers replaced", track.outlier))
-    out = [f"{m.sum()} {what}: {_describe_stretches(track.times[m], track.interval)}" for what, m in marked if m.any()]
+    marked = (("sample", "filled", track.filled), ("outlier", "replaced", track.outlier))
+    out = [f"{format_count(m.sum(), noun)} {change}: {_describe_stretches(track.times[m], track.interval)}"
+           for noun, change, m in marked if m.any()]
     unknown = _find_missing_ball(track)
     if unknown.any() and not unknown.all():
         out.append(f"ball unknown in {unknown.sum()} of {len(track)} samples")

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ...base.errors import InputError
+from ...base.errors import InputError, format_count
 from ...base.time_series import find_runs
 from . import Track
 
@@ -125,7 +125,7 @@ class Match:
         high = np.inf if end is None else end + 1e-9
         there = np.flatnonzero(np.isfinite(path).all(axis=1) & (self.times >= low) & (self.times <= high))
         if len(there) < 2:
-            found = f"{player_id!r} has {len(there)} samples from {start} to {end} s"
+            found = f"{player_id!r} has {format_count(len(there), 'sample')} from {start} to {end} s"
             raise InputError("player", found, "at least two")
         part = slice(there[0], there[-1] + 1)
         return Track(self.times[part], path[part], self.ball[part], name=player_id)
@@ -172,6 +172,6 @@ def describe_presence(match: Match) -> list[str]:
         if not short and [tuple(np.round(span, 6)) for span in spans] == whole:
             continue
         where = ", ".join(f"{start:.1f}-{end:.1f}" for start, end in spans[:4]) + ", ..." * (len(spans) > 4)
-        gaps = f", {len(short)} short gaps" if short else ""
+        gaps = f", {format_count(len(short), 'short gap')}" if short else ""
         lines.append(f"{player.id}: present for {seconds:.0f} s ({where or 'never'} s){gaps}")
     return lines

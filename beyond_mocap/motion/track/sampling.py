@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ...base.errors import InputError
+from ...base.errors import InputError, format_count
 from ...base.time_series import interpolate_columns
 from ...base.vectors import arctan2
 from .data import BALL_RADIUS, SampledTrack, Track
@@ -29,8 +29,7 @@ def sample_track(track: Track, fps: float, window: float = SMOOTHING_SECONDS) ->
     """Sample a cleaned track at an even rate: floor(duration * fps) + 1 frames from its first time on.
 
     The ball is interpolated linearly, constant before its first and after its last sample, and no lower than its
-    radius,
-    which is also its height where the feed has none.
+    radius, which is also its height where the feed has none.
 
     Args:
         track: a cleaned track.
@@ -64,14 +63,10 @@ def smooth_positions(positions: np.ndarray, fps: float, window: float = SMOOTHIN
 
     One pass of a window pulls curves inward by half its variance times the acceleration (0.037 s^2 for 1.5 s: 15 cm at
     4 m/s^2). Smoothing the residual and adding it back removes that up to the fourth derivative; twice, up to the
-    sixth.
-    Measured on five real tracks of 20-25 Hz, difference of the 1.5 s Hann windows of result and samples, mean / 95 %:
-    Hann
-    0.7 s alone 1.6 / 3.9 cm; 0.7 s corrected once 0.08 / 0.22 cm, but rms jerk 16 m/s^3; this one 0.18 / 0.5 cm and
-    jerk
-    10 m/s^3; a smoothing spline of the same jerk 0.2 / 0.5 cm, but 2-3 cm at the ends. The window also has an end: an
-    edit
-    changes nothing beyond 1.8 s, bit for bit, which a spline cannot promise.
+    sixth. Measured on five real tracks of 20-25 Hz, difference of the 1.5 s Hann windows of result and samples, mean /
+    95 %: Hann 0.7 s alone 1.6 / 3.9 cm; 0.7 s corrected once 0.08 / 0.22 cm, but rms jerk 16 m/s^3; this one 0.18 / 0.5
+    cm and jerk 10 m/s^3; a smoothing spline of the same jerk 0.2 / 0.5 cm, but 2-3 cm at the ends. The window also has
+    an end: an edit changes nothing beyond 1.8 s, bit for bit, which a spline cannot promise.
 
     Args:
         positions: (T, k).
@@ -111,10 +106,8 @@ def compute_travel_direction(velocity: np.ndarray, fps: float) -> np.ndarray:
     """Compute the direction of travel, held while the player is slower than MOVING_SPEED.
 
     Slower frames keep the direction before them, and turn to the next one in the last half second before it: a player
-    at
-    rest does not spin with the noise and does not snap round when setting off. If all are slow, it is the direction of
-    the
-    fastest frame, 0 if none moves.
+    at rest does not spin with the noise and does not snap round when setting off. If all are slow, it is the direction
+    of the fastest frame, 0 if none moves.
 
     Args:
         velocity: (T, 2) m/s.
@@ -143,7 +136,8 @@ def _build_time_grids(track: Track, fps: float) -> tuple[np.ndarray, np.ndarray,
     if not 1.0 <= fps <= 480.0:
         raise InputError("fps", f"{fps}", "1 to 480 frames per second")
     if np.count_nonzero(track.is_measured) < 2 or not np.all(np.diff(track.times) > 0):
-        raise InputError(track.name, f"{np.count_nonzero(track.is_measured)} usable samples", "two or more, cleaned")
+        raise InputError(track.name, format_count(np.count_nonzero(track.is_measured), "usable sample"),
+                         "two or more, cleaned")
     duration = track.times[-1] - track.times[0]
     if duration > _MAX_SECONDS:
         raise InputError(track.name, f"{duration:.0f} s", "at most six hours", "cut the track")

@@ -2,8 +2,7 @@
 
 Only the loopback address is bound or called, so nothing from another machine comes in and nothing goes out. Frames stay
 in a ring buffer of some seconds. The thread never waits longer than a fifth of a second, reads a limited number of
-bytes
-per second, and ends with `stop`, which also closes all sockets.
+bytes per second, and ends with `stop`, which also closes all sockets.
 """
 
 from __future__ import annotations
@@ -21,7 +20,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ...base.errors import InputError
+from ...base.errors import InputError, format_count
 from ...files.bvh.bvh import BvhRows
 from ...motion.skeleton import Skeleton
 from .bvh_stream import BvhStream
@@ -199,7 +198,8 @@ class Listener:
         if state == "stopped":
             return "Not listening"
         if self.stream.invalid_count:
-            return f"{self.stream.invalid_count} invalid pieces on {port_name}: {self.stream.last_error}"
+            count = format_count(self.stream.invalid_count, "invalid piece")
+            return f"{count} on {port_name}: {self.stream.last_error}"
         if self._reason:
             return f"{self._reason} ({port_name})"
         return f"Waiting for frames on {port_name} of this machine"

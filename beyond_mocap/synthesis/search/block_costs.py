@@ -16,9 +16,8 @@ class AnnotationCost:
 
     Per frame, with a the requested and m the clip's labels: the labels both have count +1, those only one has -1, and
     the sum is divided by the number of labels in either; over a block, sums and counts are added before dividing. D is
-    that
-    with the sign inverted: -1 where all agree, 1 where none does. Frames without requested labels (transitions) have no
-    effect.
+    that with the sign inverted: -1 where all agree, 1 where none does. Frames without requested labels (transitions)
+    have no effect.
 
     Attributes:
         frames: the library's N frames.

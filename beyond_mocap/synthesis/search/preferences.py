@@ -19,7 +19,8 @@ from pathlib import PurePosixPath
 import numpy as np
 
 from ...annotation.ball_contact import may_use_foot
-from ...annotation.vocabulary import SIDES
+from ...annotation.vocabulary import SIDES, compute_edit_distance
+from ...base.errors import InputError
 from ...library.keys import Key
 from ...library.library import Library
 
@@ -47,7 +48,7 @@ SHOWN_MARGIN = 0.25
 """Seconds around shown source frames that count as shown."""
 
 
-def compute_style_cost(library: Library, style: Sequence[str], weight: float, warnings: list[str]) -> np.ndarray | None:
+def compute_style_cost(library: Library, style: Sequence[str], weight: float) -> np.ndarray | None:
     """Compute the cost of library frames that are not of a style.
 
     A frame is of the style if it carries one of its labels, or belongs to a clip that one of its patterns
@@ -57,9 +58,10 @@ def compute_style_cost(library: Library, style: Sequence[str], weight: float, wa
         library: the clips, N frames.
         style: labels, or patterns of folders and clips.
         weight: cost per slot.
-        warnings: gets a line for a pattern that matches nothing.
     Returns:
         (N,) float32, None where there is no style.
+    Raises:
+        InputError: for an entry that matches nothing.
     """
     if not style or not weight:
         return None
@@ -69,9 +71,17 @@ def compute_style_cost(library: Library, style: Sequence[str], weight: float, wa
         word, clips = entry.lower(), np.array([matches_pattern(clip.path, entry) for clip in library.clips])
         carries = frames.words[:, [i for i, known in enumerate(frames.vocabulary) if known == word]].any(axis=1)
         if not carries.any() and not clips.any():
-            warnings.append(f"style '{entry}': the library has no such label, folder or clip")
+            nearest = ", ".join(_list_nearest_names(library, word))
+            raise InputError("style", repr(entry), "a label, folder or clip of the library", f"nearest: {nearest}")
         matches |= carries | clips[frames.clip]
     return np.where(matches, 0.0, weight).astype(np.float32)
+
+
+def _list_nearest_names(library: Library, name: str) -> list[str]:
+    """List the library's labels, folders and clips that differ least from a name."""
+    paths = [PurePosixPath(clip.path) for clip in library.clips if not clip.is_synthetic]
+    names = {*library.labels, *(path.stem for path in paths), *(part for path in paths for part in path.parts[:-1])}
+    return sorted(names, key=lambda other: (compute_edit_distance(name, other.lower()), other))[:3]
 
 
 def matches_pattern(path: str, pattern: str) -> bool:

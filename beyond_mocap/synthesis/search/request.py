@@ -28,6 +28,8 @@ from ..plan import Plan, ResolvedPlan
 from .preferences import LagPreference, build_lag_preference, compute_style_cost
 
 PAPERS_OMEGA = 4.0  # Faustino 2016, §3.1.1
+USE_NEAREST = "turn on Nearest Labels"
+"""Last words of the error for missing labels; the command line names its option instead."""
 
 Labels = frozenset[str] | None
 
@@ -127,7 +129,7 @@ def build_request(library: Library, plan: ResolvedPlan) -> SearchRequest:
     requested_labels = _clear_around_keys(labels_per_frame(timeline, track.times), keys, library)
     warnings += _report_missing_labels(library, plan.timeline)
     avoided = tuple(avoided) if any(avoided) else ()
-    off_style = compute_style_cost(library, settings.style, settings.style_weight, warnings)
+    off_style = compute_style_cost(library, settings.style, settings.style_weight)
     weak_foot = {"left": "right", "right": "left"}.get(settings.strong_foot, "")
     lag_preference = build_lag_preference(library, settings.lag, settings.variety, float(track.times[0]))
     return SearchRequest(plan=settings, track=track, requested_labels=tuple(requested_labels), gait=gait,
@@ -166,12 +168,11 @@ def _build_key(library, moment: KeyMoment, track, gait, allowed, use_nearest: bo
                             choices=(*choices, *select_substitutes(choices, synthetic, moment.words)),
                             used_instead=None)
     nearest = list_nearest_labels(usable, moment.words)
-    line = f"line {moment.line}, " if moment.line else ""
     problem = f"the library has no clip for '{' '.join(moment.words)}'"
-    text = f"{line}{format_seconds(moment.time)} s: {problem}; nearest: {_format_labels(nearest)}"
+    text = f"{format_seconds(moment.time)} s: {problem}; nearest: {_format_labels(nearest)}"
     if not use_nearest:
-        way_out = "add such a clip, or turn on Nearest Labels"
-        raise NotInLibraryError(f"{text}; use one of these, {way_out}", nearest)
+        way_out = f"add such a clip, or {USE_NEAREST}"
+        raise NotInLibraryError(f"{text}; use one of these, {way_out}", nearest, moment.line)
     choices = select_nearest_keys(usable, moment.words)
     gait_words = library.gaits[int(gait[int(round(frame))])].labels
     used = sort_labels(choices[0].labels) if choices else gait_words

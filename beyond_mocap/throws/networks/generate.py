@@ -207,8 +207,8 @@ def _check_description(model: ThrowModel, description: Description) -> None:
 def _check_pose(step: Step, frame: int) -> None:
     """Raise InputError if the body is invalid: networks may return NaN or huge values far from their training data."""
     if not (np.isfinite(step.pose.positions).all() and np.abs(step.pose.positions).max() < _MAX_COORDINATE):
-        raise InputError("model", f"an invalid body in frame {frame}", "a body near its description",
-                         "choose a target like those of the examples, or train the model longer")  # fmt: skip
+        raise InputError("model", f"an invalid pose in frame {frame}", "a pose like those of the examples",
+                         "choose a target like theirs, or train the model longer")  # fmt: skip
 
 
 def _build_result(model, description: Description, steps: list[Step], iterations: int,

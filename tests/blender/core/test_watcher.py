@@ -9,7 +9,7 @@ from types import SimpleNamespace
 
 import bpy
 import pytest
-from conftest import EXTENSION
+from conftest import EXTENSION, find_free_port
 from test_players import library_folder, match, ready, session  # noqa: F401  (fixtures)
 from test_turns import Context, Windows, hand  # noqa: F401
 from undo import collect_state
@@ -321,6 +321,7 @@ def a_match_child(room, _context):
 
 
 def a_stream(room, _context):
+    bpy.context.scene.beyond_mocap_stream.port = find_free_port()
     room("scene.stream.follow").start_listening(bpy.context.scene.beyond_mocap_stream)
     room("scene.stream.follow").reset_status()
 

@@ -71,7 +71,7 @@ def test_order_and_the_chosen_clip_stays_chosen(listed):
 def test_a_build_lists_speeds_and_quality(listed):
     bpy.ops.beyond_mocap.build_library()
     low, other, walk = listed.shown
-    assert "m/s" in walk.figures and walk.mark in (0, 1, 2) and "feet slide: " in walk.messages
+    assert "m/s" in walk.figures and walk.mark in (0, 1, 2) and "foot slide: " in walk.messages
     assert "no labels: not used" in other.messages.splitlines() and "no labels" not in walk.messages
 
 

@@ -181,8 +181,8 @@ def test_lines_of_the_report_keep_their_seconds(shown):
 def test_words_met_is_at_least_what_is_wanted(room):
     report = {"fps": 30.0, "annotation_similarity": {"all": -0.95}, "warp_rate": {"min": 0.8, "max": 1.0}}
     lines = room("result.quality").describe_quality(report).splitlines()
-    assert lines == ["Labels matched: 97.5 %\t≥ 95.0\tmet", "Lowest playback rate: 0.80 x\t≥ 0.85\tmissed",
-                     "Highest playback rate: 1.00 x\t≤ 1.15\tmet"]
+    assert lines == ["Labels matched: 97.5 %\t≥ 95.0\tmet", "Slowest playback: 0.80 x\t≥ 0.85\tmissed",
+                     "Fastest playback: 1.00 x\t≤ 1.15\tmet"]
 
 
 def test_jump_goes_to_the_second_and_selects_the_body(shown):

@@ -37,10 +37,10 @@ def shown(rides, ridden, monkeypatch):
     bpy.context.scene.collection.objects.link(body)
     bpy.context.view_layer.update()
     source, motion, path = ridden
-    now = [rides.riders.ComputedEdit(1, motion.motion.fps, source, path, motion, 1)]
-    monkeypatch.setattr(rides, "riding", lambda scene: [body])
-    monkeypatch.setattr(rides.riders, "find_computed_edit", lambda one: now[-1])
-    monkeypatch.setattr(rides.riders, "has_computed_edits", lambda: True)
+    now = [rides.edited_bodies.ComputedEdit(1, motion.motion.fps, source, path, motion, 1)]
+    monkeypatch.setattr(rides, "list_edited_bodies", lambda scene: [body])
+    monkeypatch.setattr(rides.edited_bodies, "find_computed_edit", lambda one: now[-1])
+    monkeypatch.setattr(rides.edited_bodies, "has_computed_edits", lambda: True)
     return now
 
 
@@ -141,7 +141,7 @@ def test_hidden_riders_and_those_not_computed_yet_are_not_drawn(rides, shown, mo
     bpy.data.objects["Rider"].hide_set(True)
     assert rides.list_items(bpy.context.scene) == []
     bpy.data.objects["Rider"].hide_set(False)
-    monkeypatch.setattr(rides.riders, "find_computed_edit", lambda one: None)
+    monkeypatch.setattr(rides.edited_bodies, "find_computed_edit", lambda one: None)
     assert rides.list_items(bpy.context.scene) == []
 
 

@@ -119,7 +119,7 @@ def test_what_the_panel_lets_one_set_is_what_the_plan_asks(extension, ready, cor
         and plan.gaits == (("walking", "walk.bvh"), ("jogging", "jog.bvh"))
     )  # fmt: skip
     ready.gaits = "walking"
-    with pytest.raises(RuntimeError, match="WORD=CLIP"):
+    with pytest.raises(RuntimeError, match="LABEL=CLIP"):
         bpy.ops.beyond_mocap.synthesize()
 
 

@@ -481,7 +481,7 @@ def test_wrong_choices_are_told_in_one_line(rooms, body, tmp_path):
     assert "Ctrl-A" in complaint(bake_to_rig)
     rig.scale = (0.01,) * 3
     load, save = bpy.ops.beyond_mocap.load_bone_map, bpy.ops.beyond_mocap.save_bone_map
-    assert "cannot be read" in complaint(load, filepath=str(tmp_path / "none.json"))
+    assert "no such file" in complaint(load, filepath=str(tmp_path / "none.json"))
     for text, said in (("{", "not JSON"), ("[]", "no object"), ('{"bones": {"tail": "x"}}', "unknown part 'tail'"),
                        (json.dumps({"bones": {"hips": "mixamorig:Hips"}}), "no bone for left upper_leg")):
         (tmp_path / "map.json").write_text(text)

@@ -9,7 +9,7 @@ import time
 import bpy
 import numpy as np
 import pytest
-from conftest import EXTENSION
+from conftest import EXTENSION, find_free_port
 from undo import assert_one_step, collect_state, press_operator
 
 CLIP = pathlib.Path(__file__).resolve().parents[3] / "sample_blend" / "library" / "kick_low_top.bvh"
@@ -26,11 +26,8 @@ def room():
 
 @pytest.fixture
 def port():
-    with socket.socket() as one:
-        one.bind(("127.0.0.1", 0))
-        number = one.getsockname()[1]
-    bpy.context.scene.beyond_mocap_stream.port = number
-    return number
+    bpy.context.scene.beyond_mocap_stream.port = find_free_port()
+    return bpy.context.scene.beyond_mocap_stream.port
 
 
 def told():

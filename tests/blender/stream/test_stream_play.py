@@ -2,7 +2,6 @@
 
 import importlib
 import pathlib
-import socket
 import threading
 import time
 from dataclasses import replace
@@ -10,7 +9,7 @@ from dataclasses import replace
 import bpy
 import numpy as np
 import pytest
-from conftest import EXTENSION
+from conftest import EXTENSION, find_free_port
 from undo import assert_one_step, press_operator
 
 SAMPLE = pathlib.Path(__file__).resolve().parents[3] / "sample_blend"
@@ -110,10 +109,7 @@ def test_whom_the_user_chooses_gets_it(playing, room, core):
 
 def test_a_stream_is_answered(playing, room, core):
     """A kick that arrives over the network, told by what it is and laid into the scene."""
-    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as one:  # no other run of the tests listens there
-        one.bind(("127.0.0.1", 0))
-        port = one.getsockname()[1]
-    playing.beyond_mocap_stream.port = port
+    port = playing.beyond_mocap_stream.port = find_free_port()
     OPS.stream_start()
     sender = core("passes.stream.sender").Sender(CLIPS / "volley_toss.bvh", port)
     thread = threading.Thread(target=sender.send_file, args=(lambda: False,))

@@ -55,6 +55,11 @@ def test_four_presses_and_enter_are_a_key_moment_at_the_playhead(room, players):
     assert said(room, players[0])[1][-1] == (9.72, "kick right low top")
 
 
+def test_an_unknown_key_is_told_with_the_known_ones(players):
+    with pytest.raises(RuntimeError, match="the key RIGHT; expected keys of 0 to 9, BACK, EARLIER, ENTER"):
+        keys("2 RIGHT", 9.72)
+
+
 def test_a_moment_may_lie_between_two_frames(room, players):
     keys("2 ENTER", 9.73)
     assert said(room, players[0])[1][-1] == (pytest.approx(9.73, abs=1e-4), "kick")

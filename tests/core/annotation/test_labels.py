@@ -14,7 +14,7 @@ from beyond_mocap.annotation.labels import find_label, list_gaits, list_labels
 from beyond_mocap.base.errors import InputError
 
 TOP = pathlib.Path(__file__).parents[3]
-SIDE_POKE = "side_poke,side poke,discrete,,foot,,sends,,low,,,low(running)\n"
+SIDE_POKE = "side_poke,side poke,kicks with the side of the foot,discrete,,foot,,sends,,low,,,low(running)\n"
 
 SYNTHETIC = {  # builders of motions and matches, each of certain labels
     *(f"beyond_mocap/synthetic/{name}.py" for name in ("gait", "gait_tables", "gestures", "kicks", "moves", "volleys")),
@@ -57,6 +57,7 @@ def test_the_table_is_the_tree_of_the_appendix():
 def test_labels_say_what_they_do_with_the_ball():
     assert find_label("receive").ball == "takes" and find_label("receive").part == "foot"
     assert find_label("catchb").both_hands and find_label("catchb").title == "Catch, Two Hands"
+    assert find_label("throw_two").title == "Throw Two" and find_label("player's").title == "Player's"
     assert find_label("moonwalk").ball == find_label("moonwalk").part == ""
     assert list_labels(ball="carries") == ("dribble",)
     assert list_gaits() == ("standing", "walking", "jogging", "running", "sprinting")
@@ -64,7 +65,7 @@ def test_labels_say_what_they_do_with_the_ball():
 
 @pytest.mark.parametrize(
     "row, found",
-    [("kick,kick,discrete,,,,,,,,,", "is repeated"), (SIDE_POKE.replace("sends", "shoots"), "ball 'shoots'"),
+    [("kick,kick,strikes,discrete,,,,,,,,,", "is repeated"), (SIDE_POKE.replace("sends", "shoots"), "ball 'shoots'"),
      ("side_poke,side poke", "wrong columns")]
 )  # fmt: skip
 def test_a_wrong_row_is_reported_with_its_line(row, found, tmp_path, monkeypatch):

@@ -16,6 +16,7 @@ from beyond_mocap.base.settings.setting import Setting, check_limits
 from beyond_mocap.cli.main import build_parser
 from beyond_mocap.path_editing.path_frame import FRAMES
 from beyond_mocap.synthesis.plan import Plan
+from command_pages import iter_commands
 from pages import SETTINGS_PAGE, build_settings_page
 
 OPTIONS = Path(__file__).resolve().parents[2] / "data" / "options-0.1.txt"
@@ -26,15 +27,6 @@ SHARPNESS = Setting(
     name="sharpness", default=0.25, least=0.0, most=1.0, unit="turns", option="--sharpness", help="of corners",
     title="Sharpness", tooltip="How sharp corners are", in_preset=True,
 )
-
-
-def verbs_of(top, name=""):
-    """Name and parser of each verb, those below another one too."""
-    for action in top._actions:
-        if isinstance(action, argparse._SubParsersAction):
-            for verb, sub in action.choices.items():
-                yield from verbs_of(sub, f"{name} {verb}".strip())
-    yield name, top
 
 
 def takes(action):
@@ -50,7 +42,7 @@ def takes(action):
 
 def lines_of(top):
     """A line for each option: verb, flags, default as users see it, number of values, choices, what it takes."""
-    for verb, own in verbs_of(top):
+    for verb, own in (("", top), *iter_commands(top)):
         for action in own._actions:
             if not isinstance(action, argparse._SubParsersAction):
                 switch = action.nargs == 0 and action.option_strings
@@ -73,7 +65,7 @@ def test_the_options_of_0_1_are_still_there():
 def with_sharpness(monkeypatch):
     """A setting more, in the table alone."""
     monkeypatch.setitem(TABLES, "synthesis", (*TABLES["synthesis"], SHARPNESS))
-    return dict(verbs_of(build_parser()))["synthesize"]
+    return dict(iter_commands(build_parser()))["synthesize"]
 
 
 FILES = ["--library", "L", "--track", "T", "--annotations", "A", "--out", "O"]

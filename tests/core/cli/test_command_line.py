@@ -3,6 +3,7 @@
 import io
 import json
 import os
+import re
 import signal
 import subprocess
 import sys
@@ -151,8 +152,8 @@ def test_what_was_written_can_be_evaluated(synthesize, run, match, clips_folder,
         "--provenance", tmp_path / "p.csv", "--ball", tmp_path / "b.csv", "--library", clips_folder, "--unit", 0.01,
         "--report", tmp_path / "e.json",
     )  # fmt: skip
-    assert (status, error) == (0, [])
     mine, again = (json.loads((tmp_path / name).read_text()) for name in ("r.json", "e.json"))
+    assert (status, error) == (0, [f"note: {line}" for line in again["warnings"]])
     assert_contract(again)
     assert again["root_error_m"]["mean"] == pytest.approx(mine["root_error_m"]["mean"], abs=1e-3)
     assert again["keys"][0]["clip"] == mine["keys"][0]["clip"]
@@ -169,7 +170,30 @@ def test_what_does_not_belong_together_is_told_by_evaluate(synthesize, run, matc
     assert not (tmp_path / "e.json").exists()
     status, _, error = run(*both, "--provenance", tmp_path / "other.csv")
     assert status == 0 and "_x.bvh" in error[-1] and "not in" in error[-1]
-    assert run(*both, "--provenance", tmp_path / "p.csv")[2] == []
+    assert not any("not in" in line for line in run(*both, "--provenance", tmp_path / "p.csv")[2])
+
+
+def test_evaluate_says_what_it_cannot_know_and_what_it_replaces(synthesize, run, match, tmp_path):
+    pytest.importorskip("matplotlib")
+    assert synthesize(report=tmp_path / "r.json")[0] == 0
+    (tmp_path / "far.csv").write_text("time_s,x_m,y_m\n" + "".join(f"{t / 10},{t / 5 + 50},0\n" for t in range(200)))
+    command = ("evaluate", tmp_path / "out.bvh", "--annotations", match / "words.txt", "--report", tmp_path / "r.json")
+    status, _, error = run(*command, "--track", tmp_path / "far.csv", "--html", tmp_path / "r.html")
+    assert status == 0 and "played: unknown" in (tmp_path / "r.html").read_text()
+    for part in ("far.csv 19.9 s; check", "m from .*far.csv on average", "clips that played are unknown",
+                 "r.json: replaces the report of synthesize"):
+        assert any(re.search(part, line) for line in error), part
+    assert not any("replaces" in line for line in run(*command)[2])
+
+
+def test_labels_are_those_beside_the_track_or_automatic(synthesize, match, tmp_path):
+    track = tmp_path / "player.csv"
+    track.write_bytes((match / "track.csv").read_bytes())
+    for expected in (0, 1):
+        status, _, error = synthesize(annotations=None, track=track, report=tmp_path / "r.json")
+        assert status == 0 and len(json.loads((tmp_path / "r.json").read_text())["keys"]) == expected
+        assert any("player.csv: with the labels of" in line for line in error) == bool(expected)
+        (tmp_path / "player.txt").write_text("3 kick right\n")
 
 
 def test_same_seed_same_file(synthesize, tmp_path):
@@ -205,8 +229,13 @@ def test_mirror(run, clips_folder, tmp_path):
     motions = [bvh.read_bvh(path, 0.01).motion for path in (clips_folder / "walk.bvh", once, twice)]
     assert np.allclose(motions[0].root_positions, motions[2].root_positions, atol=1e-4)
     assert np.allclose(motions[0].root_positions * [1, -1, 1], motions[1].root_positions, atol=1e-4)
-    assert run("mirror", once, once)[0] == 0
-    assert once.read_bytes() == twice.read_bytes()
+
+
+def test_mirror_does_not_overwrite_its_input(run, clips_folder, tmp_path):
+    clip = tmp_path / "walk.bvh"
+    clip.write_bytes(before := (clips_folder / "walk.bvh").read_bytes())
+    assert_told(run("mirror", clip, tmp_path / "." / "walk.bvh"), 2, "walk.bvh", "different files")
+    assert clip.read_bytes() == before
 
 
 def test_a_console_of_another_script_is_written_to_all_the_same(clips_folder, tmp_path, monkeypatch):
@@ -233,6 +262,12 @@ def test_a_wrong_command_line_is_status_2(run, arguments):
     assert_told(run(*arguments), 2)
 
 
+@pytest.mark.parametrize("command, arguments", [("library", ["L"]), ("throw examples", ["--out", "o"])])
+def test_an_unknown_option_points_to_the_help_of_its_command(run, command, arguments):
+    result = run(*command.split(), *arguments, "--what")
+    assert_told(result, 2, f"beyond-mocap {command}: ", "--what", f"see 'beyond-mocap {command} --help'")
+
+
 @pytest.mark.parametrize(
     "options, parts",
     [
@@ -245,7 +280,7 @@ def test_a_wrong_command_line_is_status_2(run, arguments):
         ({"omega": "0.5"}, ["omega", "0.5", "1 or more"]),
         ({"seam-window": "wide"}, ["--seam-window", "wide"]),
         ({"track-window": "-1"}, ["--track-window", "-1"]),
-        ({"gait": "walking"}, ["gait", "WORD=CLIP"]),
+        ({"gait": "walking"}, ["gait", "LABEL=CLIP"]),
         ({"gait": "walking=missing.bvh"}, ["gaits", "missing.bvh"]),
         ({"seed": "x"}, ["--seed"]),
         ({"method": "magic"}, ["magic", "path"]),
@@ -370,7 +405,7 @@ def test_libraries_that_are_none(run, synthesize, match, clip_file, tmp_path):
 
 
 def test_what_the_library_lacks_is_status_3_and_the_nearest_0(synthesize, match, tmp_path):
-    assert_told(synthesize(annotations=match / "header.txt"), 3, "header", "kick", "Nearest Labels")
+    assert_told(synthesize(annotations=match / "header.txt"), 3, "header.txt:1: 3 s: ", "kick", "or add --nearest")
     assert files_in(tmp_path) == {}
     status, _, error = synthesize("--nearest", annotations=match / "header.txt", report=tmp_path / "r.json")
     assert status == 0 and any("used instead" in line for line in error)
@@ -435,7 +470,7 @@ def test_what_a_library_says_of_itself_is_one_line_to_who_synthesizes(run, synth
     own = [line for line in out.splitlines() if line.startswith("unit ")]
     status, _, error = synthesize()
     assert status == 0 and own and not any(note in line for note in own for line in error)
-    assert sum("the command 'library' prints them" in line for line in error) == 1
+    assert sum("the command 'library' prints all" in line for line in error) == 1
 
 
 def test_no_progress_where_nobody_looks(run, clip_file, tmp_path):
@@ -455,6 +490,16 @@ def test_python_m_runs_it(clips_folder, library, match, tmp_path):
                       match / "header.txt", "--out", tmp_path / "out.bvh")  # fmt: skip
     out, error = process.communicate(timeout=120)
     assert (process.returncode, out) == (3, "") and len(error.splitlines()) == 1
+
+
+@pytest.mark.skipif(os.name == "nt", reason="Windows has no SIGPIPE")
+@pytest.mark.parametrize("unbuffered", ["", "1"])
+def test_output_that_is_not_read_ends_it_quietly(clips_folder, library, monkeypatch, unbuffered):
+    monkeypatch.setenv("PYTHONUNBUFFERED", unbuffered)
+    process = started("library", clips_folder)
+    process.stdout.close()
+    assert process.stderr.read() == "" and process.wait(120) == 141
+    process.stderr.close()
 
 
 @pytest.mark.skipif(os.name == "nt", reason="Windows sends no SIGINT to one process")
@@ -525,7 +570,7 @@ def test_real_recordings(run, tmp_path_factory, scenario):
     written = ("--out", folder / "out.bvh", "--report", folder / "r.json")
     common = ("synthesize", *library, "--track", track, "--annotations", words, *written)
     asked = read_timeline(words, 30.0).keys
-    assert_told(run(*common), 3, "Nearest Labels")
+    assert_told(run(*common), 3, "--nearest")
     assert files_in(folder) == {}
     for method in ("path", "distance", "blocks"):
         status, _, error = run(*common, "--nearest", "--method", method)
@@ -557,3 +602,10 @@ def test_pins_height_foot_and_style_are_a_players_own(synthesize, tmp_path):
     assert_told(synthesize(height=0.1), 2, "--height", "0.5 to 3 metres")
     (tmp_path / "pins.csv").write_text("time_s,part,x_m,y_m,z_m\n2,nose,30,0,1.5\n")
     assert_told(synthesize(pins=tmp_path / "pins.csv"), 2, "pins.csv:2", "'nose'")
+
+
+def test_a_missing_package_of_the_core_is_told_in_one_line():
+    code = "import sys, runpy; sys.modules['numpy'] = None; runpy.run_module('beyond_mocap', run_name='__main__')"
+    done = subprocess.run([sys.executable, "-c", code], cwd=TOP, capture_output=True, text=True)
+    expected = "beyond-mocap: numpy is missing; install the core: pip install . in the project's folder"
+    assert (done.returncode, done.stderr.strip()) == (2, expected)

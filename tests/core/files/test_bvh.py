@@ -367,7 +367,8 @@ FIRST = ROW.split()[5]
 BAD = {
     "empty": (b"", "the file is empty"),
     "blank": (b" \n\n", "the file is empty"),
-    "binary": (b"\x89PNG\r\n\x1a\n" + bytes(50), ":1: starts with"),
+    "binary": (b"\x89PNG\r\n\x1a\n" + bytes(50), ":1: binary content"),
+    "text": (b"hello\n", ":1: starts with 'hello'; expected HIERARCHY"),
     "html": (b"<html></html>", "expected HIERARCHY"),
     "cut hierarchy": (GOOD[:300], "no MOTION"),
     "cut before the frame time": (GOOD[: GOOD.index(b"Frame Time")], "Frame Time"),

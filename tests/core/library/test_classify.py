@@ -161,7 +161,7 @@ def test_one_clip_with_two_moments_is_enough(examples):
 
 def test_words_outside_their_clip_teach_nothing_and_are_told(examples):
     late = ClipAnnotation(9000, 9600, None, ("dribble",))
-    with pytest.raises(InputError, match="outside its clips"):
+    with pytest.raises(InputError, match="outside the clips"):
         train_classifier([replace(examples[0], rows=(late,))])
 
 

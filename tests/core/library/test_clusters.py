@@ -1,10 +1,18 @@
 """Blocks grouped by k-means: every block in one group, every group with a member that stands for it."""
 
+import sys
+
 import numpy as np
 import pytest
 
 from beyond_mocap.library.build import build_library
-from beyond_mocap.library.clusters import BLOCK_LENGTHS, CLUSTERS, cluster_blocks, find_block_starts
+from beyond_mocap.library.clusters import (
+    BLOCK_LENGTHS,
+    CLUSTERS,
+    _count_cores_quietly,
+    cluster_blocks,
+    find_block_starts,
+)
 
 
 @pytest.mark.parametrize("length", BLOCK_LENGTHS)
@@ -53,3 +61,15 @@ def test_clips_too_short_for_a_block_have_none(tmp_path, clip_file):
     library = build_library(tmp_path)
     assert [len(library.clusters[length].start) for length in BLOCK_LENGTHS] == [0, 2 * 4, 2 * 12]
     assert len(library.clusters[32].medoid) == 0 and library.clusters[32].label_at(0) == -1
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="hides the cores as Linux does")
+def test_a_machine_that_hides_its_cores_gets_no_warning(monkeypatch, recwarn, capsys):
+    from joblib.externals.loky.backend import context
+
+    monkeypatch.setattr(context, "physical_cores_cache", None)
+    monkeypatch.setattr(context, "_count_physical_cores_linux", lambda: 0)
+    monkeypatch.setattr(context, "_cpu_count_user", lambda count: count)
+    _count_cores_quietly()
+    assert context.cpu_count(only_physical_cores=True) > 0  # as scikit-learn asks afterwards
+    assert not recwarn.list and capsys.readouterr().err == ""

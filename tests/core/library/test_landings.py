@@ -39,7 +39,7 @@ def test_the_recording_is_kept_and_its_end_made_and_told(folder, keeper):
     clip, source = the_dive(keeper), bvh.read_bvh(folder / "saves" / "dive.bvh").motion
     assert clip.recorded_count == len(source) and len(clip.motion) > len(source) + 2.0 * clip.motion.fps
     assert np.allclose(clip.recording.rotations, source.rotations, atol=1e-5)
-    assert any("1 clips end in flight" in note and "no clip shows" in note for note in keeper.notes)
+    assert any("1 clip ending in flight" in note and "no clip shows" in note for note in keeper.notes)
     others = [other for other in keeper.clips if other.path != clip.path]
     assert all(other.recorded_count is None and other.recording is other.motion for other in others)
 

@@ -148,7 +148,7 @@ def test_clips_of_different_skeletons_are_retargeted(tmp_path, clip_file):
     level = np.mean(places[..., 2] - wanted[..., 2])  # each stands on its own floor
     off = np.linalg.norm(places - wanted - [0.0, 0.0, level], axis=-1)
     assert off.mean() < 0.03 and off.max() < 0.1  # its second of walking shows another mean posture than the walk does
-    assert any("1 clips of 1 other skeletons retargeted to the one with" in note for note in library.notes)
+    assert any("1 clip of 1 other skeleton retargeted to the one with" in note for note in library.notes)
     small_too = build_library(tmp_path, unit=0.01, skeleton=tmp_path / "child.bvh")
     assert np.allclose(small_too.skeleton.offsets, 0.7 * full.skeleton.offsets, atol=1e-4)
     assert [clip.path for clip in small_too.clips] == [clip.path for clip in library.clips]

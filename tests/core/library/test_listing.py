@@ -17,7 +17,7 @@ def test_recordings_are_listed_with_words_length_and_speed(clips_folder, tmp_pat
         assert one.seconds == pytest.approx(clip.recording.duration)
         assert 0.0 <= one.speed <= one.max_speed < 10.0
         assert one.grade in (listing.GOOD, listing.FAIR, listing.POOR)
-        assert one.details[0].startswith("feet slide: ")
+        assert one.details[0].startswith("foot slide: ")
 
 
 def test_the_same_from_the_cache(clips_folder, tmp_path):
@@ -39,8 +39,8 @@ def test_sliding_feet_and_a_drifting_floor_are_marked(clips_folder, tmp_path):
     library = build_library(clips_folder, cache_dir=tmp_path)
     clip = library.clips[0]
     assert listing._grade_clip(clip, 1.0, 1.0)[0] == listing.GOOD
-    for change, mark, line in (({"slides": 0.15, "slid": 0.4}, listing.FAIR, "feet slide: 15 cm/s (file: 40)"),
-                               ({"slides": 0.5}, listing.POOR, "feet slide: 50 cm/s"),
+    for change, mark, line in (({"slides": 0.15, "slid": 0.4}, listing.FAIR, "foot slide: 15 cm/s (file: 40)"),
+                               ({"slides": 0.5}, listing.POOR, "foot slide: 50 cm/s"),
                                ({"drift": 0.5}, listing.POOR, "floor levelled: 50 cm"),
                                ({"pops": 3}, listing.GOOD, "jumps removed: 3")):
         mended = replace(clip.repair_figures, **{"slid": 0.0, "slides": 0.0, "drift": 0.0, "pops": 0, **change})

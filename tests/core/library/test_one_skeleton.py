@@ -69,7 +69,7 @@ def test_most_frames_choose_the_skeleton_unless_told(walk, other, tmp_path):
     brought = list(unify_skeletons(paths, [other, walk], None, notes))
     assert [(motion.skeleton is walk.skeleton, moved) for motion, _, moved in brought] == [(True, True), (True, False)]
     assert [motion.fps for motion, _, _ in brought] == [30.0, 60.0]
-    assert notes == ["1 clips of 1 other skeletons retargeted to the one with 22 joints"]
+    assert notes == ["1 clip of 1 other skeleton retargeted to the one with 22 joints"]
     brought = list(unify_skeletons(paths, [other, walk], other, []))
     assert [motion.skeleton.names == other.skeleton.names for motion, _, _ in brought] == [True, True]
     assert brought[1][1].shape == (len(walk), 2, 2)
@@ -89,7 +89,7 @@ def test_the_command_writes_the_targets_names_at_the_inputs_rate(walk, other, tm
     assert np.allclose(wrote.motion.skeleton.offsets, target.motion.skeleton.offsets, atol=1e-5)
 
 
-@pytest.mark.parametrize("table, found", [({"Hip": "Hips"}, "no joint 'Hip'"), (None, "cannot be read")])
+@pytest.mark.parametrize("table, found", [({"Hip": "Hips"}, "no joint 'Hip'"), (None, "no such file")])
 def test_the_command_tells_bad_maps_in_one_line(walk, tmp_path, capsys, table, found):
     bvh.write_bvh(tmp_path / "in.bvh", walk)
     if table:

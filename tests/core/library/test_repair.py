@@ -153,7 +153,7 @@ def test_what_was_done_is_told_once_per_kind(walk):
     mended = replace(done, drift=0.04, was_sliding=True, slide=(0.3, 0.05), travel=0.2)
     lines = repair.describe_repairs([(done, 0), (mended, 3), (mended, 0)])
     assert lines == [
-        "3 single-frame jumps of joints removed from 1 clips",
+        "3 single-frame jumps of joints removed from 1 clip",
         "floor levelled in 2 clips, by 4 cm (median)",
         "feet planted in 2 clips: mean slide 30 cm/s before, 5 cm/s after; path corrected by 0.20 m (median)",
     ]

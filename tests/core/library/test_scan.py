@@ -111,6 +111,17 @@ def test_the_nearest_table_that_speaks_of_a_clip_wins(folder):
     assert words(folder, "deep/a.BVH") == ["beside"]
 
 
+def test_rows_that_name_no_clip_are_told(folder):
+    def told():
+        return Annotations(folder, find_clips(folder)).describe_unknown_files(folder)
+
+    (folder.parent / "annotations.csv").write_text(HEADER + row("other/a.bvh", "x") + row("library/b.bvh", "walking"))
+    assert told() == []
+    (folder / "annotations.csv").write_text(HEADER + row("gone.bvh", "x") * 2 + row("b.bvh", "walking"))
+    (folder.parent / "annotations.csv").write_text(HEADER + row("library/gone.bvh", "x"))
+    assert told() == ["annotations.csv: 3 rows name files that are not in the library, such as library/gone.bvh"]
+
+
 def test_a_table_two_folders_above_says_nothing(folder):
     (folder.parent.parent / "annotations.csv").write_text(HEADER + row("collection/library/b.bvh", "too far"))
     assert words(folder, "b.bvh") == []

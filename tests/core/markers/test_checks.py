@@ -106,7 +106,7 @@ def test_a_static_that_lacks_markers_is_reported_or_refused(known, clusters):
 def test_markers_of_no_segment_are_reported(known, clusters):
     assert report_unused(known.trial, clusters) == []
     strange = known.trial.rename_labels({"LWRA": "STICK", "RWRA": "*4"})
-    assert report_unused(strange, clusters) == ["1 markers belong to no segment and are not used: STICK"]
+    assert report_unused(strange, clusters) == ["markers without a segment are not used: STICK"]
     assert report_unused(strange, clusters, ["STICK"]) == []
 
 

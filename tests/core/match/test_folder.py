@@ -70,7 +70,7 @@ def test_an_order_without_sense_is_told(order, more, told):
 
 
 def test_a_file_that_is_not_there_is_told(order):
-    with pytest.raises(InputError, match="nothing.dat: No such file"):
+    with pytest.raises(InputError, match="nothing.dat: no such file"):
         build_identity(changed(order, tracking=Path("nothing.dat")), "key")
 
 

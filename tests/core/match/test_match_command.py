@@ -136,8 +136,9 @@ def test_an_option_is_taken_out_however_it_is_written(written):
 
 @pytest.mark.parametrize("options, status, told", [
     ({"tracking": "no.dat"}, 2, "no.dat: no such file"),
+    ({"tracking": str(SMALL.parent / "player1.csv")}, 2, "use synthesize for one player"),
     ({"library": "nowhere"}, 2, "nowhere"),
-    ({"from": 6, "to": 5}, 2, "end time: 5 s; expected later than the start, 6 s"),
+    ({"from": 6, "to": 5}, 2, "end time: 5 s; expected later than the start, 6 s; choose a later end"),
     ({"from": 100, "to": 200}, 2, "time range: 100 to 200 s; expected a second or more within 0 to 24 s"),
     ({"players": "home_99"}, 2, "players: 'home_99'; expected some of"),
     ({"players": "away_9", "from": 15, "to": 20}, 2, "no player is present from 15 to 20 s"),

@@ -54,7 +54,7 @@ def test_a_player_s_stretches_end_where_he_leaves_and_with_the_half():
         match.list_stretches("nobody")
     lines = describe_presence(match)
     assert [line.split(":")[0] for line in lines] == ["home_0", "home_1", "home_2"]
-    assert "1 short gaps" in lines[0] and "never" in lines[2]
+    assert "1 short gap" in lines[0] and "never" in lines[2]
 
 
 # --- sentinels
@@ -70,7 +70,7 @@ def test_a_ball_that_is_not_there_is_unknown_and_told():
     gone = np.isnan(found[:, 0])
     assert np.flatnonzero(gone).tolist() == [10, 11, 12, 13, 14, 20, 30]
     assert np.isnan(found[40, 2]) and np.isfinite(found[40, :2]).all()
-    assert "7 samples" in lines[0] and "1 heights" in lines[1] and "93%" in lines[2]
+    assert "7 samples" in lines[0] and "1 height " in lines[1] and "93%" in lines[2]
 
 
 def test_a_ball_at_rest_on_the_spot_stays():
@@ -195,7 +195,7 @@ def test_metadata_of_another_match_is_refused(tmp_path):
     with pytest.raises(InputError, match=r"16 of 22 tracked players .* are not in g_meta.xml; .* one match"):
         read_match(tracab(tmp_path, named=range(9, 20)), cache_dir=tmp_path)
     match = read_match(tracab(tmp_path, named=range(2, 15)), cache_dir=tmp_path)
-    assert any("2 of 22 players are not in the metadata: away 1, home 1" in line for line in match.report)
+    assert any("not in the metadata: 2 of 22 players (away 1, home 1)" in line for line in match.report)
     assert [team.name for team in match.teams] == ["Home", "Away"]
 
 

@@ -2,6 +2,7 @@
 
 import csv
 import pathlib
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -372,3 +373,13 @@ def test_real_tracks_stay_on_their_samples(number, rate):
     assert root_error(sampled).mean() < 0.003 and np.percentile(root_error(sampled), 95) < 0.01
     acceleration = np.gradient(sampled.velocity, 1 / 30, axis=0)
     assert np.sqrt(np.mean(acceleration**2) * 2) < 5.0
+
+
+@pytest.mark.parametrize("factor, told", [
+    (7.0, "not a player's .* check the units"), (1000.0, "millimetres"),
+    (100.0, "look like centimetres .* expected metres; divide x and y by 100"),
+])
+def test_other_units_are_refused(track_of, factor, told):
+    track = track_of(lambda t: 2.0 + 1.5 * np.sin(t), 20.0, turn=0.3)
+    with pytest.raises(InputError, match=told):
+        clean_track(replace(track, positions=factor * track.positions))

@@ -106,7 +106,7 @@ def test_every_kept_sample_is_a_file():
     (["passes"], [], "none"),
     (["passes", 0, "to"], "A", "both passer and receiver"),
     (["passes", 0, "to"], "Z", "one of A, B, C"),
-    (["passes", 0], {"from": "A"}, "no 'to'"),
+    (["passes", 0], {"from": "A"}, "no 'to'; expected the names from, to; add 'to'"),
     (["passes", 1, "from"], "A", "a pass from B, who gets pass 1"),
     (["passes", 0, "kind"], "kick", "toss, pass, attack"),
     (["passes", 0, "bounces"], -1, "from 0 to 5"),

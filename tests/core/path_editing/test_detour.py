@@ -6,7 +6,7 @@ import pytest
 from beyond_mocap.base.errors import InputError
 from beyond_mocap.motion.path.arc_length import ArcLength
 from beyond_mocap.motion.path.path import PolynomialPath
-from beyond_mocap.path_editing.detour import RISE, add_detours, compute_detour_width, compute_offsets
+from beyond_mocap.path_editing.detour import RISE, PathChange, add_detours, compute_detour_width, compute_offsets
 from beyond_mocap.path_editing.path_line import fit_line
 
 
@@ -96,3 +96,12 @@ def test_gentle_means_what_it_says(speed, radius):
 def test_a_detour_of_a_walk_costs_the_metres_that_it_is_longer():
     path = straight()
     assert ArcLength(add_detours(path, [(10.0, 6.0, 0.5)])).length > ArcLength(path).length + 0.05
+
+
+def test_a_change_is_described_once_and_within_the_path():
+    change = PathChange(0.5, ((-1.0, 4.0, 0.4), (1.5, 4.0, 0.4), (10.0, 3.0, -0.25)))
+    assert change.describe(11.0) == [
+        "waits 0.50 s", "moves 0.40 m to the left from 0.0 to 3.5 m of the path",
+        "moves 0.25 m to the right from 8.5 to 11.0 m of the path",
+    ]  # fmt: skip
+    assert PathChange().describe() == []

@@ -41,7 +41,7 @@ def test_points_in_the_order_of_their_rows(tmp_path, content, points):
     (b"x_m;y_m\n0;0\n1.234,5;0\n", ":3: x_m '1.234,5'"),
     (b"x_m;y_m\n0;0\n1,2,3;0\n", ":3: x_m '1,2,3'"),
     (b"x_m,y_m\n", "0 points"),
-    (b"x_m,y_m\n1,2\n", "1 points"),
+    (b"x_m,y_m\n1,2\n", "1 point;"),
     (b"x_m,y_m\n1,2\n1,2\n1,2\n", "3 points, all at one place"),
     (b"x_m,y_m\n1,2\n1,abc\n", ":3: y_m 'abc'"),
     (b"x_m,y_m\n1,2\n1,\n", ":3: y_m ''"),

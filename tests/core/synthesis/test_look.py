@@ -2,6 +2,7 @@
 
 import importlib.util
 import pathlib
+import sys
 from dataclasses import replace
 
 import numpy as np
@@ -18,8 +19,6 @@ TAKE = SAMPLE / "library" / "walking_1_2.bvh"
 def look():
     spec = importlib.util.spec_from_file_location("look", SAMPLE / "look.py")
     module = importlib.util.module_from_spec(spec)
-    import sys
-
     sys.modules["look"] = module  # dataclasses look their module up
     spec.loader.exec_module(module)
     return module
@@ -46,6 +45,13 @@ def test_every_camera_draws_every_moment(look, tmp_path, camera, size):
     asked = ["--camera", camera, "--from", "0", "--to", "0.6", "--every", "0.2", "--columns", "2", "--tile", "80"]
     assert look.main([str(TAKE), "--out", str(tmp_path / "sheet.png"), *asked]) == 0
     assert Image.open(tmp_path / "sheet.png").size == size
+
+
+def test_without_pillow_one_line_says_what_to_do(look, tmp_path, capsys, monkeypatch):
+    monkeypatch.setitem(sys.modules, "PIL", None)
+    assert look.main([str(TAKE), "--out", str(tmp_path / "sheet.png")]) == 2
+    assert capsys.readouterr().err.endswith("Pillow is not installed; expected Pillow for the picture; "
+                                            "pip install pillow\n")
 
 
 def test_bad_input_is_told_in_one_line(look, tmp_path, capsys):

@@ -26,13 +26,13 @@ def test_mistakes_name_their_line(tmp_path, row, part):
     file.write_text(HEADER + "2.5,left_hand,1,2,1.4,0.5\n" + row + "\n", encoding="utf-8")
     with pytest.raises(InputError, match="pins.csv:3") as caught:
         read_pins(file)
-    assert part in str(caught.value) and "\n" not in str(caught.value)
+    assert part in str(caught.value) and "\n" not in str(caught.value) and "; correct the " in str(caught.value)
 
 
 def test_a_table_without_its_columns_is_refused(tmp_path):
     file = tmp_path / "pins.csv"
     file.write_text("time_s,part\n", encoding="utf-8")
-    with pytest.raises(InputError, match="no column x_m, y_m, z_m"):
+    with pytest.raises(InputError, match="no column x_m, y_m, z_m; expected .+; add the columns"):
         read_pins(file)
 
 

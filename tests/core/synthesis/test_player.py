@@ -105,9 +105,8 @@ def test_clips_of_a_style_are_taken_rather_than_others(clip_file, track_of, tmp_
         take = synthesize(library, Plan(track=track, style=(folder,), method=method))
         shown = np.array(take.clips)[take.clip]
         assert np.mean(np.char.startswith(shown, folder)) > 0.9
-    assert "style 'c': the library has no such label, folder or clip" in synthesize(
-        library, Plan(track=track, style=("c",), method=method)
-    ).warnings
+    with pytest.raises(InputError, match="style: 'c'; expected .+; nearest: a, b, walk"):
+        synthesize(library, Plan(track=track, style=("a", "c"), method=method))
 
 
 def test_folders_clips_and_patterns_name_clips():

@@ -178,7 +178,7 @@ def test_networks_are_asked_only_for_what_is_near_what_they_know(example, model)
 def test_networks_that_lose_the_body_are_told_in_a_line(example, model, answer):
     lost = {name: by_heart(rows) for name, rows in build_training_set([example], model.settings).items()}
     object.__setattr__(lost["hip"], "said", np.full_like(lost["hip"].said, answer))
-    with pytest.raises(InputError, match="an invalid body in frame 1"):
+    with pytest.raises(InputError, match="an invalid pose in frame 1"):
         generate_motion(replace(model, networks=lost), build_description(example), options=PLAIN)
 
 

@@ -166,7 +166,7 @@ def test_a_target_under_the_ground_is_told(model):
 def test_networks_that_answer_no_numbers_are_told(model):
     networks = {name: replace(one, weights=tuple(6e30 * each for each in one.weights))
                 for name, one in model.networks.items()}  # fmt: skip
-    with pytest.raises(InputError, match="an invalid body"):
+    with pytest.raises(InputError, match="an invalid pose"):
         throw_at(replace(model, networks=networks), ThrowRequest((9.0, 0.0, 1.0)))
 
 
