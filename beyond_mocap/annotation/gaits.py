@@ -119,7 +119,7 @@ def choose_gaits(
 def compute_heading_offset(track: SampledTrack) -> np.ndarray:
     """Compute the angle from the direction of travel to the heading that the body should have.
 
-    The heading is the ball's direction, limited to what legs allow at that speed: any angle below 0.8 m/s, none from 6
+    Where the heading is planned, this is the plan's. Else it is the ball's direction, limited to what legs allow at that speed: any angle below 0.8 m/s, none from 6
     m/s on. It is zero where the ball is unknown, and near the player's own feet, where they follow it along their path.
 
     Args:
@@ -127,6 +127,8 @@ def compute_heading_offset(track: SampledTrack) -> np.ndarray:
     Returns:
         (T,) radians, counterclockwise, -pi to pi.
     """
+    if track.heading is not None:
+        return quaternion.wrap_angle(track.heading - track.direction)
     ball_offset = track.ball[:, :2] - track.positions
     known = np.isfinite(ball_offset).all(axis=1)
     distance = np.linalg.norm(np.where(known[:, None], ball_offset, 1.0), axis=1)

@@ -18,6 +18,7 @@ from ..library.automatic_locomotion import build_automatic_labels
 from ..library.keys import select_keys
 from ..motion.contacts import measure_floor_height
 from ..motion.track import sample_track, smooth_zero_phase_hann
+from ..synthesis.heading_plan import plan_track
 from ..synthesis.quality import movement
 from ..synthesis.quality.moments import (
     KeyMomentResult,
@@ -270,7 +271,7 @@ def fill_automatic_spans(view: View) -> Timeline:
         gaits = library.gaits
     except InputError:
         return view.timeline
-    sampled = sample_track(view.track, library.fps)
+    sampled = plan_track(sample_track(view.track, library.fps))
     thresholds = library.gait_thresholds
     gait_index = choose_gaits(sampled.speed, sampled.fps, [gait.speed for gait in gaits], thresholds)
     return fill_timeline(view.timeline, sampled.times, build_automatic_labels(library, gait_index, sampled))

@@ -258,7 +258,7 @@ def solve_heading(track: SampledTrack, source: SourceMotion, given: np.ndarray |
         (T,) rad, unwrapped.
     """
     firm = compute_turning_firmness(source.heel_toe_contacts, source.height, track.fps)
-    aim = track.direction + compute_heading_offset(track) if track.heading is None else track.heading
+    aim = track.direction + compute_heading_offset(track)
     return fit_heading(track.direction, track.speed, source.velocity, source.turn, given, firm=firm, aim=aim, plan=track.heading)
 
 

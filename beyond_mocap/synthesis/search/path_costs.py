@@ -86,6 +86,7 @@ TERMS = {
     "lift": "lifts a foot where the player stands",
     "turn": "turning differs from the track",
     "facing": "faces another direction",
+    "drag": "feet on the ground are dragged",
     "words": "requested labels that the clip lacks",
     "unasked": "an action not requested, or no labels at all",
     "strange": "not how people stand, walk or run in this library",
@@ -115,6 +116,7 @@ class Weights:
         turn: per radian and slot.
         lift: for a slot without both feet on the ground where the track rests.
         facing: per m/s of missed velocity in the body's frame beyond the missed speed.
+        slide: per (m/s)^2 of missed velocity, by which a foot on the ground is dragged.
         words: for lacking all requested labels.
         unasked: for frames of an action that is not requested, or that carry no label.
         strange: per radius outside of the library's normal locomotion.
@@ -138,6 +140,7 @@ class Weights:
     turn: float = 1.0
     lift: float = 1.0
     facing: float = 1.0
+    slide: float = 0.7
     words: float = 0.3
     unasked: float = 2.0
     strange: float = 0.6
@@ -145,9 +148,9 @@ class Weights:
     synthetic_key: float = 0.8
     rate: float = 0.24
     stretch: float = 4.0
-    switch: float = 0.4
+    switch: float = 0.5
     other: float = 0.4
-    young: float = 0.6
+    young: float = 0.9
     pose: float = 3.0
     feet: float = 1.5
     wild: float = 0.3
@@ -198,8 +201,7 @@ class PathCosts:
         self.reuse_cost = compute_reuse_cost(library, used) if used else None
         self.bone_distance = bone_distance
         self.frames, self.index = library.frames, CandidateIndex.for_library(library, request.allowed)
-        track = request.track
-        self.wanted_offset = compute_heading_offset(track) if track.heading is None else track.heading - track.direction
+        self.wanted_offset = compute_heading_offset(request.track)
         self._rate_cost = (weights.rate * np.abs(PLAYBACK_RATES - 1.0)).astype(np.float32)
         self._cached_costs: dict[tuple[frozenset[str], frozenset[str]], np.ndarray] = {}
         self._cached_motion: dict[tuple[int, int], tuple[float, float]] = {}
@@ -378,7 +380,9 @@ class PathCosts:
         # what the velocity in the body's frame misses beyond its speed: sideways or backward for forward
         aside = offset - np.float32(self.wanted_offset[(first + end) // 2])
         across = 2.0 * np.float32(wanted_speed) * speed * (1.0 - np.cos(aside))
-        yield "facing", w.facing * (np.sqrt(missed * missed + across) - missed)
+        whole = np.sqrt(missed * missed + across)
+        yield "facing", w.facing * (whole - missed)
+        yield "drag", w.slide * whole * whole
 
     def iter_cut_terms(self, ends: np.ndarray, start: np.ndarray) -> Iterator[Term]:
         """Generate the terms of cuts between library frames, by name, each (B, K) or broadcast to it.
