@@ -20,6 +20,9 @@ REST_HALF_DIAGONAL = 0.10
 """Metres from the middle to a corner of the box of a stand. Tracks of standing players wander by 8 cm; with 14 cm the
 root was 12.7 cm off at the 95th percentile below 1 m/s, beyond the 12 cm that are allowed."""
 
+LEAVE_DISTANCE = 0.12
+"""Metres from a stand's middle at which a body leaves it, or comes to it."""
+
 MIN_REST_SECONDS = 0.6
 """Shortest stand; shorter ones are turning points of a walk."""
 
@@ -68,8 +71,19 @@ def relax_positions(fast: np.ndarray, positions: np.ndarray, fps: float) -> np.n
     share = share * share * (3.0 - 2.0 * share)
     mixed = share * fast + (1.0 - share) * smooth_zero_phase_hann(positions, fps, SLOW_WINDOW)
     rest = np.zeros_like(mixed)
-    for first, end in find_rests(mixed, fps):
+    rests = find_rests(mixed, fps)
+    bounds = [0, *(edge for rest_ in rests for edge in rest_), len(mixed)]
+    for number, (first, end) in enumerate(rests):
         middle = 0.5 * (mixed[first:end].min(axis=0) + mixed[first:end].max(axis=0))
+        # a body stays until its track has really gone somewhere
+        near = np.linalg.norm(mixed - middle, axis=1) <= LEAVE_DISTANCE
+        low, high = bounds[2 * number], bounds[2 * number + 3]
+        before, after = np.flatnonzero(~near[low:first]), np.flatnonzero(~near[end:high])
+        first = low + int(before[-1]) + 1 if len(before) else low
+        end = end + int(after[0]) if len(after) else high
+        if number and rests[number - 1][1] > first:
+            first = (rests[number - 1][1] + rests[number][0]) // 2 if False else max(first, rests[number - 1][1])
+        rests[number] = first, end
         rest[first:end] = middle - mixed[first:end]
     return mixed + smooth_zero_phase_hann(rest, fps, _FADE_SECONDS)
 

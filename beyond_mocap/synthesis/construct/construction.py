@@ -34,7 +34,7 @@ from ..take import KeyResult
 from .edit_blending import OldMotion
 from .extra_steps import Steps, add_steps
 from .gaze import follow_with_gaze, twist_shoulders
-from .settling import SPEEDS, measure_foot_moves, settle_on_track
+from .settling import SPEEDS, measure_foot_moves, measure_rest, settle_on_track
 from .strike import Touch, strike_ball
 from .track_following import (
     absorb_foot_slide,
@@ -258,6 +258,8 @@ def solve_heading(track: SampledTrack, source: SourceMotion, given: np.ndarray |
         (T,) rad, unwrapped.
     """
     firm = compute_turning_firmness(source.heel_toe_contacts, source.height, track.fps)
+    if track.heading is not None:
+        firm = firm * measure_rest(source, track.speed)
     aim = track.direction + compute_heading_offset(track)
     return fit_heading(track.direction, track.speed, source.velocity, source.turn, given, firm=firm, aim=aim, plan=track.heading)
 

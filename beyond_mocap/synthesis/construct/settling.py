@@ -30,6 +30,7 @@ RETURN_SECONDS = (20.0, 0.5, 0.03)
 FREE_DISTANCE = 0.06
 """Metres that a slow body may stay off its planned place, of the 12 cm off the track that are allowed below 1 m/s."""
 
+REST_FIRMNESS = 40.0  # how many times firmer than in a step both feet hold a slow body
 _HELD_SECONDS = 0.1  # how soon it returns from beyond that
 _ROUNDS = 3  # of holding what is beyond
 # Weights of the recording's own move and turn against a metre of a foot in contact: they decide only what feet leave open.
@@ -70,6 +71,15 @@ def measure_foot_moves(skeleton: Skeleton, source: SourceMotion, fps: float) -> 
     return found[:, :2], found[:, 2]
 
 
+def measure_rest(source: SourceMotion, speed: np.ndarray) -> np.ndarray:
+    """Measure how firmly feet hold a body: (T,) REST_FIRMNESS where a slow one has both on the ground, 1 elsewhere.
+
+    What has to be made up for is left to the steps, where it is not seen.
+    """
+    slow = np.interp(speed, SPEEDS[:2], (1.0, 0.0))
+    return 1.0 + (REST_FIRMNESS - 1.0) * slow * source.heel_toe_contacts.any(axis=2).all(axis=1)
+
+
 def settle_on_track(track: SampledTrack, source: SourceMotion, moves: np.ndarray, heading: np.ndarray) -> SampledTrack:
     """Let a slow body move as its feet carry it, near its track.
 
@@ -87,9 +97,10 @@ def settle_on_track(track: SampledTrack, source: SourceMotion, moves: np.ndarray
     # the root with its sway is what feet carry
     planned = add_sway(track.positions, source.sway, heading)
     seconds = np.interp(track.speed, SPEEDS, RETURN_SECONDS)
+    firm = measure_rest(source, track.speed)[1:]
     weight, goal, root = (seconds * track.fps) ** -2.0, planned, planned
     for _ in range(_ROUNDS + 1):
-        root = _follow_steps(steps, weight, goal)
+        root = _follow_steps(steps, firm, weight, goal)
         off = root - planned
         away = np.linalg.norm(off, axis=1)
         beyond = away > FREE_DISTANCE
@@ -100,12 +111,11 @@ def settle_on_track(track: SampledTrack, source: SourceMotion, moves: np.ndarray
     return replace(track, positions=track.positions + moved, raw=track.raw + moved)
 
 
-def _follow_steps(steps: np.ndarray, weight: np.ndarray, goal: np.ndarray) -> np.ndarray:
-    """Solve for places (T, 2) that move by steps (T - 1, 2) and stay near goals (T, 2) by their weights (T,)."""
+def _follow_steps(steps: np.ndarray, firm: np.ndarray, weight: np.ndarray, goal: np.ndarray) -> np.ndarray:
+    """Solve for places (T, 2) that move by steps (T - 1, 2) with weights firm (T - 1,), near goals with weight (T,)."""
     squares = BandedLeastSquares(len(goal), reach=1, columns=2)
     squares.add_value(weight, goal=goal)
-    ones = np.ones(len(steps))
-    squares.add_difference(1, ones)
-    squares.right[1:] += steps
-    squares.right[:-1] -= steps
+    squares.add_difference(1, firm)
+    squares.right[1:] += firm[:, None] * steps
+    squares.right[:-1] -= firm[:, None] * steps
     return squares.solve()

@@ -31,8 +31,9 @@ _ABOVE = 1.25
 _ROUNDING = 1e-3  # m/s, for float32 speeds
 
 _CONTINUITY = ("switch", "other", "young", "pose", "rate_change")
+FREE_SPEED, FREE_TURN, FREE_ASIDE = (0.05, 0.06), np.radians(5.0), np.float32(np.radians(12.0))
 RESTING_SPEED = 0.15  # m/s of a track from which on a lifted foot costs nothing
-YOUNG_SLOTS = 6  # slots after a cut in which another one costs more: 1.6 s, since a person keeps a gait for longer
+YOUNG_SLOTS = 8  # slots after a cut in which another one costs more: 2.1 s, since a person keeps a gait for longer
 
 
 def find_cheapest(
@@ -72,7 +73,7 @@ def _find_promising(cost_of, speeds: np.ndarray, speed: float, weight: float, ne
     if near.stop - near.start > 4 * _SAMPLED * rank and weight > 0.0:
         # cost / weight bounds the missed speed, so the cheapest pairs lie within `reach` of the requested speed
         upper_bound = np.partition(cost_of(slice(near.start, near.stop, _SAMPLED)), rank)[rank]
-        reach = float(upper_bound) / weight + _ROUNDING
+        reach = float(upper_bound) / weight + FREE_SPEED[0] + FREE_SPEED[1] * speed + _ROUNDING
         low, high = np.searchsorted(speeds, [speed - reach, speed + reach])
         part = slice(max(int(low), near.start), min(int(high), near.stop))
         cost = cost_of(part)
@@ -140,7 +141,7 @@ class Weights:
     turn: float = 1.0
     lift: float = 1.0
     facing: float = 1.0
-    slide: float = 0.7
+    slide: float = 1.2
     words: float = 0.3
     unasked: float = 2.0
     strange: float = 0.6
@@ -148,9 +149,9 @@ class Weights:
     synthetic_key: float = 0.8
     rate: float = 0.24
     stretch: float = 4.0
-    switch: float = 0.5
+    switch: float = 0.6
     other: float = 0.4
-    young: float = 0.9
+    young: float = 1.0
     pose: float = 3.0
     feet: float = 1.5
     wild: float = 0.3
@@ -372,13 +373,15 @@ class PathCosts:
         wanted_speed, wanted_turn = self.requested_motion(first, end)
         w = self.weights
         missed = np.abs(speed - wanted_speed)
-        yield "speed", missed * (w.speed + w.drag * long_stance)
+        free = FREE_SPEED[0] + FREE_SPEED[1] * wanted_speed
+        yield "speed", np.maximum(missed - free, 0.0) * (w.speed + w.drag * long_stance)
         resting = 1.0 - wanted_speed / RESTING_SPEED
         if resting > 0.0:
             yield "lift", np.float32(w.lift * resting) * lifted
-        yield "turn", w.turn * np.abs(turn - wanted_turn)
+        yield "turn", w.turn * np.maximum(np.abs(turn - wanted_turn) - FREE_TURN, 0.0)
         # what the velocity in the body's frame misses beyond its speed: sideways or backward for forward
-        aside = offset - np.float32(self.wanted_offset[(first + end) // 2])
+        aside = np.abs(offset - np.float32(self.wanted_offset[(first + end) // 2]))
+        aside = np.maximum(np.minimum(aside, 2.0 * np.pi - aside) - FREE_ASIDE, 0.0)
         across = 2.0 * np.float32(wanted_speed) * speed * (1.0 - np.cos(aside))
         whole = np.sqrt(missed * missed + across)
         yield "facing", w.facing * (whole - missed)
