@@ -30,7 +30,7 @@ RETURN_SECONDS = (20.0, 0.5, 0.03)
 FREE_DISTANCE = 0.06
 """Metres that a slow body may stay off its planned place, of the 12 cm off the track that are allowed below 1 m/s."""
 
-REST_FIRMNESS = 40.0  # how many times firmer than in a step both feet hold a slow body
+REST_FIRMNESS = 150.0  # how many times firmer than in a step both feet hold a slow body
 _HELD_SECONDS = 0.1  # how soon it returns from beyond that
 _ROUNDS = 3  # of holding what is beyond
 # Weights of the recording's own move and turn against a metre of a foot in contact: they decide only what feet leave open.

@@ -27,7 +27,7 @@ from ...motion.track import SampledTrack, smooth_zero_phase_hann
 from .strike import Touch
 
 TURN_WEIGHT = 12.0  # weight of the recording's own turning per frame, against the direction of travel
-MAX_OFF_PLAN = np.radians(20.0)
+MAX_OFF_PLAN = np.radians(25.0)
 PLAN_SPEEDS, PLAN_WEIGHTS = (0.1, 0.5, 1.1), (1e-5, 0.02, 0.05)
 AIRBORNE_FIRMNESS = 40.0  # factor on it where the body flies, lies or kneels and so cannot turn at will
 _FLIGHT_SECONDS = 0.3  # s without a foot on the ground that count as flight; the flights of running are shorter
