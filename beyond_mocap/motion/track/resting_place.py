@@ -8,10 +8,12 @@ in the middle of that box.
 from __future__ import annotations
 
 from collections import deque
+from collections.abc import Iterator
 from dataclasses import replace
 
 import numpy as np
 
+from ...base.easing import smoothstep
 from ...base.time_series import find_runs
 from .data import SampledTrack
 from .sampling import compute_travel_direction, smooth_zero_phase_hann
@@ -35,57 +37,53 @@ _FADE_SECONDS = 0.5  # s over which a body comes to rest
 def relax_track(track: SampledTrack) -> SampledTrack:
     """Let the body of a track rest where the track hardly moves.
 
-    Above 1 m/s nothing changes; below, positions pass through a plain window of 1.6 s, and are constant in stands. `raw`
-    moves by as much, since the body is held to it.
+    Above 1 m/s nothing changes; below, positions pass through a plain window of 1.6 s, and are constant in stands.
 
     Args:
         track: T frames.
     Returns:
-        The same with other positions and what follows from them.
+        The same with other positions and what follows from them; `raw` has them too, since the body is held to it.
     """
     if len(track) < 3:
         return track
     positions = relax_positions(track.positions, track.raw, track.fps)
     velocity = np.gradient(positions, 1.0 / track.fps, axis=0, edge_order=2)
-    # what is left of the measurement's jitter fades with the speed too
-    rest = np.linalg.norm(positions - track.positions, axis=1, keepdims=True)
-    raw = np.where(rest > 0.0, positions, track.raw)
+    raw = np.where(np.any(positions != track.positions, axis=1, keepdims=True), positions, track.raw)
     return replace(track, positions=positions, raw=raw, velocity=velocity, speed=np.linalg.norm(velocity, axis=1),
                    direction=compute_travel_direction(velocity, track.fps))
 
 
-def relax_positions(fast: np.ndarray, positions: np.ndarray, fps: float) -> np.ndarray:
+def relax_positions(fast: np.ndarray, measured: np.ndarray, fps: float) -> np.ndarray:
     """Smooth slow positions more, and let a body rest where they hardly move.
 
     Args:
         fast: (T, 2) m, smoothed for a moving body (`sampling.smooth_positions`).
-        positions: (T, 2) m, as measured.
+        measured: (T, 2) m, as measured.
         fps: frames per second.
     Returns:
         (T, 2) m.
     """
-    velocity = np.gradient(smooth_zero_phase_hann(positions, fps, FAST_WINDOW), 1.0 / fps, axis=0)
+    velocity = np.gradient(smooth_zero_phase_hann(measured, fps, FAST_WINDOW), 1.0 / fps, axis=0)
     speed = smooth_zero_phase_hann(np.linalg.norm(velocity, axis=1)[:, None], fps, _SPEED_WINDOW)
-    low, high = _MIXED_SPEEDS
-    share = np.clip((speed - low) / (high - low), 0.0, 1.0)
-    share = share * share * (3.0 - 2.0 * share)
-    mixed = share * fast + (1.0 - share) * smooth_zero_phase_hann(positions, fps, SLOW_WINDOW)
-    rest = np.zeros_like(mixed)
-    rests = find_rests(mixed, fps)
-    bounds = [0, *(edge for rest_ in rests for edge in rest_), len(mixed)]
+    share = smoothstep((speed - _MIXED_SPEEDS[0]) / (_MIXED_SPEEDS[1] - _MIXED_SPEEDS[0]))
+    mixed = share * fast + (1.0 - share) * smooth_zero_phase_hann(measured, fps, SLOW_WINDOW)
+    to_rest = np.zeros_like(mixed)
+    for first, end, middle in _extend_rests(mixed, find_rests(mixed, fps)):
+        to_rest[first:end] = middle - mixed[first:end]
+    return mixed + smooth_zero_phase_hann(to_rest, fps, _FADE_SECONDS)
+
+
+def _extend_rests(positions: np.ndarray, rests: list[tuple[int, int]]) -> Iterator[tuple[int, int, np.ndarray]]:
+    """Extend each rest to where the positions have really gone somewhere: first frame, end, and middle (2,) m."""
+    free_from = 0
     for number, (first, end) in enumerate(rests):
-        middle = 0.5 * (mixed[first:end].min(axis=0) + mixed[first:end].max(axis=0))
-        # a body stays until its track has really gone somewhere
-        near = np.linalg.norm(mixed - middle, axis=1) <= LEAVE_DISTANCE
-        low, high = bounds[2 * number], bounds[2 * number + 3]
-        before, after = np.flatnonzero(~near[low:first]), np.flatnonzero(~near[end:high])
-        first = low + int(before[-1]) + 1 if len(before) else low
-        end = end + int(after[0]) if len(after) else high
-        if number and rests[number - 1][1] > first:
-            first = (rests[number - 1][1] + rests[number][0]) // 2 if False else max(first, rests[number - 1][1])
-        rests[number] = first, end
-        rest[first:end] = middle - mixed[first:end]
-    return mixed + smooth_zero_phase_hann(rest, fps, _FADE_SECONDS)
+        middle = 0.5 * (positions[first:end].min(axis=0) + positions[first:end].max(axis=0))
+        free_until = rests[number + 1][0] if number + 1 < len(rests) else len(positions)
+        away = np.linalg.norm(positions - middle, axis=1) > LEAVE_DISTANCE
+        gone_before, gone_after = np.flatnonzero(away[free_from:first]), np.flatnonzero(away[end:free_until])
+        begin = free_from + int(gone_before[-1]) + 1 if len(gone_before) else free_from
+        free_from = end + int(gone_after[0]) if len(gone_after) else free_until
+        yield begin, free_from, middle
 
 
 def find_rests(positions: np.ndarray, fps: float, half_diagonal: float = REST_HALF_DIAGONAL,

@@ -19,7 +19,6 @@ import numpy as np
 
 from ...annotation import sort_labels
 from ...annotation.ball_contact import find_striking_part
-from ...annotation.gaits import compute_heading_offset
 from ...library.library import Library
 from ...motion import quaternion
 from ...motion.foot_plant import PlantResult, plant_feet
@@ -260,8 +259,7 @@ def solve_heading(track: SampledTrack, source: SourceMotion, given: np.ndarray |
     firm = compute_turning_firmness(source.heel_toe_contacts, source.height, track.fps)
     if track.heading is not None:
         firm = firm * measure_rest(source, track.speed)
-    aim = track.direction + compute_heading_offset(track)
-    return fit_heading(track.direction, track.speed, source.velocity, source.turn, given, firm=firm, aim=aim, plan=track.heading)
+    return fit_heading(track.direction, track.speed, source.velocity, source.turn, given, firm=firm, plan=track.heading)
 
 
 def find_touches(library: Library, fps: float, edit: EditList, keys: tuple[KeyResult, ...]) -> tuple[Touch, ...]:

@@ -9,7 +9,6 @@ where its feet would slide.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
 
 import numpy as np
 
@@ -23,20 +22,21 @@ from ...motion.foot_plant import compute_contact_weights
 from ...motion.humanoid import identify_joints
 from ...motion.motion import compute_pose, compute_world_rotation
 from ...motion.skeleton import Skeleton
-from ...motion.track import SampledTrack, smooth_zero_phase_hann
+from ...motion.track import smooth_zero_phase_hann
 from .strike import Touch
 
 TURN_WEIGHT = 12.0  # weight of the recording's own turning per frame, against the direction of travel
-MAX_OFF_PLAN = np.radians(25.0)
-PLAN_SPEEDS, PLAN_WEIGHTS = (0.1, 0.5, 1.1), (1e-5, 0.02, 0.05)
 AIRBORNE_FIRMNESS = 40.0  # factor on it where the body flies, lies or kneels and so cannot turn at will
 _FLIGHT_SECONDS = 0.3  # s without a foot on the ground that count as flight; the flights of running are shorter
 _LOW = 0.6  # share of the usual height of the hips below which a body lies or kneels
 IN_PLACE_SPEED = 0.3  # m/s below which a direction of travel says nothing about the heading
 
-FAINT_AIM_WEIGHT, AIM_WEIGHT = 1e-4, 0.004
-"""Weights of the pull to where a body in place would turn: at any speed, and at rest (half of the turn in 1.3 s)."""
+MAX_OFF_PLAN = np.radians(25.0)  # of the heading, from the plan: with more a body that turns its back passes as planned
+PLAN_SPEEDS, PLAN_WEIGHTS = (0.1, 0.5, 1.1), (1e-5, 0.02, 0.05)
+"""Weights of the plan by the track's speed, m/s: a body at rest turns as its recording does, within MAX_OFF_PLAN."""
 
+_HELD_ROUNDS = 3  # of holding what is beyond MAX_OFF_PLAN
+FAINT_WEIGHT = 1e-4  # weight of that pull at any speed, so that there is one solution
 GIVEN_HEADING_WEIGHT = 1e6  # weight of a given heading, so large that it stays
 ROOT_WINDOW = 1.5  # s, the window through which the root lies on the track
 
@@ -63,13 +63,13 @@ _ROOT_X, _ROOT_Y, _TURN, _UNKNOWNS = 0, 1, 2, 3
 
 def fit_heading(
     direction: np.ndarray, speed: np.ndarray, velocity: np.ndarray, turn: np.ndarray, given: np.ndarray | None = None,
-    firm: np.ndarray | float = 1.0, aim: np.ndarray | None = None, plan: np.ndarray | None = None,
+    firm: np.ndarray | float = 1.0, plan: np.ndarray | None = None,
 ) -> np.ndarray:
     """Solve the heading: the least squares compromise between travel and the recording's own turning.
 
     At speed the body keeps the recording's angle to the direction of travel; where either is in place there is no such
-    angle and the recording's turning decides, with a little of `aim`. Every term is quadratic, so the whole is one
-    tridiagonal system.
+    angle and the recording's turning decides, near the plan where there is one. Every term is quadratic, so the whole
+    is one tridiagonal system.
 
     Args:
         direction: (T,) rad, of travel on the track.
@@ -78,7 +78,7 @@ def fit_heading(
         turn: (T,) rad that the recording turned since the frame before.
         given: (T,) rad that the heading has to be, NaN where it is free.
         firm: (T,) how many times firmer than usual the recording's turning is followed (`compute_turning_firmness`).
-        aim: (T,) rad that a body in place turns to slowly.
+        plan: (T,) rad, unwrapped, near which the heading stays; None without a plan.
     Returns:
         (T,) rad, unwrapped.
     """
@@ -86,16 +86,16 @@ def fit_heading(
     goal = direction - arctan2(velocity[:, 1], velocity[:, 0])
     trust = _motion_weight(speed) ** 2 * _motion_weight(np.linalg.norm(velocity, axis=1)) ** 2
     if plan is not None:
-        return follow_plan(plan, goal, trust, speed, turn, given, firm)
-    goal, trust = _add_aim(goal, trust, speed, aim, turn)
+        return follow_plan(plan, goal, trust, speed=speed, turn=turn, given=given, firm=firm)
+    trust = trust + FAINT_WEIGHT
     if given is not None:
         goal, trust = np.where(np.isnan(given), goal, given), np.where(np.isnan(given), trust, GIVEN_HEADING_WEIGHT)
     return follow_turning(_unwrap_to_turn(goal, turn), trust, turn, firm)
 
 
 def follow_plan(
-    plan: np.ndarray, goal: np.ndarray, trust: np.ndarray, speed: np.ndarray, turn: np.ndarray,
-    given: np.ndarray | None, firm: np.ndarray | float,
+    plan: np.ndarray, goal: np.ndarray, trust: np.ndarray, *, speed: np.ndarray, turn: np.ndarray,
+    given: np.ndarray | None = None, firm: np.ndarray | float = 1.0,
 ) -> np.ndarray:
     """Solve the heading near a plan: a body at rest turns as its recording does, within the plan's own dead zone.
 
@@ -118,7 +118,7 @@ def follow_plan(
         goal = np.where(np.isnan(given), goal, given - turns)
         trust = np.where(np.isnan(given), trust, GIVEN_HEADING_WEIGHT)
     heading = follow_turning(goal, trust, turn, firm)
-    for _ in range(3):
+    for _ in range(_HELD_ROUNDS):
         away = heading - plan
         beyond = (np.abs(away) > MAX_OFF_PLAN) & (trust < GIVEN_HEADING_WEIGHT)
         goal = np.where(beyond, plan + np.sign(away) * MAX_OFF_PLAN, goal)
@@ -169,16 +169,6 @@ def compute_turning_firmness(heel_toe_contacts: np.ndarray, height: np.ndarray, 
 def _motion_weight(speed: np.ndarray) -> np.ndarray:
     """Compute how much a velocity says about where a body moves: (T,) 0 in place, 1 from 1 m/s on."""
     return np.clip((speed - IN_PLACE_SPEED) / (1.0 - IN_PLACE_SPEED), 0.0, 1.0)
-
-
-def _add_aim(goal: np.ndarray, trust: np.ndarray, speed: np.ndarray, aim: np.ndarray | None, turn: np.ndarray):
-    """Add the pull towards `aim` to goals (T,) and their weights; it has an effect only where little else is known."""
-    if aim is None:
-        return goal, trust + FAINT_AIM_WEIGHT
-    pull = FAINT_AIM_WEIGHT + AIM_WEIGHT * np.clip(1.0 - speed, 0.0, 1.0) ** 2
-    goal, aim = _unwrap_to_turn(goal, turn), _unwrap_to_turn(aim, turn)
-    aim = aim + 2.0 * np.pi * np.round((goal - aim) / (2.0 * np.pi))
-    return (trust * goal + pull * aim) / (trust + pull), trust + pull
 
 
 def _unwrap_to_turn(goal: np.ndarray, turn: np.ndarray) -> np.ndarray:
@@ -382,6 +372,6 @@ def absorb_foot_slide(
                 squares.add_terms(stencil, weight, -moves[:, axis])
     for axis, kind in ((_ROOT_X, 0), (_ROOT_Y, 0), (_TURN, 1)):
         squares.add_difference(3, _STIFF[kind] / scale**4, axis)
-        squares.add_value(_STAY[kind] * scale**2 , axis)
+        squares.add_value(_STAY[kind] * scale**2, axis)
     found = squares.solve()
     return found[:, :2], found[:, _TURN]
