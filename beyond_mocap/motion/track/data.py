@@ -93,6 +93,7 @@ class SampledTrack:
         ball_measured: (T,) bool, False between samples too far apart.
         fps: frames per second.
         heading: (T,) rad from +x where the body should face, None where that is not planned.
+        leeway: (T,) m that a slow body may stay off the positions, None where those are not relaxed.
     """
 
     times: np.ndarray
@@ -106,14 +107,16 @@ class SampledTrack:
     ball_measured: np.ndarray
     fps: float
     heading: np.ndarray | None = None
+    leeway: np.ndarray | None = None
 
     def __post_init__(self):
         for name in ("times", "positions", "raw", "velocity", "speed", "direction", "ball"):
             object.__setattr__(self, name, freeze_array(getattr(self, name)))
         for name in ("valid", "ball_measured"):
             object.__setattr__(self, name, freeze_array(getattr(self, name), bool))
-        if self.heading is not None:
-            object.__setattr__(self, "heading", freeze_array(self.heading))
+        for name in ("heading", "leeway"):
+            if getattr(self, name) is not None:
+                object.__setattr__(self, name, freeze_array(getattr(self, name)))
 
     def __len__(self) -> int:
         return len(self.times)

@@ -22,8 +22,14 @@ REST_HALF_DIAGONAL = 0.10
 """Metres from the middle to a corner of the box of a stand. Tracks of standing players wander by 8 cm; with 14 cm the
 root was 12.7 cm off at the 95th percentile below 1 m/s, beyond the 12 cm that are allowed."""
 
-LEAVE_DISTANCE = 0.12
+LEAVE_DISTANCE = 0.10
 """Metres from a stand's middle at which a body leaves it, or comes to it."""
+
+MOST_DISTANCE = 0.12
+"""Metres from the smoothed track that a body stays within, also where a sharp turn of the track is smoothed away."""
+
+LEAST_LEEWAY, MOST_LEEWAY = 0.01, 0.05
+"""Metres that a body may always stay off its planned place so that its feet rest, and that it may at most."""
 
 MIN_REST_SECONDS = 0.6
 """Shortest stand; shorter ones are turning points of a walk."""
@@ -49,8 +55,10 @@ def relax_track(track: SampledTrack) -> SampledTrack:
     positions = relax_positions(track.positions, track.raw, track.fps)
     velocity = np.gradient(positions, 1.0 / track.fps, axis=0, edge_order=2)
     raw = np.where(np.any(positions != track.positions, axis=1, keepdims=True), positions, track.raw)
+    used = np.linalg.norm(positions - track.positions, axis=1)
     return replace(track, positions=positions, raw=raw, velocity=velocity, speed=np.linalg.norm(velocity, axis=1),
-                   direction=compute_travel_direction(velocity, track.fps))
+                   direction=compute_travel_direction(velocity, track.fps),
+                   leeway=np.clip(MOST_DISTANCE - used, LEAST_LEEWAY, MOST_LEEWAY))
 
 
 def relax_positions(fast: np.ndarray, measured: np.ndarray, fps: float) -> np.ndarray:
@@ -70,7 +78,14 @@ def relax_positions(fast: np.ndarray, measured: np.ndarray, fps: float) -> np.nd
     to_rest = np.zeros_like(mixed)
     for first, end, middle in _extend_rests(mixed, find_rests(mixed, fps)):
         to_rest[first:end] = middle - mixed[first:end]
-    return mixed + smooth_zero_phase_hann(to_rest, fps, _FADE_SECONDS)
+    return fast + _limit_softly(mixed + smooth_zero_phase_hann(to_rest, fps, _FADE_SECONDS) - fast)
+
+
+def _limit_softly(offset: np.ndarray) -> np.ndarray:
+    """Limit offsets (T, 2) m softly to MOST_DISTANCE; up to LEAVE_DISTANCE they do not change."""
+    length, room = np.linalg.norm(offset, axis=1, keepdims=True), MOST_DISTANCE - LEAVE_DISTANCE
+    over = np.maximum(length - LEAVE_DISTANCE, 0.0)
+    return offset * (np.minimum(length, LEAVE_DISTANCE) + room * np.tanh(over / room)) / np.maximum(length, 1e-9)
 
 
 def _extend_rests(positions: np.ndarray, rests: list[tuple[int, int]]) -> Iterator[tuple[int, int, np.ndarray]]:

@@ -27,9 +27,6 @@ SPEEDS = (0.1, 0.5, 1.1)
 RETURN_SECONDS = (20.0, 0.5, 0.03)
 """How soon the body returns to its track at SPEEDS: at speed at once, slow and in place hardly."""
 
-FREE_DISTANCE = 0.06
-"""Metres that a slow body may stay off its planned place, of the 12 cm off the track that are allowed below 1 m/s."""
-
 REST_FIRMNESS = 150.0  # how many times firmer than in a step both feet hold a slow body
 _HELD_SECONDS = 0.1  # how soon it returns from beyond that
 _ROUNDS = 3  # of holding what is beyond
@@ -103,9 +100,9 @@ def settle_on_track(track: SampledTrack, source: SourceMotion, moves: np.ndarray
         root = _follow_steps(steps, firm, weight, goal)
         off = root - planned
         away = np.linalg.norm(off, axis=1)
-        beyond = away > FREE_DISTANCE
+        beyond = away > track.leeway
         weight = np.where(beyond, np.maximum(weight, (_HELD_SECONDS * track.fps) ** -2.0), weight)
-        share = FREE_DISTANCE / np.maximum(away, FREE_DISTANCE)
+        share = track.leeway / np.maximum(away, track.leeway)
         goal = np.where(beyond[:, None], planned + share[:, None] * off, goal)
     moved = root - planned
     return replace(track, positions=track.positions + moved, raw=track.raw + moved)
