@@ -25,10 +25,11 @@ calm walks lie outside, and 70 to 100 % of those of fights, celebrations, juggli
 
 _CORE_SHARE = 0.6
 _ROUNDS = 20  # of concentration; it rests after some ten
+_GROWING_ROUNDS = 5
 _SAMPLED = 4000  # frames of a class that are fitted
 _FEWEST = 200  # frames with which a class has a region of its own
 _HAND_SPEED = 0.2  # m/s, added to the hands' speed before its logarithm
-_LEAST_VARIANCE = 1e-6
+_LEAST_VARIANCE = 1e-3
 
 
 def compute_postures(positions: np.ndarray, facing: np.ndarray, fps: float, body: Humanoid) -> np.ndarray:
@@ -118,8 +119,11 @@ def _fit_region(postures: np.ndarray) -> tuple[np.ndarray, np.ndarray, float] | 
     spread = np.median(np.abs(chosen - middle), axis=0) + np.sqrt(_LEAST_VARIANCE)
     squared = np.sum(((chosen - middle) / spread) ** 2, axis=1)
     count = int(_CORE_SHARE * len(chosen))
-    for _ in range(_ROUNDS):
-        core = chosen[np.argsort(squared, kind="stable")[:count]]
+    for number in range(_ROUNDS + _GROWING_ROUNDS):
+        if number < _ROUNDS:
+            core = chosen[np.argsort(squared, kind="stable")[:count]]
+        else:  # the ends of a swing are rare: what is not far from the core belongs to it
+            core = chosen[squared <= BELONGING**2 * np.sort(squared)[count - 1]]
         middle = core.mean(axis=0)
         inverse = np.linalg.inv(np.cov(core.T) + _LEAST_VARIANCE * np.eye(chosen.shape[1]))
         away = chosen - middle

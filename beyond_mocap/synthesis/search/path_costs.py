@@ -98,6 +98,7 @@ TERMS = {
     "feet": "planted feet that jump at the cut",
     "left": "abrupt motion before the cut",
     "cut": "the cut itself, and abrupt motion after it",
+    "soon": "cut soon after another",
     "replay": "shown a moment ago",
     "rate_change": "change of playback rate",
     "avoided": "an avoided label",
@@ -408,6 +409,10 @@ class PathCosts:
         """Compute the cost of cuts between library frames, broadcast together, for changing the recording."""
         recording = self.index.recording
         return np.float32(self.weights.other) * (recording[ends] != recording[start])
+
+    def compute_young_cut_cost(self, age: np.ndarray) -> np.ndarray:
+        """Compute what a cut costs (B,) for coming soon after the last one, age (B,) slots ago."""
+        return self.weights.young * (1.0 - age / YOUNG_SLOTS)
 
     def compute_cut_ends(self, ends: np.ndarray, start: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Compute the cost (B,) of leaving library frames ends (B,), and (K,) of cutting to start (K,)."""

@@ -334,7 +334,7 @@ class PathSearch:
         """Build the transitions from the states `free` (B,), which end at library frames `ends` (B,)."""
         seen = self._mark_seen(before.recent[free])
         return BeamTransitions(self.costs, before.clip[free], ends, rate=before.rate[free], cost=before.cost[free],
-                               seen=seen, young=self.weights.young * (1.0 - before.age[free] / YOUNG_SLOTS))
+                               seen=seen, young=self.costs.compute_young_cut_cost(before.age[free]))
 
     def _mark_seen(self, recent: np.ndarray) -> np.ndarray:
         """Return (B, buckets) whether a state has lately shown a bucket of frames or its neighbours; recent (B, M)."""
