@@ -14,8 +14,11 @@ import numpy as np
 
 from ..annotation import Timeline, choose_gaits, fill_timeline, labels_per_frame
 from ..base.errors import InputError
+from ..base.time_series import find_runs
 from ..library.automatic_locomotion import build_automatic_labels
 from ..library.keys import select_keys
+from ..library.posture import NormalPostures
+from ..motion import quaternion
 from ..motion.contacts import measure_floor_height
 from ..motion.track import sample_track, smooth_zero_phase_hann
 from ..synthesis.heading_plan import plan_track
@@ -30,7 +33,10 @@ from ..synthesis.quality.moments import (
 from ..synthesis.quality.playback import find_replayed, list_warp_rates
 from ..synthesis.quality.unmet_constraints import report_jolts, report_unmet_constraints
 from . import realism
+from .naturalness import list_event_messages, measure_course_figures, measure_piece_figures, measure_standing
 from .reference import View, compute_source_poses
+
+JOLT_RATIO = 1.3  # times the 95th percentile of recordings
 
 
 def measure_path_errors(view: View) -> dict:
@@ -44,12 +50,16 @@ def measure_path_errors(view: View) -> dict:
     pelvis, fps = view.played.pelvis, view.fps
     source_sway = _finite_mean(view.source_values("sway"))
     out = {"root_error_m": dict.fromkeys(("mean", "p95", "max")),
+           "slow_root_error_m": dict.fromkeys(("mean", "p95", "max")),
            "pelvis_error_m": {"mean": None, "own": source_sway, "keys": None},
            "speed_coverage": {"above": None, "below": None}}  # fmt: skip
     if view.target is not None:
         error, unsmoothed = movement.measure_root_error(pelvis, view.target, fps), movement.measure_pelvis_error(pelvis,
                 view.target)
-        out["root_error_m"] = _compute_measures(error, ("mean", "p95", "max"))
+        # a slow body may rest where its track creeps
+        is_slow = movement.measure_travel_speed(view.target, fps) < movement.SPEED_EDGES[0]
+        out["root_error_m"] = _compute_measures(error[~is_slow], ("mean", "p95", "max"))
+        out["slow_root_error_m"] = _compute_measures(error[is_slow], ("mean", "p95", "max"))
         at_keys = [float(np.interp(m.requested.resolved_time, view.played.times, unsmoothed)) for m in view.moments]
         out["pelvis_error_m"] = {"mean": _finite_mean(unsmoothed), "own": source_sway,
                                  "keys": _finite_mean(np.array(at_keys))}
@@ -235,6 +245,43 @@ def measure_poses(view: View) -> dict:
     return out
 
 
+def measure_naturalness(view: View) -> dict:
+    """Measure what the eye sees of a take, beside the same of the recordings.
+
+    Args:
+        view: the take beside its library and track.
+    Returns:
+        The report's group.
+    """
+    course, reference = view.course, view.reference
+    postures = NormalPostures({}) if view.library is None else view.library.normal_postures
+    out = measure_course_figures([course], postures)
+    if view.library is None:
+        out["unusual_posture_share"] = None
+    if bool(np.any(view.played.clip >= 0)):
+        out.update(measure_piece_figures(course, view.transitions))
+    if reference is not None:
+        own = measure_course_figures(reference.courses, postures)
+        out.update({f"source_{name}": value for name, value in own.items()})
+        out["jolts_per_min"] = len(_find_jolts(view)) / course.minutes
+    if view.track is not None:
+        out["standing"] = measure_standing(view.target, view.played.contacts, view.fps)
+        planned = plan_track(sample_track(view.track, view.fps)).heading
+        count = min(len(planned), view.count)
+        off = np.degrees(np.abs(quaternion.wrap_angle(course.heading[:count] - planned[:count])))
+        out["off_plan_deg_median"], out["off_plan_deg_p90"] = np.percentile(off, (50, 90)).tolist()
+    return {"naturalness": out}
+
+
+def _find_jolts(view: View) -> list[tuple[int, int]]:
+    """Find the stretches, away from key moments, whose jerk is above 1.3 times that of recordings at that speed."""
+    jerk = movement.compute_jerk(view.played.positions, view.fps)
+    hard = movement.compute_jerk_ratios(jerk, view.speed, view.reference.jerk_p95) > JOLT_RATIO
+    for moment in view.moments:
+        hard[max(moment.entry - movement.JERK_REACH, 0) : moment.exit + movement.JERK_REACH + 1] = False
+    return find_runs(hard)
+
+
 def list_requested_labels(
     timeline: Timeline, times: np.ndarray, moments: Sequence[KeyMomentResult] = ()
 ) -> list[frozenset[str] | None]:
@@ -315,6 +362,7 @@ def list_warnings(view: View, ik_miss: np.ndarray | None, requested: Timeline | 
     """
     lines: list[str] = [*report_unmet_constraints(view.played, track=view.track, timeline=view.timeline,
                                                   library=view.library, ik_miss=ik_miss, user_timeline=requested)]
+    lines += list_event_messages(view.course, view.played.times)
     if view.reference is None:
         return lines
     jerk = movement.compute_jerk(view.played.positions, view.fps)

@@ -12,6 +12,7 @@ look-up of the frames it used. Mirrored clips are not measured again: all figure
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 from weakref import WeakKeyDictionary
 
 import numpy as np
@@ -29,6 +30,7 @@ from ..synthesis.quality import movement
 from ..synthesis.quality.moments import evaluate_moments
 from ..synthesis.quality.playback import Playback, find_transitions
 from . import realism
+from .naturalness import BodyCourse, measure_course
 
 POSES_PER_SECOND = 10.0  # of a recording that are compared with
 LEFT_OUT_POSES = 3000  # poses at most in the leave-one-clip-out estimate
@@ -52,6 +54,7 @@ class Recording:
         smoothness: (T,) m from each frame to the next, NaN at the end.
         stances: (S, 3) first frame, end and side.
         travel: (S,) m, travel of the stances.
+        course: where its body faces and goes.
     """
 
     path: str
@@ -69,6 +72,7 @@ class Recording:
     smoothness: np.ndarray
     stances: np.ndarray
     travel: np.ndarray
+    course: BodyCourse
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -91,6 +95,7 @@ class LibraryReference:
         poses: (M, 6 J) about ten a second of all clips, mirrored ones included.
         fastest: highest speed of a root, smoothed with a 1 s window, m/s.
         slowest: speed of the slowest gait, m/s.
+        courses: of all recordings.
     """
 
     fps: float
@@ -115,6 +120,7 @@ class LibraryReference:
     pose_p95: np.ndarray
     fastest: float
     slowest: float
+    courses: tuple[BodyCourse, ...]
 
     def find_rows(self, clips: tuple[str, ...], clip: np.ndarray, clip_frame: np.ndarray) -> np.ndarray:
         """Find the row of each output frame's source.
@@ -189,7 +195,8 @@ def build_reference(library: Library, fps: float) -> LibraryReference:
         stances=np.concatenate([r.stances + [start, start, 0] for r, start in zip(measured, first)]),
         heel_rest=float(np.median([recording.heel_rest for recording in measured])), jerk_p95=jerk_p95,
         smoothness_p95=realism.compute_class_p95(joined["smoothness"], joined["speed"]), poses=poses, pose_p95=pose_p95,
-        fastest=float(joined["speed"].max()), slowest=_find_slowest_speed(library), **joined,
+        fastest=float(joined["speed"].max()), slowest=_find_slowest_speed(library),
+        courses=tuple(recording.course for recording in measured), **joined,
     )  # fmt: skip
 
 
@@ -233,7 +240,7 @@ def measure_recording(clip: Clip, fps: float) -> Recording:
         support=movement.measure_support_height(feet, contacts, heel_rest),
         tip=movement.measure_tip_height(skeleton, positions, rotations), jerk=movement.compute_jerk(positions, fps),
         smoothness=np.append(realism.measure_smoothness(skeleton, positions, fps), np.nan), stances=spans,
-        travel=movement.measure_stance_travel(feet[:, :, 1], spans),
+        travel=movement.measure_stance_travel(feet[:, :, 1], spans), course=measure_course(skeleton, positions, fps),
     )  # fmt: skip
 
 
@@ -331,6 +338,11 @@ class View:
         self.speed = movement.measure_travel_speed(played.pelvis, self.fps)
         self.target = None if track is None else movement.interpolate_track(track, played.times)
         self.moments = [] if timeline is None else evaluate_moments(played, timeline.keys, self.stride, library)
+
+    @cached_property
+    def course(self) -> BodyCourse:
+        """Where the body faces and goes."""
+        return measure_course(self.played.motion.skeleton, self.played.positions, self.fps)
 
     @property
     def source(self) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:

@@ -77,7 +77,8 @@ def evaluate_played(
         "duration_s": played.motion.duration, "seconds": dict.fromkeys(SECONDS), **figures.measure_path_errors(view),
         "keys": figures.measure_key_moments(view), **figures.measure_feet(view),
         **figures.measure_corrections(view, ik_miss), **figures.measure_transitions(view),
-        **figures.measure_poses(view), "annotation_similarity": figures.measure_annotation_similarity(view),
+        **figures.measure_poses(view), **figures.measure_naturalness(view),
+        "annotation_similarity": figures.measure_annotation_similarity(view),
         "warnings": figures.list_warnings(view, ik_miss, requested),
     }
     return {**round_values(report), "warning_seconds": _list_message_spans(report["warnings"])}

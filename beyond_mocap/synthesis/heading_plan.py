@@ -19,7 +19,7 @@ from ..base.time_series import interpolate_columns
 from ..base.vectors import arctan2
 from ..motion import quaternion
 from ..motion.track import SampledTrack, smooth_zero_phase_hann
-from ..motion.track.resting_place import relax_track
+from ..motion.track.resting_place import LEAST_LEEWAY, relax_track
 
 # Costs per second, of angles in radians. They were chosen on 167 minutes of a tracked match, for few turns and
 # headings near ball and travel: no snap turns, 0.02 spins a minute, 13 degrees from the ball below 1 m/s (median).
@@ -70,16 +70,17 @@ class HeadingKey:
             raise InputError("heading key", f"{values}", "finite values, and a hold of at least 0 s")
 
 
-def plan_track(track: SampledTrack, keys: Sequence[HeadingKey] = ()) -> SampledTrack:
+def plan_track(track: SampledTrack, keys: Sequence[HeadingKey] = (), rests: bool = True) -> SampledTrack:
     """Plan where the body of a track rests and where it faces.
 
     Args:
         track: the player's track with the ball, T frames.
         keys: headings that are given.
+        rests: whether the body may rest where the track hardly moves; False: it is on the track.
     Returns:
         The same with the places and headings of the body.
     """
-    relaxed = relax_track(track)
+    relaxed = relax_track(track) if rests else replace(track, leeway=np.full(len(track), LEAST_LEEWAY))
     return replace(relaxed, heading=plan_heading(relaxed, keys))
 
 

@@ -254,10 +254,15 @@ class ResolvedPlan:
         """Output frames per second."""
         return self.requested.fps
 
-    def sample_track(self, fps: float) -> SampledTrack:
-        """Sample the track, with the solved ball, in the library's size, at `fps` frames per second."""
+    def sample_track(self, fps: float, rests: bool = True) -> SampledTrack:
+        """Sample the track, with the solved ball, in the library's size.
+
+        Args:
+            fps: frames per second.
+            rests: whether the body of a slow track may rest (`motion.track.resting_place`); method "path" only.
+        """
         trajectory = self.trajectory
         if trajectory is not None and self.size != 1.0:
             trajectory = replace(trajectory, ball=trajectory.ball / self.size)
         sampled = sample_with_trajectory(self.track, trajectory, fps, self.requested.track_window)
-        return plan_track(sampled) if self.method == "path" else sampled
+        return plan_track(sampled, rests=rests) if self.method == "path" else sampled

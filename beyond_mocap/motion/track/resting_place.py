@@ -51,7 +51,7 @@ def relax_track(track: SampledTrack) -> SampledTrack:
         The same with other positions and what follows from them; `raw` has them too, since the body is held to it.
     """
     if len(track) < 3:
-        return track
+        return replace(track, leeway=np.full(len(track), LEAST_LEEWAY))
     positions = relax_positions(track.positions, track.raw, track.fps)
     velocity = np.gradient(positions, 1.0 / track.fps, axis=0, edge_order=2)
     raw = np.where(np.any(positions != track.positions, axis=1, keepdims=True), positions, track.raw)

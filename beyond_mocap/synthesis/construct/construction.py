@@ -111,12 +111,25 @@ class Construction:
         heading = self.heading if self.is_planned else self._solve_heading()
         pose = apply_heading(self.smooth_source.pose, heading)
         if not self.is_planned and self.track.heading is not None:
-            self = replace(self, track=settle_on_track(self.track, self.smooth_source, self._foot_moves[0], heading))
+            self = replace(self, track=settle_on_track(self.track, self.smooth_source, self._foot_moves[0], heading,
+                                                       self._compute_given_root(heading)))
         ground = add_sway(self.track.positions, self.smooth_source.sway, heading)
         if not self.is_planned:
             ground, pose = self._pull_to_track(ground), self._lean_into_curves(pose)
         planted, steps_taken = self._plant_feet(np.column_stack([ground, self.smooth_source.height]), pose)
         return self._watch_ball(planted), steps_taken
+
+    def _compute_given_root(self, heading: np.ndarray) -> np.ndarray:
+        """Compute where the root has to be (T, 2) m, NaN where it is free, for a heading (T,) rad.
+
+        On the track where the heading is given too, and where the old motion stays.
+        """
+        given = add_sway(self.track.positions, self.smooth_source.sway, heading)
+        if self.heading is not None:
+            given = np.where(np.isfinite(self.heading)[:, None], given, np.nan)
+        if self.old is None:
+            return given if self.heading is not None else np.full_like(given, np.nan)
+        return np.where(self.old.is_old[:, None], self.old.root[:, :2], np.nan)
 
     def _watch_ball(self, planted: PlantResult) -> PlantResult:
         """Turn shoulders and head to the ball, except where the body meets it and where the old motion stays."""

@@ -24,10 +24,11 @@ from .track_following import add_sway
 SPEEDS = (0.1, 0.5, 1.1)
 """Metres per second of the track below which a body is slow, and above which it is at speed."""
 
-RETURN_SECONDS = (20.0, 0.5, 0.03)
+RETURN_SECONDS = (20.0, 0.5, 0.004)
 """How soon the body returns to its track at SPEEDS: at speed at once, slow and in place hardly."""
 
 REST_FIRMNESS = 150.0  # how many times firmer than in a step both feet hold a slow body
+_GIVEN_WEIGHT = 1e6  # of a given place, so large that it stays
 _HELD_SECONDS = 0.1  # how soon it returns from beyond that
 _ROUNDS = 3  # of holding what is beyond
 # Weights of the recording's own move and turn against a metre of a foot in contact: they decide only what feet leave open.
@@ -77,7 +78,9 @@ def measure_rest(source: SourceMotion, speed: np.ndarray) -> np.ndarray:
     return 1.0 + (REST_FIRMNESS - 1.0) * slow * source.heel_toe_contacts.any(axis=2).all(axis=1)
 
 
-def settle_on_track(track: SampledTrack, source: SourceMotion, moves: np.ndarray, heading: np.ndarray) -> SampledTrack:
+def settle_on_track(
+    track: SampledTrack, source: SourceMotion, moves: np.ndarray, heading: np.ndarray, given: np.ndarray
+) -> SampledTrack:
     """Let a slow body move as its feet carry it, near its track.
 
     Args:
@@ -85,6 +88,7 @@ def settle_on_track(track: SampledTrack, source: SourceMotion, moves: np.ndarray
         source: its source frames.
         moves: (T - 1, 2) m of the root, facing frame (`measure_foot_moves`).
         heading: (T,) rad.
+        given: (T, 2) m, world, where the root has to be, NaN where it is free.
     Returns:
         The track with places that the body can reach; at speed they stay.
     """
@@ -94,13 +98,14 @@ def settle_on_track(track: SampledTrack, source: SourceMotion, moves: np.ndarray
     # the root with its sway is what feet carry
     planned = add_sway(track.positions, source.sway, heading)
     seconds = np.interp(track.speed, SPEEDS, RETURN_SECONDS)
-    firm = measure_rest(source, track.speed)[1:]
-    weight, goal, root = (seconds * track.fps) ** -2.0, planned, planned
+    firm, is_given = measure_rest(source, track.speed)[1:], np.isfinite(given).all(axis=1)
+    weight = np.where(is_given, _GIVEN_WEIGHT, (seconds * track.fps) ** -2.0)
+    goal = root = np.where(is_given[:, None], given, planned)
     for _ in range(_ROUNDS + 1):
         root = _follow_steps(steps, firm, weight, goal)
         off = root - planned
         away = np.linalg.norm(off, axis=1)
-        beyond = away > track.leeway
+        beyond = (away > track.leeway) & ~is_given
         weight = np.where(beyond, np.maximum(weight, (_HELD_SECONDS * track.fps) ** -2.0), weight)
         share = track.leeway / np.maximum(away, track.leeway)
         goal = np.where(beyond[:, None], planned + share[:, None] * off, goal)
