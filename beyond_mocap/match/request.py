@@ -80,7 +80,7 @@ class MatchRequest:
     figures: bool = _DEFAULTS["figures"]
     window: float = WINDOW
     overlap: float = OVERLAP
-    variety: float = 0.3
+    variety: float = 0.6
     workers: int = 1
     scheduler: str = ""
     events_meta: Path | None = None
