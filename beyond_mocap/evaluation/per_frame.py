@@ -56,7 +56,7 @@ class Footprint:
         start, end: its first and last second on the track's clock.
         heel, toe: mean positions (2,) m of the foot's joints on the ground; equal if the foot has no toe joint.
         direction: radians of the foot, from +x.
-        slide: metres that its toe travelled (`movement.stance_travel`).
+        slide: metres that its toe travelled (`movement.measure_stance_travel`).
     """
 
     side: int

@@ -145,7 +145,7 @@ class RigTransfer:
         Args:
             rig: the armature.
             parts: its parts.
-            seen: its samples.
+            samples: its samples.
             dependencies: what each control depends on.
             object_keyed: whether the object itself is animated.
             motion: the motion that the parts show.
@@ -350,7 +350,7 @@ def to_channel_values(mode: str, rotations: np.ndarray, like: np.ndarray) -> np.
 
     Args:
         mode: rotation mode of the bone.
-        turned: (N, 4) continuous rotations.
+        rotations: (N, 4) continuous rotations.
         like: (n,) the source's first values, whose sign and full turns are kept.
     Returns:
         (N, n) values.
