@@ -116,7 +116,7 @@ class TakeOperator(BaseOperator):
         try:
             entries = self.build_entries(context)
         except (BeyondMocapError, OSError) as error:
-            return self.failed(str(error))
+            return self.report_failure(str(error))
         for entry in entries:
             queue.add_entry(entry)
         running = context.window_manager.beyond_mocap_work

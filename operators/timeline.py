@@ -206,7 +206,8 @@ class BEYOND_MOCAP_OT_pick_moment(BaseOperator, bpy.types.Operator):
 
     def execute(self, context):
         """Fail without a pointer."""
-        return self.failed("Select Key Moment needs the pointer in the NLA editor; use Go to Key Moment with an index")
+        return self.report_failure(
+            "Select Key Moment needs the pointer in the NLA editor; use Go to Key Moment with an index")
 
     def invoke(self, context, event):
         """Select what is under the pointer; if there is nothing, pass the click to Blender."""

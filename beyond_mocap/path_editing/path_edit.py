@@ -171,7 +171,7 @@ class EditedMotion:
         return Motion(self.motion.skeleton, *self.constructed, self.motion.fps)
 
     @property
-    def once(self) -> EditedMotion:
+    def remove_repeats(self) -> EditedMotion:
         """The edited motion up to its first restart: all laps are alike."""
         if not len(self.restarts):
             return self
@@ -193,7 +193,8 @@ def prepare_source(motion: Motion, settings: PathEditSettings, standing: np.ndar
     Args:
         motion: two frames or more.
         settings: how the path is fitted, and the frame of the residuals.
-        standing: (T, 2, 2) bool, contact of left and right, heel and toe; None: detected (`contacts.detect_heel_toe_contacts`).
+        standing: (T, 2, 2) bool, contact of left and right, heel and toe; None: detected
+            (`contacts.detect_heel_toe_contacts`).
         path: its own path, with seconds from the first frame as parameter; None: fitted.
     Returns:
         The source for `edit_path`.

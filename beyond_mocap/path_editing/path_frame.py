@@ -328,8 +328,8 @@ def fit_spline(places: np.ndarray, times: np.ndarray, seconds: float = SWAY_SECO
 def project_to_ground(motion: Motion, standing: np.ndarray) -> np.ndarray:
     """Project a motion on the ground: the pelvis's x and y, and the height of the ground under it.
 
-    Level ground is as high as `contacts.estimate_recorded_floor`. If all soles in contact are within 10 cm of height, the ground
-    is flat; else its height is that of the feet in contact, and linear over time between stances.
+    Level ground is as high as `contacts.estimate_recorded_floor`. If all soles in contact are within 10 cm of height,
+    the ground is flat; else its height is that of the feet in contact, and linear over time between stances.
 
     Args:
         motion: of a skeleton with legs.

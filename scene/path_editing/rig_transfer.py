@@ -73,7 +73,7 @@ class GroupMotions:
                                for table in (self.rotation, self.before, self.after))
         return quaternion.rotate(turn, points - before) + after
 
-    def moves_alike(self, one: str, other: str) -> bool:
+    def is_same_motion(self, one: str, other: str) -> bool:
         """Return whether two groups move alike: to a ten-thousandth of a degree and of a millimetre."""
         if one == other:
             return True
@@ -304,7 +304,7 @@ class RigTransfer:
             (bone, "turn") -> continuous rotations (N, 4) of its own channels; (bone, "location") -> (N, 3).
         """
         some = [one for one in self.controls
-                if not all(moves.moves_alike(one.own, other) for other in (one.turn, one.place))]
+                if not all(moves.is_same_motion(one.own, other) for other in (one.turn, one.place))]
         return (self._compute_rotations(some, moves, rows)
                 | self._compute_locations([one for one in some if one.has_location], moves, rows)) if some else {}
 

@@ -108,7 +108,7 @@ def solve_cuts(times, points, weights, cuts, player_cost) -> Cuts:
     while back[chain[-1]] >= 0:
         chain.append(int(back[chain[-1]]))
     chain = np.array(chain[::-1])
-    return _build_cuts(pieces.take(chain), times, cuts, player_cost)
+    return _build_cuts(pieces.select_rows(chain), times, cuts, player_cost)
 
 
 def _compute_short_cost(pieces: PieceFits, times: np.ndarray) -> np.ndarray:

@@ -114,18 +114,18 @@ class _MarkerSetParser:
             raise InputError(place, f"name {value[:40]!r}", "one word of letters, digits, `_`, `-` and `.`", _FORM)
         self.name = value
 
-    def _segment(self, joint: str, labels: tuple[str, ...], place: str) -> None:
+    def _add_segment(self, joint: str, labels: tuple[str, ...], place: str) -> None:
         if joint not in JOINTS:
             raise InputError(place, f"no segment {joint[:40]!r}", f"one of {', '.join(JOINTS)}", "check the spelling")
         self.segments[joint] = (*self.segments.get(joint, ()), *labels)
 
-    def _landmark(self, name: str, labels: tuple[str, ...], place: str) -> None:
+    def _add_landmark(self, name: str, labels: tuple[str, ...], place: str) -> None:
         if name not in LANDMARKS:
             expected = f"one of {', '.join(sorted(LANDMARKS))}"
             raise InputError(place, f"no landmark {name[:40]!r}", expected, "check the spelling")
         self.landmarks[name] = (*self.landmarks.get(name, ()), *labels)
 
-    def _also(self, own: str, others: tuple[str, ...], place: str) -> None:
+    def _add_aliases(self, own: str, others: tuple[str, ...], place: str) -> None:
         for other in others:
             if self.aliases.setdefault(other, own) != own:
                 found = f"{other[:40]!r} for {self.aliases[other]!r} and {own!r}"
