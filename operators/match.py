@@ -233,7 +233,10 @@ class BEYOND_MOCAP_OT_match_camera(ShownMatchVerb, bpy.types.Operator):
     player: StringProperty(name="Player", options={"SKIP_SAVE"}, description="ID of the player; empty: the active one")
 
     @classmethod
-    def description(cls, _context, properties):
+    def description(cls, context, properties):
+        chosen = find_active_player(context.scene.beyond_mocap_match)
+        if properties.which == "EYES" and chosen is not None:
+            return f"Look through the eyes of the selected player, or of {chosen.name or chosen.feed_id} if none is"
         return next(item[2] for item in CAMERA_ITEMS if item[0] == properties.which)
 
     def do(self, context):

@@ -56,7 +56,7 @@ def find_selected_moment(target: bpy.types.Object) -> lanes.PlacedMoment:
     """Find the selected key moment. Raises InputError if there is none."""
     found = next((moment for moment in lanes.list_moments(target) if moment.is_selected), None)
     if found is None:
-        raise InputError(describe_target(target), "no key moment is selected", "one",
+        raise InputError(describe_target(target), "no key moment is selected", "a key moment",
                          "click its name in the NLA editor")
     return found
 
