@@ -82,7 +82,7 @@ def _receive_frames(scene: bpy.types.Scene, listener: Listener) -> HitMotion | N
     latest = listener.latest_frame()
     if latest is not None and latest.number != _state["seen"]:
         _state["seen"] = latest.number
-        if _show_frame(scene, listener, latest) == "posed":
+        if _show_frame(scene, latest) == "posed":
             _latencies.append(time.monotonic() - (latest.time if latest.sent is None else latest.sent))
         if get_current_listener() is None:  # the stream has been stopped
             return None
@@ -96,7 +96,7 @@ def _receive_frames(scene: bpy.types.Scene, listener: Listener) -> HitMotion | N
     return found
 
 
-def _show_frame(scene, listener: Listener, latest) -> str:
+def _show_frame(scene, latest) -> str:
     """Pose the streamed character.
 
     Returns:

@@ -67,7 +67,7 @@ def apply_rally(scene: bpy.types.Scene, new_rally: NewRally) -> None:
     _apply_players(scene, new_rally.rally, [player.name for player in new_rally.rally.scene.players])
     follow.add_hit_call(store_strike)
     follow.add_update_call(update_rally)
-    _write_status(scene)
+    _write_status()
 
 
 def stop_rally() -> None:
@@ -187,7 +187,7 @@ def _apply_pass(scene, piece: LivePass) -> None:
     _apply_players(scene, next_rally, list(piece.motions))
     _session["rally"] = next_rally
     scene.beyond_mocap_stream.target = ""
-    _write_status(scene, piece)
+    _write_status(piece)
 
 
 def _apply_players(scene, one: Rally, names: list[str]) -> None:
@@ -228,7 +228,7 @@ def _end_rally(reason: str) -> None:
     status_texts.playing, status_texts.played = False, reason
 
 
-def _write_status(scene, piece: LivePass | None = None) -> None:
+def _write_status(piece: LivePass | None = None) -> None:
     """Write the state of the rally for the panel."""
     status_texts, one = bpy.context.window_manager.beyond_mocap_streaming, get_current_rally()
     status_texts.playing = True

@@ -96,14 +96,15 @@ class _MarkerSetParser:
             raise InputError(place, f"{line[:40]!r}", "`what: labels`", _FORM)
         word, _, rest = head.partition(" ")
         whole, word, rest = " ".join(head.lower().split()), word.lower(), rest.strip()
+        add = {"segment": self._add_segment, "landmark": self._add_landmark, "also": self._add_aliases}
         if whole == "marker set":
             self._set_name(value, place)
         elif whole == "about":
             self.about = value
         elif whole in _LISTS:
             self.lists[whole] = (*self.lists.get(whole, ()), *_parse_labels(value, place))
-        elif word in ("segment", "landmark", "also") and rest:
-            getattr(self, f"_{word}")(rest, _parse_labels(value, place), place)
+        elif word in add and rest:
+            add[word](rest, _parse_labels(value, place), place)
         else:
             raise InputError(place, f"{head[:40]!r}", f"one of {_KEYWORDS}", _FORM)
 
