@@ -166,6 +166,7 @@ class _MatchBuilder:
         self.position, self.before = np.array([0.0, 0.0, FOOTBALL.radius]), np.zeros(3)
 
     def build_match(self) -> SyntheticMatch:
+        """Build touches until the match is over."""
         self._meet_ball("kick", "foot")
         while self.time < self.match.seconds:
             self._pass_ball()
