@@ -85,7 +85,7 @@ TERMS = {
     "words": "requested labels that the clip lacks",
     "unasked": "an action not requested, or no labels at all",
     "made": "synthetic clip, not recorded",
-    "rate": "played faster or slower than recorded",
+    "rate": "playback rate",
     "strike": "does not fit the ball at the strike",
     "pose": "change of pose at the cut",
     "feet": "planted feet that jump at the cut",
