@@ -86,7 +86,8 @@ def describe_figures(motions: list[Motion], contacts: list[np.ndarray], firsts: 
 
 def describe_corrections(corrections: list[Correction], takes: list[Take], firsts: list[int]) -> str:
     """Format how far roots and arms are moved, and how often, as one line."""
-    curves = np.concatenate([own.curves(at, len(take.motion)) for own, take, at in zip(corrections, takes, firsts)])
+    found = zip(corrections, takes, firsts)
+    curves = np.concatenate([own.build_curves(at, len(take.motion)) for own, take, at in found])
     root, arms = np.linalg.norm(curves[:, ROOT], axis=1), np.linalg.norm(curves[:, ARMS].reshape(-1, 2, 3), axis=2)
     knots = sum(len(own.knots) for own in corrections)
     return (

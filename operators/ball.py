@@ -286,7 +286,7 @@ and its touches are proposals for key moments"""
         """Build the request."""
         return tracked.build_order(context.scene)
 
-    work = staticmethod(tracked.run_order)
+    run_job = staticmethod(tracked.run_order)
 
     def apply(self, scene, solved):
         """Create the ball and the list of touches."""

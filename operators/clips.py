@@ -217,7 +217,7 @@ kind, in this file or as a .blend for a folder of asset libraries"""
             raise InputError(target, "is the open file", "another file", "switch As a File off instead")
 
     @staticmethod
-    def work(order, progress, cancelled, _hurry):
+    def run_job(order, progress, cancelled, _hurry):
         """Read the motions and render the pictures."""
         from ..beyond_mocap.files.bvh import bvh
         from ..beyond_mocap.library.label_files import read_labels

@@ -156,7 +156,7 @@ glTF and USD clips are converted first, and the result is cached"""
         self.stop_polling(context)
 
     @staticmethod
-    def work(order, progress, cancelled, _hurry):
+    def run_job(order, progress, cancelled, _hurry):
         """Build the library and list its clips; a library that cannot be built is listed too, so that it can be
         labelled.
         """
@@ -225,7 +225,7 @@ quality"""
         return ListOrder(settings.library_folder, folder, preferences.find_cache_folder(folder), built)
 
     @staticmethod
-    def work(order, progress, _cancelled, _hurry):
+    def run_job(order, progress, _cancelled, _hurry):
         """List from the built library where there is one, else from the folder."""
         from ..beyond_mocap.library.listing import list_clips, scan_clips
 

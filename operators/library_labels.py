@@ -331,7 +331,7 @@ others; the result is a file that works with any library"""
                           to_absolute_path(self.out))
 
     @staticmethod
-    def work(order, progress, cancelled, _hurry):
+    def run_job(order, progress, cancelled, _hurry):
         """Read the clips, train and write the classifier; returns the file and lines about what was learned."""
         from ..beyond_mocap.library import cache
         from ..beyond_mocap.library.classify import classifier

@@ -274,7 +274,7 @@ class BEYOND_MOCAP_OT_clean_markers(MarkersVerb, BackgroundOperator, bpy.types.O
         return thing.name, trial, sets.build_marker_set(thing).select_clusters(trial.labels) if assigned else None
 
     @staticmethod
-    def work(order, progress, cancelled, _hurry):
+    def run_job(order, progress, cancelled, _hurry):
         """Clean the trial."""
         from ..beyond_mocap.markers.cleaning.clean import clean_trial
 
@@ -306,7 +306,7 @@ class BEYOND_MOCAP_OT_reconstruct_markers(MarkersVerb, BackgroundOperator, bpy.t
         return solve.build_request(context.scene, self.find_cloud(context))
 
     @staticmethod
-    def work(order, progress, cancelled, _hurry):
+    def run_job(order, progress, cancelled, _hurry):
         """Reconstruct the trial."""
         from ..beyond_mocap.markers.reconstruct import reconstruct
 
@@ -341,7 +341,7 @@ class BEYOND_MOCAP_OT_find_release(MarkersVerb, BackgroundOperator, bpy.types.Op
         return solve.build_release_request(context.scene, self.find_cloud(context))
 
     @staticmethod
-    def work(order, progress, _cancelled, _hurry):
+    def run_job(order, progress, _cancelled, _hurry):
         """Estimate the release."""
         from ..beyond_mocap.markers.release.release import estimate_release
 

@@ -77,7 +77,7 @@ select the first minute"""
         return order.build_read_request(context.scene.beyond_mocap_match, bpy.path.abspath(chosen) if chosen else "")
 
     @staticmethod
-    def work(asked, progress, cancelled, hurry):
+    def run_job(asked, progress, cancelled, hurry):
         return order.read_match(asked, progress)
 
     def apply(self, scene, result):
@@ -141,7 +141,7 @@ and pressing the button again resumes with the finished work"""
         return order.build_command(context.scene), wanted, self.find_library(wanted)
 
     @staticmethod
-    def work(asked, progress, cancelled, hurry):
+    def run_job(asked, progress, cancelled, hurry):
         """Run the command in its own process, then load the result."""
         arguments, wanted, library = asked
         notes = child.run_command(arguments, lambda done, text: progress(SYNTHESIS_SHARE * done, text), cancelled)
@@ -165,7 +165,7 @@ that is displayed"""
         return wanted, self.find_library(wanted)
 
     @staticmethod
-    def work(asked, progress, cancelled, hurry):
+    def run_job(asked, progress, cancelled, hurry):
         wanted, library = asked
         return wanted, load.load_section(wanted, library, progress, cancelled), ()
 
@@ -233,7 +233,10 @@ class BEYOND_MOCAP_OT_match_camera(ShownMatchVerb, bpy.types.Operator):
     player: StringProperty(name="Player", options={"SKIP_SAVE"}, description="ID of the player; empty: the active one")
 
     @classmethod
-    def description(cls, _context, properties):
+    def description(cls, context, properties):
+        chosen = find_active_player(context.scene.beyond_mocap_match)
+        if properties.which == "EYES" and chosen is not None:
+            return f"Look through the eyes of the selected player, or of {chosen.name or chosen.feed_id} if none is"
         return next(item[2] for item in CAMERA_ITEMS if item[0] == properties.which)
 
     def do(self, context):

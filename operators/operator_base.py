@@ -49,13 +49,13 @@ class BaseOperator:
         try:
             action()
         except BeyondMocapError as error:
-            return self.failed(str(error))
+            return self.report_failure(str(error))
         except OSError as error:
             found = f"{error.filename or 'file'}: {error.strerror or error}"
-            return self.failed(f"{found}; check the path and its permissions")
+            return self.report_failure(f"{found}; check the path and its permissions")
         return {"FINISHED"}
 
-    def failed(self, message: str):
+    def report_failure(self, message: str):
         """Report an error."""
         self.report({"ERROR"}, message)
         return {"CANCELLED"}
@@ -132,9 +132,9 @@ class BackgroundOperator(BaseOperator):
         kind: name of the work.
         left: message after ESC.
 
-    `order(context)` collects plain values from the scene. `work(order, progress, cancelled, hurry)`, a static function
-    that never uses bpy, computes. `apply(scene, result)` writes the result. Called from a script (`execute`), all three
-    run at once; started by a button (`invoke`), the work runs in a thread and ESC cancels it.
+    `order(context)` collects plain values from the scene. `run_job(order, progress, cancelled, hurry)`, a static
+    function that never uses bpy, computes. `apply(scene, result)` writes the result. Called from a script (`execute`),
+    all three run at once; started by a button (`invoke`), the job runs in a thread and ESC cancels it.
     """
 
     kind = ""
@@ -147,7 +147,7 @@ class BackgroundOperator(BaseOperator):
         try:
             order = self.order(context)
             callbacks = (lambda done, text: manager.progress_update(int(100 * done)), lambda: False, lambda: False)
-            result = self.work(order, *callbacks)
+            result = self.run_job(order, *callbacks)
         finally:
             manager.progress_end()
         self.apply(context.scene, result)
@@ -161,9 +161,9 @@ class BackgroundOperator(BaseOperator):
 
     def start(self, context):
         """Collect the order and start the thread."""
-        order, work = self.order(context), self.work
+        order, run_job = self.order(context), self.run_job
         self.scene = context.scene.session_uid
-        self.job = background.Job(self.kind, lambda *asking: work(order, *asking))
+        self.job = background.Job(self.kind, lambda *asking: run_job(order, *asking))
 
     def start_polling(self, context):
         """Start polling."""

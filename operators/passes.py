@@ -150,7 +150,7 @@ leads from one player's strike to the next"""
             order.clear_examples()
         return make.build_order(context.scene)
 
-    work = staticmethod(make.run_order)
+    run_job = staticmethod(make.run_order)
 
     def apply(self, scene, result):
         """Apply the result to characters and ball."""
@@ -168,10 +168,10 @@ leads from one player's strike to the next"""
             return {"CANCELLED"}
         return super().modal(context, event)
 
-    def failed(self, message):
+    def report_failure(self, message):
         """Show the error of an update in the panel; the scene that is shown stays."""
         if not self.live:
-            return super().failed(message)
+            return super().report_failure(message)
         bpy.context.scene.beyond_mocap_passes.messages = message
         return {"CANCELLED"}
 

@@ -21,7 +21,7 @@ character; nothing is received from other machines, and nothing is sent"""
     bl_label = "Start Stream"
     bl_options = {"REGISTER"}
     needs = ("A stream is already received: press Stop Stream first",
-             lambda context: follow.current_listener() is None)
+             lambda context: follow.get_current_listener() is None)
 
     def do(self, context):
         """Bind the port and start to listen."""
@@ -33,7 +33,7 @@ class ListeningVerb(BaseOperator):
     """An operator for the stream that is received."""
 
     needs = ("No stream is received: press Start Stream first",
-             lambda context: follow.current_listener() is not None)
+             lambda context: follow.get_current_listener() is not None)
 
 
 class BEYOND_MOCAP_OT_stream_stop(ListeningVerb, bpy.types.Operator):
@@ -51,7 +51,7 @@ class BEYOND_MOCAP_OT_stream_stop(ListeningVerb, bpy.types.Operator):
 class PlayingVerb(BaseOperator):
     """An operator for the rally that is played live."""
 
-    needs = "No rally is being played: press Play Live first", lambda context: play.current_rally() is not None
+    needs = "No rally is being played: press Play Live first", lambda context: play.get_current_rally() is not None
 
 
 class BEYOND_MOCAP_OT_stream_end(PlayingVerb, bpy.types.Operator):
@@ -77,7 +77,7 @@ class BEYOND_MOCAP_OT_stream_keep(ListeningVerb, bpy.types.Operator):
 
     def do(self, context):
         """Build a motion from the ring buffer and write it to an action."""
-        motion = build_recording(follow.current_listener(), self.seconds)
+        motion = build_recording(follow.get_current_listener(), self.seconds)
         if motion is None:
             raise InputError("stream", "nothing has arrived yet", "frames", "start the sender")
         follow.keep_recording(context, motion)
@@ -98,11 +98,11 @@ motion of the library, to the player chosen with keys 1 to 9 or a click"""
     def order(self, context):
         """Collect the order of the scene, the holder of the ball and the rally's time."""
         settings = context.scene.beyond_mocap_passes
-        return make.build_order(context.scene), self.holder or settings.players[0].name, play.rally_seconds(
+        return make.build_order(context.scene), self.holder or settings.players[0].name, play.compute_rally_seconds(
             context.scene)
 
     @staticmethod
-    def work(order, progress, cancelled, _hurry):
+    def run_job(order, progress, cancelled, _hurry):
         return play.start_rally(*order, progress, cancelled)
 
     def apply(self, scene, result):
@@ -121,7 +121,7 @@ class BEYOND_MOCAP_OT_stream_target(PlayingVerb, bpy.types.Operator):
         names = [row.name for row in context.scene.beyond_mocap_passes.players]
         if self.number > len(names):
             raise InputError("player", f"number {self.number}", f"1 to {len(names)}")
-        if names[self.number - 1] == play.current_rally().holder:
+        if names[self.number - 1] == play.get_current_rally().holder:
             raise InputError("player", f"{names[self.number - 1]} has the ball", "another player")
         context.scene.beyond_mocap_stream.target = names[self.number - 1]
 
@@ -132,7 +132,7 @@ class BEYOND_MOCAP_OT_stream_act(BaseOperator, bpy.types.Operator):
     bl_idname = "beyond_mocap.stream_act"
     bl_label = "Do as Selected"
     needs = ("Press Play Live, and select an armature whose motion has a strike",
-             lambda context: play.current_rally() is not None and find_armature(context) is not None)
+             lambda context: play.get_current_rally() is not None and find_armature(context) is not None)
 
     def do(self, context):
         """Find the strike; in a window the answer appears as soon as it is ready."""

@@ -33,7 +33,7 @@ def store_result(context, player, order, result) -> None:
     for one in result.takes:
         lines = {"quality": quality.describe_quality(one.report),
                  "moments": quality.describe_moments(one.report),
-                 "warnings": quality.list_warnings(one.report, order.warnings, result.library.notes),
+                 "warnings": quality.describe_warnings(one.report, order.warnings, result.library.notes),
                  "recipe": json.dumps(one.recipe),
                  "made_of": json.dumps(result.made_of)}
         stored.append((session.store_take(one.plan, one.take, one.report), lines))
@@ -116,7 +116,7 @@ class TakeOperator(BaseOperator):
         try:
             entries = self.build_entries(context)
         except (BeyondMocapError, OSError) as error:
-            return self.failed(str(error))
+            return self.report_failure(str(error))
         for entry in entries:
             queue.add_entry(entry)
         running = context.window_manager.beyond_mocap_work

@@ -22,7 +22,7 @@ class TargetOperator(BackgroundOperator):
         """Build the request from the scene."""
         return order.build_request(context.scene, find_thrower(context), self.act)
 
-    work = staticmethod(made.generate_throw)
+    run_job = staticmethod(made.generate_throw)
 
     def apply(self, scene, result):
         body = scene.objects.get(result.order.body)

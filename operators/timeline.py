@@ -56,7 +56,7 @@ def find_selected_moment(target: bpy.types.Object) -> lanes.PlacedMoment:
     """Find the selected key moment. Raises InputError if there is none."""
     found = next((moment for moment in lanes.list_moments(target) if moment.is_selected), None)
     if found is None:
-        raise InputError(describe_target(target), "no key moment is selected", "one",
+        raise InputError(describe_target(target), "no key moment is selected", "a key moment",
                          "click its name in the NLA editor")
     return found
 
@@ -206,7 +206,8 @@ class BEYOND_MOCAP_OT_pick_moment(BaseOperator, bpy.types.Operator):
 
     def execute(self, context):
         """Fail without a pointer."""
-        return self.failed("Select Key Moment needs the pointer in the NLA editor; use Go to Key Moment with an index")
+        return self.report_failure(
+            "Select Key Moment needs the pointer in the NLA editor; use Go to Key Moment with an index")
 
     def invoke(self, context, event):
         """Select what is under the pointer; if there is nothing, pass the click to Blender."""

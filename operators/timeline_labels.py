@@ -76,7 +76,7 @@ class BEYOND_MOCAP_OT_split_span(TimelineVerb, bpy.types.Operator):
         there = [span for span in there if span.is_selected] or there
         if not there:
             found = "no span is under the playhead"
-            raise InputError(describe_target(target), found, "one", "move the playhead into a strip")
+            raise InputError(describe_target(target), found, "a span", "move the playhead into a strip")
         for placed in there:
             lay_strips.change_span(target, placed.strip, replace(placed.span, end=time))
             lay_strips.add_span(target, replace(placed.span, start=time), clock)
@@ -102,7 +102,7 @@ class BEYOND_MOCAP_OT_join_spans(TimelineVerb, bpy.types.Operator):
         chosen = list_selected_spans(target)
         if len(chosen) < 2:
             found = "fewer than two spans are selected"
-            raise InputError(describe_target(target), found, "two or more", "select their strips")
+            raise InputError(describe_target(target), found, "two spans or more", "select their strips")
         inner = [moment.key for moment in lanes.list_moments(target)
                  if moment.strip in {span.strip for span in chosen[1:]}]
         for placed in chosen[1:]:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import bpy
 
-from ..scene.match.settings import find_active_player
 from .tab import TabPanel, create_value_column, draw_paragraph, draw_section
 
 MAX_LINES = 12  # lines of a report shown in the panel
@@ -101,9 +100,7 @@ def draw_display(layout, match) -> None:
     """Draw the cameras, and messages about the displayed match."""
     row = layout.row(align=True)
     row.operator("beyond_mocap.match_camera", text="Broadcast", icon="VIEW_CAMERA").which = "STAND"
-    chosen = find_active_player(match)
-    name = f"Eyes of {chosen.name or chosen.feed_id}" if chosen is not None else "Eyes"
-    row.operator("beyond_mocap.match_camera", text=name, icon="HIDE_OFF").which = "EYES"
+    row.operator("beyond_mocap.match_camera", text="Eyes", icon="HIDE_OFF").which = "EYES"
     layout.operator("beyond_mocap.match_export", icon="EXPORT")
     for line in match.messages.splitlines()[:MAX_LINES]:
         draw_paragraph(layout, line, "INFO")

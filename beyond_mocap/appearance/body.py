@@ -51,7 +51,7 @@ def build_body(skeleton: Skeleton, height: float | None = None, example: Motion 
         skeleton: a humanoid skeleton, J joints.
         height: stature in metres for the girths; None derives it from the legs' length.
         example: any recording on the skeleton; it shows how bones are twisted if the rest pose does not stand. Without
-            it, feet and hands of such skeletons may be rotated (see `neutral.neutral_stance`).
+            it, feet and hands of such skeletons may be rotated (see `neutral.build_neutral_stance`).
     Returns:
         The mesh.
     Raises:

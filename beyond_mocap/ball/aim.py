@@ -209,7 +209,19 @@ class _Problem:
 
     @classmethod
     def from_arguments(cls, start, target, ball, seconds, bounces, spin, ground) -> _Problem:
-        """Check and broadcast the arguments of `solve_launches` to (B, 3) and (B,)."""
+        """Check and broadcast the arguments of `solve_launches` to (B, 3) and (B,).
+
+        Args:
+            start: (3,) or (B, 3) m, where the balls start.
+            target: (3,) or (B, 3) m.
+            ball: their kind.
+            seconds: s of flight, a number or (B,); None: 1 s, until it is chosen.
+            bounces: number of bounces before the target.
+            spin: (3,) or (B, 3) rad/s; None: no spin.
+            ground: m, height of the ground.
+        Returns:
+            The checked problem.
+        """
         start, target = np.asarray(start, float), np.asarray(target, float)
         spin = np.zeros(3) if spin is None else np.asarray(spin, float)
         timed = np.ones(1) if seconds is None else np.asarray(seconds, float)
@@ -227,6 +239,7 @@ class _Problem:
                    bounces=int(bounces), ground=ground)
 
     def with_seconds(self, seconds: np.ndarray) -> _Problem:
+        """Return the same problem with other seconds (B,) of flight."""
         return replace(self, seconds=seconds)
 
     def select_rows(self, rows: np.ndarray) -> _Problem:

@@ -52,10 +52,6 @@ class Balls:
     phase: np.ndarray
     bounces: np.ndarray
 
-    def select_balls(self, rows: np.ndarray) -> Balls:
-        """Select balls by a mask or by indices."""
-        return Balls(*(value[rows] for value in vars(self).values()))
-
 
 def build_balls(position: np.typing.ArrayLike, velocity: np.ndarray, spin: np.ndarray | None, ball: Ball,
                 ground: float = 0.0) -> Balls:

@@ -150,7 +150,7 @@ def measure_feet(view: View) -> dict:
 
 
 def measure_corrections(view: View, ik_miss: np.ndarray | None) -> dict:
-    """Measure what polishing changed: foot correction, missed targets, pelvis drop, bone lengths.
+    """Measure what foot correction changed: foot correction, missed targets, pelvis drop, bone lengths.
 
     Args:
         view: the take beside its library and track.

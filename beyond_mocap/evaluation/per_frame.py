@@ -26,7 +26,7 @@ class PerFrame:
         track: (T, 2) m, the measured track.
         root_error, pelvis_error: (T,) m.
         slide: (T, 2) m/s, ground speed of each foot (left, right) while it is in contact.
-        correction: (T, 2) m by which polishing moved each foot.
+        correction: (T, 2) m by which foot correction moved each foot.
         jerk: (T,) largest jerk within +-8 frames, divided by the 95th percentile of recordings at that speed.
         speed, requested_speed: (T,) m/s of the body and of the track, smoothed with a 1 s window.
     """
@@ -56,7 +56,7 @@ class Footprint:
         start, end: its first and last second on the track's clock.
         heel, toe: mean positions (2,) m of the foot's joints on the ground; equal if the foot has no toe joint.
         direction: radians of the foot, from +x.
-        slide: metres that its toe travelled (`movement.stance_travel`).
+        slide: metres that its toe travelled (`movement.measure_stance_travel`).
     """
 
     side: int

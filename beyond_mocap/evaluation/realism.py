@@ -118,7 +118,7 @@ def measure_nearest_distance(
 
 
 def compute_class_p95(values: np.ndarray, speed: np.ndarray) -> np.ndarray:
-    """Compute the 95th percentile of values in each speed class, with `movement.real_p95`.
+    """Compute the 95th percentile of values in each speed class, with `movement.compute_real_p95`.
 
     Args:
         values: (M,) m: leave-one-clip-out distances (infinite if a library has one clip only), or smoothness of uncut

@@ -79,7 +79,7 @@ class Recording:
 class LibraryReference:
     """Figures of a library's recordings at `fps`, one after the other (N frames), and the level of real motion.
 
-    Speed classes are those of `movement.speed_class`.
+    Speed classes are those of `movement.classify_speed`.
 
     Attributes:
         fps: frames per second.

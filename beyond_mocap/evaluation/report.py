@@ -57,7 +57,9 @@ def evaluate_played(
     played: Playback, *, track: Track | None = None, timeline: Timeline | None = None, library: Library | None = None,
     ik_miss: np.ndarray | None = None, requested: Timeline | None = None,
 ) -> dict:  # fmt: skip
-    """Build the report of a motion with its sources, from memory or files (`played_from_take`, `played_from_tables`).
+    """Build the report of a motion with its sources.
+
+    They come from memory (`playback_from_take`) or files (`playback_from_tables`).
 
     Args:
         played: the motion with its sources, T frames.

@@ -177,6 +177,20 @@ def check_list(value, where: str) -> list:
     return list(value)
 
 
+def check_texts(value, where: str) -> tuple[str, ...]:
+    """Check that a value is a list of texts.
+
+    Args:
+        value: the value.
+        where: its place, for errors.
+    Returns:
+        The texts.
+    Raises:
+        InputError: if it is not.
+    """
+    return tuple(check_text(one, where) for one in check_list(value, where))
+
+
 def describe_value(value) -> str:
     """Format a value as JSON, shortened to 40 characters, for errors.
 

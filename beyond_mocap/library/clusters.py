@@ -41,10 +41,6 @@ class Clusters:
     label: np.ndarray
     medoid: np.ndarray
 
-    def list_members(self, cluster: int) -> np.ndarray:
-        """List the first frames of the blocks in `cluster`."""
-        return self.start[self.label == cluster]
-
     def label_at(self, frame: int) -> int:
         """Return the cluster of the block that starts at `frame`, or -1 where none starts."""
         place = int(np.searchsorted(self.start, frame))

@@ -123,10 +123,12 @@ class _RecordingSignals:
                    facing=facing, leg=measure_leg_length(motion.skeleton), floor=floor, upright=upright)
 
     def build_row(self, start: float, end: float, words, key: int | None = None) -> ClipAnnotation:
+        """Build the annotation of the frames `start` to `end`, rounded and clamped to the motion."""
         last = len(self.motion) - 1
         return ClipAnnotation(int(max(0, round(start))), int(min(last, round(end))), key, tuple(words))
 
     def to_frames(self, seconds: float) -> float:
+        """Convert seconds to frames of the motion."""
         return seconds * self.motion.fps
 
 

@@ -17,7 +17,7 @@ from ..base.time_series import find_runs
 from .files.unit_and_axes import measure_handedness
 from .model.marker_set import UNLABELED
 from .model.model import MarkerModel
-from .trial import MarkerTrial, list_some
+from .trial import MarkerTrial, format_some
 
 _MIRRORED_BELOW = -0.5  # handedness below which a body is mirrored (-1: surely, +1: surely not)
 # metres by which a distance may differ, in addition to half of its range in the trial itself
@@ -68,7 +68,7 @@ def _check_static_complete(trial: MarkerTrial, static: MarkerTrial) -> list[str]
     lacking = [label for label in trial.labels if label not in static.labels]
     if not lacking:
         return []
-    names = list_some(lacking)
+    names = format_some(lacking)
     if len(lacking) > _MAX_MISSING_SHARE * len(trial.labels):
         raise InputError(
             static.name,
@@ -90,7 +90,7 @@ def report_unused(trial: MarkerTrial, clusters: Mapping[str, Sequence[str]], oth
     """
     known = {label for group in clusters.values() for label in group} | set(others)
     left = [label for label in trial.labels if label not in known and not UNLABELED.match(label)]
-    return [f"markers without a segment are not used: {list_some(left)}"] if left else []
+    return [f"markers without a segment are not used: {format_some(left)}"] if left else []
 
 
 def _check_sides(trial: MarkerTrial, static: MarkerTrial | None, clusters) -> None:

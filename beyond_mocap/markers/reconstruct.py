@@ -21,7 +21,7 @@ from .cleaning.clean import CleaningResult, clean_trial
 from .model.model import MarkerModel
 from .pose.pose import HeldBall, PoseSettings, PoseSolution, solve_poses
 from .pose.residuals import collect_markers, measure_floor
-from .trial import MarkerTrial, list_some, resample_evenly
+from .trial import MarkerTrial, format_some, resample_evenly
 
 _DEFAULTS = collect_defaults("markers")
 FILTERS = find_setting("markers", "filter").choice_names
@@ -288,7 +288,7 @@ def _check_trial(trial, still, marker_set, model) -> tuple[str, ...]:
     clusters = collect_clusters(marker_set, model, trial)
     others = () if marker_set is None else (*marker_set.ball, *marker_set.other)
     lacking = () if marker_set is None or model is not None else marker_set.list_missing(trial.labels)
-    missing = [f"markers of the set {marker_set.name} are missing: {list_some(lacking)}"] if lacking else []
+    missing = [f"markers of the set {marker_set.name} are missing: {format_some(lacking)}"] if lacking else []
     return (*missing, *report_unused(trial, clusters, others), *check_trial(trial, still, clusters, model))
 
 
@@ -336,7 +336,7 @@ def _calibrate_model(marker_set, trial, still, progress, cancelled) -> MarkerMod
         lacking = [] if still is None else [label for label in trial.labels if label not in still.labels]
         if not lacking:
             raise
-        raise InputError(still.name, f"{error}; markers missing in it: {list_some(lacking)}") from None
+        raise InputError(still.name, f"{error}; markers missing in it: {format_some(lacking)}") from None
 
 
 def _check_model_fits(model: MarkerModel, trial: MarkerTrial) -> None:
@@ -344,7 +344,7 @@ def _check_model_fits(model: MarkerModel, trial: MarkerTrial) -> None:
     lacking = [label for label in model.markers if label not in trial.labels]
     if len(lacking) > (1.0 - MIN_MARKER_SHARE) * len(model.markers):
         found = f"has {len(model.markers) - len(lacking)} of the model's {len(model.markers)} markers"
-        raise InputError(trial.name, f"{found}, not {list_some(lacking)}", "a trial with the model's markers",
+        raise InputError(trial.name, f"{found}, not {format_some(lacking)}", "a trial with the model's markers",
                          "choose another model, or the marker set that has these labels")
 
 

@@ -178,7 +178,7 @@ class MarkerTrial:
         return replace(self, positions=positions, residuals=self.residuals if keeps_residuals else None)
 
 
-def list_some(names: Sequence[str], most: int = 6) -> str:
+def format_some(names: Sequence[str], most: int = 6) -> str:
     """Format the first names of a list, and how many more there are.
 
     Args:

@@ -11,7 +11,6 @@ imported inside functions.
 
 from __future__ import annotations
 
-import io
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -19,7 +18,7 @@ import numpy as np
 
 from ..base.errors import format_count
 from ..evaluation import html_page as html
-from ..evaluation.plots import style_axes
+from ..evaluation.plots import render_png, style_axes
 from .trial_results import (
     MIN_PAIRS,
     TrialResult,
@@ -145,7 +144,7 @@ def draw_residuals_and_time(results: Sequence[TrialResult]) -> bytes:
     _draw_bars(right, names, [np.mean(t) if t else np.nan for t in times], [np.std(t) if t else 0.0 for t in times])
     right.set_ylabel("ms")
     right.set_title("solving time per frame", loc="left", fontsize=9.5)
-    return _render_png(figure)
+    return render_png(figure)
 
 
 def draw_residuals_by_trial(results: Sequence[TrialResult]) -> bytes:
@@ -166,7 +165,7 @@ def draw_residuals_by_trial(results: Sequence[TrialResult]) -> bytes:
     ax.set_xlabel("mm, root mean square", fontsize=8)
     ax.set_title("markers against the model", loc="left", fontsize=9.5)
     ax.legend(fontsize=8, frameon=False)
-    return _render_png(figure)
+    return render_png(figure)
 
 
 def draw_impact_map(points: np.ndarray) -> bytes:
@@ -194,7 +193,7 @@ def draw_impact_map(points: np.ndarray) -> bytes:
     above.tick_params(labelbottom=False, labelsize=8)
     beside.tick_params(labelleft=False, labelsize=8)
     _draw_ground_axes(main)
-    return _render_png(figure)
+    return render_png(figure)
 
 
 def draw_impact_scatter(results: Sequence[TrialResult], points: np.ndarray) -> bytes:
@@ -220,7 +219,7 @@ def draw_impact_scatter(results: Sequence[TrialResult], points: np.ndarray) -> b
             ax.legend(fontsize=8, frameon=False)
     for ax in axes[len(sides):]:
         ax.axis("off")
-    return _render_png(figure)
+    return render_png(figure)
 
 
 def draw_speeds(measured: np.ndarray, estimated: np.ndarray) -> bytes:
@@ -249,7 +248,7 @@ def draw_speeds(measured: np.ndarray, estimated: np.ndarray) -> bytes:
     right.set_ylabel("estimated, m/s")
     right.set_title("pair by pair", loc="left", fontsize=9.5)
     right.legend(fontsize=8, frameon=False)
-    return _render_png(figure)
+    return render_png(figure)
 
 
 def _merge_frame_statistics(results: Sequence[TrialResult]) -> tuple[float, float]:
@@ -300,9 +299,3 @@ def _build_canvas(rows: int, columns: int, height: float):
     axes = figure.subplots(rows, columns, squeeze=False).ravel()
     style_axes(axes)
     return figure, axes
-
-
-def _render_png(figure) -> bytes:
-    out = io.BytesIO()
-    figure.savefig(out, format="png", metadata={"Software": None})
-    return out.getvalue()

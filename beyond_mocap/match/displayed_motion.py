@@ -83,7 +83,7 @@ def add_gaze(
         motion: T frames.
         ball: (T, 3) m, world frame.
         known: (T,) bool, where the ball is known.
-        look: (3,) direction in which the head joint looks, in its own frame (`synthesize.look_of`).
+        look: (3,) direction in which the head joint looks, in its own frame (`synthesize.estimate_look`).
         seed: of the player's habits.
         start: s of the motion's first frame on the match's clock.
     Returns:

@@ -62,8 +62,8 @@ class PeriodClock:
         spread: s, the usual distance from the lag (median absolute deviation times 1.48).
         matched: share of the certain events that have a touch.
         by_chance: the same with wrong lags.
-        told: number of certain events.
-        sure: nats, how unlikely it is that so many fit by chance at a lag as large (`_compute_confidence`).
+        event_count: number of certain events.
+        confidence_nats: nats, how unlikely it is that so many fit by chance at a lag as large (`_compute_confidence`).
     """
 
     lag: float
@@ -71,13 +71,14 @@ class PeriodClock:
     spread: float
     matched: float
     by_chance: float
-    told: int
-    sure: float
+    event_count: int
+    confidence_nats: float
 
     @property
     def fits(self) -> bool:
         """True if its events fit touches better than by chance."""
-        return self.sure >= _MIN_CONFIDENCE and self.matched >= max(_MIN_MATCHED, _MIN_CHANCE_RATIO * self.by_chance)
+        least = max(_MIN_MATCHED, _MIN_CHANCE_RATIO * self.by_chance)
+        return self.confidence_nats >= _MIN_CONFIDENCE and self.matched >= least
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -150,7 +151,7 @@ def _fit_half_clock(events, touches, half: Half, span) -> tuple[PeriodClock, np.
         clock = _fit_clock(events, since, touches, zero, span)
         if clock is not None:
             candidates.append((clock, zero + (since - clock.lag) / (1.0 + clock.drift)))
-    return max(candidates, key=lambda one: one[0].sure, default=None)
+    return max(candidates, key=lambda one: one[0].confidence_nats, default=None)
 
 
 def _describe_clock(number: int, clock: PeriodClock) -> str:
@@ -181,7 +182,7 @@ def _fit_clock(events, since, touches, start: float, span) -> PeriodClock | None
     lag = _find_commonest_lag(early - late, np.where(certain, 1.0, _DOUBTFUL_WEIGHT))
     lag, drift = _fit_line(early, late, lag)
     fit = _EventFit(events, since, touch_times, who=players, span=(span[0] - start, span[1] - start), drift=drift)
-    right, wrong = fit.at([lag]), fit.at([lag + by for by in _WRONG_LAGS])
+    right, wrong = fit.count_fitting([lag]), fit.count_fitting([lag + by for by in _WRONG_LAGS])
     if right[0, 1] < _MIN_INSIDE:
         return None
     # 1.48 turns the median absolute deviation of a normal distribution into its standard deviation.
@@ -193,7 +194,7 @@ def _fit_clock(events, since, touches, start: float, span) -> PeriodClock | None
     confidence = _compute_confidence(right[0, 0], right[0, 1],
                                      chance) + _DOUBTFUL_WEIGHT * doubtful - _compute_lag_cost(lag)
     return PeriodClock(lag=float(lag), drift=float(drift), spread=spread, matched=float(matched),
-                       by_chance=float(chance), told=int(right[0, 1]), sure=float(confidence))
+                       by_chance=float(chance), event_count=int(right[0, 1]), confidence_nats=float(confidence))
 
 
 def _find_commonest_lag(lags: np.ndarray, weights: np.ndarray) -> float:
@@ -264,7 +265,7 @@ class _EventFit:
             edges = np.concatenate([[-np.inf], np.sort(when[who == player]), [np.inf]])
             self._rows.append((since[own], certain[own], edges))
 
-    def at(self, lags) -> np.ndarray:
+    def count_fitting(self, lags) -> np.ndarray:
         """Count [fitting, all] within the span over all `lags`: row 0 certain events, row 1 the others."""
         out = np.zeros((2, 2), int)
         for since, certain, edges in self._rows:
@@ -291,7 +292,7 @@ def _compute_confidence(fitting: int, count: int, chance: float) -> float:
 
 def _check_clocks(events: MatchEvents, clocks: Mapping[int, PeriodClock]) -> None:
     """Check that a period fits better than by chance, if there are enough events; InputError otherwise."""
-    many = sum(clock.told for clock in clocks.values()) >= _MIN_CERTAIN
+    many = sum(clock.event_count for clock in clocks.values()) >= _MIN_CERTAIN
     if many and not any(clock.fits for clock in clocks.values()):
         best = max(clocks.values(), key=lambda clock: clock.matched)
         found = f"{best.matched:.0%} of passes and shots fit a touch of their player (by chance {best.by_chance:.0%})"

@@ -26,6 +26,7 @@ from ..files.json_values import (
     check_number,
     check_numbers,
     check_text,
+    check_texts,
     check_whole_number,
     describe_value,
     parse_json,
@@ -307,10 +308,6 @@ def _parse_row(value, where: str, count: int) -> list:
     return row
 
 
-def _parse_labels(value, where: str) -> tuple[str, ...]:
-    return tuple(check_text(word, where) for word in check_list(value, where))
-
-
 def _parse_plan(row, where: str, take_array) -> Plan:
     """Parse the plan of a stretch."""
     track = _parse_track(row, where, take_array)
@@ -318,12 +315,12 @@ def _parse_plan(row, where: str, take_array) -> Plan:
     spans, keys = [], []
     for value in check_list(row["spans"], f"{where}: spans"):
         start, end, words, avoid = _parse_row(value, f"{where}: spans", 4)
-        spans.append(Span(check_number(start, where), check_number(end, where), _parse_labels(words, where),
-                          avoid=_parse_labels(avoid, where)))
+        spans.append(Span(check_number(start, where), check_number(end, where), check_texts(words, where),
+                          avoid=check_texts(avoid, where)))
     for value in check_list(row["keys"], f"{where}: keys"):
         time, words, avoid, solved = _parse_row(value, f"{where}: keys", 4)
         solved = None if solved is None else check_number(solved, where)
-        keys.append(KeyMoment(check_number(time, where), _parse_labels(words, where), None, _parse_labels(avoid, where),
+        keys.append(KeyMoment(check_number(time, where), check_texts(words, where), None, check_texts(avoid, where),
                               solved))
     pins = [_parse_pin(value, f"{where}: pins") for value in check_list(row["pins"], f"{where}: pins")]
     return Plan(
@@ -357,7 +354,7 @@ def _parse_settings(value, where: str) -> dict:
 def _parse_texts(value, where: str) -> tuple:
     """Parse texts, or pairs of texts."""
     rows = check_list(value, where)
-    return tuple(check_text(row, where) if isinstance(row, str) else _parse_labels(_parse_row(row, where, 2), where)
+    return tuple(check_text(row, where) if isinstance(row, str) else check_texts(_parse_row(row, where, 2), where)
                  for row in rows)
 
 
@@ -413,4 +410,4 @@ def _parse_named_key(value, clips: int, where: str) -> NamedKey:
         raise InputError(f"{where}: placed", f"clip {describe_value(clip)}", f"0 to {clips - 1}")
     frame, start, end = (check_number(each, f"{where}: placed") for each in (frame, start, end))
     return NamedKey(time=check_number(time, where), clip=check_whole_number(clip, where), frame=frame, start=start,
-                    end=end, words=_parse_labels(words, where))
+                    end=end, words=check_texts(words, where))

@@ -112,22 +112,22 @@ class _StretchConstructor:
         self.count = count_frames(self.plan, self.fps)
         self.edges = build_window_edges(self.begin, self.count, window, self.fps, step=1)
 
-    def construct_take(self, start: float, end: float, tell: Callable[[float], None]) -> Take | None:
+    def construct_take(self, start: float, end: float, report_progress: Callable[[float], None]) -> Take | None:
         """Construct the frames from `start` to `end` s; None if there are fewer than two."""
         low = max(0, int(np.ceil((start - self.begin) * self.fps - 1e-6)))
         high = min(self.count, int(np.floor((end - self.begin) * self.fps + 1e-6)) + 1)
         if high - low < 2:
             return None
-        parts = list(self._iter_parts(low, high, tell))
+        parts = list(self._iter_parts(low, high, report_progress))
         return join_takes(parts, cut_plan(self.plan, self._compute_time(low), self._compute_time(high - 1)))
 
-    def _iter_parts(self, low: int, high: int, tell: Callable[[float], None]) -> Iterator[Take]:
+    def _iter_parts(self, low: int, high: int, report_progress: Callable[[float], None]) -> Iterator[Take]:
         """Iterate over the frames low .. high, window by window."""
         settle_frames = int(round(SETTLE_SECONDS * self.fps))
         numbers = [n for n, (a, b) in enumerate(zip(self.edges, self.edges[1:])) if a < high and b > low]
         before = None
         for done, number in enumerate(numbers):
-            tell(done / len(numbers))
+            report_progress(done / len(numbers))
             window, blended = self._construct_window(number), None
             first, end = max(low, window.low), min(high, window.high)
             if number and first < window.low + settle_frames:

@@ -47,7 +47,7 @@ class MatchState:
         self.players[player].update(values)
         self.write_state()
 
-    def count_window(self, player: str) -> None:
+    def record_window(self, player: str) -> None:
         """Count one more searched window of a player."""
         self.players[player]["units_done"] += 1
         if time.monotonic() - self._write_time > WRITE_INTERVAL:

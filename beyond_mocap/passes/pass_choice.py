@@ -145,7 +145,8 @@ def _select_options(problem: PassProblem, number: int, site: Site, use_counts: d
     cost += np.array([random_costs[key] + REUSE_COST * use_counts.get(key, 0) for key in keys])
     best = _find_best(cost, moments.which)
     use_counts[keys[best[0]]] = use_counts.get(keys[best[0]], 0) + 1
-    return _Options(moments.only(best), facing[best], cost[best], NaturalFlights(starts, velocities, int(best[0])))
+    flights = NaturalFlights(starts, velocities, int(best[0]))
+    return _Options(moments.select_moments(best), facing[best], cost[best], flights)
 
 
 def _combine_headings(problem: PassProblem, moments: StrikeMoments, site: Site,
@@ -163,7 +164,7 @@ def _combine_headings(problem: PassProblem, moments: StrikeMoments, site: Site,
     if problem.scene.directions:
         facing = site.facing + np.round(quaternion.wrap_angle(facing - site.facing) / EIGHTH_TURN) * EIGHTH_TURN
     every = np.repeat(np.arange(len(moments)), facing.shape[1])
-    return moments.only(every), quaternion.wrap_angle(facing.ravel())
+    return moments.select_moments(every), quaternion.wrap_angle(facing.ravel())
 
 
 def _select_possible(problem: PassProblem, number: int, site: Site) -> StrikeMoments:
@@ -176,13 +177,13 @@ def _select_possible(problem: PassProblem, number: int, site: Site) -> StrikeMom
         lowest = f"no {site.part} strike of {site.player} is below {height.min():.2f} m"
         found = f"the ball lies on the ground, but {lowest}"
         raise InputError("serve", found, "a motion that strikes lower", "serve from a player or a place")
-    return moments.only(height < radius + GROUND_REACH)
+    return moments.select_moments(height < radius + GROUND_REACH)
 
 
 def _build_last_link(options: _Options) -> Link:
     """Build the last strike: the option with the lowest cost, without a flight."""
     best = int(np.argmin(options.cost))
-    return Link(moment=options.moments.only([best]), facing=float(options.facing[best]), seconds=0.0,
+    return Link(moment=options.moments.select_moments([best]), facing=float(options.facing[best]), seconds=0.0,
                 velocity=np.zeros(3), natural=options.natural)
 
 
@@ -203,7 +204,7 @@ def _choose_link(problem: PassProblem, number: int, options: _Options, after: Li
     option = int(flights.option[best])
     # the natural trajectory that starts nearest to the chosen flight, for display
     chosen_index = int(np.argmin(np.linalg.norm(options.natural.starts - flights.starts[best], axis=1)))
-    return Link(moment=options.moments.only([option]), facing=float(options.facing[option]),
+    return Link(moment=options.moments.select_moments([option]), facing=float(options.facing[option]),
                 seconds=float(flights.seconds[best]), velocity=flights.velocity[best],
                 natural=replace(options.natural, chosen_index=chosen_index))  # fmt: skip
 

@@ -165,7 +165,7 @@ class StrikeMoments:
     def __len__(self) -> int:
         return len(self.which)
 
-    def only(self, which: Sequence[int] | np.ndarray) -> StrikeMoments:
+    def select_moments(self, which: Sequence[int] | np.ndarray) -> StrikeMoments:
         """Those of a mask or of indices (M,)."""
         part_states = self.part_states
         return replace(self, which=self.which[which], frame=self.frame[which], lead=self.lead[which],

@@ -147,7 +147,15 @@ class _Search:
         return self.places[who, change]
 
     def update_collisions(self, changes, collisions, changed):
-        """Update the collisions, by time, for bodies whose changes are new."""
+        """Update the collisions, by time, for bodies whose changes are new.
+
+        Args:
+            changes: one `PathChange` for each body.
+            collisions: those before the changes.
+            changed: numbers of the bodies whose changes are new.
+        Returns:
+            The collisions that are left.
+        """
         found = [collision for collision in collisions if not {collision.first, collision.second} & set(changed)]
         for rank, who in enumerate(changed):
             found += self.find_body_collisions(who, changes, changed[:rank])
@@ -162,7 +170,13 @@ class _Search:
         return tuple(collision for collision in found if not (fixed[collision.first] and fixed[collision.second]))
 
     def find_body_collisions(self, who, changes, without):
-        """Find the collisions of one body, except those with the bodies `without`."""
+        """Find the collisions of one body, except those with the bodies `without`.
+
+        Args:
+            who: number of the body.
+            changes: one `PathChange` for each body.
+            without: numbers of the bodies to ignore.
+        """
         known = self.collision_cache.setdefault((who, changes[who]), {})
         others = [other for other in self.possible_meetings[who] if other not in without]
         new = [other for other in others if (other, changes[other]) not in known]
@@ -235,7 +249,15 @@ class _Search:
                    change in remedy.items())
 
     def find_wait(self, state, collision, who):
-        """Find the shortest wait of one body that resolves a collision."""
+        """Find the shortest wait of one body that resolves a collision.
+
+        Args:
+            state: the changes so far.
+            collision: the collision.
+            who: number of the body that waits.
+        Returns:
+            The number of the body -> its change; None if no wait within the limits is enough.
+        """
         if collision.start <= self.clock[0]:
             return None  # they are too near at their very start
         now, other = state.changes[who], collision.second if who == collision.first else collision.first
@@ -252,7 +274,15 @@ class _Search:
         return self.find_least_remedy(state, collision, measure_gap, build_remedy, self.limits.delay - now.delay)
 
     def find_detour(self, state, collision, sides):
-        """Find the smallest detour that resolves a collision, to given sides and equal for all bodies that make one."""
+        """Find the smallest detour that resolves a collision, to given sides and equal for all bodies that make one.
+
+        Args:
+            state: the changes so far.
+            collision: the collision.
+            sides: number of each body that makes one -> its side, -1 or 1.
+        Returns:
+            Number of a body -> its change; None if no detour within the limits is enough.
+        """
         covers = {who: self.compute_cover(state, collision, who) for who in sides}
         if any(_is_crowded(state.changes[who], covers[who]) for who in sides):
             return None
@@ -279,7 +309,14 @@ class _Search:
     def find_least_remedy(self, state, collision, gap, remedy, most):
         """Find the remedy of the smallest amount that keeps both apart around a collision.
 
-        gap: maps amounts (A,) to metres (A,); remedy: maps an amount to changes; most: largest amount.
+        Args:
+            state: the changes so far.
+            collision: the collision.
+            gap: maps amounts (A,) to metres (A,) between both bodies.
+            remedy: maps an amount to changes.
+            most: largest amount.
+        Returns:
+            The changes of the smallest amount; None if none is enough.
         """
         low, high = 0.0, most
         for _ in range(2):  # a grid, then a finer one below its first amount that suffices
@@ -304,14 +341,26 @@ class _Search:
         return compute_least_gaps(first, second, self.limits.distance, self.limits.height)
 
     def is_clear(self, state, collision, changed):
-        """Return whether the two bodies are apart around the time of a collision, with these changes."""
+        """Return whether the two bodies are apart around the time of a collision, with these changes.
+
+        Args:
+            state: the changes so far.
+            collision: the collision.
+            changed: number of a body -> its change, in place of the one so far.
+        """
         times = self.select_times(collision)
         first, second = (self.followers[who].at(times, changed.get(who, state.changes[who]))[None]
                          for who in (collision.first, collision.second))
         return self.compute_gap(first, second)[0] >= self.required_gap
 
     def compute_cover(self, state, collision, who):
-        """Compute (first, last): metres along the original path between which a body must keep aside."""
+        """Compute (first, last): metres along the original path between which a body must keep aside.
+
+        Args:
+            state: the changes so far.
+            collision: the collision.
+            who: number of the body.
+        """
         follower, change = self.followers[who], state.changes[who]
         first, last = (follower.arc_at(time, change) for time in (collision.start, collision.end))
         if last < first and follower.sampled_path.closed:
@@ -321,8 +370,14 @@ class _Search:
     def build_train(self, who, cover, offset):
         """Build the detours that keep a body aside all along the cover.
 
-        Each begins to return where the next begins to leave, so that together they are one long detour. offset: a
-        number or an array, and so are the numbers of the detours.
+        Each begins to return where the next begins to leave, so that together they are one long detour.
+
+        Args:
+            who: number of the body.
+            cover: (first, last) metres along its original path.
+            offset: metres to the side, a number or an array; the numbers of the detours are of the same kind.
+        Returns:
+            (begin, width, offset) of each detour, metres.
         """
         first, last = cover
         width = np.maximum(compute_detour_width(offset, self.followers[who].speed), (last - first) / 3.0)
@@ -349,7 +404,15 @@ class _Search:
         return state
 
     def reduce_part(self, state, who, shared):
-        """Choose the smallest share of a part of one body's change that adds no collision."""
+        """Choose the smallest share of a part of one body's change that adds no collision.
+
+        Args:
+            state: the changes so far.
+            who: number of the body.
+            shared: maps its change and a share to the reduced change.
+        Returns:
+            The state with the reduced change, or the same state.
+        """
         for share in _SHARES:
             changes = list(state.changes)
             changes[who] = shared(state.changes[who], share)

@@ -64,7 +64,7 @@ def find_collisions_of(body: int, others, times, places, distance: float = DISTA
     """Find the collisions of one body with others.
 
     Args:
-        one: number of the body.
+        body: number of the body.
         others: numbers of the others.
         times: (T,) seconds, rising.
         places: (N, T, 3) metres, world frame.
@@ -85,7 +85,7 @@ def find_collisions_at(body: int, others, steps, times, places, distance: float 
     """Find the collisions of one body with others within given steps.
 
     Args:
-        one: number of the body.
+        body: number of the body.
         others: (M,) numbers of the others, equal ones together.
         steps: (M,) step s from frame s to s + 1, rising for each body.
         times: (T,) seconds, rising.

@@ -171,7 +171,7 @@ class EditedMotion:
         return Motion(self.motion.skeleton, *self.constructed, self.motion.fps)
 
     @property
-    def once(self) -> EditedMotion:
+    def remove_repeats(self) -> EditedMotion:
         """The edited motion up to its first restart: all laps are alike."""
         if not len(self.restarts):
             return self
@@ -193,7 +193,8 @@ def prepare_source(motion: Motion, settings: PathEditSettings, standing: np.ndar
     Args:
         motion: two frames or more.
         settings: how the path is fitted, and the frame of the residuals.
-        standing: (T, 2, 2) bool, contact of left and right, heel and toe; None: detected (`contacts.points`).
+        standing: (T, 2, 2) bool, contact of left and right, heel and toe; None: detected
+            (`contacts.detect_heel_toe_contacts`).
         path: its own path, with seconds from the first frame as parameter; None: fitted.
     Returns:
         The source for `edit_path`.
@@ -205,7 +206,9 @@ def prepare_source(motion: Motion, settings: PathEditSettings, standing: np.ndar
     has_legs, messages = _check_legs(motion)
     if standing is None:
         standing = contacts.detect_heel_toe_contacts(motion) if has_legs else np.zeros((len(motion), 2, 2), dtype=bool)
-    path = path or (_fit_ground_path if has_legs else _fit_root_path)(motion, standing, settings)
+    if path is None:
+        path = (path_frame.fit_path(motion, standing, settings.fit, settings.degree) if has_legs
+                else _fit_root_path(motion, settings))
     times = np.arange(len(motion)) / motion.fps
     arc = ArcLength(path)
     metres = arc.distance_at(times)
@@ -475,11 +478,7 @@ def _compute_mean_heading(motion: Motion, has_legs: bool) -> float:
     return float(np.arctan2(np.sin(headings).mean(), np.cos(headings).mean()))
 
 
-def _fit_ground_path(motion: Motion, standing: np.ndarray, settings: PathEditSettings) -> Path:
-    return path_frame.fit_path(motion, standing, settings.fit, settings.degree)
-
-
-def _fit_root_path(motion: Motion, standing: np.ndarray, settings: PathEditSettings) -> Path:
+def _fit_root_path(motion: Motion, settings: PathEditSettings) -> Path:
     """Fit the path of a body without legs: that of its root, at the usual height of its lowest joint."""
     places, _ = forward_kinematics(motion)
     line = motion.root_positions.copy()

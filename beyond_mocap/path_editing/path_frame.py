@@ -233,7 +233,7 @@ def fit_path(motion: Motion, standing: np.ndarray, kind: str = "spline", degree:
 
     Args:
         motion: of a skeleton with legs.
-        standing: (T, 2, 2) bool, as `contacts.points` of the motion.
+        standing: (T, 2, 2) bool, as `contacts.detect_heel_toe_contacts` of the motion.
         kind: one of KINDS.
         degree: of the polynomial.
     Returns:
@@ -328,8 +328,8 @@ def fit_spline(places: np.ndarray, times: np.ndarray, seconds: float = SWAY_SECO
 def project_to_ground(motion: Motion, standing: np.ndarray) -> np.ndarray:
     """Project a motion on the ground: the pelvis's x and y, and the height of the ground under it.
 
-    Level ground is as high as `contacts.recorded_floor`. If all soles in contact are within 10 cm of height, the ground
-    is flat; else its height is that of the feet in contact, and linear over time between stances.
+    Level ground is as high as `contacts.estimate_recorded_floor`. If all soles in contact are within 10 cm of height,
+    the ground is flat; else its height is that of the feet in contact, and linear over time between stances.
 
     Args:
         motion: of a skeleton with legs.

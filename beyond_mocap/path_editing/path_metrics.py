@@ -34,7 +34,7 @@ def measure_path_edit(source, edited, path, ground=None) -> dict:
     Returns:
         Figures by name, None where unknown, such as feet of a skeleton without legs. `before`: before planting.
     """
-    edited = edited.once
+    edited = edited.remove_repeats
     pelvis, own = (_compute_pelvis(motion, source.has_legs) for motion in (edited.motion, source.motion))
     frames = np.clip(np.rint(edited.frames).astype(int), 0, len(source.motion) - 1)
     fps = edited.motion.fps

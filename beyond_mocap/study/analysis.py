@@ -228,7 +228,7 @@ def _build_finding(new: str, old: str, differences: np.ndarray, pooled: float, d
                    d=mean / sd if varies else np.nan, delta=delta)  # fmt: skip
 
 
-def _count_shares(name: str, values: list[int]) -> Shares:
+def _compute_shares(name: str, values: list[int]) -> Shares:
     counts = np.bincount(np.array(values, int), minlength=len(SCALE) + 1)[1:]
     mean = float(np.mean(values)) if values else np.nan
     return Shares(name, counts, mean, float(np.std(values, ddof=1)) if len(values) > 1 else np.nan)
@@ -240,7 +240,7 @@ def _count_by_system(study: Study, answers: Answers, scenario: str | None = None
     for system in study.systems:
         names = {clip.name for clip in study.clips if clip.system == system and scenario in (None, clip.scenario)}
         rated = (answers.ratings[rater].items() for rater in answers.raters)
-        out.append(_count_shares(system, [value for row in rated for name, value in row if name in names]))
+        out.append(_compute_shares(system, [value for row in rated for name, value in row if name in names]))
     return tuple(out)
 
 

@@ -105,6 +105,8 @@ def build_provenance_fields(library: Library, frames_shown: SourceFrames) -> dic
     Args:
         library: the clips.
         frames_shown: T source frames.
+    Returns:
+        Name of a field -> its value.
     """
     sources = list_sources(library, frames_shown)
     names = tuple(dict.fromkeys(sources))

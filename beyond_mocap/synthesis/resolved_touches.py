@@ -22,7 +22,7 @@ from ..base.errors import InputError, TimedMessage
 from ..motion.track import BALL_RADIUS
 from .construct.contact_geometry import add_flight_arc, lead_ball_through
 from .construct.dribble import plan_dribbles
-from .construct.strike import held_frames
+from .construct.strike import compute_contact_frames
 from .plan import Plan, PlayerTouch, ResolvedPlan, SolvedTrajectory
 from .take import DribbleTouch, KeyResult, Take
 
@@ -207,7 +207,7 @@ def apply_trajectory(take: Take, plan: ResolvedPlan) -> Take:
     if plan.trajectory is None or take.ball is None:
         return replace(take, solved=plan.trajectory)
     fps, contact_ball, times = take.motion.fps, take.ball.positions, take.ball.times
-    held = [held_frames(key.frame, len(contact_ball)) for key in _list_ball_keys(take)]
+    held = [compute_contact_frames(key.frame, len(contact_ball)) for key in _list_ball_keys(take)]
     course_changes = [(touch.time - take.start_time) * fps for touch in plan.trajectory.touches]
     trajectory, filled = plan.trajectory.interpolate(times)
     path = np.where(np.isfinite(trajectory), trajectory, contact_ball)

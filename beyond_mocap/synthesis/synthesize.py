@@ -166,7 +166,7 @@ def _construct_motion(
     source = fetch_motion(library, edit, index, plan.fps)
     keys = build_key_results(library, plan.fps, request, edit, source)
     clock.append(time.perf_counter())
-    report(0.9, "Polishing")
+    report(0.9, "Correcting feet")
     touches = find_touches(library, plan.fps, edit, keys)
     construction = Construction(library=library, plan=plan, track=track, source=source, touches=touches,
                                 look=estimate_look(library))

@@ -91,7 +91,7 @@ class Take:
         seed: of the search.
         seconds: stage -> s that it took.
         warnings: what did not turn out as requested.
-        correction: (T, 2) m by which polishing moved each foot (left, right) from where the placed clip had it.
+        correction: (T, 2) m by which foot correction moved each foot (left, right) from where the placed clip had it.
         ik_miss: (T, 2) m that each leg was short of where its foot should be.
         stepped: (T, 2) bool, extra steps of feet that are in contact in the source (no contacts).
         plan: the request.

@@ -108,11 +108,6 @@ class ThrowEvaluation:
         return np.array([one.deviation for one in self.motions]).reshape(-1, 4)
 
     @property
-    def network_deviations(self) -> np.ndarray:
-        """Deviations (N, 4) m before any correction."""
-        return np.array([one.network for one in self.motions]).reshape(-1, 4)
-
-    @property
     def impacts(self) -> np.ndarray:
         """Impact errors (N,) m."""
         return np.array([one.impact for one in self.motions])

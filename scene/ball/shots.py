@@ -16,7 +16,7 @@ from ..core.material import get_material
 from ..core.measure import frames_per_second, units_per_metre
 from ..core.saved_state import restore_playback, save_playback
 from ..passes.hit_analysis import read_motion
-from ..passes.possession import curves_before, sample_property
+from ..passes.possession import read_curves_before, sample_property
 from ..passes.settings import KEPT
 from ..path_editing.curve import remove_curve
 from .settings import MARK
@@ -379,7 +379,7 @@ def build_keys(scene: bpy.types.Scene, ball: bpy.types.Object, solved: SolvedSho
 
 def _sample_earlier_keys(ball: bpy.types.Object, strike: int) -> tuple[np.ndarray, np.ndarray, np.ndarray] | None:
     """Sample the ball's earlier animation up to the frame before the strike; None if there is none."""
-    curves = curves_before(ball.beyond_mocap_aim.before)
+    curves = read_curves_before(ball.beyond_mocap_aim.before)
     ends = channels.find_key_range(curves)
     if ends is None or ends[0] >= strike or ("location", 0) not in curves:
         return None

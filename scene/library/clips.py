@@ -283,11 +283,11 @@ def _scan_folder() -> float:
 
 
 def _start_scan(folder: str) -> None:
-    def work():
+    def run_scan():
         result["files"] = list_files(folder) if folder else {}
 
     result: dict = {}
-    thread = threading.Thread(target=work, name="beyond-mocap watch", daemon=True)
+    thread = threading.Thread(target=run_scan, name="beyond-mocap watch", daemon=True)
     _scan_state.update(saw=result, folder=folder, thread=thread)
     thread.start()
 

@@ -198,7 +198,7 @@ def _sample_action(path: Path, scene: bpy.types.Scene, rig: bpy.types.Object, ac
     matrices = world[:, None] @ posed[:, order].transpose(0, 1, 3, 2).astype(float)  # Blender stores columns
     if not np.all(np.isfinite(matrices)):
         raise InputError(path, f"NaN or infinite values in action {action.name}", "an intact file", "export it again")
-    return ImportedTake(action.name, _build_motion(path, rig, bones, matrices=matrices, world=world[0], fps=fps))
+    return ImportedTake(action.name, _build_motion(path, bones, matrices=matrices, world=world[0], fps=fps))
 
 
 def _list_times(action, slot, rate: float) -> tuple[float, np.ndarray]:
@@ -228,12 +228,11 @@ def _list_tree_bones(rig: bpy.types.Object) -> list[bpy.types.Bone]:
     return bones
 
 
-def _build_motion(path: Path, rig, bones, matrices: np.ndarray, world: np.ndarray, fps: float) -> Motion:
+def _build_motion(path: Path, bones, matrices: np.ndarray, world: np.ndarray, fps: float) -> Motion:
     """Build a motion from bones.
 
     Args:
         path: for messages.
-        rig: the armature.
         bones: of one tree, parents first.
         matrices: (T, B, 4, 4) the bones in the world, metres.
         world: (4, 4) the armature in the world.

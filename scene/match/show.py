@@ -47,7 +47,7 @@ def show_match(context: bpy.types.Context, section: MatchSection, first: int) ->
         for person, worn in characters:
             bake_character(scene, person, worn, start=section.start, first=first, last=last)
         if section.ball is not None:
-            bake_ball(context, section.ball, section.start, first, last)
+            bake_ball(context, section.ball, section.start, first)
     with _measure_seconds(durations, "cameras"):
         frames, size = np.arange(first, last + 1), (section.length, section.width)
         camera = cameras.create_broadcast_camera(scene, size, frames, _compute_camera_targets(scene, section, frames,
@@ -106,7 +106,7 @@ def hide_outside(objects: list[bpy.types.Object], is_present: np.ndarray, first:
         ours.mark_object(channels.create_action(thing, f"{thing.name} shown", first + at, curves))
 
 
-def bake_ball(context: bpy.types.Context, path: BallPath, start: float, first: int, last: int) -> bpy.types.Object:
+def bake_ball(context: bpy.types.Context, path: BallPath, start: float, first: int) -> bpy.types.Object:
     """Bake the ball with its roll, hidden where its trajectory is unknown, and its trajectory as a curve.
 
     Args:
@@ -114,7 +114,6 @@ def bake_ball(context: bpy.types.Context, path: BallPath, start: float, first: i
         path: the ball path.
         start: s on the match's clock.
         first: scene frame of that time.
-        last: last displayed frame.
     Returns:
         The ball.
     """

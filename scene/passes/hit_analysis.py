@@ -171,17 +171,17 @@ def build_picture(found: dict) -> np.ndarray:
     count, middle = max(found["count"] - 1, 1), _BARS + (SIZE - _BARS) // 2
     panes = ((middle + _EDGE, SIZE - _EDGE), (_BARS + _EDGE, middle - _EDGE))
 
-    def column_of(frame: float) -> int:
+    def find_column(frame: float) -> int:
         """Column of the picture for a frame."""
         return int(round(_EDGE + frame / count * (SIZE - 1 - 2 * _EDGE)))
 
     for second in np.arange(0.0, found["count"], found["fps"]):
-        image[_BARS:, column_of(second), :3] = _GRID
+        image[_BARS:, find_column(second), :3] = _GRID
     image[middle, :, :3] = _GRID
     for first, last in found["motions"]:
-        image[6:16, column_of(first) : column_of(last) + 1, :3] = _MOTION
+        image[6:16, find_column(first) : find_column(last) + 1, :3] = _MOTION
     for first, last in found["stretches"]:
-        image[22:38, column_of(first) - 1 : column_of(last) + 2, :3] = _STRETCH
+        image[22:38, find_column(first) - 1 : find_column(last) + 2, :3] = _STRETCH
     for (low, high), name, frames, colour, mark in (
         (panes[0], "height", "highs", _HEIGHT, _HIGH), (panes[1], "speed", "fasts", _SPEED, _FAST)
     ):
@@ -189,7 +189,7 @@ def build_picture(found: dict) -> np.ndarray:
         top = max(float(values.max()), found["threshold"] if name == "height" else 0.0, 1e-6)
         bottom = min(float(values.min()), 0.0)
         for frame in found[frames]:
-            image[low:high, column_of(frame), :3] = mark
+            image[low:high, find_column(frame), :3] = mark
         if name == "height":
             level = int(low + (found["threshold"] - bottom) / (top - bottom) * (high - low - 1))
             image[level, _EDGE : SIZE - _EDGE : 3, :3] = _LEVEL

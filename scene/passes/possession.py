@@ -169,10 +169,10 @@ def sample_own_path(
 
 def find_own_curves(before: BeyondMocapBefore) -> tuple[dict, list]:
     """Find the curves of the ball's own action, and its rest transform as `saved_state.read_stance` stores it."""
-    return curves_before(before), json.loads(before.stance)[""]
+    return read_curves_before(before), json.loads(before.stance)[""]
 
 
-def curves_before(before: BeyondMocapBefore) -> dict:
+def read_curves_before(before: BeyondMocapBefore) -> dict:
     """Find the curves that an object played before, by data path and index."""
     slots = before.action.slots if before.action is not None else ()
     slot = next((one for one in slots if one.identifier == before.slot), None)

@@ -8,6 +8,7 @@ scene without a path, such as those of applied edits and of players.
 from __future__ import annotations
 
 import json
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from time import perf_counter
 
@@ -256,12 +257,12 @@ def _build_follower(scene, body, until: float):
 
     if perf_counter() > until:
         raise _build_timeout_error()
-    try:
-        if is_edited_as_rig(body):
-            raise InputError(body.name, "is a rig")
-        read = choose_adapter(body).read_motion(scene)
-        frames, hips = read.first + np.arange(len(read.motion)), read.motion.root_positions
-    except BeyondMocapError:  # sample it instead
+    frames = hips = None
+    if not is_edited_as_rig(body):
+        with suppress(BeyondMocapError):
+            read = choose_adapter(body).read_motion(scene)
+            frames, hips = read.first + np.arange(len(read.motion)), read.motion.root_positions
+    if frames is None:
         frames, hips = _sample_hips(scene, body, until)
     if not np.isfinite(hips).all():
         raise InputError("its pose", "a place with NaN or infinite values", "finite values", "check its keys")

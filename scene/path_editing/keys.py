@@ -130,7 +130,7 @@ def sample_channels(sheet: ActionPair, places: list[Place], whole: np.ndarray, f
         sheet: the actions.
         places: the channels.
         whole: (T,) whole scene frames.
-        shown: (N,) scene frames.
+        frames: (N,) scene frames.
     Returns:
         (N,) values by channel.
     """

@@ -228,7 +228,7 @@ def _find_tips(rig, parts: RigParts, parents: list[int], rest: np.ndarray, sampl
     return tuple(ends), np.array(tips).reshape(-1, 3)
 
 
-def build_single_part(rig: bpy.types.Object, samples: RigSamples, object_keyed: bool, units: float) -> RigParts:
+def build_single_part(rig: bpy.types.Object, samples: RigSamples, units: float) -> RigParts:
     """Build the parts of an armature that is no upright body: one part, the topmost bone that moves with most bones."""
     bones = [bone.name for bone in rig.data.bones if bone.use_deform] or samples.bones
     places, _ = compute_world_places(samples, [samples.find_bone(name) for name in bones], units)

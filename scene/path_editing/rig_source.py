@@ -44,8 +44,7 @@ class RigSource:
         self.units = units_per_metre(scene)
         with rig_look.create_private_scene(rig, scene) as side:
             samples = rig_look.sample_rig(rig, side, played.frames, sorted(played.others))
-            parts = rig_parts.identify_parts(rig) or rig_parts.build_single_part(rig, samples, played.object_keyed,
-                                                                                 self.units)
+            parts = rig_parts.identify_parts(rig) or rig_parts.build_single_part(rig, samples, self.units)
             self.motion = rig_parts.build_motion(rig, parts, samples, self.units, frames_per_second(scene))
             controls = _list_controls(rig, side, parts, played)
             dependencies = control_study.find_carriers(rig, side, controls, list(parts.visible_bones.values()))

@@ -73,7 +73,7 @@ class GroupMotions:
                                for table in (self.rotation, self.before, self.after))
         return quaternion.rotate(turn, points - before) + after
 
-    def moves_alike(self, one: str, other: str) -> bool:
+    def is_same_motion(self, one: str, other: str) -> bool:
         """Return whether two groups move alike: to a ten-thousandth of a degree and of a millimetre."""
         if one == other:
             return True
@@ -145,7 +145,7 @@ class RigTransfer:
         Args:
             rig: the armature.
             parts: its parts.
-            seen: its samples.
+            samples: its samples.
             dependencies: what each control depends on.
             object_keyed: whether the object itself is animated.
             motion: the motion that the parts show.
@@ -304,7 +304,7 @@ class RigTransfer:
             (bone, "turn") -> continuous rotations (N, 4) of its own channels; (bone, "location") -> (N, 3).
         """
         some = [one for one in self.controls
-                if not all(moves.moves_alike(one.own, other) for other in (one.turn, one.place))]
+                if not all(moves.is_same_motion(one.own, other) for other in (one.turn, one.place))]
         return (self._compute_rotations(some, moves, rows)
                 | self._compute_locations([one for one in some if one.has_location], moves, rows)) if some else {}
 
@@ -350,7 +350,7 @@ def to_channel_values(mode: str, rotations: np.ndarray, like: np.ndarray) -> np.
 
     Args:
         mode: rotation mode of the bone.
-        turned: (N, 4) continuous rotations.
+        rotations: (N, 4) continuous rotations.
         like: (n,) the source's first values, whose sign and full turns are kept.
     Returns:
         (N, n) values.

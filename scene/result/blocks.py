@@ -68,7 +68,7 @@ def build_strip_name(take: Take, frame: int) -> str:
     return f"{clip}{mirrored} {' '.join(take.words[frame])}".strip()[:60]
 
 
-def convert_to_strips(body: bpy.types.Object, scene: bpy.types.Scene) -> bpy.types.NlaTrack:
+def convert_to_strips(body: bpy.types.Object) -> bpy.types.NlaTrack:
     """Cut the action of `body` into strips on a track of the extension; the action is removed. Returns the track."""
     whole, slot = channels.find_playing_action(body)
     track = find_track(body)
@@ -101,7 +101,7 @@ def convert_to_strips(body: bpy.types.Object, scene: bpy.types.Scene) -> bpy.typ
     return track
 
 
-def convert_to_action(body: bpy.types.Object, scene: bpy.types.Scene) -> bpy.types.Action | None:
+def convert_to_action(body: bpy.types.Object) -> bpy.types.Action | None:
     """Join the strips of `body` to one action, if it does not play one already; the strips are removed."""
     whole, _ = channels.find_playing_action(body)
     track = find_track(body)

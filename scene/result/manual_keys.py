@@ -56,7 +56,7 @@ class ManualKeys:
     """The manual keys of an action.
 
     Attributes:
-        keys: keys by channel, as of `channels.keys_of`.
+        keys: keys by channel, as `channels.read_keys` returns them.
         missing: by channel, whole frames whose key is missing.
         whole: channels that are kept as they are.
         groups: by channel, name of its group.

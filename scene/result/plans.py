@@ -33,7 +33,7 @@ def build_plan(settings: BeyondMocapSettings, player: BeyondMocapPlayer,
     Args:
         settings: of the scene.
         player: the player.
-        still: see `drawn_track.read`.
+        still: see `drawn_track.read_drawn_track`.
     Returns:
         The plan, and warnings about the track.
     """

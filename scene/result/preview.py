@@ -94,9 +94,9 @@ def apply_preview(context: bpy.types.Context, player: BeyondMocapPlayer, form: s
     if result.motion.kept and body.animation_data is not None:
         restore_nla(result.motion, body.animation_data)
     if form == "STRIPS":
-        blocks.convert_to_strips(body, context.scene)
+        blocks.convert_to_strips(body)
     else:
-        blocks.convert_to_action(body, context.scene)
+        blocks.convert_to_action(body)
     _clear_state(player)
     result.state = "ACCEPTED"
     _apply_shared(context)

@@ -45,8 +45,8 @@ CURVES = (  # name, tooltip
     ("Root Error (cm)", "Distance of root and track, both smoothed over 1.5 s; the target is 1.5 cm for 95 %"),
     ("Slide Left (cm/s)", "Speed over the ground of the left foot while it is in contact"),
     ("Slide Right (cm/s)", "Speed over the ground of the right foot while it is in contact"),
-    ("Correction Left (cm)", "Distance by which polishing moved the left foot from its place in the clip"),
-    ("Correction Right (cm)", "Distance by which polishing moved the right foot from its place in the clip"),
+    ("Correction Left (cm)", "Distance by which foot correction moved the left foot from its place in the clip"),
+    ("Correction Right (cm)", "Distance by which foot correction moved the right foot from its place in the clip"),
     ("Jerk (of real)", "Highest jerk nearby, over the 95th percentile of recordings at that speed"),
     ("Speed Gap (m/s)", "Speed of the body above that of the track"),
     ("Piece (0 or 1)", "Changes between 0 and 1 at every cut between two clips"),
@@ -101,8 +101,8 @@ def describe_moments(report: Mapping) -> str:
     return "\n".join(lines)
 
 
-def list_warnings(report: Mapping, more: Iterable[str] = (), known: Iterable[str] = ()) -> str:
-    """List the warnings of a report, after `more` (of the track), without those that are `known`."""
+def describe_warnings(report: Mapping, more: Iterable[str] = (), known: Iterable[str] = ()) -> str:
+    """Describe the warnings of a report, after `more` (of the track), without those that are `known`."""
     from ...beyond_mocap.base.errors import line_spans
 
     seconds = dict(zip(report.get("warnings", ()), report.get("warning_seconds", ())))

@@ -108,7 +108,7 @@ def build_request(settings: BeyondMocapSettings, player: BeyondMocapPlayer, mode
         settings: of the scene.
         player: the player.
         mode: what to synthesize.
-        still: see `drawn_track.read`.
+        still: see `drawn_track.read_drawn_track`.
     Returns:
         The request.
     Raises:

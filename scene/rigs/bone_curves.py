@@ -55,11 +55,11 @@ def compute_bone_poses(driven: DrivenRig, motion: Motion, frames: np.ndarray, ro
     def to_armature_space(points: np.ndarray) -> np.ndarray:
         return quaternion.rotate(quaternion.inverse(object_rotation), points - object_origin) / scale
 
-    rotations = {driven.bone_of(part): to_bone_rotations(world[:, i], driven.bone_of(part)) for i,
+    rotations = {driven.find_bone(part): to_bone_rotations(world[:, i], driven.find_bone(part)) for i,
                  part in enumerate(driven.parts)}
-    places = {driven.bone_of("hips"): to_armature_space(hips)}
+    places = {driven.find_bone("hips"): to_armature_space(hips)}
     if "root" in driven.table:
-        bone = driven.bone_of("root")
+        bone = driven.find_bone("root")
         if root == "KEEP":  # it stays at rest
             rotations[bone] = np.repeat(driven.rest_rotations[bone][None], len(frames), axis=0)
             places[bone] = np.repeat(driven.rest_positions[bone][None], len(frames), axis=0)
@@ -91,7 +91,7 @@ def _compute_followers(driven: DrivenRig, turns: dict, places: dict, hips, world
         return
     heads = _compute_heads(motion, world, hips)
     for bone, part in driven.followers.items():
-        carrier = driven.bone_of(part)
+        carrier = driven.find_bone(part)
         own = driven.rest_rotations[carrier].T @ driven.rest_rotations[bone]
         offset = driven.rest_rotations[carrier].T @ (driven.rest_positions[bone] - driven.rest_positions[carrier])
         turns[bone] = turns[carrier] @ own

@@ -83,13 +83,13 @@ class DrivenRig:
         self.skeleton = self._build_skeleton()
         self.sole = self._measure_sole()
 
-    def bone_of(self, part: str) -> str:
+    def find_bone(self, part: str) -> str:
         """Return the bone of a part."""
         return self.table[part]
 
     def rest_heads(self, *parts: str) -> np.ndarray:
         """Return the positions (n, 3) of parts at rest, in the armature's space."""
-        return np.array([self.rest_positions[self.bone_of(part)] for part in parts])
+        return np.array([self.rest_positions[self.find_bone(part)] for part in parts])
 
     def to_metres(self, vectors: np.ndarray) -> np.ndarray:
         """Convert vectors of the armature's space to the core's upright metres."""
@@ -100,9 +100,9 @@ class DrivenRig:
         names = [bone_maps.JOINTS[part] for part in self.parts]
         parents, bones = [], list(self.table.values())
         for part in self.parts:
-            ride = self.controls.carriers[bones.index(self.bone_of(part))]
+            ride = self.controls.carriers[bones.index(self.find_bone(part))]
             carrier = bones[ride.position_carrier] if ride.position_carrier >= 0 else None
-            above = [p for p in self.parts if self.bone_of(p) == carrier]
+            above = [p for p in self.parts if self.find_bone(p) == carrier]
             parents.append(-1 if part == "hips" else self.parts.index(above[0]) if above else 0)
         heads = self.to_metres(self.rest_heads(*self.parts))
         offsets = heads - heads[np.maximum(parents, 0)]
@@ -116,7 +116,7 @@ class DrivenRig:
         kind = part.partition(" ")[2]
         if kind not in ("hand", "foot", "toe") or self.parts.index(part) in parents:
             return None
-        bone = self.rig.data.bones[self.bone_of(part)]
+        bone = self.rig.data.bones[self.find_bone(part)]
         fingers = [np.array(child.head_local) for child in bone.children if not re.search(r"(?i)twist|ik", child.name)]
         at = np.array(bone.head_local)
         tip = self.to_metres((np.mean(fingers, axis=0) if fingers and kind == "hand" else np.array(bone.tail_local))
@@ -136,7 +136,7 @@ class DrivenRig:
         leg = float(np.linalg.norm(self.to_metres(np.subtract(*self.rest_heads("left upper_leg", "left foot")))))
         if -0.02 * leg <= level <= 0.16 * leg:
             return max(level, 0.0)  # the armature's origin is on the floor
-        tails = [self.to_metres(np.array(self.rig.data.bones[self.bone_of(part)].tail_local))[2] for part in ends]
+        tails = [self.to_metres(np.array(self.rig.data.bones[self.find_bone(part)].tail_local))[2] for part in ends]
         return float(np.clip(level - min(tails), 0.0, 0.16 * leg))
 
 

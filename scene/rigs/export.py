@@ -183,9 +183,8 @@ def _copy_armature(stage: bpy.types.Scene, rig: bpy.types.Object, shown: _Sample
         poses = {name: in_place @ pose for name, pose in poses.items()}
     if line is not None:
         poses[root or ROOT_BONE] = line
-    parents = _simplify_bones(stage, copy, rig, kept=bones, hips=hips if line is not None and root is None else None,
-                              messages=messages)
-    _create_action(copy, poses, parents, shown.object_matrices, wanted)
+    parents = _simplify_bones(stage, copy, rig, kept=bones, hips=hips if line is not None and root is None else None)
+    _create_action(copy, poses, parents, shown.object_matrices)
     return copy
 
 
@@ -199,7 +198,7 @@ def _select_bones(rig: bpy.types.Object, wanted: ExportOptions, root: str | None
     return deform | ({named} if named else set())
 
 
-def _simplify_bones(stage, copy, rig, kept: set[str], hips: str | None, messages: list[str]) -> dict[str, str | None]:
+def _simplify_bones(stage, copy, rig, kept: set[str], hips: str | None) -> dict[str, str | None]:
     """Simplify the copy's bones: only the selected ones, each below the nearest selected one, with plain inheritance.
 
     With `hips` a root bone is added above all. Returns bone -> parent.
@@ -244,8 +243,7 @@ def _find_parent(rig: bpy.types.Object, name: str, kept: set[str]) -> str | None
     return None
 
 
-def _create_action(copy, poses: dict[str, np.ndarray], parents: dict[str, str | None], lies: np.ndarray,
-                   wanted: ExportOptions) -> None:
+def _create_action(copy, poses: dict[str, np.ndarray], parents: dict[str, str | None], lies: np.ndarray) -> None:
     """Create one action of the copy: its bones as `poses` (F, 4, 4) in its space, the object as `lies` (F, 4, 4)."""
     rest = {name: np.array(copy.data.bones[name].matrix_local) for name in parents}
     curves: dict[str, tuple[str, np.ndarray]] = {}

@@ -48,7 +48,7 @@ def reduce_keys(
     ends = channels.find_key_range(curves)
     driven = DrivenRig(rig, table, scene)
     frames = np.arange(ends[0], ends[1] + 1)
-    dense = _sample_channels(rig, curves, frames)
+    dense = _sample_channels(curves, frames)
     reach = _build_end_function(driven, dense)
     places, levers, share = reach({}), _measure_levers(driven), 1.0
     for _ in range(_ROUNDS):
@@ -119,7 +119,7 @@ def _is_rotation(path: str) -> bool:
     return ".rotation_" in path
 
 
-def _sample_channels(rig: bpy.types.Object, curves: dict, frames: np.ndarray) -> dict[str, np.ndarray]:
+def _sample_channels(curves: dict, frames: np.ndarray) -> dict[str, np.ndarray]:
     """Sample the values (F, n) of every complete bone channel: rotations and locations with keys in all components."""
     found: dict[str, np.ndarray] = {}
     for path in dict.fromkeys(path for path, _ in curves):

@@ -69,7 +69,7 @@ def reset_status() -> None:
 
 def update_stream(scene: bpy.types.Scene) -> HitMotion | None:
     """Show what has arrived in a scene, update the status, and return the strike that was just detected, if any."""
-    listener = current_listener()
+    listener = get_current_listener()
     found = _receive_frames(scene, listener) if listener is not None else None
     for call in list(_on_look):
         call(scene)
@@ -82,9 +82,9 @@ def _receive_frames(scene: bpy.types.Scene, listener: Listener) -> HitMotion | N
     latest = listener.latest_frame()
     if latest is not None and latest.number != _state["seen"]:
         _state["seen"] = latest.number
-        if _show_frame(scene, listener, latest) == "posed":
+        if _show_frame(scene, latest) == "posed":
             _latencies.append(time.monotonic() - (latest.time if latest.sent is None else latest.sent))
-        if current_listener() is None:  # the stream has been stopped
+        if get_current_listener() is None:  # the stream has been stopped
             return None
     found = None
     if now - _state["looked"] >= DETECT_SECONDS:
@@ -96,7 +96,7 @@ def _receive_frames(scene: bpy.types.Scene, listener: Listener) -> HitMotion | N
     return found
 
 
-def _show_frame(scene, listener: Listener, latest) -> str:
+def _show_frame(scene, latest) -> str:
     """Pose the streamed character.
 
     Returns:
@@ -137,7 +137,7 @@ def _detect_hit(scene) -> HitMotion | None:
 
 def write_status() -> None:
     """Write the status of the stream for the panel."""
-    status_texts, listener = bpy.context.window_manager.beyond_mocap_streaming, current_listener()
+    status_texts, listener = bpy.context.window_manager.beyond_mocap_streaming, get_current_listener()
     if listener is None:
         status_texts.on, status_texts.state, status_texts.line, status_texts.figures = False, "stopped", "", ""
         return
@@ -162,7 +162,7 @@ def _give_up(reason: str) -> None:
 
 def _run_timer() -> float:
     """Update the stream, and return the seconds until the next call."""
-    if current_listener() is None and not _on_look:
+    if get_current_listener() is None and not _on_look:
         if bpy.context.window_manager.beyond_mocap_streaming.on:
             write_status()
             window.redraw_editors()
@@ -194,7 +194,7 @@ def start_listening(settings) -> Listener:
     """
     clip = bpy.path.abspath(settings.clip) if settings.clip else ""
     hierarchy = read_hierarchy(clip) if clip else None
-    before = current_listener()
+    before = get_current_listener()
     if before is not None:
         raise InputError(f"port {before.port}", "a stream is already received", "one at a time", "press Stop Stream")
     one = Listener(settings.port, settings.protocol, hierarchy, settings.unit or None).start()
@@ -212,7 +212,7 @@ def stop_listening() -> None:
         one.stop()
 
 
-def current_listener() -> Listener | None:
+def get_current_listener() -> Listener | None:
     """The listener of the session, or None."""
     return _session.get("listener")
 

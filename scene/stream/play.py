@@ -67,7 +67,7 @@ def apply_rally(scene: bpy.types.Scene, new_rally: NewRally) -> None:
     _apply_players(scene, new_rally.rally, [player.name for player in new_rally.rally.scene.players])
     follow.add_hit_call(store_strike)
     follow.add_update_call(update_rally)
-    _write_status(scene)
+    _write_status()
 
 
 def stop_rally() -> None:
@@ -78,12 +78,12 @@ def stop_rally() -> None:
     _session.clear()
 
 
-def current_rally() -> Rally | None:
+def get_current_rally() -> Rally | None:
     """The rally that is being played, or None."""
     return _session.get("rally")
 
 
-def rally_seconds(scene: bpy.types.Scene) -> float:
+def compute_rally_seconds(scene: bpy.types.Scene) -> float:
     """Compute the scene's time on the rally's clock."""
     return (scene.frame_current_final - scene.beyond_mocap_passes.start_frame) / frames_per_second(scene)
 
@@ -91,7 +91,7 @@ def rally_seconds(scene: bpy.types.Scene) -> float:
 def find_target(scene: bpy.types.Scene) -> str:
     """Find the receiver of the next pass: the chosen player, otherwise the next one in the list."""
     names = [row.name for row in scene.beyond_mocap_passes.players]
-    chosen, holder = scene.beyond_mocap_stream.target, current_rally().holder
+    chosen, holder = scene.beyond_mocap_stream.target, get_current_rally().holder
     if chosen in names and chosen != holder:
         return chosen
     if not names:
@@ -126,7 +126,7 @@ def find_shown_strike(scene: bpy.types.Scene, body: bpy.types.Object) -> HitMoti
 
 def update_rally(scene: bpy.types.Scene) -> None:
     """Start a requested pass, or insert one that is ready."""
-    if current_rally() is None or scene.session_uid != _session["scene"]:
+    if get_current_rally() is None or scene.session_uid != _session["scene"]:
         return
     if scene.beyond_mocap_passes.made_of != PLAYED:
         _end_rally("The scene has been updated or cleared: press Play Live to continue")
@@ -137,7 +137,7 @@ def update_rally(scene: bpy.types.Scene) -> None:
         if job.poll():
             _session.pop("job")
             _finish_job(scene, job)
-    elif _session.get("pending") is not None and rally_seconds(scene) >= current_rally().ready_time:
+    elif _session.get("pending") is not None and compute_rally_seconds(scene) >= get_current_rally().ready_time:
         try:
             order = _collect_request(scene, _session.pop("pending"))
         except InputError as error:
@@ -148,7 +148,7 @@ def update_rally(scene: bpy.types.Scene) -> None:
 
 def answer_now(scene: bpy.types.Scene, hit: HitMotion) -> LivePass:
     """Answer a strike at once, for scripts: the pass is computed and inserted before this returns."""
-    if current_rally() is None:
+    if get_current_rally() is None:
         raise InputError("play live", "no rally is being played", "a rally", "press Play Live")
     piece = _build_answer(*_collect_request(scene, hit), None, None)
     _apply_pass(scene, piece)
@@ -158,8 +158,8 @@ def answer_now(scene: bpy.types.Scene, hit: HitMotion) -> LivePass:
 def _collect_request(scene, hit: HitMotion) -> tuple:
     """Collect what a pass needs: library, rally, time, hit, receiver, bounces."""
     # not before the holder can act
-    now = max(rally_seconds(scene), current_rally().ready_time)
-    return _session["library"], current_rally(), now, hit, find_target(scene), scene.beyond_mocap_stream.bounces
+    now = max(compute_rally_seconds(scene), get_current_rally().ready_time)
+    return _session["library"], get_current_rally(), now, hit, find_target(scene), scene.beyond_mocap_stream.bounces
 
 
 def _build_answer(library, one, now: float, hit: HitMotion, to: str, bounces: int, progress, cancelled) -> LivePass:
@@ -183,11 +183,11 @@ def _finish_job(scene, job) -> None:
 
 def _apply_pass(scene, piece: LivePass) -> None:
     """Insert a pass into the scene from now on."""
-    next_rally = current_rally().add_pass(piece, max(rally_seconds(scene), current_rally().ready_time))
+    next_rally = get_current_rally().add_pass(piece, max(compute_rally_seconds(scene), get_current_rally().ready_time))
     _apply_players(scene, next_rally, list(piece.motions))
     _session["rally"] = next_rally
     scene.beyond_mocap_stream.target = ""
-    _write_status(scene, piece)
+    _write_status(piece)
 
 
 def _apply_players(scene, one: Rally, names: list[str]) -> None:
@@ -217,7 +217,7 @@ def _update_target(scene) -> None:
     for row in scene.beyond_mocap_passes.players:
         # a player is clicked by character, mesh or place
         known = {row.body, row.place, *(row.body.children if row.body else ())}
-        if active is not None and active in known and row.name != current_rally().holder:
+        if active is not None and active in known and row.name != get_current_rally().holder:
             scene.beyond_mocap_stream.target = row.name
 
 
@@ -228,9 +228,9 @@ def _end_rally(reason: str) -> None:
     status_texts.playing, status_texts.played = False, reason
 
 
-def _write_status(scene, piece: LivePass | None = None) -> None:
+def _write_status(piece: LivePass | None = None) -> None:
     """Write the state of the rally for the panel."""
-    status_texts, one = bpy.context.window_manager.beyond_mocap_streaming, current_rally()
+    status_texts, one = bpy.context.window_manager.beyond_mocap_streaming, get_current_rally()
     status_texts.playing = True
     lines = [f"{one.holder} has the ball, passes so far: {one.passes}"]
     if piece is not None:
@@ -241,7 +241,7 @@ def _write_status(scene, piece: LivePass | None = None) -> None:
 
 def _after_undo() -> None:
     """End the rally after an undo, which changes the scene that the rally knows."""
-    if current_rally() is not None:
+    if get_current_rally() is not None:
         _end_rally("Undo has ended Play Live: press it to start again")
 
 

@@ -55,7 +55,7 @@ def read_own_motion(scene: bpy.types.Scene, body: bpy.types.Object) -> tuple["Mo
 
 def find_stance(rig: DrivenRig) -> tuple[np.ndarray, float]:
     """Find position (2,) m and heading (rad) of a rig without motion."""
-    place = rig.placement.to_world(np.array([rig.rest_positions[rig.bone_of("hips")]]))[0]
+    place = rig.placement.to_world(np.array([rig.rest_positions[rig.find_bone("hips")]]))[0]
     forward = quaternion.rotate(quaternion.inverse(rig.upright), np.array([1.0, 0.0, 0.0]))
     forward = quaternion.rotate(rig.placement.rotation, forward)
     return np.asarray(place[:2]), float(np.arctan2(forward[1], forward[0]))

@@ -166,7 +166,7 @@ def _edit_at_playhead(context: bpy.types.Context, what: str) -> CommandResult:
         context.scene.frame_float += step
         return CommandResult(f"{clock.to_seconds(context.scene.frame_current_final):.2f} s")
     if found is None:
-        raise InputError("playhead", "is on no key moment or span", f"one to {what}", "go to one first")
+        raise InputError("playhead", "is on no key moment or span", "a key moment or span", "go to one first")
     return CommandResult(_mirror_item(target, found) if what == "mirror" else _remove_item(target, found), True)
 
 

@@ -84,7 +84,7 @@ def normalize_object(target: bpy.types.Object) -> bool:
         except InputError:
             continue
         changed |= _normalize_markers(strip, clock, target.name)
-        if _needs_action(track, strip, span, clock):
+        if _needs_action(track, strip, span):
             _renew_action(target, track, strip, span, clock)
             changed = True
     return changed | _align_to_frames(target, clock)
@@ -116,7 +116,7 @@ def _name_tracks(target: bpy.types.Object) -> bool:
     return changed
 
 
-def _needs_action(track, strip: bpy.types.NlaStrip, span: Span, clock: Clock) -> bool:
+def _needs_action(track, strip: bpy.types.NlaStrip, span: Span) -> bool:
     """Return whether a span's strip needs another action: its line changed, or its action is shared."""
     action = strip.action
     own = action.users - action.use_fake_user == 1

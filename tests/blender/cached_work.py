@@ -44,7 +44,8 @@ def cache_work(monkeypatch, library: type) -> None:
     done, known = {}, {}
     for name in CACHED_OPERATORS:
         operator = getattr(bpy.types, f"BEYOND_MOCAP_OT_{name}")
-        monkeypatch.setattr(operator, "work", staticmethod(_build_cached(name, operator.work, library, done, known)))
+        cached = _build_cached(name, operator.run_job, library, done, known)
+        monkeypatch.setattr(operator, "run_job", staticmethod(cached))
 
 
 def _build_cached(name: str, work, library: type, done: dict, known: dict):

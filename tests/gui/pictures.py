@@ -6,12 +6,24 @@ from functools import cache
 
 import bpy
 from mathutils import Euler
-from tab import EXTENSION, TAB, copy_sample, import_module, output, run_operator, window
+from tab import (
+    EXTENSION,
+    TAB,
+    copy_sample,
+    get_settings,
+    import_module,
+    output,
+    run_operator,
+    wait_for_work,
+    wait_until,
+    window,
+)  # fmt: skip
 from window import draw_unfolded
 
 KEPT_PICTURES = pathlib.Path("docs/pictures")
 NAMES = {"players": "track", "synthesis": "synthesize"}  # panels whose page has another name
-NOT_SHOWN = ("throws",)  # no page shows them
+NOT_SHOWN = ("throws", "ball")  # their pages show them at work
+LONG = ("library", "quality")  # longer than the window
 TABS = 22  # pixels of a sidebar's right edge that are its tabs
 FRAME = 190
 
@@ -84,8 +96,23 @@ def check_the_whole_window():
     window.save_part(KEPT_PICTURES / "panel.png", area.x, area.y, area.width, area.height, "-resize", "1000x")
 
 
+def widen_sidebar(area, by=90):
+    """Drag the sidebar's edge, so that fewer labels are cut."""
+    region = window.find_sidebar(area)
+    x, y = region.x, region.y + region.height // 2
+    yield from window.move_pointer(x, y)
+    yield 0.3
+    window.send_event("LEFTMOUSE", "PRESS")
+    yield 0.1
+    for step in range(10):
+        yield from window.move_pointer(x - by * (step + 1) // 10, y)
+    window.send_event("LEFTMOUSE", "RELEASE")
+    yield 0.5
+
+
 def check_each_panel_of_the_3d_view():
     area = window.find_area("VIEW_3D")
+    yield from widen_sidebar(area)
     tops = [(cls, list_panels("VIEW_3D", cls.__name__)) for cls in list_panels("VIEW_3D")]
     for top, within in tops:
         if top.__name__.endswith(NOT_SHOWN):
@@ -93,10 +120,152 @@ def check_each_panel_of_the_3d_view():
         show_only([top, *within], "VIEW_3D")
         fold_again = [draw_unfolded(cls) for cls in (top, *within)]
         name = top.__name__.partition("_PT_")[2]
+        bpy.context.preferences.view.ui_scale = 0.85 if name in LONG else 1.0
         yield from window.open_tab(area, TAB)
         yield from save_tab_picture(f"panel-{NAMES.get(name, name)}", area)
         for fold in fold_again:
             fold()
+    bpy.context.preferences.view.ui_scale = 1.0
+
+
+def check_overlays():
+    """All overlays of the first player, shortly before the kick at 8.5 s."""
+    scene, settings = bpy.context.scene, get_settings()
+    settings.view.players = "ACTIVE"
+    for name in import_module("panels.view").ICONS:
+        setattr(settings.view, name, True)
+    store = import_module("scene.overlays.store")
+    yield from wait_until(lambda: store.find_prepared(settings.players[0].take), what="overlays")
+    scene.frame_set(round(1 + 8.2 * scene.render.fps))
+    look_at(settings.players[0].body)
+    yield from save_view_picture("view")
+    for name in import_module("panels.view").ICONS:
+        setattr(settings.view, name, False)
+
+
+def check_menu_of_labels():
+    """The menu after `2` (kick), in which the library lacks something."""
+    area, annotate = window.find_area("VIEW_3D"), import_module("operators.annotate")
+    region = next(region for region in area.regions if region.type == "WINDOW")
+    yield from window.move_pointer(area.x + area.width // 3, area.y + area.height // 2)
+    for key in ("J", "TWO"):
+        yield from window.press_key(key)
+        yield 1
+    x0, y0, x1, y1 = (int(value) for value in annotate._menu["box"].box)
+    window.save_part(KEPT_PICTURES / "annotate.png", region.x + x0 - 8, region.y + y0 - 8, x1 - x0 + 16, y1 - y0 + 16)
+    for _ in range(3):
+        yield from window.press_key("ESC")
+
+
+def check_timeline():
+    """The strips of the first player, and the tab beside them."""
+    scene, area = bpy.context.scene, window.find_area("VIEW_3D")
+    for shown in scene.objects:
+        shown.select_set(shown == get_settings().players[0].dot)
+    with bpy.context.temp_override(window=window.window, area=area):
+        bpy.ops.screen.area_split(direction="HORIZONTAL", factor=0.55)
+    other = next(one for one in window.window.screen.areas if one.type == "VIEW_3D" and one != area)
+    area.ui_type = "NLA_EDITOR"
+    area.spaces.active.dopesheet.show_only_selected = True
+    yield from window.open_tab(area, TAB)
+    region = next(region for region in area.regions if region.type == "WINDOW")
+    with bpy.context.temp_override(window=window.window, area=area, region=region):
+        bpy.ops.nla.view_all()
+        bpy.ops.beyond_mocap.go_to_moment(index=1)
+    scene.frame_set(500)  # beside the name of the moment
+    yield 1.5
+    window.save_part(KEPT_PICTURES / "timeline.png", area.x, area.y, area.width, area.height, "-resize", "1200x")
+    area.ui_type = "VIEW_3D"
+    with bpy.context.temp_override(window=window.window, area=other):
+        bpy.ops.screen.area_close()
+    yield 0.5
+
+
+def check_assets():
+    """The kicks of the library as assets."""
+    bpy.context.window_manager.beyond_mocap_clips.find = "kick"
+    run_operator("beyond_mocap.make_assets", which="SHOWN")
+    yield from wait_for_work()
+    area = window.find_area("VIEW_3D")
+    area.ui_type = "ASSETS"
+    yield 2
+    area.spaces.active.params.asset_library_reference = "LOCAL"
+    yield 2
+    window.save_part(KEPT_PICTURES / "library-assets.png", area.x, area.y + area.height - 180, 640, 180)
+    area.ui_type = "VIEW_3D"
+    yield 0.5
+
+
+def check_a_throw():
+    """A throw of a sample clip's body at an Empty, just after the release, with its panel."""
+    bpy.ops.wm.read_homefile(use_empty=True, load_ui=False)
+    yield 1
+    scene = bpy.context.scene
+    scene.render.fps, get_settings().library_folder = 30, str(copy_sample() / "library")
+    bpy.ops.beyond_mocap.import_clips(filepath=str(copy_sample() / "library" / "walking_1_2.bvh"))
+    thrower = create_person(bpy.context.object)
+    target = bpy.data.objects.new("Target", None)
+    target.location, target.empty_display_type, target.empty_display_size = (10.0, 1.0, 2.0), "SPHERE", 0.3
+    scene.collection.objects.link(target)
+    settings = thrower.beyond_mocap_throw
+    settings.target, settings.frame = target, 70
+    run_operator("beyond_mocap.throw_at_target")
+    yield from wait_until(lambda: settings.made, what="a throw")
+    yield from wait_for_work()
+    scene.frame_set(78)
+    hips = thrower.matrix_world @ thrower.pose.bones[0].head
+    space = window.find_area("VIEW_3D").spaces.active
+    space.overlay.show_extras, view = True, space.region_3d  # the target
+    view.view_perspective, view.view_distance = "PERSP", 9.0
+    view.view_location, view.view_rotation = ((hips.x + 10.0) / 2, 0.5, 0.0), Euler((1.35, 0.0, 0.2)).to_quaternion()
+    panel, = (cls for cls in list_panels("VIEW_3D") if "PT_throws" in cls.__name__)
+    area = window.find_area("VIEW_3D")
+    show_only([panel], "VIEW_3D")
+    yield from window.open_tab(area, TAB)
+    yield 1
+    window.save_part(KEPT_PICTURES / "throw.png", area.x, area.y + area.height // 3, area.width - TABS, area.height * 2
+                     // 3, "-resize", "1000x")
+
+
+def check_a_passing_scene():
+    bpy.ops.wm.read_homefile(use_empty=True, load_ui=False)
+    yield 1
+    scene = bpy.context.scene
+    scene.render.fps = 30
+    run_operator("beyond_mocap.passes_sample", "EXEC_DEFAULT", sample="three")
+    passes = scene.beyond_mocap_passes
+    get_settings().library_folder, passes.repeat = str(copy_sample() / "passes" / "library"), 1
+    run_operator("beyond_mocap.passes_make")
+    yield from wait_for_work()
+    assert passes.made_of, passes.messages
+    scene.frame_set(int(passes.strikes.splitlines()[1].partition("\t")[0]) + 8)
+    view = window.find_area("VIEW_3D").spaces.active.region_3d
+    view.view_perspective, view.view_distance, view.view_location = "PERSP", 7.5, (0.0, 0.0, 0.6)
+    view.view_rotation = Euler((1.15, 0.0, 0.6)).to_quaternion()
+    yield from save_view_picture("passing-scene")
+    panel, = (cls for cls in list_panels("VIEW_3D") if "PT_ball" in cls.__name__)
+    area = window.find_area("VIEW_3D")
+    show_only([panel], "VIEW_3D")
+    draw, look = panel.draw, bpy.context.preferences.view
+    panel.draw = lambda self, context: import_module("panels.ball").draw_passing_scene(self, self.layout, context)
+    draw_unfolded(panel)
+    look.ui_scale = 0.75  # it is longer than the window
+    yield from window.open_tab(area, TAB)
+    yield from save_tab_picture("panel-ball", area)
+    look.ui_scale = 1.0
+    panel.draw = draw
+
+
+def create_person(armature):
+    """Give an armature a low-poly body; return the armature."""
+    scene = bpy.context.scene
+    motion = import_module("scene.core.action").read_motion(armature, scene)
+    person = import_module("scene.stage.body").create_character(armature, "person", (0.75, 0.05, 0.06),
+                                                                scene.collection, scene, motion)
+    for collection in person.users_collection:
+        collection.color_tag = "NONE"
+    armature.hide_set(False)
+    return armature
 
 
 def create_walk_on_bend():
@@ -106,12 +275,8 @@ def create_walk_on_bend():
     scene = bpy.context.scene
     bpy.ops.beyond_mocap.import_clips(filepath=str(copy_sample() / "library" / "walk_jog_walk.bvh"))
     walker = bpy.context.object
+    create_person(walker)
     motion = import_module("scene.core.action").read_motion(walker, scene)
-    person = import_module("scene.stage.body").create_character(walker, "person", (0.75, 0.05, 0.06), scene.collection,
-                                                                scene, motion)
-    for collection in person.users_collection:
-        collection.color_tag = "NONE"
-    walker.hide_set(False)
     bpy.ops.beyond_mocap.edit_path(kind="NURBS", count=6)
     curve = bpy.context.object
     for point, aside in zip(curve.data.splines[0].points, (0.0, 0.0, 5.0, -5.0, 0.0, 4.0)):
@@ -135,8 +300,7 @@ def save_view_picture(name):
 
 def check_path_editing():
     yield from create_walk_on_bend()
-    for shown in window.find_area("VIEW_3D").spaces:
-        shown.overlay.show_extras = False  # cameras are no part of it
+    window.find_area("VIEW_3D").spaces.active.overlay.show_extras = False  # cameras are no part of it
     for kind in ("quarter", "behind"):
         run_operator("beyond_mocap.path_camera", "EXEC_DEFAULT", which=kind.upper())
         yield from save_view_picture(f"path-editing-{kind}")
@@ -187,7 +351,7 @@ def check_optical_markers():
     show_only([panel], "VIEW_3D")
     yield from window.open_tab(area, TAB)
     fold, look = draw_unfolded(panel), bpy.context.preferences.view
-    look.ui_scale = 0.7  # it is longer than the window
+    look.ui_scale = 0.65  # it is longer than the window
     yield 1
     yield from save_tab_picture("panel-markers", area)
     look.ui_scale = 1.0
@@ -230,5 +394,5 @@ def check_the_preferences():
     bpy.context.window_manager.addon_search = "Beyond Mocap"
     bpy.ops.preferences.addon_expand(module=EXTENSION)
     yield 1.5
-    window.save_part(KEPT_PICTURES / "preferences.png", shown.x + 170, shown.y + 4, shown.width - 180, shown.height
-                     * 6 // 10)
+    window.save_part(KEPT_PICTURES / "preferences.png", shown.x + 170, shown.y + 10, shown.width - 180, shown.height
+                     * 6 // 10 - 6)

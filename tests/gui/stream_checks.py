@@ -103,7 +103,7 @@ def check_strikes_are_answered_while_the_scene_plays():
     bpy.ops.screen.animation_play()
     end = start_sending("passes/library/volley_pass.bvh")
     try:
-        rally = import_module("scene.stream.play").current_rally
+        rally = import_module("scene.stream.play").get_current_rally
         yield from wait_until(lambda: rally() is None or rally().passes >= 1)
         assert rally() is not None, get_stream_status().played
         frame, passes, holder = get_scene().frame_current, rally().passes, rally().holder

@@ -79,7 +79,7 @@ class Stretches:
     def __len__(self) -> int:
         return len(self.seconds)
 
-    def take(self, which: np.ndarray) -> Stretches:
+    def select_rows(self, which: np.ndarray) -> Stretches:
         """Select some of the stretches."""
         return Stretches(*(getattr(self, name)[which] for name in self.__dataclass_fields__))
 
@@ -169,7 +169,7 @@ def _choose_starts(stretches: Stretches, ball: Ball, cancelled) -> list[np.ndarr
     far = np.flatnonzero(np.linalg.norm((stretches.end - stretches.start)[:, :2], axis=1) > _SHORT_DISTANCE)
     if not len(far):
         return [start]
-    far_stretches = stretches.take(far)
+    far_stretches = stretches.select_rows(far)
     most = 0.5 * ball.gravity * far_stretches.seconds + 2.0  # with this speed the ball is down again at the end
     fits = [_fit_batches(far_stretches, _build_guess(far_stretches, np.minimum(upward, most)), ball,
                          rounds=_COARSE_ROUNDS, simulate=_simulate_coarse, cancelled=cancelled)
@@ -278,7 +278,8 @@ def _fit_batches(stretches: Stretches, unknown, ball: Ball, rounds: int, simulat
         if cancelled is not None and cancelled():
             raise UserCancelledError("solving the ball: cancelled")
         some = order[low : low + _BATCH]
-        out[some], costs[some] = _solve_least_squares(stretches.take(some), unknown[some], ball, rounds, simulate)
+        rows = stretches.select_rows(some)
+        out[some], costs[some] = _solve_least_squares(rows, unknown[some], ball, rounds, simulate)
     return out, costs
 
 
@@ -318,7 +319,7 @@ def _compute_jacobian(stretches: Stretches, unknown: np.ndarray, ball: Ball) -> 
     change of the start position (unknowns 0, 1) moves the whole trajectory and needs no simulation.
     """
     count = len(unknown)
-    copies = stretches.take(np.tile(np.arange(count), 6))
+    copies = stretches.select_rows(np.tile(np.arange(count), 6))
     nudged = np.tile(unknown, (6, 1))
     nudged[count:] += np.repeat(np.diag(_DIFFERENCE_STEPS)[2:], count, axis=0)
     seen, end = _simulate_to_samples(copies, nudged, ball, _simulate_coarse)

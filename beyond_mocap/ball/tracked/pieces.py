@@ -52,7 +52,7 @@ class PieceFits:
     def __len__(self) -> int:
         return len(self.first)
 
-    def take(self, which) -> PieceFits:
+    def select_rows(self, which) -> PieceFits:
         """Select some of the pieces."""
         return PieceFits(*(getattr(self, name)[which] for name in self.__dataclass_fields__))
 

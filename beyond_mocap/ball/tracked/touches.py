@@ -108,7 +108,7 @@ def solve_cuts(times, points, weights, cuts, player_cost) -> Cuts:
     while back[chain[-1]] >= 0:
         chain.append(int(back[chain[-1]]))
     chain = np.array(chain[::-1])
-    return _build_cuts(pieces.take(chain), times, cuts, player_cost)
+    return _build_cuts(pieces.select_rows(chain), times, cuts, player_cost)
 
 
 def _compute_short_cost(pieces: PieceFits, times: np.ndarray) -> np.ndarray:
@@ -155,7 +155,6 @@ def _estimate_cuts(pieces: PieceFits, left, right, times, cuts, upto, begin, pla
     here, there = pieces.position(time, left), pieces.position(time, right)
     place_left, speed_left = pieces.spread(time, left)
     place_right, speed_right = pieces.spread(time, right)
-    axes = before.shape[1]
     miss = ((here - there) ** 2).sum(axis=1) / (_JOINT_DEVIATION**2 + place_left + place_right)
     speed_var = speed_left + speed_right
     change = after - before
@@ -163,7 +162,7 @@ def _estimate_cuts(pieces: PieceFits, left, right, times, cuts, upto, begin, pla
     joint = -np.logaddexp(-0.5 * miss, -_MAX_JUMP_COST)
     joint = joint + _SKIP_COST * (second - first - _measure_interval(times)) * (resumed > cut)
     near = np.minimum(player_cost[cut], player_cost[resumed])
-    touch = TOUCH_COST + joint + near + _compute_touch_cost(size, speed_var, axes)
+    touch = TOUCH_COST + joint + near + _compute_touch_cost(size, speed_var)
     free = FREE_COST + _NEAR_COST * np.exp(-near) + joint + _compute_free_cost(before, change, here, speed_var)
     place = (here * place_right[:, None] + there * place_left[:, None]) / (place_left + place_right)[:, None]
     spread = np.sqrt((place_left + place_right) / np.maximum(size**2, 0.25) + (0.1 * step) ** 2)
@@ -175,7 +174,7 @@ def _measure_interval(times: np.ndarray) -> float:
     return float(np.median(np.diff(times)))
 
 
-def _compute_touch_cost(size, variance, axes) -> np.ndarray:
+def _compute_touch_cost(size, variance) -> np.ndarray:
     """Compute the cost of a velocity change by a touch: its size falls off exponentially, its direction is
     arbitrary.
     """

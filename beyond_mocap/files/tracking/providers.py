@@ -181,12 +181,12 @@ def _find_signality(path: Path, meta: Path, notes: list[str]) -> Files:
 
 def _find_hawkeye(path: Path, meta: Path | None, notes: list[str]) -> Files:
     """Find all of HawkEye's files in a folder, one per minute: the players', then the same number of the ball."""
-    def minute(file: Path) -> list[int]:
+    def compute_minute(file: Path) -> list[int]:
         return [int(number) for number in re.findall(r"\d+", file.name)]
 
-    players = sorted(path.parent.glob("*.samples.centroids"), key=minute)
-    balls = sorted(path.parent.glob("*.samples.ball"), key=minute)
-    if not players or [minute(file) for file in players] != [minute(file) for file in balls]:
+    players = sorted(path.parent.glob("*.samples.centroids"), key=compute_minute)
+    balls = sorted(path.parent.glob("*.samples.ball"), key=compute_minute)
+    if not players or [compute_minute(file) for file in players] != [compute_minute(file) for file in balls]:
         found = f"{format_count(len(players), 'file')} of players and {len(balls)} of the ball"
         raise InputError(path.parent, found, "one .samples.ball for every .samples.centroids", "complete the folder")
     notes.append(f"{len(players)} files of players and of the ball in {path.parent.name or path.parent} are used")

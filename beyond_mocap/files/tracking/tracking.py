@@ -47,8 +47,8 @@ def read_track_csv(path: str | os.PathLike) -> Track:
     """Read a player and the ball from `time_s,x_m,y_m[,ball_x_m,ball_y_m,ball_z_m]`, unchanged; other columns are
     ignored.
 
-    Empty cells (or nan) are unknown. Rows keep the file's order, with repeated times and gaps: `motion.track.clean`
-    repairs them and reports it.
+    Empty cells (or nan) are unknown. Rows keep the file's order, with repeated times and gaps:
+    `motion.track.clean_track` repairs them and reports it.
 
     Args:
         path: the file.

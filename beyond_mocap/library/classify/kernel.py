@@ -111,10 +111,10 @@ def fit_confidence(score: np.ndarray, rule: np.ndarray, is_act: np.ndarray, has_
     yes = int(np.sum(is_act))
     target = np.where(is_act, (yes + 1.0) / (yes + 2.0), 1.0 / (len(is_act) - yes + 2.0))
 
-    def loss(weights):
+    def compute_loss(weights):
         logit = rows @ weights
         deviation = (weights - start) / _PRIOR_SPREAD
         slope = rows.T @ (1.0 / (1.0 + np.exp(-logit)) - target) + deviation / _PRIOR_SPREAD
         return float(np.sum(np.logaddexp(0.0, logit) - target * logit) + 0.5 * deviation @ deviation), slope
 
-    return minimize(loss, start, jac=True).x
+    return minimize(compute_loss, start, jac=True).x

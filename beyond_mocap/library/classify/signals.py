@@ -82,7 +82,7 @@ def build_signals(motion: Motion) -> Signals:
     at = np.arange(0.0, len(motion) - 1 + 1e-6, motion.fps / RATE)
     rows = np.minimum(np.round(at).astype(int), len(motion) - 1)
 
-    def points(joints: list[int]) -> np.ndarray:
+    def list_joint_positions(joints: list[int]) -> np.ndarray:
         offsets = places[rows][:, joints] - places[rows][:, [hips]]
         velocities = (moving[rows][:, joints] - moving[rows][:, [hips]]) * _REACH
         turn = -facing[rows][:, None]
@@ -91,8 +91,8 @@ def build_signals(motion: Motion) -> Signals:
     sides = [_list_side_joints(body, limb) for limb in (body.left, body.right)]
     head = body.head_or_neck
     strikes = _compute_strikes(places, moving, body, head, facing)
-    return Signals(fps=motion.fps, count=len(motion), frames=at, middle=points([body.chest, head]),
-                   paired=np.stack([points(one) for one in sides], axis=1),
+    return Signals(fps=motion.fps, count=len(motion), frames=at, middle=list_joint_positions([body.chest, head]),
+                   paired=np.stack([list_joint_positions(one) for one in sides], axis=1),
                    trunk=_compute_trunk(motion, body, places, moving=moving, facing=facing, leg=leg)[rows],
                    strikes=strikes)
 

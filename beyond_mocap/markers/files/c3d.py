@@ -51,7 +51,7 @@ def read_c3d(path: str | os.PathLike, unit: float | str | None = None, subject: 
         size = os.fstat(handle.fileno()).st_size
         parameters = _read_parameters(path, handle, size)
         layout = _find_layout(path, parameters, size)
-        words = _read_words(path, handle, layout)
+        words = _read_words(handle, layout)
     positions, residuals = _decode_points(words, layout, parameters)
     return build_trial(_build_raw_markers(path, parameters, layout, positions, residuals), path, unit, subject, up)
 
@@ -267,7 +267,7 @@ def _list_frame_counts(parameters: _Parameters) -> tuple[int, list[int]]:
     return first, list(dict.fromkeys(count for count in counts if count > 0))
 
 
-def _read_words(path: Path, handle, layout: _Layout) -> np.ndarray:
+def _read_words(handle, layout: _Layout) -> np.ndarray:
     """Read (T, bytes of a frame's points) uint8."""
     handle.seek(layout.data)
     points = 4 * layout.points * layout.word

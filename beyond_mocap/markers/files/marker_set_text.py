@@ -96,14 +96,15 @@ class _MarkerSetParser:
             raise InputError(place, f"{line[:40]!r}", "`what: labels`", _FORM)
         word, _, rest = head.partition(" ")
         whole, word, rest = " ".join(head.lower().split()), word.lower(), rest.strip()
+        add = {"segment": self._add_segment, "landmark": self._add_landmark, "also": self._add_aliases}
         if whole == "marker set":
             self._set_name(value, place)
         elif whole == "about":
             self.about = value
         elif whole in _LISTS:
             self.lists[whole] = (*self.lists.get(whole, ()), *_parse_labels(value, place))
-        elif word in ("segment", "landmark", "also") and rest:
-            getattr(self, f"_{word}")(rest, _parse_labels(value, place), place)
+        elif word in add and rest:
+            add[word](rest, _parse_labels(value, place), place)
         else:
             raise InputError(place, f"{head[:40]!r}", f"one of {_KEYWORDS}", _FORM)
 
@@ -114,18 +115,18 @@ class _MarkerSetParser:
             raise InputError(place, f"name {value[:40]!r}", "one word of letters, digits, `_`, `-` and `.`", _FORM)
         self.name = value
 
-    def _segment(self, joint: str, labels: tuple[str, ...], place: str) -> None:
+    def _add_segment(self, joint: str, labels: tuple[str, ...], place: str) -> None:
         if joint not in JOINTS:
             raise InputError(place, f"no segment {joint[:40]!r}", f"one of {', '.join(JOINTS)}", "check the spelling")
         self.segments[joint] = (*self.segments.get(joint, ()), *labels)
 
-    def _landmark(self, name: str, labels: tuple[str, ...], place: str) -> None:
+    def _add_landmark(self, name: str, labels: tuple[str, ...], place: str) -> None:
         if name not in LANDMARKS:
             expected = f"one of {', '.join(sorted(LANDMARKS))}"
             raise InputError(place, f"no landmark {name[:40]!r}", expected, "check the spelling")
         self.landmarks[name] = (*self.landmarks.get(name, ()), *labels)
 
-    def _also(self, own: str, others: tuple[str, ...], place: str) -> None:
+    def _add_aliases(self, own: str, others: tuple[str, ...], place: str) -> None:
         for other in others:
             if self.aliases.setdefault(other, own) != own:
                 found = f"{other[:40]!r} for {self.aliases[other]!r} and {own!r}"

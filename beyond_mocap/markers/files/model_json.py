@@ -18,6 +18,7 @@ from ...files.json_values import (
     check_number,
     check_numbers,
     check_text,
+    check_texts,
     parse_json,
 )
 from ...motion.skeleton import Skeleton
@@ -142,10 +143,10 @@ def _build_model(whole) -> MarkerModel:
         edge_sigma=_read_column(markers, "marker", "edge_sigma", math.nan), freedom=_build_freedom(joints),
         stiffness=_read_column(joints, "joint", "stiffness", 0.0),
         centre_sigma=_read_column(joints, "joint", "centre_sigma", math.nan), ball=_read_ball(whole.get("ball"), index),
-        subject=check_text(whole.get("subject", ""), "subject"), sessions=_read_texts(whole.get("sessions", []),
+        subject=check_text(whole.get("subject", ""), "subject"), sessions=check_texts(whole.get("sessions", []),
                                                                                       "sessions"),
         set_name=check_text(whole.get("marker_set", ""), "marker_set"),
-        notes=_read_texts(whole.get("notes", []), "notes"),
+        notes=check_texts(whole.get("notes", []), "notes"),
     )
 
 
@@ -233,7 +234,3 @@ def _read_place(value, where: str) -> tuple[float, float, float]:
     if max(map(abs, place)) > _MAX_COORDINATE:
         raise InputError(where, f"{max(place, key=abs):g} m", "metres within a body", "check the unit")
     return place
-
-
-def _read_texts(value, where: str) -> tuple[str, ...]:
-    return tuple(check_text(one, where) for one in check_list(value, where))

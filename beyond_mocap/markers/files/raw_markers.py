@@ -13,7 +13,7 @@ from pathlib import Path
 import numpy as np
 
 from ...base.errors import InputError, format_count
-from ..trial import MarkerEvent, MarkerTrial, list_some
+from ..trial import MarkerEvent, MarkerTrial, format_some
 from .unit_and_axes import check_given_unit, decide_unit, detect_up_axis, measure_handedness, measure_height
 
 _MAX_COORDINATE = 1e9  # in any unit; a larger coordinate is damage
@@ -121,7 +121,7 @@ def _choose_subject(raw: RawMarkers, path, subject, notes) -> tuple[list[int], l
     points = [i for i, (name, label) in enumerate(split_labels) if label not in dropped[name]]
     if len(points) < len(split_labels):
         some = list(dict.fromkeys(label for name, label in split_labels if label in dropped[name]))
-        notes.append(f"{format_count(len(split_labels) - len(points), 'computed point')} left out: {list_some(some)}")
+        notes.append(f"{format_count(len(split_labels) - len(points), 'computed point')} left out: {format_some(some)}")
     if not points:
         raise InputError(path, "no markers", "points that are markers", "export the trial with its markers")
     counts: dict[str, int] = {}
@@ -131,12 +131,12 @@ def _choose_subject(raw: RawMarkers, path, subject, notes) -> tuple[list[int], l
     selected = [i for i in points if split_labels[i][0] in ("", whose) or counts[split_labels[i][0]] < MIN_BODY_MARKERS]
     labels = [split_labels[i][1] if split_labels[i][0] in ("", whose) else ":".join(split_labels[i]) for i in selected]
     if others := [name for name in counts if name not in ("", whose)]:
-        notes.append(f"subject {whose or 'without a name'!r} of {list_some(list(counts))}")
+        notes.append(f"subject {whose or 'without a name'!r} of {format_some(list(counts))}")
         if objects := [name for name in others if counts[name] < MIN_BODY_MARKERS]:
-            notes.append(f"markers of {list_some(objects)} kept with their own names")
+            notes.append(f"markers of {format_some(objects)} kept with their own names")
     labels, duplicates = make_unique(labels)
     if duplicates:
-        notes.append(f"duplicate labels, numbered: {list_some(duplicates)}")
+        notes.append(f"duplicate labels, numbered: {format_some(duplicates)}")
     return selected, labels, whose
 
 
@@ -146,7 +146,7 @@ def _remove_invisible(path, labels, positions, residuals, notes):
     if not is_visible.any():
         raise InputError(path, f"{len(labels)} markers, none ever visible", "places of markers", "export it again")
     if not is_visible.all():
-        notes.append(f"never visible: {list_some([label for label, seen in zip(labels, is_visible) if not seen])}")
+        notes.append(f"never visible: {format_some([label for label, seen in zip(labels, is_visible) if not seen])}")
     labels = [label for label, seen in zip(labels, is_visible) if seen]
     return labels, positions[:, is_visible], None if residuals is None else residuals[:, is_visible]
 

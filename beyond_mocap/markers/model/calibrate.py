@@ -255,7 +255,8 @@ def build_from_motion(marker_set: MarkerSet, trial: MarkerTrial) -> MarkerModel:
         except InputError as error:
             reason = error
     if not found:
-        raise reason or InputError(trial.name, "no frames")
+        raise reason or InputError(trial.name, "no upright frame", "a frame that shows the landmarks",
+                                   "record a static trial")
     most = max(found, key=lambda model: (len(model.skeleton), len(model.markers)))
     matching = [m for m in found if m.skeleton.names == most.skeleton.names and m.markers == most.markers]
     skeleton = replace(most.skeleton, offsets=np.mean([m.skeleton.offsets for m in matching], axis=0),

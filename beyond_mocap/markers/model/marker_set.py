@@ -14,7 +14,7 @@ from types import MappingProxyType
 import numpy as np
 
 from ...base.errors import InputError
-from ..trial import MarkerTrial, list_some
+from ..trial import MarkerTrial, format_some
 from .template import JOINTS, LANDMARKS
 
 UNLABELED = re.compile(r"^(\*\d+|[UuxX]_?\d+|C_\d+|[Uu]nlabell?ed.*|[Uu]nnamed.*)$")
@@ -152,8 +152,8 @@ def choose_marker_set(labels: Sequence[str], sets: Iterable[MarkerSet]) -> Marke
     unknown = sorted(set(labeled) - set(nearest.map_labels(labeled)) - set(nearest.labels))
     raise InputError(
         "markers", f"no marker set fits; nearest is {nearest.name}, of which "
-        + f"{list_some(missing, 8)} {'is' if len(missing) == 1 else 'are'} missing"
-        + (f" ({list_some(unknown, 8)} not in it)" if unknown else ""),
+        + f"{format_some(missing, 8)} {'is' if len(missing) == 1 else 'are'} missing"
+        + (f" ({format_some(unknown, 8)} not in it)" if unknown else ""),
         "all markers of one set", "choose a marker set file that has these labels",
     )
 

@@ -86,7 +86,7 @@ class Chain:
         used = [joint for run in found for joint in run]
         return tuple(run for run in found if all(used.count(joint) == 1 for joint in run))
 
-    def without_limits(self) -> "Chain":
+    def remove_limits(self) -> "Chain":
         """Return the same chain without joint limits."""
         return replace(self, low=np.where(self.free, -np.inf, 0.0), high=np.where(self.free, np.inf, 0.0))
 

@@ -183,7 +183,7 @@ def _build_chain(model, has_limits: bool) -> Chain:
     freedom = model.freedom
     limited_chain = build_chain(model.skeleton, model.joint, model.places, order=freedom.order, free=freedom.free,
                                 low=freedom.low, high=freedom.high, stiffness=model.stiffness)
-    return limited_chain if has_limits else limited_chain.without_limits()
+    return limited_chain if has_limits else limited_chain.remove_limits()
 
 
 def _collect_positions(model, trial) -> np.ndarray:

@@ -67,7 +67,7 @@ class ReleaseSettings:
         ball_marker: label; None to find one named as a ball, "" for none.
         radius: metres; None for that of the ball's kind, or fitted where the markers determine it.
         hand: "left" or "right"; None for the one that throws.
-        ball: one of `THROWN`.
+        ball: one of `THROWN_BALLS`.
         window: s before and after the first guess that are searched.
         centre: (3,) metres, the ball's centre in the hand's frame, where known from other throws.
     """

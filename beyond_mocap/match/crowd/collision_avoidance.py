@@ -67,7 +67,7 @@ def resolve_collisions(
         for episode in find_meetings(spans, past_spans):
             _separate_episode(episode, bodies, curves, pressures, fps)
         corrections = [Correction.from_curves(own, start, fps) for own in curves]
-        curves = [correction.curves(start, len(body.lines)) for correction, body in zip(corrections, bodies)]
+        curves = [correction.build_curves(start, len(body.lines)) for correction, body in zip(corrections, bodies)]
         bodies = [_update_bend(*each, start) for each in zip(bodies, motions, curves, first_frames)]
     return tuple(corrections)
 

@@ -75,7 +75,7 @@ class Correction:
     @classmethod
     def build_empty(cls, fps: float) -> Correction:
         """Build a correction that changes nothing."""
-        return cls(np.zeros(0, int), np.zeros((0, CURVES), int), fps, knot_step(fps))
+        return cls(np.zeros(0, int), np.zeros((0, CURVES), int), fps, compute_knot_step(fps))
 
     @classmethod
     def from_curves(cls, curves: np.ndarray, first: int, fps: float) -> Correction:
@@ -88,7 +88,7 @@ class Correction:
         Returns:
             The correction.
         """
-        step = knot_step(fps)
+        step = compute_knot_step(fps)
         at = np.arange(-(-first // step) * step, first + len(curves), step)
         values = np.round(np.clip(curves[at - first] / UNIT, -32767, 32767)).astype(np.int16)
         is_visible = np.abs(curves[at - first]).max(axis=1, initial=0.0) > _MIN_VISIBLE
@@ -97,16 +97,16 @@ class Correction:
         values[~is_visible] = 0
         return cls(at[stored], values[stored], fps, step)
 
-    def pieces(self) -> list[tuple[int, int]]:
+    def build_pieces(self) -> list[tuple[int, int]]:
         """(first, end) knot indices of each piece."""
         breaks = np.flatnonzero(np.diff(self.knots) > self.step) + 1
         edges = [0, *breaks.tolist(), len(self.knots)]
         return [(low, high) for low, high in zip(edges, edges[1:]) if high - low > 1]
 
-    def curves(self, first: int, count: int) -> np.ndarray:
+    def build_curves(self, first: int, count: int) -> np.ndarray:
         """Give the curves (T, 12), m and rad, at `count` frames from frame `first`; cubic between knots."""
         out = np.zeros((count, CURVES))
-        for low, high in self.pieces():
+        for low, high in self.build_pieces():
             start, end = max(int(self.knots[low]), first), min(int(self.knots[high - 1]) + 1, first + count)
             if start < end:
                 spline = CubicSpline(self.knots[low:high], self.values[low:high] * UNIT, bc_type="clamped")
@@ -114,7 +114,7 @@ class Correction:
         return out
 
 
-def knot_step(fps: float) -> int:
+def compute_knot_step(fps: float) -> int:
     """Frames from knot to knot."""
     return max(1, round(KNOT_SECONDS * fps))
 
@@ -136,7 +136,7 @@ def apply_correction(motion: Motion, correction: Correction, first: int = 0) -> 
     """
     if abs(motion.fps - correction.fps) > 1e-9:
         raise InputError("correction", f"{correction.fps:g} frames per second", f"{motion.fps:g}, the motion's rate")
-    return apply_curves(motion, correction.curves(first, len(motion)))
+    return apply_curves(motion, correction.build_curves(first, len(motion)))
 
 
 def apply_curves(motion: Motion, curves: np.ndarray) -> Motion:

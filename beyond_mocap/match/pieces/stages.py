@@ -132,7 +132,7 @@ class _PlayerSearch:
         pieces.append(piece)
         if self._is_failed(player):
             return
-        job.state.count_window(player)
+        job.state.record_window(player)
         count = sum(map(len, self._found.values()))
         job.report(count / self._count, f"Searching: {count} of {self._count} windows")
         if len(pieces) == job.state.players[player]["units"]:

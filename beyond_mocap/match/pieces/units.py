@@ -96,7 +96,7 @@ def build_units(plan: Plan, stretch: int = 0, window: float = WINDOW, overlap: f
 
 
 def count_frames(plan: Plan, fps: float = FPS) -> int:
-    """Count the frames of the plan's track at `fps`, as `motion.track.sample` does."""
+    """Count the frames of the plan's track at `fps`, as `motion.track.sample_track` does."""
     return int(np.floor((plan.track.times[-1] - plan.track.times[0]) * fps + 1e-6)) + 1
 
 

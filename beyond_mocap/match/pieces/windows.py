@@ -43,11 +43,11 @@ from .named_edit import (
 from .units import Unit, cut_plan
 
 _ARRAYS = ("clip", "first", "rate", "length", "cut")
-_PLAIN = ("player", "stretch", "number", "first", "own", "seconds", "hurried")
+_PLAIN = ("player", "stretch", "number", "first", "own", "seconds")
 _MIN_SEAM_DISTANCE = 4
 """Frames between a joint and other transitions, so that it can be blended."""
 
-_SEAM_COST, _KEY_COST = 10.0, 1000.0
+_TRANSITION_COST, _KEY_COST = 10.0, 1000.0
 """Cost of a joint that close to another transition, and of one within the clip of a key moment."""
 
 
@@ -64,7 +64,7 @@ class Piece:
         edit: at the library's rate, from the unit's first frame.
         seconds: s of processor time.
         warnings: requested labels that the library lacks.
-        hurried: frame of `edit` from which the search was shortened, or None.
+        hurried_from: frame of `edit` from which the search was shortened, or None.
     """
 
     player: str
@@ -75,7 +75,7 @@ class Piece:
     edit: NamedEdit
     seconds: float = 0.0
     warnings: tuple[str, ...] = ()
-    hurried: int | None = None
+    hurried_from: int | None = None
 
 
 def search_window(library: Library, unit: Unit, cancelled: Callable[[], bool] | None = None,
@@ -106,7 +106,7 @@ def search_window(library: Library, unit: Unit, cancelled: Callable[[], bool] | 
         edit = align_keys(library, search.run(), order)
     return Piece(player=unit.player, stretch=unit.stretch, number=unit.number, first=unit.first, own=unit.own,
                  edit=to_named_edit(library, edit, plan.timeline.keys), seconds=time.process_time() - started,
-                 warnings=order.warnings, hurried=search.hurried_from)  # fmt: skip
+                 warnings=order.warnings, hurried_from=search.hurried_from)  # fmt: skip
 
 
 def build_search_library(library: Library, plan: Plan) -> Library:
@@ -117,7 +117,7 @@ def build_search_library(library: Library, plan: Plan) -> Library:
 def save_piece(path: Path, piece: Piece) -> None:
     """Save a piece; InputError if it cannot be written."""
     header = {name: getattr(piece, name) for name in _PLAIN}
-    header |= {"warnings": [[str(line), line_spans(line)] for line in piece.warnings]}
+    header |= {"hurried": piece.hurried_from, "warnings": [[str(line), line_spans(line)] for line in piece.warnings]}
     header |= {"clips": piece.edit.clips, "keys": [asdict(key) for key in piece.edit.keys]}
     out = io.BytesIO()
     arrays = {name: getattr(piece.edit, name) for name in _ARRAYS}
@@ -134,7 +134,7 @@ def load_piece(path: Path) -> Piece | None:
         keys = tuple(NamedKey(**{**key, "words": tuple(key["words"])}) for key in header.pop("keys"))
         clips = tuple((path, mirrored) for path, mirrored in header.pop("clips"))
         warnings = tuple(TimedMessage(text, *spans) for text, spans in header["warnings"])
-        header |= {"own": tuple(header["own"]), "warnings": warnings}
+        header |= {"own": tuple(header["own"]), "warnings": warnings, "hurried_from": header.pop("hurried")}
         return Piece(edit=NamedEdit(clips=clips, **arrays, keys=keys), **header)
     except Exception:  # a damaged file can raise any error of zipfile, zlib, numpy or this package
         return None
@@ -179,8 +179,8 @@ def join_pieces(
         edit, stretch_joints = _join_stretch(library, plan, stretch_pieces)
         begin = float(plan.track.times[0])
         warnings = tuple(dict.fromkeys(line for piece in stretch_pieces for line in piece.warnings))
-        short = tuple((begin + (piece.first + piece.hurried) / FPS, begin + piece.own[1] / FPS)
-                      for piece in stretch_pieces if piece.hurried is not None)  # fmt: skip
+        short = tuple((begin + (piece.first + piece.hurried_from) / FPS, begin + piece.own[1] / FPS)
+                      for piece in stretch_pieces if piece.hurried_from is not None)  # fmt: skip
         stretches.append(Stretch(plan, edit, warnings, short))
         joints += stretch_joints
     return PlayerEdit(plans[0].track.name, window, tuple(stretches)), tuple(joints)
@@ -237,7 +237,7 @@ def _compute_joint_costs(library: Library, plan: Plan, before: Piece, after: Pie
     cost = np.diagonal(sum(values for _, values in terms)).copy()
     at = np.arange(1, high - low)
     for seam in (*left_edit.transitions, *entered_edit.transitions):
-        cost += _SEAM_COST * ((np.abs(at - seam) < _MIN_SEAM_DISTANCE) & (at != seam))
+        cost += _TRANSITION_COST * ((np.abs(at - seam) < _MIN_SEAM_DISTANCE) & (at != seam))
     for key in (*before.edit.keys, *after.edit.keys):
         name = before.edit.clips[key.clip]
         rate = FPS / next(clip for clip in library.clips if (clip.path, clip.mirrored) == name).motion.fps

@@ -41,7 +41,7 @@ from .results import (
 )
 
 Thumbnail = Callable[[str, float], "np.ndarray | None"]
-"""Player's id and second on the match clock -> picture as of `appearance.picture.pose_picture`, or None."""
+"""Player's id and second on the match clock -> picture as of `appearance.picture.render_pose`, or None."""
 
 _STRIP_SECONDS = 15.0  # s before and after a bad second, shown in its strip
 _TITLES = {"root_error_m": "off the track", "skate_cm_s": "feet in contact slide", "overlap_m": "bodies overlap"}

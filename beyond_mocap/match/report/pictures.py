@@ -56,7 +56,7 @@ def build_thumbnail_renderer(library: Library, folder: Path) -> Callable[[str, f
         library: the clips.
         folder: the match's folder.
     Returns:
-        A function of id and second that gives (PICTURE_SIZE, PICTURE_SIZE, 4) as `pose_picture` does, or None if the
+        A function of id and second that gives (PICTURE_SIZE, PICTURE_SIZE, 4) as `render_pose` does, or None if the
         player has no motion then or their edit list cannot be read.
     Raises:
         InputError: if the folder has no match.json.

@@ -56,9 +56,11 @@ class PolynomialPath(Path):
 
     @property
     def breaks(self) -> np.ndarray:
+        """See `Path`."""
         return np.linspace(*self.domain, len(self.coefficients))  # one piece would do, but its bends need as many
 
     def at(self, u: np.ndarray, derivative: int = 0) -> np.ndarray:
+        """See `Path`."""
         low, high = self.domain
         scaled = (2.0 * self._to_domain(u) - low - high) / (high - low)
         legendre = np.polynomial.legendre
@@ -94,10 +96,12 @@ class SplinePath(Path):
 
     @cached_property
     def domain(self) -> tuple[float, float]:
+        """See `Path`."""
         return float(self.knots[self.degree]), float(self.knots[-self.degree - 1])
 
     @cached_property
     def breaks(self) -> np.ndarray:
+        """See `Path`."""
         return np.unique(self.knots[self.degree : len(self.knots) - self.degree])
 
     @cached_property
@@ -107,6 +111,7 @@ class SplinePath(Path):
         return BSpline(self.knots, self.coefficients - self.coefficients[0], self.degree)
 
     def at(self, u: np.ndarray, derivative: int = 0) -> np.ndarray:
+        """See `Path`."""
         # relative to the first control point: far from the origin derivatives would lose precision
         values = self._spline(self._to_domain(u), derivative)
         return values if derivative else values + self.coefficients[0]

@@ -27,8 +27,6 @@ TURN_SLACK = np.radians(25.0)
 SWAY_SECONDS = 0.4
 """Movement slower than about six times this belongs to the path, faster movement is sway."""
 
-PATH_KINDS = ("smooth", "straight")
-
 
 def fit_smoothing_spline(
     values: np.ndarray, at: np.ndarray, pieces: int, stiff: float, order: int = 2, weights: np.ndarray | None = None,

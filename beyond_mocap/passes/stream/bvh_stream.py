@@ -79,11 +79,6 @@ class BvhStream:
         if hierarchy is not None:
             self._use_hierarchy(hierarchy)
 
-    @property
-    def has_hierarchy(self) -> bool:
-        """Whether there is a hierarchy."""
-        return self._text is not None
-
     def feed(self, data: bytes, whole: bool = False) -> list[Frame]:
         """Parse the next bytes.
 

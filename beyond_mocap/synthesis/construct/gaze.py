@@ -37,7 +37,7 @@ def follow_with_gaze(
     Args:
         motion: T frames.
         places: (T, 3) m, world, NaN where there is nothing to look at.
-        look: (3,) unit, direction in which the head joint looks, in its own frame (`pins.look_axis`).
+        look: (3,) unit, direction in which the head joint looks, in its own frame (`pins.estimate_look_axis`).
         share: (T,) share of the turn that is applied at each frame.
         chest: (T,) share of the turn that the chest takes.
     Returns:

@@ -70,7 +70,7 @@ class PinTarget:
     place: np.ndarray
     pins: tuple[PinFrames, ...]
 
-    def cut(self, low: int, high: int) -> "PinTarget":
+    def cut_target(self, low: int, high: int) -> "PinTarget":
         """Cut out the frames low .. high."""
         inside = [stay for stay in self.pins if low <= stay.frames[0] and stay.frames[1] < high]
         moved = tuple(PinFrames(stay.first - low, stay.last - low, stay.place) for stay in inside)
@@ -111,7 +111,7 @@ def apply_pins(motion: Motion, contacts: np.ndarray, pins: Sequence, start: floa
     for found in targets.values():
         affected |= found.share > 0.0
     for low, high in find_runs(affected):
-        out.solve_frames(low, high, {part: found.cut(low, high) for part, found in targets.items()})
+        out.solve_frames(low, high, {part: found.cut_target(low, high) for part, found in targets.items()})
     for part in ("left_foot", "right_foot"):
         if part in targets:
             out.clear_contacts(part, targets[part])

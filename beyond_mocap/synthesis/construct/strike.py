@@ -139,7 +139,7 @@ def strike_ball(
                                height_known=height_known, fps=fps)
         reached, moved[number] = _reach_ball(scene, body)
         root[span], rotations[span] = reached.root, reached.rotations
-        places = [scene.solve_ball(scene.surface_lines(reached, frame), frame)[0] for frame in moment.held]
+        places = [scene.solve_ball(scene.compute_surface_lines(reached, frame), frame)[0] for frame in moment.held]
         path = shift_ball_eased(scene.ball, moment.held, np.array(places), moment.bounds, fps)
     gap, shift = _measure_gaps(skeleton, root, rotations, feed=samples, path=path, touches=touches)
     return StrikeResult(root, rotations, path, gap=gap, ball_shift=shift, moved=moved)
@@ -187,7 +187,7 @@ def _iter_touch_frames(skeleton: Skeleton, touches: Sequence[Touch], count: int,
     """Generate (number, moment) of every touch that some part can serve, in order of time."""
     shortest, longest = _SHORTEST_EASE * fps, _LONGEST_EASE * fps
     order = sorted((t.frame, k) for k, t in enumerate(touches) if build_surfaces(skeleton, t.words))
-    held = [held_frames(frame, count) for frame, _ in order]
+    held = [compute_contact_frames(frame, count) for frame, _ in order]
     # held frames of all touches, with sentinels far outside on both sides, so ends[place + 1] is this touch
     ends = [(-count, -count), *held, (2 * count, 2 * count)]
     for place, (frame, number) in enumerate(order):
@@ -204,7 +204,7 @@ def _nearest_frame(frame: float, count: int) -> int:
     return int(np.clip(np.rint(frame), 0, count - 1))
 
 
-def held_frames(frame: float, count: int) -> tuple[int, int]:
+def compute_contact_frames(frame: float, count: int) -> tuple[int, int]:
     """Return the two frames, of `count`, around a fractional one in which a touch is held.
 
     Twice the same where the frame is nearly whole.
@@ -243,7 +243,7 @@ class _TouchProblem:
         """Frame of the moment among the body's frames."""
         return self.moment.frame - self.origin
 
-    def surface_lines(self, body: Body, frame: int) -> np.ndarray:
+    def compute_surface_lines(self, body: Body, frame: int) -> np.ndarray:
         """Return both ends (P, 2, 3) m of every part's line."""
         return np.array([body.surface_line(part, frame - self.origin) for part in self.parts])
 
@@ -254,14 +254,14 @@ class _TouchProblem:
             lines: (P, 2, 3) m, the parts' lines.
             frame: output frame.
         """
-        part, ball, room = self.parts[0], self.ball[frame], self.ball_range(frame)
+        part, ball, room = self.parts[0], self.ball[frame], self.compute_ball_range(frame)
         if len(lines) == 2:
             return place_between_hands(lines, part.radius, ball, room)
         solved = solve_contacts(lines[0], part.radius, [self.aim], rise=_RISE[part.part], ball=ball, ball_range=room,
                                 avoid=self.avoid)
         return solved.ball[0], solved.need
 
-    def ball_range(self, frame: int) -> BallRange:
+    def compute_ball_range(self, frame: int) -> BallRange:
         """Return how far the ball may move; a ball on the ground stays there."""
         whole = BALL_NOISE if self.measured[frame] else FILLED_NOISE
         return BallRange(whole, BALL_NOISE if self.ball[frame, 2] > _IN_THE_AIR else 0.0)
@@ -283,18 +283,18 @@ def _build_problem(body: Body, moment: _TouchFrames, origin: int, contacts, path
         height = 0.5 * (line[0] + line[1])[2] + _RISE[parts[0].part] * (radius + BALL_RADIUS)
         path = add_flight_arc(path, moment.frame, float(height), ~height_known, fps)
     ahead = _choose_direction(body, parts[0], moment, at=at, path=path, fps=fps)
-    avoid = _other_leg_lines(body, parts[0], at) if parts[0].part == "foot" else []
+    avoid = _compute_other_leg_lines(body, parts[0], at) if parts[0].part == "foot" else []
     scene = _TouchProblem(moment=moment, parts=parts, shares=shares, ball=path, measured=measured, aim=Aim(ahead),
                           avoid=avoid, origin=origin)
     if len(parts) == 2:
         return scene
     aim = choose_aim(line, radius, ahead, rise=_RISE[parts[0].part], ball=path[moment.frame],
-                     ball_range=scene.ball_range(moment.frame), avoid=avoid,
+                     ball_range=scene.compute_ball_range(moment.frame), avoid=avoid,
                      possible=partial(_limit_shift, body, parts[0], at))
     return replace(scene, aim=aim)
 
 
-def _other_leg_lines(body: Body, foot: Surface, at: int) -> list[tuple]:
+def _compute_other_leg_lines(body: Body, foot: Surface, at: int) -> list[tuple]:
     """Return line and radius of the foot and the shin that do not strike."""
     other = next(part for part in build_part_surfaces(body.skeleton, "foot") if part.side != foot.side)
     knee, ankle = body.places[at, list(limb_chain(body.skeleton, other)[1:])]
@@ -310,12 +310,12 @@ def _use_both_hands(body: Body, hands: Sequence[Surface], at: int, words: frozen
 
 def _choose_part(body: Body, choices: Sequence[Surface], at: int, contacts, ball: np.ndarray, fps: float) -> Surface:
     """Choose the part nearest to the ball, a swinging foot before one in contact."""
-    def cost(part: Surface) -> float:
+    def compute_cost(part: Surface) -> float:
         gap = float(measure_ball_gap(body.surface_line(part, at), part.radius, ball))
-        return gap + 0.3 * _is_in_contact(contacts, part)[at] - 0.05 * np.linalg.norm(_part_velocity(body, part, at,
-                fps))
+        speed = np.linalg.norm(_compute_part_velocity(body, part, at, fps))
+        return gap + 0.3 * _is_in_contact(contacts, part)[at] - 0.05 * speed
 
-    return min(choices, key=cost)
+    return min(choices, key=compute_cost)
 
 
 def _is_in_contact(contacts: np.ndarray, part: Surface) -> np.ndarray:
@@ -342,7 +342,7 @@ def _compute_share(moment: _TouchFrames, origin: int, count: int, is_in_contact:
     return ease_around(np.arange(count), low, first, last, high)
 
 
-def _part_velocity(body: Body, part: Surface, at: int, fps: float) -> np.ndarray:
+def _compute_part_velocity(body: Body, part: Surface, at: int, fps: float) -> np.ndarray:
     """Compute the velocity (3,) m/s of the part's middle."""
     middle = np.mean(body.surface_line(part, slice(max(at - 1, 0), at + 2)), axis=0)
     return (middle[-1] - middle[0]) * fps / max(len(middle) - 1, 1)
@@ -369,7 +369,7 @@ def _choose_direction(body: Body, part: Surface, moment: _TouchFrames, at: int, 
         middle = np.mean(body.surface_line(part, at), axis=0)
         incoming = -coming if np.linalg.norm(coming) > 1.0 else _level_vector(path[moment.frame] - middle)
         return unit_vector(unit_vector(incoming, ahead) + 0.8 * ahead, ahead)
-    swing = _level_vector(_part_velocity(body, part, at, fps))
+    swing = _level_vector(_compute_part_velocity(body, part, at, fps))
     along = unit_vector(swing, ahead) if np.linalg.norm(swing) > 1.0 else ahead
     return unit_vector(along + 0.5 * unit_vector(leaving, along), along) if np.linalg.norm(leaving) > 3.0 else along
 
@@ -385,7 +385,7 @@ def _reach_ball(scene: _TouchProblem, body: Body) -> tuple[Body, float]:
     Requested shifts and what the body can do are solved alternately, since a nearly straight limb yields softly and a
     spine moves on an arc.
     """
-    own = scene.surface_lines(body, scene.moment.frame)
+    own = scene.compute_surface_lines(body, scene.moment.frame)
     if np.linalg.norm(scene.solve_ball(own, scene.moment.frame)[1]) < _CLOSE:
         return body, 0.0
     limbs = [LimbReference.from_body(body, limb_chain(body.skeleton, part)) for part in scene.parts
@@ -396,7 +396,7 @@ def _reach_ball(scene: _TouchProblem, body: Body) -> tuple[Body, float]:
         if np.linalg.norm(requested - shifts) < _CLOSE:
             break
         moved_body, shifts = _move_parts(scene, body, limbs, requested), requested
-        lines = scene.surface_lines(moved_body, scene.moment.frame)
+        lines = scene.compute_surface_lines(moved_body, scene.moment.frame)
     if np.linalg.norm(scene.solve_ball(lines, scene.moment.frame)[1], axis=1).min() > OUT_OF_REACH:
         return body, 0.0
     moved = np.linalg.norm(np.mean(lines, axis=1) - np.mean(own, axis=1), axis=1).max()

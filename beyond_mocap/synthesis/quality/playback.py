@@ -42,7 +42,7 @@ class Playback:
         words: T tuples, labels of the source frames, sides after mirroring; None where not known.
         contacts: (T, 2) bool, left and right foot.
         ball: as written, or None.
-        correction: (T, 2) m each foot was moved by polishing, or None.
+        correction: (T, 2) m each foot was moved by foot correction, or None.
         keys: how key moments were served, empty for a take read from files.
     """
 

@@ -48,7 +48,8 @@ def find_changed_frames(before: SearchRequest, after: SearchRequest, slot: int) 
         none = [frozenset()] * len(after)
         words |= [a != b for a, b in zip(before.avoided or none, after.avoided or none)]
     moving = np.minimum(1.0, new.speed)
-    turn = np.abs(quaternion.wrap_angle(_slot_turn(new.direction, slot) - _slot_turn(old.direction, slot))) * moving
+    turns = _compute_slot_turn(new.direction, slot) - _compute_slot_turn(old.direction, slot)
+    turn = np.abs(quaternion.wrap_angle(turns)) * moving
     facing = np.abs(quaternion.wrap_angle(compute_heading_offset(new) - compute_heading_offset(old))) * moving
     return words | (np.abs(new.speed - old.speed) > SPEED_CHANGE) | (turn > TURN_CHANGE) | (facing > FACING_CHANGE)
 
@@ -100,11 +101,12 @@ def find_stretches_to_search(library: Library, edit: EditList, before: SearchReq
     same = _match_keys(before, after)
     for placed in edit.keys:
         if placed.number not in same:
-            affected[slice(*_clip_frames(library, before.keys[placed.number], placed))] = True
+            affected[slice(*_list_clip_frames(library, before.keys[placed.number], placed))] = True
     for number, key in enumerate(after.keys):
         if key.choices and number not in same.values():
             affected[slice(*_mean_clip_frames(library, key, len(after)))] = True
-    stays = [_clip_frames(library, after.keys[key.number], key) for key in list_unchanged_keys(edit, before, after)]
+    same_keys = list_unchanged_keys(edit, before, after)
+    stays = [_list_clip_frames(library, after.keys[key.number], key) for key in same_keys]
     run_up = int(round(RUN_UP * library.fps))
     found = [_extend_stretch(core, run_up, stays, edit) for core in list_stretches(affected, run_up)]
     return merge_stretches(found, run_up)
@@ -121,7 +123,8 @@ def find_variant_stretch(library: Library, edit: EditList, after: SearchRequest,
     missing = max(0, int(round(MIN_STRETCH * library.fps)) - (end - first))
     first, end = max(0, first - missing // 2), min(len(edit), end + missing - missing // 2)
     same = list_unchanged_keys(edit, after, after)
-    return _extend_stretch((first, end), 0, [_clip_frames(library, after.keys[key.number], key) for key in same], edit)
+    stays = [_list_clip_frames(library, after.keys[key.number], key) for key in same]
+    return _extend_stretch((first, end), 0, stays, edit)
 
 
 def list_stretches(affected: np.ndarray, gap: int) -> list[Stretch]:
@@ -140,7 +143,7 @@ def merge_stretches(found: list[Stretch], gap: int) -> list[Stretch]:
     return out
 
 
-def _clip_frames(library: Library, key: RequestedKey, placed: PlacedKey) -> Stretch:
+def _list_clip_frames(library: Library, key: RequestedKey, placed: PlacedKey) -> Stretch:
     """Return the frames that the clip of a placed key needs."""
     entry, leave = compute_needed_frames(library, placed.key)
     return max(0, int(np.floor(key.frame - entry))), int(np.ceil(key.frame + leave)) + 1
@@ -169,7 +172,7 @@ def _extend_stretch(core: Stretch, run_up: int, stays: list[Stretch], edit: Edit
                                                                  else end)
 
 
-def _slot_turn(direction: np.ndarray, slot: int) -> np.ndarray:
+def _compute_slot_turn(direction: np.ndarray, slot: int) -> np.ndarray:
     """Compute the change of direction over `slot` frames centred on each frame."""
     padded = np.pad(direction, slot // 2, mode="edge")
     return padded[2 * (slot // 2) :] - padded[: len(direction)]

@@ -109,7 +109,7 @@ def explain_path_choices(library: Library, request: SearchRequest, edit: EditLis
     """
     search = PathSearch(library, request, weights)
     slots_chosen = _read_slot_choices(search, edit)
-    slots = [_slot_costs(search, slots_chosen, slot) for slot in range(len(slots_chosen.start))]
+    slots = [_compute_slot_costs(search, slots_chosen, slot) for slot in range(len(slots_chosen.start))]
     found = []
     for first, end in edit.pieces:
         piece_slots = [slot for slot in range(len(slots_chosen.start)) if first <= slots_chosen.edges[slot] < end]
@@ -215,7 +215,8 @@ def _measure_shift(search: PathSearch, edit: EditList, pieces: KeyPieces, row: i
     return float(np.mean(off)) if same and max(map(abs, off)) < _SHIFTED and abs(off[1] - off[0]) < 0.1 else None
 
 
-def _slot_costs(search: PathSearch, choices: _SlotChoices, slot: int) -> tuple[dict[str, float], dict[str, float]]:
+def _compute_slot_costs(search: PathSearch, choices: _SlotChoices,
+                        slot: int) -> tuple[dict[str, float], dict[str, float]]:
     """Compute the costs of a slot, and of the transition into it."""
     return _compute_unary_costs(search, choices, slot), _compute_entry_costs(search, choices, slot) if slot else {}
 
@@ -241,7 +242,7 @@ def _compute_entry_costs(search: PathSearch, choices: _SlotChoices, slot: int) -
     """
     if choices.piece[slot] >= 0 and choices.piece[slot] == choices.piece[slot - 1]:
         return {}
-    before, ends = _state_before(search, choices, slot)
+    before, ends = _find_state_before(search, choices, slot)
     here = choices.clip[slot : slot + 1], choices.start[slot : slot + 1], choices.rate[slot : slot + 1]
     change = search.weights.rate_change * abs(float(choices.rate[slot] - choices.rate[slot - 1]))
     to = SlotCandidates(*here, np.zeros(1), np.array([-1]))
@@ -254,7 +255,7 @@ def _compute_entry_costs(search: PathSearch, choices: _SlotChoices, slot: int) -
     return {**costs, "replay": max(0.0, whole - change - sum(costs.values())), "rate_change": change}
 
 
-def _state_before(search: PathSearch, choices: _SlotChoices, slot: int) -> tuple[BeamStates, np.ndarray]:
+def _find_state_before(search: PathSearch, choices: _SlotChoices, slot: int) -> tuple[BeamStates, np.ndarray]:
     """Build the state of the slot before, with no cost so far, and the library frame (1,) at its end."""
     starts = choices.start[max(slot - MEMORY_SLOTS, 0) : slot]
     recent = np.full(MEMORY_SLOTS, -1)
@@ -286,7 +287,7 @@ def _iter_other_clips(search: PathSearch, choices: _SlotChoices, slot: int, paid
     to = search.collect_candidates(edge)
     cost = to.cost
     if slot:
-        before, ends = _state_before(search, choices, slot)
+        before, ends = _find_state_before(search, choices, slot)
         cost = search.build_transitions(before, np.zeros(1, int), ends).compute_all(to)[0]
     # serves[-1] is -1: free candidates compare only with free ones
     serves = np.append(search.pieces.number, -1)

@@ -92,7 +92,7 @@ TERMS = {
     "unasked": "an action not requested, or no labels at all",
     "strange": "not how people stand, walk or run in this library",
     "made": "synthetic clip, not recorded",
-    "rate": "played faster or slower than recorded",
+    "rate": "playback rate",
     "strike": "does not fit the ball at the strike",
     "pose": "change of pose at the cut",
     "feet": "planted feet that jump at the cut",

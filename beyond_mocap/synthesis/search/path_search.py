@@ -145,7 +145,7 @@ class PathSearch:
         self.edges = build_slot_edges(library, request, *((stretch.first, stretch.end) if stretch else (0, None)),
                                       on_grid)
         self.pieces = build_key_pieces(library, request, self.edges)
-        self.choice_cost = self._choice_costs()
+        self.choice_cost = self._compute_choice_costs()
         self._closed_slots = {find_slot(self.edges, request.keys[number].frame) for number in self.pieces.number}
         self.width = SearchWidth()
         self.hurried_from: int | None = None
@@ -187,7 +187,7 @@ class PathSearch:
         if self.hurried_from is None and (self._hurry() or self._narrow and slot > 0):
             self.width, self.hurried_from = NARROW, int(self.edges[slot])
 
-    def _choice_costs(self) -> np.ndarray:
+    def _compute_choice_costs(self) -> np.ndarray:
         """Compute (P,) how badly each piece's clip strikes the ball that the track has at its key moment."""
         costs = np.zeros(len(self.pieces.number))
         for number in np.unique(self.pieces.number):
@@ -275,19 +275,19 @@ class PathSearch:
         """
         low, high = self.edges[slot : slot + 2]
         closed, here = slot in self._closed_slots, np.flatnonzero(self.pieces.first == slot)
-        candidate_lists = [self._piece_candidates(low, high, here)] if closed or len(here) else []
+        candidate_lists = [self._list_piece_candidates(low, high, here)] if closed or len(here) else []
         if not closed:
-            candidate_lists += [self._frame_candidates(low, high), *self._iter_lead_in_candidates(slot)]
+            candidate_lists += [self._list_frame_candidates(low, high), *self._iter_lead_in_candidates(slot)]
             candidate_lists += [self._previous_candidate(low, high)] if self.stretch else []
         return SlotCandidates(*(np.concatenate(parts) for parts in zip(*candidate_lists)))
 
-    def _piece_candidates(self, low: int, high: int, here: np.ndarray):
+    def _list_piece_candidates(self, low: int, high: int, here: np.ndarray):
         """Build the candidates of pieces `here` that begin in a slot."""
         clip, start, rate = self.pieces.clip[here], self.pieces.start[here], self.pieces.rate[here]
         cost = self.costs.compute_key_misfit(low, high, clip, start, rate) + self.choice_cost[here]
         return clip, start, rate, cost, here
 
-    def _frame_candidates(self, low: int, high: int):
+    def _list_frame_candidates(self, low: int, high: int):
         """Build the candidates of the cheapest library frames."""
         number, start, cost = self.costs.find_cheapest(low, high, self.width.considered, self.width.candidates)
         return self.frames.clip[start], start.astype(float), PLAYBACK_RATES[number], cost, np.full(len(cost), -1)

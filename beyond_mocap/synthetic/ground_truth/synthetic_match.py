@@ -87,13 +87,6 @@ class SyntheticMatch:
         """Compute the players' places (P, N, 2) m at `times` (N,) s."""
         return np.stack([self.places.places_at(player, np.asarray(times, float)) for player in range(len(self.ids))])
 
-    @property
-    def bounce_times(self) -> np.ndarray:
-        """Times (K,) s at which the ball bounced on the ground."""
-        ends = [*(touch.time for touch in self.touches[1:]), self.seconds]
-        found = [flight.bounces[flight.bounces < end] for flight, end in zip(self.flights, ends)]
-        return np.concatenate(found) if found else np.zeros(0)
-
 
 def build_match(seconds: float = 120.0, seed: int = 0) -> SyntheticMatch:
     """Build a match of `seconds`; the same seed gives the same match."""
@@ -173,6 +166,7 @@ class _MatchBuilder:
         self.position, self.before = np.array([0.0, 0.0, FOOTBALL.radius]), np.zeros(3)
 
     def build_match(self) -> SyntheticMatch:
+        """Build touches until the match is over."""
         self._meet_ball("kick", "foot")
         while self.time < self.match.seconds:
             self._pass_ball()

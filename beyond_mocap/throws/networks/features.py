@@ -101,7 +101,17 @@ def compute_phase(name: str, chains: Chains, after: Pose, window: Windows, leg_r
 
 
 def build_hip_input(chains: Chains, settings: ModelSettings, pose: Pose, window: Windows, xp=np):
-    """Build (b_l, b_r, i, four trajectories, p_j, a_j), j = 14 (section 7.3)."""
+    """Build (b_l, b_r, i, four trajectories, p_j, a_j), j = 14 (section 7.3).
+
+    Args:
+        chains: chains of the skeleton.
+        settings: settings of the model.
+        pose: state in frame n.
+        window: network inputs of frame n.
+        xp: numpy or jax.numpy.
+    Returns:
+        x (..., in).
+    """
     parts = [*_build_motion_input(chains, settings, pose, window, xp),
              *_build_joint_input(chains, settings, pose, chains.hip_inputs, xp)]
     if settings.carried:
@@ -112,6 +122,14 @@ def build_hip_input(chains: Chains, settings: ModelSettings, pose: Pose, window:
 def build_single_input(chains: Chains, settings: ModelSettings, pose: Pose, window: Windows, xp=np):
     """Build (b_l, b_r, i, four trajectories, p_j, a_j, v_j), j = all joints that networks move.
 
+    Args:
+        chains: chains of the skeleton.
+        settings: settings of the model.
+        pose: state in frame n.
+        window: network inputs of frame n.
+        xp: numpy or jax.numpy.
+    Returns:
+        x (..., in).
     Source: Fredriksson section 7.2, where j = 25.
     """
     parts = _build_joint_input(chains, settings, pose, chains.joints, xp)
@@ -122,6 +140,14 @@ def build_single_input(chains: Chains, settings: ModelSettings, pose: Pose, wind
 def build_body_input(chains: Chains, pose: Pose, after: Pose, window: Windows, xp=np):
     """Build (b_l, b_r, i, both wrists' trajectories, o of both toes, δa_o, r_j, p_i, a_i), i = 8.
 
+    Args:
+        chains: chains of the skeleton.
+        pose: state in frame n.
+        after: what is known of frame n + 1 so far.
+        window: network inputs of frame n.
+        xp: numpy or jax.numpy.
+    Returns:
+        x (..., in).
     Source: Fredriksson section 7.3, where j = 10.
     """
     frame = _ReferenceFrame(chains.references["body"], pose, after, xp)
@@ -142,6 +168,16 @@ def build_arm_input(number: int, chains: Chains, settings: ModelSettings, pose: 
                     xp=np):
     """Build (b_l, b_r, t_wrist, o_wrist, δa_o, r_wrist¹, d, r_upper, r_lower, p_i¹, a_k¹) of arm 0 or 1.
 
+    Args:
+        number: of the limb, as in `LIMB_OF`.
+        chains: chains of the skeleton.
+        settings: settings of the model.
+        pose: state in frame n.
+        after: what is known of frame n + 1 so far.
+        window: network inputs of frame n.
+        xp: numpy or jax.numpy.
+    Returns:
+        x (..., in).
     Source: Fredriksson section 7.3.
     """
     name = LIMB_OF[number]
@@ -164,6 +200,15 @@ def build_arm_input(number: int, chains: Chains, settings: ModelSettings, pose: 
 def build_leg_input(number: int, chains: Chains, pose: Pose, after: Pose, window: Windows, xp=np):
     """Build (t_toe, o_toe, δa_o, d, r_j, p_i¹, a_k¹), j = 4, i = 3, k = 6, of leg 2 (left) or 3 (right).
 
+    Args:
+        number: of the limb, as in `LIMB_OF`.
+        chains: chains of the skeleton.
+        pose: state in frame n.
+        after: what is known of frame n + 1 so far.
+        window: network inputs of frame n.
+        xp: numpy or jax.numpy.
+    Returns:
+        x (..., in).
     Source: Fredriksson section 7.3.
     """
     name = LIMB_OF[number]
@@ -185,6 +230,15 @@ def compute_reach_guide(number: int, chains: Chains, settings: ModelSettings, po
     """Compute the relative rotations (..., 6 each) with which the limb of frame n would reach its target in n + 1.
 
     They are those of the joints that the limb's network predicts, by two-bone inverse kinematics.
+
+    Args:
+        number: of the limb, as in `LIMB_OF`.
+        chains: chains of the skeleton.
+        settings: settings of the model.
+        pose: state in frame n.
+        after: what is known of frame n + 1 so far.
+        window: network inputs of frame n.
+        xp: numpy or jax.numpy.
     """
     name = LIMB_OF[number]
     local = {joint: pose.local[..., joint, :, :] for joint in chains.members[name]}
@@ -195,7 +249,13 @@ def compute_reach_guide(number: int, chains: Chains, settings: ModelSettings, po
 
 
 def count_guides(name: str, chains: Chains, settings: ModelSettings) -> int:
-    """Count the last inputs of a network that come from `compute_reach_guide` or, for the hip, from `carry_hips`."""
+    """Count the last inputs of a network that come from `compute_reach_guide` or, for the hip, from `carry_hips`.
+
+    Args:
+        name: name of the network.
+        chains: chains of the skeleton.
+        settings: settings of the model.
+    """
     if name == "hip":
         return HIP_GUIDES if settings.carried else 0
     return 6 * len(list_predicted_joints(name, chains, settings)) if settings.guided and name in LIMB_OF else 0
@@ -283,7 +343,15 @@ def _build_joint_input(chains: Chains, settings: ModelSettings, pose: Pose, join
 
 
 def measure_limb_distance(number: int, chains: Chains, after: Pose, window: Windows, xp=np):
-    """Measure d: metres (..., 1) from a limb's first joint to the target of its end in frame n + 1."""
+    """Measure d: metres (..., 1) from a limb's first joint to the target of its end in frame n + 1.
+
+    Args:
+        number: of the limb, as in `LIMB_OF`.
+        chains: chains of the skeleton.
+        after: what is known of frame n + 1 so far.
+        window: network inputs of frame n.
+        xp: numpy or jax.numpy.
+    """
     to_target = window.next[..., number, :] - after.positions[..., chains.sockets[number], :]
     return xp.sqrt(xp.sum(to_target * to_target, axis=-1, keepdims=True))
 

@@ -94,11 +94,6 @@ class GeneratedMotion:
         """Metres (T, 4) between the networks' prediction of each effector and its target."""
         return np.linalg.norm(self.predicted - self.requested, axis=-1)
 
-    @property
-    def correction_distance(self) -> np.ndarray:
-        """Metres (T, 4) by which limits and inverse kinematics moved each effector."""
-        return np.linalg.norm(self.effectors - self.predicted, axis=-1)
-
 
 def generate_motion(
     model: ThrowModel, description: Description, start: Pose | None = None, options: Options | None = None

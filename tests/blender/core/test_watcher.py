@@ -278,8 +278,8 @@ def left_over(room):
     found += [*map(str, (*window._draw_handlers, *window._timers, *live._timers,
                          *room("scene.result.queue").list_players()))]
     found += [job.kind for job in room("scene.core.background")._newest.values() if not job.is_stale]
-    found += ["stream"] if room("scene.stream.follow").current_listener() is not None else []
-    found += ["rally"] if room("scene.stream.play").current_rally() is not None else []
+    found += ["stream"] if room("scene.stream.follow").get_current_listener() is not None else []
+    found += ["rally"] if room("scene.stream.play").get_current_rally() is not None else []
     return found + ["queue"] * room("scene.result.queue").is_busy()
 
 

@@ -155,9 +155,9 @@ def test_a_stream_that_stops_is_told_and_the_pose_stays(room, core, port, monkey
 def test_a_file_that_is_loaded_ends_the_stream(room, core, port, tmp_path):
     bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "a.blend"))
     OPS.stream_start()
-    listener = room("stream.follow").current_listener()
+    listener = room("stream.follow").get_current_listener()
     bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "a.blend"))
-    assert room("stream.follow").current_listener() is None and not listener.is_running
+    assert room("stream.follow").get_current_listener() is None and not listener.is_running
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as again:
         again.bind(("127.0.0.1", port))
 
@@ -184,7 +184,7 @@ def test_a_suits_file_that_is_none(room, port, tmp_path):
     bpy.context.scene.beyond_mocap_stream.clip = str(tmp_path / "none.bvh")
     with pytest.raises(RuntimeError, match="no such file"):
         press_operator(OPS.stream_start)
-    assert room("stream.follow").current_listener() is None
+    assert room("stream.follow").get_current_listener() is None
 
 
 def test_a_body_that_was_removed_is_made_anew(room, core, port):
@@ -201,7 +201,7 @@ def test_a_stream_that_is_given_up_says_why(room, core, port, monkeypatch):
     follow(room, send(core, port, 600.0))
     told = bpy.context.window_manager.beyond_mocap_streaming
     assert not told.on and told.state == "failed" and "skeleton has changed" in told.line
-    assert room("stream.follow").current_listener() is None and bpy.context.scene.beyond_mocap_stream.body is None
+    assert room("stream.follow").get_current_listener() is None and bpy.context.scene.beyond_mocap_stream.body is None
 
 
 def test_a_chosen_armature_is_used(room, core, port):

@@ -65,7 +65,7 @@ def places(scene, frames):
 
 def test_all_stand_and_the_ball_lies(playing, room):
     assert (
-        room("stream.play").current_rally().holder == "Ann" and told().playing
+        room("stream.play").get_current_rally().holder == "Ann" and told().playing
         and told().played.startswith("Ann has the ball")
     )
     assert all(row.body is not None for row in playing.beyond_mocap_passes.players)
@@ -115,11 +115,11 @@ def test_a_stream_is_answered(playing, room, core):
     thread = threading.Thread(target=sender.send_file, args=(lambda: False,))
     thread.start()
     look, end = room("stream.follow").update_stream, time.monotonic() + 60.0
-    while room("stream.play").current_rally().passes == 0 and time.monotonic() < end:
+    while room("stream.play").get_current_rally().passes == 0 and time.monotonic() < end:
         look(playing)
         time.sleep(0.02)
     thread.join()
-    assert room("stream.play").current_rally().passes == 1 and "Ann played volley_toss" in told().played
+    assert room("stream.play").get_current_rally().passes == 1 and "Ann played volley_toss" in told().played
 
 
 def test_what_cannot_be_answered_is_told_and_changes_nothing(playing, room, core):
@@ -131,27 +131,27 @@ def test_what_cannot_be_answered_is_told_and_changes_nothing(playing, room, core
     while "has the ball" in told().played and time.monotonic() < end:
         play.update_rally(playing)
         time.sleep(0.02)
-    assert play.current_rally().passes == 0 and play.current_rally().holder == "Ann" and told().played
+    assert play.get_current_rally().passes == 0 and play.get_current_rally().holder == "Ann" and told().played
     assert actions == {row.name: row.body.animation_data.action.name for row in playing.beyond_mocap_passes.players}
 
 
 def test_stop_playing(playing, room):
     assert OPS.stream_end() == {"FINISHED"}
-    assert room("stream.play").current_rally() is None and not told().playing
+    assert room("stream.play").get_current_rally() is None and not told().playing
     with pytest.raises(RuntimeError, match="press Play Live first"):
         OPS.stream_end()
 
 
 def test_a_file_that_is_loaded_ends_it(playing, room):
     bpy.ops.wm.read_homefile(use_empty=True)
-    assert room("stream.play").current_rally() is None
+    assert room("stream.play").get_current_rally() is None
 
 
 def test_it_is_one_step(playing, room):
     OPS.stream_end()
     OPS.passes_clear()
     assert_one_step(OPS.stream_play)
-    assert room("stream.play").current_rally() is None and "Undo has ended" in told().played
+    assert room("stream.play").get_current_rally() is None and "Undo has ended" in told().played
 
 
 def test_an_armature_can_show_how(playing, room):
@@ -161,14 +161,14 @@ def test_an_armature_can_show_how(playing, room):
         press_operator(OPS.stream_act)
     bpy.ops.beyond_mocap.import_clips(filepath=str(CLIPS / "volley_toss.bvh"))
     assert press_operator(OPS.stream_act) == {"FINISHED"}
-    assert room("stream.play").current_rally().passes == 1 and "Ann played volley_toss" in told().played
+    assert room("stream.play").get_current_rally().passes == 1 and "Ann played volley_toss" in told().played
 
 
 def test_a_scene_that_is_cleared_ends_it(playing, room):
     OPS.passes_clear()
     assert all(row.body is None for row in playing.beyond_mocap_passes.players)
     room("stream.play").update_rally(playing)
-    assert room("stream.play").current_rally() is None and "cleared" in told().played
+    assert room("stream.play").get_current_rally() is None and "cleared" in told().played
 
 
 def test_choosing_is_one_step(playing):

@@ -63,7 +63,7 @@ def test_who_touches_the_ball_gives_way_less(passing):
     deepest = measure_overlap_depths(passing[0], passing[2])[0].argmax()
     firm[0] = compute_firmness(len(passing[0][0]), np.array([deepest]), FPS)
     found = resolve_collisions(*passing, FPS, firm)
-    moved = [np.abs(own.curves(300, 150)[deepest - 5 : deepest + 6, :6]).max() for own in found]
+    moved = [np.abs(own.build_curves(300, 150)[deepest - 5 : deepest + 6, :6]).max() for own in found]
     assert moved[0] < 0.5 * moved[1]
 
 

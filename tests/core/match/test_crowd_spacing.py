@@ -167,7 +167,7 @@ def test_a_correction_keeps_bones_and_untouched_frames(walk, curves):
     moved = apply_correction(walk, found, 1000)
     assert np.array_equal(moved.rotations[80:], walk.rotations[80:])
     assert np.array_equal(moved.root_positions[:25], walk.root_positions[:25])
-    assert found.curves(1000, len(walk)) == pytest.approx(curves, abs=1.5e-3)
+    assert found.build_curves(1000, len(walk)) == pytest.approx(curves, abs=1.5e-3)
     joints, world = forward_kinematics(moved)
     before, turned = forward_kinematics(walk)
     bones = [np.linalg.norm(p[:, 1:] - p[:, list(walk.skeleton.parents[1:])], axis=2) for p in (joints, before)]
@@ -194,7 +194,7 @@ def test_windows_join_to_what_one_would_have_given(curves):
     whole = Correction.from_curves(curves, 0, FPS)
     parts = [Correction.from_curves(curves[:75], 0, FPS), Correction.from_curves(curves[45:], 45, FPS)]
     found = join_corrections([(parts[0], 0, 60), (parts[1], 60, 120)], 15)
-    assert found.curves(0, len(curves)) == pytest.approx(whole.curves(0, len(curves)), abs=2e-3)
+    assert found.build_curves(0, len(curves)) == pytest.approx(whole.build_curves(0, len(curves)), abs=2e-3)
 
 
 @pytest.mark.parametrize("knots, values, what", [

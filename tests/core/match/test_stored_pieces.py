@@ -26,7 +26,7 @@ def parts():
 
 def test_a_piece_comes_back_as_it_was(weaving_pieces, tmp_path):
     told = (TimedMessage("1.0 s: something", (1.0, 2.5)), TimedMessage("plain"))
-    piece = replace(weaving_pieces[0], warnings=told, hurried=7)
+    piece = replace(weaving_pieces[0], warnings=told, hurried_from=7)
     save_piece(tmp_path / "a.npz", piece)
     back = load_piece(tmp_path / "a.npz")
     assert compute_digest(back) == compute_digest(piece) and [line_spans(line)

@@ -65,7 +65,7 @@ def test_a_search_in_a_hurry_says_from_where_on(library, weaving_plan):
     unit = build_units(weaving_plan, window=8.0, overlap=3.0)[0]
     asked = iter([False] * 4 + [True] * 10000)
     piece = search_window(library, unit, hurry=lambda: next(asked))
-    assert piece.hurried is not None and 0 < piece.hurried < len(piece.edit) == count_frames(unit.plan)
+    assert piece.hurried_from is not None and 0 < piece.hurried_from < len(piece.edit) == count_frames(unit.plan)
 
 
 @pytest.mark.parametrize("window, overlap", [(2.0, 1.0), (60.0, 40.0), (60.0, 0.1)])

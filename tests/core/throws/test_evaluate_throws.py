@@ -85,7 +85,7 @@ def test_what_is_planted_comes_out(examples, monkeypatch):
                              (replace(motion, rotations=stiff), 0.0)])
     found = evaluate_throws(Model(example), [example] * 3, RAW_OPTIONS)
     assert found.deviations[0] == pytest.approx(np.full(4, 0.05))
-    assert found.network_deviations[0] == pytest.approx(np.full(4, np.linalg.norm([0.02, 0.05, 0.06])))
+    assert found.motions[0].network == pytest.approx(np.full(4, np.linalg.norm([0.02, 0.05, 0.06])))
     assert 0.045 < found.impacts[0] < 0.06 and 0.045 < found.motions[0].far_impact < 0.06
     assert found.motions[1].head == pytest.approx(20.0) and found.motions[1].impact == pytest.approx(0.0, abs=1e-9)
     assert found.motions[2].head_share < 0.7
