@@ -145,7 +145,7 @@ class Weights:
     slide: float = 1.2
     words: float = 0.5
     unasked: float = 2.0
-    strange: float = 0.6
+    strange: float = 2.0
     synthetic: float = 0.2
     synthetic_key: float = 0.8
     rate: float = 0.24
