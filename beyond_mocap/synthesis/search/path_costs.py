@@ -33,7 +33,7 @@ _ROUNDING = 1e-3  # m/s, for float32 speeds
 _CONTINUITY = ("switch", "other", "young", "pose", "rate_change")
 FREE_SPEED, FREE_TURN, FREE_ASIDE = (0.05, 0.06), np.radians(5.0), np.float32(np.radians(12.0))
 RESTING_SPEED = 0.15  # m/s of a track from which on a lifted foot costs nothing
-YOUNG_SLOTS = 8  # slots after a cut in which another one costs more: 2.1 s, since a person keeps a gait for longer
+YOUNG_SLOTS = 7  # slots after a cut before which another one costs more: 1.9 s, since a person keeps a gait for longer
 
 
 def find_cheapest(
@@ -140,7 +140,7 @@ class Weights:
     speed: float = 1.0
     drag: float = 1.0
     turn: float = 1.0
-    lift: float = 1.5
+    lift: float = 2.0
     facing: float = 1.0
     slide: float = 1.2
     words: float = 0.5
@@ -152,7 +152,7 @@ class Weights:
     stretch: float = 4.0
     switch: float = 0.7
     other: float = 0.5
-    young: float = 1.5
+    young: float = 1.4
     pose: float = 3.0
     feet: float = 1.5
     wild: float = 0.3
@@ -412,7 +412,7 @@ class PathCosts:
 
     def compute_young_cut_cost(self, age: np.ndarray) -> np.ndarray:
         """Compute what a cut costs (B,) for coming soon after the last one, age (B,) slots ago."""
-        return self.weights.young * (1.0 - age / YOUNG_SLOTS)
+        return self.weights.young * np.clip((YOUNG_SLOTS - age) / 2.0, 0.0, 1.0)
 
     def compute_cut_ends(self, ends: np.ndarray, start: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Compute the cost (B,) of leaving library frames ends (B,), and (K,) of cutting to start (K,)."""
