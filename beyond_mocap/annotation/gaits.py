@@ -119,8 +119,9 @@ def choose_gaits(
 def compute_heading_offset(track: SampledTrack) -> np.ndarray:
     """Compute the angle from the direction of travel to the heading that the body should have.
 
-    Where the heading is planned, this is the plan's. Else it is the ball's direction, limited to what legs allow at that speed: any angle below 0.8 m/s, none from 6
-    m/s on. It is zero where the ball is unknown, and near the player's own feet, where they follow it along their path.
+    Where the heading is planned, this is the plan's. Else it is the ball's direction, limited to what legs allow at
+    that speed: any angle below 0.8 m/s, none from 6 m/s on. It is zero where the ball is unknown, and near the player's
+    own feet, where they follow it along their path.
 
     Args:
         track: the player's track with the ball, T frames.

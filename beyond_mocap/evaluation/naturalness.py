@@ -88,7 +88,7 @@ def find_fast_turns(course: BodyCourse, angle: float, seconds: float) -> list[in
 
 
 def find_snap_turns(course: BodyCourse) -> list[int]:
-    """Find the turns by more than 75 degrees within 0.3 s, which nobody does over one foot."""
+    """Find the turns by more than 75 degrees within 0.3 s, more than a body does over one foot."""
     return find_fast_turns(course, SNAP_ANGLE, SNAP_SECONDS)
 
 

@@ -198,8 +198,8 @@ def _build_synthetic_library(library: Library) -> Library:
     """Build the clips that the recordings lack (`library.synthetic_clips`), described like them."""
     speeds = {gait.label: gait.speed for gait in library.gaits if gait.label != STANDING}
     clips = []
-    for synthetic in iter_synthetic_clips(library.clips, library.frames, library.fps, speeds, library.keys,
-                                          library.strangeness):
+    for synthetic in iter_synthetic_clips(library.clips, library.frames, library.fps, speeds, keys=library.keys,
+                                          strangeness=library.strangeness):
         clip = Clip(path=synthetic.name, mirrored=False, motion=synthetic.motion, annotations=synthetic.rows,
                     heel_toe_contacts=synthetic.heel_toe_contacts)
         clips += [clip, clip.build_twin()]

@@ -3,7 +3,7 @@
 Folders of motion capture hold fights, pushes, dances and stumbles beside walks, often labelled *walking* by their
 speed. What most of the locomotion at one speed has in common is found by concentration: a Gaussian fitted to the
 nearest 60 % of the frames again and again, from the median on, until it rests (the steps of the minimum covariance
-determinant, Rousseeuw and Van Driessen 1999). Frames far outside of it are somebody boxing, not walking.
+determinant, Rousseeuw and Van Driessen 1999). Frames far outside of it show boxing, not walking.
 """
 
 from __future__ import annotations
@@ -48,7 +48,8 @@ def compute_postures(positions: np.ndarray, facing: np.ndarray, fps: float, body
     limbs = (body.left, body.right)
     leg = np.mean([np.linalg.norm(local[:1, limb.foot] - local[:1, limb.upper_leg], axis=-1)[0] for limb in limbs])
     leg = max(leg, 1e-3)
-    columns = [local[:, body.hips, 2:] / leg, local[:, body.left.foot, 1:2] / leg - local[:, body.right.foot, 1:2] / leg]
+    width = local[:, body.left.foot, 1:2] - local[:, body.right.foot, 1:2]
+    columns = [local[:, body.hips, 2:] / leg, width / leg]
     arms = [limb for limb in limbs if None not in (limb.upper_arm, limb.lower_arm, limb.hand)]
     for limb in arms:
         columns += [_compute_direction(local, limb.upper_arm, limb.lower_arm),

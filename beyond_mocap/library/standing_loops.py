@@ -1,7 +1,7 @@
 """Long stands from the short ones that recordings have.
 
 People in recordings stand for a second or three between two actions; players stand for ten. Each calm stand is played
-forth and back again and again, slowing down at both ends, so that nobody has to take a step or be cut only because a
+forth and back again and again, slowing down at both ends, so that no step and no cut is needed only because a
 recording is over. Reversed weight shifts look like weight shifts.
 """
 

@@ -19,6 +19,7 @@ import numpy as np
 
 from ...annotation import sort_labels
 from ...annotation.ball_contact import find_striking_part
+from ...base.easing import smoothstep
 from ...library.library import Library
 from ...motion import quaternion
 from ...motion.foot_plant import PlantResult, plant_feet
@@ -135,13 +136,14 @@ class Construction:
         """Turn shoulders and head to the ball, except where the body meets it and where the old motion stays."""
         if self.look is None or not np.isfinite(self.track.ball).any():
             return planted
-        fps, at, share = self.plan.fps, np.arange(len(self.track)), 1.0 - np.broadcast_to(self._old_share, len(self.track))
+        fps, at = self.plan.fps, np.arange(len(self.track))
+        share = 1.0 - np.broadcast_to(self._old_share, len(at))
         for touch in self.touches:
             away = np.maximum(np.maximum(touch.frame - touch.entry - at, at - touch.frame - touch.leave), 0.0)
             share = np.minimum(share, np.clip(away / (0.5 * fps), 0.0, 1.0))
-        share = share * share * (3.0 - 2.0 * share)
+        share, ball = smoothstep(share), self.track.ball
         motion = Motion(self.library.skeleton, planted.root, planted.rotations, fps)
-        motion = follow_with_gaze(twist_shoulders(motion, self.track.ball, share), self.track.ball, self.look, share, 0.0)
+        motion = follow_with_gaze(twist_shoulders(motion, ball, share), ball, self.look, share, chest=0.0)
         return replace(planted, rotations=motion.rotations)
 
     def solve_ball_contact(self, planted: PlantResult, steps_taken: Steps) -> tuple[PlantResult, np.ndarray]:

@@ -31,7 +31,7 @@ REST_FIRMNESS = 150.0  # how many times firmer than in a step both feet hold a s
 _GIVEN_WEIGHT = 1e6  # of a given place, so large that it stays
 _HELD_SECONDS = 0.1  # how soon it returns from beyond that
 _ROUNDS = 3  # of holding what is beyond
-# Weights of the recording's own move and turn against a metre of a foot in contact: they decide only what feet leave open.
+# Weights of the recording's own move and turn against a metre of a foot in contact: they decide what feet leave open.
 _OWN_MOVE, _OWN_TURN = 1e-3, 1e-4
 
 
@@ -56,7 +56,7 @@ def measure_foot_moves(skeleton: Skeleton, source: SourceMotion, fps: float) -> 
     sway = np.diff(source.sway, axis=0)
     own_move = 0.5 * (source.velocity[1:] + source.velocity[:-1]) / fps + sway
     own_turn = source.turn[1:]
-    # Unknown move d and turn f of each step: sum w |d + f J a' + a' - a|^2, J a' the quarter turn of a', and the own ones
+    # Unknown move d and turn f of each step: sum w |d + f J a' + a' - a|^2 with J a quarter turn, and the own ones
     arm = np.stack([-after[..., 1], after[..., 0]], axis=-1)
     miss = before - after
     matrix, right = np.zeros((count - 1, 3, 3)), np.zeros((count - 1, 3))

@@ -19,13 +19,7 @@ from ...base.errors import TimedMessage, format_seconds
 from ...base.time_series import find_runs
 from ...library.landings import LANDING_FOLDER
 from ...library.library import Library
-from ...library.synthetic_clips import (
-    BLEND_PREFIX,
-    KICK_PREFIX,
-    RECEIVE_PREFIX,
-    STAND_PREFIX,
-    SYNTHETIC_FOLDER,
-)
+from ...library.synthetic_clips import BLEND_PREFIX, KICK_PREFIX, RECEIVE_PREFIX, STAND_PREFIX, SYNTHETIC_FOLDER
 from ...motion.track import Track
 from . import movement
 from .moments import KeyMomentResult, evaluate_moments, measure_contact

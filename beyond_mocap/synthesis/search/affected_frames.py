@@ -44,6 +44,7 @@ def find_changed_frames(before: SearchRequest, after: SearchRequest, slot: int) 
     """Return (T,) bool: frames with other requested labels, speed, turning over `slot` frames, or facing."""
     old, new = before.track, after.track
     words = np.array([a != b for a, b in zip(before.requested_labels, after.requested_labels)])
+    words |= before.is_asked != after.is_asked
     if before.avoided != after.avoided:
         none = [frozenset()] * len(after)
         words |= [a != b for a, b in zip(before.avoided or none, after.avoided or none)]

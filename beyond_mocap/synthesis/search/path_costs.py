@@ -119,7 +119,8 @@ class Weights:
         lift: for a slot without both feet on the ground where the track rests.
         facing: per m/s of missed velocity in the body's frame beyond the missed speed.
         slide: per (m/s)^2 of missed velocity, by which a foot on the ground is dragged.
-        words: for lacking all requested labels.
+        words: for lacking all labels that the user asks for.
+        automatic_words: for lacking all labels of automatic locomotion.
         unasked: for frames of an action that is not requested, or that carry no label.
         strange: per radius outside of the library's normal locomotion.
         synthetic: for a synthetic clip; it is used only where recordings miss the speed by more.
@@ -139,11 +140,12 @@ class Weights:
 
     speed: float = 1.0
     drag: float = 1.0
-    turn: float = 1.0
+    turn: float = 3.0
     lift: float = 2.0
     facing: float = 1.0
     slide: float = 1.2
-    words: float = 0.5
+    words: float = 1.5
+    automatic_words: float = 0.5
     unasked: float = 2.0
     strange: float = 2.0
     synthetic: float = 0.2
@@ -205,7 +207,7 @@ class PathCosts:
         self.frames, self.index = library.frames, CandidateIndex.for_library(library, request.allowed)
         self.wanted_offset = compute_heading_offset(request.track)
         self._rate_cost = (weights.rate * np.abs(PLAYBACK_RATES - 1.0)).astype(np.float32)
-        self._cached_costs: dict[tuple[frozenset[str], frozenset[str]], np.ndarray] = {}
+        self._cached_costs: dict[tuple[frozenset[str], bool, frozenset[str]], np.ndarray] = {}
         self._cached_motion: dict[tuple[int, int], tuple[float, float]] = {}
 
     def round_frame(self, frame: np.ndarray) -> np.ndarray:
@@ -237,13 +239,13 @@ class PathCosts:
             (K,); inf where the clip ends before or may not be used.
         """
         cost = _sum_terms(self._iter_motion_costs(first, end, self.index.build_pairs(number, frame)))
-        cost += self._fixed_costs(self._requested_labels(first, end), self.request.list_avoided(first, end))[frame]
+        cost += self._fixed_costs(*self._requested_labels(first, end), self.request.list_avoided(first, end))[frame]
         return np.where(self.index.valid[number, frame], cost, np.inf)
 
     def iter_misfit_terms(self, first: int, end: int, number: np.ndarray, frame: np.ndarray) -> Iterator[Term]:
         """Generate the terms of `compute_misfit`, by name, each (K,)."""
         yield from self._iter_motion_costs(first, end, self.index.build_pairs(number, frame))
-        yield from self._iter_fixed_terms(frame, self._requested_labels(first, end),
+        yield from self._iter_fixed_terms(frame, *self._requested_labels(first, end),
                                           self.request.list_avoided(first, end))
 
     def find_cheapest(self, first: int, end: int, considered: int, count: int):
@@ -258,9 +260,9 @@ class PathCosts:
         Returns:
             number (K,), frame (K,), misfit (K,).
         """
-        words, avoid = self._requested_labels(first, end), self.request.list_avoided(first, end)
+        (words, is_asked), avoid = self._requested_labels(first, end), self.request.list_avoided(first, end)
         pairs, fixed_cost, (speed, _) = self.index.pairs_by_speed(avoid), self._fixed_costs(words,
-                avoid), self.requested_motion(first, end)
+                is_asked, avoid), self.requested_motion(first, end)
 
         def cost_of(part: slice) -> np.ndarray:
             part_pairs = pairs.slice_pairs(part)
@@ -270,9 +272,10 @@ class PathCosts:
                                    count=count)
         return pairs.number[best], pairs.frame[best], cost
 
-    def _requested_labels(self, first: int, end: int) -> frozenset[str]:
-        """Return the labels requested in the middle of a slot."""
-        return self.request.requested_labels[(first + end) // 2] or frozenset()
+    def _requested_labels(self, first: int, end: int) -> tuple[frozenset[str], bool]:
+        """Return the labels requested in the middle of a slot, and whether the user has asked for them."""
+        middle = (first + end) // 2
+        return self.request.requested_labels[middle] or frozenset(), bool(self.request.is_asked[middle])
 
     def _iter_motion_costs(self, first: int, end: int, pairs: RatePairs) -> Iterator[Term]:
         """Generate the terms that depend on the track: motion of pairs (K,), playback rate, and the player's lag."""
@@ -284,17 +287,19 @@ class PathCosts:
         if self.request.lag_preference is not None:
             yield "variety", self.request.lag_preference.compute_cost(first, pairs.frame)
 
-    def _fixed_costs(self, words: frozenset[str], avoid: frozenset[str]) -> np.ndarray:
+    def _fixed_costs(self, words: frozenset[str], is_asked: bool, avoid: frozenset[str]) -> np.ndarray:
         """Return the cost (N,) of the library's frames wherever these labels are requested and avoided; cached."""
-        if (words, avoid) not in self._cached_costs:
-            terms = self._iter_fixed_terms(np.arange(len(self.frames)), words, avoid)
-            self._cached_costs[words, avoid] = _sum_terms(terms).astype(np.float32)
-        return self._cached_costs[words, avoid]
+        key = words, is_asked, avoid
+        if key not in self._cached_costs:
+            terms = self._iter_fixed_terms(np.arange(len(self.frames)), *key)
+            self._cached_costs[key] = _sum_terms(terms).astype(np.float32)
+        return self._cached_costs[key]
 
-    def _iter_fixed_terms(self, frame: np.ndarray, words: frozenset[str], avoid: frozenset[str]) -> Iterator[Term]:
+    def _iter_fixed_terms(self, frame: np.ndarray, words: frozenset[str], is_asked: bool,
+                          avoid: frozenset[str]) -> Iterator[Term]:
         """Generate the terms of it, by name, each (K,) of frames (K,)."""
         w, (missing, unasked) = self.weights, self.index.measure_lacking(words)
-        yield "words", w.words * missing[frame]
+        yield "words", (w.words if is_asked else w.automatic_words) * missing[frame]
         yield "unasked", np.float32(w.unasked) * unasked[frame]
         # what carries a requested action belongs, whatever it looks like
         yield "strange", np.float32(w.strange) * np.where(self.index.annotation.find_frames_with(words & DISCRETE), 0.0,
@@ -500,6 +505,5 @@ def balance_weights(alpha: float, weights: Weights = Weights()) -> Weights:
     since they hold the body on its track; so do actions that are not requested, and replayed stretches.
     """
     words, continuity = alpha / Plan.alpha, (1.0 - alpha) / (1.0 - Plan.alpha)
-    return replace(
-        weights, words=weights.words * words, **{name: getattr(weights, name) * continuity for name in _CONTINUITY}
-    )
+    factors = {"words": words, "automatic_words": words, **dict.fromkeys(_CONTINUITY, continuity)}
+    return replace(weights, **{name: getattr(weights, name) * factor for name, factor in factors.items()})

@@ -63,6 +63,7 @@ class SearchRequest:
         plan: the plan, with the settings of the costs.
         track: the player at the library's rate.
         requested_labels: requested labels per frame, None where continuity alone counts.
+        is_asked: (T,) bool, frames whose labels come from the user, not from the speed.
         gait: (T,) index into the library's gaits.
         timeline: the timeline, filled.
         keys: the key moments, in order of time.
@@ -78,6 +79,7 @@ class SearchRequest:
     plan: Plan
     track: SampledTrack
     requested_labels: tuple[Labels, ...]
+    is_asked: np.ndarray
     gait: np.ndarray
     timeline: Timeline
     keys: tuple[RequestedKey, ...]
@@ -132,7 +134,9 @@ def build_request(library: Library, plan: ResolvedPlan) -> SearchRequest:
     off_style = compute_style_cost(library, settings.style, settings.style_weight)
     weak_foot = {"left": "right", "right": "left"}.get(settings.strong_foot, "")
     lag_preference = build_lag_preference(library, settings.lag, settings.variety, float(track.times[0]))
-    return SearchRequest(plan=settings, track=track, requested_labels=tuple(requested_labels), gait=gait,
+    return SearchRequest(plan=settings, track=track, requested_labels=tuple(requested_labels),
+                         is_asked=np.array([bool(labels) for labels in labels_per_frame(plan.timeline, track.times)]),
+                         gait=gait,
                          timeline=timeline, keys=keys, allowed=allowed, warnings=tuple(warnings), avoided=avoided,
                          style_cost=off_style, weak_foot=weak_foot, lag_preference=lag_preference)
 

@@ -4,12 +4,7 @@ import numpy as np
 import pytest
 
 from beyond_mocap.motion.track import Track, sample_track
-from beyond_mocap.motion.track.resting_place import (
-    MOST_DISTANCE,
-    find_rests,
-    measure_rest_lengths,
-    relax_track,
-)
+from beyond_mocap.motion.track.resting_place import MOST_DISTANCE, find_rests, measure_rest_lengths, relax_track
 
 FPS = 30.0
 
