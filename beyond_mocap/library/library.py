@@ -118,12 +118,19 @@ class Library:
     @cached_property
     def strangeness(self) -> np.ndarray:
         """(N,) float32: how far each frame's posture lies from normal locomotion, up to 1 it belongs (`posture`)."""
-        return self.normal_postures.measure_strangeness(self.frames.posture, self.frames.speed)
+        strangeness = self.normal_postures.measure_strangeness(self.frames.posture, self.frames.speed)
+        # synthetic clips are locomotion at speeds that nothing recorded has
+        return np.where(self._is_recorded, strangeness, np.float32(0.0))
 
     @cached_property
     def normal_postures(self) -> NormalPostures:
         """How people of this library stand, walk, jog and run."""
-        return fit_normal_postures(self.frames, ~np.array([clip.is_synthetic for clip in self.clips])[self.frames.clip])
+        return fit_normal_postures(self.frames, self._is_recorded)
+
+    @cached_property
+    def _is_recorded(self) -> np.ndarray:
+        """(N,) bool, frames of recordings."""
+        return ~np.array([clip.is_synthetic for clip in self.clips])[self.frames.clip]
 
     @cached_property
     def feet_in_contact(self) -> np.ndarray:

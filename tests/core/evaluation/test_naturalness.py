@@ -33,7 +33,8 @@ def ramp(at, seconds, degrees, total=10.0):
 
 
 @pytest.mark.parametrize("degrees, seconds, snaps, spins", [
-    (90.0, 0.2, 1, 0), (60.0, 0.2, 0, 0), (90.0, 0.8, 0, 0), (230.0, 1.8, 0, 1), (-230.0, 0.4, 1, 1), (180.0, 1.8, 0, 0),
+    (90.0, 0.2, 1, 0), (60.0, 0.2, 0, 0), (90.0, 0.8, 0, 0), (230.0, 1.8, 0, 1), (-230.0, 0.4, 1, 1),
+    (180.0, 1.8, 0, 0),
 ])
 def test_turns(degrees, seconds, snaps, spins):
     body = course(heading=ramp(4.0, seconds, degrees))
