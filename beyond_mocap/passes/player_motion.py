@@ -232,8 +232,11 @@ class _PlayerBuilder:
                 labels[frame] = None
         allowed = np.ones(len(library.clips), bool)
         avoided = tuple(strikes for _ in labels) if strikes else ()
-        return SearchRequest(plan=self._build_plan(track), track=track, requested_labels=tuple(labels),
-                             is_asked=np.zeros(len(labels), bool), gait=gait, timeline=Timeline(), keys=keys, allowed=allowed, warnings=(), avoided=avoided)
+        return SearchRequest(
+            plan=self._build_plan(track), track=track, requested_labels=tuple(labels),
+            is_asked=np.zeros(len(labels), bool), gait=gait, timeline=Timeline(), keys=keys, allowed=allowed,
+            warnings=(), avoided=avoided,
+        )
 
     def _build_key(self, hit: PlacedHit, frame: float) -> RequestedKey:
         """Build the key moment of a placed hit at a fractional `frame` of the search."""
