@@ -170,11 +170,19 @@ class Construction:
     def _solve_heading(self) -> np.ndarray:
         """Solve the heading (T,) rad from given values, track and source, turned to the ball at touches."""
         given = self.heading if self.old is None else self.old.compute_heading(self.smooth_source.pose)
-        heading = solve_heading(self.track, self._turning_source, given)
+        heading = solve_heading(self.track, self._turning_source, given, self._is_at_ball)
         if self.old is not None:
             track = self.old.match_turning(self.track, heading)
-            heading = heading if track is None else solve_heading(track, self._turning_source, given)
+            heading = heading if track is None else solve_heading(track, self._turning_source, given, self._is_at_ball)
         return heading + (1.0 - self._old_share) * self._turn_to_ball(heading) if self.turns_to_ball else heading
+
+    @property
+    def _is_at_ball(self) -> np.ndarray:
+        """(T,) bool: frames within the entry and exit of a touch, where the clip decides how the body faces."""
+        at, found = np.arange(len(self.track)), np.zeros(len(self.track), bool)
+        for touch in self.touches:
+            found |= (at >= touch.frame - touch.entry) & (at <= touch.frame + touch.leave)
+        return found
 
     @property
     def _turning_source(self) -> SourceMotion:
@@ -261,20 +269,24 @@ def apply_heading(pose: np.ndarray, heading: np.ndarray) -> np.ndarray:
     return out
 
 
-def solve_heading(track: SampledTrack, source: SourceMotion, given: np.ndarray | None = None) -> np.ndarray:
+def solve_heading(
+    track: SampledTrack, source: SourceMotion, given: np.ndarray | None = None, is_free: np.ndarray | bool = False
+) -> np.ndarray:
     """Solve the heading: the compromise between the track's direction and the source's own turning.
 
     Args:
         track: T frames; a body in place or moving slowly turns to the gaze target of the track.
         source: T source frames without jumps.
         given: (T,) rad that the heading has to be, NaN where it is free.
+        is_free: (T,) bool, frames in which the planned heading does not count.
     Returns:
         (T,) rad, unwrapped.
     """
     firm = compute_turning_firmness(source.heel_toe_contacts, source.height, track.fps)
     if track.heading is not None:
         firm = firm * measure_rest(source, track.speed)
-    return fit_heading(track.direction, track.speed, source.velocity, source.turn, given, firm=firm, plan=track.heading)
+    return fit_heading(track.direction, track.speed, source.velocity, source.turn, given, firm=firm, plan=track.heading,
+                       is_free=is_free)
 
 
 def find_touches(library: Library, fps: float, edit: EditList, keys: tuple[KeyResult, ...]) -> tuple[Touch, ...]:

@@ -32,6 +32,7 @@ _ROUNDING = 1e-3  # m/s, for float32 speeds
 
 _CONTINUITY = ("switch", "other", "young", "pose", "rate_change")
 FREE_SPEED, FREE_TURN, FREE_ASIDE = (0.05, 0.06), np.radians(5.0), np.float32(np.radians(12.0))
+KEY_TURN = 0.2  # share of the weights of turning and facing within the pieces of key moments
 RESTING_SPEED = 0.15  # m/s of a track from which on a lifted foot costs nothing
 YOUNG_SLOTS = 7  # slots after a cut before which another one costs more: 1.9 s, since a person keeps a gait for longer
 
@@ -127,6 +128,7 @@ class Weights:
         synthetic_key: the same at key moments, where a recording is worth more.
         rate: per unit of time warp.
         stretch: per unit of time warp beyond 0.85 to 1.15.
+        strike: for a key moment's clip that does not fit its ball (`key_fit`).
         switch: for any cut.
         other: for a cut to another recording.
         young: for a cut just after another one, less by the slot up to YOUNG_SLOTS.
@@ -152,6 +154,7 @@ class Weights:
     synthetic_key: float = 0.8
     rate: float = 0.24
     stretch: float = 4.0
+    strike: float = 3.0
     switch: float = 0.7
     other: float = 0.5
     young: float = 1.4
@@ -208,6 +211,8 @@ class PathCosts:
         self.wanted_offset = compute_heading_offset(request.track)
         self._rate_cost = (weights.rate * np.abs(PLAYBACK_RATES - 1.0)).astype(np.float32)
         self._cached_costs: dict[tuple[frozenset[str], bool, frozenset[str]], np.ndarray] = {}
+        # a strike turns and steps as it was recorded: the body follows it there (`construct.construction`)
+        self._key_weights = replace(weights, turn=KEY_TURN * weights.turn, facing=KEY_TURN * weights.facing, slide=0.0)
         self._cached_motion: dict[tuple[int, int], tuple[float, float]] = {}
 
     def round_frame(self, frame: np.ndarray) -> np.ndarray:
@@ -348,7 +353,7 @@ class PathCosts:
         middle = self.round_frame((a + b) / 2.0)
         yield from self._iter_motion_terms(
             first, end, speed, turn=turn, offset=self.index.offset[middle], long_stance=self.index.long_stance[middle],
-            lifted=self.index.lifted[middle],
+            lifted=self.index.lifted[middle], weights=self._key_weights,
         )
         # library frames that lie beyond either end of the clip
         held = np.maximum(low - start, 0) + np.maximum(start + rate * length - high, 0)
@@ -374,10 +379,10 @@ class PathCosts:
         return running_count[self.round_frame(b) + 1] > running_count[self.round_frame(a)]
 
     def _iter_motion_terms(self, first: int, end: int, speed, turn, offset, long_stance,
-                           lifted) -> Iterator[Term]:
-        """Generate the terms of speed, turning and facing against the track."""
+                           lifted, weights: Weights | None = None) -> Iterator[Term]:
+        """Generate the terms of speed, turning and facing against the track; weights None: the search's own."""
         wanted_speed, wanted_turn = self.requested_motion(first, end)
-        w = self.weights
+        w = weights or self.weights
         missed = np.abs(speed - wanted_speed)
         free = FREE_SPEED[0] + FREE_SPEED[1] * wanted_speed
         yield "speed", np.maximum(missed - free, 0.0) * (w.speed + w.drag * long_stance)

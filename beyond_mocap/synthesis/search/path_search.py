@@ -145,7 +145,7 @@ class PathSearch:
         self.edges = build_slot_edges(library, request, *((stretch.first, stretch.end) if stretch else (0, None)),
                                       on_grid)
         self.pieces = build_key_pieces(library, request, self.edges)
-        self.choice_cost = self._compute_choice_costs()
+        self.choice_cost = weights.strike * self._compute_choice_costs()
         self._closed_slots = {find_slot(self.edges, request.keys[number].frame) for number in self.pieces.number}
         self.width = SearchWidth()
         self.hurried_from: int | None = None

@@ -8,6 +8,7 @@ import numpy as np
 
 from ...annotation import (
     AVOID_PREFIX,
+    LOCOMOTION,
     STANDING_SPEED,
     TRANSITION,
     KeyMoment,
@@ -19,6 +20,7 @@ from ...annotation import (
     labels_per_frame,
     sort_labels,
 )
+from ...annotation.vocabulary import DIRECTIONS
 from ...base.errors import NotInLibraryError, TimedMessage, format_seconds
 from ...library.automatic_locomotion import build_automatic_labels
 from ...library.keys import Key, list_nearest_labels, select_keys, select_nearest_keys, select_substitutes
@@ -135,10 +137,18 @@ def build_request(library: Library, plan: ResolvedPlan) -> SearchRequest:
     weak_foot = {"left": "right", "right": "left"}.get(settings.strong_foot, "")
     lag_preference = build_lag_preference(library, settings.lag, settings.variety, float(track.times[0]))
     return SearchRequest(plan=settings, track=track, requested_labels=tuple(requested_labels),
-                         is_asked=np.array([bool(labels) for labels in labels_per_frame(plan.timeline, track.times)]),
+                         is_asked=_find_asked(plan.timeline, track.times, requested_labels),
                          gait=gait,
                          timeline=timeline, keys=keys, allowed=allowed, warnings=tuple(warnings), avoided=avoided,
                          style_cost=off_style, weak_foot=weak_foot, lag_preference=lag_preference)
+
+
+def _find_asked(timeline: Timeline, times: np.ndarray, requested_labels: list[Labels]) -> np.ndarray:
+    """Find the frames (T,) bool whose labels come from the user or from the ball, not from speed and heading alone."""
+    own = labels_per_frame(timeline, times)
+    plain = {*LOCOMOTION, *DIRECTIONS}
+    return np.array([bool(labels) or bool((wanted or frozenset()) - plain)
+                     for labels, wanted in zip(own, requested_labels)])
 
 
 def _replace_avoided_gaits(library: Library, gait: np.ndarray, speed: np.ndarray,
