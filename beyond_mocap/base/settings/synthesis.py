@@ -108,7 +108,7 @@ TABLES = {
                 "and ?), whose clips are preferred; may be repeated", tooltip="Labels, folders or clips (with * and ?) "
                 "whose clips are preferred; separate several with ;",
                 option_more=dict(action="append")),
-        Setting(name="style_weight", default=1.0, least=0.0, most=10.0, expected=BETWEEN, option="--style-weight",
+        Setting(name="style_weight", default=0.5, least=0.0, most=10.0, expected=BETWEEN, option="--style-weight",
                 metavar="NUMBER", help="missed speed in m/s that is accepted for a clip of the style; default "
                 "%(default)g",
                 tooltip="Missed speed in m/s that is accepted for a clip of the style"),

@@ -147,7 +147,7 @@ class Weights:
     facing: float = 1.0
     slide: float = 1.2
     words: float = 1.5
-    automatic_words: float = 0.5
+    automatic_words: float = 1.0
     unasked: float = 2.0
     strange: float = 2.0
     synthetic: float = 0.2

@@ -48,6 +48,9 @@ SHOWN_MARGIN = 0.25
 """Seconds around shown source frames that count as shown."""
 
 
+STYLE_COST = 2.0  # per unit of the setting's weight: as much as changes of recording cost
+
+
 def compute_style_cost(library: Library, style: Sequence[str], weight: float) -> np.ndarray | None:
     """Compute the cost of library frames that are not of a style.
 
@@ -74,7 +77,7 @@ def compute_style_cost(library: Library, style: Sequence[str], weight: float) ->
             nearest = ", ".join(_list_nearest_names(library, word))
             raise InputError("style", repr(entry), "a label, folder or clip of the library", f"nearest: {nearest}")
         matches |= carries | clips[frames.clip]
-    return np.where(matches, 0.0, weight).astype(np.float32)
+    return np.where(matches, 0.0, STYLE_COST * weight).astype(np.float32)
 
 
 def _list_nearest_names(library: Library, name: str) -> list[str]:
