@@ -8,11 +8,12 @@ import time
 from collections.abc import Mapping
 from pathlib import Path
 
-from ..base.errors import NotInLibraryError, format_count
+from ..base.errors import InputError, NotInLibraryError, format_count
 from ..base.settings.options import add_options, option_values
 from .library import open_library
 from .outputs import ProgressReporter, Writer, add_take_files, check_outputs, choose_writer
 
+_MAX_REPORT_BYTES = 100_000_000  # no report is as large
 _OTHER_LENGTH, _OTHER_PLACE = 1.0, 2.0  # s and m by which a motion differs from its track at most
 
 
@@ -204,9 +205,11 @@ def _describe_fit(report: dict, motion, track, options) -> list[str]:
 
 def _is_synthesis_report(path: Path) -> bool:
     """Whether a file is a report that `synthesize` wrote: only that one knows the method."""
+    from ..files.content import read_utf8
+
     try:
-        found = json.loads(path.read_text("utf-8"))
-    except (OSError, ValueError, RecursionError):
+        found = json.loads(read_utf8(path, "a report", _MAX_REPORT_BYTES))
+    except (InputError, ValueError, RecursionError):
         return False
     return isinstance(found, dict) and "method" in found
 

@@ -37,7 +37,7 @@ MARK = "beyond_mocap_stream"
 SHIRT = (0.55, 0.55, 0.58)
 
 _session: dict[str, object] = {}
-_state = {"seen": 0, "told": 0.0, "looked": 0.0, "bodies": 0}
+_state = {"seen": 0, "written": 0.0, "looked": 0.0, "bodies": 0}
 _latencies: deque[float] = deque(maxlen=60)
 _on_hit: list = []
 _on_look: list = []
@@ -62,7 +62,7 @@ def remove_call(call) -> None:
 
 def reset_status() -> None:
     """Reset the status for a stream that has started."""
-    _state.update(seen=0, told=0.0, looked=0.0, bodies=0)
+    _state.update(seen=0, written=0.0, looked=0.0, bodies=0)
     _latencies.clear()
     write_status()
 
@@ -90,8 +90,8 @@ def _receive_frames(scene: bpy.types.Scene, listener: Listener) -> HitMotion | N
     if now - _state["looked"] >= DETECT_SECONDS:
         _state["looked"] = now
         found = _detect_hit(scene)
-    if now - _state["told"] >= STATUS_SECONDS:
-        _state["told"] = now
+    if now - _state["written"] >= STATUS_SECONDS:
+        _state["written"] = now
         write_status()
     return found
 
