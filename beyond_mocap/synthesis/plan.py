@@ -19,7 +19,7 @@ from ..base.settings.setting import LATER, add_fields, check_limits
 from ..base.time_series import interpolate_columns
 from ..motion.skeleton import freeze_array
 from ..motion.track import SampledTrack, Track, sample_track
-from .heading_plan import plan_track
+from .heading_plan import HeadingKey, plan_track
 
 PARTS = ("left_hand", "right_hand", "left_foot", "right_foot", "gaze")
 FEET = ("", "left", "right")
@@ -128,6 +128,7 @@ class Plan:
         timeline: the requested annotations (`annotation.read_timeline`), not yet filled.
         library: folder of the library.
         pins: where hands, feet and gaze have to be, in order of time.
+        heading_keys: where the body has to face, in order of time; the rest is planned (`heading_plan`).
         gaits: (gait label, clip) pairs; other gaits are found among all clips.
         height: m, of the player; 0 for the library's.
         strong_foot: one of FEET.
@@ -160,6 +161,7 @@ class Plan:
     root_window: float = _DEFAULTS["root_window"]
     gaits: tuple[tuple[str, str], ...] = ()
     pins: tuple[Pin, ...] = ()
+    heading_keys: tuple[HeadingKey, ...] = ()
     height: float = 0.0
     strong_foot: str = ""
     style: tuple[str, ...] = ()
@@ -171,6 +173,7 @@ class Plan:
 
     def __post_init__(self):
         object.__setattr__(self, "pins", tuple(sorted(self.pins, key=lambda pin: (pin.time, pin.part))))
+        object.__setattr__(self, "heading_keys", tuple(sorted(self.heading_keys, key=lambda key: key.time)))
         object.__setattr__(self, "style", tuple(dict.fromkeys(self.style)))
         check_limits(self, (*list_settings("synthesis"), *list_settings("player")))
         if 0.0 < self.omega < 1.0:
@@ -254,6 +257,12 @@ class ResolvedPlan:
         """Output frames per second."""
         return self.requested.fps
 
+    @property
+    def _scaled_heading_keys(self) -> list[HeadingKey]:
+        """The heading keys with their targets in the library's size."""
+        return [key if key.target is None else replace(key, target=tuple(value / self.size for value in key.target))
+                for key in self.requested.heading_keys]
+
     def sample_track(self, fps: float, rests: bool = True) -> SampledTrack:
         """Sample the track, with the solved ball, in the library's size.
 
@@ -265,4 +274,4 @@ class ResolvedPlan:
         if trajectory is not None and self.size != 1.0:
             trajectory = replace(trajectory, ball=trajectory.ball / self.size)
         sampled = sample_with_trajectory(self.track, trajectory, fps, self.requested.track_window)
-        return plan_track(sampled, rests=rests) if self.method == "path" else sampled
+        return plan_track(sampled, self._scaled_heading_keys, rests) if self.method == "path" else sampled
