@@ -125,7 +125,7 @@ class Library:
     @cached_property
     def normal_postures(self) -> NormalPostures:
         """How people of this library stand, walk, jog and run."""
-        return fit_normal_postures(self.frames, self._is_recorded)
+        return fit_normal_postures(self.frames, self._is_recorded, self.fps)
 
     @cached_property
     def _is_recorded(self) -> np.ndarray:
