@@ -6,6 +6,7 @@ import argparse
 import csv
 import io
 from collections.abc import Mapping
+from math import isfinite
 from pathlib import Path
 
 from .. import __version__
@@ -15,6 +16,7 @@ from .outputs import ProgressReporter, Writer, check_outputs
 
 # Header of the table of proposed labels.
 PROPOSAL_COLUMNS = ("file", "fps", "start_frame", "end_frame", "key_frame", "labels", "confidence", "source", "why")
+MAX_LEFT_OUT = 12  # stretches left out of locomotion that are printed
 
 
 def add_library(verbs) -> argparse.ArgumentParser:
@@ -66,8 +68,10 @@ def summarize_library(library) -> dict:
         The report as plain values for JSON.
     """
     from ..annotation import sort_labels
+    from ..library.coverage import find_missing_motion
+    from ..library.left_out import describe_left_out, find_left_out, measure_speed_classes
 
-    originals = [clip for clip in library.clips if not clip.mirrored]
+    originals, missing = [clip for clip in library.clips if not clip.mirrored], find_missing_motion(library)
     labels = sorted(library.labels)
     gaits = [{"word": g.label, "words": list(g.labels), "speed_m_s": g.speed} for g in library.gaits]
     keys = sorted({" ".join(sort_labels(key.labels)) for key in library.keys})
@@ -78,11 +82,20 @@ def summarize_library(library) -> dict:
         "gaits: " + ", ".join(f"{g['word']} {g['speed_m_s']:.1f} m/s" for g in gaits),
         f"fastest: {library.max_speed:.1f} m/s",
         "key moments: " + (", ".join(keys) if keys else "none"),
+        *library.proposal_notes,
+        *missing.values(),
+        *describe_left_out(library, MAX_LEFT_OUT),
         *library.notes,
     ]
     return {
         "version": __version__, "clips": len(originals), "minutes": library.minutes, "words": labels, "gaits": gaits,
         "fastest_m_s": library.max_speed, "keys": keys, "notes": list(library.notes), "lines": lines,
+        "proposed_clips": sum(clip.has_proposed_labels for clip in originals),
+        "lacks": [{"kind": kind, "line": line} for kind, line in missing.items()],
+        "left_out": [{"clip": one.clip, "start_s": one.start, "end_s": one.end, "speed_m_s": one.speed,
+                      "part": one.part, "why": one.reason} for one in find_left_out(library)],
+        "locomotion": [{"from_m_s": one.low, "to_m_s": one.high if isfinite(one.high) else None,
+                        "seconds": one.seconds, "left_out_s": one.left_out} for one in measure_speed_classes(library)],
     }
 
 

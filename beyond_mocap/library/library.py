@@ -16,7 +16,7 @@ import numpy as np
 from ..annotation import LOCOMOTION, ClipAnnotation, estimate_gait_thresholds
 from ..annotation.gaits import STANDING
 from ..annotation.vocabulary import DIRECTIONS
-from ..base.errors import InputError
+from ..base.errors import InputError, format_count
 from ..motion.skeleton import Skeleton
 from . import cache
 from .cache import write_synthetic_clips
@@ -194,6 +194,14 @@ class Library:
     def max_speed(self) -> float:
         """The highest speed that a clip reaches, m/s."""
         return float(self.frames.speed.max())
+
+    @property
+    def proposal_notes(self) -> tuple[str, ...]:
+        """A line where labels are proposed and not yet checked by a person; empty where they are annotated."""
+        count = sum(clip.has_proposed_labels and not clip.mirrored for clip in self.clips)
+        what = f"labels proposed for {format_count(count, 'clip')}, since no clip has any: check them with Review " \
+               "Proposals in Blender, or in the table that the command 'library' writes"
+        return (what,) if count else ()
 
     @property
     def minutes(self) -> float:

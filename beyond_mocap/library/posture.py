@@ -1,11 +1,11 @@
 """How people of a library stand, walk, jog and run, learned from the library itself, and which frames do not belong.
 
 Folders of motion capture hold fights, pushes, dances and stumbles beside walks, often labelled *walking* by their
-speed, and there may be more of them than of walks. But nobody fights while they travel straight on at one speed: such
-steady travel is the seed of each class of speed. Of the seed a Gaussian is fitted to the nearest 60 % again and again,
-from the median on, until it rests (the steps of the minimum covariance determinant, Rousseeuw and Van Driessen 1999);
-then it grows over what is near. Nobody travels steadily while they stand: there the seed is what has arms and trunk as
-walking has. Frames far outside of it show boxing, not walking.
+speed, and there may be more of them than of walks. But people do not fight while they travel straight on at one speed:
+such steady travel is the seed of each class of speed. Of the seed a Gaussian is fitted to the nearest 60 % again and
+again, from the median on, until it rests (the steps of the minimum covariance determinant, Rousseeuw and Van Driessen
+1999); then it grows over what is near. Standing has none: there the seed is what has arms and trunk as walking has.
+Frames far outside of it show boxing, not walking.
 """
 
 from __future__ import annotations
@@ -20,9 +20,10 @@ from ..annotation import DISCRETE
 from ..base.time_series import time_derivative
 from ..motion import quaternion
 from ..motion.humanoid import Humanoid
+from ..motion.track import smooth_zero_phase_hann
 
 SPEED_EDGES = (0.4, 1.2, 2.0, 3.0, 4.5)  # m/s between the classes in which postures are compared
-BELONGING = 2.75
+BELONGING = 3.0
 """How far outside of the core's radius a frame belongs, as Mahalanobis distance: a sum, since the spread of distances
 in a Gaussian is the same for any number of dimensions. On a library of five folders, 2 % of the frames of calm walks
 lie outside, and 80 to 90 % of those of celebrations, juggling, volleys and close dribbles."""
@@ -35,6 +36,7 @@ _SEED_ROUNDS, _GROWING_ROUNDS, _JOINING = 5, 3, 2.2
 _SAMPLED = 4000  # frames of a class that are fitted
 _FEWEST = 200  # frames with which a class has a region of its own
 _LEAST_SHARE = 0.4  # of the frames of a class without steady travel
+_PATH_SECONDS, _STEP_SECONDS = 0.7, 0.5  # Hann window of the path; a step
 _HAND_SPEED = 0.2  # m/s, added to the hands' speed before its logarithm
 _LEAST_VARIANCE = 2e-3
 _VARIANCE_OF_FEW = 2.0  # over the number of frames: few frames of one person know little of their spread
@@ -62,8 +64,7 @@ def compute_postures(positions: np.ndarray, facing: np.ndarray, fps: float, body
     limbs = (body.left, body.right)
     leg = np.mean([np.linalg.norm(local[:1, limb.foot] - local[:1, limb.upper_leg], axis=-1)[0] for limb in limbs])
     leg = max(leg, 1e-3)
-    width = local[:, body.left.foot, 1:2] - local[:, body.right.foot, 1:2]
-    columns = [local[:, body.hips, 2:] / leg, width / leg]
+    columns = [local[:, body.hips, 2:] / leg, _compute_step_width(positions, local, facing, fps, body)[:, None] / leg]
     arms = [limb for limb in limbs if None not in (limb.upper_arm, limb.lower_arm, limb.hand)]
     for limb in arms:
         columns += [_compute_direction(local, limb.upper_arm, limb.lower_arm),
@@ -75,6 +76,21 @@ def compute_postures(positions: np.ndarray, facing: np.ndarray, fps: float, body
         columns += [trunk / np.maximum(np.linalg.norm(trunk, axis=1, keepdims=True), 1e-9),
                     np.log(speed + _HAND_SPEED)[:, None]]
     return np.concatenate(columns, axis=1).astype(np.float32)
+
+
+def _compute_step_width(positions: np.ndarray, local: np.ndarray, facing: np.ndarray, fps: float,
+                        body: Humanoid) -> np.ndarray:
+    """Compute how far (T,) m the feet are apart sideways, less what side steps at that speed need.
+
+    Towards the width of the hips, which is left as it is: feet part and cross by as much as the body travels sideways
+    in a step. positions and local: (T, J, 3) m in the world and in the body's frame.
+    """
+    path = smooth_zero_phase_hann(positions[:, body.hips, :2], fps, _PATH_SECONDS)
+    sideways = np.abs(quaternion.rotate_level(time_derivative(path, fps), -facing)[:, 1])
+    legs = local[:, body.left.upper_leg] - local[:, body.right.upper_leg]
+    hips = float(np.linalg.norm(legs, axis=1).mean())
+    beyond = local[:, body.left.foot, 1] - local[:, body.right.foot, 1] - hips
+    return hips + np.sign(beyond) * np.maximum(np.abs(beyond) - _STEP_SECONDS * sideways, 0.0)
 
 
 def _compute_direction(local: np.ndarray, start: int, end: int) -> np.ndarray:
@@ -100,15 +116,42 @@ class NormalPostures:
             posture: (T, K) of `compute_postures`.
             speed: (T,) m/s.
         Returns:
-            (T,) float32, as a share of the distance within which a frame belongs: up to 1 a frame belongs; 0 where the library has no region.
+            (T,) float32: 1 at the end of the region, up to which a frame belongs; 0 where the library has none.
         """
         kind, out = np.digitize(speed, SPEED_EDGES), np.zeros(len(posture), np.float32)
         for k in np.unique(kind) if self.regions else ():
-            middle, inverse, radius = self.regions[min(self.regions, key=lambda other: (abs(other - k), other))]
+            middle, inverse, radius = self.regions[self._find_class(int(k))]
             away = posture[kind == k] - middle
             squared = np.maximum(np.einsum("ij,ij->i", away @ inverse, away), 0.0)
             out[kind == k] = np.sqrt(squared) / (radius + BELONGING)
         return out
+
+
+    def measure_parts(self, posture: np.ndarray, speed: np.ndarray) -> dict[str, tuple[float, np.ndarray]]:
+        """Measure how unlike normal locomotion each part of the body is in postures of about one speed.
+
+        Args:
+            posture: (T, K) of `compute_postures`.
+            speed: (T,) m/s.
+        Returns:
+            Part of PARTS -> how far its mean squared Mahalanobis distance lies above what is expected, in standard
+            deviations, and its mean offset (k,) from the region's middle; empty where the library has no region.
+        """
+        if not self.regions:
+            return {}
+        middle, inverse, _ = self.regions[self._find_class(int(np.digitize(np.mean(speed), SPEED_EDGES)))]
+        away, covariance, found = posture - middle, np.linalg.inv(inverse), {}
+        for part, columns in PARTS.items():
+            own = away[:, columns]
+            count = own.shape[1]
+            if count:
+                squared = np.einsum("ij,ij->i", own @ np.linalg.inv(covariance[columns, columns]), own)
+                found[part] = (float(squared.mean() - count) / np.sqrt(2.0 * count), own.mean(axis=0))
+        return found
+
+    def _find_class(self, kind: int) -> int:
+        """Find the nearest class that has a region."""
+        return min(self.regions, key=lambda other: (abs(other - kind), other))
 
 
 def fit_normal_postures(frames, is_recorded: np.ndarray, fps: float) -> NormalPostures:
@@ -123,7 +166,7 @@ def fit_normal_postures(frames, is_recorded: np.ndarray, fps: float) -> NormalPo
     is_learned = is_recorded & ~frames.words[:, actions].any(axis=1)
     kind, is_steady = np.digitize(frames.speed, SPEED_EDGES), find_steady_travel(frames, fps)
     regions: dict[int, _Region] = {}
-    for k in range(len(SPEED_EDGES), -1, -1):
+    for k in reversed(range(len(SPEED_EDGES) + 1)):
         postures = frames.posture[is_learned & (kind == k)]
         seed = frames.posture[is_learned & is_steady & (kind == k)]
         faster = regions.get(k + 1) if k < _WALKING_CLASS else None
@@ -161,7 +204,8 @@ class _Region:
     def from_core(cls, core: np.ndarray) -> "_Region":
         """Fit the Gaussian of a core; its radius is that of its nearest 60 %."""
         middle = core.mean(axis=0)
-        inverse = np.linalg.inv(np.cov(core.T) + (_LEAST_VARIANCE + _VARIANCE_OF_FEW / len(core)) * np.eye(core.shape[1]))
+        least = _LEAST_VARIANCE + _VARIANCE_OF_FEW / len(core)
+        inverse = np.linalg.inv(np.cov(core.T) + least * np.eye(core.shape[1]))
         region = cls(middle, inverse, 0.0, core)
         return cls(middle, inverse, float(np.sqrt(np.quantile(region.measure_squared(core), _CORE_SHARE))), core)
 

@@ -16,11 +16,21 @@ import numpy as np
 
 from ...annotation import Timeline, labels_per_frame
 from ...base.errors import TimedMessage, format_seconds
-from ...base.time_series import find_runs
+from ...base.time_series import find_runs, time_derivative
+from ...library.coverage import (
+    TRAVEL_SPEED,
+    classify_steps,
+    compute_turn_rate,
+    find_missing_motion,
+    measure_slowest_travel,
+)
+from ...library.features import SMOOTH_SECONDS
 from ...library.landings import LANDING_FOLDER
-from ...library.library import Library
+from ...library.library import RESTING_SPEED, Library
 from ...library.synthetic_clips import BLEND_PREFIX, KICK_PREFIX, RECEIVE_PREFIX, STAND_PREFIX, SYNTHETIC_FOLDER
-from ...motion.track import Track
+from ...motion import quaternion
+from ...motion.humanoid import compute_heading_from_positions
+from ...motion.track import Track, smooth_zero_phase_hann
 from . import movement
 from .moments import KeyMomentResult, evaluate_moments, measure_contact
 from .playback import Playback, compute_playback_rate, find_transitions
@@ -33,6 +43,7 @@ LEG_MISS_LIMIT = 0.005  # m that a leg may be short without a line
 GROUND_LIMIT = -TARGETS["ground_mm.min"].least / 1000.0
 CONTACT_GAP_LIMIT = KEY_TARGETS["contact_gap_m"].most
 JOIN_SECONDS = 0.4  # stretches closer than this are one
+MISSING_SECONDS = 0.5  # shortest time of a motion that the library lacks that is reported
 LABEL_SECONDS = 0.5  # shortest time of a missing label that is reported
 MAX_STRETCHES = 6  # stretches that a line lists
 _TOLERANCE = 1e-3  # of rates and seconds, for rounding
@@ -61,6 +72,7 @@ def report_unmet_constraints(
     keys = evaluate_moments(played, timeline.keys, stride, library) if timeline is not None else []
     lines = [
         *_report_synthetic(played),
+        *_report_missing_motion(played, library),
         _report_stretched_strides(played, track, library),
         _report_warp(played, source),
         _report_sliding(played),
@@ -148,6 +160,26 @@ def _report_synthetic(played: Playback) -> list[TimedMessage | None]:
     )
     return [_build_line(played.times, there, what, f" ({np.sum(there) / played.motion.fps:.1f} s in all)")
             for there, what in kinds]
+
+
+def _report_missing_motion(played: Playback, library: Library | None) -> list[TimedMessage | None]:
+    """Report each kind of motion that the library lacks and the body needs for MISSING_SECONDS or more."""
+    missing = find_missing_motion(library) if library is not None else {}
+    if library is None or not missing:
+        return []
+    fps = played.motion.fps
+    heading = np.unwrap(compute_heading_from_positions(played.motion.skeleton, played.positions))
+    path = smooth_zero_phase_hann(played.pelvis, fps, SMOOTH_SECONDS)
+    velocity = quaternion.rotate_level(time_derivative(path, fps), -heading)
+    speed = np.linalg.norm(velocity, axis=1)
+    slowest = WARP_LIMITS[0] * measure_slowest_travel(library)
+    shown = {
+        "belonging": np.ones(len(speed), bool), "standing": speed < RESTING_SPEED,
+        "slow": (speed > TRAVEL_SPEED) & (speed < slowest),
+        **classify_steps(velocity, compute_turn_rate(heading, fps)),
+    }
+    return [_build_line(played.times, shown[kind], what) for kind, what in missing.items()
+            if shown[kind].sum() >= MISSING_SECONDS * fps]
 
 
 def _report_stretched_strides(played: Playback, track: Track | None, library: Library | None) -> TimedMessage | None:
