@@ -68,10 +68,9 @@ def summarize_library(library) -> dict:
         The report as plain values for JSON.
     """
     from ..annotation import sort_labels
-    from ..library.coverage import find_missing_motion
     from ..library.left_out import describe_left_out, find_left_out, measure_speed_classes
 
-    originals, missing = [clip for clip in library.clips if not clip.mirrored], find_missing_motion(library)
+    originals = [clip for clip in library.clips if not clip.mirrored]
     labels = sorted(library.labels)
     gaits = [{"word": g.label, "words": list(g.labels), "speed_m_s": g.speed} for g in library.gaits]
     keys = sorted({" ".join(sort_labels(key.labels)) for key in library.keys})
@@ -83,7 +82,7 @@ def summarize_library(library) -> dict:
         f"fastest: {library.max_speed:.1f} m/s",
         "key moments: " + (", ".join(keys) if keys else "none"),
         *library.proposal_notes,
-        *missing.values(),
+        *library.missing_motion.values(),
         *describe_left_out(library, MAX_LEFT_OUT),
         *library.notes,
     ]
@@ -91,7 +90,7 @@ def summarize_library(library) -> dict:
         "version": __version__, "clips": len(originals), "minutes": library.minutes, "words": labels, "gaits": gaits,
         "fastest_m_s": library.max_speed, "keys": keys, "notes": list(library.notes), "lines": lines,
         "proposed_clips": sum(clip.has_proposed_labels for clip in originals),
-        "lacks": [{"kind": kind, "line": line} for kind, line in missing.items()],
+        "lacks": [{"kind": kind, "line": line} for kind, line in library.missing_motion.items()],
         "left_out": [{"clip": one.clip, "start_s": one.start, "end_s": one.end, "speed_m_s": one.speed,
                       "part": one.part, "why": one.reason} for one in find_left_out(library)],
         "locomotion": [{"from_m_s": one.low, "to_m_s": one.high if isfinite(one.high) else None,

@@ -6,12 +6,13 @@ library lacks there the search replaces by the nearest that it has, and people s
 
 from __future__ import annotations
 
-import weakref
+from collections.abc import Sequence
 
 import numpy as np
 
-from .left_out import select_locomotion_frames
-from .library import Library
+from ..annotation import LOCOMOTION
+from ..annotation.labels import find_label
+from .features import Frames
 from .posture import find_steady_travel
 from .standing_loops import find_stands
 
@@ -20,9 +21,22 @@ STEP_SPEEDS = (0.4, 2.0)  # m/s of steps in another direction than ahead
 TRAVEL_SPEED = 0.3  # m/s above which a body travels
 SIDEWAYS = 0.7  # share of the speed
 SLOWEST = 1.2  # m/s that a library's slowest travel should not exceed
-_LEAST_SECONDS = {"turning": 1.0, "sideways": 2.0, "backward": 2.0, "slow": 1.5, "belonging": 1.5}
+_LEAST_SECONDS = {"turning": 1.0, "sideways": 2.0, "backward": 2.0, "belonging": 1.5}
+_SLOW_SECONDS = 1.5
 _RATE_SECONDS = 0.3  # over which a heading's rate is measured
-_found: weakref.WeakKeyDictionary[Library, dict[str, str]] = weakref.WeakKeyDictionary()
+
+
+def select_locomotion_alone(frames: Frames, clips: Sequence) -> np.ndarray:
+    """Select the frames (N,) bool of recordings, twins left out, whose labels say no more than locomotion and turns."""
+    acts = [i for i, word in enumerate(frames.vocabulary) if _names_act(word)]
+    gaits = [i for i, word in enumerate(frames.vocabulary) if word in LOCOMOTION]
+    own = np.array([not clip.mirrored and not clip.is_synthetic for clip in clips])
+    return own[frames.clip] & frames.words[:, gaits].any(axis=1) & ~frames.words[:, acts].any(axis=1)
+
+
+def _names_act(word: str) -> bool:
+    """Whether a label names more than locomotion, turns and directions."""
+    return bool(set(find_label(word).kinds) - {"modifier"}) and word not in (*LOCOMOTION, "turning")
 
 
 def compute_turn_rate(heading: np.ndarray, fps: float) -> np.ndarray:
@@ -50,49 +64,42 @@ def classify_steps(velocity: np.ndarray, turn_rate: np.ndarray) -> dict[str, np.
     }
 
 
-def find_missing_motion(library: Library) -> dict[str, str]:
-    """Find what a library lacks; computed once for each.
+def find_missing_motion(clips: Sequence, frames: Frames, fps: float, strangeness: np.ndarray) -> dict[str, str]:
+    """Find what a library lacks.
 
     Args:
-        library: the recordings.
+        clips: of the library.
+        frames: their description, N frames.
+        fps: of the frames.
+        strangeness: (N,) how far each frame lies from normal locomotion (`posture`).
     Returns:
         Kind ("belonging", "standing", "turning", "slow", "sideways", "backward") -> a line that says what to add and
         what is shown until then; only the kinds that it lacks.
     """
-    if library not in _found:
-        _found[library] = _find_missing_motion(library)
-    return _found[library]
-
-
-def _find_missing_motion(library: Library) -> dict[str, str]:
-    """Find what a library lacks."""
-    frames, fps = library.frames, library.fps
-    belongs = select_locomotion_frames(library) & (library.strangeness <= 1.0)
+    belongs = select_locomotion_alone(frames, clips) & (strangeness <= 1.0)
     rate = np.concatenate([compute_turn_rate(frames.heading[first : first + count], fps)
                            for first, count in zip(frames.first, frames.count)])
-    seconds = {kind: float((belongs & flags).sum() / fps) for kind, flags in
-               classify_steps(frames.velocity, rate).items()}
-    seconds["belonging"] = float((belongs & find_steady_travel(frames, fps)).sum() / fps)
-    slowest = measure_slowest_travel(library)
+    kinds = {**classify_steps(frames.velocity, rate), "belonging": find_steady_travel(frames, fps)}
+    slowest = measure_slowest_travel(frames.speed[belongs], fps)
+    is_missing = {kind: (belongs & flags).sum() < _LEAST_SECONDS[kind] * fps for kind, flags in kinds.items()}
+    is_missing["standing"] = not find_stands(clips, frames, fps, strangeness)
+    is_missing["slow"] = slowest > SLOWEST
     lines = {
         "belonging": "no locomotion that surely belongs, since no clip travels straight on at one speed: add a walk; "
                      "until then all that is labelled locomotion counts as such",
-        "standing": "no calm standing: add some; until then steps of walking clips are slowed",
-        "turning": "no turn in place: add one; until then the body turns by steps of walking clips",
-        "slow": f"nothing slower than {slowest:.1f} m/s: add a walk; until then steps at that speed are shortened",
-        "sideways": "no steps sideways: add some; until then the body is moved sideways in steps of other clips",
-        "backward": "no steps backward: add some; until then the body is moved backward in steps of other clips",
+        "standing": "no calm standing: add some; until then it is synthetic",
+        "turning": "no turn in place: add one; until then steps are synthetic, or those of walks",
+        "slow": f"nothing slower than {slowest:.1f} m/s: add a walk; until then it is synthetic",
+        "sideways": "no steps sideways: add some; until then they are synthetic, or those of walks",
+        "backward": "no steps backward: add some; until then they are synthetic, or those of walks",
     }
-    is_missing = {kind: seconds[kind] < least for kind, least in _LEAST_SECONDS.items() if kind in seconds}
-    is_missing["standing"] = not find_stands(library.clips, frames, fps, library.strangeness)
-    is_missing["slow"] = slowest > SLOWEST
     return {kind: line for kind, line in lines.items() if is_missing[kind]}
 
 
-def measure_slowest_travel(library: Library) -> float:
-    """Measure the m/s below which less than _LEAST_SECONDS of locomotion travels; the fastest of a shorter one."""
-    speed = library.frames.speed[select_locomotion_frames(library) & (library.strangeness <= 1.0)]
+def measure_slowest_travel(speed: np.ndarray, fps: float) -> float:
+    """Measure the m/s below which less than 1.5 s of locomotion travels; infinite where nothing does.
+
+    speed: (N,) m/s of frames of locomotion.
+    """
     ordered = np.sort(speed[speed > TRAVEL_SPEED])
-    if not len(ordered):
-        return float("inf")
-    return float(ordered[min(len(ordered) - 1, int(_LEAST_SECONDS["slow"] * library.fps))])
+    return float(ordered[min(len(ordered) - 1, int(_SLOW_SECONDS * fps))]) if len(ordered) else float("inf")

@@ -7,6 +7,7 @@ people can look up, each with the part of the body that is most unlike.
 
 from __future__ import annotations
 
+import weakref
 from dataclasses import dataclass
 from pathlib import PurePosixPath
 
@@ -15,11 +16,13 @@ import numpy as np
 from ..annotation import LOCOMOTION
 from ..annotation.labels import find_label
 from ..base.time_series import find_runs
+from .coverage import select_locomotion_alone
 from .library import Library
 from .posture import SPEED_EDGES
 
 _JOINED, _SHORTEST = 0.4, 0.5  # seconds between stretches that are one; of the shortest stretch that is listed
 _FAR = 0.3  # of a direction's component or in leg lengths: an offset that has a name
+_found: weakref.WeakKeyDictionary[Library, tuple[LeftOut, ...]] = weakref.WeakKeyDictionary()
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -69,25 +72,17 @@ class SpeedClass:
     left_out: float
 
 
-def select_locomotion_frames(library: Library) -> np.ndarray:
-    """Select the frames (N,) bool of recordings, twins left out, whose labels are locomotion alone."""
-    frames = library.frames
-    acts = [i for i, word in enumerate(frames.vocabulary) if _names_act(word)]
-    gaits = [i for i, word in enumerate(frames.vocabulary) if word in LOCOMOTION]
-    own = np.array([not clip.mirrored and not clip.is_synthetic for clip in library.clips])
-    return own[frames.clip] & frames.words[:, gaits].any(axis=1) & ~frames.words[:, acts].any(axis=1)
-
-
-def _names_act(word: str) -> bool:
-    """Whether a label names more than locomotion, turns and directions."""
-    kinds = find_label(word).kinds
-    return bool(set(kinds) - {"modifier"}) and word not in (*LOCOMOTION, "turning")
-
-
 def find_left_out(library: Library) -> tuple[LeftOut, ...]:
-    """Find the stretches of locomotion that do not belong to it, in the library's order."""
+    """Find the stretches of locomotion that do not belong to it, in the library's order; computed once for each."""
+    if library not in _found:
+        _found[library] = _find_left_out(library)
+    return _found[library]
+
+
+def _find_left_out(library: Library) -> tuple[LeftOut, ...]:
+    """Find the stretches of locomotion that do not belong to it."""
     frames = library.frames
-    is_strange = select_locomotion_frames(library) & (library.strangeness > 1.0)
+    is_strange = select_locomotion_alone(library.frames, library.clips) & (library.strangeness > 1.0)
     found = []
     for index, clip in enumerate(library.clips):
         first = frames.first[index]
@@ -142,7 +137,7 @@ def _describe_offset(part: str, offset: np.ndarray) -> str:
 
 def measure_speed_classes(library: Library) -> tuple[SpeedClass, ...]:
     """Measure how much locomotion there is in each class of speed, and how much of it does not belong."""
-    selected = select_locomotion_frames(library)
+    selected = select_locomotion_alone(library.frames, library.clips)
     kind, edges = np.digitize(library.frames.speed, SPEED_EDGES), (0.0, *SPEED_EDGES, float("inf"))
     out = []
     for number, (low, high) in enumerate(zip(edges[:-1], edges[1:])):

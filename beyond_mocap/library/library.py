@@ -22,6 +22,7 @@ from . import cache
 from .cache import write_synthetic_clips
 from .clip import Clip
 from .clusters import Clusters
+from .coverage import find_missing_motion, measure_slowest_travel, select_locomotion_alone
 from .features import FPS, Frames, build_frames, join_frames
 from .keys import Key, collect_keys
 from .posture import NormalPostures, fit_normal_postures
@@ -126,6 +127,17 @@ class Library:
     def normal_postures(self) -> NormalPostures:
         """How people of this library stand, walk, jog and run."""
         return fit_normal_postures(self.frames, self._is_recorded, self.fps)
+
+    @cached_property
+    def missing_motion(self) -> dict[str, str]:
+        """What the recordings lack: kind of motion -> a line for people (`coverage`)."""
+        return find_missing_motion(self.clips, self.frames, self.fps, self.strangeness)
+
+    @cached_property
+    def slowest_travel(self) -> float:
+        """The m/s below which hardly any recorded locomotion travels."""
+        belongs = select_locomotion_alone(self.frames, self.clips) & (self.strangeness <= 1.0)
+        return measure_slowest_travel(self.frames.speed[belongs], self.fps)
 
     @cached_property
     def _is_recorded(self) -> np.ndarray:

@@ -276,7 +276,8 @@ def add_warnings(
         more: further lines.
         report_unmet: whether unmet constraints are reported.
     """
-    messages = [*recordings.notes, *recordings.proposal_notes, *request.warnings, *more, *_report_crowded_keys(request, take.edit)]
+    messages = [*recordings.notes, *recordings.proposal_notes, *request.warnings, *more]
+    messages += _report_crowded_keys(request, take.edit)
     if take.plan.method == "path":  # the other methods leave out no part of a clip
         messages += report_left_out(recordings, request, take.edit)
     if hurried_from is not None:

@@ -101,6 +101,10 @@ class BeyondMocapSettings(bpy.types.PropertyGroup):
     )
     library_holds: StringProperty(name="Contents", options={"HIDDEN"},
                                   description="Contents of the library that was built last")
+    library_gaps: StringProperty(
+        name="Left Out and Missing", options={"HIDDEN"},
+        description="What the library that was built last leaves out of locomotion, and which motion it lacks",
+    )
     players: CollectionProperty(type=BeyondMocapPlayer, description="The players to animate, in the order of the list")
     active_player: IntProperty(name="Player", min=0, description="The player shown below the list")
     video: PointerProperty(type=BeyondMocapVideo, description="The reference video")

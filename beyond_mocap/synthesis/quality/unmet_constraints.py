@@ -17,13 +17,7 @@ import numpy as np
 from ...annotation import Timeline, labels_per_frame
 from ...base.errors import TimedMessage, format_seconds
 from ...base.time_series import find_runs, time_derivative
-from ...library.coverage import (
-    TRAVEL_SPEED,
-    classify_steps,
-    compute_turn_rate,
-    find_missing_motion,
-    measure_slowest_travel,
-)
+from ...library.coverage import TRAVEL_SPEED, classify_steps, compute_turn_rate
 from ...library.features import SMOOTH_SECONDS
 from ...library.landings import LANDING_FOLDER
 from ...library.library import RESTING_SPEED, Library
@@ -164,21 +158,20 @@ def _report_synthetic(played: Playback) -> list[TimedMessage | None]:
 
 def _report_missing_motion(played: Playback, library: Library | None) -> list[TimedMessage | None]:
     """Report each kind of motion that the library lacks and the body needs for MISSING_SECONDS or more."""
-    missing = find_missing_motion(library) if library is not None else {}
-    if library is None or not missing:
+    if library is None or not library.missing_motion:
         return []
     fps = played.motion.fps
     heading = np.unwrap(compute_heading_from_positions(played.motion.skeleton, played.positions))
     path = smooth_zero_phase_hann(played.pelvis, fps, SMOOTH_SECONDS)
     velocity = quaternion.rotate_level(time_derivative(path, fps), -heading)
     speed = np.linalg.norm(velocity, axis=1)
-    slowest = WARP_LIMITS[0] * measure_slowest_travel(library)
+    slowest = WARP_LIMITS[0] * library.slowest_travel
     shown = {
         "belonging": np.ones(len(speed), bool), "standing": speed < RESTING_SPEED,
         "slow": (speed > TRAVEL_SPEED) & (speed < slowest),
         **classify_steps(velocity, compute_turn_rate(heading, fps)),
     }
-    return [_build_line(played.times, shown[kind], what) for kind, what in missing.items()
+    return [_build_line(played.times, shown[kind], what) for kind, what in library.missing_motion.items()
             if shown[kind].sum() >= MISSING_SECONDS * fps]
 
 
