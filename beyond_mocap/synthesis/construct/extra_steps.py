@@ -27,7 +27,7 @@ from ...motion.track import smooth_zero_phase_hann
 from .move_body_part import leg_chain
 
 SPEED = np.array([0.05, 0.3, 0.8, 1.5])
-STRIDE = np.array([0.12, 0.25, 0.40, 0.45])
+STRIDE = np.array([0.12, 0.25, 0.30, 0.34])
 TURN = np.array([0.28, 0.35, 0.45, 0.60])
 SWING = np.array([0.45, 0.38, 0.32, 0.30])
 """By the body's speed (SPEED, m/s): metres that a foot is dragged (STRIDE) and radians that it is turned (TURN) from

@@ -146,7 +146,7 @@ class Weights:
     lift: float = 2.0
     facing: float = 1.0
     slide: float = 1.2
-    words: float = 1.5
+    words: float = 3.0
     automatic_words: float = 1.0
     unasked: float = 2.0
     strange: float = 2.0
