@@ -310,8 +310,8 @@ def solve_shift(velocity: np.ndarray, weight: np.ndarray, scale: float = 1.0, fi
                 | None = None) -> np.ndarray:
     """Solve the smooth shift D that cancels velocities where they carry weight.
 
-    Minimizes sum w f |D' + v|^2 + SMOOTH_WEIGHT |D'''|^2 + PULL_WEIGHT |D|^2, with differences per frame at 30 frames per
-    second, and f the firmness of long stances (LONG_STANCE).
+    Minimizes sum w f |D' + v|^2 + SMOOTH_WEIGHT |D'''|^2 + PULL_WEIGHT |D|^2, with differences per frame at 30 frames
+    per second, and f the firmness of long stances (LONG_STANCE).
 
     Args:
         velocity: (T - 1, P, K) movement per frame of P points, or (T - 1, K) of one point.

@@ -185,7 +185,7 @@ class Construction:
         """(T,) how far the clip decides how the body faces, not the plan: 1 near a touch, 0 away from it."""
         at, found = np.arange(len(self.track)), np.zeros(len(self.track))
         for touch in self.touches:
-            before, after = min(touch.entry, FREE_SECONDS * self.plan.fps), min(touch.leave, FREE_SECONDS * self.plan.fps)
+            before, after = (min(frames, FREE_SECONDS * self.plan.fps) for frames in (touch.entry, touch.leave))
             away = np.maximum(touch.frame - before - at, at - touch.frame - after) / (FREE_FADE * self.plan.fps)
             found = np.maximum(found, 1.0 - smoothstep(np.clip(away, 0.0, 1.0)))
         return found

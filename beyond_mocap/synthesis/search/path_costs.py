@@ -104,6 +104,7 @@ TERMS = {
     "rate_change": "change of playback rate",
     "avoided": "an avoided label",
     "style": "not a clip of the style",
+    "manner": "moves unlike this player",
     "variety": "does not match this player's own lag",
 }
 """Name of a cost term -> its description in "Why This Clip?"."""
@@ -312,6 +313,8 @@ class PathCosts:
         yield "made", np.float32(w.synthetic) * self.index.is_made_travel[frame]
         if self.request.style_cost is not None:
             yield "style", self.request.style_cost[frame]
+        if self.request.manner_cost is not None:
+            yield "manner", self.request.manner_cost[frame]
         if self.reuse_cost is not None:
             yield "price", self.reuse_cost[frame]
         if avoid:
