@@ -25,6 +25,7 @@ from .clusters import Clusters
 from .coverage import find_missing_motion, measure_slowest_travel, select_locomotion_alone
 from .features import FPS, Frames, build_frames, join_frames
 from .keys import Key, collect_keys
+from .manners import Manners, measure_manners
 from .posture import NormalPostures, fit_normal_postures
 from .standing_loops import MIN_STAND_SECONDS
 from .synthetic_clips import (
@@ -138,6 +139,12 @@ class Library:
         """The m/s below which hardly any recorded locomotion travels."""
         belongs = select_locomotion_alone(self.frames, self.clips) & (self.strangeness <= 1.0)
         return measure_slowest_travel(self.frames.speed[belongs], self.fps)
+
+    @cached_property
+    def manners(self) -> Manners:
+        """How the people of this library move."""
+        is_calm = self._is_recorded & (self.strangeness <= 1.0)
+        return measure_manners([clip.path for clip in self.clips], self.frames, is_calm, self.fps)
 
     @cached_property
     def _is_recorded(self) -> np.ndarray:
