@@ -15,12 +15,12 @@ from ..annotation.labels import find_label
 from .features import Frames
 from .posture import find_steady_travel
 from .standing_loops import find_stands
+from .synthetic_clips import SLOWEST
 
 TURN_RATE, TURN_SPEED = np.radians(45.0), 0.5  # rad/s and m/s of a body that turns in place
 STEP_SPEEDS = (0.4, 2.0)  # m/s of steps in another direction than ahead
 TRAVEL_SPEED = 0.3  # m/s above which a body travels
 SIDEWAYS = 0.7  # share of the speed
-SLOWEST = 1.2  # m/s that a library's slowest travel should not exceed
 _LEAST_SECONDS = {"turning": 1.0, "sideways": 2.0, "backward": 2.0, "belonging": 1.5}
 _SLOW_SECONDS = 1.5
 _RATE_SECONDS = 0.3  # over which a heading's rate is measured

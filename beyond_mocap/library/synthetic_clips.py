@@ -13,6 +13,9 @@ upright stance and the recorded runners' elbows and lean: long runs that slowly 
 are needed, quick ones, and weaving ones. The fastest recording played faster with stretched strides would keep the
 figures and lose the look: knees pop, the body floats.
 
+Below recordings of runs alone it generates walking the same way, and where no clip stands calmly a stand: a run that is
+shortened to a walk's steps hops on the spot.
+
 Recorded kicks are seldom faster than a jog, and players who receive a ball with the foot in a recording hardly move;
 moved along at 8 m/s their supporting foot slides by metres. `synthetic.gestures` generates both on the run at the
 missing speeds; they substitute for recorded ones wherever they carry the labels by which those answer.
@@ -39,11 +42,12 @@ from ..synthetic.gait import build_gait
 from ..synthetic.gait_plan import GaitStyle
 from .features import Frames
 from .scan import CACHE_FOLDER
-from .standing_loops import iter_standing_loops
+from .standing_loops import LOOP_SECONDS, iter_standing_loops
 
 SYNTHETIC_FOLDER = f"{CACHE_FOLDER}/made-gait/"
-# how the file names of blends, of kicks and of received balls begin, in that folder
+# how the file names of blends, of kicks, of received balls, of recorded stands, of walks and of synthetic stands begin
 BLEND_PREFIX, KICK_PREFIX, RECEIVE_PREFIX, STAND_PREFIX = "blend_", "kick_", "receive_", "stand_"
+WALK_PREFIX, STILL_PREFIX = "walk_", "still_"
 KICK_LABELS, RECEIVE_LABELS = frozenset({"kick"}), frozenset({"receive", "foot"})
 FPS = 60.0  # of synthetic clips
 MAX_SPEED = 9.4  # m/s
@@ -58,8 +62,11 @@ _BLEND_STEP, _TOUCH_STEP = 1.06, 1.4
 _PAIRS = 3  # pairs of recordings blended into each gap, at most
 _MAX_SPEED_SPREAD = 0.15  # standard deviation of a steady stretch's speed, share of its mean
 _GAITS = LOCOMOTION[1:]
-# m/s of gaits without a recording
+# m/s of gaits without a recording, faster and slower than the recorded ones
 _DEFAULT_SPEEDS = {"running": 4.6, "sprinting": 7.3}
+_SLOWER_SPEEDS = {"walking": 1.2, "jogging": 2.7}
+SLOWEST = 1.2  # m/s that the slowest travel of recordings should not exceed
+_WALK_STEP, _WALK_SECONDS = 1.25, 5.0  # ratio of neighbouring speeds of walks, and their length
 # radians by which a runner's elbow and lean differ from the default, at most
 _MAX_STYLE = np.array([0.35, 0.10])
 # m/s below which a point of a foot is still
@@ -90,7 +97,7 @@ def find_speed_gaps(speed: np.ndarray, fps: float) -> tuple[tuple[float, float],
         speed: (N,) m/s of frames of locomotion.
         fps: of those frames.
     Returns:
-        (from, to) m/s of all gaps, from the slowest recording's speed to a sprint.
+        (from, to) m/s of all gaps, from the slowest recording's speed, if that is a walk, to a sprint.
     """
     grid = np.exp(np.arange(np.log(0.6), np.log(MAX_SPEED), np.log(_GRID)))
     ordered = np.sort(speed)
@@ -98,7 +105,8 @@ def find_speed_gaps(speed: np.ndarray, fps: float) -> tuple[tuple[float, float],
     lacking = reached < _MIN_SECONDS * fps
     if lacking.all():
         return ()
-    lacking[: int(np.argmin(lacking))] = False
+    slowest = int(np.argmin(lacking))
+    lacking[:slowest] = grid[slowest] > SLOWEST
     ends = np.append(grid, MAX_SPEED)
     return tuple((float(grid[a]), float(ends[b])) for a, b in find_runs(lacking))
 
@@ -148,10 +156,12 @@ def iter_synthetic_clips(
     Yields:
         Clips whose names begin with SYNTHETIC_FOLDER: they are stored beside the cache.
     """
-    speeds = {**{word: v for word, v in _DEFAULT_SPEEDS.items() if v > max(gait_speeds.values())}, **gait_speeds}
+    speeds = {**{word: v for word, v in _SLOWER_SPEEDS.items() if v < min(gait_speeds.values())},
+              **{word: v for word, v in _DEFAULT_SPEEDS.items() if v > max(gait_speeds.values())}, **gait_speeds}
     example = sample_upright_example(clips)
     style = estimate_runner_style(clips, frames, example)
     for low, high in find_speed_gaps(frames.speed[select_locomotion(frames, clips)], fps):
+        yield from _iter_walks(low, min(high, _MIN_RUN_SPEED), example, speeds)
         yield from _iter_blends(clips, frames, fps, low=low, high=high, speeds=speeds)
         yield from _iter_runs(max(0.93 * low, _MIN_RUN_SPEED), min(1.05 * high, MAX_SPEED), example, style, speeds)
     kinds = sorted({"inside" if "inside" in key.labels else "top" for key in keys if KICK_LABELS <= key.labels})
@@ -161,10 +171,13 @@ def iter_synthetic_clips(
     fastest = max(_TOUCH_STEP * measure_touch_speed(frames, clips, keys, RECEIVE_LABELS), MIN_RECEIVE_SPEED)
     yield from _iter_touches(RECEIVE_PREFIX, fastest, ("receive", "foot", "low"), kinds=["inside"], example=example,
                              speeds=speeds)
-    for number, (_, motion) in enumerate(iter_standing_loops(clips, frames, fps, strangeness, FPS)):
+    stands = [(STAND_PREFIX, motion) for _, motion in iter_standing_loops(clips, frames, fps, strangeness, FPS)]
+    if not stands:
+        stands = [(STILL_PREFIX, build_gait(0.0, LOOP_SECONDS, FPS, example.skeleton, example=example))]
+    for number, (prefix, motion) in enumerate(stands):
         row = ClipAnnotation(0, len(motion) - 1, None, (STANDING,))
         contacts = np.ones((len(motion), 2, 2), bool)
-        yield SyntheticClip(f"{SYNTHETIC_FOLDER}{STAND_PREFIX}{number + 1}.bvh", motion, (row,), contacts)
+        yield SyntheticClip(f"{SYNTHETIC_FOLDER}{prefix}{number + 1}.bvh", motion, (row,), contacts)
 
 
 def sample_upright_example(clips: Sequence) -> Motion:
@@ -278,6 +291,16 @@ def _find_stretches(clips, found) -> list[Strides]:
         if steps is not None:
             out.append(steps)
     return out[:_PAIRS]
+
+
+def _iter_walks(low: float, high: float, example: Motion, speeds: dict[str, float]) -> Iterator[SyntheticClip]:
+    """Iterate over walks from `low` to `high` m/s, where no recording is as slow."""
+    if low >= SLOWEST:
+        return
+    for speed in low * _WALK_STEP ** np.arange(np.ceil(np.log(high / low) / np.log(_WALK_STEP))):
+        motion = build_gait(float(speed), _WALK_SECONDS, FPS, example.skeleton, example=example)
+        rows = _build_gait_rows(np.full(len(motion), speed), speeds)
+        yield _ground_clip(f"{SYNTHETIC_FOLDER}{WALK_PREFIX}{speed:.2f}.bvh", motion, None, rows)
 
 
 def _iter_runs(low: float, high: float, example: Motion, style: GaitStyle,

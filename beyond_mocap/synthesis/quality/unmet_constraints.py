@@ -21,7 +21,15 @@ from ...library.coverage import TRAVEL_SPEED, classify_steps, compute_turn_rate
 from ...library.features import SMOOTH_SECONDS
 from ...library.landings import LANDING_FOLDER
 from ...library.library import RESTING_SPEED, Library
-from ...library.synthetic_clips import BLEND_PREFIX, KICK_PREFIX, RECEIVE_PREFIX, STAND_PREFIX, SYNTHETIC_FOLDER
+from ...library.synthetic_clips import (
+    BLEND_PREFIX,
+    KICK_PREFIX,
+    RECEIVE_PREFIX,
+    STAND_PREFIX,
+    STILL_PREFIX,
+    SYNTHETIC_FOLDER,
+    WALK_PREFIX,
+)
 from ...motion import quaternion
 from ...motion.humanoid import compute_heading_from_positions
 from ...motion.track import Track, smooth_zero_phase_hann
@@ -141,14 +149,18 @@ def _frames_of_clips(played: Playback, *begins: str) -> np.ndarray:
 
 def _report_synthetic(played: Playback) -> list[TimedMessage | None]:
     """Report each kind of synthetic clip: running, two recordings blended, kicks, taken balls, stands, landings."""
-    blends, kicks, receptions, stands = (_frames_of_clips(played, SYNTHETIC_FOLDER + name)
-                                         for name in (BLEND_PREFIX, KICK_PREFIX, RECEIVE_PREFIX, STAND_PREFIX))
-    running = _frames_of_clips(played, SYNTHETIC_FOLDER) & ~blends & ~kicks & ~receptions & ~stands
+    blends, kicks, receptions, stands, walks, stills = (
+        _frames_of_clips(played, SYNTHETIC_FOLDER + name)
+        for name in (BLEND_PREFIX, KICK_PREFIX, RECEIVE_PREFIX, STAND_PREFIX, WALK_PREFIX, STILL_PREFIX)
+    )
+    running = _frames_of_clips(played, SYNTHETIC_FOLDER) & ~(blends | kicks | receptions | stands | walks | stills)
     kinds = (
         (running, "synthetic running: no recording has the speed of the track"),
         (blends, "blended from a slower and a faster recording: none has the speed of the track"),
         (kicks, "synthetic kick on the run: no recorded kick is as fast as the player"),
         (receptions, "synthetic reception on the run: no recorded one is as fast as the player"),
+        (walks, "synthetic walking: no recording is as slow as the track; add a walk"),
+        (stills, "synthetic standing: no recording stands calmly; add one"),
         (stands, "a recorded stand is played forth and back: no recording stands for so long"),
         (_frames_of_clips(played, LANDING_FOLDER), "synthetic landing and getting up: the recording ends in flight"),
     )
@@ -157,7 +169,9 @@ def _report_synthetic(played: Playback) -> list[TimedMessage | None]:
 
 
 def _report_missing_motion(played: Playback, library: Library | None) -> list[TimedMessage | None]:
-    """Report each kind of motion that the library lacks and the body needs for MISSING_SECONDS or more."""
+    """Report each kind of motion that the library lacks and the body needs for MISSING_SECONDS or more, where no
+    synthetic clip stands in.
+    """
     if library is None or not library.missing_motion:
         return []
     fps = played.motion.fps
@@ -171,8 +185,9 @@ def _report_missing_motion(played: Playback, library: Library | None) -> list[Ti
         "slow": (speed > TRAVEL_SPEED) & (speed < slowest),
         **classify_steps(velocity, compute_turn_rate(heading, fps)),
     }
-    return [_build_line(played.times, shown[kind], what) for kind, what in library.missing_motion.items()
-            if shown[kind].sum() >= MISSING_SECONDS * fps]
+    recorded = ~_frames_of_clips(played, SYNTHETIC_FOLDER)
+    return [_build_line(played.times, shown[kind] & recorded, what) for kind, what in library.missing_motion.items()
+            if np.sum(shown[kind] & recorded) >= MISSING_SECONDS * fps]
 
 
 def _report_stretched_strides(played: Playback, track: Track | None, library: Library | None) -> TimedMessage | None:
