@@ -26,7 +26,7 @@ SPEED_EDGES = (0.4, 1.2, 2.0, 3.0, 4.5)  # m/s between the classes in which post
 BELONGING = 3.0
 """How far outside of the core's radius a frame belongs, as Mahalanobis distance: a sum, since the spread of distances
 in a Gaussian is the same for any number of dimensions. On a library of five folders, 2 % of the frames of calm walks
-lie outside, and 80 to 90 % of those of celebrations, juggling, volleys and close dribbles."""
+lie outside, and 70 to 85 % of those of celebrations, juggling, volleys and close dribbles."""
 
 _CORE_SHARE = 0.6
 _ROUNDS = 20  # of concentration; it rests after some ten
@@ -35,7 +35,6 @@ _ROUNDS = 20  # of concentration; it rests after some ten
 _SEED_ROUNDS, _GROWING_ROUNDS, _JOINING = 5, 3, 2.2
 _SAMPLED = 4000  # frames of a class that are fitted
 _FEWEST = 200  # frames with which a class has a region of its own
-_LEAST_SHARE = 0.4  # of the frames of a class without steady travel
 _PATH_SECONDS, _STEP_SECONDS = 0.7, 0.5  # Hann window of the path; a step
 _HAND_SPEED = 0.2  # m/s, added to the hands' speed before its logarithm
 _LEAST_VARIANCE = 2e-3
@@ -242,11 +241,11 @@ def _fit_region(postures: np.ndarray, seed: np.ndarray, faster: _Region | None) 
 
 
 def _select_similar_arms(postures: np.ndarray, faster: _Region) -> np.ndarray:
-    """Select the postures with arms and trunk within those of another class, at least _LEAST_SHARE of them."""
+    """Select the postures with arms and trunk as 95 % of another class have them, or the nearest few."""
     arms = _Region.from_core(faster.core[:, _ARMS_AND_TRUNK])
     squared = arms.measure_squared(postures[:, _ARMS_AND_TRUNK])
     limit = np.quantile(arms.measure_squared(arms.core), 0.95)
-    return postures[squared <= max(limit, np.quantile(squared, _LEAST_SHARE))]
+    return postures[squared <= max(limit, np.sort(squared)[_FEWEST - 1])]
 
 
 def _concentrate(postures: np.ndarray) -> _Region:

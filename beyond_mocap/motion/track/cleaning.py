@@ -2,7 +2,7 @@
 
 How real feeds err: samples are missing, or continue at constant velocity while the player is out of sight and then snap
 back by 0.4-1.4 m from one sample to the next, some 8 times per player and half; single samples jump away and return; an
-absent ball is at a sentinel (z = -10, or exactly at the origin).
+absent ball is at a sentinel (z = -10, or exactly at the origin). Simple cameras and receivers let every sample jitter.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ import numpy as np
 from ...base.errors import InputError, TimedMessage, format_count, format_seconds
 from ...base.time_series import find_runs
 from .data import Track, is_ball_sentinel
-from .sampling import GAP_INTERVALS, LONG_GAP
+from .sampling import GAP_INTERVALS, LONG_GAP, smooth_zero_phase_hann
 
 MAX_SPEED = 12.0
 """m/s; no player runs faster, so a sample that would need it is wrong."""
@@ -26,6 +26,8 @@ _EXCURSION = 0.5  # seconds within which a jump away has to return to count as a
 _COAST = (0.2, 0.9)  # seconds before a snap that are replaced: at least, and at most while the feed coasts
 _CATCH_UP = 3.0  # m/s by which the player may be faster while making up for a snap; large snaps need more time
 _COAST_EXACT = 0.012  # metres: a coasting feed keeps to its line up to rounding to centimetres
+_JITTER = 0.06  # metres; noise of single samples from which on a track is smoothed: optical systems have 0.01
+_JITTER_LEFT, _JITTER_SECONDS = 0.04, (0.4, 2.0)  # metres of noise that smoothing should leave; shortest, longest window
 _STRAY = 2  # samples before a jump at the track's start, or after one at its end, that are taken for strays
 _SNAP_LIMIT = 3.0  # metres; a longer step is another player, or real: reported, not repaired
 _SLOPE_SECONDS = 0.3  # seconds whose slope is the velocity next to a gap
@@ -61,6 +63,8 @@ class DataReport:
 def clean_track(track: Track) -> tuple[Track, DataReport]:
     """Clean a track: in order of time, with one plausible position per sample, and a report of the changes.
 
+    A track all of whose samples jitter is smoothed first.
+
     Rows without a time are dropped, repeated times merged to their mean, times sorted. Spikes, excursions and the
     coasted samples before a snap are marked `outlier`; missing samples, and those of gaps longer than three sample
     intervals, are inserted and marked `filled`. Both get a cubic between the valid neighbours that starts and ends with
@@ -82,6 +86,7 @@ def clean_track(track: Track) -> tuple[Track, DataReport]:
     if np.count_nonzero(known) < 2:
         found = f"{format_count(np.count_nonzero(known), 'sample')} with a position"
         raise InputError(track.name, found, "at least two")
+    positions[known], jitter = _smooth_jitter(times[known], positions[known])
     outlier, snaps = np.zeros(len(times), dtype=bool), ()
     outlier[known], snaps = _detect_outliers(times[known], positions[known])
     _check_unit(times[known], positions[known], outlier[known], track.name)
@@ -89,7 +94,7 @@ def clean_track(track: Track) -> tuple[Track, DataReport]:
     positions = _interpolate_gaps(times, positions, is_valid)
     cleaned = Track(times, positions, ball, ball_height_known=np.isfinite(ball[:, 2]), filled=~known, outlier=outlier,
                     name=track.name)
-    return cleaned, _build_report(cleaned, notes, snaps, dropped, merged)
+    return cleaned, _build_report(cleaned, notes, snaps, dropped, merged, jitter)
 
 
 def _check_unit(times: np.ndarray, positions: np.ndarray, outlier: np.ndarray, name: str) -> None:
@@ -165,6 +170,26 @@ def _insert_missing_rows(times, positions, ball, name: str):
         return times, positions, ball
     blank = np.nan
     return np.insert(times, at, np.concatenate(new)), np.insert(positions, at, blank, 0), np.insert(ball, at, blank, 0)
+
+
+def _smooth_jitter(times: np.ndarray, positions: np.ndarray) -> tuple[np.ndarray, list[str]]:
+    """Smooth positions (N, 2) m that jitter as a whole, and describe that in a line; unchanged where they do not.
+
+    White noise of s metres along both axes puts samples 1.44 s off the line between their neighbours in the median;
+    a Hann window of n samples leaves sqrt(1.5 / n) of it.
+    """
+    if len(times) < 5:
+        return positions, []
+    off = _measure_line_distance(times[1:-1], positions[1:-1], times[:-2], place_a=positions[:-2], time_b=times[2:],
+                                 place_b=positions[2:])
+    bend = _MAX_ACCELERATION / 8.0 * float(np.median(times[2:] - times[:-2])) ** 2
+    noise = (float(np.median(off)) - bend) / 1.44
+    if noise <= _JITTER:
+        return positions, []
+    rate = 1.0 / float(np.median(np.diff(times)))
+    seconds = float(np.clip(1.5 * (noise / _JITTER_LEFT) ** 2 / rate, *_JITTER_SECONDS))
+    line = f"samples jitter by {100 * noise:.0f} cm: the track is smoothed over {seconds:.1f} s"
+    return smooth_zero_phase_hann(positions, rate, seconds), [line]
 
 
 def _detect_outliers(times: np.ndarray, positions: np.ndarray) -> tuple[np.ndarray, tuple[float, ...]]:
@@ -322,10 +347,11 @@ def _interpolate_hermite(at: np.ndarray, before, after) -> np.ndarray:
     return (p0 * (1 + 2 * s) * (1 - s) ** 2 + p1 * s * s * (3 - 2 * s) + length * s * (1 - s) * (v0 * (1 - s) - v1 * s))
 
 
-def _build_report(track: Track, notes: list[str], snaps: tuple[float, ...], dropped: int, merged: int) -> DataReport:
+def _build_report(track: Track, notes: list[str], snaps: tuple[float, ...], dropped: int, merged: int,
+                  jitter: list[str]) -> DataReport:
     """Build the report of a cleaned track."""
     gaps = _find_gaps(track)
-    warnings = _collect_warnings(track, snaps, gaps)
+    warnings = [*jitter, *_collect_warnings(track, snaps, gaps)]
     return DataReport(
         lines=(*notes, *_describe_replacements(track), *warnings), rate=1.0 / track.interval, dropped=dropped,
         merged=merged, filled=int(track.filled.sum()), outliers=int(track.outlier.sum()), gaps=gaps,
