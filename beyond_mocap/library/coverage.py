@@ -15,9 +15,10 @@ from ..annotation.labels import find_label
 from .features import Frames
 from .posture import find_steady_travel
 from .standing_loops import find_stands
-from .synthetic_clips import SLOWEST
+from .synthetic_clips import SLOWEST_RECORDED
 
-TURN_RATE, TURN_SPEED = np.radians(45.0), 0.5  # rad/s and m/s of a body that turns in place
+TURN_RATE, TURN_SPEED = np.radians(45.0), 0.5  # rad/s and m/s of a recording that turns in place
+NEEDED_TURN_RATE = np.radians(20.0)  # rad/s at which a body needs one: without one the plan turns it slowly
 STEP_SPEEDS = (0.4, 2.0)  # m/s of steps in another direction than ahead
 TRAVEL_SPEED = 0.3  # m/s above which a body travels
 SIDEWAYS = 0.7  # share of the speed
@@ -46,19 +47,20 @@ def compute_turn_rate(heading: np.ndarray, fps: float) -> np.ndarray:
     return (padded[2 * half :] - padded[: -2 * half]) * fps / (2 * half)
 
 
-def classify_steps(velocity: np.ndarray, turn_rate: np.ndarray) -> dict[str, np.ndarray]:
+def classify_steps(velocity: np.ndarray, turn_rate: np.ndarray, least_rate: float) -> dict[str, np.ndarray]:
     """Classify frames by the kinds of motion that libraries often lack.
 
     Args:
         velocity: (T, 2) m/s in the body's heading frame, x forward.
         turn_rate: (T,) rad/s of the heading.
+        least_rate: rad/s from which on a body turns.
     Returns:
         "turning", "sideways" and "backward" -> (T,) bool.
     """
     speed = np.linalg.norm(velocity, axis=1)
     is_slow = (speed > STEP_SPEEDS[0]) & (speed < STEP_SPEEDS[1])
     return {
-        "turning": (np.abs(turn_rate) > TURN_RATE) & (speed < TURN_SPEED),
+        "turning": (np.abs(turn_rate) > least_rate) & (speed < TURN_SPEED),
         "sideways": is_slow & (np.abs(velocity[:, 1]) > SIDEWAYS * speed),
         "backward": is_slow & (-velocity[:, 0] > SIDEWAYS * speed),
     }
@@ -79,11 +81,11 @@ def find_missing_motion(clips: Sequence, frames: Frames, fps: float, strangeness
     belongs = select_locomotion_alone(frames, clips) & (strangeness <= 1.0)
     rate = np.concatenate([compute_turn_rate(frames.heading[first : first + count], fps)
                            for first, count in zip(frames.first, frames.count)])
-    kinds = {**classify_steps(frames.velocity, rate), "belonging": find_steady_travel(frames, fps)}
+    kinds = {**classify_steps(frames.velocity, rate, TURN_RATE), "belonging": find_steady_travel(frames, fps)}
     slowest = measure_slowest_travel(frames.speed[belongs], fps)
     is_missing = {kind: (belongs & flags).sum() < _LEAST_SECONDS[kind] * fps for kind, flags in kinds.items()}
     is_missing["standing"] = not find_stands(clips, frames, fps, strangeness)
-    is_missing["slow"] = slowest > SLOWEST
+    is_missing["slow"] = slowest > SLOWEST_RECORDED
     lines = {
         "belonging": "no locomotion that surely belongs, since no clip travels straight on at one speed: add a walk; "
                      "until then all that is labelled locomotion counts as such",

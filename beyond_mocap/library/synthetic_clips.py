@@ -13,8 +13,8 @@ upright stance and the recorded runners' elbows and lean: long runs that slowly 
 are needed, quick ones, and weaving ones. The fastest recording played faster with stretched strides would keep the
 figures and lose the look: knees pop, the body floats.
 
-Below recordings of runs alone it generates walking the same way, and where no clip stands calmly a stand: a run that is
-shortened to a walk's steps hops on the spot.
+Where all recordings run, or all walk slower, it generates walking the same way, and where no clip stands calmly a stand:
+a run that is shortened to a walk's steps hops on the spot.
 
 Recorded kicks are seldom faster than a jog, and players who receive a ball with the foot in a recording hardly move;
 moved along at 8 m/s their supporting foot slides by metres. `synthetic.gestures` generates both on the run at the
@@ -55,6 +55,8 @@ MAX_SPEED = 9.4  # m/s
 _MIN_RUN_SPEED, MIN_RECEIVE_SPEED = 2.4, 1.7
 # range of playback rates of a clip
 _WARP = (0.875, 1.125)
+_SLOWEST = 1.6  # m/s, a walk: the slowest travel should not exceed it when it is played slower
+SLOWEST_RECORDED = _SLOWEST / _WARP[0]
 _MIN_SECONDS = 1.5  # seconds of recording at a speed from which on it is no gap
 _GRID = 1.03  # ratio of neighbouring speeds
 # ratios of neighbouring speeds of blends and of touches
@@ -65,7 +67,6 @@ _GAITS = LOCOMOTION[1:]
 # m/s of gaits without a recording, faster and slower than the recorded ones
 _DEFAULT_SPEEDS = {"running": 4.6, "sprinting": 7.3}
 _SLOWER_SPEEDS = {"walking": 1.2, "jogging": 2.7}
-SLOWEST = 1.2  # m/s that the slowest travel of recordings should not exceed
 _WALK_STEP, _WALK_SECONDS = 1.25, 5.0  # ratio of neighbouring speeds of walks, and their length
 # radians by which a runner's elbow and lean differ from the default, at most
 _MAX_STYLE = np.array([0.35, 0.10])
@@ -106,7 +107,7 @@ def find_speed_gaps(speed: np.ndarray, fps: float) -> tuple[tuple[float, float],
     if lacking.all():
         return ()
     slowest = int(np.argmin(lacking))
-    lacking[:slowest] = grid[slowest] > SLOWEST
+    lacking[:slowest] = grid[slowest] > _SLOWEST
     ends = np.append(grid, MAX_SPEED)
     return tuple((float(grid[a]), float(ends[b])) for a, b in find_runs(lacking))
 
@@ -161,8 +162,8 @@ def iter_synthetic_clips(
     example = sample_upright_example(clips)
     style = estimate_runner_style(clips, frames, example)
     for low, high in find_speed_gaps(frames.speed[select_locomotion(frames, clips)], fps):
-        yield from _iter_walks(low, min(high, _MIN_RUN_SPEED), example, speeds)
-        yield from _iter_blends(clips, frames, fps, low=low, high=high, speeds=speeds)
+        blends = list(_iter_blends(clips, frames, fps, low=low, high=high, speeds=speeds))
+        yield from blends or _iter_walks(low, min(high, _MIN_RUN_SPEED), example, speeds)
         yield from _iter_runs(max(0.93 * low, _MIN_RUN_SPEED), min(1.05 * high, MAX_SPEED), example, style, speeds)
     kinds = sorted({"inside" if "inside" in key.labels else "top" for key in keys if KICK_LABELS <= key.labels})
     fastest = measure_touch_speed(frames, clips, keys, KICK_LABELS)
@@ -294,10 +295,8 @@ def _find_stretches(clips, found) -> list[Strides]:
 
 
 def _iter_walks(low: float, high: float, example: Motion, speeds: dict[str, float]) -> Iterator[SyntheticClip]:
-    """Iterate over walks from `low` to `high` m/s, where no recording is as slow."""
-    if low >= SLOWEST:
-        return
-    for speed in low * _WALK_STEP ** np.arange(np.ceil(np.log(high / low) / np.log(_WALK_STEP))):
+    """Iterate over walks from `low` to `high` m/s, where recordings on one side are missing for blends."""
+    for speed in low * _WALK_STEP ** np.arange(max(0.0, np.ceil(np.log(high / low) / np.log(_WALK_STEP)))):
         motion = build_gait(float(speed), _WALK_SECONDS, FPS, example.skeleton, example=example)
         rows = _build_gait_rows(np.full(len(motion), speed), speeds)
         yield _ground_clip(f"{SYNTHETIC_FOLDER}{WALK_PREFIX}{speed:.2f}.bvh", motion, None, rows)

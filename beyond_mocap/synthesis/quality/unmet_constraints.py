@@ -17,7 +17,7 @@ import numpy as np
 from ...annotation import Timeline, labels_per_frame
 from ...base.errors import TimedMessage, format_seconds
 from ...base.time_series import find_runs, time_derivative
-from ...library.coverage import TRAVEL_SPEED, classify_steps, compute_turn_rate
+from ...library.coverage import NEEDED_TURN_RATE, TRAVEL_SPEED, classify_steps, compute_turn_rate
 from ...library.features import SMOOTH_SECONDS
 from ...library.landings import LANDING_FOLDER
 from ...library.library import RESTING_SPEED, Library
@@ -48,6 +48,7 @@ JOIN_SECONDS = 0.4  # stretches closer than this are one
 MISSING_SECONDS = 0.5  # shortest time of a motion that the library lacks that is reported
 LABEL_SECONDS = 0.5  # shortest time of a missing label that is reported
 MAX_STRETCHES = 6  # stretches that a line lists
+_STANDS_AND_GOES_AHEAD = (STAND_PREFIX, STILL_PREFIX, WALK_PREFIX, BLEND_PREFIX)
 _TOLERANCE = 1e-3  # of rates and seconds, for rounding
 
 
@@ -159,7 +160,7 @@ def _report_synthetic(played: Playback) -> list[TimedMessage | None]:
         (blends, "blended from a slower and a faster recording: none has the speed of the track"),
         (kicks, "synthetic kick on the run: no recorded kick is as fast as the player"),
         (receptions, "synthetic reception on the run: no recorded one is as fast as the player"),
-        (walks, "synthetic walking: no recording is as slow as the track; add a walk"),
+        (walks, "synthetic walking: no recording has the speed of the track; add one"),
         (stills, "synthetic standing: no recording stands calmly; add one"),
         (stands, "a recorded stand is played forth and back: no recording stands for so long"),
         (_frames_of_clips(played, LANDING_FOLDER), "synthetic landing and getting up: the recording ends in flight"),
@@ -183,11 +184,15 @@ def _report_missing_motion(played: Playback, library: Library | None) -> list[Ti
     shown = {
         "belonging": np.ones(len(speed), bool), "standing": speed < RESTING_SPEED,
         "slow": (speed > TRAVEL_SPEED) & (speed < slowest),
-        **classify_steps(velocity, compute_turn_rate(heading, fps)),
+        **classify_steps(velocity, compute_turn_rate(heading, fps), NEEDED_TURN_RATE),
     }
-    recorded = ~_frames_of_clips(played, SYNTHETIC_FOLDER)
-    return [_build_line(played.times, shown[kind] & recorded, what) for kind, what in library.missing_motion.items()
-            if np.sum(shown[kind] & recorded) >= MISSING_SECONDS * fps]
+    synthetic = _frames_of_clips(played, SYNTHETIC_FOLDER)
+    ahead = _frames_of_clips(played, *(SYNTHETIC_FOLDER + name for name in _STANDS_AND_GOES_AHEAD))
+    lines = []
+    for kind, what in library.missing_motion.items():
+        lacks = shown[kind] & ~(synthetic & ~ahead if kind in ("turning", "sideways", "backward") else synthetic)
+        lines.append(_build_line(played.times, lacks, what) if lacks.sum() >= MISSING_SECONDS * fps else None)
+    return lines
 
 
 def _report_stretched_strides(played: Playback, track: Track | None, library: Library | None) -> TimedMessage | None:

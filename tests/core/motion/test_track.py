@@ -383,3 +383,18 @@ def test_other_units_are_refused(track_of, factor, told):
     track = track_of(lambda t: 2.0 + 1.5 * np.sin(t), 20.0, turn=0.3)
     with pytest.raises(InputError, match=told):
         clean_track(replace(track, positions=factor * track.positions))
+
+
+@pytest.mark.parametrize("rate", [10.0, 25.0])
+def test_a_track_that_jitters_by_20_cm_is_smoothed_and_told(rate):
+    noisy, truth = made(rate=rate, noise=0.2)
+    cleaned, report = clean_track(noisy)
+    before, after = (np.sqrt(np.mean(distance(one.positions, truth) ** 2)) for one in (noisy, cleaned))
+    assert after < 0.6 * before
+    assert any("jitter by" in line and "smoothed over" in line for line in report.warnings)
+
+
+def test_the_noise_of_usual_systems_is_left_as_it_is():
+    noisy, _ = made(noise=0.02)
+    cleaned, report = clean_track(noisy)
+    assert np.array_equal(cleaned.positions, noisy.positions) and report.warnings == ()
