@@ -13,8 +13,8 @@ upright stance and the recorded runners' elbows and lean: long runs that slowly 
 are needed, quick ones, and weaving ones. The fastest recording played faster with stretched strides would keep the
 figures and lose the look: knees pop, the body floats.
 
-Where all recordings run, or all walk slower, it generates walking the same way, and where no clip stands calmly a stand:
-a run that is shortened to a walk's steps hops on the spot.
+Where all recordings run, or all walk slower, it generates walking the same way, and where no clip stands calmly a
+stand: a run that is shortened to a walk's steps hops on the spot.
 
 Recorded kicks are seldom faster than a jog, and players who receive a ball with the foot in a recording hardly move;
 moved along at 8 m/s their supporting foot slides by metres. `synthetic.gestures` generates both on the run at the

@@ -106,6 +106,29 @@ def test_the_library_is_told(run, clips_folder, library, tmp_path):
     assert report["clips"] == 6 and len(report["gaits"]) == 4 and "kick" in report["words"]
 
 
+def test_a_library_without_labels_is_described_and_used_with_proposed_ones(run, match, clip_file, tmp_path):
+    clips = tmp_path / "clips"
+    clip_file(clips / "walk.bvh", 1.4, 4.0, words="")
+    clip_file(clips / "run.bvh", 4.5, 4.0, words="")
+    status, out, error = run("library", clips, "--report", tmp_path / "r.json")
+    assert (status, error) == (0, []) and "labels proposed for 2 clips" in out
+    report = json.loads((tmp_path / "r.json").read_text())
+    assert report["proposed_clips"] == 2 and {"walking", "running"} <= set(report["words"])
+    status, _, error = run("synthesize", "--library", clips, "--track", match / "track_only.csv",
+                           "--annotations", match / "empty.txt", "--out", tmp_path / "out.bvh")
+    assert status == 0 and any("labels proposed for 2 clips" in line for line in error)
+
+
+def test_the_report_says_what_is_left_out_and_what_lacks(run, clips_folder, library, tmp_path):
+    status, out, _ = run("library", clips_folder, "--report", tmp_path / "r.json")
+    report = json.loads((tmp_path / "r.json").read_text())
+    assert status == 0 and report["proposed_clips"] == 0
+    lacking = {one["kind"] for one in report["lacks"]}
+    assert "turning" in lacking and "no turn in place: add one" in out
+    assert sum(one["seconds"] for one in report["locomotion"]) > 15.0 and report["locomotion"][-1]["to_m_s"] is None
+    assert all(one["start_s"] <= one["end_s"] and one["why"] for one in report["left_out"])
+
+
 def test_the_cache_can_be_put_elsewhere_and_made_anew(run, tmp_path, clip_file):
     clip_file(tmp_path / "clips" / "walk.bvh", 1.4, 1.5)
     for more in ((), ("--rebuild",)):
