@@ -34,6 +34,7 @@ def add_heading_key(player, seconds: float, hold: float, heading: float = 0.0,
     key.faces = "DIRECTION" if target is None else "OBJECT"
     key.heading, key.target, key.time, key.hold = heading, target, seconds, hold
     player.active_heading_key = len(player.heading_keys) - 1
+    player.id_data.update_tag()  # Blender reports no change of properties by a script, and Live waits for one
     return key
 
 
@@ -41,6 +42,7 @@ def remove_heading_key(player, number: int) -> None:
     """Remove a heading key; its object stays."""
     player.heading_keys.remove(number)
     player.active_heading_key = max(0, min(player.active_heading_key, len(player.heading_keys) - 1))
+    player.id_data.update_tag()
 
 
 def measure_heading(turned: bpy.types.Object) -> float:

@@ -140,6 +140,25 @@ def test_another_player_is_where_their_track_is(plans, drawn):
     np.testing.assert_allclose([k.target for k in found], wanted, atol=1e-5)
 
 
+def test_live_hears_of_added_and_removed_keys(extension, drawn):
+    live = importlib.import_module(f"{extension.__name__}.scene.result.freshness").LIVE
+    heard = []
+
+    def hear(_scene, graph):
+        heard.extend(update.id for update in graph.updates if isinstance(update.id, live.watched_types))
+
+    bpy.context.view_layer.update()
+    bpy.app.handlers.depsgraph_update_post.append(hear)
+    try:
+        for operator in (bpy.ops.beyond_mocap.add_heading_key, bpy.ops.beyond_mocap.remove_heading_key):
+            heard.clear()
+            assert operator() == {"FINISHED"}
+            bpy.context.view_layer.update()
+            assert heard
+    finally:
+        bpy.app.handlers.depsgraph_update_post.remove(hear)
+
+
 def test_what_cannot_be_faced_is_told(plans, drawn, core):
     trouble, player = core("base.errors").InputError, drawn.players[0]
     with pytest.raises(RuntimeError, match="no object selected; expected the object to face"):
