@@ -88,7 +88,9 @@ def read_arrows(mesh):
 
 @pytest.mark.parametrize("size", [1.0, 1.25])
 def test_arrows_lie_on_the_track_and_point_along_the_planned_heading(room, core, size):
-    """A player who runs along Y; then turned by two keys while standing at the end. In the library's size he is smaller.
+    """A player who runs along Y; then turned by two keys while standing at the end.
+
+    In the library's size they are smaller.
     """
     times = np.arange(0.0, 8.01, 0.1)
     y = 4.0 * np.minimum(times, 4.0)

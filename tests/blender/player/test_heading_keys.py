@@ -1,5 +1,5 @@
-"""Heading keys: added to directions and objects in one step, read into the plan as the core knows them, and told what is
-wrong."""
+"""Heading keys: added to directions and objects in one step, read into the plan as the core knows them, and told what
+is wrong."""
 
 import dataclasses
 import importlib
@@ -103,8 +103,8 @@ def test_a_moving_object_is_faced_where_it_is_at_each_moment(plans, drawn):
     found = read_keys(plans, drawn, still=True)
     times = np.array([one.time for one in found])
     assert times[0] == 2.0 and times[-1] == 3.0 and np.diff(times).max() < 1.0 / 6.0 and np.diff(times).min() > 0.0
-    np.testing.assert_allclose([one.target for one in found], np.stack([25.0 * times, np.full(len(times), 7.0)], axis=1),
-                               atol=1e-4)
+    wanted = np.stack([25.0 * times, np.full(len(times), 7.0)], axis=1)
+    np.testing.assert_allclose([one.target for one in found], wanted, atol=1e-4)
     bpy.context.scene.frame_set(7)
     assert read_keys(plans, drawn) == found  # whatever frame is shown
 
