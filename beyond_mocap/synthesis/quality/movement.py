@@ -113,12 +113,12 @@ def compute_class_rms(values: np.ndarray, classes: np.ndarray, least: int = 30) 
     Args:
         values: (N,).
         classes: (N,) class of each.
-        least: values that a class needs; others take the nearest class that has them.
+        least: values that a class needs.
     Returns:
-        (5,), NaN where no class has enough.
+        (5,), NaN where a class has too few.
     """
     rms = [np.sqrt(np.mean(values[classes == k] ** 2)) if np.sum(classes == k) >= least else np.nan for k in range(5)]
-    return fill_from_nearest(np.array(rms))
+    return np.array(rms)
 
 
 def fill_from_nearest(values: np.ndarray) -> np.ndarray:
