@@ -12,14 +12,15 @@ from ..annotation import LOCOMOTION_LABELS, Timeline, labels_per_frame
 from ..annotation.labels import list_labels
 from ..annotation.vocabulary import DIRECTIONS, SIDES
 from ..base.errors import TimedMessage
-from ..base.time_series import find_runs
+from ..base.time_series import find_runs, interpolate_columns
+from ..base.vectors import arctan2
 from ..library.posture import NormalPostures
 from ..motion import quaternion
 from ..motion.track import sample_track
 from ..synthesis.heading_plan import plan_track
 from ..synthesis.plan import sample_with_trajectory
 from ..synthesis.quality import movement
-from ..synthesis.quality.targets import TARGETS
+from ..synthesis.quality.targets import TARGETS, Target
 from ..synthesis.quality.unmet_constraints import report_jolts
 from ..synthesis.take import Take
 from .naturalness import (
@@ -27,6 +28,7 @@ from .naturalness import (
     find_stands,
     list_event_messages,
     measure_course_figures,
+    measure_facing_off_travel,
     measure_piece_figures,
     measure_standing,
     select_unasked_spins,
@@ -36,14 +38,17 @@ from .reference import View
 JOLT_RATIO = TARGETS["seam_jerk_ratio.max"].most
 STRIKE_SECONDS = 0.4  # s to either side of a strike in which it may jolt: its swing, and half a window of the jerk
 
+ASIDE = np.radians(30.0)
+"""Angle between the ball's bearing and the travel from which on the ball lies aside."""
+
 _PLAIN_LABELS = frozenset((*LOCOMOTION_LABELS, *DIRECTIONS, *SIDES))
 _STRIKES = frozenset(list_labels(ball="sends"))
 
 FRAMES_KEYS = {
     "off_travel_deg_median": "fast_frames", "off_travel_deg_p90": "fast_frames",
     "unusual_posture_share": "slow_frames", "dwell_s_median": "slow_pieces", "short_dwell_share": "slow_pieces",
-    "off_plan_deg_median": "plan_frames", "off_plan_deg_p90": "plan_frames",
-    "sd_ms": "strides", "foot_lifts_per_min": "seconds", "both_down": "seconds",
+    "off_travel_aside_deg_p90": "aside_frames", "off_plan_deg_median": "plan_frames",
+    "off_plan_deg_p90": "plan_frames", "sd_ms": "strides", "foot_lifts_per_min": "seconds", "both_down": "seconds",
 }  # fmt: skip
 """What a figure rests on where that is not the group's `frames`: a key beside it."""
 
@@ -64,6 +69,11 @@ class Title:
     scale: float = 1.0
     digits: int = 1
 
+    def describe_target(self, target: Target | None) -> str:
+        """Describe a target in the shown unit, such as "≤ 5.0"; "" without one."""
+        limits = () if target is None else (("≥", target.least), ("≤", target.most))
+        return " ".join(f"{sign} {self.scale * limit:.{self.digits}f}" for sign, limit in limits if limit is not None)
+
 
 TITLES = {
     "snap_turns_per_min": Title("Snap turns"),
@@ -79,6 +89,7 @@ TITLES = {
     "off_plan_deg_p90": Title("Heading off plan, 90 %", "°"),
     "off_travel_deg_median": Title("Heading off travel", "°"),
     "off_travel_deg_p90": Title("Heading off travel, 90 %", "°"),
+    "off_travel_aside_deg_p90": Title("The same, ball aside", "°"),
     "standing.foot_lifts_per_min": Title("Foot lifts standing", "/min", digits=0),
     "standing.both_down": Title("Both feet down standing", "%", 100.0, 0),
     "tempo.sd_ms": Title("Uneven tempo", "ms"),
@@ -139,7 +150,8 @@ def measure_naturalness(view: View, planned: np.ndarray | None, requested: Timel
         out.update(measure_piece_figures(course, view.transitions / view.fps))
     if planned is not None:
         out.update(_measure_plan_figures(view, planned))
-    if view.target is not None:
+    if view.track is not None:
+        out.update(_measure_off_travel_aside(view))
         out["standing"] = measure_standing(find_stands(view.target, view.fps), view.played.contacts, view.fps)
     if view.reference is not None:
         jolts = len(find_runs(find_jolts(view)))
@@ -158,6 +170,21 @@ def _measure_plan_figures(view: View, planned: np.ndarray) -> dict:
     return {"plan_frames": len(off), "off_plan_deg_median": float(np.percentile(off, 50)),
             "off_plan_deg_p90": float(np.percentile(off, 90)),
             "unasked_spins_per_min": 60.0 * FPS * len(unasked) / len(planned)}
+
+
+def _measure_off_travel_aside(view: View) -> dict:
+    """Measure the 90th percentile of the angle between heading and travel where the ball lies aside of the travel."""
+    course, track = view.course, view.track
+    known = np.isfinite(track.ball[:, :2]).all(axis=1)
+    if not known.any():
+        return {"aside_frames": 0, "off_travel_aside_deg_p90": None}
+    times = view.played.start_time + course.times
+    body = interpolate_columns(times, view.played.times, view.played.pelvis)
+    to_ball = interpolate_columns(times, track.times[known], track.ball[known, :2]) - body
+    bearing = arctan2(to_ball[:, 1], to_ball[:, 0])
+    off = np.degrees(measure_facing_off_travel(course)[np.abs(quaternion.wrap_angle(bearing - course.travel)) > ASIDE])
+    off = off[np.isfinite(off)]
+    return {"aside_frames": len(off), "off_travel_aside_deg_p90": float(np.percentile(off, 90)) if len(off) else None}
 
 
 def fill_plan(planned: np.ndarray) -> np.ndarray:

@@ -235,16 +235,15 @@ def judge_figures(report: Mapping) -> Iterator[Row]:
     table, unknown = flatten_report(report), report.get("unknown") or {}
     fps = float(report.get("fps") or 30.0)
     for name, value in table.items():
-        group, _, leaf = name.rpartition(".")
-        target = find_target(name, fps)
+        leaf, target = name.rpartition(".")[2], find_target(name, fps)
         if leaf.startswith("source_") or leaf in ("own", "own_frames") or (value is None and target is None):
             continue
-        twin = f"{group}.own" if leaf == "mean" and f"{group}.own" in table else f"{group}.source_{leaf}"
+        twin = find_twin_name(name, table)
         own = table.get(twin)
         is_met = target.is_met(value, table) if target and isinstance(value, (int, float)) else None
         status = "" if is_met is None else ("met" if is_met else "missed")
         target_text = target.describe(table) if target else ""
-        rests_on = "" if own is None else _format_count(find_count_name(twin, table), table)
+        rests_on = "" if own is None else format_rest(twin, table)
         reason = unknown.get(name, "") if value is None else ""
         yield Row(name, _format_value(value), _format_value(own, ""), target_text, status, rests_on, str(reason))
 
@@ -265,13 +264,19 @@ def find_count_name(name: str, table: Mapping[str, Any]) -> str:
     return count if count in table and count != name else ""
 
 
-def _format_count(name: str, table: Mapping[str, Any]) -> str:
-    """Format what a figure rests on: "1,032 frames", "12 strides", "5.1 s"."""
-    value = table.get(name)
+def find_twin_name(name: str, table: Mapping[str, Any]) -> str:
+    """Find the name of the recordings' own figure beside a figure; the table need not have it."""
+    group, dot, leaf = name.rpartition(".")
+    return f"{group}.own" if leaf == "mean" and f"{group}.own" in table else f"{group}{dot}source_{leaf}"
+
+
+def format_rest(name: str, table: Mapping[str, Any]) -> str:
+    """Format what a figure rests on: "1,032 frames", "12 strides", "5.1 s"; "" where it is not known."""
+    count = find_count_name(name, table)
+    value, unit = table.get(count), count.rpartition("_")[2].rpartition(".")[2]
     if not isinstance(value, (int, float)):
         return ""
-    unit = name.rpartition(".")[2].rpartition("_")[2]
-    return f"{value:.1f} s" if unit == "seconds" else f"{value:,} {unit}" if value != 1 else format_count(1, unit[:-1])
+    return f"{value:.1f} s" if unit == "seconds" else format_count(int(value), unit.removesuffix("s"))
 
 
 def _format_value(value, unknown: str = "–") -> str:

@@ -9,7 +9,7 @@ from ..synthesis.quality.targets import find_target
 from .reference import View
 
 _NEEDS_TRACK = r"(slow_)?root_error_m|pelvis_error_m\.(mean|keys)|pelvis_surge_m_s\.track|speed_coverage|keys \d+\."
-_NEEDS_TRACK += r"(position|pelvis)_error_m|naturalness\.(off_plan|unasked|standing)"
+_NEEDS_TRACK += r"(position|pelvis)_error_m|naturalness\.(off_plan|unasked|off_travel_aside|standing)"
 _NEEDS_LIBRARY = r"(.*\.)?(source_\w+|own)$|pelvis_surge_ratio|seam_jerk_ratio|jerk_ratio|pose_realism|speed_coverage|"
 _NEEDS_LIBRARY += r"bone_change_m|annotation_similarity\.had_keys|naturalness\.(unusual|jolts)"
 _NEEDS_CLIPS = r"warp_rate|loop_share|seams|naturalness\.(cuts|dwell|short)|annotation_similarity"
@@ -27,6 +27,7 @@ _REASONS = (
     (r"seam_jerk_ratio\.rest", "no frame is far from a cut"),
     (r"seam_jerk_ratio", "the take has no cut"),
     (r"warp_rate", "no piece has two frames"),
+    (r"naturalness\.off_travel_aside", "the ball never lies aside of a body faster than 2 m/s"),
     (r"naturalness\.(source_)?off_travel", "the body is never faster than 2 m/s"),
     (r"naturalness\.(source_)?unusual", "the body is never slower than 2 m/s without a label that asks for it"),
     (r"naturalness\.(dwell|short)", "no piece between two cuts is slower than 2 m/s"),
