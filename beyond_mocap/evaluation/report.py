@@ -248,6 +248,23 @@ def judge_figures(report: Mapping) -> Iterator[Row]:
         yield Row(name, _format_value(value), _format_value(own, ""), target_text, status, rests_on, str(reason))
 
 
+def describe_figures(report: Mapping) -> list[str]:
+    """Describe how many targets are met, which ones are missed, and which figures with a target are not known.
+
+    Args:
+        report: from `evaluate`.
+    Returns:
+        Lines of text.
+    """
+    rows = list(judge_figures(report))
+    judged, missed = [row for row in rows if row.status], [row for row in rows if row.status == "missed"]
+    lines = [f"{len(judged) - len(missed)} of {len(judged)} targets met"]
+    for row in missed:
+        own = f"; recordings {row.own}" + (f" over {row.rests_on}" if row.rests_on else "") if row.own else ""
+        lines.append(f"missed: {row.name} {row.value} (target {row.target}{own})")
+    return lines + [f"not known: {row.name}, {row.reason}" for row in rows if row.reason]
+
+
 def find_count_name(name: str, table: Mapping[str, Any]) -> str:
     """Find the name of the frames, pieces, strides or seconds that a figure rests on.
 
