@@ -280,9 +280,11 @@ def at_rate(take, fps):
     at = np.minimum(np.arange(len(motion)) * FPS / fps, len(take.motion) - 1.0)
     near = np.floor(at + 1e-9).astype(int)
     step = np.append(np.where(np.diff(take.clip) != 0, 2.0, np.diff(take.clip_frame)), 2.0)
-    return replace(take, motion=motion, clip=take.clip[near], mirrored=take.mirrored[near], contacts=take.contacts[near],
-                   words=tuple(take.words[i] for i in near), clip_frame=take.clip_frame[near] + (at - near) * step[near],
-                   seams=np.rint(take.seams * fps / FPS).astype(int))
+    return replace(
+        take, motion=motion, clip=take.clip[near], mirrored=take.mirrored[near], contacts=take.contacts[near],
+        words=tuple(take.words[i] for i in near), clip_frame=take.clip_frame[near] + (at - near) * step[near],
+        seams=np.rint(take.seams * fps / FPS).astype(int),
+    )  # fmt: skip
 
 
 @pytest.mark.parametrize("fps", [25.0, 60.0])
