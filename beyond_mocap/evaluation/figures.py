@@ -221,7 +221,8 @@ def measure_transitions(view: View) -> dict:
             "rest_max": _finite_max(rest), "rest_share_above_real": _finite_mean(rest > 1.0), **beside,
         }
         out["jerk_ratio"] = {**_compute_measures(everywhere, ("median", "p95", "max")),
-                             "share_above_real": _finite_mean(everywhere > 1.0), "frames": len(everywhere), **beside}
+                             "share_above_real": _finite_mean(everywhere > 1.0), "frames": len(everywhere),
+                             "other_speed_frames": _count_other_speeds(view, len(everywhere)), **beside}
     known = view.are_clips_known
     rates = list_warp_rates(*view.source)
     return {
@@ -229,6 +230,12 @@ def measure_transitions(view: View) -> dict:
         "warp_rate": {"min": -_finite_max(-rates), "max": _finite_max(rates)},
         "loop_share": _finite_mean(find_replayed(*view.source, view.fps)) if known else None,
     }
+
+
+def _count_other_speeds(view: View, count: int) -> int:
+    """Count the frames of the jerk at speeds that no recording has; they are compared with the nearest speed."""
+    pace = view.speed[movement.TRANSITION_TO_JERK :][:count]
+    return int(np.sum(~view.reference.jerk_recorded[movement.classify_speed(pace)]))
 
 
 def measure_poses(view: View) -> dict:

@@ -33,7 +33,7 @@ STAND_SECONDS = 1.5  # of the shortest stand
 SHORT_DWELL = 0.5  # s
 FAST_SPEED = 4.0  # m/s above which the tempo of strides is measured
 STEADY_RANGE = 0.4  # m/s within which the speeds of strides are steady; the period changes by 26 ms over it
-STEADY_STRIDES = 3  # strides of the shortest steady stretch
+STEADY_STRIDES = 2  # strides of the shortest steady stretch; recorded runs are short
 STRIDE_SECONDS = (0.35, 1.0)  # shortest and longest stride of a run; others are missed or counted twice
 ASKED_SPIN = np.radians(175.0)
 """Turn of the heading plan, in a spin's direction, that asks for it: a body may be off its plan by 25 degrees."""

@@ -96,6 +96,7 @@ class LibraryReference:
         jerk_ratio: (N,) of the window around a frame to jerk_p95, NaN at a clip's ends.
         heel_rest: height of the heel joint on a flat foot, m.
         jerk_p95: (5,) m/s^3 by speed class.
+        jerk_recorded: (5,) bool, classes with recordings of their own; others have the nearest one's jerk_p95.
         smoothness_p95: (5,) m by speed class.
         pose_p95: (5,) m by speed class, NaN where fewer than FEWEST_RECORDINGS have that speed.
         pose_recordings: (5,) int, recordings with that speed.
@@ -124,6 +125,7 @@ class LibraryReference:
     contacts: np.ndarray
     heel_rest: float
     jerk_p95: np.ndarray
+    jerk_recorded: np.ndarray
     smoothness_p95: np.ndarray
     poses: np.ndarray
     pose_p95: np.ndarray
@@ -214,6 +216,7 @@ def build_reference(library: Library, fps: float) -> LibraryReference:
         jerk_ratio=np.concatenate([_measure_jerk_ratio(recording, jerk_p95) for recording in measured]),
         stances=np.concatenate([r.stances + [start, start, 0] for r, start in zip(measured, first)]),
         heel_rest=float(np.median([recording.heel_rest for recording in measured])), jerk_p95=jerk_p95,
+        jerk_recorded=movement.find_recorded_classes(speed),
         smoothness_p95=realism.compute_class_p95(joined["smoothness"], joined["speed"]), poses=poses,
         pose_p95=limits[0], pose_recordings=limits[1],
         fastest=float(joined["speed"].max()), slowest=_find_slowest_speed(library),

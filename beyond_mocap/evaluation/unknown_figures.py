@@ -35,7 +35,7 @@ _REASONS = (
     (r"naturalness\.standing\.source_", "no recorded stand of 1.5 s is used"),
     (r"naturalness\.standing", "the track stands nowhere for 1.5 s"),
     (r"naturalness\.tempo\.source_", "no steady running above 4 m/s is used"),
-    (r"naturalness\.tempo", "nowhere three strides of steady running above 4 m/s"),
+    (r"naturalness\.tempo", "nowhere two strides of steady running above 4 m/s"),
     (r"annotation_similarity\.had_keys", "no key moment has a label that the library has"),
     (r"annotation_similarity\.(keys|eq18_keys)", "no key moments"),
     (r"annotation_similarity", "no labels are requested"),

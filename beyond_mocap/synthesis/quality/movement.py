@@ -199,6 +199,11 @@ def compute_real_p95(windows: np.ndarray, speed: np.ndarray, least: int = 30) ->
     return fill_from_nearest(np.array([np.percentile(v, 95) if len(v) >= least else np.nan for v in values]))
 
 
+def find_recorded_classes(speed: np.ndarray, least: int = 30) -> np.ndarray:
+    """Find the speed classes (5,) bool with `least` windows or more, of speeds (M,) m/s (see `compute_real_p95`)."""
+    return np.bincount(classify_speed(speed), minlength=5) >= least
+
+
 def compute_transition_ratios(values: np.ndarray, transitions: np.ndarray, speed: np.ndarray,
                               real: np.ndarray) -> np.ndarray:
     """Compute windowed jerk at each transition over the real p95 at that speed.

@@ -171,7 +171,7 @@ def test_tempo_is_the_deviation_of_the_stride_period(periods, deviation):
 def test_tempo_needs_steady_running_above_4_m_s():
     periods = [0.64]
     assert list_steady_strides(course(speed=3.8, stride=strides(periods))) == []
-    assert list_steady_strides(course(speed=np.linspace(4.0, 9.0, 300), stride=strides(periods))) == []
+    assert list_steady_strides(course(speed=np.linspace(4.0, 12.0, 300), stride=strides(periods))) == []
     found = measure_tempo([course(speed=5.0, stride=strides(periods))], [np.zeros(300, bool)])
     assert found["strides"] == 0 and np.isnan(found["sd_ms"])
 
