@@ -245,7 +245,8 @@ def judge_figures(report: Mapping) -> Iterator[Row]:
         target_text = target.describe(table) if target else ""
         rests_on = "" if own is None else format_rest(twin, table)
         reason = unknown.get(name, "") if value is None else ""
-        yield Row(name, _format_value(value), _format_value(own, ""), target_text, status, rests_on, str(reason))
+        yield Row(name, _format_value(value), _format_value(own, ""), target_text, status=status, rests_on=rests_on,
+                  reason=str(reason))
 
 
 def describe_figures(report: Mapping) -> list[str]:
