@@ -187,13 +187,15 @@ def build_naturalness_section(report: Mapping) -> Html:
         is_met = target.is_met(value, table) if target and value is not None else None
         status = {True: "met", False: "missed", None: ""}[is_met]
         reason = "" if value is not None else f"not known: {unknown[name]}"
-        why_no_own = f"not known: {unknown[twin]}" if twin in unknown else ""
+        own_rest = format_rest(twin, table) if own is not None else ""
+        if twin in unknown:
+            own_rest = f"not known: {unknown[twin]}"
         lines.append(build_row(
             f"{title.text}, {title.unit}", build_number_cell(value, title.digits, title.scale, status),
-            build_number_cell(own, title.digits, title.scale), format_rest(twin, table) or why_no_own,
+            format_rest(name, table), build_number_cell(own, title.digits, title.scale), own_rest,
             title.describe_target(target), build_element("td", reason or status, class_=status or "quiet"),
         ))  # fmt: skip
-    head = ("", build_title("value"), build_title("recordings"), "measured on", "target", "")
+    head = ("", build_title("value"), "over", build_title("recordings"), "over", "target", "")
     return build_section("What the eye sees", build_table(head, lines)) if lines else Html()
 
 
