@@ -24,6 +24,7 @@ from ...library.library import RESTING_SPEED, Library
 from ...library.synthetic_clips import (
     BLEND_PREFIX,
     KICK_PREFIX,
+    LOOP_PREFIX,
     RECEIVE_PREFIX,
     STAND_PREFIX,
     STILL_PREFIX,
@@ -48,6 +49,15 @@ JOIN_SECONDS = 0.4  # stretches closer than this are one
 MISSING_SECONDS = 0.5  # shortest time of a motion that the library lacks that is reported
 LABEL_SECONDS = 0.5  # shortest time of a missing label that is reported
 MAX_STRETCHES = 6  # stretches that a line lists
+_SYNTHETIC_KINDS = {
+    BLEND_PREFIX: "blended from a slower and a faster recording: none has the speed of the track",
+    KICK_PREFIX: "synthetic kick on the run: no recorded kick is as fast as the player",
+    RECEIVE_PREFIX: "synthetic reception on the run: no recorded one is as fast as the player",
+    STAND_PREFIX: "a recorded stand is played forth and back: no recording stands for so long",
+    STILL_PREFIX: "synthetic standing: no recording stands calmly; add one",
+    WALK_PREFIX: "synthetic walking: no recording has the speed of the track; add one",
+    LOOP_PREFIX: "strides of a recorded run are repeated: no recording runs so steadily for so long",
+}
 _STANDS_AND_GOES_AHEAD = (STAND_PREFIX, STILL_PREFIX, WALK_PREFIX, BLEND_PREFIX)
 _TOLERANCE = 1e-3  # of rates and seconds, for rounding
 
@@ -89,22 +99,18 @@ def report_unmet_constraints(
     return [line for line in lines if line]
 
 
-def report_jolts(times: np.ndarray, starts: np.ndarray, ratios: np.ndarray) -> TimedMessage | None:
-    """Report transitions that are harder than recordings are.
+def report_jolts(times: np.ndarray, flags: np.ndarray, most: float) -> TimedMessage | None:
+    """Report jerk that is harder than recordings have it.
 
     Args:
         times: (T,) s.
-        starts: (S,) frames of transitions.
-        ratios: (S,) of `movement.compute_transition_ratios`.
+        flags: (T,) bool, frames with such a jerk.
+        most: the highest one, over the 95th percentile of recordings at that speed.
     Returns:
         A line, None where there is none.
     """
-    most, flags = TARGETS["seam_jerk_ratio.max"].most, np.zeros(len(times), bool)
-    hard = ratios > most
-    for start in starts[hard]:
-        flags[max(start - movement.JERK_REACH // 2, 0) : start + movement.JERK_REACH // 2] = True
-    hardest = f"{ratios.max(where=hard, initial=0.0):.2f} times as hard as recordings of that speed"
-    return _build_line(times, flags, f"transitions jolt up to {hardest} (target {most:g})")
+    hardest = f"{most:.2f} times as hard as recordings of that speed"
+    return _build_line(times, flags, f"the body jolts up to {hardest} (target {TARGETS['seam_jerk_ratio.max'].most:g})")
 
 
 def format_stretches(times: np.ndarray, flags: np.ndarray) -> str:
@@ -149,24 +155,16 @@ def _frames_of_clips(played: Playback, *begins: str) -> np.ndarray:
 
 
 def _report_synthetic(played: Playback) -> list[TimedMessage | None]:
-    """Report each kind of synthetic clip: running, two recordings blended, kicks, taken balls, stands, landings."""
-    blends, kicks, receptions, stands, walks, stills = (
-        _frames_of_clips(played, SYNTHETIC_FOLDER + name)
-        for name in (BLEND_PREFIX, KICK_PREFIX, RECEIVE_PREFIX, STAND_PREFIX, WALK_PREFIX, STILL_PREFIX)
-    )
-    running = _frames_of_clips(played, SYNTHETIC_FOLDER) & ~(blends | kicks | receptions | stands | walks | stills)
-    kinds = (
+    """Report each kind of synthetic clip: running, walking, blends, touches, stands, long runs, landings."""
+    kinds = {name: _frames_of_clips(played, SYNTHETIC_FOLDER + name) for name in _SYNTHETIC_KINDS}
+    running = _frames_of_clips(played, SYNTHETIC_FOLDER) & ~np.any(list(kinds.values()), axis=0)
+    lines = [
         (running, "synthetic running: no recording has the speed of the track"),
-        (blends, "blended from a slower and a faster recording: none has the speed of the track"),
-        (kicks, "synthetic kick on the run: no recorded kick is as fast as the player"),
-        (receptions, "synthetic reception on the run: no recorded one is as fast as the player"),
-        (walks, "synthetic walking: no recording has the speed of the track; add one"),
-        (stills, "synthetic standing: no recording stands calmly; add one"),
-        (stands, "a recorded stand is played forth and back: no recording stands for so long"),
+        *((there, _SYNTHETIC_KINDS[name]) for name, there in kinds.items()),
         (_frames_of_clips(played, LANDING_FOLDER), "synthetic landing and getting up: the recording ends in flight"),
-    )
+    ]
     return [_build_line(played.times, there, what, f" ({np.sum(there) / played.motion.fps:.1f} s in all)")
-            for there, what in kinds]
+            for there, what in lines]
 
 
 def _report_missing_motion(played: Playback, library: Library | None) -> list[TimedMessage | None]:
