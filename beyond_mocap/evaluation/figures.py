@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -20,8 +21,8 @@ from ..library.keys import select_keys
 from ..library.posture import NormalPostures
 from ..motion import quaternion
 from ..motion.contacts import measure_floor_height
-from ..motion.track import sample_track, smooth_zero_phase_hann
-from ..synthesis.heading_plan import plan_track
+from ..motion.track import SampledTrack, sample_track, smooth_zero_phase_hann
+from ..synthesis.heading_plan import plan_track, rest_track
 from ..synthesis.quality import movement
 from ..synthesis.quality.moments import (
     KeyMomentResult,
@@ -266,11 +267,17 @@ def measure_naturalness(view: View) -> dict:
         out["jolts_per_min"] = len(_find_jolts(view)) / course.minutes
     if view.track is not None:
         out["standing"] = measure_standing(view.target, view.played.contacts, view.fps)
-        planned = plan_track(sample_track(view.track, view.fps)).heading
-        count = min(len(planned), view.count)
-        off = np.degrees(np.abs(quaternion.wrap_angle(course.heading[:count] - planned[:count])))
-        out["off_plan_deg_median"], out["off_plan_deg_p90"] = np.percentile(off, (50, 90)).tolist()
+    out["off_plan_deg_median"], out["off_plan_deg_p90"] = _measure_off_plan(view)
     return {"naturalness": out}
+
+
+def _measure_off_plan(view: View) -> list[float | None]:
+    """Measure the degrees between heading and planned heading: median and p90, None where nothing was planned."""
+    planned = view.played.planned_heading
+    if planned is None or not np.isfinite(planned).any():
+        return [None, None]
+    off = np.abs(quaternion.wrap_angle(view.course.heading - planned))
+    return np.degrees(np.nanpercentile(off, (50, 90))).tolist()
 
 
 def _find_jolts(view: View) -> list[tuple[int, int]]:
@@ -318,10 +325,19 @@ def fill_automatic_spans(view: View) -> Timeline:
         gaits = library.gaits
     except InputError:
         return view.timeline
-    sampled = plan_track(sample_track(view.track, library.fps))
+    sampled = _sample_planned_track(view, library.fps)
     thresholds = library.gait_thresholds
     gait_index = choose_gaits(sampled.speed, sampled.fps, [gait.speed for gait in gaits], thresholds)
     return fill_timeline(view.timeline, sampled.times, build_automatic_labels(library, gait_index, sampled))
+
+
+def _sample_planned_track(view: View, fps: float) -> SampledTrack:
+    """Sample the track with the heading that was planned for the take, else with the track's own plan."""
+    planned, sampled = view.played.planned_heading, sample_track(view.track, fps)
+    if planned is None or not np.isfinite(planned).all():
+        return plan_track(sampled)
+    heading = np.interp(sampled.times, view.played.times, np.unwrap(planned))
+    return replace(rest_track(sampled), heading=heading)
 
 
 def measure_annotation_similarity(view: View) -> dict:

@@ -64,7 +64,7 @@ _TURNING = "turning"
 
 @dataclass(frozen=True)
 class HeadingKey:
-    """A heading that is given for some time.
+    """A heading that is given for some time, at most until the next one.
 
     Attributes:
         time: s on the track's clock from which on it holds.
@@ -113,7 +113,7 @@ class HeadingRequest:
     """What is asked of the heading of a player.
 
     Attributes:
-        keys: headings that are given.
+        keys: headings that are given; each ends where the next one begins.
         gazes: pins of the gaze.
         spans: labels that the user asks for; a gait with a direction and turning with a side count.
         play: what a player of a match faces beside the ball, None where that is not known.
@@ -246,7 +246,7 @@ def _compute_heading_costs(bearings: _Bearings, request: HeadingRequest) -> np.n
         cost += GAZE_COST * slow * np.maximum(_measure_angles(gaze) - GAZE_REACH, 0.0)
     asked = _compute_asked_heading(bearings, request.spans)
     cost += DIRECTION_COST * np.maximum(_measure_angles(asked) - DEAD_ZONE, 0.0)
-    for key in request.keys:
+    for key in _end_at_next(request.keys):
         cost += GIVEN_COST * _measure_angles(_compute_given_heading(bearings, key))
     return cost
 
@@ -265,6 +265,13 @@ def _compute_bearing(bearings: _Bearings, place: Sequence[float]) -> np.ndarray:
 def _find_held(bearings: _Bearings, held: HeadingKey | Pin, reach: float) -> np.ndarray:
     """Find the decisions (D,) bool within `reach` s of the time for which a key or a pin holds."""
     return (bearings.times >= held.time - reach) & (bearings.times <= held.time + held.hold + reach)
+
+
+def _end_at_next(keys: Sequence[HeadingKey]) -> list[HeadingKey]:
+    """End each key where the next one begins."""
+    keys = sorted(keys, key=lambda key: key.time)
+    ends = [key.time - _DECISION_SECONDS for key in keys[1:]] + [np.inf]
+    return [replace(key, hold=min(key.hold, max(end - key.time, 0.0))) for key, end in zip(keys, ends)]
 
 
 def _compute_given_heading(bearings: _Bearings, key: HeadingKey) -> np.ndarray:
