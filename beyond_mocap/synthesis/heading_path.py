@@ -64,12 +64,12 @@ def find_cheapest_path(costs: np.ndarray, step_costs: np.ndarray) -> np.ndarray:
     """Find the cheapest sequence of headings.
 
     Args:
-        costs: (D, BINS) of every heading at every decision.
+        costs: (D, BINS) of every heading at every decision; inf where it is not possible.
         step_costs: (D, 2 N + 1) of coming to a decision by -N .. N bins; inf where that is too fast.
     Returns:
         (D,) bins, unwrapped.
     """
-    units = np.rint(costs / COST_UNIT).astype(np.int64)
+    units = np.rint(np.minimum(costs / COST_UNIT, _FORBIDDEN)).astype(np.int64)
     steps = np.rint(np.minimum(step_costs / COST_UNIT, _FORBIDDEN)).astype(np.int64)[:, :, None]
     most, bins = steps.shape[1] // 2, np.arange(BINS)
     came_from = (bins[None, :] - np.arange(-most, most + 1)[:, None]) % BINS
@@ -83,3 +83,24 @@ def find_cheapest_path(costs: np.ndarray, step_costs: np.ndarray) -> np.ndarray:
     for k in range(len(units) - 1, 0, -1):
         path[k - 1] = path[k] - (best[k, path[k] % BINS] - most)
     return path - BINS * (path[0] // BINS)
+
+
+def replace_part(bins: np.ndarray, first: int, end: int, costs: np.ndarray, step_costs: np.ndarray) -> np.ndarray:
+    """Replace a part of a path by the cheapest one for other costs that joins the rest at both ends.
+
+    Args:
+        bins: (D,) the path.
+        first, end: its part; where that ends before the path does, the path's own bins there are kept.
+        costs, step_costs: of all D decisions, as for `find_cheapest_path`.
+    Returns:
+        (D,) bins, unwrapped; behind the part they differ by whole turns at most.
+    """
+    own = costs[first:end].copy()
+    for row, is_joined in ((0, first > 0), (-1, end < len(bins))):
+        if is_joined:
+            own[row] = np.where(np.arange(BINS) == bins[first:end][row] % BINS, 0.0, np.inf)
+    part = find_cheapest_path(own, step_costs[first:end])
+    if first > 0:
+        part = part + bins[first] - part[0]
+    turns = BINS * ((part[-1] - bins[end - 1]) // BINS) if end < len(bins) else 0
+    return np.concatenate([bins[:first], part, bins[end:] + turns])

@@ -27,7 +27,7 @@ from ..motion import quaternion
 from ..motion.skeleton import freeze_array
 from ..motion.track import SampledTrack, smooth_zero_phase_hann
 from ..motion.track.resting_place import LEAST_LEEWAY, relax_track
-from .heading_path import BIN_ANGLE, BINS, HeadingPath, find_cheapest_path
+from .heading_path import BIN_ANGLE, BINS, HeadingPath, find_cheapest_path, replace_part
 
 if TYPE_CHECKING:
     from .plan import Pin
@@ -46,10 +46,14 @@ OTHER_WAY_COST = 3.0  # per radian that is turned against a label: the long way 
 GAZE_COST, GAZE_REACH = 6.0, np.radians(45.0)  # per radian beyond what hips and shoulders turn towards a pinned gaze
 KEEPER_BALL_COST, KEEPER_SIDEWAYS = 3.0, 0.5  # of a goalkeeper, at any speed up to 3 m/s; share of SIDEWAYS_COST
 
+ASKED_SECONDS = 3.0
+"""Seconds before and after what is asked in which it may change the plan; elsewhere it does not."""
+
 _TRAVEL_SPEEDS = np.array([1.6, 2.2, 3.0, 4.5])  # m/s, with the largest angle between heading and travel at each
 _KEEPER_SPEEDS = np.array([3.0, 3.6, 4.4, 5.5])
 _TRAVEL_LIMITS = np.radians([180.0, 60.0, 35.0, 25.0])
 _STANDING_TURN, _RUNNING_TURN, _RUNNING_SPEED = 3, 4, 2.2  # bins per decision (180 and 240 degrees/s); m/s
+_STEPS = np.arange(-_RUNNING_TURN, _RUNNING_TURN + 1)  # bins from one decision to the next
 _NEAR_BALL = 2.0  # m; a nearer ball has no bearing, the last one holds
 _FAR_BALL = (25.0, 30.0)  # m between which the way of the ball takes its place
 _BALL_LEAD = 1.0  # s that the way of a far ball is ahead of it
@@ -168,10 +172,15 @@ def plan_heading_path(track: SampledTrack, request: HeadingRequest) -> HeadingPa
     at = np.arange(0, count, max(int(round(_DECISION_SECONDS * track.fps)), 1))
     if at[-1] != count - 1:
         at = np.append(at, count - 1)
-    bearings = _compute_bearings(track, request, at)
-    seconds = np.diff(bearings.times, append=bearings.times[-1] + _DECISION_SECONDS)
-    costs = _compute_heading_costs(bearings, request) * seconds[:, None]
-    return HeadingPath(bearings.times, find_cheapest_path(costs, _compute_step_costs(bearings, seconds, request.spans)))
+    bearings = _compute_bearings(track, request.play, at)
+    costs, step_costs = _compute_heading_costs(bearings, request.is_keeper), _compute_step_costs(bearings)
+    bins = find_cheapest_path(costs, step_costs)
+    runs = find_runs(_find_asked(bearings, request))
+    if runs:
+        costs, step_costs = _add_asked_costs(bearings, request, costs), _add_side_costs(bearings, request, step_costs)
+    for first, end in runs:
+        bins = replace_part(bins, first, end, costs, step_costs)
+    return HeadingPath(bearings.times, bins)
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -180,6 +189,7 @@ class _Bearings:
 
     Attributes:
         times: (D,) s.
+        seconds: (D,) from each decision to the next.
         positions: (D, 2) m.
         speed: (D,) m/s.
         travel: (D,) rad, direction of travel.
@@ -187,22 +197,25 @@ class _Bearings:
     """
 
     times: np.ndarray
+    seconds: np.ndarray
     positions: np.ndarray
     speed: np.ndarray
     travel: np.ndarray
     ball: np.ndarray
 
 
-def _compute_bearings(track: SampledTrack, request: HeadingRequest, at: np.ndarray) -> _Bearings:
+def _compute_bearings(track: SampledTrack, play: Play | None, at: np.ndarray) -> _Bearings:
     """Compute smoothed speed, travel and bearing of the ball at the frames `at` (D,)."""
     velocity = smooth_zero_phase_hann(track.velocity, track.fps, _VELOCITY_SECONDS)[at]
-    bearing, offset = np.full(len(track), np.nan), _compute_faced_place(track, request.play) - track.positions
+    bearing, offset = np.full(len(track), np.nan), _compute_faced_place(track, play) - track.positions
     far = np.flatnonzero(np.linalg.norm(offset, axis=1) >= _NEAR_BALL)
     if len(far):
         # the last far ball's bearing holds; before the first one, that one's
         last = far[np.maximum(np.searchsorted(far, np.arange(len(track)), side="right") - 1, 0)]
         bearing = arctan2(offset[last, 1], offset[last, 0])
-    return _Bearings(times=np.round(track.times[at], 6), positions=track.positions[at], ball=bearing[at],
+    times = np.round(track.times[at], 6)
+    seconds = np.diff(times, append=times[-1] + _DECISION_SECONDS)
+    return _Bearings(times=times, seconds=seconds, positions=track.positions[at], ball=bearing[at],
                      speed=np.linalg.norm(velocity, axis=1), travel=arctan2(velocity[:, 1], velocity[:, 0]))
 
 
@@ -228,12 +241,11 @@ def _compute_faced_place(track: SampledTrack, play: Play | None) -> np.ndarray:
     return smooth_zero_phase_hann(place, track.fps, _VELOCITY_SECONDS) if lost.any() else place
 
 
-def _compute_heading_costs(bearings: _Bearings, request: HeadingRequest) -> np.ndarray:
-    """Compute the cost per second (D, BINS) of every heading at every decision."""
-    is_keeper, v = request.is_keeper, bearings.speed[:, None]
+def _compute_heading_costs(bearings: _Bearings, is_keeper: bool) -> np.ndarray:
+    """Compute the cost (D, BINS) of every heading at every decision where nothing is asked."""
+    v = bearings.speed[:, None]
     from_ball, from_travel = _measure_angles(bearings.ball), _measure_angles(bearings.travel)
-    slow = 1.0 - np.clip((v - 1.0) / 2.0, 0.0, 1.0)
-    ball_cost = KEEPER_BALL_COST if is_keeper else BALL_COST * 0.5 * (1.0 + slow)
+    ball_cost = KEEPER_BALL_COST if is_keeper else BALL_COST * 0.5 * (1.0 + _compute_slowness(v))
     cost = ball_cost * np.maximum(from_ball - DEAD_ZONE, 0.0)
     limits = np.interp(v, _KEEPER_SPEEDS if is_keeper else _TRAVEL_SPEEDS, _TRAVEL_LIMITS)
     cost += TRAVEL_COST * np.maximum(from_travel - limits, 0.0)
@@ -241,6 +253,27 @@ def _compute_heading_costs(bearings: _Bearings, request: HeadingRequest) -> np.n
     bell = np.exp(-(((from_travel - np.pi / 2.0) / SIDEWAYS_WIDTH) ** 2))
     sideways = SIDEWAYS_COST * (KEEPER_SIDEWAYS if is_keeper else 1.0)
     cost += sideways * bell * np.clip((v - 0.5) / 0.7, 0.0, 1.0)
+    return cost * bearings.seconds[:, None]
+
+
+def _compute_slowness(speed: np.ndarray) -> np.ndarray:
+    """Compute how slow a body is: 1 up to 1 m/s, 0 from 3 m/s on."""
+    return 1.0 - np.clip((speed - 1.0) / 2.0, 0.0, 1.0)
+
+
+def _find_asked(bearings: _Bearings, request: HeadingRequest) -> np.ndarray:
+    """Find the decisions (D,) bool that what is asked changes; all others stay as they are without it."""
+    spans = [span for span in request.spans if _find_quarter(span) is not None or _find_turning_side(span) is not None]
+    times = [(held.time, held.time + held.hold) for held in (*request.keys, *request.gazes)]
+    found = np.zeros(len(bearings.times), bool)
+    for start, end in times + [(span.start, span.end) for span in spans]:
+        found |= (bearings.times >= start - ASKED_SECONDS) & (bearings.times <= end + ASKED_SECONDS)
+    return found
+
+
+def _add_asked_costs(bearings: _Bearings, request: HeadingRequest, costs: np.ndarray) -> np.ndarray:
+    """Add the costs of what is asked to those of every heading at every decision (D, BINS)."""
+    cost, slow = np.zeros_like(costs), _compute_slowness(bearings.speed)[:, None]
     for pin in request.gazes:
         gaze = np.where(_find_held(bearings, pin, _GAZE_SECONDS), _compute_bearing(bearings, pin.position), np.nan)
         cost += GAZE_COST * slow * np.maximum(_measure_angles(gaze) - GAZE_REACH, 0.0)
@@ -248,7 +281,7 @@ def _compute_heading_costs(bearings: _Bearings, request: HeadingRequest) -> np.n
     cost += DIRECTION_COST * np.maximum(_measure_angles(asked) - DEAD_ZONE, 0.0)
     for key in _end_at_next(request.keys):
         cost += GIVEN_COST * _measure_angles(_compute_given_heading(bearings, key))
-    return cost
+    return costs + cost * bearings.seconds[:, None]
 
 
 def _measure_angles(bearing: np.ndarray) -> np.ndarray:
@@ -287,11 +320,24 @@ def _compute_asked_heading(bearings: _Bearings, spans: Sequence[Span]) -> np.nda
     """
     out = np.full(len(bearings.times), np.nan)
     for span in spans:
-        quarters = [number for number, word in enumerate(DIRECTIONS) if word in span.words]
-        if len(quarters) == 1 and set(span.words) <= {*LOCOMOTION, *DIRECTIONS} - {STANDING}:
+        quarter = _find_quarter(span)
+        if quarter is not None:
             inside = _find_inside(bearings, span) & (bearings.speed > _DIRECTION_SPEED)
-            out = np.where(inside, bearings.travel - 0.5 * np.pi * quarters[0], out)
+            out = np.where(inside, bearings.travel - 0.5 * np.pi * quarter, out)
     return out
+
+
+def _find_quarter(span: Span) -> int | None:
+    """Find the quarter turn from heading to travel that a gait's labels ask for; None without one."""
+    found = [number for number, word in enumerate(DIRECTIONS) if word in span.words]
+    is_gait = set(span.words) <= {*LOCOMOTION, *DIRECTIONS} - {STANDING}
+    return found[0] if len(found) == 1 and is_gait else None
+
+
+def _find_turning_side(span: Span) -> int | None:
+    """Find the side to which labels ask to turn, 1 left and -1 right; None without one."""
+    found = [sign for side, sign in zip(SIDES, (1, -1)) if side in span.words]
+    return found[0] if _TURNING in span.words and len(found) == 1 else None
 
 
 def _find_inside(bearings: _Bearings, span: Span) -> np.ndarray:
@@ -299,23 +345,18 @@ def _find_inside(bearings: _Bearings, span: Span) -> np.ndarray:
     return (bearings.times >= span.start) & (bearings.times <= span.end)
 
 
-def _compute_step_costs(bearings: _Bearings, seconds: np.ndarray, spans: Sequence[Span]) -> np.ndarray:
-    """Compute the cost (D, 2 N + 1) of coming to a decision by -N .. N bins; inf where legs cannot turn so fast.
-
-    Args:
-        bearings: of D decisions.
-        seconds: (D,) from each decision to the next.
-        spans: labels that the user asks for; turning with a side goes that way.
-    """
-    most = max(_STANDING_TURN, _RUNNING_TURN)
-    steps = np.arange(-most, most + 1)
-    duration, angle = np.roll(seconds, 1)[:, None], BIN_ANGLE * np.abs(steps)
+def _compute_step_costs(bearings: _Bearings) -> np.ndarray:
+    """Compute the cost (D, 2 N + 1) of coming to a decision by -N .. N bins; inf where legs cannot turn so fast."""
+    duration, angle = np.roll(bearings.seconds, 1)[:, None], BIN_ANGLE * np.abs(_STEPS)
     rate = angle / np.maximum(duration, 1e-9) / np.pi
-    cost = (TURN_COST + TURN_RATE_COST * rate**2) * duration * (steps != 0) + TURN_ANGLE_COST * angle
-    for span in spans:
-        sides = [side for side in SIDES if side in span.words]
-        if _TURNING in span.words and len(sides) == 1:
-            is_other = steps < 0 if sides[0] == SIDES[0] else steps > 0
-            cost = cost + _find_inside(bearings, span)[:, None] * is_other * OTHER_WAY_COST * angle
+    cost = (TURN_COST + TURN_RATE_COST * rate**2) * duration * (_STEPS != 0) + TURN_ANGLE_COST * angle
     limit = np.where(bearings.speed > _RUNNING_SPEED, _RUNNING_TURN, _STANDING_TURN)[:, None]
-    return np.where(np.abs(steps) <= limit, cost, np.inf)
+    return np.where(np.abs(_STEPS) <= limit, cost, np.inf)
+
+
+def _add_side_costs(bearings: _Bearings, request: HeadingRequest, step_costs: np.ndarray) -> np.ndarray:
+    """Add the cost of turning against the side that a label asks for to step costs (D, 2 N + 1)."""
+    for span in request.spans:
+        against = np.maximum(-(_find_turning_side(span) or 0) * _STEPS, 0)
+        step_costs = step_costs + _find_inside(bearings, span)[:, None] * OTHER_WAY_COST * BIN_ANGLE * against
+    return step_costs
