@@ -42,17 +42,21 @@ SIDEWAYS_COST, SIDEWAYS_WIDTH = 2.5, np.radians(45.0)  # at a right angle to tra
 TURN_COST, TURN_RATE_COST, TURN_ANGLE_COST = 0.12, 0.08, 0.7  # per second of turning, per (pi / s)^2, per radian
 GIVEN_COST = 40.0  # per radian and second: given headings hold against all others
 DIRECTION_COST = 12.0  # per radian beyond the dead zone from the heading that a label asks for: above TRAVEL_COST
-OTHER_WAY_COST = 3.0  # per radian that is turned against a label: the long way round is cheaper
+OTHER_WAY_COST = 8.0  # per radian that is turned against a label: the long way round is cheaper
 GAZE_COST, GAZE_REACH = 6.0, np.radians(45.0)  # per radian beyond what hips and shoulders turn towards a pinned gaze
 KEEPER_BALL_COST, KEEPER_SIDEWAYS = 3.0, 0.5  # of a goalkeeper, at any speed up to 3 m/s; share of SIDEWAYS_COST
 
 ASKED_SECONDS = 3.0
 """Seconds before and after what is asked in which it may change the plan; elsewhere it does not."""
 
+HOLD_FADE = 0.7
+"""Seconds before and after a heading key over which the body comes to hold it."""
+
 _TRAVEL_SPEEDS = np.array([1.6, 2.2, 3.0, 4.5])  # m/s, with the largest angle between heading and travel at each
 _KEEPER_SPEEDS = np.array([3.0, 3.6, 4.4, 5.5])
 _TRAVEL_LIMITS = np.radians([180.0, 60.0, 35.0, 25.0])
 _STANDING_TURN, _RUNNING_TURN, _RUNNING_SPEED = 3, 4, 2.2  # bins per decision (180 and 240 degrees/s); m/s
+_CALM_TURN = 2  # the same towards what is asked (120 degrees/s): a body that is held to a faster turn snaps
 _STEPS = np.arange(-_RUNNING_TURN, _RUNNING_TURN + 1)  # bins from one decision to the next
 _NEAR_BALL = 2.0  # m; a nearer ball has no bearing, the last one holds
 _FAR_BALL = (25.0, 30.0)  # m between which the way of the ball takes its place
@@ -177,7 +181,7 @@ def plan_heading_path(track: SampledTrack, request: HeadingRequest) -> HeadingPa
     bins = find_cheapest_path(costs, step_costs)
     runs = find_runs(_find_asked(bearings, request))
     if runs:
-        costs, step_costs = _add_asked_costs(bearings, request, costs), _add_side_costs(bearings, request, step_costs)
+        costs, step_costs = _add_asked_costs(bearings, request, costs), _limit_turns(bearings, request, step_costs)
     for first, end in runs:
         bins = replace_part(bins, first, end, costs, step_costs)
     return HeadingPath(bearings.times, bins)
@@ -307,6 +311,12 @@ def _end_at_next(keys: Sequence[HeadingKey]) -> list[HeadingKey]:
     return [replace(key, hold=min(key.hold, max(end - key.time, 0.0))) for key, end in zip(keys, ends)]
 
 
+def measure_hold(keys: Sequence[HeadingKey], times: np.ndarray) -> np.ndarray | None:
+    """Measure how far heading keys hold at times (T,) s: (T,) from 0 to 1, None without keys."""
+    away = [np.maximum(key.time - times, times - key.time - key.hold) for key in _end_at_next(keys)]
+    return 1.0 - smoothstep(np.min(away, axis=0), 0.0, HOLD_FADE) if away else None
+
+
 def _compute_given_heading(bearings: _Bearings, key: HeadingKey) -> np.ndarray:
     """Compute the heading (D,) rad that a key gives, NaN where it does not hold."""
     heading = key.heading if key.target is None else _compute_bearing(bearings, key.target)
@@ -354,8 +364,9 @@ def _compute_step_costs(bearings: _Bearings) -> np.ndarray:
     return np.where(np.abs(_STEPS) <= limit, cost, np.inf)
 
 
-def _add_side_costs(bearings: _Bearings, request: HeadingRequest, step_costs: np.ndarray) -> np.ndarray:
-    """Add the cost of turning against the side that a label asks for to step costs (D, 2 N + 1)."""
+def _limit_turns(bearings: _Bearings, request: HeadingRequest, step_costs: np.ndarray) -> np.ndarray:
+    """Limit the turns (D, 2 N + 1) to what is asked to a calm speed, and to the side that a label asks for."""
+    step_costs = np.where(np.abs(_STEPS) <= _CALM_TURN, step_costs, np.inf)
     for span in request.spans:
         against = np.maximum(-(_find_turning_side(span) or 0) * _STEPS, 0)
         step_costs = step_costs + _find_inside(bearings, span)[:, None] * OTHER_WAY_COST * BIN_ANGLE * against

@@ -22,7 +22,7 @@ from ..library.features import FPS
 from ..motion.skeleton import freeze_array
 from ..motion.track import SampledTrack, Track, sample_track
 from .heading_path import HeadingPath
-from .heading_plan import HeadingKey, HeadingRequest, Play, plan_heading_path, rest_track
+from .heading_plan import HeadingKey, HeadingRequest, Play, measure_hold, plan_heading_path, rest_track
 
 GAZE = "gaze"
 PARTS = ("left_hand", "right_hand", "left_foot", "right_foot", GAZE)
@@ -174,6 +174,7 @@ class Plan:
     solve_touches: bool = field(default=_DEFAULTS["solve_touches"], metadata=LATER)
     variety: float = field(default=_DEFAULTS["variety"], metadata=LATER)
     lag: float = field(default=_DEFAULTS["lag"], metadata=LATER)
+    manner: int = field(default=_DEFAULTS["manner"], metadata=LATER)
     solved: SolvedTrajectory | None = field(default=None, compare=False, repr=False, metadata=LATER)
     heading_path: HeadingPath | None = field(default=None, compare=False, repr=False, metadata=LATER)
 
@@ -277,11 +278,14 @@ class ResolvedPlan:
         Returns:
             The planned heading, the same whatever frame rate it is read at.
         """
-        keys = [key if key.target is None else replace(key, target=self._scale_place(key.target))
+        size = self.size
+        keys = [key if key.target is None else replace(key, target=(key.target[0] / size, key.target[1] / size))
                 for key in self.requested.heading_keys]
-        gazes = [replace(pin, position=self._scale_place(pin.position))
-                 for pin in self.requested.pins if pin.part == GAZE]
-        request = HeadingRequest(keys=tuple(keys), gazes=tuple(gazes), spans=self.timeline.spans, play=play)
+        gazes = [(pin, [value / size for value in pin.position]) for pin in self.requested.pins if pin.part == GAZE]
+        request = HeadingRequest(
+            keys=tuple(keys), gazes=tuple(replace(pin, position=tuple(place)) for pin, place in gazes),
+            spans=self.timeline.spans, play=play,
+        )
         return plan_heading_path(rest_track(self._sample_ball_track(FPS)), request)
 
     def sample_track(self, fps: float, rests: bool = True) -> SampledTrack:
@@ -296,7 +300,8 @@ class ResolvedPlan:
         if (fps, rests) not in self._sampled:
             sampled = self._sample_ball_track(fps)
             if self.method == "path":
-                sampled = replace(rest_track(sampled, rests), heading=self.heading_path.sample(sampled.times))
+                sampled = replace(rest_track(sampled, rests), heading=self.heading_path.sample(sampled.times),
+                                  held=measure_hold(self.requested.heading_keys, sampled.times))
             self._sampled[fps, rests] = sampled
         return self._sampled[fps, rests]
 
@@ -306,7 +311,3 @@ class ResolvedPlan:
         if trajectory is not None and self.size != 1.0:
             trajectory = replace(trajectory, ball=trajectory.ball / self.size)
         return sample_with_trajectory(self.track, trajectory, fps, self.requested.track_window)
-
-    def _scale_place(self, place: tuple[float, ...]) -> tuple[float, ...]:
-        """Scale a place, m, to the library's size."""
-        return tuple(value / self.size for value in place)

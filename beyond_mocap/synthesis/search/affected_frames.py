@@ -38,6 +38,8 @@ def find_moved_frames(before: SearchRequest, after: SearchRequest) -> np.ndarray
     off |= np.linalg.norm(old.raw - new.raw, axis=1) > PLACE_CHANGE
     off |= np.abs(quaternion.wrap_angle(new.direction - old.direction)) * np.minimum(1.0, new.speed) > TURN_CHANGE
     off |= _measure_heading_change(old, new) > TURN_CHANGE
+    if old.held is not None or new.held is not None:
+        off |= (0.0 if old.held is None else old.held) != (0.0 if new.held is None else new.held)
     ball = ~np.isclose(old.ball, new.ball, rtol=0.0, atol=PLACE_CHANGE, equal_nan=True).all(axis=1)
     return off | ball | (old.ball_measured != new.ball_measured)
 
