@@ -268,9 +268,10 @@ def _compute_slowness(speed: np.ndarray) -> np.ndarray:
 def _find_asked(bearings: _Bearings, request: HeadingRequest) -> np.ndarray:
     """Find the decisions (D,) bool that what is asked changes; all others stay as they are without it."""
     spans = [span for span in request.spans if _find_quarter(span) is not None or _find_turning_side(span) is not None]
-    times = [(held.time, held.time + held.hold) for held in (*request.keys, *request.gazes)]
+    times = [(key.time, key.time + key.hold) for key in request.keys]
+    times += [(pin.time, pin.end) for pin in request.gazes] + [(span.start, span.end) for span in spans]
     found = np.zeros(len(bearings.times), bool)
-    for start, end in times + [(span.start, span.end) for span in spans]:
+    for start, end in times:
         found |= (bearings.times >= start - ASKED_SECONDS) & (bearings.times <= end + ASKED_SECONDS)
     return found
 

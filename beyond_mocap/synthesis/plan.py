@@ -281,11 +281,9 @@ class ResolvedPlan:
         size = self.size
         keys = [key if key.target is None else replace(key, target=(key.target[0] / size, key.target[1] / size))
                 for key in self.requested.heading_keys]
-        gazes = [(pin, [value / size for value in pin.position]) for pin in self.requested.pins if pin.part == GAZE]
-        request = HeadingRequest(
-            keys=tuple(keys), gazes=tuple(replace(pin, position=tuple(place)) for pin, place in gazes),
-            spans=self.timeline.spans, play=play,
-        )
+        gazes = [replace(pin, position=(pin.position[0] / size, pin.position[1] / size, pin.position[2] / size))
+                 for pin in self.requested.pins if pin.part == GAZE]
+        request = HeadingRequest(keys=tuple(keys), gazes=tuple(gazes), spans=self.timeline.spans, play=play)
         return plan_heading_path(rest_track(self._sample_ball_track(FPS)), request)
 
     def sample_track(self, fps: float, rests: bool = True) -> SampledTrack:

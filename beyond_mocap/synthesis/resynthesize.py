@@ -136,7 +136,7 @@ def _check_stretch(plan: Plan, before: Take, variant: VariantStretch) -> None:
 
 
 def _is_comparable(plan: Plan, before: Take) -> bool:
-    """Return whether the plans differ only in track, timeline, library folder, pins and headings, over the same time."""
+    """Return whether the plans differ only in track, timeline, library folder, pins and headings, at the same times."""
     old = before.plan
     if old is None or plan.method != "path":
         return False

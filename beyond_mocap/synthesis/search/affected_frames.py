@@ -1,11 +1,12 @@
 """Frames that an edit affects: where the new request differs from the old one, and what of it has to be searched again.
 
 Affected are frames with another request: other labels, also avoided ones, another speed (by more than 5 cm/s), turning
-(by more than 0.05 rad over a slot), facing or planned heading (by more than 0.3 rad), and key moments that moved, changed their labels,
-were added or removed, or whose ball has moved (by more than 15 cm), with the entry and exit of their clips. A run-up of
-a second around them is searched too, so that the new motion leads into the old one; key moments that stay are avoided
-where they are not inside. Where only the track or the ball has moved (by more than a millimetre), or the planned heading
-has turned a little (by more than 0.05 rad), the source frames stay and the motion is constructed again.
+(by more than 0.05 rad over a slot), facing or planned heading (by more than 0.3 rad), and key moments that moved,
+changed their labels, were added or removed, or whose ball has moved (by more than 15 cm), with the entry and exit of
+their clips. A run-up of a second around them is searched too, so that the new motion leads into the old one; key
+moments that stay are avoided where they are not inside. Where only the track or the ball has moved (by more than a
+millimetre), or the planned heading has turned a little (by more than 0.05 rad), the source frames stay and the motion
+is constructed again.
 """
 
 from __future__ import annotations

@@ -11,6 +11,7 @@ import pytest
 from beyond_mocap.annotation import KeyMoment, Span, Timeline, labels_per_frame
 from beyond_mocap.base.errors import InputError
 from beyond_mocap.evaluation.figures import fill_automatic_spans
+from beyond_mocap.evaluation.naturalness import measure_course
 from beyond_mocap.evaluation.report import evaluate, evaluate_played, flatten_report, format_table
 from beyond_mocap.files import tables
 from beyond_mocap.files.bvh import bvh
@@ -254,6 +255,17 @@ def _same(a, b):
         assert a == pytest.approx(b, rel=0.02, abs=0.01)
     else:
         assert a == b
+
+
+def test_heading_is_compared_with_the_plan_of_the_take(uncut, track_of, library):
+    """Not with what its track alone would plan: a heading key may have asked for something else."""
+    course = measure_course(uncut.motion.skeleton, playback_from_take(uncut).positions, uncut.motion.fps)
+    for off in (0.0, 40.0):
+        take = replace(uncut, planned_heading=course.heading + np.radians(off) + 2.0 * np.pi)
+        figures = evaluate(take, track_of(take), library)["naturalness"]
+        assert figures["off_plan_deg_median"] == pytest.approx(off, abs=1e-6)
+    unplanned = evaluate(replace(uncut, planned_heading=None), track_of(uncut), library)["naturalness"]
+    assert unplanned["off_plan_deg_median"] is None and unplanned["off_plan_deg_p90"] is None
 
 
 def test_a_motion_alone_still_has_what_needs_nothing_else(uncut):
