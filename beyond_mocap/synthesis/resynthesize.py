@@ -86,8 +86,8 @@ def resynthesize(
     """Update a take after its plan has changed: search and construct only what the change affects.
 
     Pins are applied again. It is a whole synthesis where the change is not one of labels, track, ball, pins or headings
-    (another method, frame rate, length or choice), where `before` was built from another library or by another method than
-    "path", or where all of it is affected. The same library, plan and take give the same bits.
+    (another method, frame rate, length or choice), where `before` was built from another library or by another method
+    than "path", or where all of it is affected. The same library, plan and take give the same bits.
 
     Args:
         library: the recordings.
