@@ -51,7 +51,7 @@ class HeadingPath:
             out += weight * np.interp(times + offset, self.times, angles)
         return out
 
-    def cut(self, start: float, end: float) -> HeadingPath:
+    def cut_span(self, start: float, end: float) -> HeadingPath:
         """Cut out the decisions that the headings from `start` to `end` s depend on, less whole turns."""
         reach = 0.5 * SMOOTHING_SECONDS
         low = max(int(np.searchsorted(self.times, start - reach, side="right")) - 1, 0)

@@ -12,7 +12,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
+from typing import Any
 
 import numpy as np
 
@@ -28,9 +28,6 @@ from ..motion.skeleton import freeze_array
 from ..motion.track import SampledTrack, smooth_zero_phase_hann
 from ..motion.track.resting_place import LEAST_LEEWAY, relax_track
 from .heading_path import BIN_ANGLE, BINS, HeadingPath, find_cheapest_path, replace_part
-
-if TYPE_CHECKING:
-    from .plan import Pin
 
 # Costs per second, of angles in radians. They were chosen on 167 minutes of a tracked match, for few turns and
 # headings near ball and travel: no snap turns, 0.02 spins a minute, 13 degrees from the ball below 1 m/s (median).
@@ -122,13 +119,13 @@ class HeadingRequest:
 
     Attributes:
         keys: headings that are given; each ends where the next one begins.
-        gazes: pins of the gaze.
+        gazes: pins of the gaze: objects with `time`, `hold` and `end` s and `position` m (`plan.Pin`).
         spans: labels that the user asks for; a gait with a direction and turning with a side count.
         play: what a player of a match faces beside the ball, None where that is not known.
     """
 
     keys: tuple[HeadingKey, ...] = ()
-    gazes: tuple[Pin, ...] = ()
+    gazes: tuple[Any, ...] = ()
     spans: tuple[Span, ...] = ()
     play: Play | None = None
 
@@ -300,7 +297,7 @@ def _compute_bearing(bearings: _Bearings, place: Sequence[float]) -> np.ndarray:
     return arctan2(offset[:, 1], offset[:, 0])
 
 
-def _find_held(bearings: _Bearings, held: HeadingKey | Pin, reach: float) -> np.ndarray:
+def _find_held(bearings: _Bearings, held: Any, reach: float) -> np.ndarray:
     """Find the decisions (D,) bool within `reach` s of the time for which a key or a pin holds."""
     return (bearings.times >= held.time - reach) & (bearings.times <= held.time + held.hold + reach)
 

@@ -140,7 +140,7 @@ def cut_plan(plan: Plan, start: float, end: float) -> Plan:
         timeline=Timeline(tuple(spans), tuple(inside)),
         pins=tuple(pin for pin in plan.pins if pin.time <= end and pin.end >= start),
         heading_keys=tuple(key for key in plan.heading_keys if key.time <= end and key.time + key.hold >= start),
-        heading_path=None if plan.heading_path is None else plan.heading_path.cut(start, end),
+        heading_path=None if plan.heading_path is None else plan.heading_path.cut_span(start, end),
         solved=None if plan.solved is None else _cut_trajectory(plan.solved, start - _BALL_MARGIN, end + _BALL_MARGIN),
     )
 

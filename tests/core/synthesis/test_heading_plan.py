@@ -188,6 +188,6 @@ def test_a_part_of_a_plan_reads_as_the_whole():
     times = np.arange(0.0, 30.0, 1.0 / 6.0)
     path = HeadingPath(np.round(times, 6), np.cumsum(np.random.default_rng(3).integers(0, 3, len(times))))
     inside = np.arange(300, 600) / 30.0
-    part = path.cut(inside[0], inside[-1])
+    part = path.cut_span(inside[0], inside[-1])
     assert len(part.times) < 70 and 0 <= part.bins[0] < 36
     assert degrees_from(part.sample(inside), np.degrees(path.sample(inside))).max() < 1e-9
