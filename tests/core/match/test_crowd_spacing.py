@@ -25,7 +25,6 @@ from beyond_mocap.match.crowd.spacing import (
     find_meetings,
     join_spans,
 )
-from beyond_mocap.motion import quaternion
 from beyond_mocap.motion.humanoid import identify_joints
 from beyond_mocap.motion.motion import forward_kinematics, place_motion
 from beyond_mocap.synthesis.quality.movement import compute_jerk
