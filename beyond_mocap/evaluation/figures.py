@@ -21,6 +21,7 @@ from ..library.posture import NormalPostures
 from ..motion import quaternion
 from ..motion.contacts import measure_floor_height
 from ..motion.track import sample_track, smooth_zero_phase_hann
+from ..synthesis.construct.gaze import estimate_look
 from ..synthesis.heading_plan import plan_track
 from ..synthesis.quality import movement
 from ..synthesis.quality.moments import (
@@ -33,7 +34,13 @@ from ..synthesis.quality.moments import (
 from ..synthesis.quality.playback import find_replayed, list_warp_rates
 from ..synthesis.quality.unmet_constraints import report_jolts, report_unmet_constraints
 from . import realism
-from .naturalness import list_event_messages, measure_course_figures, measure_piece_figures, measure_standing
+from .naturalness import (
+    list_event_messages,
+    measure_course_figures,
+    measure_head_off_ball,
+    measure_piece_figures,
+    measure_standing,
+)
 from .reference import View, compute_source_poses
 
 JOLT_RATIO = 1.3  # times the 95th percentile of recordings
@@ -264,6 +271,11 @@ def measure_naturalness(view: View) -> dict:
         own = measure_course_figures(reference.courses, postures)
         out.update({f"source_{name}": value for name, value in own.items()})
         out["jolts_per_min"] = len(_find_jolts(view)) / course.minutes
+    played, library = view.played, view.library
+    if library is not None and played.ball is not None and played.motion.skeleton.names == library.skeleton.names:
+        off = measure_head_off_ball(played.motion.skeleton, played.positions, played.rotations, played.ball.positions,
+                                    estimate_look(library))
+        out["head_off_ball_deg_median"] = float(np.degrees(np.median(off))) if len(off) else None
     if view.track is not None:
         out["standing"] = measure_standing(view.target, view.played.contacts, view.fps)
         planned = plan_track(sample_track(view.track, view.fps)).heading

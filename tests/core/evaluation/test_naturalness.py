@@ -12,8 +12,11 @@ from beyond_mocap.evaluation.naturalness import (
     measure_course,
     measure_dwell,
     measure_facing_off_travel,
+    measure_head_off_ball,
     measure_standing,
 )
+from beyond_mocap.motion import quaternion
+from beyond_mocap.motion.humanoid import identify_joints
 from beyond_mocap.motion.motion import forward_kinematics
 from beyond_mocap.synthetic.gait import build_gait
 
@@ -82,3 +85,15 @@ def test_a_synthetic_walk():
     assert np.median(body.speed) == pytest.approx(2.5, rel=0.1)
     assert np.degrees(np.median(measure_facing_off_travel(body))) < 10.0
     assert not find_snap_turns(body) and not find_spins(body) and not find_pelvis_drops(body)
+
+
+def test_the_head_off_the_ball_counts_balls_within_range():
+    motion = build_gait(0.0, 3.0, FPS)
+    places, world = forward_kinematics(motion)
+    head = identify_joints(motion.skeleton).head
+    look = quaternion.rotate(quaternion.inverse(world[0, head]), np.array([1.0, 0.0, 0.0]))
+    sight = quaternion.rotate(world[:, head], look)
+    ball = places[:, head] + 5.0 * quaternion.rotate_about_up(sight, np.full(len(sight), np.radians(30.0)))
+    ball[:20], ball[20:30] = places[:20, head] - 5.0 * sight[:20], np.nan
+    found = np.degrees(measure_head_off_ball(motion.skeleton, places, world, ball, look))
+    assert len(found) == len(motion) - 30 and np.allclose(found, 30.0, atol=1.0)
