@@ -119,7 +119,7 @@ def test_nothing_snaps(standing, look, watch, way):
         "overhead": np.column_stack([x, 0.02 + 0 * x, 3.2 + 0 * x]),
         "behind": np.column_stack([-2.0 + 0 * x, 0.6 * x, 0.4 + 0 * x]),
         "beside": np.column_stack([x, 1.0 + 0 * x, 1.0 + 0 * x]),
-        "from side to side": jumping(standing) * [1.0, -1.0, 1.0] + jumping(standing, 140.0) * [0.0, 2.0, 0.0],
+        "from side to side": bearing_ball(standing, np.where(np.arange(len(standing)) < 180, -85.0, 85.0)),
     }[way]
     found = watch(ball)
     seen, _ = sight(found, look)
@@ -135,6 +135,8 @@ def test_turns_stay_within_the_ranges_of_neck_and_trunk(standing, look, watch):
         yaw, twist = angles(watch(bearing_ball(standing, degrees)), look)
         assert yaw.max() < np.degrees(MAX_YAW) + 3.0
         assert np.degrees(MAX_TWIST) - 8.0 < (twist - own[1]).max() and twist.max() < np.degrees(MAX_TWIST) + 3.0
+    yaw, _ = angles(watch(bearing_ball(standing, 90.0), shoulder_share=0.0), look)
+    assert np.degrees(MAX_YAW) - 15.0 < yaw.max() < np.degrees(MAX_YAW) + 3.0
     yaw, twist = angles(watch(bearing_ball(standing, 180.0)), look)
     assert np.abs(yaw).max() < 15.0 and np.abs(twist - own[1]).max() < 1.0  # no one looks through their own head
 
@@ -144,6 +146,8 @@ def test_a_twist_that_the_clip_has_counts_towards_the_range():
     for own in np.radians([-30.0, 0.0, 20.0, 37.0, 60.0]):
         twist = compute_twist(seen, np.full(300, own), FPS)
         assert np.all(twist >= 0.0) and np.all(own + twist <= max(MAX_TWIST, own) + 1e-9)
+        mirrored = compute_twist(seen * [1.0, -1.0, 1.0], np.full(300, -own), FPS)
+        np.testing.assert_allclose(mirrored, -twist, atol=1e-12)
     assert compute_twist(seen, np.full(300, -0.5), FPS).min() > 0.9 * compute_twist(seen, np.zeros(300), FPS).max()
 
 
