@@ -19,7 +19,14 @@ from ...base.errors import TimedMessage, format_seconds
 from ...base.time_series import find_runs
 from ...library.landings import LANDING_FOLDER
 from ...library.library import Library
-from ...library.synthetic_clips import BLEND_PREFIX, KICK_PREFIX, RECEIVE_PREFIX, STAND_PREFIX, SYNTHETIC_FOLDER
+from ...library.synthetic_clips import (
+    BLEND_PREFIX,
+    KICK_PREFIX,
+    LOOP_PREFIX,
+    RECEIVE_PREFIX,
+    STAND_PREFIX,
+    SYNTHETIC_FOLDER,
+)
 from ...motion.track import Track
 from . import movement
 from .moments import KeyMomentResult, evaluate_moments, measure_contact
@@ -74,22 +81,18 @@ def report_unmet_constraints(
     return [line for line in lines if line]
 
 
-def report_jolts(times: np.ndarray, starts: np.ndarray, ratios: np.ndarray) -> TimedMessage | None:
-    """Report transitions that are harder than recordings are.
+def report_jolts(times: np.ndarray, flags: np.ndarray, most: float) -> TimedMessage | None:
+    """Report jerk that is harder than recordings have it.
 
     Args:
         times: (T,) s.
-        starts: (S,) frames of transitions.
-        ratios: (S,) of `movement.compute_transition_ratios`.
+        flags: (T,) bool, frames with such a jerk.
+        most: the highest one, over the 95th percentile of recordings at that speed.
     Returns:
         A line, None where there is none.
     """
-    most, flags = TARGETS["seam_jerk_ratio.max"].most, np.zeros(len(times), bool)
-    hard = ratios > most
-    for start in starts[hard]:
-        flags[max(start - movement.JERK_REACH // 2, 0) : start + movement.JERK_REACH // 2] = True
-    hardest = f"{ratios.max(where=hard, initial=0.0):.2f} times as hard as recordings of that speed"
-    return _build_line(times, flags, f"transitions jolt up to {hardest} (target {most:g})")
+    hardest = f"{most:.2f} times as hard as recordings of that speed"
+    return _build_line(times, flags, f"the body jolts up to {hardest} (target {TARGETS['seam_jerk_ratio.max'].most:g})")
 
 
 def format_stretches(times: np.ndarray, flags: np.ndarray) -> str:
@@ -134,16 +137,19 @@ def _frames_of_clips(played: Playback, *begins: str) -> np.ndarray:
 
 
 def _report_synthetic(played: Playback) -> list[TimedMessage | None]:
-    """Report each kind of synthetic clip: running, two recordings blended, kicks, taken balls, stands, landings."""
-    blends, kicks, receptions, stands = (_frames_of_clips(played, SYNTHETIC_FOLDER + name)
-                                         for name in (BLEND_PREFIX, KICK_PREFIX, RECEIVE_PREFIX, STAND_PREFIX))
-    running = _frames_of_clips(played, SYNTHETIC_FOLDER) & ~blends & ~kicks & ~receptions & ~stands
+    """Report each kind of synthetic clip: running, blends, touches, long stands and runs, landings."""
+    blends, kicks, receptions, stands, loops = (
+        _frames_of_clips(played, SYNTHETIC_FOLDER + name)
+        for name in (BLEND_PREFIX, KICK_PREFIX, RECEIVE_PREFIX, STAND_PREFIX, LOOP_PREFIX)
+    )
+    running = _frames_of_clips(played, SYNTHETIC_FOLDER) & ~blends & ~kicks & ~receptions & ~stands & ~loops
     kinds = (
         (running, "synthetic running: no recording has the speed of the track"),
         (blends, "blended from a slower and a faster recording: none has the speed of the track"),
         (kicks, "synthetic kick on the run: no recorded kick is as fast as the player"),
         (receptions, "synthetic reception on the run: no recorded one is as fast as the player"),
         (stands, "a recorded stand is played forth and back: no recording stands for so long"),
+        (loops, "strides of a recorded run are repeated: no recording runs so steadily for so long"),
         (_frames_of_clips(played, LANDING_FOLDER), "synthetic landing and getting up: the recording ends in flight"),
     )
     return [_build_line(played.times, there, what, f" ({np.sum(there) / played.motion.fps:.1f} s in all)")
