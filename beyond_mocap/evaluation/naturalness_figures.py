@@ -50,7 +50,8 @@ FRAMES_KEYS = {
     "off_travel_deg_median": "fast_frames", "off_travel_deg_p90": "fast_frames",
     "unusual_posture_share": "slow_frames", "dwell_s_median": "slow_pieces", "short_dwell_share": "slow_pieces",
     "off_travel_aside_deg_p90": "aside_frames", "off_plan_deg_median": "plan_frames",
-    "head_off_ball_deg_median": "ball_frames", "off_plan_deg_p90": "plan_frames", "sd_ms": "strides", "foot_lifts_per_min": "seconds", "both_down": "seconds",
+    "off_plan_deg_p90": "plan_frames", "head_off_ball_deg_median": "ball_frames", "sd_ms": "strides",
+    "foot_lifts_per_min": "seconds", "both_down": "seconds",
 }  # fmt: skip
 """What a figure rests on where that is not the group's `frames`: a key beside it."""
 
