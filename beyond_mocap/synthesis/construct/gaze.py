@@ -116,7 +116,7 @@ def watch_ball(
 
 
 def hide_lost_ball(ball: np.ndarray, is_measured: np.ndarray, fps: float) -> np.ndarray:
-    """Hide the ball farther than MEMORY_SECONDS from its next measurement, where nobody can know it.
+    """Hide the ball farther than MEMORY_SECONDS from its next measurement, where its place is a guess.
 
     Args:
         ball: (T, 3) m, world, NaN where unknown.
