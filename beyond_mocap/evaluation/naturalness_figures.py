@@ -17,6 +17,7 @@ from ..base.vectors import arctan2
 from ..library.posture import NormalPostures
 from ..motion import quaternion
 from ..motion.track import sample_track
+from ..synthesis.construct.gaze import estimate_look
 from ..synthesis.heading_plan import plan_track
 from ..synthesis.quality import movement
 from ..synthesis.quality.targets import TARGETS, Target
@@ -27,6 +28,7 @@ from .naturalness import (
     list_event_messages,
     measure_course_figures,
     measure_facing_off_travel,
+    measure_head_off_ball,
     measure_piece_figures,
     measure_standing,
     select_unasked_spins,
@@ -46,7 +48,8 @@ FRAMES_KEYS = {
     "off_travel_deg_median": "fast_frames", "off_travel_deg_p90": "fast_frames",
     "unusual_posture_share": "slow_frames", "dwell_s_median": "slow_pieces", "short_dwell_share": "slow_pieces",
     "off_travel_aside_deg_p90": "aside_frames", "off_plan_deg_median": "plan_frames",
-    "off_plan_deg_p90": "plan_frames", "sd_ms": "strides", "foot_lifts_per_min": "seconds", "both_down": "seconds",
+    "off_plan_deg_p90": "plan_frames", "head_off_ball_deg_median": "ball_frames", "sd_ms": "strides",
+    "foot_lifts_per_min": "seconds", "both_down": "seconds",
 }  # fmt: skip
 """What a figure rests on where that is not the group's `frames`: a key beside it."""
 
@@ -88,6 +91,7 @@ TITLES = {
     "off_travel_deg_median": Title("Heading off travel", "°"),
     "off_travel_deg_p90": Title("Heading off travel, 90 %", "°"),
     "off_travel_aside_deg_p90": Title("The same, ball aside", "°"),
+    "head_off_ball_deg_median": Title("Head off the ball", "°"),
     "standing.foot_lifts_per_min": Title("Foot lifts standing", "/min", digits=0),
     "standing.both_down": Title("Both feet down standing", "%", 100.0, 0),
     "tempo.sd_ms": Title("Uneven tempo", "ms"),
@@ -133,6 +137,7 @@ def measure_naturalness(view: View, planned: np.ndarray | None, requested: Timel
         out.update(measure_piece_figures(course, view.transitions / view.fps))
     if planned is not None:
         out.update(_measure_plan_figures(view, planned))
+    out.update(_measure_head_off_ball(view))
     if view.track is not None:
         out.update(_measure_off_travel_aside(view))
         out["standing"] = measure_standing(find_stands(view.target, view.fps), view.played.contacts, view.fps)
@@ -168,6 +173,17 @@ def _measure_off_travel_aside(view: View) -> dict:
     off = np.degrees(measure_facing_off_travel(course)[np.abs(quaternion.wrap_angle(bearing - course.travel)) > ASIDE])
     off = off[np.isfinite(off)]
     return {"aside_frames": len(off), "off_travel_aside_deg_p90": float(np.percentile(off, 90)) if len(off) else None}
+
+
+def _measure_head_off_ball(view: View) -> dict:
+    """Measure the angle between head and ball; nothing without a ball, or on another skeleton than the library's."""
+    played, library = view.played, view.library
+    if library is None or played.ball is None or played.motion.skeleton.names != library.skeleton.names:
+        return {}
+    off = measure_head_off_ball(played.motion.skeleton, played.positions, played.rotations, played.ball.positions,
+                                estimate_look(library))
+    return {"ball_frames": len(off), "head_off_ball_deg_median": float(np.degrees(np.median(off))) if len(off)
+            else None}
 
 
 def fill_plan(planned: np.ndarray) -> np.ndarray:

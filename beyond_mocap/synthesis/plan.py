@@ -177,6 +177,7 @@ class Plan:
     manner: int = field(default=_DEFAULTS["manner"], metadata=LATER)
     solved: SolvedTrajectory | None = field(default=None, compare=False, repr=False, metadata=LATER)
     heading_path: HeadingPath | None = field(default=None, compare=False, repr=False, metadata=LATER)
+    watch: float = field(default=_DEFAULTS["watch"], metadata=LATER)
 
     def __post_init__(self):
         object.__setattr__(self, "pins", tuple(sorted(self.pins, key=lambda pin: (pin.time, pin.part))))
