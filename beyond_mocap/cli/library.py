@@ -102,8 +102,8 @@ def open_library(options, reporter: ProgressReporter, rebuild: bool = False, see
     from ..library.build import build_library
 
     return build_library(
-        folder or options.library, rebuild=rebuild, cache_dir=options.cache, skeleton=options.skeleton, unit=options.unit,
-        seed=seed, progress=reporter.show_progress, cancelled=reporter.is_cancelled,
+        folder or options.library, rebuild=rebuild, cache_dir=options.cache, skeleton=options.skeleton,
+        unit=options.unit, seed=seed, progress=reporter.show_progress, cancelled=reporter.is_cancelled,
     )
 
 

@@ -178,8 +178,8 @@ def collect_recorded_windows(library: Library) -> Windows:
     found = [windows for windows in parts if len(windows)]
     if len(found) < 2:
         raise InputError(
-            library.folder, f"{format_count(len(found), 'recording')} with {2 * SECONDS:g} s of locomotion", "2 or more",
-            "add recordings, or compare with another library",
+            library.folder, f"{format_count(len(found), 'recording')} with {2 * SECONDS:g} s of locomotion",
+            "2 or more", "add recordings, or compare with another library",
         )
     return _join_windows(found)
 
@@ -219,7 +219,11 @@ def match_windows(synthesized: Windows, recorded: Windows) -> tuple[Windows, Win
 
 
 def list_subsets(synthesized: Windows, recorded: Windows) -> dict[str, Sides]:
-    """List the windows of both sides that have figures: all, each class of speed, and takes with and without a cut."""
+    """List the windows of both sides that have figures.
+
+    They are all, each class of speed, takes with and without a cut, and of recordings those that the takes show: less
+    area there is due to the choice of recordings.
+    """
     kinds = [np.digitize(windows.speed, SPEED_EDGES) for windows in (synthesized, recorded)]
     edges = [0.0, *SPEED_EDGES]
     names = [f"{low:g} to {high:g} m/s" for low, high in zip(edges, edges[1:])] + [f"above {edges[-1]:g} m/s"]
@@ -228,6 +232,7 @@ def list_subsets(synthesized: Windows, recorded: Windows) -> dict[str, Sides]:
         "all": (np.ones(len(synthesized), bool), everything),
         **{name: (kinds[0] == kind, kinds[1] == kind) for kind, name in enumerate(names)},
         "with a cut": (synthesized.has_cut, everything), "without a cut": (~synthesized.has_cut, everything),
+        "recordings in takes": (np.ones(len(synthesized), bool), np.isin(recorded.recording, synthesized.recording)),
     }  # fmt: skip
 
 
