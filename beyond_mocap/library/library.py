@@ -24,7 +24,9 @@ from .clip import Clip
 from .clusters import Clusters
 from .features import FPS, Frames, build_frames, join_frames
 from .keys import Key, collect_keys
+from .manners import Manners, measure_manners
 from .posture import NormalPostures, fit_normal_postures
+from .run_loops import MIN_SPEED
 from .standing_loops import MIN_STAND_SECONDS
 from .synthetic_clips import (
     KICK_LABELS,
@@ -36,6 +38,7 @@ from .synthetic_clips import (
     select_locomotion,
 )
 
+MIN_RUN_SECONDS = 2.0  # of a track's runs from which on long runs are needed
 RESTING_SPEED = 0.1  # m/s of a track below which a player stands
 Progress = Callable[[float, str], None]
 
@@ -128,6 +131,12 @@ class Library:
         return fit_normal_postures(self.frames, self._is_recorded)
 
     @cached_property
+    def manners(self) -> Manners:
+        """How the people of this library move."""
+        is_calm = self._is_recorded & (self.strangeness <= 1.0)
+        return measure_manners([clip.path for clip in self.clips], self.frames, is_calm, self.fps)
+
+    @cached_property
     def _is_recorded(self) -> np.ndarray:
         """(N,) bool, frames of recordings."""
         return ~np.array([clip.is_synthetic for clip in self.clips])[self.frames.clip]
@@ -173,8 +182,9 @@ class Library:
     def needs_synthetic_clips(self, speed: np.ndarray, key_speeds: np.ndarray, takes: np.ndarray) -> bool:
         """Whether a track needs the synthetic clips.
 
-        It does if it stays in a speed gap for a fifth of a second or more, or has key moments that are faster than any
-        recorded kick or, for received balls, any recorded receiving with the foot can be played without sliding.
+        It does if it stays in a speed gap for a fifth of a second or more, stands or runs for long, or has
+        key moments that are faster than any recorded kick or, for received balls, any recorded receiving with the foot
+        can be played without sliding.
 
         Args:
             speed: (T,) m/s of the track at the library's rate.
@@ -188,7 +198,8 @@ class Library:
                       for act in (KICK_LABELS, RECEIVE_LABELS))
         too_fast = 1.3 * np.where(takes & np.isfinite(take), max(take, MIN_RECEIVE_SPEED), kick)
         rests = np.sum(speed < RESTING_SPEED) >= MIN_STAND_SECONDS * self.fps
-        return inside >= 0.2 * self.fps or bool(rests) or bool(np.any(key_speeds > too_fast))
+        runs = np.sum(speed > MIN_SPEED) >= MIN_RUN_SECONDS * self.fps
+        return inside >= 0.2 * self.fps or bool(rests | runs) or bool(np.any(key_speeds > too_fast))
 
     @cached_property
     def max_speed(self) -> float:

@@ -19,7 +19,14 @@ from ...base.errors import TimedMessage, format_seconds
 from ...base.time_series import find_runs
 from ...library.landings import LANDING_FOLDER
 from ...library.library import Library
-from ...library.synthetic_clips import BLEND_PREFIX, KICK_PREFIX, RECEIVE_PREFIX, STAND_PREFIX, SYNTHETIC_FOLDER
+from ...library.synthetic_clips import (
+    BLEND_PREFIX,
+    KICK_PREFIX,
+    LOOP_PREFIX,
+    RECEIVE_PREFIX,
+    STAND_PREFIX,
+    SYNTHETIC_FOLDER,
+)
 from ...motion.track import Track
 from . import movement
 from .moments import KeyMomentResult, evaluate_moments, measure_contact
@@ -134,16 +141,19 @@ def _frames_of_clips(played: Playback, *begins: str) -> np.ndarray:
 
 
 def _report_synthetic(played: Playback) -> list[TimedMessage | None]:
-    """Report each kind of synthetic clip: running, two recordings blended, kicks, taken balls, stands, landings."""
-    blends, kicks, receptions, stands = (_frames_of_clips(played, SYNTHETIC_FOLDER + name)
-                                         for name in (BLEND_PREFIX, KICK_PREFIX, RECEIVE_PREFIX, STAND_PREFIX))
-    running = _frames_of_clips(played, SYNTHETIC_FOLDER) & ~blends & ~kicks & ~receptions & ~stands
+    """Report each kind of synthetic clip: running, blends, touches, long stands and runs, landings."""
+    blends, kicks, receptions, stands, loops = (
+        _frames_of_clips(played, SYNTHETIC_FOLDER + name)
+        for name in (BLEND_PREFIX, KICK_PREFIX, RECEIVE_PREFIX, STAND_PREFIX, LOOP_PREFIX)
+    )
+    running = _frames_of_clips(played, SYNTHETIC_FOLDER) & ~blends & ~kicks & ~receptions & ~stands & ~loops
     kinds = (
         (running, "synthetic running: no recording has the speed of the track"),
         (blends, "blended from a slower and a faster recording: none has the speed of the track"),
         (kicks, "synthetic kick on the run: no recorded kick is as fast as the player"),
         (receptions, "synthetic reception on the run: no recorded one is as fast as the player"),
         (stands, "a recorded stand is played forth and back: no recording stands for so long"),
+        (loops, "strides of a recorded run are repeated: no recording runs so steadily for so long"),
         (_frames_of_clips(played, LANDING_FOLDER), "synthetic landing and getting up: the recording ends in flight"),
     )
     return [_build_line(played.times, there, what, f" ({np.sum(there) / played.motion.fps:.1f} s in all)")
