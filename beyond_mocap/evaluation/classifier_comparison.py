@@ -8,8 +8,8 @@ of the same take. The area under the curve is 0.5 for a guess and 1 for certaint
 
 Frames that are not locomotion are left out: on both sides those whose source has the label of an action or of the ball,
 and of recordings those whose postures do not belong to normal locomotion (`Library.strangeness`), which a take should
-not show. Track and plan ask for other speeds and turns than recordings have; so there is a second area without the
-features that they decide, for the body alone.
+not show. Track and plan ask for other speeds, turns and directions of head and shoulders than recordings have, where
+there was no ball to look at; so there is a second area without the features that they decide, for the body alone.
 """
 
 from __future__ import annotations

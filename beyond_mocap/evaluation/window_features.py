@@ -46,7 +46,7 @@ class Signal(NamedTuple):
         unit: of its values.
         values: (T,), or (T, 2) for left and right.
         statistics: keys of _STATISTICS that are taken of it.
-        is_course: whether the track and the plan decide it, not the body.
+        is_course: whether track and plan decide it: where the body goes, faces and looks, not how.
     """
 
     name: str
@@ -57,7 +57,7 @@ class Signal(NamedTuple):
 
 
 class Feature(NamedTuple):
-    """One column of `WindowFeatures.values`: its name, unit, and whether track and plan decide it, not the body."""
+    """One column of `WindowFeatures.values`: its name, unit, and whether track and plan decide it (`Signal`)."""
 
     name: str
     unit: str
@@ -192,7 +192,7 @@ def _list_posture_signals(skeleton: Skeleton, positions: np.ndarray, sight: np.n
     outward = np.array([1.0, -1.0])
     trunk = local[:, body.neck_or_chest]
     gaze = arctan2(sight[:, 1], sight[:, 0]) - compute_heading_from_positions(skeleton, positions)
-    gaze = np.degrees(quaternion.wrap_angle(gaze))
+    gaze, down = np.degrees(quaternion.wrap_angle(gaze)), -np.degrees(np.arcsin(np.clip(sight[:, 2], -1.0, 1.0)))
     signals = [
         Signal("trunk lean ahead", "deg", np.degrees(arctan2(trunk[:, 0], trunk[:, 2])), ("median", "range")),
         Signal("trunk lean aside", "deg", np.degrees(arctan2(trunk[:, 1], trunk[:, 2])), ("range",)),
@@ -201,9 +201,10 @@ def _list_posture_signals(skeleton: Skeleton, positions: np.ndarray, sight: np.n
         Signal("foot ahead of the pelvis", "m", local[:, [body.left.foot, body.right.foot], 0], ("range",)),
         Signal("knee flexion", "deg", _measure_flexions(local, body, ("upper_leg", "lower_leg", "foot")),
                ("median", "high")),
-        Signal("head turned aside", "deg", np.abs(gaze), ("median",)),
+        Signal("head turned aside", "deg", np.abs(gaze), ("median",), True),
         Signal("turn of the head", "deg", gaze, ("range",)),
-        Signal("head down", "deg", -np.degrees(np.arcsin(np.clip(sight[:, 2], -1.0, 1.0))), ("median", "range")),
+        Signal("head down", "deg", down, ("median",), True),
+        Signal("nod of the head", "deg", down, ("range",)),
     ]
     if None in (body.left.hand, body.right.hand, body.left.upper_arm, body.right.upper_arm):
         return signals
@@ -216,7 +217,7 @@ def _list_posture_signals(skeleton: Skeleton, positions: np.ndarray, sight: np.n
         Signal("hand beside the pelvis", "m", hands[..., 1] * outward, ("median",)),
         Signal("elbow flexion", "deg", _measure_flexions(local, body, ("upper_arm", "lower_arm", "hand")),
                ("median", "range")),
-        Signal("shoulders turned against the hips", "deg", np.abs(twist), ("median",)),
+        Signal("shoulders turned against the hips", "deg", np.abs(twist), ("median",), True),
         Signal("turn of the shoulders against the hips", "deg", twist, ("range",)),
     ]
 
