@@ -156,7 +156,7 @@ def _list_course_signals(skeleton: Skeleton, positions: np.ndarray, path: np.nda
 
 
 def _list_joint_signals(skeleton: Skeleton, positions: np.ndarray, fps: float) -> list[Signal]:
-    """List speeds and accelerations of the joints relative to the pelvis in the frame of the heading."""
+    """List speeds and accelerations of the joints in the frame of the pelvis."""
     local = _compute_local(skeleton, positions)
     velocity = time_derivative(local, fps)
     acceleration = time_derivative(velocity, fps)
@@ -179,10 +179,14 @@ def list_named_joints(body: Humanoid) -> dict[str, list[int]]:
 
 
 def _compute_local(skeleton: Skeleton, positions: np.ndarray) -> np.ndarray:
-    """Compute positions (T, J, 3) from the pelvis in the frame of the heading: X ahead, Y left."""
-    hips = identify_joints(skeleton).hips
-    heading = compute_heading_from_positions(skeleton, positions)
-    return quaternion.rotate_about_up(positions - positions[:, hips, None], -heading[:, None])
+    """Compute positions (T, J, 3) from the pelvis in its own frame: X ahead, Y left.
+
+    The heading would not do, since shoulders that are turned aside turn it, and legs would seem to go sideways.
+    """
+    body = identify_joints(skeleton)
+    across = positions[:, body.left.upper_leg] - positions[:, body.right.upper_leg]
+    ahead = arctan2(-across[:, 0], across[:, 1])
+    return quaternion.rotate_about_up(positions - positions[:, body.hips, None], -ahead[:, None])
 
 
 def _list_posture_signals(skeleton: Skeleton, positions: np.ndarray, sight: np.ndarray, path: np.ndarray,
