@@ -157,7 +157,7 @@ def run_evaluate(options, reporter: ProgressReporter, writers: Mapping[str, Writ
     from ..annotation import check_timeline, read_timeline
     from ..evaluation.html import build_html_report
     from ..evaluation.plots import require_matplotlib
-    from ..evaluation.report import evaluate_played
+    from ..evaluation.report import describe_figures, evaluate_played
     from ..files.atomic import atomic_write
     from ..files.bvh import bvh
     from ..files.tables import read_ball, write_report
@@ -181,7 +181,7 @@ def run_evaluate(options, reporter: ProgressReporter, writers: Mapping[str, Writ
     if timeline is not None and track is not None and library is not None:  # otherwise some labels or times are unknown
         check_timeline(timeline, library.labels, start, float(track.times[-1]), str(options.annotations))
     report = evaluate_played(played, track=track, timeline=timeline, library=library)
-    notes = [*report["warnings"], *_describe_fit(report, motion, track, options)]
+    notes = [*report["warnings"], *report["notes"], *_describe_fit(report, motion, track, options)]
     if provenance is None and report["keys"]:
         notes.append("the clips that played are unknown; name them with --provenance")
     if _is_synthesis_report(options.report):
@@ -196,7 +196,7 @@ def run_evaluate(options, reporter: ProgressReporter, writers: Mapping[str, Writ
         reporter.show_note(
             f"{options.provenance}: {count} not in {options.library} and not compared, such as {unknown_clips[0]}"
         )
-    print(options.report)
+    print("\n".join((*describe_figures(report), str(options.report))))
 
 
 def _describe_fit(report: dict, motion, track, options) -> list[str]:

@@ -153,7 +153,10 @@ def test_what_was_written_can_be_evaluated(synthesize, run, match, clips_folder,
         "--report", tmp_path / "e.json",
     )  # fmt: skip
     mine, again = (json.loads((tmp_path / name).read_text()) for name in ("r.json", "e.json"))
-    assert (status, error) == (0, [f"note: {line}" for line in again["warnings"]])
+    assert (status, error) == (0, [f"note: {line}" for line in (*again["warnings"], *again["notes"])])
+    lines = out if isinstance(out, list) else out.splitlines()
+    assert re.fullmatch(r"\d+ of \d+ targets met", lines[0]) and lines[-1] == str(tmp_path / "e.json")
+    assert any(line.startswith("not known: naturalness.") for line in lines)
     assert_contract(again)
     assert again["root_error_m"]["mean"] == pytest.approx(mine["root_error_m"]["mean"], abs=1e-3)
     assert again["keys"][0]["clip"] == mine["keys"][0]["clip"]
