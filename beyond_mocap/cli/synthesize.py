@@ -10,6 +10,7 @@ from pathlib import Path
 
 from ..base.errors import InputError, NotInLibraryError, format_count
 from ..base.settings.options import add_options, option_values
+from .comparing import run_comparison
 from .library import open_library
 from .outputs import ProgressReporter, Writer, add_take_files, check_outputs, choose_writer
 
@@ -125,12 +126,15 @@ def add_evaluate(verbs) -> argparse.ArgumentParser:
     Returns:
         The parser of this verb.
     """
-    verb = verbs.add_parser("evaluate", help="measure a motion")
-    verb.add_argument("motion", type=Path, metavar="M.bvh")
+    verb = verbs.add_parser("evaluate", help="measure a motion, or compare takes with recordings")
+    verb.add_argument("motion", type=Path, nargs="+", metavar="M.bvh",
+                      help="the motion; with --against one or more takes, or folders of takes")
     verb.add_argument("--track", type=Path, metavar="T.csv")
     verb.add_argument("--annotations", type=Path, metavar="A.txt")
     add_take_files(verb)
     verb.add_argument("--library", type=Path)
+    verb.add_argument("--against", type=Path, metavar="LIBRARY",
+                      help="measure whether classifiers can distinguish the takes from this library's recordings")
     add_options(verb, "library")
     verb.add_argument("--report", type=Path, required=True, metavar="R.json")
     verb.add_argument("--html", type=Path, metavar="R.html", help="a page with plots; needs matplotlib")
@@ -139,7 +143,7 @@ def add_evaluate(verbs) -> argparse.ArgumentParser:
 
 
 def run_evaluate(options, reporter: ProgressReporter, writers: Mapping[str, Writer]) -> None:
-    """Run `evaluate`: report on a motion that was written before.
+    """Run `evaluate`: report on a motion that was written before, or compare takes with recordings.
 
     If there is a library, `--unit` applies to its recordings.
 
@@ -148,6 +152,13 @@ def run_evaluate(options, reporter: ProgressReporter, writers: Mapping[str, Writ
         reporter: progress, notes and cancellation.
         writers: further output formats, by file suffix (Blender's).
     """
+    if options.against:
+        return run_comparison(options, reporter)
+    if len(options.motion) > 1:
+        raise InputError("evaluate", f"{len(options.motion)} motions", "one motion, or --against LIBRARY",
+                         "evaluate them one after the other")
+    (options.motion,) = options.motion
+
     from ..annotation import check_timeline, read_timeline
     from ..evaluation.html import build_html_report
     from ..evaluation.plots import require_matplotlib

@@ -360,7 +360,7 @@ class View:
         self.played, self.timeline, self.library, self.track = played, timeline, library, track
         self.fps, self.count = motion.fps, len(motion)
         self.reference = None if library is None else load_reference(library, motion.fps)
-        self.scale = 1.0 if library is None else _compute_scale(motion.skeleton, library.skeleton)
+        self.scale = 1.0 if library is None else compute_scale(motion.skeleton, library.skeleton)
         self.stride = played.compute_stride(library)
         self.reference_rows = self._find_reference_rows()
         self.used_rows = np.rint(self.reference_rows[np.isfinite(self.reference_rows)]).astype(int)
@@ -419,7 +419,7 @@ class View:
         return self.reference.find_rows(self.played.clips, self.played.clip, self.played.clip_frame)
 
 
-def _compute_scale(skeleton: Skeleton, library: Skeleton) -> float:
+def compute_scale(skeleton: Skeleton, library: Skeleton) -> float:
     """Compute the stature of a skeleton relative to the library's; InputError if the bones differ otherwise."""
     if skeleton.has_same_bones(library, 5e-3):
         return 1.0
