@@ -38,6 +38,7 @@ from ..synthetic import gestures
 from ..synthetic.gait import build_gait
 from ..synthetic.gait_plan import GaitStyle
 from .features import Frames
+from .missing_steps import BACK, STEP, TURN, iter_missing_steps
 from .scan import CACHE_FOLDER
 from .standing_loops import iter_standing_loops
 
@@ -165,6 +166,9 @@ def iter_synthetic_clips(
         row = ClipAnnotation(0, len(motion) - 1, None, (STANDING,))
         contacts = np.ones((len(motion), 2, 2), bool)
         yield SyntheticClip(f"{SYNTHETIC_FOLDER}{STAND_PREFIX}{number + 1}.bvh", motion, (row,), contacts)
+    for name, motion, heel_toe_contacts, speed in iter_missing_steps(clips, frames, fps, strangeness, example, FPS):
+        rows = _build_step_rows(name, len(motion), speed, speeds)
+        yield _ground_clip(f"{SYNTHETIC_FOLDER}{name}.bvh", motion, heel_toe_contacts, rows)
 
 
 def sample_upright_example(clips: Sequence) -> Motion:
@@ -316,6 +320,14 @@ def _build_gait_rows(speed: np.ndarray, speeds: dict[str, float]) -> tuple[ClipA
     words = sorted((word for word in speeds if word in _GAITS), key=speeds.get)
     band = np.searchsorted(compute_gait_thresholds(np.array([speeds[word] for word in words])), speed, side="right")
     return tuple(ClipAnnotation(a, b - 1, None, (words[band[a]], "front")) for a, b in find_equal_runs(band))
+
+
+def _build_step_rows(name: str, count: int, speed: float, speeds: dict[str, float]) -> tuple[ClipAnnotation, ...]:
+    """Build the row of a step that recordings lack (`missing_steps`): the gait of its speed, and its direction."""
+    if name.startswith((TURN, STEP)):
+        return (ClipAnnotation(0, count - 1, None, (STANDING, "turning") if name.startswith(TURN) else (STANDING,)),)
+    gait = _build_gait_rows(np.full(1, speed), speeds)[0].words[0]
+    return (ClipAnnotation(0, count - 1, None, (gait, "back" if name.startswith(BACK) else "left")),)
 
 
 def _ground_clip(name: str, motion: Motion, heel_toe_contacts: np.ndarray | None, rows,

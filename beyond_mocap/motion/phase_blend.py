@@ -14,6 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.interpolate import PchipInterpolator
 
+from ..base.easing import smoothstep
 from ..base.vectors import distances_along
 from . import quaternion
 from .humanoid import compute_heading_from_positions
@@ -139,6 +140,38 @@ def blend_strides(slow: Strides, fast: Strides, speed: float, fps: float) -> tup
     ground = path + quaternion.rotate_level(mixed["sway"], facing)
     root = np.concatenate([ground, mixed["height"][:, None]], axis=1)
     return Motion(slow.motion.skeleton, root, quaternion.unify_signs(rotations), fps), mixed["inside"] > 0.0
+
+
+def loop_strides(strides: Strides, seconds: float, fps: float, tempo: float = 1.0,
+                 length: float = 1.0) -> tuple[Motion, np.ndarray]:
+    """Play a walk again and again, straight along +X or, backward in time, along -X.
+
+    Its steps get one duration. The last one is mixed into the one before the first, which has the same foot.
+
+    Args:
+        strides: a recording of at least three steps.
+        seconds: of the result.
+        fps: frames per second of the result.
+        tempo: factor on steps per second; below zero time runs backward.
+        length: factor on the distance travelled per step.
+    Returns:
+        The motion, and the contacts (T, 2, 2) bool of left and right, heel and toe.
+    """
+    rate = tempo / float(strides.seconds.mean())
+    count = (strides.steps - 1) // 2 * 2
+    phase = 1.0 + np.mod(np.arange(int(seconds * fps) + 1) / fps * rate, count)
+    # both samples show the same foot: one step before the loop begins, and one step before it ends
+    share = smoothstep(phase - count)[:, None]
+    late, early = (_sample_at_phase(strides, at, strides.steps) for at in (phase, np.clip(phase - count, 0.0, 1.0)))
+    mixed = {name: late[name] * (1.0 - weight) + early[name] * weight for name in ("height", "sway", "turn", "way",
+             "inside") for weight in [share.reshape(-1, *[1] * (late[name].ndim - 1))]}
+    facing = _integrate((mixed["turn"] - mixed["turn"].mean()) * rate, fps)
+    path = _integrate(quaternion.rotate_level(mixed["way"], facing) * (rate * length), fps)
+    rotations = quaternion.slerp(late["pose"], early["pose"], share)
+    rotations[:, 0] = quaternion.multiply(quaternion.from_up_angle(facing), rotations[:, 0])
+    ground = path + quaternion.rotate_level(mixed["sway"], facing)
+    root = np.concatenate([ground, mixed["height"][:, None]], axis=1)
+    return Motion(strides.motion.skeleton, root, quaternion.unify_signs(rotations), fps), mixed["inside"] > 0.0
 
 
 def _align_first_foot(a: Strides, b: Strides) -> tuple[Strides, Strides]:
