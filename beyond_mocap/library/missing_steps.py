@@ -27,7 +27,7 @@ from ..motion.humanoid import compute_heading_from_positions, identify_joints
 from ..motion.motion import Motion, compute_local_rotations, forward_kinematics
 from ..motion.phase_blend import Strides, find_strides, loop_strides
 from ..motion.retargeting.neutral import NeutralStance, build_neutral_stance
-from ..motion.retargeting.posture import Posture, to_motion
+from ..motion.retargeting.posture import to_motion
 from ..motion.retargeting.structure import list_descendants
 from ..motion.skeleton import Skeleton
 from ..motion.track import smooth_zero_phase_hann
@@ -39,17 +39,19 @@ BACK, SIDE, TURN, STEP = "back_", "side_", "turn_", "step_"
 """How the names of the clips begin."""
 
 BACK_SPEEDS = (0.4, 0.8, 1.2, 1.6)  # m/s
-SIDE_SPEEDS = ((0.5, False), (0.8, False), (1.1, True), (1.5, True))  # m/s, and whether the feet cross
+# m/s, degrees from the heading to the left, and whether the feet cross
+SIDE_WALKS = ((0.5, 90, False), (0.8, 90, False), (1.1, 90, True), (1.5, 90, True), (0.5, 45, False), (0.9, 45, False),
+              (1.3, 45, False), (0.5, 135, False), (0.9, 135, False), (1.3, 135, False))
 TURNS = tuple(np.radians((45.0, 90.0, 135.0, 180.0)))
 MOVES = ((0.3, 0.0), (-0.3, 0.0), (0.0, 0.25), (0.0, 0.45))  # m ahead and to the left
-MIN_SECONDS = 6.0  # of recording at a speed in a direction from which on it does not lack
+MIN_SECONDS = 15.0  # of recording at a speed in a direction from which on it does not lack
 MIN_MOVES = 3  # recorded moves from a stand to a stand from which on such moves do not lack
-_SPEED_RANGE, _DIRECTION_RANGE = (0.8, 1.25), np.radians(30.0)  # around a speed and a direction
+_SPEED_RANGE, _DIRECTION_RANGE = (0.8, 1.25), np.radians(22.5)  # around a speed and a direction
 _RESTING_SPEED, _RESTING_TURN, _MOST_MOVE_SECONDS = 0.15, np.radians(20.0), 3.0  # m/s, rad/s and s
 _MOST_MOVE_OF_TURN, _MOVE_RANGE = 0.5, 0.12  # m
-_LOOP_SECONDS = 6.0  # of a walk
+_LOOP_SECONDS = 5.0  # of a walk
 # of walks whose trunk, arms and legs are used: m/s, the best one, rad that they turn, s, steps, and how many
-_WALK_SPEEDS, _USUAL_SPEED, _MOST_BEND, _MIN_WALK_SECONDS, _LEAST_STEPS, _WALKS = (0.7, 1.9), 1.2, 0.6, 1.5, 4, 6
+_WALK_SPEEDS, _USUAL_SPEED, _MOST_BEND, _MIN_WALK_SECONDS, _LEAST_STEPS, _WALKS = (0.7, 1.9), 1.2, 0.6, 1.5, 4, 3
 _WALKS_OF_SPEED = 2
 _STEP_SHARE = 0.6  # exponent: how much of a change of speed is longer steps; the rest is tempo
 _BACK_STEP = 0.92  # a backward step against a forward one at the same speed
@@ -128,10 +130,10 @@ def iter_missing_steps(
                 yield f"{BACK}{speed:.1f}_{number + 1}", *reverse_walk(walk, speed, rate), speed
     neutral = build_neutral_stance(example.skeleton, example)
     carriage = measure_carriage(clips, frames, fps, strangeness, walks, rate)
-    for speed, crosses in SIDE_SPEEDS if walks else ():
-        if count_seconds(frames, fps, belongs, speed, np.pi / 2.0) < MIN_SECONDS:
-            sequence = build_side_walk(speed, _LOOP_SECONDS, rate, neutral, crosses)
-            name = f"{SIDE}{'cross' if crosses else 'close'}_{speed:.1f}"
+    for speed, degrees, crosses in SIDE_WALKS if walks else ():
+        if count_seconds(frames, fps, belongs, speed, np.radians(degrees)) < MIN_SECONDS:
+            sequence = build_side_walk(speed, np.radians(degrees), _LOOP_SECONDS, rate, neutral, crosses)
+            name = f"{SIDE}{degrees}_{speed:.1f}"
             yield name, lend_upper_body(sequence, neutral, carriage, speed), None, speed
     missing = list_missing_moves(measure_moves(clips, frames, fps, belongs)) if carriage.stand is not None else []
     for name, move, turn in missing:
@@ -191,7 +193,7 @@ def _measure_hip_drop(motion: Motion) -> float:
     legs = [positions[:, [limb.upper_leg, limb.lower_leg, limb.foot]] for limb in (body.left, body.right)]
     length = np.mean([np.linalg.norm(np.diff(leg[0], axis=0), axis=-1).sum() for leg in legs])
     height = np.mean([leg[:, 0, 2] for leg in legs], axis=0) - np.min([leg[:, 2, 2] for leg in legs], axis=0)
-    return float(length - np.percentile(height, 80))
+    return float(length - np.percentile(height, 95))
 
 
 def _turn_ahead(motion: Motion) -> np.ndarray:

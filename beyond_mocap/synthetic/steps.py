@@ -28,7 +28,7 @@ PEAK_TURN_RATE = np.radians(140.0)  # rad/s of a turn on the spot
 # cross, longer steps than without crossing, and rad by which the pelvis turns with the legs
 _CROSS_AHEAD, _CROSS_WIDTH, _CROSS_CADENCE, _CROSS_TURN = 0.20, 0.25, 0.80, np.radians(16.0)
 # s: before the first step and after the last one, of a swing, and from one landing to the next lift
-_REST, _SWING, _BOTH_DOWN = 0.5, 0.38, 0.10
+_REST, _SWING, _BOTH_DOWN = 2.5, 0.38, 0.10
 _MOST_TURN_OF_STEP = np.radians(50.0)
 _SWAY = 0.045  # m that an adult's hips move over the standing foot
 _QUINTIC_PEAK = 1.875  # largest slope of `quintic_step`
@@ -49,20 +49,22 @@ class StepSequence:
     phase: np.ndarray
 
 
-def build_side_walk(speed: float, duration: float, fps: float, neutral: NeutralStance, crosses: bool) -> StepSequence:
-    """Build a steady walk to the left of a body that faces +X.
+def build_side_walk(speed: float, direction: float, duration: float, fps: float, neutral: NeutralStance,
+                    crosses: bool = False) -> StepSequence:
+    """Build a steady walk of a body that faces +X and goes to its left, or diagonally.
 
     Args:
         speed: m/s.
+        direction: rad, of travel relative to the heading.
         duration: s.
         fps: frames per second.
         neutral: neutral stance of the body.
-        crosses: the right foot passes ahead of the left one; else they only close up.
+        crosses: the right foot passes ahead of the left one, for a body that goes to its left; else they only close up.
     Returns:
         The movement.
     """
     style = GaitStyle(cadence=_CROSS_CADENCE if crosses else 1.0, life=0.0)
-    plan = plan_gait(speed, duration, fps, neutral, direction=np.pi / 2.0, style=style)
+    plan = plan_gait(speed, duration, fps, neutral, direction=direction, style=style)
     steps = tuple(plan_footsteps(plan, neutral, style, side) for side in (LEFT, RIGHT))
     if crosses:
         steps = tuple(_cross_foot(one, plan, neutral) for one in steps)
