@@ -24,6 +24,7 @@ from .clip import Clip
 from .clusters import Clusters
 from .features import FPS, Frames, build_frames, join_frames
 from .keys import Key, collect_keys
+from .manners import Manners, measure_manners
 from .missing_steps import BACK_SPEEDS, TURNS
 from .posture import NormalPostures, fit_normal_postures
 from .standing_loops import MIN_STAND_SECONDS
@@ -127,6 +128,12 @@ class Library:
     def normal_postures(self) -> NormalPostures:
         """How people of this library stand, walk, jog and run."""
         return fit_normal_postures(self.frames, self._is_recorded)
+
+    @cached_property
+    def manners(self) -> Manners:
+        """How the people of this library move."""
+        is_calm = self._is_recorded & (self.strangeness <= 1.0)
+        return measure_manners([clip.path for clip in self.clips], self.frames, is_calm, self.fps)
 
     @cached_property
     def _is_recorded(self) -> np.ndarray:

@@ -169,6 +169,7 @@ class Plan:
     solve_touches: bool = field(default=_DEFAULTS["solve_touches"], metadata=LATER)
     variety: float = field(default=_DEFAULTS["variety"], metadata=LATER)
     lag: float = field(default=_DEFAULTS["lag"], metadata=LATER)
+    manner: int = field(default=_DEFAULTS["manner"], metadata=LATER)
     solved: SolvedTrajectory | None = field(default=None, compare=False, repr=False, metadata=LATER)
 
     def __post_init__(self):
@@ -260,7 +261,8 @@ class ResolvedPlan:
     @property
     def _scaled_heading_keys(self) -> list[HeadingKey]:
         """The heading keys with their targets in the library's size."""
-        return [key if key.target is None else replace(key, target=tuple(value / self.size for value in key.target))
+        return [key if key.target is None else
+                replace(key, target=(key.target[0] / self.size, key.target[1] / self.size))
                 for key in self.requested.heading_keys]
 
     def sample_track(self, fps: float, rests: bool = True) -> SampledTrack:

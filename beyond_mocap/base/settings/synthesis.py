@@ -85,6 +85,8 @@ TABLES = {
                 "that neighbours in a match are not in step"),
         Setting(name="lag", default=0.0, least=0.0, most=60.0, unit="seconds", help="lag of a player of a match behind "
                 "the clock, so that neighbours differ"),
+        Setting(name="manner", default=-1, least=-1, most=100000, help="number of the recording whose manner of "
+                "walking a player of a match keeps; -1 for none"),
         Setting(name="gaits", default=(), option="--gait", metavar="LABEL=CLIP", help="the clip that represents a "
                 "gait, such as walking=folder/walk.bvh; once for each gait", title="Gait Clips", tuning="any",
                 tooltip="Clips that represent the gaits, such as walking=folder/walk.bvh; jogging=folder/jog.bvh",

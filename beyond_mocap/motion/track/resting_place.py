@@ -28,7 +28,7 @@ LEAVE_DISTANCE = 0.10
 MOST_DISTANCE = 0.12
 """Metres from the smoothed track that a body stays within, also where a sharp turn of the track is smoothed away."""
 
-LEAST_LEEWAY, MOST_LEEWAY = 0.01, 0.05
+LEAST_LEEWAY, MOST_LEEWAY = 0.01, 0.04
 """Metres that a body may always stay off its planned place so that its feet rest, and that it may at most."""
 
 MIN_REST_SECONDS = 0.6
@@ -58,7 +58,7 @@ def relax_track(track: SampledTrack) -> SampledTrack:
     used = np.linalg.norm(positions - track.positions, axis=1)
     return replace(track, positions=positions, raw=raw, velocity=velocity, speed=np.linalg.norm(velocity, axis=1),
                    direction=compute_travel_direction(velocity, track.fps),
-                   leeway=np.clip(MOST_DISTANCE - used, LEAST_LEEWAY, MOST_LEEWAY))
+                   leeway=np.clip(LEAVE_DISTANCE - used, LEAST_LEEWAY, MOST_LEEWAY))
 
 
 def relax_positions(fast: np.ndarray, measured: np.ndarray, fps: float) -> np.ndarray:

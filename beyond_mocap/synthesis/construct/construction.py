@@ -51,6 +51,10 @@ from .transitions import blend_rotations, blend_values, compute_blend_share
 # s on either side of a key moment without a clip, in which the body reaches for the ball and returns
 REACH_SECONDS = 0.4
 
+FREE_SECONDS, FREE_FADE = 0.4, 0.4
+"""Seconds before and after a touch, within the entry and exit of its clip, in which the clip decides how the body
+faces, and seconds over which the plan takes over: a run-up that turned as it was recorded spun on sharp turns."""
+
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Construction:
@@ -170,18 +174,20 @@ class Construction:
     def _solve_heading(self) -> np.ndarray:
         """Solve the heading (T,) rad from given values, track and source, turned to the ball at touches."""
         given = self.heading if self.old is None else self.old.compute_heading(self.smooth_source.pose)
-        heading = solve_heading(self.track, self._turning_source, given, self._is_at_ball)
+        heading = solve_heading(self.track, self._turning_source, given, self._freedom)
         if self.old is not None:
             track = self.old.match_turning(self.track, heading)
-            heading = heading if track is None else solve_heading(track, self._turning_source, given, self._is_at_ball)
+            heading = heading if track is None else solve_heading(track, self._turning_source, given, self._freedom)
         return heading + (1.0 - self._old_share) * self._turn_to_ball(heading) if self.turns_to_ball else heading
 
     @property
-    def _is_at_ball(self) -> np.ndarray:
-        """(T,) bool: frames within the entry and exit of a touch, where the clip decides how the body faces."""
-        at, found = np.arange(len(self.track)), np.zeros(len(self.track), bool)
+    def _freedom(self) -> np.ndarray:
+        """(T,) how far the clip decides how the body faces, not the plan: 1 near a touch, 0 away from it."""
+        at, found = np.arange(len(self.track)), np.zeros(len(self.track))
         for touch in self.touches:
-            found |= (at >= touch.frame - touch.entry) & (at <= touch.frame + touch.leave)
+            before, after = (min(frames, FREE_SECONDS * self.plan.fps) for frames in (touch.entry, touch.leave))
+            away = np.maximum(touch.frame - before - at, at - touch.frame - after) / (FREE_FADE * self.plan.fps)
+            found = np.maximum(found, 1.0 - smoothstep(np.clip(away, 0.0, 1.0)))
         return found
 
     @property
@@ -270,7 +276,7 @@ def apply_heading(pose: np.ndarray, heading: np.ndarray) -> np.ndarray:
 
 
 def solve_heading(
-    track: SampledTrack, source: SourceMotion, given: np.ndarray | None = None, is_free: np.ndarray | bool = False
+    track: SampledTrack, source: SourceMotion, given: np.ndarray | None = None, freedom: np.ndarray | float = 0.0
 ) -> np.ndarray:
     """Solve the heading: the compromise between the track's direction and the source's own turning.
 
@@ -278,7 +284,7 @@ def solve_heading(
         track: T frames; a body in place or moving slowly turns to the gaze target of the track.
         source: T source frames without jumps.
         given: (T,) rad that the heading has to be, NaN where it is free.
-        is_free: (T,) bool, frames in which the planned heading does not count.
+        freedom: (T,) from 0 to 1, how little the planned heading counts.
     Returns:
         (T,) rad, unwrapped.
     """
@@ -286,7 +292,7 @@ def solve_heading(
     if track.heading is not None:
         firm = firm * measure_rest(source, track.speed)
     return fit_heading(track.direction, track.speed, source.velocity, source.turn, given, firm=firm, plan=track.heading,
-                       is_free=is_free)
+                       freedom=freedom)
 
 
 def find_touches(library: Library, fps: float, edit: EditList, keys: tuple[KeyResult, ...]) -> tuple[Touch, ...]:

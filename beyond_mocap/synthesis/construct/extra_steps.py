@@ -27,7 +27,7 @@ from ...motion.track import smooth_zero_phase_hann
 from .move_body_part import leg_chain
 
 SPEED = np.array([0.05, 0.3, 0.8, 1.5])
-STRIDE = np.array([0.12, 0.25, 0.40, 0.45])
+STRIDE = np.array([0.12, 0.25, 0.30, 0.34])
 TURN = np.array([0.28, 0.35, 0.45, 0.60])
 SWING = np.array([0.45, 0.38, 0.32, 0.30])
 """By the body's speed (SPEED, m/s): metres that a foot is dragged (STRIDE) and radians that it is turned (TURN) from
@@ -43,6 +43,10 @@ SETTLE_SECONDS = 0.04  # s of contact that a foot needs before the other one is 
 UNWIND_SECONDS = 0.17  # s before a lift in which a foot may lag
 SHORTEST = 0.2  # s of a stance that are left on either side of a step
 FOOT_SEPARATION = 0.11  # m between the ankles of feet that pass each other
+CROSSING_ROOM = (0.15, 0.30)
+"""Metres that feet are one before the other from which on they need not be side by side, and from which on they may
+cross."""
+MAX_SEPARATING = 0.15  # m that a foot is set down further apart at most
 LIFT_HEIGHT = 0.045  # m that a foot is lifted
 HEEL_UP, TOE_UP = 0.22, 0.06  # rad: heel over toe after lifting, toe over heel before landing
 SWAY = 0.012  # m that the pelvis moves over the planted foot
@@ -437,6 +441,8 @@ def _separate_feet(plan: _StepPlan, stepped: np.ndarray, left: np.ndarray) -> np
     near = np.pad(stepped, ((1, 1), (0, 0)))
     # a stance is loose, and may be moved, if a step begins or ends it
     loose = [[bool(near[a, side] or near[b + 1, side]) for a, b in stances[side]] for side in (_LEFT, _RIGHT)]
+    # the shorter one of two is moved more: a long stand does not shift for one step beside it
+    yields = [[free / (b - a) for free, (a, b) in zip(*both)] for both in zip(loose, stances)]
     place = [[foot.points[a:b].mean(axis=0) for a, b in stances[side]] for side, foot in enumerate(plan.feet)]
     pushed = [[0.0j] * len(side) for side in place]
     # pairs of overlapping stances with the body's left in the middle of the overlap; one of them at least is loose
@@ -446,12 +452,16 @@ def _separate_feet(plan: _StepPlan, stepped: np.ndarray, left: np.ndarray) -> np
     for _ in range(_ROUNDS):
         for i, j, left_direction in pairs:
             between = place[_LEFT][i] - place[_RIGHT][j] + pushed[_LEFT][i] - pushed[_RIGHT][j]
-            missing = FOOT_SEPARATION - float((between * left_direction.conjugate()).real.min())
+            # real part to the left, imaginary part backward; feet one well before the other may cross
+            apart = between * left_direction.conjugate()
+            needed = np.interp(np.abs(apart.imag), CROSSING_ROOM, (FOOT_SEPARATION, -FOOT_SEPARATION))
+            missing = min(float((needed - apart.real).max()), MAX_SEPARATING - max(abs(pushed[_LEFT][i]),
+                                                                                    abs(pushed[_RIGHT][j])))
             if missing > 0.0:
                 # split what lacks between the loose ones of the two
-                share = missing / (loose[_LEFT][i] + loose[_RIGHT][j])
-                pushed[_LEFT][i] += share * loose[_LEFT][i] * left_direction
-                pushed[_RIGHT][j] -= share * loose[_RIGHT][j] * left_direction
+                share = missing / (yields[_LEFT][i] + yields[_RIGHT][j])
+                pushed[_LEFT][i] += share * yields[_LEFT][i] * left_direction
+                pushed[_RIGHT][j] -= share * yields[_RIGHT][j] * left_direction
     out = np.zeros((len(stepped), 2, 2))
     for side in (_LEFT, _RIGHT):
         if any(pushed[side]):

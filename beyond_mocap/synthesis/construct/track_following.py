@@ -63,7 +63,7 @@ _ROOT_X, _ROOT_Y, _TURN, _UNKNOWNS = 0, 1, 2, 3
 
 def fit_heading(
     direction: np.ndarray, speed: np.ndarray, velocity: np.ndarray, turn: np.ndarray, given: np.ndarray | None = None,
-    firm: np.ndarray | float = 1.0, plan: np.ndarray | None = None, is_free: np.ndarray | bool = False,
+    firm: np.ndarray | float = 1.0, plan: np.ndarray | None = None, freedom: np.ndarray | float = 0.0,
 ) -> np.ndarray:
     """Solve the heading: the least squares compromise between travel and the recording's own turning.
 
@@ -79,7 +79,7 @@ def fit_heading(
         given: (T,) rad that the heading has to be, NaN where it is free.
         firm: (T,) how many times firmer than usual the recording's turning is followed (`compute_turning_firmness`).
         plan: (T,) rad, unwrapped, near which the heading stays; None without a plan.
-        is_free: (T,) bool, frames in which the plan does not count, as at the ball.
+        freedom: (T,) from 0 to 1, how little the plan counts, as at the ball.
     Returns:
         (T,) rad, unwrapped.
     """
@@ -87,7 +87,7 @@ def fit_heading(
     goal = direction - arctan2(velocity[:, 1], velocity[:, 0])
     trust = _motion_weight(speed) ** 2 * _motion_weight(np.linalg.norm(velocity, axis=1)) ** 2
     if plan is not None:
-        return follow_plan(plan, goal, trust, speed=speed, turn=turn, given=given, firm=firm, is_free=is_free)
+        return follow_plan(plan, goal, trust, speed=speed, turn=turn, given=given, firm=firm, freedom=freedom)
     trust = trust + FAINT_WEIGHT
     if given is not None:
         goal, trust = np.where(np.isnan(given), goal, given), np.where(np.isnan(given), trust, GIVEN_HEADING_WEIGHT)
@@ -96,7 +96,7 @@ def fit_heading(
 
 def follow_plan(
     plan: np.ndarray, goal: np.ndarray, trust: np.ndarray, *, speed: np.ndarray, turn: np.ndarray,
-    given: np.ndarray | None = None, firm: np.ndarray | float = 1.0, is_free: np.ndarray | bool = False,
+    given: np.ndarray | None = None, firm: np.ndarray | float = 1.0, freedom: np.ndarray | float = 0.0,
 ) -> np.ndarray:
     """Solve the heading near a plan: a body at rest turns as its recording does, within the plan's own dead zone.
 
@@ -108,13 +108,14 @@ def follow_plan(
         turn: (T,) rad that the recording turned since the frame before.
         given: (T,) rad that the heading has to be, NaN where it is free; None for free everywhere.
         firm: (T,) how many times firmer than usual the recording's turning is followed.
-        is_free: (T,) bool, frames in which the recording alone decides.
+        freedom: (T,) from 0 to 1, how far the recording alone decides.
     Returns:
         (T,) rad.
     """
-    most = np.where(is_free, np.pi, MAX_OFF_PLAN)
+    most = MAX_OFF_PLAN + freedom * (np.pi - MAX_OFF_PLAN)
     off = np.clip(quaternion.wrap_angle(goal - plan), -most, most)
-    pull = np.where(is_free, FAINT_WEIGHT, np.interp(speed, PLAN_SPEEDS, PLAN_WEIGHTS))
+    pull = np.interp(speed, PLAN_SPEEDS, PLAN_WEIGHTS)
+    pull = pull + freedom * (FAINT_WEIGHT - pull)
     goal, trust = plan + off * trust / (trust + pull), trust + pull
     if given is not None:
         turns = 2.0 * np.pi * np.round((np.nan_to_num(given) - plan) / (2.0 * np.pi))
@@ -124,7 +125,7 @@ def follow_plan(
     for _ in range(_HELD_ROUNDS):
         away = heading - plan
         beyond = (np.abs(away) > most) & (trust < GIVEN_HEADING_WEIGHT)
-        goal = np.where(beyond, plan + np.sign(away) * MAX_OFF_PLAN, goal)
+        goal = np.where(beyond, plan + np.sign(away) * most, goal)
         trust = np.where(beyond, np.maximum(trust, PLAN_WEIGHTS[-1]), trust)
         heading = follow_turning(goal, trust, turn, firm)
     return heading

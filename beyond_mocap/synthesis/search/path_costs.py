@@ -104,6 +104,7 @@ TERMS = {
     "rate_change": "change of playback rate",
     "avoided": "an avoided label",
     "style": "not a clip of the style",
+    "manner": "moves unlike this player",
     "variety": "does not match this player's own lag",
 }
 """Name of a cost term -> its description in "Why This Clip?"."""
@@ -146,7 +147,7 @@ class Weights:
     lift: float = 2.0
     facing: float = 1.0
     slide: float = 1.2
-    words: float = 1.5
+    words: float = 3.0
     automatic_words: float = 1.0
     unasked: float = 2.0
     strange: float = 2.0
@@ -312,6 +313,8 @@ class PathCosts:
         yield "made", np.float32(w.synthetic) * self.index.is_made_travel[frame]
         if self.request.style_cost is not None:
             yield "style", self.request.style_cost[frame]
+        if self.request.manner_cost is not None:
+            yield "manner", self.request.manner_cost[frame]
         if self.reuse_cost is not None:
             yield "price", self.reuse_cost[frame]
         if avoid:

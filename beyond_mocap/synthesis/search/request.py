@@ -27,7 +27,7 @@ from ...library.keys import Key, list_nearest_labels, select_keys, select_neares
 from ...library.library import Library
 from ...motion.track import SampledTrack
 from ..plan import Plan, ResolvedPlan
-from .preferences import LagPreference, build_lag_preference, compute_style_cost
+from .preferences import LagPreference, build_lag_preference, compute_manner_cost, compute_style_cost
 
 PAPERS_OMEGA = 4.0  # Faustino 2016, §3.1.1
 USE_NEAREST = "turn on Nearest Labels"
@@ -74,6 +74,7 @@ class SearchRequest:
         avoided: per frame the labels that must not be shown; empty where all may be shown throughout.
         style_cost: (N,) float32, cost per slot of library frames without the requested style, None where none is
             requested.
+        manner_cost: (N,) float32, cost per slot of library frames that move unlike the player, None for no manner.
         weak_foot: side of the foot that key moments without a side avoid, or "".
         lag_preference: the player's preference for a lag, None for none.
     """
@@ -89,6 +90,7 @@ class SearchRequest:
     warnings: tuple[str, ...]
     avoided: tuple[frozenset[str], ...] = ()
     style_cost: np.ndarray | None = None
+    manner_cost: np.ndarray | None = None
     weak_foot: str = ""
     lag_preference: LagPreference | None = None
 
@@ -140,7 +142,8 @@ def build_request(library: Library, plan: ResolvedPlan) -> SearchRequest:
                          is_asked=_find_asked(plan.timeline, track.times, requested_labels),
                          gait=gait,
                          timeline=timeline, keys=keys, allowed=allowed, warnings=tuple(warnings), avoided=avoided,
-                         style_cost=off_style, weak_foot=weak_foot, lag_preference=lag_preference)
+                         style_cost=off_style, manner_cost=compute_manner_cost(library, settings.manner),
+                         weak_foot=weak_foot, lag_preference=lag_preference)
 
 
 def _find_asked(timeline: Timeline, times: np.ndarray, requested_labels: list[Labels]) -> np.ndarray:
