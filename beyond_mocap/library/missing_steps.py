@@ -35,7 +35,7 @@ from ..synthetic.steps import StepSequence, build_side_walk, build_steps_in_plac
 from .features import Frames
 from .standing_loops import iter_standing_loops
 
-BACK, SIDE, TURN, STEP = "back_", "side_", "turn_", "step_"
+BACK_PREFIX, SIDE_PREFIX, TURN_PREFIX, STEP_PREFIX = "back_", "side_", "turn_", "step_"
 """How the names of the clips begin."""
 
 BACK_SPEEDS = (0.4, 0.8, 1.2, 1.6)  # m/s
@@ -118,7 +118,7 @@ def iter_missing_steps(
         example: a recording on the library's skeleton, for its neutral stance.
         rate: frames per second of the clips.
     Yields:
-        Name, which begins with BACK, SIDE, TURN or STEP; the motion; its contacts (T, 2, 2) bool of heels and toes,
+        Name, which begins with one of the prefixes; the motion; its contacts (T, 2, 2) bool of heels and toes,
         None where they have to be detected; and its speed, m/s, 0 from a stand to a stand.
     """
     belongs = select_calm_frames(clips, frames, strangeness)
@@ -127,13 +127,13 @@ def iter_missing_steps(
         if walks and count_seconds(frames, fps, belongs, speed, np.pi) < MIN_SECONDS:
             nearest = sorted(walks, key=lambda walk: abs(np.log(walk.speed / speed)))[:_WALKS_OF_SPEED]
             for number, walk in enumerate(nearest):
-                yield f"{BACK}{speed:.1f}_{number + 1}", *reverse_walk(walk, speed, rate), speed
+                yield f"{BACK_PREFIX}{speed:.1f}_{number + 1}", *reverse_walk(walk, speed, rate), speed
     neutral = build_neutral_stance(example.skeleton, example)
     carriage = measure_carriage(clips, frames, fps, strangeness, walks, rate)
     for speed, degrees, crosses in SIDE_WALKS if walks else ():
         if count_seconds(frames, fps, belongs, speed, np.radians(degrees)) < MIN_SECONDS:
             sequence = build_side_walk(speed, np.radians(degrees), _LOOP_SECONDS, rate, neutral, crosses)
-            name = f"{SIDE}{degrees}_{speed:.1f}"
+            name = f"{SIDE_PREFIX}{degrees}_{speed:.1f}"
             yield name, lend_upper_body(sequence, neutral, carriage, speed), None, speed
     missing = list_missing_moves(measure_moves(clips, frames, fps, belongs)) if carriage.stand is not None else []
     for name, move, turn in missing:
@@ -290,9 +290,9 @@ def list_missing_moves(recorded: np.ndarray) -> list[tuple[str, tuple[float, flo
     missing = []
     for turn in TURNS:
         if np.sum((far < _MOST_MOVE_OF_TURN) & (np.abs(turned - turn) < np.radians(22.5))) < MIN_MOVES:
-            missing.append((f"{TURN}{np.degrees(turn):.0f}", (0.0, 0.0), float(turn)))
+            missing.append((f"{TURN_PREFIX}{np.degrees(turn):.0f}", (0.0, 0.0), float(turn)))
     for move in MOVES:
         off = np.linalg.norm(np.stack([recorded[:, 0], np.abs(recorded[:, 1])], axis=1) - move, axis=1)
         if np.sum((off < _MOVE_RANGE) & (turned < np.radians(22.5))) < MIN_MOVES:
-            missing.append((f"{STEP}{move[0]:.1f}_{move[1]:.1f}", move, 0.0))
+            missing.append((f"{STEP_PREFIX}{move[0]:.1f}_{move[1]:.1f}", move, 0.0))
     return missing

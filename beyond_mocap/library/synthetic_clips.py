@@ -38,7 +38,7 @@ from ..synthetic import gestures
 from ..synthetic.gait import build_gait
 from ..synthetic.gait_plan import GaitStyle
 from .features import Frames
-from .missing_steps import BACK, STEP, TURN, iter_missing_steps
+from .missing_steps import BACK_PREFIX, STEP_PREFIX, TURN_PREFIX, iter_missing_steps
 from .scan import CACHE_FOLDER
 from .standing_loops import iter_standing_loops
 
@@ -324,10 +324,10 @@ def _build_gait_rows(speed: np.ndarray, speeds: dict[str, float]) -> tuple[ClipA
 
 def _build_step_rows(name: str, count: int, speed: float, speeds: dict[str, float]) -> tuple[ClipAnnotation, ...]:
     """Build the row of a step that recordings lack (`missing_steps`): the gait of its speed, and its direction."""
-    if name.startswith((TURN, STEP)):
-        return (ClipAnnotation(0, count - 1, None, (STANDING, "turning") if name.startswith(TURN) else (STANDING,)),)
+    if name.startswith((TURN_PREFIX, STEP_PREFIX)):
+        return (ClipAnnotation(0, count - 1, None, (STANDING, "turning") if name.startswith(TURN_PREFIX) else (STANDING,)),)
     gait = _build_gait_rows(np.full(1, speed), speeds)[0].words[0]
-    return (ClipAnnotation(0, count - 1, None, (gait, "back" if name.startswith(BACK) else "left")),)
+    return (ClipAnnotation(0, count - 1, None, (gait, "back" if name.startswith(BACK_PREFIX) else "left")),)
 
 
 def _ground_clip(name: str, motion: Motion, heel_toe_contacts: np.ndarray | None, rows,
