@@ -49,7 +49,7 @@ MIN_MOVES = 3  # recorded moves from a stand to a stand from which on such moves
 _SPEED_RANGE, _DIRECTION_RANGE = (0.8, 1.25), np.radians(22.5)  # around a speed and a direction
 _RESTING_SPEED, _RESTING_TURN, _MOST_MOVE_SECONDS = 0.15, np.radians(20.0), 3.0  # m/s, rad/s and s
 _MOST_MOVE_OF_TURN, _MOVE_RANGE = 0.5, 0.12  # m
-_LOOP_SECONDS = 5.0  # of a walk
+_LOOP_SECONDS = 4.5  # of a walk
 # of walks whose trunk, arms and legs are used: m/s, the best one, rad that they turn, s, steps, and how many
 _WALK_SPEEDS, _USUAL_SPEED, _MOST_BEND, _MIN_WALK_SECONDS, _LEAST_STEPS, _WALKS = (0.7, 1.9), 1.2, 0.6, 1.5, 4, 3
 _WALKS_OF_SPEED = 2

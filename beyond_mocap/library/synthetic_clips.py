@@ -324,10 +324,11 @@ def _build_gait_rows(speed: np.ndarray, speeds: dict[str, float]) -> tuple[ClipA
 
 def _build_step_rows(name: str, count: int, speed: float, speeds: dict[str, float]) -> tuple[ClipAnnotation, ...]:
     """Build the row of a step that recordings lack (`missing_steps`): the gait of its speed, and its direction."""
-    if name.startswith((TURN_PREFIX, STEP_PREFIX)):
-        return (ClipAnnotation(0, count - 1, None, (STANDING, "turning") if name.startswith(TURN_PREFIX) else (STANDING,)),)
-    gait = _build_gait_rows(np.full(1, speed), speeds)[0].words[0]
-    return (ClipAnnotation(0, count - 1, None, (gait, "back" if name.startswith(BACK_PREFIX) else "left")),)
+    words = (STANDING, "turning") if name.startswith(TURN_PREFIX) else (STANDING,)
+    if not name.startswith((TURN_PREFIX, STEP_PREFIX)):
+        gait = _build_gait_rows(np.full(1, speed), speeds)[0].words[0]
+        words = (gait, "back" if name.startswith(BACK_PREFIX) else "left")
+    return (ClipAnnotation(0, count - 1, None, words),)
 
 
 def _ground_clip(name: str, motion: Motion, heel_toe_contacts: np.ndarray | None, rows,

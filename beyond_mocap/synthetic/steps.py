@@ -18,7 +18,7 @@ from ..motion.retargeting.neutral import NeutralStance
 from ..motion.retargeting.posture import Posture
 from . import gait_tables as tables
 from .footsteps import Footsteps
-from .gait import build_posture, plan_footsteps, plant_feet
+from .gait import build_upper_posture, plan_footsteps, plant_feet
 from .gait_plan import GaitPlan, GaitStyle, plan_gait
 from .gait_tables import interpolate_figure
 
@@ -26,10 +26,11 @@ LEFT, RIGHT = 0, 1
 PEAK_TURN_RATE = np.radians(140.0)  # rad/s of a turn on the spot
 # crossing: m that the trailing foot is ahead of the leading one, widths of the base against those of feet that do not
 # cross, longer steps than without crossing, and rad by which the pelvis turns with the legs
-_CROSS_AHEAD, _CROSS_WIDTH, _CROSS_CADENCE, _CROSS_TURN = 0.20, 0.25, 0.80, np.radians(16.0)
-# s: before the first step and after the last one, of a swing, and from one landing to the next lift
-_REST, _SWING, _BOTH_DOWN = 2.5, 0.38, 0.10
-_MOST_TURN_OF_STEP = np.radians(50.0)
+_CROSS_AHEAD, _CROSS_WIDTH, _CROSS_CADENCE, _CROSS_TURN = 0.26, 0.25, 0.80, np.radians(16.0)
+# s: a stand before the first step and after the last one, the part of it that is planned, a swing, and from one landing
+# to the next lift. A search holds a clip longer than its steps take if it goes on standing
+_REST, _PLANNED_REST, _SWING, _BOTH_DOWN = 2.5, 0.5, 0.38, 0.10
+_MOST_TURN_OF_TWO_STEPS = np.radians(100.0)
 _SWAY = 0.045  # m that an adult's hips move over the standing foot
 _QUINTIC_PEAK = 1.875  # largest slope of `quintic_step`
 _LONG_AGO = 20.0  # s
@@ -68,11 +69,11 @@ def build_side_walk(speed: float, direction: float, duration: float, fps: float,
     steps = tuple(plan_footsteps(plan, neutral, style, side) for side in (LEFT, RIGHT))
     if crosses:
         steps = tuple(_cross_foot(one, plan, neutral) for one in steps)
-    posture = build_posture(plan, steps, neutral, style, seed=0)
+    posture = build_upper_posture(plan, neutral, style, seed=0)
     if crosses:
         turn = -_CROSS_TURN * np.cos(2.0 * np.pi * plan.phase)[:, None] * [0.0, 0.0, 1.0]
         posture = posture.replace_arrays(pelvis=posture.pelvis + turn, spine=posture.spine - turn)
-        posture = plant_feet(posture, plan.times, steps, neutral)
+    posture = plant_feet(posture, plan.times, steps, neutral)
     return StepSequence(posture.frames(plan.requested_slice), plan.phase[plan.requested_slice])
 
 
@@ -96,12 +97,12 @@ def build_steps_in_place(move: tuple[float, float], turn: float, fps: float, neu
     Returns:
         The movement; the foot on the side to which it goes steps first.
     """
-    count = max(2, int(np.ceil(abs(turn) / _MOST_TURN_OF_STEP)))
-    lifts = _REST + (_SWING + _BOTH_DOWN) * np.arange(count)
+    count = 2 * max(1, int(np.ceil(abs(turn) / _MOST_TURN_OF_TWO_STEPS)))
+    lifts = _PLANNED_REST + (_SWING + _BOTH_DOWN) * np.arange(count)
     first = RIGHT if move[1] < 0.0 or turn < 0.0 else LEFT
     begin = lifts[0] - 0.1
     seconds = max(lifts[-1] + _SWING + 0.05 - begin, _QUINTIC_PEAK * abs(turn) / PEAK_TURN_RATE)
-    plan = plan_gait(0.0, round((begin + seconds + _REST) * fps) / fps, fps, neutral, style=GaitStyle(life=0.0))
+    plan = plan_gait(0.0, round((begin + seconds + _PLANNED_REST) * fps) / fps, fps, neutral, style=GaitStyle(life=0.0))
 
     def place_body(times):
         """Path (N, 2) m and heading (N,) rad at seconds `times`."""
@@ -112,12 +113,14 @@ def build_steps_in_place(move: tuple[float, float], turn: float, fps: float, neu
     direction = np.pi / 2.0 if turn else np.arctan2(move[1], move[0])
     steps = tuple(_plan_swings(side, [lift for s, lift in swings if s == side], place_body, direction, neutral)
                   for side in (LEFT, RIGHT))
-    posture = build_posture(plan, steps, neutral, GaitStyle(life=0.0), seed=0)
+    posture = build_upper_posture(plan, neutral, GaitStyle(life=0.0), seed=0)
     path, heading = place_body(plan.times)
-    hips = np.repeat(posture.hips[:1], len(plan.times), axis=0)  # the height of a stand; later ones look for the feet
+    hips = posture.hips.copy()
     hips[:, :2] = path + quaternion.rotate_level(_compute_sway(plan.times, swings, neutral), heading)
     posture = plant_feet(posture.replace_arrays(hips=hips, heading=heading), plan.times, steps, neutral)
     posture = posture.frames(plan.requested_slice)
+    longer = int((_REST - _PLANNED_REST) * fps)
+    posture = posture.frames(np.clip(np.arange(-longer, len(posture) + longer), 0, len(posture) - 1))
     return StepSequence(posture, np.zeros(len(posture)))
 
 
