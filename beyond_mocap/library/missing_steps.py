@@ -19,7 +19,7 @@ from scipy.interpolate import CubicSpline, PchipInterpolator
 
 from ..annotation import DISCRETE
 from ..base.easing import smoothstep
-from ..base.time_series import find_runs
+from ..base.time_series import find_runs, hann_smooth
 from ..base.vectors import arctan2
 from ..motion import quaternion
 from ..motion.foot_plant import plant_feet
@@ -49,6 +49,7 @@ MIN_MOVES = 3  # recorded moves from a stand to a stand from which on such moves
 _SPEED_RANGE, _DIRECTION_RANGE = (0.8, 1.25), np.radians(22.5)  # around a speed and a direction
 _RESTING_SPEED, _RESTING_TURN, _MOST_MOVE_SECONDS = 0.15, np.radians(20.0), 3.0  # m/s, rad/s and s
 _MOST_MOVE_OF_TURN, _MOVE_RANGE = 0.5, 0.12  # m
+_STRANGE_SECONDS = 0.3  # reach of the window in which strangeness is averaged
 _LOOP_SECONDS = 4.5  # of a walk
 # of walks whose trunk, arms and legs are used: m/s, the best one, rad that they turn, s, steps, and how many
 _WALK_SPEEDS, _USUAL_SPEED, _MOST_BEND, _MIN_WALK_SECONDS, _LEAST_STEPS, _WALKS = (0.7, 1.9), 1.2, 0.6, 1.5, 4, 3
@@ -121,7 +122,7 @@ def iter_missing_steps(
         Name, which begins with one of the prefixes; the motion; its contacts (T, 2, 2) bool of heels and toes,
         None where they have to be detected; and its speed, m/s, 0 from a stand to a stand.
     """
-    belongs = select_calm_frames(clips, frames, strangeness)
+    belongs = select_calm_frames(clips, frames, fps, strangeness)
     walks = find_calm_walks(clips, frames, fps, belongs)
     for speed in BACK_SPEEDS:
         if walks and count_seconds(frames, fps, belongs, speed, np.pi) < MIN_SECONDS:
@@ -141,11 +142,16 @@ def iter_missing_steps(
         yield name, lend_upper_body(sequence, neutral, carriage, 0.0), None, 0.0
 
 
-def select_calm_frames(clips: Sequence, frames: Frames, strangeness: np.ndarray) -> np.ndarray:
-    """Select the frames (N,) bool of recordings, twins left out, that belong to locomotion and show no action."""
+def select_calm_frames(clips: Sequence, frames: Frames, fps: float, strangeness: np.ndarray) -> np.ndarray:
+    """Select the frames (N,) bool of recordings, twins left out, that belong to locomotion and show no action.
+
+    What counts is the strangeness around a frame: at the ends of a swing a usual walk is strange for a moment.
+    """
     actions = [i for i, word in enumerate(frames.vocabulary) if word in DISCRETE]
     own = np.array([not clip.mirrored and not clip.is_synthetic for clip in clips])
-    return own[frames.clip] & (strangeness <= 1.0) & ~frames.words[:, actions].any(axis=1)
+    parts = [slice(first, first + count) for first, count in zip(frames.first, frames.count)]
+    around = [hann_smooth(strangeness[at], int(_STRANGE_SECONDS * fps)) for at in parts]
+    return own[frames.clip] & (np.concatenate(around) <= 1.0) & ~frames.words[:, actions].any(axis=1)
 
 
 def count_seconds(frames: Frames, fps: float, belongs: np.ndarray, speed: float, direction: float) -> float:

@@ -26,7 +26,7 @@ LEFT, RIGHT = 0, 1
 PEAK_TURN_RATE = np.radians(140.0)  # rad/s of a turn on the spot
 # crossing: m that the trailing foot is ahead of the leading one, widths of the base against those of feet that do not
 # cross, longer steps than without crossing, and rad by which the pelvis turns with the legs
-_CROSS_AHEAD, _CROSS_WIDTH, _CROSS_CADENCE, _CROSS_TURN = 0.26, 0.25, 0.80, np.radians(16.0)
+_CROSS_AHEAD, _CROSS_WIDTH, _CROSS_CADENCE, _CROSS_TURN = 0.34, 0.25, 0.80, np.radians(20.0)
 # s: a stand before the first step and after the last one, the part of it that is planned, a swing, and from one landing
 # to the next lift. A search holds a clip longer than its steps take if it goes on standing
 _REST, _PLANNED_REST, _SWING, _BOTH_DOWN = 2.5, 0.5, 0.38, 0.10
