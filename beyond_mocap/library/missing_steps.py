@@ -130,10 +130,11 @@ def iter_missing_steps(
             for number, walk in enumerate(nearest):
                 yield f"{BACK_PREFIX}{speed:.1f}_{number + 1}", *reverse_walk(walk, speed, rate), speed
     neutral = build_neutral_stance(example.skeleton, example)
-    carriage = measure_carriage(clips, frames, fps, strangeness, walks, rate)
+    carriage = measure_carriage(clips, frames, fps, strangeness, walks=walks, rate=rate)
     for speed, degrees, crosses in SIDE_WALKS if walks else ():
         if count_seconds(frames, fps, belongs, speed, np.radians(degrees)) < MIN_SECONDS:
-            sequence = build_side_walk(speed, np.radians(degrees), _LOOP_SECONDS, rate, neutral, crosses)
+            sequence = build_side_walk(speed, np.radians(degrees), _LOOP_SECONDS, rate, neutral,
+                                       crosses=crosses)
             name = f"{SIDE_PREFIX}{degrees}_{speed:.1f}"
             yield name, lend_upper_body(sequence, neutral, carriage, speed), None, speed
     missing = list_missing_moves(measure_moves(clips, frames, fps, belongs)) if carriage.stand is not None else []

@@ -166,7 +166,9 @@ def iter_synthetic_clips(
         row = ClipAnnotation(0, len(motion) - 1, None, (STANDING,))
         contacts = np.ones((len(motion), 2, 2), bool)
         yield SyntheticClip(f"{SYNTHETIC_FOLDER}{STAND_PREFIX}{number + 1}.bvh", motion, (row,), contacts)
-    for name, motion, heel_toe_contacts, speed in iter_missing_steps(clips, frames, fps, strangeness, example, FPS):
+    for name, motion, heel_toe_contacts, speed in iter_missing_steps(
+        clips, frames, fps, strangeness, example=example, rate=FPS
+    ):
         rows = _build_step_rows(name, len(motion), speed, speeds)
         yield _ground_clip(f"{SYNTHETIC_FOLDER}{name}.bvh", motion, heel_toe_contacts, rows)
 
