@@ -27,6 +27,7 @@ from .keys import Key, collect_keys
 from .manners import Manners, measure_manners
 from .missing_steps import BACK_SPEEDS, TURNS
 from .posture import NormalPostures, fit_normal_postures
+from .run_loops import MIN_SPEED
 from .standing_loops import MIN_STAND_SECONDS
 from .synthetic_clips import (
     KICK_LABELS,
@@ -38,6 +39,7 @@ from .synthetic_clips import (
     select_locomotion,
 )
 
+MIN_RUN_SECONDS = 2.0  # of a track's runs from which on long runs are needed
 RESTING_SPEED = 0.1  # m/s of a track below which a player stands
 Progress = Callable[[float, str], None]
 
@@ -182,9 +184,9 @@ class Library:
                               key_speeds: np.ndarray, takes: np.ndarray) -> bool:
         """Whether a track needs the synthetic clips.
 
-        It does if it stays in a speed gap for a fifth of a second or more, rests, goes sideways or backward while slow,
-        turns where it stands, or has key moments that are faster than any recorded kick or, for received balls, any
-        recorded receiving with the foot can be played without sliding.
+        It does if it stays in a speed gap for a fifth of a second or more, stands or runs for long, goes sideways or
+        backward while slow, turns where it stands, or has key moments that are faster than any recorded kick or, for
+        received balls, any recorded receiving with the foot can be played without sliding.
 
         Args:
             speed: (T,) m/s of the track at the library's rate.
@@ -200,10 +202,11 @@ class Library:
                       for act in (KICK_LABELS, RECEIVE_LABELS))
         too_fast = 1.3 * np.where(takes & np.isfinite(take), max(take, MIN_RECEIVE_SPEED), kick)
         rests = np.sum(speed < RESTING_SPEED) >= MIN_STAND_SECONDS * self.fps
+        runs = np.sum(speed > MIN_SPEED) >= MIN_RUN_SECONDS * self.fps
         aside = (speed > STANDING_SPEED) & (speed < 1.25 * BACK_SPEEDS[-1]) & (np.abs(offset) > np.pi / 3.0)
         turned = np.sum(np.abs(np.diff(heading))[speed[1:] < STANDING_SPEED])
-        needs_steps = np.sum(aside) >= 0.5 * self.fps or turned >= 0.5 * TURNS[0]
-        return inside >= 0.2 * self.fps or bool(rests or needs_steps) or bool(np.any(key_speeds > too_fast))
+        steps = np.sum(aside) >= 0.5 * self.fps or turned >= 0.5 * TURNS[0]
+        return inside >= 0.2 * self.fps or bool(rests | runs | steps) or bool(np.any(key_speeds > too_fast))
 
     @cached_property
     def max_speed(self) -> float:

@@ -25,7 +25,7 @@ from ..motion import quaternion
 from ..motion.foot_plant import plant_feet
 from ..motion.humanoid import compute_heading_from_positions, identify_joints
 from ..motion.motion import Motion, compute_local_rotations, forward_kinematics
-from ..motion.phase_blend import Strides, find_strides, loop_strides
+from ..motion.phase_blend import Strides, find_strides, repeat_strides
 from ..motion.retargeting.neutral import NeutralStance, build_neutral_stance
 from ..motion.retargeting.posture import to_motion
 from ..motion.retargeting.structure import list_descendants
@@ -178,6 +178,7 @@ def find_calm_walks(clips: Sequence, frames: Frames, fps: float, belongs: np.nda
             rows = slice(int(frames.source[part.start]), int(frames.source[part.stop - 1]) + 1)
             strides = find_strides(clip.motion.frames(rows.start, rows.stop), clip.heel_toe_contacts[rows])
             if strides is not None and strides.steps >= _LEAST_STEPS:
+                strides = strides.select_steps(0, strides.steps - 1 + strides.steps % 2)  # an odd number, to repeat
                 unusual = abs(np.log(strides.speed / _USUAL_SPEED)) - 0.05 * min(strides.steps, 10)
                 found.append((unusual, index, strides))
     return [strides for *_, strides in sorted(found, key=lambda one: one[:2])[:_WALKS]]
@@ -235,7 +236,7 @@ def reverse_walk(walk: Strides, speed: float, rate: float) -> tuple[Motion, np.n
     """
     ratio = speed / walk.speed
     length = _BACK_STEP * ratio**_STEP_SHARE
-    motion, contacts = loop_strides(walk, _LOOP_SECONDS, rate, tempo=-ratio / length, length=length)
+    motion, contacts = repeat_strides(walk, _LOOP_SECONDS, rate, tempo=-ratio / length, length=length)
     planted = plant_feet(motion.skeleton, motion.root_positions, motion.rotations, contacts, rate)
     return Motion(motion.skeleton, planted.root, planted.rotations, rate), contacts
 

@@ -39,12 +39,13 @@ from ..synthetic.gait import build_gait
 from ..synthetic.gait_plan import GaitStyle
 from .features import Frames
 from .missing_steps import BACK_PREFIX, STEP_PREFIX, TURN_PREFIX, iter_missing_steps
+from .run_loops import LOOP_SECONDS, iter_run_loops
 from .scan import CACHE_FOLDER
 from .standing_loops import iter_standing_loops
 
 SYNTHETIC_FOLDER = f"{CACHE_FOLDER}/made-gait/"
-# how the file names of blends, of kicks and of received balls begin, in that folder
-BLEND_PREFIX, KICK_PREFIX, RECEIVE_PREFIX, STAND_PREFIX = "blend_", "kick_", "receive_", "stand_"
+# how the file names of blends, kicks, received balls, long stands and long runs begin, in that folder
+BLEND_PREFIX, KICK_PREFIX, RECEIVE_PREFIX, STAND_PREFIX, LOOP_PREFIX = "blend_", "kick_", "receive_", "stand_", "loop_"
 KICK_LABELS, RECEIVE_LABELS = frozenset({"kick"}), frozenset({"receive", "foot"})
 FPS = 60.0  # of synthetic clips
 MAX_SPEED = 9.4  # m/s
@@ -54,8 +55,8 @@ _MIN_RUN_SPEED, MIN_RECEIVE_SPEED = 2.4, 1.7
 _WARP = (0.875, 1.125)
 _MIN_SECONDS = 1.5  # seconds of recording at a speed from which on it is no gap
 _GRID = 1.03  # ratio of neighbouring speeds
-# ratios of neighbouring speeds of blends and of touches
-_BLEND_STEP, _TOUCH_STEP = 1.06, 1.4
+# ratios of neighbouring speeds of blends, of touches and of runs at an even speed
+_BLEND_STEP, _TOUCH_STEP, _EVEN_STEP = 1.06, 1.4, 1.1
 _PAIRS = 3  # pairs of recordings blended into each gap, at most
 _MAX_SPEED_SPREAD = 0.15  # standard deviation of a steady stretch's speed, share of its mean
 _GAITS = LOCOMOTION[1:]
@@ -166,6 +167,10 @@ def iter_synthetic_clips(
         row = ClipAnnotation(0, len(motion) - 1, None, (STANDING,))
         contacts = np.ones((len(motion), 2, 2), bool)
         yield SyntheticClip(f"{SYNTHETIC_FOLDER}{STAND_PREFIX}{number + 1}.bvh", motion, (row,), contacts)
+    is_run = select_locomotion(frames, clips) & (strangeness <= 1.0)
+    for speed, motion, contacts in iter_run_loops(clips, frames, fps, is_run, FPS):
+        rows = _build_gait_rows(np.full(len(motion), speed), speeds)
+        yield _ground_clip(f"{SYNTHETIC_FOLDER}{LOOP_PREFIX}{speed:.2f}.bvh", motion, contacts, rows, plants_feet=True)
     for name, motion, heel_toe_contacts, speed in iter_missing_steps(
         clips, frames, fps, strangeness, example=example, rate=FPS
     ):
@@ -288,9 +293,15 @@ def _find_stretches(clips, found) -> list[Strides]:
 
 def _iter_runs(low: float, high: float, example: Motion, style: GaitStyle,
                speeds: dict[str, float]) -> Iterator[SyntheticClip]:
-    """Iterate over runs from `low` to `high` m/s and back: slow changes, as quick as players change, and weaving."""
+    """Iterate over runs at even speeds, and from `low` to `high` m/s and back: slow changes, as quick as players
+    change, and weaving.
+    """
     if high < 1.1 * low:
         return
+    for speed in np.exp(np.arange(np.log(low), np.log(high), np.log(_EVEN_STEP))):
+        even = np.full(int(LOOP_SECONDS * FPS), speed)
+        motion = build_gait(even, None, FPS, example.skeleton, style=style, example=example)
+        yield _ground_clip(f"{SYNTHETIC_FOLDER}even_{speed:.2f}.bvh", motion, None, _build_gait_rows(even, speeds))
     for name, pace, weaves in (("slow", 0.8, False), ("quick", 2.5, False), ("weave", 1.0, True)):
         ramp = np.linspace(low, high, max(int((high - low) / pace * FPS), int(1.5 * FPS)))
         speed = np.concatenate([ramp, ramp[::-1]])

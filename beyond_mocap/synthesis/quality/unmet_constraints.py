@@ -20,7 +20,14 @@ from ...base.time_series import find_runs
 from ...library.landings import LANDING_FOLDER
 from ...library.library import Library
 from ...library.missing_steps import BACK_PREFIX, SIDE_PREFIX, STEP_PREFIX, TURN_PREFIX
-from ...library.synthetic_clips import BLEND_PREFIX, KICK_PREFIX, RECEIVE_PREFIX, STAND_PREFIX, SYNTHETIC_FOLDER
+from ...library.synthetic_clips import (
+    BLEND_PREFIX,
+    KICK_PREFIX,
+    LOOP_PREFIX,
+    RECEIVE_PREFIX,
+    STAND_PREFIX,
+    SYNTHETIC_FOLDER,
+)
 from ...motion.track import Track
 from . import movement
 from .moments import KeyMomentResult, evaluate_moments, measure_contact
@@ -42,6 +49,7 @@ _SYNTHETIC_KINDS = (
     (KICK_PREFIX, "synthetic kick on the run: no recorded kick is as fast as the player"),
     (RECEIVE_PREFIX, "synthetic reception on the run: no recorded one is as fast as the player"),
     (STAND_PREFIX, "a recorded stand is played forth and back: no recording stands for so long"),
+    (LOOP_PREFIX, "strides of a recorded run are repeated: no recording runs so steadily for so long"),
     (BACK_PREFIX, "a recorded walk is played backward: hardly any recording goes backward at this speed"),
     (SIDE_PREFIX, "synthetic side step: hardly any recording goes sideways or diagonally at this speed"),
     (TURN_PREFIX, "synthetic turn on the spot: hardly any recording turns so far from a stand to a stand"),

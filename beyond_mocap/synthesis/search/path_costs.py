@@ -159,7 +159,7 @@ class Weights:
     switch: float = 0.7
     other: float = 0.5
     young: float = 1.4
-    pose: float = 3.0
+    pose: float = 4.5
     feet: float = 1.5
     wild: float = 0.3
     rate_change: float = 0.16
