@@ -1,7 +1,7 @@
 """The manner of a player: whose walk, arms and energy they show throughout a match.
 
 Folders of motion capture hold many people. One who walks like the first now and like the second a moment later is
-nobody. So a player follows the manner of one recording's calm walking, and clips that look like it come first, of
+no one. So a player follows the manner of one recording's calm walking, and clips that look like it come first, of
 whomever they are.
 """
 

@@ -161,7 +161,7 @@ class Plan:
     root_window: float = _DEFAULTS["root_window"]
     gaits: tuple[tuple[str, str], ...] = ()
     pins: tuple[Pin, ...] = ()
-    heading_keys: tuple[HeadingKey, ...] = ()
+    heading_keys: tuple[HeadingKey, ...] = field(default=(), metadata=LATER)
     height: float = 0.0
     strong_foot: str = ""
     style: tuple[str, ...] = ()

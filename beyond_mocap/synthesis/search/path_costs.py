@@ -150,7 +150,7 @@ class Weights:
     words: float = 3.0
     automatic_words: float = 1.0
     unasked: float = 2.0
-    strange: float = 2.0
+    strange: float = 4.0
     synthetic: float = 0.2
     synthetic_key: float = 0.8
     rate: float = 0.24
