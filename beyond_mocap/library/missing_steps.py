@@ -33,6 +33,7 @@ from ..motion.skeleton import Skeleton
 from ..motion.track import smooth_zero_phase_hann
 from ..synthetic.steps import StepSequence, build_side_walk, build_steps_in_place
 from .features import Frames
+from .run_loops import MAX_MISMATCH, iter_steady_parts
 from .standing_loops import iter_standing_loops
 
 BACK_PREFIX, SIDE_PREFIX, TURN_PREFIX, STEP_PREFIX = "back_", "side_", "turn_", "step_"
@@ -45,14 +46,16 @@ SIDE_WALKS = ((0.5, 90, False), (0.8, 90, False), (1.1, 90, True), (1.5, 90, Tru
 TURNS = tuple(np.radians((45.0, 90.0, 135.0, 180.0)))
 MOVES = ((0.3, 0.0), (-0.3, 0.0), (0.0, 0.25), (0.0, 0.45))  # m ahead and to the left
 MIN_SECONDS = 15.0  # of recording at a speed in a direction from which on it does not lack
+MIN_TURN_SECONDS = 6.0  # of recorded turns on the spot from which on they do not lack
 MIN_MOVES = 3  # recorded moves from a stand to a stand from which on such moves do not lack
 _SPEED_RANGE, _DIRECTION_RANGE = (0.8, 1.25), np.radians(22.5)  # around a speed and a direction
 _RESTING_SPEED, _RESTING_TURN, _MOST_MOVE_SECONDS = 0.15, np.radians(20.0), 3.0  # m/s, rad/s and s
-_MOST_MOVE_OF_TURN, _MOVE_RANGE = 0.5, 0.12  # m
+_MOVE_RANGE, _MOST_TURN_OF_MOVE = 0.12, np.radians(22.5)  # m and rad around a move
+_ON_THE_SPOT, _LEAST_TURN_RATE, _MOST_TURN_RATE = 0.3, np.radians(60.0), np.radians(250.0)  # m/s and rad/s
 _STRANGE_SECONDS = 0.3  # reach of the window in which strangeness is averaged
 _LOOP_SECONDS = 4.5  # of a walk
-# of walks whose trunk, arms and legs are used: m/s, the best one, rad that they turn, s, steps, and how many
-_WALK_SPEEDS, _USUAL_SPEED, _MOST_BEND, _MIN_WALK_SECONDS, _LEAST_STEPS, _WALKS = (0.7, 1.9), 1.2, 0.6, 1.5, 4, 3
+# of walks whose trunk, arms and legs are used: m/s, the best one, s, and how many
+_WALK_SPEEDS, _USUAL_SPEED, _MIN_WALK_SECONDS, _WALKS = (0.7, 1.9), 1.2, 1.5, 3
 _WALKS_OF_SPEED = 2
 _STEP_SHARE = 0.6  # exponent: how much of a change of speed is longer steps; the rest is tempo
 _BACK_STEP = 0.92  # a backward step against a forward one at the same speed
@@ -137,8 +140,8 @@ def iter_missing_steps(
                                        crosses=crosses)
             name = f"{SIDE_PREFIX}{degrees}_{speed:.1f}"
             yield name, lend_upper_body(sequence, neutral, carriage, speed), None, speed
-    missing = list_missing_moves(measure_moves(clips, frames, fps, belongs)) if carriage.stand is not None else []
-    for name, move, turn in missing:
+    missing = list_missing_turns(frames, fps, belongs) + list_missing_moves(measure_moves(clips, frames, fps, belongs))
+    for name, move, turn in missing if carriage.stand is not None else ():
         sequence = build_steps_in_place(move, turn, rate, neutral)
         yield name, lend_upper_body(sequence, neutral, carriage, 0.0), None, 0.0
 
@@ -164,7 +167,7 @@ def count_seconds(frames: Frames, fps: float, belongs: np.ndarray, speed: float,
 
 
 def find_calm_walks(clips: Sequence, frames: Frames, fps: float, belongs: np.ndarray) -> list[Strides]:
-    """Find straight calm walks of `belongs` (N,) bool, the ones nearest to a usual walk first, one of each clip."""
+    """Find steady walks of `belongs` (N,) bool that can be repeated, the most usual first, at most one of each clip."""
     ahead = np.abs(arctan2(frames.velocity[:, 1], frames.velocity[:, 0])) < _DIRECTION_RANGE
     walks = belongs & ahead & (frames.speed > _WALK_SPEEDS[0]) & (frames.speed < _WALK_SPEEDS[1])
     found = []
@@ -172,15 +175,12 @@ def find_calm_walks(clips: Sequence, frames: Frames, fps: float, belongs: np.nda
         at = slice(frames.first[index], frames.first[index] + frames.count[index])
         runs = [run for run in find_runs(walks[at]) if run[1] - run[0] >= _MIN_WALK_SECONDS * fps]
         for first, end in sorted(runs, key=lambda run: run[0] - run[1])[:1]:
-            part = slice(at.start + first, at.start + end)
-            if np.ptp(frames.heading[part]) > _MOST_BEND:
-                continue
-            rows = slice(int(frames.source[part.start]), int(frames.source[part.stop - 1]) + 1)
+            rows = slice(int(frames.source[at.start + first]), int(frames.source[at.start + end - 1]) + 1)
             strides = find_strides(clip.motion.frames(rows.start, rows.stop), clip.heel_toe_contacts[rows])
-            if strides is not None and strides.steps >= _LEAST_STEPS:
-                strides = strides.select_steps(0, strides.steps - 1 + strides.steps % 2)  # an odd number, to repeat
-                unusual = abs(np.log(strides.speed / _USUAL_SPEED)) - 0.05 * min(strides.steps, 10)
-                found.append((unusual, index, strides))
+            parts = [] if strides is None else [one for one in iter_steady_parts(strides) if one[0] < MAX_MISMATCH]
+            if parts:
+                mismatch, part = min(parts, key=lambda one: one[0])
+                found.append((abs(np.log(part.speed / _USUAL_SPEED)) + mismatch / MAX_MISMATCH, index, part))
     return [strides for *_, strides in sorted(found, key=lambda one: one[:2])[:_WALKS]]
 
 
@@ -292,15 +292,21 @@ def measure_moves(clips: Sequence, frames: Frames, fps: float, belongs: np.ndarr
     return np.array(moves).reshape(-1, 3)
 
 
+def list_missing_turns(frames: Frames, fps: float, belongs: np.ndarray) -> list[tuple[str, tuple[float, float], float]]:
+    """List turns on the spot where frames `belongs` (N,) hardly have any: name, m ahead and left, rad."""
+    turning = np.abs(np.gradient(frames.heading)) * fps
+    same_clip = (np.gradient(frames.clip) == 0.0) & (turning < _MOST_TURN_RATE)
+    turns = belongs & same_clip & (frames.speed < _ON_THE_SPOT) & (turning > _LEAST_TURN_RATE)
+    if np.sum(turns) >= MIN_TURN_SECONDS * fps:
+        return []
+    return [(f"{TURN_PREFIX}{np.degrees(turn):.0f}", (0.0, 0.0), float(turn)) for turn in TURNS]
+
+
 def list_missing_moves(recorded: np.ndarray) -> list[tuple[str, tuple[float, float], float]]:
-    """List turns and moves that `recorded` (M, 3) hardly has to either side: name, m ahead and left, rad."""
-    far, turned = np.linalg.norm(recorded[:, :2], axis=1), np.abs(recorded[:, 2])
+    """List steps of MOVES that `recorded` (M, 3) hardly has to either side: name, m ahead and left, rad."""
     missing = []
-    for turn in TURNS:
-        if np.sum((far < _MOST_MOVE_OF_TURN) & (np.abs(turned - turn) < np.radians(22.5))) < MIN_MOVES:
-            missing.append((f"{TURN_PREFIX}{np.degrees(turn):.0f}", (0.0, 0.0), float(turn)))
     for move in MOVES:
         off = np.linalg.norm(np.stack([recorded[:, 0], np.abs(recorded[:, 1])], axis=1) - move, axis=1)
-        if np.sum((off < _MOVE_RANGE) & (turned < np.radians(22.5))) < MIN_MOVES:
+        if np.sum((off < _MOVE_RANGE) & (np.abs(recorded[:, 2]) < _MOST_TURN_OF_MOVE)) < MIN_MOVES:
             missing.append((f"{STEP_PREFIX}{move[0]:.1f}_{move[1]:.1f}", move, 0.0))
     return missing

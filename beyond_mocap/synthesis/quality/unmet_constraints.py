@@ -52,7 +52,7 @@ _SYNTHETIC_KINDS = (
     (LOOP_PREFIX, "strides of a recorded run are repeated: no recording runs so steadily for so long"),
     (BACK_PREFIX, "a recorded walk is played backward: hardly any recording goes backward at this speed"),
     (SIDE_PREFIX, "synthetic side step: hardly any recording goes sideways or diagonally at this speed"),
-    (TURN_PREFIX, "synthetic turn on the spot: hardly any recording turns so far from a stand to a stand"),
+    (TURN_PREFIX, "synthetic turn on the spot: hardly any recording turns where it stands"),
     (STEP_PREFIX, "synthetic step: hardly any recording takes it from a stand to a stand"),
 )
 
