@@ -35,6 +35,7 @@ def add_synthesize(verbs) -> argparse.ArgumentParser:
     verb.add_argument("--report", type=Path, metavar="R.json")
     add_options(verb, "synthesis")
     verb.add_argument("--pins", type=Path, metavar="P.csv", help="targets of hands, feet and gaze with times")
+    verb.add_argument("--headings", type=Path, metavar="H.csv", help="where the body faces, with times")
     add_options(verb, "player")
     add_options(verb, "library")
     verb.set_defaults(run=run_synthesize)
@@ -53,6 +54,7 @@ def run_synthesize(options, reporter: ProgressReporter, writers: Mapping[str, Wr
     from ..files.tables import write_ball, write_report
     from ..files.tracking.tracking import read_track_csv
     from ..motion.track import clean_track
+    from ..synthesis.heading_table import read_heading_keys
     from ..synthesis.pin_table import read_pins
     from ..synthesis.plan import Plan
     from ..synthesis.provenance import write_provenance
@@ -62,7 +64,8 @@ def run_synthesize(options, reporter: ProgressReporter, writers: Mapping[str, Wr
     started = time.perf_counter()
     outputs = (options.out, options.provenance, options.ball, options.report)
     annotations = options.annotations or _find_annotations(options.track)
-    check_outputs(*outputs, reserved=(options.track, annotations, options.pins, options.skeleton))
+    check_outputs(*outputs, reserved=(options.track, annotations, options.pins, options.headings,
+                                      options.skeleton))
     write = choose_writer(options.out, writers)
     track, data = clean_track(read_track_csv(options.track))
     timeline = read_timeline(annotations, options.fps, float(track.times[0])) if annotations else Timeline()
@@ -72,7 +75,9 @@ def run_synthesize(options, reporter: ProgressReporter, writers: Mapping[str, Wr
     ready = time.perf_counter()
     plan = Plan(
         track=track, timeline=timeline, library=str(options.library),
-        pins=read_pins(options.pins) if options.pins else (), **option_values(Plan, options, "synthesis", "player"),
+        pins=read_pins(options.pins) if options.pins else (),
+        heading_keys=read_heading_keys(options.headings) if options.headings else (),
+        **option_values(Plan, options, "synthesis", "player"),
     )
     try:
         take = synthesize(library, plan, reporter.show_progress, reporter.is_cancelled)
@@ -146,7 +151,7 @@ def run_evaluate(options, reporter: ProgressReporter, writers: Mapping[str, Writ
     from ..annotation import check_timeline, read_timeline
     from ..evaluation.html import build_html_report
     from ..evaluation.plots import require_matplotlib
-    from ..evaluation.report import evaluate_played
+    from ..evaluation.report import describe_figures, evaluate_played
     from ..files.atomic import atomic_write
     from ..files.bvh import bvh
     from ..files.tables import read_ball, write_report
@@ -170,7 +175,7 @@ def run_evaluate(options, reporter: ProgressReporter, writers: Mapping[str, Writ
     if timeline is not None and track is not None and library is not None:  # otherwise some labels or times are unknown
         check_timeline(timeline, library.labels, start, float(track.times[-1]), str(options.annotations))
     report = evaluate_played(played, track=track, timeline=timeline, library=library)
-    notes = [*report["warnings"], *_describe_fit(report, motion, track, options)]
+    notes = [*report["warnings"], *report["notes"], *_describe_fit(report, motion, track, options)]
     if provenance is None and report["keys"]:
         notes.append("the clips that played are unknown; name them with --provenance")
     if _is_synthesis_report(options.report):
@@ -185,7 +190,7 @@ def run_evaluate(options, reporter: ProgressReporter, writers: Mapping[str, Writ
         reporter.show_note(
             f"{options.provenance}: {count} not in {options.library} and not compared, such as {unknown_clips[0]}"
         )
-    print(options.report)
+    print("\n".join((*describe_figures(report), str(options.report))))
 
 
 def _describe_fit(report: dict, motion, track, options) -> list[str]:

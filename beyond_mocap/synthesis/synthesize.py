@@ -176,7 +176,7 @@ def _construct_motion(
         **build_provenance_fields(library, source), motion=motion, start_time=float(track.times[0]),
         contacts=steps.contacts, timeline=request.timeline, keys=keys, ball=ball, method=plan.method,
         seed=plan.requested.seed, correction=planted.correction, ik_miss=planted.miss, stepped=steps.stepped,
-        plan=plan.requested, edit=edit,
+        plan=plan.requested, edit=edit, planned_heading=track.heading,
     )
     clock.append(time.perf_counter())
     report(1.0, "Done")

@@ -289,10 +289,11 @@ def solve_heading(
         (T,) rad, unwrapped.
     """
     firm = compute_turning_firmness(source.heel_toe_contacts, source.height, track.fps)
+    held = 0.0 if track.held is None else track.held * (1.0 - freedom)
     if track.heading is not None:
         firm = firm * measure_rest(source, track.speed)
-    return fit_heading(track.direction, track.speed, source.velocity, source.turn, given, firm=firm, plan=track.heading,
-                       freedom=freedom)
+    return fit_heading(track.direction, track.speed, source.velocity, source.turn, given, plan=track.heading,
+                       firm=firm + held * (1.0 - firm), freedom=freedom, held=held)
 
 
 def find_touches(library: Library, fps: float, edit: EditList, keys: tuple[KeyResult, ...]) -> tuple[Touch, ...]:

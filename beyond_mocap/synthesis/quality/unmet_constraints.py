@@ -93,22 +93,18 @@ def report_unmet_constraints(
     return [line for line in lines if line]
 
 
-def report_jolts(times: np.ndarray, starts: np.ndarray, ratios: np.ndarray) -> TimedMessage | None:
-    """Report transitions that are harder than recordings are.
+def report_jolts(times: np.ndarray, flags: np.ndarray, most: float) -> TimedMessage | None:
+    """Report jerk that is harder than recordings have it.
 
     Args:
         times: (T,) s.
-        starts: (S,) frames of transitions.
-        ratios: (S,) of `movement.compute_transition_ratios`.
+        flags: (T,) bool, frames with such a jerk.
+        most: the highest one, over the 95th percentile of recordings at that speed.
     Returns:
         A line, None where there is none.
     """
-    most, flags = TARGETS["seam_jerk_ratio.max"].most, np.zeros(len(times), bool)
-    hard = ratios > most
-    for start in starts[hard]:
-        flags[max(start - movement.JERK_REACH // 2, 0) : start + movement.JERK_REACH // 2] = True
-    hardest = f"{ratios.max(where=hard, initial=0.0):.2f} times as hard as recordings of that speed"
-    return _build_line(times, flags, f"transitions jolt up to {hardest} (target {most:g})")
+    hardest = f"{most:.2f} times as hard as recordings of that speed"
+    return _build_line(times, flags, f"the body jolts up to {hardest} (target {TARGETS['seam_jerk_ratio.max'].most:g})")
 
 
 def format_stretches(times: np.ndarray, flags: np.ndarray) -> str:

@@ -257,6 +257,28 @@ def test_a_line_about_several_stretches_goes_from_one_to_the_next(shown):
         bpy.ops.beyond_mocap.jump_to(stops="soon")
 
 
+def test_events_are_lines_that_go_to_their_second(shown, room):
+    """A spin at 3.5 s and two snap turns at 1.2 and 4.0 s, in a report as `evaluate` writes it."""
+    report = {
+        "fps": 30.0, "warnings": ["1.2, 4.0 s: the body turns by more than 75 degrees within 0.3 s",
+                                  "3.5 s: the body turns by more than 200 degrees within 2 s"],
+        "warning_seconds": [[[1.2, 1.2], [4.0, 4.0]], [[3.5, 3.5]]],
+        "naturalness": {"snap_turns_per_min": 2.0, "spins_per_min": 0.2, "standing": {"both_down": 0.9}},
+    }  # fmt: skip
+    quality, scene = room("result.quality"), bpy.context.scene
+    player = scene.beyond_mocap.players[0]
+    player.warnings = quality.describe_warnings(report)
+    stops = [line.partition("\t")[2] for line in player.warnings.splitlines()]
+    seen = []
+    for stop in (stops[0], stops[0], stops[1]):
+        bpy.ops.beyond_mocap.jump_to(stops=stop, player=player.name)
+        seen.append((scene.frame_current - 1) / scene.render.fps)
+    assert seen == pytest.approx([1.2, 4.0, 3.5], abs=0.03)
+    assert quality.describe_quality(report).splitlines() == [
+        "Snap turns: 2.0 /min\t≤ 0.6\tmissed", "Spins: 0.2 /min\t≤ 0.3\tmet",
+        "Both feet down standing: 90 %\t≥ 80\tmet"]
+
+
 def test_jump_at_another_frame_rate(shown):
     scene = bpy.context.scene
     scene.render.fps, scene.render.fps_base = 24, 1.001
