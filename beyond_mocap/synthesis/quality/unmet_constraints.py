@@ -19,6 +19,7 @@ from ...base.errors import TimedMessage, format_seconds
 from ...base.time_series import find_runs
 from ...library.landings import LANDING_FOLDER
 from ...library.library import Library
+from ...library.missing_steps import BACK_PREFIX, SIDE_PREFIX, STEP_PREFIX, TURN_PREFIX
 from ...library.synthetic_clips import (
     BLEND_PREFIX,
     KICK_PREFIX,
@@ -43,6 +44,17 @@ JOIN_SECONDS = 0.4  # stretches closer than this are one
 LABEL_SECONDS = 0.5  # shortest time of a missing label that is reported
 MAX_STRETCHES = 6  # stretches that a line lists
 _TOLERANCE = 1e-3  # of rates and seconds, for rounding
+_SYNTHETIC_KINDS = (
+    (BLEND_PREFIX, "blended from a slower and a faster recording: none has the speed of the track"),
+    (KICK_PREFIX, "synthetic kick on the run: no recorded kick is as fast as the player"),
+    (RECEIVE_PREFIX, "synthetic reception on the run: no recorded one is as fast as the player"),
+    (STAND_PREFIX, "a recorded stand is played forth and back: no recording stands for so long"),
+    (LOOP_PREFIX, "strides of a recorded run are repeated: no recording runs so steadily for so long"),
+    (BACK_PREFIX, "a recorded walk is played backward: hardly any recording goes backward at this speed"),
+    (SIDE_PREFIX, "synthetic side step: hardly any recording goes sideways or diagonally at this speed"),
+    (TURN_PREFIX, "synthetic turn on the spot: hardly any recording turns where it stands"),
+    (STEP_PREFIX, "synthetic step: hardly any recording takes it from a stand to a stand"),
+)
 
 
 def report_unmet_constraints(
@@ -137,21 +149,17 @@ def _frames_of_clips(played: Playback, *begins: str) -> np.ndarray:
 
 
 def _report_synthetic(played: Playback) -> list[TimedMessage | None]:
-    """Report each kind of synthetic clip: running, blends, touches, long stands and runs, landings."""
-    blends, kicks, receptions, stands, loops = (
-        _frames_of_clips(played, SYNTHETIC_FOLDER + name)
-        for name in (BLEND_PREFIX, KICK_PREFIX, RECEIVE_PREFIX, STAND_PREFIX, LOOP_PREFIX)
-    )
-    running = _frames_of_clips(played, SYNTHETIC_FOLDER) & ~blends & ~kicks & ~receptions & ~stands & ~loops
-    kinds = (
+    """Report each kind of synthetic clip."""
+    running = _frames_of_clips(played, SYNTHETIC_FOLDER)
+    kinds = []
+    for name, what in _SYNTHETIC_KINDS:
+        there = _frames_of_clips(played, SYNTHETIC_FOLDER + name)
+        kinds.append((there, what))
+        running = running & ~there
+    kinds += [
         (running, "synthetic running: no recording has the speed of the track"),
-        (blends, "blended from a slower and a faster recording: none has the speed of the track"),
-        (kicks, "synthetic kick on the run: no recorded kick is as fast as the player"),
-        (receptions, "synthetic reception on the run: no recorded one is as fast as the player"),
-        (stands, "a recorded stand is played forth and back: no recording stands for so long"),
-        (loops, "strides of a recorded run are repeated: no recording runs so steadily for so long"),
         (_frames_of_clips(played, LANDING_FOLDER), "synthetic landing and getting up: the recording ends in flight"),
-    )
+    ]
     return [_build_line(played.times, there, what, f" ({np.sum(there) / played.motion.fps:.1f} s in all)")
             for there, what in kinds]
 
