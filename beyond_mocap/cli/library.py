@@ -98,7 +98,8 @@ def summarize_library(library) -> dict:
     }
 
 
-def open_library(options, reporter: ProgressReporter, rebuild: bool = False, seed: int = 0):
+def open_library(options, reporter: ProgressReporter, rebuild: bool = False, seed: int = 0,
+                 folder: Path | None = None):
     """Build or load the library of the command line.
 
     Args:
@@ -106,14 +107,15 @@ def open_library(options, reporter: ProgressReporter, rebuild: bool = False, see
         reporter: progress and cancellation.
         rebuild: whether to build it again although the cache is up to date.
         seed: seed of the clustering.
+        folder: its folder; None for the option `library`.
     Returns:
         The `Library`.
     """
     from ..library.build import build_library
 
     return build_library(
-        options.library, rebuild=rebuild, cache_dir=options.cache, skeleton=options.skeleton, unit=options.unit,
-        seed=seed, progress=reporter.show_progress, cancelled=reporter.is_cancelled,
+        folder or options.library, rebuild=rebuild, cache_dir=options.cache, skeleton=options.skeleton,
+        unit=options.unit, seed=seed, progress=reporter.show_progress, cancelled=reporter.is_cancelled,
     )
 
 

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -17,8 +18,8 @@ from ..base.errors import InputError
 from ..library.automatic_locomotion import build_automatic_labels
 from ..library.keys import Key, select_nearest_keys
 from ..motion.contacts import measure_floor_height
-from ..motion.track import sample_track, smooth_zero_phase_hann
-from ..synthesis.heading_plan import plan_track
+from ..motion.track import SampledTrack, sample_track, smooth_zero_phase_hann
+from ..synthesis.heading_plan import plan_track, rest_track
 from ..synthesis.quality import movement
 from ..synthesis.quality.moments import (
     KeyMomentResult,
@@ -309,10 +310,17 @@ def fill_automatic_spans(view: View) -> Timeline:
         gaits = library.gaits
     except InputError:
         return view.timeline
-    sampled = plan_track(sample_track(view.track, library.fps))
+    sampled = _sample_planned_track(view, library.fps)
     thresholds = library.gait_thresholds
     gait_index = choose_gaits(sampled.speed, sampled.fps, [gait.speed for gait in gaits], thresholds)
     return fill_timeline(view.timeline, sampled.times, build_automatic_labels(library, gait_index, sampled))
+
+
+def _sample_planned_track(view: View, fps: float) -> SampledTrack:
+    """Sample the track with the heading that was planned for the take, else with the track's own plan."""
+    sampled = sample_track(view.track, fps)
+    heading = view.interpolate_planned_heading(sampled.times)
+    return plan_track(sampled) if heading is None else replace(rest_track(sampled), heading=heading)
 
 
 def measure_annotation_similarity(view: View) -> dict:

@@ -14,7 +14,7 @@ import numpy as np
 
 from ..base.errors import TimedMessage
 from ..base.time_series import find_runs, interpolate_columns, time_derivative
-from ..base.vectors import arctan2
+from ..base.vectors import arctan2, unit_vectors
 from ..library.posture import NormalPostures, compute_postures
 from ..motion import quaternion
 from ..motion.humanoid import compute_heading_from_positions, identify_joints, measure_leg_length
@@ -181,6 +181,27 @@ def measure_facing_off_travel(course: BodyCourse) -> np.ndarray:
     """Measure the angle (T,) rad between heading and travel, NaN up to SLOW_SPEED."""
     off = np.abs(quaternion.wrap_angle(course.heading - course.travel))
     return np.where(course.speed > SLOW_SPEED, off, np.nan)
+
+
+def measure_head_off_ball(skeleton: Skeleton, positions: np.ndarray, rotations: np.ndarray, ball: np.ndarray,
+                          look: np.ndarray) -> np.ndarray:
+    """Measure the angle between where the head looks and the ball, where a body can turn its head to it.
+
+    Args:
+        skeleton: J joints.
+        positions: (T, J, 3) m, world.
+        rotations: (T, J, 4) world.
+        ball: (T, 3) m, world, NaN where unknown.
+        look: (3,) unit, direction in which the head joint looks, in its own frame.
+    Returns:
+        (N,) rad of the frames whose ball is at most a right angle off the body's heading.
+    """
+    head = identify_joints(skeleton).head_or_neck
+    away, heading = ball - positions[:, head], compute_heading_from_positions(skeleton, positions)
+    with np.errstate(invalid="ignore"):
+        in_range = np.abs(quaternion.wrap_angle(arctan2(away[:, 1], away[:, 0]) - heading)) <= np.pi / 2.0
+    sight = quaternion.rotate(rotations[in_range, head], look)
+    return np.arccos(np.clip(np.sum(sight * unit_vectors(away[in_range]), axis=1), -1.0, 1.0))
 
 
 def find_stands(path: np.ndarray, fps: float) -> np.ndarray:

@@ -17,18 +17,18 @@ from ..base.vectors import arctan2
 from ..library.posture import NormalPostures
 from ..motion import quaternion
 from ..motion.track import sample_track
+from ..synthesis.construct.gaze import estimate_look
 from ..synthesis.heading_plan import plan_track
-from ..synthesis.plan import sample_with_trajectory
 from ..synthesis.quality import movement
 from ..synthesis.quality.targets import TARGETS, Target
 from ..synthesis.quality.unmet_constraints import report_jolts
-from ..synthesis.take import Take
 from .naturalness import (
     FPS,
     find_stands,
     list_event_messages,
     measure_course_figures,
     measure_facing_off_travel,
+    measure_head_off_ball,
     measure_piece_figures,
     measure_standing,
     select_unasked_spins,
@@ -48,7 +48,8 @@ FRAMES_KEYS = {
     "off_travel_deg_median": "fast_frames", "off_travel_deg_p90": "fast_frames",
     "unusual_posture_share": "slow_frames", "dwell_s_median": "slow_pieces", "short_dwell_share": "slow_pieces",
     "off_travel_aside_deg_p90": "aside_frames", "off_plan_deg_median": "plan_frames",
-    "off_plan_deg_p90": "plan_frames", "sd_ms": "strides", "foot_lifts_per_min": "seconds", "both_down": "seconds",
+    "off_plan_deg_p90": "plan_frames", "head_off_ball_deg_median": "ball_frames", "sd_ms": "strides",
+    "foot_lifts_per_min": "seconds", "both_down": "seconds",
 }  # fmt: skip
 """What a figure rests on where that is not the group's `frames`: a key beside it."""
 
@@ -90,6 +91,7 @@ TITLES = {
     "off_travel_deg_median": Title("Heading off travel", "°"),
     "off_travel_deg_p90": Title("Heading off travel, 90 %", "°"),
     "off_travel_aside_deg_p90": Title("The same, ball aside", "°"),
+    "head_off_ball_deg_median": Title("Head off the ball", "°"),
     "standing.foot_lifts_per_min": Title("Foot lifts standing", "/min", digits=0),
     "standing.both_down": Title("Both feet down standing", "%", 100.0, 0),
     "tempo.sd_ms": Title("Uneven tempo", "ms"),
@@ -97,36 +99,21 @@ TITLES = {
 """Figure of the group -> how pages show it."""
 
 
-def plan_headings(take: Take) -> tuple[np.ndarray, np.ndarray] | None:
-    """Plan the heading of a take as its synthesis did.
+def find_planned_headings(view: View) -> np.ndarray | None:
+    """Find the planned heading (T,) rad at the frames of the view's course.
 
-    Args:
-        take: the take.
-    Returns:
-        s on the track's clock, and rad; None for a take without its plan.
-    """
-    plan = take.plan
-    if plan is None or plan.method != "path":
-        return None
-    track = plan_track(sample_with_trajectory(plan.track, take.solved, FPS, plan.track_window), plan.heading_keys)
-    return track.times, track.heading
-
-
-def find_planned_headings(view: View, planned: tuple[np.ndarray, np.ndarray] | None) -> np.ndarray | None:
-    """Find the planned heading (T,) rad at the frames of the view's course; NaN beyond the plan, None without a track.
+    It is the plan that the take was made with, where that is known, else that of the track alone; NaN beyond its ends,
+    None without either.
 
     Args:
         view: the take beside its library and track.
-        planned: of `plan_headings`; None: it is planned from the track.
     """
-    if planned is None and view.track is None:
-        return None
-    if planned is None:
-        track = plan_track(sample_track(view.track, FPS))
-        times, heading = track.times, track.heading
-    else:
-        times, heading = planned
-    return np.interp(view.played.start_time + view.course.times, times, heading, left=np.nan, right=np.nan)
+    times = view.played.start_time + view.course.times
+    heading = view.interpolate_planned_heading(times)
+    if heading is not None or view.track is None:
+        return heading
+    track = plan_track(sample_track(view.track, FPS))
+    return np.interp(times, track.times, track.heading, left=np.nan, right=np.nan)
 
 
 def measure_naturalness(view: View, planned: np.ndarray | None, requested: Timeline | None) -> dict:
@@ -150,6 +137,7 @@ def measure_naturalness(view: View, planned: np.ndarray | None, requested: Timel
         out.update(measure_piece_figures(course, view.transitions / view.fps))
     if planned is not None:
         out.update(_measure_plan_figures(view, planned))
+    out.update(_measure_head_off_ball(view))
     if view.track is not None:
         out.update(_measure_off_travel_aside(view))
         out["standing"] = measure_standing(find_stands(view.target, view.fps), view.played.contacts, view.fps)
@@ -185,6 +173,17 @@ def _measure_off_travel_aside(view: View) -> dict:
     off = np.degrees(measure_facing_off_travel(course)[np.abs(quaternion.wrap_angle(bearing - course.travel)) > ASIDE])
     off = off[np.isfinite(off)]
     return {"aside_frames": len(off), "off_travel_aside_deg_p90": float(np.percentile(off, 90)) if len(off) else None}
+
+
+def _measure_head_off_ball(view: View) -> dict:
+    """Measure the angle between head and ball; nothing without a ball, or on another skeleton than the library's."""
+    played, library = view.played, view.library
+    if library is None or played.ball is None or played.motion.skeleton.names != library.skeleton.names:
+        return {}
+    off = measure_head_off_ball(played.motion.skeleton, played.positions, played.rotations, played.ball.positions,
+                                estimate_look(library))
+    return {"ball_frames": len(off), "head_off_ball_deg_median": float(np.degrees(np.median(off))) if len(off)
+            else None}
 
 
 def fill_plan(planned: np.ndarray) -> np.ndarray:

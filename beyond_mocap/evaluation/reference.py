@@ -360,7 +360,7 @@ class View:
         self.played, self.timeline, self.library, self.track = played, timeline, library, track
         self.fps, self.count = motion.fps, len(motion)
         self.reference = None if library is None else load_reference(library, motion.fps)
-        self.scale = 1.0 if library is None else _compute_scale(motion.skeleton, library.skeleton)
+        self.scale = 1.0 if library is None else compute_scale(motion.skeleton, library.skeleton)
         self.stride = played.compute_stride(library)
         self.reference_rows = self._find_reference_rows()
         self.used_rows = np.rint(self.reference_rows[np.isfinite(self.reference_rows)]).astype(int)
@@ -391,6 +391,18 @@ class View:
         """Clip, mirrored, clip_frame and stride per frame, in the order that `played` functions take."""
         return self.played.clip, self.played.mirrored, self.played.clip_frame, self.stride
 
+    def interpolate_planned_heading(self, times: np.ndarray) -> np.ndarray | None:
+        """Interpolate the heading that was planned for the take, constant beyond its ends.
+
+        Args:
+            times: (N,) s on the track's clock.
+        Returns:
+            (N,) rad, unwrapped; None where it is not known.
+        """
+        planned = self.played.planned_heading
+        known = np.zeros(0, bool) if planned is None else np.isfinite(planned)
+        return np.interp(times, self.played.times[known], np.unwrap(planned[known])) if known.any() else None
+
     def source_values(self, name: str) -> np.ndarray:
         """Return a figure of the uncut recordings at the used frames.
 
@@ -407,7 +419,7 @@ class View:
         return self.reference.find_rows(self.played.clips, self.played.clip, self.played.clip_frame)
 
 
-def _compute_scale(skeleton: Skeleton, library: Skeleton) -> float:
+def compute_scale(skeleton: Skeleton, library: Skeleton) -> float:
     """Compute the stature of a skeleton relative to the library's; InputError if the bones differ otherwise."""
     if skeleton.has_same_bones(library, 5e-3):
         return 1.0

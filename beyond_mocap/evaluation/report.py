@@ -18,13 +18,7 @@ from ..synthesis.quality.playback import Playback, playback_from_take
 from ..synthesis.quality.targets import find_target
 from ..synthesis.take import Take
 from . import figures
-from .naturalness_figures import (
-    FRAMES_KEYS,
-    find_planned_headings,
-    list_naturalness_messages,
-    measure_naturalness,
-    plan_headings,
-)
+from .naturalness_figures import FRAMES_KEYS, find_planned_headings, list_naturalness_messages, measure_naturalness
 from .reference import View
 from .unknown_figures import list_unknown_figures
 
@@ -47,7 +41,7 @@ def evaluate(take: Take, track: Track | None, library: Library | None) -> dict:
     """
     report = evaluate_played(
         playback_from_take(take), track=track, timeline=take.timeline, library=library, ik_miss=take.ik_miss,
-        requested=take.plan.timeline if take.plan else Timeline(), planned=plan_headings(take),
+        requested=take.plan.timeline if take.plan else Timeline(),
     )
     seconds = {name: take.seconds.get(name) for name in (*SECONDS, *(s for s in take.seconds if s not in SECONDS))}
     warnings = list(dict.fromkeys((*take.warnings, *report["warnings"])))
@@ -64,7 +58,6 @@ def evaluate(take: Take, track: Track | None, library: Library | None) -> dict:
 def evaluate_played(
     played: Playback, *, track: Track | None = None, timeline: Timeline | None = None, library: Library | None = None,
     ik_miss: np.ndarray | None = None, requested: Timeline | None = None,
-    planned: tuple[np.ndarray, np.ndarray] | None = None,
 ) -> dict:  # fmt: skip
     """Build the report of a motion with its sources.
 
@@ -77,7 +70,6 @@ def evaluate_played(
         library: the library, or None.
         ik_miss: (T,) or (T, 2) m by which inverse kinematics missed its targets, or None.
         requested: the user's own timeline if `timeline` includes automatic spans.
-        planned: s on the track's clock and rad, the planned heading; None: it is planned from the track.
     Returns:
         The report as plain values for JSON, None where a value is unknown.
     Raises:
@@ -85,7 +77,7 @@ def evaluate_played(
     """
     view = View(played, track, timeline, library)
     user_timeline = timeline if requested is None else requested
-    heading = find_planned_headings(view, planned)
+    heading = find_planned_headings(view)
     events, notes = list_naturalness_messages(view, heading)
     report = {
         "version": VERSION, "seed": None, "fps": played.motion.fps, "frames": len(played.motion),

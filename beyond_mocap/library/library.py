@@ -14,7 +14,7 @@ from typing import Any, Callable
 import numpy as np
 
 from ..annotation import LOCOMOTION, ClipAnnotation, estimate_gait_thresholds
-from ..annotation.gaits import STANDING
+from ..annotation.gaits import STANDING, STANDING_SPEED
 from ..annotation.vocabulary import DIRECTIONS
 from ..base.errors import InputError, format_count
 from ..motion.skeleton import Skeleton
@@ -26,6 +26,7 @@ from .coverage import find_missing_motion, measure_slowest_travel, select_locomo
 from .features import FPS, Frames, build_frames, join_frames
 from .keys import Key, collect_keys
 from .manners import Manners, measure_manners
+from .missing_steps import BACK_SPEEDS, TURNS
 from .posture import NormalPostures, fit_normal_postures
 from .run_loops import MIN_SPEED
 from .standing_loops import MIN_STAND_SECONDS
@@ -191,15 +192,18 @@ class Library:
         """(from, to) m/s of the speeds that recorded locomotion does not reach."""
         return find_speed_gaps(self.frames.speed[select_locomotion(self.frames, self.clips)], self.fps)
 
-    def needs_synthetic_clips(self, speed: np.ndarray, key_speeds: np.ndarray, takes: np.ndarray) -> bool:
+    def needs_synthetic_clips(self, speed: np.ndarray, offset: np.ndarray, heading: np.ndarray,
+                              key_speeds: np.ndarray, takes: np.ndarray) -> bool:
         """Whether a track needs the synthetic clips.
 
-        It does if it stays in a speed gap for a fifth of a second or more, stands or runs for long, or has
-        key moments that are faster than any recorded kick or, for received balls, any recorded receiving with the foot
-        can be played without sliding.
+        It does if it stays in a speed gap for a fifth of a second or more, stands or runs for long, goes sideways or
+        backward while slow, turns where it stands, or has key moments that are faster than any recorded kick or, for
+        received balls, any recorded receiving with the foot can be played without sliding.
 
         Args:
             speed: (T,) m/s of the track at the library's rate.
+            offset: (T,) rad from its direction of travel to its heading.
+            heading: (T,) rad.
             key_speeds: (K,) m/s at its key moments.
             takes: (K,) bool, the key moment receives the ball.
         Returns:
@@ -211,7 +215,10 @@ class Library:
         too_fast = 1.3 * np.where(takes & np.isfinite(take), max(take, MIN_RECEIVE_SPEED), kick)
         rests = np.sum(speed < RESTING_SPEED) >= MIN_STAND_SECONDS * self.fps
         runs = np.sum(speed > MIN_SPEED) >= MIN_RUN_SECONDS * self.fps
-        return inside >= 0.2 * self.fps or bool(rests | runs) or bool(np.any(key_speeds > too_fast))
+        aside = (speed > STANDING_SPEED) & (speed < 1.25 * BACK_SPEEDS[-1]) & (np.abs(offset) > np.pi / 3.0)
+        turned = np.sum(np.abs(np.diff(heading))[speed[1:] < STANDING_SPEED])
+        steps = np.sum(aside) >= 0.5 * self.fps or turned >= 0.5 * TURNS[0]
+        return inside >= 0.2 * self.fps or bool(rests | runs | steps) or bool(np.any(key_speeds > too_fast))
 
     @cached_property
     def max_speed(self) -> float:

@@ -44,7 +44,7 @@ def iter_run_loops(clips: Sequence, frames: Frames, fps: float, is_run: np.ndarr
     """
     best: dict[int, tuple[float, Strides]] = {}
     for strides in _iter_strides(clips, frames, fps, is_run):
-        for mismatch, part in _iter_steady_parts(strides):
+        for mismatch, part in iter_steady_parts(strides):
             band = int(np.floor(np.log(part.speed / MIN_SPEED) / np.log(SPEED_STEP)))
             if mismatch < best.get(band, (MAX_MISMATCH, None))[0]:
                 best[band] = mismatch, part
@@ -68,8 +68,14 @@ def _iter_strides(clips: Sequence, frames: Frames, fps: float, is_run: np.ndarra
                     yield strides
 
 
-def _iter_steady_parts(strides: Strides) -> Iterator[tuple[float, Strides]]:
-    """Iterate over the steady straight parts of strides that can be repeated, with how badly their ends fit, m."""
+def iter_steady_parts(strides: Strides) -> Iterator[tuple[float, Strides]]:
+    """Iterate over the steady straight parts of strides that can be repeated, with how badly their ends fit, m.
+
+    Args:
+        strides: a recording.
+    Yields:
+        The mean distance of all joints, m, between the ends of the part, and the part, an odd number of steps.
+    """
     speed = strides.metres / strides.seconds
     at_landings = np.interp(strides.landings, np.arange(len(strides.facing)), strides.facing)
     for count in _REPEATED:

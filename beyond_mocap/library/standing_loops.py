@@ -48,14 +48,14 @@ def iter_standing_loops(clips: Sequence, frames: Frames, fps: float, strangeness
 
 def find_stands(clips: Sequence, frames: Frames, fps: float, strangeness: np.ndarray) -> list[tuple[int, int, int]]:
     """Find the longest calm stands of recordings: clip, first frame and end of each, the longest first."""
-    found = []
+    found, speed = [], frames.speed  # computed over all frames at every access
     for index, clip in enumerate(clips):
         if clip.mirrored or clip.is_synthetic:
             continue
         at = slice(frames.first[index], frames.first[index] + frames.count[index])
         nearest = np.minimum(np.rint(frames.source[at]).astype(int), len(clip.heel_toe_contacts) - 1)
         both = clip.heel_toe_contacts.any(axis=2).all(axis=1)[nearest]
-        calm = both & (frames.speed[at] < _STILL_SPEED) & (strangeness[at] <= 1.0)
+        calm = both & (speed[at] < _STILL_SPEED) & (strangeness[at] <= 1.0)
         runs = [part for run in find_runs(calm) for part in _split_at_turns(frames.heading[at], frames.path[at], *run)
                 if part[1] - part[0] >= MIN_STAND_SECONDS * fps]
         longest = sorted(runs, key=lambda run: run[0] - run[1])[:MAX_STANDS_OF_CLIP]

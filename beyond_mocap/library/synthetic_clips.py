@@ -41,6 +41,7 @@ from ..synthetic import gestures
 from ..synthetic.gait import build_gait
 from ..synthetic.gait_plan import GaitStyle
 from .features import Frames
+from .missing_steps import BACK_PREFIX, STEP_PREFIX, TURN_PREFIX, iter_missing_steps
 from .run_loops import LOOP_SECONDS, iter_run_loops
 from .scan import CACHE_FOLDER
 from .standing_loops import LOOP_SECONDS as STAND_SECONDS
@@ -186,6 +187,11 @@ def iter_synthetic_clips(
     for speed, motion, contacts in iter_run_loops(clips, frames, fps, is_run, FPS):
         rows = _build_gait_rows(np.full(len(motion), speed), speeds)
         yield _ground_clip(f"{SYNTHETIC_FOLDER}{LOOP_PREFIX}{speed:.2f}.bvh", motion, contacts, rows, plants_feet=True)
+    for name, motion, heel_toe_contacts, speed in iter_missing_steps(
+        clips, frames, fps, strangeness, example=example, rate=FPS
+    ):
+        rows = _build_step_rows(name, len(motion), speed, speeds)
+        yield _ground_clip(f"{SYNTHETIC_FOLDER}{name}.bvh", motion, heel_toe_contacts, rows)
 
 
 def sample_upright_example(clips: Sequence) -> Motion:
@@ -351,6 +357,15 @@ def _build_gait_rows(speed: np.ndarray, speeds: dict[str, float]) -> tuple[ClipA
     words = sorted((word for word in speeds if word in _GAITS), key=speeds.get)
     band = np.searchsorted(compute_gait_thresholds(np.array([speeds[word] for word in words])), speed, side="right")
     return tuple(ClipAnnotation(a, b - 1, None, (words[band[a]], "front")) for a, b in find_equal_runs(band))
+
+
+def _build_step_rows(name: str, count: int, speed: float, speeds: dict[str, float]) -> tuple[ClipAnnotation, ...]:
+    """Build the row of a step that recordings lack (`missing_steps`): the gait of its speed, and its direction."""
+    words = (STANDING, "turning") if name.startswith(TURN_PREFIX) else (STANDING,)
+    if not name.startswith((TURN_PREFIX, STEP_PREFIX)):
+        gait = _build_gait_rows(np.full(1, speed), speeds)[0].words[0]
+        words = (gait, "back" if name.startswith(BACK_PREFIX) else "left")
+    return (ClipAnnotation(0, count - 1, None, words),)
 
 
 def _ground_clip(name: str, motion: Motion, heel_toe_contacts: np.ndarray | None, rows,

@@ -148,8 +148,9 @@ def blend_strides(slow: Strides, fast: Strides, speed: float, fps: float) -> tup
     return Motion(slow.motion.skeleton, root, quaternion.unify_signs(rotations), fps), mixed["inside"] > 0.0
 
 
-def repeat_strides(strides: Strides, seconds: float, fps: float) -> tuple[Motion, np.ndarray]:
-    """Repeat steady locomotion at an even tempo, from the origin along +X.
+def repeat_strides(strides: Strides, seconds: float, fps: float, tempo: float = 1.0,
+                   length: float = 1.0) -> tuple[Motion, np.ndarray]:
+    """Repeat steady locomotion at an even tempo, from the origin along +X, or backward in time along -X.
 
     The first step comes before the part that is repeated: the last one passes into it, so that the end fits the start.
     Every step lasts as long as the mean step, and the body does not turn from one stride to the next.
@@ -158,12 +159,14 @@ def repeat_strides(strides: Strides, seconds: float, fps: float) -> tuple[Motion
         strides: an odd number of steps, three or more.
         seconds: duration of the result.
         fps: frames per second of the result.
+        tempo: factor on steps per second; below 0 time runs backward.
+        length: factor on the distance travelled with each step.
     Returns:
         The motion, and the contacts (T, 2, 2) bool of left and right, heel and toe.
     """
     repeated = strides.steps - 1
     times = np.arange(int(seconds * fps)) / fps
-    rate = repeated / strides.seconds[1:].sum()
+    rate = tempo * repeated / strides.seconds[1:].sum()
     phase = 1.0 + times * rate % repeated
     share = smoothstep(np.maximum(phase - repeated, 0.0))
     later, earlier = (_sample_at_phase(strides, at, strides.steps)
@@ -171,11 +174,12 @@ def repeat_strides(strides: Strides, seconds: float, fps: float) -> tuple[Motion
     weight = {name: share.reshape(-1, *[1] * (values.ndim - 1)) for name, values in later.items()}
     mixed = {name: (1.0 - weight[name]) * later[name] + weight[name] * earlier[name]
              for name in ("height", "sway", "turn", "way", "inside")}
-    whole = int(times[-1] * rate // repeated * repeated / rate * fps)  # frames of whole repetitions
+    # frames of whole repetitions, or all where not even one fits
+    whole = int(times[-1] * abs(rate) // repeated * repeated / abs(rate) * fps) or len(times)
     facing = _integrate((mixed["turn"] - mixed["turn"][:whole].mean()) * rate, fps)
     travel = quaternion.rotate_level(mixed["way"], facing)
     facing = facing - arctan2(*travel[:whole].mean(axis=0)[::-1])
-    path = _integrate(quaternion.rotate_level(mixed["way"], facing) * rate, fps)
+    path = _integrate(quaternion.rotate_level(mixed["way"], facing) * (rate * length), fps)
     rotations = quaternion.slerp(later["pose"], earlier["pose"], share[:, None])
     rotations[:, 0] = quaternion.multiply(quaternion.from_up_angle(facing), rotations[:, 0])
     root = np.column_stack([path + quaternion.rotate_level(mixed["sway"], facing), mixed["height"]])

@@ -1,25 +1,33 @@
 """The planned heading of a player: where the body faces at every moment, decided before any clip is chosen.
 
 Above 3 m/s the body faces its travel, between 1 and 3 m/s it faces between travel and ball and walks backward or
-sideways where they differ, and below 1 m/s, where the direction of a creeping track is noise, it faces the ball. It
-turns the short way at limited speed, rests within a dead zone, and does not go sideways for long. All of these weigh
-against each other, and the ball comes back; so the plan is the cheapest path through all headings of all moments
-(dynamic programming), not a filter, which cannot look ahead.
+sideways where they differ, and below 1 m/s, where the direction of a creeping track is noise, it faces the ball, or
+where the ball goes if that is far. It turns the short way at limited speed, rests within a dead zone, and does not go
+sideways for long. What is asked takes part: given headings, pins of the gaze, labels with a direction. All of these
+weigh against each other, and the ball comes back; so the plan is the cheapest path through all headings of all moments
+(dynamic programming, `heading_path`), not a filter, which cannot look ahead.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
+from ..annotation import LOCOMOTION, Span
+from ..annotation.gaits import STANDING
+from ..annotation.vocabulary import DIRECTIONS, SIDES
+from ..base.easing import smoothstep
 from ..base.errors import InputError
-from ..base.time_series import interpolate_columns
+from ..base.time_series import find_runs, interpolate_columns, time_derivative
 from ..base.vectors import arctan2
 from ..motion import quaternion
+from ..motion.skeleton import freeze_array
 from ..motion.track import SampledTrack, smooth_zero_phase_hann
 from ..motion.track.resting_place import LEAST_LEEWAY, relax_track
+from .heading_path import BIN_ANGLE, BINS, HeadingPath, find_cheapest_path, replace_part
 
 # Costs per second, of angles in radians. They were chosen on 167 minutes of a tracked match, for few turns and
 # headings near ball and travel: no snap turns, 0.02 spins a minute, 13 degrees from the ball below 1 m/s (median).
@@ -30,22 +38,38 @@ FORWARD_COST = 0.3  # per radian to travel and m/s above 0.6: forward is cheaper
 SIDEWAYS_COST, SIDEWAYS_WIDTH = 2.5, np.radians(45.0)  # at a right angle to travel, and the width of that bell
 TURN_COST, TURN_RATE_COST, TURN_ANGLE_COST = 0.12, 0.08, 0.7  # per second of turning, per (pi / s)^2, per radian
 GIVEN_COST = 40.0  # per radian and second: given headings hold against all others
+DIRECTION_COST = 12.0  # per radian beyond the dead zone from the heading that a label asks for: above TRAVEL_COST
+OTHER_WAY_COST = 8.0  # per radian that is turned against a label: the long way round is cheaper
+GAZE_COST, GAZE_REACH = 6.0, np.radians(45.0)  # per radian beyond what hips and shoulders turn towards a pinned gaze
+KEEPER_BALL_COST, KEEPER_SIDEWAYS = 3.0, 0.5  # of a goalkeeper, at any speed up to 3 m/s; share of SIDEWAYS_COST
+
+ASKED_SECONDS = 3.0
+"""Seconds before and after what is asked in which it may change the plan; elsewhere it does not."""
+
+HOLD_FADE = 0.7
+"""Seconds before and after a heading key over which the body comes to hold it."""
 
 _TRAVEL_SPEEDS = np.array([1.6, 2.2, 3.0, 4.5])  # m/s, with the largest angle between heading and travel at each
+_KEEPER_SPEEDS = np.array([3.0, 3.6, 4.4, 5.5])
 _TRAVEL_LIMITS = np.radians([180.0, 60.0, 35.0, 25.0])
 _STANDING_TURN, _RUNNING_TURN, _RUNNING_SPEED = 3, 4, 2.2  # bins per decision (180 and 240 degrees/s); m/s
+_CALM_TURN = 2  # the same towards what is asked (120 degrees/s): a body that is held to a faster turn snaps
+_STEPS = np.arange(-_RUNNING_TURN, _RUNNING_TURN + 1)  # bins from one decision to the next
 _NEAR_BALL = 2.0  # m; a nearer ball has no bearing, the last one holds
+_FAR_BALL = (25.0, 30.0)  # m between which the way of the ball takes its place
+_BALL_LEAD = 1.0  # s that the way of a far ball is ahead of it
+_BALL_GAP = 2.0  # s; the ball is not known in longer gaps
+_DIRECTION_SPEED = 0.3  # m/s from which on a track has a direction that a label can mean
+_GAZE_SECONDS = 0.3  # s before and after a pin of the gaze in which it counts
 
-_BINS = 36
 _DECISION_SECONDS = 1.0 / 6.0
-_SMOOTHING_SECONDS = 0.7  # s, of the headings between decisions
 _VELOCITY_SECONDS = 1.0  # s, of the travel and the ball that are faced
-_UNIT = 1e-6  # cost of one integer unit: whole numbers add up alike whatever comes before them, so edits stay local
+_TURNING = "turning"
 
 
 @dataclass(frozen=True)
 class HeadingKey:
-    """A heading that is given for some time.
+    """A heading that is given for some time, at most until the next one.
 
     Attributes:
         time: s on the track's clock from which on it holds.
@@ -70,6 +94,47 @@ class HeadingKey:
             raise InputError("heading key", f"{values}", "finite values, and a hold of at least 0 s")
 
 
+@dataclass(frozen=True, eq=False)
+class Play:
+    """What a player of a match faces beside the ball.
+
+    Attributes:
+        times: (M,) s on the track's clock, ascending.
+        places: (M, 2) m that the body faces while the ball is not known.
+        is_keeper: whether this is a goalkeeper, who faces the ball also when moving.
+    """
+
+    times: np.ndarray
+    places: np.ndarray
+    is_keeper: bool = False
+
+    def __post_init__(self):
+        object.__setattr__(self, "times", freeze_array(self.times))
+        object.__setattr__(self, "places", freeze_array(self.places))
+
+
+@dataclass(frozen=True, kw_only=True)
+class HeadingRequest:
+    """What is asked of the heading of a player.
+
+    Attributes:
+        keys: headings that are given; each ends where the next one begins.
+        gazes: pins of the gaze: objects with `time`, `hold` and `end` s and `position` m (`plan.Pin`).
+        spans: labels that the user asks for; a gait with a direction and turning with a side count.
+        play: what a player of a match faces beside the ball, None where that is not known.
+    """
+
+    keys: tuple[HeadingKey, ...] = ()
+    gazes: tuple[Any, ...] = ()
+    spans: tuple[Span, ...] = ()
+    play: Play | None = None
+
+    @property
+    def is_keeper(self) -> bool:
+        """Whether it is a goalkeeper's."""
+        return self.play is not None and self.play.is_keeper
+
+
 def plan_track(track: SampledTrack, keys: Sequence[HeadingKey] = (), rests: bool = True) -> SampledTrack:
     """Plan where the body of a track rests and where it faces.
 
@@ -80,123 +145,227 @@ def plan_track(track: SampledTrack, keys: Sequence[HeadingKey] = (), rests: bool
     Returns:
         The same with the places and headings of the body.
     """
-    relaxed = relax_track(track) if rests else replace(track, leeway=np.full(len(track), LEAST_LEEWAY))
+    relaxed = rest_track(track, rests)
     return replace(relaxed, heading=plan_heading(relaxed, keys))
 
 
+def rest_track(track: SampledTrack, rests: bool = True) -> SampledTrack:
+    """Let the body of a track rest where the track hardly moves; with `rests` False it is on the track."""
+    return relax_track(track) if rests else replace(track, leeway=np.full(len(track), LEAST_LEEWAY))
+
+
 def plan_heading(track: SampledTrack, keys: Sequence[HeadingKey] = ()) -> np.ndarray:
+    """Plan the heading of a player: (T,) rad from +x, unwrapped, for the arguments of `plan_heading_path`."""
+    return plan_heading_path(track, HeadingRequest(keys=tuple(keys))).sample(track.times)
+
+
+def plan_heading_path(track: SampledTrack, request: HeadingRequest) -> HeadingPath:
     """Plan the heading of a player.
 
     Args:
         track: the player's track with the ball, T frames; its positions are where the body will be.
-        keys: headings that are given.
+        request: what is asked.
     Returns:
-        (T,) rad from +x, unwrapped.
+        The planned heading.
     Source: Reconstructed from the rules of ../shared/metrics.md, *Heading plan*.
     """
     count = len(track)
     at = np.arange(0, count, max(int(round(_DECISION_SECONDS * track.fps)), 1))
     if at[-1] != count - 1:
         at = np.append(at, count - 1)
-    bearings = _compute_bearings(track)
-    costs = _compute_heading_costs(bearings, keys, track, at)
-    speed = bearings.speed[at]
-    found = _find_cheapest_path(costs, speed, np.diff(track.times[at], append=track.times[at[-1]] + _DECISION_SECONDS))
-    heading = np.interp(np.arange(count), at, np.unwrap(2.0 * np.pi / _BINS * found))
-    return smooth_zero_phase_hann(heading[:, None], track.fps, _SMOOTHING_SECONDS)[:, 0]
+    bearings = _compute_bearings(track, request.play, at)
+    costs, step_costs = _compute_heading_costs(bearings, request.is_keeper), _compute_step_costs(bearings)
+    bins = find_cheapest_path(costs, step_costs)
+    runs = find_runs(_find_asked(bearings, request))
+    if runs:
+        costs, step_costs = _add_asked_costs(bearings, request, costs), _limit_turns(bearings, request, step_costs)
+    for first, end in runs:
+        bins = replace_part(bins, first, end, costs, step_costs)
+    return HeadingPath(bearings.times, bins)
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, kw_only=True)
 class _Bearings:
-    """What a heading is weighed against at each of T frames.
+    """What a heading is weighed against at each of D decisions.
 
     Attributes:
-        speed: (T,) m/s.
-        travel: (T,) rad, direction of travel.
-        ball: (T,) rad, bearing of the ball, NaN where there is none.
+        times: (D,) s.
+        seconds: (D,) from each decision to the next.
+        positions: (D, 2) m.
+        speed: (D,) m/s.
+        travel: (D,) rad, direction of travel.
+        ball: (D,) rad, bearing of the ball or of the play, NaN where there is neither.
     """
 
+    times: np.ndarray
+    seconds: np.ndarray
+    positions: np.ndarray
     speed: np.ndarray
     travel: np.ndarray
     ball: np.ndarray
 
 
-def _compute_bearings(track: SampledTrack) -> _Bearings:
-    """Compute smoothed speed, travel and bearing of the ball."""
-    velocity = smooth_zero_phase_hann(track.velocity, track.fps, _VELOCITY_SECONDS)
+def _compute_bearings(track: SampledTrack, play: Play | None, at: np.ndarray) -> _Bearings:
+    """Compute smoothed speed, travel and bearing of the ball at the frames `at` (D,)."""
+    velocity = smooth_zero_phase_hann(track.velocity, track.fps, _VELOCITY_SECONDS)[at]
+    bearing, offset = np.full(len(track), np.nan), _compute_faced_place(track, play) - track.positions
+    far = np.flatnonzero(np.linalg.norm(offset, axis=1) >= _NEAR_BALL)
+    if len(far):
+        # the last far ball's bearing holds; before the first one, that one's
+        last = far[np.maximum(np.searchsorted(far, np.arange(len(track)), side="right") - 1, 0)]
+        bearing = arctan2(offset[last, 1], offset[last, 0])
+    times = np.round(track.times[at], 6)
+    seconds = np.diff(times, append=times[-1] + _DECISION_SECONDS)
+    return _Bearings(times=times, seconds=seconds, positions=track.positions[at], ball=bearing[at],
+                     speed=np.linalg.norm(velocity, axis=1), travel=arctan2(velocity[:, 1], velocity[:, 0]))
+
+
+def _compute_faced_place(track: SampledTrack, play: Play | None) -> np.ndarray:
+    """Compute the place (T, 2) m that a slow body faces: the ball, where a far one goes, or the play without a ball.
+
+    NaN where there is none of these.
+    """
     known = np.isfinite(track.ball[:, :2]).all(axis=1)
-    bearing = np.full(len(track), np.nan)
+    place = np.full((len(track), 2), np.nan)
     if known.any():
         ball = smooth_zero_phase_hann(interpolate_columns(track.times, track.times[known], track.ball[known, :2]),
                                       track.fps, _VELOCITY_SECONDS)
-        offset = ball - track.positions
-        far = np.flatnonzero(np.linalg.norm(offset, axis=1) >= _NEAR_BALL)
-        if len(far):
-            # the last far ball's bearing holds; before the first one, that one's
-            last = far[np.maximum(np.searchsorted(far, np.arange(len(track)), side="right") - 1, 0)]
-            bearing = arctan2(offset[last, 1], offset[last, 0])
-    return _Bearings(np.linalg.norm(velocity, axis=1), arctan2(velocity[:, 1], velocity[:, 0]), bearing)
+        distance = np.linalg.norm(ball - track.positions, axis=1)
+        ahead = _BALL_LEAD * smoothstep(distance, *_FAR_BALL)[:, None]
+        place = ball + ahead * time_derivative(ball, track.fps)
+    if play is None:
+        return place
+    lost = np.zeros(len(track), bool)
+    for first, end in find_runs(~(known & track.ball_measured)):
+        lost[first:end] = end - first > _BALL_GAP * track.fps
+    place = np.where(lost[:, None], interpolate_columns(track.times, play.times, play.places), place)
+    return smooth_zero_phase_hann(place, track.fps, _VELOCITY_SECONDS) if lost.any() else place
 
 
-def _compute_heading_costs(bearings: _Bearings, keys: Sequence[HeadingKey], track: SampledTrack,
-                           at: np.ndarray) -> np.ndarray:
-    """Compute the cost per second (D, bins) of every heading at the decisions `at` (D,)."""
-    angle = 2.0 * np.pi / _BINS * np.arange(_BINS)
-    v = bearings.speed[at, None]
-    from_ball = np.nan_to_num(np.abs(quaternion.wrap_angle(angle - bearings.ball[at, None])))
-    from_travel = np.abs(quaternion.wrap_angle(angle - bearings.travel[at, None]))
-    cost = BALL_COST * np.maximum(from_ball - DEAD_ZONE, 0.0) * (1.0 - 0.5 * np.clip((v - 1.0) / 2.0, 0.0, 1.0))
-    cost += TRAVEL_COST * np.maximum(from_travel - np.interp(v, _TRAVEL_SPEEDS, _TRAVEL_LIMITS), 0.0)
+def _compute_heading_costs(bearings: _Bearings, is_keeper: bool) -> np.ndarray:
+    """Compute the cost (D, BINS) of every heading at every decision where nothing is asked."""
+    v = bearings.speed[:, None]
+    from_ball, from_travel = _measure_angles(bearings.ball), _measure_angles(bearings.travel)
+    ball_cost = KEEPER_BALL_COST if is_keeper else BALL_COST * 0.5 * (1.0 + _compute_slowness(v))
+    cost = ball_cost * np.maximum(from_ball - DEAD_ZONE, 0.0)
+    limits = np.interp(v, _KEEPER_SPEEDS if is_keeper else _TRAVEL_SPEEDS, _TRAVEL_LIMITS)
+    cost += TRAVEL_COST * np.maximum(from_travel - limits, 0.0)
     cost += FORWARD_COST * np.clip(v - 0.6, 0.0, 3.0) * from_travel
     bell = np.exp(-(((from_travel - np.pi / 2.0) / SIDEWAYS_WIDTH) ** 2))
-    cost += SIDEWAYS_COST * bell * np.clip((v - 0.5) / 0.7, 0.0, 1.0)
-    for key in keys:
-        given = _compute_given_heading(key, track, at)
-        cost += GIVEN_COST * np.nan_to_num(np.abs(quaternion.wrap_angle(angle - given[:, None])))
-    return cost
+    sideways = SIDEWAYS_COST * (KEEPER_SIDEWAYS if is_keeper else 1.0)
+    cost += sideways * bell * np.clip((v - 0.5) / 0.7, 0.0, 1.0)
+    return cost * bearings.seconds[:, None]
 
 
-def _compute_given_heading(key: HeadingKey, track: SampledTrack, at: np.ndarray) -> np.ndarray:
-    """Compute the heading (D,) rad that a key gives at the decisions `at`, NaN where it does not hold."""
-    times, reach = track.times[at], 0.5 * _DECISION_SECONDS
-    holds = (times >= key.time - reach) & (times <= key.time + key.hold + reach)
-    if key.target is None:
-        heading = np.full(len(at), key.heading)
-    else:
-        offset = np.asarray(key.target) - track.positions[at]
-        heading = arctan2(offset[:, 1], offset[:, 0])
-    return np.where(holds, heading, np.nan)
+def _compute_slowness(speed: np.ndarray) -> np.ndarray:
+    """Compute how slow a body is: 1 up to 1 m/s, 0 from 3 m/s on."""
+    return 1.0 - np.clip((speed - 1.0) / 2.0, 0.0, 1.0)
 
 
-def _find_cheapest_path(costs: np.ndarray, speed: np.ndarray, seconds: np.ndarray) -> np.ndarray:
-    """Find the cheapest sequence of headings.
+def _find_asked(bearings: _Bearings, request: HeadingRequest) -> np.ndarray:
+    """Find the decisions (D,) bool that what is asked changes; all others stay as they are without it."""
+    spans = [span for span in request.spans if _find_quarter(span) is not None or _find_turning_side(span) is not None]
+    times = [(key.time, key.time + key.hold) for key in request.keys]
+    times += [(pin.time, pin.end) for pin in request.gazes] + [(span.start, span.end) for span in spans]
+    found = np.zeros(len(bearings.times), bool)
+    for start, end in times:
+        found |= (bearings.times >= start - ASKED_SECONDS) & (bearings.times <= end + ASKED_SECONDS)
+    return found
 
-    Args:
-        costs: (D, bins) per second.
-        speed: (D,) m/s.
-        seconds: (D,) from each decision to the next.
-    Returns:
-        (D,) bins.
+
+def _add_asked_costs(bearings: _Bearings, request: HeadingRequest, costs: np.ndarray) -> np.ndarray:
+    """Add the costs of what is asked to those of every heading at every decision (D, BINS)."""
+    cost, slow = np.zeros_like(costs), _compute_slowness(bearings.speed)[:, None]
+    for pin in request.gazes:
+        gaze = np.where(_find_held(bearings, pin, _GAZE_SECONDS), _compute_bearing(bearings, pin.position), np.nan)
+        cost += GAZE_COST * slow * np.maximum(_measure_angles(gaze) - GAZE_REACH, 0.0)
+    asked = _compute_asked_heading(bearings, request.spans)
+    cost += DIRECTION_COST * np.maximum(_measure_angles(asked) - DEAD_ZONE, 0.0)
+    for key in _end_at_next(request.keys):
+        cost += GIVEN_COST * _measure_angles(_compute_given_heading(bearings, key))
+    return costs + cost * bearings.seconds[:, None]
+
+
+def _measure_angles(bearing: np.ndarray) -> np.ndarray:
+    """Measure the angle (D, BINS) rad of every heading from a bearing (D,), 0 where that is NaN."""
+    return np.nan_to_num(np.abs(quaternion.wrap_angle(BIN_ANGLE * np.arange(BINS) - bearing[:, None])))
+
+
+def _compute_bearing(bearings: _Bearings, place: Sequence[float]) -> np.ndarray:
+    """Compute the bearing (D,) rad of a place, m."""
+    offset = np.asarray(place[:2]) - bearings.positions
+    return arctan2(offset[:, 1], offset[:, 0])
+
+
+def _find_held(bearings: _Bearings, held: Any, reach: float) -> np.ndarray:
+    """Find the decisions (D,) bool within `reach` s of the time for which a key or a pin holds."""
+    return (bearings.times >= held.time - reach) & (bearings.times <= held.time + held.hold + reach)
+
+
+def _end_at_next(keys: Sequence[HeadingKey]) -> list[HeadingKey]:
+    """End each key where the next one begins."""
+    keys = sorted(keys, key=lambda key: key.time)
+    ends = [key.time - _DECISION_SECONDS for key in keys[1:]] + [np.inf]
+    return [replace(key, hold=min(key.hold, max(end - key.time, 0.0))) for key, end in zip(keys, ends)]
+
+
+def measure_hold(keys: Sequence[HeadingKey], times: np.ndarray) -> np.ndarray | None:
+    """Measure how far heading keys hold at times (T,) s: (T,) from 0 to 1, None without keys."""
+    away = [np.maximum(key.time - times, times - key.time - key.hold) for key in _end_at_next(keys)]
+    return 1.0 - smoothstep(np.min(away, axis=0), 0.0, HOLD_FADE) if away else None
+
+
+def _compute_given_heading(bearings: _Bearings, key: HeadingKey) -> np.ndarray:
+    """Compute the heading (D,) rad that a key gives, NaN where it does not hold."""
+    heading = key.heading if key.target is None else _compute_bearing(bearings, key.target)
+    return np.where(_find_held(bearings, key, 0.5 * _DECISION_SECONDS), heading, np.nan)
+
+
+def _compute_asked_heading(bearings: _Bearings, spans: Sequence[Span]) -> np.ndarray:
+    """Compute the heading (D,) rad that labels such as "walking back" mean, NaN without one.
+
+    A label's direction is that of the motion seen from the body, so the heading lies at the opposite angle from travel.
     """
-    units = np.rint(costs * seconds[:, None] / _UNIT).astype(np.int64)
-    most = max(_STANDING_TURN, _RUNNING_TURN)
-    steps = np.arange(-most, most + 1)
-    bins = np.arange(_BINS)
-    came_from = (bins[None, :] - steps[:, None]) % _BINS
-    angle = 2.0 * np.pi / _BINS * np.abs(steps)
-    total, back = units[0], np.zeros((len(units), _BINS), dtype=int)
-    for k in range(1, len(units)):
-        duration = seconds[k - 1]
-        rate = angle / max(duration, 1e-9) / np.pi
-        turning = (TURN_COST + TURN_RATE_COST * rate**2) * duration * (steps != 0) + TURN_ANGLE_COST * angle
-        limit = _RUNNING_TURN if speed[k] > _RUNNING_SPEED else _STANDING_TURN
-        turning = np.where(np.abs(steps) <= limit, turning, 1e6)
-        reached = total[came_from] + np.rint(turning / _UNIT).astype(np.int64)[:, None]
-        best = reached.argmin(axis=0)
-        back[k] = came_from[best, bins]
-        total = reached[best, bins] + units[k]
-    path = np.empty(len(units), dtype=int)
-    path[-1] = int(total.argmin())
-    for k in range(len(units) - 1, 0, -1):
-        path[k - 1] = back[k, path[k]]
-    return path
+    out = np.full(len(bearings.times), np.nan)
+    for span in spans:
+        quarter = _find_quarter(span)
+        if quarter is not None:
+            inside = _find_inside(bearings, span) & (bearings.speed > _DIRECTION_SPEED)
+            out = np.where(inside, bearings.travel - 0.5 * np.pi * quarter, out)
+    return out
+
+
+def _find_quarter(span: Span) -> int | None:
+    """Find the quarter turn from heading to travel that a gait's labels ask for; None without one."""
+    found = [number for number, word in enumerate(DIRECTIONS) if word in span.words]
+    is_gait = set(span.words) <= {*LOCOMOTION, *DIRECTIONS} - {STANDING}
+    return found[0] if len(found) == 1 and is_gait else None
+
+
+def _find_turning_side(span: Span) -> int | None:
+    """Find the side to which labels ask to turn, 1 left and -1 right; None without one."""
+    found = [sign for side, sign in zip(SIDES, (1, -1)) if side in span.words]
+    return found[0] if _TURNING in span.words and len(found) == 1 else None
+
+
+def _find_inside(bearings: _Bearings, span: Span) -> np.ndarray:
+    """Find the decisions (D,) bool within a span."""
+    return (bearings.times >= span.start) & (bearings.times <= span.end)
+
+
+def _compute_step_costs(bearings: _Bearings) -> np.ndarray:
+    """Compute the cost (D, 2 N + 1) of coming to a decision by -N .. N bins; inf where legs cannot turn so fast."""
+    duration, angle = np.roll(bearings.seconds, 1)[:, None], BIN_ANGLE * np.abs(_STEPS)
+    rate = angle / np.maximum(duration, 1e-9) / np.pi
+    cost = (TURN_COST + TURN_RATE_COST * rate**2) * duration * (_STEPS != 0) + TURN_ANGLE_COST * angle
+    limit = np.where(bearings.speed > _RUNNING_SPEED, _RUNNING_TURN, _STANDING_TURN)[:, None]
+    return np.where(np.abs(_STEPS) <= limit, cost, np.inf)
+
+
+def _limit_turns(bearings: _Bearings, request: HeadingRequest, step_costs: np.ndarray) -> np.ndarray:
+    """Limit the turns (D, 2 N + 1) to what is asked to a calm speed, and to the side that a label asks for."""
+    step_costs = np.where(np.abs(_STEPS) <= _CALM_TURN, step_costs, np.inf)
+    for span in request.spans:
+        against = np.maximum(-(_find_turning_side(span) or 0) * _STEPS, 0)
+        step_costs = step_costs + _find_inside(bearings, span)[:, None] * OTHER_WAY_COST * BIN_ANGLE * against
+    return step_costs

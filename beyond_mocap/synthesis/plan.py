@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -17,11 +18,14 @@ from ..base.errors import InputError, format_seconds
 from ..base.settings import collect_defaults, find_setting, list_settings
 from ..base.settings.setting import LATER, add_fields, check_limits
 from ..base.time_series import interpolate_columns
+from ..library.features import FPS
 from ..motion.skeleton import freeze_array
 from ..motion.track import SampledTrack, Track, sample_track
-from .heading_plan import HeadingKey, plan_track
+from .heading_path import HeadingPath
+from .heading_plan import HeadingKey, HeadingRequest, Play, measure_hold, plan_heading_path, rest_track
 
-PARTS = ("left_hand", "right_hand", "left_foot", "right_foot", "gaze")
+GAZE = "gaze"
+PARTS = ("left_hand", "right_hand", "left_foot", "right_foot", GAZE)
 FEET = ("", "left", "right")
 METHODS = find_setting("synthesis", "method").choice_names
 _DEFAULTS = collect_defaults("synthesis", "player")
@@ -134,6 +138,7 @@ class Plan:
         strong_foot: one of FEET.
         style: labels, or names or patterns of folders and clips ("academy", "lmd/*").
         solved: the ball's trajectory where it is known already, such as from a whole match.
+        heading_path: the planned heading where it is known already, such as over a whole match.
     Raises:
         InputError: for a number outside the limits of its setting, and for two pins of one part at one time.
     Source: Faustino 2016: catch_up §3.3.2, alpha eq. 13 (for "path" `synthesis.search.path_costs`), delta §3.2.4, omega
@@ -171,6 +176,8 @@ class Plan:
     lag: float = field(default=_DEFAULTS["lag"], metadata=LATER)
     manner: int = field(default=_DEFAULTS["manner"], metadata=LATER)
     solved: SolvedTrajectory | None = field(default=None, compare=False, repr=False, metadata=LATER)
+    heading_path: HeadingPath | None = field(default=None, compare=False, repr=False, metadata=LATER)
+    watch: float = field(default=_DEFAULTS["watch"], metadata=LATER)
 
     def __post_init__(self):
         object.__setattr__(self, "pins", tuple(sorted(self.pins, key=lambda pin: (pin.time, pin.part))))
@@ -247,6 +254,7 @@ class ResolvedPlan:
     track: Track
     trajectory: SolvedTrajectory | None
     size: float
+    _sampled: dict[tuple[float, bool], SampledTrack] = field(default_factory=dict, init=False, repr=False)
 
     @property
     def method(self) -> str:
@@ -258,22 +266,47 @@ class ResolvedPlan:
         """Output frames per second."""
         return self.requested.fps
 
-    @property
-    def _scaled_heading_keys(self) -> list[HeadingKey]:
-        """The heading keys with their targets in the library's size."""
-        return [key if key.target is None else
-                replace(key, target=(key.target[0] / self.size, key.target[1] / self.size))
+    @cached_property
+    def heading_path(self) -> HeadingPath:
+        """The planned heading; method "path" only."""
+        return self.requested.heading_path or self.plan_heading()
+
+    def plan_heading(self, play: Play | None = None) -> HeadingPath:
+        """Plan the heading.
+
+        Args:
+            play: what a player of a match faces beside the ball.
+        Returns:
+            The planned heading, the same whatever frame rate it is read at.
+        """
+        size = self.size
+        keys = [key if key.target is None else replace(key, target=(key.target[0] / size, key.target[1] / size))
                 for key in self.requested.heading_keys]
+        gazes = [replace(pin, position=(pin.position[0] / size, pin.position[1] / size, pin.position[2] / size))
+                 for pin in self.requested.pins if pin.part == GAZE]
+        request = HeadingRequest(keys=tuple(keys), gazes=tuple(gazes), spans=self.timeline.spans, play=play)
+        return plan_heading_path(rest_track(self._sample_ball_track(FPS)), request)
 
     def sample_track(self, fps: float, rests: bool = True) -> SampledTrack:
-        """Sample the track, with the solved ball, in the library's size.
+        """Sample the track, with the solved ball, in the library's size; each of its forms is computed once.
+
+        With method "path" it has the places and headings of the body.
 
         Args:
             fps: frames per second.
             rests: whether the body of a slow track may rest (`motion.track.resting_place`); method "path" only.
         """
+        if (fps, rests) not in self._sampled:
+            sampled = self._sample_ball_track(fps)
+            if self.method == "path":
+                sampled = replace(rest_track(sampled, rests), heading=self.heading_path.sample(sampled.times),
+                                  held=measure_hold(self.requested.heading_keys, sampled.times))
+            self._sampled[fps, rests] = sampled
+        return self._sampled[fps, rests]
+
+    def _sample_ball_track(self, fps: float) -> SampledTrack:
+        """Sample the track, with the solved ball, in the library's size, as it was measured."""
         trajectory = self.trajectory
         if trajectory is not None and self.size != 1.0:
             trajectory = replace(trajectory, ball=trajectory.ball / self.size)
-        sampled = sample_with_trajectory(self.track, trajectory, fps, self.requested.track_window)
-        return plan_track(sampled, self._scaled_heading_keys, rests) if self.method == "path" else sampled
+        return sample_with_trajectory(self.track, trajectory, fps, self.requested.track_window)

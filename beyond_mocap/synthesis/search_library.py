@@ -7,6 +7,7 @@ from collections.abc import Callable
 import numpy as np
 
 from ..annotation.ball_contact import takes_with_foot
+from ..annotation.gaits import compute_heading_offset
 from ..library.automatic_locomotion import apply_chosen_gaits
 from ..library.library import Library
 from .plan import ResolvedPlan
@@ -38,4 +39,6 @@ def _lacks_speeds(library: Library, plan: ResolvedPlan) -> bool:
     track = plan.sample_track(library.fps)
     moments = np.array([key.resolved_time for key in plan.timeline.keys])
     takes = np.array([takes_with_foot(key.words) for key in plan.timeline.keys], bool)
-    return library.needs_synthetic_clips(track.speed, np.interp(moments, track.times, track.speed), takes)
+    offset = compute_heading_offset(track)
+    return library.needs_synthetic_clips(track.speed, offset, np.unwrap(track.direction + offset),
+                                         np.interp(moments, track.times, track.speed), takes)

@@ -12,23 +12,23 @@ fetched (`synthesis.search.source_frames`) and placed on the track (`synthesis.c
 from __future__ import annotations
 
 import time
-import weakref
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ..annotation import LOCOMOTION_LABELS, avoided_labels_per_frame
+from ..annotation import avoided_labels_per_frame
 from ..base.errors import InputError, TimedMessage, format_seconds
 from ..base.time_series import find_runs
 from ..library.library import Library
 from ..motion.foot_plant import PlantResult
-from ..motion.motion import Motion, sample_frames
+from ..motion.motion import Motion
 from ..motion.track.ball_path import BallPath
 from .body_size import to_player_size
 from .construct.construction import Construction, build_key_results, find_touches
 from .construct.extra_steps import Steps
-from .construct.pins import apply_pins, estimate_look_axis
+from .construct.gaze import estimate_look
+from .construct.pins import apply_pins
 from .construct.thesis_methods import construct_blocks
 from .plan import METHODS, Plan, ResolvedPlan
 from .provenance import build_provenance_fields
@@ -55,8 +55,6 @@ KEY_MARGIN = 1.5
 PIN_TOLERANCE, GAZE_TOLERANCE = 0.01, np.radians(5.0)
 """Metres, and radians of a gaze, by which a pin may be missed without a warning."""
 
-LOOK_POSES = 200  # poses from which the look axis is estimated
-_look_axes: weakref.WeakKeyDictionary[Library, np.ndarray] = weakref.WeakKeyDictionary()
 
 Progress = Callable[[float, str], None]
 
@@ -168,15 +166,14 @@ def _construct_motion(
     clock.append(time.perf_counter())
     report(0.9, "Correcting feet")
     touches = find_touches(library, plan.fps, edit, keys)
-    construction = Construction(library=library, plan=plan, track=track, source=source, touches=touches,
-                                look=estimate_look(library))
+    construction = Construction(library=library, plan=plan, track=track, source=source, touches=touches)
     planted, steps, ball = _construct_body(construction, result.interpolate_travelled(index))
     motion = Motion(library.skeleton, planted.root, planted.rotations, plan.fps)
     take = Take(
         **build_provenance_fields(library, source), motion=motion, start_time=float(track.times[0]),
         contacts=steps.contacts, timeline=request.timeline, keys=keys, ball=ball, method=plan.method,
         seed=plan.requested.seed, correction=planted.correction, ik_miss=planted.miss, stepped=steps.stepped,
-        plan=plan.requested, edit=edit,
+        plan=plan.requested, edit=edit, planned_heading=track.heading,
     )
     clock.append(time.perf_counter())
     report(1.0, "Done")
@@ -247,19 +244,6 @@ def add_pins(take: Take, recordings: Library) -> Take:
     results = tuple(PinResult(pin, miss) for pin, miss in zip(pins, found.miss))
     unpinned = take.motion, take.contacts
     return replace(take, motion=motion, contacts=found.contacts, pins=results, unpinned=unpinned)
-
-
-def estimate_look(library: Library) -> np.ndarray:
-    """Estimate the direction (3,) in which heads look, in their own frame, over the library's locomotion; cached."""
-    if library not in _look_axes:
-        frames = library.frames
-        gaits = [i for i, word in enumerate(frames.vocabulary) if word in LOCOMOTION_LABELS]
-        going = np.flatnonzero(frames.words[:, gaits].any(axis=1) & (frames.velocity[:, 0] > 0.0))
-        some = going[:: max(1, len(going) // LOOK_POSES)] if len(going) else np.arange(min(len(frames), LOOK_POSES))
-        pairs = zip(frames.clip[some], frames.source[some])
-        poses = [sample_frames(library.clips[clip].motion, np.array([frame]))[1] for clip, frame in pairs]
-        _look_axes[library] = estimate_look_axis(library.skeleton, np.concatenate(poses))
-    return _look_axes[library]
 
 
 def add_warnings(

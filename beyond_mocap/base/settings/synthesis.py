@@ -81,6 +81,10 @@ TABLES = {
                 option="--root-window", help="window through which the body is on the track ('path'); default "
                 "%(default)g", title="Sway Window", tooltip="For Path Following: smoothing window in which body and "
                 "track agree; a shorter one keeps less sway", in_preset=True, tuning="path"),
+        Setting(name="watch", default=1.0, least=0.0, most=1.0, expected=BETWEEN, option="--watch", metavar="SHARE",
+                help="how much head and shoulders turn to the ball ('path'), 0 for not at all; default %(default)g",
+                title="Watch the Ball", tooltip="For Path Following: how much head and shoulders turn to the ball; 0 "
+                "keeps them as in the clips", in_preset=True, tuning="path"),
         Setting(name="variety", default=0.0, least=0.0, most=10.0, unit="m/s", help="missed speed that is accepted so "
                 "that neighbours in a match are not in step"),
         Setting(name="lag", default=0.0, least=0.0, most=60.0, unit="seconds", help="lag of a player of a match behind "
@@ -94,8 +98,9 @@ TABLES = {
         Setting(name="mirror", default=True, option="--no-mirror", help="do not use mirrored clips",
                 title="Mirrored Clips", tooltip="Use each clip also with left and right exchanged", in_preset=True),
         Setting(name="made", default=True, option="--no-made", help="no synthetic or blended clips where recordings "
-                "lack a speed", title="Synthetic Clips", tooltip="For Path Following: add synthetic or blended clips "
-                "where recordings lack a speed or a kick on the run", in_preset=True, tuning="path"),
+                "lack a speed or a step", title="Synthetic Clips", tooltip="For Path Following: add synthetic or "
+                "blended clips where recordings lack a speed, a side step, a turn on the spot or a kick on the run",
+                in_preset=True, tuning="path"),
         Setting(name="nearest", default=False, option="--nearest", help="continue with the nearest labels that the "
                 "library has", title="Nearest Labels", tooltip="Where the library lacks a key moment's labels, use the "
                 "nearest ones and add a warning", in_preset=True),

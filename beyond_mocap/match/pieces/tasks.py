@@ -262,7 +262,7 @@ def _build_overlap(take: Take, request: FinishRequest) -> np.ndarray:
 def _join_provenance(tables: Sequence[Provenance]) -> Provenance:
     """Join the provenance of several stretches."""
     arrays = {name: np.concatenate([getattr(one, name) for one in tables])
-              for name in ("times", "clip_frame", "mirrored", "contacts")}  # fmt: skip
+              for name in ("times", "clip_frame", "mirrored", "contacts", "planned_heading")}  # fmt: skip
     return Provenance(clip=tuple(clip for one in tables for clip in one.clip),
                       words=tuple(words for one in tables for words in one.words), **arrays)
 

@@ -93,6 +93,7 @@ class SampledTrack:
         ball_measured: (T,) bool, False between samples too far apart.
         fps: frames per second.
         heading: (T,) rad from +x where the body should face, None where that is not planned.
+        held: (T,) from 0 to 1, how far that heading is given rather than planned, None for nowhere.
         leeway: (T,) m that a slow body may stay off the positions, None where those are not relaxed.
     """
 
@@ -107,6 +108,7 @@ class SampledTrack:
     ball_measured: np.ndarray
     fps: float
     heading: np.ndarray | None = None
+    held: np.ndarray | None = None
     leeway: np.ndarray | None = None
 
     def __post_init__(self):
@@ -114,7 +116,7 @@ class SampledTrack:
             object.__setattr__(self, name, freeze_array(getattr(self, name)))
         for name in ("valid", "ball_measured"):
             object.__setattr__(self, name, freeze_array(getattr(self, name), bool))
-        for name in ("heading", "leeway"):
+        for name in ("heading", "held", "leeway"):
             if getattr(self, name) is not None:
                 object.__setattr__(self, name, freeze_array(getattr(self, name)))
 

@@ -7,6 +7,7 @@ in the middle of that box.
 
 from __future__ import annotations
 
+import heapq
 from collections import deque
 from collections.abc import Iterator
 from dataclasses import replace
@@ -14,7 +15,6 @@ from dataclasses import replace
 import numpy as np
 
 from ...base.easing import smoothstep
-from ...base.time_series import find_runs
 from .data import SampledTrack
 from .sampling import compute_travel_direction, smooth_zero_phase_hann
 
@@ -94,8 +94,8 @@ def _extend_rests(positions: np.ndarray, rests: list[tuple[int, int]]) -> Iterat
     for number, (first, end) in enumerate(rests):
         middle = 0.5 * (positions[first:end].min(axis=0) + positions[first:end].max(axis=0))
         free_until = rests[number + 1][0] if number + 1 < len(rests) else len(positions)
-        away = np.linalg.norm(positions - middle, axis=1) > LEAVE_DISTANCE
-        gone_before, gone_after = np.flatnonzero(away[free_from:first]), np.flatnonzero(away[end:free_until])
+        gone_before, gone_after = (np.flatnonzero(np.linalg.norm(part - middle, axis=1) > LEAVE_DISTANCE)
+                                   for part in (positions[free_from:first], positions[end:free_until]))
         begin = free_from + int(gone_before[-1]) + 1 if len(gone_before) else free_from
         free_from = end + int(gone_after[0]) if len(gone_after) else free_until
         yield begin, free_from, middle
@@ -116,23 +116,23 @@ def find_rests(positions: np.ndarray, fps: float, half_diagonal: float = REST_HA
     found: list[tuple[int, int]] = []
     least = max(int(round(seconds * fps)), 2)
     length = measure_rest_lengths(positions, half_diagonal)
-    free = np.ones(len(positions), dtype=bool)
-    while True:
-        # what is left of each stretch before the next one that is taken
-        possible = [(first, end) for first, end in find_runs(free) if end - first >= least]
-        best = max((_find_longest(length, *run) for run in possible), key=lambda run: (run[1] - run[0], -run[0]),
-                   default=(0, 0))
-        if best[1] - best[0] < least:
-            return sorted(found)
-        found.append(best)
-        free[slice(*best)] = False
+    queue: list[tuple[int, int, int, int]] = []
+    _push_longest(queue, length, 0, len(positions))
+    while queue and -queue[0][0] >= least:
+        negative, start, first, end = heapq.heappop(queue)
+        found.append((start, start - negative))
+        # what is left before and behind it
+        _push_longest(queue, length, first, start)
+        _push_longest(queue, length, start - negative, end)
+    return sorted(found)
 
 
-def _find_longest(length: np.ndarray, first: int, end: int) -> tuple[int, int]:
-    """Return the longest stretch that begins and ends within first .. end."""
-    inside = np.minimum(length[first:end], end - np.arange(first, end))
-    start = first + int(np.argmax(inside))
-    return start, start + int(inside[start - first])
+def _push_longest(queue: list[tuple[int, int, int, int]], length: np.ndarray, first: int, end: int) -> None:
+    """Push the longest stretch that begins and ends within first .. end: minus its length, its start, and both."""
+    if end > first:
+        inside = np.minimum(length[first:end], end - np.arange(first, end))
+        best = int(np.argmax(inside))
+        heapq.heappush(queue, (-int(inside[best]), first + best, first, end))
 
 
 def measure_rest_lengths(positions: np.ndarray, half_diagonal: float) -> np.ndarray:

@@ -33,7 +33,7 @@ from ..search.source_frames import SourceFrames, SourceMotion, fetch_overlap
 from ..take import KeyResult
 from .edit_blending import OldMotion
 from .extra_steps import Steps, add_steps
-from .gaze import follow_with_gaze, twist_shoulders
+from .gaze import compute_release, estimate_look, hide_lost_ball, watch_ball
 from .settling import SPEEDS, measure_foot_moves, measure_rest, settle_on_track
 from .strike import Touch, strike_ball
 from .track_following import (
@@ -50,6 +50,8 @@ from .transitions import blend_rotations, blend_values, compute_blend_share
 
 # s on either side of a key moment without a clip, in which the body reaches for the ball and returns
 REACH_SECONDS = 0.4
+# s around a header in which the head moves as recorded, and s beside touches in which watching begins and ends
+HEADER_SECONDS, RELEASE_SECONDS = 0.3, 0.5
 
 FREE_SECONDS, FREE_FADE = 0.4, 0.4
 """Seconds before and after a touch, within the entry and exit of its clip, in which the clip decides how the body
@@ -69,8 +71,6 @@ class Construction:
         heading: (T,) rad that is given, NaN where it is free; None where nothing is given.
         old: the motion that stays at both ends, None for none.
         turns_to_ball: whether the body turns so that the striking part points at the ball.
-        look: (3,) direction in which the head looks in its own frame, with which the body watches the ball; None: it
-            does not.
         is_planned: whether the track is a planned path: it is kept exactly, the heading is given in all frames, and the
             body does not lean more than its source does.
     """
@@ -84,7 +84,6 @@ class Construction:
     old: OldMotion | None = None
     turns_to_ball: bool = True
     is_planned: bool = False
-    look: np.ndarray | None = None
 
     @cached_property
     def smooth_source(self) -> SourceMotion:
@@ -137,17 +136,21 @@ class Construction:
         return np.where(self.old.is_old[:, None], self.old.root[:, :2], np.nan)
 
     def _watch_ball(self, planted: PlantResult) -> PlantResult:
-        """Turn shoulders and head to the ball, except where the body meets it and where the old motion stays."""
-        if self.look is None or not np.isfinite(self.track.ball).any():
+        """Turn shoulders and head to the ball by the plan's share, except where the body meets it."""
+        strength, fps, track = self.plan.requested.watch, self.plan.fps, self.track
+        ball = hide_lost_ball(track.ball, track.ball_measured, fps)
+        if not strength or not np.isfinite(ball).any():
             return planted
-        fps, at = self.plan.fps, np.arange(len(self.track))
-        share = 1.0 - np.broadcast_to(self._old_share, len(at))
-        for touch in self.touches:
-            away = np.maximum(np.maximum(touch.frame - touch.entry - at, at - touch.frame - touch.leave), 0.0)
-            share = np.minimum(share, np.clip(away / (0.5 * fps), 0.0, 1.0))
-        share, ball = smoothstep(share), self.track.ball
-        motion = Motion(self.library.skeleton, planted.root, planted.rotations, fps)
-        motion = follow_with_gaze(twist_shoulders(motion, ball, share), ball, self.look, share, chest=0.0)
+        heads = [(touch.frame - HEADER_SECONDS * fps, touch.frame + HEADER_SECONDS * fps) for touch in self.touches
+                 if find_striking_part(touch.words) == "head"]
+        bodies = [(touch.frame - touch.entry, touch.frame + touch.leave) for touch in self.touches]
+        head, shoulders = (strength * compute_release(touches, len(track), RELEASE_SECONDS * fps)
+                           for touches in (heads, bodies))
+        motion = watch_ball(
+            Motion(self.library.skeleton, planted.root, planted.rotations, fps),
+            ball, look=estimate_look(self.library), speed=track.speed, seed=self.plan.requested.seed,
+            start=float(track.times[0]), head_share=head, shoulder_share=shoulders,
+        )
         return replace(planted, rotations=motion.rotations)
 
     def solve_ball_contact(self, planted: PlantResult, steps_taken: Steps) -> tuple[PlantResult, np.ndarray]:
@@ -289,10 +292,11 @@ def solve_heading(
         (T,) rad, unwrapped.
     """
     firm = compute_turning_firmness(source.heel_toe_contacts, source.height, track.fps)
+    held = 0.0 if track.held is None else track.held * (1.0 - freedom)
     if track.heading is not None:
         firm = firm * measure_rest(source, track.speed)
-    return fit_heading(track.direction, track.speed, source.velocity, source.turn, given, firm=firm, plan=track.heading,
-                       freedom=freedom)
+    return fit_heading(track.direction, track.speed, source.velocity, source.turn, given, plan=track.heading,
+                       firm=firm + held * (1.0 - firm), freedom=freedom, held=held)
 
 
 def find_touches(library: Library, fps: float, edit: EditList, keys: tuple[KeyResult, ...]) -> tuple[Touch, ...]:

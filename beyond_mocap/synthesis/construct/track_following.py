@@ -35,6 +35,9 @@ MAX_OFF_PLAN = np.radians(25.0)  # of the heading, from the plan: with more a bo
 PLAN_SPEEDS, PLAN_WEIGHTS = (0.1, 0.5, 1.1), (1e-5, 0.02, 0.05)
 """Weights of the plan by the track's speed, m/s: a body at rest turns as its recording does, within MAX_OFF_PLAN."""
 
+MAX_OFF_HELD, HELD_WEIGHT = np.radians(5.0), 0.5
+"""The same where the heading is given, and the weight added to that of the plan there."""
+
 _HELD_ROUNDS = 3  # of holding what is beyond MAX_OFF_PLAN
 FAINT_WEIGHT = 1e-4  # weight of that pull at any speed, so that there is one solution
 GIVEN_HEADING_WEIGHT = 1e6  # weight of a given heading, so large that it stays
@@ -64,6 +67,7 @@ _ROOT_X, _ROOT_Y, _TURN, _UNKNOWNS = 0, 1, 2, 3
 def fit_heading(
     direction: np.ndarray, speed: np.ndarray, velocity: np.ndarray, turn: np.ndarray, given: np.ndarray | None = None,
     firm: np.ndarray | float = 1.0, plan: np.ndarray | None = None, freedom: np.ndarray | float = 0.0,
+    held: np.ndarray | float = 0.0,
 ) -> np.ndarray:
     """Solve the heading: the least squares compromise between travel and the recording's own turning.
 
@@ -80,6 +84,7 @@ def fit_heading(
         firm: (T,) how many times firmer than usual the recording's turning is followed (`compute_turning_firmness`).
         plan: (T,) rad, unwrapped, near which the heading stays; None without a plan.
         freedom: (T,) from 0 to 1, how little the plan counts, as at the ball.
+        held: (T,) from 0 to 1, how far the plan is given.
     Returns:
         (T,) rad, unwrapped.
     """
@@ -87,7 +92,8 @@ def fit_heading(
     goal = direction - arctan2(velocity[:, 1], velocity[:, 0])
     trust = _motion_weight(speed) ** 2 * _motion_weight(np.linalg.norm(velocity, axis=1)) ** 2
     if plan is not None:
-        return follow_plan(plan, goal, trust, speed=speed, turn=turn, given=given, firm=firm, freedom=freedom)
+        return follow_plan(plan, goal, trust, speed=speed, turn=turn, given=given, firm=firm, freedom=freedom,
+                           held=held)
     trust = trust + FAINT_WEIGHT
     if given is not None:
         goal, trust = np.where(np.isnan(given), goal, given), np.where(np.isnan(given), trust, GIVEN_HEADING_WEIGHT)
@@ -97,6 +103,7 @@ def fit_heading(
 def follow_plan(
     plan: np.ndarray, goal: np.ndarray, trust: np.ndarray, *, speed: np.ndarray, turn: np.ndarray,
     given: np.ndarray | None = None, firm: np.ndarray | float = 1.0, freedom: np.ndarray | float = 0.0,
+    held: np.ndarray | float = 0.0,
 ) -> np.ndarray:
     """Solve the heading near a plan: a body at rest turns as its recording does, within the plan's own dead zone.
 
@@ -109,13 +116,14 @@ def follow_plan(
         given: (T,) rad that the heading has to be, NaN where it is free; None for free everywhere.
         firm: (T,) how many times firmer than usual the recording's turning is followed.
         freedom: (T,) from 0 to 1, how far the recording alone decides.
+        held: (T,) from 0 to 1, how far the plan is given: there the body faces as planned.
     Returns:
         (T,) rad.
     """
-    most = MAX_OFF_PLAN + freedom * (np.pi - MAX_OFF_PLAN)
+    most = MAX_OFF_PLAN + freedom * (np.pi - MAX_OFF_PLAN) - held * (MAX_OFF_PLAN - MAX_OFF_HELD)
     off = np.clip(quaternion.wrap_angle(goal - plan), -most, most)
     pull = np.interp(speed, PLAN_SPEEDS, PLAN_WEIGHTS)
-    pull = pull + freedom * (FAINT_WEIGHT - pull)
+    pull = pull + freedom * (FAINT_WEIGHT - pull) + held * HELD_WEIGHT
     goal, trust = plan + off * trust / (trust + pull), trust + pull
     if given is not None:
         turns = 2.0 * np.pi * np.round((np.nan_to_num(given) - plan) / (2.0 * np.pi))

@@ -21,6 +21,7 @@ from ...library.coverage import NEEDED_TURN_RATE, TRAVEL_SPEED, classify_steps, 
 from ...library.features import SMOOTH_SECONDS
 from ...library.landings import LANDING_FOLDER
 from ...library.library import RESTING_SPEED, Library
+from ...library.missing_steps import BACK_PREFIX, SIDE_PREFIX, STEP_PREFIX, TURN_PREFIX
 from ...library.synthetic_clips import (
     BLEND_PREFIX,
     KICK_PREFIX,
@@ -49,17 +50,21 @@ JOIN_SECONDS = 0.4  # stretches closer than this are one
 MISSING_SECONDS = 0.5  # shortest time of a motion that the library lacks that is reported
 LABEL_SECONDS = 0.5  # shortest time of a missing label that is reported
 MAX_STRETCHES = 6  # stretches that a line lists
-_SYNTHETIC_KINDS = {
-    BLEND_PREFIX: "blended from a slower and a faster recording: none has the speed of the track",
-    KICK_PREFIX: "synthetic kick on the run: no recorded kick is as fast as the player",
-    RECEIVE_PREFIX: "synthetic reception on the run: no recorded one is as fast as the player",
-    STAND_PREFIX: "a recorded stand is played forth and back: no recording stands for so long",
-    STILL_PREFIX: "synthetic standing: no recording stands calmly; add one",
-    WALK_PREFIX: "synthetic walking: no recording has the speed of the track; add one",
-    LOOP_PREFIX: "strides of a recorded run are repeated: no recording runs so steadily for so long",
-}
 _STANDS_AND_GOES_AHEAD = (STAND_PREFIX, STILL_PREFIX, WALK_PREFIX, BLEND_PREFIX)
 _TOLERANCE = 1e-3  # of rates and seconds, for rounding
+_SYNTHETIC_KINDS = (
+    (BLEND_PREFIX, "blended from a slower and a faster recording: none has the speed of the track"),
+    (KICK_PREFIX, "synthetic kick on the run: no recorded kick is as fast as the player"),
+    (RECEIVE_PREFIX, "synthetic reception on the run: no recorded one is as fast as the player"),
+    (STAND_PREFIX, "a recorded stand is played forth and back: no recording stands for so long"),
+    (STILL_PREFIX, "synthetic standing: no recording stands calmly; add one"),
+    (WALK_PREFIX, "synthetic walking: no recording has the speed of the track; add one"),
+    (LOOP_PREFIX, "strides of a recorded run are repeated: no recording runs so steadily for so long"),
+    (BACK_PREFIX, "a recorded walk is played backward: hardly any recording goes backward at this speed"),
+    (SIDE_PREFIX, "synthetic side step: hardly any recording goes sideways or diagonally at this speed"),
+    (TURN_PREFIX, "synthetic turn on the spot: hardly any recording turns where it stands"),
+    (STEP_PREFIX, "synthetic step: hardly any recording takes it from a stand to a stand"),
+)
 
 
 def report_unmet_constraints(
@@ -155,16 +160,19 @@ def _frames_of_clips(played: Playback, *begins: str) -> np.ndarray:
 
 
 def _report_synthetic(played: Playback) -> list[TimedMessage | None]:
-    """Report each kind of synthetic clip: running, walking, blends, touches, stands, long runs, landings."""
-    kinds = {name: _frames_of_clips(played, SYNTHETIC_FOLDER + name) for name in _SYNTHETIC_KINDS}
-    running = _frames_of_clips(played, SYNTHETIC_FOLDER) & ~np.any(list(kinds.values()), axis=0)
-    lines = [
+    """Report each kind of synthetic clip."""
+    running = _frames_of_clips(played, SYNTHETIC_FOLDER)
+    kinds = []
+    for name, what in _SYNTHETIC_KINDS:
+        there = _frames_of_clips(played, SYNTHETIC_FOLDER + name)
+        kinds.append((there, what))
+        running = running & ~there
+    kinds += [
         (running, "synthetic running: no recording has the speed of the track"),
-        *((there, _SYNTHETIC_KINDS[name]) for name, there in kinds.items()),
         (_frames_of_clips(played, LANDING_FOLDER), "synthetic landing and getting up: the recording ends in flight"),
     ]
     return [_build_line(played.times, there, what, f" ({np.sum(there) / played.motion.fps:.1f} s in all)")
-            for there, what in lines]
+            for there, what in kinds]
 
 
 def _report_missing_motion(played: Playback, library: Library | None) -> list[TimedMessage | None]:

@@ -630,6 +630,19 @@ def test_pins_height_foot_and_style_are_a_players_own(synthesize, tmp_path):
     assert_told(synthesize(pins=tmp_path / "pins.csv"), 2, "pins.csv:2", "'nose'")
 
 
+def test_headings_are_planned_and_written_with_the_provenance(synthesize, tmp_path):
+    (tmp_path / "headings.csv").write_text("time_s,heading_deg,hold_s\n2,120,1\n")
+    files = {"headings": tmp_path / "headings.csv", "provenance": tmp_path / "p.csv", "report": tmp_path / "r.json"}
+    assert synthesize(**files)[0] == 0
+    rows = [line.split(",") for line in (tmp_path / "p.csv").read_text().splitlines()]
+    assert rows[0][-1] == "planned_heading_deg"
+    held = [float(row[-1]) for row in rows[1:] if 2.3 < float(row[1]) < 2.7]
+    assert held and all(abs(value - 120.0) < 12.0 for value in held)
+    assert json.loads((tmp_path / "r.json").read_text())["naturalness"]["off_plan_deg_median"] is not None
+    (tmp_path / "headings.csv").write_text("time_s,heading_deg\n2,\n")
+    assert_told(synthesize(headings=tmp_path / "headings.csv"), 2, "headings.csv:2", "no heading")
+
+
 def test_a_missing_package_of_the_core_is_told_in_one_line():
     code = "import sys, runpy; sys.modules['numpy'] = None; runpy.run_module('beyond_mocap', run_name='__main__')"
     done = subprocess.run([sys.executable, "-c", code], cwd=TOP, capture_output=True, text=True)

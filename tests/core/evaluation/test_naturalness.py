@@ -15,14 +15,16 @@ from beyond_mocap.evaluation.naturalness import (
     measure_course_figures,
     measure_dwell,
     measure_facing_off_travel,
+    measure_head_off_ball,
     measure_piece_figures,
     measure_standing,
     measure_tempo,
     select_unasked_spins,
 )
 from beyond_mocap.library.posture import NormalPostures
+from beyond_mocap.motion.humanoid import identify_joints
 from beyond_mocap.motion.motion import Motion, forward_kinematics
-from beyond_mocap.motion.quaternion import from_up_angle, multiply
+from beyond_mocap.motion.quaternion import from_up_angle, inverse, multiply, rotate, rotate_about_up
 from beyond_mocap.synthetic.gait import build_gait
 
 FPS = 30.0
@@ -235,3 +237,15 @@ def test_the_heading_is_across_hips_and_shoulders():
     twisted = Motion(motion.skeleton, motion.root_positions, rotations, FPS)
     turned = np.degrees(measure_course(motion.skeleton, forward_kinematics(twisted)[0], FPS).heading - straight)
     assert np.all(turned > 10.0) and np.all(turned < 35.0)  # the shoulders alone are turned by 40, the hips by 0
+
+
+def test_the_head_off_the_ball_counts_balls_within_range():
+    motion = build_gait(0.0, 3.0, FPS)
+    places, world = forward_kinematics(motion)
+    head = identify_joints(motion.skeleton).head
+    look = rotate(inverse(world[0, head]), np.array([1.0, 0.0, 0.0]))
+    sight = rotate(world[:, head], look)
+    ball = places[:, head] + 5.0 * rotate_about_up(sight, np.full(len(sight), np.radians(30.0)))
+    ball[:20], ball[20:30] = places[:20, head] - 5.0 * sight[:20], np.nan
+    found = np.degrees(measure_head_off_ball(motion.skeleton, places, world, ball, look))
+    assert len(found) == len(motion) - 30 and np.allclose(found, 30.0, atol=1.0)

@@ -11,6 +11,7 @@ import pytest
 from beyond_mocap.annotation import KeyMoment, Span, Timeline, labels_per_frame
 from beyond_mocap.base.errors import InputError
 from beyond_mocap.evaluation.figures import fill_automatic_spans
+from beyond_mocap.evaluation.naturalness import measure_course
 from beyond_mocap.evaluation.report import evaluate, evaluate_played, flatten_report, format_table
 from beyond_mocap.files import tables
 from beyond_mocap.files.bvh import bvh
@@ -219,7 +220,8 @@ def test_automatic_words_come_from_made_clips_too_where_one_is_shown(shows, word
     library = SimpleNamespace(fps=FPS, gaits=(walk,), gait_thresholds=np.zeros(0), clips=(), with_synthetic_clips=more)
     times = np.arange(0.0, 4.0, 0.04)
     track = Track(times, np.column_stack([2.4 * times, np.zeros_like(times)]))
-    view = SimpleNamespace(library=library, track=track, timeline=Timeline(), played=SimpleNamespace(clips=(shows,)))
+    view = SimpleNamespace(library=library, track=track, timeline=Timeline(), played=SimpleNamespace(clips=(shows,)),
+                           interpolate_planned_heading=lambda times: None)
     asked = labels_per_frame(fill_automatic_spans(view), np.array([1.0, 2.0, 3.0]))
     assert all(word in found for found in asked)
 
@@ -256,6 +258,16 @@ def _same(a, b):
         assert a == pytest.approx(b, rel=0.02, abs=0.01)
     else:
         assert a == b
+
+
+def test_heading_is_compared_with_the_plan_of_the_take(uncut, track_of, library):
+    """Not with what its track alone would plan: a heading key may have asked for something else."""
+    course = measure_course(uncut.motion.skeleton, playback_from_take(uncut).positions, uncut.motion.fps)
+    assert len(course.heading) == len(uncut.motion)
+    for off in (0.0, 40.0):
+        take = replace(uncut, planned_heading=course.heading + np.radians(off) + 2.0 * np.pi)
+        figures = evaluate(take, track_of(take), library)["naturalness"]
+        assert figures["off_plan_deg_median"] == pytest.approx(off, abs=1e-6)
 
 
 def test_a_motion_alone_still_has_what_needs_nothing_else(uncut):

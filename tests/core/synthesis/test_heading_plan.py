@@ -3,9 +3,19 @@
 import numpy as np
 import pytest
 
+from beyond_mocap.annotation import Span, parse_timeline
 from beyond_mocap.base.errors import InputError
 from beyond_mocap.motion.track import SampledTrack, Track, sample_track
-from beyond_mocap.synthesis.heading_plan import HeadingKey, plan_heading, plan_track
+from beyond_mocap.synthesis.heading_path import HeadingPath
+from beyond_mocap.synthesis.heading_plan import (
+    HeadingKey,
+    HeadingRequest,
+    Play,
+    plan_heading,
+    plan_heading_path,
+    plan_track,
+)
+from beyond_mocap.synthesis.plan import Pin, Plan, ResolvedPlan
 
 FPS = 30.0
 
@@ -21,6 +31,10 @@ def going(velocity, ball, seconds=8.0, noise=0.0) -> SampledTrack:
 
 def constant(*value):
     return lambda times: np.tile(np.array(value, float), (len(times), 1))
+
+
+def planned(track, **request):
+    return plan_heading_path(track, HeadingRequest(**request)).sample(track.times)
 
 
 def degrees_from(heading, wanted):
@@ -94,3 +108,86 @@ def test_very_short_tracks(count):
     times = np.arange(count) / 25.0
     planned = plan_track(sample_track(Track(times, np.zeros((count, 2))), FPS))
     assert len(planned.heading) == len(planned.leeway) == len(planned) and np.isfinite(planned.heading).all()
+
+
+def test_a_key_ends_where_the_next_one_begins():
+    keys = HeadingKey(1.0, heading=0.0, hold=5.0), HeadingKey(3.0, heading=np.pi / 2.0, hold=2.0)
+    heading = plan_heading(going(constant(0.0, 0.0), constant(20.0, 0.0)), keys)
+    assert degrees_from(heading[int(4.0 * FPS) : int(4.8 * FPS)], 90.0).max() < 8.0
+
+
+@pytest.mark.parametrize("speed, least, most", [(0.0, 35.0, 60.0), (5.0, 120.0, 181.0)])
+def test_a_pinned_gaze_draws_the_heading_of_a_slow_body(speed, least, most):
+    """The pin lies behind; ball and travel ahead. Hips and shoulders turn the rest of the way."""
+    track = going(constant(speed, 0.0), constant(400.0, 0.0))
+    heading = planned(track, gazes=(Pin(3.0, "gaze", (-300.0, 1.0, 1.5), 2.0),))
+    off = degrees_from(heading[int(3.5 * FPS) : int(4.8 * FPS)], 180.0)
+    assert least < off.min() and off.max() < most
+    assert degrees_from(heading[: int(1.5 * FPS)], 0.0).max() < 21.0
+
+
+@pytest.mark.parametrize("words, wanted", [("walking", 0.0), ("walking back", 180.0), ("walking left", -90.0),
+                                           ("running right", 90.0)])
+def test_a_label_with_a_direction_turns_the_body_from_its_travel(words, wanted):
+    """The direction is that of the motion seen from the body: who walks to their left faces to the right of it."""
+    times = np.arange(0.0, 10.0, 0.04)
+    track = sample_track(Track(times, np.column_stack([2.0 * times, 0.0 * times])), FPS)
+    heading = planned(track, spans=(Span(3.0, 7.0, tuple(words.split())),))
+    assert degrees_from(heading[int(3.5 * FPS) : int(6.5 * FPS)], wanted).max() < 30.0
+    assert degrees_from(heading[: int(1.5 * FPS)], 0.0).max() < 15.0
+
+
+@pytest.mark.parametrize("side, sign", [("left", 1.0), ("right", -1.0)])
+def test_a_turn_goes_to_the_side_that_a_label_asks_for(side, sign):
+    """From ahead to 100 degrees on the left: the short way is to the left."""
+    keys = HeadingKey(1.0, heading=0.0), HeadingKey(5.0, heading=np.radians(100.0))
+    heading = planned(going(constant(0.0, 0.0), constant(9.0, 0.0)), keys=keys,
+                      spans=(Span(1.2, 5.2, ("turning", side)),))
+    turned = np.degrees(heading[int(5.0 * FPS)] - heading[int(1.0 * FPS)])
+    assert turned == pytest.approx(100.0 if sign > 0 else -260.0, abs=25.0)
+
+
+def test_where_a_far_ball_goes_is_faced():
+    """It crosses 60 m away at 25 m/s: a second ahead of it is 23 degrees."""
+    crossing = lambda times: np.column_stack([np.full(len(times), 60.0), 25.0 * (times - 4.0)])  # noqa: E731
+    track = going(constant(0.0, 0.0), crossing)
+    near = going(constant(0.0, 0.0), lambda times: 0.4 * crossing(times))
+    at = int(4.0 * FPS)
+    ahead = [np.degrees(plan_heading(each)[at]) for each in (track, near)]
+    assert ahead[0] > ahead[1] + 10.0
+
+
+def test_without_the_ball_the_play_is_faced():
+    track = going(constant(0.0, 0.0), lambda times: np.where((times < 4.0)[:, None], [30.0, 0.0], np.nan), seconds=12.0)
+    play = Play(np.array([0.0, 12.0]), np.array([[0.0, 20.0], [0.0, 20.0]]))
+    heading = planned(track, play=play)
+    assert degrees_from(heading[: int(3.0 * FPS)], 0.0).max() < 25.0
+    assert degrees_from(heading[int(7.0 * FPS) :], 90.0).max() < 25.0
+
+
+@pytest.mark.parametrize("is_keeper, most", [(True, 25.0), (False, 90.0)])
+def test_a_goalkeeper_faces_the_ball_also_at_a_walk_and_a_jog(is_keeper, most):
+    """2.2 m/s along the goal line, the ball at a right angle to it."""
+    track = going(constant(0.0, 2.2), lambda times: np.column_stack([np.full(len(times), 35.0), 2.2 * times]))
+    play = Play(np.array([0.0, 8.0]), np.zeros((2, 2)), is_keeper)
+    off = degrees_from(planned(track, play=play)[30:-30], 0.0)
+    assert off.max() < most and (is_keeper or off.min() > 40.0)
+
+
+def test_every_frame_rate_reads_one_plan():
+    times = np.arange(0.0, 20.0, 0.04)
+    places = np.column_stack([np.sin(times), 0.5 * np.cos(0.7 * times)])
+    ball = 20.0 * np.column_stack([np.cos(0.3 * times), np.sin(0.3 * times), 0.0 * times])
+    plan = Plan(track=Track(times, places, ball))
+    resolved = ResolvedPlan(requested=plan, timeline=parse_timeline(""), track=plan.track, trajectory=None, size=1.0)
+    slow, fast = (resolved.sample_track(fps).heading for fps in (25.0, 50.0))
+    assert np.allclose(slow, fast[::2][: len(slow)], rtol=0.0, atol=1e-9)
+
+
+def test_a_part_of_a_plan_reads_as_the_whole():
+    times = np.arange(0.0, 30.0, 1.0 / 6.0)
+    path = HeadingPath(np.round(times, 6), np.cumsum(np.random.default_rng(3).integers(0, 3, len(times))))
+    inside = np.arange(300, 600) / 30.0
+    part = path.cut_span(inside[0], inside[-1])
+    assert len(part.times) < 70 and 0 <= part.bins[0] < 36
+    assert degrees_from(part.sample(inside), np.degrees(path.sample(inside))).max() < 1e-9
