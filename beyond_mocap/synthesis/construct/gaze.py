@@ -43,12 +43,14 @@ EYE_ANGLE = np.radians(12.0)
 """By how much the head stops short of the ball: eyes take the rest, and small movements altogether."""
 TWIST_FREE_ANGLE = np.radians(8.0)
 """Bearing of the ball up to which shoulders hardly follow."""
-TWIST_SHARE = 0.9
+TWIST_SHARE = 0.8
 """Share that shoulders take of the bearing beyond it."""
 HEAD_SPEED, SHOULDER_SPEED = np.radians(280.0), np.radians(140.0)
 """Largest speeds, rad/s, of head against shoulders and of shoulders against hips."""
 HEAD_SECONDS, SHOULDER_SECONDS = 0.4, 0.8
 """s, windows that smooth the turning of head and shoulders."""
+NOD_SECONDS = 1.0
+"""s, window that removes nods and sway from where a head looks: recorded heads nod by 8 to 10 degrees in a second."""
 
 LEAST_ATTENTION, LEAST_ATTENTION_FAR = 0.45, 0.15
 """Shares of the head's turn at the least attentive moments, for a ball on the pitch around and for one far away."""
@@ -111,7 +113,8 @@ def watch_ball(
         return motion
     world = quaternion.multiply(quaternion.from_up_angle(twist)[:, None], world)  # of all joints above the spine
     yaw, pitch = compute_head_angles(see(habits.delay), trunk.twist + twist, fps)
-    turn = _compute_head_turn(world[:, body.head_or_neck], look, trunk.heading + yaw, pitch)
+    sight = quaternion.rotate(world[:, body.head_or_neck], np.broadcast_to(look, away.shape))
+    turn = _compute_head_turn(_remove_nods(sight, trunk.heading, fps), trunk.heading + yaw, pitch)
     return _turn_head(motion, world, (eased * head_share * attention)[:, None] * turn)
 
 
@@ -337,14 +340,22 @@ def _twist_spine(motion: Motion, world: np.ndarray, twist: np.ndarray) -> tuple[
     return replace(motion, rotations=rotations), twist
 
 
-def _compute_head_turn(head: np.ndarray, look: np.ndarray, yaw: np.ndarray, pitch: np.ndarray) -> np.ndarray:
+def _remove_nods(sight: np.ndarray, heading: np.ndarray, fps: float) -> np.ndarray:
+    """Smooth where a head looks, (T, 3) unit, world, seen from the body with its heading (T,) rad.
+
+    A head that looks at a ball still nods and sways with every step: only its slow course is turned to the ball.
+    """
+    own = smooth_zero_phase_hann(quaternion.rotate_about_up(sight, -heading), fps, NOD_SECONDS)
+    return quaternion.rotate_about_up(unit_vectors(own), heading)
+
+
+def _compute_head_turn(sight: np.ndarray, yaw: np.ndarray, pitch: np.ndarray) -> np.ndarray:
     """Compute the turns (T, 3), rotation vectors in the world, from where heads look to a direction, without the part
     that eyes take.
 
-    head: (T, 4) world rotations; yaw and pitch (T,) rad of the direction, world.
+    sight: (T, 3) unit, world; yaw and pitch (T,) rad of the direction, world.
     """
     target = np.column_stack([np.cos(pitch) * np.cos(yaw), np.cos(pitch) * np.sin(yaw), np.sin(pitch)])
-    sight = quaternion.rotate(head, np.broadcast_to(look, target.shape))
     turn = quaternion.to_rotation_vector(quaternion.rotation_between(sight, target))
     angle = np.linalg.norm(turn, axis=1, keepdims=True)
     return turn * _leave_rest(angle, EYE_ANGLE) / np.maximum(angle, 1e-9)
