@@ -43,7 +43,7 @@ EYE_ANGLE = np.radians(12.0)
 """By how much the head stops short of the ball: eyes take the rest, and small movements altogether."""
 TWIST_FREE_ANGLE = np.radians(8.0)
 """Bearing of the ball up to which shoulders hardly follow."""
-TWIST_SHARE = 0.8
+TWIST_SHARE = 0.9
 """Share that shoulders take of the bearing beyond it."""
 HEAD_SPEED, SHOULDER_SPEED = np.radians(280.0), np.radians(140.0)
 """Largest speeds, rad/s, of head against shoulders and of shoulders against hips."""
