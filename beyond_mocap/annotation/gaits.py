@@ -22,6 +22,7 @@ LOCOMOTION = list_gaits()
 """The labels that speed alone decides, slow to fast; "dribble" joins any of them when the ball is at the feet."""
 
 STANDING = LOCOMOTION[0]
+TURNING = "turning"
 """The gait without travel."""
 
 LOCOMOTION_LABELS = frozenset((*LOCOMOTION, *list_labels(ball="carries")))

@@ -206,8 +206,8 @@ def _add_source_figures(out: dict, view: View, asked: np.ndarray, postures: Norm
     stands = measure_standing(reference.stands & used, reference.contacts, view.fps)
     for name, value in own.pop("tempo").items():
         out["tempo"][f"source_{name}"] = value
-    if "standing" in out:
-        out["standing"].update({f"source_{name}": value for name, value in stands.items()})
+    if (standing := out.get("standing")) is not None:
+        standing.update({f"source_{name}": value for name, value in stands.items()})
     out.update({f"source_{name}": value for name, value in own.items()})
 
 

@@ -11,6 +11,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from ..annotation import LOCOMOTION
+from ..annotation.gaits import TURNING
 from ..annotation.labels import find_label
 from .features import Frames
 from .posture import find_steady_travel
@@ -22,7 +23,7 @@ NEEDED_TURN_RATE = np.radians(20.0)  # rad/s at which a body needs one: without 
 STEP_SPEEDS = (0.4, 2.0)  # m/s of steps in another direction than ahead
 TRAVEL_SPEED = 0.3  # m/s above which a body travels
 SIDEWAYS = 0.7  # share of the speed
-_LEAST_SECONDS = {"turning": 1.0, "sideways": 2.0, "backward": 2.0, "belonging": 1.5}
+_LEAST_SECONDS = {"turns": 1.0, "sideways": 2.0, "backward": 2.0, "belonging": 1.5}
 _SLOW_SECONDS = 1.5
 _RATE_SECONDS = 0.3  # over which a heading's rate is measured
 
@@ -37,7 +38,7 @@ def select_locomotion_alone(frames: Frames, clips: Sequence) -> np.ndarray:
 
 def _names_act(word: str) -> bool:
     """Whether a label names more than locomotion, turns and directions."""
-    return bool(set(find_label(word).kinds) - {"modifier"}) and word not in (*LOCOMOTION, "turning")
+    return bool(set(find_label(word).kinds) - {"modifier"}) and word not in (*LOCOMOTION, TURNING)
 
 
 def compute_turn_rate(heading: np.ndarray, fps: float) -> np.ndarray:
@@ -55,12 +56,12 @@ def classify_steps(velocity: np.ndarray, turn_rate: np.ndarray, least_rate: floa
         turn_rate: (T,) rad/s of the heading.
         least_rate: rad/s from which on a body turns.
     Returns:
-        "turning", "sideways" and "backward" -> (T,) bool.
+        "turns", "sideways" and "backward" -> (T,) bool.
     """
     speed = np.linalg.norm(velocity, axis=1)
     is_slow = (speed > STEP_SPEEDS[0]) & (speed < STEP_SPEEDS[1])
     return {
-        "turning": (np.abs(turn_rate) > least_rate) & (speed < TURN_SPEED),
+        "turns": (np.abs(turn_rate) > least_rate) & (speed < TURN_SPEED),
         "sideways": is_slow & (np.abs(velocity[:, 1]) > SIDEWAYS * speed),
         "backward": is_slow & (-velocity[:, 0] > SIDEWAYS * speed),
     }
@@ -75,7 +76,7 @@ def find_missing_motion(clips: Sequence, frames: Frames, fps: float, strangeness
         fps: of the frames.
         strangeness: (N,) how far each frame lies from normal locomotion (`posture`).
     Returns:
-        Kind ("belonging", "standing", "turning", "slow", "sideways", "backward") -> a line that says what to add and
+        Kind ("belonging", "stands", "turns", "slow", "sideways", "backward") -> a line that says what to add and
         what is shown until then; only the kinds that it lacks.
     """
     belongs = select_locomotion_alone(frames, clips) & (strangeness <= 1.0)
@@ -84,13 +85,13 @@ def find_missing_motion(clips: Sequence, frames: Frames, fps: float, strangeness
     kinds = {**classify_steps(frames.velocity, rate, TURN_RATE), "belonging": find_steady_travel(frames, fps)}
     slowest = measure_slowest_travel(frames.speed[belongs], fps)
     is_missing = {kind: (belongs & flags).sum() < _LEAST_SECONDS[kind] * fps for kind, flags in kinds.items()}
-    is_missing["standing"] = not find_stands(clips, frames, fps, strangeness)
+    is_missing["stands"] = not find_stands(clips, frames, fps, strangeness)
     is_missing["slow"] = slowest > SLOWEST_RECORDED
     lines = {
         "belonging": "no locomotion that surely belongs, since no clip travels straight on at one speed: add a walk; "
                      "until then all that is labelled locomotion counts as such",
-        "standing": "no calm standing: add some; until then it is synthetic",
-        "turning": "no turn in place: add one; until then steps are synthetic, or those of walks",
+        "stands": "no calm standing: add some; until then it is synthetic",
+        "turns": "no turn in place: add one; until then steps are synthetic, or those of walks",
         "slow": f"nothing slower than {slowest:.1f} m/s: add a walk; until then it is synthetic",
         "sideways": "no steps sideways: add some; until then they are synthetic, or those of walks",
         "backward": "no steps backward: add some; until then they are synthetic, or those of walks",

@@ -29,7 +29,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ..annotation import DISCRETE, LOCOMOTION, ClipAnnotation, compute_gait_thresholds
-from ..annotation.gaits import STANDING
+from ..annotation.gaits import STANDING, TURNING
 from ..base.time_series import find_equal_runs, find_runs
 from ..base.vectors import arctan2, cross_product
 from ..motion import contacts, quaternion
@@ -361,7 +361,7 @@ def _build_gait_rows(speed: np.ndarray, speeds: dict[str, float]) -> tuple[ClipA
 
 def _build_step_rows(name: str, count: int, speed: float, speeds: dict[str, float]) -> tuple[ClipAnnotation, ...]:
     """Build the row of a step that recordings lack (`missing_steps`): the gait of its speed, and its direction."""
-    words = (STANDING, "turning") if name.startswith(TURN_PREFIX) else (STANDING,)
+    words = (STANDING, TURNING) if name.startswith(TURN_PREFIX) else (STANDING,)
     if not name.startswith((TURN_PREFIX, STEP_PREFIX)):
         gait = _build_gait_rows(np.full(1, speed), speeds)[0].words[0]
         words = (gait, "back" if name.startswith(BACK_PREFIX) else "left")

@@ -188,7 +188,7 @@ def _report_missing_motion(played: Playback, library: Library | None) -> list[Ti
     speed = np.linalg.norm(velocity, axis=1)
     slowest = WARP_LIMITS[0] * library.slowest_travel
     shown = {
-        "belonging": np.ones(len(speed), bool), "standing": speed < RESTING_SPEED,
+        "belonging": np.ones(len(speed), bool), "stands": speed < RESTING_SPEED,
         "slow": (speed > TRAVEL_SPEED) & (speed < slowest),
         **classify_steps(velocity, compute_turn_rate(heading, fps), NEEDED_TURN_RATE),
     }
@@ -196,7 +196,7 @@ def _report_missing_motion(played: Playback, library: Library | None) -> list[Ti
     ahead = _frames_of_clips(played, *(SYNTHETIC_FOLDER + name for name in _STANDS_AND_GOES_AHEAD))
     lines = []
     for kind, what in library.missing_motion.items():
-        lacks = shown[kind] & ~(synthetic & ~ahead if kind in ("turning", "sideways", "backward") else synthetic)
+        lacks = shown[kind] & ~(synthetic & ~ahead if kind in ("turns", "sideways", "backward") else synthetic)
         lines.append(_build_line(played.times, lacks, what) if lacks.sum() >= MISSING_SECONDS * fps else None)
     return lines
 

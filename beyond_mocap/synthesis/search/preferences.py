@@ -40,9 +40,9 @@ evenly."""
 PREFERRED_RANGE, FULL_COST_RANGE = 0.05, 0.45
 """Seconds from a preferred lag up to which there is no cost, and from which on there is the full cost."""
 
-REUSE_COST = 1.0
+REUSE_COST = 2.5
 """Cost per slot of the same source frames, that of a metre per second of missed speed."""
-SAME_CLIP_COST = 0.25
+SAME_CLIP_COST = 0.6
 """Cost per slot of other frames of the same clip, or of its mirror image."""
 SHOWN_MARGIN = 0.25
 """Seconds around shown source frames that count as shown."""
@@ -52,7 +52,7 @@ MANNER_COST = 0.4
 """Cost per slot of a clip whose manner is not the player's. On ten windows of a match and five folders it brings the
 manners that are shown in one minute a quarter nearer to the player's, for 3 % more cuts; twice that costs 10 %."""
 
-STYLE_COST = 2.0  # per unit of the setting's weight: as much as changes of recording cost
+STYLE_COST = 3.0  # per unit of the setting's weight: as much as changes of recording cost
 
 
 def compute_style_cost(library: Library, style: Sequence[str], weight: float) -> np.ndarray | None:

@@ -9,8 +9,8 @@ from beyond_mocap.library.synthetic_clips import STILL_PREFIX, SYNTHETIC_FOLDER,
 from beyond_mocap.synthetic.gait import build_gait
 
 MOTIONS = {
-    "standing": ("standing", {"speed": 0.0}),
-    "turning": ("standing turning left", {"speed": 0.0, "turn_rate": 1.2}),
+    "stands": ("standing", {"speed": 0.0}),
+    "turns": ("standing turning left", {"speed": 0.0, "turn_rate": 1.2}),
     "slow": ("walking", {"speed": 1.0}),
     "sideways": ("walking left", {"speed": 0.9, "direction": np.pi / 2.0}),
     "backward": ("walking back", {"speed": 0.9, "direction": np.pi}),
@@ -41,7 +41,7 @@ def test_what_is_not_recorded_is_missing(tmp_path, missing):
 
 
 def test_the_slowest_speed_is_named(tmp_path):
-    assert build(tmp_path, ["standing"], speed=3.0).missing_motion["slow"].startswith("nothing slower than 3.0 m/s")
+    assert build(tmp_path, ["stands"], speed=3.0).missing_motion["slow"].startswith("nothing slower than 3.0 m/s")
 
 
 def test_without_steady_travel_nothing_is_known_to_belong(tmp_path):
@@ -60,7 +60,7 @@ def test_a_library_of_runs_gets_synthetic_walks_and_a_stand(tmp_path):
 
 
 def test_a_library_that_stands_and_walks_gets_neither(tmp_path):
-    library = build(tmp_path, ["standing", "slow"])
+    library = build(tmp_path, ["stands", "slow"])
     made = [clip for clip in library.with_synthetic_clips.clips if clip.is_synthetic]
     assert made and not any(clip.path.startswith(SYNTHETIC_FOLDER + STILL_PREFIX) for clip in made)
     slowest = min(library.with_synthetic_clips.frames.speed[library.with_synthetic_clips.frames.clip == number].mean()
