@@ -29,6 +29,8 @@ from ..motion.track import SampledTrack, smooth_zero_phase_hann
 from ..motion.track.resting_place import LEAST_LEEWAY, relax_track
 from .heading_path import BIN_ANGLE, BINS, HeadingPath, find_cheapest_path, replace_part
 
+FPS = 30.0  # at which headings are planned, whatever the rate of the take
+
 # Costs per second, of angles in radians. They were chosen on 167 minutes of a tracked match, for few turns and
 # headings near ball and travel: no snap turns, 0.02 spins a minute, 13 degrees from the ball below 1 m/s (median).
 DEAD_ZONE = np.radians(20.0)  # within which the body does not follow the ball

@@ -18,11 +18,10 @@ from ..base.errors import InputError, format_seconds
 from ..base.settings import collect_defaults, find_setting, list_settings
 from ..base.settings.setting import LATER, add_fields, check_limits
 from ..base.time_series import interpolate_columns
-from ..library.features import FPS
 from ..motion.skeleton import freeze_array
 from ..motion.track import SampledTrack, Track, sample_track
 from .heading_path import HeadingPath
-from .heading_plan import HeadingKey, HeadingRequest, Play, measure_hold, plan_heading_path, rest_track
+from .heading_plan import FPS, HeadingKey, HeadingRequest, Play, measure_hold, plan_heading_path, rest_track
 
 GAZE = "gaze"
 PARTS = ("left_hand", "right_hand", "left_foot", "right_foot", GAZE)
