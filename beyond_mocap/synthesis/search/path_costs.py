@@ -155,7 +155,7 @@ class Weights:
     synthetic_key: float = 0.8
     rate: float = 0.24
     stretch: float = 4.0
-    strike: float = 3.0
+    strike: float = 6.0
     switch: float = 0.7
     other: float = 0.5
     young: float = 1.4
