@@ -146,7 +146,7 @@ class Weights:
     turn: float = 3.0
     lift: float = 2.0
     facing: float = 1.0
-    slide: float = 1.2
+    slide: float = 2.0
     words: float = 3.0
     automatic_words: float = 1.0
     unasked: float = 2.0
@@ -156,8 +156,8 @@ class Weights:
     rate: float = 0.24
     stretch: float = 4.0
     strike: float = 6.0
-    switch: float = 0.7
-    other: float = 0.5
+    switch: float = 0.8
+    other: float = 0.6
     young: float = 1.4
     pose: float = 4.5
     feet: float = 1.5
