@@ -175,8 +175,8 @@ glTF and USD clips are converted first, and the result is cached"""
             library = build_library(order.folder, **options, progress=progress, cancelled=cancelled)
         except InputError as error:
             return BuildResult(order.setting, None, error, scan_clips(order.folder, options["cache_dir"]), files)
-        return BuildResult(order.setting, library, None, list_clips(library), files, describe_library(library),
-                           describe_gaps(library))
+        return BuildResult(order.setting, library, None, list_clips(library), files,
+                           contents=describe_library(library), gaps=describe_gaps(library))
 
     def apply(self, scene, result):
         """Store the library and report its content."""

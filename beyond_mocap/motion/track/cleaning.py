@@ -94,7 +94,7 @@ def clean_track(track: Track) -> tuple[Track, DataReport]:
     positions = _interpolate_gaps(times, positions, is_valid)
     cleaned = Track(times, positions, ball, ball_height_known=np.isfinite(ball[:, 2]), filled=~known, outlier=outlier,
                     name=track.name)
-    return cleaned, _build_report(cleaned, notes, snaps, dropped, merged, jitter)
+    return cleaned, _build_report(cleaned, notes, snaps, dropped=dropped, merged=merged, jitter=jitter)
 
 
 def _check_unit(times: np.ndarray, positions: np.ndarray, outlier: np.ndarray, name: str) -> None:
@@ -347,7 +347,7 @@ def _interpolate_hermite(at: np.ndarray, before, after) -> np.ndarray:
     return (p0 * (1 + 2 * s) * (1 - s) ** 2 + p1 * s * s * (3 - 2 * s) + length * s * (1 - s) * (v0 * (1 - s) - v1 * s))
 
 
-def _build_report(track: Track, notes: list[str], snaps: tuple[float, ...], dropped: int, merged: int,
+def _build_report(track: Track, notes: list[str], snaps: tuple[float, ...], *, dropped: int, merged: int,
                   jitter: list[str]) -> DataReport:
     """Build the report of a cleaned track."""
     gaps = _find_gaps(track)
