@@ -41,9 +41,22 @@ def test_a_goalkeeper_whom_the_feed_names_is_one():
     assert {name for name, play in named.items() if play.is_keeper} == {"h2", "a1"}
 
 
+def test_a_keeper_whom_the_feed_does_not_name_is_found_beside_one_whom_it_does():
+    named = build_plays(placed(ROWS, {"h2": "Goalkeeper"}))
+    assert {name for name, play in named.items() if play.is_keeper} == {"h2", "a1"}
+
+
 def test_few_players_have_neither_keeper_nor_goal():
-    plays = build_plays(placed((("h1", "home", (0.0, 0.0)), ("a1", "away", (40.0, 0.0)))))
-    assert not any(play.is_keeper for play in plays.values()) and np.isfinite(plays["h1"].places).all()
+    """The nearest opponent is faced however far, and nothing where there is none: not the middle of the pitch."""
+    plays = build_plays(placed((("h1", "home", (0.0, 9.0)), ("a1", "away", (40.0, 0.0)))))
+    assert not any(play.is_keeper for play in plays.values()) and np.allclose(plays["h1"].places, (40.0, 0.0))
+    assert np.isnan(build_plays(placed((("h1", "home", (0.0, 9.0)),)))["h1"].places).all()
+
+
+def test_outside_the_periods_no_goal_is_known():
+    plays = build_plays(replace(placed(ROWS), periods=((0.0, 10.0),)))
+    assert np.allclose(plays["h4"].places[:50], (52.5, 0.0))
+    assert np.allclose(plays["h4"].places[60:], (3.0, 2.0))
 
 
 @pytest.mark.parametrize("fps", [30.0, 25.0])
