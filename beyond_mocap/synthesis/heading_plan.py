@@ -102,7 +102,7 @@ class Play:
 
     Attributes:
         times: (M,) s on the track's clock, ascending.
-        places: (M, 2) m that the body faces while the ball is not known.
+        places: (M, 2) m that the body faces while the ball is not known, NaN where there is nothing to face.
         is_keeper: whether this is a goalkeeper, who faces the ball also when moving.
     """
 
@@ -225,21 +225,21 @@ def _compute_bearings(track: SampledTrack, play: Play | None, at: np.ndarray) ->
 def _compute_faced_place(track: SampledTrack, play: Play | None) -> np.ndarray:
     """Compute the place (T, 2) m that a slow body faces: the ball, where a far one goes, or the play without a ball.
 
-    NaN where there is none of these.
+    NaN where there is none of these: a ball that is lost for long is not between where it was and where it will be.
     """
     known = np.isfinite(track.ball[:, :2]).all(axis=1)
-    place = np.full((len(track), 2), np.nan)
+    place, lost = np.full((len(track), 2), np.nan), np.ones(len(track), bool)
     if known.any():
         ball = smooth_zero_phase_hann(interpolate_columns(track.times, track.times[known], track.ball[known, :2]),
                                       track.fps, _VELOCITY_SECONDS)
         distance = np.linalg.norm(ball - track.positions, axis=1)
         ahead = _BALL_LEAD * smoothstep(distance, *_FAR_BALL)[:, None]
         place = ball + ahead * time_derivative(ball, track.fps)
+        lost[:] = False
+        for first, end in find_runs(~(known & track.ball_measured)):
+            lost[first:end] = end - first > _BALL_GAP * track.fps
     if play is None:
-        return place
-    lost = np.zeros(len(track), bool)
-    for first, end in find_runs(~(known & track.ball_measured)):
-        lost[first:end] = end - first > _BALL_GAP * track.fps
+        return np.where(lost[:, None], np.nan, place)
     place = np.where(lost[:, None], interpolate_columns(track.times, play.times, play.places), place)
     return smooth_zero_phase_hann(place, track.fps, _VELOCITY_SECONDS) if lost.any() else place
 

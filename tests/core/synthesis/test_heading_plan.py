@@ -165,6 +165,21 @@ def test_without_the_ball_the_play_is_faced():
     assert degrees_from(heading[int(7.0 * FPS) :], 90.0).max() < 25.0
 
 
+def test_the_last_bearing_holds_while_the_ball_is_lost_for_long():
+    """It is lost for 60 s on the right and comes back on the left: nothing turns the body in between."""
+    ball = lambda times: np.where((times < 5.0)[:, None], [30.0, -5.0],  # noqa: E731
+                                  np.where((times < 65.0)[:, None], np.nan, [-30.0, 5.0]))
+    heading = plan_heading(going(constant(0.0, 0.0), ball, seconds=75.0))
+    assert np.ptp(heading[int(4 * FPS) : int(60 * FPS)]) < np.radians(1.0)
+    assert degrees_from(heading[-1], 170.0) < 25.0
+
+
+def test_a_short_stretch_without_any_ball_faces_the_play():
+    track = going(constant(0.0, 0.0), constant(np.nan, np.nan), seconds=1.5)
+    play = Play(np.array([0.0, 12.0]), np.array([[0.0, 20.0], [0.0, 20.0]]))
+    assert degrees_from(planned(track, play=play), 90.0).max() < 25.0
+
+
 @pytest.mark.parametrize("is_keeper, most", [(True, 25.0), (False, 90.0)])
 def test_a_goalkeeper_faces_the_ball_also_at_a_walk_and_a_jog(is_keeper, most):
     """2.2 m/s along the goal line, the ball at a right angle to it."""
