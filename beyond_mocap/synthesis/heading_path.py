@@ -61,7 +61,9 @@ class HeadingPath:
 
 
 def find_cheapest_path(costs: np.ndarray, step_costs: np.ndarray) -> np.ndarray:
-    """Find the cheapest sequence of headings.
+    """Find the cheapest sequence of headings; among equals the one that has turned least from its first one.
+
+    So a body that turns away and back comes back the way it went, rather than all the way round.
 
     Args:
         costs: (D, BINS) of every heading at every decision; inf where it is not possible.
@@ -72,17 +74,23 @@ def find_cheapest_path(costs: np.ndarray, step_costs: np.ndarray) -> np.ndarray:
     units = np.rint(np.minimum(costs / COST_UNIT, _FORBIDDEN)).astype(np.int64)
     steps = np.rint(np.minimum(step_costs / COST_UNIT, _FORBIDDEN)).astype(np.int64)[:, :, None]
     most, bins = steps.shape[1] // 2, np.arange(BINS)
-    came_from = (bins[None, :] - np.arange(-most, most + 1)[:, None]) % BINS
-    total, best = units[0], np.zeros((len(units), BINS), dtype=np.int64)
+    turns = np.arange(-most, most + 1)[:, None]
+    came_from = (bins[None, :] - turns) % BINS
+    total, turned, best = units[0], np.zeros(BINS, dtype=np.int64), np.zeros((len(units), BINS), dtype=np.int64)
     for k in range(1, len(units)):
-        reached = total[came_from] + steps[k]
-        reached.argmin(axis=0, out=best[k])
-        total = reached[best[k], bins] + units[k]
+        reached, angles = total[came_from] + steps[k], turned[came_from] + turns
+        best[k] = _find_least(reached, np.abs(angles))
+        total, turned = reached[best[k], bins] + units[k], angles[best[k], bins]
     path = np.empty(len(units), dtype=np.int64)
-    path[-1] = int(total.argmin())
+    path[-1] = int(_find_least(total, np.abs(turned)))
     for k in range(len(units) - 1, 0, -1):
         path[k - 1] = path[k] - (best[k, path[k] % BINS] - most)
     return path - BINS * (path[0] // BINS)
+
+
+def _find_least(values: np.ndarray, seconds: np.ndarray) -> np.ndarray:
+    """Find the first row of the least of values (K, ...); among equals the one of the least of `seconds` (K, ...)."""
+    return np.where(values == values.min(axis=0), seconds, _FORBIDDEN).argmin(axis=0)
 
 
 def replace_part(bins: np.ndarray, first: int, end: int, costs: np.ndarray, step_costs: np.ndarray) -> np.ndarray:

@@ -147,6 +147,13 @@ def test_a_turn_goes_to_the_side_that_a_label_asks_for(side, sign):
     assert turned == pytest.approx(100.0 if sign > 0 else -260.0, abs=25.0)
 
 
+@pytest.mark.parametrize("away", [180.0, -180.0, 60.0])
+def test_a_turn_away_comes_back_the_way_it_went(away):
+    heading = plan_heading(going(constant(0.0, 0.0), constant(20.0, 0.0), seconds=14.0),
+                           [HeadingKey(6.0, heading=np.radians(away), hold=1.0)])
+    assert np.ptp(heading) > np.radians(abs(away) - 20.0) and abs(heading[-1] - heading[0]) < np.radians(45.0)
+
+
 def test_where_a_far_ball_goes_is_faced():
     """It crosses 60 m away at 25 m/s: a second ahead of it is 23 degrees."""
     crossing = lambda times: np.column_stack([np.full(len(times), 60.0), 25.0 * (times - 4.0)])  # noqa: E731
