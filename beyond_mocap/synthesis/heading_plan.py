@@ -62,6 +62,7 @@ _FAR_BALL = (25.0, 30.0)  # m between which the way of the ball takes its place
 _BALL_LEAD = 1.0  # s that the way of a far ball is ahead of it
 _BALL_GAP = 2.0  # s; the ball is not known in longer gaps
 _DIRECTION_SPEED = 0.3  # m/s from which on a track has a direction that a label can mean
+_FAR_MISS = np.radians([45.0, 135.0])  # between which a given heading counts as one that the body cannot reach in time
 _GAZE_SECONDS = 0.3  # s before and after a pin of the gaze in which it counts
 
 _DECISION_SECONDS = 1.0 / 6.0
@@ -94,6 +95,15 @@ class HeadingKey:
                              "a heading or a target", "give one of the two")
         if not np.isfinite(values).all() or self.hold < 0.0:
             raise InputError("heading key", f"{values}", "finite values, and a hold of at least 0 s")
+
+    @property
+    def end(self) -> float:
+        """Seconds until which it holds."""
+        return self.time + self.hold
+
+    def is_within(self, start: float, end: float) -> bool:
+        """Whether it holds at any time from `start` to `end` s."""
+        return self.time <= end and self.end >= start
 
 
 @dataclass(frozen=True, eq=False)
@@ -158,7 +168,7 @@ def rest_track(track: SampledTrack, rests: bool = True) -> SampledTrack:
 
 def plan_heading(track: SampledTrack, keys: Sequence[HeadingKey] = ()) -> np.ndarray:
     """Plan the heading of a player: (T,) rad from +x, unwrapped, for the arguments of `plan_heading_path`."""
-    return plan_heading_path(track, HeadingRequest(keys=tuple(keys))).sample(track.times)
+    return sample_heading(plan_heading_path(track, HeadingRequest(keys=tuple(keys))), keys, track)[0]
 
 
 def plan_heading_path(track: SampledTrack, request: HeadingRequest) -> HeadingPath:
@@ -267,24 +277,29 @@ def _compute_slowness(speed: np.ndarray) -> np.ndarray:
 def _find_asked(bearings: _Bearings, request: HeadingRequest) -> np.ndarray:
     """Find the decisions (D,) bool that what is asked changes; all others stay as they are without it."""
     spans = [span for span in request.spans if _find_quarter(span) is not None or _find_turning_side(span) is not None]
-    times = [(key.time, key.time + key.hold) for key in request.keys]
-    times += [(pin.time, pin.end) for pin in request.gazes] + [(span.start, span.end) for span in spans]
-    found = np.zeros(len(bearings.times), bool)
-    for start, end in times:
-        found |= (bearings.times >= start - ASKED_SECONDS) & (bearings.times <= end + ASKED_SECONDS)
-    return found
+    held = [(pin.time, pin.end) for pin in (*request.keys, *request.gazes)]
+    starts, ends = np.array([*held, *((span.start, span.end) for span in spans)]).reshape(-1, 2).T
+    begun = np.searchsorted(np.sort(starts - ASKED_SECONDS), bearings.times, side="right")
+    return begun > np.searchsorted(np.sort(ends + ASKED_SECONDS), bearings.times, side="left")
 
 
 def _add_asked_costs(bearings: _Bearings, request: HeadingRequest, costs: np.ndarray) -> np.ndarray:
     """Add the costs of what is asked to those of every heading at every decision (D, BINS)."""
     cost, slow = np.zeros_like(costs), _compute_slowness(bearings.speed)[:, None]
     for pin in request.gazes:
-        gaze = np.where(_find_held(bearings, pin, _GAZE_SECONDS), _compute_bearing(bearings, pin.position), np.nan)
-        cost += GAZE_COST * slow * np.maximum(_measure_angles(gaze) - GAZE_REACH, 0.0)
+        at = np.flatnonzero((bearings.times >= pin.time - _GAZE_SECONDS) & (bearings.times <= pin.end + _GAZE_SECONDS))
+        offset = np.asarray(pin.position[:2]) - bearings.positions[at]
+        gaze = arctan2(offset[:, 1], offset[:, 0])
+        cost[at] += GAZE_COST * slow[at] * np.maximum(_measure_angles(gaze) - GAZE_REACH, 0.0)
     asked = _compute_asked_heading(bearings, request.spans)
     cost += DIRECTION_COST * np.maximum(_measure_angles(asked) - DEAD_ZONE, 0.0)
-    for key in _end_at_next(request.keys):
-        cost += GIVEN_COST * _measure_angles(_compute_given_heading(bearings, key))
+    if request.keys:
+        given = _Given(request.keys)
+        key = given.find_keys(bearings.times + 0.5 * _DECISION_SECONDS)
+        heading = given.compute_heading(key, bearings.positions)
+        is_held = bearings.times <= given.ends[key] + 0.5 * _DECISION_SECONDS
+        is_held &= bearings.times >= given.starts[key] - 0.5 * _DECISION_SECONDS
+        cost += GIVEN_COST * _measure_angles(np.where(is_held, heading, np.nan))
     return costs + cost * bearings.seconds[:, None]
 
 
@@ -293,34 +308,70 @@ def _measure_angles(bearing: np.ndarray) -> np.ndarray:
     return np.nan_to_num(np.abs(quaternion.wrap_angle(BIN_ANGLE * np.arange(BINS) - bearing[:, None])))
 
 
-def _compute_bearing(bearings: _Bearings, place: Sequence[float]) -> np.ndarray:
-    """Compute the bearing (D,) rad of a place, m."""
-    offset = np.asarray(place[:2]) - bearings.positions
-    return arctan2(offset[:, 1], offset[:, 0])
+class _Given:
+    """The headings that K keys give, in order of time; each key ends where the next one begins.
+
+    Attributes:
+        starts, ends: (K,) s.
+        gaps: (K + 1,) s before each key and after the last one in which none holds; inf at both ends.
+    """
+
+    def __init__(self, keys: Sequence[HeadingKey]):
+        keys = sorted(keys, key=lambda key: key.time)
+        self.starts = np.array([key.time for key in keys])
+        self.ends = np.minimum([key.end for key in keys], np.append(self.starts[1:], np.inf))
+        self.gaps = np.concatenate([[np.inf], self.starts[1:] - self.ends[:-1], [np.inf]])
+        self._headings = np.array([np.nan if key.heading is None else key.heading for key in keys])
+        self._targets = np.array([key.target or (0.0, 0.0) for key in keys])
+
+    def find_keys(self, times: np.ndarray) -> np.ndarray:
+        """Find the last key (T,) that has begun at `times` (T,) s, before the first one that one."""
+        return np.maximum(np.searchsorted(self.starts, times, side="right") - 1, 0)
+
+    def compute_heading(self, rows: np.ndarray, positions: np.ndarray) -> np.ndarray:
+        """Compute the heading (T,) rad that the keys `rows` (T,) give at positions (T, 2) m."""
+        offset, headings = self._targets[rows] - positions, self._headings[rows]
+        return np.where(np.isnan(headings), arctan2(offset[:, 1], offset[:, 0]), headings)
 
 
-def _find_held(bearings: _Bearings, held: Any, reach: float) -> np.ndarray:
-    """Find the decisions (D,) bool within `reach` s of the time for which a key or a pin holds."""
-    return (bearings.times >= held.time - reach) & (bearings.times <= held.time + held.hold + reach)
+def sample_heading(path: HeadingPath, keys: Sequence[HeadingKey],
+                   track: SampledTrack) -> tuple[np.ndarray, np.ndarray | None]:
+    """Sample a planned heading, which where keys hold is exactly the one that they give.
+
+    The plan comes near it, in steps of ten degrees and smoothed; what it misses is added back where a key holds, and
+    fades out within HOLD_FADE s or until the next key. Much more than that is a heading that the body has not the time
+    to reach, and stays.
+
+    Args:
+        path: the planned heading.
+        keys: headings that are given.
+        track: where the body is, T frames.
+    Returns:
+        The heading (T,) rad from +x, unwrapped, and how far it is given (T,) from 0 to 1, None without keys.
+    """
+    heading = path.sample(track.times)
+    if not keys:
+        return heading, None
+    given, times = _Given(keys), track.times
+    key = given.find_keys(times)
+    after = np.minimum(key + (times >= given.starts[0]), len(given.starts) - 1)  # the next key, at the ends the nearest
+    since = np.where(times < given.starts[0], np.inf, np.maximum(times - given.ends[key], 0.0))
+    until = np.where(times >= given.starts[-1], np.inf, given.starts[after] - times)
+    reach = np.clip(given.gaps, 1e-6, HOLD_FADE)
+    misses = [_shrink_far_misses(given.compute_heading(rows, track.positions) - heading) for rows in (key, after)]
+    heading = heading + misses[0] * _fade(since / reach[key + 1]) + misses[1] * _fade(until / reach[after])
+    return heading, _fade(np.minimum(since, until) / HOLD_FADE)
 
 
-def _end_at_next(keys: Sequence[HeadingKey]) -> list[HeadingKey]:
-    """End each key where the next one begins."""
-    keys = sorted(keys, key=lambda key: key.time)
-    ends = [key.time - _DECISION_SECONDS for key in keys[1:]] + [np.inf]
-    return [replace(key, hold=min(key.hold, max(end - key.time, 0.0))) for key, end in zip(keys, ends)]
+def _shrink_far_misses(angle: np.ndarray) -> np.ndarray:
+    """Shrink angles (T,) rad, wrapped, towards 0 the farther they are."""
+    angle = quaternion.wrap_angle(angle)
+    return angle * (1.0 - smoothstep(np.abs(angle), *_FAR_MISS))
 
 
-def measure_hold(keys: Sequence[HeadingKey], times: np.ndarray) -> np.ndarray | None:
-    """Measure how far heading keys hold at times (T,) s: (T,) from 0 to 1, None without keys."""
-    away = [np.maximum(key.time - times, times - key.time - key.hold) for key in _end_at_next(keys)]
-    return 1.0 - smoothstep(np.min(away, axis=0), 0.0, HOLD_FADE) if away else None
-
-
-def _compute_given_heading(bearings: _Bearings, key: HeadingKey) -> np.ndarray:
-    """Compute the heading (D,) rad that a key gives, NaN where it does not hold."""
-    heading = key.heading if key.target is None else _compute_bearing(bearings, key.target)
-    return np.where(_find_held(bearings, key, 0.5 * _DECISION_SECONDS), heading, np.nan)
+def _fade(share: np.ndarray) -> np.ndarray:
+    """Fade from 1 where a share (T,) is 0 to 0 where it is 1."""
+    return 1.0 - smoothstep(share)
 
 
 def _compute_asked_heading(bearings: _Bearings, spans: Sequence[Span]) -> np.ndarray:

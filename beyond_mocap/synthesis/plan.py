@@ -21,7 +21,7 @@ from ..base.time_series import interpolate_columns
 from ..motion.skeleton import freeze_array
 from ..motion.track import SampledTrack, Track, sample_track
 from .heading_path import HeadingPath
-from .heading_plan import FPS, HeadingKey, HeadingRequest, Play, measure_hold, plan_heading_path, rest_track
+from .heading_plan import FPS, HeadingKey, HeadingRequest, Play, plan_heading_path, rest_track, sample_heading
 
 GAZE = "gaze"
 PARTS = ("left_hand", "right_hand", "left_foot", "right_foot", GAZE)
@@ -29,6 +29,7 @@ FEET = ("", "left", "right")
 METHODS = find_setting("synthesis", "method").choice_names
 _DEFAULTS = collect_defaults("synthesis", "player")
 _HEIGHT = find_setting("player", "height")
+_SAME = 1e-5  # s by which the end of a hold and the next key may differ where both are meant to be one time
 
 
 @dataclass(frozen=True)
@@ -139,7 +140,8 @@ class Plan:
         solved: the ball's trajectory where it is known already, such as from a whole match.
         heading_path: the planned heading where it is known already, such as over a whole match.
     Raises:
-        InputError: for a number outside the limits of its setting, and for two pins of one part at one time.
+        InputError: for a number outside the limits of its setting, and for two pins of one part or two heading keys at
+            one time.
     Source: Faustino 2016: catch_up §3.3.2, alpha eq. 13 (for "path" `synthesis.search.path_costs`), delta §3.2.4, omega
         and gaits §3.1.1, seam_window eq. 25 (twice its s; "path" blends over half of it). Others: made in
         `library.synthetic_clips`, track_window in `motion.track.smooth_positions`, solve_touches in
@@ -191,6 +193,7 @@ class Plan:
         if self.strong_foot not in FEET:
             raise InputError("strong foot", repr(self.strong_foot), "left, right, or empty for any")
         self._check_pins()
+        self._check_heading_keys()
 
     if TYPE_CHECKING:
 
@@ -209,6 +212,14 @@ class Plan:
                 if after.time <= before.end:
                     found = f"two pins of {part} at {format_seconds(after.time)} s"
                     raise InputError("pins", found, "one place at a time", "move one, or shorten the earlier hold")
+
+    def _check_heading_keys(self):
+        """Raise InputError for two heading keys at one time; one may begin where another ends."""
+        for before, after in zip(self.heading_keys, self.heading_keys[1:]):
+            if after.time == before.time or after.time < before.end - _SAME:
+                found = f"two keys at {format_seconds(after.time)} s"
+                raise InputError("heading keys", found, "one heading at a time",
+                                 "move one, or shorten the earlier hold")
 
 
 def sample_with_trajectory(track: Track, trajectory: SolvedTrajectory | None, fps: float,
@@ -279,12 +290,19 @@ class ResolvedPlan:
             The planned heading, the same whatever frame rate it is read at.
         """
         size = self.size
-        keys = [key if key.target is None else replace(key, target=(key.target[0] / size, key.target[1] / size))
-                for key in self.requested.heading_keys]
         gazes = [replace(pin, position=(pin.position[0] / size, pin.position[1] / size, pin.position[2] / size))
                  for pin in self.requested.pins if pin.part == GAZE]
-        request = HeadingRequest(keys=tuple(keys), gazes=tuple(gazes), spans=self.timeline.spans, play=play)
+        request = HeadingRequest(keys=self._find_heading_keys(), gazes=tuple(gazes), spans=self.timeline.spans, play=play)
         return plan_heading_path(rest_track(self._sample_ball_track(FPS)), request)
+
+    def _find_heading_keys(self) -> tuple[HeadingKey, ...]:
+        """Find the heading keys that hold at any time of the track, or of a whole match's, in the library's size."""
+        size, (start, end) = self.size, self.track.times[[0, -1]]
+        return tuple(
+            key if key.target is None else replace(key, target=(key.target[0] / size, key.target[1] / size))
+            for key in self.requested.heading_keys
+            if self.requested.heading_path is not None or key.is_within(start, end)
+        )
 
     def sample_track(self, fps: float, rests: bool = True) -> SampledTrack:
         """Sample the track, with the solved ball, in the library's size; each of its forms is computed once.
@@ -298,8 +316,9 @@ class ResolvedPlan:
         if (fps, rests) not in self._sampled:
             sampled = self._sample_ball_track(fps)
             if self.method == "path":
-                sampled = replace(rest_track(sampled, rests), heading=self.heading_path.sample(sampled.times),
-                                  held=measure_hold(self.requested.heading_keys, sampled.times))
+                sampled = rest_track(sampled, rests)
+                heading, held = sample_heading(self.heading_path, self._find_heading_keys(), sampled)
+                sampled = replace(sampled, heading=heading, held=held)
             self._sampled[fps, rests] = sampled
         return self._sampled[fps, rests]
 

@@ -267,7 +267,7 @@ def add_warnings(
     if hurried_from is not None:
         since = take.start_time + hurried_from / recordings.fps
         messages.append(TimedMessage(f"{since:.1f} s: the search was cut short from here on", (since, since)))
-    messages += [*_report_avoided_labels(take), *_report_missed_pins(take)]
+    messages += [*_report_avoided_labels(take), *_report_missed_pins(take), *_report_ignored_heading_keys(take.plan)]
     unmet = _report_unmet(recordings, take.plan, take) if report_unmet else ()
     return replace(take, is_cut_short=hurried_from is not None, warnings=(*messages, *unmet))
 
@@ -318,6 +318,19 @@ def _report_missed_pins(take: Take) -> list[str]:
             messages.append(TimedMessage(f"{pin} is {beyond:.0f} degrees beyond what the neck can turn", when))
         elif result.pin.part != "gaze" and result.miss > PIN_TOLERANCE:
             messages.append(TimedMessage(f"{pin} is out of reach by {100.0 * result.miss:.0f} cm", when))
+    return messages
+
+
+def _report_ignored_heading_keys(plan: Plan) -> list[str]:
+    """Report the heading keys before the start and after the end of the track, one line for each of the two."""
+    start, end = plan.track.times[0], plan.track.times[-1]
+    messages = []
+    for keys in ([key for key in plan.heading_keys if key.end < start],
+                 [key for key in plan.heading_keys if key.time > end]):
+        if keys:
+            when, last = format_seconds(keys[0].time), format_seconds(keys[-1].time)
+            name = f"heading key at {when} s" if len(keys) == 1 else f"{len(keys)} heading keys at {when} to {last} s"
+            messages.append(f"{name}: outside the track's {format_seconds(start)} to {format_seconds(end)} s; ignored")
     return messages
 
 

@@ -68,11 +68,11 @@ def _read_heading_key(settings, player, key, still: bool) -> list[HeadingKey]:
     start, hold = round(key.time, 6), round(key.hold, 6)
     if key.faces == "DIRECTION":
         return [HeadingKey(start, heading=round(key.heading, 6), hold=hold)]
-    times = np.append(np.arange(start, start + hold, FACING_SECONDS), start + hold)
+    times = np.unique(np.round(np.append(np.arange(start, start + hold, FACING_SECONDS), start + hold), 6))
     places = _sample_target(settings, player, key, times, still)
     if (places == places[0]).all():
         return [HeadingKey(start, target=tuple(places[0].tolist()), hold=hold)]
-    return [HeadingKey(round(time, 6), target=tuple(place)) for time, place in zip(times.tolist(), places.tolist())]
+    return [HeadingKey(time, target=tuple(place)) for time, place in zip(times.tolist(), places.tolist())]
 
 
 def _sample_target(settings, player, key, times: np.ndarray, still: bool) -> np.ndarray:

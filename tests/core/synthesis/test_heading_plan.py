@@ -6,6 +6,7 @@ import pytest
 from beyond_mocap.annotation import Span, parse_timeline
 from beyond_mocap.base.errors import InputError
 from beyond_mocap.motion.track import SampledTrack, Track, sample_track
+from beyond_mocap.synthesis import heading_plan
 from beyond_mocap.synthesis.heading_path import HeadingPath
 from beyond_mocap.synthesis.heading_plan import (
     HeadingKey,
@@ -16,6 +17,7 @@ from beyond_mocap.synthesis.heading_plan import (
     plan_track,
 )
 from beyond_mocap.synthesis.plan import Pin, Plan, ResolvedPlan
+from beyond_mocap.synthesis.synthesize import synthesize
 
 FPS = 30.0
 
@@ -110,8 +112,29 @@ def test_very_short_tracks(count):
     assert len(planned.heading) == len(planned.leeway) == len(planned) and np.isfinite(planned.heading).all()
 
 
+@pytest.mark.parametrize("hold, later", [(0.0, 3.0), (2.5, 5.0)])
+def test_two_keys_at_one_time_are_refused(hold, later):
+    """One may begin where another ends."""
+    track, key = Track(np.arange(0.0, 8.0, 0.04), np.zeros((200, 2))), HeadingKey(3.0, heading=0.0, hold=hold)
+    Plan(track=track, heading_keys=(HeadingKey(3.0 + max(hold, 0.1), heading=1.0), key))
+    with pytest.raises(InputError, match=f"two keys at {later:g} s; expected one heading at a time"):
+        Plan(track=track, heading_keys=(HeadingKey(later, heading=1.0), key))
+
+
+def test_keys_outside_the_track_are_told_and_ignored(library, track_of):
+    track = track_of(0.6, seconds=8.0)
+    keys = [HeadingKey(time, heading=2.0) for time in (-3.0, track.times[-1] + 0.2, 95.0)]
+    take = synthesize(library, Plan(track=track, heading_keys=keys))
+    end = f"{track.times[-1]:g}"
+    assert f"heading key at -3 s: outside the track's 0 to {end} s; ignored" in take.warnings
+    assert f"2 heading keys at {track.times[-1] + 0.2:g} to 95 s: outside the track's 0 to {end} s; ignored" in \
+        take.warnings
+    plain = synthesize(library, Plan(track=track))
+    assert np.array_equal(take.planned_heading, plain.planned_heading)
+
+
 def test_a_key_ends_where_the_next_one_begins():
-    keys = HeadingKey(1.0, heading=0.0, hold=5.0), HeadingKey(3.0, heading=np.pi / 2.0, hold=2.0)
+    keys = HeadingKey(1.0, heading=0.0, hold=2.0), HeadingKey(3.0, heading=np.pi / 2.0, hold=2.0)
     heading = plan_heading(going(constant(0.0, 0.0), constant(20.0, 0.0)), keys)
     assert degrees_from(heading[int(4.0 * FPS) : int(4.8 * FPS)], 90.0).max() < 8.0
 
@@ -145,6 +168,33 @@ def test_a_turn_goes_to_the_side_that_a_label_asks_for(side, sign):
                       spans=(Span(1.2, 5.2, ("turning", side)),))
     turned = np.degrees(heading[int(5.0 * FPS)] - heading[int(1.0 * FPS)])
     assert turned == pytest.approx(100.0 if sign > 0 else -260.0, abs=25.0)
+
+
+@pytest.mark.parametrize("hold", [0.0, 0.4, 2.0])
+def test_a_key_is_met_exactly_and_smoothly(hold):
+    """Nor are the headings of ten degrees seen, nor the window that smooths them."""
+    track = going(constant(0.3, 0.0), constant(20.0, 0.0), seconds=12.0)
+    keys = HeadingKey(4.0, heading=np.radians(84.9), hold=hold), HeadingKey(8.5, target=(-3.0, 9.0))
+    heading = plan_heading(track, keys)
+    assert degrees_from(heading[int(4.0 * FPS) : int((4.0 + hold) * FPS) + 1], 84.9).max() < 1.0
+    at = int(8.5 * FPS)
+    place = track.positions[at]
+    assert degrees_from(heading[at], np.degrees(np.arctan2(9.0 - place[1], -3.0 - place[0]))) < 1.0
+    assert np.degrees(np.abs(np.diff(heading))).max() * FPS < 220.0
+    assert np.degrees(np.abs(np.diff(heading, 2))).max() * FPS**2 < 1500.0
+
+
+def test_many_keys_are_measured_at_once(monkeypatch):
+    """An object that is faced for long gives thousands."""
+    counts, measure = [], heading_plan._measure_angles
+    monkeypatch.setattr(heading_plan, "_measure_angles", lambda bearing: counts.append(len(bearing)) or measure(bearing))
+    track, sums = going(constant(0.0, 0.0), constant(20.0, 0.0), seconds=20.0), []
+    for step in (9.0, 0.15):
+        counts.clear()
+        heading = plan_heading(track, [HeadingKey(time, heading=0.1 * time) for time in np.arange(0.0, 20.0, step)])
+        sums.append(sum(counts))
+    assert sums[0] == sums[1]
+    assert np.abs(heading[:590] - 0.1 * track.times[:590]).max() < np.radians(1.0)
 
 
 @pytest.mark.parametrize("away", [180.0, -180.0, 60.0])
