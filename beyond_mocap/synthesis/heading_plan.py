@@ -56,6 +56,7 @@ _KEEPER_SPEEDS = np.array([3.0, 3.6, 4.4, 5.5])
 _TRAVEL_LIMITS = np.radians([180.0, 60.0, 35.0, 25.0])
 _STANDING_TURN, _RUNNING_TURN, _RUNNING_SPEED = 3, 4, 2.2  # bins per decision (180 and 240 degrees/s); m/s
 _CALM_TURN = 2  # the same towards what is asked (120 degrees/s): a body that is held to a faster turn snaps
+_APPROACH = 1.5  # s in which a body turns by 180 degrees that calmly, before and after
 _STEPS = np.arange(-_RUNNING_TURN, _RUNNING_TURN + 1)  # bins from one decision to the next
 _NEAR_BALL = 2.0  # m; a nearer ball has no bearing, the last one holds
 _FAR_BALL = (25.0, 30.0)  # m between which the way of the ball takes its place
@@ -190,7 +191,8 @@ def plan_heading_path(track: SampledTrack, request: HeadingRequest) -> HeadingPa
     bins = find_cheapest_path(costs, step_costs)
     runs = find_runs(_find_asked(bearings, request))
     if runs:
-        costs, step_costs = _add_asked_costs(bearings, request, costs), _limit_turns(bearings, request, step_costs)
+        asked_costs = _compute_asked_costs(bearings, request)
+        costs, step_costs = costs + asked_costs, _limit_turns(bearings, request, step_costs, asked_costs)
     for first, end in runs:
         bins = replace_part(bins, first, end, costs, step_costs)
     return HeadingPath(bearings.times, bins)
@@ -283,9 +285,9 @@ def _find_asked(bearings: _Bearings, request: HeadingRequest) -> np.ndarray:
     return begun > np.searchsorted(np.sort(ends + ASKED_SECONDS), bearings.times, side="left")
 
 
-def _add_asked_costs(bearings: _Bearings, request: HeadingRequest, costs: np.ndarray) -> np.ndarray:
-    """Add the costs of what is asked to those of every heading at every decision (D, BINS)."""
-    cost, slow = np.zeros_like(costs), _compute_slowness(bearings.speed)[:, None]
+def _compute_asked_costs(bearings: _Bearings, request: HeadingRequest) -> np.ndarray:
+    """Compute the cost (D, BINS) that what is asked adds to every heading at every decision."""
+    cost, slow = np.zeros((len(bearings.times), BINS)), _compute_slowness(bearings.speed)[:, None]
     for pin in request.gazes:
         at = np.flatnonzero((bearings.times >= pin.time - _GAZE_SECONDS) & (bearings.times <= pin.end + _GAZE_SECONDS))
         offset = np.asarray(pin.position[:2]) - bearings.positions[at]
@@ -300,7 +302,7 @@ def _add_asked_costs(bearings: _Bearings, request: HeadingRequest, costs: np.nda
         is_held = bearings.times <= given.ends[key] + 0.5 * _DECISION_SECONDS
         is_held &= bearings.times >= given.starts[key] - 0.5 * _DECISION_SECONDS
         cost += GIVEN_COST * _measure_angles(np.where(is_held, heading, np.nan))
-    return costs + cost * bearings.seconds[:, None]
+    return cost * bearings.seconds[:, None]
 
 
 def _measure_angles(bearing: np.ndarray) -> np.ndarray:
@@ -415,9 +417,20 @@ def _compute_step_costs(bearings: _Bearings) -> np.ndarray:
     return np.where(np.abs(_STEPS) <= limit, cost, np.inf)
 
 
-def _limit_turns(bearings: _Bearings, request: HeadingRequest, step_costs: np.ndarray) -> np.ndarray:
-    """Limit the turns (D, 2 N + 1) to what is asked to a calm speed, and to the side that a label asks for."""
-    step_costs = np.where(np.abs(_STEPS) <= _CALM_TURN, step_costs, np.inf)
+def _limit_turns(bearings: _Bearings, request: HeadingRequest, step_costs: np.ndarray,
+                 asked_costs: np.ndarray) -> np.ndarray:
+    """Limit the turns (D, 2 N + 1) to what is asked to a calm speed, and to the side that a label asks for.
+
+    That is where what is asked costs (D, BINS), on the way there and from there; other turns are as fast as without it.
+    """
+    is_asked = asked_costs.any(axis=1)
+    for span in request.spans:
+        is_asked |= _find_inside(bearings, span) & (_find_turning_side(span) is not None)
+    moments = np.concatenate([[-np.inf], bearings.times[is_asked], [np.inf]])
+    number = np.searchsorted(moments, bearings.times)
+    away = np.minimum(moments[number] - bearings.times, bearings.times - moments[number - 1])
+    is_fast = (np.abs(_STEPS) > _CALM_TURN) & (away <= _APPROACH)[:, None]
+    step_costs = np.where(is_fast, np.inf, step_costs)
     for span in request.spans:
         against = np.maximum(-(_find_turning_side(span) or 0) * _STEPS, 0)
         step_costs = step_costs + _find_inside(bearings, span)[:, None] * OTHER_WAY_COST * BIN_ANGLE * against

@@ -149,6 +149,15 @@ def test_a_pinned_gaze_draws_the_heading_of_a_slow_body(speed, least, most):
     assert degrees_from(heading[: int(1.5 * FPS)], 0.0).max() < 21.0
 
 
+def test_a_pin_of_the_gaze_of_a_runner_slows_no_turn():
+    """It adds no cost at 5 m/s, where the path turns back in half a second."""
+    back = lambda times: np.column_stack([np.where(times < 4.0, 5.0, -5.0), np.full(len(times), 0.5)])  # noqa: E731
+    track = going(back, constant(np.nan, np.nan))
+    pinned = planned(track, gazes=(Pin(5.5, "gaze", (0.0, 50.0, 1.5), 1.0),))
+    assert np.array_equal(pinned, planned(track)) and np.ptp(pinned) > np.radians(150.0)
+    assert np.degrees(np.abs(np.diff(pinned))).max() * FPS > 130.0
+
+
 @pytest.mark.parametrize("words, wanted", [("walking", 0.0), ("walking back", 180.0), ("walking left", -90.0),
                                            ("running right", 90.0)])
 def test_a_label_with_a_direction_turns_the_body_from_its_travel(words, wanted):
