@@ -1,7 +1,8 @@
 """A planned heading: whole steps of ten degrees at decisions some times a second, smoothed where it is read.
 
 The cheapest one is found by dynamic programming. Costs are whole numbers, which add up alike whatever comes before
-them: an edit leaves the headings far from it, bit for bit.
+them. So an edit leaves the headings far from it, bit for bit, but where two courses cost almost alike over long, such
+as the two sides of a dead zone: there it may decide which one is taken until the body next turns.
 """
 
 from __future__ import annotations

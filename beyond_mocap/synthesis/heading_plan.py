@@ -35,6 +35,7 @@ FPS = 30.0  # at which headings are planned, whatever the rate of the take
 # headings near ball and travel: no snap turns, 0.02 spins a minute, 13 degrees from the ball below 1 m/s (median).
 DEAD_ZONE = np.radians(20.0)  # within which the body does not follow the ball
 BALL_COST = 1.0  # per radian beyond it, half of that from 3 m/s on
+PULL_COST = 0.02  # per radian to the ball, also within: where all cost alike, an edit far away would choose more often
 TRAVEL_COST = 6.0  # per radian beyond TRAVEL_LIMITS
 FORWARD_COST = 0.3  # per radian to travel and m/s above 0.6: forward is cheaper
 SIDEWAYS_COST, SIDEWAYS_WIDTH = 2.5, np.radians(45.0)  # at a right angle to travel, and the width of that bell
@@ -261,7 +262,7 @@ def _compute_heading_costs(bearings: _Bearings, is_keeper: bool) -> np.ndarray:
     v = bearings.speed[:, None]
     from_ball, from_travel = _measure_angles(bearings.ball), _measure_angles(bearings.travel)
     ball_cost = KEEPER_BALL_COST if is_keeper else BALL_COST * 0.5 * (1.0 + _compute_slowness(v))
-    cost = ball_cost * np.maximum(from_ball - DEAD_ZONE, 0.0)
+    cost = ball_cost * np.maximum(from_ball - DEAD_ZONE, 0.0) + PULL_COST * from_ball
     limits = np.interp(v, _KEEPER_SPEEDS if is_keeper else _TRAVEL_SPEEDS, _TRAVEL_LIMITS)
     cost += TRAVEL_COST * np.maximum(from_travel - limits, 0.0)
     cost += FORWARD_COST * np.clip(v - 0.6, 0.0, 3.0) * from_travel

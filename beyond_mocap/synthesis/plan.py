@@ -292,7 +292,8 @@ class ResolvedPlan:
         size = self.size
         gazes = [replace(pin, position=(pin.position[0] / size, pin.position[1] / size, pin.position[2] / size))
                  for pin in self.requested.pins if pin.part == GAZE]
-        request = HeadingRequest(keys=self._find_heading_keys(), gazes=tuple(gazes), spans=self.timeline.spans, play=play)
+        keys = self._find_heading_keys()
+        request = HeadingRequest(keys=keys, gazes=tuple(gazes), spans=self.timeline.spans, play=play)
         return plan_heading_path(rest_track(self._sample_ball_track(FPS)), request)
 
     def _find_heading_keys(self) -> tuple[HeadingKey, ...]:
