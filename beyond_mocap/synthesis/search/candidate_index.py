@@ -87,8 +87,8 @@ class CandidateIndex:
         self.is_synthetic = np.array([clip.is_synthetic for clip in library.clips])[library.frames.clip]
         strange = maximum_filter1d(library.strangeness, SLOT, origin=-(SLOT // 2), mode="nearest")
         self.strange = np.clip(strange - 1.0, 0.0, MOST_STRANGE)
-        names = [clip.path for clip in library.clips]
-        self.recording = np.array([names.index(name) for name in names])[library.frames.clip]
+        recording = np.unique([clip.path for clip in library.clips], return_inverse=True)[1]
+        self.recording = recording[library.frames.clip]
         self.is_made_travel = self.is_synthetic & (library.frames.speed > 0.2)
         self.bucket = (np.arange(len(library.frames)) // BUCKET).astype(int)
         speed, turn, lasts = map(np.stack, zip(*(compute_speed_and_turn(library, rate) for rate in PLAYBACK_RATES)))

@@ -132,7 +132,7 @@ class Weights:
         strike: for a key moment's clip that does not fit its ball (`key_fit`).
         switch: for any cut.
         other: for a cut to another recording.
-        young: for a cut just after another one, less by the slot up to YOUNG_SLOTS.
+        young: for a cut just after another one, less in the last two of YOUNG_SLOTS.
         pose: per metre of joint distance.
         feet: per metre that a foot in contact before and after a cut would jump.
         wild: for cutting where the clips jerk by as much again as is usual.
