@@ -197,8 +197,8 @@ class Library:
         """Whether a track needs the synthetic clips.
 
         It does if it stays in a speed gap for a fifth of a second or more, stands or runs for some seconds in all,
-        goes sideways or backward while slow, turns where it stands, or has key moments that are faster than any recorded
-        kick or, for received balls, any recorded receiving with the foot can be played without sliding.
+        goes sideways or backward while slow, turns where it stands, or has key moments that are faster than any
+        recorded kick or, for received balls, any recorded receiving with the foot can be played without sliding.
 
         Args:
             speed: (T,) m/s of the track at the library's rate.
