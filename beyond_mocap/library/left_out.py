@@ -82,7 +82,8 @@ def find_left_out(library: Library) -> tuple[LeftOut, ...]:
 def _find_left_out(library: Library) -> tuple[LeftOut, ...]:
     """Find the stretches of locomotion that do not belong to it."""
     frames = library.frames
-    is_strange = select_locomotion_alone(library.frames, library.clips) & (library.strangeness > 1.0)
+    speed = frames.speed  # computed over all frames at every access
+    is_strange = select_locomotion_alone(frames, library.clips) & (library.strangeness > 1.0)
     found = []
     for index, clip in enumerate(library.clips):
         first = frames.first[index]
@@ -90,7 +91,8 @@ def _find_left_out(library: Library) -> tuple[LeftOut, ...]:
         for start, end in _join_runs(runs, int(_JOINED * library.fps)):
             if end - start >= _SHORTEST * library.fps:
                 part = slice(first + start, first + end)
-                found.append(_describe_stretch(library, clip.path, part, start / library.fps, (end - 1) / library.fps))
+                found.append(_describe_stretch(library, clip.path, part, speed[part], start=start / library.fps,
+                                               end=(end - 1) / library.fps))
     return tuple(found)
 
 
@@ -105,9 +107,11 @@ def _join_runs(runs: list[tuple[int, int]], gap: int) -> list[tuple[int, int]]:
     return joined
 
 
-def _describe_stretch(library: Library, path: str, frames: slice, start: float, end: float) -> LeftOut:
-    """Describe a stretch of the library's frames by the part that is most unlike the locomotion of its speed."""
-    speed = library.frames.speed[frames]
+def _describe_stretch(library: Library, path: str, frames: slice, speed: np.ndarray, *, start: float,
+                      end: float) -> LeftOut:
+    """Describe a stretch of the library's frames, of `speed` m/s, by the part that is most unlike the locomotion of
+    that speed.
+    """
     posture, is_strange = library.frames.posture[frames], library.strangeness[frames] > 1.0
     parts = library.normal_postures.measure_parts(posture[is_strange], speed[is_strange])
     part = max(parts, key=lambda name: parts[name][0])

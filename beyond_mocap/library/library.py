@@ -196,9 +196,9 @@ class Library:
                               key_speeds: np.ndarray, takes: np.ndarray) -> bool:
         """Whether a track needs the synthetic clips.
 
-        It does if it stays in a speed gap for a fifth of a second or more, stands or runs for long, goes sideways or
-        backward while slow, turns where it stands, or has key moments that are faster than any recorded kick or, for
-        received balls, any recorded receiving with the foot can be played without sliding.
+        It does if it stays in a speed gap for a fifth of a second or more, stands or runs for some seconds in all,
+        goes sideways or backward while slow, turns where it stands, or has key moments that are faster than any
+        recorded kick or, for received balls, any recorded receiving with the foot can be played without sliding.
 
         Args:
             speed: (T,) m/s of the track at the library's rate.
@@ -286,7 +286,7 @@ def measure_gaits(library: Library) -> tuple[Gait, ...]:
     Returns:
         The gaits from slow to fast.
     Raises:
-        InputError: if no clip shows locomotion.
+        InputError: if no clip shows locomotion, or none that travels faster than the library stands.
     Source: Faustino 2016, section 3.1.1.
     """
     seconds: dict[str, Any] = {word: Counter() for word in LOCOMOTION}
@@ -310,12 +310,13 @@ def measure_gaits(library: Library) -> tuple[Gait, ...]:
         if times:
             words = max(times, key=lambda w: (times[w], w))
             found.append(Gait(word, words, metres[word][words] / max(times[words], 1e-9)))
-    if not any(gait.label != STANDING for gait in found):
-        raise InputError(
-            library.folder, "no locomotion clip", "clips annotated walking, jogging, running or sprinting",
-            "label the clips that show locomotion",
-        )
     ordered = [gait for i, gait in enumerate(found) if all(gait.speed > other.speed for other in found[:i])]
+    if not any(gait.label != STANDING for gait in ordered):
+        labelled = any(gait.label != STANDING for gait in found)
+        raise InputError(
+            library.folder, f"no locomotion clip{' that is faster than its stands' if labelled else ''}",
+            "clips annotated walking, jogging, running or sprinting", "label the clips that show locomotion",
+        )
     return tuple(ordered)
 
 

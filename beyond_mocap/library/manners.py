@@ -10,6 +10,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.spatial.distance import cdist
 
 WALKING_SPEEDS = (0.5, 2.2)  # m/s at which a manner is seen; runs and stands follow the walk of their own clip
 LEAST_SECONDS = 3.0  # of calm walking in a recording whose manner players can follow
@@ -65,7 +66,7 @@ def measure_manners(paths: list[str], frames, is_calm: np.ndarray, fps: float) -
     means = total[known] / count[known, None]
     spread = means.std(axis=0) + _LEAST_SPREAD if len(known) else 1.0
     scaled = means / spread
-    distance = np.linalg.norm(scaled[:, None] - scaled[None], axis=2)
+    distance = cdist(scaled, scaled)
     others = distance[np.triu_indices(len(known), 1)]
     number = np.full(len(count), -1)
     number[known] = np.arange(len(known))

@@ -65,10 +65,12 @@ def find_stands(clips: Sequence, frames: Frames, fps: float, strangeness: np.nda
 
 def _split_at_turns(heading: np.ndarray, path: np.ndarray, first: int, end: int) -> Iterator[tuple[int, int]]:
     """Split a stand where the body has turned or shifted too far for one: (first, end) of each part."""
-    start = first
-    for frame in range(first, end):
-        inside = slice(start, frame + 1)
-        if np.ptp(heading[inside]) > _MOST_TURN or np.ptp(path[inside], axis=0).max() > _MOST_SHIFT:
+    values = np.column_stack([heading, path])[first:end].tolist()
+    most = (_MOST_TURN, *[_MOST_SHIFT] * (len(values[0]) - 1))
+    start, lowest, highest = first, values[0], values[0]
+    for frame, value in enumerate(values, first):
+        lowest, highest = list(map(min, lowest, value)), list(map(max, highest, value))
+        if any(high - low > limit for low, high, limit in zip(lowest, highest, most)):
             yield start, frame
-            start = frame
+            start, lowest, highest = frame, value, value
     yield start, end

@@ -48,8 +48,9 @@ TABLES = {
         Setting(name="fps", default=30.0, unit="frames per second", option="--fps", identifier="rate",
                 title="Frame Rate", tooltip="Frames per second of the result; the scene keeps its own rate",
                 in_preset=True, option_more=dict(least=1.0, most=480.0), panel_more=dict(min=10.0, max=240.0)),
-        Setting(name="seed", default=0, option="--seed", help="seed of the clustering for blocks and distance",
-                tooltip="Random seed of the clustering for Blocks and Distance; Path Following does not use it",
+        Setting(name="seed", default=0, option="--seed", help="seed of the player's habits of watching the ball, and "
+                "of the clustering for blocks and distance",
+                tooltip="Random seed of how the player watches the ball, and of the clustering for Blocks and Distance",
                 in_preset=True, option_more=dict(least=0, most=2**31 - 1), panel_more=dict(min=0)),
         Setting(name="solve_touches", default=False, option="--solve-touches", help="move key moments to the touches "
                 "found in the ball's samples; the ball follows physics and is dribbled step by step",

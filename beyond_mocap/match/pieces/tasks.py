@@ -261,8 +261,10 @@ def _build_overlap(take: Take, request: FinishRequest) -> np.ndarray:
 
 def _join_provenance(tables: Sequence[Provenance]) -> Provenance:
     """Join the provenance of several stretches."""
-    arrays = {name: np.concatenate([getattr(one, name) for one in tables])
-              for name in ("times", "clip_frame", "mirrored", "contacts", "planned_heading")}  # fmt: skip
+    names = ["times", "clip_frame", "mirrored", "contacts"]
+    if all(one.planned_heading is not None for one in tables):
+        names.append("planned_heading")
+    arrays = {name: np.concatenate([getattr(one, name) for one in tables]) for name in names}
     return Provenance(clip=tuple(clip for one in tables for clip in one.clip),
                       words=tuple(words for one in tables for words in one.words), **arrays)
 

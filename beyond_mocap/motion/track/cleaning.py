@@ -14,7 +14,7 @@ import numpy as np
 from ...base.errors import InputError, TimedMessage, format_count, format_seconds
 from ...base.time_series import find_runs
 from .data import Track, is_ball_sentinel
-from .sampling import GAP_INTERVALS, LONG_GAP, smooth_zero_phase_hann
+from .sampling import GAP_INTERVALS, LONG_GAP
 
 MAX_SPEED = 12.0
 """m/s; no player runs faster, so a sample that would need it is wrong."""
@@ -28,6 +28,9 @@ _CATCH_UP = 3.0  # m/s by which the player may be faster while making up for a s
 _COAST_EXACT = 0.012  # metres: a coasting feed keeps to its line up to rounding to centimetres
 _JITTER = 0.06  # metres; noise of single samples from which on a track is smoothed: optical systems have 0.01
 _JITTER_LEFT, _JITTER_SECONDS = 0.04, (0.4, 1.5)  # metres of noise that smoothing should leave; seconds of its window
+# noise of s metres along both axes puts a sample 1.22 s off its neighbours' line, and a step 1.5 s off the usual one,
+# along each axis; five times that is passed once in 300 000 samples
+_SPIKE_NOISE, _JUMP_NOISE = 6.1, 7.5
 _STRAY = 2  # samples before a jump at the track's start, or after one at its end, that are taken for strays
 _SNAP_LIMIT = 3.0  # metres; a longer step is another player, or real: reported, not repaired
 _SLOPE_SECONDS = 0.3  # seconds whose slope is the velocity next to a gap
@@ -63,13 +66,12 @@ class DataReport:
 def clean_track(track: Track) -> tuple[Track, DataReport]:
     """Clean a track: in order of time, with one plausible position per sample, and a report of the changes.
 
-    A track all of whose samples jitter is smoothed first.
-
     Rows without a time are dropped, repeated times merged to their mean, times sorted. Spikes, excursions and the
     coasted samples before a snap are marked `outlier`; missing samples, and those of gaps longer than three sample
-    intervals, are inserted and marked `filled`. Both get a cubic between the valid neighbours that starts and ends with
-    their velocities (beyond one second only as curved as the distance allows). Before the first and after the last
-    valid sample the velocity fades (to a third in half a second). A track that is already clean comes back equal.
+    intervals, are inserted and marked `filled`. Where all samples jitter, the others are smoothed. Both kinds of marked
+    samples then get a cubic between the valid neighbours that starts and ends with their velocities (beyond one second
+    only as curved as the distance allows). Before the first and after the last valid sample the velocity fades (to a
+    third in half a second). A track that is already clean comes back equal.
 
     Args:
         track: samples as the feed has them, pitch frame.
@@ -86,11 +88,14 @@ def clean_track(track: Track) -> tuple[Track, DataReport]:
     if np.count_nonzero(known) < 2:
         found = f"{format_count(np.count_nonzero(known), 'sample')} with a position"
         raise InputError(track.name, found, "at least two")
-    positions[known], jitter = _smooth_jitter(times[known], positions[known])
+    noise = _measure_jitter(times[known], positions[known])
     outlier, snaps = np.zeros(len(times), dtype=bool), ()
-    outlier[known], snaps = _detect_outliers(times[known], positions[known])
-    _check_unit(times[known], positions[known], outlier[known], track.name)
+    outlier[known], snaps = _detect_outliers(times[known], positions[known], noise)
     is_valid = known & ~outlier
+    jitter = []
+    if noise > 0.0:
+        positions[is_valid], jitter = _smooth_jitter(times[is_valid], positions[is_valid], noise, snaps)
+    _check_unit(times[known], positions[known], outlier[known], track.name)
     positions = _interpolate_gaps(times, positions, is_valid)
     cleaned = Track(times, positions, ball, ball_height_known=np.isfinite(ball[:, 2]), filled=~known, outlier=outlier,
                     name=track.name)
@@ -172,32 +177,63 @@ def _insert_missing_rows(times, positions, ball, name: str):
     return np.insert(times, at, np.concatenate(new)), np.insert(positions, at, blank, 0), np.insert(ball, at, blank, 0)
 
 
-def _smooth_jitter(times: np.ndarray, positions: np.ndarray) -> tuple[np.ndarray, list[str]]:
-    """Smooth positions (N, 2) m that jitter as a whole, and describe that in a line; unchanged where they do not.
+def _measure_jitter(times: np.ndarray, positions: np.ndarray) -> float:
+    """Measure the metres by which samples (N, 2) jitter along each axis; 0 where the track need not be smoothed.
 
-    White noise of s metres along both axes puts samples 1.44 s off the line between their neighbours in the median;
-    a Hann window of n samples leaves sqrt(1.5 / n) of it.
+    White noise of s metres along both axes puts samples 1.44 s off the line between their neighbours in the median.
     """
     if len(times) < 5:
-        return positions, []
+        return 0.0
     off = _measure_line_distance(times[1:-1], positions[1:-1], times[:-2], place_a=positions[:-2], time_b=times[2:],
                                  place_b=positions[2:])
     bend = _MAX_ACCELERATION / 8.0 * float(np.median(times[2:] - times[:-2])) ** 2
     noise = (float(np.median(off)) - bend) / 1.44
-    if noise <= _JITTER:
-        return positions, []
-    rate = 1.0 / float(np.median(np.diff(times)))
-    seconds = float(np.clip(1.5 * (noise / _JITTER_LEFT) ** 2 / rate, *_JITTER_SECONDS))
-    line = f"samples jitter by {100 * noise:.0f} cm: the track is smoothed over {seconds:.1f} s"
-    return smooth_zero_phase_hann(positions, rate, seconds), [line]
+    return noise if noise > _JITTER else 0.0
 
 
-def _detect_outliers(times: np.ndarray, positions: np.ndarray) -> tuple[np.ndarray, tuple[float, ...]]:
-    """Detect the samples (N,) bool to replace, and the times of steps too large to repair; all positions are numbers.
+def _smooth_jitter(times: np.ndarray, positions: np.ndarray, noise: float,
+                   snaps: tuple[float, ...]) -> tuple[np.ndarray, list[str]]:
+    """Smooth valid positions (N, 2) that jitter by `noise` metres, and describe that in a line.
+
+    Each stretch between gaps, and between the steps at `snaps` that are left as they are, is smoothed on its own.
     """
-    wrong = _detect_spikes(times, positions)
+    steps = np.diff(times)
+    rate = 1.0 / float(np.median(steps))
+    # a Hann window of n samples leaves sqrt(1.5 / n) of white noise
+    seconds = float(np.clip(1.5 * (noise / _JITTER_LEFT) ** 2 / rate, *_JITTER_SECONDS))
+    snaps_before = np.searchsorted(np.sort(snaps), times, side="right")
+    is_cut = (steps > GAP_INTERVALS / rate + 1e-9) | (np.diff(snaps_before) > 0)
+    stretches = np.split(np.arange(len(times)), np.flatnonzero(is_cut) + 1)
+    smooth = np.concatenate([_fit_local_lines(times[part], positions[part], seconds * rate) for part in stretches])
+    return smooth, [f"samples jitter by {100 * noise:.0f} cm: the track is smoothed over {seconds:.1f} s"]
+
+
+def _fit_local_lines(times: np.ndarray, positions: np.ndarray, width: float) -> np.ndarray:
+    """Fit a line around each sample by least squares under a Hann window of `width` samples: its values (N, 2) there.
+
+    Unlike a window alone, it needs no samples beyond the ends, nor even times.
+    """
+    half = max(int(np.ceil(width / 2.0 - 1e-9)) - 1, 0)
+    window = 0.5 + 0.5 * np.cos(2.0 * np.pi * np.arange(-half, half + 1) / width)
+    moment = times - times.mean()
+    columns = np.column_stack([np.ones_like(moment), moment, moment**2, positions, moment[:, None] * positions])
+    # "same" would have the window's length where that is longer than the stretch
+    sums = np.stack([np.convolve(column, window)[half : half + len(times)] for column in columns.T], axis=1)
+    total, first = sums[:, :1], sums[:, 1:2]
+    mean, centre = sums[:, 3:5] / total, first / total
+    variance = sums[:, 2:3] / total - centre**2
+    slope = (sums[:, 5:] / total - centre * mean) / np.where(variance > 1e-9, variance, np.inf)
+    return mean + slope * (moment[:, None] - centre)
+
+
+def _detect_outliers(times: np.ndarray, positions: np.ndarray,
+                     noise: float) -> tuple[np.ndarray, tuple[float, ...]]:
+    """Detect the samples (N,) bool to replace, and the times of steps too large to repair; all positions are numbers,
+    and jitter by `noise` metres.
+    """
+    wrong = _detect_spikes(times, positions, noise)
     left = np.flatnonzero(~wrong)
-    jumps, excess = _detect_jumps(times[left], positions[left])
+    jumps, excess = _detect_jumps(times[left], positions[left], noise)
     too_far, used = [], set()
     for place, jump in enumerate(jumps):
         if jump in used:
@@ -218,7 +254,7 @@ def _detect_outliers(times: np.ndarray, positions: np.ndarray) -> tuple[np.ndarr
     return wrong, tuple(too_far)
 
 
-def _detect_spikes(times: np.ndarray, positions: np.ndarray) -> np.ndarray:
+def _detect_spikes(times: np.ndarray, positions: np.ndarray, noise: float) -> np.ndarray:
     """Detect single samples (N,) bool far off the line between their neighbours, while the neighbours' lines fit
     better.
 
@@ -238,7 +274,7 @@ def _detect_spikes(times: np.ndarray, positions: np.ndarray) -> np.ndarray:
         ) for i, j, k in _ENDS
     )
     neighbour_distances = np.concatenate([[first], off, [last]])
-    far = off > _SPIKE + _MAX_ACCELERATION / 8.0 * (times[2:] - times[:-2]) ** 2
+    far = off > _SPIKE + _SPIKE_NOISE * noise + _MAX_ACCELERATION / 8.0 * (times[2:] - times[:-2]) ** 2
     wrong[1:-1] = far & (off > 1.5 * np.maximum(neighbour_distances[:-2], neighbour_distances[2:]))
     return wrong
 
@@ -252,7 +288,7 @@ def _measure_line_distance(time, place, time_a, place_a, time_b, place_b) -> np.
     return np.linalg.norm(place - place_a * (1 - share) - place_b * share, axis=-1)
 
 
-def _detect_jumps(times: np.ndarray, positions: np.ndarray) -> tuple[list[int], np.ndarray]:
+def _detect_jumps(times: np.ndarray, positions: np.ndarray, noise: float) -> tuple[list[int], np.ndarray]:
     """Detect steps that no player takes.
 
     Returns:
@@ -268,7 +304,8 @@ def _detect_jumps(times: np.ndarray, positions: np.ndarray) -> tuple[list[int], 
     usual = np.median(np.lib.stride_tricks.sliding_window_view(padded, 2 * half + 1, axis=0), axis=2)
     excess = (velocity - usual) * steps[:, None]
     short = steps <= GAP_INTERVALS * np.median(steps) + 1e-9
-    jumps = np.flatnonzero(short & (np.linalg.norm(excess, axis=1) > _SPIKE + _MAX_ACCELERATION / 3.0 * steps))
+    allowed = _SPIKE + _JUMP_NOISE * noise + _MAX_ACCELERATION / 3.0 * steps
+    jumps = np.flatnonzero(short & (np.linalg.norm(excess, axis=1) > allowed))
     return jumps.tolist(), excess[jumps]
 
 

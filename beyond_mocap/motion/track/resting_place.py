@@ -25,8 +25,9 @@ root was 12.7 cm off at the 95th percentile below 1 m/s, beyond the 12 cm that a
 LEAVE_DISTANCE = 0.10
 """Metres from a stand's middle at which a body leaves it, or comes to it."""
 
-MOST_DISTANCE = 0.12
-"""Metres from the smoothed track that a body stays within, also where a sharp turn of the track is smoothed away."""
+MOST_DISTANCE = 0.11
+"""Metres from the smoothed track that a body stays within, also where a sharp turn of the track is smoothed away; with
+LEAST_LEEWAY that is 12 cm, as much as the noise of tracks explains (../shared/metrics.md)."""
 
 LEAST_LEEWAY, MOST_LEEWAY = 0.01, 0.04
 """Metres that a body may always stay off its planned place so that its feet rest, and that it may at most."""

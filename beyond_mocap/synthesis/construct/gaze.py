@@ -56,7 +56,7 @@ LEAST_ATTENTION, LEAST_ATTENTION_FAR = 0.45, 0.15
 """Shares of the head's turn at the least attentive moments, for a ball on the pitch around and for one far away."""
 NEAR_DISTANCES, FAR_DISTANCES = (4.0, 12.0), (25.0, 60.0)
 """m: a ball closer than the first is always watched, beyond the second attention varies; and where a ball is far."""
-SPRINT_SPEEDS, SPRINT_LOSS = (4.5, 7.5), 0.65
+SPRINT_SPEEDS, SPRINT_LOSS = (3.5, 6.0), 0.65
 """m/s between which runners turn less and less, and the share that a sprint removes."""
 MEMORY_SECONDS = 2.0
 """s after and before its last measurement in which a ball is watched where the track places it."""

@@ -35,6 +35,7 @@ MAX_OFF_PLAN = np.radians(25.0)  # of the heading, from the plan: with more a bo
 PLAN_SPEEDS, PLAN_WEIGHTS = (0.1, 0.5, 1.1), (1e-5, 0.02, 0.05)
 """Weights of the plan by the track's speed, m/s: a body at rest turns as its recording does, within MAX_OFF_PLAN."""
 
+BEYOND_WEIGHT = 5.0  # of the plan where the heading is farther off: against the firmness of two planted feet
 MAX_OFF_HELD, HELD_WEIGHT = np.radians(5.0), 0.5
 """The same where the heading is given, and the weight added to that of the plan there."""
 
@@ -134,7 +135,7 @@ def follow_plan(
         away = heading - plan
         beyond = (np.abs(away) > most) & (trust < GIVEN_HEADING_WEIGHT)
         goal = np.where(beyond, plan + np.sign(away) * most, goal)
-        trust = np.where(beyond, np.maximum(trust, PLAN_WEIGHTS[-1]), trust)
+        trust = np.where(beyond, np.maximum(trust, BEYOND_WEIGHT), trust)
         heading = follow_turning(goal, trust, turn, firm)
     return heading
 

@@ -13,6 +13,8 @@ from ...base.vectors import arctan2
 from ...library.library import Library
 from .block_costs import AnnotationCost
 
+STAND_SPEED = 0.2  # m/s that a clip of a stand never exceeds
+
 SLOT = 8  # output frames of a usual slot
 PLAYBACK_RATES = np.array([0.875, 0.9375, 1.0, 1.0625, 1.125])  # playback rates that are tried
 MOST_STRANGE = 3.0  # radii beyond the region of normal locomotion at which the cost stops growing
@@ -87,9 +89,12 @@ class CandidateIndex:
         self.is_synthetic = np.array([clip.is_synthetic for clip in library.clips])[library.frames.clip]
         strange = maximum_filter1d(library.strangeness, SLOT, origin=-(SLOT // 2), mode="nearest")
         self.strange = np.clip(strange - 1.0, 0.0, MOST_STRANGE)
-        names = [clip.path for clip in library.clips]
-        self.recording = np.array([names.index(name) for name in names])[library.frames.clip]
-        self.is_made_travel = self.is_synthetic & (library.frames.speed > 0.2)
+        recording = np.unique([clip.path for clip in library.clips], return_inverse=True)[1]
+        self.recording = recording[library.frames.clip]
+        fastest = np.zeros(len(library.clips))
+        np.maximum.at(fastest, library.frames.clip, library.frames.speed)
+        # a recorded stand that is played forth and back costs nothing; the ends of a synthetic turn are no stand
+        self.is_made_travel = self.is_synthetic & (fastest[library.frames.clip] > STAND_SPEED)
         self.bucket = (np.arange(len(library.frames)) // BUCKET).astype(int)
         speed, turn, lasts = map(np.stack, zip(*(compute_speed_and_turn(library, rate) for rate in PLAYBACK_RATES)))
         self.speed, self.turn = speed.astype(np.float32), turn.astype(np.float32)

@@ -11,8 +11,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ...annotation import DISCRETE
-from ...annotation.gaits import compute_heading_offset
+from ...annotation import LOCOMOTION
+from ...annotation.gaits import TURNING, compute_heading_offset
+from ...annotation.vocabulary import DIRECTIONS
 from ...library.library import Library
 from ..plan import Plan
 from .candidate_index import PLAYBACK_RATES, SLOT, CandidateIndex, RatePairs
@@ -132,7 +133,7 @@ class Weights:
         strike: for a key moment's clip that does not fit its ball (`key_fit`).
         switch: for any cut.
         other: for a cut to another recording.
-        young: for a cut just after another one, less by the slot up to YOUNG_SLOTS.
+        young: for a cut just after another one, less in the last two of YOUNG_SLOTS.
         pose: per metre of joint distance.
         feet: per metre that a foot in contact before and after a cut would jump.
         wild: for cutting where the clips jerk by as much again as is usual.
@@ -167,6 +168,7 @@ class Weights:
     held: float = 0.1
 
 
+_PLAIN = frozenset((*LOCOMOTION, *DIRECTIONS, TURNING))  # labels that do not ask for an unusual posture
 _NEAR_KEY = 45  # frames around a key moment in which its own labels may be shown
 
 AVOIDED_COST = 1000.0
@@ -307,9 +309,9 @@ class PathCosts:
         w, (missing, unasked) = self.weights, self.index.measure_lacking(words)
         yield "words", (w.words if is_asked else w.automatic_words) * missing[frame]
         yield "unasked", np.float32(w.unasked) * unasked[frame]
-        # what carries a requested action belongs, whatever it looks like
-        yield "strange", np.float32(w.strange) * np.where(self.index.annotation.find_frames_with(words & DISCRETE), 0.0,
-                                                          self.index.strange)[frame]
+        # what carries a requested label beyond a plain gait belongs, whatever it looks like
+        belongs = self.index.annotation.find_frames_with(words - _PLAIN)
+        yield "strange", np.float32(w.strange) * np.where(belongs, 0.0, self.index.strange)[frame]
         yield "made", np.float32(w.synthetic) * self.index.is_made_travel[frame]
         if self.request.style_cost is not None:
             yield "style", self.request.style_cost[frame]

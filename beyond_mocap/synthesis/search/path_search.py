@@ -217,9 +217,9 @@ class PathSearch:
                           piece=nothing - 1, recent=recent, age=self._measure_arrival_age()), 1
 
     def _measure_arrival_age(self) -> np.ndarray:
-        """Measure (1,) how many slots before the stretch the last cut is."""
+        """Measure (1,) how many slots before the stretch the last cut is; one at its own start is searched again."""
         first, cuts = self.stretch.first, self.stretch.edit.transitions
-        since = first - max((cut for cut in cuts if cut <= first), default=first - YOUNG_SLOTS * SLOT)
+        since = first - max((cut for cut in cuts if cut < first), default=first - YOUNG_SLOTS * SLOT)
         return np.array([min(since // SLOT, YOUNG_SLOTS)])
 
     def _add_exit_cost(self, states: BeamStates, frames_shown: int) -> BeamStates:

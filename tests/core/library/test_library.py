@@ -186,6 +186,14 @@ def test_without_locomotion_the_library_stands_but_has_no_gaits(tmp_path, clip_f
     assert str(tmp_path) in one_line(told)
 
 
+def test_walking_that_is_no_faster_than_standing_is_no_locomotion(tmp_path, clip_file):
+    clip_file(tmp_path / "stand.bvh", 0.3, 3.0, "standing")
+    clip_file(tmp_path / "walk.bvh", 0.0, 3.0)
+    with pytest.raises(InputError, match="no locomotion clip that is faster than its stands.*walking") as told:
+        build_library(tmp_path).with_synthetic_clips
+    assert str(tmp_path) in one_line(told)
+
+
 def test_without_annotations_labels_are_proposed_and_marked(tmp_path, clip_file):
     clip_file(tmp_path / "walk.bvh", words="")
     clip_file(tmp_path / "run.bvh", 4.5, 4.0, words="")
