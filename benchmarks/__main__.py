@@ -25,6 +25,7 @@ from beyond_mocap import __version__  # noqa: E402
 
 SECTIONS = {  # name -> heading, (subheading, module, function) of each part
     "scenarios": ("Synthesis", (("", "scenarios", "section"),)),
+    "against": ("Takes against recordings", (("", "against_recordings", "section"),)),
     "match": ("Players of a match", (("", "match", "speed_section"),)),
     "crowd": ("All players of a match", (("", "match", "crowd_section"),)),
     "paths": ("Path editing", (("", "path_editing", "section"),)),

@@ -21,6 +21,9 @@ if TYPE_CHECKING:
     from ..beyond_mocap.library.library import Library
 
 
+MAX_LEFT_OUT = 12  # stretches left out of locomotion that the panel lists
+
+
 class FolderOperator(BackgroundOperator):
     """Base of operators about the library's folder."""
 
@@ -66,6 +69,7 @@ class BuildResult:
         error: the error in that case.
         listing: its clips.
         files: the folder's files when it was read.
+        contents, gaps: texts for the panel.
     """
 
     setting: str
@@ -73,6 +77,8 @@ class BuildResult:
     error: InputError | None
     listing: tuple
     files: dict
+    contents: str = ""
+    gaps: str = ""
 
 
 class BEYOND_MOCAP_OT_build_library(FolderOperator, bpy.types.Operator):
@@ -169,7 +175,8 @@ glTF and USD clips are converted first, and the result is cached"""
             library = build_library(order.folder, **options, progress=progress, cancelled=cancelled)
         except InputError as error:
             return BuildResult(order.setting, None, error, scan_clips(order.folder, options["cache_dir"]), files)
-        return BuildResult(order.setting, library, None, list_clips(library), files)
+        return BuildResult(order.setting, library, None, list_clips(library), files,
+                           contents=describe_library(library), gaps=describe_gaps(library))
 
     def apply(self, scene, result):
         """Store the library and report its content."""
@@ -179,7 +186,9 @@ glTF and USD clips are converted first, and the result is cached"""
         if result.error is not None:
             raise result.error
         session.store_library(result.library, scene.beyond_mocap.library_unit or None)
-        scene.beyond_mocap.library_holds = describe_library(result.library)
+        scene.beyond_mocap.library_holds, scene.beyond_mocap.library_gaps = result.contents, result.gaps
+        for note in result.library.proposal_notes:
+            self.report({"WARNING"}, note)
         for note in result.library.notes:
             self.report({"INFO"}, note)
         self.report({"INFO"}, scene.beyond_mocap.library_holds.splitlines()[0])
@@ -196,6 +205,19 @@ def describe_library(library: "Library") -> str:
     for word, count in keys.most_common():
         lines.append(f"{find_label(word).title}: {format_count(count, 'moment')}")
     return "\n".join(lines)
+
+
+def describe_gaps(library: "Library") -> str:
+    """Describe for the panel, one line each, what is proposed, missing and left out of locomotion; the first line sums
+    it up; "" where there is nothing to say.
+    """
+    from ..beyond_mocap.library.left_out import describe_left_out
+
+    missing, left_out = list(library.missing_motion.values()), describe_left_out(library, MAX_LEFT_OUT)
+    parts = ["Proposed labels"] if library.proposal_notes else []
+    parts += [f"{format_count(len(missing), 'motion')} missing"] if missing else []
+    parts += [left_out[0].partition(":")[0]] if left_out else []
+    return "\n".join([", ".join(parts), *library.proposal_notes, *missing, *left_out]) if parts else ""
 
 
 @dataclass(frozen=True, eq=False)

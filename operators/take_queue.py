@@ -21,7 +21,7 @@ from ..scene.player import dots
 from ..scene.result import freshness, plans, preview, quality, queue
 from ..scene.result import synthesis_request as orders
 from ..scene.timeline import strips
-from .library import describe_library
+from .library import describe_gaps, describe_library
 from .operator_base import NEEDS_LIBRARY, BaseOperator
 
 
@@ -29,6 +29,7 @@ def store_result(context, player, order, result) -> None:
     """Store the takes of a result in the session, show the first of them, and update what depends on it."""
     session.store_library(result.library, order.unit)
     context.scene.beyond_mocap.library_holds = describe_library(result.library)
+    context.scene.beyond_mocap.library_gaps = describe_gaps(result.library)
     stored = []
     for one in result.takes:
         lines = {"quality": quality.describe_quality(one.report),

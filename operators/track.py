@@ -1,4 +1,4 @@
-"""A player's track: drawn as a curve or taken from a moving object, with speeds; pins for hands, feet and gaze."""
+"""A player's track: drawn as a curve or taken from a moving object, with speeds; pins and heading keys."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from ..beyond_mocap.motion.track.line_track import MAX_SPEED
 from ..scene.core import channels, window
 from ..scene.core.measure import units_per_metre
 from ..scene.core.settings import find_active_player, is_track
-from ..scene.player import dots, drawn_track, pins
+from ..scene.player import dots, drawn_track, heading_keys, pins
 from ..scene.result import bake
 from .operator_base import BaseOperator
 from .player import choose_shirt, find_free_name
@@ -160,3 +160,72 @@ class BEYOND_MOCAP_OT_remove_pin(BaseOperator, bpy.types.Operator):
         channels.check_local(context.scene)
         player = find_active_player(context.scene.beyond_mocap)
         pins.remove_pin(player, min(player.active_pin, len(player.pins) - 1))
+
+
+class BEYOND_MOCAP_OT_add_heading_key(BaseOperator, bpy.types.Operator):
+    """Let the body of the active player face a direction or an object from the current frame on"""
+
+    bl_idname = "beyond_mocap.add_heading_key"
+    bl_label = "Add Heading Key"
+    faces: bpy.props.EnumProperty(
+        name="Faces", description="What the body faces",
+        items=(("DIRECTION", "Direction", "The X axis of the selected Empty or, without one, of the player's dot"),
+               ("OBJECT", "Object", "The active object: it may move, and may be another player's dot or body")))
+    heading: bpy.props.FloatProperty(name="Direction", subtype="ANGLE", options={"SKIP_SAVE"},
+                                     description="Direction, counterclockwise from the world's X axis")
+    hold: bpy.props.FloatProperty(name="Hold", default=1.0, min=0.0, precision=2, unit="TIME_ABSOLUTE",
+                                  description="Seconds for which the body faces it")
+    needs = ("Import tracking or draw a track in step 2 first",
+             lambda context: find_active_player(context.scene.beyond_mocap) is not None)
+
+    def do(self, context):
+        """Find what to face, check for another key at that time, add the key."""
+        scene = context.scene
+        channels.check_local(scene)
+        player, seconds = find_active_player(scene.beyond_mocap), pins.find_current_second(scene)
+        for other in player.heading_keys:
+            if other.time <= seconds + self.hold and seconds <= other.time + other.hold:
+                found, step = f"a heading key at {other.time:.2f} s", "go to another frame or shorten that key's hold"
+                raise InputError(f"player {player.name}", found, "one heading at a time", step)
+        target = find_faced_object(context, player) if self.faces == "OBJECT" else None
+        if target is None and not self.properties.is_property_set("heading"):
+            self.heading = heading_keys.measure_heading(find_turned_object(context, player))
+        heading_keys.add_heading_key(player, seconds, self.hold, self.heading, target)
+        what = f"{np.degrees(self.heading):.0f}°" if target is None else target.name
+        self.report({"INFO"}, f"{player.name} faces {what} at {seconds:.2f} s; press Update")
+
+
+def find_turned_object(context, player) -> bpy.types.Object:
+    """Find the object whose rotation is the direction: the selected Empty, else the player's dot."""
+    chosen = context.object
+    if chosen is not None and chosen.type == "EMPTY" and chosen.select_get():
+        return chosen
+    if player.dot is None:
+        raise InputError(f"player {player.name}", "no dot and no Empty selected", "an object that has the direction",
+                         "press Add to Timeline, or select an Empty")
+    return player.dot
+
+
+def find_faced_object(context, player) -> bpy.types.Object:
+    """Find the object to face: the active one, if it is not the player's own."""
+    chosen = context.object
+    if chosen is None or not chosen.select_get() or chosen in (player.dot, player.body):
+        found = "no object selected" if chosen is None or not chosen.select_get() else f"{chosen.name}, their own"
+        raise InputError(f"player {player.name}", found, "the object to face", "select another object")
+    return chosen
+
+
+class BEYOND_MOCAP_OT_remove_heading_key(BaseOperator, bpy.types.Operator):
+    """Remove the active heading key in the list; its object stays"""
+
+    bl_idname = "beyond_mocap.remove_heading_key"
+    bl_label = "Remove Heading Key"
+    needs = ("The active player has no heading keys",
+             lambda context: (player := find_active_player(context.scene.beyond_mocap)) is not None
+             and len(player.heading_keys) > 0)
+
+    def do(self, context):
+        """Remove the key and choose the next one."""
+        channels.check_local(context.scene)
+        player = find_active_player(context.scene.beyond_mocap)
+        heading_keys.remove_heading_key(player, min(player.active_heading_key, len(player.heading_keys) - 1))

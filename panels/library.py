@@ -69,6 +69,10 @@ class BEYOND_MOCAP_PT_library(TabPanel, bpy.types.Panel):
         if content:
             if body := draw_header(layout, "library_holds", first):
                 draw_table(body, content)
+        first, *lines = settings.library_gaps.splitlines() or ("",)
+        if first and (body := draw_header(layout, "library_gaps", first, icon="INFO")):
+            for line in lines:
+                draw_paragraph(body, line, "DOT")
         if body := draw_header(layout, "library_clips", f"Clips ({listing.total})" if current and listing.total
                                else "Clips"):
             draw_clips(body, settings, listing, current)

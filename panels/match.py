@@ -94,6 +94,7 @@ def draw_processing(layout, scene) -> None:
     for name in ("solve_touches", "workers", "scheduler", "first_frame"):
         column.prop(match, name)
     column.prop(scene.beyond_mocap, "rate")
+    column.prop(scene.beyond_mocap, "watch", slider=True)
 
 
 def draw_display(layout, match) -> None:

@@ -1,4 +1,4 @@
-"""Players: their list with its pins, annotation by keys and the reference video."""
+"""Players: their list with its pins and heading keys, annotation by keys and the reference video."""
 
 from __future__ import annotations
 
@@ -63,6 +63,7 @@ class BEYOND_MOCAP_PT_players(TabPanel, bpy.types.Panel):
         column.prop(player, "body")
         draw_player_settings(layout, player)
         draw_pins(layout, player)
+        draw_heading_keys(layout, player)
 
 
 class BEYOND_MOCAP_UL_pins(bpy.types.UIList):
@@ -74,6 +75,21 @@ class BEYOND_MOCAP_UL_pins(bpy.types.UIList):
         if item.target is None:
             row.label(text="Missing Empty", icon="ERROR")
             return
+        row.prop(item, "time", text="")
+        row.prop(item, "hold", text="")
+
+
+class BEYOND_MOCAP_UL_heading_keys(bpy.types.UIList):
+    """A player's heading keys: the direction or object, the time and the duration."""
+
+    def draw_item(self, _context, layout, _data, item, _icon, _active_data, _active_property):
+        row = layout.row(align=True)
+        if item.faces == "DIRECTION":
+            row.prop(item, "heading", text="")
+        else:
+            place = row.row(align=True)
+            place.alert = item.find_target() is None
+            place.prop(item, "target", text="")
         row.prop(item, "time", text="")
         row.prop(item, "hold", text="")
 
@@ -102,6 +118,20 @@ def draw_pins(layout, player) -> None:
         row = body.row(align=True)
         row.operator_menu_enum("beyond_mocap.add_pin", "part", text="Pin at Body", icon="PINNED").at = "BODY"
         row.operator_menu_enum("beyond_mocap.add_pin", "part", text="At Cursor", icon="PIVOT_CURSOR").at = "CURSOR"
+
+
+def draw_heading_keys(layout, player) -> None:
+    """Draw the directions and objects that the body faces."""
+    count = len(player.heading_keys)
+    if body := draw_header(layout, "player_heading_keys", f"Heading Keys: {count}" if count else "Heading Keys"):
+        row = body.row()
+        row.template_list("BEYOND_MOCAP_UL_heading_keys", "", player, "heading_keys", player,
+                          active_propname="active_heading_key", rows=2)
+        row.column(align=True).operator("beyond_mocap.remove_heading_key", text="", icon="REMOVE")
+        row = body.row(align=True)
+        name = "beyond_mocap.add_heading_key"
+        row.operator(name, text="Face Direction", icon="ORIENTATION_LOCAL").faces = "DIRECTION"
+        row.operator(name, text="Face This", icon="CON_TRACKTO").faces = "OBJECT"
 
 
 class BEYOND_MOCAP_PT_annotate(TabPanel, bpy.types.Panel):

@@ -77,4 +77,4 @@ class BEYOND_MOCAP_PT_synthesis(TabPanel, bpy.types.Panel):
         if not body:
             return
         for name in settings.list_tuning():
-            body.prop(settings, name, slider=name == "alpha")
+            body.prop(settings, name, slider=name in ("alpha", "watch"))

@@ -8,8 +8,8 @@ from ..scene.core.settings import find_active_player
 from .tab import TabPanel
 
 ICONS = {"track": "CURVE_PATH", "footprints": "MOD_DYNAMICPAINT", "contacts": "PIVOT_CURSOR", "seams": "SEQUENCE",
-         "moments": "KEYTYPE_KEYFRAME_VEC", "speed": "DRIVER_DISTANCE", "ghosts": "GHOST_ENABLED",
-         "shots": "CON_TRACKTO"}
+         "moments": "KEYTYPE_KEYFRAME_VEC", "speed": "DRIVER_DISTANCE", "heading": "ORIENTATION_LOCAL",
+         "ghosts": "GHOST_ENABLED", "shots": "CON_TRACKTO"}
 
 
 class BEYOND_MOCAP_PT_view(TabPanel, bpy.types.Panel):

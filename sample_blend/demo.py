@@ -108,6 +108,7 @@ def synthesize_players(load, settings, steps) -> list[dict]:
     library_seconds = time.perf_counter() - started
     session.store_library(clips, None)
     settings.library_holds = load("operators.library").describe_library(clips)
+    settings.library_gaps = load("operators.library").describe_gaps(clips)
     reports = []
     for player in settings.players:
         steps.enter_part(player.name)

@@ -22,6 +22,7 @@ LOCOMOTION = list_gaits()
 """The labels that speed alone decides, slow to fast; "dribble" joins any of them when the ball is at the feet."""
 
 STANDING = LOCOMOTION[0]
+TURNING = "turning"
 """The gait without travel."""
 
 LOCOMOTION_LABELS = frozenset((*LOCOMOTION, *list_labels(ball="carries")))
@@ -119,14 +120,17 @@ def choose_gaits(
 def compute_heading_offset(track: SampledTrack) -> np.ndarray:
     """Compute the angle from the direction of travel to the heading that the body should have.
 
-    The heading is the ball's direction, limited to what legs allow at that speed: any angle below 0.8 m/s, none from 6
-    m/s on. It is zero where the ball is unknown, and near the player's own feet, where they follow it along their path.
+    Where the heading is planned, this is the plan's. Else it is the ball's direction, limited to what legs allow at
+    that speed: any angle below 0.8 m/s, none from 6 m/s on. It is zero where the ball is unknown, and near the player's
+    own feet, where they follow it along their path.
 
     Args:
         track: the player's track with the ball, T frames.
     Returns:
         (T,) radians, counterclockwise, -pi to pi.
     """
+    if track.heading is not None:
+        return quaternion.wrap_angle(track.heading - track.direction)
     ball_offset = track.ball[:, :2] - track.positions
     known = np.isfinite(ball_offset).all(axis=1)
     distance = np.linalg.norm(np.where(known[:, None], ball_offset, 1.0), axis=1)

@@ -6,6 +6,7 @@ import argparse
 import csv
 import io
 from collections.abc import Mapping
+from math import isfinite
 from pathlib import Path
 
 from .. import __version__
@@ -15,6 +16,7 @@ from .outputs import ProgressReporter, Writer, check_outputs
 
 # Header of the table of proposed labels.
 PROPOSAL_COLUMNS = ("file", "fps", "start_frame", "end_frame", "key_frame", "labels", "confidence", "source", "why")
+MAX_LEFT_OUT = 12  # stretches left out of locomotion that are printed
 
 
 def add_library(verbs) -> argparse.ArgumentParser:
@@ -66,6 +68,7 @@ def summarize_library(library) -> dict:
         The report as plain values for JSON.
     """
     from ..annotation import sort_labels
+    from ..library.left_out import describe_left_out, find_left_out, measure_speed_classes
 
     originals = [clip for clip in library.clips if not clip.mirrored]
     labels = sorted(library.labels)
@@ -78,15 +81,25 @@ def summarize_library(library) -> dict:
         "gaits: " + ", ".join(f"{g['word']} {g['speed_m_s']:.1f} m/s" for g in gaits),
         f"fastest: {library.max_speed:.1f} m/s",
         "key moments: " + (", ".join(keys) if keys else "none"),
+        *library.proposal_notes,
+        *library.missing_motion.values(),
+        *describe_left_out(library, MAX_LEFT_OUT),
         *library.notes,
     ]
     return {
         "version": __version__, "clips": len(originals), "minutes": library.minutes, "words": labels, "gaits": gaits,
         "fastest_m_s": library.max_speed, "keys": keys, "notes": list(library.notes), "lines": lines,
+        "proposed_clips": sum(clip.has_proposed_labels for clip in originals),
+        "lacks": [{"kind": kind, "line": line} for kind, line in library.missing_motion.items()],
+        "left_out": [{"clip": one.clip, "start_s": one.start, "end_s": one.end, "speed_m_s": one.speed,
+                      "part": one.part, "why": one.reason} for one in find_left_out(library)],
+        "locomotion": [{"from_m_s": one.low, "to_m_s": one.high if isfinite(one.high) else None,
+                        "seconds": one.seconds, "left_out_s": one.left_out} for one in measure_speed_classes(library)],
     }
 
 
-def open_library(options, reporter: ProgressReporter, rebuild: bool = False, seed: int = 0):
+def open_library(options, reporter: ProgressReporter, rebuild: bool = False, seed: int = 0,
+                 folder: Path | None = None):
     """Build or load the library of the command line.
 
     Args:
@@ -94,14 +107,15 @@ def open_library(options, reporter: ProgressReporter, rebuild: bool = False, see
         reporter: progress and cancellation.
         rebuild: whether to build it again although the cache is up to date.
         seed: seed of the clustering.
+        folder: its folder; None for the option `library`.
     Returns:
         The `Library`.
     """
     from ..library.build import build_library
 
     return build_library(
-        options.library, rebuild=rebuild, cache_dir=options.cache, skeleton=options.skeleton, unit=options.unit,
-        seed=seed, progress=reporter.show_progress, cancelled=reporter.is_cancelled,
+        folder or options.library, rebuild=rebuild, cache_dir=options.cache, skeleton=options.skeleton,
+        unit=options.unit, seed=seed, progress=reporter.show_progress, cancelled=reporter.is_cancelled,
     )
 
 

@@ -10,6 +10,7 @@ from pathlib import Path
 
 from ..base.errors import InputError, NotInLibraryError, format_count
 from ..base.settings.options import add_options, option_values
+from .comparing import run_comparison
 from .library import open_library
 from .outputs import ProgressReporter, Writer, add_take_files, check_outputs, choose_writer
 
@@ -35,6 +36,7 @@ def add_synthesize(verbs) -> argparse.ArgumentParser:
     verb.add_argument("--report", type=Path, metavar="R.json")
     add_options(verb, "synthesis")
     verb.add_argument("--pins", type=Path, metavar="P.csv", help="targets of hands, feet and gaze with times")
+    verb.add_argument("--headings", type=Path, metavar="H.csv", help="where the body faces, with times")
     add_options(verb, "player")
     add_options(verb, "library")
     verb.set_defaults(run=run_synthesize)
@@ -53,6 +55,7 @@ def run_synthesize(options, reporter: ProgressReporter, writers: Mapping[str, Wr
     from ..files.tables import write_ball, write_report
     from ..files.tracking.tracking import read_track_csv
     from ..motion.track import clean_track
+    from ..synthesis.heading_table import read_heading_keys
     from ..synthesis.pin_table import read_pins
     from ..synthesis.plan import Plan
     from ..synthesis.provenance import write_provenance
@@ -62,7 +65,8 @@ def run_synthesize(options, reporter: ProgressReporter, writers: Mapping[str, Wr
     started = time.perf_counter()
     outputs = (options.out, options.provenance, options.ball, options.report)
     annotations = options.annotations or _find_annotations(options.track)
-    check_outputs(*outputs, reserved=(options.track, annotations, options.pins, options.skeleton))
+    check_outputs(*outputs, reserved=(options.track, annotations, options.pins, options.headings,
+                                      options.skeleton))
     write = choose_writer(options.out, writers)
     track, data = clean_track(read_track_csv(options.track))
     timeline = read_timeline(annotations, options.fps, float(track.times[0])) if annotations else Timeline()
@@ -72,7 +76,9 @@ def run_synthesize(options, reporter: ProgressReporter, writers: Mapping[str, Wr
     ready = time.perf_counter()
     plan = Plan(
         track=track, timeline=timeline, library=str(options.library),
-        pins=read_pins(options.pins) if options.pins else (), **option_values(Plan, options, "synthesis", "player"),
+        pins=read_pins(options.pins) if options.pins else (),
+        heading_keys=read_heading_keys(options.headings) if options.headings else (),
+        **option_values(Plan, options, "synthesis", "player"),
     )
     try:
         take = synthesize(library, plan, reporter.show_progress, reporter.is_cancelled)
@@ -120,12 +126,15 @@ def add_evaluate(verbs) -> argparse.ArgumentParser:
     Returns:
         The parser of this verb.
     """
-    verb = verbs.add_parser("evaluate", help="measure a motion")
-    verb.add_argument("motion", type=Path, metavar="M.bvh")
+    verb = verbs.add_parser("evaluate", help="measure a motion, or compare takes with recordings")
+    verb.add_argument("motion", type=Path, nargs="+", metavar="M.bvh",
+                      help="the motion; with --against one or more takes, or folders of takes")
     verb.add_argument("--track", type=Path, metavar="T.csv")
     verb.add_argument("--annotations", type=Path, metavar="A.txt")
     add_take_files(verb)
     verb.add_argument("--library", type=Path)
+    verb.add_argument("--against", type=Path, metavar="LIBRARY",
+                      help="measure whether classifiers can distinguish the takes from this library's recordings")
     add_options(verb, "library")
     verb.add_argument("--report", type=Path, required=True, metavar="R.json")
     verb.add_argument("--html", type=Path, metavar="R.html", help="a page with plots; needs matplotlib")
@@ -134,7 +143,7 @@ def add_evaluate(verbs) -> argparse.ArgumentParser:
 
 
 def run_evaluate(options, reporter: ProgressReporter, writers: Mapping[str, Writer]) -> None:
-    """Run `evaluate`: report on a motion that was written before.
+    """Run `evaluate`: report on a motion that was written before, or compare takes with recordings.
 
     If there is a library, `--unit` applies to its recordings.
 
@@ -143,10 +152,17 @@ def run_evaluate(options, reporter: ProgressReporter, writers: Mapping[str, Writ
         reporter: progress, notes and cancellation.
         writers: further output formats, by file suffix (Blender's).
     """
+    if options.against:
+        return run_comparison(options, reporter)
+    if len(options.motion) > 1:
+        raise InputError("evaluate", f"{len(options.motion)} motions", "one motion, or --against LIBRARY",
+                         "evaluate them one after the other")
+    (options.motion,) = options.motion
+
     from ..annotation import check_timeline, read_timeline
     from ..evaluation.html import build_html_report
     from ..evaluation.plots import require_matplotlib
-    from ..evaluation.report import evaluate_played
+    from ..evaluation.report import describe_figures, evaluate_played
     from ..files.atomic import atomic_write
     from ..files.bvh import bvh
     from ..files.tables import read_ball, write_report
@@ -170,7 +186,7 @@ def run_evaluate(options, reporter: ProgressReporter, writers: Mapping[str, Writ
     if timeline is not None and track is not None and library is not None:  # otherwise some labels or times are unknown
         check_timeline(timeline, library.labels, start, float(track.times[-1]), str(options.annotations))
     report = evaluate_played(played, track=track, timeline=timeline, library=library)
-    notes = [*report["warnings"], *_describe_fit(report, motion, track, options)]
+    notes = [*report["warnings"], *report["notes"], *_describe_fit(report, motion, track, options)]
     if provenance is None and report["keys"]:
         notes.append("the clips that played are unknown; name them with --provenance")
     if _is_synthesis_report(options.report):
@@ -185,7 +201,7 @@ def run_evaluate(options, reporter: ProgressReporter, writers: Mapping[str, Writ
         reporter.show_note(
             f"{options.provenance}: {count} not in {options.library} and not compared, such as {unknown_clips[0]}"
         )
-    print(options.report)
+    print("\n".join((*describe_figures(report), str(options.report))))
 
 
 def _describe_fit(report: dict, motion, track, options) -> list[str]:

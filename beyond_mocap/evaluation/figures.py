@@ -9,15 +9,17 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Sequence
+from dataclasses import replace
 
 import numpy as np
 
 from ..annotation import Timeline, choose_gaits, fill_timeline, labels_per_frame
 from ..base.errors import InputError
 from ..library.automatic_locomotion import build_automatic_labels
-from ..library.keys import select_keys
+from ..library.keys import Key, select_nearest_keys
 from ..motion.contacts import measure_floor_height
-from ..motion.track import sample_track, smooth_zero_phase_hann
+from ..motion.track import SampledTrack, sample_track, smooth_zero_phase_hann
+from ..synthesis.heading_plan import plan_track, rest_track
 from ..synthesis.quality import movement
 from ..synthesis.quality.moments import (
     KeyMomentResult,
@@ -27,9 +29,12 @@ from ..synthesis.quality.moments import (
     measure_contact,
 )
 from ..synthesis.quality.playback import find_replayed, list_warp_rates
-from ..synthesis.quality.unmet_constraints import report_jolts, report_unmet_constraints
+from ..synthesis.quality.unmet_constraints import report_unmet_constraints
 from . import realism
 from .reference import View, compute_source_poses
+
+SPEED_NAMES = ("0-1", "1-2", "2-3", "3-4.5", "4.5+")
+"""Names of the classes of `movement.classify_speed`, m/s."""
 
 
 def measure_path_errors(view: View) -> dict:
@@ -42,16 +47,19 @@ def measure_path_errors(view: View) -> dict:
     """
     pelvis, fps = view.played.pelvis, view.fps
     source_sway = _finite_mean(view.source_values("sway"))
-    out = {"root_error_m": dict.fromkeys(("mean", "p95", "max")),
-           "pelvis_error_m": {"mean": None, "own": source_sway, "keys": None},
+    out: dict = {"root_error_m": dict.fromkeys(("mean", "p95", "max")),
+           "slow_root_error_m": dict.fromkeys(("mean", "p95", "max")),
+           "pelvis_error_m": {"mean": None, "own": source_sway, "keys": None, "own_frames": len(view.used_rows)},
            "speed_coverage": {"above": None, "below": None}}  # fmt: skip
     if view.target is not None:
         error, unsmoothed = movement.measure_root_error(pelvis, view.target, fps), movement.measure_pelvis_error(pelvis,
                 view.target)
-        out["root_error_m"] = _compute_measures(error, ("mean", "p95", "max"))
+        # a slow body may rest where its track creeps
+        is_slow = movement.measure_travel_speed(view.target, fps) < movement.SPEED_EDGES[0]
+        out["root_error_m"] = _compute_measures(error[~is_slow], ("mean", "p95", "max"))
+        out["slow_root_error_m"] = _compute_measures(error[is_slow], ("mean", "p95", "max"))
         at_keys = [float(np.interp(m.requested.resolved_time, view.played.times, unsmoothed)) for m in view.moments]
-        out["pelvis_error_m"] = {"mean": _finite_mean(unsmoothed), "own": source_sway,
-                                 "keys": _finite_mean(np.array(at_keys))}
+        out["pelvis_error_m"].update(mean=_finite_mean(unsmoothed), keys=_finite_mean(np.array(at_keys)))
     if view.target is not None and view.reference is not None:
         requested_speed = movement.measure_travel_speed(view.target, fps)
         out["speed_coverage"] = movement.measure_speed_coverage(requested_speed, view.reference.fastest,
@@ -62,15 +70,20 @@ def measure_path_errors(view: View) -> dict:
 def _measure_surge(view: View) -> dict:
     """Measure surge against the rms of the used recordings at the same speed.
 
+    Only frames of speeds at which recordings are used count: the surge of a walk says nothing about that of a sprint.
     The key `track` is the surge of the track itself, smoothed with the window within which the root must follow it.
     """
     surge_values = movement.measure_surge(view.played.pelvis, view.fps)
-    own = movement.compute_class_rms(view.source_values("surge"), movement.classify_speed(view.source_values("speed")))
-    rms, source_rms = _finite_rms(surge_values), _finite_rms(own[movement.classify_speed(view.speed)])
+    source, classes = view.source_values("surge"), movement.classify_speed(view.source_values("speed"))
+    own = movement.compute_class_rms(source, classes)[movement.classify_speed(view.speed)]
+    known = np.isfinite(own)
+    source_rms = _finite_rms(own)
     smooth = None if view.target is None else smooth_zero_phase_hann(view.target, view.fps, movement.ROOT_WINDOW)
     track_rms = None if smooth is None else _finite_rms(movement.measure_surge(smooth, view.fps))
-    surge = {"mean": rms, "own": source_rms, "track": track_rms}
-    return {"pelvis_surge_ratio": rms / source_rms if source_rms else math.nan, "pelvis_surge_m_s": surge}
+    surge = {"mean": _finite_rms(surge_values), "own": source_rms, "track": track_rms,
+             "compared_frames": int(known.sum()), "own_frames": len(source)}  # fmt: skip
+    ratio = _finite_rms(surge_values[known]) / source_rms if source_rms else math.nan
+    return {"pelvis_surge_ratio": ratio, "pelvis_surge_m_s": surge}
 
 
 def measure_key_moments(view: View) -> list[dict]:
@@ -116,7 +129,7 @@ def measure_feet(view: View) -> dict:
     played, fps = view.played, view.fps
     planted = played.feet
     travel = movement.measure_stance_travel(planted[:, :, 1], movement.list_stances(played.contacts))
-    source_travel = np.zeros(0) if view.reference is None else view.reference.select_used_travel(view.used_rows)
+    source_travel = np.zeros(0) if view.reference is None else view.reference.select_used_travel(view.used)
     skating = movement.find_skating_steps(planted[:, :, 1], measure_floor_height(played.motion), fps)
     known = view.reference is not None
     heel_rest = view.reference.heel_rest if known else movement.measure_heel_rest(planted, played.contacts)
@@ -128,13 +141,15 @@ def measure_feet(view: View) -> dict:
                   "stances_over_21mm": _finite_mean(travel > movement.NOTICED_SLIDE),
                   "gmd_ratio": _finite_mean(skating), "source_gmd_ratio": _finite_mean(view.source_values("skating")),
                   "source_stance_mm_median": 1000.0 * _finite_median(source_travel),
-                  "source_stances_over_21mm": _finite_mean(source_travel > movement.NOTICED_SLIDE),},
+                  "source_stances_over_21mm": _finite_mean(source_travel > movement.NOTICED_SLIDE),
+                  "source_frames": len(view.used_rows), "source_stances": len(source_travel),},
         "ground_mm": {"min": 1000.0 * float(played.positions[..., 2].min()), "support_max": 1000.0
                       * _finite_max(support), "source_support_max": 1000.0 * _finite_max(view.source_values("support")),
                       "tip_min": -1000.0 * _finite_max(-movement.measure_tip_height(played.motion.skeleton,
                                                                                     played.positions,
                                                                                     played.rotations)),
-                      "source_tip_min": -1000.0 * _finite_max(-view.source_values("tip")),},
+                      "source_tip_min": -1000.0 * _finite_max(-view.source_values("tip")),
+                      "source_frames": len(view.used_rows),},
     }
 
 
@@ -194,23 +209,34 @@ def measure_transitions(view: View) -> dict:
     Returns:
         The report's groups.
     """
-    out = {"seam_jerk_ratio": dict.fromkeys(("median", "p95", "max", "share_above_real"))}
+    out: dict = {"seam_jerk_ratio": dict.fromkeys(("median", "p95", "max", "share_above_real"))}
     if view.reference is not None:
-        values = movement.compute_jerk(view.played.positions, view.fps)
-        at_seams = movement.compute_transition_ratios(values, view.transitions, view.speed, view.reference.jerk_p95)
-        rest = movement.compute_rest_ratios(values, view.transitions, view.speed, view.reference.jerk_p95)
+        own, real = view.source_values("jerk_ratio"), view.reference.jerk_p95
+        own = own[np.isfinite(own)]
+        at_seams = movement.compute_transition_ratios(view.jerk, view.transitions, view.speed, real)
+        rest = movement.compute_rest_ratios(view.jerk, view.transitions, view.speed, real)
+        everywhere = movement.compute_jerk_ratios(view.jerk, view.speed, real)
+        beside = {"source_share_above_real": _finite_mean(own > 1.0), "source_frames": len(own)}
         out["seam_jerk_ratio"] = {
             **_compute_measures(at_seams, ("median", "p95", "max")), "share_above_real": _finite_mean(at_seams > 1.0),
-            "source_share_above_real": _finite_mean(view.source_values("jerk_above_real")),
-            "rest_max": _finite_max(rest), "rest_share_above_real": _finite_mean(rest > 1.0),
+            "rest_max": _finite_max(rest), "rest_share_above_real": _finite_mean(rest > 1.0), **beside,
         }
-    known = bool(np.any(view.played.clip >= 0))
+        out["jerk_ratio"] = {**_compute_measures(everywhere, ("median", "p95", "max")),
+                             "share_above_real": _finite_mean(everywhere > 1.0), "frames": len(everywhere),
+                             "other_speed_frames": _count_other_speeds(view, len(everywhere)), **beside}
+    known = view.are_clips_known
     rates = list_warp_rates(*view.source)
     return {
         **out, "seams": len(view.transitions) if known else None,
         "warp_rate": {"min": -_finite_max(-rates), "max": _finite_max(rates)},
         "loop_share": _finite_mean(find_replayed(*view.source, view.fps)) if known else None,
     }
+
+
+def _count_other_speeds(view: View, count: int) -> int:
+    """Count the frames of the jerk at speeds that no recording has; they are compared with the nearest speed."""
+    pace = view.speed[movement.TRANSITION_TO_JERK :][:count]
+    return int(np.sum(~view.reference.jerk_recorded[movement.classify_speed(pace)]))
 
 
 def measure_poses(view: View) -> dict:
@@ -227,11 +253,25 @@ def measure_poses(view: View) -> dict:
     source_smoothness = _compute_measures(view.source_values("smoothness"), ("mean", "p95", "max"))
     smoothness = {**_compute_measures(curve, ("mean", "p95", "max")),
                   **{f"source_{name}": value for name, value in source_smoothness.items()}}
-    out: dict = {"pose_realism": None, "smoothness_m": smoothness}
-    if view.reference is not None and np.isfinite(view.reference.pose_p95).all():
-        distance = realism.measure_nearest_distance(features / view.scale, view.reference.poses)
-        out["pose_realism"] = _finite_mean(realism.find_unreal_frames(distance, view.speed, view.reference.pose_p95))
-    return out
+    smoothness["source_frames"] = len(view.used_rows)
+    out = {"pose_realism": None, "smoothness_m": smoothness}
+    return out if view.reference is None else {**out, **_measure_pose_realism(view, features)}
+
+
+def _measure_pose_realism(view: View, features: np.ndarray) -> dict:
+    """Measure pose realism, over all frames of speeds that enough recordings have, and by speed class."""
+    reference, classes = view.reference, movement.classify_speed(view.speed)
+    if not np.isfinite(reference.pose_p95).any():
+        unreal = np.full(view.count, np.nan)
+    else:
+        distance = realism.measure_nearest_distance(features / view.scale, reference.poses)
+        unreal = realism.find_unreal_frames(distance, view.speed, reference.pose_p95)
+    by_speed = {
+        name: {"share": _finite_mean(unreal[classes == k]), "frames": int(np.sum(classes == k)),
+               "recordings": int(reference.pose_recordings[k])} for k, name in enumerate(SPEED_NAMES)
+    }  # fmt: skip
+    return {"pose_realism": _finite_mean(unreal), "pose_realism_frames": int(np.isfinite(unreal).sum()),
+            "pose_realism_by_speed": by_speed}
 
 
 def list_requested_labels(
@@ -270,10 +310,17 @@ def fill_automatic_spans(view: View) -> Timeline:
         gaits = library.gaits
     except InputError:
         return view.timeline
-    sampled = sample_track(view.track, library.fps)
+    sampled = _sample_planned_track(view, library.fps)
     thresholds = library.gait_thresholds
     gait_index = choose_gaits(sampled.speed, sampled.fps, [gait.speed for gait in gaits], thresholds)
     return fill_timeline(view.timeline, sampled.times, build_automatic_labels(library, gait_index, sampled))
+
+
+def _sample_planned_track(view: View, fps: float) -> SampledTrack:
+    """Sample the track with the heading that was planned for the take, else with the track's own plan."""
+    sampled = sample_track(view.track, fps)
+    heading = view.interpolate_planned_heading(sampled.times)
+    return plan_track(sampled) if heading is None else replace(rest_track(sampled), heading=heading)
 
 
 def measure_annotation_similarity(view: View) -> dict:
@@ -282,28 +329,40 @@ def measure_annotation_similarity(view: View) -> dict:
     Args:
         view: the take beside its library and track.
     Returns:
-        Means over all frames, over the key moments, and over those that the library has, for requested labels only; the
-        first two also as Faustino's eq. 18 is printed.
+        Means over all frames, over the key moments, and over the key moments' labels that the library has together, for
+        requested labels only; the first two also as Faustino's eq. 18 is printed.
     """
     played = view.played
     if view.timeline is None or played.words is None:
         return dict.fromkeys(("all", "keys", "had_keys", "eq18_all", "eq18_keys"))
     requested = list_requested_labels(fill_automatic_spans(view), played.times, view.moments)
     key_requested, key_played = [m.requested.words for m in view.moments], [m.words for m in view.moments]
-    offered = [] if view.library is None else view.library.keys
-    available = [m for m in view.moments if select_keys(offered, m.requested.words)]
+    library = extend_with_synthetic(view.library, played)
+    had = [] if library is None else [_select_had_labels(library.keys, moment) for moment in view.moments]
     return {  # means over the frames that count, as in Faustino Table 2
         "all": _finite_mean(measure_similarity(requested, played.words)),
         "keys": _finite_mean(measure_similarity(key_requested, key_played)),
-        "had_keys": _finite_mean(measure_similarity([m.requested.words for m in available],
-                                                    [m.words for m in available])),
+        "had_keys": _finite_mean(measure_similarity(had, key_played)),
         "eq18_all": _finite_mean(measure_similarity(requested, played.words, compute_eq18)),
         "eq18_keys": _finite_mean(measure_similarity(key_requested, key_played, compute_eq18)),
+        "key_count": len(view.moments), "had_key_count": sum(map(bool, had)),
     }
 
 
+def _select_had_labels(keys: tuple[Key, ...], moment: KeyMomentResult) -> frozenset[str] | None:
+    """Select the requested labels of a key moment that one key of the library carries; None without any.
+
+    Of a key moment that no key serves whole, these are the labels of the nearest ones, so that a substitute counts by
+    what it could have shown; of several equally near ones, those that are shown best.
+    """
+    requested, shown = frozenset(moment.requested.words), frozenset(moment.words)
+    carried = {requested & key.labels for key in select_nearest_keys(keys, moment.requested.words)}
+    best = max(carried, key=lambda labels: (len(labels & shown), sorted(labels)), default=frozenset())
+    return best or None
+
+
 def list_warnings(view: View, ik_miss: np.ndarray | None, requested: Timeline | None) -> list[str]:
-    """List what was relaxed in the take and when, and visible jolts.
+    """List what was relaxed in the take and when.
 
     Args:
         view: the take beside its library and track.
@@ -312,14 +371,8 @@ def list_warnings(view: View, ik_miss: np.ndarray | None, requested: Timeline | 
     Returns:
         One line for each warning.
     """
-    lines: list[str] = [*report_unmet_constraints(view.played, track=view.track, timeline=view.timeline,
-                                                  library=view.library, ik_miss=ik_miss, user_timeline=requested)]
-    if view.reference is None:
-        return lines
-    jerk = movement.compute_jerk(view.played.positions, view.fps)
-    ratios = movement.compute_transition_ratios(jerk, view.transitions, view.speed, view.reference.jerk_p95)
-    jolt_line = report_jolts(view.played.times, view.transitions, ratios)
-    return [*lines, jolt_line] if jolt_line else lines
+    return [*report_unmet_constraints(view.played, track=view.track, timeline=view.timeline, library=view.library,
+                                      ik_miss=ik_miss, user_timeline=requested)]
 
 
 def compute_eq18(requested: Iterable[str], played: Iterable[str]) -> float:

@@ -19,12 +19,14 @@ from ..motion.track import Track
 from ..synthesis.quality import movement
 from ..synthesis.quality.movement import measure_contact_speeds
 from ..synthesis.quality.playback import Playback
+from ..synthesis.quality.targets import find_target
 from . import plots
 from .html_page import (
     Html,
     build_element,
     build_image,
     build_list,
+    build_number_cell,
     build_page,
     build_row,
     build_section,
@@ -32,8 +34,9 @@ from .html_page import (
     build_title,
     join_html,
 )
+from .naturalness_figures import TITLES
 from .reference import View
-from .report import judge_figures
+from .report import find_twin_name, flatten_report, format_rest, judge_figures
 
 MAX_MOMENTS = 12
 """Key moments with stick figures on the page; the table lists all."""
@@ -71,7 +74,7 @@ def build_html_report(
     return build_page(
         title, _build_head(view, report, title), _build_warnings(report), build_section("Over time", over_time),
         _build_clips(view), _build_labels(view), _build_moments(view, report), _build_worst(view),
-        _build_figures(report), style=_STYLE,
+        build_naturalness_section(report), _build_figures(report), style=_STYLE,
     )  # fmt: skip
 
 
@@ -84,8 +87,9 @@ def _build_head(view: View, report: Mapping, title: str) -> Html:
 
 
 def _build_warnings(report: Mapping) -> Html:
-    lines = build_list(report.get("warnings") or ())
-    return build_section("Warnings", lines) if lines else Html()
+    warnings, notes = (build_list(report.get(name) or ()) for name in ("warnings", "notes"))
+    return join_html(build_section("Warnings", warnings) if warnings else Html(),
+                     build_section("Notes", notes) if notes else Html())
 
 
 def _build_clips(view: View) -> Html:
@@ -170,12 +174,38 @@ def find_worst_frames(view: View) -> list[tuple[int, str]]:
     return frames
 
 
+def build_naturalness_section(report: Mapping) -> Html:
+    """Build the section of the group `naturalness`, with readable names; empty for a report without it."""
+    table, unknown = flatten_report(report), report.get("unknown") or {}
+    lines = []
+    for leaf, title in TITLES.items():
+        name = f"naturalness.{leaf}"
+        target = find_target(name, float(report.get("fps") or 30.0))
+        value, own = table.get(name), table.get(twin := find_twin_name(name, table))
+        if value is None and name not in unknown:
+            continue
+        is_met = target.is_met(value, table) if target and value is not None else None
+        status = {True: "met", False: "missed", None: ""}[is_met]
+        reason = "" if value is not None else f"not known: {unknown[name]}"
+        own_rest = format_rest(twin, table) if own is not None else ""
+        if twin in unknown:
+            own_rest = f"not known: {unknown[twin]}"
+        lines.append(build_row(
+            f"{title.text}, {title.unit}", build_number_cell(value, title.digits, title.scale, status),
+            format_rest(name, table), build_number_cell(own, title.digits, title.scale), own_rest,
+            title.describe_target(target), build_element("td", reason or status, class_=status or "quiet"),
+        ))  # fmt: skip
+    head = ("", build_title("value"), "over", build_title("recordings"), "over", "target", "")
+    return build_section("What the eye sees", build_table(head, lines)) if lines else Html()
+
+
 def _build_figures(report: Mapping) -> Html:
     head = ("figure", build_title("value"), build_title("recordings"), "target", "")
     rows = [
         build_row(
-            row.name, build_element("td", row.value, class_="n"), build_element("td", row.own, class_="n"), row.target,
-            build_element("td", row.status, class_=row.status or "quiet"),
+            row.name, build_element("td", row.value, class_="n"),
+            build_element("td", f"{row.own} ({row.rests_on})" if row.rests_on else row.own, class_="n"), row.target,
+            build_element("td", f"not known: {row.reason}" if row.reason else row.status, class_=row.status or "quiet"),
         ) for row in judge_figures(report) if not row.name.startswith("keys ")
     ]  # fmt: skip
     return build_section("All figures", build_table(head, rows), _build_key_table(report))

@@ -17,6 +17,8 @@ from ..synthesis.quality import movement
 from ..synthesis.quality.movement import classify_speed
 
 VELOCITY_SECONDS = 0.12  # weight of m/s against metres, like `library.features.HORIZON`
+FEWEST_RECORDINGS = 3
+"""Recordings that a speed class needs, so that with one's own left out two others show how far apart people are."""
 _ROWS_AT_ONCE = 512  # rows of distances at once, to limit memory
 
 
@@ -121,8 +123,7 @@ def compute_class_p95(values: np.ndarray, speed: np.ndarray) -> np.ndarray:
     """Compute the 95th percentile of values in each speed class, with `movement.compute_real_p95`.
 
     Args:
-        values: (M,) m: leave-one-clip-out distances (infinite if a library has one clip only), or smoothness of uncut
-            recordings (NaN between clips).
+        values: (M,) m: smoothness of uncut recordings (NaN between clips).
         speed: (M,) m/s.
     Returns:
         (5,) m.
@@ -131,17 +132,51 @@ def compute_class_p95(values: np.ndarray, speed: np.ndarray) -> np.ndarray:
     return movement.compute_real_p95(values[known], speed[known])
 
 
+def count_recordings(owner: np.ndarray, speed: np.ndarray, least: int) -> np.ndarray:
+    """Count the recordings in each speed class.
+
+    Args:
+        owner: (M,) int, recording of each pose.
+        speed: (M,) m/s.
+        least: poses that a recording needs in a class.
+    Returns:
+        (5,) int.
+    """
+    counts = np.zeros((5, owner.max(initial=-1) + 1), dtype=int)
+    np.add.at(counts, (classify_speed(speed), owner), 1)
+    return np.sum(counts >= least, axis=1)
+
+
+def compute_pose_limits(distance: np.ndarray, speed: np.ndarray, recordings: np.ndarray) -> np.ndarray:
+    """Compute the 95th percentile of leave-one-clip-out distances in each speed class.
+
+    Args:
+        distance: (M,) m.
+        speed: (M,) m/s.
+        recordings: (5,) int, of `count_recordings`.
+    Returns:
+        (5,) m, NaN in classes with fewer than FEWEST_RECORDINGS: the only recording of a speed is far from all others,
+        and a limit that comes from it would let anything pass.
+    """
+    classes, out = classify_speed(speed), np.full(5, np.nan)
+    for k in np.flatnonzero(recordings >= FEWEST_RECORDINGS):
+        known = distance[(classes == k) & np.isfinite(distance)]
+        out[k] = np.percentile(known, 95) if len(known) else np.nan
+    return out
+
+
 def find_unreal_frames(distance: np.ndarray, speed: np.ndarray, real: np.ndarray) -> np.ndarray:
     """Find the frames whose nearest library pose is farther than the recordings' 95th percentile.
 
     Args:
         distance: (T,) m to the nearest pose.
         speed: (T,) m/s.
-        real: (5,) m, the percentile of each speed class.
+        real: (5,) m, the percentile of each speed class, NaN where it is not known.
     Returns:
-        (T,) bool.
+        (T,) 1 or 0, NaN where the percentile is not known.
     """
-    return distance > real[classify_speed(speed)]
+    limit = real[classify_speed(speed)]
+    return np.where(np.isfinite(limit), distance > limit, np.nan)
 
 
 def measure_smoothness(skeleton: Skeleton, positions: np.ndarray, fps: float) -> np.ndarray:

@@ -12,6 +12,7 @@ look-up of the frames it used. Mirrored clips are not measured again: all figure
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 from weakref import WeakKeyDictionary
 
 import numpy as np
@@ -24,11 +25,13 @@ from ..library.library import Library
 from ..motion.humanoid import Humanoid, estimate_stature, identify_joints
 from ..motion.motion import compute_pose, forward_kinematics, resample, sample_frames
 from ..motion.skeleton import Skeleton
-from ..motion.track import Track
+from ..motion.track import Track, smooth_zero_phase_hann
 from ..synthesis.quality import movement
 from ..synthesis.quality.moments import evaluate_moments
 from ..synthesis.quality.playback import Playback, find_transitions
 from . import realism
+from .naturalness import FPS as COURSE_FPS
+from .naturalness import BodyCourse, find_stands, measure_course
 
 POSES_PER_SECOND = 10.0  # of a recording that are compared with
 LEFT_OUT_POSES = 3000  # poses at most in the leave-one-clip-out estimate
@@ -52,6 +55,9 @@ class Recording:
         smoothness: (T,) m from each frame to the next, NaN at the end.
         stances: (S, 3) first frame, end and side.
         travel: (S,) m, travel of the stances.
+        stands: (T,) bool, whether its body stands.
+        contacts: (T, 2) bool, feet on the ground.
+        course: where its body faces and goes, at 30 frames per second.
     """
 
     path: str
@@ -69,6 +75,9 @@ class Recording:
     smoothness: np.ndarray
     stances: np.ndarray
     travel: np.ndarray
+    stands: np.ndarray
+    contacts: np.ndarray
+    course: BodyCourse
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -82,15 +91,19 @@ class LibraryReference:
         index: path -> recording.
         first: (C + 1,) each recording's first row.
         rate: (C,) each recording's own frames per second.
-        sway, surge, speed, contact_speed, skating, support, tip, smoothness, stances, travel: those of `Recording`,
-            joined.
-        jerk_above_real: (N,) 1 where the window around a frame is above jerk_p95, else 0, NaN at a clip's ends.
+        sway, surge, speed, contact_speed, skating, support, tip, smoothness, stances, travel, stands, contacts: those
+            of `Recording`, joined.
+        jerk_ratio: (N,) of the window around a frame to jerk_p95, NaN at a clip's ends.
         heel_rest: height of the heel joint on a flat foot, m.
         jerk_p95: (5,) m/s^3 by speed class.
-        smoothness_p95, pose_p95: (5,) m by speed class.
+        jerk_recorded: (5,) bool, classes with recordings of their own; others have the nearest one's jerk_p95.
+        smoothness_p95: (5,) m by speed class.
+        pose_p95: (5,) m by speed class, NaN where fewer than FEWEST_RECORDINGS have that speed.
+        pose_recordings: (5,) int, recordings with that speed.
         poses: (M, 6 J) about ten a second of all clips, mirrored ones included.
         fastest: highest speed of a root, smoothed with a 1 s window, m/s.
         slowest: speed of the slowest gait, m/s.
+        courses: of all recordings.
     """
 
     fps: float
@@ -104,17 +117,22 @@ class LibraryReference:
     skating: np.ndarray
     support: np.ndarray
     tip: np.ndarray
-    jerk_above_real: np.ndarray
+    jerk_ratio: np.ndarray
     smoothness: np.ndarray
     stances: np.ndarray
     travel: np.ndarray
+    stands: np.ndarray
+    contacts: np.ndarray
     heel_rest: float
     jerk_p95: np.ndarray
+    jerk_recorded: np.ndarray
     smoothness_p95: np.ndarray
     poses: np.ndarray
     pose_p95: np.ndarray
+    pose_recordings: np.ndarray
     fastest: float
     slowest: float
+    courses: tuple[BodyCourse, ...]
 
     def find_rows(self, clips: tuple[str, ...], clip: np.ndarray, clip_frame: np.ndarray) -> np.ndarray:
         """Find the row of each output frame's source.
@@ -131,19 +149,29 @@ class LibraryReference:
         frame = np.clip(clip_frame * self.fps / self.rate[recordings], 0, np.diff(self.first)[recordings] - 1)
         return np.where((recordings >= 0) & (clip >= 0), self.first[recordings] + frame, np.nan)
 
-    def select_used_travel(self, rows: np.ndarray) -> np.ndarray:
-        """Select the travel of the source stances that a take uses.
+    def flag_used(self, rows: np.ndarray) -> np.ndarray:
+        """Flag the rows (N,) bool that a take uses; a faster playback skips none in between.
 
         Args:
-            rows: int, the rows of the frames it uses.
-        Returns:
-            (S',) m.
+            rows: (U,) fractional rows of the frames that it uses.
         """
-        used = np.zeros(self.first[-1] + 1, dtype=int)
-        used[rows + 1] = 1
+        used = np.zeros(self.first[-1], dtype=bool)
+        used[np.floor(rows).astype(int)] = used[np.ceil(rows).astype(int)] = True
+        return used
+
+    def select_used_travel(self, used: np.ndarray) -> np.ndarray:
+        """Select the travel (S',) m of the source stances of which a used row (N,) bool is part."""
         # count[i] is the number of used rows before row i, so a stance is used if it grows over the stance.
-        count = np.cumsum(used)
+        count = np.append(0, np.cumsum(used))
         return self.travel[count[self.stances[:, 1]] > count[self.stances[:, 0]]]
+
+    def split_by_course(self, used: np.ndarray) -> list[np.ndarray]:
+        """Split used rows (N,) bool into the frames (T,) bool of each course, at its own rate."""
+        out = []
+        for course, first, end in zip(self.courses, self.first, self.first[1:]):
+            rows = np.rint(np.arange(len(course.heading)) * self.fps / COURSE_FPS).astype(int)
+            out.append(used[first:end][np.minimum(rows, end - first - 1)])
+        return out
 
 
 _CACHE: WeakKeyDictionary[Library, dict[float, LibraryReference]] = WeakKeyDictionary()
@@ -180,27 +208,34 @@ def build_reference(library: Library, fps: float) -> LibraryReference:
     windows = [movement.collect_uncut_windows(recording.jerk, recording.speed) for recording in measured]
     jerk, speed = (np.concatenate(column) for column in zip(*windows))
     jerk_p95 = movement.compute_real_p95(jerk, speed)
-    poses, pose_p95 = _select_poses(measured, twins, identify_joints(library.skeleton), fps)
+    poses, *limits = _select_poses(measured, twins, identify_joints(library.skeleton), fps)
     joined = {name: np.concatenate([getattr(recording, name) for recording in measured]) for name in _JOINED_FIELDS}
     return LibraryReference(
         fps=fps, index={recording.path: i for i, recording in enumerate(measured)}, first=first,
         rate=np.array([recording.rate for recording in measured]),
-        jerk_above_real=np.concatenate([_flag_high_jerk(recording, jerk_p95) for recording in measured]),
+        jerk_ratio=np.concatenate([_measure_jerk_ratio(recording, jerk_p95) for recording in measured]),
         stances=np.concatenate([r.stances + [start, start, 0] for r, start in zip(measured, first)]),
         heel_rest=float(np.median([recording.heel_rest for recording in measured])), jerk_p95=jerk_p95,
-        smoothness_p95=realism.compute_class_p95(joined["smoothness"], joined["speed"]), poses=poses, pose_p95=pose_p95,
-        fastest=float(joined["speed"].max()), slowest=_find_slowest_speed(library), **joined,
+        jerk_recorded=movement.find_recorded_classes(speed),
+        smoothness_p95=realism.compute_class_p95(joined["smoothness"], joined["speed"]), poses=poses,
+        pose_p95=limits[0], pose_recordings=limits[1],
+        fastest=float(joined["speed"].max()), slowest=_find_slowest_speed(library),
+        courses=tuple(recording.course for recording in measured), **joined,
     )  # fmt: skip
 
 
-_JOINED_FIELDS = ("sway", "surge", "speed", "contact_speed", "skating", "support", "tip", "smoothness", "travel")
+_JOINED_FIELDS = ("sway", "surge", "speed", "contact_speed", "skating", "support", "tip", "smoothness", "travel",
+                  "stands", "contacts")  # fmt: skip
 
 
 def _select_originals(clips: tuple[Clip, ...]) -> tuple[list[Clip], np.ndarray]:
-    """Select one clip per path, unmirrored if possible, and whether its mirrored twin is in the library too (C,)."""
+    """Select one recording per path, unmirrored if possible, and whether its mirrored twin is in the library too (C,).
+
+    Synthetic clips are no recordings.
+    """
     chosen: dict[str, Clip] = {}
     count: dict[str, int] = {}
-    for clip in sorted(clips, key=lambda clip: clip.mirrored):
+    for clip in sorted((clip for clip in clips if not clip.is_synthetic), key=lambda clip: clip.mirrored):
         chosen.setdefault(clip.path, clip)
         count[clip.path] = count.get(clip.path, 0) + 1
     return list(chosen.values()), np.array([count[path] > 1 for path in chosen])
@@ -233,24 +268,24 @@ def measure_recording(clip: Clip, fps: float) -> Recording:
         support=movement.measure_support_height(feet, contacts, heel_rest),
         tip=movement.measure_tip_height(skeleton, positions, rotations), jerk=movement.compute_jerk(positions, fps),
         smoothness=np.append(realism.measure_smoothness(skeleton, positions, fps), np.nan), stances=spans,
-        travel=movement.measure_stance_travel(feet[:, :, 1], spans),
+        travel=movement.measure_stance_travel(feet[:, :, 1], spans), course=measure_course(skeleton, positions, fps),
+        stands=find_stands(smooth_zero_phase_hann(pelvis, fps, movement.ROOT_WINDOW), fps), contacts=contacts,
     )  # fmt: skip
 
 
-def _flag_high_jerk(recording: Recording, real: np.ndarray) -> np.ndarray:
-    """Flag each frame of a recording: 1 if the window around it has more jerk than `real`, 0 if not, NaN at its ends.
-    """
+def _measure_jerk_ratio(recording: Recording, real: np.ndarray) -> np.ndarray:
+    """Measure the jerk (T,) of the window around each frame of a recording over `real`, NaN at its ends."""
     out = np.full(len(recording.sway), np.nan)
     windows, speed = movement.collect_uncut_windows(recording.jerk, recording.speed)
     start = movement.JERK_REACH + movement.TRANSITION_TO_JERK
-    out[start : start + len(windows)] = windows > real[movement.classify_speed(speed)]
+    out[start : start + len(windows)] = windows / real[movement.classify_speed(speed)]
     return out
 
 
 def _select_poses(measured: list[Recording], twins: np.ndarray, body: Humanoid, fps: float) -> tuple[np.ndarray,
-        np.ndarray]:
-    """Select the poses to compare with (M, 6 J), and compute the 95th percentile (5,) of the leave-one-clip-out
-    distance.
+        np.ndarray, np.ndarray]:
+    """Select the poses to compare with (M, 6 J); compute the 95th percentile (5,) of the leave-one-clip-out distance,
+    and the number of recordings (5,) behind it.
 
     That is the distance of a clip's own poses to all other clips' (its mirrored twin left out too), over at most 3000
     poses evenly spread.
@@ -264,7 +299,8 @@ def _select_poses(measured: list[Recording], twins: np.ndarray, body: Humanoid, 
     owners = np.concatenate([owner, owner[has_twin]])
     sampled = np.unique(np.linspace(0, len(rows) - 1, LEFT_OUT_POSES).astype(int))
     distance = realism.measure_nearest_distance(rows[sampled], poses, owner[sampled], owners)
-    return poses, realism.compute_class_p95(distance, speed[sampled])
+    recordings = realism.count_recordings(owner, speed, int(POSES_PER_SECOND))
+    return poses, realism.compute_pose_limits(distance, speed[sampled], recordings), recordings
 
 
 def compute_source_poses(library: Library, clips: tuple[str, ...], clip, mirrored, clip_frame) -> np.ndarray:
@@ -312,6 +348,7 @@ class View:
         stride: clip frames per output frame at playback rate 1.
         reference_rows: (T,) fractional rows of the reference, NaN if unknown.
         used_rows: (U,) int, the rows of the known frames.
+        used: (N,) bool, the rows of the reference that are used.
         transitions: first frame of each clip but the first.
         speed: (T,) m/s.
         target: (T, 2) m, the track at the output frames, or None.
@@ -323,19 +360,48 @@ class View:
         self.played, self.timeline, self.library, self.track = played, timeline, library, track
         self.fps, self.count = motion.fps, len(motion)
         self.reference = None if library is None else load_reference(library, motion.fps)
-        self.scale = 1.0 if library is None else _compute_scale(motion.skeleton, library.skeleton)
+        self.scale = 1.0 if library is None else compute_scale(motion.skeleton, library.skeleton)
         self.stride = played.compute_stride(library)
         self.reference_rows = self._find_reference_rows()
         self.used_rows = np.rint(self.reference_rows[np.isfinite(self.reference_rows)]).astype(int)
+        known = self.reference_rows[np.isfinite(self.reference_rows)]
+        self.used = np.zeros(0, dtype=bool) if self.reference is None else self.reference.flag_used(known)
         self.transitions = find_transitions(*self.source)
         self.speed = movement.measure_travel_speed(played.pelvis, self.fps)
         self.target = None if track is None else movement.interpolate_track(track, played.times)
         self.moments = [] if timeline is None else evaluate_moments(played, timeline.keys, self.stride, library)
 
     @property
+    def are_clips_known(self) -> bool:
+        """Whether the played clips are known."""
+        return bool(np.any(self.played.clip >= 0))
+
+    @cached_property
+    def jerk(self) -> np.ndarray:
+        """(T-3,) m/s^3, of `movement.compute_jerk`."""
+        return movement.compute_jerk(self.played.positions, self.fps)
+
+    @cached_property
+    def course(self) -> BodyCourse:
+        """Where the body faces and goes."""
+        return measure_course(self.played.motion.skeleton, self.played.positions, self.fps)
+
+    @property
     def source(self) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
         """Clip, mirrored, clip_frame and stride per frame, in the order that `played` functions take."""
         return self.played.clip, self.played.mirrored, self.played.clip_frame, self.stride
+
+    def interpolate_planned_heading(self, times: np.ndarray) -> np.ndarray | None:
+        """Interpolate the heading that was planned for the take, constant beyond its ends.
+
+        Args:
+            times: (N,) s on the track's clock.
+        Returns:
+            (N,) rad, unwrapped; None where it is not known.
+        """
+        planned = self.played.planned_heading
+        known = np.zeros(0, bool) if planned is None else np.isfinite(planned)
+        return np.interp(times, self.played.times[known], np.unwrap(planned[known])) if known.any() else None
 
     def source_values(self, name: str) -> np.ndarray:
         """Return a figure of the uncut recordings at the used frames.
@@ -353,7 +419,7 @@ class View:
         return self.reference.find_rows(self.played.clips, self.played.clip, self.played.clip_frame)
 
 
-def _compute_scale(skeleton: Skeleton, library: Skeleton) -> float:
+def compute_scale(skeleton: Skeleton, library: Skeleton) -> float:
     """Compute the stature of a skeleton relative to the library's; InputError if the bones differ otherwise."""
     if skeleton.has_same_bones(library, 5e-3):
         return 1.0

@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ..annotation import Timeline
-from ..base.errors import InputError, line_spans
+from ..base.errors import InputError, format_count, line_spans
 from ..library.library import Library
 from ..motion.track import Track
 from ..synthesis.quality.moments import measure_dribble_touches
@@ -18,7 +18,9 @@ from ..synthesis.quality.playback import Playback, playback_from_take
 from ..synthesis.quality.targets import find_target
 from ..synthesis.take import Take
 from . import figures
+from .naturalness_figures import FRAMES_KEYS, find_planned_headings, list_naturalness_messages, measure_naturalness
 from .reference import View
+from .unknown_figures import list_unknown_figures
 
 VERSION = 1
 MAX_DEPTH = 30
@@ -74,15 +76,21 @@ def evaluate_played(
         InputError: if the library has another skeleton than the motion.
     """
     view = View(played, track, timeline, library)
+    user_timeline = timeline if requested is None else requested
+    heading = find_planned_headings(view)
+    events, notes = list_naturalness_messages(view, heading)
     report = {
         "version": VERSION, "seed": None, "fps": played.motion.fps, "frames": len(played.motion),
         "duration_s": played.motion.duration, "seconds": dict.fromkeys(SECONDS), **figures.measure_path_errors(view),
         "keys": figures.measure_key_moments(view), **figures.measure_feet(view),
         **figures.measure_corrections(view, ik_miss), **figures.measure_transitions(view),
-        **figures.measure_poses(view), "annotation_similarity": figures.measure_annotation_similarity(view),
-        "warnings": figures.list_warnings(view, ik_miss, requested),
+        **figures.measure_poses(view), **measure_naturalness(view, heading, user_timeline),
+        "annotation_similarity": figures.measure_annotation_similarity(view),
+        "warnings": [*figures.list_warnings(view, ik_miss, requested), *events], "notes": notes,
     }
-    return {**round_values(report), "warning_seconds": _list_message_spans(report["warnings"])}
+    out = round_values(report)
+    return {**out, "warning_seconds": _list_message_spans(report["warnings"]),
+            "unknown": list_unknown_figures(flatten_report(out), view)}
 
 
 def _list_message_spans(lines: list[str]) -> list[list[list[float]]]:
@@ -152,7 +160,8 @@ def flatten_report(report: Mapping) -> dict[str, Any]:
     Args:
         report: the report.
     Returns:
-        Name -> value: nested names joined with dots, key moments numbered from 1, warnings counted.
+        Name -> value: nested names joined with dots, key moments numbered from 1, warnings and notes counted; without
+        the reasons for unknown figures.
     Raises:
         InputError: see `check_depth`.
     """
@@ -161,9 +170,9 @@ def flatten_report(report: Mapping) -> dict[str, Any]:
 
 
 def _flatten(value, name: str) -> dict[str, Any]:
-    if name == "warnings":
+    if name in ("warnings", "notes"):
         return {name: len(value)}
-    if name == "warning_seconds":
+    if name in ("warning_seconds", "unknown"):
         return {}
     if isinstance(value, Mapping):
         return {k: v for key, entry in value.items() for k,
@@ -194,6 +203,8 @@ class Row(NamedTuple):
         own: the recordings' score.
         target: the target, or "".
         status: "met", "missed" or "".
+        rests_on: what the recordings' score rests on, such as "1,032 frames", or "".
+        reason: why the value is not known, or "".
     """
 
     name: str
@@ -201,6 +212,8 @@ class Row(NamedTuple):
     own: str
     target: str
     status: str
+    rests_on: str = ""
+    reason: str = ""
 
 
 def judge_figures(report: Mapping) -> Iterator[Row]:
@@ -211,18 +224,69 @@ def judge_figures(report: Mapping) -> Iterator[Row]:
     Returns:
         A row for each figure that is known or has a target.
     """
-    table = flatten_report(report)
+    table, unknown = flatten_report(report), report.get("unknown") or {}
     fps = float(report.get("fps") or 30.0)
     for name, value in table.items():
-        group, _, leaf = name.rpartition(".")
-        target = find_target(name, fps)
-        if leaf.startswith("source_") or leaf == "own" or (value is None and target is None):
+        leaf, target = name.rpartition(".")[2], find_target(name, fps)
+        if leaf.startswith("source_") or leaf in ("own", "own_frames") or (value is None and target is None):
             continue
-        own = table.get(f"{group}.source_{leaf}", table.get(f"{group}.own") if leaf == "mean" else None)
+        twin = find_twin_name(name, table)
+        own = table.get(twin)
         is_met = target.is_met(value, table) if target and isinstance(value, (int, float)) else None
         status = "" if is_met is None else ("met" if is_met else "missed")
         target_text = target.describe(table) if target else ""
-        yield Row(name, _format_value(value), _format_value(own, ""), target_text, status)
+        rests_on = "" if own is None else format_rest(twin, table)
+        reason = unknown.get(name, "") if value is None else ""
+        yield Row(name, _format_value(value), _format_value(own, ""), target_text, status=status, rests_on=rests_on,
+                  reason=str(reason))
+
+
+def describe_figures(report: Mapping) -> list[str]:
+    """Describe how many targets are met, which ones are missed, and which figures with a target are not known.
+
+    Args:
+        report: from `evaluate`.
+    Returns:
+        Lines of text.
+    """
+    rows = list(judge_figures(report))
+    judged, missed = [row for row in rows if row.status], [row for row in rows if row.status == "missed"]
+    lines = [f"{len(judged) - len(missed)} of {len(judged)} targets met"]
+    for row in missed:
+        own = f"; recordings {row.own}" + (f" over {row.rests_on}" if row.rests_on else "") if row.own else ""
+        lines.append(f"missed: {row.name} {row.value} (target {row.target}{own})")
+    return lines + [f"not known: {row.name}, {row.reason}" for row in rows if row.reason]
+
+
+def find_count_name(name: str, table: Mapping[str, Any]) -> str:
+    """Find the name of the frames, pieces, strides or seconds that a figure rests on.
+
+    Args:
+        name: dotted name of the figure.
+        table: figures by name, all of them or those of its group.
+    Returns:
+        A name in the table, "" where it has none.
+    """
+    group, dot, leaf = name.rpartition(".")
+    begin = "own_" if leaf == "own" else "source_" if leaf.startswith("source_") else ""
+    key = FRAMES_KEYS.get(leaf.removeprefix("source_"), "frames")
+    count = f"{group}{dot}{begin}{key}"
+    return count if count in table and count != name else ""
+
+
+def find_twin_name(name: str, table: Mapping[str, Any]) -> str:
+    """Find the name of the recordings' own figure beside a figure; the table need not have it."""
+    group, dot, leaf = name.rpartition(".")
+    return f"{group}.own" if leaf == "mean" and f"{group}.own" in table else f"{group}{dot}source_{leaf}"
+
+
+def format_rest(name: str, table: Mapping[str, Any]) -> str:
+    """Format what a figure rests on: "1,032 frames", "12 strides", "5.1 s"; "" where it is not known."""
+    count = find_count_name(name, table)
+    value, unit = table.get(count), count.rpartition("_")[2].rpartition(".")[2]
+    if not isinstance(value, (int, float)):
+        return ""
+    return f"{value:.1f} s" if unit == "seconds" else format_count(int(value), unit.removesuffix("s"))
 
 
 def _format_value(value, unknown: str = "–") -> str:

@@ -1,4 +1,7 @@
-"""Builds a library from a folder: every recording read once, repaired, on one skeleton, indexed and cached."""
+"""Builds a library from a folder: every recording read once, repaired, on one skeleton, indexed and cached.
+
+In a folder without any annotation, labels are proposed (`library.proposals`), used at once, and marked as proposed.
+"""
 
 from __future__ import annotations
 
@@ -10,15 +13,18 @@ from typing import Callable, Iterable
 
 from ..annotation import ClipAnnotation
 from ..base.errors import InputError, UserCancelledError
+from ..base.settings import find_setting
 from ..files.bvh import bvh
 from ..synthetic.landing import ends_in_flight
 from . import cache, landings, repair
 from . import common_skeleton as one_skeleton
 from .cache import write_synthetic_clips
+from .classify.classifier import FILE_NAME, Classifier, read_classifier
 from .clip import Clip
 from .clusters import BLOCK_LENGTHS, cluster_blocks
 from .features import FPS, build_frames
 from .library import Library, Progress
+from .proposals import propose_labels
 from .scan import Annotations, find_readable_clips
 
 
@@ -30,7 +36,8 @@ def build_library(
     """Build the library of all recordings below a folder, or load it from its cache where nothing has changed.
 
     Clips of other skeletons are retargeted to this one and all are repaired (`common_skeleton`, `repair`); notes say
-    how.
+    how. Where no clip has an annotation, labels are proposed, by the model that was learned for this folder if there is
+    one, and `Library.proposal_notes` says so.
 
     Args:
         folder: where the recordings are.
@@ -45,7 +52,8 @@ def build_library(
     Returns:
         The library.
     Raises:
-        InputError: for unreadable files, a folder without clips, or clips without legs.
+        InputError: for unreadable files, a folder without clips, clips without legs, or of which neither annotations
+            nor proposals say anything.
         UserCancelledError: if `cancelled` returns True.
     """
     folder = Path(folder)
@@ -55,7 +63,9 @@ def build_library(
     files = [conversions.find_readable_file(path) for path in paths]
     annotations = Annotations(folder, paths)
     skeleton_file = Path(skeleton) if skeleton else None
-    key = cache.compute_fingerprint(folder, files, annotations.list_sources(paths), skeleton_file, unit=unit, seed=seed)
+    model = _find_model(place, annotations, paths)
+    sources = [*annotations.list_sources(paths), *([model] if model else [])]
+    key = cache.compute_fingerprint(folder, files, sources, skeleton_file, unit=unit, seed=seed)
     if not rebuild:
         report(0.0, "Reading the cache")
         found = cache.load_library(place, key)
@@ -65,7 +75,8 @@ def build_library(
             return Library(folder=str(folder), cache_location=(place, key), **found)
     notes: list[str] = [*([cache_note] if cache_note else []), *annotations.describe_unknown_files(folder)]
     clips = _read_clips(folder, paths, files, annotations=annotations, chosen=skeleton_file, unit=unit, threads=threads,
-                        notes=notes, report=report, cancelled=cancelled)
+                        notes=notes, report=report, cancelled=cancelled,
+                        classifier=read_classifier(model) if model else None)
     library = _index_clips(str(folder), clips, tuple(notes), seed=seed, report=report, cancelled=cancelled)
     write_synthetic_clips(place, _list_completed(library.clips))
     if not cache.save_library(place, key, library):
@@ -83,7 +94,14 @@ def _list_completed(clips: Iterable[Clip]) -> list[Clip]:
     return [clip for clip in clips if clip.recorded_count is not None]
 
 
-def _read_clips(folder, paths, files, annotations, chosen, unit, threads, notes, report, cancelled) -> tuple[Clip, ...]:
+def _find_model(place: Path, annotations: Annotations, paths: list[Path]) -> Path | None:
+    """Find the learned model in the cache folder; None where there is none, or where any clip has annotations."""
+    model = place / FILE_NAME
+    return model if model.is_file() and not any(annotations.read_rows(path, FPS) for path in paths) else None
+
+
+def _read_clips(folder, paths, files, annotations, chosen, unit, threads, notes, report, cancelled,
+                classifier) -> tuple[Clip, ...]:
     """Read all recordings, repair them, bring them to one skeleton, put each on the floor, and add the twins."""
     read, without_pops, levelled = zip(*_read_files(paths, files, unit, threads=threads, report=report,
                                                     cancelled=cancelled))
@@ -97,17 +115,33 @@ def _read_clips(folder, paths, files, annotations, chosen, unit, threads, notes,
         one = repair.repair_floor_and_feet(motion, standing, was_retargeted)
         repaired.append(replace(one, drift=one.drift + levelled[number][1]))
         rows.append(_limit_rows(path, annotations.read_rows(path, motion.fps), len(motion)))
+    is_proposed = not any(rows)
+    if is_proposed:
+        rows = _propose_rows(folder, repaired, classifier, report, cancelled)
     notes += repair.describe_repairs([(one, pops) for one, (_, pops) in zip(repaired, without_pops)])
     originals = _complete_landings([path.relative_to(folder).as_posix() for path in paths], repaired, rows, notes)
     figures = [repair.RepairFigures(pops, one.drift, *one.slide) for one, (_, pops) in zip(repaired, without_pops)]
-    originals = [replace(clip, repair_figures=what) for clip, what in zip(originals, figures)]
-    clips = [clip for original in originals for clip in (original, original.build_twin())]
-    if not any(clip.annotations for clip in clips):
+    originals = [replace(clip, repair_figures=what, has_proposed_labels=is_proposed)
+                 for clip, what in zip(originals, figures)]
+    return tuple(clip for original in originals for clip in (original, original.build_twin()))
+
+
+def _propose_rows(folder: Path, repaired: list[repair.RepairedClip], classifier: Classifier | None,
+                  report: Progress, cancelled) -> list[tuple[ClipAnnotation, ...]]:
+    """Propose the annotations of all clips; InputError where nothing is proposed."""
+    rows, least = [], find_setting("library.learn", "least").default
+    for number, one in enumerate(repaired):
+        _check_cancelled(cancelled)
+        report(0.68 + 0.02 * number / len(repaired), "Proposing labels")
+        proposals = propose_labels(one.motion, classifier=classifier)
+        rows.append(tuple(one.annotation for one in proposals if one.confidence >= least))
+    if not any(rows):
         raise InputError(
-            folder, "no annotation for any clip", "NAME.txt beside NAME.bvh or an annotations.csv",
+            folder, "no annotation for any clip, and no label to propose",
+            "NAME.txt beside NAME.bvh or an annotations.csv",
             "label frames as standing, walking, jogging, running, kick ...",
         )
-    return tuple(clips)
+    return rows
 
 
 def _read_files(paths, files, unit, threads, report, cancelled) -> list[tuple]:

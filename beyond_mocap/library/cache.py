@@ -30,7 +30,7 @@ from .repair import RepairFigures
 from .scan import CACHE_FOLDER
 
 # raised whenever what is computed or stored changes, so that old caches are not used
-VERSION = 24
+VERSION = 31
 _FRAME_ARRAYS = tuple(field.name for field in fields(Frames) if field.name != "vocabulary")
 
 
@@ -104,7 +104,7 @@ def _build_header(key: str, library) -> dict:
         "lengths": list(library.clusters),
         "clips": [[clip.path, clip.mirrored, clip.motion.fps, len(clip.motion),
                    [asdict(row) for row in clip.annotations], clip.recorded_count, asdict(clip.repair_figures)
-                   if clip.repair_figures else None] for clip in library.clips],
+                   if clip.repair_figures else None, clip.has_proposed_labels] for clip in library.clips],
     }  # fmt: skip
 
 
@@ -133,13 +133,14 @@ def _restore_fields(header: dict, arrays: dict) -> dict:
     names, parents, ends = (header[part] for part in ("names", "parents", "end_parents"))
     skeleton = Skeleton(names, parents, arrays["offsets"], ends, arrays["end_offsets"])
     clips, start = [], 0
-    for path, mirrored, fps, count, rows, recorded, mended in header["clips"]:
+    for path, mirrored, fps, count, rows, recorded, mended, is_proposed in header["clips"]:
         part = slice(start, start + count)
         motion = Motion(skeleton, arrays["root"][part], arrays["rotations"][part], fps)
         rows = tuple(ClipAnnotation(row["start"], row["end"], row["key"], tuple(row["words"])) for row in rows)
         mended = mended and RepairFigures(**mended)
         clips.append(Clip(path=path, mirrored=mirrored, motion=motion, annotations=rows,
-                          heel_toe_contacts=arrays["standing"][part], recorded_count=recorded, repair_figures=mended))
+                          heel_toe_contacts=arrays["standing"][part], recorded_count=recorded, repair_figures=mended,
+                          has_proposed_labels=is_proposed))
         start += count
     frames = Frames(
         vocabulary=tuple(header["vocabulary"]), **{name: arrays[f"frames.{name}"] for name in _FRAME_ARRAYS}

@@ -28,6 +28,7 @@ class Clip:
         recorded_count: number of recorded frames, where a synthetic landing and getting up follow (`library.landings`);
             None: all.
         repair_figures: what the repair found and left; None for synthetic clips.
+        has_proposed_labels: whether the annotations are proposed (`library.proposals`), not written by a person.
     """
 
     path: str
@@ -37,6 +38,7 @@ class Clip:
     heel_toe_contacts: np.ndarray
     recorded_count: int | None = None
     repair_figures: repair.RepairFigures | None = None
+    has_proposed_labels: bool = False
 
     @property
     def is_synthetic(self) -> bool:
@@ -73,4 +75,4 @@ class Clip:
         heel_toe_contacts = self.heel_toe_contacts[:, ::-1]
         return Clip(path=self.path, mirrored=not self.mirrored, motion=mirror(self.motion), annotations=rows,
                     heel_toe_contacts=heel_toe_contacts, recorded_count=self.recorded_count,
-                    repair_figures=self.repair_figures)
+                    repair_figures=self.repair_figures, has_proposed_labels=self.has_proposed_labels)

@@ -19,6 +19,7 @@ from ..motion.humanoid import compute_heading_from_positions, identify_joints
 from ..motion.motion import compute_pose, sample_frames
 from ..motion.skeleton import Skeleton
 from ..motion.track import smooth_zero_phase_hann
+from .posture import compute_postures
 
 FPS = 30.0  # frames per second of every library
 HORIZON = 0.12  # seconds: weighs m/s and m/s^2 against metres
@@ -41,6 +42,7 @@ class Frames:
         feet: (N, 4) metres from the path to the left and the right toe (ankle where there is none), heading frame.
         jerk: (N,) m/s^3 of the joint that has most, from the third difference around each frame.
         features: (N, D) float32, metres.
+        posture: (N, K) float32, see `posture.compute_postures`.
         mean, basis: (K,) and (K, D), which convert raw features.
         words: (N, V) bool, one column per label of `vocabulary`.
         vocabulary: V labels.
@@ -57,6 +59,7 @@ class Frames:
     feet: np.ndarray
     jerk: np.ndarray
     features: np.ndarray
+    posture: np.ndarray
     mean: np.ndarray
     basis: np.ndarray
     words: np.ndarray
@@ -169,6 +172,7 @@ def _build_frames(clips, reference: Frames | None) -> Frames:
             _compute_feet(positions, toes, path, facing),
             compute_max_jerk(positions, FPS),
             compute_raw_features(positions[:, joints], facing, FPS).astype(np.float32),
+            compute_postures(positions, facing, FPS, body),
             build_label_matrix(clip, source, vocabulary),
         )  # fmt: skip
         for name, column in zip(_COLUMNS, columns):
@@ -202,13 +206,13 @@ def join_frames(a: Frames, b: Frames) -> Frames:
         words[rows, [vocabulary.index(word) for word in frames.vocabulary]] = frames.words
     parts = {
         name: np.concatenate([getattr(a, name), getattr(b, name)])
-        for name in ("source", "count", "root", "heading", "path", "velocity", "feet", "jerk", "features")
+        for name in ("source", "count", "root", "heading", "path", "velocity", "feet", "jerk", "features", "posture")
     }
     clip, first = np.append(a.clip, b.clip + len(a.first)), np.append(a.first, b.first + len(a))
     return Frames(clip=clip, first=first, mean=a.mean, basis=a.basis, words=words, vocabulary=vocabulary, **parts)
 
 
-_COLUMNS = ("clip", "source", "root", "heading", "path", "velocity", "feet", "jerk", "features", "words")
+_COLUMNS = ("clip", "source", "root", "heading", "path", "velocity", "feet", "jerk", "features", "posture", "words")
 
 
 def _compute_feet(positions: np.ndarray, toes: list[int], path: np.ndarray, facing: np.ndarray) -> np.ndarray:

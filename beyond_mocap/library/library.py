@@ -14,16 +14,22 @@ from typing import Any, Callable
 import numpy as np
 
 from ..annotation import LOCOMOTION, ClipAnnotation, estimate_gait_thresholds
-from ..annotation.gaits import STANDING
+from ..annotation.gaits import STANDING, STANDING_SPEED
 from ..annotation.vocabulary import DIRECTIONS
-from ..base.errors import InputError
+from ..base.errors import InputError, format_count
 from ..motion.skeleton import Skeleton
 from . import cache
 from .cache import write_synthetic_clips
 from .clip import Clip
 from .clusters import Clusters
+from .coverage import find_missing_motion, measure_slowest_travel, select_locomotion_alone
 from .features import FPS, Frames, build_frames, join_frames
 from .keys import Key, collect_keys
+from .manners import Manners, measure_manners
+from .missing_steps import BACK_SPEEDS, TURNS
+from .posture import NormalPostures, fit_normal_postures
+from .run_loops import MIN_SPEED
+from .standing_loops import MIN_STAND_SECONDS
 from .synthetic_clips import (
     KICK_LABELS,
     MIN_RECEIVE_SPEED,
@@ -34,6 +40,8 @@ from .synthetic_clips import (
     select_locomotion,
 )
 
+MIN_RUN_SECONDS = 2.0  # of a track's runs from which on long runs are needed
+RESTING_SPEED = 0.1  # m/s of a track below which a player stands
 Progress = Callable[[float, str], None]
 
 
@@ -113,6 +121,40 @@ class Library:
                                clip in enumerate(self.clips)])
 
     @cached_property
+    def strangeness(self) -> np.ndarray:
+        """(N,) float32: how far each frame's posture lies from normal locomotion, up to 1 it belongs (`posture`)."""
+        strangeness = self.normal_postures.measure_strangeness(self.frames.posture, self.frames.speed)
+        # synthetic clips are locomotion at speeds that nothing recorded has
+        return np.where(self._is_recorded, strangeness, np.float32(0.0))
+
+    @cached_property
+    def normal_postures(self) -> NormalPostures:
+        """How people of this library stand, walk, jog and run."""
+        return fit_normal_postures(self.frames, self._is_recorded, self.fps)
+
+    @cached_property
+    def missing_motion(self) -> dict[str, str]:
+        """What the recordings lack: kind of motion -> a line for people (`coverage`)."""
+        return find_missing_motion(self.clips, self.frames, self.fps, self.strangeness)
+
+    @cached_property
+    def slowest_travel(self) -> float:
+        """The m/s below which hardly any recorded locomotion travels."""
+        belongs = select_locomotion_alone(self.frames, self.clips) & (self.strangeness <= 1.0)
+        return measure_slowest_travel(self.frames.speed[belongs], self.fps)
+
+    @cached_property
+    def manners(self) -> Manners:
+        """How the people of this library move."""
+        is_calm = self._is_recorded & (self.strangeness <= 1.0)
+        return measure_manners([clip.path for clip in self.clips], self.frames, is_calm, self.fps)
+
+    @cached_property
+    def _is_recorded(self) -> np.ndarray:
+        """(N,) bool, frames of recordings."""
+        return ~np.array([clip.is_synthetic for clip in self.clips])[self.frames.clip]
+
+    @cached_property
     def feet_in_contact(self) -> np.ndarray:
         """(N, 2) bool: left and right foot on the ground, heel or toe."""
         contacts = (clip.heel_toe_contacts.any(axis=2)[_round_to_frames(clip, self._select_clip_frames(i))] for i,
@@ -150,14 +192,18 @@ class Library:
         """(from, to) m/s of the speeds that recorded locomotion does not reach."""
         return find_speed_gaps(self.frames.speed[select_locomotion(self.frames, self.clips)], self.fps)
 
-    def needs_synthetic_clips(self, speed: np.ndarray, key_speeds: np.ndarray, takes: np.ndarray) -> bool:
+    def needs_synthetic_clips(self, speed: np.ndarray, offset: np.ndarray, heading: np.ndarray,
+                              key_speeds: np.ndarray, takes: np.ndarray) -> bool:
         """Whether a track needs the synthetic clips.
 
-        It does if it stays in a speed gap for a fifth of a second or more, or has key moments that are faster than any
+        It does if it stays in a speed gap for a fifth of a second or more, stands or runs for some seconds in all,
+        goes sideways or backward while slow, turns where it stands, or has key moments that are faster than any
         recorded kick or, for received balls, any recorded receiving with the foot can be played without sliding.
 
         Args:
             speed: (T,) m/s of the track at the library's rate.
+            offset: (T,) rad from its direction of travel to its heading.
+            heading: (T,) rad.
             key_speeds: (K,) m/s at its key moments.
             takes: (K,) bool, the key moment receives the ball.
         Returns:
@@ -167,12 +213,25 @@ class Library:
         kick, take = (measure_touch_speed(self.frames, self.clips, self.keys, act)
                       for act in (KICK_LABELS, RECEIVE_LABELS))
         too_fast = 1.3 * np.where(takes & np.isfinite(take), max(take, MIN_RECEIVE_SPEED), kick)
-        return inside >= 0.2 * self.fps or bool(np.any(key_speeds > too_fast))
+        rests = np.sum(speed < RESTING_SPEED) >= MIN_STAND_SECONDS * self.fps
+        runs = np.sum(speed > MIN_SPEED) >= MIN_RUN_SECONDS * self.fps
+        aside = (speed > STANDING_SPEED) & (speed < 1.25 * BACK_SPEEDS[-1]) & (np.abs(offset) > np.pi / 3.0)
+        turned = np.sum(np.abs(np.diff(heading))[speed[1:] < STANDING_SPEED])
+        steps = np.sum(aside) >= 0.5 * self.fps or turned >= 0.5 * TURNS[0]
+        return inside >= 0.2 * self.fps or bool(rests | runs | steps) or bool(np.any(key_speeds > too_fast))
 
     @cached_property
     def max_speed(self) -> float:
         """The highest speed that a clip reaches, m/s."""
         return float(self.frames.speed.max())
+
+    @property
+    def proposal_notes(self) -> tuple[str, ...]:
+        """A line where labels are proposed and not yet checked by a person; empty where they are annotated."""
+        count = sum(clip.has_proposed_labels and not clip.mirrored for clip in self.clips)
+        what = f"labels proposed for {format_count(count, 'clip')}, since no clip has any: check them with Review " \
+               "Proposals in Blender, or in the table that the command 'library' writes"
+        return (what,) if count else ()
 
     @property
     def minutes(self) -> float:
@@ -184,7 +243,8 @@ def _build_synthetic_library(library: Library) -> Library:
     """Build the clips that the recordings lack (`library.synthetic_clips`), described like them."""
     speeds = {gait.label: gait.speed for gait in library.gaits if gait.label != STANDING}
     clips = []
-    for synthetic in iter_synthetic_clips(library.clips, library.frames, library.fps, speeds, library.keys):
+    for synthetic in iter_synthetic_clips(library.clips, library.frames, library.fps, speeds, keys=library.keys,
+                                          strangeness=library.strangeness):
         clip = Clip(path=synthetic.name, mirrored=False, motion=synthetic.motion, annotations=synthetic.rows,
                     heel_toe_contacts=synthetic.heel_toe_contacts)
         clips += [clip, clip.build_twin()]
@@ -226,7 +286,7 @@ def measure_gaits(library: Library) -> tuple[Gait, ...]:
     Returns:
         The gaits from slow to fast.
     Raises:
-        InputError: if no clip shows locomotion.
+        InputError: if no clip shows locomotion, or none that travels faster than the library stands.
     Source: Faustino 2016, section 3.1.1.
     """
     seconds: dict[str, Any] = {word: Counter() for word in LOCOMOTION}
@@ -250,12 +310,13 @@ def measure_gaits(library: Library) -> tuple[Gait, ...]:
         if times:
             words = max(times, key=lambda w: (times[w], w))
             found.append(Gait(word, words, metres[word][words] / max(times[words], 1e-9)))
-    if not any(gait.label != STANDING for gait in found):
-        raise InputError(
-            library.folder, "no locomotion clip", "clips annotated walking, jogging, running or sprinting",
-            "label the clips that show locomotion",
-        )
     ordered = [gait for i, gait in enumerate(found) if all(gait.speed > other.speed for other in found[:i])]
+    if not any(gait.label != STANDING for gait in ordered):
+        labelled = any(gait.label != STANDING for gait in found)
+        raise InputError(
+            library.folder, f"no locomotion clip{' that is faster than its stands' if labelled else ''}",
+            "clips annotated walking, jogging, running or sprinting", "label the clips that show locomotion",
+        )
     return tuple(ordered)
 
 

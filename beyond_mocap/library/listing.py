@@ -131,6 +131,8 @@ def _grade_clip(clip: Clip, speed: float, jerk: float) -> tuple[int, tuple[str, 
     details.append(f"jerk: {jerk:.1f} x usual")
     if clip.recorded_count is not None:
         details.append("ends in flight: synthetic landing added")
+    if clip.has_proposed_labels:
+        details.append("labels: proposed")
     if not clip.annotations:
         details.append("no labels: not used")
     return max(marks), tuple(details)

@@ -125,7 +125,8 @@ class _RecordingSignals:
     def build_row(self, start: float, end: float, words, key: int | None = None) -> ClipAnnotation:
         """Build the annotation of the frames `start` to `end`, rounded and clamped to the motion."""
         last = len(self.motion) - 1
-        return ClipAnnotation(int(max(0, round(start))), int(min(last, round(end))), key, tuple(words))
+        return ClipAnnotation(int(max(0, round(start))), int(min(last, round(end))),
+                              None if key is None else int(key), tuple(words))
 
     def to_frames(self, seconds: float) -> float:
         """Convert seconds to frames of the motion."""

@@ -13,6 +13,9 @@ upright stance and the recorded runners' elbows and lean: long runs that slowly 
 are needed, quick ones, and weaving ones. The fastest recording played faster with stretched strides would keep the
 figures and lose the look: knees pop, the body floats.
 
+Where all recordings run, or all walk slower, it generates walking the same way, and where no clip stands calmly a
+stand: a run that is shortened to a walk's steps hops on the spot.
+
 Recorded kicks are seldom faster than a jog, and players who receive a ball with the foot in a recording hardly move;
 moved along at 8 m/s their supporting foot slides by metres. `synthetic.gestures` generates both on the run at the
 missing speeds; they substitute for recorded ones wherever they carry the labels by which those answer.
@@ -26,6 +29,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ..annotation import DISCRETE, LOCOMOTION, ClipAnnotation, compute_gait_thresholds
+from ..annotation.gaits import STANDING, TURNING
 from ..base.time_series import find_equal_runs, find_runs
 from ..base.vectors import arctan2, cross_product
 from ..motion import contacts, quaternion
@@ -37,11 +41,17 @@ from ..synthetic import gestures
 from ..synthetic.gait import build_gait
 from ..synthetic.gait_plan import GaitStyle
 from .features import Frames
+from .missing_steps import BACK_PREFIX, STEP_PREFIX, TURN_PREFIX, iter_missing_steps
+from .run_loops import LOOP_SECONDS, iter_run_loops
 from .scan import CACHE_FOLDER
+from .standing_loops import LOOP_SECONDS as STAND_SECONDS
+from .standing_loops import iter_standing_loops
 
 SYNTHETIC_FOLDER = f"{CACHE_FOLDER}/made-gait/"
-# how the file names of blends, of kicks and of received balls begin, in that folder
-BLEND_PREFIX, KICK_PREFIX, RECEIVE_PREFIX = "blend_", "kick_", "receive_"
+# how the file names of blends, kicks, received balls, long stands, long runs, walks and synthetic stands begin, in that
+# folder
+BLEND_PREFIX, KICK_PREFIX, RECEIVE_PREFIX, STAND_PREFIX, LOOP_PREFIX = "blend_", "kick_", "receive_", "stand_", "loop_"
+WALK_PREFIX, STILL_PREFIX = "walk_", "still_"
 KICK_LABELS, RECEIVE_LABELS = frozenset({"kick"}), frozenset({"receive", "foot"})
 FPS = 60.0  # of synthetic clips
 MAX_SPEED = 9.4  # m/s
@@ -49,15 +59,19 @@ MAX_SPEED = 9.4  # m/s
 _MIN_RUN_SPEED, MIN_RECEIVE_SPEED = 2.4, 1.7
 # range of playback rates of a clip
 _WARP = (0.875, 1.125)
+_SLOWEST = 1.6  # m/s, a walk: the slowest travel should not exceed it when it is played slower
+SLOWEST_RECORDED = _SLOWEST / _WARP[0]
 _MIN_SECONDS = 1.5  # seconds of recording at a speed from which on it is no gap
 _GRID = 1.03  # ratio of neighbouring speeds
-# ratios of neighbouring speeds of blends and of touches
-_BLEND_STEP, _TOUCH_STEP = 1.06, 1.4
+# ratios of neighbouring speeds of blends, of touches and of runs at an even speed
+_BLEND_STEP, _TOUCH_STEP, _EVEN_STEP = 1.06, 1.4, 1.1
 _PAIRS = 3  # pairs of recordings blended into each gap, at most
 _MAX_SPEED_SPREAD = 0.15  # standard deviation of a steady stretch's speed, share of its mean
 _GAITS = LOCOMOTION[1:]
-# m/s of gaits without a recording
+# m/s of gaits without a recording, faster and slower than the recorded ones
 _DEFAULT_SPEEDS = {"running": 4.6, "sprinting": 7.3}
+_SLOWER_SPEEDS = {"walking": 1.2, "jogging": 2.7}
+_WALK_STEP, _WALK_SECONDS = 1.25, 5.0  # ratio of neighbouring speeds of walks, and their length
 # radians by which a runner's elbow and lean differ from the default, at most
 _MAX_STYLE = np.array([0.35, 0.10])
 # m/s below which a point of a foot is still
@@ -88,7 +102,7 @@ def find_speed_gaps(speed: np.ndarray, fps: float) -> tuple[tuple[float, float],
         speed: (N,) m/s of frames of locomotion.
         fps: of those frames.
     Returns:
-        (from, to) m/s of all gaps, from the slowest recording's speed to a sprint.
+        (from, to) m/s of all gaps, from the slowest recording's speed, if that is a walk, to a sprint.
     """
     grid = np.exp(np.arange(np.log(0.6), np.log(MAX_SPEED), np.log(_GRID)))
     ordered = np.sort(speed)
@@ -96,7 +110,8 @@ def find_speed_gaps(speed: np.ndarray, fps: float) -> tuple[tuple[float, float],
     lacking = reached < _MIN_SECONDS * fps
     if lacking.all():
         return ()
-    lacking[: int(np.argmin(lacking))] = False
+    slowest = int(np.argmin(lacking))
+    lacking[:slowest] = grid[slowest] > _SLOWEST
     ends = np.append(grid, MAX_SPEED)
     return tuple((float(grid[a]), float(ends[b])) for a, b in find_runs(lacking))
 
@@ -131,7 +146,8 @@ def measure_touch_speed(frames: Frames, clips: Sequence, keys: Sequence, act: fr
 
 
 def iter_synthetic_clips(
-    clips: Sequence, frames: Frames, fps: float, gait_speeds: dict[str, float], keys: Sequence
+    clips: Sequence, frames: Frames, fps: float, gait_speeds: dict[str, float], keys: Sequence,
+    strangeness: np.ndarray
 ) -> Iterator[SyntheticClip]:
     """Iterate over all synthetic clips of a library.
 
@@ -141,14 +157,17 @@ def iter_synthetic_clips(
         fps: of the frames.
         gait_speeds: m/s of the recorded gaits.
         keys: the recordings' key moments.
+        strangeness: (N,) how far each frame lies from normal locomotion (`posture`).
     Yields:
         Clips whose names begin with SYNTHETIC_FOLDER: they are stored beside the cache.
     """
-    speeds = {**{word: v for word, v in _DEFAULT_SPEEDS.items() if v > max(gait_speeds.values())}, **gait_speeds}
+    speeds = {**{word: v for word, v in _SLOWER_SPEEDS.items() if v < min(gait_speeds.values())},
+              **{word: v for word, v in _DEFAULT_SPEEDS.items() if v > max(gait_speeds.values())}, **gait_speeds}
     example = sample_upright_example(clips)
     style = estimate_runner_style(clips, frames, example)
     for low, high in find_speed_gaps(frames.speed[select_locomotion(frames, clips)], fps):
-        yield from _iter_blends(clips, frames, fps, low=low, high=high, speeds=speeds)
+        blends = list(_iter_blends(clips, frames, fps, low=low, high=high, speeds=speeds))
+        yield from blends or _iter_walks(low, min(high, _MIN_RUN_SPEED), example, speeds)
         yield from _iter_runs(max(0.93 * low, _MIN_RUN_SPEED), min(1.05 * high, MAX_SPEED), example, style, speeds)
     kinds = sorted({"inside" if "inside" in key.labels else "top" for key in keys if KICK_LABELS <= key.labels})
     fastest = measure_touch_speed(frames, clips, keys, KICK_LABELS)
@@ -157,6 +176,22 @@ def iter_synthetic_clips(
     fastest = max(_TOUCH_STEP * measure_touch_speed(frames, clips, keys, RECEIVE_LABELS), MIN_RECEIVE_SPEED)
     yield from _iter_touches(RECEIVE_PREFIX, fastest, ("receive", "foot", "low"), kinds=["inside"], example=example,
                              speeds=speeds)
+    stands = [(STAND_PREFIX, motion) for _, motion in iter_standing_loops(clips, frames, fps, strangeness, FPS)]
+    if not stands:
+        stands = [(STILL_PREFIX, build_gait(0.0, STAND_SECONDS, FPS, example.skeleton, example=example))]
+    for number, (prefix, motion) in enumerate(stands):
+        row = ClipAnnotation(0, len(motion) - 1, None, (STANDING,))
+        contacts = np.ones((len(motion), 2, 2), bool)
+        yield SyntheticClip(f"{SYNTHETIC_FOLDER}{prefix}{number + 1}.bvh", motion, (row,), contacts)
+    is_run = select_locomotion(frames, clips) & (strangeness <= 1.0)
+    for speed, motion, contacts in iter_run_loops(clips, frames, fps, is_run, FPS):
+        rows = _build_gait_rows(np.full(len(motion), speed), speeds)
+        yield _ground_clip(f"{SYNTHETIC_FOLDER}{LOOP_PREFIX}{speed:.2f}.bvh", motion, contacts, rows, plants_feet=True)
+    for name, motion, heel_toe_contacts, speed in iter_missing_steps(
+        clips, frames, fps, strangeness, example=example, rate=FPS
+    ):
+        rows = _build_step_rows(name, len(motion), speed, speeds)
+        yield _ground_clip(f"{SYNTHETIC_FOLDER}{name}.bvh", motion, heel_toe_contacts, rows)
 
 
 def sample_upright_example(clips: Sequence) -> Motion:
@@ -272,11 +307,25 @@ def _find_stretches(clips, found) -> list[Strides]:
     return out[:_PAIRS]
 
 
+def _iter_walks(low: float, high: float, example: Motion, speeds: dict[str, float]) -> Iterator[SyntheticClip]:
+    """Iterate over walks from `low` to `high` m/s, where recordings on one side are missing for blends."""
+    for speed in low * _WALK_STEP ** np.arange(max(0.0, np.ceil(np.log(high / low) / np.log(_WALK_STEP)))):
+        motion = build_gait(float(speed), _WALK_SECONDS, FPS, example.skeleton, example=example)
+        rows = _build_gait_rows(np.full(len(motion), speed), speeds)
+        yield _ground_clip(f"{SYNTHETIC_FOLDER}{WALK_PREFIX}{speed:.2f}.bvh", motion, None, rows)
+
+
 def _iter_runs(low: float, high: float, example: Motion, style: GaitStyle,
                speeds: dict[str, float]) -> Iterator[SyntheticClip]:
-    """Iterate over runs from `low` to `high` m/s and back: slow changes, as quick as players change, and weaving."""
+    """Iterate over runs at even speeds, and from `low` to `high` m/s and back: slow changes, as quick as players
+    change, and weaving.
+    """
     if high < 1.1 * low:
         return
+    for speed in np.exp(np.arange(np.log(low), np.log(high), np.log(_EVEN_STEP))):
+        even = np.full(int(LOOP_SECONDS * FPS), speed)
+        motion = build_gait(even, None, FPS, example.skeleton, style=style, example=example)
+        yield _ground_clip(f"{SYNTHETIC_FOLDER}even_{speed:.2f}.bvh", motion, None, _build_gait_rows(even, speeds))
     for name, pace, weaves in (("slow", 0.8, False), ("quick", 2.5, False), ("weave", 1.0, True)):
         ramp = np.linspace(low, high, max(int((high - low) / pace * FPS), int(1.5 * FPS)))
         speed = np.concatenate([ramp, ramp[::-1]])
@@ -308,6 +357,15 @@ def _build_gait_rows(speed: np.ndarray, speeds: dict[str, float]) -> tuple[ClipA
     words = sorted((word for word in speeds if word in _GAITS), key=speeds.get)
     band = np.searchsorted(compute_gait_thresholds(np.array([speeds[word] for word in words])), speed, side="right")
     return tuple(ClipAnnotation(a, b - 1, None, (words[band[a]], "front")) for a, b in find_equal_runs(band))
+
+
+def _build_step_rows(name: str, count: int, speed: float, speeds: dict[str, float]) -> tuple[ClipAnnotation, ...]:
+    """Build the row of a step that recordings lack (`missing_steps`): the gait of its speed, and its direction."""
+    words = (STANDING, TURNING) if name.startswith(TURN_PREFIX) else (STANDING,)
+    if not name.startswith((TURN_PREFIX, STEP_PREFIX)):
+        gait = _build_gait_rows(np.full(1, speed), speeds)[0].words[0]
+        words = (gait, "back" if name.startswith(BACK_PREFIX) else "left")
+    return (ClipAnnotation(0, count - 1, None, words),)
 
 
 def _ground_clip(name: str, motion: Motion, heel_toe_contacts: np.ndarray | None, rows,

@@ -253,7 +253,8 @@ _FIELD_NAMES = {
     "start": "start time", "end": "end time", "tracking": "tracking file", "meta": "metadata", "events": "events file",
     "events_meta": "events metadata", "events_provider": "events provider",
     "solve_touches": "touch solving", "players": "list of players", "fps": "frame rate", "seed": "seed",
-    "nearest": "nearest labels setting", "provider": "provider", "form": "version", "software": "version",
+    "watch": "strength of watching the ball", "nearest": "nearest labels setting", "provider": "provider",
+    "form": "version", "software": "version",
 }
 
 

@@ -33,6 +33,8 @@ from ..files.json_values import (
 )
 from ..files.plain_npz import HEADER, read_plain_arrays, take_header_text
 from ..motion.track import Track
+from ..synthesis.heading_path import HeadingPath
+from ..synthesis.heading_plan import HeadingKey
 from ..synthesis.plan import METHODS, Pin, Plan, PlayerTouch, SolvedTrajectory
 from ..synthesis.resolved_touches import resolve_touches
 from .crowd.correction import Correction
@@ -60,7 +62,8 @@ _MAX_STRETCH = 24 * 3600.0
 _MAX_FRAMES, _MAX_RATE = 1e7, 100.0
 _MIN_WINDOW = 1.0  # s
 _DEFAULTS = {
-    field.name: field.default for field in fields(Plan) if field.name not in ("track", "timeline", "pins", "solved")
+    field.name: field.default for field in fields(Plan)
+    if field.name not in ("track", "timeline", "pins", "heading_keys", "solved", "heading_path")
 }  # fmt: skip
 _RUN_TYPES = {"clip": "<i2", "first": "<f8", "rate": "<f8", "length": "<i4", "cut": "|u1"}
 _UNKNOWN = -(2**31)
@@ -219,7 +222,7 @@ def _build_stretch_header(stretch: Stretch) -> dict:
         "name": plan.track.name, "settings": {name: getattr(plan, name) for name in _DEFAULTS},
         "spans": [[span.start, span.end, list(span.words), list(span.avoid)] for span in plan.timeline.spans],
         "keys": [[key.time, list(key.words), list(key.avoid), key.solved] for key in plan.timeline.keys],
-        "pins": [asdict(pin) for pin in plan.pins],
+        "pins": [asdict(pin) for pin in plan.pins], "headings": [asdict(key) for key in plan.heading_keys],
         "touches": None if course is None else [list(asdict(touch).values()) for touch in course.touches],
         "clips": [list(clip) for clip in stretch.edit.clips],
         "placed": [list(asdict(key).values()) for key in stretch.edit.keys],
@@ -229,11 +232,14 @@ def _build_stretch_header(stretch: Stretch) -> dict:
 
 def _build_stretch_arrays(stretch: Stretch) -> dict[str, np.ndarray]:
     """Build the arrays of a stretch; `flags` has the bits 1 ball height known, 2 filled in, 4 outlier."""
-    track, course = stretch.plan.track, stretch.plan.solved
+    plan, track, course = stretch.plan, stretch.plan.track, stretch.plan.solved
     flags = track.ball_height_known + 2 * track.filled + 4 * track.outlier
     arrays = {name: getattr(stretch.edit, name).astype(kind) for name, kind in _RUN_TYPES.items()}
     arrays |= {"flags": flags.astype(np.uint8), "times": pack_differences(np.round(track.times * 1e6)[:, None]),
                "positions": pack_positions(track.positions), "ball": pack_positions(track.ball)}  # fmt: skip
+    if plan.heading_path is not None:
+        steps = np.column_stack([np.round(plan.heading_path.times * 1e6), plan.heading_path.bins])
+        arrays |= {"heading_path": pack_differences(steps)}
     if course is not None:
         arrays |= {"course": pack_positions(course.ball), "course_filled": course.filled.astype(np.uint8)}
     return arrays
@@ -277,10 +283,12 @@ def _parse_stretch(row, index: int, arrays: dict[str, np.ndarray]) -> Stretch:
     """Parse a stretch from its header row and arrays."""
     where = f"stretch {index}"
     names = ("name", "settings", "spans", "keys", "pins", "touches", "clips", "placed", "warnings", "short")
-    check_names(row, where, names, names)
+    check_names(row, where, (*names, "headings"), names)  # files of 0.1 have no headings
 
-    def take_array(name: str, columns: int | None = None, count: int | None = None) -> np.ndarray:
+    def take_array(name: str, columns: int | None = None, count: int | None = None, is_needed: bool = True):
         values = arrays.pop(f"{index}/{name}", None)
+        if values is None and not is_needed:
+            return None
         ends = () if columns is None else (columns,)
         if values is None or values.shape[1:] != ends or values.ndim != 1 + len(ends):
             found = "no such array" if values is None else f"shape {values.shape}"
@@ -323,8 +331,11 @@ def _parse_plan(row, where: str, take_array) -> Plan:
         keys.append(KeyMoment(check_number(time, where), check_texts(words, where), None, check_texts(avoid, where),
                               solved))
     pins = [_parse_pin(value, f"{where}: pins") for value in check_list(row["pins"], f"{where}: pins")]
+    headings = [_parse_heading(value, f"{where}: headings")
+                for value in check_list(row.get("headings", []), f"{where}: headings")]
     return Plan(
         track=track, timeline=Timeline(tuple(spans), tuple(keys)), pins=tuple(pins),
+        heading_keys=tuple(headings), heading_path=_parse_heading_path(where, take_array),
         solved=_parse_trajectory(row, where, take_array, float(first), float(last)),
         **_parse_settings(row["settings"], f"{where}: settings"),
     )  # fmt: skip
@@ -336,6 +347,26 @@ def _parse_pin(value, where: str) -> Pin:
     place = check_numbers(value["position"], where, 3, "[x, y, z] m")
     return Pin(check_number(value["time"], where), check_text(value["part"], where), place,
                check_number(value["hold"], where))
+
+
+def _parse_heading(value, where: str) -> HeadingKey:
+    names = ("time", "heading", "target", "hold")
+    check_names(value, where, names, names)
+    heading, target = value["heading"], value["target"]
+    return HeadingKey(check_number(value["time"], where), None if heading is None else check_number(heading, where),
+                      None if target is None else check_numbers(target, where, 2, "[x, y] m"),
+                      check_number(value["hold"], where))
+
+
+def _parse_heading_path(where: str, take_array) -> HeadingPath | None:
+    """Parse the planned heading of a stretch; None where it is planned when it is needed, as in files of 0.1."""
+    steps = take_array("heading_path", 2, is_needed=False)
+    if steps is None:
+        return None
+    values = unpack_differences(steps, f"{where}: heading_path")
+    if not len(values) or np.any(np.diff(values[:, 0]) <= 0.0):
+        raise InputError(f"{where}: heading_path", f"{len(values)} times", "one or more, ascending")
+    return HeadingPath(values[:, 0] / 1e6, values[:, 1])
 
 
 def _parse_settings(value, where: str) -> dict:

@@ -222,7 +222,7 @@ def cut_take(take: Take, first: int, end: int) -> Take:
     if ball is not None:
         turns = None if ball.rotations is None else ball.rotations[inside]
         ball = BallPath(ball.times[inside], ball.positions[inside], ball.measured[inside], turns)
-    values = {name: getattr(take, name) for name in ("correction", "ik_miss", "stepped")}
+    values = {name: getattr(take, name) for name in ("correction", "ik_miss", "stepped", "planned_heading")}
     return replace(
         take, motion=take.motion.frames(first, end), start_time=start, clip=take.clip[inside],
         clip_frame=take.clip_frame[inside], mirrored=take.mirrored[inside], words=take.words[inside],
@@ -269,7 +269,7 @@ def join_takes(takes: Sequence[Take], plan: Plan) -> Take:
     number = {path: index for index, path in enumerate(clips)}
     firsts = np.cumsum([0, *(len(take.motion) for take in takes)])
     seams = np.concatenate([take.seams + first for take, first in zip(takes, firsts)])
-    arrays = ("clip_frame", "mirrored", "contacts", "correction", "ik_miss", "stepped")
+    arrays = ("clip_frame", "mirrored", "contacts", "correction", "ik_miss", "stepped", "planned_heading")
     begin, fps = takes[0].start_time, takes[0].motion.fps
     return replace(
         takes[0], motion=concatenate_motions([take.motion for take in takes]), clips=clips,

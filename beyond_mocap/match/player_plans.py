@@ -11,7 +11,10 @@ from pathlib import Path
 from ..annotation import Timeline, format_timeline
 from ..ball.tracked.solve import SolvedBall
 from ..base.errors import InputError, format_seconds
+from ..library.library import Library
+from ..synthesis.heading_plan import Play
 from ..synthesis.plan import Plan
+from ..synthesis.resolve_plan import resolve_plan
 from ..synthesis.resolved_touches import build_trajectory
 from .folder import MatchFolder
 from .labels import USER, MatchLabels, Moment, build_timeline, is_edited, read_labels, write_labels
@@ -39,7 +42,7 @@ class PlayerPlans:
 
 def build_player_plans(
     roles: tuple[Role, ...], files: Mapping[str, str], labels: MatchLabels, solved: SolvedBall | None,
-    request: MatchRequest, folder: MatchFolder, known_labels: frozenset[str],
+    request: MatchRequest, folder: MatchFolder, library: Library, plays: Mapping[str, Play],
 ) -> list[PlayerPlans]:
     """Build the plans of all players.
 
@@ -53,7 +56,8 @@ def build_player_plans(
         solved: the solved ball, None if it is not solved.
         request: the request.
         folder: the match's folder.
-        known_labels: labels beyond the vocabulary.
+        library: the clips; its labels are known beyond the vocabulary.
+        plays: what players face beside the ball, by id.
     Returns:
         One entry per role.
     """
@@ -62,9 +66,9 @@ def build_player_plans(
         file = files[role.player.id]
         try:
             moments = () if role.reason else _read_moments(file, role, labels, request=request, folder=folder,
-                                                           known_labels=known_labels)
-            plans = tuple(_build_plan(role, number, moments, solved, request)
-                          for number in range(len(role.target_tracks)))
+                                                           known_labels=library.labels)
+            plans = tuple(_plan_heading(_build_plan(role, number, moments, solved, request), library,
+                                        plays.get(role.player.id)) for number in range(len(role.target_tracks)))
             unused = tuple(one for one in moments if one.source == USER and not _is_used(one, role))
             out.append(PlayerPlans(role, file, () if role.reason else plans, unused))
         except InputError as error:
@@ -151,7 +155,13 @@ def _build_plan(role: Role, number: int, moments, solved: SolvedBall | None, req
     plan = Plan(
         track=track, timeline=timeline, library=str(request.library), nearest=request.nearest,
         seed=request.seed + role.number, fps=request.fps, solve_touches=solved is not None, variety=request.variety,
-        lag=role.lag,
+        lag=role.lag, manner=role.number, watch=request.watch,
     )
     return to_stored_plan(plan if solved is None
                           else replace(plan, solved=build_trajectory(solved, role.player.id, plan)))
+
+
+def _plan_heading(plan: Plan, library: Library, play: Play | None) -> Plan:
+    """Plan the heading over a whole stretch, so that all windows that are cut out of it agree."""
+    resolved = resolve_plan(plan, library, are_touches_resolved=True)
+    return replace(plan, heading_path=resolved.plan_heading(play))

@@ -20,7 +20,7 @@ from ..files.event_providers import EVENT_PROVIDERS
 from .pieces.units import OVERLAP, WINDOW
 
 _DEFAULTS = collect_defaults("match")
-FORM = 3
+FORM = 4
 """Raised whenever the same request would give other results, so that stored ones are not used for it."""
 
 WINDOW_LIMITS = (5.0, 600.0)
@@ -75,12 +75,13 @@ class MatchRequest:
     seed: int = _DEFAULTS["seed"]
     nearest: bool = _DEFAULTS["nearest"]
     solve_touches: bool = _DEFAULTS["solve_touches"]
+    watch: float = _DEFAULTS["watch"]
     annotations: Path | None = None
     bvh: bool = _DEFAULTS["bvh"]
     figures: bool = _DEFAULTS["figures"]
     window: float = WINDOW
     overlap: float = OVERLAP
-    variety: float = 0.3
+    variety: float = 0.6
     workers: int = 1
     scheduler: str = ""
     events_meta: Path | None = None
@@ -108,8 +109,8 @@ class MatchRequest:
         return {name: value.as_posix() if isinstance(value, Path) else value for name, value in asdict(self).items()}
 
 
-_RESULTS = ("provider", "start", "end", "players", "fps", "seed", "nearest", "solve_touches", "window", "overlap",
-            "variety", "events_provider")
+_RESULTS = ("provider", "start", "end", "players", "fps", "seed", "nearest", "solve_touches", "watch", "window",
+            "overlap", "variety", "events_provider")
 _FILES = ("tracking", "meta", "events", "events_meta")
 
 

@@ -32,6 +32,7 @@ from .match_ball import apply_led_ball, build_ball_plan, sample_ball
 from .pieces import stages
 from .pieces.pool import WorkerConfig, check_workers, stop_workers
 from .pieces.tasks import LibrarySource, set_library
+from .play import build_plays
 from .player_plans import build_player_plans, check_label_folder, list_unknown_texts, list_unused_labels
 from .report.pictures import build_thumbnail_renderer
 from .request import MatchRequest, build_identity
@@ -163,7 +164,7 @@ def _run_stages(
     roles, state.report["spacing"] = separate_roles(roles, match.times[inside], touches)
     names = build_file_names(player.id for player in match.players)
     parts = build_player_plans(roles, names, words, solved=solved, request=job.request, folder=job.folder,
-                               known_labels=job.library.labels)
+                               library=job.library, plays=build_plays(match))
     rows = job.folder.previous_state.get("players", ())
     finished = {row["id"]: row["finished"] for row in rows if isinstance(row.get("finished"), str)}
     state.players = {part.role.player.id: build_player_row(part, finished.get(part.role.player.id)) for part in parts}

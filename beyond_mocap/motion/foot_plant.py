@@ -29,6 +29,10 @@ from .skeleton import Skeleton
 SMOOTH_WEIGHT, PULL_WEIGHT = 0.005, 3e-4
 """Weights of `solve_shift`: of the third difference of the shift, and of the shift itself."""
 
+LONG_STANCE = 20.0
+"""Frames at 30 fps of a stance from which on it weighs more, by the square of its length: over seconds the pull would
+let a foot creep by centimetres."""
+
 HEEL_SHARE = 0.2
 """Weight of a heel while its toe is in contact too, against the toe's 1."""
 
@@ -295,12 +299,19 @@ def relax_contact_weights(weight: np.ndarray, excess: np.ndarray) -> np.ndarray:
     return weight / (1.0 + worst[label] / 0.02)[:, None] ** 2
 
 
+def _measure_firmness(is_planted: np.ndarray, scale: float) -> np.ndarray:
+    """Measure how many times firmer than a step's each stance is, (T,) for frames (T,) bool of stances."""
+    label = number_runs(is_planted)
+    length = np.bincount(label)[label] * is_planted
+    return np.maximum(scale * length / LONG_STANCE, 1.0) ** 2
+
+
 def solve_shift(velocity: np.ndarray, weight: np.ndarray, scale: float = 1.0, fixed_shifts: np.ndarray
                 | None = None) -> np.ndarray:
     """Solve the smooth shift D that cancels velocities where they carry weight.
 
-    Minimizes sum w |D' + v|^2 + SMOOTH_WEIGHT |D'''|^2 + PULL_WEIGHT |D|^2, with differences per frame at 30 frames per
-    second.
+    Minimizes sum w f |D' + v|^2 + SMOOTH_WEIGHT |D'''|^2 + PULL_WEIGHT |D|^2, with differences per frame at 30 frames
+    per second, and f the firmness of long stances (LONG_STANCE).
 
     Args:
         velocity: (T - 1, P, K) movement per frame of P points, or (T - 1, K) of one point.
@@ -314,6 +325,7 @@ def solve_shift(velocity: np.ndarray, weight: np.ndarray, scale: float = 1.0, fi
     if velocity.ndim == 2:
         velocity = velocity[:, None, :]
     weights = np.minimum(weight[1:], weight[:-1])
+    weights = weights * _measure_firmness(weights.max(axis=1) > 0.0, scale)[:, None]
     total = weights.sum(axis=1)
     weighted_velocity = np.einsum("tp,tpk->tk", weights, velocity)
     squares = BandedLeastSquares(count, columns=velocity.shape[2])

@@ -61,10 +61,11 @@ class Motion:
 
 
 def _normalize_rotations(q: np.ndarray) -> np.ndarray:
-    """Normalize quaternions, but leave unit ones as they are: dividing again would change the last bits at every copy.
+    """Normalize quaternions, but leave each unit one as it is: dividing again would change its last bits at every copy.
     """
     q = np.asarray(q, dtype=float)
-    return q if np.all(np.abs(np.sum(q * q, axis=-1) - 1.0) < 1e-12) else quaternion.normalize(q)
+    is_unit = np.abs(np.sum(q * q, axis=-1, keepdims=True) - 1.0) < 1e-12
+    return q if np.all(is_unit) else np.where(is_unit, q, quaternion.normalize(q))
 
 
 def forward_kinematics(motion: Motion) -> tuple[np.ndarray, np.ndarray]:

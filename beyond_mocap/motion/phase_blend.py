@@ -9,15 +9,16 @@ based on motion blending", mix parameterized recordings in this manner.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.interpolate import PchipInterpolator
 
-from ..base.vectors import distances_along
+from ..base.easing import smoothstep
+from ..base.vectors import arctan2, distances_along
 from . import quaternion
 from .humanoid import compute_heading_from_positions
-from .motion import Motion, forward_kinematics, sample_frames
+from .motion import Motion, compute_pose, forward_kinematics, sample_frames
 from .track import smooth_zero_phase_hann
 
 _SWAY_SECONDS = 0.7
@@ -66,10 +67,16 @@ class Strides:
         """Mean speed over all steps, m/s."""
         return float(self.metres.sum() / self.seconds.sum())
 
-    def remove_first_step(self) -> "Strides":
-        """Return the same strides without the first step."""
-        return Strides(motion=self.motion, landings=self.landings[1:], first_side=1 - self.first_side,
-                       heel_toe_contacts=self.heel_toe_contacts, facing=self.facing, path=self.path)
+    def select_steps(self, first: int, end: int) -> Strides:
+        """Return the same strides with only the steps first .. end."""
+        return replace(self, landings=self.landings[first : end + 1], first_side=(self.first_side + first) % 2)
+
+    def measure_poses(self, phase: np.ndarray) -> np.ndarray:
+        """Measure where the joints are relative to the hips and the heading, (T, J, 3) m, at phases (T,) in steps."""
+        sample = _sample_at_phase(self, phase, self.steps)
+        root = np.column_stack([sample["sway"], sample["height"]])
+        places, _ = compute_pose(self.motion.skeleton, root, sample["pose"])
+        return places
 
 
 def find_strides(motion: Motion, heel_toe_contacts: np.ndarray) -> Strides | None:
@@ -141,11 +148,49 @@ def blend_strides(slow: Strides, fast: Strides, speed: float, fps: float) -> tup
     return Motion(slow.motion.skeleton, root, quaternion.unify_signs(rotations), fps), mixed["inside"] > 0.0
 
 
+def repeat_strides(strides: Strides, seconds: float, fps: float, tempo: float = 1.0,
+                   length: float = 1.0) -> tuple[Motion, np.ndarray]:
+    """Repeat steady locomotion at an even tempo, from the origin along +X, or backward in time along -X.
+
+    The first step comes before the part that is repeated: the last one passes into it, so that the end fits the start.
+    Every step lasts as long as the mean step, and the body does not turn from one stride to the next.
+
+    Args:
+        strides: an odd number of steps, three or more.
+        seconds: duration of the result.
+        fps: frames per second of the result.
+        tempo: factor on steps per second; below 0 time runs backward.
+        length: factor on the distance travelled with each step.
+    Returns:
+        The motion, and the contacts (T, 2, 2) bool of left and right, heel and toe.
+    """
+    repeated = strides.steps - 1
+    times = np.arange(int(seconds * fps)) / fps
+    rate = tempo * repeated / strides.seconds[1:].sum()
+    phase = 1.0 + times * rate % repeated
+    share = smoothstep(np.maximum(phase - repeated, 0.0))
+    later, earlier = (_sample_at_phase(strides, at, strides.steps)
+                      for at in (phase, np.where(share > 0.0, phase - repeated, phase)))
+    weight = {name: share.reshape(-1, *[1] * (values.ndim - 1)) for name, values in later.items()}
+    mixed = {name: (1.0 - weight[name]) * later[name] + weight[name] * earlier[name]
+             for name in ("height", "sway", "turn", "way", "inside")}
+    # frames of whole repetitions, or all where not even one fits
+    whole = int(times[-1] * abs(rate) // repeated * repeated / abs(rate) * fps) or len(times)
+    facing = _integrate((mixed["turn"] - mixed["turn"][:whole].mean()) * rate, fps)
+    travel = quaternion.rotate_level(mixed["way"], facing)
+    facing = facing - arctan2(*travel[:whole].mean(axis=0)[::-1])
+    path = _integrate(quaternion.rotate_level(mixed["way"], facing) * (rate * length), fps)
+    rotations = quaternion.slerp(later["pose"], earlier["pose"], share[:, None])
+    rotations[:, 0] = quaternion.multiply(quaternion.from_up_angle(facing), rotations[:, 0])
+    root = np.column_stack([path + quaternion.rotate_level(mixed["sway"], facing), mixed["height"]])
+    return Motion(strides.motion.skeleton, root, quaternion.unify_signs(rotations), fps), mixed["inside"] > 0.0
+
+
 def _align_first_foot(a: Strides, b: Strides) -> tuple[Strides, Strides]:
     """Make both begin with the same foot: the longer one loses its first step where they do not."""
     if a.first_side == b.first_side:
         return a, b
-    return (a.remove_first_step(), b) if a.steps > b.steps else (a, b.remove_first_step())
+    return (a.select_steps(1, a.steps), b) if a.steps > b.steps else (a, b.select_steps(1, b.steps))
 
 
 def _solve_blend_weight(slow: Strides, fast: Strides, steps: int, speed: float) -> float:

@@ -17,7 +17,6 @@ from ..annotation.gaits import compute_heading_offset
 from ..annotation.striking import BODY_PARTS
 from ..annotation.timeline import KeyMoment
 from ..ball.contact import find_striking_surface
-from ..base.easing import smoothstep
 from ..base.errors import InputError, format_seconds
 from ..base.time_series import interpolate_columns
 from ..base.vectors import arctan2
@@ -30,7 +29,6 @@ from ..motion.track import BALL_RADIUS, SampledTrack, Track
 from ..motion.track.ball_path import BallPath
 from ..motion.track.sampling import compute_travel_direction
 from ..synthesis.construct.construction import Construction
-from ..synthesis.construct.gaze import CHEST_SHARE, follow_with_gaze
 from ..synthesis.construct.strike import Touch
 from ..synthesis.construct.strike_fixed_ball import FixedStrike, FixedStrikeResult, strike_fixed_ball
 from ..synthesis.construct.track_following import IN_PLACE_SPEED, follow_turning
@@ -41,7 +39,6 @@ from ..synthesis.search.path_costs import BoneDistance
 from ..synthesis.search.path_search import PathSearch
 from ..synthesis.search.request import RequestedKey, SearchRequest
 from ..synthesis.search.source_frames import SourceMotion, fetch_motion
-from ..synthesis.synthesize import estimate_look
 from ..synthesis.take import Take
 from .player_path import HitOrder, PlacedHit, Stance, build_player_path, compute_travel_time, place_hits
 from .pose_distance import BoneWeights, weigh_bones
@@ -50,8 +47,6 @@ TRANSITION = 0.4
 """Seconds over which one piece of a clip blends into the next."""
 FASTEST_FACTOR = 1.15
 """Times the library's highest speed that a player reaches without a warning."""
-HEADER_SECONDS = 0.3
-"""Seconds around a header in which the head moves as recorded; it blends over as many more."""
 _PART_LABELS = {**{part: part for part in BODY_PARTS}, "hand": "throw"}  # there is no label "hand"
 _WATCH_WEIGHT = 0.02  # weight of facing the ball while standing, against the clip's own turning
 
@@ -62,7 +57,7 @@ class BodySettings:
 
     Attributes:
         transition: seconds of the blend between pieces of clips (section 4: S_T).
-        watch: whether the head follows the ball.
+        watch: whether head and shoulders follow the ball.
         seed: seed that the take records; nothing here is left to chance.
         weights: bone weights of eq. 1, by which poses are compared where one clip is left for the next.
     """
@@ -167,6 +162,11 @@ def _check_orders(orders: Sequence[HitOrder], times: np.ndarray, fps: float) -> 
             raise InputError("strike", f"one player has two at {after.time:g} s", "one at a time")
 
 
+def _find_part_label(order: HitOrder) -> str:
+    """Find the label of the part that strikes; a tool strikes like a kick."""
+    return _PART_LABELS.get(order.part, "kick")
+
+
 class _PlayerBuilder:
     """Builds the motion of one player.
 
@@ -186,7 +186,7 @@ class _PlayerBuilder:
         self.ball = interpolate_columns(self.times, ball.times, ball.positions)
 
     def build(self, progress, cancelled) -> PlayerMotion:
-        """Search, construct, turn the head and solve ball contact."""
+        """Search, construct and solve ball contact."""
         report = progress or (lambda fraction, text: None)
         count = max(int(np.floor((self.times[-1] - self.start) * self.library.fps + 1e-6)) + 1, 2)
         order = self._build_request(self.start + np.arange(count) / self.library.fps)
@@ -208,7 +208,6 @@ class _PlayerBuilder:
                                             heading=self._compute_heading(track, path.facing, source),
                                             is_planned=True).construct_body()
         body = Motion(self.library.skeleton, planted.root, planted.rotations, self.fps)
-        body = self._follow_ball(body)
         met = strike_fixed_ball(body, constructed.heel_toe_contacts.any(axis=2), self._build_contacts())
         ball = BallPath(self.times, self.ball, np.ones(len(self.times), bool))
         take = Take(**build_provenance_fields(self.library, source), motion=met.motion, start_time=self.start,
@@ -232,15 +231,18 @@ class _PlayerBuilder:
                 labels[frame] = None
         allowed = np.ones(len(library.clips), bool)
         avoided = tuple(strikes for _ in labels) if strikes else ()
-        return SearchRequest(plan=self._build_plan(track), track=track, requested_labels=tuple(labels), gait=gait,
-                             timeline=Timeline(), keys=keys, allowed=allowed, warnings=(), avoided=avoided)
+        return SearchRequest(
+            plan=self._build_plan(track), track=track, requested_labels=tuple(labels),
+            is_asked=np.zeros(len(labels), bool), gait=gait, timeline=Timeline(), keys=keys, allowed=allowed,
+            warnings=(), avoided=avoided,
+        )
 
     def _build_key(self, hit: PlacedHit, frame: float) -> RequestedKey:
         """Build the key moment of a placed hit at a fractional `frame` of the search."""
         order = hit.order
         clip = self.library.clips[order.clip]
         frames = range(int(hit.first), int(hit.last) + 1)
-        labels = frozenset({_PART_LABELS.get(order.part, "kick"), order.side}
+        labels = frozenset({_find_part_label(order), order.side}
                            - {""}).union(*map(clip.labels_at, frames))
         key = Key(order.clip, float(order.strike_frame), hit.first, hit.last, labels)
         return RequestedKey(requested=KeyMoment(order.time, tuple(sorted(labels))), frame=frame, choices=(key,),
@@ -260,7 +262,8 @@ class _PlayerBuilder:
     def _build_plan(self, track: SampledTrack) -> Plan:
         """Build the plan that the take stores: the track of the player's path."""
         return Plan(track=Track(track.times, track.positions, track.ball), library=self.library.folder, fps=self.fps,
-                    seam_window=2.0 * self.settings.transition, seed=self.settings.seed, made=False)
+                    seam_window=2.0 * self.settings.transition, seed=self.settings.seed, made=False,
+                    watch=float(self.settings.watch))
 
     def _compute_heading(self, track: SampledTrack, recorded: np.ndarray, source: SourceMotion) -> np.ndarray:
         """Compute the heading (T,) rad: as recorded in hit motions, and between them a compromise, turned the short
@@ -288,26 +291,9 @@ class _PlayerBuilder:
     def _build_touches(self) -> list[Touch]:
         """Build the hit motions as stretches in which no steps are added."""
         return [
-            Touch((hit.order.time - self.start) * self.fps, ("kick",), (hit.order.time - hit.start) * self.fps,
-                  (hit.end - hit.order.time) * self.fps) for hit in self.hits
+            Touch((hit.order.time - self.start) * self.fps, (_find_part_label(hit.order),),
+                  (hit.order.time - hit.start) * self.fps, (hit.end - hit.order.time) * self.fps) for hit in self.hits
         ]  # fmt: skip
-
-    def _follow_ball(self, body: Motion) -> Motion:
-        """Turn the head to the ball, except around headers; in hit motions the chest, which carries the arms, is left
-        alone.
-        """
-        if not self.settings.watch:
-            return body
-        share = np.ones(len(self.times))
-        for order in self.orders:
-            if order.part == "head":
-                share *= np.clip((np.abs(self.times - order.time) - HEADER_SECONDS) / HEADER_SECONDS, 0.0, 1.0)
-        arms = np.ones(len(self.times))
-        for hit in self.hits:
-            outside = np.maximum(hit.start - self.times, self.times - hit.end)
-            arms *= np.clip(outside / HEADER_SECONDS, 0.0, 1.0)
-        share, arms = smoothstep(share), smoothstep(arms)
-        return follow_with_gaze(body, self.ball, estimate_look(self.library), share, CHEST_SHARE * arms)
 
     def _build_contacts(self) -> list[FixedStrike]:
         """Build the ball contacts to solve: frame, surface, ball centre, and the blend in and out."""

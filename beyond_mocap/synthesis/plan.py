@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -19,12 +20,16 @@ from ..base.settings.setting import LATER, add_fields, check_limits
 from ..base.time_series import interpolate_columns
 from ..motion.skeleton import freeze_array
 from ..motion.track import SampledTrack, Track, sample_track
+from .heading_path import HeadingPath
+from .heading_plan import FPS, HeadingKey, HeadingRequest, Play, plan_heading_path, rest_track, sample_heading
 
-PARTS = ("left_hand", "right_hand", "left_foot", "right_foot", "gaze")
+GAZE = "gaze"
+PARTS = ("left_hand", "right_hand", "left_foot", "right_foot", GAZE)
 FEET = ("", "left", "right")
 METHODS = find_setting("synthesis", "method").choice_names
 _DEFAULTS = collect_defaults("synthesis", "player")
 _HEIGHT = find_setting("player", "height")
+_SAME = 1e-5  # s by which the end of a hold and the next key may differ where both are meant to be one time
 
 
 @dataclass(frozen=True)
@@ -127,13 +132,16 @@ class Plan:
         timeline: the requested annotations (`annotation.read_timeline`), not yet filled.
         library: folder of the library.
         pins: where hands, feet and gaze have to be, in order of time.
+        heading_keys: where the body has to face, in order of time; the rest is planned (`heading_plan`).
         gaits: (gait label, clip) pairs; other gaits are found among all clips.
         height: m, of the player; 0 for the library's.
         strong_foot: one of FEET.
         style: labels, or names or patterns of folders and clips ("academy", "lmd/*").
         solved: the ball's trajectory where it is known already, such as from a whole match.
+        heading_path: the planned heading where it is known already, such as over a whole match.
     Raises:
-        InputError: for a number outside the limits of its setting, and for two pins of one part at one time.
+        InputError: for a number outside the limits of its setting, and for two pins of one part or two heading keys at
+            one time.
     Source: Faustino 2016: catch_up §3.3.2, alpha eq. 13 (for "path" `synthesis.search.path_costs`), delta §3.2.4, omega
         and gaits §3.1.1, seam_window eq. 25 (twice its s; "path" blends over half of it). Others: made in
         `library.synthetic_clips`, track_window in `motion.track.smooth_positions`, solve_touches in
@@ -159,6 +167,7 @@ class Plan:
     root_window: float = _DEFAULTS["root_window"]
     gaits: tuple[tuple[str, str], ...] = ()
     pins: tuple[Pin, ...] = ()
+    heading_keys: tuple[HeadingKey, ...] = field(default=(), metadata=LATER)
     height: float = 0.0
     strong_foot: str = ""
     style: tuple[str, ...] = ()
@@ -166,10 +175,14 @@ class Plan:
     solve_touches: bool = field(default=_DEFAULTS["solve_touches"], metadata=LATER)
     variety: float = field(default=_DEFAULTS["variety"], metadata=LATER)
     lag: float = field(default=_DEFAULTS["lag"], metadata=LATER)
+    manner: int = field(default=_DEFAULTS["manner"], metadata=LATER)
     solved: SolvedTrajectory | None = field(default=None, compare=False, repr=False, metadata=LATER)
+    heading_path: HeadingPath | None = field(default=None, compare=False, repr=False, metadata=LATER)
+    watch: float = field(default=_DEFAULTS["watch"], metadata=LATER)
 
     def __post_init__(self):
         object.__setattr__(self, "pins", tuple(sorted(self.pins, key=lambda pin: (pin.time, pin.part))))
+        object.__setattr__(self, "heading_keys", tuple(sorted(self.heading_keys, key=lambda key: key.time)))
         object.__setattr__(self, "style", tuple(dict.fromkeys(self.style)))
         check_limits(self, (*list_settings("synthesis"), *list_settings("player")))
         if 0.0 < self.omega < 1.0:
@@ -180,6 +193,7 @@ class Plan:
         if self.strong_foot not in FEET:
             raise InputError("strong foot", repr(self.strong_foot), "left, right, or empty for any")
         self._check_pins()
+        self._check_heading_keys()
 
     if TYPE_CHECKING:
 
@@ -198,6 +212,14 @@ class Plan:
                 if after.time <= before.end:
                     found = f"two pins of {part} at {format_seconds(after.time)} s"
                     raise InputError("pins", found, "one place at a time", "move one, or shorten the earlier hold")
+
+    def _check_heading_keys(self):
+        """Raise InputError for two heading keys at one time; one may begin where another ends."""
+        for before, after in zip(self.heading_keys, self.heading_keys[1:]):
+            if after.time == before.time or after.time < before.end - _SAME:
+                found = f"two keys at {format_seconds(after.time)} s"
+                raise InputError("heading keys", found, "one heading at a time",
+                                 "move one, or shorten the earlier hold")
 
 
 def sample_with_trajectory(track: Track, trajectory: SolvedTrajectory | None, fps: float,
@@ -242,6 +264,7 @@ class ResolvedPlan:
     track: Track
     trajectory: SolvedTrajectory | None
     size: float
+    _sampled: dict[tuple[float, bool], SampledTrack] = field(default_factory=dict, init=False, repr=False)
 
     @property
     def method(self) -> str:
@@ -253,8 +276,55 @@ class ResolvedPlan:
         """Output frames per second."""
         return self.requested.fps
 
-    def sample_track(self, fps: float) -> SampledTrack:
-        """Sample the track, with the solved ball, in the library's size, at `fps` frames per second."""
+    @cached_property
+    def heading_path(self) -> HeadingPath:
+        """The planned heading; method "path" only."""
+        return self.requested.heading_path or self.plan_heading()
+
+    def plan_heading(self, play: Play | None = None) -> HeadingPath:
+        """Plan the heading.
+
+        Args:
+            play: what a player of a match faces beside the ball.
+        Returns:
+            The planned heading, the same whatever frame rate it is read at.
+        """
+        size = self.size
+        gazes = [replace(pin, position=(pin.position[0] / size, pin.position[1] / size, pin.position[2] / size))
+                 for pin in self.requested.pins if pin.part == GAZE]
+        keys = self._find_heading_keys()
+        request = HeadingRequest(keys=keys, gazes=tuple(gazes), spans=self.timeline.spans, play=play)
+        return plan_heading_path(rest_track(self._sample_ball_track(FPS)), request)
+
+    def _find_heading_keys(self) -> tuple[HeadingKey, ...]:
+        """Find the heading keys that hold at any time of the track, or of a whole match's, in the library's size."""
+        size, (start, end) = self.size, self.track.times[[0, -1]]
+        return tuple(
+            key if key.target is None else replace(key, target=(key.target[0] / size, key.target[1] / size))
+            for key in self.requested.heading_keys
+            if self.requested.heading_path is not None or key.is_within(start, end)
+        )
+
+    def sample_track(self, fps: float, rests: bool = True) -> SampledTrack:
+        """Sample the track, with the solved ball, in the library's size; each of its forms is computed once.
+
+        With method "path" it has the places and headings of the body.
+
+        Args:
+            fps: frames per second.
+            rests: whether the body of a slow track may rest (`motion.track.resting_place`); method "path" only.
+        """
+        if (fps, rests) not in self._sampled:
+            sampled = self._sample_ball_track(fps)
+            if self.method == "path":
+                sampled = rest_track(sampled, rests)
+                heading, held = sample_heading(self.heading_path, self._find_heading_keys(), sampled)
+                sampled = replace(sampled, heading=heading, held=held)
+            self._sampled[fps, rests] = sampled
+        return self._sampled[fps, rests]
+
+    def _sample_ball_track(self, fps: float) -> SampledTrack:
+        """Sample the track, with the solved ball, in the library's size, as it was measured."""
         trajectory = self.trajectory
         if trajectory is not None and self.size != 1.0:
             trajectory = replace(trajectory, ball=trajectory.ball / self.size)

@@ -12,6 +12,7 @@ from ..annotation import sort_labels
 from ..files.atomic import atomic_write
 from ..files.tables import format_csv, parse_column, parse_flags, read_rows
 from ..library.library import Library
+from ..motion import quaternion
 from ..motion.skeleton import freeze_array
 from .search.source_frames import SourceFrames
 from .take import Take
@@ -19,6 +20,8 @@ from .take import Take
 PROVENANCE_COLUMNS = (
     "frame", "time_s", "clip", "clip_frame", "mirrored", "labels", "contact_left", "contact_right",
 )  # fmt: skip
+HEADING_COLUMN = "planned_heading_deg"
+"""Last column, where the heading was planned."""
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -32,6 +35,7 @@ class Provenance:
         mirrored: (T,) bool.
         words: T tuples of labels.
         contacts: (T, 2) bool, left and right foot in contact.
+        planned_heading: (T,) rad from +x that was planned, NaN or None where there is no plan.
     """
 
     times: np.ndarray
@@ -40,10 +44,13 @@ class Provenance:
     mirrored: np.ndarray
     words: tuple[tuple[str, ...], ...]
     contacts: np.ndarray
+    planned_heading: np.ndarray | None = None
 
     def __post_init__(self):
         for name, kind in (("times", float), ("clip_frame", float), ("mirrored", bool), ("contacts", bool)):
             object.__setattr__(self, name, freeze_array(getattr(self, name), kind))
+        if self.planned_heading is not None:
+            object.__setattr__(self, "planned_heading", freeze_array(self.planned_heading))
 
     def __len__(self) -> int:
         return len(self.times)
@@ -58,28 +65,34 @@ def build_provenance(take: Take) -> Provenance:
         mirrored=take.mirrored,
         words=tuple(map(tuple, take.words)),
         contacts=take.contacts,
+        planned_heading=take.planned_heading,
     )
 
 
 def write_provenance(path: str | os.PathLike, take: Take | Provenance) -> None:
     """Write provenance as CSV, one row per output frame.
 
-    Columns: `frame,time_s,clip,clip_frame,mirrored,labels,contact_left,contact_right`.
+    Columns: `frame,time_s,clip,clip_frame,mirrored,labels,contact_left,contact_right`, and where the heading was
+    planned `planned_heading_deg`, degrees from +x.
 
     Args:
         path: the file.
         take: a take or its provenance.
     """
     table = build_provenance(take) if isinstance(take, Take) else take
-    columns = zip(
+    columns = [
         (f"{time:.6f}" for time in table.times),
         table.clip,
         (f"{frame:.4f}" for frame in table.clip_frame),
         table.mirrored.astype(int),
         (" ".join(words) for words in table.words),
         *table.contacts.astype(int).T,
-    )
-    atomic_write(path, format_csv(PROVENANCE_COLUMNS, ((i, *row) for i, row in enumerate(columns))))
+    ]
+    names = PROVENANCE_COLUMNS
+    if table.planned_heading is not None:
+        names, degrees = (*names, HEADING_COLUMN), np.degrees(quaternion.wrap_angle(table.planned_heading))
+        columns.append([f"{value:.2f}" if np.isfinite(value) else "" for value in degrees])
+    atomic_write(path, format_csv(names, ((i, *row) for i, row in enumerate(zip(*columns)))))
 
 
 def read_provenance(path: str | os.PathLike) -> Provenance:
@@ -89,6 +102,7 @@ def read_provenance(path: str | os.PathLike) -> Provenance:
         InputError: naming the line of a row that does not have this form.
     """
     rows = list(read_rows(path, PROVENANCE_COLUMNS))
+    is_planned = bool(rows) and HEADING_COLUMN in rows[0][1]
     return Provenance(
         times=parse_column(rows, "time_s"),
         clip=tuple(row["clip"] for _, row in rows),
@@ -96,6 +110,7 @@ def read_provenance(path: str | os.PathLike) -> Provenance:
         mirrored=parse_flags(rows, "mirrored"),
         words=tuple(tuple(row["labels"].split()) for _, row in rows),
         contacts=np.column_stack([parse_flags(rows, "contact_left"), parse_flags(rows, "contact_right")]),
+        planned_heading=np.radians(parse_column(rows, HEADING_COLUMN, blank=True)) if is_planned else None,
     )
 
 

@@ -85,9 +85,9 @@ def resynthesize(
 ) -> Take:
     """Update a take after its plan has changed: search and construct only what the change affects.
 
-    Pins are applied again. It is a whole synthesis where the change is not one of labels, track, ball or pins (another
-    method, frame rate, length or choice), where `before` was built from another library or by another method than
-    "path", or where all of it is affected. The same library, plan and take give the same bits.
+    Pins are applied again. It is a whole synthesis where the change is not one of labels, track, ball, pins or headings
+    (another method, frame rate, length or choice), where `before` was built from another library or by another method
+    than "path", or where all of it is affected. The same library, plan and take give the same bits.
 
     Args:
         library: the recordings.
@@ -136,11 +136,12 @@ def _check_stretch(plan: Plan, before: Take, variant: VariantStretch) -> None:
 
 
 def _is_comparable(plan: Plan, before: Take) -> bool:
-    """Return whether the plans differ only in track, timeline, library folder and pins, over the same time."""
+    """Return whether the plans differ only in track, timeline, library folder, pins and headings, at the same times."""
     old = before.plan
     if old is None or plan.method != "path":
         return False
-    same_choices = replace(plan, track=old.track, timeline=old.timeline, library=old.library, pins=old.pins) == old
+    same_choices = replace(plan, track=old.track, timeline=old.timeline, library=old.library, pins=old.pins,
+                           heading_keys=old.heading_keys) == old
     return same_choices and np.array_equal(plan.track.times[[0, -1]], old.track.times[[0, -1]])
 
 
@@ -366,6 +367,7 @@ class _TakeUpdate:
             correction=self.correction,
             ik_miss=self.miss,
             stepped=self.stepped,
+            planned_heading=self.track.heading,
             plan=self.plan.requested,
             edit=self.edit,
         )

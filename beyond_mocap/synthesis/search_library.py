@@ -7,9 +7,9 @@ from collections.abc import Callable
 import numpy as np
 
 from ..annotation.ball_contact import takes_with_foot
+from ..annotation.gaits import compute_heading_offset
 from ..library.automatic_locomotion import apply_chosen_gaits
 from ..library.library import Library
-from ..motion.track import sample_track
 from .plan import ResolvedPlan
 from .search.edit_list import EditList
 
@@ -36,7 +36,9 @@ def extend_library(
 
 def _lacks_speeds(library: Library, plan: ResolvedPlan) -> bool:
     """Return whether the recordings lack speeds of the track, or touches as fast as its key moments."""
-    track = sample_track(plan.track, library.fps, plan.requested.track_window)
+    track = plan.sample_track(library.fps)
     moments = np.array([key.resolved_time for key in plan.timeline.keys])
     takes = np.array([takes_with_foot(key.words) for key in plan.timeline.keys], bool)
-    return library.needs_synthetic_clips(track.speed, np.interp(moments, track.times, track.speed), takes)
+    offset = compute_heading_offset(track)
+    return library.needs_synthetic_clips(track.speed, offset, np.unwrap(track.direction + offset),
+                                         np.interp(moments, track.times, track.speed), takes)

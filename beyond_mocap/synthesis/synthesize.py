@@ -12,23 +12,23 @@ fetched (`synthesis.search.source_frames`) and placed on the track (`synthesis.c
 from __future__ import annotations
 
 import time
-import weakref
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ..annotation import LOCOMOTION_LABELS, avoided_labels_per_frame
+from ..annotation import avoided_labels_per_frame
 from ..base.errors import InputError, TimedMessage, format_seconds
 from ..base.time_series import find_runs
 from ..library.library import Library
 from ..motion.foot_plant import PlantResult
-from ..motion.motion import Motion, sample_frames
+from ..motion.motion import Motion
 from ..motion.track.ball_path import BallPath
 from .body_size import to_player_size
 from .construct.construction import Construction, build_key_results, find_touches
 from .construct.extra_steps import Steps
-from .construct.pins import apply_pins, estimate_look_axis
+from .construct.gaze import estimate_look
+from .construct.pins import apply_pins
 from .construct.thesis_methods import construct_blocks
 from .plan import METHODS, Plan, ResolvedPlan
 from .provenance import build_provenance_fields
@@ -55,8 +55,6 @@ KEY_MARGIN = 1.5
 PIN_TOLERANCE, GAZE_TOLERANCE = 0.01, np.radians(5.0)
 """Metres, and radians of a gaze, by which a pin may be missed without a warning."""
 
-LOOK_POSES = 200  # poses from which the look axis is estimated
-_look_axes: weakref.WeakKeyDictionary[Library, np.ndarray] = weakref.WeakKeyDictionary()
 
 Progress = Callable[[float, str], None]
 
@@ -175,7 +173,7 @@ def _construct_motion(
         **build_provenance_fields(library, source), motion=motion, start_time=float(track.times[0]),
         contacts=steps.contacts, timeline=request.timeline, keys=keys, ball=ball, method=plan.method,
         seed=plan.requested.seed, correction=planted.correction, ik_miss=planted.miss, stepped=steps.stepped,
-        plan=plan.requested, edit=edit,
+        plan=plan.requested, edit=edit, planned_heading=track.heading,
     )
     clock.append(time.perf_counter())
     report(1.0, "Done")
@@ -248,19 +246,6 @@ def add_pins(take: Take, recordings: Library) -> Take:
     return replace(take, motion=motion, contacts=found.contacts, pins=results, unpinned=unpinned)
 
 
-def estimate_look(library: Library) -> np.ndarray:
-    """Estimate the direction (3,) in which heads look, in their own frame, over the library's locomotion; cached."""
-    if library not in _look_axes:
-        frames = library.frames
-        gaits = [i for i, word in enumerate(frames.vocabulary) if word in LOCOMOTION_LABELS]
-        going = np.flatnonzero(frames.words[:, gaits].any(axis=1) & (frames.velocity[:, 0] > 0.0))
-        some = going[:: max(1, len(going) // LOOK_POSES)] if len(going) else np.arange(min(len(frames), LOOK_POSES))
-        pairs = zip(frames.clip[some], frames.source[some])
-        poses = [sample_frames(library.clips[clip].motion, np.array([frame]))[1] for clip, frame in pairs]
-        _look_axes[library] = estimate_look_axis(library.skeleton, np.concatenate(poses))
-    return _look_axes[library]
-
-
 def add_warnings(
     take: Take, recordings: Library, request: SearchRequest, hurried_from: int | None, *, more: Sequence[str] = (),
     report_unmet: bool = True,
@@ -275,13 +260,14 @@ def add_warnings(
         more: further lines.
         report_unmet: whether unmet constraints are reported.
     """
-    messages = [*recordings.notes, *request.warnings, *more, *_report_crowded_keys(request, take.edit)]
+    messages = [*recordings.notes, *recordings.proposal_notes, *request.warnings, *more]
+    messages += _report_crowded_keys(request, take.edit)
     if take.plan.method == "path":  # the other methods leave out no part of a clip
         messages += report_left_out(recordings, request, take.edit)
     if hurried_from is not None:
         since = take.start_time + hurried_from / recordings.fps
         messages.append(TimedMessage(f"{since:.1f} s: the search was cut short from here on", (since, since)))
-    messages += [*_report_avoided_labels(take), *_report_missed_pins(take)]
+    messages += [*_report_avoided_labels(take), *_report_missed_pins(take), *_report_ignored_heading_keys(take.plan)]
     unmet = _report_unmet(recordings, take.plan, take) if report_unmet else ()
     return replace(take, is_cut_short=hurried_from is not None, warnings=(*messages, *unmet))
 
@@ -332,6 +318,19 @@ def _report_missed_pins(take: Take) -> list[str]:
             messages.append(TimedMessage(f"{pin} is {beyond:.0f} degrees beyond what the neck can turn", when))
         elif result.pin.part != "gaze" and result.miss > PIN_TOLERANCE:
             messages.append(TimedMessage(f"{pin} is out of reach by {100.0 * result.miss:.0f} cm", when))
+    return messages
+
+
+def _report_ignored_heading_keys(plan: Plan) -> list[str]:
+    """Report the heading keys before the start and after the end of the track, one line for each of the two."""
+    start, end = plan.track.times[0], plan.track.times[-1]
+    messages = []
+    for keys in ([key for key in plan.heading_keys if key.end < start],
+                 [key for key in plan.heading_keys if key.time > end]):
+        if keys:
+            when, last = format_seconds(keys[0].time), format_seconds(keys[-1].time)
+            name = f"heading key at {when} s" if len(keys) == 1 else f"{len(keys)} heading keys at {when} to {last} s"
+            messages.append(f"{name}: outside the track's {format_seconds(start)} to {format_seconds(end)} s; ignored")
     return messages
 
 

@@ -102,6 +102,7 @@ class Take:
         solved: the ball's trajectory where it was solved.
         contact_ball: the ball as it was met, before it was led along that trajectory, None where it was not.
         dribble_touches: the touches of dribbles.
+        planned_heading: (T,) rad from +x that was planned, None without a plan (`heading_plan`).
     """
 
     motion: Motion
@@ -131,3 +132,4 @@ class Take:
     solved: SolvedTrajectory | None = None
     contact_ball: BallPath | None = None
     dribble_touches: tuple[DribbleTouch, ...] = ()
+    planned_heading: np.ndarray | None = None

@@ -169,15 +169,28 @@ def build_posture(
     Returns:
         The posture, N rows.
     """
+    return plant_feet(build_upper_posture(gait_plan, neutral, style, seed), gait_plan.times, steps, neutral)
+
+
+def build_upper_posture(gait_plan: GaitPlan, neutral: NeutralStance, style: GaitStyle, seed: int) -> Posture:
+    """Build the posture at all moments of a plan without feet, which `plant_feet` sets.
+
+    Args:
+        gait_plan: the plan.
+        neutral: neutral stance of the body.
+        style: style of the gait.
+        seed: of the variation.
+    Returns:
+        The posture, N rows.
+    """
     above = pose_trunk(gait_plan, neutral, style, seed)
     count = len(gait_plan.times)
     rate = 1.0 / (gait_plan.times[1] - gait_plan.times[0])
-    posture = Posture(
+    return Posture(
         fps=round(rate / gait_plan.stride, 6), heading=gait_plan.heading, arms=pose_arms(gait_plan, style, seed),
         wrists=np.full((count, 2), np.radians(8.0)), ankles=np.zeros((count, 2, 3)), feet=np.zeros((count, 2, 3)),
         toes=np.zeros((count, 2)), knees=np.full((count, 2), np.radians(2.0)), **above,
     )
-    return plant_feet(posture, gait_plan.times, steps, neutral)
 
 
 def plant_feet(posture: Posture, times: np.ndarray, steps: tuple[Footsteps, ...], neutral: NeutralStance) -> Posture:

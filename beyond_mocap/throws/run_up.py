@@ -145,7 +145,7 @@ def _build_construction(
     library: Library, plan: ResolvedPlan, order: SearchRequest, edit: EditList, heading_of: Callable
 ) -> Construction:
     """Build the construction of the motion that the search found."""
-    track = plan.sample_track(plan.fps)
+    track = plan.sample_track(plan.fps, rests=False)  # it is led through the throw to a centimetre
     index = output_index(len(track.times), library, plan.fps, len(edit))
     source = fetch_motion(library, edit, index, plan.fps)
     touches = find_touches(library, plan.fps, edit, build_key_results(library, plan.fps, order, edit, source))

@@ -11,6 +11,7 @@ from bpy.props import BoolProperty, CollectionProperty, FloatProperty, IntProper
 
 from ...beyond_mocap.base.settings import list_settings
 from ..overlays.settings import BeyondMocapView
+from ..player.heading_keys import BeyondMocapHeadingKey
 from ..player.pins import BeyondMocapPin
 from ..result.result import BeyondMocapResult, BeyondMocapShared
 from ..rigs.rig import BeyondMocapRig
@@ -55,6 +56,9 @@ class BeyondMocapPlayer(bpy.types.PropertyGroup):
     )
     pins: CollectionProperty(type=BeyondMocapPin, description="Targets for hands, feet and gaze, with their times")
     active_pin: IntProperty(name="Pin", min=0, description="The pin shown below the list")
+    heading_keys: CollectionProperty(type=BeyondMocapHeadingKey,
+                                     description="Directions and objects that the body faces, with their times")
+    active_heading_key: IntProperty(name="Heading Key", min=0, description="The heading key chosen in the list")
     annotation_file: StringProperty(
         name="Labels", **FILE,
         description="Text file of lines 'START END labels' and 'TIME labels'; none means automatic locomotion",
@@ -101,6 +105,10 @@ class BeyondMocapSettings(bpy.types.PropertyGroup):
     )
     library_holds: StringProperty(name="Contents", options={"HIDDEN"},
                                   description="Contents of the library that was built last")
+    library_gaps: StringProperty(
+        name="Left Out and Missing", options={"HIDDEN"},
+        description="What the library that was built last leaves out of locomotion, and which motion it lacks",
+    )
     players: CollectionProperty(type=BeyondMocapPlayer, description="The players to animate, in the order of the list")
     active_player: IntProperty(name="Player", min=0, description="The player shown below the list")
     video: PointerProperty(type=BeyondMocapVideo, description="The reference video")

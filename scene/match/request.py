@@ -164,7 +164,7 @@ def _build_arguments(scene: bpy.types.Scene) -> list[str]:
     out += ["--from", format_float(match.start)] + (["--to", format_float(match.end)] if match.end else [])
     out += _build_player_arguments(match)
     out += [] if match.solve_touches else ["--no-solve-touches"]
-    out += ["--fps", format_float(settings.rate), "--seed", str(settings.seed)]
+    out += ["--fps", format_float(settings.rate), "--seed", str(settings.seed), "--watch", format_float(settings.watch)]
     return out + (["--unit", format_float(settings.library_unit)] if settings.library_unit else [])
 
 

@@ -169,6 +169,8 @@ def _draw_shapes():
 def _draw_overlay(context, view, name: str, shown: DrawnTake) -> None:
     if name == "contacts":
         _draw_contacts(shown)
+    elif name == "heading" and not shown.active:
+        return
     elif name == "ghosts":
         for frame in _ghost_frames(view, shown):
             _draw_batches(context, _build_batches((shown.take, "ghost", frame),
@@ -344,6 +346,7 @@ ROWS = {
     "speed": _build_key_row(("track speed", colours.TRACK_SPEED), ("body speed", colours.BODY_SPEED),
                             ("1 m high: 5 m/s", colours.GREY)), "contacts": _build_key_row(("left", colours.LEFT),
                                                                                            ("right", colours.RIGHT)),
+    "heading": _build_key_row(("planned heading", colours.HEADING), ("heading key", colours.HEADING_KEY)),
     "paths": _build_key_row(("original", colours.SKY), ("new path", colours.ORANGE), ("tick: 1 s", colours.GREY)),
     "shots": _build_key_row(("ball trajectory", colours.WHITE), ("other candidates", colours.BLACK),
                             ("after the target", colours.VERMILION), ("striking part", colours.SKY),

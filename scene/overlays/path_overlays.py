@@ -122,10 +122,8 @@ def build_figure(source: "PathEditSource", row: int) -> list[Mesh]:
 
 def build_tracker(colour) -> list[Mesh]:
     """Build a ring with an arrow along X."""
-    tip, back = ARROW, ARROW - 0.14
-    arrow = [(RING, 0.0, LIFT), (tip, 0.0, LIFT), (tip, 0.0, LIFT), (back, 0.08, LIFT), (tip, 0.0, LIFT),
-             (back, -0.08, LIFT)]
-    points = np.concatenate([shapes.build_circle((0.0, 0.0, LIFT), RING), np.array(arrow, np.float32)])
+    arrow = shapes.build_arrows(np.array([[RING, 0.0]]), np.zeros(1), ARROW - RING, LIFT)
+    points = np.concatenate([shapes.build_circle((0.0, 0.0, LIFT), RING), arrow])
     return [build_uniform_mesh(points, colour, WIDE)]
 
 

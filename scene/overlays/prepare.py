@@ -12,7 +12,7 @@ from . import colours, shapes
 if TYPE_CHECKING:  # the core's modules are slow to import, and enabling the extension must be quick
     from ...beyond_mocap.evaluation.per_frame import Footprint, PerFrame, Strike
     from ...beyond_mocap.library.library import Library
-    from ...beyond_mocap.synthesis.plan import Plan
+    from ...beyond_mocap.synthesis.plan import Plan, ResolvedPlan
     from ...beyond_mocap.synthesis.search.explanation import ChoiceReason
     from ...beyond_mocap.synthesis.take import Take
 
@@ -20,6 +20,7 @@ RAIL, SOLE, SOLE_EDGE, TRANSITION = 0.020, 0.024, 0.027, 0.030  # metres above t
 RAILS, HALF_TRANSITION = (0.13, 0.17), 0.35
 SPEED_FOOT, PER_SPEED = 0.05, 0.2  # metres of the speed curtain's lower edge, and of its height for each m/s
 BALL_SECONDS = 1.0
+ARROW, HEADING, HEADING_SECONDS = 0.45, 0.032, 0.5  # m long, m above the ground, s from one arrow to the next
 MOST_PARTS = 4
 
 
@@ -146,7 +147,9 @@ def prepare_take(plan: "Plan", take: "Take", library: "Library | None") -> Prepa
     from ...beyond_mocap.evaluation.per_frame import find_footprints, find_strikes, measure_per_frame
     from ...beyond_mocap.evaluation.reference import View
     from ...beyond_mocap.synthesis.quality.playback import playback_from_take
+    from ...beyond_mocap.synthesis.resolve_plan import resolve_plan
 
+    resolved = None if library is None else resolve_plan(plan, library, trajectory=take.solved)
     view = View(playback_from_take(take), plan.track, take.timeline, library)
     figures, strike_list = measure_per_frame(view), find_strikes(view)
     positions = view.played.positions.astype(np.float32)
@@ -157,14 +160,15 @@ def prepare_take(plan: "Plan", take: "Take", library: "Library | None") -> Prepa
               "footprints": _build_footprints(find_footprints(view)),
               "seams": _build_transitions(view.played.pelvis, take.seams),
               "moments": _build_moments(strike_list, take),
-              "speed": _build_speed(ground, figures)}
+              "speed": _build_speed(ground, figures),
+              "heading": () if resolved is None else build_heading_arrows(resolved)}
     return PreparedTake(start=float(take.start_time), fps=float(take.motion.fps), count=len(take.motion),
                         meshes={name: found for name, found in meshes.items() if found},
                         pelvis=positions[:, view.played.body.hips], toes=view.played.feet[:, :, 1].astype(np.float32),
                         contacts=view.played.contacts, figures=positions, pairs=pairs,
                         pair_colours=_build_pair_colours(skeleton.names, pairs),
                         transitions=tuple(int(seam) for seam in take.seams),
-                        pieces=_build_pieces(plan, take, library, view.played.pelvis),
+                        pieces=_build_pieces(resolved, take, library, view.played.pelvis),
                         labels=tuple(_build_label(strike) for strike in strike_list))
 
 
@@ -229,6 +233,29 @@ def _build_speed(path: np.ndarray, figures: "PerFrame") -> tuple[Mesh, ...]:
             build_line_mesh(over[0], colours.TRACK_SPEED, 1.5), build_line_mesh(over[1], colours.BODY_SPEED, 2.0))
 
 
+def build_heading_arrows(plan: "ResolvedPlan") -> tuple[Mesh, ...]:
+    """Build an arrow along the planned heading every HEADING_SECONDS, and at both ends of every heading key.
+
+    Returns:
+        Two meshes, a dark edge and the arrows; none for a method without a heading plan.
+    """
+    sampled, keys = plan.sample_track(plan.fps), plan.requested.heading_keys
+    if sampled.heading is None:
+        return ()
+    ends = [second for key in keys for second in (key.time, key.time + key.hold)]
+    frames = np.round((np.array(ends) - sampled.times[0]) * sampled.fps).astype(int)
+    regular = np.arange(0, len(sampled), max(1, round(HEADING_SECONDS * sampled.fps)))
+    rows = np.union1d(regular, frames[(frames >= 0) & (frames < len(sampled))])
+    points = shapes.build_arrows(plan.size * sampled.positions[rows], sampled.heading[rows], ARROW, HEADING)
+    times, half = sampled.times[rows], 0.5 / sampled.fps
+    is_held = np.zeros(len(rows), dtype=bool)
+    for key in keys:
+        is_held |= (times >= key.time - half) & (times <= key.time + key.hold + half)
+    rgba = np.where(is_held[:, None], (*colours.HEADING_KEY, 1.0), (*colours.HEADING, 1.0)).astype(np.float32)
+    edge = build_uniform_mesh(points, colours.BLACK, 5.0, 0.8)
+    return edge, Mesh("LINES", points, rgba.repeat(len(points) // len(rows), axis=0), 2.5)
+
+
 def _build_pair_colours(names: tuple[str, ...], pairs: np.ndarray) -> np.ndarray:
     from ...beyond_mocap.motion.humanoid import split_joint_name
 
@@ -243,7 +270,8 @@ def _build_label(strike: "Strike") -> Label:
     return Label(strike.time, tuple(map(float, place)), f"{strike.time:.2f} s  {' '.join(strike.words)}{gap_text}")
 
 
-def _build_pieces(plan: "Plan", take: "Take", library: "Library | None", pelvis: np.ndarray) -> tuple[Piece, ...]:
+def _build_pieces(plan: "ResolvedPlan | None", take: "Take", library: "Library | None",
+                  pelvis: np.ndarray) -> tuple[Piece, ...]:
     """Build the pieces, with the reasons of the search if the library is known."""
     last = len(pelvis) - 1
     return tuple(Piece(take.start_time + start, take.start_time + end,
@@ -251,9 +279,11 @@ def _build_pieces(plan: "Plan", take: "Take", library: "Library | None", pelvis:
                  for start, end, name, lines in _iter_pieces(plan, take, library))
 
 
-def _iter_pieces(plan: "Plan", take: "Take", library: "Library | None"):
+def _iter_pieces(plan: "ResolvedPlan | None", take: "Take", library: "Library | None"):
     """Iterate over start and end (seconds from the take's first), name and lines of every piece."""
-    if library is None or take.edit is None:
+    from ...beyond_mocap.synthesis.search.explanation import explain_choices
+
+    if library is None or plan is None or take.edit is None:
         edges = [0, *map(int, take.seams), len(take.clip)]
         for low, high in zip(edges, edges[1:]):
             name = shorten_clip_name(take.clips[take.clip[low]], bool(take.mirrored[low]))
@@ -261,16 +291,9 @@ def _iter_pieces(plan: "Plan", take: "Take", library: "Library | None"):
             frames_text = f"frames {clip_frames[0]:.0f} to {clip_frames[1]:.0f}"
             yield low / take.motion.fps, high / take.motion.fps, name, (name, frames_text)
         return
-    for reason in _explain_pieces(plan, take, library):
+    for reason in explain_choices(library, plan, take.edit):
         name = shorten_clip_name(reason.path, reason.mirrored)
         yield reason.first / library.fps, reason.end / library.fps, name, describe_reason(reason, name)
-
-
-def _explain_pieces(plan: "Plan", take: "Take", library: "Library") -> list["ChoiceReason"]:
-    from ...beyond_mocap.synthesis.resolve_plan import resolve_plan
-    from ...beyond_mocap.synthesis.search.explanation import explain_choices
-
-    return explain_choices(library, resolve_plan(plan, library, trajectory=take.solved), take.edit)
 
 
 def describe_reason(reason: "ChoiceReason", name: str) -> tuple[str, ...]:

@@ -9,7 +9,7 @@ from ..core import window
 from ..core.properties import with_settings
 from . import store
 
-OVERLAYS = ("track", "footprints", "contacts", "seams", "moments", "speed", "ghosts")
+OVERLAYS = ("track", "footprints", "contacts", "seams", "moments", "speed", "heading", "ghosts")
 """The overlays, in the order in which they are drawn and listed."""
 
 PATH_OVERLAYS = ("path_source", "path_new", "path_trackers", "path_residuals", "path_ghost")

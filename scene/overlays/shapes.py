@@ -13,6 +13,7 @@ HEEL_SHARE = 0.2  # share of a shoe's length behind the ankle
 LENGTHS = (0.22, 0.32)  # metres, limits of a shoe's length
 USUAL = 0.28  # metres of a shoe without toe joints
 CIRCLE = 24  # segments
+BARB = 0.14, 0.08  # metres along and across an arrow
 
 
 def build_soles(heel: np.ndarray, toe: np.ndarray, direction: np.ndarray, side: np.ndarray, height: float):
@@ -102,6 +103,24 @@ def build_cross(centre, size: float) -> np.ndarray:
     """Build a three-dimensional cross: lines (6, 3)."""
     arms = np.eye(3).repeat(2, axis=0) * np.tile([size, -size], 3)[:, None]
     return (arms + centre).astype(np.float32)
+
+
+def build_arrows(places: np.ndarray, headings: np.ndarray, length: float, height: float) -> np.ndarray:
+    """Build flat arrows.
+
+    Args:
+        places: (N, 2) m, where they begin.
+        headings: (N,) rad from +x.
+        length: m.
+        height: m above the ground.
+    Returns:
+        Lines (6 N, 3): shaft, left barb, right barb of each.
+    """
+    ahead = np.stack([np.cos(headings), np.sin(headings)], axis=1)
+    aside = np.stack([-ahead[:, 1], ahead[:, 0]], axis=1)
+    tips, back = places + length * ahead, places + (length - BARB[0]) * ahead
+    corners = [places, tips, tips, back + BARB[1] * aside, tips, back - BARB[1] * aside]
+    return place_on_ground(np.stack(corners, axis=1).reshape(-1, 2), height)
 
 
 def list_figure_pairs(parents) -> np.ndarray:

@@ -1,1 +1,1 @@
-"""A player's track, dot, pins and labels in the view."""
+"""A player's track, dot, pins, heading keys and labels in the view."""

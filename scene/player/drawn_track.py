@@ -13,6 +13,7 @@ import numpy as np
 from bpy_extras.view3d_utils import location_3d_to_region_2d
 
 from ...beyond_mocap.base.errors import InputError
+from ...beyond_mocap.base.time_series import interpolate_columns
 from ...beyond_mocap.base.vectors import distances_along
 from ...beyond_mocap.motion.humanoid import identify_joints
 from ...beyond_mocap.motion.track import Track
@@ -74,10 +75,25 @@ def read_drawn_track(scene: bpy.types.Scene, drawn: bpy.types.Object, start: flo
                                 name=f"curve {drawn.name}")
     if drawn.type == "CURVES":
         raise InputError(f"object {drawn.name}", "hair curves", "a curve (Add > Curve)", "convert it: Object > Convert")
-    frames, places = _read_moving_object(scene, drawn, still)
-    clock = build_scene_clock(scene)
-    seconds = clock.start_time + (frames - clock.start_frame) / clock.fps
-    return build_moving_track(seconds, places[:, :2] / units_per_metre(scene), f"object {drawn.name}")
+    return build_moving_track(*_read_timed_places(scene, drawn, still), f"object {drawn.name}")
+
+
+def sample_object(scene: bpy.types.Scene, target: bpy.types.Object, times: np.ndarray, still: bool) -> np.ndarray:
+    """Sample where an object is on the ground, moving or not.
+
+    Args:
+        scene: of the object.
+        target: any object; a curve stands where its origin is.
+        times: (T,) s on the track's clock.
+        still: see `read_drawn_track`.
+    Returns:
+        (T, 2) m; before and after its motion where that begins and ends.
+    """
+    if _is_at_rest(target):
+        place = np.array(target.matrix_world.translation, dtype=float)[:2] / units_per_metre(scene)
+        return np.tile(place, (len(times), 1))
+    seconds, places = _read_timed_places(scene, target, still)
+    return interpolate_columns(times, seconds, places)
 
 
 def build_line(scene: bpy.types.Scene, drawn: bpy.types.Object) -> DrawnLine:
@@ -129,6 +145,21 @@ def create_curve(context: bpy.types.Context, name: str, collection) -> bpy.types
     collection.objects.link(drawn)
     context.view_layer.update()  # computes the handles
     return drawn
+
+
+def _is_at_rest(target: bpy.types.Object) -> bool:
+    """Return whether nothing moves an object but the user."""
+    data = target.animation_data
+    is_animated = data is not None and (data.action or data.drivers or data.nla_tracks)
+    return not (is_animated or target.parent or target.constraints or target.type == "ARMATURE")
+
+
+def _read_timed_places(scene: bpy.types.Scene, moving: bpy.types.Object, still: bool) -> tuple[np.ndarray, np.ndarray]:
+    """Read seconds (F,) on the track's clock and positions (F, 2) m of a moving object."""
+    frames, places = _read_moving_object(scene, moving, still)
+    clock = build_scene_clock(scene)
+    seconds = clock.start_time + (frames - clock.start_frame) / clock.fps
+    return seconds, places[:, :2] / units_per_metre(scene)
 
 
 def _read_values(points, name: str, size: int) -> np.ndarray:
@@ -253,6 +284,11 @@ def build_speed_labels(scene: bpy.types.Scene) -> list[tuple[tuple[float, float,
         if pin.target is not None and pin.target.visible_get():
             hold = f" + {pin.hold:.1f}" if pin.hold else ""
             found.append((tuple(pin.target.matrix_world.translation), f"{pin.time:.1f}{hold} s", PIN_RGBA))
+    for key in player.heading_keys:
+        target = key.find_target() if key.faces == "OBJECT" else None
+        if target is not None and target.visible_get():
+            hold = f" + {key.hold:.1f}" if key.hold else ""
+            found.append((tuple(target.matrix_world.translation), f"faced {key.time:.1f}{hold} s", PIN_RGBA))
     return found
 
 

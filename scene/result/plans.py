@@ -3,19 +3,24 @@
 from __future__ import annotations
 
 import bpy
+import numpy as np
 
 from ...beyond_mocap.annotation import Timeline
 from ...beyond_mocap.base.errors import InputError
+from ...beyond_mocap.base.time_series import interpolate_columns
 from ...beyond_mocap.motion.track import Track, clean_track
+from ...beyond_mocap.synthesis.heading_plan import HeadingKey
 from ...beyond_mocap.synthesis.plan import Plan
 from ..core.measure import build_scene_clock
 from ..core.properties import read_property_values
 from ..core.settings import BeyondMocapPlayer, BeyondMocapSettings, find_active_player, to_absolute_path
-from ..player import pins
+from ..player import drawn_track, pins
 from ..player.tracks import read_track
 from ..timeline import label_tracks as lanes
 from ..timeline import strips
 from . import blocks
+
+FACING_SECONDS = 0.15  # s between two headings towards an object that moves; shorter than the plan's own decisions
 
 
 def list_selected_players(settings: BeyondMocapSettings) -> list[BeyondMocapPlayer]:
@@ -40,8 +45,51 @@ def build_plan(settings: BeyondMocapSettings, player: BeyondMocapPlayer,
     track, found = clean_track(read_track(settings, player, still))
     plan = Plan(track=track, timeline=read_timeline(player, settings.rate, track),
                 library=to_absolute_path(settings.library_folder), pins=pins.read_pins(player.id_data, player),
+                heading_keys=read_heading_keys(settings, player, still),
                 **read_property_values(Plan, settings, "synthesis"), **read_property_values(Plan, player, "player"))
     return plan, found.warnings
+
+
+def read_heading_keys(settings: BeyondMocapSettings, player: BeyondMocapPlayer,
+                      still: bool = False) -> tuple[HeadingKey, ...]:
+    """Read a player's heading keys; one towards an object that moves while it holds becomes several.
+
+    Args:
+        settings: of the scene.
+        player: the player.
+        still: see `drawn_track.read_drawn_track`.
+    Raises:
+        InputError: if the object of a key is missing, or is the player's own.
+    """
+    return tuple(found for key in player.heading_keys for found in _read_heading_key(settings, player, key, still))
+
+
+def _read_heading_key(settings, player, key, still: bool) -> list[HeadingKey]:
+    start, hold = round(key.time, 6), round(key.hold, 6)
+    if key.faces == "DIRECTION":
+        return [HeadingKey(start, heading=round(key.heading, 6), hold=hold)]
+    times = np.unique(np.round(np.append(np.arange(start, start + hold, FACING_SECONDS), start + hold), 6))
+    places = _sample_target(settings, player, key, times, still)
+    if (places == places[0]).all():
+        return [HeadingKey(start, target=tuple(places[0].tolist()), hold=hold)]
+    return [HeadingKey(time, target=tuple(place)) for time, place in zip(times.tolist(), places.tolist())]
+
+
+def _sample_target(settings, player, key, times: np.ndarray, still: bool) -> np.ndarray:
+    """Sample where the object of a key is, (T, 2) m at times (T,) s; a player is where their track is."""
+    target = key.find_target()
+    where, step = f"player {player.name}, heading key at {key.time:.2f} s", "choose one in the list, or remove the key"
+    if target is None:
+        raise InputError(where, "its object is missing", "an object of the scene", step)
+    owner = next((other for other in settings.players if target in (other.dot, other.body)), None)
+    if owner == player:
+        raise InputError(where, f"{target.name}, the player's own", "another object", step)
+    if owner is None:
+        places = drawn_track.sample_object(player.id_data, target, times, still)
+    else:
+        track, _ = clean_track(read_track(settings, owner, still))
+        places = interpolate_columns(times, track.times, track.positions)
+    return np.round(places, 6)
 
 
 def read_timeline(player: BeyondMocapPlayer, fps: float, track: Track) -> Timeline:

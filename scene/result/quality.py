@@ -38,6 +38,17 @@ FIGURES = (  # name, key path in the report, factor (a negative one counts from 
     ("Unusual poses", "pose_realism", 100, "{:.1f}", " %"),
     ("Repeated frames", "loop_share", 100, "{:.1f}", " %"),
     ("Lowest point", "ground_mm.min", 1, "{:.1f}", " mm"),
+    ("Snap turns", "naturalness.snap_turns_per_min", 1, "{:.1f}", " /min"),
+    ("Spins", "naturalness.spins_per_min", 1, "{:.1f}", " /min"),
+    ("Spins not asked for", "naturalness.unasked_spins_per_min", 1, "{:.1f}", " /min"),
+    ("Pelvis drops", "naturalness.pelvis_drops_per_min", 1, "{:.1f}", " /min"),
+    ("Jolts", "naturalness.jolts_per_min", 1, "{:.1f}", " /min"),
+    ("Cuts", "naturalness.cuts_per_min", 1, "{:.0f}", " /min"),
+    ("Time between slow cuts", "naturalness.dwell_s_median", 1, "{:.1f}", " s"),
+    ("Unusual body language", "naturalness.unusual_posture_share", 100, "{:.1f}", " %"),
+    ("Heading off plan, 90 %", "naturalness.off_plan_deg_p90", 1, "{:.0f}", "°"),
+    ("Foot lifts standing", "naturalness.standing.foot_lifts_per_min", 1, "{:.0f}", " /min"),
+    ("Both feet down standing", "naturalness.standing.both_down", 100, "{:.0f}", " %"),
     ("Computing time", "seconds.total", 1, "{:.1f}", " s"),
 )
 ERROR_GROUP, ERROR_MARK = "Beyond Mocap", "beyond_mocap_error_curves"

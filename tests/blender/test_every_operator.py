@@ -95,6 +95,16 @@ def pin_a_hand():
     bpy.ops.beyond_mocap.add_pin(part="right_hand")
 
 
+def select_ball():
+    """The ball's dot, active."""
+    worlds.select_objects(bpy.data.objects["Ball dot"])
+
+
+def face_ball():
+    select_ball()
+    bpy.ops.beyond_mocap.add_heading_key(faces="OBJECT")
+
+
 def draw():
     """A drawn track, active."""
     bpy.ops.beyond_mocap.draw_track()
@@ -342,6 +352,7 @@ def moved(folder):
 ROWS = {
     "accept": Row("synthesized"),
     "accept_touches": Row("imported", prepare=a_touch),
+    "add_heading_key": Row("imported", lambda places: {"faces": "OBJECT"}, select_ball),
     "add_moment": Row("imported", lambda places: {"words": "header"}),
     "add_pin": Row("synthesized", lambda places: {"part": "right_hand"}),
     "add_preset": Row("imported", lambda places: {"name": "Tried"}, changes=False),
@@ -433,6 +444,7 @@ ROWS = {
     "reduce_keys": Row("rig", prepare=bake_it),
     "relink_library": Row("imported", lambda places: {"directory": f"{moved(places.clips)}/"}),
     "remove_clip": Row("clip"),
+    "remove_heading_key": Row("imported", prepare=face_ball),
     "remove_pin": Row("synthesized", prepare=pin_a_hand),
     "remove_player": Row("imported"),
     "remove_video": Row("video"),

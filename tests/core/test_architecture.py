@@ -36,7 +36,7 @@ LAZY = {
     "files": ["kloppy"],
     "library": ["joblib", "sklearn", "threadpoolctl"],
     "synthesis": ["threadpoolctl"],
-    "evaluation": ["matplotlib"],
+    "evaluation": ["matplotlib", "sklearn", "threadpoolctl"],
     "markers": ["c3d", "matplotlib", "threadpoolctl"],
     "passes": ["threadpoolctl"],
     "throws": ["threadpoolctl"],

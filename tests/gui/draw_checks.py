@@ -119,3 +119,30 @@ def check_a_pin_is_created_moved_and_followed():
     window.save_picture(PICTURES / "draw_pins.png")
     get_settings().live = False
     assert_no_errors_since(mark)
+
+
+def check_a_heading_key_is_faced_and_drawn():
+    mark, scene = len(output.text()), window.window.scene
+    player, view = get_player(), get_settings().view
+    flag = bpy.data.objects.new("Flag", None)
+    scene.collection.objects.link(flag)
+    flag.location = (9.0, 20.0, 0.0)
+    window.window.view_layer.objects.active = flag
+    flag.select_set(True)
+    scene.frame_set(1)
+    view.heading, get_settings().live = True, True
+    yield 1.0
+    yield from wait_until_settled()
+    before = get_take()
+    assert run_operator("beyond_mocap.add_heading_key", "EXEC_DEFAULT", faces="OBJECT", hold=60.0) == {"FINISHED"}
+    yield from wait_until(lambda: get_take() is not before)
+    yield from wait_until_settled()
+    store, draw = import_module("scene.overlays.store"), import_module("scene.overlays.draw")
+    yield from wait_until(lambda: store.find_prepared(player.take))
+    look_down(window.find_area("VIEW_3D"), 18.0)
+    yield from wait_until(lambda: (player.take, "heading") in draw._batches, what="arrows are drawn")
+    window.save_picture(PICTURES / "draw_heading.png")
+    (_, arrows) = store.find_prepared(player.take).meshes["heading"]
+    assert (arrows.points[:, 1].reshape(-1, 6)[:, 1] > arrows.points[:, 1].reshape(-1, 6)[:, 0]).mean() > 0.8
+    get_settings().live = False
+    assert_no_errors_since(mark)

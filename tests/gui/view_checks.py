@@ -8,7 +8,7 @@ from mathutils import Euler, Quaternion
 from tab import PICTURES, TAB, copy_sample, get_settings, import_module, output, report_time, wait_until, window
 from window import ObjectProxy
 
-OVERLAYS = ("track", "footprints", "contacts", "seams", "moments", "speed", "ghosts")
+OVERLAYS = ("track", "footprints", "contacts", "seams", "moments", "speed", "heading", "ghosts")
 
 
 def switch_overlays(*names):

@@ -262,7 +262,7 @@ def _label_touches(samples, found, positions, players, teams, pitch, untracked_c
     kept = np.flatnonzero((chosen >= 0) | ~all_tracked)
     time, spread, margin, place = time[kept], spread[kept], margin[kept], place[kept]
     before, after, away, chosen = before[kept], after[kept], away[:, kept], chosen[kept]
-    known_height, goals = _has_heights(samples), _find_goal_lines(positions, teams, pitch[0])
+    known_height, goals = _has_heights(samples), find_goal_lines(positions, teams, pitch[0])
     out = []
     for k in range(len(time)):
         player = int(chosen[k])
@@ -294,8 +294,16 @@ def _describe_feed(samples: Samples, heights: bool) -> tuple[str, ...]:
     return tuple(lines)
 
 
-def _find_goal_lines(positions: np.ndarray, teams: Sequence[str], length: float) -> dict[int, float]:
-    """Find the goalkeepers (indices) and the x m of their goal lines in this part of the match."""
+def find_goal_lines(positions: np.ndarray, teams: Sequence[str], length: float) -> dict[int, float]:
+    """Find the goalkeepers and their goal lines in a part of a match.
+
+    Args:
+        positions: (P, N, 2) m of the players, NaN where absent.
+        teams: (P,) names.
+        length: m of the pitch.
+    Returns:
+        Index of each goalkeeper -> x m of their goal line; none for a team where that is not clear.
+    """
     found = kinds.find_keepers(positions, list(teams)) if len(teams) == len(positions) else {}
     places = {keeper: np.nanmedian(positions[keeper, :, 0]) for keeper in found.values()}
     return {keeper: float(np.sign(x)) * length / 2.0 for keeper, x in places.items() if abs(x) > length / 5.0}

@@ -3,7 +3,7 @@
 
 from pathlib import Path
 
-from .setting import Setting
+from .setting import BETWEEN, Setting
 
 TABLES = {
     "match.section": (
@@ -37,6 +37,8 @@ TABLES = {
         Setting(name="seed", default=0, least=0, most=2**31 - 1, option="--seed"),
         Setting(name="nearest", default=True, option="--exact", help="a player fails if the library lacks labels, "
                 "instead of using the nearest ones"),
+        Setting(name="watch", default=1.0, least=0.0, most=1.0, expected=BETWEEN, option="--watch", metavar="SHARE",
+                help="how much heads and shoulders turn to the ball, 0 for not at all; default %(default)g"),
         Setting(name="first_frame", default=1, tooltip="Scene frame on which the stretch starts"),
     ),
     "touches": (

@@ -48,8 +48,9 @@ TABLES = {
         Setting(name="fps", default=30.0, unit="frames per second", option="--fps", identifier="rate",
                 title="Frame Rate", tooltip="Frames per second of the result; the scene keeps its own rate",
                 in_preset=True, option_more=dict(least=1.0, most=480.0), panel_more=dict(min=10.0, max=240.0)),
-        Setting(name="seed", default=0, option="--seed", help="seed of the clustering for blocks and distance",
-                tooltip="Random seed of the clustering for Blocks and Distance; Path Following does not use it",
+        Setting(name="seed", default=0, option="--seed", help="seed of the player's habits of watching the ball, and "
+                "of the clustering for blocks and distance",
+                tooltip="Random seed of how the player watches the ball, and of the clustering for Blocks and Distance",
                 in_preset=True, option_more=dict(least=0, most=2**31 - 1), panel_more=dict(min=0)),
         Setting(name="solve_touches", default=False, option="--solve-touches", help="move key moments to the touches "
                 "found in the ball's samples; the ball follows physics and is dribbled step by step",
@@ -81,10 +82,16 @@ TABLES = {
                 option="--root-window", help="window through which the body is on the track ('path'); default "
                 "%(default)g", title="Sway Window", tooltip="For Path Following: smoothing window in which body and "
                 "track agree; a shorter one keeps less sway", in_preset=True, tuning="path"),
+        Setting(name="watch", default=1.0, least=0.0, most=1.0, expected=BETWEEN, option="--watch", metavar="SHARE",
+                help="how much head and shoulders turn to the ball ('path'), 0 for not at all; default %(default)g",
+                title="Watch the Ball", tooltip="For Path Following: how much head and shoulders turn to the ball; 0 "
+                "keeps them as in the clips", in_preset=True, tuning="path"),
         Setting(name="variety", default=0.0, least=0.0, most=10.0, unit="m/s", help="missed speed that is accepted so "
                 "that neighbours in a match are not in step"),
         Setting(name="lag", default=0.0, least=0.0, most=60.0, unit="seconds", help="lag of a player of a match behind "
                 "the clock, so that neighbours differ"),
+        Setting(name="manner", default=-1, least=-1, most=100000, help="number of the recording whose manner of "
+                "walking a player of a match keeps; -1 for none"),
         Setting(name="gaits", default=(), option="--gait", metavar="LABEL=CLIP", help="the clip that represents a "
                 "gait, such as walking=folder/walk.bvh; once for each gait", title="Gait Clips", tuning="any",
                 tooltip="Clips that represent the gaits, such as walking=folder/walk.bvh; jogging=folder/jog.bvh",
@@ -92,8 +99,9 @@ TABLES = {
         Setting(name="mirror", default=True, option="--no-mirror", help="do not use mirrored clips",
                 title="Mirrored Clips", tooltip="Use each clip also with left and right exchanged", in_preset=True),
         Setting(name="made", default=True, option="--no-made", help="no synthetic or blended clips where recordings "
-                "lack a speed", title="Synthetic Clips", tooltip="For Path Following: add synthetic or blended clips "
-                "where recordings lack a speed or a kick on the run", in_preset=True, tuning="path"),
+                "lack a speed or a step", title="Synthetic Clips", tooltip="For Path Following: add synthetic or "
+                "blended clips where recordings lack a speed, a side step, a turn on the spot or a kick on the run",
+                in_preset=True, tuning="path"),
         Setting(name="nearest", default=False, option="--nearest", help="continue with the nearest labels that the "
                 "library has", title="Nearest Labels", tooltip="Where the library lacks a key moment's labels, use the "
                 "nearest ones and add a warning", in_preset=True),

@@ -27,6 +27,8 @@ TABLES = {
                 "trajectory there, and the gap between the two"),
         Setting(name="speed", default=False, tooltip="The requested speed as a curtain over the track, and the "
                 "body's speed as a line"),
+        Setting(name="heading", default=False, title="Planned Heading", tooltip="An arrow every half second where "
+                "the body is planned to face, in another colour where a heading key holds"),
         Setting(name="ghosts", default=False, tooltip="Stick figures of the body around the current frame"),
         Setting(name="path_source", default=True, title="Original Path", tooltip="The fitted path of the original "
                 "motion"),

@@ -7,6 +7,7 @@ second.
 
 from __future__ import annotations
 
+import re
 import tempfile
 import threading
 from collections.abc import Sequence
@@ -16,7 +17,7 @@ from pathlib import Path
 import numpy as np
 
 from ...base.errors import InputError
-from ...evaluation.report import evaluate, round_values
+from ...evaluation.report import evaluate, find_count_name, flatten_report, round_values
 from ...files.bvh import bvh
 from ...library.build import build_library
 from ...library.library import Library
@@ -32,7 +33,8 @@ from ..player_edit import PlayerEdit
 from .units import Unit
 from .windows import Piece, search_window
 
-_MAX_NAMES, _MIN_NAMES, _SUM_NAMES = {"max", "support_max"}, {"min"}, {"frames", "duration_s"}
+_MAX_NAMES, _MIN_NAMES = {"max", "support_max", "recordings"}, {"min"}
+_SUMS = re.compile(r".*frames|duration_s|.*count|seams|(source_)?(seconds|strides|stances)|slow_pieces")
 
 
 @dataclass(frozen=True)
@@ -192,8 +194,9 @@ def build_player_report(
 def merge_reports(reports: Sequence[dict], weights: Sequence[float]) -> dict:
     """Merge the reports of several stretches.
 
-    Means, shares and percentiles are weighted averages; maxima and minima stay so; numbers of frames and seconds are
-    summed; lists are joined. A value that only some reports have is taken from these.
+    Means, shares and percentiles are averages, weighted by what they rest on where a report says so, else by the
+    stretches; maxima and minima stay so; numbers of frames and seconds are summed; lists are joined. A value that only
+    some reports have is taken from these.
 
     Args:
         reports: one per stretch.
@@ -203,7 +206,10 @@ def merge_reports(reports: Sequence[dict], weights: Sequence[float]) -> dict:
     """
     if len(reports) == 1:
         return dict(reports[0])
-    return {name: _merge_values(name, [one.get(name) for one in reports], weights) for name in reports[0]}
+    out = {name: _merge_values(name, [one.get(name) for one in reports], weights) for name in reports[0]}
+    flat = flatten_report(out)
+    return {**out, **({"unknown": {name: reason for name, reason in out["unknown"].items() if flat.get(name) is None}}
+                      if out.get("unknown") else {})}
 
 
 def measure_time_lost(warning_seconds: Sequence[Sequence[Sequence[float]]]) -> float:
@@ -255,8 +261,10 @@ def _build_overlap(take: Take, request: FinishRequest) -> np.ndarray:
 
 def _join_provenance(tables: Sequence[Provenance]) -> Provenance:
     """Join the provenance of several stretches."""
-    arrays = {name: np.concatenate([getattr(one, name) for one in tables])
-              for name in ("times", "clip_frame", "mirrored", "contacts")}  # fmt: skip
+    names = ["times", "clip_frame", "mirrored", "contacts"]
+    if all(one.planned_heading is not None for one in tables):
+        names.append("planned_heading")
+    arrays = {name: np.concatenate([getattr(one, name) for one in tables]) for name in names}
     return Provenance(clip=tuple(clip for one in tables for clip in one.clip),
                       words=tuple(words for one in tables for words in one.words), **arrays)
 
@@ -276,18 +284,26 @@ def _merge_values(name: str, values: list, weights: Sequence[float]):
         return None
     first = known[0][0]
     if isinstance(first, dict):
-        known_weights = [weight for _, weight in known]
-        return {key: _merge_values(key, [value.get(key) for value, _ in known], known_weights) for key in first}
+        return {key: _merge_values(key, [value.get(key) for value, _ in known], _list_weights(key, known))
+                for key in first}
     if isinstance(first, list):
         return [entry for value, _ in known for entry in value]
     if isinstance(first, (bool, str)) or name in ("version", "seed", "fps"):
         return first
     numbers = np.array([value for value, _ in known], dtype=float)
-    if name in _MAX_NAMES or name in _MIN_NAMES or name in _SUM_NAMES:
+    is_sum = _SUMS.fullmatch(name) is not None
+    if name in _MAX_NAMES or name in _MIN_NAMES or is_sum:
         merged = numbers.max() if name in _MAX_NAMES else numbers.min() if name in _MIN_NAMES else numbers.sum()
     else:
-        merged = np.average(numbers, weights=[weight for _, weight in known])
-    return int(merged) if isinstance(first, int) and name in _SUM_NAMES else float(merged)
+        shares = np.array([weight for _, weight in known], dtype=float)
+        merged = np.average(numbers, weights=shares if shares.any() else None)
+    return int(merged) if isinstance(first, int) and (is_sum or name in _MAX_NAMES) else float(merged)
+
+
+def _list_weights(name: str, groups: Sequence[tuple[dict, float]]) -> list[float]:
+    """List the weight of a figure in each of several (group, weight of its stretch): what it rests on, if known."""
+    counts = [group.get(find_count_name(name, group)) for group, _ in groups]
+    return [weight if count is None else float(count) for count, (_, weight) in zip(counts, groups)]
 
 
 def _compute_curves(played: Playback, track: Track, overlap: np.ndarray, ball: BallPath):

@@ -15,6 +15,7 @@ from ...annotation import Timeline
 from ...base.errors import InputError
 from ...library.features import FPS
 from ...motion.track import Track
+from ...synthesis.heading_plan import HOLD_FADE
 from ...synthesis.plan import Plan, SolvedTrajectory
 from ...synthesis.search.candidate_index import SLOT
 from ..player_edit import to_stored_plan
@@ -122,8 +123,9 @@ def build_window_edges(start: float, count: int, window: float, fps: float = FPS
 def cut_plan(plan: Plan, start: float, end: float) -> Plan:
     """Cut a plan to a span within its track.
 
-    The track's first sample is at `start` and its last at `end`, interpolated where the feed has none. Key moments and
-    pins outside are left out; spans that reach into the time stay whole.
+    The track's first sample is at `start` and its last at `end`, interpolated where the feed has none. Key moments,
+    pins and headings outside are left out, but for headings that fade in or out inside; spans that reach into the time
+    stay whole.
 
     Args:
         plan: the plan.
@@ -139,6 +141,9 @@ def cut_plan(plan: Plan, start: float, end: float) -> Plan:
         track=cut_track(plan.track, start, end),
         timeline=Timeline(tuple(spans), tuple(inside)),
         pins=tuple(pin for pin in plan.pins if pin.time <= end and pin.end >= start),
+        heading_keys=tuple(key for key in plan.heading_keys if key.is_within(start - HOLD_FADE, end + HOLD_FADE)),
+        heading_path=None if plan.heading_path is None else plan.heading_path.cut_span(start - HOLD_FADE,
+                                                                                       end + HOLD_FADE),
         solved=None if plan.solved is None else _cut_trajectory(plan.solved, start - _BALL_MARGIN, end + _BALL_MARGIN),
     )
 

@@ -25,6 +25,7 @@ from ...evaluation.html_page import (
     build_title,
     join_html,
 )
+from ...evaluation.naturalness_figures import TITLES
 from ...evaluation.report import flatten_report
 from ...synthesis.quality.targets import find_target
 from .pictures import encode_png, render_heat_strip
@@ -163,8 +164,8 @@ def _build_teams(match: MatchResults, span: tuple[float, float], anchors, shared
         members = [player for player in match.players if player.team == team.name]
         dot = build_element("span", class_="dot", style=f"background:{team.colour}") if team.colour else ""
         if members:
-            table = build_team_table(members, strips, anchors, shared)
-            parts.append(build_section(join_html(dot, team.name or "No team"), table))
+            tables = build_team_table(members, strips, anchors, shared), build_naturalness_table(members, anchors)
+            parts.append(build_section(join_html(dot, team.name or "No team"), *tables))
     text = ("Strips: the worst figure of every second; green far below its limit, amber at it, red beyond, grey where "
             "the player has no motion. Green and red figures: target met or not.")  # fmt: skip
     return [*parts, build_element("p", text, class_="quiet")] if parts else []
@@ -269,6 +270,12 @@ COLUMNS = (
     Column("loop_share", "repeated", "%", 100.0),
     Column("overlap_m.max", "overlap", "cm", 100.0),
 )
+_NATURALNESS = ("snap_turns_per_min", "spins_per_min", "pelvis_drops_per_min", "jolts_per_min", "cuts_per_min",
+                "dwell_s_median", "short_dwell_share", "unusual_posture_share", "off_plan_deg_p90",
+                "off_travel_deg_p90", "standing.foot_lifts_per_min", "standing.both_down")  # fmt: skip
+NATURALNESS_COLUMNS = tuple(Column(f"naturalness.{name}", TITLES[name].text.lower(), TITLES[name].unit,
+                                   TITLES[name].scale, TITLES[name].digits) for name in _NATURALNESS)
+"""The second table of a team: what the eye sees."""
 _MAX_OVERLAP = 0.02  # m of overlap of two bodies that is accepted
 
 
@@ -323,20 +330,56 @@ def _describe_status(player: PlayerResult) -> str:
 
 
 def _build_summary(players: Sequence[PlayerResult], shared: tuple[str, ...]) -> list[Html]:
-    """Build the rows with mean and maximum over all players with a report; none for a single one."""
+    """Build the rows with mean and worst over all players with a report; none for a single one."""
     reported = [player for player in players if player.report]
+    counts = [len(select_own_warnings(player, shared)) for player in reported]
+    return [build_row(title, *cells, build_number_cell(measure(counts)), "", class_="sum")
+            for (title, cells), measure in zip(_summarize_columns(COLUMNS, reported),
+                                               (lambda known: sum(known) / len(known), max))]
+
+
+def _summarize_columns(columns: Sequence[Column], reported: Sequence[PlayerResult]) -> list[tuple[str, list[Html]]]:
+    """Summarize columns by mean and worst: a title and cells for each; none for a single player."""
     if len(reported) < 2:
         return []
-    columns = [[_find_value(player, column.figure, flatten_report(player.report)) for player in reported]
-               for column in COLUMNS]
-    lines = []
-    for title, measure in (("mean", lambda known: sum(known) / len(known)), ("worst", max)):
-        known = [[value for value in values if math.isfinite(value)] for values in columns]
-        cells = [_build_plain_cell(column, measure(values) if values else math.nan) for column,
-                 values in zip(COLUMNS, known)]
-        counts = [len(select_own_warnings(player, shared)) for player in reported]
-        lines.append(build_row(title, *cells, build_number_cell(measure(counts)), "", class_="sum"))
-    return lines
+    tables = [flatten_report(player.report) for player in reported]
+    found = [[_find_value(player, column.figure, table) for player, table in zip(reported, tables)]
+             for column in columns]
+    known = [[value for value in values if math.isfinite(value)] for values in found]
+    means = [sum(values) / len(values) if values else math.nan for values in known]
+    worst = [_find_worst_value(column, values) if values else math.nan for column, values in zip(columns, known)]
+    return [(title, [_build_plain_cell(column, value) for column, value in zip(columns, values)])
+            for title, values in (("mean", means), ("worst", worst))]
+
+
+def _find_worst_value(column: Column, values: Sequence[float]) -> float:
+    """Find the worst of a column's values: the smallest where the target is a lower limit."""
+    target = find_target(column.figure, 30.0)
+    return min(values) if target is not None and target.most is None and target.own is None else max(values)
+
+
+def build_naturalness_table(players: Sequence[PlayerResult], anchors: Mapping[str, str]) -> Html:
+    """Build a team's table of what the eye sees: a row per player, mean and worst; empty without such a report.
+
+    Args:
+        players: of the team.
+        anchors: anchor of each player's part of the page, by id.
+    Returns:
+        The table.
+    """
+    reported = [player for player in players if player.report.get("naturalness")]
+    if not reported:
+        return Html()
+    rows = []
+    for player in reported:
+        found = flatten_report({key: value for key, value in player.report.items() if key != "per_second"})
+        cells = [_build_cell(column, _find_value(player, column.figure, found), player, found)
+                 for column in NATURALNESS_COLUMNS]
+        rows.append(build_row(build_element("td", _build_link(player, anchors), class_="name"), *cells))
+    rows += [build_row(title, *cells, class_="sum")
+             for title, cells in _summarize_columns(NATURALNESS_COLUMNS, reported)]
+    titles = [build_title(column.title, column.unit) for column in NATURALNESS_COLUMNS]
+    return join_html(build_element("h3", "What the eye sees"), build_table(("player", *titles), rows))
 
 
 def _find_value(player: PlayerResult, figure: str, found: Mapping[str, object]) -> float:

@@ -71,8 +71,8 @@ class Posture:
         arrays = {f.name: np.concatenate([getattr(p, f.name) for p in parts]) for f in fields(cls) if f.name != "fps"}
         return cls(fps=parts[0].fps, **arrays)
 
-    def frames(self, where: slice) -> "Posture":
-        """Return a slice of the frames."""
+    def frames(self, where: slice | np.ndarray) -> "Posture":
+        """Return a slice of the frames, or those of given numbers (K,)."""
         return replace(self, **{f.name: getattr(self, f.name)[where] for f in fields(self) if f.name != "fps"})
 
 

@@ -2,7 +2,7 @@
 
 How real feeds err: samples are missing, or continue at constant velocity while the player is out of sight and then snap
 back by 0.4-1.4 m from one sample to the next, some 8 times per player and half; single samples jump away and return; an
-absent ball is at a sentinel (z = -10, or exactly at the origin).
+absent ball is at a sentinel (z = -10, or exactly at the origin). Simple cameras and receivers let every sample jitter.
 """
 
 from __future__ import annotations
@@ -26,6 +26,11 @@ _EXCURSION = 0.5  # seconds within which a jump away has to return to count as a
 _COAST = (0.2, 0.9)  # seconds before a snap that are replaced: at least, and at most while the feed coasts
 _CATCH_UP = 3.0  # m/s by which the player may be faster while making up for a snap; large snaps need more time
 _COAST_EXACT = 0.012  # metres: a coasting feed keeps to its line up to rounding to centimetres
+_JITTER = 0.06  # metres; noise of single samples from which on a track is smoothed: optical systems have 0.01
+_JITTER_LEFT, _JITTER_SECONDS = 0.04, (0.4, 1.5)  # metres of noise that smoothing should leave; seconds of its window
+# noise of s metres along both axes puts a sample 1.22 s off its neighbours' line, and a step 1.5 s off the usual one,
+# along each axis; five times that is passed once in 300 000 samples
+_SPIKE_NOISE, _JUMP_NOISE = 6.1, 7.5
 _STRAY = 2  # samples before a jump at the track's start, or after one at its end, that are taken for strays
 _SNAP_LIMIT = 3.0  # metres; a longer step is another player, or real: reported, not repaired
 _SLOPE_SECONDS = 0.3  # seconds whose slope is the velocity next to a gap
@@ -63,9 +68,10 @@ def clean_track(track: Track) -> tuple[Track, DataReport]:
 
     Rows without a time are dropped, repeated times merged to their mean, times sorted. Spikes, excursions and the
     coasted samples before a snap are marked `outlier`; missing samples, and those of gaps longer than three sample
-    intervals, are inserted and marked `filled`. Both get a cubic between the valid neighbours that starts and ends with
-    their velocities (beyond one second only as curved as the distance allows). Before the first and after the last
-    valid sample the velocity fades (to a third in half a second). A track that is already clean comes back equal.
+    intervals, are inserted and marked `filled`. Where all samples jitter, the others are smoothed. Both kinds of marked
+    samples then get a cubic between the valid neighbours that starts and ends with their velocities (beyond one second
+    only as curved as the distance allows). Before the first and after the last valid sample the velocity fades (to a
+    third in half a second). A track that is already clean comes back equal.
 
     Args:
         track: samples as the feed has them, pitch frame.
@@ -82,14 +88,18 @@ def clean_track(track: Track) -> tuple[Track, DataReport]:
     if np.count_nonzero(known) < 2:
         found = f"{format_count(np.count_nonzero(known), 'sample')} with a position"
         raise InputError(track.name, found, "at least two")
+    noise = _measure_jitter(times[known], positions[known])
     outlier, snaps = np.zeros(len(times), dtype=bool), ()
-    outlier[known], snaps = _detect_outliers(times[known], positions[known])
-    _check_unit(times[known], positions[known], outlier[known], track.name)
+    outlier[known], snaps = _detect_outliers(times[known], positions[known], noise)
     is_valid = known & ~outlier
+    jitter = []
+    if noise > 0.0:
+        positions[is_valid], jitter = _smooth_jitter(times[is_valid], positions[is_valid], noise, snaps)
+    _check_unit(times[known], positions[known], outlier[known], track.name)
     positions = _interpolate_gaps(times, positions, is_valid)
     cleaned = Track(times, positions, ball, ball_height_known=np.isfinite(ball[:, 2]), filled=~known, outlier=outlier,
                     name=track.name)
-    return cleaned, _build_report(cleaned, notes, snaps, dropped, merged)
+    return cleaned, _build_report(cleaned, notes, snaps, dropped=dropped, merged=merged, jitter=jitter)
 
 
 def _check_unit(times: np.ndarray, positions: np.ndarray, outlier: np.ndarray, name: str) -> None:
@@ -167,12 +177,63 @@ def _insert_missing_rows(times, positions, ball, name: str):
     return np.insert(times, at, np.concatenate(new)), np.insert(positions, at, blank, 0), np.insert(ball, at, blank, 0)
 
 
-def _detect_outliers(times: np.ndarray, positions: np.ndarray) -> tuple[np.ndarray, tuple[float, ...]]:
-    """Detect the samples (N,) bool to replace, and the times of steps too large to repair; all positions are numbers.
+def _measure_jitter(times: np.ndarray, positions: np.ndarray) -> float:
+    """Measure the metres by which samples (N, 2) jitter along each axis; 0 where the track need not be smoothed.
+
+    White noise of s metres along both axes puts samples 1.44 s off the line between their neighbours in the median.
     """
-    wrong = _detect_spikes(times, positions)
+    if len(times) < 5:
+        return 0.0
+    off = _measure_line_distance(times[1:-1], positions[1:-1], times[:-2], place_a=positions[:-2], time_b=times[2:],
+                                 place_b=positions[2:])
+    bend = _MAX_ACCELERATION / 8.0 * float(np.median(times[2:] - times[:-2])) ** 2
+    noise = (float(np.median(off)) - bend) / 1.44
+    return noise if noise > _JITTER else 0.0
+
+
+def _smooth_jitter(times: np.ndarray, positions: np.ndarray, noise: float,
+                   snaps: tuple[float, ...]) -> tuple[np.ndarray, list[str]]:
+    """Smooth valid positions (N, 2) that jitter by `noise` metres, and describe that in a line.
+
+    Each stretch between gaps, and between the steps at `snaps` that are left as they are, is smoothed on its own.
+    """
+    steps = np.diff(times)
+    rate = 1.0 / float(np.median(steps))
+    # a Hann window of n samples leaves sqrt(1.5 / n) of white noise
+    seconds = float(np.clip(1.5 * (noise / _JITTER_LEFT) ** 2 / rate, *_JITTER_SECONDS))
+    snaps_before = np.searchsorted(np.sort(snaps), times, side="right")
+    is_cut = (steps > GAP_INTERVALS / rate + 1e-9) | (np.diff(snaps_before) > 0)
+    stretches = np.split(np.arange(len(times)), np.flatnonzero(is_cut) + 1)
+    smooth = np.concatenate([_fit_local_lines(times[part], positions[part], seconds * rate) for part in stretches])
+    return smooth, [f"samples jitter by {100 * noise:.0f} cm: the track is smoothed over {seconds:.1f} s"]
+
+
+def _fit_local_lines(times: np.ndarray, positions: np.ndarray, width: float) -> np.ndarray:
+    """Fit a line around each sample by least squares under a Hann window of `width` samples: its values (N, 2) there.
+
+    Unlike a window alone, it needs no samples beyond the ends, nor even times.
+    """
+    half = max(int(np.ceil(width / 2.0 - 1e-9)) - 1, 0)
+    window = 0.5 + 0.5 * np.cos(2.0 * np.pi * np.arange(-half, half + 1) / width)
+    moment = times - times.mean()
+    columns = np.column_stack([np.ones_like(moment), moment, moment**2, positions, moment[:, None] * positions])
+    # "same" would have the window's length where that is longer than the stretch
+    sums = np.stack([np.convolve(column, window)[half : half + len(times)] for column in columns.T], axis=1)
+    total, first = sums[:, :1], sums[:, 1:2]
+    mean, centre = sums[:, 3:5] / total, first / total
+    variance = sums[:, 2:3] / total - centre**2
+    slope = (sums[:, 5:] / total - centre * mean) / np.where(variance > 1e-9, variance, np.inf)
+    return mean + slope * (moment[:, None] - centre)
+
+
+def _detect_outliers(times: np.ndarray, positions: np.ndarray,
+                     noise: float) -> tuple[np.ndarray, tuple[float, ...]]:
+    """Detect the samples (N,) bool to replace, and the times of steps too large to repair; all positions are numbers,
+    and jitter by `noise` metres.
+    """
+    wrong = _detect_spikes(times, positions, noise)
     left = np.flatnonzero(~wrong)
-    jumps, excess = _detect_jumps(times[left], positions[left])
+    jumps, excess = _detect_jumps(times[left], positions[left], noise)
     too_far, used = [], set()
     for place, jump in enumerate(jumps):
         if jump in used:
@@ -193,7 +254,7 @@ def _detect_outliers(times: np.ndarray, positions: np.ndarray) -> tuple[np.ndarr
     return wrong, tuple(too_far)
 
 
-def _detect_spikes(times: np.ndarray, positions: np.ndarray) -> np.ndarray:
+def _detect_spikes(times: np.ndarray, positions: np.ndarray, noise: float) -> np.ndarray:
     """Detect single samples (N,) bool far off the line between their neighbours, while the neighbours' lines fit
     better.
 
@@ -213,7 +274,7 @@ def _detect_spikes(times: np.ndarray, positions: np.ndarray) -> np.ndarray:
         ) for i, j, k in _ENDS
     )
     neighbour_distances = np.concatenate([[first], off, [last]])
-    far = off > _SPIKE + _MAX_ACCELERATION / 8.0 * (times[2:] - times[:-2]) ** 2
+    far = off > _SPIKE + _SPIKE_NOISE * noise + _MAX_ACCELERATION / 8.0 * (times[2:] - times[:-2]) ** 2
     wrong[1:-1] = far & (off > 1.5 * np.maximum(neighbour_distances[:-2], neighbour_distances[2:]))
     return wrong
 
@@ -227,7 +288,7 @@ def _measure_line_distance(time, place, time_a, place_a, time_b, place_b) -> np.
     return np.linalg.norm(place - place_a * (1 - share) - place_b * share, axis=-1)
 
 
-def _detect_jumps(times: np.ndarray, positions: np.ndarray) -> tuple[list[int], np.ndarray]:
+def _detect_jumps(times: np.ndarray, positions: np.ndarray, noise: float) -> tuple[list[int], np.ndarray]:
     """Detect steps that no player takes.
 
     Returns:
@@ -243,7 +304,8 @@ def _detect_jumps(times: np.ndarray, positions: np.ndarray) -> tuple[list[int], 
     usual = np.median(np.lib.stride_tricks.sliding_window_view(padded, 2 * half + 1, axis=0), axis=2)
     excess = (velocity - usual) * steps[:, None]
     short = steps <= GAP_INTERVALS * np.median(steps) + 1e-9
-    jumps = np.flatnonzero(short & (np.linalg.norm(excess, axis=1) > _SPIKE + _MAX_ACCELERATION / 3.0 * steps))
+    allowed = _SPIKE + _JUMP_NOISE * noise + _MAX_ACCELERATION / 3.0 * steps
+    jumps = np.flatnonzero(short & (np.linalg.norm(excess, axis=1) > allowed))
     return jumps.tolist(), excess[jumps]
 
 
@@ -322,10 +384,11 @@ def _interpolate_hermite(at: np.ndarray, before, after) -> np.ndarray:
     return (p0 * (1 + 2 * s) * (1 - s) ** 2 + p1 * s * s * (3 - 2 * s) + length * s * (1 - s) * (v0 * (1 - s) - v1 * s))
 
 
-def _build_report(track: Track, notes: list[str], snaps: tuple[float, ...], dropped: int, merged: int) -> DataReport:
+def _build_report(track: Track, notes: list[str], snaps: tuple[float, ...], *, dropped: int, merged: int,
+                  jitter: list[str]) -> DataReport:
     """Build the report of a cleaned track."""
     gaps = _find_gaps(track)
-    warnings = _collect_warnings(track, snaps, gaps)
+    warnings = [*jitter, *_collect_warnings(track, snaps, gaps)]
     return DataReport(
         lines=(*notes, *_describe_replacements(track), *warnings), rate=1.0 / track.interval, dropped=dropped,
         merged=merged, filled=int(track.filled.sum()), outliers=int(track.outlier.sum()), gaps=gaps,

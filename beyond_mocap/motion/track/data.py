@@ -92,6 +92,9 @@ class SampledTrack:
         ball: (T, 3) metres, NaN where there is no ball at all.
         ball_measured: (T,) bool, False between samples too far apart.
         fps: frames per second.
+        heading: (T,) rad from +x where the body should face, None where that is not planned.
+        held: (T,) from 0 to 1, how far that heading is given rather than planned, None for nowhere.
+        leeway: (T,) m that a slow body may stay off the positions, None where those are not relaxed.
     """
 
     times: np.ndarray
@@ -104,12 +107,18 @@ class SampledTrack:
     ball: np.ndarray
     ball_measured: np.ndarray
     fps: float
+    heading: np.ndarray | None = None
+    held: np.ndarray | None = None
+    leeway: np.ndarray | None = None
 
     def __post_init__(self):
         for name in ("times", "positions", "raw", "velocity", "speed", "direction", "ball"):
             object.__setattr__(self, name, freeze_array(getattr(self, name)))
         for name in ("valid", "ball_measured"):
             object.__setattr__(self, name, freeze_array(getattr(self, name), bool))
+        for name in ("heading", "held", "leeway"):
+            if getattr(self, name) is not None:
+                object.__setattr__(self, name, freeze_array(getattr(self, name)))
 
     def __len__(self) -> int:
         return len(self.times)
@@ -117,7 +126,8 @@ class SampledTrack:
     def frames(self, start: int, stop: int) -> "SampledTrack":
         """Return frames start .. stop-1."""
         arrays = {field.name: getattr(self, field.name) for field in fields(self) if field.name != "fps"}
-        return SampledTrack(**{name: values[start:stop] for name, values in arrays.items()}, fps=self.fps)
+        return SampledTrack(**{name: None if values is None else values[start:stop] for name, values in arrays.items()},
+                            fps=self.fps)
 
 
 def is_ball_sentinel(ball: np.ndarray) -> np.ndarray:

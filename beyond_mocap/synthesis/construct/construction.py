@@ -19,10 +19,11 @@ import numpy as np
 
 from ...annotation import sort_labels
 from ...annotation.ball_contact import find_striking_part
-from ...annotation.gaits import compute_heading_offset
+from ...base.easing import smoothstep
 from ...library.library import Library
 from ...motion import quaternion
 from ...motion.foot_plant import PlantResult, plant_feet
+from ...motion.motion import Motion
 from ...motion.track import SampledTrack
 from ..body_size import scale_ball
 from ..plan import ResolvedPlan
@@ -32,6 +33,8 @@ from ..search.source_frames import SourceFrames, SourceMotion, fetch_overlap
 from ..take import KeyResult
 from .edit_blending import OldMotion
 from .extra_steps import Steps, add_steps
+from .gaze import compute_release, estimate_look, hide_lost_ball, watch_ball
+from .settling import SPEEDS, measure_foot_moves, measure_rest, settle_on_track
 from .strike import Touch, strike_ball
 from .track_following import (
     absorb_foot_slide,
@@ -47,6 +50,12 @@ from .transitions import blend_rotations, blend_values, compute_blend_share
 
 # s on either side of a key moment without a clip, in which the body reaches for the ball and returns
 REACH_SECONDS = 0.4
+# s around a header in which the head moves as recorded, and s beside touches in which watching begins and ends
+HEADER_SECONDS, RELEASE_SECONDS = 0.3, 0.5
+
+FREE_SECONDS, FREE_FADE = 0.4, 0.4
+"""Seconds before and after a touch, within the entry and exit of its clip, in which the clip decides how the body
+faces, and seconds over which the plan takes over: a run-up that turned as it was recorded spun on sharp turns."""
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -92,6 +101,11 @@ class Construction:
             sway=blend_values(source.sway, over.at, over.sway, weight),
         )
 
+    @cached_property
+    def _foot_moves(self) -> tuple[np.ndarray, np.ndarray]:
+        """How the body has to move and turn so that its feet in contact stay (`measure_foot_moves`)."""
+        return measure_foot_moves(self.library.skeleton, self.smooth_source, self.plan.fps)
+
     def construct_body(self) -> tuple[PlantResult, Steps]:
         """Construct the body on its track with planted feet.
 
@@ -99,11 +113,45 @@ class Construction:
             The planted body (T frames) and the extra steps it takes.
         """
         heading = self.heading if self.is_planned else self._solve_heading()
-        ground = add_sway(self.track.positions, self.smooth_source.sway, heading)
         pose = apply_heading(self.smooth_source.pose, heading)
+        if not self.is_planned and self.track.heading is not None:
+            self = replace(self, track=settle_on_track(self.track, self.smooth_source, self._foot_moves[0], heading,
+                                                       self._compute_given_root(heading)))
+        ground = add_sway(self.track.positions, self.smooth_source.sway, heading)
         if not self.is_planned:
             ground, pose = self._pull_to_track(ground), self._lean_into_curves(pose)
-        return self._plant_feet(np.column_stack([ground, self.smooth_source.height]), pose)
+        planted, steps_taken = self._plant_feet(np.column_stack([ground, self.smooth_source.height]), pose)
+        return self._watch_ball(planted), steps_taken
+
+    def _compute_given_root(self, heading: np.ndarray) -> np.ndarray:
+        """Compute where the root has to be (T, 2) m, NaN where it is free, for a heading (T,) rad.
+
+        On the track where the heading is given too, and where the old motion stays.
+        """
+        given = add_sway(self.track.positions, self.smooth_source.sway, heading)
+        if self.heading is not None:
+            given = np.where(np.isfinite(self.heading)[:, None], given, np.nan)
+        if self.old is None:
+            return given if self.heading is not None else np.full_like(given, np.nan)
+        return np.where(self.old.is_old[:, None], self.old.root[:, :2], np.nan)
+
+    def _watch_ball(self, planted: PlantResult) -> PlantResult:
+        """Turn shoulders and head to the ball by the plan's share, except where the body meets it."""
+        strength, fps, track = self.plan.requested.watch, self.plan.fps, self.track
+        ball = hide_lost_ball(track.ball, track.ball_measured, fps)
+        if not strength or not np.isfinite(ball).any():
+            return planted
+        heads = [(touch.frame - HEADER_SECONDS * fps, touch.frame + HEADER_SECONDS * fps) for touch in self.touches
+                 if find_striking_part(touch.words) == "head"]
+        bodies = [(touch.frame - touch.entry, touch.frame + touch.leave) for touch in self.touches]
+        head, shoulders = (strength * compute_release(touches, len(track), RELEASE_SECONDS * fps)
+                           for touches in (heads, bodies))
+        motion = watch_ball(
+            Motion(self.library.skeleton, planted.root, planted.rotations, fps),
+            ball, look=estimate_look(self.library), speed=track.speed, seed=self.plan.requested.seed,
+            start=float(track.times[0]), head_share=head, shoulder_share=shoulders,
+        )
+        return replace(planted, rotations=motion.rotations)
 
     def solve_ball_contact(self, planted: PlantResult, steps_taken: Steps) -> tuple[PlantResult, np.ndarray]:
         """Bring the striking part to the ball at every touch.
@@ -129,11 +177,31 @@ class Construction:
     def _solve_heading(self) -> np.ndarray:
         """Solve the heading (T,) rad from given values, track and source, turned to the ball at touches."""
         given = self.heading if self.old is None else self.old.compute_heading(self.smooth_source.pose)
-        heading = solve_heading(self.track, self.smooth_source, given)
+        heading = solve_heading(self.track, self._turning_source, given, self._freedom)
         if self.old is not None:
             track = self.old.match_turning(self.track, heading)
-            heading = heading if track is None else solve_heading(track, self.smooth_source, given)
+            heading = heading if track is None else solve_heading(track, self._turning_source, given, self._freedom)
         return heading + (1.0 - self._old_share) * self._turn_to_ball(heading) if self.turns_to_ball else heading
+
+    @property
+    def _freedom(self) -> np.ndarray:
+        """(T,) how far the clip decides how the body faces, not the plan: 1 near a touch, 0 away from it."""
+        at, found = np.arange(len(self.track)), np.zeros(len(self.track))
+        for touch in self.touches:
+            before, after = (min(frames, FREE_SECONDS * self.plan.fps) for frames in (touch.entry, touch.leave))
+            away = np.maximum(touch.frame - before - at, at - touch.frame - after) / (FREE_FADE * self.plan.fps)
+            found = np.maximum(found, 1.0 - smoothstep(np.clip(away, 0.0, 1.0)))
+        return found
+
+    @property
+    def _turning_source(self) -> SourceMotion:
+        """The source frames with the turning that keeps feet in contact where the body is slow."""
+        if self.track.heading is None or len(self.track) < 2:
+            return self.smooth_source
+        slow = np.interp(self.track.speed, SPEEDS[1:], (1.0, 0.0))[1:]
+        turn = self.smooth_source.turn.copy()
+        turn[1:] += slow * (self._foot_moves[1] - turn[1:])
+        return replace(self.smooth_source, turn=turn)
 
     @property
     def _old_share(self) -> np.ndarray | float:
@@ -210,19 +278,25 @@ def apply_heading(pose: np.ndarray, heading: np.ndarray) -> np.ndarray:
     return out
 
 
-def solve_heading(track: SampledTrack, source: SourceMotion, given: np.ndarray | None = None) -> np.ndarray:
+def solve_heading(
+    track: SampledTrack, source: SourceMotion, given: np.ndarray | None = None, freedom: np.ndarray | float = 0.0
+) -> np.ndarray:
     """Solve the heading: the compromise between the track's direction and the source's own turning.
 
     Args:
         track: T frames; a body in place or moving slowly turns to the gaze target of the track.
         source: T source frames without jumps.
         given: (T,) rad that the heading has to be, NaN where it is free.
+        freedom: (T,) from 0 to 1, how little the planned heading counts.
     Returns:
         (T,) rad, unwrapped.
     """
     firm = compute_turning_firmness(source.heel_toe_contacts, source.height, track.fps)
-    aim = track.direction + compute_heading_offset(track)
-    return fit_heading(track.direction, track.speed, source.velocity, source.turn, given, firm=firm, aim=aim)
+    held = 0.0 if track.held is None else track.held * (1.0 - freedom)
+    if track.heading is not None:
+        firm = firm * measure_rest(source, track.speed)
+    return fit_heading(track.direction, track.speed, source.velocity, source.turn, given, plan=track.heading,
+                       firm=firm + held * (1.0 - firm), freedom=freedom, held=held)
 
 
 def find_touches(library: Library, fps: float, edit: EditList, keys: tuple[KeyResult, ...]) -> tuple[Touch, ...]:

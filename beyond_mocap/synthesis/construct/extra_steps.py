@@ -27,7 +27,7 @@ from ...motion.track import smooth_zero_phase_hann
 from .move_body_part import leg_chain
 
 SPEED = np.array([0.05, 0.3, 0.8, 1.5])
-STRIDE = np.array([0.12, 0.25, 0.40, 0.45])
+STRIDE = np.array([0.12, 0.25, 0.30, 0.34])
 TURN = np.array([0.28, 0.35, 0.45, 0.60])
 SWING = np.array([0.45, 0.38, 0.32, 0.30])
 """By the body's speed (SPEED, m/s): metres that a foot is dragged (STRIDE) and radians that it is turned (TURN) from
@@ -40,8 +40,13 @@ LAG_DIFFERENCE = 0.3  # difference of lag from which on the foot that lags more 
 MIN_SWING = 0.26  # s of the quickest step
 HEEL_OFF, TOE_ON = 0.06, 0.03  # s that the heel is up before the toe, and that the toe is down before the step ends
 SETTLE_SECONDS = 0.04  # s of contact that a foot needs before the other one is lifted, and after it is down again
+UNWIND_SECONDS = 0.17  # s before a lift in which a foot may lag
 SHORTEST = 0.2  # s of a stance that are left on either side of a step
 FOOT_SEPARATION = 0.11  # m between the ankles of feet that pass each other
+CROSSING_ROOM = (0.15, 0.30)
+"""Metres that feet are one before the other from which on they need not be side by side, and from which on they may
+cross."""
+MAX_SEPARATING = 0.15  # m that a foot is set down further apart at most
 LIFT_HEIGHT = 0.045  # m that a foot is lifted
 HEEL_UP, TOE_UP = 0.22, 0.06  # rad: heel over toe after lifting, toe over heel before landing
 SWAY = 0.012  # m that the pelvis moves over the planted foot
@@ -249,6 +254,7 @@ class _StepPlan:
         self.swing = np.maximum(np.rint(np.interp(speed, SPEED, SWING) * fps).astype(int), 3)
         least = (max(1, int(round(seconds * fps))) for seconds in (SETTLE_SECONDS, SHORTEST, MIN_SWING))
         self.settled, self.shortest, self.least = least
+        self.unwinding = int(round(UNWIND_SECONDS * fps))
         self.turn = np.interp(speed, SPEED, TURN)
         self.stride = np.minimum(np.interp(speed, SPEED, STRIDE), self._limit_stride())
         self.last_side: int | None = None
@@ -279,7 +285,9 @@ class _StepPlan:
         # distance in strides and turn in turns, as one length
         away = np.abs(foot.middle[at] - foot.middle[first]) / self.stride[at]
         self.lag[at, side] = np.hypot(away, (foot.yaw[at] - foot.yaw[first]) / self.turn[at])
-        return float(self.lag[at, side].max(initial=0.0))
+        # a foot that lifts soon anyway may lag until then
+        counted = slice(first, end if end == len(self.speed) else max(end - self.unwinding, first + 1))
+        return float(self.lag[counted, side].max(initial=0.0))
 
     def run(self) -> None:
         """Break stances until none drags any more, or none can be broken."""
@@ -379,10 +387,11 @@ class _StepPlan:
         lag = self.lag[first:end, side]
         # break a stance of lag n into equal parts, each with at most DRAG_TOLERANCE
         share = lag.max() / np.ceil(lag.max() / DRAG_TOLERANCE)
-        due = np.full(len(lag), share)
+        resting = np.interp(self.speed[first:end], SPEED[:2], (1.0, 0.0))
+        due = np.maximum(share, resting)
         if any(a < end and first < b for a, b in self.dragged_stances[1 - side][:1]):
             # where both lag the same, one steps at half the lag, so that they take turns
-            due *= 0.5 + 0.5 * np.clip(np.abs(lag - self.lag[first:end, 1 - side]) / (0.5 * share), 0.0, 1.0)
+            due *= 0.5 + 0.5 * np.clip(np.abs(lag - self.lag[first:end, 1 - side]) / (0.5 * due), 0.0, 1.0)
         at = int(places[np.argmin(np.abs(places - np.argmax(lag >= due)))])
         return first + at, int(down[at])
 
@@ -432,6 +441,8 @@ def _separate_feet(plan: _StepPlan, stepped: np.ndarray, left: np.ndarray) -> np
     near = np.pad(stepped, ((1, 1), (0, 0)))
     # a stance is loose, and may be moved, if a step begins or ends it
     loose = [[bool(near[a, side] or near[b + 1, side]) for a, b in stances[side]] for side in (_LEFT, _RIGHT)]
+    # the shorter one of two is moved more: a long stand does not shift for one step beside it
+    yields = [[free / (b - a) for free, (a, b) in zip(*both)] for both in zip(loose, stances)]
     place = [[foot.points[a:b].mean(axis=0) for a, b in stances[side]] for side, foot in enumerate(plan.feet)]
     pushed = [[0.0j] * len(side) for side in place]
     # pairs of overlapping stances with the body's left in the middle of the overlap; one of them at least is loose
@@ -441,12 +452,16 @@ def _separate_feet(plan: _StepPlan, stepped: np.ndarray, left: np.ndarray) -> np
     for _ in range(_ROUNDS):
         for i, j, left_direction in pairs:
             between = place[_LEFT][i] - place[_RIGHT][j] + pushed[_LEFT][i] - pushed[_RIGHT][j]
-            missing = FOOT_SEPARATION - float((between * left_direction.conjugate()).real.min())
+            # real part to the left, imaginary part backward; feet one well before the other may cross
+            apart = between * left_direction.conjugate()
+            needed = np.interp(np.abs(apart.imag), CROSSING_ROOM, (FOOT_SEPARATION, -FOOT_SEPARATION))
+            missing = min(float((needed - apart.real).max()), MAX_SEPARATING - max(abs(pushed[_LEFT][i]),
+                                                                                    abs(pushed[_RIGHT][j])))
             if missing > 0.0:
                 # split what lacks between the loose ones of the two
-                share = missing / (loose[_LEFT][i] + loose[_RIGHT][j])
-                pushed[_LEFT][i] += share * loose[_LEFT][i] * left_direction
-                pushed[_RIGHT][j] -= share * loose[_RIGHT][j] * left_direction
+                share = missing / (yields[_LEFT][i] + yields[_RIGHT][j])
+                pushed[_LEFT][i] += share * yields[_LEFT][i] * left_direction
+                pushed[_RIGHT][j] -= share * yields[_RIGHT][j] * left_direction
     out = np.zeros((len(stepped), 2, 2))
     for side in (_LEFT, _RIGHT):
         if any(pushed[side]):

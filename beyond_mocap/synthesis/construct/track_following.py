@@ -31,9 +31,16 @@ _FLIGHT_SECONDS = 0.3  # s without a foot on the ground that count as flight; th
 _LOW = 0.6  # share of the usual height of the hips below which a body lies or kneels
 IN_PLACE_SPEED = 0.3  # m/s below which a direction of travel says nothing about the heading
 
-FAINT_AIM_WEIGHT, AIM_WEIGHT = 1e-4, 0.004
-"""Weights of the pull to where a body in place would turn: at any speed, and at rest (half of the turn in 1.3 s)."""
+MAX_OFF_PLAN = np.radians(25.0)  # of the heading, from the plan: with more a body that turns its back passes as planned
+PLAN_SPEEDS, PLAN_WEIGHTS = (0.1, 0.5, 1.1), (1e-5, 0.02, 0.05)
+"""Weights of the plan by the track's speed, m/s: a body at rest turns as its recording does, within MAX_OFF_PLAN."""
 
+BEYOND_WEIGHT = 5.0  # of the plan where the heading is farther off: against the firmness of two planted feet
+MAX_OFF_HELD, HELD_WEIGHT = np.radians(5.0), 0.5
+"""The same where the heading is given, and the weight added to that of the plan there."""
+
+_HELD_ROUNDS = 3  # of holding what is beyond MAX_OFF_PLAN
+FAINT_WEIGHT = 1e-4  # weight of that pull at any speed, so that there is one solution
 GIVEN_HEADING_WEIGHT = 1e6  # weight of a given heading, so large that it stays
 ROOT_WINDOW = 1.5  # s, the window through which the root lies on the track
 
@@ -60,13 +67,14 @@ _ROOT_X, _ROOT_Y, _TURN, _UNKNOWNS = 0, 1, 2, 3
 
 def fit_heading(
     direction: np.ndarray, speed: np.ndarray, velocity: np.ndarray, turn: np.ndarray, given: np.ndarray | None = None,
-    firm: np.ndarray | float = 1.0, aim: np.ndarray | None = None,
+    firm: np.ndarray | float = 1.0, plan: np.ndarray | None = None, freedom: np.ndarray | float = 0.0,
+    held: np.ndarray | float = 0.0,
 ) -> np.ndarray:
     """Solve the heading: the least squares compromise between travel and the recording's own turning.
 
     At speed the body keeps the recording's angle to the direction of travel; where either is in place there is no such
-    angle and the recording's turning decides, with a little of `aim`. Every term is quadratic, so the whole is one
-    tridiagonal system.
+    angle and the recording's turning decides, near the plan where there is one. Every term is quadratic, so the whole
+    is one tridiagonal system.
 
     Args:
         direction: (T,) rad, of travel on the track.
@@ -75,17 +83,61 @@ def fit_heading(
         turn: (T,) rad that the recording turned since the frame before.
         given: (T,) rad that the heading has to be, NaN where it is free.
         firm: (T,) how many times firmer than usual the recording's turning is followed (`compute_turning_firmness`).
-        aim: (T,) rad that a body in place turns to slowly.
+        plan: (T,) rad, unwrapped, near which the heading stays; None without a plan.
+        freedom: (T,) from 0 to 1, how little the plan counts, as at the ball.
+        held: (T,) from 0 to 1, how far the plan is given.
     Returns:
         (T,) rad, unwrapped.
     """
     # the heading that keeps the recorded angle between travel and facing
     goal = direction - arctan2(velocity[:, 1], velocity[:, 0])
     trust = _motion_weight(speed) ** 2 * _motion_weight(np.linalg.norm(velocity, axis=1)) ** 2
-    goal, trust = _add_aim(goal, trust, speed, aim, turn)
+    if plan is not None:
+        return follow_plan(plan, goal, trust, speed=speed, turn=turn, given=given, firm=firm, freedom=freedom,
+                           held=held)
+    trust = trust + FAINT_WEIGHT
     if given is not None:
         goal, trust = np.where(np.isnan(given), goal, given), np.where(np.isnan(given), trust, GIVEN_HEADING_WEIGHT)
     return follow_turning(_unwrap_to_turn(goal, turn), trust, turn, firm)
+
+
+def follow_plan(
+    plan: np.ndarray, goal: np.ndarray, trust: np.ndarray, *, speed: np.ndarray, turn: np.ndarray,
+    given: np.ndarray | None = None, firm: np.ndarray | float = 1.0, freedom: np.ndarray | float = 0.0,
+    held: np.ndarray | float = 0.0,
+) -> np.ndarray:
+    """Solve the heading near a plan: a body at rest turns as its recording does, within the plan's own dead zone.
+
+    Args:
+        plan: (T,) rad, the planned heading, unwrapped.
+        goal: (T,) rad, the heading that keeps the recorded angle between travel and facing.
+        trust: (T,) weight of that goal.
+        speed: (T,) m/s on the track.
+        turn: (T,) rad that the recording turned since the frame before.
+        given: (T,) rad that the heading has to be, NaN where it is free; None for free everywhere.
+        firm: (T,) how many times firmer than usual the recording's turning is followed.
+        freedom: (T,) from 0 to 1, how far the recording alone decides.
+        held: (T,) from 0 to 1, how far the plan is given: there the body faces as planned.
+    Returns:
+        (T,) rad.
+    """
+    most = MAX_OFF_PLAN + freedom * (np.pi - MAX_OFF_PLAN) - held * (MAX_OFF_PLAN - MAX_OFF_HELD)
+    off = np.clip(quaternion.wrap_angle(goal - plan), -most, most)
+    pull = np.interp(speed, PLAN_SPEEDS, PLAN_WEIGHTS)
+    pull = pull + freedom * (FAINT_WEIGHT - pull) + held * HELD_WEIGHT
+    goal, trust = plan + off * trust / (trust + pull), trust + pull
+    if given is not None:
+        turns = 2.0 * np.pi * np.round((np.nan_to_num(given) - plan) / (2.0 * np.pi))
+        goal = np.where(np.isnan(given), goal, given - turns)
+        trust = np.where(np.isnan(given), trust, GIVEN_HEADING_WEIGHT)
+    heading = follow_turning(goal, trust, turn, firm)
+    for _ in range(_HELD_ROUNDS):
+        away = heading - plan
+        beyond = (np.abs(away) > most) & (trust < GIVEN_HEADING_WEIGHT)
+        goal = np.where(beyond, plan + np.sign(away) * most, goal)
+        trust = np.where(beyond, np.maximum(trust, BEYOND_WEIGHT), trust)
+        heading = follow_turning(goal, trust, turn, firm)
+    return heading
 
 
 def follow_turning(
@@ -130,16 +182,6 @@ def compute_turning_firmness(heel_toe_contacts: np.ndarray, height: np.ndarray, 
 def _motion_weight(speed: np.ndarray) -> np.ndarray:
     """Compute how much a velocity says about where a body moves: (T,) 0 in place, 1 from 1 m/s on."""
     return np.clip((speed - IN_PLACE_SPEED) / (1.0 - IN_PLACE_SPEED), 0.0, 1.0)
-
-
-def _add_aim(goal: np.ndarray, trust: np.ndarray, speed: np.ndarray, aim: np.ndarray | None, turn: np.ndarray):
-    """Add the pull towards `aim` to goals (T,) and their weights; it has an effect only where little else is known."""
-    if aim is None:
-        return goal, trust + FAINT_AIM_WEIGHT
-    pull = FAINT_AIM_WEIGHT + AIM_WEIGHT * np.clip(1.0 - speed, 0.0, 1.0) ** 2
-    goal, aim = _unwrap_to_turn(goal, turn), _unwrap_to_turn(aim, turn)
-    aim = aim + 2.0 * np.pi * np.round((goal - aim) / (2.0 * np.pi))
-    return (trust * goal + pull * aim) / (trust + pull), trust + pull
 
 
 def _unwrap_to_turn(goal: np.ndarray, turn: np.ndarray) -> np.ndarray:
@@ -308,7 +350,7 @@ def _turn_trunk(skeleton: Skeleton, rotations: np.ndarray, axis: np.ndarray, ang
 
 
 def absorb_foot_slide(
-    skeleton: Skeleton, root: np.ndarray, rotations: np.ndarray, heel_toe_contacts: np.ndarray, fps: float
+    skeleton: Skeleton, root: np.ndarray, rotations: np.ndarray, heel_toe_contacts: np.ndarray, fps: float,
 ) -> tuple[np.ndarray, np.ndarray]:
     """Move the root and turn the body a little so that planted feet slide less.
 

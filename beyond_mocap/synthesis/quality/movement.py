@@ -113,12 +113,12 @@ def compute_class_rms(values: np.ndarray, classes: np.ndarray, least: int = 30) 
     Args:
         values: (N,).
         classes: (N,) class of each.
-        least: values that a class needs; others take the nearest class that has them.
+        least: values that a class needs.
     Returns:
-        (5,), NaN where no class has enough.
+        (5,), NaN where a class has too few.
     """
     rms = [np.sqrt(np.mean(values[classes == k] ** 2)) if np.sum(classes == k) >= least else np.nan for k in range(5)]
-    return fill_from_nearest(np.array(rms))
+    return np.array(rms)
 
 
 def fill_from_nearest(values: np.ndarray) -> np.ndarray:
@@ -197,6 +197,11 @@ def compute_real_p95(windows: np.ndarray, speed: np.ndarray, least: int = 30) ->
     classes = classify_speed(speed)
     values = [windows[classes == k] for k in range(5)]
     return fill_from_nearest(np.array([np.percentile(v, 95) if len(v) >= least else np.nan for v in values]))
+
+
+def find_recorded_classes(speed: np.ndarray, least: int = 30) -> np.ndarray:
+    """Find the speed classes (5,) bool with `least` windows or more, of speeds (M,) m/s (see `compute_real_p95`)."""
+    return np.bincount(classify_speed(speed), minlength=5) >= least
 
 
 def compute_transition_ratios(values: np.ndarray, transitions: np.ndarray, speed: np.ndarray,

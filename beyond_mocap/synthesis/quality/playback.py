@@ -44,6 +44,7 @@ class Playback:
         ball: as written, or None.
         correction: (T, 2) m each foot was moved by foot correction, or None.
         keys: how key moments were served, empty for a take read from files.
+        planned_heading: (T,) rad from +x that was planned, NaN or None where that is not known.
     """
 
     motion: Motion
@@ -57,6 +58,7 @@ class Playback:
     ball: BallPath | None = None
     correction: np.ndarray | None = None
     keys: tuple[KeyResult, ...] = ()
+    planned_heading: np.ndarray | None = None
 
     @property
     def times(self) -> np.ndarray:
@@ -117,7 +119,7 @@ def playback_from_take(take: Take) -> Playback:
         motion=take.motion, start_time=take.start_time, clips=tuple(take.clips), clip=np.asarray(take.clip, dtype=int),
         clip_frame=np.asarray(take.clip_frame, dtype=float), mirrored=np.asarray(take.mirrored, dtype=bool),
         words=tuple(take.words), contacts=np.asarray(take.contacts, dtype=bool), ball=take.ball,
-        correction=take.correction, keys=tuple(take.keys),
+        correction=take.correction, keys=tuple(take.keys), planned_heading=take.planned_heading,
     )
 
 
@@ -131,7 +133,8 @@ def playback_from_tables(
     Args:
         motion: T frames.
         provenance: `synthesis.provenance.Provenance`, or anything with its arrays: times (T,) s, clip (T paths),
-            clip_frame (T,), mirrored (T,) bool, words (T tuples), contacts (T, 2) bool.
+            clip_frame (T,), mirrored (T,) bool, words (T tuples), contacts (T, 2) bool, planned_heading (T,) rad or
+            None.
         ball: the ball's path.
         start_time: s of frame 0 where there is no provenance.
         where: the table's file, for messages.
@@ -151,6 +154,7 @@ def playback_from_tables(
         clip=index.reshape(-1), clip_frame=np.asarray(provenance.clip_frame, dtype=float),
         mirrored=np.asarray(provenance.mirrored, dtype=bool), words=tuple(map(tuple, provenance.words)),
         contacts=np.asarray(provenance.contacts, dtype=bool), ball=ball,
+        planned_heading=getattr(provenance, "planned_heading", None),
     )
 
 

@@ -16,11 +16,25 @@ import numpy as np
 
 from ...annotation import Timeline, labels_per_frame
 from ...base.errors import TimedMessage, format_seconds
-from ...base.time_series import find_runs
+from ...base.time_series import find_runs, time_derivative
+from ...library.coverage import NEEDED_TURN_RATE, TRAVEL_SPEED, classify_steps, compute_turn_rate
+from ...library.features import SMOOTH_SECONDS
 from ...library.landings import LANDING_FOLDER
-from ...library.library import Library
-from ...library.synthetic_clips import BLEND_PREFIX, KICK_PREFIX, RECEIVE_PREFIX, SYNTHETIC_FOLDER
-from ...motion.track import Track
+from ...library.library import RESTING_SPEED, Library
+from ...library.missing_steps import BACK_PREFIX, SIDE_PREFIX, STEP_PREFIX, TURN_PREFIX
+from ...library.synthetic_clips import (
+    BLEND_PREFIX,
+    KICK_PREFIX,
+    LOOP_PREFIX,
+    RECEIVE_PREFIX,
+    STAND_PREFIX,
+    STILL_PREFIX,
+    SYNTHETIC_FOLDER,
+    WALK_PREFIX,
+)
+from ...motion import quaternion
+from ...motion.humanoid import compute_heading_from_positions
+from ...motion.track import Track, smooth_zero_phase_hann
 from . import movement
 from .moments import KeyMomentResult, evaluate_moments, measure_contact
 from .playback import Playback, compute_playback_rate, find_transitions
@@ -28,13 +42,29 @@ from .targets import KEY_TARGETS, TARGETS
 
 WARP_LIMITS = (TARGETS["warp_rate.min"].least, TARGETS["warp_rate.max"].most)
 ROOT_ERROR_LIMIT = TARGETS["root_error_m.p95"].most
+SLOW_ROOT_ERROR_LIMIT = 1.5 * TARGETS["slow_root_error_m.max"].most  # m; a creeping track itself is off by 8 cm
 LEG_MISS_LIMIT = 0.005  # m that a leg may be short without a line
 GROUND_LIMIT = -TARGETS["ground_mm.min"].least / 1000.0
 CONTACT_GAP_LIMIT = KEY_TARGETS["contact_gap_m"].most
 JOIN_SECONDS = 0.4  # stretches closer than this are one
+MISSING_SECONDS = 0.5  # shortest time of a motion that the library lacks that is reported
 LABEL_SECONDS = 0.5  # shortest time of a missing label that is reported
 MAX_STRETCHES = 6  # stretches that a line lists
+_STANDS_AND_GOES_AHEAD = (STAND_PREFIX, STILL_PREFIX, WALK_PREFIX, BLEND_PREFIX)
 _TOLERANCE = 1e-3  # of rates and seconds, for rounding
+_SYNTHETIC_KINDS = (
+    (BLEND_PREFIX, "blended from a slower and a faster recording: none has the speed of the track"),
+    (KICK_PREFIX, "synthetic kick on the run: no recorded kick is as fast as the player"),
+    (RECEIVE_PREFIX, "synthetic reception on the run: no recorded one is as fast as the player"),
+    (STAND_PREFIX, "a recorded stand is played forth and back: no recording stands for so long"),
+    (STILL_PREFIX, "synthetic standing: no recording stands calmly; add one"),
+    (WALK_PREFIX, "synthetic walking: no recording has the speed of the track; add one"),
+    (LOOP_PREFIX, "strides of a recorded run are repeated: no recording runs so steadily for so long"),
+    (BACK_PREFIX, "a recorded walk is played backward: hardly any recording goes backward at this speed"),
+    (SIDE_PREFIX, "synthetic side step: hardly any recording goes sideways or diagonally at this speed"),
+    (TURN_PREFIX, "synthetic turn on the spot: hardly any recording turns where it stands"),
+    (STEP_PREFIX, "synthetic step: hardly any recording takes it from a stand to a stand"),
+)
 
 
 def report_unmet_constraints(
@@ -60,6 +90,7 @@ def report_unmet_constraints(
     keys = evaluate_moments(played, timeline.keys, stride, library) if timeline is not None else []
     lines = [
         *_report_synthetic(played),
+        *_report_missing_motion(played, library),
         _report_stretched_strides(played, track, library),
         _report_warp(played, source),
         _report_sliding(played),
@@ -73,22 +104,18 @@ def report_unmet_constraints(
     return [line for line in lines if line]
 
 
-def report_jolts(times: np.ndarray, starts: np.ndarray, ratios: np.ndarray) -> TimedMessage | None:
-    """Report transitions that are harder than recordings are.
+def report_jolts(times: np.ndarray, flags: np.ndarray, most: float) -> TimedMessage | None:
+    """Report jerk that is harder than recordings have it.
 
     Args:
         times: (T,) s.
-        starts: (S,) frames of transitions.
-        ratios: (S,) of `movement.compute_transition_ratios`.
+        flags: (T,) bool, frames with such a jerk.
+        most: the highest one, over the 95th percentile of recordings at that speed.
     Returns:
         A line, None where there is none.
     """
-    most, flags = TARGETS["seam_jerk_ratio.max"].most, np.zeros(len(times), bool)
-    hard = ratios > most
-    for start in starts[hard]:
-        flags[max(start - movement.JERK_REACH // 2, 0) : start + movement.JERK_REACH // 2] = True
-    hardest = f"{ratios.max(where=hard, initial=0.0):.2f} times as hard as recordings of that speed"
-    return _build_line(times, flags, f"transitions jolt up to {hardest} (target {most:g})")
+    hardest = f"{most:.2f} times as hard as recordings of that speed"
+    return _build_line(times, flags, f"the body jolts up to {hardest} (target {TARGETS['seam_jerk_ratio.max'].most:g})")
 
 
 def format_stretches(times: np.ndarray, flags: np.ndarray) -> str:
@@ -133,19 +160,45 @@ def _frames_of_clips(played: Playback, *begins: str) -> np.ndarray:
 
 
 def _report_synthetic(played: Playback) -> list[TimedMessage | None]:
-    """Report each kind of synthetic clip: running, two recordings blended, kicks, taken balls, landings."""
-    blends, kicks, receptions = (_frames_of_clips(played, SYNTHETIC_FOLDER + name)
-                                 for name in (BLEND_PREFIX, KICK_PREFIX, RECEIVE_PREFIX))
-    running = _frames_of_clips(played, SYNTHETIC_FOLDER) & ~blends & ~kicks & ~receptions
-    kinds = (
+    """Report each kind of synthetic clip."""
+    running = _frames_of_clips(played, SYNTHETIC_FOLDER)
+    kinds = []
+    for name, what in _SYNTHETIC_KINDS:
+        there = _frames_of_clips(played, SYNTHETIC_FOLDER + name)
+        kinds.append((there, what))
+        running = running & ~there
+    kinds += [
         (running, "synthetic running: no recording has the speed of the track"),
-        (blends, "blended from a slower and a faster recording: none has the speed of the track"),
-        (kicks, "synthetic kick on the run: no recorded kick is as fast as the player"),
-        (receptions, "synthetic reception on the run: no recorded one is as fast as the player"),
         (_frames_of_clips(played, LANDING_FOLDER), "synthetic landing and getting up: the recording ends in flight"),
-    )
+    ]
     return [_build_line(played.times, there, what, f" ({np.sum(there) / played.motion.fps:.1f} s in all)")
             for there, what in kinds]
+
+
+def _report_missing_motion(played: Playback, library: Library | None) -> list[TimedMessage | None]:
+    """Report each kind of motion that the library lacks and the body needs for MISSING_SECONDS or more, where no
+    synthetic clip stands in.
+    """
+    if library is None or not library.missing_motion:
+        return []
+    fps = played.motion.fps
+    heading = np.unwrap(compute_heading_from_positions(played.motion.skeleton, played.positions))
+    path = smooth_zero_phase_hann(played.pelvis, fps, SMOOTH_SECONDS)
+    velocity = quaternion.rotate_level(time_derivative(path, fps), -heading)
+    speed = np.linalg.norm(velocity, axis=1)
+    slowest = WARP_LIMITS[0] * library.slowest_travel
+    shown = {
+        "belonging": np.ones(len(speed), bool), "stands": speed < RESTING_SPEED,
+        "slow": (speed > TRAVEL_SPEED) & (speed < slowest),
+        **classify_steps(velocity, compute_turn_rate(heading, fps), NEEDED_TURN_RATE),
+    }
+    synthetic = _frames_of_clips(played, SYNTHETIC_FOLDER)
+    ahead = _frames_of_clips(played, *(SYNTHETIC_FOLDER + name for name in _STANDS_AND_GOES_AHEAD))
+    lines = []
+    for kind, what in library.missing_motion.items():
+        lacks = shown[kind] & ~(synthetic & ~ahead if kind in ("turns", "sideways", "backward") else synthetic)
+        lines.append(_build_line(played.times, lacks, what) if lacks.sum() >= MISSING_SECONDS * fps else None)
+    return lines
 
 
 def _report_stretched_strides(played: Playback, track: Track | None, library: Library | None) -> TimedMessage | None:
@@ -200,10 +253,12 @@ def _report_root_error(played: Playback, track: Track | None) -> TimedMessage | 
     """Report a root that is off the track."""
     if track is None:
         return None
-    error = movement.measure_root_error(played.pelvis, movement.interpolate_track(track, played.times),
-                                        played.motion.fps)
-    return _build_line(played.times, error > ROOT_ERROR_LIMIT,
-                       f"the body is off the track by up to {error.max(initial=0.0):.2f} m")
+    target, fps = movement.interpolate_track(track, played.times), played.motion.fps
+    error = movement.measure_root_error(played.pelvis, target, fps)
+    slow = movement.measure_travel_speed(target, fps) < movement.SPEED_EDGES[0]
+    off = error > np.where(slow, SLOW_ROOT_ERROR_LIMIT, ROOT_ERROR_LIMIT)
+    return _build_line(played.times, off,
+                       f"the body is off the track by up to {error.max(where=off, initial=0.0):.2f} m")
 
 
 def _report_key_times(played: Playback, keys: list[KeyMomentResult]) -> TimedMessage | None:

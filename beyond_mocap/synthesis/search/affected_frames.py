@@ -1,11 +1,12 @@
 """Frames that an edit affects: where the new request differs from the old one, and what of it has to be searched again.
 
 Affected are frames with another request: other labels, also avoided ones, another speed (by more than 5 cm/s), turning
-(by more than 0.05 rad over a slot) or facing (by more than 0.3 rad), and key moments that moved, changed their labels,
-were added or removed, or whose ball has moved (by more than 15 cm), with the entry and exit of their clips. A run-up of
-a second around them is searched too, so that the new motion leads into the old one; key moments that stay are avoided
-where they are not inside. Where only the track or the ball has moved (by more than a millimetre), the source frames
-stay and the motion is constructed again.
+(by more than 0.05 rad over a slot), facing or planned heading (by more than 0.3 rad), and key moments that moved,
+changed their labels, were added or removed, or whose ball has moved (by more than 15 cm), with the entry and exit of
+their clips. A run-up of a second around them is searched too, so that the new motion leads into the old one; key
+moments that stay are avoided where they are not inside. Where only the track or the ball has moved (by more than a
+millimetre), or the planned heading has turned a little (by more than 0.05 rad), the source frames stay and the motion
+is constructed again.
 """
 
 from __future__ import annotations
@@ -18,6 +19,7 @@ from ...annotation.gaits import compute_heading_offset
 from ...base.time_series import find_runs
 from ...library.library import Library
 from ...motion import quaternion
+from ...motion.track import SampledTrack
 from .edit_list import EditList, PlacedKey
 from .request import RequestedKey, SearchRequest, compute_needed_frames
 
@@ -31,11 +33,14 @@ Stretch = tuple[int, int]
 
 
 def find_moved_frames(before: SearchRequest, after: SearchRequest) -> np.ndarray:
-    """Return (T,) bool: frames at which the track, its direction or the ball has moved."""
+    """Return (T,) bool: frames at which the track, its direction, the planned heading or the ball has moved."""
     old, new = before.track, after.track
     off = np.linalg.norm(old.positions - new.positions, axis=1) > PLACE_CHANGE
     off |= np.linalg.norm(old.raw - new.raw, axis=1) > PLACE_CHANGE
     off |= np.abs(quaternion.wrap_angle(new.direction - old.direction)) * np.minimum(1.0, new.speed) > TURN_CHANGE
+    off |= _measure_heading_change(old, new) > TURN_CHANGE
+    if old.held is not None or new.held is not None:
+        off |= (0.0 if old.held is None else old.held) != (0.0 if new.held is None else new.held)
     ball = ~np.isclose(old.ball, new.ball, rtol=0.0, atol=PLACE_CHANGE, equal_nan=True).all(axis=1)
     return off | ball | (old.ball_measured != new.ball_measured)
 
@@ -44,6 +49,7 @@ def find_changed_frames(before: SearchRequest, after: SearchRequest, slot: int) 
     """Return (T,) bool: frames with other requested labels, speed, turning over `slot` frames, or facing."""
     old, new = before.track, after.track
     words = np.array([a != b for a, b in zip(before.requested_labels, after.requested_labels)])
+    words |= before.is_asked != after.is_asked
     if before.avoided != after.avoided:
         none = [frozenset()] * len(after)
         words |= [a != b for a, b in zip(before.avoided or none, after.avoided or none)]
@@ -51,7 +57,15 @@ def find_changed_frames(before: SearchRequest, after: SearchRequest, slot: int) 
     turns = _compute_slot_turn(new.direction, slot) - _compute_slot_turn(old.direction, slot)
     turn = np.abs(quaternion.wrap_angle(turns)) * moving
     facing = np.abs(quaternion.wrap_angle(compute_heading_offset(new) - compute_heading_offset(old))) * moving
+    facing = np.maximum(facing, _measure_heading_change(old, new))
     return words | (np.abs(new.speed - old.speed) > SPEED_CHANGE) | (turn > TURN_CHANGE) | (facing > FACING_CHANGE)
+
+
+def _measure_heading_change(old: SampledTrack, new: SampledTrack) -> np.ndarray:
+    """Measure the change (T,) rad of the planned heading, at any speed; 0 without a plan."""
+    if old.heading is None or new.heading is None:
+        return np.zeros(len(new))
+    return np.abs(quaternion.wrap_angle(new.heading - old.heading))
 
 
 def list_unchanged_keys(edit: EditList, before: SearchRequest, after: SearchRequest) -> tuple[PlacedKey, ...]:

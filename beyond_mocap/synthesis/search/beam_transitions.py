@@ -11,7 +11,7 @@ from dataclasses import dataclass, fields
 
 import numpy as np
 
-_SAME = 0.05  # library frames: places closer than this are the same, apart from rounding
+SAME_FRAME = 0.05  # library frames: places closer than this are the same, apart from rounding
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,13 +49,16 @@ class BeamTransitions:
         end: (B,) library frame at which it ends.
         rate: (B,) playback rate.
         seen: (B, buckets) bool, what it has shown lately.
+        young: (B,) what each state's last cut adds to the next one.
         base: cost of the cheapest state.
         above: (B,) float32, cost above the base.
     """
 
-    def __init__(self, costs, clip: np.ndarray, end: np.ndarray, rate: np.ndarray, cost: np.ndarray, seen: np.ndarray):
+    def __init__(self, costs, clip: np.ndarray, end: np.ndarray, rate: np.ndarray, cost: np.ndarray, seen: np.ndarray,
+                 young: np.ndarray):
         self.costs, self.clip, self.end, self.seen = costs, clip, end, seen
         self.rate = rate.astype(np.float32)
+        self.young = young.astype(np.float32)
         self.base = float(cost.min())
         self.above = (cost - self.base).astype(np.float32)
 
@@ -112,7 +115,7 @@ class BeamTransitions:
         leave, enter = costs.compute_cut_ends(end, start)
         cost = to.cost.astype(np.float32)
         lower_bound += (enter + cost)[:, None]
-        lower_bound += leave + self.above
+        lower_bound += leave + self.young + self.above
         # without a cut nothing but the costs of state and candidate remains
         candidate, state = self._find_uncut_pairs(to)
         lower_bound[candidate, state] = self.above[state] + cost[candidate]
@@ -133,7 +136,10 @@ class BeamTransitions:
         start, end = to.start[candidate], self.end[state]
         frame = costs.round_frame(start)
         cut = np.float32(weights.feet) * costs.measure_foot_jump(costs.round_frame(end), frame)
-        cut += np.float32(weights.replay) * self.seen[state, costs.index.bucket[frame]]
+        cut += costs.compute_recording_change(costs.round_frame(end), frame)
+        # a stand may be shown again: nothing in it is recognized
+        shown = self.seen[state, costs.index.bucket[frame]]
+        cut += np.float32(weights.replay) * shown * np.maximum(costs.index.lifted[frame], np.float32(0.1))
         cut[_is_same_frame(start, end) & (to.clip[candidate] == self.clip[state])] = 0.0
         rate = np.float32(weights.rate_change) * np.abs(to.rate.astype(np.float32)[candidate] - self.rate[state])
         return lower_bound.ravel()[pairs] + cut + rate
@@ -144,9 +150,9 @@ class BeamTransitions:
         Returns:
             Candidates (M,) and states (M,).
         """
-        # states sorted by their end; for each candidate the range low .. high of ends within _SAME
+        # states sorted by their end; for each candidate the range low .. high of ends within SAME_FRAME
         by_end = np.argsort(self.end, kind="stable")
-        low, high = (np.searchsorted(self.end[by_end], to.start + off) for off in (-_SAME, _SAME))
+        low, high = (np.searchsorted(self.end[by_end], to.start + off) for off in (-SAME_FRAME, SAME_FRAME))
         candidate = np.flatnonzero(high > low)
         many = high[candidate] - low[candidate]
         # enumerate all ranges in one array: position in the run of repeats plus the run's own `low`
@@ -158,7 +164,7 @@ class BeamTransitions:
 
 def _is_same_frame(start: np.ndarray, end: np.ndarray) -> np.ndarray:
     """Return (P,) bool: whether library frames are the same, apart from rounding."""
-    return np.abs(start - end) < _SAME
+    return np.abs(start - end) < SAME_FRAME
 
 
 def _find_cheapest_of_runs(cost: np.ndarray, begins: np.ndarray) -> np.ndarray:

@@ -6,15 +6,18 @@ import weakref
 from dataclasses import dataclass, fields
 
 import numpy as np
-from scipy.ndimage import maximum_filter1d
+from scipy.ndimage import maximum_filter1d, uniform_filter1d
 
 from ...annotation import DISCRETE
 from ...base.vectors import arctan2
 from ...library.library import Library
 from .block_costs import AnnotationCost
 
+STAND_SPEED = 0.2  # m/s that a clip of a stand never exceeds
+
 SLOT = 8  # output frames of a usual slot
 PLAYBACK_RATES = np.array([0.875, 0.9375, 1.0, 1.0625, 1.125])  # playback rates that are tried
+MOST_STRANGE = 3.0  # radii beyond the region of normal locomotion at which the cost stops growing
 BUCKET = 40  # library frames that count as one for replayed stretches
 JERK_REACH = 8  # frames to either side over which the jerk of a transition is measured
 _SPEED_CLASSES = (1.0, 2.0, 3.0, 4.5)  # m/s between the classes in which jerk is compared
@@ -34,6 +37,7 @@ class RatePairs:
         turn: (K,) rad over the slot.
         offset: (K,) rad from the direction of travel to the facing.
         long_stance: (K,) s of contact of both feet beyond that of a walk.
+        lifted: (K,) share of the slot without both feet on the ground.
     """
 
     number: np.ndarray
@@ -42,6 +46,7 @@ class RatePairs:
     turn: np.ndarray
     offset: np.ndarray
     long_stance: np.ndarray
+    lifted: np.ndarray
 
     def slice_pairs(self, which: slice) -> "RatePairs":
         """Select a slice of the pairs."""
@@ -58,8 +63,10 @@ class CandidateIndex:
         turn: (R, N) rad over a slot.
         valid: (R, N) bool, whether the clip lasts that long and is allowed.
         by_speed: (K,) the valid pairs, flat indices into (R, N), in order of their speeds.
-        offset, long_stance: (N,), see `RatePairs`.
+        offset, long_stance, lifted: (N,), see `RatePairs`.
         is_synthetic: (N,) bool, frames of synthetic clips.
+        strange: (N,) float32, how far outside of normal locomotion a slot from there on is, up to MOST_STRANGE.
+        recording: (N,) int, the same for a clip and its mirrored twin.
         is_in_contact: (N, 2) bool, feet in contact.
         wild_before, wild_after: (N,), see `measure_wildness`.
         bucket: (N,) int; frames of one bucket look alike when they are shown twice.
@@ -80,6 +87,14 @@ class CandidateIndex:
         self.frames = library.frames
         self.annotation = AnnotationCost(library.frames)
         self.is_synthetic = np.array([clip.is_synthetic for clip in library.clips])[library.frames.clip]
+        strange = maximum_filter1d(library.strangeness, SLOT, origin=-(SLOT // 2), mode="nearest")
+        self.strange = np.clip(strange - 1.0, 0.0, MOST_STRANGE)
+        recording = np.unique([clip.path for clip in library.clips], return_inverse=True)[1]
+        self.recording = recording[library.frames.clip]
+        fastest = np.zeros(len(library.clips))
+        np.maximum.at(fastest, library.frames.clip, library.frames.speed)
+        # a recorded stand that is played forth and back costs nothing; the ends of a synthetic turn are no stand
+        self.is_made_travel = self.is_synthetic & (fastest[library.frames.clip] > STAND_SPEED)
         self.bucket = (np.arange(len(library.frames)) // BUCKET).astype(int)
         speed, turn, lasts = map(np.stack, zip(*(compute_speed_and_turn(library, rate) for rate in PLAYBACK_RATES)))
         self.speed, self.turn = speed.astype(np.float32), turn.astype(np.float32)
@@ -89,6 +104,8 @@ class CandidateIndex:
         self.offset = -arctan2(self.frames.velocity[:, 1], self.frames.velocity[:, 0]).astype(np.float32)
         self.long_stance = np.clip(library.stance_seconds - USUAL_STANCE, 0.0, _LONGEST_STANCE).astype(np.float32)
         self.is_in_contact = library.feet_in_contact
+        lifted = (~self.is_in_contact.all(axis=1)).astype(np.float32)
+        self.lifted = uniform_filter1d(lifted, SLOT, origin=-(SLOT // 2), mode="nearest")
         self.wild_before, self.wild_after = measure_wildness(library)
         self._by_words: dict[frozenset[str], tuple[np.ndarray, np.ndarray]] = {}
         self._sorted: dict[frozenset[str], RatePairs] = {}
@@ -97,7 +114,7 @@ class CandidateIndex:
     def build_pairs(self, number: np.ndarray, frame: np.ndarray) -> RatePairs:
         """Build the pairs of PLAYBACK_RATES[number (K,)] and library frame (K,)."""
         played = self.speed[number, frame], self.turn[number, frame]
-        return RatePairs(number, frame, *played, self.offset[frame], self.long_stance[frame])
+        return RatePairs(number, frame, *played, self.offset[frame], self.long_stance[frame], self.lifted[frame])
 
     def pairs_by_speed(self, avoid: frozenset[str] = frozenset()) -> RatePairs:
         """Return all valid pairs in order of their speeds, without those that show a label of `avoid` unless all do."""

@@ -17,11 +17,11 @@ import numpy as np
 from ...library.library import Library
 from ..plan import ResolvedPlan
 from ..search_library import extend_library
-from .beam_transitions import SlotCandidates
+from .beam_transitions import SAME_FRAME, SlotCandidates
 from .block_costs import AnnotationCost, collect_windows, compute_distances, measure_typical_distance
 from .candidate_index import PLAYBACK_RATES, SLOT
 from .edit_list import EditList
-from .path_costs import Term, Weights, balance_weights
+from .path_costs import YOUNG_SLOTS, Term, Weights, balance_weights
 from .path_search import MEMORY_SLOTS, BeamStates, PathSearch
 from .request import SearchRequest, build_request
 from .slots import KeyPieces, build_slot_edges
@@ -250,7 +250,8 @@ def _compute_entry_costs(search: PathSearch, choices: _SlotChoices, slot: int) -
     whole = float(search.build_transitions(before, np.zeros(1, int), ends).compute_all(to)[0, 0])
     if whole <= change + 1e-5:
         return {"rate_change": change}
-    costs = _terms_to_costs(search.costs.iter_cut_terms(ends, here[1]))
+    costs = {**_terms_to_costs(search.costs.iter_cut_terms(ends, here[1])),
+             "soon": float(search.costs.compute_young_cut_cost(before.age)[0])}
     return {**costs, "replay": max(0.0, whole - change - sum(costs.values())), "rate_change": change}
 
 
@@ -261,8 +262,17 @@ def _find_state_before(search: PathSearch, choices: _SlotChoices, slot: int) -> 
     recent[MEMORY_SLOTS - len(starts) :] = search.index.bucket[search.costs.round_frame(starts)]
     one, nothing = slice(slot - 1, slot), np.zeros(1, int)
     state = BeamStates(choices.clip[one], choices.start[one], choices.rate[one], cost=np.zeros(1), back=nothing,
-                       piece=choices.piece[one], recent=recent[None])
+                       piece=choices.piece[one], recent=recent[None], age=np.array([_measure_age(choices, slot - 1)]))
     return state, state.start + state.rate * (choices.edges[slot] - choices.edges[slot - 1])
+
+
+def _measure_age(choices: _SlotChoices, slot: int) -> int:
+    """Measure how many slots before the end of a slot the last cut is, up to YOUNG_SLOTS."""
+    for number in range(slot, 0, -1):
+        end = choices.start[number - 1] + choices.rate[number - 1] * (choices.edges[number] - choices.edges[number - 1])
+        if choices.clip[number] != choices.clip[number - 1] or abs(choices.start[number] - end) >= SAME_FRAME:
+            return min(slot - number + 1, YOUNG_SLOTS)
+    return YOUNG_SLOTS
 
 
 def _iter_other_clips(search: PathSearch, choices: _SlotChoices, slot: int, paid: float,

@@ -22,7 +22,7 @@ from ...motion.track import SampledTrack
 from .request import library_frame
 
 HEIGHT_COST = 0.8  # per metre of height beyond the noise
-PLACE_COST = 0.3  # per metre on the ground beyond the noise
+PLACE_COST = 0.6  # per metre on the ground beyond the noise
 ANGLE_COST = 0.2  # per radian between the part's velocity and the leaving ball
 _NOISE = 0.15  # m by which a tracked ball may be off without saying anything about the clip
 _FARTHEST = 1.0  # m on the ground beyond which the cost does not grow

@@ -11,7 +11,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ...annotation.gaits import compute_heading_offset
+from ...annotation import LOCOMOTION
+from ...annotation.gaits import TURNING, compute_heading_offset
+from ...annotation.vocabulary import DIRECTIONS
 from ...library.library import Library
 from ..plan import Plan
 from .candidate_index import PLAYBACK_RATES, SLOT, CandidateIndex, RatePairs
@@ -29,7 +31,11 @@ _SAMPLED = 8  # every eighth pair is sampled
 _ABOVE = 1.25
 _ROUNDING = 1e-3  # m/s, for float32 speeds
 
-_CONTINUITY = ("switch", "pose", "rate_change")
+_CONTINUITY = ("switch", "other", "young", "pose", "rate_change")
+FREE_SPEED, FREE_TURN, FREE_ASIDE = (0.05, 0.06), np.radians(5.0), np.float32(np.radians(12.0))
+KEY_TURN = 0.2  # share of the weights of turning and facing within the pieces of key moments
+RESTING_SPEED = 0.15  # m/s of a track from which on a lifted foot costs nothing
+YOUNG_SLOTS = 7  # slots after a cut before which another one costs more: 1.9 s, since a person keeps a gait for longer
 
 
 def find_cheapest(
@@ -69,7 +75,7 @@ def _find_promising(cost_of, speeds: np.ndarray, speed: float, weight: float, ne
     if near.stop - near.start > 4 * _SAMPLED * rank and weight > 0.0:
         # cost / weight bounds the missed speed, so the cheapest pairs lie within `reach` of the requested speed
         upper_bound = np.partition(cost_of(slice(near.start, near.stop, _SAMPLED)), rank)[rank]
-        reach = float(upper_bound) / weight + _ROUNDING
+        reach = float(upper_bound) / weight + FREE_SPEED[0] + FREE_SPEED[1] * speed + _ROUNDING
         low, high = np.searchsorted(speeds, [speed - reach, speed + reach])
         part = slice(max(int(low), near.start), min(int(high), near.stop))
         cost = cost_of(part)
@@ -80,10 +86,13 @@ def _find_promising(cost_of, speeds: np.ndarray, speed: float, weight: float, ne
 
 TERMS = {
     "speed": "speed differs from the track",
+    "lift": "lifts a foot where the player stands",
     "turn": "turning differs from the track",
     "facing": "faces another direction",
+    "drag": "feet on the ground are dragged",
     "words": "requested labels that the clip lacks",
     "unasked": "an action not requested, or no labels at all",
+    "strange": "not how people stand, walk or run in this library",
     "made": "synthetic clip, not recorded",
     "rate": "playback rate",
     "strike": "does not fit the ball at the strike",
@@ -91,10 +100,12 @@ TERMS = {
     "feet": "planted feet that jump at the cut",
     "left": "abrupt motion before the cut",
     "cut": "the cut itself, and abrupt motion after it",
+    "soon": "cut soon after another",
     "replay": "shown a moment ago",
     "rate_change": "change of playback rate",
     "avoided": "an avoided label",
     "style": "not a clip of the style",
+    "manner": "moves unlike this player",
     "variety": "does not match this player's own lag",
 }
 """Name of a cost term -> its description in "Why This Clip?"."""
@@ -108,14 +119,21 @@ class Weights:
         speed: per m/s of missed speed.
         drag: per m/s, and per second of contact of both feet beyond that of a walk.
         turn: per radian and slot.
-        facing: per radian between the body and where it should face.
-        words: for lacking all requested labels.
+        lift: for a slot without both feet on the ground where the track rests.
+        facing: per m/s of missed velocity in the body's frame beyond the missed speed.
+        slide: per (m/s)^2 of missed velocity, by which a foot on the ground is dragged.
+        words: for lacking all labels that the user asks for.
+        automatic_words: for lacking all labels of automatic locomotion.
         unasked: for frames of an action that is not requested, or that carry no label.
+        strange: per radius outside of the library's normal locomotion.
         synthetic: for a synthetic clip; it is used only where recordings miss the speed by more.
         synthetic_key: the same at key moments, where a recording is worth more.
         rate: per unit of time warp.
         stretch: per unit of time warp beyond 0.85 to 1.15.
+        strike: for a key moment's clip that does not fit its ball (`key_fit`).
         switch: for any cut.
+        other: for a cut to another recording.
+        young: for a cut just after another one, less in the last two of YOUNG_SLOTS.
         pose: per metre of joint distance.
         feet: per metre that a foot in contact before and after a cut would jump.
         wild: for cutting where the clips jerk by as much again as is usual.
@@ -126,16 +144,23 @@ class Weights:
 
     speed: float = 1.0
     drag: float = 1.0
-    turn: float = 0.5
-    facing: float = 0.15
-    words: float = 1.0
+    turn: float = 3.0
+    lift: float = 2.0
+    facing: float = 1.0
+    slide: float = 2.0
+    words: float = 3.0
+    automatic_words: float = 1.0
     unasked: float = 2.0
+    strange: float = 4.0
     synthetic: float = 0.2
     synthetic_key: float = 0.8
     rate: float = 0.24
     stretch: float = 4.0
-    switch: float = 0.1
-    pose: float = 2.0
+    strike: float = 6.0
+    switch: float = 0.8
+    other: float = 0.6
+    young: float = 1.4
+    pose: float = 4.5
     feet: float = 1.5
     wild: float = 0.3
     rate_change: float = 0.16
@@ -143,6 +168,7 @@ class Weights:
     held: float = 0.1
 
 
+_PLAIN = frozenset((*LOCOMOTION, *DIRECTIONS, TURNING))  # labels that do not ask for an unusual posture
 _NEAR_KEY = 45  # frames around a key moment in which its own labels may be shown
 
 AVOIDED_COST = 1000.0
@@ -187,7 +213,9 @@ class PathCosts:
         self.frames, self.index = library.frames, CandidateIndex.for_library(library, request.allowed)
         self.wanted_offset = compute_heading_offset(request.track)
         self._rate_cost = (weights.rate * np.abs(PLAYBACK_RATES - 1.0)).astype(np.float32)
-        self._cached_costs: dict[tuple[frozenset[str], frozenset[str]], np.ndarray] = {}
+        self._cached_costs: dict[tuple[frozenset[str], bool, frozenset[str]], np.ndarray] = {}
+        # a strike turns and steps as it was recorded: the body follows it there (`construct.construction`)
+        self._key_weights = replace(weights, turn=KEY_TURN * weights.turn, facing=KEY_TURN * weights.facing, slide=0.0)
         self._cached_motion: dict[tuple[int, int], tuple[float, float]] = {}
 
     def round_frame(self, frame: np.ndarray) -> np.ndarray:
@@ -200,8 +228,11 @@ class PathCosts:
             track = self.request.track
             last = min(end, len(track.times) - 1)
             speed = float(track.speed[first : last + 1].mean())
-            # a slow body turns on the spot: its direction counts less
-            turn = float(track.direction[last] - track.direction[first]) * min(1.0, speed)
+            if track.heading is None:
+                # a slow body turns on the spot: its direction counts less
+                turn = float(track.direction[last] - track.direction[first]) * min(1.0, speed)
+            else:
+                turn = float(track.heading[last] - track.heading[first])
             self._cached_motion[first, end] = speed, turn
         return self._cached_motion[first, end]
 
@@ -216,13 +247,13 @@ class PathCosts:
             (K,); inf where the clip ends before or may not be used.
         """
         cost = _sum_terms(self._iter_motion_costs(first, end, self.index.build_pairs(number, frame)))
-        cost += self._fixed_costs(self._requested_labels(first, end), self.request.list_avoided(first, end))[frame]
+        cost += self._fixed_costs(*self._requested_labels(first, end), self.request.list_avoided(first, end))[frame]
         return np.where(self.index.valid[number, frame], cost, np.inf)
 
     def iter_misfit_terms(self, first: int, end: int, number: np.ndarray, frame: np.ndarray) -> Iterator[Term]:
         """Generate the terms of `compute_misfit`, by name, each (K,)."""
         yield from self._iter_motion_costs(first, end, self.index.build_pairs(number, frame))
-        yield from self._iter_fixed_terms(frame, self._requested_labels(first, end),
+        yield from self._iter_fixed_terms(frame, *self._requested_labels(first, end),
                                           self.request.list_avoided(first, end))
 
     def find_cheapest(self, first: int, end: int, considered: int, count: int):
@@ -237,9 +268,9 @@ class PathCosts:
         Returns:
             number (K,), frame (K,), misfit (K,).
         """
-        words, avoid = self._requested_labels(first, end), self.request.list_avoided(first, end)
+        (words, is_asked), avoid = self._requested_labels(first, end), self.request.list_avoided(first, end)
         pairs, fixed_cost, (speed, _) = self.index.pairs_by_speed(avoid), self._fixed_costs(words,
-                avoid), self.requested_motion(first, end)
+                is_asked, avoid), self.requested_motion(first, end)
 
         def cost_of(part: slice) -> np.ndarray:
             part_pairs = pairs.slice_pairs(part)
@@ -249,35 +280,43 @@ class PathCosts:
                                    count=count)
         return pairs.number[best], pairs.frame[best], cost
 
-    def _requested_labels(self, first: int, end: int) -> frozenset[str]:
-        """Return the labels requested in the middle of a slot."""
-        return self.request.requested_labels[(first + end) // 2] or frozenset()
+    def _requested_labels(self, first: int, end: int) -> tuple[frozenset[str], bool]:
+        """Return the labels requested in the middle of a slot, and whether the user has asked for them."""
+        middle = (first + end) // 2
+        return self.request.requested_labels[middle] or frozenset(), bool(self.request.is_asked[middle])
 
     def _iter_motion_costs(self, first: int, end: int, pairs: RatePairs) -> Iterator[Term]:
         """Generate the terms that depend on the track: motion of pairs (K,), playback rate, and the player's lag."""
         # pairs hold the turn over SLOT frames, this slot may be longer or shorter
         turn = pairs.turn * np.float32((end - first) / SLOT)
         yield from self._iter_motion_terms(first, end, pairs.speed, turn=turn, offset=pairs.offset,
-                                           long_stance=pairs.long_stance)
+                                           long_stance=pairs.long_stance, lifted=pairs.lifted)
         yield "rate", self._rate_cost[pairs.number]
         if self.request.lag_preference is not None:
             yield "variety", self.request.lag_preference.compute_cost(first, pairs.frame)
 
-    def _fixed_costs(self, words: frozenset[str], avoid: frozenset[str]) -> np.ndarray:
+    def _fixed_costs(self, words: frozenset[str], is_asked: bool, avoid: frozenset[str]) -> np.ndarray:
         """Return the cost (N,) of the library's frames wherever these labels are requested and avoided; cached."""
-        if (words, avoid) not in self._cached_costs:
-            terms = self._iter_fixed_terms(np.arange(len(self.frames)), words, avoid)
-            self._cached_costs[words, avoid] = _sum_terms(terms).astype(np.float32)
-        return self._cached_costs[words, avoid]
+        key = words, is_asked, avoid
+        if key not in self._cached_costs:
+            terms = self._iter_fixed_terms(np.arange(len(self.frames)), *key)
+            self._cached_costs[key] = _sum_terms(terms).astype(np.float32)
+        return self._cached_costs[key]
 
-    def _iter_fixed_terms(self, frame: np.ndarray, words: frozenset[str], avoid: frozenset[str]) -> Iterator[Term]:
+    def _iter_fixed_terms(self, frame: np.ndarray, words: frozenset[str], is_asked: bool,
+                          avoid: frozenset[str]) -> Iterator[Term]:
         """Generate the terms of it, by name, each (K,) of frames (K,)."""
         w, (missing, unasked) = self.weights, self.index.measure_lacking(words)
-        yield "words", w.words * missing[frame]
+        yield "words", (w.words if is_asked else w.automatic_words) * missing[frame]
         yield "unasked", np.float32(w.unasked) * unasked[frame]
-        yield "made", np.float32(w.synthetic) * self.index.is_synthetic[frame]
+        # what carries a requested label beyond a plain gait belongs, whatever it looks like
+        belongs = self.index.annotation.find_frames_with(words - _PLAIN)
+        yield "strange", np.float32(w.strange) * np.where(belongs, 0.0, self.index.strange)[frame]
+        yield "made", np.float32(w.synthetic) * self.index.is_made_travel[frame]
         if self.request.style_cost is not None:
             yield "style", self.request.style_cost[frame]
+        if self.request.manner_cost is not None:
+            yield "manner", self.request.manner_cost[frame]
         if self.reuse_cost is not None:
             yield "price", self.reuse_cost[frame]
         if avoid:
@@ -318,7 +357,8 @@ class PathCosts:
         speed = np.linalg.norm(path[1] - path[0], axis=1) * self.library.fps / length
         middle = self.round_frame((a + b) / 2.0)
         yield from self._iter_motion_terms(
-            first, end, speed, turn=turn, offset=self.index.offset[middle], long_stance=self.index.long_stance[middle]
+            first, end, speed, turn=turn, offset=self.index.offset[middle], long_stance=self.index.long_stance[middle],
+            lifted=self.index.lifted[middle], weights=self._key_weights,
         )
         # library frames that lie beyond either end of the clip
         held = np.maximum(low - start, 0) + np.maximum(start + rate * length - high, 0)
@@ -343,14 +383,25 @@ class PathCosts:
         running_count = np.append(0, np.cumsum(self.index.annotation.find_frames_with(avoid.difference(*near))))
         return running_count[self.round_frame(b) + 1] > running_count[self.round_frame(a)]
 
-    def _iter_motion_terms(self, first: int, end: int, speed, turn, offset, long_stance) -> Iterator[Term]:
-        """Generate the terms of speed, turning and facing against the track."""
+    def _iter_motion_terms(self, first: int, end: int, speed, turn, offset, long_stance,
+                           lifted, weights: Weights | None = None) -> Iterator[Term]:
+        """Generate the terms of speed, turning and facing against the track; weights None: the search's own."""
         wanted_speed, wanted_turn = self.requested_motion(first, end)
-        w, moving = self.weights, min(1.0, wanted_speed)
-        yield "speed", np.abs(speed - wanted_speed) * (w.speed + w.drag * long_stance)
-        yield "turn", w.turn * (0.3 + 0.7 * moving) * np.abs(turn - wanted_turn)
-        aside = np.abs(offset - float(self.wanted_offset[(first + end) // 2]))
-        yield "facing", w.facing * moving * np.minimum(aside, 2.0 * np.pi - aside)
+        w = weights or self.weights
+        missed = np.abs(speed - wanted_speed)
+        free = FREE_SPEED[0] + FREE_SPEED[1] * wanted_speed
+        yield "speed", np.maximum(missed - free, 0.0) * (w.speed + w.drag * long_stance)
+        resting = 1.0 - wanted_speed / RESTING_SPEED
+        if resting > 0.0:
+            yield "lift", np.float32(w.lift * resting) * lifted
+        yield "turn", w.turn * np.maximum(np.abs(turn - wanted_turn) - FREE_TURN, 0.0)
+        # what the velocity in the body's frame misses beyond its speed: sideways or backward for forward
+        aside = np.abs(offset - np.float32(self.wanted_offset[(first + end) // 2]))
+        aside = np.maximum(np.minimum(aside, 2.0 * np.pi - aside) - FREE_ASIDE, 0.0)
+        across = 2.0 * np.float32(wanted_speed) * speed * (1.0 - np.cos(aside))
+        whole = np.sqrt(missed * missed + across)
+        yield "facing", w.facing * (whole - missed)
+        yield "drag", w.slide * whole * whole
 
     def iter_cut_terms(self, ends: np.ndarray, start: np.ndarray) -> Iterator[Term]:
         """Generate the terms of cuts between library frames, by name, each (B, K) or broadcast to it.
@@ -367,7 +418,16 @@ class PathCosts:
         yield "feet", np.float32(self.weights.feet) * self.measure_foot_jump(ends[:, None], start)
         left, entered = self.compute_cut_ends(ends, start)
         yield "left", left[:, None]
-        yield "cut", entered
+        yield "cut", entered + self.compute_recording_change(ends[:, None], start)
+
+    def compute_recording_change(self, ends: np.ndarray, start: np.ndarray) -> np.ndarray:
+        """Compute the cost of cuts between library frames, broadcast together, for changing the recording."""
+        recording = self.index.recording
+        return np.float32(self.weights.other) * (recording[ends] != recording[start])
+
+    def compute_young_cut_cost(self, age: np.ndarray) -> np.ndarray:
+        """Compute what a cut costs (B,) for coming soon after the last one, age (B,) slots ago."""
+        return self.weights.young * np.clip((YOUNG_SLOTS - age) / 2.0, 0.0, 1.0)
 
     def compute_cut_ends(self, ends: np.ndarray, start: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Compute the cost (B,) of leaving library frames ends (B,), and (K,) of cutting to start (K,)."""
@@ -455,6 +515,5 @@ def balance_weights(alpha: float, weights: Weights = Weights()) -> Weights:
     since they hold the body on its track; so do actions that are not requested, and replayed stretches.
     """
     words, continuity = alpha / Plan.alpha, (1.0 - alpha) / (1.0 - Plan.alpha)
-    return replace(
-        weights, words=weights.words * words, **{name: getattr(weights, name) * continuity for name in _CONTINUITY}
-    )
+    factors = {"words": words, "automatic_words": words, **dict.fromkeys(_CONTINUITY, continuity)}
+    return replace(weights, **{name: getattr(weights, name) * factor for name, factor in factors.items()})

@@ -17,11 +17,11 @@ import numpy as np
 
 from ...base.errors import InputError, UserCancelledError
 from ...library.library import Library
-from .beam_transitions import BeamTransitions, SlotCandidates
+from .beam_transitions import SAME_FRAME, BeamTransitions, SlotCandidates
 from .candidate_index import PLAYBACK_RATES, SLOT
 from .edit_list import EditList, PlacedKey, find_transitions, replace_stretch
 from .key_fit import compute_key_misfit, measure_ball, measure_strikes
-from .path_costs import BoneDistance, PathCosts, Weights
+from .path_costs import YOUNG_SLOTS, BoneDistance, PathCosts, Weights
 from .preferences import UsedStretch, compute_weak_foot_cost
 from .request import SearchRequest
 from .slots import build_key_pieces, build_slot_edges, find_slot
@@ -79,6 +79,7 @@ class BeamStates:
         back: (B,) state of the slot before.
         piece: (B,) of a key moment, or -1.
         recent: (B, M) buckets shown lately.
+        age: (B,) slots since the last cut.
     """
 
     clip: np.ndarray
@@ -88,6 +89,7 @@ class BeamStates:
     back: np.ndarray
     piece: np.ndarray
     recent: np.ndarray
+    age: np.ndarray
 
     def select(self, which: np.ndarray) -> "BeamStates":
         """Select states by index."""
@@ -143,7 +145,7 @@ class PathSearch:
         self.edges = build_slot_edges(library, request, *((stretch.first, stretch.end) if stretch else (0, None)),
                                       on_grid)
         self.pieces = build_key_pieces(library, request, self.edges)
-        self.choice_cost = self._compute_choice_costs()
+        self.choice_cost = weights.strike * self._compute_choice_costs()
         self._closed_slots = {find_slot(self.edges, request.keys[number].frame) for number in self.pieces.number}
         self.width = SearchWidth()
         self.hurried_from: int | None = None
@@ -201,7 +203,8 @@ class PathSearch:
         to = self.collect_candidates(0)
         recent = np.full((len(to.clip), MEMORY_SLOTS), -1)
         return self._prune_states(BeamStates(to.clip, to.start, to.rate, cost=to.cost, back=np.zeros(len(to.clip), int),
-                                             piece=to.piece, recent=recent))
+                                             piece=to.piece, recent=recent,
+                                             age=np.full(len(to.clip), YOUNG_SLOTS)))
 
     def _build_arrival(self) -> tuple[BeamStates, int]:
         """Build the state from which a stretch starts, the frame before it; and that state's length, 1."""
@@ -211,7 +214,13 @@ class PathSearch:
         recent = self.index.bucket[self.costs.round_frame(frames_shown)][None, :]
         nothing = np.zeros(1, int)
         return BeamStates(edit.clip[at], edit.frame[at], _compute_steps(edit, at), cost=np.zeros(1), back=nothing,
-                          piece=nothing - 1, recent=recent), 1
+                          piece=nothing - 1, recent=recent, age=self._measure_arrival_age()), 1
+
+    def _measure_arrival_age(self) -> np.ndarray:
+        """Measure (1,) how many slots before the stretch the last cut is; one at its own start is searched again."""
+        first, cuts = self.stretch.first, self.stretch.edit.transitions
+        since = first - max((cut for cut in cuts if cut < first), default=first - YOUNG_SLOTS * SLOT)
+        return np.array([min(since // SLOT, YOUNG_SLOTS)])
 
     def _add_exit_cost(self, states: BeamStates, frames_shown: int) -> BeamStates:
         """Add to the last states the cost of the transition to the frame that stays behind the stretch.
@@ -244,8 +253,10 @@ class PathSearch:
             known = np.concatenate([np.zeros(0), *(cost for _, _, _, cost, _, _ in going_on)])
             options += [self._find_transitions(slot, before, ends, free, known), *going_on]
         clip, start, rate, cost, back, piece = (np.concatenate(parts) for parts in zip(*options))
+        goes_on = (clip == before.clip[back]) & (np.abs(start - ends[back]) < SAME_FRAME)
+        age = np.where(goes_on, np.minimum(before.age[back] + 1, YOUNG_SLOTS), 1)
         return self._prune_states(BeamStates(clip, start, rate, cost=cost, back=back, piece=piece,
-                                             recent=np.roll(before.recent[back], -1, axis=1)))
+                                             recent=np.roll(before.recent[back], -1, axis=1), age=age))
 
     def _prune_states(self, states: BeamStates) -> BeamStates:
         """Keep the cheapest free and the cheapest bound states, a beam of each, and update their memory."""
@@ -323,7 +334,7 @@ class PathSearch:
         """Build the transitions from the states `free` (B,), which end at library frames `ends` (B,)."""
         seen = self._mark_seen(before.recent[free])
         return BeamTransitions(self.costs, before.clip[free], ends, rate=before.rate[free], cost=before.cost[free],
-                               seen=seen)
+                               seen=seen, young=self.costs.compute_young_cut_cost(before.age[free]))
 
     def _mark_seen(self, recent: np.ndarray) -> np.ndarray:
         """Return (B, buckets) whether a state has lately shown a bucket of frames or its neighbours; recent (B, M)."""

@@ -8,6 +8,7 @@ import numpy as np
 
 from ...annotation import (
     AVOID_PREFIX,
+    LOCOMOTION,
     STANDING_SPEED,
     TRANSITION,
     KeyMoment,
@@ -19,13 +20,14 @@ from ...annotation import (
     labels_per_frame,
     sort_labels,
 )
+from ...annotation.vocabulary import DIRECTIONS
 from ...base.errors import NotInLibraryError, TimedMessage, format_seconds
 from ...library.automatic_locomotion import build_automatic_labels
 from ...library.keys import Key, list_nearest_labels, select_keys, select_nearest_keys, select_substitutes
 from ...library.library import Library
 from ...motion.track import SampledTrack
 from ..plan import Plan, ResolvedPlan
-from .preferences import LagPreference, build_lag_preference, compute_style_cost
+from .preferences import LagPreference, build_lag_preference, compute_manner_cost, compute_style_cost
 
 PAPERS_OMEGA = 4.0  # Faustino 2016, §3.1.1
 USE_NEAREST = "turn on Nearest Labels"
@@ -63,6 +65,7 @@ class SearchRequest:
         plan: the plan, with the settings of the costs.
         track: the player at the library's rate.
         requested_labels: requested labels per frame, None where continuity alone counts.
+        is_asked: (T,) bool, frames whose labels come from the user, not from the speed.
         gait: (T,) index into the library's gaits.
         timeline: the timeline, filled.
         keys: the key moments, in order of time.
@@ -71,6 +74,7 @@ class SearchRequest:
         avoided: per frame the labels that must not be shown; empty where all may be shown throughout.
         style_cost: (N,) float32, cost per slot of library frames without the requested style, None where none is
             requested.
+        manner_cost: (N,) float32, cost per slot of library frames that move unlike the player, None for no manner.
         weak_foot: side of the foot that key moments without a side avoid, or "".
         lag_preference: the player's preference for a lag, None for none.
     """
@@ -78,6 +82,7 @@ class SearchRequest:
     plan: Plan
     track: SampledTrack
     requested_labels: tuple[Labels, ...]
+    is_asked: np.ndarray
     gait: np.ndarray
     timeline: Timeline
     keys: tuple[RequestedKey, ...]
@@ -85,6 +90,7 @@ class SearchRequest:
     warnings: tuple[str, ...]
     avoided: tuple[frozenset[str], ...] = ()
     style_cost: np.ndarray | None = None
+    manner_cost: np.ndarray | None = None
     weak_foot: str = ""
     lag_preference: LagPreference | None = None
 
@@ -132,9 +138,20 @@ def build_request(library: Library, plan: ResolvedPlan) -> SearchRequest:
     off_style = compute_style_cost(library, settings.style, settings.style_weight)
     weak_foot = {"left": "right", "right": "left"}.get(settings.strong_foot, "")
     lag_preference = build_lag_preference(library, settings.lag, settings.variety, float(track.times[0]))
-    return SearchRequest(plan=settings, track=track, requested_labels=tuple(requested_labels), gait=gait,
+    return SearchRequest(plan=settings, track=track, requested_labels=tuple(requested_labels),
+                         is_asked=_find_asked(plan.timeline, track.times, requested_labels),
+                         gait=gait,
                          timeline=timeline, keys=keys, allowed=allowed, warnings=tuple(warnings), avoided=avoided,
-                         style_cost=off_style, weak_foot=weak_foot, lag_preference=lag_preference)
+                         style_cost=off_style, manner_cost=compute_manner_cost(library, settings.manner),
+                         weak_foot=weak_foot, lag_preference=lag_preference)
+
+
+def _find_asked(timeline: Timeline, times: np.ndarray, requested_labels: list[Labels]) -> np.ndarray:
+    """Find the frames (T,) bool whose labels come from the user or from the ball, not from speed and heading alone."""
+    own = labels_per_frame(timeline, times)
+    plain = {*LOCOMOTION, *DIRECTIONS}
+    return np.array([bool(labels) or bool((wanted or frozenset()) - plain)
+                     for labels, wanted in zip(own, requested_labels)])
 
 
 def _replace_avoided_gaits(library: Library, gait: np.ndarray, speed: np.ndarray,

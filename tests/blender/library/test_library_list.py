@@ -75,12 +75,28 @@ def test_a_build_lists_speeds_and_quality(listed):
     assert "no labels: not used" in other.messages.splitlines() and "no labels" not in walk.messages
 
 
-def test_a_library_without_words_is_listed_all_the_same(listed, folder):
+def test_a_library_without_words_is_built_with_proposed_ones_and_says_so(listed, folder):
     for text in folder.rglob("*.txt"):
         text.unlink()
-    with pytest.raises(RuntimeError, match="no annotation for any clip"):
+    assert bpy.ops.beyond_mocap.build_library() == {"FINISHED"}
+    assert len(listed.shown) == 3 and all(clip.words for clip in listed.shown)
+    assert all("labels: proposed" in clip.messages.splitlines() for clip in listed.shown)
+    first, told, *_ = bpy.context.scene.beyond_mocap.library_gaps.splitlines()
+    assert first.startswith("Proposed labels") and told.startswith("labels proposed for 3 clips") and "--" not in told
+
+
+def test_what_a_library_lacks_is_shown(listed):
+    bpy.ops.beyond_mocap.build_library()
+    gaps = bpy.context.scene.beyond_mocap.library_gaps
+    assert "missing" in gaps.splitlines()[0] and "no turn in place: add one" in gaps and "Proposed" not in gaps
+    assert not any("proposed" in clip.messages for clip in listed.shown)
+
+
+def test_a_library_that_cannot_be_built_is_listed_all_the_same(listed, folder):
+    (folder / "walk.txt").write_text("5 6 walking\n")
+    with pytest.raises(RuntimeError, match="frames 0 to 90"):
         bpy.ops.beyond_mocap.build_library()
-    assert len(listed.shown) == 3 and not any(clip.words for clip in listed.shown)
+    assert len(listed.shown) == 3
 
 
 def test_a_clip_comes_in_as_it_was_recorded(listed, folder, core, rooms):

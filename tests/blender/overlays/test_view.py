@@ -62,7 +62,7 @@ def prepared(shown, room):
 
 def test_every_overlay_has_what_it_draws(prepared, shown, room):
     take = room("core.session").find_take(shown.players[0].take).take
-    assert set(prepared.meshes) == {"track", "footprints", "seams", "moments", "speed"}
+    assert set(prepared.meshes) == {"track", "footprints", "seams", "moments", "speed", "heading"}
     for meshes in prepared.meshes.values():
         for mesh in meshes:
             assert mesh.points.dtype == mesh.colours.dtype == np.float32
@@ -77,6 +77,57 @@ def test_soles_stand_where_feet_stand(prepared):
     soles = prepared.meshes["footprints"][0].points.reshape(-1, 17 * 3, 3)[:, :, :2].mean(axis=1)
     standing = prepared.toes[prepared.contacts][:, :2]
     assert np.linalg.norm(soles[:, None] - standing, axis=-1).min(axis=1).max() < 0.2
+
+
+def read_arrows(mesh):
+    """Places (N, 2) and headings (N,) of arrows."""
+    corners = mesh.points.reshape(-1, 6, 3)
+    along = (corners[:, 1] - corners[:, 0])[:, :2]
+    return corners[:, 0, :2], np.arctan2(along[:, 1], along[:, 0])
+
+
+@pytest.mark.parametrize("size", [1.0, 1.25])
+def test_arrows_lie_on_the_track_and_point_along_the_planned_heading(room, core, size):
+    """A player who runs along Y; then turned by two keys while standing at the end.
+
+    In the library's size they are smaller.
+    """
+    times = np.arange(0.0, 8.01, 0.1)
+    y = 4.0 * np.minimum(times, 4.0)
+    track = core("motion.track").Track(times, np.stack([np.full(len(times), 2.0), y], axis=1) / size)
+    key = core("synthesis.heading_plan").HeadingKey
+    keys = key(5.6, heading=np.pi, hold=0.7), key(7.5, target=(2.0, 99.0), hold=99.0)
+    plan_module = core("synthesis.plan")
+    asked = plan_module.Plan(track=track, heading_keys=keys, fps=30.0)
+    resolved = plan_module.ResolvedPlan(requested=asked, timeline=asked.timeline, track=track, trajectory=None,
+                                        size=size)
+    edge, arrows = room("overlays.prepare").build_heading_arrows(resolved)
+    places, headings = read_arrows(arrows)
+    assert len(places) == 17 + 2 and len(edge.points) == len(arrows.points) == 6 * len(places)
+    seconds = np.sort(np.concatenate([np.arange(0.0, 8.01, 0.5), [5.6, 6.3]]))
+    np.testing.assert_allclose(places[:, 0], 2.0, atol=0.05)
+    np.testing.assert_allclose(places[:, 1], np.interp(seconds, times, y), atol=0.25)  # smoothed at the stop
+    running = seconds < 3.5
+    np.testing.assert_allclose(headings[running], np.pi / 2, atol=0.1)
+    held = (seconds >= 5.59) & (seconds <= 6.31)
+    np.testing.assert_allclose(np.cos(headings[held] - np.pi), 1.0, atol=0.03)
+    colours = room("overlays.colours")
+    is_key = (arrows.colours.reshape(-1, 6, 4)[:, 0, :3] == np.float32(colours.HEADING_KEY)).all(axis=1)
+    assert is_key.tolist() == (held | (seconds >= 7.49)).tolist()
+    np.testing.assert_allclose(np.linalg.norm(np.diff(arrows.points.reshape(-1, 6, 3)[:, :2], axis=1)[:, 0], axis=1),
+                               0.45, atol=1e-5)
+
+
+def test_the_arrows_of_a_take_are_its_plans(prepared, shown, room, core):
+    """What is drawn is what the construction was given."""
+    taken = room("core.session").find_take(shown.players[0].take)
+    library = room("core.session").find_library(taken.plan.library, None)
+    resolved = core("synthesis.resolve_plan").resolve_plan(taken.plan, library, trajectory=taken.take.solved)
+    planned = resolved.sample_track(taken.take.motion.fps)
+    step = round(0.5 * taken.take.motion.fps)
+    places, headings = read_arrows(prepared.meshes["heading"][1])
+    np.testing.assert_allclose(places, planned.positions[::step], atol=1e-5)
+    np.testing.assert_allclose(np.cos(headings - planned.heading[::step]), 1.0, atol=1e-6)
 
 
 def test_left_and_right_soles_are_mirrored(room):
@@ -123,7 +174,7 @@ def test_takes_of_the_other_methods_are_told_too(shown, room, method):
     prepare_now(room("overlays.store"))
     found = room("overlays.store").find_prepared(bpy.context.scene.beyond_mocap.players[0].take)
     assert found.pieces and all(len(piece.lines) >= 3 for piece in found.pieces)
-    assert "track" in found.meshes and "footprints" in found.meshes
+    assert "track" in found.meshes and "footprints" in found.meshes and "heading" not in found.meshes
 
 
 def test_what_no_player_shows_is_forgotten(prepared, shown, room):
@@ -204,6 +255,28 @@ def test_a_line_about_several_stretches_goes_from_one_to_the_next(shown):
     assert seen == pytest.approx([1.0, 2.5, 4.0, 1.0], abs=0.03)
     with pytest.raises(RuntimeError, match="stops: 'soon'; expected seconds"):
         bpy.ops.beyond_mocap.jump_to(stops="soon")
+
+
+def test_events_are_lines_that_go_to_their_second(shown, room):
+    """A spin at 3.5 s and two snap turns at 1.2 and 4.0 s, in a report as `evaluate` writes it."""
+    report = {
+        "fps": 30.0, "warnings": ["1.2, 4.0 s: the body turns by more than 75 degrees within 0.3 s",
+                                  "3.5 s: the body turns by more than 200 degrees within 2 s"],
+        "warning_seconds": [[[1.2, 1.2], [4.0, 4.0]], [[3.5, 3.5]]],
+        "naturalness": {"snap_turns_per_min": 2.0, "spins_per_min": 0.2, "standing": {"both_down": 0.9}},
+    }  # fmt: skip
+    quality, scene = room("result.quality"), bpy.context.scene
+    player = scene.beyond_mocap.players[0]
+    player.warnings = quality.describe_warnings(report)
+    stops = [line.partition("\t")[2] for line in player.warnings.splitlines()]
+    seen = []
+    for stop in (stops[0], stops[0], stops[1]):
+        bpy.ops.beyond_mocap.jump_to(stops=stop, player=player.name)
+        seen.append((scene.frame_current - 1) / scene.render.fps)
+    assert seen == pytest.approx([1.2, 4.0, 3.5], abs=0.03)
+    assert quality.describe_quality(report).splitlines() == [
+        "Snap turns: 2.0 /min\t≤ 0.6\tmissed", "Spins: 0.2 /min\t≤ 0.3\tmet",
+        "Both feet down standing: 90 %\t≥ 80\tmet"]
 
 
 def test_jump_at_another_frame_rate(shown):

@@ -106,6 +106,29 @@ def test_the_library_is_told(run, clips_folder, library, tmp_path):
     assert report["clips"] == 6 and len(report["gaits"]) == 4 and "kick" in report["words"]
 
 
+def test_a_library_without_labels_is_described_and_used_with_proposed_ones(run, match, clip_file, tmp_path):
+    clips = tmp_path / "clips"
+    clip_file(clips / "walk.bvh", 1.4, 4.0, words="")
+    clip_file(clips / "run.bvh", 4.5, 4.0, words="")
+    status, out, error = run("library", clips, "--report", tmp_path / "r.json")
+    assert (status, error) == (0, []) and "labels proposed for 2 clips" in out
+    report = json.loads((tmp_path / "r.json").read_text())
+    assert report["proposed_clips"] == 2 and {"walking", "running"} <= set(report["words"])
+    status, _, error = run("synthesize", "--library", clips, "--track", match / "track_only.csv",
+                           "--annotations", match / "empty.txt", "--out", tmp_path / "out.bvh")
+    assert status == 0 and any("labels proposed for 2 clips" in line for line in error)
+
+
+def test_the_report_says_what_is_left_out_and_what_lacks(run, clips_folder, library, tmp_path):
+    status, out, _ = run("library", clips_folder, "--report", tmp_path / "r.json")
+    report = json.loads((tmp_path / "r.json").read_text())
+    assert status == 0 and report["proposed_clips"] == 0
+    lacking = {one["kind"] for one in report["lacks"]}
+    assert "turns" in lacking and "no turn in place: add one" in out
+    assert sum(one["seconds"] for one in report["locomotion"]) > 15.0 and report["locomotion"][-1]["to_m_s"] is None
+    assert all(one["start_s"] <= one["end_s"] and one["why"] for one in report["left_out"])
+
+
 def test_the_cache_can_be_put_elsewhere_and_made_anew(run, tmp_path, clip_file):
     clip_file(tmp_path / "clips" / "walk.bvh", 1.4, 1.5)
     for more in ((), ("--rebuild",)):
@@ -153,7 +176,10 @@ def test_what_was_written_can_be_evaluated(synthesize, run, match, clips_folder,
         "--report", tmp_path / "e.json",
     )  # fmt: skip
     mine, again = (json.loads((tmp_path / name).read_text()) for name in ("r.json", "e.json"))
-    assert (status, error) == (0, [f"note: {line}" for line in again["warnings"]])
+    assert (status, error) == (0, [f"note: {line}" for line in (*again["warnings"], *again["notes"])])
+    lines = out if isinstance(out, list) else out.splitlines()
+    assert re.fullmatch(r"\d+ of \d+ targets met", lines[0]) and lines[-1] == str(tmp_path / "e.json")
+    assert any(line.startswith("not known: naturalness.") for line in lines)
     assert_contract(again)
     assert again["root_error_m"]["mean"] == pytest.approx(mine["root_error_m"]["mean"], abs=1e-3)
     assert again["keys"][0]["clip"] == mine["keys"][0]["clip"]
@@ -390,14 +416,13 @@ Frame Time: 0.033333
 
 
 def test_libraries_that_are_none(run, synthesize, match, clip_file, tmp_path):
-    folders = {name: tmp_path / name for name in ("empty", "silent", "stand", "two")}
+    folders = {name: tmp_path / name for name in ("empty", "stand", "two")}
     folders["empty"].mkdir()
-    clip_file(folders["silent"] / "walk.bvh", words="")
     clip_file(folders["stand"] / "stand.bvh", 0.0, 1.5, "standing")
     clip_file(folders["two"] / "walk.bvh", 1.4, 2.0)
     other = clip_file(folders["two"] / "child.bvh", 1.4, 1.0)
     other.write_text(STICK)
-    parts = {"empty": ["BVH"], "silent": ["annotation"], "stand": ["locomotion"], "two": ["child.bvh", "legs"]}
+    parts = {"empty": ["BVH"], "stand": ["locomotion"], "two": ["child.bvh", "legs"]}
     for name, folder in folders.items():
         assert_told(run("library", folder), 2, name, *parts[name])
         assert_told(synthesize(library=folder, annotations=match / "empty.txt"), 2, name, *parts[name])
@@ -602,6 +627,19 @@ def test_pins_height_foot_and_style_are_a_players_own(synthesize, tmp_path):
     assert_told(synthesize(height=0.1), 2, "--height", "0.5 to 3 metres")
     (tmp_path / "pins.csv").write_text("time_s,part,x_m,y_m,z_m\n2,nose,30,0,1.5\n")
     assert_told(synthesize(pins=tmp_path / "pins.csv"), 2, "pins.csv:2", "'nose'")
+
+
+def test_headings_are_planned_and_written_with_the_provenance(synthesize, tmp_path):
+    (tmp_path / "headings.csv").write_text("time_s,heading_deg,hold_s\n2,120,1\n")
+    files = {"headings": tmp_path / "headings.csv", "provenance": tmp_path / "p.csv", "report": tmp_path / "r.json"}
+    assert synthesize(**files)[0] == 0
+    rows = [line.split(",") for line in (tmp_path / "p.csv").read_text().splitlines()]
+    assert rows[0][-1] == "planned_heading_deg"
+    held = [float(row[-1]) for row in rows[1:] if 2.3 < float(row[1]) < 2.7]
+    assert held and all(abs(value - 120.0) < 12.0 for value in held)
+    assert json.loads((tmp_path / "r.json").read_text())["naturalness"]["off_plan_deg_median"] is not None
+    (tmp_path / "headings.csv").write_text("time_s,heading_deg\n2,\n")
+    assert_told(synthesize(headings=tmp_path / "headings.csv"), 2, "headings.csv:2", "no heading")
 
 
 def test_a_missing_package_of_the_core_is_told_in_one_line():

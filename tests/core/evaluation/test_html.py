@@ -13,7 +13,7 @@ from beyond_mocap.base.errors import InputError
 from beyond_mocap.cli import main as command
 from beyond_mocap.evaluation.html import build_html_report, find_worst_frames
 from beyond_mocap.evaluation.reference import View
-from beyond_mocap.evaluation.report import evaluate, evaluate_played
+from beyond_mocap.evaluation.report import describe_figures, evaluate, evaluate_played
 from beyond_mocap.files.bvh import bvh
 from beyond_mocap.motion.motion import Motion
 from beyond_mocap.synthesis.provenance import write_provenance
@@ -90,6 +90,26 @@ def test_figures_stand_beside_their_targets(page, take, track_of, library):
         assert leaf in page
     judged = re.search(r"(\d+) of (\d+) targets met", page)
     assert 0 < int(judged[1]) <= int(judged[2])
+
+
+def test_what_the_eye_sees_is_readable(page):
+    part = page[page.index("<h2>What the eye sees") : page.index("<h2>All figures")]
+    text = "".join(Tags(part).text)
+    for name in ("Snap turns, /min", "Unusual body language, %", "Heading off plan, 90 %, °", "Both feet down"):
+        assert name in text
+    assert "≤ 0.6" in text and "≥ 80" in text and " frames" in text
+    assert "not known: the track stands nowhere for 1.5 s" in text
+    assert "not known: nowhere two strides of steady running" in text
+    assert "naturalness" not in text
+
+
+def test_a_report_of_version_0_1_has_a_page(take, track_of, library):
+    report = evaluate(take, track_of(take), library)
+    for name in ("naturalness", "unknown", "notes", "jerk_ratio", "slow_root_error_m", "pose_realism_by_speed"):
+        del report[name]
+    page = build_html_report(playback_from_take(take), report, track=track_of(take), library=library)
+    assert "All figures" in page and "What the eye sees" not in page
+    assert describe_figures(report)[0].endswith("targets met")
 
 
 def test_names_are_escaped(take, track_of, library):

@@ -77,6 +77,17 @@ def test_unreal_compares_at_the_speed():
     np.testing.assert_array_equal(flags, [True, False, True])
 
 
+def test_a_class_needs_three_recordings_with_a_second_each():
+    owner, speed = np.repeat([0, 1, 2, 3], 20), np.repeat([0.5, 0.6, 0.7, 6.0], 20)
+    owner, speed = np.append(owner, [0] * 9), np.append(speed, [3.5] * 9)  # nine poses are not enough
+    counts = realism.count_recordings(owner, speed, 10)
+    assert counts.tolist() == [3, 0, 0, 0, 1]
+    limits = realism.compute_pose_limits(np.where(speed > 4.0, 5.0, 0.1), speed, counts)
+    assert limits[0] == pytest.approx(0.1) and np.isnan(limits[1:]).all()
+    flags = realism.find_unreal_frames(np.array([0.2, 0.05, 9.0]), np.array([0.5, 0.5, 6.0]), limits)
+    np.testing.assert_array_equal(flags, [1.0, 0.0, np.nan])
+
+
 def test_smoothness_peaks_at_a_cut():
     places = [forward_kinematics(swinging(seed=seed))[0] for seed in (1, 2)]
     cut = realism.measure_smoothness(SKELETON, np.concatenate([places[0][:40], places[1][40:80]]), FPS)

@@ -2,6 +2,7 @@
 
 import json
 import os
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -44,6 +45,15 @@ def test_provenance_comes_back(tmp_path):
     assert back.clip == wrote.clip and back.words == wrote.words
     for name in ("times", "clip_frame", "mirrored", "contacts"):
         np.testing.assert_allclose(getattr(back, name), getattr(wrote, name), atol=1e-6)
+
+
+def test_a_planned_heading_comes_back_with_its_unknowns(tmp_path):
+    file, wrote = tmp_path / "p.csv", replace(provenance(), planned_heading=np.array([np.pi / 2.0, np.nan, 7.0]))
+    write_provenance(file, wrote)
+    cells = [row.split(",")[-1] for row in file.read_text().splitlines()]
+    assert cells == ["planned_heading_deg", "90.00", "", "41.07"]
+    back = read_provenance(file).planned_heading
+    np.testing.assert_allclose(back, [np.pi / 2.0, np.nan, 7.0 - 2.0 * np.pi], atol=1e-4)
 
 
 def test_a_take_tells_where_its_frames_came_from(tmp_path):

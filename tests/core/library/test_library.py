@@ -11,6 +11,7 @@ from beyond_mocap.motion.humanoid import identify_joints
 from beyond_mocap.motion.motion import Motion, forward_kinematics
 from beyond_mocap.motion.skeleton import Skeleton
 from beyond_mocap.synthetic.gait import build_gait
+from beyond_mocap.synthetic.gestures import build_strike
 
 CSV = "file,start_frame,end_frame,key_frame,labels\n"
 
@@ -185,18 +186,33 @@ def test_without_locomotion_the_library_stands_but_has_no_gaits(tmp_path, clip_f
     assert str(tmp_path) in one_line(told)
 
 
-def test_without_annotations_nothing_is_built(tmp_path, clip_file):
-    clip_file(tmp_path / "walk.bvh", words="")
-    with pytest.raises(InputError, match="no annotation for any clip.*NAME.txt") as told:
-        build_library(tmp_path)
+def test_walking_that_is_no_faster_than_standing_is_no_locomotion(tmp_path, clip_file):
+    clip_file(tmp_path / "stand.bvh", 0.3, 3.0, "standing")
+    clip_file(tmp_path / "walk.bvh", 0.0, 3.0)
+    with pytest.raises(InputError, match="no locomotion clip that is faster than its stands.*walking") as told:
+        build_library(tmp_path).with_synthetic_clips
     assert str(tmp_path) in one_line(told)
 
 
-def test_a_clip_without_words_may_stand_among_others(tmp_path, clip_file):
+def test_without_annotations_labels_are_proposed_and_marked(tmp_path, clip_file):
+    clip_file(tmp_path / "walk.bvh", words="")
+    clip_file(tmp_path / "run.bvh", 4.5, 4.0, words="")
+    bvh.write_bvh(tmp_path / "kick.bvh", build_strike("kick low top", fps=60.0).motion)
+    for _ in range(2):  # built, then from the cache
+        library = build_library(tmp_path)
+        assert all(clip.has_proposed_labels for clip in library.clips)
+        assert {"walking", "running"} <= {gait.label for gait in library.gaits}
+        key, = [key for key in library.keys if not library.clips[key.clip].mirrored]
+        assert {"kick", "right"} <= key.labels
+        note, = library.proposal_notes
+        assert note.startswith("labels proposed for 3 clips") and "\n" not in note
+
+
+def test_proposals_stop_with_the_first_annotation(tmp_path, clip_file):
     clip_file(tmp_path / "walk.bvh")
     clip_file(tmp_path / "silent.bvh", 1.0, 2.0, "")
     library = build_library(tmp_path)
-    assert clip_of(library, "silent.bvh").annotations == ()
+    assert library.proposal_notes == () and clip_of(library, "silent.bvh").annotations == ()
 
 
 def test_rows_beyond_the_clip_are_cut_or_told(tmp_path, clip_file):

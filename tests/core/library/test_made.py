@@ -108,7 +108,8 @@ def test_a_track_at_a_recorded_speed_uses_recordings_only(library):
 
 
 def test_a_track_between_two_recordings_is_played_by_a_blend(library):
-    plan = Plan(track=straight(2.05))
+    (low, high), *_ = library.speed_gaps
+    plan = Plan(track=straight(np.sqrt(low * high)))
     take = synthesize(library, plan)
     assert any(name.startswith(SYNTHETIC_FOLDER + BLEND_PREFIX) for name in take.clips)
     without = synthesize(library, replace(plan, made=False))

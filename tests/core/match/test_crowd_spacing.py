@@ -25,8 +25,6 @@ from beyond_mocap.match.crowd.spacing import (
     find_meetings,
     join_spans,
 )
-from beyond_mocap.match.displayed_motion import add_gaze
-from beyond_mocap.motion import quaternion
 from beyond_mocap.motion.humanoid import identify_joints
 from beyond_mocap.motion.motion import forward_kinematics, place_motion
 from beyond_mocap.synthesis.quality.movement import compute_jerk
@@ -209,29 +207,6 @@ def test_arrays_that_are_no_correction_are_told(knots, values, what):
 def test_rates_have_to_agree(walk):
     with pytest.raises(InputError, match="frames per second"):
         apply_correction(walk, Correction.build_empty(25.0))
-
-
-def test_heads_follow_the_ball_each_in_its_own_way(walk):
-    head = identify_joints(walk.skeleton).head
-    at = np.arange(len(walk)) / 20.0
-    ball = np.column_stack([3.0 + 0.0 * at, 8.0 * np.sin(at), 0.1 + 0.0 * at])
-    known, look = np.ones(len(walk), bool), np.array([1.0, 0.0, 0.0])
-    seen = [add_gaze(walk, ball, known, look, seed, start=100.0) for seed in (1, 2, 1)]
-    assert np.array_equal(seen[0].rotations, seen[2].rotations)
-    apart = quaternion.multiply(seen[0].rotations[:, head], quaternion.inverse(seen[1].rotations[:, head]))
-    assert np.linalg.norm(quaternion.to_rotation_vector(apart), axis=1).max() > 0.05
-    still = [joint for joint in range(len(walk.skeleton)) if joint not in _turned(walk)]
-    assert np.array_equal(seen[0].rotations[:, still], walk.rotations[:, still])
-
-
-def _turned(motion):
-    body = identify_joints(motion.skeleton)
-    return {body.chest, body.neck, body.head}
-
-
-def test_without_a_ball_nobody_looks(walk):
-    nothing = np.zeros((len(walk), 3))
-    assert add_gaze(walk, nothing, np.zeros(len(walk), bool), np.array([1.0, 0, 0])) is walk
 
 
 def test_curves_have_their_columns():

@@ -26,6 +26,26 @@ def test_reports_of_stretches_are_joined_by_what_their_figures_mean():
     assert merge_reports([one], [30]) == one
 
 
+def test_figures_of_stretches_weigh_by_what_they_rest_on():
+    group = {"frames": 30, "snap_turns_per_min": 2.0, "fast_frames": 0, "off_travel_deg_p90": None, "slow_frames": 30,
+             "unusual_posture_share": 0.1, "source_frames": 10, "source_snap_turns_per_min": 6.0,
+             "standing": {"seconds": 1.0, "both_down": 0.5}, "tempo": {"sd_ms": None, "strides": 0}}  # fmt: skip
+    other = {"frames": 90, "snap_turns_per_min": 0.0, "fast_frames": 80, "off_travel_deg_p90": 40.0, "slow_frames": 10,
+             "unusual_posture_share": 0.5, "source_frames": 20, "source_snap_turns_per_min": 0.0,
+             "standing": {"seconds": 9.0, "both_down": 1.0}, "tempo": {"sd_ms": 12.0, "strides": 7}}  # fmt: skip
+    reports = [{"naturalness": group, "unknown": {"naturalness.off_travel_deg_p90": "never fast", "loop_share": "?"},
+                "loop_share": None, "notes": ["1 s"]},
+               {"naturalness": other, "unknown": {"loop_share": "?"}, "loop_share": None, "notes": []}]  # fmt: skip
+    joined = merge_reports(reports, [30, 90])
+    assert joined["unknown"] == {"loop_share": "?"} and joined["notes"] == ["1 s"]
+    found = joined["naturalness"]
+    assert (found["frames"], found["slow_frames"], found["source_frames"]) == (120, 40, 30)
+    assert found["snap_turns_per_min"] == 0.5 and found["source_snap_turns_per_min"] == 2.0
+    assert found["unusual_posture_share"] == pytest.approx(0.2) and found["off_travel_deg_p90"] == 40.0
+    assert found["standing"] == {"seconds": 10.0, "both_down": pytest.approx(0.95)}
+    assert found["tempo"] == {"sd_ms": 12.0, "strides": 7}
+
+
 def test_every_second_has_its_own_figures(take, library):
     played, track = playback_from_take(take), take.plan.track
     count = len(take.motion)

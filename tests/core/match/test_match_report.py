@@ -2,6 +2,7 @@
 
 import base64
 import json
+import re
 import struct
 import zlib
 from html.parser import HTMLParser
@@ -185,6 +186,20 @@ def test_an_empty_folder_and_an_empty_match(tmp_path):
         build_match_page(tmp_path)
     (tmp_path / "match.json").write_text('{"players": []}', "utf-8")
     assert "0 of 0 players finished" in build_match_page(tmp_path)
+
+
+def test_what_the_eye_sees_has_a_table_of_its_own(tmp_path):
+    """Spins of 3.0 and 0.1 a minute: mean 1.6, worst 3.0; both feet down 90 and 40 %: worst is the least."""
+    seen = [{"spins_per_min": spins, "dwell_s_median": dwell, "standing": {"both_down": down}}
+            for spins, dwell, down in ((3.0, 1.25, 0.9), (0.1, 2.5, 0.4))]
+    text = build_match_page(written(tmp_path, {"a": {**report(), "naturalness": seen[0]}, "b": report(),
+                                               "c": {**report(), "naturalness": seen[1]}}))  # fmt: skip
+    assert text.count("What the eye sees") == 1  # player b is of the other team, with a report of version 0.1
+    cells = [re.findall(r"<td class=(?:n|&quot;|\"|'|[^>])*>([\d.–]+)", row) for row in text.split("<tr")
+             if "mean<" in row or "worst<" in row]
+    assert ["–", "1.6", "–", "–", "–", "1.9", "–", "–", "–", "–", "–", "65"] in cells
+    assert ["–", "3.0", "–", "–", "–", "1.2", "–", "–", "–", "–", "–", "40"] in cells
+    assert "What the eye sees" not in build_match_page(written(tmp_path, {"a": report(), "c": report()}))
 
 
 def test_reports_without_seconds_still_make_a_page(tmp_path):

@@ -51,7 +51,7 @@ def test_a_striker_pushed_aside_by_others_still_meets_the_ball(striker):
     assert gap_at(take, key) < MIN_GAP
     at = round(key.frame)
     assert np.linalg.norm(take.motion.root_positions[at] - plain.motion.root_positions[at]) > 0.05
-    far = np.abs(np.arange(len(take.motion)) - at) > 60  # the head looks round over some time
+    far = np.abs(np.arange(len(take.motion)) - at) > 25  # the push lasts 18 frames, the ball contact 9
     assert np.array_equal(take.motion.rotations[far], plain.motion.rotations[far])
 
 
@@ -73,5 +73,8 @@ def test_a_second_touch_soon_after_does_not_take_the_foot_off_the_first(striker)
         posed = compute_pose(skeleton, motion.root_positions[at], motion.rotations[at])
         foot = np.mean(build_surfaces(skeleton, key.words)[0].compute_line(*posed), axis=0)
         places[at] = foot + np.array([(-1.0) ** number * 0.21, 0.0, 0.0])
-    found = restore_ball_contact(replace(take, keys=keys, ball=replace(take.ball, positions=places)), places)
-    assert max(gap_at(found, one) for one in keys) < MIN_GAP
+    both = replace(take, keys=keys, ball=replace(take.ball, positions=places))
+    found, alone = (restore_ball_contact(one, places) for one in (both, replace(both, keys=(key,))))
+    assert gap_at(found, soon) < MIN_GAP
+    # near the ground a foot comes to the ball only within millimetres, with and without the second touch
+    assert gap_at(found, key) <= max(gap_at(alone, key), MIN_GAP) < 0.003 < gap_at(both, key)

@@ -15,6 +15,8 @@ from beyond_mocap.match.crowd.correction import CURVES, Correction
 from beyond_mocap.match.pieces.named_edit import NamedEdit, NamedKey
 from beyond_mocap.match.player_edit import PlayerEdit, Stretch, read_player, to_stored_plan, write_player
 from beyond_mocap.motion.track import Track
+from beyond_mocap.synthesis.heading_path import HeadingPath
+from beyond_mocap.synthesis.heading_plan import HeadingKey
 from beyond_mocap.synthesis.plan import Pin, Plan, PlayerTouch, SolvedTrajectory
 
 RUNS = ("clip", "first", "rate", "length", "cut")
@@ -50,6 +52,8 @@ def made_stretch(random, begin: float) -> Stretch:
         style=("academy",),
         gaits=(("walking", "walk.bvh"),), strong_foot="left",
         pins=(Pin(begin + 2.0, "gaze", (0.0, 1.0, 1.5), 0.5),),
+        heading_keys=(HeadingKey(begin + 1.0, 0.7), HeadingKey(begin + 3.0, target=(1.0, -2.5), hold=1.5)),
+        heading_path=HeadingPath(np.round(begin + np.arange(40) / 6.0, 6), random.integers(-50, 50, 40)),
     )  # fmt: skip
     edit = NamedEdit(clips=(("a.bvh", False), ("sub/ü.bvh", True)), clip=[0, 1, 0], first=random.normal(size=3) * 100.0,
                      rate=[1.0, 0.875, 0.7], length=[90, 60, 90], cut=[True, False, True],
@@ -84,9 +88,18 @@ def test_a_player_comes_back_number_for_number(tmp_path):
         )
         assert one.plan.solved.touches == other.plan.solved.touches
         assert vars(one.plan).keys() == vars(other.plan).keys()
-        plain = set(vars(one.plan)) - {"track", "solved"}
+        assert np.array_equal(one.plan.heading_path.times, other.plan.heading_path.times)
+        assert np.array_equal(one.plan.heading_path.bins, other.plan.heading_path.bins)
+        plain = set(vars(one.plan)) - {"track", "solved", "heading_path"}
         assert all(getattr(one.plan, name) == getattr(other.plan, name) for name in plain)
         assert (one.warnings, one.short) == (other.warnings, other.short)
+
+
+def test_a_file_without_headings_is_read(tmp_path, whole):
+    with_arrays(whole, tmp_path / "arrays.npz", heading_path=None)
+    with_header((tmp_path / "arrays.npz").read_bytes(), tmp_path / "old.npz", lambda h: first(h).pop("headings"))
+    plan = read_player(tmp_path / "old.npz").stretches[0].plan
+    assert plan.heading_keys == () and plan.heading_path is None
 
 
 def test_the_same_player_gives_the_same_bytes(tmp_path, whole):

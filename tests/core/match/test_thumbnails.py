@@ -34,7 +34,7 @@ def test_a_picture_is_the_pose_of_that_second(made):
     draw = build_thumbnail_renderer(library, folder)
     for second in (2.5, 4.0):
         frame = round((second - take.start_time) * take.motion.fps)
-        near = range(frame - 9, frame + 10, 3)
+        near = range(frame - 15, frame + 16, 5)  # a keeper who stands moves little in less
         picture = draw("home_1", second)
         off = [np.abs(picture - render_pose(take.motion, one, PICTURE_SIZE)).mean() for one in near]
         assert near[int(np.argmin(off))] == frame and min(off) < 0.2 * np.median(off)

@@ -383,3 +383,52 @@ def test_other_units_are_refused(track_of, factor, told):
     track = track_of(lambda t: 2.0 + 1.5 * np.sin(t), 20.0, turn=0.3)
     with pytest.raises(InputError, match=told):
         clean_track(replace(track, positions=factor * track.positions))
+
+
+@pytest.mark.parametrize("rate", [10.0, 25.0])
+def test_a_track_that_jitters_by_20_cm_is_smoothed_and_told(rate):
+    noisy, truth = made(rate=rate, noise=0.2)
+    cleaned, report = clean_track(noisy)
+    before, after = (np.sqrt(np.mean(distance(one.positions, truth) ** 2)) for one in (noisy, cleaned))
+    assert after < 0.6 * before
+    assert any("jitter by" in line and "smoothed over" in line for line in report.warnings)
+
+
+@pytest.mark.parametrize("rate", [10.0, 25.0])
+def test_smoothing_jitter_keeps_to_the_samples_beside_a_gap(rate):
+    times = np.arange(int(20 * rate) + 1) / rate
+    times = times[(times <= 8.0) | (times >= 13.0)]
+    truth = np.column_stack([5.0 * times, np.zeros_like(times)])
+    cleaned, report = clean_track(Track(times, truth + np.random.default_rng(0).normal(0, 0.2, truth.shape)))
+    assert any("jitter by" in line for line in report.warnings)
+    assert np.array_equal(cleaned.times[cleaned.is_measured], times)
+    assert distance(cleaned.positions[cleaned.is_measured], truth).max() < 0.4  # as the samples themselves
+
+
+@pytest.mark.parametrize("rate", [10.0, 25.0])
+@pytest.mark.parametrize("samples, offset", [(1, (8.0, 0.0)), (4, (3.0, 4.0))])
+def test_what_jumps_away_from_a_track_that_jitters_is_replaced_and_told(rate, samples, offset):
+    noisy, truth = made(rate=rate, noise=0.2, seed=2)
+    away = slice(int(10 * rate), int(10 * rate) + samples)
+    positions = noisy.positions.copy()
+    positions[away] += offset
+    cleaned, report = clean_track(replace(noisy, positions=positions))
+    assert np.array_equal(np.flatnonzero(cleaned.outlier), np.arange(len(truth))[away])
+    assert any("jitter by" in line for line in report.lines) and any("replaced" in line for line in report.lines)
+    assert distance(cleaned.positions, truth).max() < (0.3 if samples == 1 else 0.35)
+
+
+@pytest.mark.parametrize("rate", [10.0, 25.0])
+def test_a_track_that_jitters_is_not_smoothed_across_a_step_that_is_left(rate):
+    noisy, truth = made(rate=rate, noise=0.2, seed=2)
+    step = np.where(noisy.times[:, None] < 10.0, 0.0, (3.0, 4.0))
+    cleaned, report = clean_track(replace(noisy, positions=noisy.positions + step))
+    assert any("jitter by" in line for line in report.warnings)
+    assert any("left as they are: 10.00 s" in line for line in report.warnings)
+    assert not cleaned.outlier.any() and distance(cleaned.positions, truth + step).max() < 0.3
+
+
+def test_the_noise_of_usual_systems_is_left_as_it_is():
+    noisy, _ = made(noise=0.02)
+    cleaned, report = clean_track(noisy)
+    assert np.array_equal(cleaned.positions, noisy.positions) and report.warnings == ()

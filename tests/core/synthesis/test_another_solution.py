@@ -30,7 +30,7 @@ def test_a_stretch_is_another_one_and_the_rest_is_the_same_to_the_last_bit(libra
     off = np.flatnonzero(changed(take, other)) / fps
     assert len(off) and off.min() < end and off.max() > start
     reach = BLEND_SECONDS + 0.4 + (1.5 if start == 4.0
-                                   else 0.5)  # a kick's own entry and exit; a stretch of some length
+                                   else 0.8)  # a kick's own entry and exit; a stretch of some length
     assert start - reach < off.min() and off.max() < end + reach, (off.min(), off.max())
     first, last = int(start * fps), int(end * fps)
     shared = footage(take, first, last) & footage(other, first, last)

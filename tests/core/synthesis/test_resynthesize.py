@@ -7,9 +7,10 @@ import pytest
 
 from beyond_mocap.annotation import Span
 from beyond_mocap.base.errors import UserCancelledError
-from beyond_mocap.motion.humanoid import identify_joints
+from beyond_mocap.motion.humanoid import compute_heading, identify_joints
 from beyond_mocap.motion.motion import forward_kinematics
 from beyond_mocap.motion.track import Track, sample_track, smooth_zero_phase_hann
+from beyond_mocap.synthesis.heading_plan import ASKED_SECONDS, HeadingKey
 from beyond_mocap.synthesis.plan import Plan
 from beyond_mocap.synthesis.resynthesize import BLEND_SECONDS, resynthesize
 from beyond_mocap.synthesis.search.affected_frames import RUN_UP
@@ -55,6 +56,23 @@ def test_a_key_moment_asked_twice_stays(library, track, timeline_of):
     before = synthesize(library, Plan(track=track, timeline=timeline_of((5.0, "kick right"), (5.0, "kick right"))))
     again = resynthesize(library, before.plan, before)
     assert not changed(before, again).any() and again.keys == before.keys and again.warnings == before.warnings
+
+
+@pytest.mark.parametrize("turn", [90.0, -160.0])
+def test_a_heading_key_turns_the_body_and_changes_nothing_far_from_it(library, track_of, turn):
+    """It is added, and taken away again, on a player who strolls; the rest comes back bit for bit."""
+    before = synthesize(library, Plan(track=track_of(0.6, seconds=20.0)))
+    key = HeadingKey(9.0, heading=np.radians(turn), hold=2.0)
+    after = resynthesize(library, replace(before.plan, heading_keys=(key,)), before)
+    held = compute_heading(after.motion)[int(9.3 * 30) : int(10.7 * 30)]
+    assert np.degrees(np.abs(np.angle(np.exp(1j * (held - key.heading))))).max() < 25.0
+    reach = ASKED_SECONDS + 0.5 + RUN_UP + BLEND_SECONDS + 0.5 * before.plan.seam_window
+    off = np.flatnonzero(changed(before, after)) / 30.0
+    assert len(off) and key.time - reach < off[0] and off[-1] < key.time + key.hold + reach
+    assert np.array_equal(after.planned_heading[: int(5.0 * 30)], before.planned_heading[: int(5.0 * 30)])
+    again = resynthesize(library, before.plan, after)
+    assert key.time - reach < np.flatnonzero(changed(before, again)).min(initial=999) / 30.0
+    assert np.allclose(np.exp(1j * again.planned_heading), np.exp(1j * before.planned_heading), atol=1e-9)
 
 
 @pytest.mark.parametrize("time", [4.8, 5.2, 6.0])

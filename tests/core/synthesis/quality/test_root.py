@@ -69,10 +69,10 @@ def test_surge_is_the_planted_speed_wobble(amount):
     assert np.sqrt(np.mean(surge**2)) == pytest.approx(amount / np.sqrt(2), rel=0.06, abs=1e-9)
 
 
-def test_class_rms_borrows_from_the_nearest_class_that_is_known():
+def test_class_rms_is_not_known_for_classes_with_few_values():
     values = np.concatenate([np.full(40, 0.1), np.full(50, 0.3)])
     classes = np.concatenate([np.zeros(40, int), np.full(50, 3)])
-    np.testing.assert_allclose(movement.compute_class_rms(values, classes), [0.1, 0.1, 0.3, 0.3, 0.3])
+    np.testing.assert_allclose(movement.compute_class_rms(values, classes), [0.1, np.nan, np.nan, 0.3, np.nan])
     assert np.isnan(movement.compute_class_rms(values[:5], classes[:5])).all()
 
 

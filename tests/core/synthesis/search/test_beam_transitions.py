@@ -21,7 +21,8 @@ def ways(library, order):
     offered = SlotCandidates(clips[start.astype(int)], start, rates[0], random.uniform(0.0, 1.0, FRAMES), piece)
     seen = random.uniform(size=(STATES, int(costs.index.bucket[-1]) + 1)) < 0.2
     cost = 1000.0 + random.uniform(0.0, 0.5, STATES)
-    return BeamTransitions(costs, clips[end.astype(int)], end, rates[1, :STATES], cost, seen), offered
+    return BeamTransitions(costs, clips[end.astype(int)], end, rates[1, :STATES], cost, seen,
+                           random.uniform(0.0, 0.5, STATES)), offered
 
 
 def test_every_way_costs_its_cut_and_what_follows(ways):
@@ -29,8 +30,11 @@ def test_every_way_costs_its_cut_and_what_follows(ways):
     every = found.compute_all(offered)
     costs, start = found.costs, offered.start.astype(int)
     cut = sum(values for _, values in costs.iter_cut_terms(found.end, start))
-    replay = costs.weights.replay * found.seen[:, costs.index.bucket[start]]
-    cut = np.where((found.end[:, None] == start) & (found.clip[:, None] == offered.clip), 0.0, cut + replay)
+    # a stand may be shown again nearly for nothing
+    shown = found.seen[:, costs.index.bucket[start]]
+    replay = costs.weights.replay * shown * np.maximum(costs.index.lifted[start], 0.1)
+    cut = np.where((found.end[:, None] == start) & (found.clip[:, None] == offered.clip), 0.0,
+                   cut + replay + found.young[:, None])
     rate = costs.weights.rate_change * np.abs(found.rate[:, None] - offered.rate)
     whole = found.base + found.above[:, None] + cut + rate + offered.cost
     assert np.count_nonzero(cut == 0.0) >= 6
