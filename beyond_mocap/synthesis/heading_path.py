@@ -15,7 +15,7 @@ from ..motion.skeleton import freeze_array
 
 BINS = 36
 BIN_ANGLE = 2.0 * np.pi / BINS
-"""Headings that are told apart, and radians between two of them."""
+"""Number of headings, and radians between two of them."""
 
 COST_UNIT = 1e-6
 """Cost of one whole number."""

@@ -95,8 +95,10 @@ class HeadingKey:
         if (self.heading is None) == (self.target is None):
             raise InputError("heading key", f"{self.time:g} s: heading {self.heading}, target {self.target}",
                              "a heading or a target", "give one of the two")
-        if not np.isfinite(values).all() or self.hold < 0.0:
-            raise InputError("heading key", f"{values}", "finite values, and a hold of at least 0 s")
+        if not np.isfinite(values).all():
+            raise InputError("heading key", "a value that is not finite", "finite numbers", "correct the key")
+        if self.hold < 0.0:
+            raise InputError("heading key", f"a hold of {self.hold:g} s", "0 s or more", "correct the key")
 
     @property
     def end(self) -> float:
