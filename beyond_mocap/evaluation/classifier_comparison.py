@@ -3,7 +3,7 @@
 A classifier two-sample test (Lopez-Paz and Oquab 2017, "Revisiting classifier two-sample tests"). Windows of 1 s of
 takes and of unmirrored recordings are matched by speed: at each speed there are as many of one as of the other. Two
 classifiers learn which is which, and answer for windows that they have not seen: for each answer all windows of the
-same recording are left out on both sides, because a take shows recordings that could be known by heart, and all windows
+same recording are left out on both sides, because a take shows recordings that could have been learned, and all windows
 of the same take. The area under the curve is 0.5 for a guess and 1 for certainty.
 
 Frames that are not locomotion are left out: on both sides those whose source has the label of an action or of the ball,
@@ -92,7 +92,7 @@ def compare_with_recordings(takes: Mapping[str, Playback], library: Library) -> 
         found = (f"{len(synthesized)} windows of {SECONDS:g} s that match by speed, of {len(all_synthesized)} in takes "
                  f"and {len(all_recorded)} in {library.folder}")
         raise InputError("takes", found, f"{FEWEST} or more", "add takes, or recordings of their speeds")
-    is_body = np.array([not feature.is_course for feature in features])
+    is_body = np.array([not feature.is_planned for feature in features])
     with threadpool_limits(limits=1):  # with more threads, sums have another order and other bits
         areas, losses = cross_validate(synthesized, recorded)
         body_areas, _ = cross_validate(synthesized.select_features(is_body), recorded.select_features(is_body),
@@ -400,6 +400,8 @@ def format_comparison(report: Mapping) -> str:
         areas, body = ([_format_area(subset[key][kind]) for kind in CLASSIFIERS] for key in ("auc", "auc_body"))
         windows = "+".join(map(str, subset["windows"]))
         lines.append(f"| {name} | {windows} | {areas[0]} | {areas[1]} | {body[0]}, {body[1]} |")
+    if any(min(subset["windows"]) < FEWEST for subset in subsets.values()):
+        lines += ["", f"Not known: fewer than {FEWEST} windows on a side."]
     for kind in CLASSIFIERS:
         lines += ["", f"| {kind.replace('_', ' ')}: feature | takes | recordings | area by itself | area lost |",
                   "|---|---|---|---|---|"]

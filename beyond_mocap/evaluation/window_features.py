@@ -46,14 +46,14 @@ class Signal(NamedTuple):
         unit: of its values.
         values: (T,), or (T, 2) for left and right.
         statistics: keys of _STATISTICS that are taken of it.
-        is_course: whether track and plan decide it: where the body goes, faces and looks, not how.
+        is_planned: whether track and plan decide it: where the body goes, faces and looks, not how.
     """
 
     name: str
     unit: str
     values: np.ndarray
     statistics: tuple[str, ...]
-    is_course: bool = False
+    is_planned: bool = False
 
 
 class Feature(NamedTuple):
@@ -61,7 +61,7 @@ class Feature(NamedTuple):
 
     name: str
     unit: str
-    is_course: bool
+    is_planned: bool
 
 
 @dataclass(frozen=True, eq=False)
@@ -131,7 +131,7 @@ def _measure_signal(signal: Signal, frames: np.ndarray) -> list[tuple[Feature, n
         else:
             both = np.stack([_STATISTICS[name](side[frames]) for side in signal.values.T])
             found = _list_both(title, both)
-        out += [(Feature(text, signal.unit, signal.is_course), values) for text, values in found]
+        out += [(Feature(text, signal.unit, signal.is_planned), values) for text, values in found]
     return out
 
 

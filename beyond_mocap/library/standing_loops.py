@@ -1,7 +1,7 @@
 """Long stands from the short ones that recordings have.
 
 People in recordings stand for a second or three between two actions; players stand for ten. Each calm stand is played
-forth and back again and again, slowing down at both ends, so that no step and no cut is needed only because a
+forward and backward again and again, slowing down at both ends, so that no step and no cut is needed only because a
 recording is over. Reversed weight shifts look like weight shifts.
 """
 
@@ -40,7 +40,7 @@ def iter_standing_loops(clips: Sequence, frames: Frames, fps: float, strangeness
         clip = clips[index]
         begin, last = frames.source[first], frames.source[end - 1]
         seconds = (last - begin) / clip.motion.fps
-        # forth and back on a cosine whose fastest moment has the recording's own rate
+        # forward and backward on a cosine whose fastest moment has the recording's own rate
         phase = 2.0 * np.arange(int(LOOP_SECONDS * rate)) / rate / seconds
         source = begin + 0.5 * (last - begin) * (1.0 - np.cos(phase))
         yield clip.path, Motion(clip.motion.skeleton, *sample_frames(clip.motion, source), rate)

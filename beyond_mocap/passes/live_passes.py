@@ -34,7 +34,7 @@ BLEND_SECONDS = 0.4
 """Seconds over which a player's previous motion blends into the new one."""
 BALL_DISTANCE = 0.6
 """Metres from the holder to the ball at the start."""
-_TAIL, _SWAY = 4.0, 2.5  # s: standing that is synthesized after a pass; its end that is repeated forth and back
+_TAIL, _SWAY = 4.0, 2.5  # s: standing that is synthesized after a pass; its end that is repeated forward and backward
 _READY_SECONDS = 1.2  # s after the last strike at which the receiver can act
 _ROUNDS = 2  # plans before the final one, each moving the holder nearer to where the ball lies
 
@@ -246,7 +246,7 @@ def _roll_ball(path: BallPath, ball_place: np.ndarray, strike: float) -> np.ndar
 
 
 def _extend_standing(motion: Motion) -> Motion:
-    """Extend a motion that ends standing by STANDING_SECONDS, playing its last seconds forth and back."""
+    """Extend a motion that ends standing by STANDING_SECONDS, playing its last seconds forward and backward."""
     count = len(motion)
     sway = min(int(_SWAY * motion.fps), count - 1)
     # a triangle wave over the last `sway` frames

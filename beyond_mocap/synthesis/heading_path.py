@@ -1,8 +1,7 @@
 """A planned heading: whole steps of ten degrees at decisions some times a second, smoothed where it is read.
 
 The cheapest one is found by dynamic programming. Costs are whole numbers, which add up alike whatever comes before
-them. So an edit leaves the headings far from it, bit for bit, but where two courses cost almost alike over long, such
-as the two sides of a dead zone: there it may decide which one is taken until the body next turns.
+them. A part of it can be planned again such that it joins the rest.
 """
 
 from __future__ import annotations
@@ -15,7 +14,7 @@ from ..motion.skeleton import freeze_array
 
 BINS = 36
 BIN_ANGLE = 2.0 * np.pi / BINS
-"""Headings that are told apart, and radians between two of them."""
+"""Number of headings, and radians between two of them."""
 
 COST_UNIT = 1e-6
 """Cost of one whole number."""

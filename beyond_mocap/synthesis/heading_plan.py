@@ -46,6 +46,8 @@ OTHER_WAY_COST = 8.0  # per radian that is turned against a label: the long way 
 GAZE_COST, GAZE_REACH = 6.0, np.radians(45.0)  # per radian beyond what hips and shoulders turn towards a pinned gaze
 KEEPER_BALL_COST, KEEPER_SIDEWAYS = 3.0, 0.5  # of a goalkeeper, at any speed up to 3 m/s; share of SIDEWAYS_COST
 
+_UPDATE_SECONDS = 1.5  # before and after a change in which an update plans again: half a turn takes one second
+_NOTICED_COST = 1e-3  # by which a heading's cost at a decision differs where an update plans it again
 ASKED_SECONDS = 3.0
 """Seconds before and after what is asked in which it may change the plan; elsewhere it does not."""
 
@@ -95,8 +97,10 @@ class HeadingKey:
         if (self.heading is None) == (self.target is None):
             raise InputError("heading key", f"{self.time:g} s: heading {self.heading}, target {self.target}",
                              "a heading or a target", "give one of the two")
-        if not np.isfinite(values).all() or self.hold < 0.0:
-            raise InputError("heading key", f"{values}", "finite values, and a hold of at least 0 s")
+        if not np.isfinite(values).all():
+            raise InputError("heading key", "a value that is not finite", "finite numbers", "correct the key")
+        if self.hold < 0.0:
+            raise InputError("heading key", f"a hold of {self.hold:g} s", "0 s or more", "correct the key")
 
     @property
     def end(self) -> float:
@@ -183,20 +187,72 @@ def plan_heading_path(track: SampledTrack, request: HeadingRequest) -> HeadingPa
         The planned heading.
     Source: Reconstructed from the rules of ../shared/metrics.md, *Heading plan*.
     """
+    weighed = _weigh_headings(track, request)
+    bins = find_cheapest_path(weighed.plain, weighed.plain_steps)
+    for first, end in find_runs(weighed.is_asked):
+        bins = replace_part(bins, first, end, weighed.costs, weighed.steps)
+    return HeadingPath(weighed.times, bins)
+
+
+def update_heading_path(path: HeadingPath, track: SampledTrack, request: HeadingRequest, old_track: SampledTrack,
+                        old_request: HeadingRequest) -> HeadingPath:
+    """Update a planned heading after its track, ball or what is asked has changed: far from it every heading stays.
+
+    Within its dead zone a plan may rest at one of several headings that cost almost the same. Planned anew, it could
+    rest at another one for minutes because something moved elsewhere.
+
+    Args:
+        path: the heading planned before.
+        track, request: as for `plan_heading_path`.
+        old_track, old_request: those of the path.
+    Returns:
+        The planned heading; a whole new one where the times differ.
+    """
+    weighed, old = _weigh_headings(track, request), _weigh_headings(old_track, old_request)
+    if not np.array_equal(weighed.times, old.times) or not np.array_equal(path.times, old.times):
+        return plan_heading_path(track, request)
+    differs = np.abs(weighed.costs - old.costs).max(axis=1) > _NOTICED_COST
+    differs |= np.any(np.isfinite(weighed.steps) != np.isfinite(old.steps), axis=1)
+    changed = weighed.times[differs]
+    reach = np.searchsorted(changed, weighed.times[:, None] + [-_UPDATE_SECONDS, _UPDATE_SECONDS])
+    bins = path.bins
+    for first, end in find_runs(reach[:, 1] > reach[:, 0]):
+        bins = replace_part(bins, first, end, weighed.costs, weighed.steps)
+    return HeadingPath(path.times, bins)
+
+
+@dataclass(frozen=True, eq=False)
+class _WeighedHeadings:
+    """What every heading costs at each of D decisions.
+
+    Attributes:
+        times: (D,) s.
+        plain, plain_steps: costs where nothing is asked, as for `find_cheapest_path`.
+        costs, steps: the same with what is asked.
+        is_asked: (D,) bool, decisions that what is asked changes.
+    """
+
+    times: np.ndarray
+    plain: np.ndarray
+    plain_steps: np.ndarray
+    costs: np.ndarray
+    steps: np.ndarray
+    is_asked: np.ndarray
+
+
+def _weigh_headings(track: SampledTrack, request: HeadingRequest) -> _WeighedHeadings:
+    """Weigh all headings at all decisions of a track."""
     count = len(track)
     at = np.arange(0, count, max(int(round(_DECISION_SECONDS * track.fps)), 1))
     if at[-1] != count - 1:
         at = np.append(at, count - 1)
     bearings = _compute_bearings(track, request.play, at)
-    costs, step_costs = _compute_heading_costs(bearings, request.is_keeper), _compute_step_costs(bearings)
-    bins = find_cheapest_path(costs, step_costs)
-    runs = find_runs(_find_asked(bearings, request))
-    if runs:
+    plain, plain_steps = _compute_heading_costs(bearings, request.is_keeper), _compute_step_costs(bearings)
+    costs, steps, is_asked = plain, plain_steps, _find_asked(bearings, request)
+    if is_asked.any():
         asked_costs = _compute_asked_costs(bearings, request)
-        costs, step_costs = costs + asked_costs, _limit_turns(bearings, request, step_costs, asked_costs)
-    for first, end in runs:
-        bins = replace_part(bins, first, end, costs, step_costs)
-    return HeadingPath(bearings.times, bins)
+        costs, steps = costs + asked_costs, _limit_turns(bearings, request, steps, asked_costs)
+    return _WeighedHeadings(bearings.times, plain, plain_steps, costs, steps, is_asked)
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)

@@ -26,7 +26,12 @@ def read_heading_keys(path: str | os.PathLike) -> tuple[HeadingKey, ...]:
     Raises:
         InputError: naming the line that does not have this form.
     """
-    return tuple(_build_key(row, place) for place, row in read_rows(path, COLUMNS[:1]))
+    rows = list(read_rows(path, COLUMNS[:1]))
+    unknown = [name for _, row in rows[:1] for name in row if name not in COLUMNS]
+    if unknown:
+        raise InputError(f"{path}:1", f"unknown column {', '.join(unknown)}", f"some of {','.join(COLUMNS)}",
+                         "rename or remove it")
+    return tuple(_build_key(row, place) for place, row in rows)
 
 
 def _build_key(row: dict[str, str], place: str) -> HeadingKey:

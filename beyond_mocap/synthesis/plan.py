@@ -21,7 +21,16 @@ from ..base.time_series import interpolate_columns
 from ..motion.skeleton import freeze_array
 from ..motion.track import SampledTrack, Track, sample_track
 from .heading_path import HeadingPath
-from .heading_plan import FPS, HeadingKey, HeadingRequest, Play, plan_heading_path, rest_track, sample_heading
+from .heading_plan import (
+    FPS,
+    HeadingKey,
+    HeadingRequest,
+    Play,
+    plan_heading_path,
+    rest_track,
+    sample_heading,
+    update_heading_path,
+)
 
 GAZE = "gaze"
 PARTS = ("left_hand", "right_hand", "left_foot", "right_foot", GAZE)
@@ -257,6 +266,7 @@ class ResolvedPlan:
         track: the player's samples, m in the library's size.
         trajectory: the ball's trajectory, m in the player's size; None where it is not solved.
         size: how many times as tall as the library's skeleton the player is.
+        known_path: the planned heading of a take that is updated, None for none.
     """
 
     requested: Plan
@@ -264,6 +274,7 @@ class ResolvedPlan:
     track: Track
     trajectory: SolvedTrajectory | None
     size: float
+    known_path: HeadingPath | None = None
     _sampled: dict[tuple[float, bool], SampledTrack] = field(default_factory=dict, init=False, repr=False)
 
     @property
@@ -279,7 +290,7 @@ class ResolvedPlan:
     @cached_property
     def heading_path(self) -> HeadingPath:
         """The planned heading; method "path" only."""
-        return self.requested.heading_path or self.plan_heading()
+        return self.requested.heading_path or self.known_path or self.plan_heading()
 
     def plan_heading(self, play: Play | None = None) -> HeadingPath:
         """Plan the heading.
@@ -289,12 +300,24 @@ class ResolvedPlan:
         Returns:
             The planned heading, the same whatever frame rate it is read at.
         """
+        return plan_heading_path(rest_track(self._sample_ball_track(FPS)), self._build_heading_request(play))
+
+    def update_heading(self, old: ResolvedPlan) -> ResolvedPlan:
+        """Return the plan with the planned heading of an old one, changed only where track, ball or keys have."""
+        if self.method != "path" or self.requested.heading_path is not None:
+            return self
+        tracks = [rest_track(plan._sample_ball_track(FPS)) for plan in (self, old)]
+        requests = [plan._build_heading_request(None) for plan in (self, old)]
+        path = update_heading_path(old.heading_path, tracks[0], requests[0], tracks[1], requests[1])
+        return replace(self, known_path=path)
+
+    def _build_heading_request(self, play: Play | None) -> HeadingRequest:
+        """Build what is asked of the heading, in the library's size."""
         size = self.size
         gazes = [replace(pin, position=(pin.position[0] / size, pin.position[1] / size, pin.position[2] / size))
                  for pin in self.requested.pins if pin.part == GAZE]
         keys = self._find_heading_keys()
-        request = HeadingRequest(keys=keys, gazes=tuple(gazes), spans=self.timeline.spans, play=play)
-        return plan_heading_path(rest_track(self._sample_ball_track(FPS)), request)
+        return HeadingRequest(keys=keys, gazes=tuple(gazes), spans=self.timeline.spans, play=play)
 
     def _find_heading_keys(self) -> tuple[HeadingKey, ...]:
         """Find the heading keys that hold at any time of the track, or of a whole match's, in the library's size."""

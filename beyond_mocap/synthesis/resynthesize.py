@@ -152,7 +152,8 @@ def _update_take(
     """Update the take in the library's size, and finish it; None where it has to be synthesized as a whole."""
     old_plan = resolve_plan(before.plan, library, trajectory=before.solved)
     same_ball = _has_same_ball(requested, before.plan)
-    plan = resolve_plan(requested, library, trajectory=before.solved if same_ball else None)
+    old_plan = replace(old_plan, known_path=before.heading_path)
+    plan = resolve_plan(requested, library, trajectory=before.solved if same_ball else None).update_heading(old_plan)
     library_take = to_library_size(before, plan.size)
     found = _update_stretches(library, plan, old_plan, library_take, report, cancelled=cancelled, hurry=hurry,
                               variant=variant)
@@ -368,6 +369,7 @@ class _TakeUpdate:
             ik_miss=self.miss,
             stepped=self.stepped,
             planned_heading=self.track.heading,
+            heading_path=self.plan.heading_path,
             plan=self.plan.requested,
             edit=self.edit,
         )

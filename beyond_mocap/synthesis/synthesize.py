@@ -174,6 +174,7 @@ def _construct_motion(
         contacts=steps.contacts, timeline=request.timeline, keys=keys, ball=ball, method=plan.method,
         seed=plan.requested.seed, correction=planted.correction, ik_miss=planted.miss, stepped=steps.stepped,
         plan=plan.requested, edit=edit, planned_heading=track.heading,
+        heading_path=plan.heading_path if plan.method == "path" else None,
     )
     clock.append(time.perf_counter())
     report(1.0, "Done")

@@ -10,6 +10,7 @@ from ..annotation import KeyMoment, Timeline
 from ..annotation.ball_contact import choose_contact_labels
 from ..motion.motion import Motion
 from ..motion.track.ball_path import BallPath
+from .heading_path import HeadingPath
 from .plan import Pin, Plan, SolvedTrajectory
 from .search.edit_list import EditList
 
@@ -103,6 +104,7 @@ class Take:
         contact_ball: the ball as it was met, before it was led along that trajectory, None where it was not.
         dribble_touches: the touches of dribbles.
         planned_heading: (T,) rad from +x that was planned, None without a plan (`heading_plan`).
+        heading_path: the same as it was decided, for updates.
     """
 
     motion: Motion
@@ -133,3 +135,4 @@ class Take:
     contact_ball: BallPath | None = None
     dribble_touches: tuple[DribbleTouch, ...] = ()
     planned_heading: np.ndarray | None = None
+    heading_path: HeadingPath | None = None

@@ -93,7 +93,7 @@ class CandidateIndex:
         self.recording = recording[library.frames.clip]
         fastest = np.zeros(len(library.clips))
         np.maximum.at(fastest, library.frames.clip, library.frames.speed)
-        # a recorded stand that is played forth and back costs nothing; the ends of a synthetic turn are no stand
+        # a recorded stand that is played forward and backward costs nothing; the ends of a synthetic turn are no stand
         self.is_made_travel = self.is_synthetic & (fastest[library.frames.clip] > STAND_SPEED)
         self.bucket = (np.arange(len(library.frames)) // BUCKET).astype(int)
         speed, turn, lasts = map(np.stack, zip(*(compute_speed_and_turn(library, rate) for rate in PLAYBACK_RATES)))

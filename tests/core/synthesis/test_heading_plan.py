@@ -15,6 +15,8 @@ from beyond_mocap.synthesis.heading_plan import (
     plan_heading,
     plan_heading_path,
     plan_track,
+    rest_track,
+    update_heading_path,
 )
 from beyond_mocap.synthesis.plan import Pin, Plan, ResolvedPlan
 from beyond_mocap.synthesis.synthesize import synthesize
@@ -284,3 +286,22 @@ def test_a_part_of_a_plan_reads_as_the_whole():
     part = path.cut_span(inside[0], inside[-1])
     assert len(part.times) < 70 and 0 <= part.bins[0] < 36
     assert degrees_from(part.sample(inside), np.degrees(path.sample(inside))).max() < 1e-9
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_an_update_keeps_every_heading_far_from_a_change(seed):
+    """A player who jitters about in the dead zone; a dip of 60 cm in the middle of a minute."""
+    random, times = np.random.default_rng(seed), np.arange(0.0, 60.0, 0.1)
+    places = np.cumsum(random.normal(0.0, 0.03, (len(times), 2)), axis=0)
+    dip = np.exp(-((times - 30.0) ** 2) / 0.5)[:, None] * [0.0, 0.6]
+    balls = np.column_stack([12.0 * np.cos(times / 9.0), 12.0 * np.sin(times / 7.0), np.full(len(times), 0.11)])
+    old, new = (rest_track(sample_track(Track(times, body, balls), FPS)) for body in (places, places + dip))
+    path = plan_heading_path(old, HeadingRequest())
+    updated = update_heading_path(path, new, HeadingRequest(), old, HeadingRequest())
+    far = np.abs(path.times - 30.0) > 8.0
+    assert np.array_equal(updated.bins[far] % 36, path.bins[far] % 36)
+    assert np.array_equal(update_heading_path(path, old, HeadingRequest(), old, HeadingRequest()).bins, path.bins)
+    faced = HeadingRequest(keys=(HeadingKey(30.0, np.pi, hold=2.0),))
+    asked = update_heading_path(path, old, faced, old, HeadingRequest())
+    inside = (path.times > 30.2) & (path.times < 31.8)
+    assert np.all(asked.bins[inside] % 36 == 18) and np.array_equal(asked.bins[far] % 36, path.bins[far] % 36)

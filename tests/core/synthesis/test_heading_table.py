@@ -21,7 +21,7 @@ def test_a_table_is_read_as_it_is_meant(tmp_path):
 @pytest.mark.parametrize("row, part", [
     ("x,90,,,", "time_s 'x'"), ("2,,,,1", "no heading; expected either heading_deg, or x_m and y_m"),
     ("2,90,1,2,", "heading_deg, x_m, y_m; expected either"), ("2,,1,,", "x_m; expected either"),
-    ("2,east,,,", "heading_deg 'east'"), ("2,90,,,-1", "a hold of at least 0 s"), ("2,90", "2 cells"),
+    ("2,east,,,", "heading_deg 'east'"), ("2,90,,,-1", "a hold of -1 s; expected 0 s or more"), ("2,90", "2 cells"),
 ])
 def test_mistakes_name_their_line(tmp_path, row, part):
     file = tmp_path / "headings.csv"
@@ -35,4 +35,11 @@ def test_a_table_without_times_is_refused(tmp_path):
     file = tmp_path / "headings.csv"
     file.write_text("heading_deg\n90\n", encoding="utf-8")
     with pytest.raises(InputError, match="no column time_s"):
+        read_heading_keys(file)
+
+
+def test_an_unknown_column_is_named(tmp_path):
+    file = tmp_path / "headings.csv"
+    file.write_text("time_s,heading_deg,hold\n2,90,1\n", encoding="utf-8")
+    with pytest.raises(InputError, match="headings.csv:1: unknown column hold; expected some of time_s"):
         read_heading_keys(file)

