@@ -198,8 +198,8 @@ def update_heading_path(path: HeadingPath, track: SampledTrack, request: Heading
                         old_request: HeadingRequest) -> HeadingPath:
     """Update a planned heading after its track, ball or what is asked has changed: far from it every heading stays.
 
-    Within its dead zone a plan may rest at one of several headings that cost almost the same. Planned from scratch, it could
-    rest at another one for minutes because something moved elsewhere.
+    Within its dead zone a plan may rest at one of several headings that cost almost the same. Planned from scratch,
+    it could rest at another one for minutes because something moved elsewhere.
 
     Args:
         path: the heading planned before.
