@@ -198,8 +198,8 @@ def update_heading_path(path: HeadingPath, track: SampledTrack, request: Heading
                         old_request: HeadingRequest) -> HeadingPath:
     """Update a planned heading after its track, ball or what is asked has changed: far from it every heading stays.
 
-    Within its dead zone a plan may rest at one of several headings that cost almost the same. Planned anew, it could
-    rest at another one for minutes because something moved elsewhere.
+    Within its dead zone a plan may rest at one of several headings that cost almost the same. Planned from scratch,
+    it could rest at another one for minutes because something moved elsewhere.
 
     Args:
         path: the heading planned before.
@@ -252,7 +252,8 @@ def _weigh_headings(track: SampledTrack, request: HeadingRequest) -> _WeighedHea
     if is_asked.any():
         asked_costs = _compute_asked_costs(bearings, request)
         costs, steps = costs + asked_costs, _limit_turns(bearings, request, steps, asked_costs)
-    return _WeighedHeadings(bearings.times, plain, plain_steps, costs, steps, is_asked)
+    return _WeighedHeadings(times=bearings.times, plain=plain, plain_steps=plain_steps, costs=costs, steps=steps,
+                            is_asked=is_asked)
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
