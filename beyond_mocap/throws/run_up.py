@@ -27,6 +27,7 @@ from ..motion.motion import Motion, resample
 from ..motion.retargeting.retarget import Retargeter
 from ..motion.track import SampledTrack, Track, smooth_zero_phase_hann
 from ..synthesis.construct.construction import Construction, build_key_results, find_touches
+from ..synthesis.heading_plan import HeadingKey
 from ..synthesis.plan import Plan, ResolvedPlan
 from ..synthesis.resolve_plan import resolve_plan
 from ..synthesis.resolved_touches import resolve_touches
@@ -51,6 +52,7 @@ EDGE = 0.1
 
 _CLIP = "generated throw"
 _END_SECONDS = 0.5  # s at either end of a stretch with the heading of the surrounding motion
+_KEY_SECONDS = 0.2  # s between two heading keys: the planned heading turns with the throw
 _CATCH_UP = 0.8  # m/s, speed difference to the track on the detour to the throw
 _DETOUR_RANGE = (1.0, 4.0)  # s, shortest and longest duration of the detour to the throw and back
 
@@ -100,6 +102,7 @@ def construct_run_up(
     with threadpool_limits(limits=1):
         resolved_plan = resolve_touches(plan)
     plan_with_throw, warnings = _insert_in_plan(resolved_plan, throw, release, at, action)
+    plan_with_throw, left_out = _insert_headings(plan_with_throw, throw, at - release, between)
     resolved = resolve_plan(plan_with_throw, library, are_touches_resolved=True)
     size = resolved.size
     skeleton = library.skeleton.scale(size)
@@ -121,7 +124,7 @@ def construct_run_up(
     if not has_same_bones:
         motion = Retargeter(motion, throw.skeleton, example=throw, keeps_travel=True).retarget(motion)
     start, seams = float(resolved.track.times[0]), construction.source.transitions
-    return RunUpResult(motion=motion, start=start, transitions=seams, warnings=(*warnings, *order.warnings))
+    return RunUpResult(motion=motion, start=start, transitions=seams, warnings=(*warnings, *left_out, *order.warnings))
 
 
 def _check_times(plan: Plan, throw: Motion, begin: float) -> None:
@@ -203,6 +206,34 @@ def _insert_in_plan(plan: Plan, throw: Motion, release: float, at: float, action
         warnings.append("the plan's pinned clips are ignored, because the plan contains a throw")
     track = _lead_through(plan, throw, release, at)
     return replace(plan, track=track, timeline=timeline, pins=(), method="path"), warnings
+
+
+def _insert_headings(plan: Plan, throw: Motion, begin: float, between: Motion | None) -> tuple[Plan, list[str]]:
+    """Insert the throw's heading into a plan, and that of `between` at both ends; also return warnings.
+
+    The body then turns to the throw before it begins: without the keys it would jump to the throw's heading.
+    """
+    keys = _build_heading_keys(throw, begin)
+    if between is not None:
+        count, start = int(_END_SECONDS * between.fps), float(plan.track.times[0])
+        for first in (0, len(between) - count):
+            end = _build_heading_keys(between.frames(first, first + count), start + first / between.fps)
+            keys += [key for key in end if key.time < keys[0].time - _KEY_SECONDS or key.time > begin + throw.duration]
+    own, warnings = [], []
+    for key in plan.heading_keys:
+        if key.is_within(begin, begin + throw.duration):
+            warnings.append(TimedMessage(f"{format_seconds(key.time)} s: the given heading overlaps the throw and is "
+                                         "left out", (key.time, key.time)))
+        else:
+            own.append(key)
+    return replace(plan, heading_keys=(*own, *keys), heading_path=None), warnings
+
+
+def _build_heading_keys(motion: Motion, start: float) -> list[HeadingKey]:
+    """Build keys of a motion's own heading, one every _KEY_SECONDS, for a motion that begins at `start` s."""
+    faces, times = np.unwrap(compute_heading(motion)), np.arange(len(motion)) / motion.fps
+    at = np.append(np.arange(0.0, times[-1] - 0.5 * _KEY_SECONDS, _KEY_SECONDS), times[-1])
+    return [HeadingKey(float(start + second), float(np.interp(second, times, faces))) for second in at]
 
 
 def _insert_in_timeline(

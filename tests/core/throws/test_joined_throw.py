@@ -12,6 +12,7 @@ from beyond_mocap.library.build import build_library
 from beyond_mocap.motion.humanoid import compute_heading, identify_joints
 from beyond_mocap.motion.motion import Motion, forward_kinematics, place_motion, sample_frames
 from beyond_mocap.motion.track import BALL_RADIUS, Track
+from beyond_mocap.synthesis.heading_plan import HeadingKey
 from beyond_mocap.synthesis.plan import Plan, PlayerTouch, SolvedTrajectory
 from beyond_mocap.synthesis.quality.movement import compute_jerk, compute_window_maxima
 from beyond_mocap.synthetic.gait import build_gait
@@ -90,6 +91,16 @@ def test_the_synthesizer_joins_it_on_the_track(library, speed):
         assert np.linalg.norm(joined.motion.root_positions[frame, :2] - [speed * (second - AT), 0.0]) < 0.3
 
 
+def test_a_body_that_walks_across_turns_to_the_throw_before_it(library):
+    motion, release, plan = on_library(library, 0.0)
+    across = np.stack([np.zeros_like(TIMES), 1.2 * (TIMES - AT)], axis=1)
+    way = construct_run_up(library, replace(plan, track=Track(TIMES, across, None)), motion, release, AT)
+    heading = np.unwrap(compute_heading(way.motion))
+    assert np.ptp(heading) > 1.0 and np.abs(np.diff(heading)).max() * FPS < 10.0
+    joined = join_throw(way.motion, way.start, motion, release, at=AT)
+    assert np.all(measure_transition_jerk(joined) <= measure_library_jerk(library, FPS))
+
+
 def test_the_library_itself_stays_as_it_was(library):
     motion, release, _ = on_library(library, 0.0)
     clips, keys = library.clips, library.keys
@@ -101,10 +112,12 @@ def test_the_library_itself_stays_as_it_was(library):
 def test_what_lies_within_the_throw_gives_way(library):
     motion, release, plan = on_library(library, 0.0)
     words = (KeyMoment(AT + 0.2, ("kick", "low")), KeyMoment(AT + 4.0, ("kick", "low")))
-    plan = replace(plan, timeline=Timeline((Span(AT - 4.0, AT + 4.0, ("standing",)),), words))
+    faces = (HeadingKey(AT - 0.1, 1.0), HeadingKey(AT - 4.0, 0.5))
+    plan = replace(plan, timeline=Timeline((Span(AT - 4.0, AT + 4.0, ("standing",)),), words), heading_keys=faces)
     way = construct_run_up(library, plan, motion, release, AT)
     assert [line for line in way.warnings if "left out" in line] == [
-        "6.2 s: 'kick low' overlaps the throw and is left out"
+        "6.2 s: 'kick low' overlaps the throw and is left out",
+        "5.9 s: the given heading overlaps the throw and is left out",
     ]
 
 
