@@ -219,7 +219,8 @@ def _insert_headings(plan: Plan, throw: Motion, begin: float, between: Motion | 
         for first in (0, len(between) - count):
             end = _build_heading_keys(between.frames(first, first + count), start + first / between.fps)
             keys += [key for key in end if key.time < keys[0].time - _KEY_SECONDS or key.time > begin + throw.duration]
-    own, warnings = [], []
+    own: list[HeadingKey] = []
+    warnings: list[str] = []
     for key in plan.heading_keys:
         if key.is_within(begin, begin + throw.duration):
             warnings.append(TimedMessage(f"{format_seconds(key.time)} s: the given heading overlaps the throw and is "
