@@ -22,23 +22,14 @@ from . import cache
 from .cache import write_synthetic_clips
 from .clip import Clip
 from .clusters import Clusters
-from .coverage import find_missing_motion, measure_slowest_travel, select_locomotion_alone
+from .coverage import BACK_SPEEDS, TURNS, Coverage, measure_coverage
 from .features import FPS, Frames, build_frames, join_frames
 from .keys import Key, collect_keys
 from .manners import Manners, measure_manners
-from .missing_steps import BACK_SPEEDS, TURNS
 from .posture import NormalPostures, fit_normal_postures
 from .run_loops import MIN_SPEED
 from .standing_loops import MIN_STAND_SECONDS
-from .synthetic_clips import (
-    KICK_LABELS,
-    MIN_RECEIVE_SPEED,
-    RECEIVE_LABELS,
-    find_speed_gaps,
-    iter_synthetic_clips,
-    measure_touch_speed,
-    select_locomotion,
-)
+from .synthetic_clips import KICK_LABELS, MIN_RECEIVE_SPEED, RECEIVE_LABELS, iter_synthetic_clips, measure_touch_speed
 
 MIN_RUN_SECONDS = 2.0  # of a track's runs from which on long runs are needed
 RESTING_SPEED = 0.1  # m/s of a track below which a player stands
@@ -133,15 +124,9 @@ class Library:
         return fit_normal_postures(self.frames, self._is_recorded, self.fps)
 
     @cached_property
-    def missing_motion(self) -> dict[str, str]:
-        """What the recordings lack: kind of motion -> a line for people (`coverage`)."""
-        return find_missing_motion(self.clips, self.frames, self.fps, self.strangeness)
-
-    @cached_property
-    def slowest_travel(self) -> float:
-        """The m/s below which hardly any recorded locomotion travels."""
-        belongs = select_locomotion_alone(self.frames, self.clips) & (self.strangeness <= 1.0)
-        return measure_slowest_travel(self.frames.speed[belongs], self.fps)
+    def coverage(self) -> Coverage:
+        """What the recordings lack of the motion that players need."""
+        return measure_coverage(self.clips, self.frames, self.fps, self.strangeness)
 
     @cached_property
     def manners(self) -> Manners:
@@ -187,18 +172,14 @@ class Library:
         frames = join_frames(self.frames, synthetic.frames)
         return replace(self, clips=(*self.clips, *synthetic.clips), frames=frames, clusters={})
 
-    @cached_property
-    def speed_gaps(self) -> tuple[tuple[float, float], ...]:
-        """(from, to) m/s of the speeds that recorded locomotion does not reach."""
-        return find_speed_gaps(self.frames.speed[select_locomotion(self.frames, self.clips)], self.fps)
-
     def needs_synthetic_clips(self, speed: np.ndarray, offset: np.ndarray, heading: np.ndarray,
                               key_speeds: np.ndarray, takes: np.ndarray) -> bool:
         """Whether a track needs the synthetic clips.
 
         It does if it stays in a speed gap for a fifth of a second or more, stands or runs for some seconds in all,
-        goes sideways or backward while slow, turns where it stands, or has key moments that are faster than any
-        recorded kick or, for received balls, any recorded receiving with the foot can be played without sliding.
+        goes sideways or backward while slow or turns where it stands and the recordings lack that, or has key moments
+        that are faster than any recorded kick or, for received balls, any recorded receiving with the foot can be
+        played without sliding.
 
         Args:
             speed: (T,) m/s of the track at the library's rate.
@@ -209,7 +190,7 @@ class Library:
         Returns:
             True if it does.
         """
-        inside = sum(int(np.sum((speed > low) & (speed < high))) for low, high in self.speed_gaps)
+        inside = sum(int(np.sum((speed > low) & (speed < high))) for low, high in self.coverage.speed_gaps)
         kick, take = (measure_touch_speed(self.frames, self.clips, self.keys, act)
                       for act in (KICK_LABELS, RECEIVE_LABELS))
         too_fast = 1.3 * np.where(takes & np.isfinite(take), max(take, MIN_RECEIVE_SPEED), kick)
@@ -217,7 +198,9 @@ class Library:
         runs = np.sum(speed > MIN_SPEED) >= MIN_RUN_SECONDS * self.fps
         aside = (speed > STANDING_SPEED) & (speed < 1.25 * BACK_SPEEDS[-1]) & (np.abs(offset) > np.pi / 3.0)
         turned = np.sum(np.abs(np.diff(heading))[speed[1:] < STANDING_SPEED])
-        steps = np.sum(aside) >= 0.5 * self.fps or turned >= 0.5 * TURNS[0]
+        lacks = self.coverage.lacks
+        steps = (np.sum(aside) >= 0.5 * self.fps and (lacks("sideways") or lacks("backward"))
+                 or turned >= 0.5 * TURNS[0] and (lacks("turns") or lacks("moves")))
         return inside >= 0.2 * self.fps or bool(rests | runs | steps) or bool(np.any(key_speeds > too_fast))
 
     @cached_property
@@ -244,7 +227,7 @@ def _build_synthetic_library(library: Library) -> Library:
     speeds = {gait.label: gait.speed for gait in library.gaits if gait.label != STANDING}
     clips = []
     for synthetic in iter_synthetic_clips(library.clips, library.frames, library.fps, speeds, keys=library.keys,
-                                          strangeness=library.strangeness):
+                                          strangeness=library.strangeness, coverage=library.coverage):
         clip = Clip(path=synthetic.name, mirrored=False, motion=synthetic.motion, annotations=synthetic.rows,
                     heel_toe_contacts=synthetic.heel_toe_contacts)
         clips += [clip, clip.build_twin()]

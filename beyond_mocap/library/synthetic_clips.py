@@ -28,9 +28,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ..annotation import DISCRETE, LOCOMOTION, ClipAnnotation, compute_gait_thresholds
+from ..annotation import LOCOMOTION, ClipAnnotation, compute_gait_thresholds
 from ..annotation.gaits import STANDING, TURNING
-from ..base.time_series import find_equal_runs, find_runs
+from ..base.time_series import find_equal_runs
 from ..base.vectors import arctan2, cross_product
 from ..motion import contacts, quaternion
 from ..motion.foot_plant import plant_feet
@@ -40,6 +40,7 @@ from ..motion.phase_blend import Strides, blend_strides, find_strides
 from ..synthetic import gestures
 from ..synthetic.gait import build_gait
 from ..synthetic.gait_plan import GaitStyle
+from .coverage import MAX_SPEED, MIN_SPEED_SECONDS, Coverage, select_locomotion
 from .features import Frames
 from .missing_steps import BACK_PREFIX, STEP_PREFIX, TURN_PREFIX, iter_missing_steps
 from .run_loops import LOOP_SECONDS, iter_run_loops
@@ -54,15 +55,8 @@ BLEND_PREFIX, KICK_PREFIX, RECEIVE_PREFIX, STAND_PREFIX, LOOP_PREFIX = "blend_",
 WALK_PREFIX, STILL_PREFIX = "walk_", "still_"
 KICK_LABELS, RECEIVE_LABELS = frozenset({"kick"}), frozenset({"receive", "foot"})
 FPS = 60.0  # of synthetic clips
-MAX_SPEED = 9.4  # m/s
 # m/s: lowest speed of synthetic running (blends cover slower speeds), and of receiving a ball on the run
 _MIN_RUN_SPEED, MIN_RECEIVE_SPEED = 2.4, 1.7
-# range of playback rates of a clip
-_WARP = (0.875, 1.125)
-_SLOWEST = 1.6  # m/s, a walk: the slowest travel should not exceed it when it is played slower
-SLOWEST_RECORDED = _SLOWEST / _WARP[0]
-_MIN_SECONDS = 1.5  # seconds of recording at a speed from which on it is no gap
-_GRID = 1.03  # ratio of neighbouring speeds
 # ratios of neighbouring speeds of blends, of touches and of runs at an even speed
 _BLEND_STEP, _TOUCH_STEP, _EVEN_STEP = 1.06, 1.4, 1.1
 _PAIRS = 3  # pairs of recordings blended into each gap, at most
@@ -95,37 +89,6 @@ class SyntheticClip:
     heel_toe_contacts: np.ndarray
 
 
-def find_speed_gaps(speed: np.ndarray, fps: float) -> tuple[tuple[float, float], ...]:
-    """Find the ranges of speed that too few seconds of recorded locomotion reach within the time warp.
-
-    Args:
-        speed: (N,) m/s of frames of locomotion.
-        fps: of those frames.
-    Returns:
-        (from, to) m/s of all gaps, from the slowest recording's speed, if that is a walk, to a sprint.
-    """
-    grid = np.exp(np.arange(np.log(0.6), np.log(MAX_SPEED), np.log(_GRID)))
-    ordered = np.sort(speed)
-    reached = np.searchsorted(ordered, grid / _WARP[0]) - np.searchsorted(ordered, grid / _WARP[1])
-    lacking = reached < _MIN_SECONDS * fps
-    if lacking.all():
-        return ()
-    slowest = int(np.argmin(lacking))
-    lacking[:slowest] = grid[slowest] > _SLOWEST
-    ends = np.append(grid, MAX_SPEED)
-    return tuple((float(grid[a]), float(ends[b])) for a, b in find_runs(lacking))
-
-
-def select_locomotion(frames: Frames, clips: Sequence) -> np.ndarray:
-    """Select the frames (N,) bool of recordings, twins left out, that show locomotion and no action."""
-    named = {word: frames.words[:, column] for column, word in enumerate(frames.vocabulary)}
-    none = np.zeros(len(frames), bool)
-    moves = np.any([named.get(word, none) for word in _GAITS], axis=0)
-    acts = np.any([none, *(named[word] for word in DISCRETE if word in named)], axis=0)
-    own = np.array([not clip.mirrored and not clip.is_synthetic for clip in clips])
-    return moves & ~acts & own[frames.clip]
-
-
 def measure_touch_speed(frames: Frames, clips: Sequence, keys: Sequence, act: frozenset[str]) -> float:
     """Measure the fastest approach of a touch.
 
@@ -147,7 +110,7 @@ def measure_touch_speed(frames: Frames, clips: Sequence, keys: Sequence, act: fr
 
 def iter_synthetic_clips(
     clips: Sequence, frames: Frames, fps: float, gait_speeds: dict[str, float], keys: Sequence,
-    strangeness: np.ndarray
+    strangeness: np.ndarray, coverage: Coverage,
 ) -> Iterator[SyntheticClip]:
     """Iterate over all synthetic clips of a library.
 
@@ -158,6 +121,7 @@ def iter_synthetic_clips(
         gait_speeds: m/s of the recorded gaits.
         keys: the recordings' key moments.
         strangeness: (N,) how far each frame lies from normal locomotion (`posture`).
+        coverage: what the recordings lack.
     Yields:
         Clips whose names begin with SYNTHETIC_FOLDER: they are stored beside the cache.
     """
@@ -165,7 +129,7 @@ def iter_synthetic_clips(
               **{word: v for word, v in _DEFAULT_SPEEDS.items() if v > max(gait_speeds.values())}, **gait_speeds}
     example = sample_upright_example(clips)
     style = estimate_runner_style(clips, frames, example)
-    for low, high in find_speed_gaps(frames.speed[select_locomotion(frames, clips)], fps):
+    for low, high in coverage.speed_gaps:
         blends = list(_iter_blends(clips, frames, fps, low=low, high=high, speeds=speeds))
         yield from blends or _iter_walks(low, min(high, _MIN_RUN_SPEED), example, speeds)
         yield from _iter_runs(max(0.93 * low, _MIN_RUN_SPEED), min(1.05 * high, MAX_SPEED), example, style, speeds)
@@ -177,7 +141,7 @@ def iter_synthetic_clips(
     yield from _iter_touches(RECEIVE_PREFIX, fastest, ("receive", "foot", "low"), kinds=["inside"], example=example,
                              speeds=speeds)
     stands = [(STAND_PREFIX, motion) for _, motion in iter_standing_loops(clips, frames, fps, strangeness, FPS)]
-    if not stands:
+    if not coverage.has_stand:
         stands = [(STILL_PREFIX, build_gait(0.0, STAND_SECONDS, FPS, example.skeleton, example=example))]
     for number, (prefix, motion) in enumerate(stands):
         row = ClipAnnotation(0, len(motion) - 1, None, (STANDING,))
@@ -188,7 +152,7 @@ def iter_synthetic_clips(
         rows = _build_gait_rows(np.full(len(motion), speed), speeds)
         yield _ground_clip(f"{SYNTHETIC_FOLDER}{LOOP_PREFIX}{speed:.2f}.bvh", motion, contacts, rows, plants_feet=True)
     for name, motion, heel_toe_contacts, speed in iter_missing_steps(
-        clips, frames, fps, strangeness, example=example, rate=FPS
+        clips, frames, fps, strangeness, coverage=coverage, example=example, rate=FPS
     ):
         rows = _build_step_rows(name, len(motion), speed, speeds)
         yield _ground_clip(f"{SYNTHETIC_FOLDER}{name}.bvh", motion, heel_toe_contacts, rows)
@@ -216,7 +180,7 @@ def estimate_runner_style(clips: Sequence, frames: Frames, example: Motion) -> G
         The style; the default one where no clip runs.
     """
     rows = np.flatnonzero(select_locomotion(frames, clips) & (frames.speed > _MIN_RUN_SPEED))
-    if len(rows) < _MIN_SECONDS * 30.0:
+    if len(rows) < MIN_SPEED_SECONDS * 30.0:
         return GaitStyle()
     rows = rows[np.linspace(0, len(rows) - 1, 60).astype(int)]
     samples = [sample_frames(clips[frames.clip[row]].motion, frames.source[row : row + 1]) for row in rows]
