@@ -201,10 +201,11 @@ def _report_missing_motion(played: Playback, library: Library | None) -> list[Ti
     speed = np.linalg.norm(velocity, axis=1)
     synthetic = _frames_of_clips(played, SYNTHETIC_FOLDER)
     ahead = _frames_of_clips(played, *(SYNTHETIC_FOLDER + name for name in _STANDS_AND_GOES_AHEAD))
+    stands = _frames_of_clips(played, SYNTHETIC_FOLDER + STAND_PREFIX)  # recorded ones, played to and fro
     recorded = _classify_recorded_steps(played, library)
     steps = classify_steps(velocity, compute_turn_rate(heading, fps), NEEDED_TURN_RATE)
     needed = {
-        "belonging": ~synthetic & (speed < CALM_SPEED), "stands": ~synthetic & (speed < RESTING_SPEED),
+        "belonging": ~(synthetic & ~stands) & (speed < CALM_SPEED), "stands": ~synthetic & (speed < RESTING_SPEED),
         "speeds": ~synthetic & (speed > STEP_SPEEDS[0]) & (speed < coverage.slowest_speed),
         **{kind: flags & ~(synthetic & ~ahead) & ~recorded[kind] for kind, flags in steps.items()},
     }

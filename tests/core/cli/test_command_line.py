@@ -124,7 +124,7 @@ def test_the_report_says_what_is_left_out_and_what_lacks(run, clips_folder, libr
     report = json.loads((tmp_path / "r.json").read_text())
     assert status == 0 and report["proposed_clips"] == 0
     lacking = {one["kind"] for one in report["lacks"]}
-    assert "turns" in lacking and "no turn in place: add one" in out
+    assert "turns" in lacking and "hardly any turns in place: add some" in out
     assert sum(one["seconds"] for one in report["locomotion"]) > 15.0 and report["locomotion"][-1]["to_m_s"] is None
     assert all(one["start_s"] <= one["end_s"] and one["why"] for one in report["left_out"])
 

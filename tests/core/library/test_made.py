@@ -11,14 +11,13 @@ import pytest
 from beyond_mocap.annotation import KeyMoment, Timeline
 from beyond_mocap.files.bvh import bvh
 from beyond_mocap.library.build import build_library
+from beyond_mocap.library.coverage import MAX_SPEED, find_speed_gaps
 from beyond_mocap.library.keys import Key, select_substitutes
 from beyond_mocap.library.synthetic_clips import (
     BLEND_PREFIX,
     KICK_PREFIX,
-    MAX_SPEED,
     RECEIVE_PREFIX,
     SYNTHETIC_FOLDER,
-    find_speed_gaps,
 )
 from beyond_mocap.motion.humanoid import identify_joints
 from beyond_mocap.motion.motion import forward_kinematics
@@ -61,7 +60,7 @@ def test_no_locomotion_no_gaps():
 def test_made_clips_fill_the_gaps_up_to_a_sprint(library, more):
     speed = np.concatenate([more.frames.speed[more.frames.clip == i] for i, c in enumerate(more.clips)
                             if c.is_synthetic])
-    for low, high in library.speed_gaps:
+    for low, high in library.coverage.speed_gaps:
         for wanted in np.linspace(low, min(high, 9.0), 9):
             assert np.sum(np.abs(np.log(speed / wanted)) < 0.12) > 10
     assert made(more, BLEND_PREFIX) and made(more, KICK_PREFIX)
@@ -108,7 +107,7 @@ def test_a_track_at_a_recorded_speed_uses_recordings_only(library):
 
 
 def test_a_track_between_two_recordings_is_played_by_a_blend(library):
-    (low, high), *_ = library.speed_gaps
+    (low, high), *_ = library.coverage.speed_gaps
     plan = Plan(track=straight(np.sqrt(low * high)))
     take = synthesize(library, plan)
     assert any(name.startswith(SYNTHETIC_FOLDER + BLEND_PREFIX) for name in take.clips)
