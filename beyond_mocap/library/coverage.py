@@ -1,7 +1,7 @@
 """What a library's recordings show of the motion that players need, and what they lack: the one place that decides it.
 
 Players spend more than half of their time below 2 m/s, standing, turning, stepping sideways and backward. Synthetic
-clips (`synthetic_clips`, `missing_steps`) are made of exactly what is lacking here, and people read the same lines in
+clips (`synthetic_clips`, `missing_steps`) are made for exactly what is lacking here, and people read the same lines in
 the panel, in the report of a library, and in the takes that need it.
 
 Only frames that belong (`posture`) are counted, and recorded ones; mirrored twins give the other side.
@@ -39,9 +39,9 @@ MIN_TURN_SECONDS = 6.0  # of recorded turns on the spot from which on they do no
 MIN_MOVES = 3  # recorded moves from a stand to a stand from which on such moves do not lack
 MIN_CALM_SECONDS = 1.5  # of steady travel from which on it is known what belongs
 CALM_SPEED = 2.0  # m/s up to which people walk
-NEEDED_TURN_RATE = np.radians(20.0)  # rad/s at which a body needs a turn: without one the plan turns it slowly
+_NEEDED_TURN_RATE = np.radians(20.0)  # rad/s at which a body needs a turn: without one the plan turns it slowly
 STEP_SPEEDS = (0.4, 2.0)  # m/s of steps in another direction than ahead
-TURN_SPEED = 0.5  # m/s of a body that turns in place
+_TURN_SPEED = 0.5  # m/s of a body that turns in place
 _SLOWEST_SPEED = 0.6  # m/s; what is slower is a stand with steps
 _GRID = 1.03  # ratio of neighbouring speeds
 _SPEED_RANGE, _DIRECTION_RANGE = (0.8, 1.25), np.radians(22.5)  # around a speed and a direction
@@ -56,7 +56,7 @@ _RATE_SECONDS = 0.3  # over which a heading's rate is measured
 _LACKS = {
     "belonging": ("nothing recorded surely belongs to calm standing or walking, upright with arms hanging",
                   "add a straight walk at one speed and a stand at ease"),
-    "stands": ("no calm standing", "add three seconds of it"),
+    "stands": ("no calm standing", "add four seconds of it"),
     "turns": ("hardly any turns in place", "add some"),
     "moves": ("hardly any single steps from a stand to a stand", "add some"),
     "speeds": ("hardly any locomotion", "add some"),
@@ -296,20 +296,19 @@ def compute_turn_rate(heading: np.ndarray, fps: float) -> np.ndarray:
     return (padded[2 * half :] - padded[: -2 * half]) * fps / (2 * half)
 
 
-def classify_steps(velocity: np.ndarray, turn_rate: np.ndarray, least_rate: float) -> dict[str, np.ndarray]:
+def classify_steps(velocity: np.ndarray, turn_rate: np.ndarray) -> dict[str, np.ndarray]:
     """Classify frames by the kinds of motion that libraries often lack.
 
     Args:
         velocity: (T, 2) m/s in the body's heading frame, x forward.
         turn_rate: (T,) rad/s of the heading.
-        least_rate: rad/s from which on a body turns.
     Returns:
         "turns", "sideways" and "backward" -> (T,) bool.
     """
     speed = np.linalg.norm(velocity, axis=1)
     is_slow = (speed > STEP_SPEEDS[0]) & (speed < STEP_SPEEDS[1])
     return {
-        "turns": (np.abs(turn_rate) > least_rate) & (speed < TURN_SPEED),
+        "turns": (np.abs(turn_rate) > _NEEDED_TURN_RATE) & (speed < _TURN_SPEED),
         "sideways": is_slow & (np.abs(velocity[:, 1]) > _SIDEWAYS * speed),
         "backward": is_slow & (-velocity[:, 0] > _SIDEWAYS * speed),
     }

@@ -177,9 +177,8 @@ class Library:
         """Whether a track needs the synthetic clips.
 
         It does if it stays in a speed gap for a fifth of a second or more, stands or runs for some seconds in all,
-        goes sideways or backward while slow or turns where it stands and the recordings lack that, or has key moments
-        that are faster than any recorded kick or, for received balls, any recorded receiving with the foot can be
-        played without sliding.
+        goes sideways or backward while slow, turns where it stands, or has key moments that are faster than any
+        recorded kick or, for received balls, any recorded receiving with the foot can be played without sliding.
 
         Args:
             speed: (T,) m/s of the track at the library's rate.
@@ -198,9 +197,7 @@ class Library:
         runs = np.sum(speed > MIN_SPEED) >= MIN_RUN_SECONDS * self.fps
         aside = (speed > STANDING_SPEED) & (speed < 1.25 * BACK_SPEEDS[-1]) & (np.abs(offset) > np.pi / 3.0)
         turned = np.sum(np.abs(np.diff(heading))[speed[1:] < STANDING_SPEED])
-        lacks = self.coverage.lacks
-        steps = (np.sum(aside) >= 0.5 * self.fps and (lacks("sideways") or lacks("backward"))
-                 or turned >= 0.5 * TURNS[0] and (lacks("turns") or lacks("moves")))
+        steps = np.sum(aside) >= 0.5 * self.fps or turned >= 0.5 * TURNS[0]
         return inside >= 0.2 * self.fps or bool(rests | runs | steps) or bool(np.any(key_speeds > too_fast))
 
     @cached_property

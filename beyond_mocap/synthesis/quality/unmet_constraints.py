@@ -17,14 +17,7 @@ import numpy as np
 from ...annotation import Timeline, labels_per_frame
 from ...base.errors import TimedMessage, format_seconds
 from ...base.time_series import find_runs, time_derivative
-from ...library.coverage import (
-    CALM_SPEED,
-    NEEDED_TURN_RATE,
-    STEP_SPEEDS,
-    classify_steps,
-    compute_turn_rate,
-    describe_lack,
-)
+from ...library.coverage import CALM_SPEED, STEP_SPEEDS, classify_steps, compute_turn_rate, describe_lack
 from ...library.features import SMOOTH_SECONDS
 from ...library.landings import LANDING_FOLDER
 from ...library.library import RESTING_SPEED, Library
@@ -58,8 +51,6 @@ MISSING_SECONDS = 0.5  # shortest time of a motion that the library lacks that i
 LABEL_SECONDS = 0.5  # shortest time of a missing label that is reported
 MAX_STRETCHES = 6  # stretches that a line lists
 _STANDS_AND_GOES_AHEAD = (STAND_PREFIX, STILL_PREFIX, WALK_PREFIX, BLEND_PREFIX)
-_NEAREST = "the nearest recording is shown"
-_NOT_SYNTHETIC = {"belonging": "players move as these recordings do"}
 _TOLERANCE = 1e-3  # of rates and seconds, for rounding
 # how a clip's name begins, the kind of motion that recordings lack (`coverage`), and what is shown instead
 _SYNTHETIC_INSTEAD = (
@@ -203,14 +194,14 @@ def _report_missing_motion(played: Playback, library: Library | None) -> list[Ti
     ahead = _frames_of_clips(played, *(SYNTHETIC_FOLDER + name for name in _STANDS_AND_GOES_AHEAD))
     stands = _frames_of_clips(played, SYNTHETIC_FOLDER + STAND_PREFIX)  # recorded ones, played to and fro
     recorded = _classify_recorded_steps(played, library)
-    steps = classify_steps(velocity, compute_turn_rate(heading, fps), NEEDED_TURN_RATE)
+    steps = classify_steps(velocity, compute_turn_rate(heading, fps))
     needed = {
         "belonging": ~(synthetic & ~stands) & (speed < CALM_SPEED), "stands": ~synthetic & (speed < RESTING_SPEED),
         "speeds": ~synthetic & (speed > STEP_SPEEDS[0]) & (speed < coverage.slowest_speed),
         **{kind: flags & ~(synthetic & ~ahead) & ~recorded[kind] for kind, flags in steps.items()},
     }
-    return [_build_line(played.times, _drop_short_runs(there, MISSING_SECONDS * fps),
-                        coverage.describe_lack(kind, _NOT_SYNTHETIC.get(kind, _NEAREST)))
+    return [_build_line(played.times, _drop_short_runs(there, MISSING_SECONDS * fps), coverage.lines[kind]
+                        if kind == "belonging" else coverage.describe_lack(kind, "the nearest recording is shown"))
             for kind, there in needed.items() if coverage.lacks(kind)]
 
 
@@ -235,7 +226,7 @@ def _classify_recorded_steps(played: Playback, library: Library) -> dict[str, np
         part = slice(frames.first[number], frames.first[number] + frames.count[number])
         nearest = np.searchsorted(frames.source[part], played.clip_frame[there])
         rate = compute_turn_rate(frames.heading[part], library.fps)
-        for kind, flags in classify_steps(frames.velocity[part], rate, NEEDED_TURN_RATE).items():
+        for kind, flags in classify_steps(frames.velocity[part], rate).items():
             found[kind][there] = flags[np.minimum(nearest, len(flags) - 1)]
     return found
 

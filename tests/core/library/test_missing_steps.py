@@ -36,8 +36,8 @@ def forward(tmp_path_factory):
 
 def list_steps(library):
     example = sample_upright_example(library.clips)
-    return list(iter_missing_steps(library.clips, library.frames, library.fps, library.strangeness, library.coverage, example,
-                                   60.0))
+    return list(iter_missing_steps(library.clips, library.frames, library.fps, library.strangeness, library.coverage,
+                                   example, 60.0))
 
 
 def made(library, begins):

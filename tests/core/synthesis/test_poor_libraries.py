@@ -5,6 +5,8 @@ import pytest
 
 from beyond_mocap.files.bvh import bvh
 from beyond_mocap.library.build import build_library
+from beyond_mocap.library.missing_steps import TURN_PREFIX
+from beyond_mocap.library.synthetic_clips import SYNTHETIC_FOLDER
 from beyond_mocap.motion import quaternion
 from beyond_mocap.motion.humanoid import identify_joints
 from beyond_mocap.motion.motion import Motion, compute_local_rotations, forward_kinematics
@@ -114,8 +116,10 @@ def test_a_turn_that_the_library_lacks_is_told_with_its_seconds(poor):
     angle = np.interp(TIMES, [3.0, 6.0], [0.0, np.pi])
     ball = 5.0 * np.column_stack([np.cos(angle), np.sin(angle), np.full(len(TIMES), 0.02)])
     take = synthesize(poor("no turn"), Plan(track=Track(TIMES, np.zeros((len(TIMES), 2)), ball)))
-    line, = [line for line in take.warnings if "hardly any turns in place: add some; until then synthetic" in line]
+    line, = [line for line in take.warnings if "hardly any turns in place: add some" in line]
     assert any(first < 6.0 and last > 3.0 for first, last in line.spans)
+    is_synthetic = any(name.startswith(SYNTHETIC_FOLDER + TURN_PREFIX) for name in take.clips)
+    assert line.endswith("until then synthetic ones are shown" if is_synthetic else "the nearest recording is shown")
 
 
 @pytest.mark.parametrize("name", ["fights", "boxing"])
@@ -125,7 +129,10 @@ def test_a_library_with_fights_alone_says_that_nothing_is_known_to_belong(poor, 
     assert lack.endswith("until then players move as these recordings do")
     take = synthesize_path(poor(name), WALK)
     line, = [line for line in take.warnings if line.endswith(lack)]
-    assert sum(last - first for first, last in line.spans) > 5.0
+    played = playback_from_take(take)
+    is_recorded = np.array([not name.startswith(SYNTHETIC_FOLDER) for name in played.clips])[played.clip]
+    seconds = np.sum(is_recorded) / take.motion.fps
+    assert seconds > 2.0 and sum(last - first for first, last in line.spans) == pytest.approx(seconds, abs=0.1)
 
 
 def test_a_library_that_walks_belongs_to_walking(poor):
