@@ -34,8 +34,9 @@ def list_motions(kind):
     walks = [(speed, 180) for speed in BACK_SPEEDS] if kind == "backward" else [walk[:2] for walk in SIDE_WALKS]
     words = "walking back" if kind == "backward" else "walking left"
     # the speed of slow synthetic steps swings out of the range around it for half of the time
-    return {f"{kind}{i}": (words, build_gait(speed, SECONDS if speed > 0.5 else 2.0 * SECONDS, 30.0,
-                                             direction=np.radians(degrees))) for i, (speed, degrees) in enumerate(walks)}
+    seconds = [SECONDS if speed > 0.5 else 2.0 * SECONDS for speed, _ in walks]
+    return {f"{kind}{i}": (words, build_gait(speed, seconds[i], 30.0, direction=np.radians(degrees)))
+            for i, (speed, degrees) in enumerate(walks)}
 
 
 def build(folder, kinds, speed=1.1):
