@@ -89,7 +89,8 @@ def run_synthesize(options, reporter: ProgressReporter, writers: Mapping[str, Wr
     if options.report:
         from ..evaluation.report import evaluate
 
-        report = evaluate(take, track, library)
+        with reporter.stop_at_once():
+            report = evaluate(take, track, library)
         report["warnings"] = [*report.get("warnings", []), *data.lines]
     write(take, options.out)
     if options.provenance:
@@ -152,8 +153,15 @@ def run_evaluate(options, reporter: ProgressReporter, writers: Mapping[str, Writ
         reporter: progress, notes and cancellation.
         writers: further output formats, by file suffix (Blender's).
     """
-    if options.against:
-        return run_comparison(options, reporter)
+    with reporter.stop_at_once():
+        if options.against:
+            run_comparison(options, reporter)
+        else:
+            _evaluate_motion(options, reporter)
+
+
+def _evaluate_motion(options, reporter: ProgressReporter) -> None:
+    """Report on a motion that was written before."""
     if len(options.motion) > 1:
         raise InputError("evaluate", f"{len(options.motion)} motions", "one motion, or --against LIBRARY",
                          "evaluate them one after the other")
@@ -221,7 +229,7 @@ def _describe_fit(report: dict, motion, track, options) -> list[str]:
 
 def _is_synthesis_report(path: Path) -> bool:
     """Whether a file is a report that `synthesize` wrote: only that one knows the method."""
-    from ..files.content import read_utf8
+    from ..base.content import read_utf8
 
     try:
         found = json.loads(read_utf8(path, "a report", _MAX_REPORT_BYTES))

@@ -5,9 +5,9 @@ import os
 import pytest
 
 from beyond_mocap.annotation import read_annotation_csv, read_text
+from beyond_mocap.base.content import read_bytes, read_utf8
 from beyond_mocap.base.errors import InputError
 from beyond_mocap.files.bvh import bvh
-from beyond_mocap.files.content import read_bytes, read_utf8
 from beyond_mocap.files.obj import read_mesh
 from beyond_mocap.files.tables import read_ball
 from beyond_mocap.files.tracking.tracking import read_match, read_track_csv
