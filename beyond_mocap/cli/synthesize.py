@@ -8,6 +8,8 @@ import time
 from collections.abc import Mapping
 from pathlib import Path
 
+import numpy as np
+
 from ..base.errors import InputError, NotInLibraryError, format_count
 from ..base.settings.options import add_options, option_values
 from .comparing import run_comparison
@@ -197,6 +199,9 @@ def _evaluate_motion(options, reporter: ProgressReporter) -> None:
     notes = [*report["warnings"], *report["notes"], *_describe_fit(report, motion, track, options)]
     if provenance is None and report["keys"]:
         notes.append("the clips that played are unknown; name them with --provenance")
+    if ball is None and track is not None and np.isfinite(track.ball).any():
+        notes.append(f"{options.motion}: the ball as written is unknown, so the report has no contact gaps and no "
+                     "angle between head and ball; name it with --ball")
     if _is_synthesis_report(options.report):
         notes.append(f"{options.report}: replaces the report of synthesize, which knew more, such as the clips")
     write_report(options.report, report)
@@ -204,7 +209,7 @@ def _evaluate_motion(options, reporter: ProgressReporter) -> None:
         atomic_write(options.html, build_html_report(played, report, track=track, timeline=timeline, library=library,
                                                      title=options.motion.name))  # fmt: skip
     reporter.finish(notes)
-    if library is not None and (unknown_clips := _find_unknown_clips(played.clips, library)):
+    if library is not None and (unknown_clips := played.list_unknown_clips(library)):
         count = format_count(len(unknown_clips), "clip")
         reporter.show_note(
             f"{options.provenance}: {count} not in {options.library} and not compared, such as {unknown_clips[0]}"
@@ -236,11 +241,3 @@ def _is_synthesis_report(path: Path) -> bool:
     except (InputError, ValueError, RecursionError):
         return False
     return isinstance(found, dict) and "method" in found
-
-
-def _find_unknown_clips(clips: tuple[str, ...], library) -> list[str]:
-    """Find the clips of a provenance table that are neither in the library nor in its cache folder."""
-    from ..library.scan import CACHE_FOLDER
-
-    known = {clip.path for clip in library.clips}
-    return [clip for clip in clips if clip and clip not in known and not clip.startswith(CACHE_FOLDER)]
