@@ -571,6 +571,18 @@ def test_the_second_ctrl_c_breaks_off_what_does_not_listen():
     assert (signal.getsignal(signal.SIGINT), signal.getsignal(signal.SIGTERM)) == before
 
 
+def test_the_first_ctrl_c_breaks_off_a_block_that_never_asks():
+    told = ProgressReporter(False)
+    with _InterruptHandler(told), pytest.raises(KeyboardInterrupt), told.stop_at_once():
+        signal.raise_signal(signal.SIGINT)
+        pytest.fail("the block went on")
+    with _InterruptHandler(told := ProgressReporter(False)):
+        with told.stop_at_once():
+            pass
+        signal.raise_signal(signal.SIGINT)
+        assert told.is_cancelled()
+
+
 def test_signals_that_python_did_not_set_are_left_as_the_system_has_them(monkeypatch):
     """Blender sets handlers of its own before Python: `signal.signal` then returns None, which it does not take
     back."""
