@@ -15,6 +15,8 @@ _NEEDS_LIBRARY += r"bone_change_m|annotation_similarity\.had_keys|naturalness\.(
 _NEEDS_CLIPS = r"warp_rate|loop_share|seams|naturalness\.(cuts|dwell|short)|annotation_similarity"
 _NEEDS_RECORDINGS = r"(.*\.)?(source_\w+|own)$|pelvis_surge_ratio"
 
+_MADE_ONLY = "known only while the take is made"
+
 _REASONS = (
     (r"root_error_m", "the track is never faster than 1 m/s"),
     (r"slow_root_error_m", "the track is never slower than 1 m/s"),
@@ -22,7 +24,7 @@ _REASONS = (
     (r"skate\.(source_)?stance", "no foot stays in contact for two frames"),
     (r"skate|ground_mm\.(source_)?support|foot_correction", "no foot is in contact"),
     (r"ground_mm\.(source_)?tip", "the feet of the skeleton have no end"),
-    (r"ik_miss_share", "known only while the take is made"),
+    (r"ik_miss_share", _MADE_ONLY),
     (r"pose_realism", "fewer than 3 recordings at each speed of the take"),
     (r"seam_jerk_ratio\.rest", "no frame is far from a cut"),
     (r"seam_jerk_ratio", "the take has no cut"),
@@ -70,6 +72,8 @@ def _find_reason(name: str, view: View) -> str:
         return "no library"
     if not view.are_clips_known and _matches(f"{_NEEDS_CLIPS}|{_NEEDS_RECORDINGS}", name):
         return "the played clips are not known"
+    if view.played.correction is None and name.startswith("foot_correction_m"):
+        return _MADE_ONLY
     if not len(view.used_rows) and _matches(_NEEDS_RECORDINGS, name):
         return "no recording is used: all clips are synthetic"
     return next((reason for pattern, reason in _REASONS if _matches(pattern, name)), "nothing to measure")
