@@ -14,15 +14,18 @@ from dataclasses import replace
 import numpy as np
 
 from ..annotation import KeyMoment, Timeline
-from ..annotation.ball_contact import build_surfaces, find_striking_part
+from ..annotation.ball_contact import build_surfaces, find_striking_part, measure_contact_gap
 from ..annotation.labels import list_labels
 from ..ball.tracked.kinds import THROW_IN, TOUCH_KINDS
 from ..ball.tracked.solve import SolvedBall, SolvedTouch
 from ..base.errors import InputError, TimedMessage
+from ..base.time_series import find_runs
+from ..motion.motion import compute_pose
 from ..motion.track import BALL_RADIUS
+from .construct.ball_detour import lead_ball_around_body
 from .construct.contact_geometry import add_flight_arc, lead_ball_through
 from .construct.dribble import plan_dribbles
-from .construct.strike import compute_contact_frames
+from .construct.strike import BALL_NOISE, compute_contact_frames, find_nearest_frame
 from .plan import Plan, PlayerTouch, ResolvedPlan, SolvedTrajectory
 from .take import DribbleTouch, KeyResult, Take
 
@@ -33,6 +36,7 @@ _WITHIN = 1.5  # m from the player within which a touch by an unknown player may
 # cost in seconds: player unknown, other part, other kind
 _UNKNOWN_PLAYER_COST, _OTHER_PART_COST, _OTHER_KIND_COST = 0.15, 0.25, 0.15
 _MAX_SAMPLE_GAP = 0.1  # s from the nearest measured sample beyond which the ball counts as filled in
+_MET_GAP = 0.03  # m between the surfaces up to which a part is at the ball
 _STEP = 0.004  # s between the points of a trajectory
 _SENDING, _TAKING = frozenset(list_labels(ball="sends")), frozenset(list_labels(ball="takes"))
 _CARRYING = frozenset(list_labels(ball="carries"))
@@ -194,18 +198,18 @@ def report_missing_touches(take: Take, plan: ResolvedPlan) -> list[str]:
     ]  # fmt: skip
 
 
-def apply_trajectory(take: Take, plan: ResolvedPlan) -> Take:
-    """Lead the ball of a take along its solved trajectory, through the places where it was met, and dribble it step by
-    step.
+def apply_trajectory(take: Take, plan: ResolvedPlan) -> tuple[Take, list[str]]:
+    """Lead the ball of a take along its solved trajectory, through the places where it was met and around the body, and
+    dribble it step by step.
 
     Args:
         take: the take with the ball as it was met.
         plan: the resolved plan.
     Returns:
-        The take; unchanged where nothing is solved.
+        The take, unchanged where nothing is solved, and messages about measured places that lie in the body.
     """
     if plan.trajectory is None or take.ball is None:
-        return replace(take, solved=plan.trajectory)
+        return replace(take, solved=plan.trajectory), []
     fps, contact_ball, times = take.motion.fps, take.ball.positions, take.ball.times
     held = [compute_contact_frames(key.frame, len(contact_ball)) for key in _list_ball_keys(take)]
     course_changes = [(touch.time - take.start_time) * fps for touch in plan.trajectory.touches]
@@ -225,14 +229,38 @@ def apply_trajectory(take: Take, plan: ResolvedPlan) -> Take:
                              foot_contacts=foot_contacts, ball=path, stretches=stretches, held=held, fps=fps,
                              measured=take.ball.measured & ~filled, course_changes=course_changes)
     pushes = tuple(DribbleTouch(push.first, push.last, push.side) for push in dribbled.pushes)
-    ball = replace(take.ball, positions=dribbled.ball)
-    return replace(take, ball=ball, solved=plan.trajectory, contact_ball=take.ball, dribble_touches=pushes)
+    touched = [*_list_met_frames(take, dribbled.ball), *((push.first, push.last) for push in pushes)]
+    around = lead_ball_around_body(take.motion.skeleton, take.motion.root_positions, take.motion.rotations,
+                                   ball=dribbled.ball, held=touched, fps=fps)
+    ball, far = replace(take.ball, positions=around), np.linalg.norm(around - dribbled.ball, axis=1)
+    messages = _report_detours(times, np.where(take.ball.measured & ~filled, far, 0.0))
+    return replace(take, ball=ball, solved=plan.trajectory, contact_ball=take.ball, dribble_touches=pushes), messages
+
+
+def _report_detours(times: np.ndarray, moved: np.ndarray) -> list[str]:
+    """Report where the ball goes farther round the body than its noise: `moved` (T,) m from where it was measured."""
+    return [
+        TimedMessage(
+            f"{times[first]:.1f}-{times[end - 1]:.1f} s: the measured ball is inside the body; it goes round it, up to "
+            f"{moved[first:end].max():.2f} m away", (float(times[first]), float(times[end - 1])),
+        ) for first, end in find_runs(moved > BALL_NOISE)
+    ]  # fmt: skip
 
 
 def _list_ball_keys(take: Take) -> list[KeyResult]:
     """List the key moments in which some part meets the ball, in order of time."""
     skeleton = take.motion.skeleton
     return sorted((key for key in take.keys if build_surfaces(skeleton, key.contact_labels)), key=lambda key: key.frame)
+
+
+def _list_met_frames(take: Take, ball: np.ndarray) -> list[tuple[int, int]]:
+    """List the frames of the key moments at which the body does meet the ball (T, 3) m, as first and last frame."""
+    keys, skeleton = _list_ball_keys(take), take.motion.skeleton
+    frames = np.array([find_nearest_frame(key.frame, len(ball)) for key in keys], dtype=int)
+    posed = compute_pose(skeleton, take.motion.root_positions[frames], take.motion.rotations[frames])
+    gaps = [measure_contact_gap(skeleton, places, world, key.contact_labels, ball[frame])
+            for key, frame, places, world in zip(keys, frames, *posed)]
+    return [(int(frame), int(frame)) for frame, gap in zip(frames, gaps) if abs(gap) < _MET_GAP]
 
 
 def _find_course_changes(pair: tuple[int, int], others: list[tuple[int, int]], course_changes: list[float],

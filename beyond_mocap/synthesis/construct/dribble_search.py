@@ -9,6 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ...annotation.body_surfaces import BodySolid, build_leg_surfaces
 from ...annotation.striking import Surface, build_part_surfaces, find_nearest_point
 from ...ball.roll import compute_roll_speeds, simulate_rolls
 from ...base.time_series import find_runs
@@ -17,7 +18,6 @@ from ...motion.motion import compute_pose
 from ...motion.skeleton import Skeleton
 from ...motion.track import BALL_RADIUS, smooth_zero_phase_hann
 from .contact_geometry import find_touching_places
-from .move_body_part import foot_tip_line
 
 SOONEST, _LATEST = 0.2, 1.3  # s, shortest and longest roll from one touch to the next
 _ANGLES = np.radians([0.0, 35.0, -35.0, 65.0, -65.0])  # sides of the ball that are tried, from straight ahead
@@ -45,9 +45,7 @@ _LEAST_EXTRA = 0.5  # m/s by which it may leave slower, free of cost: a foot slo
 _KEPT = 6  # pushes of one swing from which the ball may roll on
 _START = -1  # node number of the part's beginning
 
-SHIN_RADIUS, TIP_RADIUS = 0.05, 0.0  # m around the lines of a shin and of the toes' tip that the ball stays out of
 SLOW = 0.6  # m/s below which the facing counts as the body's direction, not the velocity
-_ROUNDS, _CLOSE = 6, 5e-4  # most rounds of pushing a trajectory out of the body, and m at which they end
 
 
 @dataclass(frozen=True)
@@ -89,9 +87,7 @@ class Legs:
         pelvis: (W, 2) m, world.
         feet: striking surfaces of the left and right foot.
         lines: per foot both ends (W, 3) m of its surface's line.
-        start, along: (W, 6, 3) m, begin and extent of the lines of feet, shins and toes' tips.
-        squared: (W, 6) m^2, squared lengths of these lines.
-        least: (6,) m, radius of each part plus the ball's.
+        solid: feet, shins and toes' tips, which the ball stays out of.
         velocity: (W, 2) m/s of the pelvis without the sway of steps.
         speed: (W,) m/s of it.
         ahead: (W, 2) unit, direction of travel; the facing where the body is slower than SLOW.
@@ -111,14 +107,7 @@ class Legs:
         self.pelvis = places[:, body.hips, :2]
         self.feet: tuple[Surface, ...] = build_part_surfaces(skeleton, "foot")
         self.lines = [foot.compute_line(places, world) for foot in self.feet]
-        solid = [(line, foot.radius) for line, foot in zip(self.lines, self.feet)]
-        for limb in (body.left, body.right):
-            solid.append(((places[:, limb.lower_leg], places[:, limb.foot]), SHIN_RADIUS))
-            solid.append((foot_tip_line(skeleton, limb, places, world), TIP_RADIUS))
-        self.start = np.stack([line[0] for line, _ in solid], axis=1)  # (W, 6, 3)
-        self.along = np.stack([line[1] for line, _ in solid], axis=1) - self.start
-        self.squared = np.maximum(np.sum(self.along**2, axis=-1), 1e-12)
-        self.least = np.array([radius for _, radius in solid]) + BALL_RADIUS
+        self.solid = BodySolid.from_pose(build_leg_surfaces(skeleton), places, world)
         self.velocity = _smooth_velocity(self.pelvis, fps)
         self.speed = np.linalg.norm(self.velocity, axis=1)
         angle = compute_heading_from_positions(skeleton, places)
@@ -130,62 +119,6 @@ class Legs:
         """Compute the velocity (W, 2) m/s of the middle of a foot; side: 0 left, 1 right."""
         middle = np.mean(self.lines[side], axis=0)[:, :2]
         return np.gradient(middle, axis=0) * self.fps
-
-    def measure_gaps(self, balls: np.ndarray, frames: np.ndarray) -> np.ndarray:
-        """Measure the gaps between balls and the nearest part of the body.
-
-        Args:
-            balls: (N, 3) m, centres, world.
-            frames: (N,) frame of each.
-        Returns:
-            (N,) m, negative inside the body.
-        """
-        return np.min(self._offsets_and_gaps(balls, frames)[1], axis=1)
-
-    def keep_out(self, path: np.ndarray, free: np.ndarray) -> np.ndarray:
-        """Lead a ball's trajectory around the body.
-
-        Args:
-            path: (W, 3) m, world.
-            free: (W,) bool, where the ball may move.
-        Returns:
-            (W, 3) m; only x and y change.
-        """
-        every, aside, free = np.arange(len(path)), np.zeros((len(path), 2)), free[:, None]
-        for left in reversed(range(_ROUNDS)):
-            out = self.compute_way_out(path + np.pad(aside, ((0, 0), (0, 1))), every) * free
-            if np.abs(out).max(initial=0.0) < _CLOSE:
-                break
-            aside += out
-            # smooth with (1, 2, 1) / 4 between rounds, except after the last
-            if left:
-                padded = np.pad(aside, ((1, 1), (0, 0)), mode="edge")
-                aside = free * (0.25 * padded[:-2] + 0.5 * aside + 0.25 * padded[2:])
-        return path + np.pad(aside, ((0, 0), (0, 1)))
-
-    def compute_way_out(self, balls: np.ndarray, frames: np.ndarray) -> np.ndarray:
-        """Compute the shortest level move out of the part of the body that each ball is deepest in.
-
-        Args:
-            balls: (N, 3) m, centres, world.
-            frames: (N,) frame of each.
-        Returns:
-            (N, 2) m; zero outside the body.
-        """
-        away, gaps = self._offsets_and_gaps(balls, frames)
-        rows, part = np.arange(len(balls)), np.argmin(gaps, axis=1)
-        offset, level = away[rows, part], np.linalg.norm(away[rows, part, :2], axis=1)
-        needed = np.sqrt(np.maximum(self.least[part] ** 2 - offset[:, 2] ** 2, 0.0))
-        return offset[:, :2] * (np.maximum(needed - level, 0.0) / np.maximum(level, 1e-6))[:, None]
-
-    def _offsets_and_gaps(self, balls: np.ndarray, frames: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Compute the vectors (N, 6, 3) m from the nearest points of all parts to the balls, and the gaps (N, 6) m."""
-        start, along = self.start[frames], self.along[frames]
-        to = balls[:, None] - start
-        # nearest point of a line segment: projection, limited to its ends
-        share = np.clip(np.einsum("npk,npk->np", to, along) / self.squared[frames], 0.0, 1.0)
-        to -= share[..., None] * along
-        return to, np.sqrt(np.einsum("npk,npk->np", to, to)) - self.least
 
 
 def _smooth_velocity(places: np.ndarray, fps: float) -> np.ndarray:
@@ -289,7 +222,7 @@ class DribbleSearch:
         fit = _FIT_COST * np.maximum(np.hypot(off[:, 0], off[:, 1]) - _NEAR, 0.0) * self.measured[frames]
         ahead = np.einsum("nk,nk->n", balls[:, :2] - self.body.pelvis[frames], self.body.ahead[frames])
         beside = _AHEAD_COST * np.maximum(_BESIDE - ahead, 0.0)
-        inside = _INSIDE_COST * _RATE * np.maximum(-self.body.measure_gaps(balls, frames), 0.0)
+        inside = _INSIDE_COST * _RATE * np.maximum(-self.body.solid.measure_gaps(balls, frames), 0.0)
         return (fit + beside + inside) / self.fps
 
     def run(self) -> tuple[int, int, np.ndarray] | None:
