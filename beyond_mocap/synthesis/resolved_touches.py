@@ -16,12 +16,13 @@ import numpy as np
 from ..annotation import KeyMoment, Timeline
 from ..annotation.ball_contact import build_surfaces, find_striking_part, measure_contact_gap
 from ..annotation.labels import list_labels
+from ..ball.tracked.carried import find_carried_stretches
 from ..ball.tracked.kinds import THROW_IN, TOUCH_KINDS
 from ..ball.tracked.solve import SolvedBall, SolvedTouch
 from ..base.errors import InputError, TimedMessage
 from ..base.time_series import find_runs
 from ..motion.motion import compute_pose
-from ..motion.track import BALL_RADIUS
+from ..motion.track import BALL_RADIUS, Track
 from .construct.ball_detour import lead_ball_around_body
 from .construct.contact_geometry import add_flight_arc, lead_ball_through
 from .construct.dribble import plan_dribbles
@@ -36,6 +37,7 @@ _WITHIN = 1.5  # m from the player within which a touch by an unknown player may
 # cost in seconds: player unknown, other part, other kind
 _UNKNOWN_PLAYER_COST, _OTHER_PART_COST, _OTHER_KIND_COST = 0.15, 0.25, 0.15
 _MAX_SAMPLE_GAP = 0.1  # s from the nearest measured sample beyond which the ball counts as filled in
+_CARRIED_MARGIN = 0.15  # s from the ends of such a stretch from which on its course shows no touches, only steering
 _MET_GAP = 0.03  # m between the surfaces up to which a part is at the ball
 _STEP = 0.004  # s between the points of a trajectory
 _SENDING, _TAKING = frozenset(list_labels(ball="sends")), frozenset(list_labels(ball="takes"))
@@ -95,8 +97,18 @@ def build_trajectory(solved: SolvedBall, player: str, plan: Plan) -> SolvedTraje
     ball = np.maximum(solved.ball.at(times), [-np.inf, -np.inf, BALL_RADIUS])
     ball = np.where(unknown[:, None], np.nan, ball)
     seen = solved.times[solved.measured]
-    return SolvedTrajectory(times, ball, _is_far(times, seen),
-                            tuple(_build_touch(touch, player, plan) for touch in inside))
+    carried = _find_carries(plan.track)
+    filled = _is_far(times, seen) | _is_within(times, carried)
+    moments = np.array([touch.time for touch in inside])
+    inside = [touch for touch, is_carried in zip(inside, _is_within(moments, carried, _CARRIED_MARGIN))
+              if not (is_carried and touch.player in ("", player))]
+    return SolvedTrajectory(times, ball, filled, tuple(_build_touch(touch, player, plan) for touch in inside))
+
+
+def _is_within(times: np.ndarray, stretches: list[tuple[float, float]], margin: float = 0.0) -> np.ndarray:
+    """Return (M,) bool: times within stretches, more than a margin in seconds from their ends."""
+    return np.any([(times >= first + margin) & (times <= last - margin) for first, last in stretches],
+                  axis=0) if stretches else np.zeros(len(times), bool)
 
 
 def _is_far(times: np.ndarray, seen: np.ndarray) -> np.ndarray:
@@ -188,6 +200,10 @@ def report_missing_touches(take: Take, plan: ResolvedPlan) -> list[str]:
         ) for key in plan.timeline.keys if find_striking_part(key.words) and key.solved is None
     ]  # fmt: skip
     touched = np.array([take.start_time + push.first / take.motion.fps for push in take.dribble_touches])
+    missing += [
+        TimedMessage(f"{first:.1f}-{last:.1f} s: the feed has the ball at the player's own place; it is dribbled as "
+                     "the feet have it", (first, last)) for first, last in _find_carries(plan.requested.track)
+    ]  # fmt: skip
     return missing + [
         TimedMessage(
             f"{span.start:g}-{span.end:g} s: no foot touches the ball in this "
@@ -220,10 +236,8 @@ def apply_trajectory(take: Take, plan: ResolvedPlan) -> tuple[Take, list[str]]:
         path = add_flight_arc(path, float(np.mean(pair)), float(contact_ball[list(pair), 2].mean()), ~known, fps)
         path = lead_ball_through(path, pair, contact_ball[list(pair)],
                                  _find_course_changes(pair, held[:number] + held[number + 1 :], course_changes, fps))
-    stretches = [
-        ((span.start - take.start_time) * fps, (span.end - take.start_time) * fps)
-        for span in plan.timeline.spans if _CARRYING.intersection(span.words)
-    ]  # fmt: skip
+    stretches = [((first - take.start_time) * fps, (last - take.start_time) * fps)
+                 for first, last in _list_dribbles(plan)]
     foot_contacts = take.contacts if take.stepped is None else take.contacts | take.stepped
     dribbled = plan_dribbles(take.motion.skeleton, take.motion.root_positions, take.motion.rotations,
                              foot_contacts=foot_contacts, ball=path, stretches=stretches, held=held, fps=fps,
@@ -235,6 +249,21 @@ def apply_trajectory(take: Take, plan: ResolvedPlan) -> tuple[Take, list[str]]:
     ball, far = replace(take.ball, positions=around), np.linalg.norm(around - dribbled.ball, axis=1)
     messages = _report_detours(times, np.where(take.ball.measured & ~filled, far, 0.0))
     return replace(take, ball=ball, solved=plan.trajectory, contact_ball=take.ball, dribble_touches=pushes), messages
+
+
+def _list_dribbles(plan: ResolvedPlan) -> list[tuple[float, float]]:
+    """List first and last second of each dribble: labelled ones, and where the feed has the ball at the player."""
+    labelled = [(span.start, span.end) for span in plan.timeline.spans if _CARRYING.intersection(span.words)]
+    out: list[tuple[float, float]] = []
+    for first, last in sorted([*labelled, *_find_carries(plan.requested.track)]):
+        joins = out and first <= out[-1][1]
+        out = [*out[:-1], (out[-1][0], max(out[-1][1], last))] if joins else [*out, (first, last)]
+    return out
+
+
+def _find_carries(track: Track) -> list[tuple[float, float]]:
+    """Find first and last second of each stretch in which the feed has the ball at the player's place."""
+    return find_carried_stretches(track.times, track.ball, track.positions)
 
 
 def _report_detours(times: np.ndarray, moved: np.ndarray) -> list[str]:

@@ -19,7 +19,7 @@ from ...motion.skeleton import Skeleton
 from ...motion.track import BALL_RADIUS, smooth_zero_phase_hann
 from .contact_geometry import find_touching_places
 
-SOONEST, _LATEST = 0.2, 1.3  # s, shortest and longest roll from one touch to the next
+SOONEST, _LATEST = 0.2, 0.6  # s, shortest roll from one touch to the next, and longest beyond the `_LONG` below
 _ANGLES = np.radians([0.0, 35.0, -35.0, 65.0, -65.0])  # sides of the ball that are tried, from straight ahead
 _ALONG = 0.7  # share of the line from ankle to toes at which the ball is touched
 _RETURNING, _BEHIND = -0.5, 0.0  # least m/s of a touching foot relative to the body, and least m ahead of the pelvis
@@ -35,6 +35,9 @@ _INSIDE_COST = 60.0  # per metre of ball inside the body, for 1/30 s
 _NEAR, _FIT_COST = 0.25, 3.0  # per metre beyond this distance from its sample, for 1 s
 _BESIDE, _AHEAD_COST = 0.3, 4.0  # per metre less than this ahead of the pelvis, for 1 s
 _TOUCH_COST, _LONG, _LONG_COST = 0.04, 0.7, 4.0  # per touch, and per second beyond this to the next touch
+# A faster player knocks the ball farther ahead and reaches it after more steps, with a foot that is on its way back to
+# the ground but still moves forward over it: from _FAST on, for each m/s more, this is added to the values above.
+_FAST, _MORE_BESIDE, _MORE_TOUCH_COST, _MORE_LONG, _MORE_RETURNING = 3.0, 0.1, 0.06, 0.12, -0.8
 _ACROSS_COST, _BACK_COST, _SPEED_COST, _BRAKE_COST = 0.05, 0.3, 0.05, 0.6  # per m/s that such a foot cannot give
 _ANGLE_COST = 0.3  # per radian off straight ahead
 _PLANTED_COST = 0.3  # per touch by a planted foot
@@ -152,6 +155,7 @@ class DribbleSearch:
         self.body = Legs(skeleton, root[span], rotations[span], fps)
         self.foot_contacts, self.feed, self.measured = foot_contacts[span], path[span], measured[span]
         self.pushes: list[Push] = []
+        self.haste = np.maximum(self.body.speed - _FAST, 0.0)  # (W,) m/s
         self._build_nodes()
 
     def _build_nodes(self) -> None:
@@ -182,12 +186,13 @@ class DribbleSearch:
         velocity = np.stack([self.body.foot_velocity(0), self.body.foot_velocity(1)])
         self.velocity = velocity[self.side, self.frame]
         forward = np.sum((self.velocity - self.body.velocity[self.frame]) * ahead, axis=1)
-        before = np.sum((np.mean(line, axis=0)[:, :2] - self.body.pelvis[self.frame]) * ahead, axis=1)
-        # a foot in the air has to swing forward and be ahead of the pelvis; a planted foot always counts
-        usable &= (forward > _RETURNING) & (before > _BEHIND) | (self.stood > 0)
+        # a foot in the air has to swing forward; a planted foot always counts
+        returning = _RETURNING + _MORE_RETURNING * self.haste[self.frame]
+        usable &= (forward > returning) | (self.stood > 0)
         self._keep_nodes(usable)
         self.held = self._evaluate_places(self.place, self.frame)
         self.touch = _TOUCH_COST + _ANGLE_COST * np.abs(_ANGLES[self.angle]) + _PLANTED_COST * self.stood
+        self.touch += _MORE_TOUCH_COST * self.haste[self.frame]
 
     def _keep_nodes(self, usable: np.ndarray) -> None:
         """Keep the usable nodes, sorted by frame (ties in the order they were built)."""
@@ -197,13 +202,15 @@ class DribbleSearch:
             setattr(self, name, getattr(self, name)[order])
 
     def _list_swings(self, side: int) -> list[tuple[int, int, int, int]]:
-        """List the swings of a foot as (first, end, number, 0).
+        """List the swings of a foot as (first, end, number, 0), while it is ahead of the pelvis and not in contact.
 
         Where the player hardly moves, frames in contact are added as (frame, frame + 1, number, 1): there the foot may
         touch the ball without a swing. Numbers are unique over both feet.
         """
+        middle = np.mean(self.body.lines[side], axis=0)[:, :2]
+        is_ahead = np.einsum("wk,wk->w", middle - self.body.pelvis, self.body.ahead) > _BEHIND
         air = [(first, end, 2 * number + side, 0) for number,
-               (first, end) in enumerate(find_runs(~self.foot_contacts[:, side]))]
+               (first, end) in enumerate(find_runs(is_ahead & ~self.foot_contacts[:, side]))]
         step = max(int(_STANDING_STEP * self.fps), 1)
         still = [f for f in range(0, self.count, step) if self.foot_contacts[f, side] and self.body.speed[f] < SLOW]
         return [*air, *((frame, frame + 1, 2 * (self.count + frame) + side, 1) for frame in still)]
@@ -221,7 +228,8 @@ class DribbleSearch:
         off = balls[:, :2] - self.feed[frames, :2]
         fit = _FIT_COST * np.maximum(np.hypot(off[:, 0], off[:, 1]) - _NEAR, 0.0) * self.measured[frames]
         ahead = np.einsum("nk,nk->n", balls[:, :2] - self.body.pelvis[frames], self.body.ahead[frames])
-        beside = _AHEAD_COST * np.maximum(_BESIDE - ahead, 0.0)
+        least = _BESIDE + _MORE_BESIDE * self.haste[frames]
+        beside = _AHEAD_COST * np.maximum(least - ahead, 0.0)
         inside = _INSIDE_COST * _RATE * np.maximum(-self.body.solid.measure_gaps(balls, frames), 0.0)
         return (fit + beside + inside) / self.fps
 
@@ -244,7 +252,7 @@ class DribbleSearch:
             return self._trace_path() if self.part.is_met_at_start and self.part.is_met_at_end else None
         if not self.part.is_met_at_start:
             # an open beginning: any touch soon after it may be the first; before that the ball follows the samples
-            soon = np.flatnonzero(self.frame <= _FROM_END * self.fps)
+            soon = np.flatnonzero(self.frame <= max(_FROM_END * self.fps, self.frame[0]))
             self.roll_cost[soon] = _WAIT_COST * self.frame[soon] / self.fps + _FIT_COST * self._sample_distance(soon)
             self.roll_cost[soon] += np.append(0.0, np.cumsum(self._evaluate_samples()))[self.frame[soon]]
         # nodes are sorted by frame, so all rolls and pushes into a node come from nodes that are complete
@@ -288,7 +296,7 @@ class DribbleSearch:
         # after[n]: cost of following the samples from the frame behind node n to the end
         after = np.append(np.cumsum(self._evaluate_samples()[::-1])[::-1], 0.0)[self.frame + 1]
         whole = self.push_cost + after + _WAIT_COST * left + _FIT_COST * self._sample_distance(slice(None))
-        whole = np.where(left <= _FROM_END, whole, np.inf)
+        whole = np.where(left <= max(_FROM_END, left[-1]), whole, np.inf)
         if len(whole):
             self.best_cost, self.last_node = whole.min(), int(np.argmin(whole))
 
@@ -307,12 +315,16 @@ class DribbleSearch:
         """Return (N,) bool: nodes with the same foot, swing and side of the ball as this one."""
         return (self.side == self.side[node]) & (self.angle == self.angle[node]) & (self.swing == self.swing[node])
 
+    def _choose_longest(self, frame: int) -> float:
+        """Choose how long a roll that ends at a frame may take, in seconds, free of cost."""
+        return _LONG + _MORE_LONG * self.haste[frame]
+
     def _list_sources(self, frame: int) -> np.ndarray:
         """List the nodes from which the ball may roll to a frame: those within _LATEST, or else the latest ones."""
         found = np.array(self.sources, dtype=int)
         since = frame - np.where(found == _START, 0, self.frame[found])
         enough = since >= SOONEST * self.fps
-        soon = enough & (since <= _LATEST * self.fps)
+        soon = enough & (since <= (_LATEST + self._choose_longest(frame)) * self.fps)
         return found[soon if soon.any() else enough & (since == since[enough].min(initial=frame + 1))]
 
     def _find_rolls(self, nodes: np.ndarray, frame: int) -> None:
@@ -344,7 +356,7 @@ class DribbleSearch:
         speeds = compute_roll_speeds(starts[:, None], ends, frames[:, None] / self.fps)
         least = np.where(sources == _START, 0.0, self.push_cost[sources])[:, None] + self._evaluate_launch(sources,
                 speeds.start_velocity)
-        least += _LONG_COST * np.maximum(frames / self.fps - _LONG, 0.0)[:, None]
+        least += _LONG_COST * np.maximum(frames / self.fps - self._choose_longest(frame), 0.0)[:, None]
         if swing is not None:
             least[(self.swing[sources][:, None] == swing) & (sources != _START)[:, None]] = np.inf
         order = np.argsort(least, axis=0, kind="stable")

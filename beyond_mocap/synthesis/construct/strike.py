@@ -16,7 +16,6 @@ from functools import partial
 import numpy as np
 
 from ...annotation.ball_contact import build_surfaces, find_contact_window, measure_contact_gap, uses_both_hands
-from ...annotation.body_surfaces import SHIN_RADIUS
 from ...annotation.labels import list_labels
 from ...annotation.striking import Surface, build_part_surfaces, measure_ball_gap
 from ...base.vectors import unit_vector
@@ -284,7 +283,7 @@ def _build_problem(body: Body, moment: _TouchFrames, origin: int, contacts, path
         height = 0.5 * (line[0] + line[1])[2] + _RISE[parts[0].part] * (radius + BALL_RADIUS)
         path = add_flight_arc(path, moment.frame, float(height), ~height_known, fps)
     ahead = _choose_direction(body, parts[0], moment, at=at, path=path, fps=fps)
-    avoid = _compute_leg_lines(body, parts[0], at) if parts[0].part == "foot" else []
+    avoid = _compute_other_leg_lines(body, parts[0], at) if parts[0].part == "foot" else []
     scene = _TouchProblem(moment=moment, parts=parts, shares=shares, ball=path, measured=measured, aim=Aim(ahead),
                           avoid=avoid, origin=origin)
     if len(parts) == 2:
@@ -295,11 +294,11 @@ def _build_problem(body: Body, moment: _TouchFrames, origin: int, contacts, path
     return replace(scene, aim=aim)
 
 
-def _compute_leg_lines(body: Body, foot: Surface, at: int) -> list[tuple]:
-    """Return line and radius of both shins and of the foot that does not strike."""
+def _compute_other_leg_lines(body: Body, foot: Surface, at: int) -> list[tuple]:
+    """Return line and radius of the foot and the shin that do not strike."""
     other = next(part for part in build_part_surfaces(body.skeleton, "foot") if part.side != foot.side)
-    shins = [tuple(body.places[at, list(limb_chain(body.skeleton, part)[1:])]) for part in (other, foot)]
-    return [(body.surface_line(other, at), other.radius), *((shin, SHIN_RADIUS) for shin in shins)]
+    knee, ankle = body.places[at, list(limb_chain(body.skeleton, other)[1:])]
+    return [(body.surface_line(other, at), other.radius), ((knee, ankle), other.radius)]
 
 
 def _use_both_hands(body: Body, hands: Sequence[Surface], at: int, words: frozenset[str]) -> bool:

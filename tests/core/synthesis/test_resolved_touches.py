@@ -129,7 +129,8 @@ def test_solved_from_the_samples_of_a_track(library, planted, timeline_of):
 
 def test_in_a_dribble_the_ball_is_touched_step_by_step(library, planted, timeline_of, track_of):
     bare = track_of(2.8, seconds=10.0)
-    lying = np.column_stack([bare.positions, np.full(len(bare), BALL_RADIUS)])
+    swaying = bare.positions + 0.25 * np.sin(4.0 * bare.times)[:, None]
+    lying = np.column_stack([swaying, np.full(len(bare), BALL_RADIUS)])
     course = SolvedTrajectory(bare.times, lying, np.zeros(len(bare), bool))
     plan = planted(timeline_of((2.0, 8.0, "dribble")), course=course)
     take = synthesize(library, plan)
