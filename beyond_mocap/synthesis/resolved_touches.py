@@ -1,6 +1,6 @@
 """Key moments moved to the solved touches of the ball, and the ball's trajectory by physics and by contact.
 
-    plan = resolve_touches(Plan(track=track, timeline=timeline, solve_touches=True))
+    plan = resolve_touches(Plan(track=track, timeline=timeline))
 
 This is what `synthesize` and `resynthesize` do with a solved ball (`solve_ball`): before the search, key moments move
 to solved touches; when the body is done, the ball passes through the places where it was met, as solved in between, and
@@ -13,7 +13,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from ..annotation import KeyMoment, Timeline
+from ..annotation import KeyMoment, Span, Timeline
 from ..annotation.ball_contact import build_surfaces, find_striking_part, measure_contact_gap
 from ..annotation.labels import list_labels
 from ..ball.tracked.carried import find_carried_stretches
@@ -184,33 +184,49 @@ def _restore_order(keys: list[KeyMoment]) -> list[KeyMoment]:
 
 
 def report_missing_touches(take: Take, plan: ResolvedPlan) -> list[str]:
-    """Report key moments that request a touch where the trajectory has none, and dribbles without a touch.
+    """Report what the ball has not: touches that key moments request, touches of dribbles, places of its own.
 
     Args:
         take: the take of `apply_trajectory`.
         plan: the resolved plan.
     """
+    touching = [key for key in plan.timeline.keys if find_striking_part(key.words)]
+    dribbles = [span for span in plan.timeline.spans if _CARRYING.intersection(span.words)]
     if plan.trajectory is None:
         message = "the ball's touches are not solved: the track has no ball, or too few samples of it"
-        return [message] if plan.requested.solve_touches else []
-    missing: list[str] = [
-        TimedMessage(
-            f"{key.time:g} s: the ball's trajectory has no touch for '{' '.join(key.words)}' within "
-            f"{MAX_TOUCH_OFFSET:g} s; the key moment stays at its time", (key.time, key.time),
-        ) for key in plan.timeline.keys if find_striking_part(key.words) and key.solved is None
-    ]  # fmt: skip
+        return [message] if plan.requested.solve_touches and (touching or dribbles) else []
+    return [*_report_untouched_keys([key for key in touching if key.solved is None]),
+            *_report_carries(plan.requested.track), *_report_untouched_dribbles(take, dribbles)]
+
+
+def _report_untouched_keys(keys: list[KeyMoment]) -> list[str]:
+    """Report in one line the key moments for which the trajectory has no touch."""
+    if not keys:
+        return []
+    times = ", ".join(f"{key.time:g}" for key in keys)
+    words = ", ".join(dict.fromkeys(f"'{' '.join(key.words)}'" for key in keys))
+    stay = "the key moment stays at its time" if len(keys) == 1 else "these key moments stay at their times"
+    return [TimedMessage(f"{times} s: the ball's trajectory has no touch for {words} within {MAX_TOUCH_OFFSET:g} s; "
+                         f"{stay}", *((key.time, key.time) for key in keys))]
+
+
+def _report_carries(track: Track) -> list[str]:
+    """Report in one line where the feed has the ball at the player's place."""
+    carries = _find_carries(track)
+    times = ", ".join(f"{first:.1f}-{last:.1f}" for first, last in carries)
+    return [TimedMessage(f"{times} s: the feed has the ball at the player's own place; it is dribbled as the feet have "
+                         "it", *carries)] if carries else []
+
+
+def _report_untouched_dribbles(take: Take, dribbles: list[Span]) -> list[str]:
+    """Report the labelled dribbles in which no foot touches the ball."""
     touched = np.array([take.start_time + push.first / take.motion.fps for push in take.dribble_touches])
-    missing += [
-        TimedMessage(f"{first:.1f}-{last:.1f} s: the feed has the ball at the player's own place; it is dribbled as "
-                     "the feet have it", (first, last)) for first, last in _find_carries(plan.requested.track)
-    ]  # fmt: skip
-    return missing + [
+    return [
         TimedMessage(
             f"{span.start:g}-{span.end:g} s: no foot touches the ball in this "
             f"'{' '.join(sorted(_CARRYING.intersection(span.words)))}': it is too short, or no foot "
             "is near the ball", (span.start, span.end),
-        ) for span in plan.timeline.spans
-        if _CARRYING.intersection(span.words) and not ((touched >= span.start) & (touched <= span.end)).any()
+        ) for span in dribbles if not ((touched >= span.start) & (touched <= span.end)).any()
     ]  # fmt: skip
 
 

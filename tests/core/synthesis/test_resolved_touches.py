@@ -35,7 +35,7 @@ def planted(track_of):
         bare = track_of(2.8, seconds=10.0)
         course = course or course_of(bare)
         ball, _ = course.interpolate(bare.times)
-        return Plan(Track(bare.times, bare.positions, ball), timeline, solve_touches=True, solved=course, **more)
+        return Plan(Track(bare.times, bare.positions, ball), timeline, solved=course, **more)
 
     return make
 
@@ -65,7 +65,7 @@ def test_the_ball_keeps_its_course_but_for_an_even_change_of_velocity(kicked):
     assert np.allclose(kicked.ball.positions[:, 2], BALL_RADIUS)
 
 
-def test_default_takes_know_nothing_of_it(library, planted, timeline_of):
+def test_takes_without_solved_touches_know_nothing_of_it(library, planted, timeline_of):
     plan = planted(timeline_of((5.3, KICK)))
     plain = synthesize(library, replace(plan, solve_touches=False, solved=None))
     assert plain.keys[0].frame == pytest.approx(5.3 * 30.0, abs=0.5)
@@ -112,7 +112,7 @@ def test_a_track_without_a_ball_is_told(library, track_of, timeline_of, seen):
     ball = np.full((len(bare), 3), np.nan)
     ball[:: len(bare) // max(seen, 1)][:seen] = [1.0, 0.0, BALL_RADIUS]  # too far apart, if several
     track = Track(bare.times, bare.positions, ball)
-    take = synthesize(library, Plan(track, timeline_of((3.0, KICK)), solve_touches=True))
+    take = synthesize(library, Plan(track, timeline_of((3.0, KICK))))
     assert any("no ball" in line for line in take.warnings) and take.solved is None
 
 
