@@ -1,150 +1,113 @@
-"""The whole body as simple solids, and how far a ball is from it: what a ball must not lie inside.
+"""The surfaces of a whole body as simple bodies, and how deep the ball lies in them.
 
-    surfaces = build_body_surfaces(skeleton)
-    gaps = BodySolid.from_pose(surfaces, positions, rotations).measure_gaps(balls, frames)
-
-Feet, head and hands are the surfaces that strike the ball (`striking`), so a ball that touches one of them lies
-outside of the body. Legs, arms and trunk are capsules around their bones, as thick as the drawn body
-(`appearance.body`) without its clothes.
+Limbs and trunk are capsules that taper from one joint to the next, with the girths of the drawn body
+(`appearance.body`); feet, head and hands are the surfaces that strike the ball (`striking`), so that a ball which
+touches one of them is not inside it.
 """
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import cached_property
 
 import numpy as np
 
 from ..motion.humanoid import Humanoid, Limb, identify_joints
 from ..motion.skeleton import Skeleton
 from ..motion.track import BALL_RADIUS
-from .striking import Surface, build_part_surfaces
+from .striking import BODY_PARTS, Surface, build_part_surfaces, find_nearest_point
 
-SHIN_RADIUS, TIP_RADIUS = 0.05, 0.0
-"""Metres around the lines of a shin and of the toes' tip."""
-
-THIGH_RADIUS, PELVIS_RADIUS, TRUNK_RADIUS, SHOULDER_RADIUS, NECK_RADIUS = 0.075, 0.10, 0.115, 0.07, 0.055
-UPPER_ARM_RADIUS, FOREARM_RADIUS = 0.045, 0.04
+# Metres at the first and the last joint: half depths of the drawn body. The trunk is wider than deep: capsules along
+# its flanks, across the hips and across the shoulders give it its width.
+_LIMBS = {
+    "thigh": ("upper_leg", "lower_leg", 0.080, 0.055), "shank": ("lower_leg", "foot", 0.055, 0.038),
+    "upper arm": ("upper_arm", "lower_arm", 0.046, 0.039), "forearm": ("lower_arm", "hand", 0.039, 0.026),
+}  # fmt: skip
+_HIPS_RADIUS, _SPINE_RADIUS, _SHOULDER_RADIUS, _FLANK_RADIUS, _NECK_RADIUS = 0.09, 0.105, 0.07, 0.05, 0.055
 _ORIGIN = np.zeros(3)
 _ORIGIN.setflags(write=False)
 
 
-def build_leg_surfaces(skeleton: Skeleton) -> tuple[Surface, ...]:
-    """Build what a ball on the ground can lie inside: both feet, then shin and toes' tip of the left and right leg.
-
-    Args:
-        skeleton: the skeleton, J joints.
-    """
-    surfaces = [*build_part_surfaces(skeleton, "foot")]
-    for side, limb in _list_limbs(identify_joints(skeleton)):
-        toe = limb.toe_or_foot
-        tip = (toe, skeleton.tip_offset(toe))
-        surfaces.append(_build_bone("shin", side, SHIN_RADIUS, limb.lower_leg, limb.foot))
-        surfaces.append(Surface("tip", side, TIP_RADIUS, (toe, _ORIGIN), tip))
-    return tuple(surfaces)
-
-
-def build_body_surfaces(skeleton: Skeleton) -> tuple[Surface, ...]:
-    """Build all solids of a body: the legs' (`build_leg_surfaces`), thighs, trunk, head, arms and hands.
-
-    Args:
-        skeleton: the skeleton, J joints; what it lacks is left out.
-    """
-    body, surfaces = identify_joints(skeleton), [*build_leg_surfaces(skeleton)]
-    surfaces.append(_build_bone("pelvis", "", PELVIS_RADIUS, body.left.upper_leg, body.right.upper_leg))
-    surfaces.append(_build_bone("trunk", "", TRUNK_RADIUS, body.hips, body.chest))
-    surfaces += [*build_part_surfaces(skeleton, "head"), *build_part_surfaces(skeleton, "hand")]
-    if body.head is not None:
-        surfaces.append(_build_bone("neck", "", NECK_RADIUS, body.chest, body.head))
-    if None not in (body.left.upper_arm, body.right.upper_arm):
-        shoulders = body.left.upper_arm, body.right.upper_arm
-        surfaces.append(_build_bone("shoulders", "", SHOULDER_RADIUS, *shoulders))
-    for side, limb in _list_limbs(body):
-        surfaces.append(_build_bone("thigh", side, THIGH_RADIUS, limb.upper_leg, limb.lower_leg))
-        if None not in (limb.upper_arm, limb.lower_arm, limb.hand):
-            surfaces.append(_build_bone("upper arm", side, UPPER_ARM_RADIUS, limb.upper_arm, limb.lower_arm))
-            surfaces.append(_build_bone("forearm", side, FOREARM_RADIUS, limb.lower_arm, limb.hand))
-    return tuple(surfaces)
-
-
-def _list_limbs(body: Humanoid) -> tuple[tuple[str, Limb], ...]:
-    """List both sides with their limbs."""
-    return ("left", body.left), ("right", body.right)
-
-
-def _build_bone(part: str, side: str, radius: float, start: int, end: int) -> Surface:
-    """Build the solid around the line between two joints."""
-    return Surface(part, side, radius, (start, _ORIGIN), (end, _ORIGIN))
-
-
 @dataclass(frozen=True, eq=False)
-class BodySolid:
-    """S solids of a body over W frames.
+class BodySurface(Surface):
+    """A surface whose radius changes evenly along its line.
 
     Attributes:
-        start, along: (W, S, 3) m, begin and extent of the solids' lines, world frame.
-        least: (S,) m, the radius of each solid plus the ball's.
+        part: a part of `BODY_PARTS` but the chest, or "thigh", "shank", "upper arm", "forearm", "trunk", "neck".
+        end_radius: m, at its end; `radius` is that at its start.
     """
 
-    start: np.ndarray
-    along: np.ndarray
-    least: np.ndarray
+    end_radius: float
 
-    @classmethod
-    def from_pose(cls, surfaces: tuple[Surface, ...], positions: np.ndarray, rotations: np.ndarray) -> BodySolid:
-        """Place solids on a posed body.
 
-        Args:
-            surfaces: the solids, S of them.
-            positions: (W, J, 3) m, world frame.
-            rotations: (W, J, 4) quaternions, world frame.
-        """
-        lines = [surface.compute_line(positions, rotations) for surface in surfaces]
-        start = np.stack([line[0] for line in lines], axis=1)
-        along = np.stack([line[1] for line in lines], axis=1) - start
-        return cls(start, along, np.array([surface.radius for surface in surfaces]) + BALL_RADIUS)
+def build_body_surfaces(skeleton: Skeleton) -> tuple[BodySurface, ...]:
+    """Build the surfaces of a whole body; parts that the skeleton lacks are left out.
 
-    @cached_property
-    def _squared(self) -> np.ndarray:
-        """Squared lengths (W, S) m^2 of the solids' lines."""
-        return np.maximum(np.sum(self.along**2, axis=-1), 1e-12)
+    Args:
+        skeleton: a humanoid skeleton, J joints.
+    """
+    body = identify_joints(skeleton)
+    parts = [one for part in BODY_PARTS if part != "chest" for one in build_part_surfaces(skeleton, part)]
+    striking = [BodySurface(**vars(one), end_radius=one.radius) for one in parts]
+    limbs = [one for side in ("left", "right") for one in _list_limbs(getattr(body, side), side)]
+    return (*striking, *limbs, *_list_trunk(body))
 
-    def measure_gaps(self, balls: np.ndarray, frames: np.ndarray) -> np.ndarray:
-        """Measure the gaps between balls and the nearest part of the body.
 
-        Args:
-            balls: (N, 3) m, centres, world frame.
-            frames: (N,) frame of each.
-        Returns:
-            (N,) m, negative inside the body.
-        """
-        return np.min(self.compute_offsets(balls, frames)[1], axis=1)
+def _list_limbs(limb: Limb, side: str) -> list[BodySurface]:
+    """List the capsules of a leg and an arm."""
+    found = []
+    for part, (first, last, radius, end_radius) in _LIMBS.items():
+        joints = getattr(limb, first), getattr(limb, last)
+        if None not in joints:
+            found.append(_build_capsule(part, side, joints, radius, end_radius))
+    return found
 
-    def compute_offsets(self, balls: np.ndarray, frames: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Compute the vectors (N, S, 3) m from the nearest points of all solids to the balls, and the gaps (N, S) m.
 
-        Args:
-            balls: (N, 3) m, centres, world frame.
-            frames: (N,) frame of each.
-        """
-        start, along = self.start[frames], self.along[frames]
-        to = balls[:, None] - start
-        # nearest point of a line segment: projection, limited to its ends
-        share = np.clip(np.einsum("npk,npk->np", to, along) / self._squared[frames], 0.0, 1.0)
-        to -= share[..., None] * along
-        return to, np.sqrt(np.einsum("npk,npk->np", to, to)) - self.least
+def _list_trunk(body: Humanoid) -> list[BodySurface]:
+    """List the capsules of hips, spine, shoulders, flanks and neck."""
+    arms = [limb.upper_arm for limb in (body.left, body.right)]
+    hips = body.left.upper_leg, body.right.upper_leg
+    found = [_build_capsule("trunk", "", hips, _HIPS_RADIUS)]
+    found.append(_build_capsule("trunk", "", (body.hips, body.chest), _SPINE_RADIUS))
+    if body.neck is not None and body.spine:
+        found.append(_build_capsule("trunk", "", (body.chest, body.neck), _SPINE_RADIUS, _NECK_RADIUS))
+    if body.neck is not None and body.head is not None:
+        found.append(_build_capsule("neck", "", (body.neck, body.head), _NECK_RADIUS))
+    if None not in arms:
+        found.append(_build_capsule("trunk", "", arms, _SHOULDER_RADIUS))
+        found += [_build_capsule("trunk", "", pair, _FLANK_RADIUS) for pair in zip(hips, arms)]
+    return found
 
-    def compute_way_out(self, balls: np.ndarray, frames: np.ndarray) -> np.ndarray:
-        """Compute the shortest level move out of the part of the body that each ball is deepest in.
 
-        Args:
-            balls: (N, 3) m, centres, world frame.
-            frames: (N,) frame of each.
-        Returns:
-            (N, 2) m; zero outside the body.
-        """
-        away, gaps = self.compute_offsets(balls, frames)
-        rows, part = np.arange(len(balls)), np.argmin(gaps, axis=1)
-        offset, level = away[rows, part], np.linalg.norm(away[rows, part, :2], axis=1)
-        needed = np.sqrt(np.maximum(self.least[part] ** 2 - offset[:, 2] ** 2, 0.0))
-        return offset[:, :2] * (np.maximum(needed - level, 0.0) / np.maximum(level, 1e-6))[:, None]
+def _build_capsule(part: str, side: str, joints, radius: float, end_radius: float | None = None) -> BodySurface:
+    """Build the capsule between two joints, of one radius if no other is given for its end."""
+    start, end = joints
+    return BodySurface(part=part, side=side, radius=radius, start=(start, _ORIGIN), end=(end, _ORIGIN),
+                       end_radius=radius if end_radius is None else end_radius)
+
+
+def measure_ball_depths(
+    surfaces: Sequence[BodySurface], positions: np.ndarray, rotations: np.ndarray, ball: np.ndarray
+) -> np.ndarray:
+    """Measure how deep the ball lies in each surface.
+
+    Args:
+        surfaces: S surfaces, of `build_body_surfaces`.
+        positions: (T, J, 3) m, world frame.
+        rotations: (T, J, 4) quaternions, world frame.
+        ball: (T, 3) m, the ball's centre, world frame.
+    Returns:
+        (T, S) m, negative where they are apart, NaN without a ball.
+    """
+    depths = [_measure_depth(surface, positions, rotations, ball) for surface in surfaces]
+    return np.stack(depths, axis=1) if depths else np.zeros((len(ball), 0))
+
+
+def _measure_depth(surface: BodySurface, positions: np.ndarray, rotations: np.ndarray, ball: np.ndarray) -> np.ndarray:
+    """Measure how deep (T,) m the ball lies in one surface."""
+    start, end = surface.compute_line(positions, rotations)
+    nearest = find_nearest_point((start, end), ball)
+    length = np.linalg.norm(end - start, axis=-1)
+    share = np.linalg.norm(nearest - start, axis=-1) / np.maximum(length, 1e-9)
+    radius = surface.radius + share * (surface.end_radius - surface.radius)
+    return radius + BALL_RADIUS - np.linalg.norm(ball - nearest, axis=-1)

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ...annotation.body_surfaces import BodySolid, build_body_surfaces
+from ...annotation.body_solid import BodySolid, build_solid_surfaces
 from ...base.easing import quintic_step_by_powers
 from ...motion.motion import compute_pose
 from ...motion.skeleton import Skeleton
@@ -85,7 +85,8 @@ def lead_ball_around_body(skeleton: Skeleton, root: np.ndarray, rotations: np.nd
         return path
     for first, last in held:
         free[max(first, 0) : last + 1] = False
-    solid = BodySolid.from_pose(build_body_surfaces(skeleton), *compute_pose(skeleton, root[frames], rotations[frames]))
+    posed = compute_pose(skeleton, root[frames], rotations[frames])
+    solid = BodySolid.from_pose(build_solid_surfaces(skeleton), *posed)
     body = _NearBody(frames, solid, free, fps)
     for _ in range(_ROUNDS):
         inside = body.find_inside(path)

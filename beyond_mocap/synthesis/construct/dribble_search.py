@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ...annotation.body_surfaces import BodySolid, build_leg_surfaces
+from ...annotation.body_solid import BodySolid, build_leg_surfaces
 from ...annotation.striking import Surface, build_part_surfaces, find_nearest_point
 from ...ball.roll import compute_roll_speeds, simulate_rolls
 from ...base.time_series import find_runs
