@@ -14,8 +14,9 @@ from dataclasses import replace
 import numpy as np
 
 from ..annotation import KeyMoment, Span, Timeline
-from ..annotation.ball_contact import build_surfaces, find_striking_part, measure_contact_gap
+from ..annotation.ball_contact import build_surfaces, find_striking_part
 from ..annotation.labels import list_labels
+from ..annotation.striking import measure_ball_gap
 from ..ball.tracked.carried import find_carried_stretches
 from ..ball.tracked.kinds import THROW_IN, TOUCH_KINDS
 from ..ball.tracked.solve import SolvedBall, SolvedTouch
@@ -23,8 +24,8 @@ from ..base.errors import InputError, TimedMessage
 from ..base.time_series import find_runs
 from ..motion.motion import compute_pose
 from ..motion.track import BALL_RADIUS, Track
-from .construct.ball_detour import lead_ball_around_body
-from .construct.contact_geometry import add_flight_arc, lead_ball_through
+from .construct.ball_detour import find_free_contact, lead_ball_around_body
+from .construct.contact_geometry import BALL_SECONDS, add_flight_arc, lead_ball_through
 from .construct.dribble import plan_dribbles
 from .construct.strike import BALL_NOISE, compute_contact_frames, find_nearest_frame
 from .plan import Plan, PlayerTouch, ResolvedPlan, SolvedTrajectory
@@ -67,7 +68,7 @@ def solve_track_ball(plan: Plan) -> SolvedTrajectory | None:
     from ..ball.tracked.solve import solve_ball
 
     try:
-        solved = solve_ball(plan.track)
+        solved = solve_ball(plan.track, only_own_flights=True)
     except InputError:
         return None
     return build_trajectory(solved, plan.track.name, plan)
@@ -259,9 +260,10 @@ def apply_trajectory(take: Take, plan: ResolvedPlan) -> tuple[Take, list[str]]:
                              foot_contacts=foot_contacts, ball=path, stretches=stretches, held=held, fps=fps,
                              measured=take.ball.measured & ~filled, course_changes=course_changes)
     pushes = tuple(DribbleTouch(push.first, push.last, push.side) for push in dribbled.pushes)
-    touched = [*_list_met_frames(take, dribbled.ball), *((push.first, push.last) for push in pushes)]
-    around = lead_ball_around_body(take.motion.skeleton, take.motion.root_positions, take.motion.rotations,
-                                   ball=dribbled.ball, held=touched, fps=fps)
+    pushed = [(push.first, push.last) for push in pushes]
+    free, met = _free_met_ball(take, dribbled.ball, pushed)
+    around = lead_ball_around_body(take.motion.skeleton, take.motion.root_positions, take.motion.rotations, ball=free,
+                                   held=[*met, *pushed], fps=fps)
     ball, far = replace(take.ball, positions=around), np.linalg.norm(around - dribbled.ball, axis=1)
     messages = _report_detours(times, np.where(take.ball.measured & ~filled, far, 0.0))
     return replace(take, ball=ball, solved=plan.trajectory, contact_ball=take.ball, dribble_touches=pushes), messages
@@ -298,14 +300,32 @@ def _list_ball_keys(take: Take) -> list[KeyResult]:
     return sorted((key for key in take.keys if build_surfaces(skeleton, key.contact_labels)), key=lambda key: key.frame)
 
 
-def _list_met_frames(take: Take, ball: np.ndarray) -> list[tuple[int, int]]:
-    """List the frames of the key moments at which the body does meet the ball (T, 3) m, as first and last frame."""
-    keys, skeleton = _list_ball_keys(take), take.motion.skeleton
-    frames = np.array([find_nearest_frame(key.frame, len(ball)) for key in keys], dtype=int)
-    posed = compute_pose(skeleton, take.motion.root_positions[frames], take.motion.rotations[frames])
-    gaps = [measure_contact_gap(skeleton, places, world, key.contact_labels, ball[frame])
-            for key, frame, places, world in zip(keys, frames, *posed)]
-    return [(int(frame), int(frame)) for frame, gap in zip(frames, gaps) if abs(gap) < _MET_GAP]
+def _free_met_ball(take: Take, ball: np.ndarray,
+                   pushes: list[tuple[int, int]]) -> tuple[np.ndarray, list[tuple[int, int]]]:
+    """Move the ball (T, 3) m out of the rest of the body where a part meets it at a key moment.
+
+    Args:
+        take: the take.
+        ball: (T, 3) m.
+        pushes: first and last frame of each touch of a dribble.
+    Returns:
+        The ball, and first and last frame of each such meeting.
+    """
+    out, met, skeleton, reach = ball, [], take.motion.skeleton, int(BALL_SECONDS * take.motion.fps)
+    for key in _list_ball_keys(take):
+        frame = find_nearest_frame(key.frame, len(ball))
+        places, world = (values[0] for values in compute_pose(skeleton, take.motion.root_positions[frame : frame + 1],
+                                                              take.motion.rotations[frame : frame + 1]))
+        surfaces = build_surfaces(skeleton, key.contact_labels)
+        gaps = [abs(measure_ball_gap(part.compute_line(places, world), part.radius, out[frame])) for part in surfaces]
+        if min(gaps) < _MET_GAP:
+            place = find_free_contact(skeleton, surfaces[int(np.argmin(gaps))], places, world, out[frame])
+            edges = [other for pair in (*pushes, *met) for other in pair]
+            bounds = (max([frame - reach, *(edge for edge in edges if edge < frame)]),
+                      min([frame + reach, *(edge for edge in edges if edge > frame)]))
+            out = lead_ball_through(out, (frame, frame), np.array([place, place]), bounds)
+            met.append((frame, frame))
+    return out, met
 
 
 def _find_course_changes(pair: tuple[int, int], others: list[tuple[int, int]], course_changes: list[float],

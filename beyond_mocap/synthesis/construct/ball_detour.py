@@ -14,9 +14,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from ...annotation.body_solid import BodySolid, build_solid_surfaces
+from ...annotation.striking import Surface
 from ...base.easing import quintic_step_by_powers
 from ...motion.motion import compute_pose
 from ...motion.skeleton import Skeleton
+from ...motion.track import BALL_RADIUS
 
 DETOUR_SECONDS = 0.5
 """Seconds over which a detour begins and ends where no touch does."""
@@ -29,7 +31,37 @@ _STEP, _FARTHEST = 0.02, 1.2  # m, lengths of detours that are tried
 _LONGEST = 0.4  # s that one direction serves: a body turns
 _ROUNDS = 5  # most rounds: a detour may lead into another part of the body
 _LEVEL = [(np.cos(angle), np.sin(angle), 0.0) for angle in np.radians(np.arange(0.0, 360.0, 15.0))]
+_SHARES = np.linspace(0.0, 1.0, 11)  # of a surface's line, from which its contacts are tried
+_AROUND = np.array([(np.cos(up) * x, np.cos(up) * y, np.sin(up))
+                    for up in np.radians(np.arange(-60.0, 61.0, 7.5)) for x, y, _ in _LEVEL])
+_FARTHEST_CONTACT = 0.3  # m, as the noise of a measured ball
 _RISING = [(0.0, 0.0, 1.0), *((0.7 * x, 0.7 * y, 0.7) for x, y, _ in _LEVEL[::3])]
+
+
+def find_free_contact(skeleton: Skeleton, surface: Surface, positions: np.ndarray, rotations: np.ndarray,
+                      ball: np.ndarray) -> np.ndarray:
+    """Find where a ball touches a striking surface without being inside the rest of the body.
+
+    Args:
+        skeleton: the skeleton.
+        surface: the surface.
+        positions: (J, 3) m, world.
+        rotations: (J, 4) world.
+        ball: (3,) m, its centre where it touches the surface.
+    Returns:
+        The nearest such place (3,) m, no lower than the ball; the ball's own where it is free or none is near enough.
+    """
+    solid, still = BodySolid.from_pose(build_solid_surfaces(skeleton), positions[None], rotations[None]), ball[None]
+    if solid.measure_gaps(still, np.zeros(1, int))[0] > -_CLEARANCE:
+        return ball
+    start, end = surface.compute_line(positions, rotations)
+    middles = start + _SHARES[:, None] * (end - start)
+    places = (middles[:, None] + (surface.radius + BALL_RADIUS) * _AROUND).reshape(-1, 3)
+    apart = np.linalg.norm(places - ball, axis=1)
+    near = (places[:, 2] >= ball[2] - _TOLERANCE) & (apart <= _FARTHEST_CONTACT)
+    places, apart = places[near], apart[near]
+    free = np.flatnonzero(solid.measure_gaps(places, np.zeros(len(places), int)) > -_TOLERANCE)
+    return places[free[np.argmin(apart[free])]] if len(free) else ball
 
 
 @dataclass(frozen=True, eq=False)
