@@ -28,25 +28,33 @@ def find_carried_stretches(times: np.ndarray, ball: np.ndarray, positions: np.nd
         First and last second of each stretch.
     """
     offset = ball[:, :2] - positions
-    with_player = _find_frames_with_player(times, offset)
-    for first, end in find_runs(~with_player):
+    near = np.linalg.norm(offset, axis=1) < _NEAR
+    rests = near.copy()
+    for seconds in (-_STEP_SECONDS, _STEP_SECONDS):
+        rests &= _measure_speeds(times, offset, seconds) < _STEP_SPEED
+    for first, end in find_runs(~rests):
         if first and end < len(times) and times[end] - times[first - 1] <= _PAUSE:
-            with_player[first:end] = True
-    return [(float(times[first]), float(times[end - 1])) for first, end in find_runs(with_player)
+            rests[first:end] = True
+    spans = [_widen(times, near, first, end) for first, end in find_runs(rests)]
+    return [(float(times[first]), float(times[end - 1])) for first, end in spans
             if _is_carried(times[first:end], offset[first:end], positions[first:end])]
 
 
-def _find_frames_with_player(times: np.ndarray, offset: np.ndarray) -> np.ndarray:
-    """Find the frames (N,) bool in which the ball is near the player and does not move against them."""
-    rests = [_measure_speeds(times, offset, seconds) < _STEP_SPEED for seconds in (-_STEP_SECONDS, _STEP_SECONDS)]
-    return (np.linalg.norm(offset, axis=1) < _NEAR) & (rests[0] | rests[1])
+def _widen(times: np.ndarray, near: np.ndarray, first: int, end: int) -> tuple[int, int]:
+    """Widen a run by the frames at either end whose step leads out of it, while the ball is near."""
+    low, high = times[first] - _STEP_SECONDS, times[end - 1] + _STEP_SECONDS
+    while first and near[first - 1] and times[first - 1] >= low:
+        first -= 1
+    while end < len(times) and near[end] and times[end] <= high:
+        end += 1
+    return first, end
 
 
 def _measure_speeds(times: np.ndarray, offset: np.ndarray, seconds: float) -> np.ndarray:
     """Measure the speeds (N,) m/s of the ball against the player over the time before or after each frame."""
     other = np.clip(np.searchsorted(times, times + seconds - 1e-6), 0, len(times) - 1)
     moved = np.linalg.norm(offset - offset[other], axis=1)
-    return np.where(other == np.arange(len(times)), np.inf, moved / np.maximum(np.abs(times - times[other]), 1e-9))
+    return np.where(other == np.arange(len(times)), 0.0, moved / np.maximum(np.abs(times - times[other]), 1e-9))
 
 
 def _is_carried(times: np.ndarray, offset: np.ndarray, positions: np.ndarray) -> bool:
