@@ -229,11 +229,11 @@ def finish_take(
     """
     take = add_pins(to_player_size(take, plan.size, plan.requested, before), recordings)
     started = time.perf_counter()
-    take = apply_trajectory(take, plan)
+    take, detours = apply_trajectory(take, plan)
     if plan.trajectory is not None:
         take = replace(take, seconds={**take.seconds, "ball": time.perf_counter() - started})
-    return add_warnings(take, recordings, request, hurried_from, more=report_missing_touches(take, plan),
-                        report_unmet=report_unmet)
+    return add_warnings(take, recordings, request, hurried_from, report_unmet=report_unmet,
+                        more=[*report_missing_touches(take, plan), *detours])
 
 
 def add_pins(take: Take, recordings: Library) -> Take:

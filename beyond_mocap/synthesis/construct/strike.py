@@ -150,8 +150,8 @@ def _move_to_contact(skeleton: Skeleton, root, rotations, feed, touch: Touch, fp
 
     Only where the labels allow for that and the ball is out of reach at the key moment itself.
     """
-    first, last = _nearest_frame(touch.frame, len(root)), _nearest_frame(touch.frame + find_contact_window(touch.words)
-                                                                         * fps, len(root))
+    latest = touch.frame + find_contact_window(touch.words) * fps
+    first, last = (find_nearest_frame(frame, len(root)) for frame in (touch.frame, latest))
     if first == last or not np.isfinite(feed[first : last + 1]).all():
         return touch
     places, world = compute_pose(skeleton, root[first : last + 1], rotations[first : last + 1])
@@ -195,11 +195,11 @@ def _iter_touch_frames(skeleton: Skeleton, touches: Sequence[Touch], count: int,
         before, after = ends[place][1], ends[place + 2][0]
         low = max(int(first - np.clip(touch.entry, shortest, longest)), before)
         high = min(int(np.ceil(last + np.clip(touch.leave, shortest, longest))), after)
-        yield number, _TouchFrames(words=frozenset(touch.words), frame=_nearest_frame(frame, count), held=held[place],
-                                   low=low, high=high, bounds=(before, after))
+        yield number, _TouchFrames(words=frozenset(touch.words), frame=find_nearest_frame(frame, count),
+                                   held=held[place], low=low, high=high, bounds=(before, after))
 
 
-def _nearest_frame(frame: float, count: int) -> int:
+def find_nearest_frame(frame: float, count: int) -> int:
     """Return the whole frame, of `count`, nearest to a fractional one."""
     return int(np.clip(np.rint(frame), 0, count - 1))
 
@@ -209,9 +209,9 @@ def compute_contact_frames(frame: float, count: int) -> tuple[int, int]:
 
     Twice the same where the frame is nearly whole.
     """
-    if abs(frame - _nearest_frame(frame, count)) < 0.02:
-        frame = _nearest_frame(frame, count)
-    return _nearest_frame(np.floor(frame), count), _nearest_frame(np.ceil(frame), count)
+    if abs(frame - find_nearest_frame(frame, count)) < 0.02:
+        frame = find_nearest_frame(frame, count)
+    return find_nearest_frame(np.floor(frame), count), find_nearest_frame(np.ceil(frame), count)
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -483,7 +483,7 @@ def _move_parts(scene: _TouchProblem, body: Body, limbs: Sequence[LimbReference]
 
 def _measure_gaps(skeleton: Skeleton, root, rotations, feed, path, touches) -> tuple[np.ndarray, np.ndarray]:
     """Measure gap (K,) m and level shift of the ball (K,) m at the frame nearest to each touch."""
-    frames = np.array([_nearest_frame(touch.frame, len(root)) for touch in touches], dtype=int)
+    frames = np.array([find_nearest_frame(touch.frame, len(root)) for touch in touches], dtype=int)
     places, world = compute_pose(skeleton, root[frames], rotations[frames])
     rows = zip(places, world, touches, path[frames])
     gaps = [measure_contact_gap(skeleton, place, turn, touch.words, ball) for place, turn, touch, ball in rows]

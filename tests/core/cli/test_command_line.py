@@ -447,7 +447,7 @@ def test_what_the_library_lacks_is_status_3_and_the_nearest_0(synthesize, match,
     assert key["labels"] == ["header"] and key["used_instead"]
 
 
-def test_touches_are_solved_where_that_is_asked(synthesize, match, tmp_path, track_of):
+def test_touches_are_solved_unless_that_is_refused(synthesize, match, tmp_path, track_of):
     track = track_of(2.8, 8.0)
     since = track.times - 4.03
     ball = track.times * 0.0 + np.where(since < 0, -3.0, 12.0) * since + 4.03 * 2.8 + 0.45
@@ -458,11 +458,12 @@ def test_touches_are_solved_where_that_is_asked(synthesize, match, tmp_path, tra
     (tmp_path / "words.txt").write_text("0 8\n4.3 kick right\n")
     asked = {"track": tmp_path / "kicked.csv", "annotations": tmp_path / "words.txt", "report": tmp_path / "r.json"}
     keys = []
-    for more in ((), ("--solve-touches",)):
+    for more in (("--no-solve-touches",), ("--solve-touches",), ()):
         assert synthesize(*more, **asked)[0] == 0
         keys += json.loads((tmp_path / "r.json").read_text())["keys"]
-    assert [key["time_s"] for key in keys] == [4.3, 4.3] and keys[0]["solved_time_s"] is None
+    assert [key["time_s"] for key in keys] == [4.3] * 3 and keys[0]["solved_time_s"] is None
     assert keys[1]["solved_time_s"] == pytest.approx(4.03, abs=0.02) and keys[1]["contact_gap_m"] < 0.005
+    assert keys[1] == keys[2]
 
 
 def test_mirrors_can_be_forbidden(synthesize, tmp_path):
