@@ -23,6 +23,11 @@ class Title:
     scale: float = 1.0
     digits: int = 1
 
+    @property
+    def name(self) -> str:
+        """The text with its unit."""
+        return f"{self.text}, {self.unit}" if self.unit else self.text
+
     def describe_target(self, target: Target | None) -> str:
         """Describe a target in the shown unit, such as "≤ 5.0"; "" without one."""
         limits = () if target is None else (("≥", target.least), ("≤", target.most))

@@ -25,9 +25,7 @@ from .touch_view import TouchView
 
 FAST_BALL = 18.0  # m/s of the ball just after a kick, from which on it is a fast one
 LEAST_BALL = 5.0  # m/s from which on ball and foot speed are compared; slower balls are nudged, or taken along
-RATIO = (1.06, 1.3)
-"""Ball speed over foot speed of kicks (`../shared/findings/field.md`; Lees and others 2010: 1.06 for side-foot passes to
-1.3 for instep drives)."""
+RATIO = (1.06, 1.3)  # ball speed over foot speed of kicks: Kellis and Katis 2007, J. Sports Sci. Med. 6, 154-165
 DEPTH = 0.010  # m that the ball may lie in the body: it is soft, and so are people
 _ACROSS = 0.15  # m by which a ball may lie on the other side of the body's middle from the foot that touches it
 
@@ -35,9 +33,9 @@ _HEIGHTS = {
     ("foot", "low"): (0.0, 0.6), ("foot", ""): (0.0, 1.05), ("foot", "high"): (0.35, 2.0), ("thigh", ""): (0.45, 1.1),
     ("chest", ""): (0.9, 1.75), ("head", ""): (1.3, 2.6),
 }  # fmt: skip
-"""Body part and height that labels name -> heights (m) of the ball's middle at which they touch it, for a leg of 0.86 m:
-below and above the knee, up to the hips without a height; the chest from the belt to a jump; the head from a crouch to a
-jump. Hands reach anywhere."""
+"""Body part and height that labels name -> heights (m) of the ball's middle at which they touch it, for a leg of
+0.86 m: below and above the knee, up to the hips without a height; the chest from the belt to a jump; the head from a
+crouch to a jump. Hands reach anywhere."""
 
 _IN_FLIGHT = frozenset(list_labels(in_flight=True))
 
@@ -50,6 +48,7 @@ FRAMES_KEYS = {
 """What a figure rests on: a key beside it."""
 
 TITLES = {
+    "reception.receptions": Title("Receptions", "", digits=0),
     "reception.speed_m_s_median": Title("Foot speed at receptions", "m/s"),
     "reception.speed_m_s_max": Title("Fastest foot at a reception", "m/s"),
     "reception.strike_count": Title("Receptions played as strikes", "", digits=0),
@@ -58,7 +57,7 @@ TITLES = {
     **{f"{group}.{leaf}": Title(f"{text}, {kicks}", unit, scale, digits)
        for group, kicks in (("fast_kick", "ball above 18 m/s"), ("kick", "all kicks"))
        for leaf, text, unit, scale, digits in (
-           ("ankle_speed_m_s_median", "Kicking foot's speed", "m/s", 1.0, 1),
+           ("kicks", "Kicks", "", 1.0, 0), ("ankle_speed_m_s_median", "Kicking foot's speed", "m/s", 1.0, 1),
            ("plant_beside_m_median", "Plant foot beside the kicking one", "cm", 100.0, 0),
            ("plant_ahead_m_median", "Plant foot ahead of the kicking one", "cm", 100.0, 0),
            ("plant_in_range_share", "Plant feet in place", "%", 100.0, 0),
@@ -146,20 +145,21 @@ def fits_side(touch_view: TouchView, moment: KeyMomentResult) -> bool:
 
 def measure_ball_inside(touch_view: TouchView) -> dict:
     """Measure in how many frames the ball lies more than 10 mm inside the body, and how deep at most."""
-    near, depths, _ = touch_view.depths
     known = int(np.isfinite(touch_view.ball).all(axis=1).sum())
-    deepest = depths.max(axis=1, initial=0.0)
+    if not known:
+        return {"ball_frames": 0, **dict.fromkeys(("inside_frames", "inside_share", "depth_mm_max"))}
+    deepest = touch_view.depths[1].max(axis=1, initial=0.0)
     inside = int(np.sum(deepest > DEPTH))
-    return {"ball_frames": known, "inside_frames": inside, "inside_share": inside / known if known else math.nan,
-            "depth_mm_max": 1000.0 * float(deepest.max(initial=0.0)) if known else math.nan}
+    return {"ball_frames": known, "inside_frames": inside, "inside_share": inside / known,
+            "depth_mm_max": 1000.0 * float(deepest.max(initial=0.0))}
 
 
 def list_substituted(view: View) -> dict:
     """List the key moments that are shown by other labels than the requested ones, or by synthetic clips."""
     rows = [{"time_s": one.requested.time, "labels": list(one.requested.words),
-             "shown": list(one.words if one.used_instead is None else one.used_instead), "clip": one.clip,
+             "shown": list(one.words or one.used_instead or ()), "clip": one.clip,
              "is_substituted": one.used_instead is not None, "is_synthetic": _is_synthetic(one)}
-            for one in view.moments]
+            for one in view.moments if view.are_clips_known]
     return {"moment_count": len(rows), "substituted_count": sum(row["is_substituted"] for row in rows),
             "synthetic_count": sum(row["is_synthetic"] for row in rows),
             "substituted": [row for row in rows if row["is_substituted"] or row["is_synthetic"]]}

@@ -122,8 +122,8 @@ class TouchView:
 
     def measure_kicks(self) -> list[touches.Kick]:
         """Measure every kick."""
-        return [touches.measure_kick(self.legs, self.find_second(one), self.find_foot(one), self.measure_ball_speed(one))
-                for one in self.kicks]
+        found = [(self.find_second(one), self.find_foot(one), self.measure_ball_speed(one)) for one in self.kicks]
+        return [touches.measure_kick(self.legs, *one) for one in found]
 
 
 def _carries_only(words) -> bool:
