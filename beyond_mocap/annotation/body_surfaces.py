@@ -48,7 +48,7 @@ def build_body_surfaces(skeleton: Skeleton) -> tuple[BodySurface, ...]:
     """
     body = identify_joints(skeleton)
     parts = [one for part in BODY_PARTS if part != "chest" for one in build_part_surfaces(skeleton, part)]
-    striking = [BodySurface(one.part, one.side, one.radius, one.start, one.end, one.radius) for one in parts]
+    striking = [BodySurface(**vars(one), end_radius=one.radius) for one in parts]
     limbs = [one for side in ("left", "right") for one in _list_limbs(getattr(body, side), side)]
     return (*striking, *limbs, *_list_trunk(body))
 
@@ -82,8 +82,8 @@ def _list_trunk(body: Humanoid) -> list[BodySurface]:
 def _build_capsule(part: str, side: str, joints, radius: float, end_radius: float | None = None) -> BodySurface:
     """Build the capsule between two joints, of one radius if no other is given for its end."""
     start, end = joints
-    return BodySurface(part, side, radius, (start, _ORIGIN), (end, _ORIGIN), radius if end_radius is None
-                       else end_radius)
+    return BodySurface(part=part, side=side, radius=radius, start=(start, _ORIGIN), end=(end, _ORIGIN),
+                       end_radius=radius if end_radius is None else end_radius)
 
 
 def measure_ball_depths(

@@ -170,7 +170,7 @@ def _is_synthetic(moment: KeyMomentResult) -> bool:
 
 
 def list_touch_messages(touch_view: TouchView) -> list[TimedMessage]:
-    """List a line for each kind of fault at the ball: strikes that nobody asked for, the ball inside the body."""
+    """List a line for each kind of fault at the ball: strikes that nothing asks for, the ball inside the body."""
     start = touch_view.view.played.start_time
     seconds = [start + second for second, _ in touch_view.strikes]
     strikes = [format_event(seconds, "a foot swings like a kick that nothing asks for")] if seconds else []

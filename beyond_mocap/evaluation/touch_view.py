@@ -69,7 +69,7 @@ class TouchView:
 
     @cached_property
     def strikes(self) -> list[tuple[float, int]]:
-        """Strikes that nobody asked for: seconds from the first frame, and side."""
+        """Strikes that nothing asks for: seconds from the first frame, and side."""
         asked = self._list_asked_seconds()
         return [(second, side) for second, side in touches.find_strikes(self.legs)
                 if not any(first <= second <= last for first, last in asked)]

@@ -130,7 +130,8 @@ def measure_legs(skeleton: Skeleton, positions: np.ndarray, fps: float, planted:
     joints = [body.hips, body.left.foot, body.right.foot, body.left.toe_or_foot, body.right.toe_or_foot]
     places = scale * resample_positions(positions[:, joints], fps)
     rows = np.minimum(np.rint(np.arange(len(places)) * fps / FPS).astype(int), len(planted) - 1)
-    return LegCourse(places[:, 0], places[:, 1:3], places[:, 3:5], course.heading, course.speed, planted[rows], scale)
+    return LegCourse(pelvis=places[:, 0], ankles=places[:, 1:3], toes=places[:, 3:5], heading=course.heading,
+                     speed=course.speed, planted=planted[rows], scale=scale)
 
 
 def measure_reception(legs: LegCourse, second: float, side: int | None) -> float:
