@@ -52,6 +52,7 @@ TITLES = {
     "reception.speed_m_s_median": Title("Foot speed at receptions", "m/s"),
     "reception.speed_m_s_max": Title("Fastest foot at a reception", "m/s"),
     "reception.strike_count": Title("Receptions played as strikes", "", digits=0),
+    "body_reception.speed_m_s_median": Title("Thigh, chest or head at receptions", "m/s"),
     "second_strike_count": Title("Second strikes", "", digits=0),
     "unasked_strike_count": Title("Strikes not asked for", "", digits=0),
     **{f"{group}.{leaf}": Title(f"{text}, {kicks}", unit, scale, digits)
@@ -85,11 +86,11 @@ def measure_touches(touch_view: TouchView) -> dict:
     Returns:
         The report's group.
     """
-    speeds = [touches.measure_reception(touch_view.legs, touch_view.find_second(one), touch_view.find_foot(one))
-              for one in touch_view.receptions]
     kicks = touch_view.measure_kicks()
     out = {
-        "reception": touches.summarize_receptions(speeds), "kick": touches.summarize_kicks(kicks),
+        "reception": touches.summarize_receptions(touch_view.measure_receptions()),
+        "body_reception": touches.summarize_receptions(touch_view.measure_body_receptions()),
+        "kick": touches.summarize_kicks(kicks),
         "fast_kick": touches.summarize_kicks([kick for kick in kicks if kick.ball_speed > FAST_BALL]),
         "ball_speed": summarize_ball_speeds(kicks), "fit": measure_fit(touch_view),
         "ball_inside": measure_ball_inside(touch_view), "second_strike_count": len(touch_view.second_strikes),

@@ -7,7 +7,7 @@ from functools import cached_property
 
 import numpy as np
 
-from ..annotation.ball_contact import may_use_foot
+from ..annotation.ball_contact import find_striking_part, may_use_foot
 from ..annotation.body_surfaces import BodySurface, build_body_surfaces, measure_ball_depths
 from ..annotation.labels import list_labels
 from ..annotation.striking import build_part_surfaces, measure_smallest_gap
@@ -30,13 +30,15 @@ class TouchView:
     Attributes:
         view: the take beside its library.
         played: the take as played.
-        receptions: key moments that ask for a ball which a foot takes.
+        receptions: key moments that ask for a ball which a foot receives.
+        body_receptions: those which ask for one that thigh, chest or head take.
         kicks: those which ask for one that a foot sends.
     """
 
     def __init__(self, view: View):
         self.view, self.played = view, view.played
         self.receptions = [one for one in view.moments if touches.is_foot_reception(one.requested.words)]
+        self.body_receptions = [one for one in view.moments if touches.is_body_reception(one.requested.words)]
         self.kicks = [one for one in view.moments if touches.is_kick(one.requested.words)]
 
     @cached_property
@@ -77,7 +79,7 @@ class TouchView:
     @property
     def second_strikes(self) -> list[tuple[float, int]]:
         """Those within 2.5 s after a reception."""
-        after = [self.find_second(one) for one in self.receptions]
+        after = [self.find_second(one) for one in (*self.receptions, *self.body_receptions)]
         return [strike for strike in self.strikes if any(0.0 < strike[0] - second <= SECOND_STRIKE_SECONDS
                                                         for second in after)]
 
@@ -86,7 +88,7 @@ class TouchView:
         spans = []
         for moment in self.view.moments:
             second, words = self.find_second(moment), frozenset(moment.requested.words)
-            if moment in self.receptions:
+            if moment in self.receptions or moment in self.body_receptions:
                 spans.append((second - _OWN_STRIKE_SECONDS, second + _OWN_STRIKE_SECONDS))
             elif may_use_foot(words):
                 spans.append((second - _ASKED_SECONDS, second + _ASKED_SECONDS))
@@ -119,6 +121,18 @@ class TouchView:
         if last >= self.view.count:
             return math.nan
         return float(np.linalg.norm(self.ball[last] - self.ball[first])) * self.view.fps / (last - first)
+
+    def measure_receptions(self) -> list[float]:
+        """Measure the speed (m/s) of the foot at every reception."""
+        return [touches.measure_reception(self.legs, self.find_second(one), self.find_foot(one))
+                for one in self.receptions]
+
+    def measure_body_receptions(self) -> list[float]:
+        """Measure the speed (m/s) of the requested part at every reception with thigh, chest or head."""
+        skeleton, positions = self.played.motion.skeleton, self.played.positions
+        return [touches.measure_body_reception(skeleton, positions, self.view.fps,
+                                               find_striking_part(one.requested.words) or "", self.find_second(one))
+                for one in self.body_receptions]
 
     def measure_kicks(self) -> list[touches.Kick]:
         """Measure every kick."""

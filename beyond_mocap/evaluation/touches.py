@@ -13,7 +13,7 @@ from functools import cached_property
 
 import numpy as np
 
-from ..annotation.ball_contact import find_striking_part, takes_with_foot
+from ..annotation.ball_contact import find_striking_part
 from ..annotation.labels import list_labels
 from ..annotation.vocabulary import SIDES
 from ..base.time_series import find_runs, time_derivative
@@ -38,7 +38,9 @@ _STRIDE_LEAST = 0.05  # m of the stride before the last; shorter ones are steps 
 PLANT_BESIDE, PLANT_AHEAD = (0.20, 0.37), (-0.05, 0.20)
 """Metres of the plant foot beside and ahead of the kicking ankle (`../shared/metrics.md`, row *kick*)."""
 
-_SENDS = frozenset(list_labels(ball="sends"))
+_SENDS, _TAKES = frozenset(list_labels(ball="sends")), frozenset(list_labels(ball="takes"))
+_RECEPTIONS = frozenset(("receive", "trap"))  # a foot that blocks takes the ball too, but does not give with it
+_BODY_PARTS = ("thigh", "chest", "head")
 
 
 @dataclass(frozen=True, eq=False)
@@ -98,9 +100,15 @@ class Kick:
 
 
 def is_foot_reception(words: Iterable[str]) -> bool:
-    """Return whether labels ask for a ball that a foot takes."""
+    """Return whether labels ask for a ball that a foot receives."""
     words = set(words)
-    return takes_with_foot(words) and find_striking_part(words) == "foot"
+    return bool(_RECEPTIONS & words) and find_striking_part(words) == "foot"
+
+
+def is_body_reception(words: Iterable[str]) -> bool:
+    """Return whether labels ask for a ball that thigh, chest or head take."""
+    words = set(words)
+    return bool(_TAKES & words) and find_striking_part(words) in _BODY_PARTS
 
 
 def is_kick(words: Iterable[str]) -> bool:
@@ -144,10 +152,34 @@ def measure_reception(legs: LegCourse, second: float, side: int | None) -> float
     Returns:
         m/s, NaN beyond the body's ends.
     """
+    return _find_fastest(legs.relative_velocity[:, [0, 1] if side is None else [side]], second)
+
+
+def measure_body_reception(skeleton: Skeleton, positions: np.ndarray, fps: float, part: str, second: float) -> float:
+    """Measure the largest speed of a knee, the chest or the head relative to the pelvis about a reception.
+
+    Args:
+        skeleton: J joints.
+        positions: (N, J, 3) m, world.
+        fps: frames per second of the positions.
+        part: "thigh" (the faster knee), "chest" or "head".
+        second: s from the first frame.
+    Returns:
+        m/s, NaN beyond the ends.
+    """
+    body = identify_joints(skeleton)
+    joints = {"thigh": [body.left.lower_leg, body.right.lower_leg], "chest": [body.chest],
+              "head": [body.head_or_neck]}[part]  # fmt: skip
+    away = resample_positions(positions[:, joints] - positions[:, [body.hips]], fps)
+    return _find_fastest(time_derivative(away * (LEG_LENGTH / measure_leg_length(skeleton)), FPS), second)
+
+
+def _find_fastest(velocities: np.ndarray, second: float) -> float:
+    """Find the largest speed of velocities (T, P, 3) m/s within RECEPTION_SECONDS of a second; NaN beyond them."""
     reach = RECEPTION_SECONDS * FPS
     first, last = math.ceil(second * FPS - reach - 1e-6), math.floor(second * FPS + reach + 1e-6)
-    speeds = np.linalg.norm(legs.relative_velocity[max(first, 0) : last + 1], axis=-1)
-    return float(speeds[:, [0, 1] if side is None else [side]].max()) if speeds.size else math.nan
+    speeds = np.linalg.norm(velocities[max(first, 0) : last + 1], axis=-1)
+    return float(speeds.max()) if speeds.size else math.nan
 
 
 def measure_kick(legs: LegCourse, second: float, side: int | None, ball_speed: float = math.nan) -> Kick:
@@ -228,7 +260,7 @@ def _list_peaks(values: np.ndarray, flags: np.ndarray) -> list[int]:
 
 
 def summarize_receptions(speeds: Sequence[float]) -> dict:
-    """Summarize receptions by the speed (m/s) of their feet."""
+    """Summarize receptions by the speed (m/s) of their feet or other parts."""
     known = np.array([speed for speed in speeds if math.isfinite(speed)])
     return {"receptions": len(known), "speed_m_s_median": float(np.median(known)) if len(known) else math.nan,
             "speed_m_s_max": float(known.max()) if len(known) else math.nan,

@@ -15,6 +15,7 @@ from beyond_mocap.evaluation.report import evaluate, flatten_report
 from beyond_mocap.evaluation.touch_view import TouchView
 from beyond_mocap.evaluation.touches import LegCourse
 from beyond_mocap.motion import quaternion
+from beyond_mocap.motion.humanoid import measure_leg_length
 from beyond_mocap.motion.motion import Motion
 from beyond_mocap.motion.track import BALL_RADIUS
 from beyond_mocap.motion.track.ball_path import BallPath
@@ -52,6 +53,30 @@ def test_a_reception_has_its_fastest_ankle_within_130_ms(away, expected):
     assert touches.measure_reception(legs, 3.0 + away, None) == touches.measure_reception(legs, 3.0 + away, 1)
     assert touches.measure_reception(legs, 3.0, 0) == pytest.approx(0.0, abs=1e-9)
     assert math.isnan(touches.measure_reception(legs, 9.0, 1))
+
+
+@pytest.mark.parametrize("fps", [30.0, 60.0])
+def test_other_parts_are_measured_against_the_pelvis(kicker, fps):
+    """A chest that moves back at 1.5 m/s while the whole body drifts; the head moves along with it at twice that."""
+    skeleton, body = kicker.motion.skeleton, playback_from_take(kicker).body
+    times = np.arange(int(4 * fps)) / fps
+    positions = np.zeros((len(times), len(skeleton), 3)) + times[:, None, None] * [3.0, 0.0, 0.0]
+    positions[:, body.chest, 0] -= 1.5 * times
+    positions[:, body.head_or_neck, 0] -= 3.0 * times
+    scale = 0.86 / measure_leg_length(skeleton)
+    parts = ("thigh", "chest", "head")
+    speeds = [touches.measure_body_reception(skeleton, positions, fps, part, 2.0) for part in parts]
+    assert speeds == pytest.approx([0.0, 1.5 * scale, 3.0 * scale], abs=1e-9)
+
+
+def test_labels_say_what_is_measured():
+    feet = (("receive", "foot", "low"), ("trap",), ("receive",))
+    assert all(touches.is_foot_reception(words) and not touches.is_kick(words) for words in feet)
+    assert touches.is_body_reception(("receive", "body", "high")) and not touches.is_body_reception(("catchb",))
+    assert all(touches.is_kick(words) for words in (("kick", "right"), ("pass",), ("volley", "kick")))
+    assert not any(touches.is_kick(words) for words in (("header",), ("throwb", "high"), ("dribble",)))
+    named = (("left",), ("right", "low"), ("left", "right"), ())
+    assert [touches.find_side(words) for words in named] == [0, 1, None, None]
 
 
 def build_kick(side=1, heading=0.4):
