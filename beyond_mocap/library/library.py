@@ -29,9 +29,10 @@ from .manners import Manners, measure_manners
 from .missing_steps import BACK_SPEEDS, TURNS
 from .posture import NormalPostures, fit_normal_postures
 from .run_loops import MIN_SPEED
+from .running_kicks import KICK_LABELS
 from .standing_loops import MIN_STAND_SECONDS
 from .synthetic_clips import (
-    KICK_LABELS,
+    KICK_STEP,
     MIN_RECEIVE_SPEED,
     RECEIVE_LABELS,
     find_speed_gaps,
@@ -212,7 +213,7 @@ class Library:
         inside = sum(int(np.sum((speed > low) & (speed < high))) for low, high in self.speed_gaps)
         kick, take = (measure_touch_speed(self.frames, self.clips, self.keys, act)
                       for act in (KICK_LABELS, RECEIVE_LABELS))
-        too_fast = 1.3 * np.where(takes & np.isfinite(take), max(take, MIN_RECEIVE_SPEED), kick)
+        too_fast = KICK_STEP * np.where(takes & np.isfinite(take), max(take, MIN_RECEIVE_SPEED), kick)
         rests = np.sum(speed < RESTING_SPEED) >= MIN_STAND_SECONDS * self.fps
         runs = np.sum(speed > MIN_SPEED) >= MIN_RUN_SECONDS * self.fps
         aside = (speed > STANDING_SPEED) & (speed < 1.25 * BACK_SPEEDS[-1]) & (np.abs(offset) > np.pi / 3.0)
