@@ -359,8 +359,7 @@ def _build_kick_clip(kick: RunningKick, speeds: dict[str, float]) -> SyntheticCl
     gesture = kick.gesture
     row = ClipAnnotation(np.ceil(gesture.start * FPS), np.floor(gesture.end * FPS), gesture.key * FPS, kick.words)
     gait_row = _build_gait_rows(np.full(len(gesture.motion), kick.speed), speeds)
-    return _ground_clip(f"{SYNTHETIC_FOLDER}{KICK_PREFIX}{kick.name}.bvh", gesture.motion, None, (row, *gait_row),
-                        plants_feet=True)
+    return _ground_clip(f"{SYNTHETIC_FOLDER}{KICK_PREFIX}{kick.name}.bvh", gesture.motion, None, (row, *gait_row))
 
 
 def _build_gait_rows(speed: np.ndarray, speeds: dict[str, float]) -> tuple[ClipAnnotation, ...]:

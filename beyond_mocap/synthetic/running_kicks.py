@@ -18,6 +18,7 @@ import numpy as np
 from scipy.interpolate import PchipInterpolator
 
 from ..motion import quaternion
+from ..motion.foot_plant import plant_feet as lift_feet
 from ..motion.humanoid import compute_heading_from_positions, identify_joints
 from ..motion.motion import Motion, compute_pose, sample_frames_cubic
 from ..motion.retargeting.neutral import NeutralStance
@@ -40,7 +41,8 @@ _LAST_STRIDE = 1.12  # factor on the duration of the last step before the plant 
 _SPEEDS = ((-0.6, 1.0), (-0.2, 1.04), (0.0, 0.84), (0.2, 0.88), (0.6, 1.0))  # share of the run's speed: it brakes
 # m of an adult, limits of the plant foot's place from the kicking ankle at the contact, as the body faces
 _AHEAD, _BESIDE = (0.03, 0.14), (0.26, 0.33)
-_LONGEST_REACH = 0.58  # share of the leg by which the plant foot lands ahead of the hips: a long last stride
+# shares of the leg by which the plant foot lands ahead of the hips, a long last stride, and leaves behind them
+_LONGEST_REACH, _LONGEST_BEHIND = 0.58, 0.62
 _MOST_EARLIER = 0.018  # s by which a swing meets the ball earlier in a fast run, whose hips pass the ball sooner
 _PLANT_YAW = 0.7  # share of the kick's direction to which the plant foot points
 _FLAT_STANCE = 2.0  # m/s of the gait whose foot rolls as the plant foot does: heel first, then flat for long
@@ -136,7 +138,8 @@ def build_running_kick(
     reach = _measure_reach(gait_plan, landings[1], neutral)
     earlier = _compute_earlier(swing, neutral, direction, reach)
     poses = _read_swing(swing, rate * times - earlier, neutral, direction)
-    steps[LEFT] = _place_plant_foot(steps[LEFT], gait_plan, landings[1], poses, reach=reach, direction=direction)
+    steps[LEFT] = _place_plant_foot(steps[LEFT], gait_plan, landings[1], poses, reach=reach, direction=direction,
+                                    leg=neutral.leg)
     motion = _lay_swing(gait_plan, tuple(steps), poses, neutral, style, landing=landings[2])
     return Gesture(motion, APPROACH_SECONDS, APPROACH_SECONDS + landings[0] - 0.1, APPROACH_SECONDS + landings[2] + 0.1)
 
@@ -196,17 +199,19 @@ def _compute_places(swing: Swing, times: np.ndarray) -> np.ndarray:
 
 
 def _place_plant_foot(steps: Footsteps, gait_plan: GaitPlan, landing: float, poses: _SwingPoses, *, reach: float,
-                      direction: float) -> Footsteps:
+                      direction: float, leg: float) -> Footsteps:
     """Place the plant foot beside the kicking ankle and, as far as the leg reaches, ahead of it."""
     which = int(np.argmin(np.abs(steps.on - APPROACH_SECONDS - landing)))
     contact = int(np.argmin(np.abs(gait_plan.times - APPROACH_SECONDS)))
     offset = poses.ankle[contact, :2] + poses.plant
     offset[0] = min(offset[0], reach)
-    place, yaw, speed = steps.place.copy(), steps.yaw.copy(), steps.speed.copy()
+    place, yaw, speed, off = (values.copy() for values in (steps.place, steps.yaw, steps.speed, steps.off))
     place[which] = gait_plan.path[contact] + offset
+    near = gait_plan.path[:, 0] - place[which, 0] < _LONGEST_BEHIND * leg
+    off[which] = min(off[which], gait_plan.times[near].max())
     yaw[which] += _PLANT_YAW * direction
     speed[which] = _FLAT_STANCE
-    return replace(steps, place=place, yaw=yaw, speed=speed)
+    return replace(steps, place=place, yaw=yaw, speed=speed, off=off)
 
 
 def _lay_swing(gait_plan: GaitPlan, steps: tuple[Footsteps, ...], poses: _SwingPoses, neutral: NeutralStance,
@@ -221,8 +226,11 @@ def _lay_swing(gait_plan: GaitPlan, steps: tuple[Footsteps, ...], poses: _SwingP
     posture = posture.replace_arrays(hips=hips, pelvis=quaternion.to_rotation_vector(pelvis))
     posture = plant_feet(posture, gait_plan.times, steps, neutral)
     run, kept = to_motion(posture.frames(gait_plan.requested_slice), neutral), gait_plan.requested_slice
-    return replace(run, rotations=_blend_joints(run, poses.rotations[kept], times[kept], share[kept], steps[RIGHT],
-                                                landing))
+    mixed = _blend_joints(run, poses.rotations[kept], times[kept], share[kept], steps[RIGHT], landing)
+    # the hips of a run may be lower than the kick's own, so that its foot would go through the ground
+    nowhere = np.zeros((len(mixed), 2, 2), bool)
+    lifted = lift_feet(run.skeleton, run.root_positions, mixed, nowhere, run.fps)
+    return replace(run, root_positions=lifted.root, rotations=lifted.rotations)
 
 
 def _blend_joints(run: Motion, kick: np.ndarray, times: np.ndarray, share: np.ndarray, steps: Footsteps,

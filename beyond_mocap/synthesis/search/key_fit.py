@@ -30,7 +30,7 @@ TURN_COST = 0.1  # per radian that the body has to turn to the ball, and m/s of 
 ANGLE_COST = 0.2  # per radian between the part's velocity and the leaving ball
 FAR_ANGLE_COST = 0.6  # per radian beyond what a body turns to it
 LOFT_COST = 0.2  # per radian between the elevations of both, beyond the noise
-SPEED_COST = 0.4  # per unit of the logarithm of the ball's speed over the part's, outside of the usual range
+SPEED_COST = 1.0  # per unit of the logarithm of the ball's speed over the part's, outside of the usual range
 SPEED_RATIO = (1.06, 1.3)
 """Speed of the leaving ball over that of the foot."""
 
@@ -86,6 +86,11 @@ class StrikeMeasurements:
     height: np.ndarray
     velocity: np.ndarray
     sends: np.ndarray
+
+    def play(self, choice: np.ndarray, rate: np.ndarray) -> "StrikeMeasurements":
+        """Return the same of clips `choice` (P,) played at playback rates (P,)."""
+        return StrikeMeasurements(self.place[choice], self.height[choice], rate[:, None] * self.velocity[choice],
+                                  self.sends[choice])
 
 
 def measure_ball(track: SampledTrack, frame: float, is_height_known: bool) -> BallMeasurement:
@@ -168,7 +173,7 @@ def compute_key_misfit(found: StrikeMeasurements, ball: BallMeasurement) -> np.n
 
 
 def _compute_needed_turn(place: np.ndarray, goal: np.ndarray) -> np.ndarray:
-    """Compute the turn (K,) rad about the hips that brings parts at places (K, 2) m within TURN_REACH of a goal (2,) m."""
+    """Compute the turn (K,) rad about the hips that brings parts at (K, 2) m within TURN_REACH of a goal at (2,) m."""
     apart = np.abs(arctan2(place[:, 0] * goal[1] - place[:, 1] * goal[0], place @ goal))
     return np.maximum(apart - compute_free_angle(np.linalg.norm(place, axis=1), np.linalg.norm(goal), TURN_REACH), 0.0)
 

@@ -193,7 +193,8 @@ class PathSearch:
         for number in np.unique(self.pieces.number):
             key, at = self.request.keys[number], self.pieces.number == number
             ball = measure_ball(self.request.track, key.frame, key.is_ball_height_known)
-            costs[at] = compute_key_misfit(measure_strikes(self.library, key.choices), ball)[self.pieces.choice[at]]
+            played = measure_strikes(self.library, key.choices).play(self.pieces.choice[at], self.pieces.rate[at])
+            costs[at] = compute_key_misfit(played, ball)
             costs[at] += compute_weak_foot_cost(key.requested.words, key.choices,
                                                 self.request.weak_foot)[self.pieces.choice[at]]
         return costs
