@@ -7,7 +7,7 @@ that speed up; where no recorded kick of a kind can be used its swing is synthet
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -28,9 +28,11 @@ _HARD, _SOFT = 11.0, 6.5  # m/s of the ankle against the pelvis in a hard kick a
 _RATES = (0.6, 1.25)  # limits of a swing's playback rate: slower ones are those of soft passes
 _BESIDE, _AHEAD = (0.2, 0.37), (-0.05, 0.2)  # m, usual places of the plant foot from the kicking ankle
 _PLACE_COST, _PEAK_COST = 15.0, 60.0  # m/s of foot speed that a metre, or a second from the fastest moment, is worth
-_DIRECTIONS = np.radians([-22.0, 10.0, 42.0])  # of low balls from the run, toward the plant leg's side
-_HIGH_DIRECTIONS = np.radians([10.0])
+_DIRECTIONS = np.radians([-15.0, 30.0])  # of low balls from the run, toward the plant leg's side
+_HIGH_DIRECTIONS, _HIGH_SPEEDS = np.radians([10.0]), 2
 _PASS = ("low", "inside")
+_PASS_SPEEDS = (1.2, 2.2)  # m/s of soft passes in a walk and a jog: recorded kicks are shots, too hard for them
+_RUNNING_SPEED = 2.0  # m/s from which a kick is labelled running, as in `match.labels`
 _SURFACES = [word for word in list_labels(group="surface") if word != "volley"]
 
 
@@ -65,11 +67,19 @@ def iter_running_kicks(clips: Sequence, keys: Sequence, slowest: float, example:
     if not np.isfinite(slowest):  # no kick is recorded
         return
     neutral = build_neutral_stance(example.skeleton, example)
-    count = int(np.ceil(np.log(MAX_KICK_SPEED / max(slowest, _SLOWEST_RUN)) / np.log(_SPEED_STEP)))
+    speeds = max(0, int(np.ceil(np.log(MAX_KICK_SPEED / max(slowest, _SLOWEST_RUN)) / np.log(_SPEED_STEP))))
     for kind in sorted({_find_kind(key.labels) for key in keys if KICK_LABELS <= key.labels}):
         swing = choose_swing(clips, [key for key in keys if _find_kind(key.labels) == kind], neutral, kind[-1])
-        for speed in max(slowest, _SLOWEST_RUN) * _SPEED_STEP ** np.arange(max(count, 0)):
-            yield from _build_kicks(swing, float(speed), kind, neutral, style)
+        strengths = {"": max(1.0, _HARD / measure_foot_speed(swing))}
+        if kind == _PASS:
+            soft = {"soft_": _SOFT / measure_foot_speed(swing)}
+            strengths |= soft
+            for speed in _PASS_SPEEDS:
+                yield from _build_kicks(swing, speed, kind, soft, neutral=neutral, style=style)
+        # a high ball is seldom met in a sprint
+        count = speeds if kind[0] == "low" else min(speeds, _HIGH_SPEEDS)
+        for speed in max(slowest, _SLOWEST_RUN) * _SPEED_STEP ** np.arange(count):
+            yield from _build_kicks(swing, float(speed), kind, strengths, neutral=neutral, style=style)
 
 
 def choose_swing(clips: Sequence, keys: Sequence, neutral: NeutralStance, surface: str) -> Swing:
@@ -113,15 +123,13 @@ def _rate_swing(swing: Swing) -> float:
     return speeds[3] - _PLACE_COST * off - _PEAK_COST * abs(float(around[int(np.argmax(speeds))]))
 
 
-def _build_kicks(swing: Swing, speed: float, kind: tuple[str, ...], neutral: NeutralStance,
-                 style: GaitStyle) -> Iterator[RunningKick]:
-    """Build the kicks of one kind and speed: in some directions, hard ones and soft ones for passes."""
-    foot_speed = measure_foot_speed(swing)
-    strengths = {"": max(1.0, _HARD / foot_speed)} | ({"soft_": _SOFT / foot_speed} if kind == _PASS else {})
+def _build_kicks(swing: Swing, speed: float, kind: tuple[str, ...], strengths: Mapping[str, float], *,
+                 neutral: NeutralStance, style: GaitStyle) -> Iterator[RunningKick]:
+    """Build the kicks of one kind and speed: in some directions, at the playback rate of each strength."""
+    pace = "running" if speed > _RUNNING_SPEED else "standing"
     for strength, rate in strengths.items():
         for direction in _DIRECTIONS if kind[0] == "low" else _HIGH_DIRECTIONS:
             gesture = build_running_kick(swing, speed, neutral, direction=float(direction),
                                          rate=float(np.clip(rate, *_RATES)), style=style)
-            name = f"{strength}{'_'.join(kind)}_{speed:.1f}_{np.degrees(direction):+.0f}"
-            yield RunningKick(name=name, gesture=gesture, speed=speed,
-                              words=("kick", "right", *kind, "running", "front"))
+            yield RunningKick(name=f"{strength}{'_'.join(kind)}_{speed:.1f}_{np.degrees(direction):+.0f}",
+                              gesture=gesture, speed=speed, words=("kick", "right", *kind, pace, "front"))

@@ -22,7 +22,7 @@ from ..motion.foot_plant import plant_feet as lift_feet
 from ..motion.humanoid import compute_heading_from_positions, identify_joints
 from ..motion.motion import Motion, compute_pose, sample_frames_cubic
 from ..motion.retargeting.neutral import NeutralStance
-from ..motion.retargeting.posture import to_motion
+from ..motion.retargeting.posture import Posture, to_motion
 from ..motion.retargeting.structure import list_descendants
 from . import gait_tables as tables
 from .footsteps import Footsteps
@@ -48,6 +48,7 @@ _PLANT_YAW = 0.7  # share of the kick's direction to which the plant foot points
 _FLAT_STANCE = 2.0  # m/s of the gait whose foot rolls as the plant foot does: heel first, then flat for long
 _BODY = (-0.42, -0.18, 0.22, 0.55)  # s from the contact between which pelvis, trunk and arms are the kick's
 _LEG_IN, _LEG_OUT = (0.02, 0.12), 0.24  # s after the foot leaves the ground, and after the contact: the leg is
+_MARGIN = 30  # frames before and after that are planned, too, so that swings which cross the ends are known
 _SPEED_SECONDS = 1.0 / 60.0  # s before and after a moment between which a speed is measured
 
 
@@ -129,19 +130,33 @@ def build_running_kick(
     Returns:
         The kick; it starts where the last but one step begins and ends where the kicking foot lands.
     """
-    count = int(round((APPROACH_SECONDS + RUN_OUT_SECONDS) * fps)) + 1
-    shares = np.array(_SPEEDS).T
-    speeds = speed * np.interp(np.arange(count) / fps - APPROACH_SECONDS, *shares)
-    gait_plan, landings = _time_steps(plan_gait(speeds, None, fps, neutral, style=style), speed)
-    times = gait_plan.times - APPROACH_SECONDS
-    steps = [plan_footsteps(gait_plan, neutral, style, side) for side in (LEFT, RIGHT)]
+    gait_plan, landings = _plan_run(speed, fps, neutral, style)
     reach = _measure_reach(gait_plan, landings[1], neutral)
     earlier = _compute_earlier(swing, neutral, direction, reach)
-    poses = _read_swing(swing, rate * times - earlier, neutral, direction)
-    steps[LEFT] = _place_plant_foot(steps[LEFT], gait_plan, landings[1], poses, reach=reach, direction=direction,
+    steps = [plan_footsteps(gait_plan, neutral, style, side) for side in (LEFT, RIGHT)]
+    contact = _read_swing(swing, np.array([-earlier]), neutral, direction)
+    steps[LEFT] = _place_plant_foot(steps[LEFT], gait_plan, landings[1], contact, reach=reach, direction=direction,
                                     leg=neutral.leg)
-    motion = _lay_swing(gait_plan, tuple(steps), poses, neutral, style, landing=landings[2])
-    return Gesture(motion, APPROACH_SECONDS, APPROACH_SECONDS + landings[0] - 0.1, APPROACH_SECONDS + landings[2] + 0.1)
+    kept = _select_frames(gait_plan)
+    times = gait_plan.times[kept] - APPROACH_SECONDS
+    posture = build_upper_posture(gait_plan, neutral, style, 0).frames(kept)
+    poses = _read_swing(swing, rate * times - earlier, neutral, direction)
+    motion = _lay_swing(posture, times, tuple(steps), poses, neutral, landing=landings[2])
+    start, end = APPROACH_SECONDS + landings[0] - 0.1, APPROACH_SECONDS + landings[2] + 0.1
+    return Gesture(motion.frames(_MARGIN, len(motion) - _MARGIN), APPROACH_SECONDS, start, end)
+
+
+def _plan_run(speed: float, fps: float, neutral: NeutralStance, style: GaitStyle) -> tuple[GaitPlan, np.ndarray]:
+    """Plan the run: also s from the contact at which right, plant and right foot land."""
+    count = int(round((APPROACH_SECONDS + RUN_OUT_SECONDS) * fps)) + 1
+    shares = np.interp(np.arange(count) / fps - APPROACH_SECONDS, *np.array(_SPEEDS).T)
+    return _time_steps(plan_gait(speed * shares, None, fps, neutral, style=style), speed)
+
+
+def _select_frames(gait_plan: GaitPlan) -> slice:
+    """Select the requested frames of a plan, and _MARGIN more at both ends."""
+    more = gait_plan.pad - _MARGIN * gait_plan.stride
+    return slice(more, len(gait_plan.times) - more, gait_plan.stride)
 
 
 def _time_steps(gait_plan: GaitPlan, speed: float) -> tuple[GaitPlan, np.ndarray]:
@@ -203,7 +218,7 @@ def _place_plant_foot(steps: Footsteps, gait_plan: GaitPlan, landing: float, pos
     """Place the plant foot beside the kicking ankle and, as far as the leg reaches, ahead of it."""
     which = int(np.argmin(np.abs(steps.on - APPROACH_SECONDS - landing)))
     contact = int(np.argmin(np.abs(gait_plan.times - APPROACH_SECONDS)))
-    offset = poses.ankle[contact, :2] + poses.plant
+    offset = poses.ankle[0, :2] + poses.plant
     offset[0] = min(offset[0], reach)
     place, yaw, speed, off = (values.copy() for values in (steps.place, steps.yaw, steps.speed, steps.off))
     place[which] = gait_plan.path[contact] + offset
@@ -214,19 +229,16 @@ def _place_plant_foot(steps: Footsteps, gait_plan: GaitPlan, landing: float, pos
     return replace(steps, place=place, yaw=yaw, speed=speed, off=off)
 
 
-def _lay_swing(gait_plan: GaitPlan, steps: tuple[Footsteps, ...], poses: _SwingPoses, neutral: NeutralStance,
-               style: GaitStyle, landing: float) -> Motion:
-    """Lay a swing onto a run; its kicking foot lands at `landing` s."""
-    times = gait_plan.times - APPROACH_SECONDS
+def _lay_swing(posture: Posture, times: np.ndarray, steps: tuple[Footsteps, ...], poses: _SwingPoses,
+               neutral: NeutralStance, landing: float) -> Motion:
+    """Lay a swing onto a run, both at s from the contact (T,); the kicking foot lands at `landing` s."""
     share = compute_envelope(times, *_BODY)
-    posture = build_upper_posture(gait_plan, neutral, style, 0)
     hips = posture.hips.copy()
     hips[:, 2] += share * (poses.height - hips[:, 2])
     pelvis = quaternion.slerp(quaternion.from_rotation_vector(posture.pelvis), poses.pelvis, share)
     posture = posture.replace_arrays(hips=hips, pelvis=quaternion.to_rotation_vector(pelvis))
-    posture = plant_feet(posture, gait_plan.times, steps, neutral)
-    run, kept = to_motion(posture.frames(gait_plan.requested_slice), neutral), gait_plan.requested_slice
-    mixed = _blend_joints(run, poses.rotations[kept], times[kept], share[kept], steps[RIGHT], landing)
+    run = to_motion(plant_feet(posture, times + APPROACH_SECONDS, steps, neutral), neutral)
+    mixed = _blend_joints(run, poses.rotations, times, share, steps[RIGHT], landing)
     # the hips of a run may be lower than the kick's own, so that its foot would go through the ground
     nowhere = np.zeros((len(mixed), 2, 2), bool)
     lifted = lift_feet(run.skeleton, run.root_positions, mixed, nowhere, run.fps)

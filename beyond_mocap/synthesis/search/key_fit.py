@@ -204,11 +204,11 @@ def _compute_exit_misfit(found: StrikeMeasurements, leaving: np.ndarray, free_tu
     """
     velocity = found.velocity
     level, speed = np.linalg.norm(velocity[:, :2], axis=1), np.linalg.norm(velocity, axis=1)
-    ball_level, ball_speed = np.linalg.norm(leaving[:2]), np.linalg.norm(np.nan_to_num(leaving))
+    ball_level, ball_speed = np.hypot(leaving[:1], leaving[1:2]), np.linalg.norm(np.nan_to_num(leaving))
     turned = arctan2(velocity[:, 1], velocity[:, 0]) - arctan2(leaving[1], leaving[0])
     turned = np.abs(quaternion.wrap_angle(turned))
     cost = ANGLE_COST * turned + FAR_ANGLE_COST * np.maximum(turned - free_turn, 0.0)
-    loft = np.abs(arctan2(velocity[:, 2], level) - arctan2(leaving[2], ball_level))
+    loft = np.abs(arctan2(velocity[:, 2], level) - arctan2(leaving[2:], ball_level))
     cost += np.nan_to_num(LOFT_COST * np.maximum(loft - _LOFT_NOISE, 0.0))
     least, most = np.log(SPEED_RATIO)
     ratio = np.log(np.maximum(ball_speed, FAST_BALL) / np.maximum(speed, FAST_PART))

@@ -56,10 +56,16 @@ def kicks(clips):
 
 def test_each_recorded_surface_is_kicked_at_all_speeds_and_into_all_directions(kicks):
     assert {kick.words[:4] for kick in kicks} == {("kick", "right", "low", "inside"), ("kick", "right", "low", "top")}
-    assert min(kick.speed for kick in kicks) == 3.0 and max(kick.speed for kick in kicks) > 6.0
+    assert max(kick.speed for kick in kicks) > 6.0
     assert len({kick.name for kick in kicks}) == len(kicks)
-    for surface, count in (("top", 3), ("inside", 6)):  # passes hard and soft
+    for surface, count in (("top", 2), ("inside", 4)):  # passes hard and soft
         assert sum(surface in kick.words and kick.speed == 3.0 for kick in kicks) == count
+
+
+def test_only_soft_passes_are_slower_than_recorded_kicks(kicks):
+    slow = [kick for kick in kicks if kick.speed < 3.0]
+    assert slow and all("inside" in kick.words and kick.name.startswith("soft") for kick in slow)
+    assert {("standing" in kick.words, kick.speed < 2.0) for kick in slow} == {(True, True), (False, False)}
 
 
 def test_without_a_recorded_kick_there_is_none():

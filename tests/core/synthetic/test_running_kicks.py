@@ -15,7 +15,7 @@ NEUTRAL = build_neutral_stance(build_adult_skeleton())
 BODY = identify_joints(NEUTRAL.skeleton)
 
 
-@pytest.fixture(scope="module", params=[("instep", speed) for speed in SPEEDS] + [("inside", speed) for speed in SPEEDS])
+@pytest.fixture(scope="module", params=[(kind, speed) for kind in ("instep", "inside") for speed in SPEEDS])
 def kick(request):
     """Kind, run's speed, the kick, its joints (T, J, 3) m and the frame of the contact."""
     kind, speed = request.param
