@@ -18,6 +18,7 @@ from ..annotation.gaits import STANDING, STANDING_SPEED
 from ..annotation.vocabulary import DIRECTIONS
 from ..base.errors import InputError, format_count
 from ..motion.skeleton import Skeleton
+from ..synthetic.recorded_kicks import KICK_LABELS
 from . import cache
 from .cache import write_synthetic_clips
 from .clip import Clip
@@ -29,7 +30,6 @@ from .manners import Manners, measure_manners
 from .missing_steps import BACK_SPEEDS, TURNS
 from .posture import NormalPostures, fit_normal_postures
 from .run_loops import MIN_SPEED
-from .running_kicks import KICK_LABELS
 from .standing_loops import MIN_STAND_SECONDS
 from .synthetic_clips import (
     KICK_STEP,

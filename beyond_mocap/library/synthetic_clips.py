@@ -17,8 +17,8 @@ Where all recordings run, or all walk slower, it generates walking the same way,
 stand: a run that is shortened to a walk's steps hops on the spot.
 
 Recorded kicks are seldom faster than a jog, and players who receive a ball with the foot in a recording hardly move;
-moved along at 8 m/s their supporting foot slides by metres. `synthetic.gestures` generates both on the run at the
-missing speeds; they substitute for recorded ones wherever they carry the labels by which those answer.
+moved along at 8 m/s their supporting foot slides by metres. `synthetic.recorded_kicks` and `synthetic.gestures`
+generate both on the run at the missing speeds; they substitute for recorded ones that answer by the same labels.
 """
 
 from __future__ import annotations
@@ -40,10 +40,10 @@ from ..motion.phase_blend import Strides, blend_strides, find_strides
 from ..synthetic import gestures
 from ..synthetic.gait import build_gait
 from ..synthetic.gait_plan import GaitStyle
+from ..synthetic.recorded_kicks import KICK_LABELS, RunningKick, iter_running_kicks
 from .features import Frames
 from .missing_steps import BACK_PREFIX, STEP_PREFIX, TURN_PREFIX, iter_missing_steps
 from .run_loops import LOOP_SECONDS, iter_run_loops
-from .running_kicks import KICK_LABELS, RunningKick, iter_running_kicks
 from .scan import CACHE_FOLDER
 from .standing_loops import LOOP_SECONDS as STAND_SECONDS
 from .standing_loops import iter_standing_loops

@@ -238,14 +238,14 @@ def _lay_swing(posture: Posture, times: np.ndarray, steps: tuple[Footsteps, ...]
     pelvis = quaternion.slerp(quaternion.from_rotation_vector(posture.pelvis), poses.pelvis, share)
     posture = posture.replace_arrays(hips=hips, pelvis=quaternion.to_rotation_vector(pelvis))
     run = to_motion(plant_feet(posture, times + APPROACH_SECONDS, steps, neutral), neutral)
-    mixed = _blend_joints(run, poses.rotations, times, share, steps[RIGHT], landing)
+    mixed = _blend_joints(run, poses.rotations, times, share=share, steps=steps[RIGHT], landing=landing)
     # the hips of a run may be lower than the kick's own, so that its foot would go through the ground
     nowhere = np.zeros((len(mixed), 2, 2), bool)
     lifted = lift_feet(run.skeleton, run.root_positions, mixed, nowhere, run.fps)
     return replace(run, root_positions=lifted.root, rotations=lifted.rotations)
 
 
-def _blend_joints(run: Motion, kick: np.ndarray, times: np.ndarray, share: np.ndarray, steps: Footsteps,
+def _blend_joints(run: Motion, kick: np.ndarray, times: np.ndarray, *, share: np.ndarray, steps: Footsteps,
                   landing: float) -> np.ndarray:
     """Blend a run's local rotations (T, J, 4) into a kick's `kick`: trunk and arms by `share`, the leg in its swing."""
     body, skeleton = identify_joints(run.skeleton), run.skeleton

@@ -47,7 +47,7 @@ def compute_turn_to_ball(
     """
     turn, at = np.zeros(len(root)), np.arange(len(root))
     for touch in touches:
-        offset = _turn_at_touch(skeleton, root, rotations, ball, touch, fps)
+        offset = _turn_at_touch(skeleton, root, rotations, ball=ball, touch=touch, fps=fps)
         bump = np.clip(1.0 - np.abs(at - touch.frame) / (_BALL_TURN_SECONDS * fps), 0.0, 1.0)
         # quintic ease; where two touches overlap the larger turn wins
         grown = offset * bump**3 * (10.0 - 15.0 * bump + 6.0 * bump**2)
@@ -55,7 +55,7 @@ def compute_turn_to_ball(
     return turn
 
 
-def _turn_at_touch(skeleton: Skeleton, root, rotations, ball, touch: Touch, fps: float) -> float:
+def _turn_at_touch(skeleton: Skeleton, root, rotations, *, ball, touch: Touch, fps: float) -> float:
     """Compute the turn, rad, at one touch; 0 without a foot that strikes or a known ball."""
     frame = int(np.clip(round(touch.frame), 1, len(root) - 2)) if len(root) > 2 else 0
     found = [surface for surface in build_surfaces(skeleton, touch.words) if surface.part == "foot"]

@@ -30,7 +30,7 @@ TURN_COST = 0.1  # per radian that the body has to turn to the ball, and m/s of 
 ANGLE_COST = 0.2  # per radian between the part's velocity and the leaving ball
 FAR_ANGLE_COST = 0.6  # per radian beyond what a body turns to it
 LOFT_COST = 0.2  # per radian between the elevations of both, beyond the noise
-SPEED_COST = 1.0  # per unit of the logarithm of the ball's speed over the part's, outside of the usual range
+SPEED_COST = 0.7  # per unit of the logarithm of the ball's speed over the part's, outside of the usual range
 SPEED_RATIO = (1.06, 1.3)
 """Speed of the leaving ball over that of the foot."""
 

@@ -15,9 +15,9 @@ import numpy as np
 from ..annotation.labels import list_labels
 from ..motion.motion import Motion
 from ..motion.retargeting.neutral import NeutralStance, build_neutral_stance
-from ..synthetic.gait_plan import GaitStyle
-from ..synthetic.gestures import Gesture
-from ..synthetic.running_kicks import Swing, build_running_kick, build_swing, measure_foot_speed, measure_plant_foot
+from .gait_plan import GaitStyle
+from .gestures import Gesture
+from .running_kicks import Swing, build_running_kick, build_swing, measure_foot_speed, measure_plant_foot
 
 KICK_LABELS = frozenset({"kick"})
 MAX_KICK_SPEED = 8.0  # m/s: faster players do not strike a ball but push it on

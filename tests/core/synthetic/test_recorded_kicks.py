@@ -8,12 +8,12 @@ import pytest
 from beyond_mocap.annotation import ClipAnnotation
 from beyond_mocap.library.clip import Clip
 from beyond_mocap.library.keys import collect_keys
-from beyond_mocap.library.running_kicks import choose_swing, iter_running_kicks
 from beyond_mocap.motion.retargeting.adult import build_adult_skeleton
 from beyond_mocap.motion.retargeting.neutral import build_neutral_stance
 from beyond_mocap.synthetic.gait import build_gait
 from beyond_mocap.synthetic.gait_plan import GaitStyle
 from beyond_mocap.synthetic.kicks import BEFORE
+from beyond_mocap.synthetic.recorded_kicks import choose_swing, iter_running_kicks
 from beyond_mocap.synthetic.running_kicks import build_swing, measure_foot_speed
 
 NEUTRAL = build_neutral_stance(build_adult_skeleton())
