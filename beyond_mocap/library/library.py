@@ -18,6 +18,7 @@ from ..annotation.gaits import STANDING, STANDING_SPEED
 from ..annotation.vocabulary import DIRECTIONS
 from ..base.errors import InputError, format_count
 from ..motion.skeleton import Skeleton
+from ..synthetic.recorded_kicks import KICK_LABELS
 from . import cache
 from .cache import write_synthetic_clips
 from .clip import Clip
@@ -29,7 +30,7 @@ from .manners import Manners, measure_manners
 from .posture import NormalPostures, fit_normal_postures
 from .run_loops import MIN_SPEED
 from .standing_loops import MIN_STAND_SECONDS
-from .synthetic_clips import KICK_LABELS, MIN_RECEIVE_SPEED, RECEIVE_LABELS, iter_synthetic_clips, measure_touch_speed
+from .synthetic_clips import KICK_STEP, MIN_RECEIVE_SPEED, RECEIVE_LABELS, iter_synthetic_clips, measure_touch_speed
 
 MIN_RUN_SECONDS = 2.0  # of a track's runs from which on long runs are needed
 RESTING_SPEED = 0.1  # m/s of a track below which a player stands
@@ -192,7 +193,7 @@ class Library:
         inside = sum(int(np.sum((speed > low) & (speed < high))) for low, high in self.coverage.speed_gaps)
         kick, take = (measure_touch_speed(self.frames, self.clips, self.keys, act)
                       for act in (KICK_LABELS, RECEIVE_LABELS))
-        too_fast = 1.3 * np.where(takes & np.isfinite(take), max(take, MIN_RECEIVE_SPEED), kick)
+        too_fast = KICK_STEP * np.where(takes & np.isfinite(take), max(take, MIN_RECEIVE_SPEED), kick)
         rests = np.sum(speed < RESTING_SPEED) >= MIN_STAND_SECONDS * self.fps
         runs = np.sum(speed > MIN_SPEED) >= MIN_RUN_SECONDS * self.fps
         aside = (speed > STANDING_SPEED) & (speed < 1.25 * BACK_SPEEDS[-1]) & (np.abs(offset) > np.pi / 3.0)

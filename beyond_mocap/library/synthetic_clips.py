@@ -17,8 +17,8 @@ Where all recordings run, or all walk slower, it generates walking the same way,
 stand: a run that is shortened to a walk's steps hops on the spot.
 
 Recorded kicks are seldom faster than a jog, and players who receive a ball with the foot in a recording hardly move;
-moved along at 8 m/s their supporting foot slides by metres. `synthetic.gestures` generates both on the run at the
-missing speeds; they substitute for recorded ones wherever they carry the labels by which those answer.
+moved along at 8 m/s their supporting foot slides by metres. `synthetic.recorded_kicks` and `synthetic.gestures`
+generate both on the run at the missing speeds; they substitute for recorded ones that answer by the same labels.
 """
 
 from __future__ import annotations
@@ -40,6 +40,7 @@ from ..motion.phase_blend import Strides, blend_strides, find_strides
 from ..synthetic import gestures
 from ..synthetic.gait import build_gait
 from ..synthetic.gait_plan import GaitStyle
+from ..synthetic.recorded_kicks import KICK_LABELS, RunningKick, iter_running_kicks
 from .coverage import MAX_SPEED, MIN_SPEED_SECONDS, Coverage, select_locomotion
 from .features import Frames
 from .missing_steps import BACK_PREFIX, STEP_PREFIX, TURN_PREFIX, iter_missing_steps
@@ -53,11 +54,13 @@ SYNTHETIC_FOLDER = f"{CACHE_FOLDER}/made-gait/"
 # folder
 BLEND_PREFIX, KICK_PREFIX, RECEIVE_PREFIX, STAND_PREFIX, LOOP_PREFIX = "blend_", "kick_", "receive_", "stand_", "loop_"
 WALK_PREFIX, STILL_PREFIX = "walk_", "still_"
-KICK_LABELS, RECEIVE_LABELS = frozenset({"kick"}), frozenset({"receive", "foot"})
+RECEIVE_LABELS = frozenset({"receive", "foot"})
 FPS = 60.0  # of synthetic clips
 # m/s: lowest speed of synthetic running (blends cover slower speeds), and of receiving a ball on the run
 _MIN_RUN_SPEED, MIN_RECEIVE_SPEED = 2.4, 1.7
-# ratios of neighbouring speeds of blends, of touches and of runs at an even speed
+# factor on the fastest recorded kick's speed from which on kicks are synthetic
+KICK_STEP = 1.3
+# ratios of neighbouring speeds of blends, of received balls and of runs at an even speed
 _BLEND_STEP, _TOUCH_STEP, _EVEN_STEP = 1.06, 1.4, 1.1
 _PAIRS = 3  # pairs of recordings blended into each gap, at most
 _MAX_SPEED_SPREAD = 0.15  # standard deviation of a steady stretch's speed, share of its mean
@@ -133,10 +136,9 @@ def iter_synthetic_clips(
         blends = list(_iter_blends(clips, frames, fps, low=low, high=high, speeds=speeds))
         yield from blends or _iter_walks(low, min(high, _MIN_RUN_SPEED), example, speeds)
         yield from _iter_runs(max(0.93 * low, _MIN_RUN_SPEED), min(1.05 * high, MAX_SPEED), example, style, speeds)
-    kinds = sorted({"inside" if "inside" in key.labels else "top" for key in keys if KICK_LABELS <= key.labels})
     fastest = measure_touch_speed(frames, clips, keys, KICK_LABELS)
-    yield from _iter_touches(KICK_PREFIX, _TOUCH_STEP * fastest, ("kick", "low"), kinds=kinds, example=example,
-                             speeds=speeds)
+    for kick in iter_running_kicks(clips, keys, KICK_STEP * fastest, example, style):
+        yield _build_kick_clip(kick, speeds)
     fastest = max(_TOUCH_STEP * measure_touch_speed(frames, clips, keys, RECEIVE_LABELS), MIN_RECEIVE_SPEED)
     yield from _iter_touches(RECEIVE_PREFIX, fastest, ("receive", "foot", "low"), kinds=["inside"], example=example,
                              speeds=speeds)
@@ -314,6 +316,14 @@ def _iter_touches(
             gait_row = _build_gait_rows(np.full(len(strike.motion), speed), speeds)
             yield _ground_clip(f"{SYNTHETIC_FOLDER}{name}{kind}_{speed:.1f}.bvh", strike.motion, None, (row, *gait_row))
         speed *= _TOUCH_STEP
+
+
+def _build_kick_clip(kick: RunningKick, speeds: dict[str, float]) -> SyntheticClip:
+    """Build the clip of a kick on the run."""
+    gesture = kick.gesture
+    row = ClipAnnotation(np.ceil(gesture.start * FPS), np.floor(gesture.end * FPS), gesture.key * FPS, kick.words)
+    gait_row = _build_gait_rows(np.full(len(gesture.motion), kick.speed), speeds)
+    return _ground_clip(f"{SYNTHETIC_FOLDER}{KICK_PREFIX}{kick.name}.bvh", gesture.motion, None, (row, *gait_row))
 
 
 def _build_gait_rows(speed: np.ndarray, speeds: dict[str, float]) -> tuple[ClipAnnotation, ...]:
