@@ -11,7 +11,7 @@ from .labels import find_label, list_labels, read_labels
 from .striking import Surface, build_part_surfaces, measure_smallest_gap
 from .vocabulary import SIDES
 
-_BY_PART = {part: frozenset(list_labels(part=part)) for part in ("head", "chest", "hand", "foot")}
+_BY_PART = {part: frozenset(list_labels(part=part)) for part in ("head", "chest", "hand", "thigh", "foot")}
 """Part -> its labels. The first part that has one of a motion's labels counts."""
 
 _BOTH_HANDS = frozenset(list_labels(both_hands=True))
@@ -23,6 +23,7 @@ _FOOT_ON_BALL = tuple(
 )  # fmt: skip
 _FOOT_OR_OTHER = frozenset(label.name for label in read_labels().values() if "foot" in label.parts and not label.part)
 _FOOT_TAKES = frozenset(list_labels(ball="takes", part="foot", is_root=True))
+_TAKES, _SENDS = frozenset(list_labels(ball="takes")), frozenset(list_labels(ball="sends"))
 _FLIGHT_SECONDS = 0.6  # from take-off to ball contact at most, in dives by hand
 
 
@@ -34,7 +35,7 @@ def find_striking_part(labels: Iterable[str]) -> str | None:
     Args:
         labels: the labels of a motion.
     Returns:
-        "foot", "head", "chest" or "hand"; None for labels without ball contact.
+        "foot", "thigh", "head", "chest" or "hand"; None for labels without ball contact.
     """
     labels = set(labels)
     return next((part for part, part_labels in _BY_PART.items() if part_labels & labels), None)
@@ -113,6 +114,20 @@ def takes_with_foot(labels: Iterable[str]) -> bool:
         labels: the labels of a motion.
     """
     return bool(_FOOT_TAKES.intersection(labels))
+
+
+def takes_and_sends(a: frozenset[str], b: frozenset[str]) -> bool:
+    """Return whether one of two motions only takes the ball and the other one only sends it.
+
+    A foot that stops a ball gives with it, one that sends it swings through, so neither can stand for the other. A
+    dribble carries the ball and does both.
+
+    Args:
+        a: the labels of one motion.
+        b: the labels of the other.
+    """
+    (a_takes, a_sends), (b_takes, b_sends) = ((bool(_TAKES & labels), bool(_SENDS & labels)) for labels in (a, b))
+    return a_takes != a_sends and a_takes == b_sends and a_sends == b_takes
 
 
 def build_surfaces(skeleton: Skeleton, labels: Iterable[str]) -> tuple[Surface, ...]:

@@ -9,6 +9,7 @@ import numpy as np
 from ..annotation.ball_contact import takes_with_foot
 from ..annotation.gaits import compute_heading_offset
 from ..library.automatic_locomotion import apply_chosen_gaits
+from ..library.keys import select_keys
 from ..library.library import Library
 from .plan import ResolvedPlan
 from .search.edit_list import EditList
@@ -35,10 +36,12 @@ def extend_library(
 
 
 def _lacks_speeds(library: Library, plan: ResolvedPlan) -> bool:
-    """Return whether the recordings lack speeds of the track, or touches as fast as its key moments."""
+    """Return whether the recordings lack speeds of the track, receptions, or touches as fast as its key moments."""
     track = plan.sample_track(library.fps)
     moments = np.array([key.resolved_time for key in plan.timeline.keys])
     takes = np.array([takes_with_foot(key.words) for key in plan.timeline.keys], bool)
     offset = compute_heading_offset(track)
+    if any(take and not select_keys(library.keys, key.words) for take, key in zip(takes, plan.timeline.keys)):
+        return True
     return library.needs_synthetic_clips(track.speed, offset, np.unwrap(track.direction + offset),
                                          np.interp(moments, track.times, track.speed), takes)

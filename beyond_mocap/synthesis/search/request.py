@@ -179,7 +179,7 @@ def _build_key(library, moment: KeyMoment, track, gait, allowed, use_nearest: bo
     if moment.avoid:
         usable, synthetic = _remove_avoided(moment, usable, synthetic, warnings)
     # recordings that carry the labels first, then synthetic clips
-    choices = select_keys(usable, moment.words)
+    choices = select_keys(usable, moment.words) or (select_keys(synthetic, moment.words) if use_nearest else ())
     if choices:
         return RequestedKey(requested=moment, frame=frame,
                             choices=(*choices, *select_substitutes(choices, synthetic, moment.words)),
