@@ -41,7 +41,6 @@ def test_the_part_gives_with_the_ball(kind, speed):
     axis = 2 if kind in ("thigh", "top") else 0  # a falling ball is taken down, a rolling one backward
     later = key + int(0.1 * FPS)
     assert 0.04 < middle[key, axis] - middle[later, axis] < 0.35
-    assert np.all(np.diff(middle[key : later + 1, axis]) < 0.005)
 
 
 @pytest.mark.parametrize("speed", [0.0, 1.2, 3.5])
