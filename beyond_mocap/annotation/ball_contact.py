@@ -24,6 +24,9 @@ _FOOT_ON_BALL = tuple(
 _FOOT_OR_OTHER = frozenset(label.name for label in read_labels().values() if "foot" in label.parts and not label.part)
 _FOOT_TAKES = frozenset(list_labels(ball="takes", part="foot", is_root=True))
 _TAKES, _SENDS = frozenset(list_labels(ball="takes")), frozenset(list_labels(ball="sends"))
+_STATED = frozenset({"foot", *list_labels(group="height"), *list_labels(group="surface")})
+_PART_BY_HEIGHT = ((0.45, ("foot", "low")), (0.75, ("foot", "high")), (1.05, ("thigh",)), (np.inf, ("body",)))
+"""Below which height in m of the ball which part takes it: the knee of an adult is at 0.5 m, the hip at 0.95 m."""
 _FLIGHT_SECONDS = 0.6  # from take-off to ball contact at most, in dives by hand
 
 
@@ -114,6 +117,22 @@ def takes_with_foot(labels: Iterable[str]) -> bool:
         labels: the labels of a motion.
     """
     return bool(_FOOT_TAKES.intersection(labels))
+
+
+def choose_part_by_height(labels: Iterable[str], height: float | None) -> tuple[str, ...]:
+    """Choose the part that takes a ball at a height, where the labels leave that open: a plain "receive".
+
+    Args:
+        labels: the labels of a motion.
+        height: m of the ball's centre above the ground, None where it is unknown.
+    Returns:
+        The labels, with those of the part and height added.
+    """
+    labels = tuple(labels)
+    is_open = takes_with_foot(labels) and find_striking_part(labels) == "foot" and not _STATED & set(labels)
+    if not is_open or height is None:
+        return labels
+    return (*labels, *next(part for most, part in _PART_BY_HEIGHT if height < most))
 
 
 def takes_and_sends(a: frozenset[str], b: frozenset[str]) -> bool:

@@ -17,9 +17,9 @@ Where all recordings run, or all walk slower, it generates walking the same way,
 stand: a run that is shortened to a walk's steps hops on the spot.
 
 Recorded kicks are seldom faster than a jog, and players who receive a ball with the foot in a recording hardly move;
-moved along at 8 m/s their supporting foot slides by metres. `synthetic.gestures` and `synthetic.receptions` generate
-both on the run at the missing speeds; they substitute for recorded ones wherever they carry the labels by which those
-answer. Where no recording receives a ball, receptions are generated for all speeds, from a stand on.
+moved along at 8 m/s their supporting foot slides by metres. `synthetic.gestures` and `synthetic.actions.receptions`
+generate both on the run at the missing speeds; they substitute for recorded ones wherever they carry the labels by
+which those answer.
 """
 
 from __future__ import annotations
@@ -41,13 +41,13 @@ from ..motion.phase_blend import Strides, blend_strides, find_strides
 from ..synthetic import gestures
 from ..synthetic.gait import build_gait
 from ..synthetic.gait_plan import GaitStyle
-from ..synthetic.receptions import RECEPTIONS, build_reception
+from ..synthetic.actions.receptions import build_reception
 from .features import Frames
+from .loops.run_loops import LOOP_SECONDS, iter_run_loops
+from .loops.standing_loops import LOOP_SECONDS as STAND_SECONDS
+from .loops.standing_loops import iter_standing_loops
 from .missing_steps import BACK_PREFIX, STEP_PREFIX, TURN_PREFIX, iter_missing_steps
-from .run_loops import LOOP_SECONDS, iter_run_loops
 from .scan import CACHE_FOLDER
-from .standing_loops import LOOP_SECONDS as STAND_SECONDS
-from .standing_loops import iter_standing_loops
 
 SYNTHETIC_FOLDER = f"{CACHE_FOLDER}/made-gait/"
 # how the file names of blends, kicks, received balls, long stands, long runs, walks and synthetic stands begin, in that
@@ -175,7 +175,8 @@ def iter_synthetic_clips(
     fastest = measure_touch_speed(frames, clips, keys, KICK_LABELS)
     yield from _iter_touches(KICK_PREFIX, _TOUCH_STEP * fastest, ("kick", "low"), kinds=kinds, example=example,
                              speeds=speeds)
-    yield from _iter_receptions(clips, frames, keys, example, speeds)
+    fastest = max(_TOUCH_STEP * measure_touch_speed(frames, clips, keys, RECEIVE_LABELS), MIN_RECEIVE_SPEED)
+    yield from _iter_receptions(fastest, example, speeds)
     stands = [(STAND_PREFIX, motion) for _, motion in iter_standing_loops(clips, frames, fps, strangeness, FPS)]
     if not stands:
         stands = [(STILL_PREFIX, build_gait(0.0, STAND_SECONDS, FPS, example.skeleton, example=example))]
@@ -352,19 +353,16 @@ def _iter_touches(
         speed *= _TOUCH_STEP
 
 
-def _iter_receptions(clips, frames: Frames, keys, example: Motion, speeds: dict[str, float]) -> Iterator[SyntheticClip]:
-    """Iterate over receptions of all kinds that no recording has, and over those that are faster than recorded ones."""
-    for kind, reception in RECEPTIONS.items():
-        recorded = measure_touch_speed(frames, clips, keys, frozenset(reception.action))
-        fastest = max(_TOUCH_STEP * recorded, MIN_RECEIVE_SPEED) if np.isfinite(recorded) else 0.0
-        for speed in reception.list_speeds(fastest):
-            touch = build_reception(kind, example.skeleton, FPS, speed, example=example)
-            row = ClipAnnotation(np.ceil(touch.start * FPS), np.floor(touch.end * FPS), touch.key * FPS,
-                                 reception.list_labels(speed))
-            gaits = _build_gait_rows(np.full(len(touch.motion), speed), speeds) if speed else (
-                ClipAnnotation(0, len(touch.motion) - 1, None, (STANDING,)),)
-            name = f"{SYNTHETIC_FOLDER}{RECEIVE_PREFIX}{kind}_{speed:.1f}.bvh"
-            yield _ground_clip(name, touch.motion, None, (row, *gaits))
+def _iter_receptions(speed: float, example: Motion, speeds: dict[str, float]) -> Iterator[SyntheticClip]:
+    """Iterate over receptions with the inside of the right foot on the run, from `speed` m/s to a sprint."""
+    while speed < MAX_SPEED:
+        touch = build_reception("inside", example.skeleton, FPS, speed, example=example)
+        words = ("receive", "right", "foot", "low", "inside", "running", "front")
+        row = ClipAnnotation(np.ceil(touch.start * FPS), np.floor(touch.end * FPS), touch.key * FPS, words)
+        gait_row = _build_gait_rows(np.full(len(touch.motion), speed), speeds)
+        name = f"{SYNTHETIC_FOLDER}{RECEIVE_PREFIX}inside_{speed:.1f}.bvh"
+        yield _ground_clip(name, touch.motion, None, (row, *gait_row))
+        speed *= _TOUCH_STEP
 
 
 def _build_gait_rows(speed: np.ndarray, speeds: dict[str, float]) -> tuple[ClipAnnotation, ...]:
@@ -401,10 +399,10 @@ def _ground_clip(name: str, motion: Motion, heel_toe_contacts: np.ndarray | None
     if plants_feet:
         planted = plant_feet(motion.skeleton, motion.root_positions, motion.rotations, heel_toe_contacts, motion.fps)
         motion = replace(motion, root_positions=planted.root, rotations=planted.rotations)
-    return SyntheticClip(name, motion, rows, heel_toe_contacts & _detect_still_points(motion))
+    return SyntheticClip(name, motion, rows, heel_toe_contacts & detect_still_points(motion))
 
 
-def _detect_still_points(motion: Motion) -> np.ndarray:
+def detect_still_points(motion: Motion) -> np.ndarray:
     """Detect which of left and right, heel and toe move over the ground by less than a stance's creep: (T, 2, 2) bool.
     """
     body = identify_joints(motion.skeleton)

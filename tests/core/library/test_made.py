@@ -27,7 +27,7 @@ from beyond_mocap.motion.track import Track
 from beyond_mocap.synthesis.plan import Plan
 from beyond_mocap.synthesis.quality.movement import list_stances, measure_stance_travel
 from beyond_mocap.synthesis.synthesize import synthesize
-from beyond_mocap.synthetic.receptions import build_reception
+from beyond_mocap.synthetic.actions.receptions import build_reception
 
 
 def straight(speed: float, seconds: float = 6.0) -> Track:

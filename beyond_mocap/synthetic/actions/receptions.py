@@ -10,14 +10,16 @@ speed of 5 to 10 m/s away at the decelerations of a foot's swing, 100 to 200 m/s
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 
-from ..motion.motion import Motion
-from ..motion.skeleton import Skeleton
-from .gestures import Gesture, StrikeRecipe, build_touch
-from .volleys import Volley, build_standing_touch
+from ...motion.motion import Motion
+from ...motion.skeleton import Skeleton
+from ..gestures import Gesture, StrikeRecipe, build_touch
+from ..volleys import Volley, build_standing_touch
+from .action import Action, ActionSetting
 
 SLOWEST = 0.7
 """Speed in m/s of a body below which it stands while it takes a ball."""
@@ -27,9 +29,8 @@ SPEEDS = (0.0, 1.2, 1.8, 2.5, 3.5, 4.9, 6.9)
 
 # a ball taken on the way: shares of the body's speed; the body slows down towards the ball and goes on
 _COURSE = ((-1.3, 1.0), (-0.8, 1.0), (-0.2, 0.94), (0.1, 0.88), (0.4, 0.9), (0.9, 1.0), (1.4, 1.0))
-_STEP = 1.4  # from one speed to the next
-_RUNNING = 2.0  # m/s from which on the body runs, as `match.labels` says of touches
 _WALK, _RUN = 1.7, 3.3  # m/s of a walk, and of a run
+_LIFT_SECONDS = 0.28  # after the touch in which a lifted foot comes down
 _SWING_SHARE = 0.66  # of the foot's swing that has passed at the touch
 # seconds before and after the touch in which a standing body differs from standing
 _SPAN = (-0.75, 0.95)
@@ -44,9 +45,12 @@ class Reception:
     """How the right side takes a ball; seconds from the touch, metres of an adult, degrees.
 
     Attributes:
+        name: as reports call it.
         labels: labels of the vocabulary, without side and pace.
-        action: the labels by which a recording shows the like.
         speeds: m/s of the body from and up to which it is done.
+        heights: m of the ball's centre from and up to which it is done.
+        height: m of the ball's centre in the rows of the foot.
+        most_ball_speed: m/s of the arriving ball up to which it is done.
         foot: rows (time, ahead of the hips, left of them, ankle height, pitch, yaw, roll); () leaves both feet.
         low: metres by which the hips are lowered at the touch.
         pelvis: rows (time, list, tilt, turn).
@@ -56,9 +60,12 @@ class Reception:
         nod: degrees by which the head looks down.
     """
 
+    name: str
     labels: tuple[str, ...]
-    action: tuple[str, ...]
     speeds: tuple[float, float]
+    heights: tuple[float, float] = (0.11, 0.45)
+    height: float = 0.11
+    most_ball_speed: float = np.inf
     foot: tuple = ()
     low: float = 0.05
     pelvis: tuple = _PELVIS
@@ -67,28 +74,10 @@ class Reception:
     right_arm: tuple = _RIGHT_ARM
     nod: float = 24.0
 
-    def list_labels(self, speed: float) -> tuple[str, ...]:
-        """List its labels at `speed` m/s of the body, with side, pace and direction."""
-        action, *others = self.labels
-        return (action, "right", *others, "running" if speed >= _RUNNING else "standing", "front")
-
-    def list_speeds(self, recorded: float) -> tuple[float, ...]:
-        """List the speeds of the body in m/s at which it is needed.
-
-        Args:
-            recorded: m/s up to which recordings show the like; 0 where none does. Then only the inside of the foot,
-                which serves most balls, is needed, and faster than recorded.
-        """
-        slowest, fastest = self.speeds
-        if not recorded:
-            return tuple(speed for speed in SPEEDS if slowest <= speed <= fastest)
-        count = max(0, int(np.ceil(np.log(fastest / recorded) / np.log(_STEP))))
-        return tuple(recorded * _STEP ** np.arange(count)) if "inside" in self.labels else ()
-
 
 RECEPTIONS = {
     "inside": Reception(
-        labels=("receive", "foot", "low", "inside"), action=("receive", "foot"), speeds=(0.0, 9.4),
+        name="reception with the inside of the foot", labels=("receive", "foot", "low", "inside"), speeds=(0.0, 9.4),
         foot=(
             (-0.12, 0.35, -0.14, 0.140, -4, -64, -4),
             (0.0, 0.36, -0.14, 0.130, -4, -70, -6), (0.08, 0.29, -0.14, 0.125, -3, -70, -8),
@@ -96,7 +85,7 @@ RECEPTIONS = {
         ),
     ),
     "outside": Reception(
-        labels=("receive", "foot", "low", "outside"), action=("receive", "foot"), speeds=(1.5, 5.5),
+        name="reception with the outside of the foot", labels=("receive", "foot", "low", "outside"), speeds=(1.5, 5.5),
         foot=(
             (-0.12, 0.29, -0.17, 0.140, 14, 26, 8),
             (0.0, 0.30, -0.18, 0.130, 14, 32, 12), (0.08, 0.25, -0.19, 0.125, 12, 32, 12),
@@ -105,7 +94,7 @@ RECEPTIONS = {
         pelvis=((-0.20, 3, 3, 4), (0.0, 3, 2, 8), (0.20, 2, 3, 2)),
     ),
     "sole": Reception(
-        labels=("receive", "foot", "low", "sole"), action=("receive", "foot"), speeds=(0.0, 1.5),
+        name="reception with the sole", labels=("receive", "foot", "low", "sole"), speeds=(0.0, 1.5), heights=(0.11, 0.15), most_ball_speed=6.0,
         foot=(
             (-0.12, 0.34, -0.12, 0.260, -24, -8, 0),
             (0.0, 0.36, -0.11, 0.240, -26, -8, 0), (0.08, 0.31, -0.11, 0.230, -24, -8, 0),
@@ -114,7 +103,7 @@ RECEPTIONS = {
         spine=((-0.20, -4, 7, 4), (0.0, -5, 10, 0), (0.20, -3, 13, 2)),
     ),
     "top": Reception(
-        labels=("receive", "foot", "high", "top"), action=("receive", "foot", "high"), speeds=(0.0, 5.5),
+        name="reception with the instep", labels=("receive", "foot", "high", "top"), speeds=(0.0, 5.5), heights=(0.45, 0.75), height=0.46,
         foot=(
             (-0.12, 0.38, -0.12, 0.470, 12, -20, -4),
             (0.0, 0.40, -0.12, 0.480, 10, -22, -6), (0.08, 0.36, -0.12, 0.400, 12, -22, -6),
@@ -125,7 +114,7 @@ RECEPTIONS = {
         spine=((-0.20, -4, 2, 4), (0.0, -6, 2, 0), (0.20, -3, 10, 4)),
     ),
     "thigh": Reception(
-        labels=("receive", "thigh"), action=("receive", "thigh"), speeds=(0.0, 4.0),
+        name="reception with the thigh", labels=("receive", "thigh"), speeds=(0.0, 4.0), heights=(0.75, 1.05), height=1.0,
         foot=(
             (-0.12, 0.22, -0.12, 0.490, 30, -8, 0),
             (0.0, 0.24, -0.12, 0.520, 28, -8, 0), (0.08, 0.23, -0.12, 0.440, 28, -8, 0),
@@ -137,7 +126,7 @@ RECEPTIONS = {
         spine=((-0.20, -5, 2, 2), (0.0, -6, 0, 0), (0.20, -3, 10, 2)),
     ),
     "chest": Reception(
-        labels=("receive", "body"), action=("receive", "body"), speeds=(0.0, 4.0), low=0.07,
+        name="reception with the chest", labels=("receive", "body"), speeds=(0.0, 4.0), heights=(1.05, 1.6), height=1.3, low=0.07,
         pelvis=((-0.40, 0, 2, 0), (-0.05, 0, -12, 0), (0.10, 0, -10, 0), (0.25, 0, -2, 0), (0.5, 0, 2, 0)),
         spine=((-0.40, 0, 2, 0), (-0.05, 0, -20, 0), (0.08, 0, -12, 0), (0.22, 0, 6, 0), (0.5, 0, 6, 0)),
         left_arm=((-0.35, 6, 36, 8, 34), (0.0, -10, 62, 0, 50), (0.25, 2, 48, 5, 44)),
@@ -149,7 +138,7 @@ RECEPTIONS = {
 
 def build_reception(
     kind: str, skeleton: Skeleton | None = None, fps: float = 60.0, speed: float = 0.0, seed: int = 0, *,
-    example: Motion | None = None,
+    height: float | None = None, example: Motion | None = None,
 ) -> Gesture:
     """Build the reception of a ball with the right side; the body faces and travels along +X and goes on.
 
@@ -159,14 +148,24 @@ def build_reception(
         fps: frames per second.
         speed: m/s of the body; below SLOWEST it stands.
         seed: of the variation.
+        height: m of the ball's centre for an adult, within the reception's; None: as its rows have it.
         example: a recording on `skeleton`, for its neutral stance.
     Returns:
         The move; its key is the touch.
     """
     reception = RECEPTIONS[kind]
+    reception = reception if height is None else _lift(reception, height)
     if speed < SLOWEST:
         return build_standing_touch(_stand(reception), skeleton, fps, seed, example=example)
     return build_touch(_travel(reception, speed), skeleton, fps, seed=seed, example=example)
+
+
+def _lift(reception: Reception, height: float) -> Reception:
+    """Lift the foot of a reception to a ball at `height` m; it is down again when the foot lands."""
+    lift = float(np.clip(height, *reception.heights)) - reception.height
+    rows = [(row[0], row[1], row[2], row[3] + lift * (1.0 if row[0] <= 0.0 else max(1.0 - row[0] / _LIFT_SECONDS, 0.0)),
+             *row[4:]) for row in reception.foot]
+    return replace(reception, foot=tuple(rows))
 
 
 def _stand(reception: Reception) -> Volley:
@@ -195,3 +194,23 @@ def _travel(reception: Reception, speed: float) -> StrikeRecipe:
         pace=0.58 + 0.19 * run, at=_SWING_SHARE, sink=((-0.15, 0.8 * low), (0.0, low), (0.25, 0.8 * low)),
         head=reception.nod,
     )
+
+
+def _build_action(kind: str, setting: ActionSetting) -> Gesture:
+    height = None if setting.height is None else setting.height / setting.scale
+    return build_reception(kind, setting.skeleton, setting.fps, setting.speed, height=height, example=setting.example)
+
+
+def _build_row(kind: str) -> Action:
+    """Build the row of a reception: the inside of the foot serves most balls, outside and sole some as well."""
+    one = RECEPTIONS[kind]
+    return Action(
+        name=one.name, labels=frozenset({*one.labels, "standing", "running", "front"}), has_side=True,
+        build=partial(_build_action, kind), heights=one.heights if one.foot else (), most_ball_speed=one.most_ball_speed,
+        speeds=tuple(speed for speed in SPEEDS if one.speeds[0] <= speed <= one.speeds[1]),
+        varies=RECEPTIONS["inside"].name if kind in ("outside", "sole") else "",
+    )  # fmt: skip
+
+
+RECEPTION_ACTIONS = tuple(map(_build_row, RECEPTIONS))
+"""The rows of `actions.table`."""
