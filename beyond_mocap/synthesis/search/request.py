@@ -21,7 +21,7 @@ from ...annotation import (
     sort_labels,
 )
 from ...annotation.vocabulary import DIRECTIONS
-from ...annotation.ball_contact import choose_part_by_height
+from ...annotation.ball_contact import choose_part_by_height, takes_with_foot
 from ...base.errors import NotInLibraryError, TimedMessage, format_seconds
 from ...library.automatic_locomotion import build_automatic_labels
 from ...library.keys import Key, list_nearest_labels, select_keys, select_nearest_keys, select_substitutes
@@ -32,6 +32,9 @@ from ..plan import Plan, ResolvedPlan
 from .preferences import LagPreference, build_lag_preference, compute_manner_cost, compute_style_cost
 
 PAPERS_OMEGA = 4.0  # Faustino 2016, §3.1.1
+RECEPTION_RATES = (0.7, 0.85, 1.0, 1.1)
+"""Playback rates at which the clip of a reception may be played: a foot that gives faster is a kick to the eye."""
+
 USE_NEAREST = "turn on Nearest Labels"
 """Last words of the error for missing labels; the command line names its option instead."""
 
@@ -134,7 +137,8 @@ def build_request(library: Library, plan: ResolvedPlan) -> SearchRequest:
         library, moment, track, ball_height=height, gait=gait, allowed=allowed, use_nearest=settings.nearest,
         warnings=warnings,
     ) for moment, height in zip(timeline.keys, heights))
-    keys = tuple(replace(key, is_ball_height_known=height is not None) for key, height in zip(keys, heights))
+    keys = tuple(replace(key, is_ball_height_known=height is not None, rates=_choose_rates(key.requested))
+                 for key, height in zip(keys, heights))
     requested_labels = _clear_around_keys(labels_per_frame(timeline, track.times), keys, library)
     warnings += _report_missing_labels(library, plan.timeline)
     avoided = tuple(avoided) if any(avoided) else ()
@@ -207,6 +211,11 @@ def _build_key(library, moment: KeyMoment, track, ball_height: float | None, gai
     warnings.append(TimedMessage(f"{text}; used instead: {instead}", (moment.time, moment.time)))
     return RequestedKey(requested=moment, frame=frame,
                         choices=(*choices, *select_substitutes(choices, synthetic, moment.words)), used_instead=used)
+
+
+def _choose_rates(moment: KeyMoment) -> tuple[float, ...]:
+    """Choose the playback rates of a key moment's clip: one that takes the ball is not hurried."""
+    return RECEPTION_RATES if takes_with_foot(moment.words) else ()
 
 
 def _remove_avoided(moment: KeyMoment, usable: tuple[Key, ...], synthetic: tuple[Key, ...], warnings: list[str]):
