@@ -196,6 +196,9 @@ def _build_key(library, moment: KeyMoment, track, ball_height: float | None, gai
                             choices=(*choices, *select_substitutes(choices, synthetic, moment.words)),
                             used_instead=None)
     choices = select_keys(actions, chosen) or select_keys(actions, moment.words)
+    if takes_with_foot(moment.words):
+        cut = [key for key in library.cut_receptions if allowed[key.clip] and not key.labels & set(moment.avoid)]
+        choices = (*select_keys(cut, chosen), *choices)
     if choices:
         return RequestedKey(requested=moment, frame=frame, choices=choices, used_instead=None)
     nearest = list_nearest_labels(usable, moment.words)
