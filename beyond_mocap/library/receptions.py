@@ -59,7 +59,8 @@ def _find_gives(frames: Frames, dribbles: np.ndarray, is_in_contact: np.ndarray,
     found = []
     for frame in find_peaks(toe[:, 0], height=_AHEAD)[0]:
         first, end = frame - max(around, back), frame + max(around, back) + 1
-        if first < 0 or end > len(frames) or frames.clip[first] != frames.clip[end - 1] or not dribbles[first:end].all():
+        inside = first >= 0 and end <= len(frames) and frames.clip[first] == frames.clip[end - 1]
+        if not inside or not dribbles[first:end].all():
             continue
         fastest = float(speed[frame - around : frame + around + 1].max())
         gives = toe[frame, 0] - toe[frame : frame + back + 1, 0].min() >= _GIVE

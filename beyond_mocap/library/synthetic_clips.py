@@ -39,9 +39,9 @@ from ..motion.humanoid import compute_heading_from_positions, identify_joints
 from ..motion.motion import Motion, forward_kinematics, sample_frames
 from ..motion.phase_blend import Strides, blend_strides, find_strides
 from ..synthetic import gestures
+from ..synthetic.actions.receptions import build_reception
 from ..synthetic.gait import build_gait
 from ..synthetic.gait_plan import GaitStyle
-from ..synthetic.actions.receptions import build_reception
 from .features import Frames
 from .loops.run_loops import LOOP_SECONDS, iter_run_loops
 from .loops.standing_loops import LOOP_SECONDS as STAND_SECONDS

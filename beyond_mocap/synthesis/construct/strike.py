@@ -53,12 +53,14 @@ from .move_body_part import (
 BALL_NOISE, FILLED_NOISE = 0.3, 1.0
 """Metres that the ball may be moved from its place, where it was measured and where the feed has filled it in."""
 
-MAX_SHIFT = {"foot": 0.45, "hand": 0.4, "head": 0.2, "chest": 0.12, "thigh": 0.1}  # m, largest move of a part from the recording
+# m, largest move of a part from the recording
+MAX_SHIFT = {"foot": 0.45, "hand": 0.4, "head": 0.2, "chest": 0.12, "thigh": 0.1}
 PELVIS_RANGE = (0.20, 0.64)  # m on the ground from pelvis to striking foot in measured kicks, unless recorded further
 OUT_OF_REACH = 0.15  # m of remaining gap above which the body does not reach at all, and plays as recorded
 MAX_DROP = 0.04  # m, largest drop of the pelvis
 _LONGEST_EASE, _SHORTEST_EASE = 0.5, 0.12  # s before and after a strike in which the body is eased
-_RISE = {"foot": 0.0, "hand": 0.0, "head": 0.6, "chest": 0.0, "thigh": 0.8}  # sine of the ball's elevation as seen from the part
+# sine of the ball's elevation as seen from the part
+_RISE = {"foot": 0.0, "hand": 0.0, "head": 0.6, "chest": 0.0, "thigh": 0.8}
 _IN_THE_AIR = 0.2  # m above which a ball may be met higher or lower
 _HANDS_APART = 0.6  # m between the hands beyond which one hand alone catches in a dive
 _STOPPING = frozenset(list_labels(ball="takes"))

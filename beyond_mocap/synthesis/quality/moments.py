@@ -8,12 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ...annotation import KeyMoment
-from ...annotation.ball_contact import (
-    choose_contact_labels,
-    find_contact_window,
-    measure_contact_gap,
-    takes_with_foot,
-)
+from ...annotation.ball_contact import choose_contact_labels, find_contact_window, measure_contact_gap, takes_with_foot
 from ...annotation.striking import build_part_surfaces, measure_smallest_gap
 from ...library.library import Library
 from ...library.missing_actions import add_actions

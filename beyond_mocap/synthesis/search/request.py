@@ -20,8 +20,8 @@ from ...annotation import (
     labels_per_frame,
     sort_labels,
 )
-from ...annotation.vocabulary import DIRECTIONS
 from ...annotation.ball_contact import choose_part_by_height, takes_with_foot
+from ...annotation.vocabulary import DIRECTIONS
 from ...base.errors import NotInLibraryError, TimedMessage, format_seconds
 from ...library.automatic_locomotion import build_automatic_labels
 from ...library.keys import Key, list_nearest_labels, select_keys, select_nearest_keys, select_substitutes

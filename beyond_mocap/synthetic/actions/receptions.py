@@ -4,8 +4,8 @@ Each is one table of key poses over seconds from the touch, played out of standi
 running (`gestures`). There is no backswing and no follow-through: the foot is out before the ball arrives, gives with
 it for 0.15 to 0.2 s at about 1 m/s against the pelvis, and the next step goes on. The support knee is bent, the trunk
 leans over the ball. Skilled players turn the pelvis parallel to the ball's course and turn the sole outward quickly at
-the touch (Int. J. Sports Sci. Coach. 2025, doi 10.1177/17479541251350820); the way of giving is what takes a ball's
-speed of 5 to 10 m/s away at the decelerations of a foot's swing, 100 to 200 m/s^2, v^2 / 2a.
+the touch (Int. J. Sports Sci. Coach. 2025, doi 10.1177/17479541251350820). How far the foot gives, 0.1 to 0.2 m, and
+its 3 m/s against the pelvis at most are the project's targets, not published figures; recorded dribbles give alike.
 """
 
 from __future__ import annotations
@@ -96,7 +96,8 @@ RECEPTIONS = {
         pelvis=((-0.20, 3, 3, 4), (0.0, 3, 2, 8), (0.20, 2, 3, 2)),
     ),
     "sole": Reception(
-        name="reception with the sole", labels=("receive", "foot", "low", "sole"), speeds=(0.0, 1.5), heights=(), most_ball_speed=6.0,
+        name="reception with the sole",
+        labels=("receive", "foot", "low", "sole"), speeds=(0.0, 1.5), heights=(), most_ball_speed=6.0,
         foot=(
             (-0.16, 0.34, -0.12, 0.260, -24, -8, 0),
             (0.0, 0.36, -0.11, 0.240, -26, -8, 0), (0.08, 0.31, -0.11, 0.230, -24, -8, 0),
@@ -105,7 +106,8 @@ RECEPTIONS = {
         spine=((-0.20, -4, 7, 4), (0.0, -5, 10, 0), (0.20, -3, 13, 2)),
     ),
     "top": Reception(
-        name="reception with the instep", labels=("receive", "foot", "high", "top"), speeds=(0.0, 5.5), heights=(0.45, 0.75), height=0.46,
+        name="reception with the instep",
+        labels=("receive", "foot", "high", "top"), speeds=(0.0, 5.5), heights=(0.45, 0.75), height=0.46,
         foot=(
             (-0.16, 0.38, -0.12, 0.470, 12, -20, -4),
             (0.0, 0.40, -0.12, 0.480, 10, -22, -6), (0.08, 0.36, -0.12, 0.400, 12, -22, -6),
@@ -116,7 +118,8 @@ RECEPTIONS = {
         spine=((-0.20, -4, 2, 4), (0.0, -6, 2, 0), (0.20, -3, 10, 4)),
     ),
     "thigh": Reception(
-        name="reception with the thigh", labels=("receive", "thigh"), speeds=(0.0, 4.0), heights=(0.75, 1.05), height=1.0,
+        name="reception with the thigh",
+        labels=("receive", "thigh"), speeds=(0.0, 4.0), heights=(0.75, 1.05), height=1.0,
         foot=(
             (-0.16, 0.22, -0.12, 0.490, 30, -8, 0),
             (0.0, 0.24, -0.12, 0.520, 28, -8, 0), (0.08, 0.23, -0.12, 0.440, 28, -8, 0),
@@ -164,7 +167,7 @@ def build_reception(
 
 def _lift(reception: Reception, height: float) -> Reception:
     """Lift the foot of a reception to a ball at `height` m; it is down again when the foot lands."""
-    lift = float(np.clip(height, *reception.heights)) - reception.height
+    lift = min(max(height, reception.heights[0]), reception.heights[-1]) - reception.height
     rows = [(row[0], row[1], row[2], row[3] + lift * (1.0 if row[0] <= 0.0 else max(1.0 - row[0] / _LIFT_SECONDS, 0.0)),
              *row[4:]) for row in reception.foot]
     return replace(reception, foot=tuple(rows))

@@ -24,7 +24,8 @@ def arrive(kind, speed=0.0, leaving=2.0):
     met = middle + [surface.radius + BALL_RADIUS, 0.0, 0.0]
     seconds = (np.arange(len(places)) - key) / FPS
     along = np.where(seconds < 0.0, -8.0, leaving) * seconds
-    ball = np.stack([met[0] + along, np.full(len(along), met[1]), np.full(len(along), max(met[2], BALL_RADIUS))], axis=1)
+    ball = np.tile([met[0], met[1], max(met[2], BALL_RADIUS)], (len(along), 1))
+    ball[:, 0] += along
     return move.motion, words, key, ball
 
 
@@ -54,7 +55,8 @@ def test_a_kicked_ball_and_one_that_is_missed_are_left_alone():
 
 def test_the_next_touch_ends_it():
     motion, words, key, ball = arrive("inside")
-    led = give_with_ball(motion.skeleton, motion.root_positions, motion.rotations, ball, (key, key), words, key + 6, FPS)
+    pose = motion.skeleton, motion.root_positions, motion.rotations
+    led = give_with_ball(*pose, ball, (key, key), words, key + 6, FPS)
     np.testing.assert_array_equal(led[key + 6 :], ball[key + 6 :])
     assert not np.array_equal(led[key + 3], ball[key + 3])
 
