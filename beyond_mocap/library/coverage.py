@@ -20,9 +20,9 @@ from ..base.vectors import arctan2
 from ..motion import quaternion
 from ..motion.phase_blend import Strides, find_strides
 from .features import Frames
+from .loops.run_loops import MAX_MISMATCH, iter_steady_parts
+from .loops.standing_loops import find_stands
 from .posture import find_steady_travel, select_calm_postures
-from .run_loops import MAX_MISMATCH, iter_steady_parts
-from .standing_loops import find_stands
 
 MAX_SPEED = 9.4  # m/s, a sprint
 WARP = (0.875, 1.125)  # range of playback rates of a clip

@@ -26,10 +26,11 @@ from .clusters import Clusters
 from .coverage import BACK_SPEEDS, TURNS, Coverage, measure_coverage
 from .features import FPS, Frames, build_frames, join_frames
 from .keys import Key, collect_keys
+from .loops.run_loops import MIN_SPEED
+from .loops.standing_loops import MIN_STAND_SECONDS
 from .manners import Manners, measure_manners
 from .posture import NormalPostures, fit_normal_postures
-from .run_loops import MIN_SPEED
-from .standing_loops import MIN_STAND_SECONDS
+from .receptions import find_cut_receptions
 from .synthetic_clips import KICK_STEP, MIN_RECEIVE_SPEED, RECEIVE_LABELS, iter_synthetic_clips, measure_touch_speed
 
 MIN_RUN_SECONDS = 2.0  # of a track's runs from which on long runs are needed
@@ -82,6 +83,11 @@ class Library:
     def keys(self) -> tuple[Key, ...]:
         """Key moments of all clips."""
         return collect_keys(self.clips)
+
+    @cached_property
+    def cut_receptions(self) -> tuple[Key, ...]:
+        """Key moments of receptions that are cut out of dribbles; none where a recording is labelled with one."""
+        return find_cut_receptions(self.clips, self.frames, self.feet_in_contact, self.keys)
 
     @cached_property
     def labels(self) -> frozenset[str]:

@@ -31,7 +31,7 @@ from ..motion.track import smooth_zero_phase_hann
 from ..synthetic.steps import StepSequence, build_side_walk, build_steps_in_place
 from .coverage import Coverage, find_calm_walks, select_calm_frames
 from .features import Frames
-from .standing_loops import iter_standing_loops
+from .loops.standing_loops import iter_standing_loops
 
 BACK_PREFIX, SIDE_PREFIX, TURN_PREFIX, STEP_PREFIX = "back_", "side_", "turn_", "step_"
 """How the names of the clips begin."""

@@ -17,8 +17,8 @@ Where all recordings run, or all walk slower, it generates walking the same way,
 stand: a run that is shortened to a walk's steps hops on the spot.
 
 Recorded kicks are seldom faster than a jog, and players who receive a ball with the foot in a recording hardly move;
-moved along at 8 m/s their supporting foot slides by metres. `synthetic.recorded_kicks` and `synthetic.gestures`
-generate both on the run at the missing speeds; they substitute for recorded ones that answer by the same labels.
+moved along at 8 m/s their supporting foot slides by metres. `synthetic.recorded_kicks` and
+`synthetic.actions.receptions` generate both on the run at the missing speeds; they substitute for recorded ones that answer by the same labels.
 """
 
 from __future__ import annotations
@@ -37,17 +37,17 @@ from ..motion.foot_plant import plant_feet
 from ..motion.humanoid import compute_heading_from_positions, identify_joints
 from ..motion.motion import Motion, forward_kinematics, sample_frames
 from ..motion.phase_blend import Strides, blend_strides, find_strides
-from ..synthetic import gestures
+from ..synthetic.actions.receptions import build_reception
 from ..synthetic.gait import build_gait
 from ..synthetic.gait_plan import GaitStyle
 from ..synthetic.recorded_kicks import KICK_LABELS, RunningKick, iter_running_kicks
 from .coverage import MAX_SPEED, MIN_SPEED_SECONDS, Coverage, select_locomotion
 from .features import Frames
+from .loops.run_loops import LOOP_SECONDS, iter_run_loops
+from .loops.standing_loops import LOOP_SECONDS as STAND_SECONDS
+from .loops.standing_loops import iter_standing_loops
 from .missing_steps import BACK_PREFIX, STEP_PREFIX, TURN_PREFIX, iter_missing_steps
-from .run_loops import LOOP_SECONDS, iter_run_loops
 from .scan import CACHE_FOLDER
-from .standing_loops import LOOP_SECONDS as STAND_SECONDS
-from .standing_loops import iter_standing_loops
 
 SYNTHETIC_FOLDER = f"{CACHE_FOLDER}/made-gait/"
 # how the file names of blends, kicks, received balls, long stands, long runs, walks and synthetic stands begin, in that
@@ -140,8 +140,7 @@ def iter_synthetic_clips(
     for kick in iter_running_kicks(clips, keys, KICK_STEP * fastest, example, style):
         yield _build_kick_clip(kick, speeds)
     fastest = max(_TOUCH_STEP * measure_touch_speed(frames, clips, keys, RECEIVE_LABELS), MIN_RECEIVE_SPEED)
-    yield from _iter_touches(RECEIVE_PREFIX, fastest, ("receive", "foot", "low"), kinds=["inside"], example=example,
-                             speeds=speeds)
+    yield from _iter_receptions(fastest, example, speeds)
     stands = [(STAND_PREFIX, motion) for _, motion in iter_standing_loops(clips, frames, fps, strangeness, FPS)]
     if not coverage.has_stand:
         stands = [(STILL_PREFIX, build_gait(0.0, STAND_SECONDS, FPS, example.skeleton, example=example))]
@@ -301,29 +300,24 @@ def _iter_runs(low: float, high: float, example: Motion, style: GaitStyle,
         yield _ground_clip(f"{SYNTHETIC_FOLDER}{name}_{low:.1f}.bvh", motion, None, _build_gait_rows(speed, speeds))
 
 
-def _iter_touches(
-    name: str, speed: float, act: tuple[str, ...], kinds: Sequence[str], example: Motion, speeds: dict[str, float]
-) -> Iterator[SyntheticClip]:
-    """Iterate over touches with the right foot on the run, from `speed` m/s to a sprint, of each kind; `act`: their
-    labels.
-    """
-    while speed < MAX_SPEED:
-        for kind in kinds:
-            strike = gestures.build_strike(f"{' '.join(act)} {kind}", example.skeleton, FPS, example=example,
-                                           at_speed=speed)
-            words = (act[0], "right", *act[1:], kind, "running", "front")
-            row = ClipAnnotation(np.ceil(strike.start * FPS), np.floor(strike.end * FPS), strike.key * FPS, words)
-            gait_row = _build_gait_rows(np.full(len(strike.motion), speed), speeds)
-            yield _ground_clip(f"{SYNTHETIC_FOLDER}{name}{kind}_{speed:.1f}.bvh", strike.motion, None, (row, *gait_row))
-        speed *= _TOUCH_STEP
-
-
 def _build_kick_clip(kick: RunningKick, speeds: dict[str, float]) -> SyntheticClip:
     """Build the clip of a kick on the run."""
     gesture = kick.gesture
     row = ClipAnnotation(np.ceil(gesture.start * FPS), np.floor(gesture.end * FPS), gesture.key * FPS, kick.words)
     gait_row = _build_gait_rows(np.full(len(gesture.motion), kick.speed), speeds)
     return _ground_clip(f"{SYNTHETIC_FOLDER}{KICK_PREFIX}{kick.name}.bvh", gesture.motion, None, (row, *gait_row))
+
+
+def _iter_receptions(speed: float, example: Motion, speeds: dict[str, float]) -> Iterator[SyntheticClip]:
+    """Iterate over receptions with the inside of the right foot on the run, from `speed` m/s to a sprint."""
+    while speed < MAX_SPEED:
+        touch = build_reception("inside", example.skeleton, FPS, speed, example=example)
+        words = ("receive", "right", "foot", "low", "inside", "running", "front")
+        row = ClipAnnotation(np.ceil(touch.start * FPS), np.floor(touch.end * FPS), touch.key * FPS, words)
+        gait_row = _build_gait_rows(np.full(len(touch.motion), speed), speeds)
+        name = f"{SYNTHETIC_FOLDER}{RECEIVE_PREFIX}inside_{speed:.1f}.bvh"
+        yield _ground_clip(name, touch.motion, None, (row, *gait_row))
+        speed *= _TOUCH_STEP
 
 
 def _build_gait_rows(speed: np.ndarray, speeds: dict[str, float]) -> tuple[ClipAnnotation, ...]:
@@ -360,10 +354,10 @@ def _ground_clip(name: str, motion: Motion, heel_toe_contacts: np.ndarray | None
     if plants_feet:
         planted = plant_feet(motion.skeleton, motion.root_positions, motion.rotations, heel_toe_contacts, motion.fps)
         motion = replace(motion, root_positions=planted.root, rotations=planted.rotations)
-    return SyntheticClip(name, motion, rows, heel_toe_contacts & _detect_still_points(motion))
+    return SyntheticClip(name, motion, rows, heel_toe_contacts & detect_still_points(motion))
 
 
-def _detect_still_points(motion: Motion) -> np.ndarray:
+def detect_still_points(motion: Motion) -> np.ndarray:
     """Detect which of left and right, heel and toe move over the ground by less than a stance's creep: (T, 2, 2) bool.
     """
     body = identify_joints(motion.skeleton)

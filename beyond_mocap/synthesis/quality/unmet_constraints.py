@@ -15,12 +15,14 @@ from collections import Counter
 import numpy as np
 
 from ...annotation import Timeline, labels_per_frame
+from ...annotation.ball_contact import takes_with_foot
 from ...base.errors import TimedMessage, format_seconds
 from ...base.time_series import find_runs, time_derivative
 from ...library.coverage import CALM_SPEED, STEP_SPEEDS, classify_steps, compute_turn_rate, describe_lack
 from ...library.features import SMOOTH_SECONDS
 from ...library.landings import LANDING_FOLDER
 from ...library.library import RESTING_SPEED, Library
+from ...library.missing_actions import ACTION_PREFIX, describe_action
 from ...library.missing_steps import BACK_PREFIX, SIDE_PREFIX, STEP_PREFIX, TURN_PREFIX
 from ...library.synthetic_clips import (
     BLEND_PREFIX,
@@ -65,7 +67,7 @@ _SYNTHETIC_INSTEAD = (
 )
 _SYNTHETIC_KINDS = (
     (SYNTHETIC_FOLDER + KICK_PREFIX, "synthetic kick on the run: no recorded kick is as fast as the player"),
-    (SYNTHETIC_FOLDER + RECEIVE_PREFIX, "synthetic reception on the run: no recorded one is as fast as the player"),
+    (SYNTHETIC_FOLDER + RECEIVE_PREFIX, "synthetic reception: no recording takes the ball so, or at the player's speed"),
     (SYNTHETIC_FOLDER + STAND_PREFIX,
      "a recorded stand is played forward and backward: no recording stands for so long"),
     (SYNTHETIC_FOLDER + LOOP_PREFIX,
@@ -98,6 +100,7 @@ def report_unmet_constraints(
     lines = [
         *_report_synthetic(played, library),
         *_report_missing_motion(played, library),
+        _report_cut_receptions(played, keys, library),
         _report_stretched_strides(played, track, library),
         _report_warp(played, source),
         _report_sliding(played),
@@ -172,11 +175,29 @@ def _report_synthetic(played: Playback, library: Library | None) -> list[TimedMe
     kinds = [(_frames_of_clips(played, prefix), what) for prefix, what in _SYNTHETIC_KINDS]
     named = tuple(SYNTHETIC_FOLDER + prefix for prefix, *_ in _SYNTHETIC_INSTEAD if prefix)
     others = _frames_of_clips(played, SYNTHETIC_FOLDER) & ~_frames_of_clips(
-        played, *named, *(prefix for prefix, _ in _SYNTHETIC_KINDS))
+        played, SYNTHETIC_FOLDER + ACTION_PREFIX, *named, *(prefix for prefix, _ in _SYNTHETIC_KINDS))
+    kinds += [(there, f"synthetic {name}: no recorded one") for name, there in _list_shown_actions(played)]
     kinds += [(_frames_of_clips(played, SYNTHETIC_FOLDER + prefix) if prefix else others, describe(kind, instead))
               for prefix, kind, instead in _SYNTHETIC_INSTEAD]
     return [_build_line(played.times, there, what, f" ({np.sum(there) / played.motion.fps:.1f} s in all)")
             for there, what in kinds]
+
+
+def _list_shown_actions(played: Playback) -> list[tuple[str, np.ndarray]]:
+    """List the synthetic actions that are shown: name, and (T,) bool frames."""
+    names = np.array([describe_action(path) or "" for path in played.clips] + [""])
+    return [(str(name), (names == name)[played.clip]) for name in np.unique(names[names != ""])]
+
+
+def _report_cut_receptions(played: Playback, keys: list[KeyMomentResult], library: Library | None
+                           ) -> TimedMessage | None:
+    """Report receptions that are cut out of dribbles (`library.receptions`)."""
+    shown = np.zeros(len(played.times), bool)
+    cut = {(library.clips[key.clip].path, key.frame) for key in library.cut_receptions} if library and any(
+        takes_with_foot(moment.requested.words) for moment in keys) else set()
+    for moment in keys:
+        shown[moment.entry : moment.exit + 1] |= (moment.clip, moment.clip_frame) in cut
+    return _build_line(played.times, shown, "reception cut out of a dribble: no recording is labelled with one")
 
 
 def _report_missing_motion(played: Playback, library: Library | None) -> list[TimedMessage | None]:

@@ -20,16 +20,21 @@ from ...annotation import (
     labels_per_frame,
     sort_labels,
 )
+from ...annotation.ball_contact import choose_part_by_height, takes_with_foot
 from ...annotation.vocabulary import DIRECTIONS
 from ...base.errors import NotInLibraryError, TimedMessage, format_seconds
 from ...library.automatic_locomotion import build_automatic_labels
 from ...library.keys import Key, list_nearest_labels, select_keys, select_nearest_keys, select_substitutes
 from ...library.library import Library
+from ...library.missing_actions import is_action_clip
 from ...motion.track import SampledTrack
 from ..plan import Plan, ResolvedPlan
 from .preferences import LagPreference, build_lag_preference, compute_manner_cost, compute_style_cost
 
 PAPERS_OMEGA = 4.0  # Faustino 2016, §3.1.1
+RECEPTION_RATES = (0.7, 0.85, 1.0, 1.1)
+"""Playback rates at which the clip of a reception may be played: a foot that gives faster is a kick to the eye."""
+
 USE_NEAREST = "turn on Nearest Labels"
 """Last words of the error for missing labels; the command line names its option instead."""
 
@@ -126,12 +131,14 @@ def build_request(library: Library, plan: ResolvedPlan) -> SearchRequest:
     timeline = fill_timeline(plan.timeline, track.times, automatic)
     allowed = np.array([settings.mirror or not clip.mirrored for clip in library.clips])
     warnings: list[str] = []
+    nearest_sample = [int(np.argmin(np.abs(plan.track.times - moment.resolved_time))) for moment in timeline.keys]
+    heights = [float(plan.track.ball[at, 2]) if plan.track.ball_height_known[at] else None for at in nearest_sample]
     keys = tuple(_build_key(
-        library, moment, track, gait=gait, allowed=allowed, use_nearest=settings.nearest, warnings=warnings,
-    ) for moment in timeline.keys)
-    known = plan.track.ball_height_known
-    nearest_sample = [int(np.argmin(np.abs(plan.track.times - key.requested.resolved_time))) for key in keys]
-    keys = tuple(replace(key, is_ball_height_known=bool(known[at])) for key, at in zip(keys, nearest_sample))
+        library, moment, track, ball_height=height, gait=gait, allowed=allowed, use_nearest=settings.nearest,
+        warnings=warnings,
+    ) for moment, height in zip(timeline.keys, heights))
+    keys = tuple(replace(key, is_ball_height_known=height is not None, rates=_choose_rates(key.requested))
+                 for key, height in zip(keys, heights))
     requested_labels = _clear_around_keys(labels_per_frame(timeline, track.times), keys, library)
     warnings += _report_missing_labels(library, plan.timeline)
     avoided = tuple(avoided) if any(avoided) else ()
@@ -170,20 +177,30 @@ def _replace_avoided_gaits(library: Library, gait: np.ndarray, speed: np.ndarray
     return out
 
 
-def _build_key(library, moment: KeyMoment, track, gait, allowed, use_nearest: bool,
+def _build_key(library, moment: KeyMoment, track, ball_height: float | None, gait, allowed, use_nearest: bool,
                warnings: list[str]) -> RequestedKey:
-    """Build one key moment: its frame and the clips that may serve it."""
+    """Build one key moment: its frame and the clips that may serve it, for a ball at a height in m."""
     frame = float(np.clip((moment.resolved_time - track.times[0]) * library.fps, 0, len(track.times) - 1))
-    usable = tuple(key for key in library.keys if allowed[key.clip] and not library.clips[key.clip].is_synthetic)
-    synthetic = tuple(key for key in library.keys if allowed[key.clip] and library.clips[key.clip].is_synthetic)
+    may_show = [key for key in library.keys if allowed[key.clip]]
+    usable = tuple(key for key in may_show if not library.clips[key.clip].is_synthetic)
+    actions = tuple(key for key in may_show if is_action_clip(library.clips[key.clip]))
+    synthetic = tuple(key for key in may_show if library.clips[key.clip].is_synthetic and key not in actions)
     if moment.avoid:
         usable, synthetic = _remove_avoided(moment, usable, synthetic, warnings)
-    # recordings that carry the labels first, then synthetic clips
-    choices = select_keys(usable, moment.words)
+    # recordings that carry the labels first, with synthetic clips; then synthetic actions; each time with the part that
+    # the ball's height asks for before any part
+    chosen = choose_part_by_height(moment.words, ball_height)
+    choices = select_keys(usable, chosen) or (() if select_keys(actions, chosen) else select_keys(usable, moment.words))
     if choices:
         return RequestedKey(requested=moment, frame=frame,
                             choices=(*choices, *select_substitutes(choices, synthetic, moment.words)),
                             used_instead=None)
+    choices = select_keys(actions, chosen) or select_keys(actions, moment.words)
+    if takes_with_foot(moment.words):
+        cut = [key for key in library.cut_receptions if allowed[key.clip] and not key.labels & set(moment.avoid)]
+        choices = (*select_keys(cut, chosen), *choices)
+    if choices:
+        return RequestedKey(requested=moment, frame=frame, choices=choices, used_instead=None)
     nearest = list_nearest_labels(usable, moment.words)
     problem = f"the library has no clip for '{' '.join(moment.words)}'"
     text = f"{format_seconds(moment.time)} s: {problem}; nearest: {_format_labels(nearest)}"
@@ -197,6 +214,11 @@ def _build_key(library, moment: KeyMoment, track, gait, allowed, use_nearest: bo
     warnings.append(TimedMessage(f"{text}; used instead: {instead}", (moment.time, moment.time)))
     return RequestedKey(requested=moment, frame=frame,
                         choices=(*choices, *select_substitutes(choices, synthetic, moment.words)), used_instead=used)
+
+
+def _choose_rates(moment: KeyMoment) -> tuple[float, ...]:
+    """Choose the playback rates of a key moment's clip: one that takes the ball is not hurried."""
+    return RECEPTION_RATES if takes_with_foot(moment.words) else ()
 
 
 def _remove_avoided(moment: KeyMoment, usable: tuple[Key, ...], synthetic: tuple[Key, ...], warnings: list[str]):
