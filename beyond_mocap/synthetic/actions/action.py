@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass
 
@@ -59,6 +60,9 @@ class Action:
         suits: lowest and highest m/s of players whom it suits; of several actions one that suits is taken.
         is_span: whether it lasts (a celebration) instead of having a key moment; its clip carries the labels from the
             gesture's start to its end.
+        varies: name of the action beside which it is offered, where the player is as fast as it needs, and the ball no
+            faster than it can be done with; empty: it is offered alone.
+        most_ball_speed: m/s of the ball before the key moment up to which it is offered so.
     """
 
     name: str
@@ -69,3 +73,5 @@ class Action:
     heights: tuple[float, ...] = ()
     suits: tuple[float, float] = (0.0, np.inf)
     is_span: bool = False
+    varies: str = ""
+    most_ball_speed: float = math.inf

@@ -1,35 +1,12 @@
-"""Every synthetic action, one row each: to add one, add a row.
+"""Every synthetic action: to add one, add a row to one of these tables.
 
-Of several rows that answer to the requested labels the one with the fewest other labels is taken, then the first.
+Of several rows that answer to the requested labels one that suits the player's speed and the ball's height is taken,
+then the one with the fewest other labels, then the first (`library.missing_actions.find_action`).
 """
 
 from __future__ import annotations
 
-import numpy as np
+from .field_table import FIELD_ACTIONS
+from .receptions import RECEPTION_ACTIONS
 
-from ..gestures import Gesture
-from ..moves import build_throw_in
-from .action import Action, ActionSetting
-from .floor import build_diving_header, build_slide_tackle
-from .headers import build_jumping_header, build_running_header, build_standing_header
-
-
-def _build_throw_in(setting: ActionSetting) -> Gesture:
-    return build_throw_in(setting.skeleton, setting.fps, example=setting.example)
-
-
-# m/s at which actions in a run are built, and of players who stand and who move
-_RUNS, _STANDS, _MOVES = (2.4, 3.4, 4.4, 5.6, 6.8), (0.0, 1.6), (1.6, np.inf)
-
-ACTIONS = (
-    Action(name="diving header", labels=frozenset({"header", "head", "dive"}), build=build_diving_header,
-           speeds=_RUNS, heights=(0.4, 1.4), suits=_MOVES),
-    Action(name="slide tackle", labels=frozenset({"tackle", "slide"}), build=build_slide_tackle, has_side=True, speeds=_RUNS),
-    Action(name="standing header", labels=frozenset({"header", "head", "standing"}), build=build_standing_header,
-           heights=(1.5, 1.9), suits=_STANDS),
-    Action(name="jumping header", labels=frozenset({"header", "head", "standing", "jump"}), build=build_jumping_header,
-           heights=(1.9, 2.6), suits=_STANDS),
-    Action(name="running header", labels=frozenset({"header", "head", "running", "jump"}), build=build_running_header,
-           speeds=_RUNS, heights=(1.6, 2.6), suits=_MOVES),
-    Action(name="throw-in", labels=frozenset({"throwb", "throw", "high"}), build=_build_throw_in),
-)
+ACTIONS = (*FIELD_ACTIONS, *RECEPTION_ACTIONS)
