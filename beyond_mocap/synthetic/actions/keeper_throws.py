@@ -67,9 +67,9 @@ ROLL_OUT = KeyPoses(
 )
 # in a low stance sideways, feet do not cross, hands ready
 SHUFFLE = KeyPoses(
-    labels="shuffle left",
+    labels="shuffle right",
     span=(-2.4, -1.7, 1.6, 2.2),
-    direction=90.0,
+    direction=-90.0,
     speeds=((-2.3, 0), (-1.6, 1.5), (1.2, 1.7), (1.9, 0.0)),
     style=GaitStyle(cadence=1.15, crouch=0.24, width=0.08, life=0.6),
     pelvis=((-1.7, 0, 16, 0), (1.6, 0, 16, 0)),

@@ -30,8 +30,8 @@ from .ground import keep_above_ground, raise_hips
 
 Rows = tuple[tuple[float, ...], ...]
 _ROUNDING_SECONDS = 0.02  # s over which corners of the tables are rounded
-_FOOT_FREE = 0.05  # m above the ground from which a foot no longer rolls on it
-_INSTEP_DOWN = np.radians([95.0, 125.0])  # rad of pitch between which a foot tips from its toes onto its instep
+# rad of pitch between which a foot tips from its toes onto its instep, and of roll between which it lies on its side
+_INSTEP_DOWN, _ON_SIDE = np.radians([95.0, 125.0]), np.radians([20.0, 60.0])
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -54,7 +54,8 @@ class KeyPoses:
         arms: rows (time, flexion, abduction, inward, elbow, palm) of both arms.
         left_arm, right_arm: rows of one arm, where they differ.
         wrists: rows (time, flexion) of both hands.
-        left_foot, right_foot: rows (time, ahead, left, up, pitch, yaw, roll).
+        left_foot, right_foot: rows (time, ahead, left, up, pitch, yaw, roll); up is that of the toes when the heel is
+            raised.
         knees: rows (time, outward turn of both knees).
         feet_span: as `span`, for the feet of a body that walks or runs before and after; None: always.
         flights: seconds of take-off and landing of each flight.
@@ -124,12 +125,12 @@ def _is_lying(recipe: KeyPoses, time: float) -> bool:
 
 
 def _widen(span: tuple[float, float]) -> tuple[float, float, float, float]:
-    return span[0] - 0.15, span[0], span[1], span[1] + 0.3
+    return span[0] - 0.05, span[0], span[1], span[1] + 0.3
 
 
 def _build_base(recipe: KeyPoses, times: np.ndarray, fps: float, neutral: NeutralStance, seed: int):
     """Build the gait below an action, and its places: (T, 2) m on the ground, before the body sways."""
-    speeds = interpolate_rows(recipe.speeds, times)[:, 0] * np.sqrt(neutral.leg / tables.LEG)
+    speeds = np.maximum(interpolate_rows(recipe.speeds, times)[:, 0], 0.0) * np.sqrt(neutral.leg / tables.LEG)
     turns = np.radians(interpolate_rows(recipe.turns, times)[:, 0])
     plan = plan_gait(speeds, None, fps, neutral, turn_rate=turns, direction=np.radians(recipe.direction),
                      style=recipe.style, seed=seed)
@@ -184,17 +185,19 @@ def _lay_foot(posture: Posture, side: int, rows: np.ndarray, ease: np.ndarray, p
     pitch, yaw, roll = np.radians(rows[:, 3:]).T
     yaw = yaw + sign * np.radians(tables.interpolate_figure("toe_out", 0.0)) + posture.heading
     stand = [tables.interpolate_figure("ahead", 0.0), sign * 0.5 * tables.interpolate_figure("width", 0.0)]
-    on_ground = (1.0 - smoothstep(rows[:, 2], 0.0, _FOOT_FREE)) * (1.0 - smoothstep(pitch, *_INSTEP_DOWN))
-    rolls = np.clip(pitch, 0.0, np.radians(90.0)) * on_ground
+    # standing on the toes or swinging; a foot on its instep or its side does not roll
+    upright = (1.0 - smoothstep(pitch, *_INSTEP_DOWN)) * (1.0 - smoothstep(np.abs(roll), *_ON_SIDE))
+    rolls = np.clip(pitch, np.radians(-30.0), np.radians(90.0)) * upright
     tip = 0.6 * np.maximum(rolls - np.radians(42.0), 0.0)
     ahead, up = roll_foot(rolls, tip, neutral, side)
     level = quaternion.rotate_level(scale * (rows[:, :2] + stand), posture.heading) + place
     level = level + ahead[:, None] * np.stack([np.cos(yaw), np.sin(yaw)], axis=-1)
     ankle = np.column_stack([level, scale * rows[:, 2] + up])
+    bend = np.maximum(rolls, 0.0) - tip
     ankles, feet, toes = posture.ankles.copy(), posture.feet.copy(), posture.toes.copy()
     ankles[:, side] = blend_arrays(ankles[:, side], ankle, ease)
     feet[:, side] = blend_arrays(feet[:, side], np.stack([roll, pitch, yaw], axis=-1), ease)
-    toes[:, side] = blend_arrays(toes[:, side], rolls - tip, ease)
+    toes[:, side] = blend_arrays(toes[:, side], bend, ease)
     return posture.replace_arrays(ankles=ankles, feet=feet, toes=toes)
 
 
