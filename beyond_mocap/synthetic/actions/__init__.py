@@ -1,1 +1,1 @@
-"""Synthetic actions as tables of key poses: a goalkeeper's moves, celebrations and gestures."""
+"""Synthetic actions that stand in for labels that no recording carries."""
