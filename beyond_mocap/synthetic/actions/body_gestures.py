@@ -12,6 +12,7 @@ from .key_poses import KeyPoses
 _REST = (2, 9, 12, 16, 0)
 POINTING = KeyPoses(
     labels="pointing right standing",
+    is_span=True,
     span=(-0.6, -0.15, 1.0, 1.6),
     right_arm=((-0.5, *_REST), (-0.2, 52, 14, 10, 46, 30), (0.0, 86, 12, 6, 10, 60), (0.25, 80, 14, 6, 12, 60),
                (0.45, 88, 10, 6, 8, 60), (0.9, 84, 12, 6, 10, 60), (1.2, 36, 12, 10, 40, 20), (1.5, *_REST)),
@@ -22,6 +23,7 @@ POINTING = KeyPoses(
 )
 CALLING = KeyPoses(
     labels="calling standing",
+    is_span=True,
     span=(-0.8, -0.15, 1.3, 1.9),
     arms=((-0.6, *_REST), (-0.25, 34, 16, 34, 110, 30), (0.0, 64, 26, 44, 136, 50), (1.2, 64, 26, 44, 136, 50),
           (1.5, 26, 14, 26, 80, 20), (1.9, *_REST)),
@@ -32,6 +34,7 @@ CALLING = KeyPoses(
 )
 DRINKING = KeyPoses(
     labels="drinking right standing",
+    is_span=True,
     span=(-1.0, -0.4, 1.6, 2.3),
     right_arm=((-0.9, *_REST), (-0.5, 26, 14, 20, 90, 20), (-0.1, 60, 30, 44, 132, 30), (0.0, 66, 34, 44, 134, 30),
                (0.5, 72, 38, 44, 134, 30), (1.3, 72, 38, 44, 134, 30), (1.6, 50, 20, 36, 120, 30), (2.0, 14, 12, 14, 50, 10),
@@ -43,6 +46,7 @@ DRINKING = KeyPoses(
 _CLAPS = np.arange(-0.9, 1.81, 0.15).tolist()
 CLAPPING = KeyPoses(
     labels="clapping standing",
+    is_span=True,
     span=(-1.4, -0.9, 1.8, 2.4),
     arms=((-1.2, *_REST), (-0.9, 46, 16, 20, 78, 40), (1.8, 48, 16, 20, 78, 40), (2.3, *_REST)),
     spine=((-0.9, 0, 4, 0), (0.4, 0, 6, 6), (1.8, 0, 4, -4)),
@@ -51,6 +55,7 @@ CLAPPING = KeyPoses(
 )
 COMPLAINING = KeyPoses(
     labels="complaining arms standing",
+    is_span=True,
     span=(-0.7, -0.2, 1.3, 2.0),
     arms=((-0.5, *_REST), (-0.15, 30, 20, -10, 70, -60), (0.0, 24, 30, -30, 66, -85), (0.3, 18, 34, -32, 58, -85),
           (0.55, 28, 32, -32, 66, -85), (1.0, 20, 32, -30, 60, -85), (1.4, 16, 16, 0, 40, -30), (1.9, *_REST)),
@@ -61,6 +66,7 @@ COMPLAINING = KeyPoses(
 )
 RESTING = KeyPoses(
     labels="resting standing",
+    is_span=True,
     span=(-1.8, -1.1, 2.4, 3.2),
     arms=((-1.7, *_REST), (-1.3, 4, 34, 24, 70, 0), (-1.0, -22, 40, 62, 88, 0), (2.3, -22, 40, 62, 88, 0),
           (2.7, 0, 28, 24, 60, 0), (3.1, *_REST)),
@@ -70,6 +76,7 @@ RESTING = KeyPoses(
 )
 TYING = KeyPoses(
     labels="tying knee standing",
+    is_span=True,
     span=(-1.6, -1.0, 2.6, 3.6),
     hips=((-1.6, 0, 0, 0), (-1.2, 0.06, 0, -0.16), (-0.7, 0.10, 0, -0.42), (-0.4, 0.10, 0, -0.48), (2.2, 0.10, 0, -0.48),
           (2.7, 0.18, 0.02, -0.26), (3.1, 0.26, 0.01, -0.04), (3.4, 0.28, 0, 0)),
@@ -85,8 +92,8 @@ TYING = KeyPoses(
                 (2.6, 0, 0, 0, 56, 0, 0), (2.8, 0.12, 0, 0.08, 30, 0, 0), (3.0, 0.28, 0, 0, 0, 0, 0)),
     hold=((-0.7, 0, 0.14), (-0.4, 1, 0.14), (2.1, 1, 0.14), (2.5, 0, 0.2)),
 )
-GESTURES = {
-    "pointing": POINTING, "calling": CALLING, "drinking": DRINKING, "clapping": CLAPPING, "complaining": COMPLAINING,
-    "resting": RESTING, "tying": TYING,
-}
+GESTURES = dict(
+    pointing=POINTING, calling=CALLING, drinking=DRINKING, clapping=CLAPPING, complaining=COMPLAINING, resting=RESTING,
+    tying=TYING,
+)
 """Recipes by name."""

@@ -25,6 +25,7 @@ def _wave(first: float, last: float, period: float, *values: tuple[float, float]
 
 ARMS_SPREAD = KeyPoses(
     labels="celebration running arms outside",
+    is_span=True,
     span=(-2.6, -1.8, 1.6, 2.4),
     speeds=_RUN,
     arms=((-1.8, 6, 62, -5, 22, 60), (-0.6, 4, 96, -10, 16, 70), (0.8, 8, 98, -10, 14, 70), (1.6, 6, 74, -5, 20, 60)),
@@ -33,6 +34,7 @@ ARMS_SPREAD = KeyPoses(
 )
 AEROPLANE = KeyPoses(
     labels="celebration running arms",
+    is_span=True,
     span=(-2.6, -1.8, 1.8, 2.6),
     speeds=((-3.4, 2.2), (-2.0, 3.8), (2.0, 3.8), (3.4, 2.0)),
     turns=((-2.8, 0), (-1.4, 38), (0.0, 0), (1.4, -38), (2.8, 0)),
@@ -45,6 +47,7 @@ _KNEEL_FEET: Rows = ((-0.5, -0.30, 0.0, 0.12, 60, 0, 0), (-0.2, -0.30, 0.0, 0.16
                      (0.12, -0.46, 0.03, 0.0, 150, 0, 0), (1.75, -0.46, 0.03, 0.0, 150, 0, 0))
 KNEE_SLIDE = KeyPoses(
     labels="celebration slide knee arms",
+    is_span=True,
     span=(-0.5, -0.1, 2.7, 3.3),
     margin=(2.2, 0.8),
     speeds=((-2.7, 2.6), (-1.2, 5.0), (-0.3, 5.0), (0.0, 4.4), (0.4, 3.0), (0.8, 1.6), (1.3, 0.0)),
@@ -65,6 +68,7 @@ KNEE_SLIDE = KeyPoses(
 )
 JUMP_FIST = KeyPoses(
     labels="celebration jump fist",
+    is_span=True,
     span=(-1.0, -0.75, 1.2, 1.9),
     hips=CATCH_HIGH.hips, pelvis=CATCH_HIGH.pelvis, spine=CATCH_HIGH.spine,
     left_foot=CATCH_HIGH.left_foot, right_foot=CATCH_HIGH.right_foot, flights=CATCH_HIGH.flights,
@@ -77,6 +81,7 @@ JUMP_FIST = KeyPoses(
 )
 POINTING_UP = KeyPoses(
     labels="celebration walking pointing arms",
+    is_span=True,
     span=(-2.2, -1.3, 1.4, 2.4),
     speeds=((-3.0, 1.3), (-1.6, 0.9), (1.6, 0.9), (3.0, 1.3)),
     head=((-1.3, 0, -24, 0), (-0.4, 0, -36, 0), (1.0, 0, -34, 0), (1.6, 0, -10, 0)),
@@ -88,6 +93,7 @@ POINTING_UP = KeyPoses(
 )
 FIST_PUMP = KeyPoses(
     labels="celebration standing fist",
+    is_span=True,
     span=(-0.8, -0.35, 1.3, 2.0),
     hips=((-0.8, 0, 0, 0), (-0.3, 0, 0, -0.02), (0.0, 0, 0, -0.14), (0.25, 0, 0, -0.08), (0.45, 0, 0, -0.14),
           (0.7, 0, 0, -0.08), (0.9, 0, 0, -0.14), (1.3, 0, 0, -0.05), (1.8, 0, 0, 0)),
@@ -115,6 +121,7 @@ def _step(times: tuple[float, ...], left: float) -> Rows:
 
 DANCE = KeyPoses(
     labels="celebration standing dance",
+    is_span=True,
     span=(-1.9, -1.5, 2.0, 2.6),
     hips=((-1.9, 0, 0, 0), *((t, 0, 0.09 * (-1) ** k, -0.07 + 0.02 * (k % 2)) for k, t in enumerate(np.arange(-1.25, 2.0, 0.75).tolist())),
           (2.4, 0, 0, 0)),
@@ -131,14 +138,15 @@ DANCE = KeyPoses(
 )
 HEAD_DOWN = KeyPoses(
     labels="walking dejected",
+    is_span=True,
     span=(-2.2, -1.2, 1.6, 2.6),
     speeds=((-3.0, 1.2), (-1.6, 0.95), (1.6, 0.95), (3.0, 1.2)),
     style=GaitStyle(arm_swing=0.5, life=0.6),
     head=((-1.2, 0, 34, 0), (0.2, 0, 38, 8), (1.6, 0, 34, 0)),
     spine=((-1.2, 0, 16, 0), (1.6, 0, 16, 0)),
 )
-CELEBRATIONS = {
-    "arms_spread": ARMS_SPREAD, "aeroplane": AEROPLANE, "knee_slide": KNEE_SLIDE, "jump_fist": JUMP_FIST,
-    "pointing_up": POINTING_UP, "fist_pump": FIST_PUMP, "dance": DANCE, "head_down": HEAD_DOWN,
-}
+CELEBRATIONS = dict(
+    arms_spread=ARMS_SPREAD, aeroplane=AEROPLANE, knee_slide=KNEE_SLIDE, jump_fist=JUMP_FIST, pointing_up=POINTING_UP,
+    fist_pump=FIST_PUMP, dance=DANCE, head_down=HEAD_DOWN,
+)
 """Recipes by name."""

@@ -187,6 +187,6 @@ DIVES = {
         ("dive_long_high", _LONG_HIGH, "long_duration high"), ("dive_long_low", _LONG_LOW, "long_duration low"),
         ("dive_short_high", _SHORT_HIGH, "short_duration high"), ("dive_short_low", _SHORT_LOW, "short_duration low"),
     )
-    for kind, label in (("catch", "catchb"), ("push", "stomp"))
+    for kind, label in (("catch", "catchb catch save"), ("push", "stomp save"))
 }  # fmt: skip
 """Recipes by name; to the left they are mirrored."""

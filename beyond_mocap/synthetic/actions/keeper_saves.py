@@ -19,6 +19,7 @@ _READY_RIGHT = (*mirror_foot(_WIDE), (1.75, 0, -0.09, 0, 0, 0, 0), (1.90, 0, -0.
 SET_ARMS = (26, 26, 22, 74, 30)
 READY = KeyPoses(
     labels="ready standing",
+    is_span=True,
     span=(-0.55, -0.2, 1.3, 2.05),
     hips=((-0.55, 0, 0, 0), (-0.30, -0.02, 0, -0.08), (-0.16, 0.0, 0, -0.02), (0.0, -0.02, 0, -0.06),
           (0.14, -0.07, 0, -0.17), (0.32, -0.06, 0, -0.14), (1.3, -0.06, 0, -0.14), (2.0, 0, 0, 0)),
@@ -32,7 +33,7 @@ READY = KeyPoses(
 
 # the body waits in a low stance, meets the ball before its chest and wraps it
 CATCH_CHEST = KeyPoses(
-    labels="catchb middle standing front",
+    labels="catchb catch save middle standing front",
     span=(-0.7, -0.35, 1.5, 2.2),
     hips=((-0.7, 0, 0, 0), (-0.3, 0.0, 0, -0.10), (0.0, 0.04, 0, -0.09), (0.14, -0.02, 0, -0.11), (0.5, 0, 0, -0.05),
           (1.2, 0, 0, -0.01), (1.6, 0, 0, 0)),
@@ -47,7 +48,7 @@ CATCH_CHEST = KeyPoses(
 
 # off the left foot with the right knee up, hands at their highest at the top
 CATCH_HIGH = KeyPoses(
-    labels="catchb high jump standing front",
+    labels="catchb catch save high jump standing front",
     span=(-1.0, -0.75, 1.3, 2.0),
     hips=((-1.0, 0, 0, 0), (-0.62, 0.16, 0.02, -0.08), (-0.46, 0.30, 0.04, -0.17), (-0.25, 0.44, 0.03, 0.06),
           (0.0, 0.56, 0.0, 0.1), (0.25, 0.66, 0, 0.03), (0.42, 0.68, 0, -0.20), (0.8, 0.68, 0, -0.05),
@@ -75,7 +76,7 @@ CATCH_HIGH = KeyPoses(
 
 # the right knee goes down beside the left heel, so that legs and hands close the way of a rolling ball
 CATCH_LOW = KeyPoses(
-    labels="catchb low knee standing front",
+    labels="catchb catch save low knee standing front",
     span=(-0.9, -0.5, 1.5, 2.3),
     hips=((-0.9, 0, 0, 0), (-0.55, 0.06, 0, -0.16), (-0.2, 0.08, 0, -0.48), (0.0, 0.08, 0, -0.555),
           (0.2, 0.08, 0, -0.55), (0.6, 0.09, 0, -0.50), (1.0, 0.16, 0.02, -0.30), (1.4, 0.24, 0.01, -0.05),
@@ -100,7 +101,7 @@ CATCH_LOW = KeyPoses(
 
 # as a high catch, but the fists meet before the face and shoot through the ball
 PUNCH = KeyPoses(
-    labels="punch high jump standing front",
+    labels="punch save high jump standing front",
     span=(-1.0, -0.75, 1.0, 1.6),
     hips=CATCH_HIGH.hips,
     pelvis=((-0.75, 0, 4, 0), (-0.46, 0, 12, 0), (-0.15, 0, -10, 0), (0.0, 0, 0, 0), (0.12, 0, 8, 0), (0.45, 0, 18, 0),
@@ -117,5 +118,5 @@ PUNCH = KeyPoses(
     flights=CATCH_HIGH.flights,
     hold=((-0.28, 0, 0.12), (-0.12, 1, 0.12), (0.05, 1, 0.12), (0.2, 0, 0.2)),
 )
-SAVES = {"ready": READY, "catch_chest": CATCH_CHEST, "catch_high": CATCH_HIGH, "catch_low": CATCH_LOW, "punch": PUNCH}
+SAVES = dict(ready=READY, catch_chest=CATCH_CHEST, catch_high=CATCH_HIGH, catch_low=CATCH_LOW, punch=PUNCH)
 """Recipes by name."""

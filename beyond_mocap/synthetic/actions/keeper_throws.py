@@ -68,6 +68,7 @@ ROLL_OUT = KeyPoses(
 # in a low stance sideways, feet do not cross, hands ready
 SHUFFLE = KeyPoses(
     labels="shuffle right",
+    is_span=True,
     span=(-2.4, -1.7, 1.6, 2.2),
     direction=-90.0,
     speeds=((-2.3, 0), (-1.6, 1.5), (1.2, 1.7), (1.9, 0.0)),
@@ -77,5 +78,5 @@ SHUFFLE = KeyPoses(
     head=((-1.7, 0, -26, 0), (1.6, 0, -26, 0)),
     arms=((-1.7, *SET_ARMS), (1.6, *SET_ARMS)),
 )
-THROWS = {"throw_out": THROW_OUT, "roll_out": ROLL_OUT, "shuffle": SHUFFLE}
+THROWS = dict(throw_out=THROW_OUT, roll_out=ROLL_OUT, shuffle=SHUFFLE)
 """Recipes by name."""

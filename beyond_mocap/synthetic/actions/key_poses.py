@@ -43,6 +43,7 @@ class KeyPoses:
     Attributes:
         labels: labels of the vocabulary.
         span: seconds in which the action shows: begin, fully there, fades, end.
+        is_span: whether it lasts instead of having a key moment.
         margin: seconds of standing or walking before and after.
         speeds: rows (time, m/s) of the gait below.
         turns: rows (time, degrees per second) of its heading.
@@ -65,6 +66,7 @@ class KeyPoses:
 
     labels: str
     span: tuple[float, float, float, float]
+    is_span: bool = False
     margin: tuple[float, float] = (0.6, 0.8)
     speeds: Rows = ((0.0, 0.0), (1.0, 0.0))
     turns: Rows = ((0.0, 0.0), (1.0, 0.0))

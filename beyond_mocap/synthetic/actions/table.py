@@ -8,6 +8,7 @@ from __future__ import annotations
 from ..gestures import Gesture
 from ..moves import build_header, build_throw_in
 from .action import Action, ActionSetting
+from .pose_table import POSE_ACTIONS
 
 
 def _build_header(setting: ActionSetting) -> Gesture:
@@ -21,4 +22,5 @@ def _build_throw_in(setting: ActionSetting) -> Gesture:
 ACTIONS = (
     Action(name="jumping header", labels=frozenset({"header", "head", "standing", "jump"}), build=_build_header),
     Action(name="throw-in", labels=frozenset({"throwb", "throw", "high"}), build=_build_throw_in),
+    *POSE_ACTIONS,
 )
