@@ -7,6 +7,7 @@ then the one with the fewest other labels, then the first (`library.missing_acti
 from __future__ import annotations
 
 from .field_table import FIELD_ACTIONS
+from .pose_table import POSE_ACTIONS
 from .receptions import RECEPTION_ACTIONS
 
-ACTIONS = (*FIELD_ACTIONS, *RECEPTION_ACTIONS)
+ACTIONS = (*FIELD_ACTIONS, *RECEPTION_ACTIONS, *POSE_ACTIONS)
