@@ -15,12 +15,15 @@ from .floor import build_bicycle_kick, build_diving_header, build_fall, build_qu
 from .headers import build_jumping_header, build_running_header, build_running_jump, build_standing_header
 
 
+_BALL_LIFT = 0.1  # m that the foot is guided higher in a goal kick: its toes would be below the ground
+
+
 def _build_get_up(setting: ActionSetting) -> Gesture:
     return build_get_up(setting.skeleton, setting.fps, example=setting.example)
 
 
 def _build_goal_kick(setting: ActionSetting) -> Gesture:
-    motion = build_kick(KICKS["instep"], setting.neutral, fps=setting.fps)
+    motion = build_kick(KICKS["instep"], setting.neutral, fps=setting.fps, lift=_BALL_LIFT)
     return Gesture(motion, BEFORE, 0.1, BEFORE + AFTER - 0.3)
 
 

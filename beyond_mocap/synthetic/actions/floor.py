@@ -77,7 +77,7 @@ def build_diving_header(setting: ActionSetting) -> Gesture:
               ((-before, -0.30, -0.02, 0.30, 60, 0, 0), (0.0, -0.74, -0.04, 0.62, 92, 0, 0),
                (0.5 * land, -0.76, -0.06, 0.52, 96, 0, 0), *_at(land, up["right_foot"]))),
         knees=((-0.3, 0, 0), (land + 0.6, 4, 4), (land + 2.3, 0, 0)),
-        rests=((0.5 * land, 0), *_at(land, up["rests"])),
+        rests=((land - 0.03, 0), *_at(land, up["rests"])),
         begin=(-0.55, -before), leaves=(-before, -before - 0.12), push=-before, flight=(-before, land),
         end=land + up["end"],
     ), setting)  # fmt: skip
@@ -204,7 +204,7 @@ def build_bicycle_kick(setting: ActionSetting) -> Gesture:
                (-0.06, 0.22, 0.0, 1.26, -40, 0, 0), (0.0, -0.10, 0.0, ball - ankle - 0.10, -86, 0, 0),
                (0.08, -0.36, 0, 1.30, -100, 0, 0), *_shift_feet(land, up["foot"], -0.28))),
         knees=((-0.3, 0, 0), (land, 4, 4), (land + 1.4, 10, 10), (land + 2.4, 0, 0)),
-        rests=((0.6 * land, 0), *_at(land, up["rests"])),
+        rests=((land - 0.03, 0), *_at(land, up["rests"])),
         begin=(-0.8, -0.5), leaves=(-0.62, -0.5), push=-0.6, flight=(-off, land), end=land + up["end"],
     ), setting)  # fmt: skip
 

@@ -60,8 +60,7 @@ def build_jumping_header(setting: ActionSetting) -> Gesture:
     Returns:
         The movement; its key is the contact, at the top of the flight.
     """
-    rise = None if setting.height is None else compute_rise(setting)
-    return build_header(setting.skeleton, setting.fps, example=setting.example, rise=rise)
+    return build_header(setting.skeleton, setting.fps, example=setting.example, rise=compute_rise(setting))
 
 
 def compute_rise(setting: ActionSetting) -> float:
