@@ -206,8 +206,8 @@ def _build_dive(launch: _Launch, labels: str, catches: bool) -> KeyPoses:
 DIVES = {
     f"{name}_{kind}": _build_dive(launch, f"{label} dive {words} right", kind == "catch")
     for name, launch, words in (
-        ("dive_long_high", _LONG_HIGH, "long_duration high"), ("dive_long_low", _LONG_LOW, "long_duration low"),
         ("dive_short_high", _SHORT_HIGH, "short_duration high"), ("dive_short_low", _SHORT_LOW, "short_duration low"),
+        ("dive_long_high", _LONG_HIGH, "long_duration high"), ("dive_long_low", _LONG_LOW, "long_duration low"),
     )
     for kind, label in (("catch", "catchb catch save"), ("push", "stomp save"))
 }  # fmt: skip
