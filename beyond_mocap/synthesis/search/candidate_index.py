@@ -25,8 +25,8 @@ JERK_REACH = 8  # frames to either side over which the jerk of a transition is m
 _SPEED_CLASSES = (1.0, 2.0, 3.0, 4.5)  # m/s between the classes in which jerk is compared
 USUAL_STANCE = 0.3  # s with both feet on the ground, in a walk
 _LONGEST_STANCE = 2.0  # s beyond the usual stance at which its cost stops growing
-# labels of what a body does for a while besides going, turning and carrying the ball; synthetic clips show it only where
-# it is requested (recordings of it are judged by their posture)
+# labels of what a body does for a while besides going, turning and carrying the ball; synthetic clips show it only
+# where it is requested (recordings of it are judged by their posture)
 _ACTING = CONTINUOUS - {TURNING, *list_gaits(), *list_labels(ball="carries")}
 _SHOWN = 14  # library frames that a long slot shows at the fastest playback rate
 
