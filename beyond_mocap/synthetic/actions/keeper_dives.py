@@ -185,6 +185,7 @@ def _build_dive(launch: _Launch, labels: str, catches: bool) -> KeyPoses:
     left_up, right_up = (_HELD, _HELD) if catches else (_FREE_LEFT, _FREE_RIGHT)
     return KeyPoses(
         labels=labels,
+        meets=(0.7, 2.3) if launch.flights and launch.flights[0][1] > 0.2 else (0.0, 0.8),
         span=(launch.begin, launch.begin + 0.35, end - 0.6, end),
         hips=_join(launch, launch.hips, _UP_HIPS, moves=True),
         pelvis=_join(launch, launch.pelvis, _UP_PELVIS),
@@ -206,8 +207,8 @@ def _build_dive(launch: _Launch, labels: str, catches: bool) -> KeyPoses:
 DIVES = {
     f"{name}_{kind}": _build_dive(launch, f"{label} dive {words} right", kind == "catch")
     for name, launch, words in (
-        ("dive_long_high", _LONG_HIGH, "long_duration high"), ("dive_long_low", _LONG_LOW, "long_duration low"),
         ("dive_short_high", _SHORT_HIGH, "short_duration high"), ("dive_short_low", _SHORT_LOW, "short_duration low"),
+        ("dive_long_high", _LONG_HIGH, "long_duration high"), ("dive_long_low", _LONG_LOW, "long_duration low"),
     )
     for kind, label in (("catch", "catchb catch save"), ("push", "stomp save"))
 }  # fmt: skip

@@ -16,7 +16,7 @@ from .key_poses import KeyPoses
 _REST = (2, 9, 12, 16, 0)
 _CARRY = (22, 10, 40, 96, 70)
 THROW_OUT = KeyPoses(
-    labels="throwout right high standing front",
+    labels="throwout right high",
     span=(-1.5, -1.1, 0.7, 1.4),
     hips=((-1.3, 0, 0, 0), (-0.75, -0.08, -0.06, -0.03), (-0.45, -0.02, -0.05, -0.04), (-0.15, 0.36, -0.02, -0.09),
           (0.0, 0.50, 0, -0.07), (0.3, 0.62, 0, -0.06), (0.8, 0.66, 0, 0)),
@@ -45,7 +45,7 @@ THROW_OUT = KeyPoses(
     hold=((-1.5, 0, 0.24), (-1.2, 1, 0.22), (-0.98, 1, 0.22), (-0.84, 0, 0.3)),
 )
 ROLL_OUT = KeyPoses(
-    labels="rollout right low standing front",
+    labels="rollout right low",
     span=(-1.4, -1.0, 0.6, 1.5),
     hips=((-1.2, 0, 0, 0), (-0.8, -0.02, -0.02, -0.04), (-0.45, 0.06, -0.02, -0.10), (-0.15, 0.50, 0, -0.36),
           (0.0, 0.62, 0, -0.42), (0.2, 0.70, 0, -0.40), (0.6, 0.80, 0, -0.14), (1.0, 0.85, 0, 0)),
