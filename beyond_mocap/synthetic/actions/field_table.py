@@ -40,7 +40,7 @@ def _build_throw_in(setting: ActionSetting) -> Gesture:
 
 
 # m/s at which actions in a run are built, and of players who stand and who move
-_RUNS, _STANDS, _MOVES = (2.4, 3.4, 4.4, 5.6, 6.8), (0.0, 1.6), (1.6, np.inf)
+_RUNS, _STANDS, _MOVES = (2.2, 3.2, 4.4, 5.6, 6.8), (0.0, 1.1), (1.1, np.inf)
 
 FIELD_ACTIONS = (
     Action(name="standing header", labels=frozenset({"header", "head", "standing"}), build=build_standing_header,
@@ -71,11 +71,15 @@ FIELD_ACTIONS = (
     Action(name="goal kick", labels=frozenset({"goal_kick", "kick", "foot", "low", "top", "with_setup", "standing"}),
            build=_build_goal_kick, has_side=True),
     Action(name="volley", labels=frozenset({"kick", "low", "volley", "standing", "foot", "pass"}), has_side=True,
-           build=partial(_build_volley, "pass")),
+           build=partial(_build_volley, "pass"), heights=(0.2, 0.6), suits=_STANDS),
     Action(name="high volley", labels=frozenset({"kick", "high", "top", "volley", "standing", "foot"}), has_side=True,
-           build=partial(_build_volley, "attack")),
+           build=partial(_build_volley, "attack"), heights=(0.5, 1.0), suits=_STANDS),
     *(Action(name=f"kick with the {part}", labels=frozenset({"kick", "low", label, "running", "foot"}), has_side=True,
              build=partial(_build_kick, kind), speeds=_RUNS)
       for part, label, kind in (("inside", "inside", "kick low inside"), ("instep", "top", "kick low top"))),
+    Action(name="lofted kick", labels=frozenset({"kick", "high", "top", "running", "foot"}), has_side=True,
+           build=partial(_build_kick, "kick low top"), speeds=_RUNS, heights=(0.1, 0.4), suits=_MOVES),
+    Action(name="lofted kick from a stand", labels=frozenset({"kick", "high", "top", "standing", "foot"}),
+           has_side=True, build=_build_goal_kick, heights=(0.1, 0.4), suits=_STANDS),
     Action(name="throw-in", labels=frozenset({"throwb", "throw", "high"}), build=_build_throw_in),
 )
