@@ -84,7 +84,7 @@ def find_action(moment: ActionMoment) -> Action | None:
         low, high = action.heights or action.meets
         off = 0.0 if moment.height is None else max(low - moment.height, moment.height - high)
         is_unsuited = not action.suits[0] <= moment.speed <= action.suits[1]
-        return is_unsuited, off > _HEIGHT_SLACK, len(action.labels - requested)
+        return bool(action.varies), is_unsuited, off > _HEIGHT_SLACK, len(action.labels - requested)
 
     is_named = any(_names_action(word) for word in requested)
     return min(serving, key=rate_misfit, default=None) if is_named else None

@@ -7,6 +7,8 @@ m/s^2 (coefficient of friction of 0.5 to 0.6: Lake, Carre 2007 for skin and clot
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 
 from ..gait_tables import GRAVITY
@@ -25,7 +27,7 @@ def _at(offset: float, rows) -> tuple:
 
 
 # seconds from the chest's landing: lying on the front, the hands push, a knee, the other foot, standing
-_UP_FRONT = {
+_UP_FRONT: dict[str, Any] = {
     "hips": ((0.0, 0, 0, 0.82), (0.55, 0, 0, 0.83), (0.95, -0.10, 0, 0.62), (1.25, -0.26, 0.02, 0.47),
              (1.6, -0.12, 0.02, 0.30), (1.95, -0.01, 0, 0.08), (2.3, 0, 0, 0)),
     "pelvis": ((0.0, 0, 86, 0), (0.6, 0, 86, 0), (0.95, 0, 66, 0), (1.25, 0, 52, -6), (1.6, 0, 40, -4),
@@ -165,7 +167,7 @@ def build_fall(setting: ActionSetting) -> Gesture:
 
 
 # seconds from the back's landing: lying on the back, sitting up, feet drawn in, through the crouch
-_UP_BACK = {
+_UP_BACK: dict[str, Any] = {
     "hips": ((0.0, 0, 0, 0.80), (0.7, 0, 0, 0.81), (1.15, 0.02, 0, 0.80), (1.55, 0.12, 0, 0.70), (1.9, 0.32, 0, 0.46),
              (2.3, 0.42, 0, 0.20), (2.7, 0.45, 0, 0)),
     "pelvis": ((0.0, 0, -86, 0), (0.55, 0, -82, 0), (1.15, 0, -32, 0), (1.5, 0, 12, 0), (1.9, 0, 40, 0),
@@ -260,6 +262,8 @@ def build_sitting(setting: ActionSetting) -> Gesture:
     later = {name: tuple((row[0] - 1.15 + sits, *row[1:]) for row in rows if row[0] >= 1.3)
              for name, rows in up.items() if name != "end"}
     spine, tilt, arm = 30, -24, (-34, 26, -10, 16)
+    arms = ((down - 0.2, *NO_ARM), (down + 0.4, 20, 20, 10, 20), (down + 1.0, *arm), (sits, *arm), *later["arm"])
+    still = ((down - 0.2, 0, 0, 0, 0, 0, 0), (sits + 2.0, 0, 0, 0, 0, 0, 0))
     gesture = build_body_poses(BodyPoses(
         speeds=((-4.0, 0.0), (4.0, 0.0)),
         hips=((down - 0.2, 0, 0, 0), (down + 0.5, -0.14, 0, 0.50), (down + 1.0, -0.44, 0, 0.80), (sits, -0.44, 0, 0.80),
@@ -269,10 +273,7 @@ def build_sitting(setting: ActionSetting) -> Gesture:
         spine=((down - 0.2, 0, 2, 0), (down + 0.5, 0, 30, 0), (down + 1.0, 0, spine, 0),
                (sits, 0, spine, 0), *later["spine"]),
         head=((down - 0.2, 0, 0), (down + 0.5, -20, 0), (down + 1.0, 0, 0), (sits, 4, 0), *later["head"]),
-        arms=tuple(((down - 0.2, *NO_ARM), (down + 0.4, 20, 20, 10, 20), (down + 1.0, *arm),
-                    (sits, *arm), *later["arm"])
-                   for _ in range(2)),
-        feet=tuple(((down - 0.2, 0, 0, 0, 0, 0, 0), (sits + 2.0, 0, 0, 0, 0, 0, 0)) for _ in range(2)),
+        arms=(arms, arms), feet=(still, still),
         knees=((down, 0, 0), (down + 1.0, 8, 8), (sits, 8, 8), (sits + 1.4, 0, 0)),
         rests=((down + 0.8, 0), (down + 1.05, 1), (sits, 1), (sits + 0.3, 0)),
         begin=(down - 0.2, down), leaves=(down - 0.2, down - 0.2), push=down - 0.3, end=sits + 1.5,
