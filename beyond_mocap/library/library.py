@@ -30,6 +30,7 @@ from .loops.standing_loops import MIN_STAND_SECONDS
 from .manners import Manners, measure_manners
 from .missing_steps import BACK_SPEEDS, TURNS
 from .posture import NormalPostures, fit_normal_postures
+from .receptions import find_cut_receptions
 from .synthetic_clips import (
     KICK_LABELS,
     MIN_RECEIVE_SPEED,
@@ -90,6 +91,11 @@ class Library:
     def keys(self) -> tuple[Key, ...]:
         """Key moments of all clips."""
         return collect_keys(self.clips)
+
+    @cached_property
+    def cut_receptions(self) -> tuple[Key, ...]:
+        """Key moments of receptions that are cut out of dribbles; none where a recording is labelled with one."""
+        return find_cut_receptions(self.clips, self.frames, self.feet_in_contact, self.keys)
 
     @cached_property
     def labels(self) -> frozenset[str]:

@@ -22,6 +22,7 @@ from ..base.errors import InputError, TimedMessage
 from ..motion.track import BALL_RADIUS
 from .construct.contact_geometry import add_flight_arc, lead_ball_through
 from .construct.dribble import plan_dribbles
+from .construct.give import give_with_ball
 from .construct.strike import compute_contact_frames
 from .plan import Plan, PlayerTouch, ResolvedPlan, SolvedTrajectory
 from .take import DribbleTouch, KeyResult, Take
@@ -207,15 +208,18 @@ def apply_trajectory(take: Take, plan: ResolvedPlan) -> Take:
     if plan.trajectory is None or take.ball is None:
         return replace(take, solved=plan.trajectory)
     fps, contact_ball, times = take.motion.fps, take.ball.positions, take.ball.times
-    held = [compute_contact_frames(key.frame, len(contact_ball)) for key in _list_ball_keys(take)]
+    keys = _list_ball_keys(take)
+    held = [compute_contact_frames(key.frame, len(contact_ball)) for key in keys]
     course_changes = [(touch.time - take.start_time) * fps for touch in plan.trajectory.touches]
     trajectory, filled = plan.trajectory.interpolate(times)
     path = np.where(np.isfinite(trajectory), trajectory, contact_ball)
     known = np.interp(times, plan.track.times, plan.track.ball_height_known.astype(float)) > 0.5
     for number, pair in enumerate(held):
         path = add_flight_arc(path, float(np.mean(pair)), float(contact_ball[list(pair), 2].mean()), ~known, fps)
-        path = lead_ball_through(path, pair, contact_ball[list(pair)],
-                                 _find_course_changes(pair, held[:number] + held[number + 1 :], course_changes, fps))
+        bounds = _find_course_changes(pair, held[:number] + held[number + 1 :], course_changes, fps)
+        path = lead_ball_through(path, pair, contact_ball[list(pair)], bounds)
+        path = give_with_ball(take.motion.skeleton, take.motion.root_positions, take.motion.rotations, path, pair,
+                              keys[number].contact_labels, bounds[1], fps)
     stretches = [
         ((span.start - take.start_time) * fps, (span.end - take.start_time) * fps)
         for span in plan.timeline.spans if _CARRYING.intersection(span.words)

@@ -4,7 +4,7 @@ out.
 The body never leaves its track for the ball. First the ball moves, within the noise of its measurement, to where the
 recorded foot (head, chest, hand) strikes. The limb does the rest by two-bone inverse kinematics, or the spine by
 bending, within the reach of a body; what remains is reported. A kick lasts a hundredth of a second, so between the two
-frames around the key moment the ball moves with the foot.
+frames around the key moment the ball moves with the foot; a ball that is taken stays longer on it (`give`).
 """
 
 from __future__ import annotations
@@ -33,6 +33,7 @@ from .contact_geometry import (
     shift_ball_eased,
     solve_contacts,
 )
+from .give import give_with_ball
 from .move_body_part import (
     MAX_ANGLE,
     MAX_SWING,
@@ -142,6 +143,7 @@ def strike_ball(
         root[span], rotations[span] = reached.root, reached.rotations
         places = [scene.solve_ball(scene.compute_surface_lines(reached, frame), frame)[0] for frame in moment.held]
         path = shift_ball_eased(scene.ball, moment.held, np.array(places), moment.bounds, fps)
+        path = give_with_ball(skeleton, root, rotations, path, moment.held, moment.words, moment.bounds[1], fps)
     gap, shift = _measure_gaps(skeleton, root, rotations, feed=samples, path=path, touches=touches)
     return StrikeResult(root, rotations, path, gap=gap, ball_shift=shift, moved=moved)
 

@@ -15,6 +15,7 @@ from collections import Counter
 import numpy as np
 
 from ...annotation import Timeline, labels_per_frame
+from ...annotation.ball_contact import takes_with_foot
 from ...base.errors import TimedMessage, format_seconds
 from ...base.time_series import find_runs, time_derivative
 from ...library.coverage import NEEDED_TURN_RATE, TRAVEL_SPEED, classify_steps, compute_turn_rate
@@ -92,6 +93,7 @@ def report_unmet_constraints(
     lines = [
         *_report_synthetic(played),
         *_report_missing_motion(played, library),
+        _report_cut_receptions(played, keys, library),
         _report_stretched_strides(played, track, library),
         _report_warp(played, source),
         _report_sliding(played),
@@ -180,6 +182,17 @@ def _list_shown_actions(played: Playback) -> list[tuple[str, np.ndarray]]:
     """List the synthetic actions that are shown: name, and (T,) bool frames."""
     names = np.array([describe_action(path) or "" for path in played.clips] + [""])
     return [(str(name), (names == name)[played.clip]) for name in np.unique(names[names != ""])]
+
+
+def _report_cut_receptions(played: Playback, keys: list[KeyMomentResult], library: Library | None
+                           ) -> TimedMessage | None:
+    """Report receptions that are cut out of dribbles (`library.receptions`)."""
+    shown = np.zeros(len(played.times), bool)
+    cut = {(library.clips[key.clip].path, key.frame) for key in library.cut_receptions} if library and any(
+        takes_with_foot(moment.requested.words) for moment in keys) else set()
+    for moment in keys:
+        shown[moment.entry : moment.exit + 1] |= (moment.clip, moment.clip_frame) in cut
+    return _build_line(played.times, shown, "reception cut out of a dribble: no recording is labelled with one")
 
 
 def _report_missing_motion(played: Playback, library: Library | None) -> list[TimedMessage | None]:
