@@ -27,12 +27,8 @@ from ..motion.track import BALL_RADIUS, Track
 from .construct.ball_detour import find_free_contact, lead_ball_around_body
 from .construct.contact_geometry import BALL_SECONDS, add_flight_arc, lead_ball_through
 from .construct.dribble import plan_dribbles
-<<<<<<< HEAD
-from .construct.strike import BALL_NOISE, compute_contact_frames, find_nearest_frame
-=======
 from .construct.give import give_with_ball
-from .construct.strike import compute_contact_frames
->>>>>>> d22-receptions
+from .construct.strike import BALL_NOISE, compute_contact_frames, find_nearest_frame
 from .plan import Plan, PlayerTouch, ResolvedPlan, SolvedTrajectory
 from .take import DribbleTouch, KeyResult, Take
 
@@ -257,21 +253,12 @@ def apply_trajectory(take: Take, plan: ResolvedPlan) -> tuple[Take, list[str]]:
     known = np.interp(times, plan.track.times, plan.track.ball_height_known.astype(float)) > 0.5
     for number, pair in enumerate(held):
         path = add_flight_arc(path, float(np.mean(pair)), float(contact_ball[list(pair), 2].mean()), ~known, fps)
-<<<<<<< HEAD
-        path = lead_ball_through(path, pair, contact_ball[list(pair)],
-                                 _find_course_changes(pair, held[:number] + held[number + 1 :], course_changes, fps))
-    stretches = [((first - take.start_time) * fps, (last - take.start_time) * fps)
-                 for first, last in _list_dribbles(plan)]
-=======
         bounds = _find_course_changes(pair, held[:number] + held[number + 1 :], course_changes, fps)
         path = lead_ball_through(path, pair, contact_ball[list(pair)], bounds)
         path = give_with_ball(take.motion.skeleton, take.motion.root_positions, take.motion.rotations, path, pair,
                               keys[number].contact_labels, bounds[1], fps)
-    stretches = [
-        ((span.start - take.start_time) * fps, (span.end - take.start_time) * fps)
-        for span in plan.timeline.spans if _CARRYING.intersection(span.words)
-    ]  # fmt: skip
->>>>>>> d22-receptions
+    stretches = [((first - take.start_time) * fps, (last - take.start_time) * fps)
+                 for first, last in _list_dribbles(plan)]
     foot_contacts = take.contacts if take.stepped is None else take.contacts | take.stepped
     dribbled = plan_dribbles(take.motion.skeleton, take.motion.root_positions, take.motion.rotations,
                              foot_contacts=foot_contacts, ball=path, stretches=stretches, held=held, fps=fps,

@@ -6,16 +6,14 @@ from collections.abc import Callable
 
 import numpy as np
 
-from ..annotation.ball_contact import choose_part_by_height, takes_with_foot
+from ..annotation.ball_contact import takes_with_foot
 from ..annotation.gaits import compute_heading_offset
 from ..library.automatic_locomotion import apply_chosen_gaits
 from ..library.library import Library
 from ..library.missing_actions import ActionMoment, add_actions, find_missing_actions
-from ..motion.track import SampledTrack
 from .plan import ResolvedPlan
+from .requested_actions import read_moment_action, read_span_action
 from .search.edit_list import EditList
-
-_ARRIVING = (0.3, 0.06)  # s before a key moment between which the arriving ball's speed is measured
 
 
 def extend_library(
@@ -60,28 +58,9 @@ def _list_action_moments(library: Library, plan: ResolvedPlan) -> list[ActionMom
     moments, spans = plan.timeline.keys, plan.timeline.spans
     if not moments and not spans:
         return []
-    track, known = plan.sample_track(library.fps), plan.track.ball_height_known
-    found = []
-    for moment in moments:
-        at = int(np.argmin(np.abs(plan.track.times - moment.resolved_time)))
-        height = float(plan.track.ball[at, 2]) if known[at] else None
-        found.append(ActionMoment(
-            labels=frozenset(choose_part_by_height(moment.words, height)), height=height,
-            speed=float(np.interp(moment.resolved_time, track.times, track.speed)),
-            ball_speed=_measure_ball_speed(track, moment.resolved_time),
-        ))
-    for span in spans:
-        inside = (track.times >= span.start) & (track.times <= span.end)
-        speed = float(track.speed[inside].mean()) if inside.any() else 0.0
-        found.append(ActionMoment(labels=frozenset(span.words), speed=speed, is_span=True))
-    return found
-
-
-def _measure_ball_speed(track: SampledTrack, time: float) -> float:
-    """Measure the speed of the ball in m/s as it arrives at `time` s, 0 where it is unknown."""
-    before, after = (np.array([np.interp(time - early, track.times, column) for column in track.ball.T])
-                     for early in _ARRIVING)
-    return float(np.nan_to_num(np.linalg.norm(after - before) / (_ARRIVING[0] - _ARRIVING[1])))
+    sampled = plan.sample_track(library.fps)
+    return [*(read_moment_action(moment, plan.track, sampled) for moment in moments),
+            *(read_span_action(span, sampled) for span in spans)]
 
 
 def _lacks_speeds(library: Library, plan: ResolvedPlan) -> bool:
