@@ -18,7 +18,8 @@ stand: a run that is shortened to a walk's steps hops on the spot.
 
 Recorded kicks are seldom faster than a jog, and players who receive a ball with the foot in a recording hardly move;
 moved along at 8 m/s their supporting foot slides by metres. `synthetic.recorded_kicks` and
-`synthetic.actions.receptions` generate both on the run at the missing speeds; they substitute for recorded ones that answer by the same labels.
+`synthetic.actions.receptions` generate both on the run at the missing speeds; they substitute for recorded ones that
+answer by the same labels.
 """
 
 from __future__ import annotations

@@ -67,7 +67,8 @@ _SYNTHETIC_INSTEAD = (
 )
 _SYNTHETIC_KINDS = (
     (SYNTHETIC_FOLDER + KICK_PREFIX, "synthetic kick on the run: no recorded kick is as fast as the player"),
-    (SYNTHETIC_FOLDER + RECEIVE_PREFIX, "synthetic reception: no recording takes the ball so, or at the player's speed"),
+    (SYNTHETIC_FOLDER + RECEIVE_PREFIX,
+     "synthetic reception: no recording takes the ball so, or at the player's speed"),
     (SYNTHETIC_FOLDER + STAND_PREFIX,
      "a recorded stand is played forward and backward: no recording stands for so long"),
     (SYNTHETIC_FOLDER + LOOP_PREFIX,

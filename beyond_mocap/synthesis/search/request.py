@@ -20,7 +20,7 @@ from ...annotation import (
     labels_per_frame,
     sort_labels,
 )
-from ...annotation.ball_contact import choose_part_by_height, takes_with_foot
+from ...annotation.ball_contact import takes_with_foot
 from ...annotation.vocabulary import DIRECTIONS
 from ...base.errors import NotInLibraryError, TimedMessage, format_seconds
 from ...library.automatic_locomotion import build_automatic_labels
