@@ -297,6 +297,8 @@ def write_classifier(path: str | os.PathLike, known: Classifier) -> None:
 
 def read_classifier(path: str | os.PathLike) -> Classifier:
     """Read a classifier; InputError where the file is missing, damaged, or of another version."""
+    if not os.path.exists(path):
+        raise InputError(path, "no such file", "a file of learned labels", _NEXT_STEP)
     try:
         content = io.BytesIO(read_bytes(path, "a file of learned labels", _MAX_BYTES))
         with np.load(content, allow_pickle=False) as stored:
