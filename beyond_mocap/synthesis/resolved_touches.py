@@ -255,8 +255,8 @@ def apply_trajectory(take: Take, plan: ResolvedPlan) -> tuple[Take, list[str]]:
         path = add_flight_arc(path, float(np.mean(pair)), float(contact_ball[list(pair), 2].mean()), ~known, fps)
         bounds = _find_course_changes(pair, held[:number] + held[number + 1 :], course_changes, fps)
         path = lead_ball_through(path, pair, contact_ball[list(pair)], bounds)
-        path = give_with_ball(take.motion.skeleton, take.motion.root_positions, take.motion.rotations, path, pair,
-                              keys[number].contact_labels, bounds[1], fps)
+        path = give_with_ball(take.motion.skeleton, take.motion.root_positions, take.motion.rotations, path, held=pair,
+                              words=keys[number].contact_labels, until=bounds[1], fps=fps)
     stretches = [((first - take.start_time) * fps, (last - take.start_time) * fps)
                  for first, last in _list_dribbles(plan)]
     foot_contacts = take.contacts if take.stepped is None else take.contacts | take.stepped

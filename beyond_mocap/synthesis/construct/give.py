@@ -30,7 +30,7 @@ _NEAR = 0.03  # m of gap up to which a part has met the ball
 
 
 def give_with_ball(
-    skeleton: Skeleton, root: np.ndarray, rotations: np.ndarray, ball: np.ndarray, held: tuple[int, int],
+    skeleton: Skeleton, root: np.ndarray, rotations: np.ndarray, ball: np.ndarray, *, held: tuple[int, int],
     words: Iterable[str], until: float, fps: float,
 ) -> np.ndarray:
     """Let the ball go with the part that takes it, then roll on along its course.

@@ -145,7 +145,8 @@ def strike_ball(
         root[span], rotations[span] = reached.root, reached.rotations
         places = [scene.solve_ball(scene.compute_surface_lines(reached, frame), frame)[0] for frame in moment.held]
         path = shift_ball_eased(scene.ball, moment.held, np.array(places), moment.bounds, fps)
-        path = give_with_ball(skeleton, root, rotations, path, moment.held, moment.words, moment.bounds[1], fps)
+        path = give_with_ball(skeleton, root, rotations, path, held=moment.held, words=moment.words,
+                              until=moment.bounds[1], fps=fps)
     gap, shift = _measure_gaps(skeleton, root, rotations, feed=samples, path=path, touches=touches)
     return StrikeResult(root, rotations, path, gap=gap, ball_shift=shift, moved=moved)
 

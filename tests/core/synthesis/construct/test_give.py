@@ -29,11 +29,15 @@ def arrive(kind, speed=0.0, leaving=2.0):
     return move.motion, words, key, ball
 
 
+def give(motion, ball, key, words, until):
+    return give_with_ball(motion.skeleton, motion.root_positions, motion.rotations, ball, held=(key, key), words=words,
+                          until=until, fps=FPS)
+
+
 @pytest.mark.parametrize("kind", ["inside", "thigh", "chest"])
 def test_a_taken_ball_loses_its_speed_on_the_part_and_is_back_on_its_course(kind):
     motion, words, key, ball = arrive(kind)
-    led = give_with_ball(motion.skeleton, motion.root_positions, motion.rotations, ball, (key, key), words, len(ball),
-                         FPS)
+    led = give(motion, ball, key, words, len(ball))
     back = key + int(ROLL_SECONDS * FPS)
     np.testing.assert_array_equal(led[: key + 1], ball[: key + 1])
     np.testing.assert_array_equal(led[back:], ball[back:])
@@ -47,16 +51,14 @@ def test_a_taken_ball_loses_its_speed_on_the_part_and_is_back_on_its_course(kind
 
 def test_a_kicked_ball_and_one_that_is_missed_are_left_alone():
     motion, words, key, ball = arrive("inside")
-    pose = motion.skeleton, motion.root_positions, motion.rotations
-    assert give_with_ball(*pose, ball, (key, key), ("kick", "right"), len(ball), FPS) is ball
+    assert give(motion, ball, key, ("kick", "right"), len(ball)) is ball
     missed = ball + [0.0, 0.5, 0.0]
-    assert give_with_ball(*pose, missed, (key, key), words, len(ball), FPS) is missed
+    assert give(motion, missed, key, words, len(ball)) is missed
 
 
 def test_the_next_touch_ends_it():
     motion, words, key, ball = arrive("inside")
-    pose = motion.skeleton, motion.root_positions, motion.rotations
-    led = give_with_ball(*pose, ball, (key, key), words, key + 6, FPS)
+    led = give(motion, ball, key, words, key + 6)
     np.testing.assert_array_equal(led[key + 6 :], ball[key + 6 :])
     assert not np.array_equal(led[key + 3], ball[key + 3])
 
