@@ -81,7 +81,7 @@ class BodySolid:
         return cls(start, along, radius + BALL_RADIUS, np.array([surface.end_radius for surface in surfaces]) - radius)
 
     @cached_property
-    def _squared(self) -> np.ndarray:
+    def _line_squares(self) -> np.ndarray:
         """Squared lengths (W, S) m^2 of the solids' lines."""
         return np.maximum(np.sum(self.along**2, axis=-1), 1e-12)
 
@@ -118,6 +118,6 @@ class BodySolid:
         start, along = self.start[frames], self.along[frames]
         to = balls[:, None] - start
         # nearest point of a line segment: projection, limited to its ends
-        share = np.clip(np.einsum("npk,npk->np", to, along) / self._squared[frames], 0.0, 1.0)
+        share = np.clip(np.einsum("npk,npk->np", to, along) / self._line_squares[frames], 0.0, 1.0)
         to -= share[..., None] * along
         return to, self.least + share * self.taper

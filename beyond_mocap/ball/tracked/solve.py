@@ -145,7 +145,8 @@ def solve_samples(times: np.ndarray, ball: np.ndarray, positions: np.ndarray, pl
     moments = np.array([touch.time for touch in solved])
     heights = _has_heights(samples)
     ends = np.array([touch.time for touch in solved if touch.player]) if only_own_flights else None
-    path = SolvedTrajectory(tuple(replace_by_flights(samples, curves, moments, heights, cancelled, ends)))
+    path = SolvedTrajectory(tuple(replace_by_flights(samples, curves, moments, heights, cancelled=cancelled,
+                                                     ends=ends)))
     solved = [_update_touch(touch, path, heights) for touch in solved]
     ends = find_ball_ends(samples.times, path.at(samples.times), *pitch)
     solved = _label_throw_ins(solved, ends, pitch[1])
