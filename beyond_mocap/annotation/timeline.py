@@ -36,6 +36,9 @@ _SAME_TIME = 1e-6  # seconds up to which two times count as equal
 AVOID_PREFIX = "-"
 """Prefix of a label in the text form that the motion must not have."""
 
+TOUCH = "touch"
+"""Label of the ball being touched: a key moment that excludes it reaches for the ball and misses it by design."""
+
 
 def check_labels(labels: Iterable[str], where: str) -> tuple[str, ...]:
     """Check labels and normalize them: lower case, each once.
@@ -117,6 +120,11 @@ class KeyMoment:
     def resolved_time(self) -> float:
         """The second at which it is played: the solved one if there is one, else the requested one."""
         return self.time if self.solved is None else self.solved
+
+    @property
+    def misses_ball(self) -> bool:
+        """Whether the body reaches for the ball and misses it by design, as the loser of a duel does."""
+        return TOUCH in self.avoid
 
 
 @dataclass(frozen=True)

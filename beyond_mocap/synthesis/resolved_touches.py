@@ -147,7 +147,7 @@ def _match_touches(timeline: Timeline, touches: tuple[PlayerTouch, ...]) -> Time
 def _compute_mismatch(key: KeyMoment, touch: PlayerTouch) -> float:
     """Compute how far a touch is from a key moment and its labels, in seconds; inf where it cannot be meant."""
     part, words, off = find_striking_part(key.words), set(key.words), abs(touch.time - key.time)
-    if part is None or off > MAX_TOUCH_OFFSET:
+    if part is None or key.misses_ball or off > MAX_TOUCH_OFFSET:
         return np.inf
     kinds = _SENDING_KINDS if _SENDING & words else _TAKING_KINDS if _TAKING & words else {touch.kind}
     unlike = _UNKNOWN_PLAYER_COST * (touch.is_own is None) + _OTHER_KIND_COST * (touch.kind not in kinds)
@@ -181,7 +181,8 @@ def report_missing_touches(take: Take, plan: ResolvedPlan) -> list[str]:
         TimedMessage(
             f"{key.time:g} s: the ball's trajectory has no touch for '{' '.join(key.words)}' within "
             f"{MAX_TOUCH_OFFSET:g} s; the key moment stays at its time", (key.time, key.time),
-        ) for key in plan.timeline.keys if find_striking_part(key.words) and key.solved is None
+        ) for key in plan.timeline.keys
+        if find_striking_part(key.words) and key.solved is None and not key.misses_ball
     ]  # fmt: skip
     touched = np.array([take.start_time + push.first / take.motion.fps for push in take.dribble_touches])
     return missing + [

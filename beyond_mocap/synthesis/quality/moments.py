@@ -171,8 +171,10 @@ def measure_contact(played: Playback, moment: KeyMomentResult) -> tuple[float, f
 
 
 def list_contact_labels(moment: KeyMomentResult) -> tuple[str, ...]:
-    """Return the labels that say which part meets the ball (`ball_contact.choose_contact_labels`)."""
-    return choose_contact_labels(moment.words, moment.requested.words)
+    """Return the labels that say which part meets the ball (`ball_contact.choose_contact_labels`); none if the moment
+    misses it by design.
+    """
+    return () if moment.requested.misses_ball else choose_contact_labels(moment.words, moment.requested.words)
 
 
 def find_written_ball(played: Playback, frame: int) -> np.ndarray:
