@@ -14,8 +14,8 @@ from ..annotation import LOCOMOTION
 from ..annotation.gaits import TURNING
 from ..annotation.labels import find_label
 from .features import Frames
+from .loops.standing_loops import find_stands
 from .posture import find_steady_travel
-from .standing_loops import find_stands
 from .synthetic_clips import SLOWEST_RECORDED
 
 TURN_RATE, TURN_SPEED = np.radians(45.0), 0.5  # rad/s and m/s of a recording that turns in place

@@ -25,11 +25,11 @@ from .clusters import Clusters
 from .coverage import find_missing_motion, measure_slowest_travel, select_locomotion_alone
 from .features import FPS, Frames, build_frames, join_frames
 from .keys import Key, collect_keys
+from .loops.run_loops import MIN_SPEED
+from .loops.standing_loops import MIN_STAND_SECONDS
 from .manners import Manners, measure_manners
 from .missing_steps import BACK_SPEEDS, TURNS
 from .posture import NormalPostures, fit_normal_postures
-from .run_loops import MIN_SPEED
-from .standing_loops import MIN_STAND_SECONDS
 from .synthetic_clips import (
     KICK_LABELS,
     MIN_RECEIVE_SPEED,

@@ -33,8 +33,8 @@ from ..motion.skeleton import Skeleton
 from ..motion.track import smooth_zero_phase_hann
 from ..synthetic.steps import StepSequence, build_side_walk, build_steps_in_place
 from .features import Frames
-from .run_loops import MAX_MISMATCH, iter_steady_parts
-from .standing_loops import iter_standing_loops
+from .loops.run_loops import MAX_MISMATCH, iter_steady_parts
+from .loops.standing_loops import iter_standing_loops
 
 BACK_PREFIX, SIDE_PREFIX, TURN_PREFIX, STEP_PREFIX = "back_", "side_", "turn_", "step_"
 """How the names of the clips begin."""

@@ -41,11 +41,11 @@ from ..synthetic import gestures
 from ..synthetic.gait import build_gait
 from ..synthetic.gait_plan import GaitStyle
 from .features import Frames
+from .loops.run_loops import LOOP_SECONDS, iter_run_loops
+from .loops.standing_loops import LOOP_SECONDS as STAND_SECONDS
+from .loops.standing_loops import iter_standing_loops
 from .missing_steps import BACK_PREFIX, STEP_PREFIX, TURN_PREFIX, iter_missing_steps
-from .run_loops import LOOP_SECONDS, iter_run_loops
 from .scan import CACHE_FOLDER
-from .standing_loops import LOOP_SECONDS as STAND_SECONDS
-from .standing_loops import iter_standing_loops
 
 SYNTHETIC_FOLDER = f"{CACHE_FOLDER}/made-gait/"
 # how the file names of blends, kicks, received balls, long stands, long runs, walks and synthetic stands begin, in that
@@ -386,10 +386,10 @@ def _ground_clip(name: str, motion: Motion, heel_toe_contacts: np.ndarray | None
     if plants_feet:
         planted = plant_feet(motion.skeleton, motion.root_positions, motion.rotations, heel_toe_contacts, motion.fps)
         motion = replace(motion, root_positions=planted.root, rotations=planted.rotations)
-    return SyntheticClip(name, motion, rows, heel_toe_contacts & _detect_still_points(motion))
+    return SyntheticClip(name, motion, rows, heel_toe_contacts & detect_still_points(motion))
 
 
-def _detect_still_points(motion: Motion) -> np.ndarray:
+def detect_still_points(motion: Motion) -> np.ndarray:
     """Detect which of left and right, heel and toe move over the ground by less than a stance's creep: (T, 2, 2) bool.
     """
     body = identify_joints(motion.skeleton)

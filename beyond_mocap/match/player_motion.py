@@ -18,6 +18,7 @@ from ..base.errors import InputError, line_spans
 from ..library.automatic_locomotion import apply_chosen_gaits
 from ..library.features import FPS
 from ..library.library import Library
+from ..library.missing_actions import add_actions
 from ..library.synthetic_clips import SYNTHETIC_FOLDER
 from ..motion.motion import concatenate_motions
 from ..motion.track.ball_path import BallPath
@@ -105,9 +106,10 @@ class _StretchConstructor:
 
     def __init__(self, library: Library, window: float, stretch: Stretch):
         self.plan, self.edit = stretch.plan, stretch.edit
-        uses_synthetic = any(path.startswith(SYNTHETIC_FOLDER) for path, _ in self.edit.clips)
-        self.library = apply_chosen_gaits(library.with_synthetic_clips if uses_synthetic else library,
-                                          dict(self.plan.gaits))
+        paths = [path for path, _ in self.edit.clips]
+        if any(path.startswith(SYNTHETIC_FOLDER) for path in paths):
+            library = add_actions(library.with_synthetic_clips, paths)
+        self.library = apply_chosen_gaits(library, dict(self.plan.gaits))
         self.fps, self.begin = self.plan.fps, float(self.plan.track.times[0])
         self.count = count_frames(self.plan, self.fps)
         self.edges = build_window_edges(self.begin, self.count, window, self.fps, step=1)

@@ -48,7 +48,7 @@ from .search.path_search import PathSearch, SearchStretch
 from .search.preferences import UsedStretch, list_used_stretches
 from .search.request import SearchRequest, build_request
 from .search.source_frames import SourceFrames, fetch_motion, look_up_frames, output_index
-from .search_library import extend_library
+from .search_library import extend_library, find_plan_actions
 from .synthesize import Progress, finish_take, synthesize
 from .take import KeyResult, Take
 
@@ -181,6 +181,8 @@ def _update_stretches(
         be synthesized as a whole.
     """
     clock = [time.perf_counter()]
+    if find_plan_actions(library, plan) != find_plan_actions(library, old_plan):
+        return None  # the clips of an edit list are numbered, and these have other ones
     library = _extend_for_both(library, (plan, old_plan), report)
     old_request, request = build_request(library, old_plan), build_request(library, plan)
     if not _is_built_from(library, before, len(old_request)):

@@ -10,6 +10,7 @@ from ..annotation.ball_contact import takes_with_foot
 from ..annotation.gaits import compute_heading_offset
 from ..library.automatic_locomotion import apply_chosen_gaits
 from ..library.library import Library
+from ..library.missing_actions import ActionMoment, add_actions, find_missing_actions
 from .plan import ResolvedPlan
 from .search.edit_list import EditList
 
@@ -26,12 +27,49 @@ def extend_library(
         report: called as report(fraction, text) before synthetic clips are built.
         edit: what an earlier search chose; where it shows synthetic clips the library has them too.
     """
+    actions = find_plan_actions(library, plan)
     shows_synthetic = edit is not None and int(edit.clip.max()) >= len(library.clips)
-    if shows_synthetic or plan.method == "path" and plan.requested.made and _lacks_speeds(library, plan):
+    if shows_synthetic or actions or _may_add_clips(plan) and _lacks_speeds(library, plan):
         if report is not None:
             report(0.0, "Building synthetic clips")
-        library = library.with_synthetic_clips
+        library = add_actions(library.with_synthetic_clips, actions)
     return apply_chosen_gaits(library, dict(plan.requested.gaits))
+
+
+def find_plan_actions(library: Library, plan: ResolvedPlan) -> tuple[str, ...]:
+    """Find the paths of synthetic clips for the actions of a plan that no recording shows (`library.missing_actions`).
+
+    Args:
+        library: the recordings.
+        plan: the resolved plan; none where it allows no synthetic clips.
+    """
+    if not _may_add_clips(plan):
+        return ()
+    return find_missing_actions(library, _list_action_moments(library, plan), plan.requested.mirror)
+
+
+def _may_add_clips(plan: ResolvedPlan) -> bool:
+    return plan.method == "path" and plan.requested.made
+
+
+def _list_action_moments(library: Library, plan: ResolvedPlan) -> list[ActionMoment]:
+    """List the actions that the key moments and spans of a plan ask for."""
+    moments, spans = plan.timeline.keys, plan.timeline.spans
+    if not moments and not spans:
+        return []
+    track, known = plan.sample_track(library.fps), plan.track.ball_height_known
+    found = []
+    for moment in moments:
+        at = int(np.argmin(np.abs(plan.track.times - moment.resolved_time)))
+        found.append(ActionMoment(
+            labels=frozenset(moment.words), speed=float(np.interp(moment.resolved_time, track.times, track.speed)),
+            height=float(plan.track.ball[at, 2]) if known[at] else None,
+        ))
+    for span in spans:
+        inside = (track.times >= span.start) & (track.times <= span.end)
+        speed = float(track.speed[inside].mean()) if inside.any() else 0.0
+        found.append(ActionMoment(labels=frozenset(span.words), speed=speed, is_span=True))
+    return found
 
 
 def _lacks_speeds(library: Library, plan: ResolvedPlan) -> bool:

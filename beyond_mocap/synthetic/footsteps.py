@@ -92,7 +92,7 @@ def compute_stance(steps: Footsteps, which: np.ndarray, share: np.ndarray, neutr
     amount = before + (after - before) * quintic_step((share - 0.2) / 0.3)
     pitch = amount * _compute_pitch(share, steps.speed[which], steps.direction[which])
     tip_pitch = 0.6 * np.maximum(pitch - _TOE_LIFT_PITCH, 0.0)
-    forward, up = _roll_foot(pitch, tip_pitch, neutral, steps.side)
+    forward, up = roll_foot(pitch, tip_pitch, neutral, steps.side)
     yaw = steps.yaw[which]
     ankle = np.stack(
         [steps.place[which, 0] + forward * np.cos(yaw), steps.place[which, 1] + forward * np.sin(yaw), up], axis=-1
@@ -116,7 +116,7 @@ def _compute_pitch(share: np.ndarray, speed: np.ndarray, direction: np.ndarray) 
     )
 
 
-def _roll_foot(pitch: np.ndarray, tip_pitch: np.ndarray, neutral: NeutralStance, side: int) -> tuple[np.ndarray,
+def roll_foot(pitch: np.ndarray, tip_pitch: np.ndarray, neutral: NeutralStance, side: int) -> tuple[np.ndarray,
         np.ndarray]:
     """Compute how far the ankle is ahead of its flat place and above the ground, (T,) m each, when the sole pitches."""
     ball_ahead, drop = neutral.ball[side, 0], -neutral.ball[side, 2]

@@ -41,7 +41,7 @@ def compute_lowest_root(skeleton: Skeleton, rotations: np.ndarray, arms: bool = 
     """
     places, world = compute_pose(skeleton, np.zeros((len(rotations), 3)), rotations)
     without = set() if arms else {joint for chain in _list_arms(skeleton) for joint in chain}
-    points = [(place, thick) for joint, place, thick in _iter_surface(skeleton, places, world) if joint not in without]
+    points = [(place, thick) for joint, place, thick in iter_surface(skeleton, places, world) if joint not in without]
     return -np.min([place[:, 2] - thick for place, thick in points], axis=0)
 
 
@@ -60,7 +60,7 @@ def raise_arms(skeleton: Skeleton, root: np.ndarray, rotations: np.ndarray, fps:
     out = rotations.copy()
     for chain in _list_arms(skeleton):
         shoulder = places[:, chain[0]]
-        points = [(p - shoulder, thick) for joint, p, thick in _iter_surface(skeleton, places, world)
+        points = [(p - shoulder, thick) for joint, p, thick in iter_surface(skeleton, places, world)
                   if joint in chain[1:]]
         out_level = points[-1][0][:, :2]
         level = unit_vectors(out_level)
@@ -105,7 +105,7 @@ def _is_below(skeleton: Skeleton, joint: int, top: int) -> bool:
     return joint == top
 
 
-def _iter_surface(skeleton: Skeleton, places: np.ndarray, world: np.ndarray):
+def iter_surface(skeleton: Skeleton, places: np.ndarray, world: np.ndarray):
     """Iterate over (joint, place (T, 3) m, thickness m) of every joint and every tip."""
     for joint, thick in enumerate(compute_thickness(skeleton)):
         yield joint, places[:, joint], thick

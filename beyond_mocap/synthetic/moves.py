@@ -47,17 +47,20 @@ _HEADER = {
 _FLIGHT = 0.25  # s, half the flight of an adult's jump
 
 
-def build_header(skeleton: Skeleton | None = None, fps: float = 60.0, seed: int = 0) -> Gesture:
+def build_header(
+    skeleton: Skeleton | None = None, fps: float = 60.0, seed: int = 0, example: Motion | None = None
+) -> Gesture:
     """Build a jump from both feet out of standing: the trunk arches, strikes the ball at the top, and the body lands.
 
     Args:
         skeleton: any humanoid skeleton; default: the project's adult.
         fps: frames per second.
         seed: of the variation of standing.
+        example: a recording on `skeleton`, for its neutral stance.
     Returns:
         The move; its key is the touch.
     """
-    neutral = build_neutral_stance(skeleton or build_adult_skeleton())
+    neutral = build_neutral_stance(skeleton or build_adult_skeleton(), example)
     scale = neutral.leg / tables.LEG
     key = 1.5
     gait_plan, steps, posture = build_standing(neutral, key + 1.9, fps, seed, width=0.10)
@@ -175,17 +178,20 @@ _THROW = {
 }
 
 
-def build_throw_in(skeleton: Skeleton | None = None, fps: float = 60.0, seed: int = 0) -> Gesture:
+def build_throw_in(
+    skeleton: Skeleton | None = None, fps: float = 60.0, seed: int = 0, example: Motion | None = None
+) -> Gesture:
     """Build a throw-in: the ball in both hands behind the head, the left foot steps ahead, the trunk whips.
 
     Args:
         skeleton: any humanoid skeleton; default: the project's adult.
         fps: frames per second.
         seed: of the variation of standing.
+        example: a recording on `skeleton`, for its neutral stance.
     Returns:
         The move; its key is the release.
     """
-    neutral = build_neutral_stance(skeleton or build_adult_skeleton())
+    neutral = build_neutral_stance(skeleton or build_adult_skeleton(), example)
     scale = neutral.leg / tables.LEG
     key = 2.2
     gait_plan, _, posture = build_standing(neutral, key + 2.0, fps, seed)

@@ -25,6 +25,7 @@ from ...beyond_mocap.annotation.key_commands import (
     ShowMessage,
 )
 from ...beyond_mocap.base.errors import InputError
+from ...beyond_mocap.library.missing_actions import list_action_labels
 from ..core import session
 from ..core.measure import Clock, build_scene_clock
 from ..core.settings import find_active_player, to_absolute_path
@@ -47,9 +48,10 @@ def find_combinations(scene: bpy.types.Scene) -> LibraryCombinations | None:
     if library is None:
         return None
     cached = _combination_cache.setdefault(library, {})
-    if settings.mirror not in cached:
-        cached[settings.mirror] = _collect_combinations(library, settings.mirror)
-    return cached[settings.mirror]
+    choices = settings.mirror, settings.made
+    if choices not in cached:
+        cached[choices] = _collect_combinations(library, *choices)
+    return cached[choices]
 
 
 def describe_subject(context: bpy.types.Context) -> str:
@@ -114,13 +116,15 @@ def _run_command(context: bpy.types.Context, command: Command) -> CommandResult:
     return CommandResult(command.line if isinstance(command, ShowMessage) else "")
 
 
-def _collect_combinations(library, mirror: bool) -> LibraryCombinations:
+def _collect_combinations(library, mirror: bool, has_synthetic: bool) -> LibraryCombinations:
     is_allowed = np.array([mirror or not clip.mirrored for clip in library.clips])
     recorded = [key for key in library.keys if is_allowed[key.clip] and not library.clips[key.clip].is_synthetic]
     frames = library.frames
     rows = np.unique(frames.words[is_allowed[frames.clip]], axis=0)
     spans = (frozenset(word for word, has in zip(frames.vocabulary, row) if has) for row in rows)
-    return LibraryCombinations(tuple(dict.fromkeys(frozenset(key.labels) for key in recorded)), tuple(spans))
+    added = [list_action_labels(is_span) if has_synthetic else () for is_span in (False, True)]
+    moments = dict.fromkeys((*(frozenset(key.labels) for key in recorded), *added[0]))
+    return LibraryCombinations(tuple(moments), (*spans, *added[1]))
 
 
 def _list_active_moments(target: bpy.types.Object | None) -> list[PlacedMoment]:

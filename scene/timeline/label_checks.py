@@ -8,6 +8,7 @@ import bpy
 
 from ...beyond_mocap.annotation import KeyMoment, Span, Timeline, find_missing_keys, find_problems
 from ...beyond_mocap.base.errors import InputError
+from ...beyond_mocap.library.missing_actions import list_action_labels
 from ..core import session
 from ..core.settings import to_absolute_path
 from . import label_tracks as lanes
@@ -115,7 +116,7 @@ def is_out_of_date(scene: bpy.types.Scene) -> bool:
 
 def _library_of(scene: bpy.types.Scene) -> tuple:
     settings = scene.beyond_mocap
-    return settings.library_folder, settings.library_holds, settings.mirror
+    return settings.library_folder, settings.library_holds, settings.mirror, settings.made
 
 
 _known: tuple = ()
@@ -139,8 +140,9 @@ def _list_conflicts(target: bpy.types.Object, items: list) -> list[tuple[int, st
 
 def _describe_missing(scene: bpy.types.Scene, timeline: Timeline, library) -> list[str]:
     """Find the nearest labels of the library for key moments that it lacks."""
-    mirror = scene.beyond_mocap.mirror
+    mirror, has_synthetic = scene.beyond_mocap.mirror, scene.beyond_mocap.made
     choices = [key.labels for key in library.keys if mirror or not library.clips[key.clip].mirrored]
+    choices += list_action_labels() if has_synthetic else ()
     lines = []
     for key, nearest in find_missing_keys(timeline, choices):
         nearest_text = ", ".join(f"'{' '.join(words)}'" for words in nearest)

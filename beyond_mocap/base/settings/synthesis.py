@@ -99,8 +99,9 @@ TABLES = {
         Setting(name="mirror", default=True, option="--no-mirror", help="do not use mirrored clips",
                 title="Mirrored Clips", tooltip="Use each clip also with left and right exchanged", in_preset=True),
         Setting(name="made", default=True, option="--no-made", help="no synthetic or blended clips where recordings "
-                "lack a speed or a step", title="Synthetic Clips", tooltip="For Path Following: add synthetic or "
-                "blended clips where recordings lack a speed, a side step, a turn on the spot or a kick on the run",
+                "lack a speed, a step or an action", title="Synthetic Clips",
+                tooltip="For Path Following: add synthetic or blended clips where recordings lack a speed, a step, "
+                "a turn or an action",
                 in_preset=True, tuning="path"),
         Setting(name="nearest", default=False, option="--nearest", help="continue with the nearest labels that the "
                 "library has", title="Nearest Labels", tooltip="Where the library lacks a key moment's labels, use the "

@@ -10,7 +10,7 @@ from __future__ import annotations
 import io
 import json
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 
@@ -21,6 +21,7 @@ from ...files.atomic import atomic_write
 from ...library.automatic_locomotion import apply_chosen_gaits
 from ...library.features import FPS
 from ...library.library import Library
+from ...library.missing_actions import add_actions
 from ...synthesis.plan import Plan
 from ...synthesis.resolve_plan import resolve_plan
 from ...synthesis.search.distance import align_keys
@@ -28,6 +29,7 @@ from ...synthesis.search.path_costs import PathCosts, balance_weights
 from ...synthesis.search.path_search import PathSearch
 from ...synthesis.search.request import build_request
 from ...synthesis.search.slots import MIN_KEY_MARGIN
+from ...synthesis.search_library import find_plan_actions
 from ..player_edit import WINDOW_SECONDS, PlayerEdit, Stretch, to_stored_plan
 from .named_edit import (
     CONTINUITY_TOLERANCE,
@@ -109,9 +111,18 @@ def search_window(library: Library, unit: Unit, cancelled: Callable[[], bool] | 
                  warnings=order.warnings, hurried_from=search.hurried_from)  # fmt: skip
 
 
-def build_search_library(library: Library, plan: Plan) -> Library:
-    """Build the library in which all windows of a plan are searched."""
-    return apply_chosen_gaits(library.with_synthetic_clips if plan.made else library, dict(plan.gaits))
+def build_search_library(library: Library, plan: Plan, used: Iterable[str] = ()) -> Library:
+    """Build the library in which a window of a plan is searched.
+
+    Args:
+        library: the recordings.
+        plan: of the window.
+        used: paths of clips that other windows show; synthetic actions among them are added.
+    """
+    if not plan.made:
+        return apply_chosen_gaits(library, dict(plan.gaits))
+    actions = find_plan_actions(library, resolve_plan(plan, library, are_touches_resolved=True))
+    return apply_chosen_gaits(add_actions(library.with_synthetic_clips, [*actions, *used]), dict(plan.gaits))
 
 
 def save_piece(path: Path, piece: Piece) -> None:
@@ -223,7 +234,8 @@ def _find_joint(library: Library, plan: Plan, before: Piece, after: Piece) -> Jo
 
 def _compute_joint_costs(library: Library, plan: Plan, before: Piece, after: Piece, low: int, high: int) -> np.ndarray:
     """Compute the costs (high - low - 1,) of joints at frames low + 1 .. high."""
-    library = build_search_library(library, plan)
+    shown = [path for piece in (before, after) for path, _ in piece.edit.clips]
+    library = build_search_library(library, plan, shown)
     begin = float(plan.track.times[0])
     here = cut_plan(plan, begin + low / FPS, begin + (high - 1) / FPS)
     order = build_request(library, resolve_plan(here, library, are_touches_resolved=True))

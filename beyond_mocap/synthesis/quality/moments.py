@@ -11,6 +11,7 @@ from ...annotation import KeyMoment
 from ...annotation.ball_contact import choose_contact_labels, find_contact_window, measure_contact_gap
 from ...annotation.striking import build_part_surfaces, measure_smallest_gap
 from ...library.library import Library
+from ...library.missing_actions import add_actions
 from ...library.synthetic_clips import SYNTHETIC_FOLDER
 from ...motion.track import Track
 from ..take import DribbleTouch
@@ -65,7 +66,7 @@ def extend_with_synthetic(library: Library | None, played: Playback) -> Library 
     """Return the library that was played: with its synthetic clips where one of them is shown."""
     if library is None or not any(path.startswith(SYNTHETIC_FOLDER) for path in played.clips):
         return library
-    return library.with_synthetic_clips
+    return add_actions(library.with_synthetic_clips, played.clips)
 
 
 def _evaluate_moment(played: Playback, key: KeyMoment, number: np.ndarray, result, library: Library

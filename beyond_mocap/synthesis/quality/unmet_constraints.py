@@ -21,6 +21,7 @@ from ...library.coverage import NEEDED_TURN_RATE, TRAVEL_SPEED, classify_steps, 
 from ...library.features import SMOOTH_SECONDS
 from ...library.landings import LANDING_FOLDER
 from ...library.library import RESTING_SPEED, Library
+from ...library.missing_actions import ACTION_PREFIX, describe_action
 from ...library.missing_steps import BACK_PREFIX, SIDE_PREFIX, STEP_PREFIX, TURN_PREFIX
 from ...library.synthetic_clips import (
     BLEND_PREFIX,
@@ -161,8 +162,8 @@ def _frames_of_clips(played: Playback, *begins: str) -> np.ndarray:
 
 def _report_synthetic(played: Playback) -> list[TimedMessage | None]:
     """Report each kind of synthetic clip."""
-    running = _frames_of_clips(played, SYNTHETIC_FOLDER)
-    kinds = []
+    running = _frames_of_clips(played, SYNTHETIC_FOLDER) & ~_frames_of_clips(played, SYNTHETIC_FOLDER + ACTION_PREFIX)
+    kinds = [(there, f"synthetic {name}: no recorded one") for name, there in _list_shown_actions(played)]
     for name, what in _SYNTHETIC_KINDS:
         there = _frames_of_clips(played, SYNTHETIC_FOLDER + name)
         kinds.append((there, what))
@@ -173,6 +174,12 @@ def _report_synthetic(played: Playback) -> list[TimedMessage | None]:
     ]
     return [_build_line(played.times, there, what, f" ({np.sum(there) / played.motion.fps:.1f} s in all)")
             for there, what in kinds]
+
+
+def _list_shown_actions(played: Playback) -> list[tuple[str, np.ndarray]]:
+    """List the synthetic actions that are shown: name, and (T,) bool frames."""
+    names = np.array([describe_action(path) or "" for path in played.clips] + [""])
+    return [(str(name), (names == name)[played.clip]) for name in np.unique(names[names != ""])]
 
 
 def _report_missing_motion(played: Playback, library: Library | None) -> list[TimedMessage | None]:

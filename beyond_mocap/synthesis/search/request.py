@@ -25,6 +25,7 @@ from ...base.errors import NotInLibraryError, TimedMessage, format_seconds
 from ...library.automatic_locomotion import build_automatic_labels
 from ...library.keys import Key, list_nearest_labels, select_keys, select_nearest_keys, select_substitutes
 from ...library.library import Library
+from ...library.missing_actions import is_action_clip
 from ...motion.track import SampledTrack
 from ..plan import Plan, ResolvedPlan
 from .preferences import LagPreference, build_lag_preference, compute_manner_cost, compute_style_cost
@@ -174,16 +175,21 @@ def _build_key(library, moment: KeyMoment, track, gait, allowed, use_nearest: bo
                warnings: list[str]) -> RequestedKey:
     """Build one key moment: its frame and the clips that may serve it."""
     frame = float(np.clip((moment.resolved_time - track.times[0]) * library.fps, 0, len(track.times) - 1))
-    usable = tuple(key for key in library.keys if allowed[key.clip] and not library.clips[key.clip].is_synthetic)
-    synthetic = tuple(key for key in library.keys if allowed[key.clip] and library.clips[key.clip].is_synthetic)
+    may_show = [key for key in library.keys if allowed[key.clip]]
+    usable = tuple(key for key in may_show if not library.clips[key.clip].is_synthetic)
+    actions = tuple(key for key in may_show if is_action_clip(library.clips[key.clip]))
+    synthetic = tuple(key for key in may_show if library.clips[key.clip].is_synthetic and key not in actions)
     if moment.avoid:
         usable, synthetic = _remove_avoided(moment, usable, synthetic, warnings)
-    # recordings that carry the labels first, then synthetic clips
+    # recordings that carry the labels first, with synthetic clips; then synthetic actions
     choices = select_keys(usable, moment.words)
     if choices:
         return RequestedKey(requested=moment, frame=frame,
                             choices=(*choices, *select_substitutes(choices, synthetic, moment.words)),
                             used_instead=None)
+    choices = select_keys(actions, moment.words)
+    if choices:
+        return RequestedKey(requested=moment, frame=frame, choices=choices, used_instead=None)
     nearest = list_nearest_labels(usable, moment.words)
     problem = f"the library has no clip for '{' '.join(moment.words)}'"
     text = f"{format_seconds(moment.time)} s: {problem}; nearest: {_format_labels(nearest)}"

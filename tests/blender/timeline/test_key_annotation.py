@@ -232,12 +232,16 @@ def test_what_the_library_holds_is_known_with_and_without_mirrored_clips(room, s
     assert annotating.find_combinations(scene) is None
     settings.library_folder = str(tmp_path)
     room("core.session").store_library(library, None)
+    settings.made = False
     found = annotating.find_combinations(scene)
     assert set(found.moments) == {frozenset({"kick", "right"}), frozenset({"kick", "left"})}
     assert set(found.spans) == {frozenset({"walking"}), frozenset({"dribble"}), frozenset({"walking", "dribble"})}
     assert annotating.find_combinations(scene) is found
     settings.mirror = False
     assert annotating.find_combinations(scene).moments == (frozenset({"kick", "right"}),)
+    settings.made = True
+    found = annotating.find_combinations(scene).moments
+    assert frozenset({"kick", "right"}) in found and any({"header", "jump", "left"} <= labels for labels in found)
 
 
 def test_a_clip_with_lanes_of_its_own_is_annotated_while_it_is_the_active_object(room, players):

@@ -45,9 +45,10 @@ def test_kick_right_low_top_is_four_presses():
 def test_roots_stand_in_the_trees_order_on_pages_of_nine():
     assert digits(TreeChoices("moment")) == dict(zip(
         ("receive", "kick", "throwb", "header", "scissors", "getting_up", "fall", "fly", "jump"), range(1, 10)))
-    assert list(digits(TreeChoices("moment"), page=1)) == ["intercept", "catchb", "stomp", "turning"]
-    assert count_pages(TreeChoices("moment")) == count_pages(TreeChoices("span")) == 2
-    assert list(digits(TreeChoices("span"), page=1)) == ["turning", "dribble", "transition"]
+    assert list(digits(TreeChoices("moment"), page=1)) == [
+        "intercept", "catchb", "stomp", "punch", "throwout", "rollout", "turning"]
+    assert (count_pages(TreeChoices("moment")), count_pages(TreeChoices("span"))) == (2, 3)
+    assert list(digits(TreeChoices("span"), page=1))[:4] == ["turning", "dribble", "ready", "shuffle"]
 
 
 @pytest.mark.parametrize(
@@ -128,7 +129,7 @@ def test_what_shares_nothing_is_not_called_near():
 
 
 def test_the_librarys_own_words_stand_behind_the_trees():
-    assert list(digits(TreeChoices("span"), HELD, page=1))[-1] == "juggling"
+    assert list(digits(TreeChoices("span"), HELD, page=2))[-1] == "juggling"
     assert "juggling" in {option.word for option in list_options(down("span", "dribble"), HELD)}
     assert "juggling" not in {option.word for option in list_options(down("span", "walking"), HELD)}
     assert down("span", "juggling").words == ("juggling",)

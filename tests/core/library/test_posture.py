@@ -8,7 +8,7 @@ import pytest
 from beyond_mocap.files.bvh import bvh
 from beyond_mocap.library.build import build_library
 from beyond_mocap.library.left_out import describe_left_out, find_left_out, measure_speed_classes
-from beyond_mocap.library.standing_loops import LOOP_SECONDS, iter_standing_loops
+from beyond_mocap.library.loops.standing_loops import LOOP_SECONDS, iter_standing_loops
 from beyond_mocap.motion import quaternion
 from beyond_mocap.motion.humanoid import identify_joints
 from beyond_mocap.motion.motion import Motion, compute_pose, forward_kinematics

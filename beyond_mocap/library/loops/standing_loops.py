@@ -11,9 +11,9 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-from ..base.time_series import find_runs
-from ..motion.motion import Motion, sample_frames
-from .features import Frames
+from ...base.time_series import find_runs
+from ...motion.motion import Motion, sample_frames
+from ..features import Frames
 
 LOOP_SECONDS = 16.0  # of a loop
 MIN_STAND_SECONDS = 1.2  # of recording; less moves too little to look alive

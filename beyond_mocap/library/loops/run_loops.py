@@ -11,12 +11,12 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-from ..base.time_series import find_runs
-from ..base.vectors import arctan2
-from ..motion.motion import Motion
-from ..motion.phase_blend import Strides, find_strides, repeat_strides
-from ..synthetic.gait_tables import interpolate_figure
-from .features import Frames
+from ...base.time_series import find_runs
+from ...base.vectors import arctan2
+from ...motion.motion import Motion
+from ...motion.phase_blend import Strides, find_strides, repeat_strides
+from ...synthetic.gait_tables import interpolate_figure
+from ..features import Frames
 
 LOOP_SECONDS = 8.0  # of a loop
 MIN_SPEED = 2.2  # m/s; slower locomotion is recorded for longer

@@ -1,0 +1,228 @@
+"""Actions that are asked for and that no recording shows: a synthetic clip of each, built on first use.
+
+A recording that carries all requested labels is always preferred. Where there is none, `synthetic.actions` may have a
+row that answers to them; its clip is built for the player's speed and the ball's height at the key moment, in steps, so
+that few clips serve many moments. The clip's path says all of it, so that an edit list is enough to build it again:
+
+    made-gait/action_diving_header_v3.0_z0.8.bvh
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, replace
+from weakref import WeakKeyDictionary
+
+import numpy as np
+
+from ..annotation import ClipAnnotation, sort_labels
+from ..annotation.gaits import compute_gait_thresholds
+from ..annotation.labels import find_label, list_gaits
+from ..annotation.vocabulary import SIDES
+from ..base.errors import InputError
+from ..base.time_series import find_equal_runs
+from ..motion import contacts
+from ..motion.motion import forward_kinematics
+from ..motion.track import smooth_zero_phase_hann
+from ..synthetic.actions.action import Action, ActionSetting
+from ..synthetic.actions.table import ACTIONS
+from .cache import write_synthetic_clips
+from .clip import Clip
+from .features import SMOOTH_SECONDS, build_frames, join_frames
+from .keys import select_keys
+from .library import Library
+from .synthetic_clips import FPS, SYNTHETIC_FOLDER, detect_still_points, sample_upright_example
+
+ACTION_PREFIX = "action_"
+_FOLDER = SYNTHETIC_FOLDER + ACTION_PREFIX
+_NAME = re.compile(r"(?P<name>\w+?)(_v(?P<speed>[\d.]+))?(_z(?P<height>[\d.]+))?(?P<side>_side)?\.bvh")
+_HEIGHT_STEP = 0.1  # m between the heights of the ball for which an action is built
+_GAITS = frozenset(list_gaits())
+_SIDE = "right"  # of clips that are not mirrored
+_KEPT = 4  # extended libraries that are kept for each library
+
+_clips: WeakKeyDictionary[Library, dict[str, tuple[Clip, Clip]]] = WeakKeyDictionary()
+_extended: WeakKeyDictionary[Library, dict[tuple[str, ...], Library]] = WeakKeyDictionary()
+
+
+@dataclass(frozen=True, kw_only=True)
+class ActionMoment:
+    """A requested action.
+
+    Attributes:
+        labels: the requested labels.
+        speed: m/s of the player.
+        height: m of the ball's centre, None where it is unknown.
+        is_span: whether the labels are a span's.
+    """
+
+    labels: frozenset[str]
+    speed: float = 0.0
+    height: float | None = None
+    is_span: bool = False
+
+
+def find_action(labels: Iterable[str], is_span: bool = False) -> Action | None:
+    """Find the synthetic action that answers to some labels.
+
+    Args:
+        labels: the requested labels.
+        is_span: whether they are a span's.
+    Returns:
+        The action with the fewest other labels; None where there is none, or where the labels name no action.
+    """
+    requested = frozenset(labels) - frozenset(SIDES)
+    serving = [action for action in ACTIONS if action.is_span == is_span and requested <= action.labels]
+    is_named = any(_names_action(word) for word in requested)
+    return min(serving, key=lambda action: len(action.labels - requested), default=None) if is_named else None
+
+
+def find_missing_actions(library: Library, moments: Iterable[ActionMoment], mirror: bool = True) -> tuple[str, ...]:
+    """Find the synthetic clips for the requested actions that no recording shows.
+
+    Args:
+        library: the clips.
+        moments: the requested actions.
+        mirror: whether mirrored twins may be shown.
+    Returns:
+        Paths of clips, sorted, each once; for `add_actions`.
+    """
+    asked = [moment for moment in moments if find_action(moment.labels, moment.is_span)
+             and not _is_recorded(library, moment, mirror)]
+    return tuple(sorted({_name_clip(moment) for moment in asked}))
+
+
+def add_actions(library: Library, paths: Iterable[str]) -> Library:
+    """Add the synthetic clips of actions to a library, each with its mirrored twin.
+
+    They are built once for each library object and are not part of its cache.
+
+    Args:
+        library: the clips.
+        paths: of clips; those that are no synthetic actions, or that it has, are left out.
+    Returns:
+        The library, itself if nothing is added.
+    Raises:
+        InputError: for an action that is not in the table.
+    """
+    known = {clip.path for clip in library.clips if clip.path.startswith(_FOLDER)}
+    added = tuple(sorted({path for path in paths if path.startswith(_FOLDER)} - known))
+    if not added:
+        return library
+    extended = _extended.setdefault(library, {})
+    if added not in extended:
+        while len(extended) >= _KEPT:
+            del extended[next(iter(extended))]
+        extended[added] = _append_clips(library, [_find_clips(library, path) for path in added])
+    return extended[added]
+
+
+def describe_action(path: str) -> str | None:
+    """Describe the action that a clip shows.
+
+    Args:
+        path: of the clip.
+    Returns:
+        Its name as reports call it; None if it is no synthetic action.
+    """
+    return _parse_path(path)[0].name if path.startswith(_FOLDER) else None
+
+
+def list_action_labels(is_span: bool = False) -> tuple[frozenset[str], ...]:
+    """List the labels that every synthetic action can serve, with either side.
+
+    Args:
+        is_span: those of spans instead of key moments.
+    """
+    return tuple(action.labels | {side} for action in ACTIONS if action.is_span == is_span for side in SIDES)
+
+
+def is_action_clip(clip: Clip) -> bool:
+    """Return whether a clip shows a synthetic action."""
+    return clip.path.startswith(_FOLDER)
+
+
+def _names_action(word: str) -> bool:
+    """Return whether a label names an action, not how or at which pace it is done."""
+    label = find_label(word)
+    return word not in _GAITS and bool(label.is_root or label.parts or label.ball or label.in_flight)
+
+
+def _is_recorded(library: Library, moment: ActionMoment, mirror: bool) -> bool:
+    """Return whether a recording carries all labels of a requested action."""
+    shown = np.array([(mirror or not clip.mirrored) and not clip.is_synthetic for clip in library.clips])
+    if not moment.is_span:
+        return bool(select_keys([key for key in library.keys if shown[key.clip]], moment.labels))
+    frames = library.frames
+    columns = [frames.vocabulary.index(word) for word in moment.labels - _GAITS if word in frames.vocabulary]
+    carries = frames.words[:, columns].all(axis=1) & shown[frames.clip]
+    return len(columns) == len(moment.labels - _GAITS) and bool(carries.any())
+
+
+def _name_clip(moment: ActionMoment) -> str:
+    """Name the clip that answers to a requested action."""
+    action = find_action(moment.labels, moment.is_span)
+    text = action.name.replace(" ", "_").replace("-", "_")
+    if action.speeds:
+        text += f"_v{min(action.speeds, key=lambda speed: abs(speed - moment.speed)):.1f}"
+    if action.heights and moment.height is not None:
+        height = min(max(moment.height, action.heights[0]), action.heights[1])
+        text += f"_z{round(height / _HEIGHT_STEP) * _HEIGHT_STEP:.1f}"
+    asks_side = moment.labels & frozenset(SIDES) and not action.has_side
+    return f"{_FOLDER}{text}{'_side' if asks_side else ''}.bvh"
+
+
+def _parse_path(path: str) -> tuple[Action, dict[str, float], frozenset[str]]:
+    """Parse a clip's path: its action, speed and height where they count, and the sides that it carries."""
+    found = _NAME.fullmatch(path.removeprefix(_FOLDER))
+    named = {action.name.replace(" ", "_").replace("-", "_"): action for action in ACTIONS}
+    if found is None or found["name"] not in named:
+        raise InputError(path, "an unknown synthetic action", "one of this version's", "synthesize the take again")
+    action = named[found["name"]]
+    numbers = {name: float(found[name]) for name in ("speed", "height") if found[name]}
+    return action, numbers, frozenset({_SIDE} if action.has_side or found["side"] else ())
+
+
+def _find_clips(library: Library, path: str) -> tuple[Clip, Clip]:
+    """Find a clip and its twin among those built for a library, or build them."""
+    known = _clips.setdefault(library, {})
+    if path not in known:
+        clip = _build_clip(library, path)
+        known[path] = clip, clip.build_twin()
+        if library.cache_location:
+            write_synthetic_clips(library.cache_location[0], known[path], missing_only=True)
+    return known[path]
+
+
+def _build_clip(library: Library, path: str) -> Clip:
+    """Build the clip of a path."""
+    action, numbers, sides = _parse_path(path)
+    recordings = [clip for clip in library.clips if not clip.is_synthetic]
+    gesture = action.build(ActionSetting(skeleton=library.skeleton, example=sample_upright_example(recordings), fps=FPS,
+                                         **numbers))
+    motion, first, last = gesture.motion, np.ceil(gesture.start * FPS), np.floor(gesture.end * FPS)
+    last = min(last, len(motion) - 1)
+    key = None if action.is_span else gesture.key * FPS
+    row = ClipAnnotation(first, last, key, sort_labels(action.labels | sides))
+    touched = contacts.detect_heel_toe_contacts(motion) & detect_still_points(motion)
+    rows = (row, *_build_gait_rows(library, motion, int(first), int(last)))
+    return Clip(path=path, mirrored=False, motion=motion, annotations=rows, heel_toe_contacts=touched)
+
+
+def _build_gait_rows(library: Library, motion, first: int, last: int) -> list[ClipAnnotation]:
+    """Build rows with the gait before frame `first` and after frame `last`, by speed."""
+    gaits = library.gaits
+    path = smooth_zero_phase_hann(forward_kinematics(motion)[0][:, 0, :2], motion.fps, SMOOTH_SECONDS)
+    speed = np.linalg.norm(np.gradient(path, axis=0), axis=1) * motion.fps
+    band = np.searchsorted(compute_gait_thresholds(np.array([gait.speed for gait in gaits])), speed, side="right")
+    parts = ((0, first), (last + 1, len(motion)))
+    return [ClipAnnotation(low + a, low + b - 1, None, gaits[band[low + a]].labels)
+            for low, high in parts if high - low > 1 for a, b in find_equal_runs(band[low:high])]
+
+
+def _append_clips(library: Library, pairs: Sequence[tuple[Clip, Clip]]) -> Library:
+    """Append clips to a library, described like its own."""
+    clips = [clip for pair in pairs for clip in pair]
+    frames = join_frames(library.frames, build_frames(clips, library.frames))
+    return replace(library, clips=(*library.clips, *clips), frames=frames, clusters={})

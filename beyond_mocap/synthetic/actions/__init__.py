@@ -1,0 +1,1 @@
+"""Synthetic actions that stand in for labels that no recording carries."""

@@ -1,0 +1,208 @@
+"""Actions of the whole body as tables of key poses, laid over standing or over a gait.
+
+A `KeyPoses` has one table per part of the body, with seconds from the key moment, so that an action is read and changed
+like a dope sheet. `build_key_poses` lays it over the body's own standing or gait and then keeps what physics says: a
+flight's centre of mass follows a parabola (`flight`), nothing is below the ground, hands that hold a ball are as far
+apart as it is wide (`ball_hands`).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from ...base.easing import quintic_step, smoothstep
+from ...motion import quaternion
+from ...motion.motion import Motion
+from ...motion.retargeting.adult import build_adult_skeleton
+from ...motion.retargeting.neutral import NeutralStance, build_neutral_stance
+from ...motion.retargeting.posture import Posture, to_motion
+from ...motion.skeleton import Skeleton
+from .. import gait_tables as tables
+from ..footsteps import roll_foot
+from ..gait import build_gait_posture
+from ..gait_plan import GaitStyle, plan_gait
+from ..gestures import LEFT, RIGHT, Gesture, blend_arrays, compute_envelope, interpolate_rounded, interpolate_rows
+from .ball_hands import hold_ball
+from .flight import apply_flight
+from .ground import keep_above_ground, raise_hips
+
+Rows = tuple[tuple[float, ...], ...]
+_ROUNDING_SECONDS = 0.02  # s over which corners of the tables are rounded
+# rad of pitch between which a foot tips from its toes onto its instep, and of roll between which it lies on its side
+_INSTEP_DOWN, _ON_SIDE = np.radians([95.0, 125.0]), np.radians([20.0, 60.0])
+
+
+@dataclass(frozen=True, kw_only=True)
+class KeyPoses:
+    """An action; seconds from the key moment, metres of an adult, degrees. Tables that are left out change nothing.
+
+    Places are relative to where the body would stand or walk without the action, and along its heading.
+
+    Attributes:
+        labels: labels of the vocabulary.
+        span: seconds in which the action shows: begin, fully there, fades, end.
+        is_span: whether it lasts instead of having a key moment.
+        margin: seconds of standing or walking before and after.
+        speeds: rows (time, m/s) of the gait below.
+        turns: rows (time, degrees per second) of its heading.
+        direction: degrees of its travel relative to the heading.
+        hips: rows (time, ahead, left, up).
+        pelvis: rows (time, list, tilt, turn); list to the right and tilt forward are positive.
+        spine: rows (time, list, tilt, turn).
+        head: rows (time, list, nod, turn).
+        arms: rows (time, flexion, abduction, inward, elbow, palm) of both arms.
+        left_arm, right_arm: rows of one arm, where they differ.
+        wrists: rows (time, flexion) of both hands.
+        left_foot, right_foot: rows (time, ahead, left, up, pitch, yaw, roll); up is that of the toes when the heel is
+            raised.
+        knees: rows (time, outward turn of both knees).
+        feet_span: as `span`, for the feet of a body that walks or runs before and after; None: always.
+        flights: seconds of take-off and landing of each flight.
+        lies: seconds between which the body lies or rolls on the ground.
+        hold: rows (time, share, m between both hands' joints): hands that meet around a ball.
+    """
+
+    labels: str
+    span: tuple[float, float, float, float]
+    is_span: bool = False
+    margin: tuple[float, float] = (0.6, 0.8)
+    speeds: Rows = ((0.0, 0.0), (1.0, 0.0))
+    turns: Rows = ((0.0, 0.0), (1.0, 0.0))
+    direction: float = 0.0
+    hips: Rows | None = None
+    pelvis: Rows | None = None
+    spine: Rows | None = None
+    head: Rows | None = None
+    arms: Rows | None = None
+    left_arm: Rows | None = None
+    right_arm: Rows | None = None
+    wrists: Rows | None = None
+    left_foot: Rows | None = None
+    right_foot: Rows | None = None
+    knees: Rows | None = None
+    feet_span: tuple[float, float, float, float] | None = None
+    flights: tuple[tuple[float, float], ...] = ()
+    lies: tuple[float, float] | None = None
+    hold: Rows | None = None
+    style: GaitStyle = GaitStyle(life=0.6)
+
+
+def build_key_poses(
+    recipe: KeyPoses, skeleton: Skeleton | None = None, fps: float = 60.0, seed: int = 0, *,
+    example: Motion | None = None,
+) -> Gesture:
+    """Build an action; the body begins at the origin and faces +X.
+
+    Args:
+        recipe: the action.
+        skeleton: any humanoid skeleton; default: the project's adult.
+        fps: frames per second.
+        seed: of the variation of standing and walking.
+        example: a recording on `skeleton`, for its neutral stance.
+    Returns:
+        The action.
+    """
+    neutral = build_neutral_stance(skeleton or build_adult_skeleton(), example)
+    key = recipe.margin[0] - recipe.span[0]
+    count = int(round((key + recipe.span[3] + recipe.margin[1]) * fps)) + 1
+    times = np.arange(count) / fps - key
+    posture, place = _build_base(recipe, times, fps, neutral, seed)
+    posture = _lay_upper_body(posture, recipe, times)
+    posture = _lay_feet(posture, recipe, times, place, neutral)
+    for flight in recipe.flights:
+        posture = apply_flight(posture, times, flight, neutral, lands_on_feet=not _is_lying(recipe, flight[1]))
+    posture = raise_hips(posture, neutral)
+    motion = to_motion(posture, neutral)
+    if recipe.lies is not None:
+        motion = keep_above_ground(motion, compute_envelope(times, *_widen(recipe.lies)))
+    if recipe.hold is not None:
+        motion = hold_ball(motion, interpolate_rows(recipe.hold, times), neutral)
+    return Gesture(motion, key, key + recipe.span[0], key + recipe.span[3])
+
+
+def _is_lying(recipe: KeyPoses, time: float) -> bool:
+    return recipe.lies is not None and recipe.lies[0] <= time + 0.2 and time <= recipe.lies[1]
+
+
+def _widen(span: tuple[float, float]) -> tuple[float, float, float, float]:
+    return span[0] - 0.05, span[0], span[1], span[1] + 0.3
+
+
+def _build_base(recipe: KeyPoses, times: np.ndarray, fps: float, neutral: NeutralStance, seed: int):
+    """Build the gait below an action, and its places: (T, 2) m on the ground, before the body sways."""
+    speeds = np.maximum(interpolate_rows(recipe.speeds, times)[:, 0], 0.0) * np.sqrt(neutral.leg / tables.LEG)
+    turns = np.radians(interpolate_rows(recipe.turns, times)[:, 0])
+    plan = plan_gait(speeds, None, fps, neutral, turn_rate=turns, direction=np.radians(recipe.direction),
+                     style=recipe.style, seed=seed)
+    return build_gait_posture(plan, neutral, recipe.style, seed), plan.path[plan.requested_slice]
+
+
+def _lay_upper_body(posture: Posture, recipe: KeyPoses, times: np.ndarray) -> Posture:
+    """Lay trunk, head, arms and hands over a posture."""
+    ease, frames = compute_envelope(times, *recipe.span), _ROUNDING_SECONDS * posture.fps
+
+    def lay(base: np.ndarray, rows: Rows | None) -> np.ndarray:
+        """Blend the first columns of `base` (T, C) to a table's."""
+        if rows is None:
+            return base
+        values = np.radians(interpolate_rounded(rows, times, frames))
+        out = base.copy()
+        out[:, : values.shape[1]] = blend_arrays(base[:, : values.shape[1]], values, ease)
+        return out
+
+    arms = np.stack([lay(posture.arms[:, side], own or recipe.arms)
+                     for side, own in ((LEFT, recipe.left_arm), (RIGHT, recipe.right_arm))], axis=1)
+    wrists = np.stack([lay(posture.wrists[:, [side]], recipe.wrists)[:, 0] for side in (LEFT, RIGHT)], axis=1)
+    knees = np.stack([lay(posture.knees[:, [side]], recipe.knees)[:, 0] for side in (LEFT, RIGHT)], axis=1)
+    return posture.replace_arrays(
+        pelvis=lay(posture.pelvis, recipe.pelvis), spine=lay(posture.spine, recipe.spine),
+        head=lay(posture.head, recipe.head), arms=arms, wrists=wrists, knees=knees,
+    )
+
+
+def _lay_feet(posture: Posture, recipe: KeyPoses, times: np.ndarray, place: np.ndarray,
+              neutral: NeutralStance) -> Posture:
+    """Move hips and feet of a posture through their tables."""
+    scale = neutral.leg / tables.LEG
+    ease = np.ones(len(times)) if recipe.feet_span is None else compute_envelope(times, *recipe.feet_span)
+    hips = posture.hips.copy()
+    if recipe.feet_span is not None:  # a body that kneels or slides does not bounce with the gait below it
+        hips = blend_arrays(hips, np.column_stack([place, np.full(len(hips), hips[-1, 2])]), ease)
+    if recipe.hips is not None:
+        moved = scale * interpolate_rounded(recipe.hips, times, _ROUNDING_SECONDS * posture.fps)
+        hips += quaternion.rotate(quaternion.from_up_angle(posture.heading), moved)
+    posture = posture.replace_arrays(hips=hips)
+    for side, rows in ((LEFT, recipe.left_foot), (RIGHT, recipe.right_foot)):
+        if rows is not None:
+            posture = _lay_foot(posture, side, interpolate_rows(rows, times), ease, place, neutral)
+    return posture
+
+
+def _lay_foot(posture: Posture, side: int, rows: np.ndarray, ease: np.ndarray, place: np.ndarray,
+              neutral: NeutralStance) -> Posture:
+    """Move one foot through its rows (T, 6); on the ground it rolls over its ball without sliding."""
+    scale, sign = neutral.leg / tables.LEG, 1.0 if side == LEFT else -1.0
+    pitch, yaw, roll = np.radians(rows[:, 3:]).T
+    yaw = yaw + sign * np.radians(tables.interpolate_figure("toe_out", 0.0)) + posture.heading
+    stand = [tables.interpolate_figure("ahead", 0.0), sign * 0.5 * tables.interpolate_figure("width", 0.0)]
+    # standing on the toes or swinging; a foot on its instep or its side does not roll
+    upright = (1.0 - smoothstep(pitch, *_INSTEP_DOWN)) * (1.0 - smoothstep(np.abs(roll), *_ON_SIDE))
+    rolls = np.clip(pitch, np.radians(-30.0), np.radians(90.0)) * upright
+    tip = 0.6 * np.maximum(rolls - np.radians(42.0), 0.0)
+    ahead, up = roll_foot(rolls, tip, neutral, side)
+    level = quaternion.rotate_level(scale * (rows[:, :2] + stand), posture.heading) + place
+    level = level + ahead[:, None] * np.stack([np.cos(yaw), np.sin(yaw)], axis=-1)
+    ankle = np.column_stack([level, scale * rows[:, 2] + up])
+    bend = np.maximum(rolls, 0.0) - tip
+    ankles, feet, toes = posture.ankles.copy(), posture.feet.copy(), posture.toes.copy()
+    ankles[:, side] = blend_arrays(ankles[:, side], ankle, ease)
+    feet[:, side] = blend_arrays(feet[:, side], np.stack([roll, pitch, yaw], axis=-1), ease)
+    toes[:, side] = blend_arrays(toes[:, side], bend, ease)
+    return posture.replace_arrays(ankles=ankles, feet=feet, toes=toes)
+
+
+def mirror_foot(rows: Rows) -> Rows:
+    """Mirror the rows of one foot to the other one."""
+    return tuple((time, ahead, -left, up, pitch, -yaw, -roll) for time, ahead, left, up, pitch, yaw, roll in rows)

@@ -1,0 +1,83 @@
+"""Actions that no recording shows are built where they are asked for, and only there."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from beyond_mocap.annotation import KeyMoment, Timeline
+from beyond_mocap.base.errors import InputError, NotInLibraryError
+from beyond_mocap.library.missing_actions import (
+    ActionMoment,
+    add_actions,
+    describe_action,
+    find_action,
+    find_missing_actions,
+    is_action_clip,
+)
+from beyond_mocap.motion.track import Track
+from beyond_mocap.synthesis.plan import Plan
+from beyond_mocap.synthesis.resynthesize import resynthesize
+from beyond_mocap.synthesis.synthesize import synthesize
+
+HEADER = ("header", "standing", "jump")
+
+
+def plan_walk(library, *words: str, **settings) -> Plan:
+    times = np.arange(0.0, 5.0, 0.1)
+    track = Track(times, np.stack([1.2 * times, 0.0 * times], axis=1))
+    timeline = Timeline(keys=(KeyMoment(2.5, words),))
+    return Plan(track=track, library=library.folder, timeline=timeline, **settings)
+
+
+def moment(*words: str, **situation) -> ActionMoment:
+    return ActionMoment(labels=frozenset(words), **situation)
+
+
+def test_only_what_no_recording_carries_is_missing(library):
+    assert find_missing_actions(library, [moment("kick", "low")]) == ()
+    assert find_missing_actions(library, [moment("walking"), moment("with", "moonwalk"), moment("front")]) == ()
+    path, = find_missing_actions(library, [moment(*HEADER), moment(*HEADER, speed=3.0)])
+    assert describe_action(path) == "jumping header" and describe_action("kick.bvh") is None
+
+
+def test_a_label_alone_finds_the_action_with_the_fewest_others():
+    assert find_action(("throwb",)).name == "throw-in" and find_action(("header", "left", "jump")) is not None
+    assert find_action(("standing",)) is find_action(("header", "sitting")) is None
+
+
+def test_actions_are_built_once_for_a_library_and_have_twins(library):
+    paths = find_missing_actions(library, [moment(*HEADER, "left")])
+    more = add_actions(library, paths)
+    assert more is add_actions(library, paths) and add_actions(more, paths) is more
+    assert add_actions(library, ()) is library
+    right, left = [clip for clip in more.clips if is_action_clip(clip)]
+    assert "right" in right.labels_at(right.annotations[0].key) and left.mirrored
+    assert "left" in left.labels_at(left.annotations[0].key)
+    assert len(more.frames) > len(library.frames) and not any(map(is_action_clip, library.clips))
+
+
+def test_a_take_shows_a_missing_action_on_time_and_says_so(library):
+    plan = plan_walk(library, *HEADER)
+    take = synthesize(library, plan)
+    key, = take.keys
+    assert key.used_instead is None and describe_action(key.clip) == "jumping header" and set(HEADER) <= set(key.words)
+    line, = [line for line in take.warnings if "synthetic jumping header: no recorded one" in line]
+    assert not any("synthetic running" in line for line in take.warnings)
+    again = resynthesize(library, plan, take)
+    np.testing.assert_array_equal(again.motion.rotations, take.motion.rotations)
+    other = resynthesize(library, plan_walk(library, "throwb"), take)
+    assert [describe_action(key.clip) for key in other.keys] == ["throw-in"]
+
+
+def test_without_synthetic_clips_the_label_is_missing_as_before(library):
+    with pytest.raises(NotInLibraryError, match="no clip for 'header"):
+        synthesize(library, plan_walk(library, *HEADER, made=False))
+    take = synthesize(library, plan_walk(library, *HEADER, made=False, nearest=True))
+    assert take.keys[0].used_instead is not None
+
+
+def test_an_action_of_another_version_is_reported(library):
+    path, = find_missing_actions(library, [moment(*HEADER)])
+    with pytest.raises(InputError, match="an unknown synthetic action"):
+        add_actions(library, [path.replace("jumping", "levitating")])
