@@ -298,8 +298,10 @@ def _find_label_problems(item: Span | KeyMoment, known: frozenset[str], place: s
     """Find what is wrong with the labels of a span or key moment."""
     if TRANSITION in (*item.words, *item.avoid):
         return _find_transition_problems(item, place)
-    out = [_build_unknown_label_error(word, item, known, place) for word in (*item.words, *item.avoid)
-           if word not in known]
+    may_miss = {TOUCH} if isinstance(item, KeyMoment) else set()
+    out = [_build_unknown_label_error(word, item, known, place)
+           for words, others in ((item.words, set()), (item.avoid, may_miss)) for word in words
+           if word not in known and word not in others]
     out += [_build_contradiction_error(word, place) for word in item.words if word in item.avoid]
     if isinstance(item, KeyMoment) and not item.words:
         out.append(InputError(place, "a key moment without labels", "TIME labels...", "add labels"))

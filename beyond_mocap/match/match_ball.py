@@ -127,7 +127,8 @@ def restore_ball_contact(take: Take, ball: np.ndarray) -> Take:
     motion = take.motion
     if meetings:
         motion = strike_fixed_ball(motion, take.contacts, meetings, has_ground=True).motion
-    return replace(take, motion=miss_ball(motion, take.contacts, ball, take.keys))
+    motion = miss_ball(motion, take.contacts, ball, take.keys)
+    return take if motion is take.motion else replace(take, motion=motion)
 
 
 def _find_free_frames(key: KeyResult, touches: Sequence[KeyResult]) -> tuple[float, float]:

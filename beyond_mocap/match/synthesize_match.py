@@ -160,7 +160,8 @@ def _run_stages(
     clock = read_clocks()
     words = _label_players(job, match, events, solved)
     inside = (match.times >= span[0] - 1e-6) & (match.times <= span[1] + 1e-6)
-    touches = {player: [one.time for one in moments if one.end is None] for player, moments in words.players.items()}
+    touches = {player: [one.time for one in moments if one.end is None and not one.misses_ball]
+               for player, moments in words.players.items()}
     roles, state.report["spacing"] = separate_roles(roles, match.times[inside], touches)
     names = build_file_names(player.id for player in match.players)
     parts = build_player_plans(roles, names, words, solved=solved, request=job.request, folder=job.folder,

@@ -26,9 +26,9 @@ from ..motion.motion import Motion
 from ..motion.track.ball_path import BallPath
 from .body_size import to_player_size
 from .construct.construction import Construction, build_key_results, find_touches
-from .construct.near_miss import miss_ball
 from .construct.extra_steps import Steps
 from .construct.gaze import estimate_look
+from .construct.near_miss import miss_ball
 from .construct.pins import apply_pins
 from .construct.thesis_methods import construct_blocks
 from .plan import METHODS, Plan, ResolvedPlan
