@@ -29,6 +29,7 @@ from beyond_mocap.files.bvh import bvh  # noqa: E402
 from beyond_mocap.motion.motion import Motion  # noqa: E402
 from beyond_mocap.synthetic.gait import build_gait  # noqa: E402
 from beyond_mocap.synthetic.gestures import Gesture, build_dribble, build_strike  # noqa: E402
+from beyond_mocap.synthetic.actions.receptions import build_reception  # noqa: E402
 from beyond_mocap.synthetic.moves import build_celebration, build_get_up, build_header, build_throw_in  # noqa: E402
 
 FPS = 30.0
@@ -144,7 +145,7 @@ def _build_moves() -> list[Clip]:
         ("kick_low_inside_slow", build_strike("kick low inside", fps=FPS, speed=0.6, seed=1),
          "kick right low inside standing front"),
         ("kick_low_top", build_strike("kick low top"), "kick right low top running front"),
-        ("receive_foot", build_strike("receive foot low inside"), "receive right foot low inside front"),
+        ("receive_foot", build_reception("inside", speed=1.8), "receive right foot low inside front"),
         ("header", build_header(fps=FPS), "header standing jump front"),
         ("throw_in", build_throw_in(fps=FPS), "throwb high front"),
         ("getting_up", build_get_up(fps=FPS), "getting_up long_duration back"),

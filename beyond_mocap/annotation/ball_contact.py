@@ -11,7 +11,7 @@ from .labels import find_label, list_labels, read_labels
 from .striking import Surface, build_part_surfaces, measure_smallest_gap
 from .vocabulary import SIDES
 
-_BY_PART = {part: frozenset(list_labels(part=part)) for part in ("head", "chest", "hand", "foot")}
+_BY_PART = {part: frozenset(list_labels(part=part)) for part in ("head", "chest", "hand", "thigh", "foot")}
 """Part -> its labels. The first part that has one of a motion's labels counts."""
 
 _BOTH_HANDS = frozenset(list_labels(both_hands=True))
@@ -23,6 +23,10 @@ _FOOT_ON_BALL = tuple(
 )  # fmt: skip
 _FOOT_OR_OTHER = frozenset(label.name for label in read_labels().values() if "foot" in label.parts and not label.part)
 _FOOT_TAKES = frozenset(list_labels(ball="takes", part="foot", is_root=True))
+_TAKES, _SENDS = frozenset(list_labels(ball="takes")), frozenset(list_labels(ball="sends"))
+_STATED = frozenset({"foot", *list_labels(group="height"), *list_labels(group="surface")})
+_PART_BY_HEIGHT = ((0.45, ("foot", "low")), (0.75, ("foot", "high")), (1.05, ("thigh",)), (np.inf, ("body",)))
+"""Below which height in m of the ball which part takes it: the knee of an adult is at 0.5 m, the hip at 0.95 m."""
 _FLIGHT_SECONDS = 0.6  # from take-off to ball contact at most, in dives by hand
 
 
@@ -34,7 +38,7 @@ def find_striking_part(labels: Iterable[str]) -> str | None:
     Args:
         labels: the labels of a motion.
     Returns:
-        "foot", "head", "chest" or "hand"; None for labels without ball contact.
+        "foot", "thigh", "head", "chest" or "hand"; None for labels without ball contact.
     """
     labels = set(labels)
     return next((part for part, part_labels in _BY_PART.items() if part_labels & labels), None)
@@ -113,6 +117,36 @@ def takes_with_foot(labels: Iterable[str]) -> bool:
         labels: the labels of a motion.
     """
     return bool(_FOOT_TAKES.intersection(labels))
+
+
+def choose_part_by_height(labels: Iterable[str], height: float | None) -> tuple[str, ...]:
+    """Choose the part that takes a ball at a height, where the labels leave that open: a plain "receive".
+
+    Args:
+        labels: the labels of a motion.
+        height: m of the ball's centre above the ground, None where it is unknown.
+    Returns:
+        The labels, with those of the part and height added.
+    """
+    labels = tuple(labels)
+    is_open = takes_with_foot(labels) and find_striking_part(labels) == "foot" and not _STATED & set(labels)
+    if not is_open or height is None:
+        return labels
+    return (*labels, *next(part for most, part in _PART_BY_HEIGHT if height < most))
+
+
+def takes_and_sends(a: frozenset[str], b: frozenset[str]) -> bool:
+    """Return whether one of two motions only takes the ball and the other one only sends it.
+
+    A foot that stops a ball gives with it, one that sends it swings through, so neither can stand for the other. A
+    dribble carries the ball and does both.
+
+    Args:
+        a: the labels of one motion.
+        b: the labels of the other.
+    """
+    (a_takes, a_sends), (b_takes, b_sends) = ((bool(_TAKES & labels), bool(_SENDS & labels)) for labels in (a, b))
+    return a_takes != a_sends and a_takes == b_sends and a_sends == b_takes
 
 
 def build_surfaces(skeleton: Skeleton, labels: Iterable[str]) -> tuple[Surface, ...]:

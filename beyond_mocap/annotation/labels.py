@@ -27,7 +27,7 @@ GROUPS = ("side", "height", "surface", "pace", "way")
 ACTIONS = ("throw", "kick")
 
 _ALLOWED_VALUES = {
-    "kind": KINDS, "group": GROUPS, "part": (*BODY_PARTS, "hands", "tool"), "flight": ("yes",),
+    "kind": KINDS, "group": GROUPS, "part": (*BODY_PARTS, "thigh", "hands", "tool"), "flight": ("yes",),
     "ball": ("sends", "takes", "carries", "never"), "height": ("low", "middle", "high"), "action": ACTIONS,
 }  # fmt: skip
 _COLUMNS = (
@@ -46,7 +46,7 @@ class Label:
         meaning: in a short phrase.
         kinds: of `KINDS`, the trees in which it is a root.
         group: of `GROUPS`; a motion has at most one label of a group; or "".
-        parts: body parts that may meet the ball, of `BODY_PARTS` or "tool".
+        parts: body parts that may meet the ball, of `BODY_PARTS`, "thigh" or "tool".
         both_hands: whether both hands meet it together.
         part_with: labels of which one must be present for the part to be certain.
         ball: "sends", "takes", "carries", "never" or "".

@@ -1,7 +1,7 @@
 """The surfaces with which a body strikes the ball, and their distance from the ball's surface.
 
 A skeleton has no skin, so parts are simple bodies: the foot a capsule from its ankle to its toe tip, the head a sphere
-around the middle from its joint to its tip, the chest and the hands spheres around their joints. Motion construction
+around the middle from its joint to its tip, the chest, the thighs and the hands spheres. Motion construction
 brings these surfaces to the ball; evaluation measures their distance.
 """
 
@@ -19,7 +19,8 @@ from ..motion.track import BALL_RADIUS
 
 BODY_PARTS = ("foot", "head", "chest", "hand")
 # Metres.
-FOOT_RADIUS, HEAD_RADIUS, CHEST_RADIUS, HAND_RADIUS = 0.05, 0.10, 0.12, 0.05
+FOOT_RADIUS, THIGH_RADIUS, HEAD_RADIUS, CHEST_RADIUS, HAND_RADIUS = 0.05, 0.08, 0.10, 0.12, 0.05
+_THIGH_SHARE = 0.6  # of the thigh from hip to knee, where a ball lands on it
 _ORIGIN = np.zeros(3)
 _ORIGIN.setflags(write=False)
 
@@ -29,7 +30,7 @@ class Surface:
     """A striking surface: all points within `radius` of the line between two points that joints carry.
 
     Attributes:
-        part: "foot", "head", "chest" or "hand".
+        part: "foot", "thigh", "head", "chest" or "hand".
         side: "left", "right" or "" (head, chest).
         radius: m.
         start, end: a joint's index and the point (3,) in metres in that joint's own frame.
@@ -61,14 +62,16 @@ def build_part_surfaces(skeleton: Skeleton, part: str, sides: Iterable[str] = ("
 
     Args:
         skeleton: the skeleton, J joints.
-        part: a part of `BODY_PARTS`.
-        sides: build one foot or hand for each.
+        part: a part of `BODY_PARTS`, or "thigh".
+        sides: build one foot, thigh or hand for each.
     Returns:
         The surfaces; none if the skeleton lacks the part.
     """
     body = identify_joints(skeleton)
     if part == "foot":
         return tuple(_build_foot(skeleton, side, getattr(body, side)) for side in sides)
+    if part == "thigh":
+        return tuple(_build_thigh(skeleton, side, getattr(body, side)) for side in sides)
     if part == "hand":
         hands = [(side, getattr(body, side).hand) for side in sides if getattr(body, side).hand is not None]
         return tuple(Surface("hand", side, HAND_RADIUS, (hand, _ORIGIN), (hand, _ORIGIN)) for side, hand in hands)
@@ -145,6 +148,11 @@ def _build_foot(skeleton: Skeleton, side: str, limb: Limb) -> Surface:
     if limb.toe is not None:
         return Surface("foot", side, FOOT_RADIUS, (limb.foot, _ORIGIN), (limb.toe, _ORIGIN))
     return Surface("foot", side, FOOT_RADIUS, (limb.foot, _ORIGIN), (limb.foot, skeleton.tip_offset(limb.foot)))
+
+
+def _build_thigh(skeleton: Skeleton, side: str, limb: Limb) -> Surface:
+    middle = (limb.upper_leg, _THIGH_SHARE * skeleton.offsets[limb.lower_leg])
+    return Surface("thigh", side, THIGH_RADIUS, middle, middle)
 
 
 def _build_head(skeleton: Skeleton, body: Humanoid) -> Surface:

@@ -10,7 +10,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 
 from ..annotation import CONTINUOUS, DISCRETE, VOCABULARY, find_nearest_labels, sort_labels
-from ..annotation.ball_contact import shows_foot_on_ball
+from ..annotation.ball_contact import shows_foot_on_ball, takes_and_sends
 from ..annotation.labels import list_labels
 from ..annotation.vocabulary import SIDES
 
@@ -79,7 +79,8 @@ def select_nearest_keys(keys: tuple[Key, ...], words) -> tuple[Key, ...]:
     """Select the keys whose labels are nearest to the requested ones: most shared labels, then fewest extra ones.
 
     None where the action itself is not shared (a kick is no answer to a slide, and a right kick none to a right
-    header), except that any foot on the ball can replace a foot on the ball, and a dive a dive.
+    header), except that any foot on the ball can replace a foot on the ball, and a dive a dive. What takes the ball is
+    never replaced by what sends it, nor the other way round.
 
     Args:
         keys: of the library.
@@ -89,7 +90,8 @@ def select_nearest_keys(keys: tuple[Key, ...], words) -> tuple[Key, ...]:
     """
     requested = frozenset(words)
     actions = _select_actions(requested) | (requested & _SAME_MOVE)
-    near = [key for key in keys if actions & key.labels or _score_same_contact(requested, key.labels)]
+    near = [key for key in keys if (actions & key.labels or _score_same_contact(requested, key.labels))
+            and not takes_and_sends(requested, key.labels)]
     scores = [(len(requested & key.labels) + _score_same_contact(requested, key.labels), -len(key.labels - requested))
               for key in near]
     return tuple(key for key, score in zip(near, scores) if score == max(scores))

@@ -37,12 +37,15 @@ from .synthetic_clips import FPS, SYNTHETIC_FOLDER, detect_still_points, sample_
 ACTION_PREFIX = "action_"
 _FOLDER = SYNTHETIC_FOLDER + ACTION_PREFIX
 _NAME = re.compile(r"(?P<name>\w+?)(_v(?P<speed>[\d.]+))?(_z(?P<height>[\d.]+))?(?P<side>_side)?\.bvh")
+_HEIGHT_SLACK = 0.15  # m by which the ball may be lower or higher than an action is built for
 _HEIGHT_STEP = 0.1  # m between the heights of the ball for which an action is built
+_SPEED_ROOM, _SPEED_SLACK = 1.2, 0.3  # factor and m/s by which a player may be slower or faster than a variant
 _GAITS = frozenset(list_gaits())
 _SIDE = "right"  # of clips that are not mirrored
 _KEPT = 4  # extended libraries that are kept for each library
 
 _clips: WeakKeyDictionary[Library, dict[str, tuple[Clip, Clip]]] = WeakKeyDictionary()
+_settings: WeakKeyDictionary[Library, ActionSetting] = WeakKeyDictionary()
 _extended: WeakKeyDictionary[Library, dict[tuple[str, ...], Library]] = WeakKeyDictionary()
 
 
@@ -54,28 +57,37 @@ class ActionMoment:
         labels: the requested labels.
         speed: m/s of the player.
         height: m of the ball's centre, None where it is unknown.
+        ball_speed: m/s of the ball before, 0 where it is unknown.
         is_span: whether the labels are a span's.
     """
 
     labels: frozenset[str]
     speed: float = 0.0
     height: float | None = None
+    ball_speed: float = 0.0
     is_span: bool = False
 
 
-def find_action(labels: Iterable[str], is_span: bool = False) -> Action | None:
-    """Find the synthetic action that answers to some labels.
+def find_action(moment: ActionMoment) -> Action | None:
+    """Find the synthetic action that answers to a requested one.
 
     Args:
-        labels: the requested labels.
-        is_span: whether they are a span's.
+        moment: the requested action.
     Returns:
-        The action with the fewest other labels; None where there is none, or where the labels name no action.
+        The action that suits the player's speed and the ball's height, with the fewest other labels; None where there
+        is none, or where the labels name no action.
     """
-    requested = frozenset(labels) - frozenset(SIDES)
-    serving = [action for action in ACTIONS if action.is_span == is_span and requested <= action.labels]
+    requested = moment.labels - frozenset(SIDES)
+    serving = [action for action in ACTIONS if action.is_span == moment.is_span and requested <= action.labels]
+
+    def rate_misfit(action: Action) -> tuple:
+        low, high = action.heights or (-np.inf, np.inf)
+        off = 0.0 if moment.height is None else max(low - moment.height, moment.height - high)
+        is_unsuited = not action.suits[0] <= moment.speed <= action.suits[1]
+        return is_unsuited, off > _HEIGHT_SLACK, len(action.labels - requested)
+
     is_named = any(_names_action(word) for word in requested)
-    return min(serving, key=lambda action: len(action.labels - requested), default=None) if is_named else None
+    return min(serving, key=rate_misfit, default=None) if is_named else None
 
 
 def find_missing_actions(library: Library, moments: Iterable[ActionMoment], mirror: bool = True) -> tuple[str, ...]:
@@ -88,9 +100,22 @@ def find_missing_actions(library: Library, moments: Iterable[ActionMoment], mirr
     Returns:
         Paths of clips, sorted, each once; for `add_actions`.
     """
-    asked = [moment for moment in moments if find_action(moment.labels, moment.is_span)
-             and not _is_recorded(library, moment, mirror)]
-    return tuple(sorted({_name_clip(moment) for moment in asked}))
+    asked = [moment for moment in moments if find_action(moment) and not _is_recorded(library, moment, mirror)]
+    return tuple(sorted({path for moment in asked for path in find_action_paths(moment)}))
+
+
+def find_action_paths(moment: ActionMoment) -> tuple[str, ...]:
+    """Find the paths of the synthetic clips that answer to a requested action; none where no action does."""
+    return tuple(_name_clip(action, moment) for action in _list_actions(moment)) if find_action(moment) else ()
+
+
+def _list_actions(moment: ActionMoment) -> list[Action]:
+    """List the action that answers best to a requested one, and those that vary it and fit the player and the ball."""
+    best, requested = find_action(moment), moment.labels - frozenset(SIDES)
+    return [best, *(one for one in ACTIONS if one.varies == best.name and requested <= one.labels
+                    and one.speeds[0] <= _SPEED_ROOM * moment.speed + _SPEED_SLACK
+                    and moment.speed <= _SPEED_ROOM * one.speeds[-1] + _SPEED_SLACK
+                    and moment.ball_speed <= one.most_ball_speed)]
 
 
 def add_actions(library: Library, paths: Iterable[str]) -> Library:
@@ -160,9 +185,8 @@ def _is_recorded(library: Library, moment: ActionMoment, mirror: bool) -> bool:
     return len(columns) == len(moment.labels - _GAITS) and bool(carries.any())
 
 
-def _name_clip(moment: ActionMoment) -> str:
-    """Name the clip that answers to a requested action."""
-    action = find_action(moment.labels, moment.is_span)
+def _name_clip(action: Action, moment: ActionMoment) -> str:
+    """Name the clip of an action that answers to a requested one."""
     text = action.name.replace(" ", "_").replace("-", "_")
     if action.speeds:
         text += f"_v{min(action.speeds, key=lambda speed: abs(speed - moment.speed)):.1f}"
@@ -198,9 +222,7 @@ def _find_clips(library: Library, path: str) -> tuple[Clip, Clip]:
 def _build_clip(library: Library, path: str) -> Clip:
     """Build the clip of a path."""
     action, numbers, sides = _parse_path(path)
-    recordings = [clip for clip in library.clips if not clip.is_synthetic]
-    gesture = action.build(ActionSetting(skeleton=library.skeleton, example=sample_upright_example(recordings), fps=FPS,
-                                         **numbers))
+    gesture = action.build(replace(_find_setting(library), speed=numbers.get("speed", 0.0), height=numbers.get("height")))
     motion, first, last = gesture.motion, np.ceil(gesture.start * FPS), np.floor(gesture.end * FPS)
     last = min(last, len(motion) - 1)
     key = None if action.is_span else gesture.key * FPS
@@ -208,6 +230,15 @@ def _build_clip(library: Library, path: str) -> Clip:
     touched = contacts.detect_heel_toe_contacts(motion) & detect_still_points(motion)
     rows = (row, *_build_gait_rows(library, motion, int(first), int(last)))
     return Clip(path=path, mirrored=False, motion=motion, annotations=rows, heel_toe_contacts=touched)
+
+
+def _find_setting(library: Library) -> ActionSetting:
+    """Find the setting of a library's actions: its skeleton and how people stand on it."""
+    if library not in _settings:
+        recordings = [clip for clip in library.clips if not clip.is_synthetic]
+        _settings[library] = ActionSetting(skeleton=library.skeleton, example=sample_upright_example(recordings),
+                                           fps=FPS)
+    return _settings[library]
 
 
 def _build_gait_rows(library: Library, motion, first: int, last: int) -> list[ClipAnnotation]:

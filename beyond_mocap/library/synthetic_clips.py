@@ -17,8 +17,9 @@ Where all recordings run, or all walk slower, it generates walking the same way,
 stand: a run that is shortened to a walk's steps hops on the spot.
 
 Recorded kicks are seldom faster than a jog, and players who receive a ball with the foot in a recording hardly move;
-moved along at 8 m/s their supporting foot slides by metres. `synthetic.gestures` generates both on the run at the
-missing speeds; they substitute for recorded ones wherever they carry the labels by which those answer.
+moved along at 8 m/s their supporting foot slides by metres. `synthetic.gestures` and `synthetic.actions.receptions`
+generate both on the run at the missing speeds; they substitute for recorded ones wherever they carry the labels by
+which those answer.
 """
 
 from __future__ import annotations
@@ -38,6 +39,7 @@ from ..motion.humanoid import compute_heading_from_positions, identify_joints
 from ..motion.motion import Motion, forward_kinematics, sample_frames
 from ..motion.phase_blend import Strides, blend_strides, find_strides
 from ..synthetic import gestures
+from ..synthetic.actions.receptions import build_reception
 from ..synthetic.gait import build_gait
 from ..synthetic.gait_plan import GaitStyle
 from .features import Frames
@@ -174,8 +176,7 @@ def iter_synthetic_clips(
     yield from _iter_touches(KICK_PREFIX, _TOUCH_STEP * fastest, ("kick", "low"), kinds=kinds, example=example,
                              speeds=speeds)
     fastest = max(_TOUCH_STEP * measure_touch_speed(frames, clips, keys, RECEIVE_LABELS), MIN_RECEIVE_SPEED)
-    yield from _iter_touches(RECEIVE_PREFIX, fastest, ("receive", "foot", "low"), kinds=["inside"], example=example,
-                             speeds=speeds)
+    yield from _iter_receptions(fastest, example, speeds)
     stands = [(STAND_PREFIX, motion) for _, motion in iter_standing_loops(clips, frames, fps, strangeness, FPS)]
     if not stands:
         stands = [(STILL_PREFIX, build_gait(0.0, STAND_SECONDS, FPS, example.skeleton, example=example))]
@@ -349,6 +350,18 @@ def _iter_touches(
             row = ClipAnnotation(np.ceil(strike.start * FPS), np.floor(strike.end * FPS), strike.key * FPS, words)
             gait_row = _build_gait_rows(np.full(len(strike.motion), speed), speeds)
             yield _ground_clip(f"{SYNTHETIC_FOLDER}{name}{kind}_{speed:.1f}.bvh", strike.motion, None, (row, *gait_row))
+        speed *= _TOUCH_STEP
+
+
+def _iter_receptions(speed: float, example: Motion, speeds: dict[str, float]) -> Iterator[SyntheticClip]:
+    """Iterate over receptions with the inside of the right foot on the run, from `speed` m/s to a sprint."""
+    while speed < MAX_SPEED:
+        touch = build_reception("inside", example.skeleton, FPS, speed, example=example)
+        words = ("receive", "right", "foot", "low", "inside", "running", "front")
+        row = ClipAnnotation(np.ceil(touch.start * FPS), np.floor(touch.end * FPS), touch.key * FPS, words)
+        gait_row = _build_gait_rows(np.full(len(touch.motion), speed), speeds)
+        name = f"{SYNTHETIC_FOLDER}{RECEIVE_PREFIX}inside_{speed:.1f}.bvh"
+        yield _ground_clip(name, touch.motion, None, (row, *gait_row))
         speed *= _TOUCH_STEP
 
 

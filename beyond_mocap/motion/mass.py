@@ -28,12 +28,13 @@ def compute_centre_of_mass(body: Humanoid, positions: np.ndarray) -> np.ndarray:
     top = positions[..., body.neck_or_chest, :]
     centre = _TRUNK[1] * top + (1.0 - _TRUNK[1]) * hips
     total = centre.copy()
-    parts = [(positions[..., top_or_head, :], _HEAD) for top_or_head in (body.head,) if top_or_head is not None]
+    parts = [] if body.head is None else [(positions[..., body.head, :], _HEAD)]
     for limb in (body.left, body.right):
         for first, second, mass, share in (*_LEG, *_ARM):
             joints = getattr(limb, first), getattr(limb, second or first)
             if None not in joints:
-                parts.append(((1.0 - share) * positions[..., joints[0], :] + share * positions[..., joints[1], :], mass))
+                near, far = (positions[..., joint, :] for joint in joints)
+                parts.append(((1.0 - share) * near + share * far, mass))
     for place, mass in parts:
         total = total + mass * (place - centre)
     return total

@@ -12,6 +12,7 @@ from ..library.automatic_locomotion import apply_chosen_gaits
 from ..library.library import Library
 from ..library.missing_actions import ActionMoment, add_actions, find_missing_actions
 from .plan import ResolvedPlan
+from .requested_actions import read_moment_action, read_span_action
 from .search.edit_list import EditList
 
 
@@ -57,19 +58,9 @@ def _list_action_moments(library: Library, plan: ResolvedPlan) -> list[ActionMom
     moments, spans = plan.timeline.keys, plan.timeline.spans
     if not moments and not spans:
         return []
-    track, known = plan.sample_track(library.fps), plan.track.ball_height_known
-    found = []
-    for moment in moments:
-        at = int(np.argmin(np.abs(plan.track.times - moment.resolved_time)))
-        found.append(ActionMoment(
-            labels=frozenset(moment.words), speed=float(np.interp(moment.resolved_time, track.times, track.speed)),
-            height=float(plan.track.ball[at, 2]) if known[at] else None,
-        ))
-    for span in spans:
-        inside = (track.times >= span.start) & (track.times <= span.end)
-        speed = float(track.speed[inside].mean()) if inside.any() else 0.0
-        found.append(ActionMoment(labels=frozenset(span.words), speed=speed, is_span=True))
-    return found
+    sampled = plan.sample_track(library.fps)
+    return [*(read_moment_action(moment, plan.track, sampled) for moment in moments),
+            *(read_span_action(span, sampled) for span in spans)]
 
 
 def _lacks_speeds(library: Library, plan: ResolvedPlan) -> bool:

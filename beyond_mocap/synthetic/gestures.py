@@ -1,4 +1,4 @@
-"""Synthetic touches of the ball while running: kicks, a trap, a dribble; and key poses over time, as all moves use
+"""Synthetic touches of the ball while running: kicks, a dribble; and key poses over time, as all moves use
 them.
 
 Each is the gait's posture with key poses blended over it, given as tables over seconds from the key moment (the touch).
@@ -55,7 +55,7 @@ class StrikeRecipe:
     """How the right foot meets the ball and how the body moves; seconds from the touch, metres of an adult, degrees.
 
     Attributes:
-        foot: rows (time, ahead of the hips, left of them, ankle height, pitch, yaw, roll).
+        foot: rows (time, ahead of the hips, left of them, ankle height, pitch, yaw, roll); () leaves it as it runs.
         pelvis: rows (time, list, tilt, turn).
         spine: rows (time, list, tilt, turn).
         left_arm: rows (time, flexion, abduction, inward, elbow).
@@ -112,21 +112,6 @@ STRIKES = {
         at=0.42,
         sink=((-0.1, 0.015), (0.0, 0.02), (0.2, 0.0)),
     ),
-    "receive foot low inside": StrikeRecipe(
-        foot=(
-            (-0.16, 0.26, -0.14, 0.16, 0, -48, 0), (0.0, 0.34, -0.14, 0.15, -4, -70, -6),
-            (0.16, 0.10, -0.15, 0.13, 2, -66, -4), (0.26, 0.10, -0.13, 0.11, 2, -45, 0),
-        ),
-        pelvis=((-0.16, 4, 2, -4), (0.0, 5, 0, 2), (0.16, 4, 2, -10)),
-        spine=((-0.16, -6, 9, 4), (0.0, -7, 12, -2), (0.16, -5, 14, 6)),
-        left_arm=((-0.16, 12, 40, 15, 42), (0.0, 16, 46, 15, 40), (0.2, 12, 40, 15, 45)),
-        right_arm=((-0.16, 4, 36, 15, 42), (0.0, -6, 42, 15, 40), (0.2, 6, 36, 15, 42)),
-        speeds=((-2.4, 2.4), (-1.2, 2.2), (-0.4, 1.2), (0.0, 0.8), (0.4, 0.9), (1.0, 1.9), (2.2, 2.6)),
-        pace=0.72,
-        at=0.5,
-        sink=((-0.1, 0.04), (0.0, 0.05), (0.25, 0.04)),
-        head=24.0,
-    ),
 }
 
 
@@ -161,6 +146,26 @@ def build_strike(
         The move.
     """
     recipe = STRIKES[kind] if at_speed is None else _adapt_to_run(STRIKES[kind], at_speed)
+    return build_touch(recipe, skeleton, fps, speed, seed, example=example)
+
+
+def build_touch(
+    recipe: StrikeRecipe, skeleton: Skeleton | None = None, fps: float = 60.0, speed: float = 1.0, seed: int = 0, *,
+    example: Motion | None = None,
+) -> Gesture:
+    """Build a touch of the ball while the body travels along +X; its right foot, if the recipe guides it, is at the
+    ball.
+
+    Args:
+        recipe: how the body moves.
+        skeleton: any humanoid skeleton; default: the project's adult.
+        fps: frames per second.
+        speed: factor on the recipe's speeds.
+        seed: of the gait's variation.
+        example: a recording on `skeleton`, for its neutral stance.
+    Returns:
+        The move.
+    """
     neutral = build_neutral_stance(skeleton or build_adult_skeleton(), example)
     key = -recipe.speeds[0][0]
     end = key + recipe.speeds[-1][0]
@@ -226,6 +231,8 @@ def _blend_strike(posture: Posture, gait_plan: GaitPlan, steps, key: float, reci
     for side, rows in ((LEFT, recipe.left_arm), (RIGHT, recipe.right_arm)):
         arms[:, side, :4] = blend_arrays(arms[:, side, :4], np.radians(interpolate_rows(rows, times)), fling)
     posture = posture.replace_arrays(pelvis=pelvis, spine=spine, head=head, arms=arms)
+    if not recipe.foot:
+        return posture
     return _guide_foot(posture, gait_plan, steps[RIGHT], key=key, rows=recipe.foot, neutral=neutral)
 
 

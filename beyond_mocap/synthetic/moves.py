@@ -45,10 +45,12 @@ _HEADER = {
     "legs": ((-0.24, 0.0), (-0.06, 0.16), (0.08, 0.10), (0.24, 0.0)),
 }
 _FLIGHT = 0.25  # s, half the flight of an adult's jump
+_TOES = 0.085  # m of an adult that the hips are higher on the toes, legs stretched
 
 
 def build_header(
-    skeleton: Skeleton | None = None, fps: float = 60.0, seed: int = 0, example: Motion | None = None
+    skeleton: Skeleton | None = None, fps: float = 60.0, seed: int = 0, example: Motion | None = None,
+    rise: float | None = None,
 ) -> Gesture:
     """Build a jump from both feet out of standing: the trunk arches, strikes the ball at the top, and the body lands.
 
@@ -57,6 +59,7 @@ def build_header(
         fps: frames per second.
         seed: of the variation of standing.
         example: a recording on `skeleton`, for its neutral stance.
+        rise: m of the hips from standing to the top of the flight; None: what half a second in the air gives.
     Returns:
         The move; its key is the touch.
     """
@@ -65,17 +68,18 @@ def build_header(
     key = 1.5
     gait_plan, steps, posture = build_standing(neutral, key + 1.9, fps, seed, width=0.10)
     times = gait_plan.times - key
-    air = _FLIGHT * np.sqrt(scale)
-    trunk, arms = np.radians(interpolate_rows(_HEADER["trunk"], times)), np.radians(interpolate_rows(_HEADER["arms"],
-            times))
-    ease = compute_envelope(times, -1.1, -0.8, 0.9, 1.4)
+    air = _FLIGHT * np.sqrt(scale) if rise is None else np.sqrt(2.0 * max(rise - _TOES * scale, 0.02) / tables.GRAVITY)
+    longer = 0.0 if rise is None else float(air) - _FLIGHT
+    table_times = _adapt_times(times, air, longer)
+    trunk, arms = (np.radians(interpolate_rows(_HEADER[name], table_times)) for name in ("trunk", "arms"))
+    ease = compute_envelope(table_times, -1.1, -0.8, 0.9, 1.4)
     pitch = np.radians(62) * compute_envelope(times, -air - 0.14, -air, air, air + 0.12)
     hips, ankles, feet, toes = posture.hips.copy(), posture.ankles.copy(), posture.feet.copy(), posture.toes.copy()
-    rise, tuck = _compute_jump(times, air, hips[:, 2], neutral)
-    hips[:, 2] = rise
+    path, tuck = _compute_jump(times, air, hips[:, 2], neutral=neutral, longer=longer, table_times=table_times)
+    hips[:, 2] = path
     for side in (LEFT, RIGHT):
         ankles[:, side], feet[:, side, 1], toes[:, side] = _compute_jumping_foot(
-            ankles[:, side], feet[:, side, 2], times, air=air, rise=rise, pitch=pitch, tuck=tuck * scale,
+            ankles[:, side], feet[:, side, 2], times, air=air, rise=path, pitch=pitch, tuck=tuck * scale,
             neutral=neutral,
         )
     pelvis = posture.pelvis + np.stack([0 * times, trunk[:, 0], 0 * times], -1) * ease[:, None]
@@ -90,16 +94,23 @@ def build_header(
     return Gesture(to_motion(posture.frames(gait_plan.requested_slice), neutral), key, key - 0.9, key + 0.9)
 
 
-def _compute_jump(times, air: float, standing: np.ndarray, neutral: NeutralStance) -> tuple[np.ndarray, np.ndarray]:
+def _adapt_times(times: np.ndarray, air: float, longer: float) -> np.ndarray:
+    """Adapt seconds (N,) of tables to a flight whose half is `longer` s longer: `air`."""
+    outside = times - np.sign(times) * longer
+    return times if longer == 0.0 else np.where(np.abs(times) > air, outside, times * (_FLIGHT / air))
+
+
+def _compute_jump(times, air: float, standing: np.ndarray, *, neutral: NeutralStance, longer: float,
+                  table_times: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Compute the height of the hips (N,) m, free fall in the air, and how far (N,) the ankles are drawn up and back
-    there.
+    there; `longer`: s that the tables' rows on the ground are further from the contact.
     """
     scale = neutral.leg / tables.LEG
-    take_off = np.mean(standing) + 0.085 * scale  # on the toes, legs stretched
+    take_off = np.mean(standing) + _TOES * scale
     speed = tables.GRAVITY * air
     flight = take_off + speed * (times + air) - 0.5 * tables.GRAVITY * (times + air) ** 2
-    crouch = np.array(_HEADER["crouch"])
-    absorb = np.array(_HEADER["absorb"])
+    crouch, absorb = (np.array(_HEADER[name]) + [shift, 0.0] for name, shift in (("crouch", -longer),
+                                                                                  ("absorb", longer)))
     base = float(np.mean(standing))
     before = CubicSpline(
         np.r_[crouch[:, 0], -air], np.r_[base - scale * crouch[:, 1], take_off], bc_type=((1, 0.0), (1, speed))
@@ -109,7 +120,7 @@ def _compute_jump(times, air: float, standing: np.ndarray, neutral: NeutralStanc
     )
     rise = np.where(np.abs(times) <= air, flight, np.where(times < 0, before(times), after(times)))
     rise = np.where((times < crouch[0, 0]) | (times > absorb[-1, 0]), standing, rise)
-    return rise, interpolate_rows(_HEADER["legs"], times)[:, 0] * (np.abs(times) < air)
+    return rise, interpolate_rows(_HEADER["legs"], table_times)[:, 0] * (np.abs(times) < air)
 
 
 def _compute_jumping_foot(ankle, yaw, times, air, rise, pitch, tuck, neutral: NeutralStance):

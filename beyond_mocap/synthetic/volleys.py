@@ -243,7 +243,21 @@ def build_volley(
     Returns:
         The move.
     """
-    recipe = VOLLEYS[kind]
+    return build_standing_touch(VOLLEYS[kind], skeleton, fps, seed, speed=speed, example=example)
+
+
+def build_standing_touch(
+    recipe: Volley, skeleton: Skeleton | None = None, fps: float = 30.0, seed: int = 0, *, speed: float = 1.0,
+    example: Motion | None = None,
+) -> Gesture:
+    """Build a touch of the ball out of standing as a recipe says; see `build_volley` for the other arguments.
+
+    Args:
+        recipe: how the body moves.
+        skeleton, fps, seed, speed, example: as for `build_volley`.
+    Returns:
+        The move.
+    """
     neutral = build_neutral_stance(skeleton or build_adult_skeleton(), example)
     gait_plan, posture = _build_ready(neutral, BEFORE + AFTER, fps, seed)
     times = (gait_plan.times - BEFORE) * speed

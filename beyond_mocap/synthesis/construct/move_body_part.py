@@ -282,6 +282,29 @@ def bend_spine(body: Body, surface: Surface, at: int, shift: np.ndarray, weight:
     return out
 
 
+def swing_thigh(body: Body, surface: Surface, at: int, shift: np.ndarray, weight: np.ndarray) -> np.ndarray:
+    """Swing a leg about its hip so that the middle of its thigh moves by a shift at one frame, as far as an arc goes.
+
+    Args:
+        body: the body, W frames.
+        surface: a thigh's surface.
+        at: frame of the body.
+        shift: (3,) m, world.
+        weight: (W,) share of the swing at each frame.
+    Returns:
+        (W, J, 4) local rotations.
+    """
+    hip = surface.start[0]
+    arm = surface.compute_line(body.places[at], body.world[at])[0] - body.places[at, hip]
+    swing = quaternion.to_rotation_vector(quaternion.rotation_between(arm[None], (arm + shift)[None]))[0]
+    turn = quaternion.from_rotation_vector(weight[:, None] * swing)
+    above = body.world[:, body.skeleton.parents[hip]]
+    own = quaternion.multiply(quaternion.inverse(above), quaternion.multiply(turn, above))
+    out = body.rotations.copy()
+    out[:, hip] = quaternion.multiply(own, body.rotations[:, hip])
+    return out
+
+
 def limit_to_ground(body: Body, foot: Surface, at, shift: np.ndarray) -> np.ndarray:
     """Limit the shift of a foot so that it does not go through the ground, except where it is below it already.
 

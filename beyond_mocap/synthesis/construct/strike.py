@@ -46,17 +46,18 @@ from .move_body_part import (
     limit_to_ground,
     move_limb,
     solve_swing,
+    swing_thigh,
 )
 
 BALL_NOISE, FILLED_NOISE = 0.3, 1.0
 """Metres that the ball may be moved from its place, where it was measured and where the feed has filled it in."""
 
-MAX_SHIFT = {"foot": 0.45, "hand": 0.4, "head": 0.2, "chest": 0.12}  # m, largest move of a part from the recording
+MAX_SHIFT = {"foot": 0.45, "hand": 0.4, "head": 0.2, "chest": 0.12, "thigh": 0.1}  # m, largest move of a part from the recording
 PELVIS_RANGE = (0.20, 0.64)  # m on the ground from pelvis to striking foot in measured kicks, unless recorded further
 OUT_OF_REACH = 0.15  # m of remaining gap above which the body does not reach at all, and plays as recorded
 MAX_DROP = 0.04  # m, largest drop of the pelvis
 _LONGEST_EASE, _SHORTEST_EASE = 0.5, 0.12  # s before and after a strike in which the body is eased
-_RISE = {"foot": 0.0, "hand": 0.0, "head": 0.6, "chest": 0.0}  # sine of the ball's elevation as seen from the part
+_RISE = {"foot": 0.0, "hand": 0.0, "head": 0.6, "chest": 0.0, "thigh": 0.8}  # sine of the ball's elevation as seen from the part
 _IN_THE_AIR = 0.2  # m above which a ball may be met higher or lower
 _HANDS_APART = 0.6  # m between the hands beyond which one hand alone catches in a dive
 _STOPPING = frozenset(list_labels(ball="takes"))
@@ -322,8 +323,8 @@ def _choose_part(body: Body, choices: Sequence[Surface], at: int, contacts, ball
 
 
 def _is_in_contact(contacts: np.ndarray, part: Surface) -> np.ndarray:
-    """Return (W,) bool: whether the part is a foot in contact."""
-    if part.part != "foot":
+    """Return (W,) bool: whether the part is a foot in contact, or a thigh above one."""
+    if part.part not in ("foot", "thigh"):
         return np.zeros(len(contacts), bool)
     return contacts[:, ("left", "right").index(part.side)]
 
@@ -473,7 +474,9 @@ def _compute_drop(body: Body, chain: tuple[int, int, int], at: int, ankle: np.nd
 def _move_parts(scene: _TouchProblem, body: Body, limbs: Sequence[LimbReference], shifts: np.ndarray) -> Body:
     """Move each part of the body by its shift (3,) m, weighted by its share."""
     root, rotations = body.root, body.rotations
-    if not limbs:
+    if scene.parts[0].part == "thigh":
+        rotations = swing_thigh(body, scene.parts[0], scene.at, shifts[0], scene.shares[0])
+    elif not limbs:
         rotations = bend_spine(body, scene.parts[0], scene.at, shifts[0], scene.shares[0])
     for part, limb, shift, share in zip(scene.parts, limbs, shifts, scene.shares):
         swing = _solve_part_swing(body, part, scene.at, shift)

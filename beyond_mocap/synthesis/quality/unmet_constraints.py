@@ -56,7 +56,7 @@ _TOLERANCE = 1e-3  # of rates and seconds, for rounding
 _SYNTHETIC_KINDS = (
     (BLEND_PREFIX, "blended from a slower and a faster recording: none has the speed of the track"),
     (KICK_PREFIX, "synthetic kick on the run: no recorded kick is as fast as the player"),
-    (RECEIVE_PREFIX, "synthetic reception on the run: no recorded one is as fast as the player"),
+    (RECEIVE_PREFIX, "synthetic reception: no recording takes the ball so, or at the player's speed"),
     (STAND_PREFIX, "a recorded stand is played forward and backward: no recording stands for so long"),
     (STILL_PREFIX, "synthetic standing: no recording stands calmly; add one"),
     (WALK_PREFIX, "synthetic walking: no recording has the speed of the track; add one"),

@@ -25,9 +25,10 @@ from ...base.errors import NotInLibraryError, TimedMessage, format_seconds
 from ...library.automatic_locomotion import build_automatic_labels
 from ...library.keys import Key, list_nearest_labels, select_keys, select_nearest_keys, select_substitutes
 from ...library.library import Library
-from ...library.missing_actions import is_action_clip
+from ...library.missing_actions import ActionMoment, find_action_paths, is_action_clip
 from ...motion.track import SampledTrack
 from ..plan import Plan, ResolvedPlan
+from ..requested_actions import read_moment_action
 from .preferences import LagPreference, build_lag_preference, compute_manner_cost, compute_style_cost
 
 PAPERS_OMEGA = 4.0  # Faustino 2016, §3.1.1
@@ -127,12 +128,12 @@ def build_request(library: Library, plan: ResolvedPlan) -> SearchRequest:
     timeline = fill_timeline(plan.timeline, track.times, automatic)
     allowed = np.array([settings.mirror or not clip.mirrored for clip in library.clips])
     warnings: list[str] = []
+    actions = [read_moment_action(moment, plan.track, track) for moment in timeline.keys]
     keys = tuple(_build_key(
-        library, moment, track, gait=gait, allowed=allowed, use_nearest=settings.nearest, warnings=warnings,
-    ) for moment in timeline.keys)
-    known = plan.track.ball_height_known
-    nearest_sample = [int(np.argmin(np.abs(plan.track.times - key.requested.resolved_time))) for key in keys]
-    keys = tuple(replace(key, is_ball_height_known=bool(known[at])) for key, at in zip(keys, nearest_sample))
+        library, moment, track, asked=asked, gait=gait, allowed=allowed, use_nearest=settings.nearest,
+        warnings=warnings,
+    ) for moment, asked in zip(timeline.keys, actions))
+    keys = tuple(replace(key, is_ball_height_known=asked.height is not None) for key, asked in zip(keys, actions))
     requested_labels = _clear_around_keys(labels_per_frame(timeline, track.times), keys, library)
     warnings += _report_missing_labels(library, plan.timeline)
     avoided = tuple(avoided) if any(avoided) else ()
@@ -171,23 +172,26 @@ def _replace_avoided_gaits(library: Library, gait: np.ndarray, speed: np.ndarray
     return out
 
 
-def _build_key(library, moment: KeyMoment, track, gait, allowed, use_nearest: bool,
+def _build_key(library, moment: KeyMoment, track, asked: ActionMoment, gait, allowed, use_nearest: bool,
                warnings: list[str]) -> RequestedKey:
     """Build one key moment: its frame and the clips that may serve it."""
     frame = float(np.clip((moment.resolved_time - track.times[0]) * library.fps, 0, len(track.times) - 1))
     may_show = [key for key in library.keys if allowed[key.clip]]
     usable = tuple(key for key in may_show if not library.clips[key.clip].is_synthetic)
-    actions = tuple(key for key in may_show if is_action_clip(library.clips[key.clip]))
-    synthetic = tuple(key for key in may_show if library.clips[key.clip].is_synthetic and key not in actions)
+    actions = _select_action_keys(library, may_show, asked)
+    synthetic = tuple(key for key in may_show if library.clips[key.clip].is_synthetic
+                      and not is_action_clip(library.clips[key.clip]))
     if moment.avoid:
         usable, synthetic = _remove_avoided(moment, usable, synthetic, warnings)
-    # recordings that carry the labels first, with synthetic clips; then synthetic actions
-    choices = select_keys(usable, moment.words)
+    # recordings that carry the labels first, with synthetic clips; then synthetic actions; each time with the part that
+    # the ball's height asks for before any part
+    chosen = asked.labels
+    choices = select_keys(usable, chosen) or (() if select_keys(actions, chosen) else select_keys(usable, moment.words))
     if choices:
         return RequestedKey(requested=moment, frame=frame,
                             choices=(*choices, *select_substitutes(choices, synthetic, moment.words)),
                             used_instead=None)
-    choices = select_keys(actions, moment.words)
+    choices = select_keys(actions, chosen) or select_keys(actions, moment.words)
     if choices:
         return RequestedKey(requested=moment, frame=frame, choices=choices, used_instead=None)
     nearest = list_nearest_labels(usable, moment.words)
@@ -203,6 +207,13 @@ def _build_key(library, moment: KeyMoment, track, gait, allowed, use_nearest: bo
     warnings.append(TimedMessage(f"{text}; used instead: {instead}", (moment.time, moment.time)))
     return RequestedKey(requested=moment, frame=frame,
                         choices=(*choices, *select_substitutes(choices, synthetic, moment.words)), used_instead=used)
+
+
+def _select_action_keys(library: Library, keys: list[Key], asked: ActionMoment) -> tuple[Key, ...]:
+    """Select the synthetic actions that were built for a requested one; any where none was."""
+    actions = tuple(key for key in keys if is_action_clip(library.clips[key.clip]))
+    paths = find_action_paths(asked)
+    return tuple(key for key in actions if library.clips[key.clip].path in paths) or actions
 
 
 def _remove_avoided(moment: KeyMoment, usable: tuple[Key, ...], synthetic: tuple[Key, ...], warnings: list[str]):

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import cached_property
+
+import numpy as np
 
 from ...motion.motion import Motion
 from ...motion.retargeting.neutral import NeutralStance, build_neutral_stance
@@ -23,6 +25,7 @@ class ActionSetting:
         fps: frames per second.
         speed: m/s of the player at the key moment; 0 for actions that do not depend on it.
         height: m of the ball's centre above the ground at the key moment; None where it is unknown.
+        neutral: the neutral stance of the body; measured on the example where it is not given.
     """
 
     skeleton: Skeleton
@@ -30,11 +33,11 @@ class ActionSetting:
     fps: float = 60.0
     speed: float = 0.0
     height: float | None = None
+    neutral: NeutralStance = None  # type: ignore[assignment]
 
-    @cached_property
-    def neutral(self) -> NeutralStance:
-        """The neutral stance of the body."""
-        return build_neutral_stance(self.skeleton, self.example)
+    def __post_init__(self):
+        if self.neutral is None:
+            object.__setattr__(self, "neutral", build_neutral_stance(self.skeleton, self.example))
 
     @property
     def scale(self) -> float:
@@ -54,8 +57,12 @@ class Action:
         has_side: whether it is done with or to one side; its mirrored twin shows the other one.
         speeds: m/s at which it is built, the nearest one to the player's; empty: it does not depend on speed.
         heights: lowest and highest m of the ball for which it is built; empty: it does not depend on the ball.
+        suits: lowest and highest m/s of players whom it suits; of several actions one that suits is taken.
         is_span: whether it lasts (a celebration) instead of having a key moment; its clip carries the labels from the
             gesture's start to its end.
+        varies: name of the action beside which it is offered, where the player is as fast as it needs, and the ball no
+            faster than it can be done with; empty: it is offered alone.
+        most_ball_speed: m/s of the ball before the key moment up to which it is offered so.
     """
 
     name: str
@@ -64,4 +71,7 @@ class Action:
     has_side: bool = False
     speeds: tuple[float, ...] = ()
     heights: tuple[float, ...] = ()
+    suits: tuple[float, float] = (0.0, np.inf)
     is_span: bool = False
+    varies: str = ""
+    most_ball_speed: float = math.inf

@@ -1,4 +1,5 @@
-"""A goalkeeper's set position and saves on the feet: catches low, at the chest and high, and a punch.
+"""A goalkeeper's set position and saves on the feet: catches low, at the chest and high, a punch, a parry,
+a tip over the bar.
 
 The set position is that of Ibrahim, Kingma, de Boode, Faber and van Dieen 2019 (J. Sports Sci. 37, 313-321): knees
 flexed by 62 and hips by 63 degrees, feet a third of the leg's length apart. Their later study (Front. Sports Act.
@@ -11,7 +12,8 @@ from __future__ import annotations
 
 from .key_poses import KeyPoses, mirror_foot
 
-_WIDE = ((-0.55, 0, 0, 0, 0, 0, 0), (-0.28, 0, 0, 0, 0, 0, 0), (-0.16, 0, 0, 0, 22, 0, 0), (-0.08, 0, 0.05, 0.04, 12, 0, 0),
+_WIDE = ((-0.55, 0, 0, 0, 0, 0, 0), (-0.28, 0, 0, 0, 0, 0, 0), (-0.16, 0, 0, 0, 22, 0, 0),
+         (-0.08, 0, 0.05, 0.04, 12, 0, 0),
          (0.0, 0, 0.09, 0, 4, 0, 0), (0.06, 0, 0.09, 0, 0, 0, 0))
 _READY_LEFT = (*_WIDE, (1.40, 0, 0.09, 0, 0, 0, 0), (1.55, 0, 0.04, 0.03, 6, 0, 0), (1.70, 0, 0, 0, 0, 0, 0))
 _READY_RIGHT = (*mirror_foot(_WIDE), (1.75, 0, -0.09, 0, 0, 0, 0), (1.90, 0, -0.04, 0.03, 6, 0, 0),
@@ -33,7 +35,7 @@ READY = KeyPoses(
 
 # the body waits in a low stance, meets the ball before its chest and wraps it
 CATCH_CHEST = KeyPoses(
-    labels="catchb catch save middle standing front",
+    labels="catchb catch save middle",
     span=(-0.7, -0.35, 1.5, 2.2),
     hips=((-0.7, 0, 0, 0), (-0.3, 0.0, 0, -0.10), (0.0, 0.04, 0, -0.09), (0.14, -0.02, 0, -0.11), (0.5, 0, 0, -0.05),
           (1.2, 0, 0, -0.01), (1.6, 0, 0, 0)),
@@ -48,7 +50,7 @@ CATCH_CHEST = KeyPoses(
 
 # off the left foot with the right knee up, hands at their highest at the top
 CATCH_HIGH = KeyPoses(
-    labels="catchb catch save high jump standing front",
+    labels="catchb catch save high jump",
     span=(-1.0, -0.75, 1.3, 2.0),
     hips=((-1.0, 0, 0, 0), (-0.62, 0.16, 0.02, -0.08), (-0.46, 0.30, 0.04, -0.17), (-0.25, 0.44, 0.03, 0.06),
           (0.0, 0.56, 0.0, 0.1), (0.25, 0.66, 0, 0.03), (0.42, 0.68, 0, -0.20), (0.8, 0.68, 0, -0.05),
@@ -76,7 +78,7 @@ CATCH_HIGH = KeyPoses(
 
 # the right knee goes down beside the left heel, so that legs and hands close the way of a rolling ball
 CATCH_LOW = KeyPoses(
-    labels="catchb catch save low knee standing front",
+    labels="catchb catch save low knee",
     span=(-0.9, -0.5, 1.5, 2.3),
     hips=((-0.9, 0, 0, 0), (-0.55, 0.06, 0, -0.16), (-0.2, 0.08, 0, -0.48), (0.0, 0.08, 0, -0.555),
           (0.2, 0.08, 0, -0.55), (0.6, 0.09, 0, -0.50), (1.0, 0.16, 0.02, -0.30), (1.4, 0.24, 0.01, -0.05),
@@ -86,7 +88,7 @@ CATCH_LOW = KeyPoses(
     spine=((-0.6, 0, 14, 0), (-0.2, 0, 38, 2), (0.0, 0, 46, 2), (0.25, 0, 40, 0), (0.7, 0, 22, 0), (1.0, 0, 20, 0),
            (1.6, 0, 8, 0), (2.2, 0, 2, 0)),
     head=((-0.6, 0, -8, 0), (-0.2, 0, -28, 0), (0.0, 0, -12, 0), (0.25, 0, 0, 0), (0.8, 0, -20, 0), (1.6, 0, 0, 0)),
-    arms=((-0.6, 30, 14, 14, 40, 10), (-0.15, 60, 6, 4, 36, -40), (0.0, 62, 4, 4, 40, -60), (0.14, 56, 6, 20, 66, -20),
+    arms=((-0.6, 30, 14, 14, 40, 10), (-0.15, 76, 6, 4, 54, -40), (0.0, 78, 4, 4, 54, -60), (0.14, 60, 6, 20, 70, -20),
           (0.35, 34, 10, 44, 112, 80), (1.1, 20, 12, 46, 118, 85), (1.6, 20, 10, 34, 84, 50), (2.2, 2, 9, 12, 16, 0)),
     wrists=((-0.5, 8), (-0.1, -18), (0.04, 6), (0.3, 34), (1.1, 34), (1.7, 8)),
     left_foot=((-0.9, 0, 0, 0, 0, 0, 0), (-0.78, 0, 0, 0, 10, 0, 0), (-0.62, 0.16, 0.02, 0.06, 0, 10, 0),
@@ -101,7 +103,7 @@ CATCH_LOW = KeyPoses(
 
 # as a high catch, but the fists meet before the face and shoot through the ball
 PUNCH = KeyPoses(
-    labels="punch save high jump standing front",
+    labels="punch save high jump",
     span=(-1.0, -0.75, 1.0, 1.6),
     hips=CATCH_HIGH.hips,
     pelvis=((-0.75, 0, 4, 0), (-0.46, 0, 12, 0), (-0.15, 0, -10, 0), (0.0, 0, 0, 0), (0.12, 0, 8, 0), (0.45, 0, 18, 0),
@@ -110,7 +112,8 @@ PUNCH = KeyPoses(
            (1.2, 0, 4, 0)),
     head=((-0.8, 0, -16, 0), (-0.2, 0, -24, 0), (0.0, 0, -22, 0), (0.3, 0, -4, 0), (0.8, 0, 0, 0), (1.3, 0, 2, 0)),
     arms=((-0.75, 6, 16, 12, 50, 20), (-0.46, -10, 20, 16, 80, 30), (-0.22, 66, 18, 40, 124, 60),
-          (-0.09, 84, 14, 34, 118, 70), (0.0, 128, 4, 22, 24, 70), (0.08, 140, 6, 16, 10, 70), (0.24, 90, 22, 18, 50, 40),
+          (-0.09, 84, 14, 34, 118, 70), (0.0, 128, 4, 22, 24, 70), (0.08, 140, 6, 16, 10, 70),
+          (0.24, 90, 22, 18, 50, 40),
           (0.45, 30, 34, 14, 46, 20), (0.9, 8, 14, 12, 24, 0), (1.4, 2, 9, 12, 16, 0)),
     wrists=((-0.4, 8), (-0.1, 0), (0.1, 0), (0.5, 8)),
     left_foot=CATCH_HIGH.left_foot,
@@ -118,5 +121,41 @@ PUNCH = KeyPoses(
     flights=CATCH_HIGH.flights,
     hold=((-0.28, 0, 0.12), (-0.12, 1, 0.12), (0.05, 1, 0.12), (0.2, 0, 0.2)),
 )
-SAVES = dict(ready=READY, catch_chest=CATCH_CHEST, catch_high=CATCH_HIGH, catch_low=CATCH_LOW, punch=PUNCH)
+# a hard ball at the chest is pushed down and away with both palms
+PARRY = KeyPoses(
+    labels="stomp save middle",
+    span=(-0.6, -0.3, 0.7, 1.4),
+    hips=((-0.6, 0, 0, 0), (-0.25, -0.02, 0, -0.12), (0.0, 0.02, 0, -0.09), (0.15, -0.03, 0, -0.10), (0.6, 0, 0, -0.05),
+          (1.2, 0, 0, 0)),
+    pelvis=((-0.3, 0, 12, 0), (0.0, 0, 4, 0), (0.15, 0, 0, 0), (0.6, 0, 8, 0), (1.3, 0, 0, 0)),
+    spine=((-0.3, 0, 12, 0), (0.0, 0, 2, 0), (0.15, 0, -2, 0), (0.6, 0, 10, 0), (1.3, 0, 2, 0)),
+    head=((-0.3, 0, -16, 0), (0.0, 0, 4, 0), (0.4, 0, 8, 0), (1.3, 0, 2, 0)),
+    arms=((-0.25, 30, 14, 14, 96, 30), (-0.08, 52, 10, 14, 84, 60), (0.0, 66, 8, 12, 58, 70), (0.1, 62, 10, 12, 66, 70),
+          (0.3, 40, 18, 14, 60, 40), (0.7, 20, 16, 14, 40, 15), (1.3, 2, 9, 12, 16, 0)),
+    wrists=((-0.3, 8), (0.0, -46), (0.12, -34), (0.5, 8)),
+    hold=((-0.2, 0, 0.2), (-0.04, 1, 0.2), (0.06, 1, 0.2), (0.25, 0, 0.2)),
+)
+
+# as a high catch, but one hand reaches further and tips the ball over the bar
+TIP_OVER = KeyPoses(
+    labels="stomp save high jump right",
+    span=(-1.0, -0.75, 1.0, 1.6),
+    hips=CATCH_HIGH.hips, left_foot=CATCH_HIGH.left_foot, right_foot=CATCH_HIGH.right_foot, flights=CATCH_HIGH.flights,
+    pelvis=((-0.75, 0, 4, 0), (-0.46, 0, 12, 6), (-0.2, 0, -2, 4), (0.0, -6, -10, 10), (0.25, 0, 4, 4), (0.45, 0, 18, 0),
+            (1.2, 0, 0, 0)),
+    spine=((-0.75, 0, 6, 0), (-0.46, 0, 16, 4), (-0.2, 0, -6, 4), (0.0, -12, -14, 8), (0.25, 0, 8, 0), (0.45, 0, 20, 0),
+           (1.2, 0, 4, 0)),
+    head=((-0.8, 0, -16, 0), (-0.3, 0, -30, 0), (0.0, 4, -32, -8), (0.3, 0, -10, 0), (0.8, 0, 0, 0), (1.3, 0, 2, 0)),
+    right_arm=((-0.75, 6, 16, 12, 40, 10), (-0.46, -24, 18, 14, 52, 10), (-0.2, 120, 10, 18, 66, 40),
+               (0.0, 172, 2, 10, 8, 60), (0.1, 164, 2, 10, 14, 60), (0.26, 90, 20, 18, 50, 40), (0.45, 30, 30, 14, 46, 20),
+               (0.9, 8, 14, 12, 24, 0), (1.4, 2, 9, 12, 16, 0)),
+    left_arm=((-0.75, 6, 16, 12, 40, 10), (-0.46, -20, 20, 14, 52, 10), (-0.2, 70, 24, 18, 80, 30),
+              (0.0, 60, 40, 14, 60, 20), (0.26, 34, 40, 14, 50, 20), (0.45, 24, 30, 14, 46, 20), (0.9, 8, 14, 12, 24, 0),
+              (1.4, 2, 9, 12, 16, 0)),
+    wrists=((-0.4, 8), (-0.04, -40), (0.08, -10), (0.4, 8)),
+)
+SAVES = dict(
+    ready=READY, catch_chest=CATCH_CHEST, catch_high=CATCH_HIGH, catch_low=CATCH_LOW, punch=PUNCH, parry=PARRY,
+    tip_over=TIP_OVER,
+)
 """Recipes by name."""

@@ -8,11 +8,11 @@ apart as it is wide (`ball_hands`).
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
-from ...base.easing import quintic_step, smoothstep
+from ...base.easing import smoothstep
 from ...motion import quaternion
 from ...motion.motion import Motion
 from ...motion.retargeting.adult import build_adult_skeleton
@@ -26,10 +26,12 @@ from ..gait_plan import GaitStyle, plan_gait
 from ..gestures import LEFT, RIGHT, Gesture, blend_arrays, compute_envelope, interpolate_rounded, interpolate_rows
 from .ball_hands import hold_ball
 from .flight import apply_flight
-from .ground import keep_above_ground, raise_hips
+from .ground import keep_above_ground, lower_hips, raise_hips
 
 Rows = tuple[tuple[float, ...], ...]
 _ROUNDING_SECONDS = 0.02  # s over which corners of the tables are rounded
+_FOOT_DOWN = 0.004  # m above the ground up to which a foot stands on it
+_RESTING_FOOT: Rows = ((0.0,) * 7, (1.0,) + (0.0,) * 6)
 # rad of pitch between which a foot tips from its toes onto its instep, and of roll between which it lies on its side
 _INSTEP_DOWN, _ON_SIDE = np.radians([95.0, 125.0]), np.radians([20.0, 60.0])
 
@@ -174,10 +176,14 @@ def _lay_feet(posture: Posture, recipe: KeyPoses, times: np.ndarray, place: np.n
         moved = scale * interpolate_rounded(recipe.hips, times, _ROUNDING_SECONDS * posture.fps)
         hips += quaternion.rotate(quaternion.from_up_angle(posture.heading), moved)
     posture = posture.replace_arrays(hips=hips)
-    for side, rows in ((LEFT, recipe.left_foot), (RIGHT, recipe.right_foot)):
+    rest = None if np.any(np.array(recipe.speeds)[:, 1]) else _RESTING_FOOT
+    is_down = np.zeros((len(times), 2), bool)
+    for side, rows in ((LEFT, recipe.left_foot or rest), (RIGHT, recipe.right_foot or rest)):
         if rows is not None:
-            posture = _lay_foot(posture, side, interpolate_rows(rows, times), ease, place, neutral)
-    return posture
+            values = interpolate_rows(rows, times)
+            posture = _lay_foot(posture, side, values, ease, place, neutral)
+            is_down[:, side] = (values[:, 2] < _FOOT_DOWN) & (ease == 1.0)
+    return lower_hips(posture, is_down, neutral)
 
 
 def _lay_foot(posture: Posture, side: int, rows: np.ndarray, ease: np.ndarray, place: np.ndarray,

@@ -1,4 +1,5 @@
-"""The actions that are tables of key poses, one row each: a goalkeeper's moves, celebrations and gestures."""
+"""The actions that are tables of key poses, one row each: at the ball, a goalkeeper's moves,
+celebrations and gestures."""
 
 from __future__ import annotations
 
@@ -7,6 +8,7 @@ from collections.abc import Mapping
 from ...annotation.vocabulary import SIDES
 from ..gestures import Gesture
 from .action import Action, ActionSetting
+from .ball_poses import BALL_POSES
 from .body_gestures import GESTURES
 from .celebrations import CELEBRATIONS
 from .keeper_dives import DIVES
@@ -30,5 +32,5 @@ def _build_rows(*tables: Mapping[str, KeyPoses]) -> tuple[Action, ...]:
     return tuple(_build_row(name, recipe) for table in tables for name, recipe in table.items())
 
 
-POSE_ACTIONS = _build_rows(SAVES, DIVES, THROWS, CELEBRATIONS, GESTURES)
+POSE_ACTIONS = _build_rows(BALL_POSES, SAVES, DIVES, THROWS, CELEBRATIONS, GESTURES)
 """Rows for `table.ACTIONS`."""

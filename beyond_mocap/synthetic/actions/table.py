@@ -1,26 +1,13 @@
-"""Every synthetic action, one row each: to add one, add a row.
+"""Every synthetic action: to add one, add a row to one of these tables.
 
-Of several rows that answer to the requested labels the one with the fewest other labels is taken, then the first.
+Of several rows that answer to the requested labels one that suits the player's speed and the ball's height is taken,
+then the one with the fewest other labels, then the first (`library.missing_actions.find_action`).
 """
 
 from __future__ import annotations
 
-from ..gestures import Gesture
-from ..moves import build_header, build_throw_in
-from .action import Action, ActionSetting
+from .field_table import FIELD_ACTIONS
 from .pose_table import POSE_ACTIONS
+from .receptions import RECEPTION_ACTIONS
 
-
-def _build_header(setting: ActionSetting) -> Gesture:
-    return build_header(setting.skeleton, setting.fps, example=setting.example)
-
-
-def _build_throw_in(setting: ActionSetting) -> Gesture:
-    return build_throw_in(setting.skeleton, setting.fps, example=setting.example)
-
-
-ACTIONS = (
-    Action(name="jumping header", labels=frozenset({"header", "head", "standing", "jump"}), build=_build_header),
-    Action(name="throw-in", labels=frozenset({"throwb", "throw", "high"}), build=_build_throw_in),
-    *POSE_ACTIONS,
-)
+ACTIONS = (*FIELD_ACTIONS, *RECEPTION_ACTIONS, *POSE_ACTIONS)

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from beyond_mocap.annotation import KeyMoment, Timeline
+from beyond_mocap.base.errors import NotInLibraryError
 from beyond_mocap.files.bvh import bvh
 from beyond_mocap.library.build import build_library
 from beyond_mocap.library.keys import Key, select_substitutes
@@ -26,7 +27,7 @@ from beyond_mocap.motion.track import Track
 from beyond_mocap.synthesis.plan import Plan
 from beyond_mocap.synthesis.quality.movement import list_stances, measure_stance_travel
 from beyond_mocap.synthesis.synthesize import synthesize
-from beyond_mocap.synthetic.gestures import build_strike
+from beyond_mocap.synthetic.actions.receptions import build_reception
 
 
 def straight(speed: float, seconds: float = 6.0) -> Track:
@@ -137,7 +138,7 @@ def with_a_receive(tmp_path_factory, clip_file):
     folder = tmp_path_factory.mktemp("receive")
     for name, speed, words in (("stand", 0.0, "standing"), ("walk", 1.4, "walking"), ("run", 4.8, "running")):
         clip_file(folder / f"{name}.bvh", speed, 4.0, words)
-    taken = build_strike("receive foot low inside")
+    taken = build_reception("inside", speed=1.2)
     bvh.write_bvh(folder / "take.bvh", taken.motion)
     words = "receive right foot low inside"
     (folder / "take.txt").write_text(f"{taken.start:.3f} {taken.end:.3f} {words}\n{taken.key:.3f} {words}\n")
@@ -151,14 +152,20 @@ def test_a_ball_taken_on_the_run_is_made_and_no_foot_slides(with_a_receive, spee
     (key,) = take.keys
     assert key.clip.startswith(SYNTHETIC_FOLDER + RECEIVE_PREFIX) == is_made and key.used_instead is None
     assert key.frame == pytest.approx(3.0 * take.motion.fps, abs=0.51)
-    assert any("synthetic reception on the run" in line for line in take.warnings) == is_made
+    assert any("synthetic reception" in line for line in take.warnings) == is_made
     body, places = identify_joints(take.motion.skeleton), forward_kinematics(take.motion)[0]
     toes = places[:, [body.left.toe, body.right.toe]]
     assert measure_stance_travel(toes, list_stances(take.contacts)).max(initial=0.0) < 0.15
 
 
-def test_where_nobody_takes_a_ball_none_is_made(more):
-    assert not made(more, RECEIVE_PREFIX)
+def test_where_nobody_takes_a_ball_it_is_taken_by_a_made_reception(more):
+    timeline = Timeline(keys=(KeyMoment(3.0, ("receive", "foot", "low")),))
+    with pytest.raises(NotInLibraryError, match="receive foot low"):
+        synthesize(more, Plan(track=straight(1.4), timeline=timeline))
+    take = synthesize(more, Plan(track=straight(1.4), timeline=timeline, nearest=True))
+    (key,) = take.keys
+    assert key.clip.startswith(SYNTHETIC_FOLDER + RECEIVE_PREFIX) and {"receive", "foot", "low"} <= set(key.words)
+    assert key.used_instead is None and any("synthetic reception" in line for line in take.warnings)
 
 
 def test_made_kicks_stand_in_for_the_same_foot_only():

@@ -42,8 +42,15 @@ def test_only_what_no_recording_carries_is_missing(library):
 
 
 def test_a_label_alone_finds_the_action_with_the_fewest_others():
-    assert find_action(("throwb",)).name == "throw-in" and find_action(("header", "left", "jump")) is not None
-    assert find_action(("standing",)) is find_action(("header", "sitting")) is None
+    assert find_action(moment("throwb")).name == "throw-in" and find_action(moment("header", "left", "jump"))
+    assert find_action(moment("standing")) is find_action(moment("header", "sitting")) is None
+
+
+def test_of_several_actions_the_one_that_suits_speed_and_ball_is_taken():
+    names = [find_action(moment("header", speed=speed, height=height)).name
+             for speed, height in ((0.0, None), (0.5, 1.7), (0.5, 2.3), (4.0, 2.1), (5.0, 0.8))]
+    assert names == ["standing header", "standing header", "jumping header", "running header", "diving header"]
+    assert find_action(moment("header", "standing", speed=4.0)).name == "standing header"
 
 
 def test_actions_are_built_once_for_a_library_and_have_twins(library):

@@ -1,0 +1,47 @@
+"""The actions that a plan asks for: labels of key moments and spans, with the player's speed and the ball there."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ..annotation import KeyMoment, Span
+from ..annotation.ball_contact import choose_part_by_height
+from ..library.missing_actions import ActionMoment
+from ..motion.track import SampledTrack, Track
+
+_ARRIVING = (0.3, 0.06)  # s before a key moment between which the arriving ball's speed is measured
+
+
+def read_moment_action(moment: KeyMoment, track: Track, sampled: SampledTrack) -> ActionMoment:
+    """Read the action that a key moment asks for.
+
+    Args:
+        moment: the key moment.
+        track: the player's track, with its ball.
+        sampled: the same at the library's rate.
+    """
+    time = moment.resolved_time
+    at = int(np.argmin(np.abs(track.times - time)))
+    height = float(track.ball[at, 2]) if track.ball_height_known[at] else None
+    return ActionMoment(labels=frozenset(choose_part_by_height(moment.words, height)), height=height,
+                        speed=float(np.interp(time, sampled.times, sampled.speed)),
+                        ball_speed=_measure_ball_speed(sampled, time))
+
+
+def read_span_action(span: Span, sampled: SampledTrack) -> ActionMoment:
+    """Read the action that a span asks for.
+
+    Args:
+        span: the span.
+        sampled: the player's track at the library's rate.
+    """
+    inside = (sampled.times >= span.start) & (sampled.times <= span.end)
+    speed = float(sampled.speed[inside].mean()) if inside.any() else 0.0
+    return ActionMoment(labels=frozenset(span.words), speed=speed, is_span=True)
+
+
+def _measure_ball_speed(track: SampledTrack, time: float) -> float:
+    """Measure the speed of the ball in m/s as it arrives at `time` s, 0 where it is unknown."""
+    before, after = (np.array([np.interp(time - early, track.times, column) for column in track.ball.T])
+                     for early in _ARRIVING)
+    return float(np.nan_to_num(np.linalg.norm(after - before) / (_ARRIVING[0] - _ARRIVING[1])))

@@ -1,0 +1,127 @@
+"""Actions that end on the ground: a diving header, a slide tackle, a fall, an overhead kick; and getting up from them.
+
+By judgement, with these figures: a dive's flight is a parabola; a body that slides over grass slows down by 5 to 6
+m/s^2 (coefficient of friction of 0.5 to 0.6: Lake, Carre 2007 for skin and cloth on turf, 0.4 to 0.7); getting up takes
+1.2 to 2 s, as in the recordings of goalkeepers.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ..gait_tables import GRAVITY
+from ..gestures import Gesture
+from .action import ActionSetting
+from .body_poses import NO_ARM, BodyPoses, build_body_poses
+
+_GRASS = 5.5  # m/s^2 by which a sliding body slows down
+_STANDING_HIPS = 0.93  # m above the ground, of an adult who stands
+
+
+def _at(offset: float, rows) -> tuple:
+    """Shift rows in time."""
+    return tuple((row[0] + offset, *row[1:]) for row in rows)
+
+
+# seconds from the chest's landing: lying on the front, the hands push, a knee, the other foot, standing
+_UP_FRONT = {
+    "hips": ((0.0, 0, 0, 0.82), (0.55, 0, 0, 0.83), (0.95, -0.10, 0, 0.62), (1.25, -0.26, 0.02, 0.47),
+             (1.6, -0.12, 0.02, 0.30), (1.95, -0.01, 0, 0.08), (2.3, 0, 0, 0)),
+    "pelvis": ((0.0, 0, 86, 0), (0.6, 0, 86, 0), (0.95, 0, 66, 0), (1.25, 0, 52, -6), (1.6, 0, 40, -4), (1.95, 0, 14, 0),
+               (2.3, 0, 0, 0)),
+    "spine": ((0.0, 0, -14, 0), (0.55, 0, -8, 0), (0.95, 0, 6, 0), (1.25, 0, 22, 4), (1.6, 0, 26, 2), (1.95, 0, 10, 0),
+              (2.3, 0, 0, 0)),
+    "head": ((0.0, -38, 0), (0.6, -30, 0), (1.25, -26, 0), (1.6, -34, 0), (2.0, -14, 0), (2.3, 0, 0)),
+    "left_arm": ((0.0, 70, 66, -46, 84), (0.2, 20, 84, -76, 92), (0.5, 20, 78, -70, 100), (0.95, 84, 16, 10, 24), (1.25, 74, 12, 10, 12),
+                 (1.6, 34, 14, 12, 24), (2.3, *NO_ARM)),
+    "right_arm": ((0.0, 66, 70, -46, 88), (0.2, 20, 88, -76, 96), (0.5, 20, 82, -70, 104), (0.95, 82, 18, 10, 26), (1.25, 76, 12, 10, 14),
+                  (1.6, 38, 14, 12, 34), (2.3, *NO_ARM)),
+    "left_foot": ((0.0, -0.84, 0.05, 0.06, 92, 0, 0), (0.95, -0.82, 0.05, 0.0, 80, 0, 0),
+                  (1.4, -0.80, 0.04, 0.0, 70, 0, 0), (1.6, -0.55, 0.04, 0.10, 50, 0, 0), (1.85, -0.06, 0.02, 0.05, 8, 0, 0),
+                  (1.97, 0, 0, 0, 0, 0, 0)),
+    "right_foot": ((0.0, -0.82, -0.08, 0.08, 92, 0, 0), (0.8, -0.82, -0.07, 0.0, 84, 0, 0),
+                   (1.0, -0.62, -0.10, 0.10, 66, 0, 0), (1.22, -0.04, -0.06, 0.05, 8, 0, 0), (1.34, 0.0, 0, 0, 0, 0, 0)),
+    "rests": ((0.0, 1), (0.6, 1), (0.85, 0), (2.3, 0)),
+    "end": 2.15,
+}  # fmt: skip
+
+
+def build_diving_header(setting: ActionSetting) -> Gesture:
+    """Build a diving header: one foot pushes off, the body flies flat to the ball and lands on arms and chest.
+
+    The hips follow a parabola through the height at which the head meets the ball. By judgement after photographs: the
+    trunk is within 20 degrees of level at the contact, and the arms reach ahead to land.
+
+    Args:
+        setting: for whom; height: of the ball.
+    Returns:
+        The movement; its key is the contact.
+    """
+    ball = 0.75 if setting.height is None else setting.height / setting.scale
+    before, hips_at_key, lies = 0.30, ball - 0.22, 0.13
+    leaves_at = min(_STANDING_HIPS - 0.08, hips_at_key + 0.45)
+    fall = (hips_at_key - leaves_at) / before - 0.5 * GRAVITY * before
+    land = max((fall + np.sqrt(fall**2 + 2.0 * GRAVITY * max(hips_at_key - lies, 0.05))) / GRAVITY, 0.08)
+    up, speed = _UP_FRONT, max(setting.speed, 2.0)
+    stop = land + speed / _GRASS
+    fling = {side: ((-0.55, -20, 16, 10, 50), (-0.30, 40, 30, 10, 50), (0.0, 92, 42, 10, 48)) for side in ("left", "right")}
+    return build_body_poses(BodyPoses(
+        speeds=((-2.0, setting.speed), (-0.6, speed), (land, 0.95 * speed), (stop, 0.0)),
+        hips=((-0.5, 0, 0, 0.05), (-before - 0.1, 0, 0, 0.08 + _STANDING_HIPS - leaves_at), (-before, 0.02, 0, _STANDING_HIPS - leaves_at),
+              (0.0, 0.02, 0, _STANDING_HIPS - hips_at_key), *_at(land, up["hips"])),
+        pelvis=((-0.5, 0, 8, 0), (-before, 0, 34, -6), (0.0, 0, 74, 0), *_at(land, up["pelvis"])),
+        spine=((-0.5, 0, 6, 0), (-before, 0, 2, 8), (-0.08, 0, -10, 0), (0.05, 0, 2, 0), *_at(land, up["spine"])),
+        head=((-0.5, -8, 0), (-before, -28, 0), (-0.06, -44, 0), (0.04, -30, 0), *_at(land, up["head"])),
+        arms=(fling["left"] + _at(land, up["left_arm"]), fling["right"] + _at(land, up["right_arm"])),
+        feet=(((-before, -0.42, 0.02, 0.10, 50, 0, 0), (0.0, -0.70, 0.04, 0.42, 78, 0, 0), *_at(land, up["left_foot"])),
+              ((-before, -0.30, -0.02, 0.30, 60, 0, 0), (0.0, -0.74, -0.04, 0.62, 92, 0, 0),
+               (0.5 * land, -0.76, -0.06, 0.52, 96, 0, 0), *_at(land, up["right_foot"]))),
+        knees=((-0.3, 0, 0), (land + 0.6, 4, 4), (land + 2.3, 0, 0)),
+        rests=((0.5 * land, 0), *_at(land, up["rests"])),
+        begin=(-0.55, -before), leaves=(-before, -before - 0.12), push=-before, flight=(-before, land),
+        end=land + up["end"],
+    ), setting)  # fmt: skip
+
+
+def build_slide_tackle(setting: ActionSetting) -> Gesture:
+    """Build a slide tackle with the right foot: down on the left thigh and hip, the right leg stretched to the ball.
+
+    The left leg is folded below, the left hand supports; the slide's own speed brings the body up again over the folded
+    leg. The slide slows down by the friction of grass.
+
+    Args:
+        setting: for whom.
+    Returns:
+        The movement; its key is the contact of the right foot.
+    """
+    speed = max(setting.speed, 2.5)
+    stop = -0.15 + speed / _GRASS
+    stop = max(stop, 0.35)
+    left_arm = ((-0.5, -10, 24, 10, 40), (-0.25, -34, 50, 0, 30), (-0.1, -34, 56, -10, 66), (0.1, -34, 58, -10, 74))
+    right_arm = ((-0.5, 10, 20, 10, 40), (-0.2, 40, 48, 10, 30), (0.0, 46, 56, 10, 26), (0.3, 40, 50, 10, 30))
+    return build_body_poses(BodyPoses(
+        speeds=((-2.0, setting.speed), (-0.6, speed), (-0.15, speed), (stop, 0.0)),
+        hips=((-0.5, 0, 0, 0.04), (-0.32, -0.04, 0.03, 0.26), (-0.14, -0.10, 0.05, 0.70), (0.0, -0.12, 0.06, 0.80),
+              (stop, -0.12, 0.06, 0.80), (stop + 0.35, -0.16, 0.05, 0.62), (stop + 0.7, -0.08, 0.03, 0.34),
+              (stop + 1.1, 0, 0, 0.06), (stop + 1.4, 0, 0, 0)),
+        pelvis=((-0.5, 0, 6, 0), (-0.3, -8, -8, 6), (-0.12, -26, -34, 16), (0.0, -32, -42, 20), (stop, -28, -34, 18),
+                (stop + 0.35, -14, 4, 10), (stop + 0.7, -4, 30, 4), (stop + 1.1, 0, 10, 0), (stop + 1.4, 0, 0, 0)),
+        spine=((-0.5, 0, 8, 0), (-0.2, 4, 16, -4), (0.0, 8, 14, -10), (stop, 8, 22, -8), (stop + 0.35, 4, 28, -4),
+               (stop + 0.7, 0, 24, 0), (stop + 1.4, 0, 0, 0)),
+        head=((-0.5, 8, 0), (0.0, 20, -6), (stop, 10, -6), (stop + 0.5, -24, 0), (stop + 1.4, 0, 0)),
+        arms=((*left_arm, (stop, -34, 54, -10, 66), (stop + 0.4, -26, 40, 0, 16), (stop + 0.7, 24, 16, 10, 26),
+               (stop + 1.4, *NO_ARM)),
+              (*right_arm, (stop, 36, 40, 10, 40), (stop + 0.5, 46, 18, 14, 40), (stop + 1.4, *NO_ARM))),
+        feet=(((-0.32, -0.06, 0.08, 0.04, 14, 16, 0), (-0.20, 0.08, 0.12, 0.06, 16, 20, 16),
+               (-0.1, 0.19, 0.06, 0.04, 26, 20, 40), (0.0, 0.27, 0.02, 0.02, 10, 10, 66),
+               (stop, 0.25, 0.02, 0.02, 10, 10, 66), (stop + 0.4, 0.08, 0.04, 0.02, 40, 10, 30),
+               (stop + 0.65, -0.08, 0.02, 0.08, 44, 10, 0), (stop + 0.85, 0, 0, 0, 0, 0, 0)),
+              ((-0.34, 0.10, -0.02, 0.16, 0, 0, 0), (-0.12, 0.66, 0.0, 0.10, -16, -10, 0),
+               (0.0, 0.76, 0.03, 0.06, -22, -14, 10), (stop - 0.05, 0.74, 0.03, 0.04, -22, -10, 6),
+               (stop + 0.25, 0.40, -0.02, 0.01, -6, -4, 0), (stop + 0.4, 0.30, -0.02, 0.0, 0, 0, 0),
+               (stop + 0.75, 0.30, -0.02, 0.0, 0, 0, 0), (stop + 0.9, 0.14, -0.01, 0.08, 12, 0, 0),
+               (stop + 1.1, 0, 0, 0, 0, 0, 0))),
+        knees=((-0.5, 0, 0), (-0.34, 22, 2), (-0.22, 46, 4), (-0.1, 60, 4), (stop, 58, 4), (stop + 0.5, 24, 4), (stop + 1.1, 0, 0)),
+        rests=((-0.2, 0), (-0.06, 1), (stop, 1), (stop + 0.2, 0)),
+        begin=(-0.5, -0.18), leaves=(-0.46, -0.46), push=-0.30, end=stop + 1.25,
+    ), setting)  # fmt: skip

@@ -1,0 +1,216 @@
+"""Synthetic receptions: the right foot (inside, outside, sole, top), thigh or chest takes the ball and gives with it.
+
+Each is one table of key poses over seconds from the touch, played out of standing (`volleys`) or over walking and
+running (`gestures`). There is no backswing and no follow-through: the foot is out before the ball arrives, gives with
+it for 0.15 to 0.2 s at about 1 m/s against the pelvis, and the next step goes on. The support knee is bent, the trunk
+leans over the ball. Skilled players turn the pelvis parallel to the ball's course and turn the sole outward quickly at
+the touch (Int. J. Sports Sci. Coach. 2025, doi 10.1177/17479541251350820); the way of giving is what takes a ball's
+speed of 5 to 10 m/s away at the decelerations of a foot's swing, 100 to 200 m/s^2, v^2 / 2a.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import partial
+
+import numpy as np
+
+from ...motion.motion import Motion
+from ...motion.skeleton import Skeleton
+from ..gestures import Gesture, StrikeRecipe, build_touch
+from ..volleys import Volley, build_standing_touch
+from .action import Action, ActionSetting
+
+SLOWEST = 0.7
+"""Speed in m/s of a body below which it stands while it takes a ball."""
+
+SPEEDS = (0.0, 1.2, 1.8, 2.5, 3.5, 4.9, 6.9)
+"""Speeds in m/s of the body at which receptions are built; from one to the next up to 1.4 times, as kicks."""
+
+# a ball taken on the way: shares of the body's speed; the body slows down towards the ball and goes on
+_COURSE = ((-1.3, 1.0), (-0.8, 1.0), (-0.2, 0.94), (0.1, 0.88), (0.4, 0.9), (0.9, 1.0), (1.4, 1.0))
+_WALK, _RUN = 1.7, 3.3  # m/s of a walk, and of a run
+_LIFT_SECONDS = 0.28  # after the touch in which a lifted foot comes down
+_SWING_SHARE = 0.66  # of the foot's swing that has passed at the touch
+# seconds before and after the touch in which a standing body differs from standing
+_SPAN = (-0.75, 0.95)
+_LEFT_ARM = ((-0.20, 12, 34, 15, 42), (0.0, 16, 44, 15, 40), (0.25, 12, 38, 15, 45))
+_RIGHT_ARM = ((-0.20, 6, 32, 15, 42), (0.0, -6, 40, 15, 38), (0.25, 4, 34, 15, 42))
+_PELVIS = ((-0.20, 3, 3, -6), (0.0, 3, 2, -2), (0.20, 2, 3, -10))
+_SPINE = ((-0.20, -4, 9, 4), (0.0, -5, 12, 0), (0.20, -3, 13, 6))
+
+
+@dataclass(frozen=True, kw_only=True)
+class Reception:
+    """How the right side takes a ball; seconds from the touch, metres of an adult, degrees.
+
+    Attributes:
+        name: as reports call it.
+        labels: labels of the vocabulary, without side and pace.
+        speeds: m/s of the body from and up to which it is done.
+        heights: m of the ball's centre from and up to which it is done.
+        height: m of the ball's centre in the rows of the foot.
+        most_ball_speed: m/s of the arriving ball up to which it is done.
+        foot: rows (time, ahead of the hips, left of them, ankle height, pitch, yaw, roll); () leaves both feet.
+        low: metres by which the hips are lowered at the touch.
+        pelvis: rows (time, list, tilt, turn).
+        spine: rows (time, list, tilt, turn).
+        left_arm: rows (time, flexion, abduction, inward, elbow).
+        right_arm: rows (time, flexion, abduction, inward, elbow).
+        nod: degrees by which the head looks down.
+    """
+
+    name: str
+    labels: tuple[str, ...]
+    speeds: tuple[float, float]
+    heights: tuple[float, float] = (0.11, 0.45)
+    height: float = 0.11
+    most_ball_speed: float = np.inf
+    foot: tuple = ()
+    low: float = 0.05
+    pelvis: tuple = _PELVIS
+    spine: tuple = _SPINE
+    left_arm: tuple = _LEFT_ARM
+    right_arm: tuple = _RIGHT_ARM
+    nod: float = 24.0
+
+
+RECEPTIONS = {
+    "inside": Reception(
+        name="reception with the inside of the foot", labels=("receive", "foot", "low", "inside"), speeds=(0.0, 9.4),
+        foot=(
+            (-0.12, 0.35, -0.14, 0.140, -4, -64, -4),
+            (0.0, 0.36, -0.14, 0.130, -4, -70, -6), (0.08, 0.29, -0.14, 0.125, -3, -70, -8),
+            (0.17, 0.19, -0.14, 0.120, -2, -66, -6), (0.28, 0.14, -0.13, 0.110, 2, -44, 0),
+        ),
+    ),
+    "outside": Reception(
+        name="reception with the outside of the foot", labels=("receive", "foot", "low", "outside"), speeds=(1.5, 5.5),
+        foot=(
+            (-0.12, 0.29, -0.17, 0.140, 14, 26, 8),
+            (0.0, 0.30, -0.18, 0.130, 14, 32, 12), (0.08, 0.25, -0.19, 0.125, 12, 32, 12),
+            (0.17, 0.17, -0.19, 0.120, 8, 26, 8), (0.28, 0.14, -0.16, 0.110, 4, 8, 2),
+        ),
+        pelvis=((-0.20, 3, 3, 4), (0.0, 3, 2, 8), (0.20, 2, 3, 2)),
+    ),
+    "sole": Reception(
+        name="reception with the sole", labels=("receive", "foot", "low", "sole"), speeds=(0.0, 1.5), heights=(0.11, 0.15), most_ball_speed=6.0,
+        foot=(
+            (-0.12, 0.34, -0.12, 0.260, -24, -8, 0),
+            (0.0, 0.36, -0.11, 0.240, -26, -8, 0), (0.08, 0.31, -0.11, 0.230, -24, -8, 0),
+            (0.17, 0.22, -0.11, 0.225, -18, -8, 0), (0.28, 0.16, -0.12, 0.170, -6, -8, 0),
+        ),
+        spine=((-0.20, -4, 7, 4), (0.0, -5, 10, 0), (0.20, -3, 13, 2)),
+    ),
+    "top": Reception(
+        name="reception with the instep", labels=("receive", "foot", "high", "top"), speeds=(0.0, 5.5), heights=(0.45, 0.75), height=0.46,
+        foot=(
+            (-0.12, 0.38, -0.12, 0.470, 12, -20, -4),
+            (0.0, 0.40, -0.12, 0.480, 10, -22, -6), (0.08, 0.36, -0.12, 0.400, 12, -22, -6),
+            (0.17, 0.28, -0.12, 0.270, 14, -18, -4), (0.28, 0.18, -0.12, 0.150, 8, -10, 0),
+        ),
+        low=0.04, left_arm=((-0.20, 14, 50, 10, 34), (0.0, 22, 64, 10, 30), (0.25, 14, 46, 12, 38)),
+        right_arm=((-0.20, 4, 42, 12, 36), (0.0, -14, 54, 10, 30), (0.25, 0, 40, 12, 38)),
+        spine=((-0.20, -4, 2, 4), (0.0, -6, 2, 0), (0.20, -3, 10, 4)),
+    ),
+    "thigh": Reception(
+        name="reception with the thigh", labels=("receive", "thigh"), speeds=(0.0, 4.0), heights=(0.75, 1.05), height=1.0,
+        foot=(
+            (-0.12, 0.22, -0.12, 0.490, 30, -8, 0),
+            (0.0, 0.24, -0.12, 0.520, 28, -8, 0), (0.08, 0.23, -0.12, 0.440, 28, -8, 0),
+            (0.17, 0.20, -0.12, 0.300, 22, -8, 0), (0.28, 0.16, -0.12, 0.150, 10, -8, 0),
+        ),
+        low=0.03, left_arm=((-0.20, 14, 50, 10, 36), (0.0, 18, 62, 10, 32), (0.25, 12, 44, 12, 40)),
+        right_arm=((-0.20, 6, 46, 12, 36), (0.0, -8, 58, 10, 32), (0.25, 2, 42, 12, 40)),
+        pelvis=((-0.20, 4, -4, -2), (0.0, 4, -8, 0), (0.20, 2, 0, -2)),
+        spine=((-0.20, -5, 2, 2), (0.0, -6, 0, 0), (0.20, -3, 10, 2)),
+    ),
+    "chest": Reception(
+        name="reception with the chest", labels=("receive", "body"), speeds=(0.0, 4.0), heights=(1.05, 1.6), height=1.3, low=0.07,
+        pelvis=((-0.40, 0, 2, 0), (-0.05, 0, -12, 0), (0.10, 0, -10, 0), (0.25, 0, -2, 0), (0.5, 0, 2, 0)),
+        spine=((-0.40, 0, 2, 0), (-0.05, 0, -20, 0), (0.08, 0, -12, 0), (0.22, 0, 6, 0), (0.5, 0, 6, 0)),
+        left_arm=((-0.35, 6, 36, 8, 34), (0.0, -10, 62, 0, 50), (0.25, 2, 48, 5, 44)),
+        right_arm=((-0.35, 6, 36, 8, 34), (0.0, -10, 62, 0, 50), (0.25, 2, 48, 5, 44)),
+        nod=18.0,
+    ),
+}  # fmt: skip
+
+
+def build_reception(
+    kind: str, skeleton: Skeleton | None = None, fps: float = 60.0, speed: float = 0.0, seed: int = 0, *,
+    height: float | None = None, example: Motion | None = None,
+) -> Gesture:
+    """Build the reception of a ball with the right side; the body faces and travels along +X and goes on.
+
+    Args:
+        kind: one of RECEPTIONS.
+        skeleton: any humanoid skeleton; default: the project's adult.
+        fps: frames per second.
+        speed: m/s of the body; below SLOWEST it stands.
+        seed: of the variation.
+        height: m of the ball's centre for an adult, within the reception's; None: as its rows have it.
+        example: a recording on `skeleton`, for its neutral stance.
+    Returns:
+        The move; its key is the touch.
+    """
+    reception = RECEPTIONS[kind]
+    reception = reception if height is None else _lift(reception, height)
+    if speed < SLOWEST:
+        return build_standing_touch(_stand(reception), skeleton, fps, seed, example=example)
+    return build_touch(_travel(reception, speed), skeleton, fps, seed=seed, example=example)
+
+
+def _lift(reception: Reception, height: float) -> Reception:
+    """Lift the foot of a reception to a ball at `height` m; it is down again when the foot lands."""
+    lift = float(np.clip(height, *reception.heights)) - reception.height
+    rows = [(row[0], row[1], row[2], row[3] + lift * (1.0 if row[0] <= 0.0 else max(1.0 - row[0] / _LIFT_SECONDS, 0.0)),
+             *row[4:]) for row in reception.foot]
+    return replace(reception, foot=tuple(rows))
+
+
+def _stand(reception: Reception) -> Volley:
+    """Convert a reception to one out of standing: the weight shifts to the left foot, or stays between both."""
+    beside, low = 0.075 if reception.foot else 0.0, reception.low
+    return Volley(
+        labels=" ".join(reception.labels), span=_SPAN, foot=reception.foot or None,
+        hips=((_SPAN[0], 0, 0, 0), (-0.36, 0, 0.8 * beside, 0.6 * low), (0.0, 0, beside, low),
+              (0.3, 0, 0.8 * beside, 0.8 * low), (_SPAN[1], 0, 0, 0)),
+        pelvis=reception.pelvis, spine=reception.spine, left_arm=reception.left_arm, right_arm=reception.right_arm,
+        head=((-0.6, 4, 0), (0.0, reception.nod, 0), (0.4, reception.nod, 0), (_SPAN[1], 0, 0)),
+    )  # fmt: skip
+
+
+def _travel(reception: Reception, speed: float) -> StrikeRecipe:
+    """Convert a reception to one on the way at `speed` m/s.
+
+    The step in which the ball is taken is longer, most of all a walker's, whose swing is short: the foot has to be out
+    and give within it. A run sinks into each step anyway.
+    """
+    run = float(np.clip((speed - _WALK) / (_RUN - _WALK), 0.0, 1.0))
+    low = reception.low * (1.0 - 0.8 * run)
+    return StrikeRecipe(
+        foot=reception.foot, pelvis=reception.pelvis, spine=reception.spine, left_arm=reception.left_arm,
+        right_arm=reception.right_arm, speeds=tuple((time, share * speed) for time, share in _COURSE), 
+        pace=0.58 + 0.19 * run, at=_SWING_SHARE, sink=((-0.15, 0.8 * low), (0.0, low), (0.25, 0.8 * low)),
+        head=reception.nod,
+    )
+
+
+def _build_action(kind: str, setting: ActionSetting) -> Gesture:
+    height = None if setting.height is None else setting.height / setting.scale
+    return build_reception(kind, setting.skeleton, setting.fps, setting.speed, height=height, example=setting.example)
+
+
+def _build_row(kind: str) -> Action:
+    """Build the row of a reception: the inside of the foot serves most balls, outside and sole some as well."""
+    one = RECEPTIONS[kind]
+    return Action(
+        name=one.name, labels=frozenset({*one.labels, "standing", "running", "front"}), has_side=True,
+        build=partial(_build_action, kind), heights=one.heights if one.foot else (), most_ball_speed=one.most_ball_speed,
+        speeds=tuple(speed for speed in SPEEDS if one.speeds[0] <= speed <= one.speeds[1]),
+        varies=RECEPTIONS["inside"].name if kind in ("outside", "sole") else "",
+    )  # fmt: skip
+
+
+RECEPTION_ACTIONS = tuple(map(_build_row, RECEPTIONS))
+"""The rows of `actions.table`."""

@@ -1,0 +1,72 @@
+"""Synthetic receptions: the part is out before the ball arrives and gives with it; the body goes on."""
+
+import numpy as np
+import pytest
+
+from beyond_mocap.annotation.ball_contact import build_surfaces, find_striking_part
+from beyond_mocap.annotation.labels import read_labels
+from beyond_mocap.motion.humanoid import identify_joints
+from beyond_mocap.motion.motion import forward_kinematics
+from beyond_mocap.synthetic.actions.receptions import RECEPTION_ACTIONS, RECEPTIONS, SPEEDS, build_reception
+
+FPS = 60.0
+CASES = [(kind, speed) for kind, one in RECEPTIONS.items() for speed in SPEEDS if one.speeds[0] <= speed
+         <= one.speeds[1]]
+
+
+def trace(kind, speed):
+    """The move, its key frame, the ankle and the part's middle relative to the hips."""
+    move = build_reception(kind, fps=FPS, speed=speed)
+    places, rotations = forward_kinematics(move.motion)
+    body = identify_joints(move.motion.skeleton)
+    surface = next(one for one in build_surfaces(move.motion.skeleton, (*RECEPTIONS[kind].labels, "right")))
+    middle = np.mean(surface.compute_line(places, rotations), axis=0)
+    hips = places[:, body.hips]
+    return move, int(round(move.key * FPS)), places[:, body.right.foot] - hips, middle - hips, places, body
+
+
+@pytest.mark.parametrize("kind, speed", [case for case in CASES if case[0] != "chest"])
+def test_the_foot_is_slow_against_the_pelvis_around_the_touch(kind, speed):
+    move, key, ankle, *_ = trace(kind, speed)
+    against = np.linalg.norm(np.gradient(ankle, axis=0), axis=1) * FPS
+    near = slice(key - 7, key + 8)
+    assert against[near].max() < 3.8 and np.median(against[near]) < 2.6
+    assert against[key - 36 : key + 36].max() < 1.3 * speed + 5.5  # no backswing: no faster than the leg of a stride
+    assert move.start < move.key < move.end <= move.motion.duration
+
+
+@pytest.mark.parametrize("kind, speed", [case for case in CASES if case[0] != "chest"])
+def test_the_part_gives_with_the_ball(kind, speed):
+    _, key, _, middle, *_ = trace(kind, speed)
+    axis = 2 if kind in ("thigh", "top") else 0  # a falling ball is taken down, a rolling one backward
+    later = key + int(0.1 * FPS)
+    assert 0.03 < middle[key, axis] - middle[later, axis] < 0.35
+
+
+@pytest.mark.parametrize("speed", [0.0, 1.2, 3.5])
+def test_the_other_foot_stands_and_its_knee_is_bent(speed):
+    _, key, _, _, places, body = trace("inside", speed)
+    standing = places[key - 3 : key + 2, body.left.toe]
+    assert np.ptp(standing[:, :2], axis=0).max() < 0.02
+    thigh = places[key, body.left.upper_leg] - places[key, body.left.lower_leg]
+    shank = places[key, body.left.foot] - places[key, body.left.lower_leg]
+    bent = np.pi - np.arccos(thigh @ shank / np.linalg.norm(thigh) / np.linalg.norm(shank))
+    assert np.radians(25) < bent < np.radians(60)
+
+
+def test_every_part_has_a_row_with_its_labels():
+    rows = {action.name: action for action in RECEPTION_ACTIONS}
+    parts = {kind: find_striking_part(rows[one.name].labels) for kind, one in RECEPTIONS.items()}
+    assert parts == {"inside": "foot", "outside": "foot", "sole": "foot", "top": "foot", "thigh": "thigh",
+                     "chest": "chest"}
+    assert all(action.labels <= set(read_labels()) and action.speeds for action in RECEPTION_ACTIONS)
+
+
+def test_the_foot_is_lifted_to_a_bouncing_ball():
+    heights = []
+    for height in (0.11, 0.4):
+        move = build_reception("inside", fps=FPS, speed=1.2, height=height)
+        places, _ = forward_kinematics(move.motion)
+        foot = identify_joints(move.motion.skeleton).right.foot
+        heights.append(places[int(round(move.key * FPS)), foot, 2])
+    assert heights[1] - heights[0] == pytest.approx(0.29, abs=0.03)
