@@ -13,7 +13,7 @@ from ..base.errors import InputError
 from .labels import list_labels
 from .striking import BODY_PARTS
 from .text import read_text
-from .timeline import AVOID_PREFIX, check_labels
+from .timeline import check_labels
 from .vocabulary import SIDES, find_similar_labels, list_vocabulary
 
 
@@ -64,7 +64,7 @@ class EventRow:
         kind: a kind of `KINDS`.
         part: a part of `BODY_PARTS`, "" for any.
         detail: a further property of the event, or "".
-        words: the labels, with placeholders in braces; one after `-` is excluded.
+        words: the labels, with placeholders in braces.
     """
 
     kind: str
@@ -165,7 +165,7 @@ def _parse_row(cells: list[str], known: frozenset[str], place: str) -> tuple[str
     if part and part not in BODY_PARTS:
         raise InputError(place, f"part {part!r}", f"one of {', '.join(BODY_PARTS)}, or blank", _NEXT_STEP)
     labels = text.split()
-    for label in (label.removeprefix(AVOID_PREFIX) for label in labels):
+    for label in labels:
         if label.startswith("{"):
             if label[1:-1] not in PLACEHOLDERS or not label.endswith("}"):
                 raise InputError(place, f"{label}", "one of " + " ".join(f"{{{name}}}" for name in PLACEHOLDERS),
@@ -173,5 +173,5 @@ def _parse_row(cells: list[str], known: frozenset[str], place: str) -> tuple[str
         elif label not in known:
             offers = ", ".join(find_similar_labels(label, known)) or "a label of the vocabulary"
             raise InputError(place, f"the label {label!r} is not in the vocabulary", f"one like {offers}", _NEXT_STEP)
-    check_labels((label.removeprefix(AVOID_PREFIX) for label in labels if not label.startswith("{")), place)
+    check_labels((label for label in labels if not label.startswith("{")), place)
     return kind, part, detail, tuple(labels)

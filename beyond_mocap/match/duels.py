@@ -30,12 +30,15 @@ event says so."""
 APART_SECONDS = 2.0
 """s between two duels of one player: nobody lunges at each touch of a dribble."""
 
+RUNNING = "running"
+"""Pace of a player who stretches a leg in the run instead of blocking from a stand."""
+
 _MIN_CONFIDENCE = 0.3  # of the touch
 _EVENT_SECONDS = 1.0  # s between a touch and the event of the opponent who lost it
 _DUEL_EVENTS = ("tackle", "aerial", "take-on", "interception")
 _TURNED_SPEED, _TURNED_ANGLE = 2.0, np.radians(100.0)  # m/s from which a player reaches for no ball behind his travel
 _SIDE_SPEED, _SIDE_ANGLE = 1.0, np.radians(25.0)  # m/s and rad off the travel from which the foot on that side reaches
-_LAYING_OFF = (kinds.THROW_IN, kinds.HAND, kinds.SAVE, kinds.CHEST_CONTROL)  # touches that no foot and no head contests
+_UNCONTESTED = (kinds.THROW_IN, kinds.HAND, kinds.SAVE, kinds.CHEST_CONTROL)  # by a foot or a head
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -46,7 +49,8 @@ class Duel:
         time: s, of the winner's touch.
         winner: id of the player who touches the ball.
         loser: id of the opponent who reaches for it.
-        kind: "aerial" for a header, else "tackle"; the kind of event whose row with the detail "lost" names the labels.
+        kind: "aerial" for a header, else "tackle"; the kind of event whose row with the detail "lost" names the labels,
+            "interception" for a tackle of a runner: a leg stretched for the ball without a stop.
         details: of the loser's event, () without one.
         distance: m on the ground from the loser's place to the ball.
         side: "left", "right", or "" for a ball ahead.
@@ -103,9 +107,9 @@ def label_lost_duels(
     out = []
     for duel in duels:
         if duel.loser == player:
-            part = "head" if duel.kind == "aerial" else "foot"
-            labels = table.find_labels(duel.kind, part, (*duel.details, "lost"), {**values.get(duel.time, {}),
-                                                                                  "side": duel.side})
+            found = {**values.get(duel.time, {}), "side": duel.side}
+            kind = "interception" if duel.kind == "tackle" and found.get("gait") == RUNNING else duel.kind
+            labels = table.find_labels(kind, "head" if kind == "aerial" else "foot", (*duel.details, "lost"), found)
             out.append(build_moment(duel.time, (*labels, AVOID_PREFIX + TOUCH), DUELS, duel.confidence))
     return [moment for moment in out if moment is not None]
 
@@ -125,7 +129,7 @@ class _DuelSearch:
     def find_duel(self, number: int) -> Duel | None:
         """Find the duel at a touch, None if nobody contests it."""
         touch = self._touches[number]
-        if not touch.player or touch.confidence < _MIN_CONFIDENCE or touch.kind in _LAYING_OFF:
+        if not touch.player or touch.confidence < _MIN_CONFIDENCE or touch.kind in _UNCONTESTED:
             return None
         is_opponent = np.array([player.team != self._teams[touch.player] for player in self._match.players])
         distances = np.where(is_opponent & self._may_lose, self._distances[:, number], np.inf)
