@@ -127,7 +127,7 @@ def restore_ball_contact(take: Take, ball: np.ndarray) -> Take:
     motion = take.motion
     if meetings:
         motion = strike_fixed_ball(motion, take.contacts, meetings, has_ground=True).motion
-    motion = miss_ball(motion, take.contacts, ball, take.keys)
+    motion = miss_ball(motion, take.contacts, ball, take.keys, reaches=False)
     return take if motion is take.motion else replace(take, motion=motion)
 
 

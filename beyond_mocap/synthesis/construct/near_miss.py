@@ -31,7 +31,9 @@ _ROUNDS = 4  # most rounds: to push a part away at one frame may bring it nearer
 _OTHER_PARTS = ("foot", "head")  # parts that keep away without being named
 
 
-def miss_ball(motion: Motion, foot_contacts: np.ndarray, ball: np.ndarray, keys: Sequence[KeyResult]) -> Motion:
+def miss_ball(
+    motion: Motion, foot_contacts: np.ndarray, ball: np.ndarray, keys: Sequence[KeyResult], reaches: bool = True
+) -> Motion:
     """Keep a body off the ball at every key moment that misses it. Frames away from these stay bit for bit.
 
     Args:
@@ -39,6 +41,7 @@ def miss_ball(motion: Motion, foot_contacts: np.ndarray, ball: np.ndarray, keys:
         foot_contacts: (T, 2) bool, left and right foot in contact.
         ball: (T, 3) m, its centre, NaN where it is unknown.
         keys: all key moments; those in which the player meets the ball limit the time around the others.
+        reaches: whether a part that is too far away comes nearer, too: not after bodies were separated.
     Returns:
         The motion.
     """
@@ -47,7 +50,9 @@ def miss_ball(motion: Motion, foot_contacts: np.ndarray, ball: np.ndarray, keys:
         frames = _find_frames(key.frame, met, len(motion), motion.fps)
         if key.requested.misses_ball and len(frames) and np.isfinite(ball[frames]).all():
             labels = choose_contact_labels(key.words, key.requested.words)
-            motion = _reach_near(motion, foot_contacts, ball, labels, int(frames[np.abs(frames - key.frame).argmin()]))
+            if reaches:
+                at = int(frames[np.abs(frames - key.frame).argmin()])
+                motion = _reach_near(motion, foot_contacts, ball, labels, at)
             motion = _keep_clear(motion, foot_contacts, ball, labels, frames)
     return motion
 
