@@ -1,7 +1,7 @@
 """Where a goalkeeper stands while nobody has measured it: between the ball and the middle of the goal.
 
-A ball within 25 m is faced from the line to it, some four metres out; the farther it is, the farther out the keeper comes
-and the nearer to the middle of the pitch. A measured keeper is never moved.
+A ball within 25 m is faced from the line to it, some four metres out; the farther it is, the farther out the keeper
+comes and the nearer to the middle of the pitch. A measured keeper is never moved.
 
     track = build_keeper_track(times, ball, goal=-52.5, name="keeper")      # a plan without a match
     match, notes = fill_keepers(match, find_kept_lines(match))              # a keeper whom the feed lacks for a while

@@ -15,7 +15,7 @@ from ...annotation import AVOID_PREFIX
 from ...annotation.event_labels import EventLabelTable
 from ...annotation.timeline import TOUCH
 from ..moments import SHOTS, Moment, build_moment
-from .shots import GOAL, Shot
+from .shots import GOAL, SAVED, Shot
 
 STANDING_REACH, SHORT_DIVE = 0.6, 1.8
 """m aside up to which a keeper stays on their feet (a step and both arms), and up to which a dive is short: in a short
@@ -42,13 +42,13 @@ def find_save_values(shot: Shot, heights: bool) -> dict[str, str]:
     """Find the labels that replace the placeholders of a save's row in the table.
 
     Args:
-        shot: one that reaches the goalkeeper.
+        shot: one that reaches the goalkeeper, or passes them.
         heights: whether the feed has the ball's height.
     Returns:
-        "dive", "duration" and "side" for a dive, and "height" where it is known.
+        "dive", "duration" and "side" for a dive, and "height" where it is known; {} for a save on the feet.
     """
     aside, height = abs(shot.lateral), shot.place[2]
-    if not STANDING_REACH < aside < _FARTHEST:
+    if not (STANDING_REACH if shot.end == SAVED else 0.0) < aside < _FARTHEST:  # who is beaten has dived
         return {}
     values = {"dive": "dive", "duration": "short_duration" if aside < SHORT_DIVE else "long_duration",
               "side": "left" if shot.lateral > 0.0 else "right"}
@@ -84,9 +84,7 @@ def label_missed_saves(shots: Sequence[Shot], table: EventLabelTable, heights: b
     out = []
     for shot in shots:
         if shot.end == GOAL and abs(shot.lateral) < MISSED_REACH:
-            height = ("low" if shot.place[2] < _LOW_DIVE else "high") if heights else ""
-            labels = table.find_labels("save", "hand", ("parried",), {"height": height,
-                                                                      **find_save_values(shot, heights)})
+            labels = table.find_labels("save", "hand", ("parried",), find_save_values(shot, heights))
             out.append(build_moment(shot.arrival, (*labels, AVOID_PREFIX + TOUCH), SHOTS, shot.confidence))
     return [moment for moment in out if moment is not None]
 

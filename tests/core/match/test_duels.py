@@ -18,8 +18,8 @@ def match_of(**players) -> Match:
     """A match of 10 s; home_x or away_x = (place at 5 s, velocity)."""
     paths = [np.asarray(place, float) + (TIMES[:, None] - 5.0) * velocity for place, velocity in players.values()]
     listed = tuple(MatchPlayer(name, name.partition("_")[0], name, -1) for name in players)
-    return Match(times=TIMES, players=listed, positions=np.array(paths), ball=np.zeros((250, 3)), length=105.0, width=68.0,
-                 fps=25.0, provider="planted", periods=((0.0, 10.0),))
+    return Match(times=TIMES, players=listed, positions=np.array(paths), ball=np.zeros((250, 3)), length=105.0,
+                 width=68.0, fps=25.0, provider="planted", periods=((0.0, 10.0),))
 
 
 def touch(player="home_1", time=5.0, part="foot", kind="kick", height=0.11, confidence=0.9) -> SolvedTouch:
@@ -73,7 +73,7 @@ def test_nobody_lunges_at_each_touch_of_a_dribble():
 def test_an_event_of_the_loser_reaches_farther():
     match = match_of(home_1=WINNER, away_1=((TOLD_REACH - 0.2, 0.0), STILL))
     event = MatchEvent(time=5.4, period=1, player="away_1", team="away", kind="tackle", details=("sliding", "lost"))
-    aligned = AlignedEvents((event,), np.array([5.4]), np.array([-1]), {})
+    aligned = AlignedEvents(events=(event,), times=np.array([5.4]), touches=np.array([-1]), clocks={})
     assert not losers(match, touch())
     (duel,) = find_duels(match, [touch()], aligned=aligned)
     (moment,) = label_lost_duels([duel], "away_1", read_event_labels(), {})

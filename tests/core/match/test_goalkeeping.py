@@ -1,4 +1,4 @@
-"""Goalkeepers: shots are found, saves follow the ball's way, who is beaten dives and misses; unmeasured ones stand right."""
+"""Goalkeepers: saves follow the ball's way, who is beaten dives and misses, who is not measured stands right."""
 
 from dataclasses import replace
 
@@ -16,7 +16,8 @@ from beyond_mocap.match.moments import SHOTS, build_timeline
 from beyond_mocap.match.play import find_kept_lines
 from beyond_mocap.motion.track.match_data import Match, MatchPlayer
 
-ROWS = (("home_1", -50.0, 0.0), ("home_2", -20.0, 10.0), ("home_3", 0.0, 20.0), ("home_9", 31.6, 0.0),
+ROWS = (("home_1", -50.0, 0.0), ("home_2", -20.0, 10.0), ("home_3", 0.0, 20.0), ("home_4", 8.0, -9.0),
+        ("home_9", 31.6, 0.0),
         ("away_1", 51.0, 0.0), ("away_2", 20.0, 12.0), ("away_3", 5.0, -20.0), ("away_4", 0.0, 8.0))
 TIMES = np.arange(200) / 25.0
 SHOT_TIME, SPEED = 3.0, 24.0
@@ -24,8 +25,8 @@ STRIKES = np.array([32.0, 0.0, 0.11])
 
 
 def match_of(aside, height=0.5, after=None) -> Match:
-    """home_9 shoots at SHOT_TIME past away_1's left hand, `aside` m away and `height` m high; the keeper's touch sends it
-    `after` (3,) m/s, None: it goes in.
+    """home_9 shoots at SHOT_TIME past away_1's left hand, `aside` m away and `height` m high; the keeper's touch sends
+    it `after` (3,) m/s, None: it goes in.
     """
     plane = np.array([51.0, aside, height])  # the keeper faces -x: their left is -y
     plane[1] = -aside
@@ -40,7 +41,8 @@ def match_of(aside, height=0.5, after=None) -> Match:
     players = tuple(MatchPlayer(name, name.partition("_")[0], name, -1) for name, _, _ in ROWS)
     paths = np.array([np.tile([x, y], (len(TIMES), 1)) for _, x, y in ROWS])
     dives = np.clip((TIMES - arrival + 0.4) / 0.4, 0.0, 1.0)
-    paths[4, :, 1] = -0.8 * aside * dives if after is not None else 0.0
+    paths[5, :, 1] = -0.8 * aside * dives if after is not None else 0.0
+    ball += np.random.default_rng(1).normal(0.0, 0.02, ball.shape)
     ball[:, 2] = np.maximum(ball[:, 2], 0.11)
     return Match(times=TIMES, players=players, positions=paths, ball=ball, length=105.0, width=68.0, fps=25.0,
                  provider="planted", periods=((0.0, TIMES[-1]),))
@@ -88,7 +90,8 @@ def test_passes_of_the_own_team_slow_balls_and_wide_ones_are_no_shots():
     match = match_of(0.1, 0.3, (0.0, 0.0, 0.0))
     solved, lines = solve_ball(match), find_kept_lines(match)
     assert [shot.end for shot in find_shots(match, solved, lines)] == [SAVED]
-    for changed in ({"player": "away_2"}, {"after": [8.0, 0.0, 0.0]}, {"after": [20.0, 14.0, 0.0]}, {"kind": "receive"}):
+    others = {"player": "away_2"}, {"after": [8.0, 0.0, 0.0]}, {"after": [20.0, 14.0, 0.0]}, {"kind": "receive"}
+    for changed in others:
         touches = tuple(replace(one, **changed) if one.player == "home_9" else one for one in solved.touches)
         assert not find_shots(match, replace(solved, touches=touches), lines)
 
@@ -110,14 +113,14 @@ def test_a_keeper_who_is_missing_is_placed_and_a_measured_one_stays():
     lines = find_kept_lines(long)
     assert fill_keepers(long, lines) == (long, ())
     paths = np.array(long.positions)
-    paths[4, 60:140] = np.nan
+    paths[5, 60:140] = np.nan
     gap = replace(long, positions=paths)
     filled, notes = fill_keepers(gap, lines)
     known = np.isfinite(paths)
     assert np.array_equal(filled.positions[known], paths[known]) and np.isfinite(filled.positions).all()
     assert len(notes) == 1 and "away_1: 6 to 13.9 s" in notes[0]
-    steps = np.linalg.norm(np.diff(filled.positions[4], axis=0), axis=1) * 10.0
-    assert steps.max() < 7.0 and (filled.positions[4, 60:140, 0] > 40.0).all()
+    steps = np.linalg.norm(np.diff(filled.positions[5], axis=0), axis=1) * 10.0
+    assert steps.max() < 7.0 and (filled.positions[5, 60:140, 0] > 40.0).all()
     paths[:, 60:140] = np.nan  # a short gap is the business of the track
     short = replace(long, positions=np.where(np.arange(200)[None, :, None] // 20 == 4, np.nan, long.positions))
     assert fill_keepers(short, lines)[0] is short
