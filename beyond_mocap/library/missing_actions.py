@@ -81,7 +81,7 @@ def find_action(moment: ActionMoment) -> Action | None:
     serving = [action for action in ACTIONS if action.is_span == moment.is_span and requested <= action.labels]
 
     def rate_misfit(action: Action) -> tuple:
-        low, high = action.heights or (-np.inf, np.inf)
+        low, high = action.heights or action.meets
         off = 0.0 if moment.height is None else max(low - moment.height, moment.height - high)
         is_unsuited = not action.suits[0] <= moment.speed <= action.suits[1]
         return is_unsuited, off > _HEIGHT_SLACK, len(action.labels - requested)

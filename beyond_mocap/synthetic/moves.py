@@ -45,7 +45,9 @@ _HEADER = {
     "legs": ((-0.24, 0.0), (-0.06, 0.16), (0.08, 0.10), (0.24, 0.0)),
 }
 _FLIGHT = 0.25  # s, half the flight of an adult's jump
-_TOES = 0.085  # m of an adult that the hips are higher on the toes, legs stretched
+_ROLL_SECONDS = (0.2, 0.2)  # s in which the feet roll up before and down after a flight of a given height
+# m of an adult that the hips are higher on the toes: legs stretched, and nearly so, which spares the knees a snap
+_TOES, _SOFT_TOES = 0.085, 0.04
 
 
 def build_header(
@@ -68,12 +70,13 @@ def build_header(
     key = 1.5
     gait_plan, steps, posture = build_standing(neutral, key + 1.9, fps, seed, width=0.10)
     times = gait_plan.times - key
-    air = _FLIGHT * np.sqrt(scale) if rise is None else np.sqrt(2.0 * max(rise - _TOES * scale, 0.02) / tables.GRAVITY)
+    air = _FLIGHT * np.sqrt(scale) if rise is None else np.sqrt(2.0 * max(rise - _SOFT_TOES * scale, 0.02) / tables.GRAVITY)
     longer = 0.0 if rise is None else float(air) - _FLIGHT
     table_times = _adapt_times(times, air, longer)
     trunk, arms = (np.radians(interpolate_rows(_HEADER[name], table_times)) for name in ("trunk", "arms"))
     ease = compute_envelope(table_times, -1.1, -0.8, 0.9, 1.4)
-    pitch = np.radians(62) * compute_envelope(times, -air - 0.14, -air, air, air + 0.12)
+    roll = (0.14, 0.12) if rise is None else _ROLL_SECONDS
+    pitch = np.radians(62) * compute_envelope(times, -air - roll[0], -air, air, air + roll[1])
     hips, ankles, feet, toes = posture.hips.copy(), posture.ankles.copy(), posture.feet.copy(), posture.toes.copy()
     path, tuck = _compute_jump(times, air, hips[:, 2], neutral=neutral, longer=longer, table_times=table_times)
     hips[:, 2] = path
@@ -106,7 +109,7 @@ def _compute_jump(times, air: float, standing: np.ndarray, *, neutral: NeutralSt
     there; `longer`: s that the tables' rows on the ground are further from the contact.
     """
     scale = neutral.leg / tables.LEG
-    take_off = np.mean(standing) + _TOES * scale
+    take_off = np.mean(standing) + (_TOES if longer == 0.0 else _SOFT_TOES) * scale
     speed = tables.GRAVITY * air
     flight = take_off + speed * (times + air) - 0.5 * tables.GRAVITY * (times + air) ** 2
     crouch, absorb = (np.array(_HEADER[name]) + [shift, 0.0] for name, shift in (("crouch", -longer),

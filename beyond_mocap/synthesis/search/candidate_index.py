@@ -8,7 +8,9 @@ from dataclasses import dataclass, fields
 import numpy as np
 from scipy.ndimage import maximum_filter1d, uniform_filter1d
 
-from ...annotation import DISCRETE
+from ...annotation import CONTINUOUS, DISCRETE
+from ...annotation.gaits import TURNING
+from ...annotation.labels import list_gaits, list_labels
 from ...base.vectors import arctan2
 from ...library.library import Library
 from .block_costs import AnnotationCost
@@ -23,6 +25,9 @@ JERK_REACH = 8  # frames to either side over which the jerk of a transition is m
 _SPEED_CLASSES = (1.0, 2.0, 3.0, 4.5)  # m/s between the classes in which jerk is compared
 USUAL_STANCE = 0.3  # s with both feet on the ground, in a walk
 _LONGEST_STANCE = 2.0  # s beyond the usual stance at which its cost stops growing
+# labels of what a body does for a while besides going, turning and carrying the ball; synthetic clips show it only
+# where it is requested (recordings of it are judged by their posture)
+_ACTING = CONTINUOUS - {TURNING, *list_gaits(), *list_labels(ball="carries")}
 _SHOWN = 14  # library frames that a long slot shows at the fastest playback rate
 
 
@@ -146,8 +151,10 @@ class CandidateIndex:
         if words not in self._by_words:
             names, frames = self.frames.vocabulary, self.frames
             missing = self.annotation.compute_missing_share(words) if words else np.zeros(len(frames))
-            actions = [i for i, word in enumerate(names) if word in DISCRETE and word not in words]
-            acts = maximum_filter1d(frames.words[:, actions].any(axis=1), SLOT + 1, origin=-(SLOT // 2), mode="nearest")
+            actions, spans = ([i for i, word in enumerate(names) if word in kind and word not in words]
+                              for kind in (DISCRETE, _ACTING))
+            acts = frames.words[:, actions].any(axis=1) | (frames.words[:, spans].any(axis=1) & self.is_synthetic)
+            acts = maximum_filter1d(acts, SLOT + 1, origin=-(SLOT // 2), mode="nearest")
             self._by_words[words] = missing.astype(np.float32), acts | ~frames.words.any(axis=1)
         return self._by_words[words]
 

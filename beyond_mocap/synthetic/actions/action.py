@@ -58,6 +58,7 @@ class Action:
         speeds: m/s at which it is built, the nearest one to the player's; empty: it does not depend on speed.
         heights: lowest and highest m of the ball for which it is built; empty: it does not depend on the ball.
         suits: lowest and highest m/s of players whom it suits; of several actions one that suits is taken.
+        meets: lowest and highest m of a ball that it can meet, where it is not built for the ball's height.
         is_span: whether it lasts (a celebration) instead of having a key moment; its clip carries the labels from the
             gesture's start to its end.
         varies: name of the action beside which it is offered, where the player is as fast as it needs, and the ball no
@@ -72,6 +73,7 @@ class Action:
     speeds: tuple[float, ...] = ()
     heights: tuple[float, ...] = ()
     suits: tuple[float, float] = (0.0, np.inf)
+    meets: tuple[float, float] = (-np.inf, np.inf)
     is_span: bool = False
     varies: str = ""
     most_ball_speed: float = math.inf

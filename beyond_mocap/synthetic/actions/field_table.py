@@ -2,13 +2,37 @@
 
 from __future__ import annotations
 
+from functools import partial
+
 import numpy as np
 
-from ..moves import build_throw_in
-from ..gestures import Gesture
+from ..gestures import Gesture, build_strike
+from ..kicks import AFTER, BEFORE, KICKS, build_kick
+from ..moves import build_get_up, build_throw_in
+from ..volleys import build_volley
 from .action import Action, ActionSetting
-from .floor import build_diving_header, build_slide_tackle
-from .headers import build_jumping_header, build_running_header, build_standing_header
+from .floor import build_bicycle_kick, build_diving_header, build_fall, build_quick_get_up, build_slide_tackle
+from .headers import build_jumping_header, build_running_header, build_running_jump, build_standing_header
+
+
+_BALL_LIFT = 0.1  # m that the foot is guided higher in a goal kick: its toes would be below the ground
+
+
+def _build_get_up(setting: ActionSetting) -> Gesture:
+    return build_get_up(setting.skeleton, setting.fps, example=setting.example)
+
+
+def _build_goal_kick(setting: ActionSetting) -> Gesture:
+    motion = build_kick(KICKS["instep"], setting.neutral, fps=setting.fps, lift=_BALL_LIFT)
+    return Gesture(motion, BEFORE, 0.1, BEFORE + AFTER - 0.3)
+
+
+def _build_volley(kind: str, setting: ActionSetting) -> Gesture:
+    return build_volley(kind, setting.skeleton, setting.fps, example=setting.example)
+
+
+def _build_kick(kind: str, setting: ActionSetting) -> Gesture:
+    return build_strike(kind, setting.skeleton, setting.fps, at_speed=setting.speed, example=setting.example)
 
 
 def _build_throw_in(setting: ActionSetting) -> Gesture:
@@ -29,5 +53,29 @@ FIELD_ACTIONS = (
            heights=(0.4, 1.4), suits=_MOVES),
     Action(name="slide tackle", labels=frozenset({"tackle", "slide"}), build=build_slide_tackle, has_side=True,
            speeds=_RUNS),
+    Action(name="overhead kick", labels=frozenset({"kick", "bicycle", "foot", "top", "back"}), build=build_bicycle_kick,
+           has_side=True, heights=(1.4, 2.0)),
+    Action(name="half overhead kick", labels=frozenset({"kick", "bicycle", "half", "foot", "top", "back"}),
+           build=build_bicycle_kick, has_side=True, heights=(1.4, 2.0)),
+    Action(name="fall", labels=frozenset({"fall", "standing"}), build=build_fall, suits=_STANDS),
+    Action(name="fall in a run", labels=frozenset({"fall", "slide", "running"}), build=build_fall, speeds=_RUNS,
+           suits=_MOVES),
+    Action(name="flight after a tackle", labels=frozenset({"fly", "slide"}), build=build_diving_header, speeds=_RUNS),
+    Action(name="getting up from the front", labels=frozenset({"getting_up", "short_duration"}),
+           build=build_quick_get_up),
+    Action(name="getting up from the back", labels=frozenset({"getting_up", "long_duration", "back"}),
+           build=_build_get_up),
+    Action(name="jump", labels=frozenset({"jump", "standing"}), build=build_jumping_header, suits=_STANDS),
+    Action(name="jump in a run", labels=frozenset({"jump", "slide", "running"}), build=build_running_jump, speeds=_RUNS,
+           suits=_MOVES),
+    Action(name="goal kick", labels=frozenset({"goal_kick", "kick", "foot", "low", "top", "with_setup", "standing"}),
+           build=_build_goal_kick, has_side=True),
+    Action(name="volley", labels=frozenset({"kick", "low", "volley", "standing", "foot", "pass"}), has_side=True,
+           build=partial(_build_volley, "pass")),
+    Action(name="high volley", labels=frozenset({"kick", "high", "top", "volley", "standing", "foot"}), has_side=True,
+           build=partial(_build_volley, "attack")),
+    *(Action(name=f"kick with the {part}", labels=frozenset({"kick", "low", label, "running", "foot"}), has_side=True,
+             build=partial(_build_kick, kind), speeds=_RUNS)
+      for part, label, kind in (("inside", "inside", "kick low inside"), ("instep", "top", "kick low top"))),
     Action(name="throw-in", labels=frozenset({"throwb", "throw", "high"}), build=_build_throw_in),
 )

@@ -77,7 +77,7 @@ def build_diving_header(setting: ActionSetting) -> Gesture:
               ((-before, -0.30, -0.02, 0.30, 60, 0, 0), (0.0, -0.74, -0.04, 0.62, 92, 0, 0),
                (0.5 * land, -0.76, -0.06, 0.52, 96, 0, 0), *_at(land, up["right_foot"]))),
         knees=((-0.3, 0, 0), (land + 0.6, 4, 4), (land + 2.3, 0, 0)),
-        rests=((0.5 * land, 0), *_at(land, up["rests"])),
+        rests=((land - 0.03, 0), *_at(land, up["rests"])),
         begin=(-0.55, -before), leaves=(-before, -before - 0.12), push=-before, flight=(-before, land),
         end=land + up["end"],
     ), setting)  # fmt: skip
@@ -125,3 +125,112 @@ def build_slide_tackle(setting: ActionSetting) -> Gesture:
         rests=((-0.2, 0), (-0.06, 1), (stop, 1), (stop + 0.2, 0)),
         begin=(-0.5, -0.18), leaves=(-0.46, -0.46), push=-0.30, end=stop + 1.25,
     ), setting)  # fmt: skip
+
+
+def build_fall(setting: ActionSetting) -> Gesture:
+    """Build a fall to the front: the right foot is held, the knees give, the hands land first; and getting up.
+
+    Args:
+        setting: for whom; speed: of the player.
+    Returns:
+        The movement; its key is the moment in which the chest lands.
+    """
+    speed, up = setting.speed, _UP_FRONT
+    stop = max(speed / _GRASS, 0.1)
+    fling = ((-0.8, *NO_ARM), (-0.5, 40, 30, 10, 40), (-0.22, 78, 30, 10, 30), (-0.06, 76, 44, 0, 60))
+    return build_body_poses(BodyPoses(
+        speeds=((-2.0, speed), (-0.3, max(0.8 * speed, 0.5)), (0.0, max(0.6 * speed, 0.5)), (stop, 0.0)),
+        hips=((-0.8, 0, 0, 0), (-0.5, 0.02, 0, 0.10), (-0.25, 0.06, 0, 0.42), (-0.08, 0.04, 0, 0.70), *up["hips"]),
+        pelvis=((-0.8, 0, 4, 0), (-0.5, 0, 22, 4), (-0.25, 0, 54, 2), (-0.08, 0, 76, 0), *up["pelvis"]),
+        spine=((-0.8, 0, 6, 0), (-0.5, 0, 16, -4), (-0.2, 0, 2, 0), *up["spine"]),
+        head=((-0.8, 4, 0), (-0.5, -10, 0), (-0.2, -36, 0), *up["head"]),
+        arms=(fling + up["left_arm"], fling + up["right_arm"]),
+        feet=(((-0.6, -0.05, 0, 0, 20, 0, 0), (-0.3, -0.34, 0.02, 0.02, 66, 0, 0), (-0.1, -0.72, 0.04, 0.12, 90, 0, 0),
+               *up["left_foot"]),
+              ((-0.7, -0.20, 0, 0.03, 40, 0, 0), (-0.4, -0.40, -0.03, 0.12, 70, 0, 0),
+               (-0.14, -0.72, -0.06, 0.26, 94, 0, 0), *up["right_foot"])),
+        knees=((-0.3, 0, 0), (0.6, 4, 4), (2.3, 0, 0)),
+        rests=((-0.1, 0), *up["rests"]),
+        begin=(-0.8, -0.35), leaves=(-0.5, -0.72), push=-0.4, end=up["end"],
+    ), setting)  # fmt: skip
+
+
+# seconds from the back's landing: lying on the back, sitting up, feet drawn in, through the crouch
+_UP_BACK = {
+    "hips": ((0.0, 0, 0, 0.80), (0.7, 0, 0, 0.81), (1.15, 0.02, 0, 0.80), (1.55, 0.12, 0, 0.70), (1.9, 0.32, 0, 0.46),
+             (2.3, 0.42, 0, 0.20), (2.7, 0.45, 0, 0)),
+    "pelvis": ((0.0, 0, -86, 0), (0.55, 0, -82, 0), (1.15, 0, -32, 0), (1.5, 0, 12, 0), (1.9, 0, 40, 0), (2.3, 0, 28, 0),
+               (2.7, 0, 0, 0)),
+    "spine": ((0.0, 0, 8, 0), (0.55, 0, 16, 0), (1.15, 0, 38, 0), (1.5, 0, 44, 0), (1.9, 0, 40, 0), (2.3, 0, 24, 0),
+              (2.7, 0, 0, 0)),
+    "head": ((0.0, 24, 0), (0.6, 16, 0), (1.15, 8, 0), (1.6, -18, 0), (2.0, -32, 0), (2.7, 0, 0)),
+    "arm": ((0.0, -16, 58, -10, 24), (0.5, -8, 34, -8, 30), (1.15, -36, 24, -10, 22), (1.55, 6, 22, 6, 30),
+            (1.9, 58, 10, 18, 20), (2.3, 44, 8, 18, 18), (2.7, *NO_ARM)),
+    "foot": ((0.0, 0.80, 0.02, 0.10, -50, 0, 0), (0.6, 0.78, 0.02, 0.02, -46, 0, 0), (1.0, 0.60, 0.02, 0.03, -10, 0, 0),
+             (1.3, 0.45, 0.0, 0.0, 0, 0, 0), (2.9, 0.45, 0.0, 0.0, 0, 0, 0)),
+    "rests": ((0.0, 1), (1.1, 1), (1.5, 0), (2.7, 0)),
+    "end": 2.6,
+}  # fmt: skip
+
+
+def build_bicycle_kick(setting: ActionSetting) -> Gesture:
+    """Build an overhead kick with the right foot: the left leg swings up first, the body lies in the air, arms land it.
+
+    By judgement after photographs and frame-by-frame pictures: the trunk is level at the contact, the ball is met
+    above the head's side of the hips, the legs pass each other as scissors.
+
+    Args:
+        setting: for whom; height: of the ball.
+    Returns:
+        The movement; its key is the contact. It faces away from where the ball goes.
+    """
+    ball = 1.75 if setting.height is None else setting.height / setting.scale
+    off, hips_at_key, lies, up = 0.28, float(np.clip(ball - 0.75, 0.75, 1.15)), 0.16, _UP_BACK
+    fall = (hips_at_key - _STANDING_HIPS) / off - 0.5 * GRAVITY * off
+    land = (fall + np.sqrt(fall**2 + 2.0 * GRAVITY * (hips_at_key - lies))) / GRAVITY
+    arm = ((-0.8, *NO_ARM), (-0.45, -30, 20, 10, 20), (-0.22, 40, 60, 0, 20), (0.0, 6, 74, -10, 16), (0.5 * land, -20, 64, -10, 20))
+    ankle = 0.09
+    return build_body_poses(BodyPoses(
+        speeds=((-2.0, 0.0), (1.0, 0.0)),
+        hips=((-0.8, 0, 0, 0), (-0.5, -0.06, 0, 0.20), (-off, -0.12, 0, 0.0), (0.0, -0.22, 0, _STANDING_HIPS - hips_at_key),
+              *((t + land, x - 0.28 * (t < 1.3) - 0.28 * (t >= 1.3), y, low) for t, x, y, low in up["hips"])),
+        pelvis=((-0.8, 0, 0, 0), (-0.5, 0, -6, 0), (-off, 0, -30, 0), (0.0, 0, -84, 0), *_at(land, up["pelvis"])),
+        spine=((-0.8, 0, 2, 0), (-0.5, 0, 12, 0), (-off, 0, 6, 0), (0.0, 0, 14, 0), *_at(land, up["spine"])),
+        head=((-0.8, 0, 0), (-0.5, -14, 0), (-off, -8, 0), (0.0, 26, 0), *_at(land, up["head"])),
+        arms=(arm + _at(land, up["arm"]), arm + _at(land, up["arm"])),
+        feet=(((-0.62, 0, 0, 0, 10, 0, 0), (-0.4, 0.30, 0.0, 0.34, 30, 0, 0), (-0.2, 0.62, 0, 1.04, 0, 0, 0),
+               (0.0, 0.50, 0.0, 0.72, -10, 0, 0), *_shift_feet(land, up["foot"], -0.28)),
+              ((-0.5, 0, 0, 0, 8, 0, 0), (-off, 0.0, 0, 0.02, 50, 0, 0), (-0.16, 0.30, 0, 0.52, 40, 0, 0),
+               (-0.06, 0.22, 0.0, 1.26, -40, 0, 0), (0.0, -0.10, 0.0, ball - ankle - 0.10, -86, 0, 0),
+               (0.08, -0.36, 0, 1.30, -100, 0, 0), *_shift_feet(land, up["foot"], -0.28))),
+        knees=((-0.3, 0, 0), (land, 4, 4), (land + 1.4, 10, 10), (land + 2.4, 0, 0)),
+        rests=((land - 0.03, 0), *_at(land, up["rests"])),
+        begin=(-0.8, -0.5), leaves=(-0.62, -0.5), push=-0.6, flight=(-off, land), end=land + up["end"],
+    ), setting)  # fmt: skip
+
+
+def _shift_feet(offset: float, rows, ahead: float) -> tuple:
+    """Shift rows of feet in time and place."""
+    return tuple((row[0] + offset, row[1] + ahead, *row[2:]) for row in rows)
+
+
+def build_quick_get_up(setting: ActionSetting) -> Gesture:
+    """Build getting up from lying on the front: the hands push, a foot steps under, the body rises.
+
+    Args:
+        setting: for whom.
+    Returns:
+        The movement; its key is halfway.
+    """
+    up, begin = _UP_FRONT, -1.2
+    poses = BodyPoses(
+        speeds=((-2.0, 0.0), (1.0, 0.0)), hips=_at(begin, up["hips"]), pelvis=_at(begin, up["pelvis"]),
+        spine=_at(begin, up["spine"]), head=_at(begin, up["head"]),
+        arms=(_at(begin, up["left_arm"]), _at(begin, up["right_arm"])),
+        feet=(_at(begin, up["left_foot"]), _at(begin, up["right_foot"])), rests=_at(begin, up["rests"]),
+        begin=(begin - 1.0, begin - 0.9), leaves=(begin - 1.0, begin - 1.0), push=begin - 1.0, end=begin + up["end"],
+    )
+    gesture = build_body_poses(poses, setting)
+    cut = gesture.key + begin
+    motion = gesture.motion.frames(int(cut * setting.fps), len(gesture.motion))
+    return Gesture(motion, gesture.key - cut, 0.3, gesture.end - cut)

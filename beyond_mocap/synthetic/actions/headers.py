@@ -60,8 +60,7 @@ def build_jumping_header(setting: ActionSetting) -> Gesture:
     Returns:
         The movement; its key is the contact, at the top of the flight.
     """
-    rise = None if setting.height is None else compute_rise(setting)
-    return build_header(setting.skeleton, setting.fps, example=setting.example, rise=rise)
+    return build_header(setting.skeleton, setting.fps, example=setting.example, rise=compute_rise(setting))
 
 
 def compute_rise(setting: ActionSetting) -> float:
@@ -71,6 +70,17 @@ def compute_rise(setting: ActionSetting) -> float:
     forehead = float(neutral.positions[head, 2]) + _FOREHEAD * setting.scale
     asked = 0.35 * setting.scale if setting.height is None else setting.height - forehead
     return float(np.clip(asked, _LEAST_RISE, _HIGHEST_RISE * setting.scale))
+
+
+def build_running_jump(setting: ActionSetting) -> Gesture:
+    """Build a jump out of a run, such as over a sliding opponent.
+
+    Args:
+        setting: for whom; speed: of the run.
+    Returns:
+        The movement; its key is the top of the flight.
+    """
+    return _build_jump_in_run(setting, heads=False)
 
 
 def build_running_header(setting: ActionSetting) -> Gesture:
@@ -83,6 +93,11 @@ def build_running_header(setting: ActionSetting) -> Gesture:
     Returns:
         The movement; its key is the contact, at the top of the flight.
     """
+    return _build_jump_in_run(setting, heads=True)
+
+
+def _build_jump_in_run(setting: ActionSetting, heads: bool) -> Gesture:
+    """Build a jump in a run."""
     neutral, style = setting.neutral, GaitStyle(life=0.3)
     air = float(np.sqrt(2.0 * compute_rise(setting) / tables.GRAVITY))
     frames = int(round((_STRIDE_BEFORE + _STRIDE_AFTER) * setting.fps)) + 1
@@ -91,7 +106,7 @@ def build_running_header(setting: ActionSetting) -> Gesture:
     steps = tuple(plan_footsteps(plan, neutral, style, side) for side in (LEFT, RIGHT))
     times = plan.times - _STRIDE_BEFORE
     posture = build_upper_posture(plan, neutral, style, 0)
-    posture = _whip_trunk(posture, times)
+    posture = _whip_trunk(posture, times) if heads else posture
     hips = posture.hips.copy()
     usual = float(np.mean(hips[np.abs(times) > air + 0.3, 2]))
     hips[:, 2] = blend_arrays(hips[:, 2], np.full(len(times), usual), compute_envelope(times, -air - 0.2, -air, air, air + 0.2))

@@ -185,6 +185,7 @@ def _build_dive(launch: _Launch, labels: str, catches: bool) -> KeyPoses:
     left_up, right_up = (_HELD, _HELD) if catches else (_FREE_LEFT, _FREE_RIGHT)
     return KeyPoses(
         labels=labels,
+        meets=(0.7, 2.3) if launch.flights and launch.flights[0][1] > 0.2 else (0.0, 0.8),
         span=(launch.begin, launch.begin + 0.35, end - 0.6, end),
         hips=_join(launch, launch.hips, _UP_HIPS, moves=True),
         pelvis=_join(launch, launch.pelvis, _UP_PELVIS),

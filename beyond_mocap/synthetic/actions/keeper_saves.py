@@ -36,6 +36,7 @@ READY = KeyPoses(
 # the body waits in a low stance, meets the ball before its chest and wraps it
 CATCH_CHEST = KeyPoses(
     labels="catchb catch save middle",
+    meets=(0.5, 1.7),
     span=(-0.7, -0.35, 1.5, 2.2),
     hips=((-0.7, 0, 0, 0), (-0.3, 0.0, 0, -0.10), (0.0, 0.04, 0, -0.09), (0.14, -0.02, 0, -0.11), (0.5, 0, 0, -0.05),
           (1.2, 0, 0, -0.01), (1.6, 0, 0, 0)),
@@ -79,6 +80,7 @@ CATCH_HIGH = KeyPoses(
 # the right knee goes down beside the left heel, so that legs and hands close the way of a rolling ball
 CATCH_LOW = KeyPoses(
     labels="catchb catch save low knee",
+    meets=(0.0, 0.5),
     span=(-0.9, -0.5, 1.5, 2.3),
     hips=((-0.9, 0, 0, 0), (-0.55, 0.06, 0, -0.16), (-0.2, 0.08, 0, -0.48), (0.0, 0.08, 0, -0.555),
           (0.2, 0.08, 0, -0.55), (0.6, 0.09, 0, -0.50), (1.0, 0.16, 0.02, -0.30), (1.4, 0.24, 0.01, -0.05),
@@ -124,6 +126,7 @@ PUNCH = KeyPoses(
 # a hard ball at the chest is pushed down and away with both palms
 PARRY = KeyPoses(
     labels="stomp save middle",
+    meets=(0.5, 1.7),
     span=(-0.6, -0.3, 0.7, 1.4),
     hips=((-0.6, 0, 0, 0), (-0.25, -0.02, 0, -0.12), (0.0, 0.02, 0, -0.09), (0.15, -0.03, 0, -0.10), (0.6, 0, 0, -0.05),
           (1.2, 0, 0, 0)),
@@ -141,21 +144,27 @@ TIP_OVER = KeyPoses(
     labels="stomp save high jump right",
     span=(-1.0, -0.75, 1.0, 1.6),
     hips=CATCH_HIGH.hips, left_foot=CATCH_HIGH.left_foot, right_foot=CATCH_HIGH.right_foot, flights=CATCH_HIGH.flights,
-    pelvis=((-0.75, 0, 4, 0), (-0.46, 0, 12, 6), (-0.2, 0, -2, 4), (0.0, -6, -10, 10), (0.25, 0, 4, 4), (0.45, 0, 18, 0),
+    pelvis=((-0.75, 0, 4, 0), (-0.46, 0, 12, 6), (-0.2, 0, -2, 4), (0.0, -6, -10, 10), (0.25, 0, 4, 4),
+            (0.45, 0, 18, 0),
             (1.2, 0, 0, 0)),
     spine=((-0.75, 0, 6, 0), (-0.46, 0, 16, 4), (-0.2, 0, -6, 4), (0.0, -12, -14, 8), (0.25, 0, 8, 0), (0.45, 0, 20, 0),
            (1.2, 0, 4, 0)),
     head=((-0.8, 0, -16, 0), (-0.3, 0, -30, 0), (0.0, 4, -32, -8), (0.3, 0, -10, 0), (0.8, 0, 0, 0), (1.3, 0, 2, 0)),
     right_arm=((-0.75, 6, 16, 12, 40, 10), (-0.46, -24, 18, 14, 52, 10), (-0.2, 120, 10, 18, 66, 40),
-               (0.0, 172, 2, 10, 8, 60), (0.1, 164, 2, 10, 14, 60), (0.26, 90, 20, 18, 50, 40), (0.45, 30, 30, 14, 46, 20),
+               (0.0, 172, 2, 10, 8, 60), (0.1, 164, 2, 10, 14, 60), (0.26, 90, 20, 18, 50, 40),
+               (0.45, 30, 30, 14, 46, 20),
                (0.9, 8, 14, 12, 24, 0), (1.4, 2, 9, 12, 16, 0)),
     left_arm=((-0.75, 6, 16, 12, 40, 10), (-0.46, -20, 20, 14, 52, 10), (-0.2, 70, 24, 18, 80, 30),
-              (0.0, 60, 40, 14, 60, 20), (0.26, 34, 40, 14, 50, 20), (0.45, 24, 30, 14, 46, 20), (0.9, 8, 14, 12, 24, 0),
+              (0.0, 60, 40, 14, 60, 20), (0.26, 34, 40, 14, 50, 20), (0.45, 24, 30, 14, 46, 20),
+              (0.9, 8, 14, 12, 24, 0),
               (1.4, 2, 9, 12, 16, 0)),
     wrists=((-0.4, 8), (-0.04, -40), (0.08, -10), (0.4, 8)),
 )
+HANDS_AT_TOP = dict(catch_high=2.36, punch=2.19, tip_over=2.44)
+"""Metres of an adult's hands at the key moment of saves with a jump, by name."""
+
 SAVES = dict(
-    ready=READY, catch_chest=CATCH_CHEST, catch_high=CATCH_HIGH, catch_low=CATCH_LOW, punch=PUNCH, parry=PARRY,
-    tip_over=TIP_OVER,
+    ready=READY, catch_chest=CATCH_CHEST, catch_high=CATCH_HIGH, catch_low=CATCH_LOW, parry=PARRY, tip_over=TIP_OVER,
+    punch=PUNCH,
 )
 """Recipes by name."""

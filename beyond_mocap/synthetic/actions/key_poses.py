@@ -8,7 +8,8 @@ apart as it is wide (`ball_hands`).
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields, replace
+from typing import Any
 
 import numpy as np
 
@@ -45,6 +46,7 @@ class KeyPoses:
     Attributes:
         labels: labels of the vocabulary.
         span: seconds in which the action shows: begin, fully there, fades, end.
+        meets: lowest and highest m of the ball that it can meet.
         is_span: whether it lasts instead of having a key moment.
         margin: seconds of standing or walking before and after.
         speeds: rows (time, m/s) of the gait below.
@@ -68,6 +70,7 @@ class KeyPoses:
 
     labels: str
     span: tuple[float, float, float, float]
+    meets: tuple[float, float] = (-np.inf, np.inf)
     is_span: bool = False
     margin: tuple[float, float] = (0.6, 0.8)
     speeds: Rows = ((0.0, 0.0), (1.0, 0.0))
@@ -207,6 +210,27 @@ def _lay_foot(posture: Posture, side: int, rows: np.ndarray, ease: np.ndarray, p
     feet[:, side] = blend_arrays(feet[:, side], np.stack([roll, pitch, yaw], axis=-1), ease)
     toes[:, side] = blend_arrays(toes[:, side], bend, ease)
     return posture.replace_arrays(ankles=ankles, feet=feet, toes=toes)
+
+
+def retime_flight(recipe: KeyPoses, half: float) -> KeyPoses:
+    """Retime an action whose key moment is the middle of its flight, for a higher or lower jump.
+
+    Args:
+        recipe: the action; it has one flight.
+        half: s from take-off to the key moment.
+    Returns:
+        The action: its tables are stretched in the flight and moved before and after it.
+    """
+    own = recipe.flights[0][1]
+
+    def retime(time: float) -> float:
+        return time * half / own if abs(time) <= own else time + float(np.sign(time)) * (half - own)
+
+    tables: dict[str, Any] = {
+        field.name: tuple((retime(row[0]), *row[1:]) for row in rows) for field in fields(recipe)
+        if field.type == "Rows | None" and (rows := getattr(recipe, field.name)) is not None
+    }
+    return replace(recipe, flights=((-half, half),), **{**tables, "span": tuple(map(retime, recipe.span))})
 
 
 def mirror_foot(rows: Rows) -> Rows:

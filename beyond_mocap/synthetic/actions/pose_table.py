@@ -5,32 +5,48 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
+import numpy as np
+
 from ...annotation.vocabulary import SIDES
+from ..gait_tables import GRAVITY
 from ..gestures import Gesture
 from .action import Action, ActionSetting
-from .ball_poses import BALL_POSES
 from .body_gestures import GESTURES
 from .celebrations import CELEBRATIONS
 from .keeper_dives import DIVES
-from .keeper_saves import SAVES
+from .keeper_saves import HANDS_AT_TOP, SAVES
 from .keeper_throws import THROWS
-from .key_poses import KeyPoses, build_key_poses
+from .key_poses import KeyPoses, build_key_poses, retime_flight
+
+_LEAST_JUMP, _MOST_JUMP = 0.14, 0.29  # s from take-off to the top: jumps of 0.1 and 0.4 m
+_BALL_ABOVE = 0.1  # m from the hands' joints to the centre of a ball that they meet overhead
+
+
+def _jump_to(recipe: KeyPoses, hands: float, setting: ActionSetting) -> KeyPoses:
+    """Retime a jump so that the hands, at height `hands` (m of an adult) in the table, meet the ball at its top."""
+    if setting.height is None:
+        return recipe
+    higher = setting.height - _BALL_ABOVE - hands * setting.scale
+    half = np.sqrt(max(recipe.flights[0][1] ** 2 + 2.0 * higher / GRAVITY, 0.0))
+    return retime_flight(recipe, float(np.clip(half, _LEAST_JUMP, _MOST_JUMP)))
 
 
 def _build_row(name: str, recipe: KeyPoses) -> Action:
     """Build the row of a recipe; those that name a side have their mirrored twin for the other one."""
+    hands = HANDS_AT_TOP.get(name)
 
     def build(setting: ActionSetting) -> Gesture:
-        return build_key_poses(recipe, setting.skeleton, setting.fps, example=setting.example)
+        chosen = recipe if hands is None else _jump_to(recipe, hands, setting)
+        return build_key_poses(chosen, setting.skeleton, setting.fps, example=setting.example)
 
     labels = frozenset(recipe.labels.split())
-    return Action(name=name.replace("_", " "), labels=labels - set(SIDES), build=build,
-                  has_side=bool(labels & set(SIDES)), is_span=recipe.is_span)
+    return Action(name=name.replace("_", " "), labels=labels - set(SIDES), build=build, meets=recipe.meets,
+                  heights=(1.9, 2.7) if hands else (), has_side=bool(labels & set(SIDES)), is_span=recipe.is_span)
 
 
 def _build_rows(*tables: Mapping[str, KeyPoses]) -> tuple[Action, ...]:
     return tuple(_build_row(name, recipe) for table in tables for name, recipe in table.items())
 
 
-POSE_ACTIONS = _build_rows(BALL_POSES, SAVES, DIVES, THROWS, CELEBRATIONS, GESTURES)
+POSE_ACTIONS = _build_rows(SAVES, DIVES, THROWS, CELEBRATIONS, GESTURES)
 """Rows for `table.ACTIONS`."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from beyond_mocap.annotation import KeyMoment, Timeline
+from beyond_mocap.annotation import KeyMoment, Span, Timeline
 from beyond_mocap.base.errors import InputError, NotInLibraryError
 from beyond_mocap.library.missing_actions import (
     ActionMoment,
@@ -15,6 +15,8 @@ from beyond_mocap.library.missing_actions import (
     find_missing_actions,
     is_action_clip,
 )
+from beyond_mocap.motion.humanoid import identify_joints
+from beyond_mocap.motion.motion import forward_kinematics
 from beyond_mocap.motion.track import Track
 from beyond_mocap.synthesis.plan import Plan
 from beyond_mocap.synthesis.resynthesize import resynthesize
@@ -51,6 +53,24 @@ def test_of_several_actions_the_one_that_suits_speed_and_ball_is_taken():
              for speed, height in ((0.0, None), (0.5, 1.7), (0.5, 2.3), (4.0, 2.1), (5.0, 0.8))]
     assert names == ["standing header", "standing header", "jumping header", "running header", "diving header"]
     assert find_action(moment("header", "standing", speed=4.0)).name == "standing header"
+
+
+def test_a_keeper_meets_the_ball_where_it_is():
+    names = [find_action(moment("catchb", *words, height=height)).name
+             for words, height in (((), 0.2), ((), 1.2), ((), 2.3), (("dive",), 0.3), (("dive",), 1.5))]
+    assert names == ["catch low", "catch chest", "catch high", "dive short low catch", "dive short high catch"]
+    assert find_action(moment("stomp", "dive", "long_duration", "left")).name == "dive long high push"
+
+
+def test_a_gesture_is_shown_where_it_is_requested_and_nowhere_else(library):
+    times = np.arange(0.0, 12.0, 0.1)
+    track = Track(times, np.stack([0.0 * times, 0.0 * times], axis=1))
+    timeline = Timeline(spans=(Span(4.0, 7.0, ("drinking",)),))
+    take = synthesize(library, Plan(track=track, library=library.folder, timeline=timeline))
+    body, (places, _) = identify_joints(take.motion.skeleton), forward_kinematics(take.motion)
+    lifted = np.max(places[:, [body.left.hand, body.right.hand], 2], axis=1) > places[:, body.chest, 2]
+    seconds = np.flatnonzero(lifted) / take.motion.fps
+    assert len(seconds) > 30 and 3.5 < seconds.min() and seconds.max() < 7.5
 
 
 def test_actions_are_built_once_for_a_library_and_have_twins(library):

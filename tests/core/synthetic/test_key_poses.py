@@ -10,12 +10,14 @@ from beyond_mocap.motion.mass import compute_centre_of_mass
 from beyond_mocap.motion.mirror import mirror
 from beyond_mocap.motion.motion import forward_kinematics
 from beyond_mocap.motion.retargeting.adult import build_adult_skeleton
+from beyond_mocap.synthetic.actions.action import ActionSetting
 from beyond_mocap.synthetic.actions.body_gestures import GESTURES
 from beyond_mocap.synthetic.actions.celebrations import CELEBRATIONS
 from beyond_mocap.synthetic.actions.keeper_dives import DIVES
 from beyond_mocap.synthetic.actions.keeper_saves import SAVES
 from beyond_mocap.synthetic.actions.keeper_throws import THROWS
 from beyond_mocap.synthetic.actions.key_poses import build_key_poses, mirror_foot
+from beyond_mocap.synthetic.actions.table import ACTIONS
 from beyond_mocap.synthetic.lying import iter_surface
 
 FPS = 60.0
@@ -151,6 +153,25 @@ def test_hands_end_where_gestures_need_them(build):
 def test_celebrations_differ():
     names = [name for name, recipe in CELEBRATIONS.items() if "celebration" in recipe.labels.split()]
     assert len(names) >= 6 and len({CELEBRATIONS[name].labels for name in names}) == len(names)
+
+
+@pytest.mark.parametrize("height", [2.25, 2.5])
+def test_a_jump_to_the_ball_is_as_high_as_the_ball(height):
+    action = next(action for action in ACTIONS if action.name == "catch high")
+    gesture = action.build(ActionSetting(skeleton=build_adult_skeleton(), fps=FPS, height=height))
+    places, _ = forward_kinematics(gesture.motion)
+    frame = int(round(gesture.key * FPS))
+    hands = places[:, [BODY.left.hand, BODY.right.hand], 2].mean(axis=1)
+    assert hands[frame] == pytest.approx(height - 0.1, abs=0.03)
+    centre = compute_centre_of_mass(BODY, places)[:, 2]
+    assert abs(int(centre.argmax()) - frame) <= 2
+
+
+def test_every_recipe_is_an_action_of_its_own_name():
+    names = [action.name for action in ACTIONS]
+    assert len(set(names)) == len(names)
+    assert {name.replace("_", " ") for name in RECIPES} <= set(names)
+    assert {action.is_span for action in ACTIONS if action.name in ("punch", "pointing")} == {True, False}
 
 
 def test_every_label_of_a_recipe_is_in_the_vocabulary():
