@@ -7,7 +7,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -18,10 +18,10 @@ from ..ball.tracked.solve import SolvedBall, SolvedTouch
 from ..base.errors import format_count
 from ..files.event_data import CERTAIN_TOUCHES, MatchEvent, MatchEvents
 from ..motion.track.match_data import Match
-from .duels import find_duels, label_lost_duels
+from .duels import Duel, find_duels, label_lost_duels
 from .event_clock import AlignedEvents, align_events
 from .goalkeeping.saves import find_save_event, find_save_values, label_missed_saves, label_set_positions
-from .goalkeeping.shots import Shot, find_shots, list_shots_at
+from .goalkeeping.shots import GOAL, SAVED, Shot, find_shots, list_shots_at
 from .moments import (
     BOTH,
     EVENTS,
@@ -119,7 +119,7 @@ def label_match(
         selected += find_dribbles([touch for _, touch in player_touches])
         players[player.id] = sort_moments([*selected, *label_set_positions(shots_at, selected)])
     notes = (*(events.notes if events else ()), *(aligned.notes if aligned else ()),
-             *_describe_left_out(touches, left_out))
+             *_describe_left_out(touches, left_out), *_describe_contests(duels, shots))
     return MatchLabels(players, notes, _measure_event_fit(aligned, touches, span) if aligned else {})
 
 
@@ -230,6 +230,15 @@ def find_dribbles(touches: list[SolvedTouch]) -> list[Moment]:
             out.append(Moment(time=round(chain[0].time, 3), labels=_DRIBBLE.labels, source=TOUCHES,
                               confidence=round(confidence, 3), end=round(chain[-1].time, 3)))
     return out
+
+
+def _describe_contests(duels: Sequence[Duel], shots: Sequence[Shot]) -> list[str]:
+    """Describe how many duels and shots there are."""
+    lines = [f"{format_count(len(duels), 'duel', 'duels')}: the player who loses one reaches and misses"]
+    counts = [(sum(shot.end == end for shot in shots), text) for end, text in ((SAVED, "saved"), (GOAL, "in the goal"))]
+    ends = ", ".join(f"{count} {text}" for count, text in counts)
+    lines_of_shots = [f"{format_count(len(shots), 'shot at a goal', 'shots at a goal')}: {ends}"]
+    return lines * bool(duels) + lines_of_shots * bool(shots)
 
 
 def _describe_left_out(touches, left_out: Counter) -> list[str]:
