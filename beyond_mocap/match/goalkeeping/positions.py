@@ -96,8 +96,8 @@ def _list_played(match: Match) -> np.ndarray:
 def _find_nearest_present(there: np.ndarray, first: int, end: int) -> int:
     """Find which of K keepers, `there` (K, N), was present last before a stretch, else first after it."""
     before, after = there[:, :first][:, ::-1], there[:, end:]
-    gaps = [(np.argmax(row) if row.any() else np.inf) for row in (before if before.any() else after)]
-    return int(np.argmin(gaps))
+    rows = before if before.any() else after
+    return int(np.argmin(np.where(rows.any(axis=1), rows.argmax(axis=1), rows.shape[1])))
 
 
 def _fill_stretch(match: Match, row: int, first: int, end: int, goal: float) -> np.ndarray:

@@ -108,7 +108,7 @@ def _build_shot(match: Match, solved: SolvedBall, number: int, keeper: str, goal
     elif end == GOAL:
         arrival, place = _find_passing(match, solved, keeper, touch.time, left, goal)
     return Shot(time=touch.time, shooter=touch.player, keeper=keeper, end=end, arrival=float(arrival),
-                place=tuple(map(float, place)), lateral=_measure_lateral(match, keeper, touch, float(arrival), place),
+                place=(float(place[0]), float(place[1]), float(place[2])), lateral=_measure_lateral(match, keeper, touch, float(arrival), place),
                 save=number + 1 if is_save else -1,
                 confidence=min([touch.confidence, *(other.confidence for other in following if is_save)]))
 
