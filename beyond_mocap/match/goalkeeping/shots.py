@@ -107,8 +107,9 @@ def _build_shot(match: Match, solved: SolvedBall, number: int, keeper: str, goal
         arrival, place = following[0].time, following[0].position
     elif end == GOAL:
         arrival, place = _find_passing(match, solved, keeper, touch.time, left, goal)
+    lateral = _measure_lateral(match, keeper, touch, float(arrival), place)
     return Shot(time=touch.time, shooter=touch.player, keeper=keeper, end=end, arrival=float(arrival),
-                place=(float(place[0]), float(place[1]), float(place[2])), lateral=_measure_lateral(match, keeper, touch, float(arrival), place),
+                place=(float(place[0]), float(place[1]), float(place[2])), lateral=lateral,
                 save=number + 1 if is_save else -1,
                 confidence=min([touch.confidence, *(other.confidence for other in following if is_save)]))
 
