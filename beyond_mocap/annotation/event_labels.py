@@ -46,7 +46,7 @@ EVENT_KINDS = (
 KINDS = tuple(kind.name for kind in EVENT_KINDS)
 
 PLACEHOLDERS = {"side": SIDES, "height": list_labels(group="height"), "gait": list_labels(group="pace"),
-                "jump": ("jump",)}
+                "jump": ("jump",), "dive": ("dive",), "duration": ("short_duration", "long_duration")}
 """Placeholders allowed in braces in a row's labels, and the labels that replace each."""
 
 TABLE = Path(__file__).with_name("event_words.csv")

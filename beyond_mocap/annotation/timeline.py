@@ -36,6 +36,9 @@ _SAME_TIME = 1e-6  # seconds up to which two times count as equal
 AVOID_PREFIX = "-"
 """Prefix of a label in the text form that the motion must not have."""
 
+TOUCH = "touch"
+"""Label of the ball being touched: a key moment that excludes it reaches for the ball and misses it by design."""
+
 
 def check_labels(labels: Iterable[str], where: str) -> tuple[str, ...]:
     """Check labels and normalize them: lower case, each once.
@@ -117,6 +120,11 @@ class KeyMoment:
     def resolved_time(self) -> float:
         """The second at which it is played: the solved one if there is one, else the requested one."""
         return self.time if self.solved is None else self.solved
+
+    @property
+    def misses_ball(self) -> bool:
+        """Whether the body reaches for the ball and misses it by design, as the loser of a duel does."""
+        return TOUCH in self.avoid
 
 
 @dataclass(frozen=True)
@@ -290,8 +298,10 @@ def _find_label_problems(item: Span | KeyMoment, known: frozenset[str], place: s
     """Find what is wrong with the labels of a span or key moment."""
     if TRANSITION in (*item.words, *item.avoid):
         return _find_transition_problems(item, place)
-    out = [_build_unknown_label_error(word, item, known, place) for word in (*item.words, *item.avoid)
-           if word not in known]
+    may_miss = {TOUCH} if isinstance(item, KeyMoment) else set()
+    out = [_build_unknown_label_error(word, item, known, place)
+           for words, others in ((item.words, set()), (item.avoid, may_miss)) for word in words
+           if word not in known and word not in others]
     out += [_build_contradiction_error(word, place) for word in item.words if word in item.avoid]
     if isinstance(item, KeyMoment) and not item.words:
         out.append(InputError(place, "a key moment without labels", "TIME labels...", "add labels"))

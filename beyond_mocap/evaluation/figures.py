@@ -27,6 +27,7 @@ from ..synthesis.quality.moments import (
     measure_ball_gap,
     measure_ball_shift,
     measure_contact,
+    measure_miss,
 )
 from ..synthesis.quality.playback import find_replayed, list_warp_rates
 from ..synthesis.quality.unmet_constraints import report_unmet_constraints
@@ -113,8 +114,8 @@ def _measure_key_moment(view: View, moment: KeyMomentResult) -> dict:
         "time_s": moment.requested.time, "solved_time_s": moment.requested.solved,
         "labels": list(moment.requested.words), "clip": moment.clip, "clip_frame": moment.clip_frame,
         "time_error_s": moment.played_at - time, **errors, "contact_gap_m": measure_ball_gap(played, moment),
-        "met_s": contact_time, "met_gap_m": contact_gap, "used_instead": None if moment.used_instead is None
-        else list(moment.used_instead),
+        "met_s": contact_time, "met_gap_m": contact_gap, "missed_by_m": measure_miss(played, moment),
+        "used_instead": None if moment.used_instead is None else list(moment.used_instead),
     }
 
 

@@ -1,47 +1,42 @@
 """Label what each player does with the ball and when, from solved touches and from a provider's events.
 
     labels = label_match(match, solve_ball(match), read_events("events.xml", match=match))
-    timeline = build_timeline(labels.players["home_7"], 0.0, 60.0)
-
-A player's labels are stored as a text file that people may edit: the contract's form, with the source of each line
-after it.
-
-    # labels of home_7: edit freely. An edited file is kept and used, any other is regenerated [5d0c3f2a]
-    12.31 kick running low  # touches 0.93
-    20.5 23.2 dribble  # touches 0.97
+    timeline = build_timeline(labels.players["home_7"], 0.0, 60.0)  # `moments`
 """
 
 from __future__ import annotations
 
-import os
-import re
 from collections import Counter
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from pathlib import Path
 
 import numpy as np
 
-from ..annotation import KeyMoment, Span, Timeline, check_timeline, format_timeline, parse_timeline, read_text
-from ..annotation.ball_contact import takes_with_foot
 from ..annotation.event_labels import EventLabelTable, read_event_labels
 from ..ball.tracked import kinds
 from ..ball.tracked.solve import SolvedBall, SolvedTouch
-from ..base.digest import hex_digest
 from ..base.errors import format_count
-from ..files.atomic import atomic_write
 from ..files.event_data import CERTAIN_TOUCHES, MatchEvent, MatchEvents
 from ..motion.track.match_data import Match
+from .duels import Duel, find_duels, label_lost_duels
 from .event_clock import AlignedEvents, align_events
+from .goalkeeping.saves import find_save_event, find_save_values, label_missed_saves, label_set_positions
+from .goalkeeping.shots import GOAL, SAVED, Shot, find_shots, list_shots_at
+from .moments import (
+    BOTH,
+    EVENTS,
+    MIN_DISTANCE_SECONDS,
+    SHOTS,
+    TOUCHES,
+    Moment,
+    build_moment,
+    select_separate_moments,
+    sort_moments,
+)
+from .play import find_kept_lines
 
 MIN_CONFIDENCE = 0.3
 """Touches with less confidence give no key moment."""
-
-MIN_DISTANCE_SECONDS = 0.5
-"""s: of two touches of a player that are closer, one becomes a key moment."""
-
-TOUCHES, EVENTS, BOTH, USER = "touches", "events", "touches and events", "user"
-"""Sources of a moment."""
 
 _RUNNING_SPEED = 2.0  # m/s, from which the player is running at a touch
 _HIGH_FOOT, _HIGH_HAND, _LOW_HAND = 0.45, 1.5, 0.7  # m of the ball's centre
@@ -54,26 +49,6 @@ _EVENT_CONFIDENCE = 0.4  # confidence of an event without a touch
 _SAME_MOMENT_SECONDS = 0.5  # s around an event without a touch in which another moment of the player stands for it
 _TOUCH_EVENTS = {kind.name: (kind.event, kind.details) for kind in kinds.TOUCH_KINDS}
 _DRIBBLE = next(kind for kind in kinds.TOUCH_KINDS if kind.name == kinds.DRIBBLE)
-_HEADER = re.compile(r"#.*\[([0-9a-f]{8})\]\s*")
-
-
-@dataclass(frozen=True, kw_only=True)
-class Moment:
-    """What a player does.
-
-    Attributes:
-        time: s on the match's clock.
-        labels: the labels.
-        source: TOUCHES, EVENTS, BOTH or USER.
-        confidence: 0 to 1.
-        end: s, the end of a stretch that starts at `time`; None for a key moment.
-    """
-
-    time: float
-    labels: tuple[str, ...]
-    source: str
-    confidence: float
-    end: float | None = None
 
 
 @dataclass(frozen=True)
@@ -91,25 +66,6 @@ class MatchLabels:
     figures: Mapping[str, object] = field(default_factory=dict)
 
 
-def build_timeline(moments: Iterable[Moment], start: float = -np.inf, end: float = np.inf) -> Timeline:
-    """Build a timeline from moments, cut to a span.
-
-    Args:
-        moments: the moments.
-        start: s.
-        end: s.
-    Returns:
-        The timeline.
-    """
-    spans, keys = [], []
-    for moment in moments:
-        if moment.end is None:
-            keys += [KeyMoment(moment.time, moment.labels)] * (start <= moment.time <= end)
-        elif min(moment.end, end) > max(moment.time, start):
-            spans.append(Span(max(moment.time, start), min(moment.end, end), moment.labels))
-    return Timeline(tuple(spans), tuple(keys))
-
-
 def label_match(
     match: Match, solved: SolvedBall | None, events: MatchEvents | None = None, table: EventLabelTable | None = None
 ) -> MatchLabels:
@@ -118,7 +74,8 @@ def label_match(
     A touch becomes a key moment with the labels that the table has for it, or for the event paired with it; its time is
     the touch's. Consecutive touches of one player are a stretch of dribble. A pass, shot or save without a touch
     becomes a key moment at its time on the corrected clock. Of two within MIN_DISTANCE_SECONDS the more certain one
-    stays. Unknown details (the foot, a height without heights in the feed) are left out of the labels.
+    stays. Who loses a duel reaches and misses (`duels`); goalkeepers wait for shots and save them as the ball comes
+    (`goalkeeping`). Unknown details (the foot, a height without heights in the feed) are left out of the labels.
 
     Args:
         match: the match.
@@ -136,71 +93,34 @@ def label_match(
     aligned = align_events(events, touches, match.halves, span) if events and solved else None
     event_by_touch = {touch: event for event, touch in enumerate(aligned.touches) if touch >= 0} if aligned else {}
     heights, left_out, players = has_heights(match), Counter(), {}
+    goal_lines = find_kept_lines(match) if solved else {}
+    shots = find_shots(match, solved, goal_lines) if solved else ()
+    saves = {shot.save: shot for shot in shots if shot.save >= 0}
+    duels = find_duels(match, touches, goal_lines, aligned)
     for player, path in zip(match.players, match.positions):
         player_touches = [(i, touch) for i, touch in enumerate(touches) if touch.player == player.id]
         found = [moment for i, touch in player_touches if (moment := build_touch_moment(
             touch, match.times, path, heights, table, event=aligned.events[event_by_touch[i]] if i in event_by_touch
-            else None,
+            else None, shot=saves.get(i),
         ))]  # fmt: skip
         confident = [moment for moment in found if moment.confidence >= MIN_CONFIDENCE]
         if aligned:
             confident += _label_untouched_events(player.id, aligned, span, times=match.times, path=path, table=table,
                                                  others=found)
+        lost = {duel.time: {**find_gait_label(duel.time, match.times, path), **find_height_labels("foot", duel.height,
+                                                                                                  heights)}
+                for duel in duels if duel.loser == player.id}
+        confident += label_lost_duels(duels, player.id, table, lost)
+        shots_at = list_shots_at(shots, player.id)
+        confident += label_missed_saves(shots_at, table, heights)
         selected = select_separate_moments(confident)
         left_out["doubtful"] += sum(moment.confidence < MIN_CONFIDENCE for moment in found)
         left_out["close"] += len(confident) - len(selected)
-        players[player.id] = sort_moments([*selected, *find_dribbles([touch for _, touch in player_touches])])
+        selected += find_dribbles([touch for _, touch in player_touches])
+        players[player.id] = sort_moments([*selected, *label_set_positions(shots_at, selected)])
     notes = (*(events.notes if events else ()), *(aligned.notes if aligned else ()),
-             *_describe_left_out(touches, left_out))
+             *_describe_left_out(touches, left_out), *_describe_contests(duels, shots))
     return MatchLabels(players, notes, _measure_event_fit(aligned, touches, span) if aligned else {})
-
-
-def write_labels(path: str | os.PathLike, player: str, moments: Iterable[Moment]) -> None:
-    """Write one player's moments.
-
-    Args:
-        path: the text file.
-        player: id.
-        moments: in any order.
-    Raises:
-        InputError: if the file cannot be written.
-    """
-    lines = [f"{_format_moment(moment)}  # {moment.source} {moment.confidence:.2f}\n"
-             for moment in sort_moments(moments)]
-    text = "edit freely. An edited file is kept and used, any other is regenerated"
-    atomic_write(path, f"# labels of {' '.join(player.split())}: {text} [{_compute_digest(lines)}]\n{''.join(lines)}")
-
-
-def is_edited(path: str | os.PathLike) -> bool:
-    """Say whether the file exists and a person wrote it or has changed it since it was written."""
-    if not Path(path).is_file():
-        return False
-    lines = read_text(path).splitlines(keepends=True)
-    head = _HEADER.fullmatch(lines[0]) if lines else None
-    return head is None or head[1] != _compute_digest(lines[1:])
-
-
-def read_labels(
-    path: str | os.PathLike, automatic: Sequence[Moment] = (), known_labels: Iterable[str] = ()
-) -> tuple[Moment, ...]:
-    """Read the moments in a file.
-
-    Args:
-        path: the text file.
-        automatic: moments; a line equal to one of them is that moment, the others are the user's.
-        known_labels: labels beyond the vocabulary.
-    Returns:
-        The moments in order.
-    Raises:
-        InputError: with the line, if it is not a timeline or has unknown labels.
-    """
-    timeline = parse_timeline(read_text(path), str(path))
-    check_timeline(timeline, known_labels, where=str(path))
-    known = {_format_moment(moment): moment for moment in automatic}
-    found = [Moment(time=key.time, labels=key.words, source=USER, confidence=1.0) for key in timeline.keys]
-    found += [Moment(time=span.start, labels=span.words, source=USER, confidence=1.0, end=span.end)
-              for span in timeline.spans]  # fmt: skip
-    return sort_moments(known.get(_format_moment(moment), moment) for moment in found)
 
 
 def _label_untouched_events(player: str, aligned: AlignedEvents, span, times, path, table, others) -> list[Moment]:
@@ -214,7 +134,7 @@ def _label_untouched_events(player: str, aligned: AlignedEvents, span, times, pa
             continue
         values = {**find_gait_label(time, times, path), "side": event.side}
         labels = table.find_labels(event.kind, event.part or "foot", event.details, values)
-        out += [Moment(time=round(time, 3), labels=labels, source=EVENTS, confidence=_EVENT_CONFIDENCE)] * bool(labels)
+        out += filter(None, [build_moment(time, labels, EVENTS, _EVENT_CONFIDENCE)])
     return out
 
 
@@ -240,7 +160,7 @@ def has_heights(match: Match) -> bool:
 
 def build_touch_moment(
     touch: SolvedTouch, times: np.ndarray, path: np.ndarray, heights: bool, table: EventLabelTable,
-    event: MatchEvent | None = None,
+    event: MatchEvent | None = None, shot: Shot | None = None,
 ) -> Moment | None:  # fmt: skip
     """Build the key moment of a touch.
 
@@ -251,28 +171,29 @@ def build_touch_moment(
         heights: whether the touch's height is known.
         table: labels by event.
         event: the event paired with the touch; its labels take precedence.
+        shot: the shot that the touch saves, None for another touch.
     Returns:
         The key moment, None if the table has no labels for it.
     """
     kind, details = _TOUCH_EVENTS[touch.kind]
-    if touch.kind == kinds.SAVE and np.linalg.norm(touch.after) > _CAUGHT_SPEED:
+    own_part = touch.part
+    if shot is not None:
+        own_part = "hand"
+        kind, details = find_save_event(shot, float(np.linalg.norm(touch.after)), heights)
+    elif touch.kind == kinds.SAVE and np.linalg.norm(touch.after) > _CAUGHT_SPEED:
         details = (*details, "parried")
-    values = {**find_gait_label(touch.time, times, path), **find_height_labels(touch.part, touch.position[2], heights)}
+    values = {**find_gait_label(touch.time, times, path), **find_height_labels(own_part, touch.position[2], heights),
+              **({} if shot is None else find_save_values(shot, heights))}
     if event is None:
-        labels = table.find_labels(kind, touch.part, details, values)
-        return _build_moment(touch, labels, TOUCHES, touch.confidence)
-    part, values = event.part or touch.part, {**values, "side": event.side}
-    if part != touch.part:
+        labels = table.find_labels(kind, own_part, details, values)
+        return build_moment(touch.time, labels, TOUCHES if shot is None else SHOTS, touch.confidence)
+    part = event.part or own_part
+    values = values if shot is not None else {**values, "side": event.side}
+    if part != own_part:
         values.update(find_height_labels(part, touch.position[2], heights))
     labels = table.find_labels(event.kind, part, event.details, values) or table.find_labels(kind, part, details,
             values)
-    return _build_moment(touch, labels, BOTH, 1.0 - _DOUBT_WITH_EVENT * (1.0 - touch.confidence))
-
-
-def _build_moment(touch: SolvedTouch, labels: tuple[str, ...], source: str, confidence: float) -> Moment | None:
-    if not labels:
-        return None
-    return Moment(time=round(touch.time, 3), labels=labels, source=source, confidence=round(confidence, 3))
+    return build_moment(touch.time, labels, BOTH, 1.0 - _DOUBT_WITH_EVENT * (1.0 - touch.confidence))
 
 
 def find_gait_label(time: float, times: np.ndarray, path: np.ndarray) -> dict[str, str]:
@@ -295,22 +216,6 @@ def find_height_labels(part: str, height: float, known: bool) -> dict[str, str]:
     return {"height": "high" if height > _HIGH_FOOT else "low", "jump": "jump" if height > _JUMP_HEIGHT else ""}
 
 
-def select_separate_moments(moments: Iterable[Moment]) -> list[Moment]:
-    """Select moments of one player at least MIN_DISTANCE_SECONDS apart, the most certain first: events before
-    touches, sent before received balls.
-    """
-    selected: list[Moment] = []
-    for moment in sorted(moments, key=_compute_weight, reverse=True):
-        if all(abs(moment.time - other.time) >= MIN_DISTANCE_SECONDS for other in selected):
-            selected.append(moment)
-    return selected
-
-
-def _compute_weight(moment: Moment) -> tuple[float, float]:
-    bonus = 0.5 * (moment.source in (EVENTS, BOTH)) + 0.3 * (not takes_with_foot(moment.labels))
-    return moment.confidence + bonus, -moment.time
-
-
 def find_dribbles(touches: list[SolvedTouch]) -> list[Moment]:
     """Find the stretches in which one player dribbles: consecutive touches, at least one of them a dribble's."""
     out, first = [], 0
@@ -327,9 +232,13 @@ def find_dribbles(touches: list[SolvedTouch]) -> list[Moment]:
     return out
 
 
-def sort_moments(moments: Iterable[Moment]) -> tuple[Moment, ...]:
-    """Sort moments by time, stretches before key moments."""
-    return tuple(sorted(moments, key=lambda moment: (moment.time, moment.end is None)))
+def _describe_contests(duels: Sequence[Duel], shots: Sequence[Shot]) -> list[str]:
+    """Describe how many duels and shots there are."""
+    lines = [f"{format_count(len(duels), 'duel', 'duels')}: the player who loses one reaches and misses"]
+    counts = [(sum(shot.end == end for shot in shots), text) for end, text in ((SAVED, "saved"), (GOAL, "in the goal"))]
+    ends = ", ".join(f"{count} {text}" for count, text in counts)
+    lines_of_shots = [f"{format_count(len(shots), 'shot at a goal', 'shots at a goal')}: {ends}"]
+    return lines * bool(duels) + lines_of_shots * bool(shots)
 
 
 def _describe_left_out(touches, left_out: Counter) -> list[str]:
@@ -341,14 +250,3 @@ def _describe_left_out(touches, left_out: Counter) -> list[str]:
         (left_out["close"], f"ignored, within {MIN_DISTANCE_SECONDS:g} s of a more certain one of the same player"),
     ]
     return [f"{format_count(count, 'touch', 'touches')} {what}" for count, what in counts if count]
-
-
-def _format_moment(moment: Moment) -> str:
-    """Format a moment as the contract's line."""
-    return format_timeline(build_timeline([moment])).rstrip("\n")
-
-
-def _compute_digest(lines: Iterable[str]) -> str:
-    """Compute the digest of lines, without their ends."""
-    content = "\n".join(line.rstrip() for line in lines if line.strip())
-    return hex_digest(content, digits=8)

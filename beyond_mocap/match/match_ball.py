@@ -20,6 +20,7 @@ from ..motion.motion import Motion, compute_pose
 from ..motion.track import BALL_RADIUS, Track, clean_track
 from ..motion.track.ball_path import BallPath
 from ..motion.track.match_data import Match
+from ..synthesis.construct.near_miss import miss_ball
 from ..synthesis.construct.strike_fixed_ball import FixedStrike, strike_fixed_ball
 from ..synthesis.plan import Plan
 from ..synthesis.resolved_touches import build_trajectory
@@ -111,19 +112,23 @@ def apply_led_ball(ball: BallPath, first: int, led: Iterable[tuple[np.ndarray, n
 def restore_ball_contact(take: Take, ball: np.ndarray) -> Take:
     """Solve ball contact again after collision avoidance and head tracking moved the striking part.
 
+    A player who misses the ball by design (`synthesis.construct.near_miss`) keeps clear of it.
+
     Args:
         take: the take.
         ball: (T, 3) m, NaN where unknown.
     Returns:
         The take with its striking parts on the ball at each key moment that touches it. Frames farther than
-        EASE_SECONDS from such a moment keep their bits.
+        EASE_SECONDS from such a moment, and those away from a miss, keep their bits.
     """
     touches = [key for key in take.keys if build_surfaces(take.motion.skeleton, key.contact_labels)]
     found = (_build_meeting(take.motion, key, ball, _find_free_frames(key, touches)) for key in touches)
     meetings = [meeting for meeting in found if meeting is not None]
-    if not meetings:
-        return take
-    return replace(take, motion=strike_fixed_ball(take.motion, take.contacts, meetings, has_ground=True).motion)
+    motion = take.motion
+    if meetings:
+        motion = strike_fixed_ball(motion, take.contacts, meetings, has_ground=True).motion
+    motion = miss_ball(motion, take.contacts, ball, take.keys, reaches=False)
+    return take if motion is take.motion else replace(take, motion=motion)
 
 
 def _find_free_frames(key: KeyResult, touches: Sequence[KeyResult]) -> tuple[float, float]:

@@ -39,6 +39,19 @@ def build_plays(match: Match) -> dict[str, Play]:
     return out
 
 
+def find_kept_lines(match: Match) -> dict[str, np.ndarray]:
+    """Find who keeps which goal.
+
+    Args:
+        match: the match, N samples.
+    Returns:
+        Id of each goalkeeper -> (N,) m, x of the goal line that they keep, NaN outside the periods and where it is not
+        clear.
+    """
+    keepers, goals = _find_ends(match, match.positions, match.times)
+    return {match.players[number].id: -goals[match.players[number].team] for number in sorted(keepers)}
+
+
 def _find_ends(match: Match, positions: np.ndarray, times: np.ndarray) -> tuple[set[int], dict[str, np.ndarray]]:
     """Find the indices of the goalkeepers, and for each team the x (M,) m of the goal that it plays at.
 

@@ -17,7 +17,8 @@ from ..synthesis.plan import Plan
 from ..synthesis.resolve_plan import resolve_plan
 from ..synthesis.resolved_touches import build_trajectory
 from .folder import MatchFolder
-from .labels import USER, MatchLabels, Moment, build_timeline, is_edited, read_labels, write_labels
+from .labels import MatchLabels
+from .moments import USER, Moment, build_timeline, is_edited, read_labels, write_labels
 from .player_edit import to_stored_plan
 from .request import MatchRequest
 from .roles import Role

@@ -27,12 +27,13 @@ from ..library.library import Library
 from ..motion.track.ball_path import BallPath
 from ..motion.track.match_data import Match
 from .folder import build_file_names, check_folder, open_folder, read_state
+from .goalkeeping.positions import fill_keepers
 from .labels import MatchLabels, label_match
 from .match_ball import apply_led_ball, build_ball_plan, sample_ball
 from .pieces import stages
 from .pieces.pool import WorkerConfig, check_workers, stop_workers
 from .pieces.tasks import LibrarySource, set_library
-from .play import build_plays
+from .play import build_plays, find_kept_lines
 from .player_plans import build_player_plans, check_label_folder, list_unknown_texts, list_unused_labels
 from .report.pictures import build_thumbnail_renderer
 from .request import MatchRequest, build_identity
@@ -153,14 +154,17 @@ def _run_stages(
 ) -> None:
     """Run all stages after reading."""
     state, begin = job.state, read_clocks()
-    roles = build_roles(match, job.request, span)
+    present, filled = fill_keepers(match, find_kept_lines(match))
+    state.report["notes"] += filled
+    roles = build_roles(present, job.request, span)
     state.report["notes"] += list_absent_players(job.request, roles, span)
     solved = _solve_ball(job, match, span, _scale_progress(report, "ball"))
     state.record_stage("ball", begin)
     clock = read_clocks()
     words = _label_players(job, match, events, solved)
     inside = (match.times >= span[0] - 1e-6) & (match.times <= span[1] + 1e-6)
-    touches = {player: [one.time for one in moments if one.end is None] for player, moments in words.players.items()}
+    touches = {player: [one.time for one in moments if one.end is None and not one.misses_ball]
+               for player, moments in words.players.items()}
     roles, state.report["spacing"] = separate_roles(roles, match.times[inside], touches)
     names = build_file_names(player.id for player in match.players)
     parts = build_player_plans(roles, names, words, solved=solved, request=job.request, folder=job.folder,

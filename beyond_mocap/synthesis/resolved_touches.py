@@ -165,7 +165,7 @@ def _match_touches(timeline: Timeline, touches: tuple[PlayerTouch, ...]) -> Time
 def _compute_mismatch(key: KeyMoment, touch: PlayerTouch) -> float:
     """Compute how far a touch is from a key moment and its labels, in seconds; inf where it cannot be meant."""
     part, words, off = find_striking_part(key.words), set(key.words), abs(touch.time - key.time)
-    if part is None or off > MAX_TOUCH_OFFSET:
+    if part is None or key.misses_ball or off > MAX_TOUCH_OFFSET:
         return np.inf
     kinds = _SENDING_KINDS if _SENDING & words else _TAKING_KINDS if _TAKING & words else {touch.kind}
     unlike = _UNKNOWN_PLAYER_COST * (touch.is_own is None) + _OTHER_KIND_COST * (touch.kind not in kinds)
@@ -192,7 +192,7 @@ def report_missing_touches(take: Take, plan: ResolvedPlan) -> list[str]:
         take: the take of `apply_trajectory`.
         plan: the resolved plan.
     """
-    touching = [key for key in plan.timeline.keys if find_striking_part(key.words)]
+    touching = [key for key in plan.timeline.keys if find_striking_part(key.words) and not key.misses_ball]
     dribbles = [span for span in plan.timeline.spans if _CARRYING.intersection(span.words)]
     if plan.trajectory is None:
         message = "the ball's touches are not solved: the track has no ball, or too few samples of it"

@@ -39,8 +39,8 @@ class KeyResult:
 
     @property
     def contact_labels(self) -> tuple[str, ...]:
-        """Labels that say which part meets the ball (`ball_contact.choose_contact_labels`)."""
-        return choose_contact_labels(self.words, self.requested.words)
+        """Labels that say which part meets the ball (`ball_contact.choose_contact_labels`); none if it misses it."""
+        return () if self.requested.misses_ball else choose_contact_labels(self.words, self.requested.words)
 
 
 @dataclass(frozen=True)

@@ -317,13 +317,13 @@ def find_touches(library: Library, fps: float, edit: EditList, keys: tuple[KeyRe
     for placed in edit.keys:
         result = keys[placed.number]
         entry, leave = np.multiply(compute_needed_frames(library, placed.key), fps / library.fps)
-        found.append(Touch(result.frame, result.words, float(entry), float(leave)))
+        found.append(Touch(result.frame, result.words, float(entry), float(leave), result.requested.misses_ball))
         served.add(placed.number)
     reach = REACH_SECONDS * fps
     for number, result in enumerate(keys):
         is_missing = result.used_instead is not None and number not in served and not find_striking_part(result.words)
         if is_missing and all(abs(result.frame - touch.frame) > reach for touch in found):
-            found.append(Touch(result.frame, result.requested.words, reach, reach))
+            found.append(Touch(result.frame, result.requested.words, reach, reach, result.requested.misses_ball))
     return tuple(found)
 
 

@@ -77,12 +77,14 @@ class Touch:
         words: labels of the clip that plays there, sides after mirroring.
         entry: frames before `frame` within which the body may be changed.
         leave: frames after it.
+        misses: whether the body reaches for the ball and misses it by design (`near_miss`).
     """
 
     frame: float
     words: tuple[str, ...]
     entry: float
     leave: float
+    misses: bool = False
 
 
 @dataclass(frozen=True, eq=False)
@@ -192,7 +194,8 @@ class _TouchFrames:
 def _iter_touch_frames(skeleton: Skeleton, touches: Sequence[Touch], count: int, fps: float):
     """Generate (number, moment) of every touch that some part can serve, in order of time."""
     shortest, longest = _SHORTEST_EASE * fps, _LONGEST_EASE * fps
-    order = sorted((t.frame, k) for k, t in enumerate(touches) if build_surfaces(skeleton, t.words))
+    order = sorted((t.frame, k) for k, t in enumerate(touches)
+                   if not t.misses and build_surfaces(skeleton, t.words))
     held = [compute_contact_frames(frame, count) for frame, _ in order]
     # held frames of all touches, with sentinels far outside on both sides, so ends[place + 1] is this touch
     ends = [(-count, -count), *held, (2 * count, 2 * count)]

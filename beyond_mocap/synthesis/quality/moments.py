@@ -153,6 +153,19 @@ def measure_ball_gap(played: Playback, moment: KeyMomentResult) -> float:
     return abs(float(measure_contact_gap(played.motion.skeleton, *pose, list_contact_labels(moment), ball)))
 
 
+def measure_miss(played: Playback, moment: KeyMomentResult) -> float:
+    """Measure how far the reaching part stays from the ball's surface at a key moment that misses it by design.
+
+    Returns:
+        m, NaN for other key moments, and without ball or part.
+    """
+    if played.ball is None or not moment.requested.misses_ball:
+        return np.nan
+    pose = played.positions[moment.frame], played.rotations[moment.frame]
+    labels = choose_contact_labels(moment.words, moment.requested.words)
+    return float(measure_contact_gap(played.motion.skeleton, *pose, labels, find_written_ball(played, moment.frame)))
+
+
 def measure_contact(played: Playback, moment: KeyMomentResult) -> tuple[float, float]:
     """Measure when the ball is met, and the gap there.
 
@@ -173,8 +186,10 @@ def measure_contact(played: Playback, moment: KeyMomentResult) -> tuple[float, f
 
 
 def list_contact_labels(moment: KeyMomentResult) -> tuple[str, ...]:
-    """Return the labels that say which part meets the ball (`ball_contact.choose_contact_labels`)."""
-    return choose_contact_labels(moment.words, moment.requested.words)
+    """Return the labels that say which part meets the ball (`ball_contact.choose_contact_labels`); none if the moment
+    misses it by design.
+    """
+    return () if moment.requested.misses_ball else choose_contact_labels(moment.words, moment.requested.words)
 
 
 def find_written_ball(played: Playback, frame: int) -> np.ndarray:

@@ -33,7 +33,7 @@ ALLOWED = {
     "beyond_mocap/library/common_skeleton.py": "arguments by name",
 }
 DOES = ("act", "action")
-SAID_OTHERWISE = {"block", "pass", "throw", "serve", "catch", "save", "jump"}
+SAID_OTHERWISE = {"block", "pass", "throw", "serve", "catch", "save", "jump", "tackle"}
 
 
 def compared(text, known):

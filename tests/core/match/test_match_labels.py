@@ -9,17 +9,14 @@ from beyond_mocap.annotation import check_timeline
 from beyond_mocap.annotation.event_labels import TABLE, read_event_labels
 from beyond_mocap.ball.tracked.solve import SolvedTouch, solve_ball
 from beyond_mocap.base.errors import InputError
-from beyond_mocap.match.labels import (
-    MIN_CONFIDENCE,
+from beyond_mocap.match.labels import MIN_CONFIDENCE, build_touch_moment, find_dribbles, label_match
+from beyond_mocap.match.moments import (
     MIN_DISTANCE_SECONDS,
     TOUCHES,
     USER,
     Moment,
     build_timeline,
-    build_touch_moment,
-    find_dribbles,
     is_edited,
-    label_match,
     read_labels,
     select_separate_moments,
     write_labels,
