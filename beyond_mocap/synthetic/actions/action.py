@@ -25,6 +25,8 @@ class ActionSetting:
         fps: frames per second.
         speed: m/s of the player at the key moment; 0 for actions that do not depend on it.
         height: m of the ball's centre above the ground at the key moment; None where it is unknown.
+        exit_speed: m/s with which the ball leaves; None where it is unknown, or the action does not depend on it.
+        direction: degrees from the player's travel in which a right foot sends the ball, left positive.
         neutral: the neutral stance of the body; measured on the example where it is not given.
     """
 
@@ -33,6 +35,8 @@ class ActionSetting:
     fps: float = 60.0
     speed: float = 0.0
     height: float | None = None
+    exit_speed: float | None = None
+    direction: float = 0.0
     neutral: NeutralStance = None  # type: ignore[assignment]
 
     def __post_init__(self):
@@ -57,6 +61,9 @@ class Action:
         has_side: whether it is done with or to one side; its mirrored twin shows the other one.
         speeds: m/s at which it is built, the nearest one to the player's; empty: it does not depend on speed.
         heights: lowest and highest m of the ball for which it is built; empty: it does not depend on the ball.
+        exit_speeds: m/s of the leaving ball for which it is built, the nearest one to the player's; empty: it does not
+            depend on that.
+        directions: degrees in each of which it is built, for a choice; empty: straight ahead.
         suits: lowest and highest m/s of players whom it suits; of several actions one that suits is taken.
         meets: lowest and highest m of a ball that it can meet, where it is not built for the ball's height.
         is_span: whether it lasts (a celebration) instead of having a key moment; its clip carries the labels from the
@@ -72,6 +79,8 @@ class Action:
     has_side: bool = False
     speeds: tuple[float, ...] = ()
     heights: tuple[float, ...] = ()
+    exit_speeds: tuple[float, ...] = ()
+    directions: tuple[float, ...] = ()
     suits: tuple[float, float] = (0.0, np.inf)
     meets: tuple[float, float] = (-np.inf, np.inf)
     is_span: bool = False
