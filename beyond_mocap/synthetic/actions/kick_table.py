@@ -11,7 +11,6 @@ from functools import partial
 
 import numpy as np
 
-from .. import gait_tables as tables
 from ..gestures import Gesture
 from ..kick_styles import KICK_STYLES
 from ..kicks import AFTER, BEFORE, build_kick
@@ -59,6 +58,11 @@ _KINDS = (
     _Kind(name="inside kick", labels="low inside", style="inside", heights=_LOW),
     _Kind(name="instep kick", labels="low top", style="instep", heights=_LOW, varies="inside kick"),
     _Kind(name="outside kick", labels="low outside", style="outside", heights=_LOW),
+    _Kind(name="toe poke", labels="low toe", style="toe poke", heights=_LOW),
+    _Kind(name="back heel", labels="low heel back", style="back heel", heights=_LOW, directions=(180.0,)),
+    _Kind(name="chip", labels="low top chip", style="chip", heights=_LOW),
+    _Kind(name="cross", labels="low top cross", style="cross", heights=_LOW),
+    _Kind(name="half volley", labels="low half_volley", style="half volley", heights=_LOW),
     _Kind(name="volley", labels="low volley top", style="instep", volley="pass", heights=_VOLLEY,
           directions=_HIGH_DIRECTIONS),
     _Kind(name="high instep kick", labels="high top volley", style="instep", volley="attack",
