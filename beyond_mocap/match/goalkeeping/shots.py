@@ -106,7 +106,7 @@ def _build_shot(match: Match, solved: SolvedBall, number: int, keeper: str, goal
     if is_save:
         arrival, place = following[0].time, following[0].position
     elif end == GOAL:
-        arrival, place = _find_passing(match, solved, keeper, touch.time, left, goal)
+        arrival, place = _find_passing(match, solved, keeper, touch.time, end=left, goal=goal)
     lateral = _measure_lateral(match, keeper, touch, float(arrival), place)
     return Shot(time=touch.time, shooter=touch.player, keeper=keeper, end=end, arrival=float(arrival),
                 place=(float(place[0]), float(place[1]), float(place[2])), lateral=lateral,
