@@ -96,7 +96,7 @@ def _is_shot(touch: SolvedTouch, goal: float) -> bool:
 
 
 def _build_shot(match: Match, solved: SolvedBall, number: int, keeper: str, goal: float) -> Shot:
-    """Build the shot of a touch: follow the ball until somebody touches it or it leaves the pitch."""
+    """Build the shot of a touch: follow the ball until a player touches it or it leaves the pitch."""
     touch, following = solved.touches[number], solved.touches[number + 1 : number + 2]
     until = min([touch.time + _LONGEST, *(other.time for other in following)])
     left = next((end for end in solved.ends if touch.time < end.time <= until), None)
