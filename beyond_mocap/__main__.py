@@ -6,7 +6,9 @@ _CORE_PACKAGES = ("numpy", "scipy", "sklearn")
 
 
 def _run() -> int:
-    """Run the command line; a missing package of the core is one line, as a fresh clone has no installed packages."""
+    """Run the command line; a missing package of the core is one line, as a fresh clone has no installed packages, and
+    so is Ctrl-C while the packages are loaded.
+    """
     try:
         from .cli.main import main
 
@@ -18,6 +20,9 @@ def _run() -> int:
         print(f"beyond-mocap: {package} is missing; install the core: pip install . in the project's folder",
               file=sys.stderr)
         return 2
+    except KeyboardInterrupt:
+        print("beyond-mocap: cancelled", file=sys.stderr)
+        return 130
 
 
 if __name__ == "__main__":

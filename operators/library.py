@@ -213,7 +213,7 @@ def describe_gaps(library: "Library") -> str:
     """
     from ..beyond_mocap.library.left_out import describe_left_out
 
-    missing, left_out = list(library.missing_motion.values()), describe_left_out(library, MAX_LEFT_OUT)
+    missing, left_out = list(library.coverage.lines.values()), describe_left_out(library, MAX_LEFT_OUT)
     parts = ["Proposed labels"] if library.proposal_notes else []
     parts += [f"{format_count(len(missing), 'motion')} missing"] if missing else []
     parts += [left_out[0].partition(":")[0]] if left_out else []

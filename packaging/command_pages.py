@@ -32,7 +32,7 @@ how they are written is in [the text form](annotation-text.md). A library may ad
 lists most of these labels without explaining them; the meanings are our reading.
 
 `transition` is no label of the vocabulary: alone in a line with two times, it asks for nothing, and continuity decides
-what the player does. With nearest labels (`--nearest`), the action itself may change: a reception may become a kick.
+what the player does. With nearest labels (`--nearest`), the action itself may change; a reception never becomes a kick.
 """
 TABLE_HEAD = "| short form | name | meaning | goes with |\n| --- | --- | --- | --- |"
 KINDS = {

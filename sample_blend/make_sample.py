@@ -27,9 +27,9 @@ from beyond_mocap.base.time_series import (  # noqa: E402
 from beyond_mocap.base.vectors import unit_vectors  # noqa: E402
 from beyond_mocap.files.bvh import bvh  # noqa: E402
 from beyond_mocap.motion.motion import Motion  # noqa: E402
+from beyond_mocap.synthetic.actions.receptions import build_reception  # noqa: E402
 from beyond_mocap.synthetic.gait import build_gait  # noqa: E402
 from beyond_mocap.synthetic.gestures import Gesture, build_dribble, build_strike  # noqa: E402
-from beyond_mocap.synthetic.actions.receptions import build_reception  # noqa: E402
 from beyond_mocap.synthetic.moves import build_celebration, build_get_up, build_header, build_throw_in  # noqa: E402
 
 FPS = 30.0

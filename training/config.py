@@ -9,9 +9,9 @@ import os
 from dataclasses import asdict, dataclass, field, fields, replace
 from pathlib import Path
 
+from beyond_mocap.base.content import read_utf8
 from beyond_mocap.base.errors import InputError
 from beyond_mocap.files import json_values as values
-from beyond_mocap.files.content import read_utf8
 from beyond_mocap.throws.networks.model import ModelSettings
 
 PAGE = "docs/reference/network-weights.md"

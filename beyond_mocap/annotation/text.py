@@ -10,9 +10,9 @@ means automatic locomotion, and the label `transition` alone means a transition.
 from __future__ import annotations
 
 import os
-from pathlib import Path
 
-from ..base.errors import InputError, build_read_error, format_seconds
+from ..base.content import read_bytes
+from ..base.errors import InputError, format_seconds
 from .timeline import AVOID_PREFIX, LONGEST_TIME, NUMBER, KeyMoment, Span, Timeline, format_labels
 
 _EXPECTED_FORM = "'START END labels...' or 'TIME labels...'"
@@ -89,12 +89,7 @@ def read_text(path: str | os.PathLike) -> str:
     Raises:
         InputError: if it is missing, too large, binary or not UTF-8.
     """
-    try:
-        if Path(path).stat().st_size > _LARGEST_FILE:
-            raise InputError(path, "the file is larger than 16 MiB", "a text file")
-        data = Path(path).read_bytes()
-    except (OSError, ValueError) as error:
-        raise build_read_error(path, "a text file", error) from None
+    data = read_bytes(path, "a text file", _LARGEST_FILE)
     if b"\0" in data:
         raise InputError(path, "binary content", "a text file", "save it as plain UTF-8 text")
     try:

@@ -7,9 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..motion.track import BALL_RADIUS
+from .physics import FOOTBALL, compute_deceleration
 
-ROLLING = 1.0
-"""m/s^2: deceleration of a football on turf (FIFA's test of pitches: 4 to 8 m of roll from a 1 m ramp)."""
 _GRAVITY, _BOUNCE = 9.81, 0.55
 _ON_GROUND = 0.03  # m above its radius up to which a ball counts as rolling
 _MIN_HOP_HEIGHT = 0.02  # m; a lower hop counts as rolling
@@ -23,11 +22,13 @@ class RollSpeeds:
         start_velocity: (..., 2) m/s at the start.
         end_velocity: (..., 2) m/s at the end.
         rolling_seconds: (...,) s before the ball rests.
+        deceleration: (...,) m/s^2 while it rolls.
     """
 
     start_velocity: np.ndarray
     end_velocity: np.ndarray
     rolling_seconds: np.ndarray
+    deceleration: np.ndarray
 
 
 @dataclass(frozen=True, eq=False)
@@ -46,7 +47,7 @@ class RollResult:
 def compute_roll_speeds(starts: np.ndarray, ends: np.ndarray, seconds: np.ndarray) -> RollSpeeds:
     """Compute the speeds of a ball that rolls from `starts` to `ends` in a given time.
 
-    It decelerates by ROLLING all the time, or comes to rest early if it has time.
+    It decelerates evenly, by what ground and air take at its mean speed, or comes to rest early if it has time.
 
     Args:
         starts: (..., 2 or 3) m.
@@ -57,11 +58,12 @@ def compute_roll_speeds(starts: np.ndarray, ends: np.ndarray, seconds: np.ndarra
     """
     offset = ends[..., :2] - starts[..., :2]
     length = np.hypot(offset[..., 0], offset[..., 1])
-    rests = length < 0.5 * ROLLING * seconds**2
-    fast = np.where(rests, np.sqrt(2.0 * ROLLING * length), length / seconds + 0.5 * ROLLING * seconds)
-    rolling = np.where(rests, fast / ROLLING, seconds)
+    slows = compute_deceleration(length / seconds, FOOTBALL)
+    rests = length < 0.5 * slows * seconds**2
+    fast = np.where(rests, np.sqrt(2.0 * slows * length), length / seconds + 0.5 * slows * seconds)
+    rolling = np.where(rests, fast / slows, seconds)
     along = offset / np.maximum(length, 1e-9)[..., None]
-    return RollSpeeds(along * fast[..., None], along * (fast - ROLLING * rolling)[..., None], rolling)
+    return RollSpeeds(along * fast[..., None], along * (fast - slows * rolling)[..., None], rolling, slows)
 
 
 def simulate_rolls(starts: np.ndarray, ends: np.ndarray, frames: np.ndarray, fps: float) -> RollResult:
@@ -82,7 +84,7 @@ def simulate_rolls(starts: np.ndarray, ends: np.ndarray, frames: np.ndarray, fps
     rolling_times = np.minimum(at, speeds.rolling_seconds[:, None])
     fast = np.hypot(speeds.start_velocity[:, 0], speeds.start_velocity[:, 1])
     along = speeds.start_velocity / np.maximum(fast, 1e-9)[:, None]
-    distances = fast[:, None] * rolling_times - 0.5 * ROLLING * rolling_times**2
+    distances = fast[:, None] * rolling_times - 0.5 * speeds.deceleration[:, None] * rolling_times**2
     height, height_error = _compute_heights(starts[:, 2], ends[:, 2], frames / fps, at)
     level = starts[:, None, :2] + distances[..., None] * along[:, None]
     return RollResult(np.concatenate([level, height[..., None]], axis=-1), height_error)

@@ -36,7 +36,6 @@ def run_comparison(options, reporter: ProgressReporter) -> None:
     for motion, provenance in files.items():
         body = bvh.read_bvh(motion).motion
         takes[str(motion)] = playback_from_tables(body, read_provenance(provenance), where=str(provenance))
-        reporter.check_cancelled()
     library = open_library(options, reporter, folder=options.against)
     report = compare_with_recordings(takes, library)
     write_report(options.report, round_values(report))

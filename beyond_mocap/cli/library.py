@@ -82,7 +82,7 @@ def summarize_library(library) -> dict:
         f"fastest: {library.max_speed:.1f} m/s",
         "key moments: " + (", ".join(keys) if keys else "none"),
         *library.proposal_notes,
-        *library.missing_motion.values(),
+        *library.coverage.lines.values(),
         *describe_left_out(library, MAX_LEFT_OUT),
         *library.notes,
     ]
@@ -90,7 +90,7 @@ def summarize_library(library) -> dict:
         "version": __version__, "clips": len(originals), "minutes": library.minutes, "words": labels, "gaits": gaits,
         "fastest_m_s": library.max_speed, "keys": keys, "notes": list(library.notes), "lines": lines,
         "proposed_clips": sum(clip.has_proposed_labels for clip in originals),
-        "lacks": [{"kind": kind, "line": line} for kind, line in library.missing_motion.items()],
+        "lacks": [{"kind": kind, "line": line} for kind, line in library.coverage.lines.items()],
         "left_out": [{"clip": one.clip, "start_s": one.start, "end_s": one.end, "speed_m_s": one.speed,
                       "part": one.part, "why": one.reason} for one in find_left_out(library)],
         "locomotion": [{"from_m_s": one.low, "to_m_s": one.high if isfinite(one.high) else None,

@@ -155,7 +155,7 @@ def _escape_unencodable(stream) -> None:
 
 
 class _InterruptHandler:
-    """Context manager: Ctrl-C, or a render farm's SIGTERM, requests cancellation; a second one interrupts at once.
+    """Context manager: Ctrl-C, or a render farm's SIGTERM, requests cancellation (`ProgressReporter.cancel`).
 
     Outside the main thread it does nothing.
     """
@@ -174,6 +174,4 @@ class _InterruptHandler:
             signal.signal(kind, signal.SIG_DFL if before is None else before)
 
     def _handle_signal(self, *_):
-        if self._reporter.is_cancelled():
-            raise KeyboardInterrupt
         self._reporter.cancel()

@@ -31,6 +31,7 @@ class ProgressReporter:
         self._json = as_json
         self._bar = not as_json and self._stream.isatty()
         self._stop_requested = threading.Event()
+        self._stops_at_once = False
         self._last = ""
 
     def show_progress(self, fraction: float, text: str) -> None:
@@ -70,8 +71,28 @@ class ProgressReporter:
             self.show_note(text)
 
     def cancel(self) -> None:
-        """Request cancellation."""
+        """Request cancellation; a second request, and one within `stop_at_once`, interrupts.
+
+        Raises:
+            KeyboardInterrupt: where it interrupts.
+        """
+        is_repeated = self.is_cancelled()
         self._stop_requested.set()
+        if is_repeated or self._stops_at_once:
+            raise KeyboardInterrupt
+
+    @contextmanager
+    def stop_at_once(self):
+        """Context manager: Ctrl-C interrupts the block wherever it is.
+
+        For work that never asks `is_cancelled`, and has nothing to save or to end.
+        """
+        self.check_cancelled()
+        self._stops_at_once = True
+        try:
+            yield
+        finally:
+            self._stops_at_once = False
 
     def is_cancelled(self) -> bool:
         """Return whether the user requested cancellation."""

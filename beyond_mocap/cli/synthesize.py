@@ -8,6 +8,8 @@ import time
 from collections.abc import Mapping
 from pathlib import Path
 
+import numpy as np
+
 from ..base.errors import InputError, NotInLibraryError, format_count
 from ..base.settings.options import add_options, option_values
 from .comparing import run_comparison
@@ -35,6 +37,7 @@ def add_synthesize(verbs) -> argparse.ArgumentParser:
     add_take_files(verb)
     verb.add_argument("--report", type=Path, metavar="R.json")
     add_options(verb, "synthesis")
+    verb.add_argument("--solve-touches", action="store_true", default=True, help="the default; version 0.1 needed it")
     verb.add_argument("--pins", type=Path, metavar="P.csv", help="targets of hands, feet and gaze with times")
     verb.add_argument("--headings", type=Path, metavar="H.csv", help="where the body faces, with times")
     add_options(verb, "player")
@@ -89,7 +92,8 @@ def run_synthesize(options, reporter: ProgressReporter, writers: Mapping[str, Wr
     if options.report:
         from ..evaluation.report import evaluate
 
-        report = evaluate(take, track, library)
+        with reporter.stop_at_once():
+            report = evaluate(take, track, library)
         report["warnings"] = [*report.get("warnings", []), *data.lines]
     write(take, options.out)
     if options.provenance:
@@ -152,8 +156,15 @@ def run_evaluate(options, reporter: ProgressReporter, writers: Mapping[str, Writ
         reporter: progress, notes and cancellation.
         writers: further output formats, by file suffix (Blender's).
     """
-    if options.against:
-        return run_comparison(options, reporter)
+    with reporter.stop_at_once():
+        if options.against:
+            run_comparison(options, reporter)
+        else:
+            _evaluate_motion(options, reporter)
+
+
+def _evaluate_motion(options, reporter: ProgressReporter) -> None:
+    """Report on a motion that was written before."""
     if len(options.motion) > 1:
         raise InputError("evaluate", f"{len(options.motion)} motions", "one motion, or --against LIBRARY",
                          "evaluate them one after the other")
@@ -189,6 +200,9 @@ def run_evaluate(options, reporter: ProgressReporter, writers: Mapping[str, Writ
     notes = [*report["warnings"], *report["notes"], *_describe_fit(report, motion, track, options)]
     if provenance is None and report["keys"]:
         notes.append("the clips that played are unknown; name them with --provenance")
+    if ball is None and track is not None and np.isfinite(track.ball).any():
+        notes.append(f"{options.motion}: the ball as written is unknown, so the report has no contact gaps and no "
+                     "angle between head and ball; name it with --ball")
     if _is_synthesis_report(options.report):
         notes.append(f"{options.report}: replaces the report of synthesize, which knew more, such as the clips")
     write_report(options.report, report)
@@ -196,7 +210,7 @@ def run_evaluate(options, reporter: ProgressReporter, writers: Mapping[str, Writ
         atomic_write(options.html, build_html_report(played, report, track=track, timeline=timeline, library=library,
                                                      title=options.motion.name))  # fmt: skip
     reporter.finish(notes)
-    if library is not None and (unknown_clips := _find_unknown_clips(played.clips, library)):
+    if library is not None and (unknown_clips := played.list_unknown_clips(library)):
         count = format_count(len(unknown_clips), "clip")
         reporter.show_note(
             f"{options.provenance}: {count} not in {options.library} and not compared, such as {unknown_clips[0]}"
@@ -221,18 +235,10 @@ def _describe_fit(report: dict, motion, track, options) -> list[str]:
 
 def _is_synthesis_report(path: Path) -> bool:
     """Whether a file is a report that `synthesize` wrote: only that one knows the method."""
-    from ..files.content import read_utf8
+    from ..base.content import read_utf8
 
     try:
         found = json.loads(read_utf8(path, "a report", _MAX_REPORT_BYTES))
     except (InputError, ValueError, RecursionError):
         return False
     return isinstance(found, dict) and "method" in found
-
-
-def _find_unknown_clips(clips: tuple[str, ...], library) -> list[str]:
-    """Find the clips of a provenance table that are neither in the library nor in its cache folder."""
-    from ..library.scan import CACHE_FOLDER
-
-    known = {clip.path for clip in library.clips}
-    return [clip for clip in clips if clip and clip not in known and not clip.startswith(CACHE_FOLDER)]

@@ -240,7 +240,8 @@ class _Player:
             timeline = read_timeline(options.annotations, fps, float(track.times[0]))
         library = build_library(options.library, cache_dir=options.cache, unit=options.unit,
                                 progress=reporter.show_progress, cancelled=reporter.is_cancelled)
-        plan = Plan(track=track, timeline=timeline, library=str(options.library), fps=fps, seed=options.seed)
+        plan = Plan(track=track, timeline=timeline, library=str(options.library), fps=fps, seed=options.seed,
+                    solve_touches=False)
         return cls(library, plan, model.settings.action, options.time)
 
     def find_position(self, time: float) -> tuple[float, ...]:

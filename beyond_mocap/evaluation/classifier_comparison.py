@@ -85,8 +85,8 @@ def compare_with_recordings(takes: Mapping[str, Playback], library: Library) -> 
     """
     from threadpoolctl import threadpool_limits
 
-    all_synthesized, features = collect_take_windows(takes, library)
     all_recorded = collect_recorded_windows(library)
+    all_synthesized, features = collect_take_windows(takes, library)
     synthesized, recorded = match_windows(all_synthesized, all_recorded)
     if len(synthesized) < FEWEST:
         found = (f"{len(synthesized)} windows of {SECONDS:g} s that match by speed, of {len(all_synthesized)} in takes "
@@ -120,7 +120,8 @@ def collect_take_windows(takes: Mapping[str, Playback], library: Library) -> tup
         takes: name -> a take.
         library: its recordings.
     Raises:
-        InputError: without takes, or for one without sources, on another skeleton or too short.
+        InputError: without takes, or for one without sources, with clips that the library does not have, on another
+            skeleton or too short.
     """
     parts = [_measure_take(name, played, library) for name, played in takes.items()]
     if not parts:
@@ -132,6 +133,10 @@ def _measure_take(name: str, played: Playback, library: Library) -> tuple[Window
     """Measure the windows of one take."""
     if played.words is None:
         raise InputError(name, "the clips that it shows are not known", "its table of sources", "add --provenance")
+    if unknown := played.list_unknown_clips(library):
+        # of these it is not known which recordings the folds have to leave out with them
+        raise InputError(name, f"shows {format_count(len(unknown), 'clip')} that {library.folder} does not have, such "
+                         f"as {unknown[0]}", "a take synthesized from this library", "compare it with its own library")
     motion = _fit_to_library(name, played.motion, library)
     measured = _measure_motion(name, motion, library)
     stride = played.compute_stride(library)

@@ -164,35 +164,28 @@ def measure_corrections(view: View, ik_miss: np.ndarray | None) -> dict:
         The report's groups.
     """
     played = view.played
-    shift, drop = _compare_to_source(view)
-    if played.correction is not None:
-        shift = np.asarray(played.correction)[played.contacts]
+    shift = None if played.correction is None else np.asarray(played.correction)[played.contacts]
     missed = None if ik_miss is None else np.asarray(ik_miss).reshape(view.count, -1).max(axis=1) > 0.005
     bones = None if view.library is None else _measure_bone_change(view)
     return {
-        "foot_correction_m": _compute_measures(shift, ("p95",)), "ik_miss_share": None if missed is None
-        else _finite_mean(missed), "pelvis_drop_m": drop, "bone_change_m": bones,
+        "foot_correction_m": {"p95": None} if shift is None else _compute_measures(shift, ("p95",)),
+        "ik_miss_share": None if missed is None else _finite_mean(missed),
+        "pelvis_drop_m": _measure_pelvis_drop(view), "bone_change_m": bones,
     }
 
 
-def _compare_to_source(view: View) -> tuple[np.ndarray, float]:
-    """Compare planted feet and pelvis with the source poses, away from transitions, where two clips are blended.
-
-    Returns the distance (N,) m of planted feet from the source pose placed at the output's pelvis and heading, and the
-    largest drop of the pelvis below the source's, m.
-    """
+def _measure_pelvis_drop(view: View) -> float:
+    """Measure the largest drop of the pelvis below the source poses, m, away from transitions, which are blended."""
     if view.library is None or not len(view.used_rows):
-        return np.zeros(0), math.nan
+        return math.nan
     played, hips = view.played, view.played.body.hips
-    joints = movement.list_foot_joints(played.motion.skeleton)
     local = realism.compute_local_positions(played.motion.skeleton, played.positions, hips)
     source = compute_source_poses(view.library, played.clips, played.clip, played.mirrored, played.clip_frame)
     is_unblended = np.isfinite(source[:, 0, 0])
     for seam in view.transitions:
         is_unblended[max(seam - movement.JERK_REACH, 0) : seam + movement.JERK_REACH] = False
-    shift = movement.measure_planted_shift(local[:, joints], source[:, joints], played.contacts & is_unblended[:, None])
     drop = (source[:, hips, 2] - local[:, hips, 2])[is_unblended]
-    return shift, float(max(drop.max(), 0.0)) if len(drop) else math.nan
+    return float(max(drop.max(), 0.0)) if len(drop) else math.nan
 
 
 def _measure_bone_change(view: View) -> float:

@@ -20,7 +20,7 @@ from ..synthesis.quality import movement
 from ..synthesis.quality.movement import measure_contact_speeds
 from ..synthesis.quality.playback import Playback
 from ..synthesis.quality.targets import find_target
-from . import plots
+from . import naturalness_figures, plots, touch_figures
 from .html_page import (
     Html,
     build_element,
@@ -34,9 +34,9 @@ from .html_page import (
     build_title,
     join_html,
 )
-from .naturalness_figures import TITLES
 from .reference import View
 from .report import find_twin_name, flatten_report, format_rest, judge_figures
+from .titles import Title
 
 MAX_MOMENTS = 12
 """Key moments with stick figures on the page; the table lists all."""
@@ -74,7 +74,7 @@ def build_html_report(
     return build_page(
         title, _build_head(view, report, title), _build_warnings(report), build_section("Over time", over_time),
         _build_clips(view), _build_labels(view), _build_moments(view, report), _build_worst(view),
-        build_naturalness_section(report), _build_figures(report), style=_STYLE,
+        build_naturalness_section(report), build_touch_section(report), _build_figures(report), style=_STYLE,
     )  # fmt: skip
 
 
@@ -176,10 +176,33 @@ def find_worst_frames(view: View) -> list[tuple[int, str]]:
 
 def build_naturalness_section(report: Mapping) -> Html:
     """Build the section of the group `naturalness`, with readable names; empty for a report without it."""
+    table = _build_titled_table(report, "naturalness", naturalness_figures.TITLES)
+    return build_section("What the eye sees", table) if table else Html()
+
+
+def build_touch_section(report: Mapping) -> Html:
+    """Build the section of the group `touches`, with the key moments that other labels or synthetic clips show."""
+    table = _build_titled_table(report, "touches", touch_figures.TITLES)
+    return build_section("At the ball", table, _build_substituted(report["touches"])) if table else Html()
+
+
+def _build_substituted(group: Mapping) -> Html:
+    """Build the table of key moments that are shown by other labels or by synthetic clips; empty without any."""
+    rows = [build_row(build_number_cell(row["time_s"], 2), " ".join(row["labels"]), " ".join(row["shown"]),
+                      "synthetic" if row["is_synthetic"] else "", row["clip"] or "")
+            for row in group.get("substituted") or ()]
+    head = (build_title("s"), "labels asked for", "labels shown", "", "clip")
+    return build_table(head, rows, class_="keys") if rows else Html()
+
+
+def _build_titled_table(report: Mapping, group: str, titles: Mapping[str, Title]) -> Html:
+    """Build the table of a group's figures by their readable names; empty for a report without them."""
+    if not report.get(group):
+        return Html()
     table, unknown = flatten_report(report), report.get("unknown") or {}
     lines = []
-    for leaf, title in TITLES.items():
-        name = f"naturalness.{leaf}"
+    for leaf, title in titles.items():
+        name = f"{group}.{leaf}"
         target = find_target(name, float(report.get("fps") or 30.0))
         value, own = table.get(name), table.get(twin := find_twin_name(name, table))
         if value is None and name not in unknown:
@@ -191,12 +214,12 @@ def build_naturalness_section(report: Mapping) -> Html:
         if twin in unknown:
             own_rest = f"not known: {unknown[twin]}"
         lines.append(build_row(
-            f"{title.text}, {title.unit}", build_number_cell(value, title.digits, title.scale, status),
+            title.name, build_number_cell(value, title.digits, title.scale, status),
             format_rest(name, table), build_number_cell(own, title.digits, title.scale), own_rest,
             title.describe_target(target), build_element("td", reason or status, class_=status or "quiet"),
         ))  # fmt: skip
     head = ("", build_title("value"), "over", build_title("recordings"), "over", "target", "")
-    return build_section("What the eye sees", build_table(head, lines)) if lines else Html()
+    return build_table(head, lines) if lines else Html()
 
 
 def _build_figures(report: Mapping) -> Html:
@@ -206,7 +229,7 @@ def _build_figures(report: Mapping) -> Html:
             row.name, build_element("td", row.value, class_="n"),
             build_element("td", f"{row.own} ({row.rests_on})" if row.rests_on else row.own, class_="n"), row.target,
             build_element("td", f"not known: {row.reason}" if row.reason else row.status, class_=row.status or "quiet"),
-        ) for row in judge_figures(report) if not row.name.startswith("keys ")
+        ) for row in judge_figures(report) if not row.name.startswith(("keys ", "touches.substituted"))
     ]  # fmt: skip
     return build_section("All figures", build_table(head, rows), _build_key_table(report))
 

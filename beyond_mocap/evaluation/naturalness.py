@@ -76,7 +76,7 @@ def measure_course(skeleton: Skeleton, positions: np.ndarray, fps: float) -> Bod
         positions: (N, J, 3) m, world.
         fps: frames per second of the positions.
     """
-    positions = _resample_positions(positions, fps)
+    positions = resample_positions(positions, fps)
     body = identify_joints(skeleton)
     pelvis = positions[:, body.hips] * (LEG_LENGTH / measure_leg_length(skeleton))
     velocity = time_derivative(smooth_zero_phase_hann(pelvis[:, :2], FPS, SPEED_WINDOW), FPS)
@@ -90,8 +90,13 @@ def measure_course(skeleton: Skeleton, positions: np.ndarray, fps: float) -> Bod
     )
 
 
-def _resample_positions(positions: np.ndarray, fps: float) -> np.ndarray:
-    """Resample positions (N, J, 3) to FPS, linearly between frames."""
+def resample_positions(positions: np.ndarray, fps: float) -> np.ndarray:
+    """Resample positions (N, J, 3) m to FPS, linearly between frames.
+
+    Args:
+        positions: at `fps`.
+        fps: frames per second.
+    """
     if fps == FPS:
         return positions
     times = np.arange(len(positions)) / fps
@@ -339,13 +344,18 @@ def list_event_messages(
         found = find(course)
         unasked = select_unasked_spins(course, planned) if name == "spins" and planned is not None else found
         asked = [frame for frame in found if frame not in unasked]
-        warnings += [_format_event(start + course.times[unasked], text)] if unasked else []
-        notes += [_format_event(start + course.times[asked], f"{text}, as ball and play ask")] if asked else []
+        warnings += [format_event(start + course.times[unasked], text)] if unasked else []
+        notes += [format_event(start + course.times[asked], f"{text}, as ball and play ask")] if asked else []
     return warnings, notes
 
 
-def _format_event(seconds: Iterable[float], text: str) -> TimedMessage:
-    """Format "3.1, 7.5 s: text"."""
+def format_event(seconds: Iterable[float], text: str) -> TimedMessage:
+    """Format "3.1, 7.5 s: text".
+
+    Args:
+        seconds: of each event, on the track's clock.
+        text: what happens there.
+    """
     at = [float(second) for second in seconds]
     more = f" and {len(at) - _MAX_LISTED} more" if len(at) > _MAX_LISTED else ""
     named = ", ".join(f"{second:.1f}" for second in at[:_MAX_LISTED])

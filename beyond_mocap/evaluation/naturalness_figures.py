@@ -4,7 +4,6 @@ events as lines with their seconds."""
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 
 import numpy as np
 
@@ -20,7 +19,7 @@ from ..motion.track import sample_track
 from ..synthesis.construct.gaze import estimate_look
 from ..synthesis.heading_plan import plan_track
 from ..synthesis.quality import movement
-from ..synthesis.quality.targets import TARGETS, Target
+from ..synthesis.quality.targets import TARGETS
 from ..synthesis.quality.unmet_constraints import report_jolts
 from .naturalness import (
     FPS,
@@ -34,6 +33,7 @@ from .naturalness import (
     select_unasked_spins,
 )
 from .reference import View
+from .titles import Title
 
 JOLT_RATIO = TARGETS["seam_jerk_ratio.max"].most
 STRIKE_SECONDS = 0.4  # s to either side of a strike in which it may jolt: its swing, and half a window of the jerk
@@ -52,28 +52,6 @@ FRAMES_KEYS = {
     "foot_lifts_per_min": "seconds", "both_down": "seconds",
 }  # fmt: skip
 """What a figure rests on where that is not the group's `frames`: a key beside it."""
-
-
-@dataclass(frozen=True)
-class Title:
-    """How pages show a figure of the group.
-
-    Attributes:
-        text: name.
-        unit: shown unit.
-        scale: factor to it.
-        digits: after the decimal point.
-    """
-
-    text: str
-    unit: str = "/min"
-    scale: float = 1.0
-    digits: int = 1
-
-    def describe_target(self, target: Target | None) -> str:
-        """Describe a target in the shown unit, such as "≤ 5.0"; "" without one."""
-        limits = () if target is None else (("≥", target.least), ("≤", target.most))
-        return " ".join(f"{sign} {self.scale * limit:.{self.digits}f}" for sign, limit in limits if limit is not None)
 
 
 TITLES = {

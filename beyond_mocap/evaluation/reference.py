@@ -21,6 +21,7 @@ from ..annotation import Timeline
 from ..annotation.gaits import STANDING
 from ..base.errors import InputError
 from ..library.clip import Clip
+from ..library.keys import collect_keys
 from ..library.library import Library
 from ..motion.humanoid import Humanoid, estimate_stature, identify_joints
 from ..motion.motion import compute_pose, forward_kinematics, resample, sample_frames
@@ -32,6 +33,7 @@ from ..synthesis.quality.playback import Playback, find_transitions
 from . import realism
 from .naturalness import FPS as COURSE_FPS
 from .naturalness import BodyCourse, find_stands, measure_course
+from .touches import Kick, find_side, is_foot_reception, is_kick, measure_kick, measure_legs, measure_reception
 
 POSES_PER_SECOND = 10.0  # of a recording that are compared with
 LEFT_OUT_POSES = 3000  # poses at most in the leave-one-clip-out estimate
@@ -58,6 +60,8 @@ class Recording:
         stands: (T,) bool, whether its body stands.
         contacts: (T, 2) bool, feet on the ground.
         course: where its body faces and goes, at 30 frames per second.
+        kicks: those that its labels name.
+        receptions: m/s of the foot at receptions that its labels name.
     """
 
     path: str
@@ -78,6 +82,8 @@ class Recording:
     stands: np.ndarray
     contacts: np.ndarray
     course: BodyCourse
+    kicks: tuple[Kick, ...]
+    receptions: tuple[float, ...]
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -104,6 +110,7 @@ class LibraryReference:
         fastest: highest speed of a root, smoothed with a 1 s window, m/s.
         slowest: speed of the slowest gait, m/s.
         courses: of all recordings.
+        kicks, receptions: of all recordings, see `Recording`.
     """
 
     fps: float
@@ -133,6 +140,8 @@ class LibraryReference:
     fastest: float
     slowest: float
     courses: tuple[BodyCourse, ...]
+    kicks: tuple[Kick, ...]
+    receptions: tuple[float, ...]
 
     def find_rows(self, clips: tuple[str, ...], clip: np.ndarray, clip_frame: np.ndarray) -> np.ndarray:
         """Find the row of each output frame's source.
@@ -220,7 +229,9 @@ def build_reference(library: Library, fps: float) -> LibraryReference:
         smoothness_p95=realism.compute_class_p95(joined["smoothness"], joined["speed"]), poses=poses,
         pose_p95=limits[0], pose_recordings=limits[1],
         fastest=float(joined["speed"].max()), slowest=_find_slowest_speed(library),
-        courses=tuple(recording.course for recording in measured), **joined,
+        courses=tuple(recording.course for recording in measured),
+        kicks=tuple(kick for recording in measured for kick in recording.kicks),
+        receptions=tuple(speed for recording in measured for speed in recording.receptions), **joined,
     )  # fmt: skip
 
 
@@ -259,6 +270,8 @@ def measure_recording(clip: Clip, fps: float) -> Recording:
     contacts = clip.contacts[source_frames]
     spans = movement.list_stances(contacts)
     heel_rest, floor = movement.measure_heel_rest(feet, contacts), float(np.percentile(feet[:, :, 1, 2], 2))
+    course = measure_course(skeleton, positions, fps)
+    kicks, receptions = _measure_labelled_touches(clip, positions, fps, contacts, course)
     return Recording(
         path=clip.path, rate=clip.motion.fps, features=realism.build_pose_features(skeleton, positions, fps, hips),
         sway=movement.measure_sway(pelvis, fps), surge=movement.measure_surge(pelvis, fps),
@@ -268,9 +281,22 @@ def measure_recording(clip: Clip, fps: float) -> Recording:
         support=movement.measure_support_height(feet, contacts, heel_rest),
         tip=movement.measure_tip_height(skeleton, positions, rotations), jerk=movement.compute_jerk(positions, fps),
         smoothness=np.append(realism.measure_smoothness(skeleton, positions, fps), np.nan), stances=spans,
-        travel=movement.measure_stance_travel(feet[:, :, 1], spans), course=measure_course(skeleton, positions, fps),
+        travel=movement.measure_stance_travel(feet[:, :, 1], spans), course=course, kicks=kicks, receptions=receptions,
         stands=find_stands(smooth_zero_phase_hann(pelvis, fps, movement.ROOT_WINDOW), fps), contacts=contacts,
     )  # fmt: skip
+
+
+def _measure_labelled_touches(
+    clip: Clip, positions: np.ndarray, fps: float, contacts: np.ndarray, course: BodyCourse
+) -> tuple[tuple[Kick, ...], tuple[float, ...]]:
+    """Measure the kicks and receptions (m/s of the foot) that a clip's labels name."""
+    keys = [key for key in collect_keys([clip]) if is_kick(key.labels) or is_foot_reception(key.labels)]
+    if not keys:
+        return (), ()
+    legs = measure_legs(clip.motion.skeleton, positions, fps, contacts, course)
+    found = [(key.labels, (key.frame / clip.motion.fps, find_side(key.labels))) for key in keys]
+    return (tuple(measure_kick(legs, *at) for labels, at in found if is_kick(labels)),
+            tuple(measure_reception(legs, *at) for labels, at in found if is_foot_reception(labels)))
 
 
 def _measure_jerk_ratio(recording: Recording, real: np.ndarray) -> np.ndarray:

@@ -15,6 +15,8 @@ _NEEDS_LIBRARY += r"bone_change_m|annotation_similarity\.had_keys|naturalness\.(
 _NEEDS_CLIPS = r"warp_rate|loop_share|seams|naturalness\.(cuts|dwell|short)|annotation_similarity"
 _NEEDS_RECORDINGS = r"(.*\.)?(source_\w+|own)$|pelvis_surge_ratio"
 
+_MADE_ONLY = "known only while the take is made"
+
 _REASONS = (
     (r"root_error_m", "the track is never faster than 1 m/s"),
     (r"slow_root_error_m", "the track is never slower than 1 m/s"),
@@ -22,7 +24,7 @@ _REASONS = (
     (r"skate\.(source_)?stance", "no foot stays in contact for two frames"),
     (r"skate|ground_mm\.(source_)?support|foot_correction", "no foot is in contact"),
     (r"ground_mm\.(source_)?tip", "the feet of the skeleton have no end"),
-    (r"ik_miss_share", "known only while the take is made"),
+    (r"ik_miss_share", _MADE_ONLY),
     (r"pose_realism", "fewer than 3 recordings at each speed of the take"),
     (r"seam_jerk_ratio\.rest", "no frame is far from a cut"),
     (r"seam_jerk_ratio", "the take has no cut"),
@@ -36,6 +38,12 @@ _REASONS = (
     (r"naturalness\.standing", "the track stands nowhere for 1.5 s"),
     (r"naturalness\.tempo\.source_", "no steady running above 4 m/s is used"),
     (r"naturalness\.tempo", "nowhere two strides of steady running above 4 m/s"),
+    (r"touches\.reception\.source_", "the library has no labelled reception with the foot"),
+    (r"touches\.(fast_)?kick\.source_", "the library has no labelled kick"),
+    (r"touches\.reception", "no key moment is a reception with the foot"),
+    (r"touches\.fast_kick", "no ball leaves a kick faster than 18 m/s"),
+    (r"touches\.ball_inside", "no ball"),
+    (r"touches\.ball_speed", "no ball leaves a kick faster than 5 m/s"),
     (r"annotation_similarity\.had_keys", "no key moment has a label that the library has"),
     (r"annotation_similarity\.(keys|eq18_keys)", "no key moments"),
     (r"annotation_similarity", "no labels are requested"),
@@ -57,7 +65,7 @@ def list_unknown_figures(flat: Mapping[str, object], view: View) -> dict[str, st
 
 def _is_expected(name: str, fps: float) -> bool:
     """Return whether a figure should have a value: it has a target, or is the recordings' own."""
-    if name.startswith(("keys ", "dribbles", "pins")):
+    if name.startswith(("keys ", "dribbles", "pins", "touches.substituted")):
         return False
     return find_target(name, fps) is not None or _matches(_NEEDS_RECORDINGS, name)
 
@@ -68,9 +76,12 @@ def _find_reason(name: str, view: View) -> str:
         return "no track"
     if view.library is None and _matches(_NEEDS_LIBRARY, name):
         return "no library"
-    if not view.are_clips_known and _matches(f"{_NEEDS_CLIPS}|{_NEEDS_RECORDINGS}", name):
+    is_of_library = name.startswith("touches.")  # its recordings' own figures are those of the whole library
+    if not is_of_library and not view.are_clips_known and _matches(f"{_NEEDS_CLIPS}|{_NEEDS_RECORDINGS}", name):
         return "the played clips are not known"
-    if not len(view.used_rows) and _matches(_NEEDS_RECORDINGS, name):
+    if view.played.correction is None and name.startswith("foot_correction_m"):
+        return _MADE_ONLY
+    if not is_of_library and not len(view.used_rows) and _matches(_NEEDS_RECORDINGS, name):
         return "no recording is used: all clips are synthetic"
     return next((reason for pattern, reason in _REASONS if _matches(pattern, name)), "nothing to measure")
 

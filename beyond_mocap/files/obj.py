@@ -11,8 +11,8 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from ..base.content import read_bytes
 from ..base.errors import InputError, format_count
-from .content import read_bytes
 
 _MAX_METRES = 1e5  # metres; larger coordinates are in a wrong unit
 

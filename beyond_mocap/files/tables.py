@@ -16,11 +16,11 @@ from types import MappingProxyType
 
 import numpy as np
 
+from ..base.content import read_bytes
 from ..base.errors import InputError
 from ..motion.skeleton import freeze_array
 from ..motion.track.ball_path import BallPath
 from .atomic import atomic_write
-from .content import read_bytes
 
 BALL_COLUMNS = ("time_s", "x_m", "y_m", "z_m", "measured")
 _MAX_METRES = 1e4  # metres; larger coordinates are in a wrong unit

@@ -17,6 +17,7 @@ from typing import Iterable
 import numpy as np
 
 from ..annotation import ClipAnnotation
+from ..base.content import read_bytes
 from ..base.digest import byte_digest
 from ..base.errors import InputError
 from ..files.atomic import atomic_write
@@ -30,7 +31,7 @@ from .repair import RepairFigures
 from .scan import CACHE_FOLDER
 
 # raised whenever what is computed or stored changes, so that old caches are not used
-VERSION = 32
+VERSION = 33
 _FRAME_ARRAYS = tuple(field.name for field in fields(Frames) if field.name != "vocabulary")
 
 
@@ -40,8 +41,8 @@ def compute_fingerprint(folder: Path, clips, sources, skeleton: Path | None, **o
     for path in [*clips, *sources, *([skeleton] if skeleton else [])]:
         parts.append(os.fsencode(os.path.relpath(path, folder)) + b"\0")
         try:
-            parts.append(byte_digest(Path(path).read_bytes(), size=64))
-        except OSError:
+            parts.append(byte_digest(read_bytes(path, "a file of the library"), size=64))
+        except InputError:
             parts.append(b"unreadable")
     return byte_digest(*parts, size=64).hex()[:32]
 

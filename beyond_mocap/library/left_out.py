@@ -8,15 +8,17 @@ people can look up, each with the part of the body that is most unlike.
 from __future__ import annotations
 
 import weakref
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import PurePosixPath
 
 import numpy as np
 
 from ..annotation import LOCOMOTION
+from ..annotation.gaits import TURNING
 from ..annotation.labels import find_label
 from ..base.time_series import find_runs
-from .coverage import select_locomotion_alone
+from .features import Frames
 from .library import Library
 from .posture import SPEED_EDGES
 
@@ -94,6 +96,19 @@ def _find_left_out(library: Library) -> tuple[LeftOut, ...]:
                 found.append(_describe_stretch(library, clip.path, part, speed[part], start=start / library.fps,
                                                end=(end - 1) / library.fps))
     return tuple(found)
+
+
+def select_locomotion_alone(frames: Frames, clips: Sequence) -> np.ndarray:
+    """Select the frames (N,) bool of recordings, twins left out, whose labels say no more than locomotion and turns."""
+    acts = [i for i, word in enumerate(frames.vocabulary) if _names_act(word)]
+    gaits = [i for i, word in enumerate(frames.vocabulary) if word in LOCOMOTION]
+    own = np.array([not clip.mirrored and not clip.is_synthetic for clip in clips])
+    return own[frames.clip] & frames.words[:, gaits].any(axis=1) & ~frames.words[:, acts].any(axis=1)
+
+
+def _names_act(word: str) -> bool:
+    """Whether a label names more than locomotion, turns and directions."""
+    return bool(set(find_label(word).kinds) - {"modifier"}) and word not in (*LOCOMOTION, TURNING)
 
 
 def _join_runs(runs: list[tuple[int, int]], gap: int) -> list[tuple[int, int]]:

@@ -18,27 +18,20 @@ from ..annotation.gaits import STANDING, STANDING_SPEED
 from ..annotation.vocabulary import DIRECTIONS
 from ..base.errors import InputError, format_count
 from ..motion.skeleton import Skeleton
+from ..synthetic.recorded_kicks import KICK_LABELS
 from . import cache
 from .cache import write_synthetic_clips
 from .clip import Clip
 from .clusters import Clusters
-from .coverage import find_missing_motion, measure_slowest_travel, select_locomotion_alone
+from .coverage import BACK_SPEEDS, TURNS, Coverage, measure_coverage
 from .features import FPS, Frames, build_frames, join_frames
 from .keys import Key, collect_keys
 from .loops.run_loops import MIN_SPEED
 from .loops.standing_loops import MIN_STAND_SECONDS
 from .manners import Manners, measure_manners
-from .missing_steps import BACK_SPEEDS, TURNS
 from .posture import NormalPostures, fit_normal_postures
-from .synthetic_clips import (
-    KICK_LABELS,
-    MIN_RECEIVE_SPEED,
-    RECEIVE_LABELS,
-    find_speed_gaps,
-    iter_synthetic_clips,
-    measure_touch_speed,
-    select_locomotion,
-)
+from .receptions import find_cut_receptions
+from .synthetic_clips import KICK_STEP, MIN_RECEIVE_SPEED, RECEIVE_LABELS, iter_synthetic_clips, measure_touch_speed
 
 MIN_RUN_SECONDS = 2.0  # of a track's runs from which on long runs are needed
 RESTING_SPEED = 0.1  # m/s of a track below which a player stands
@@ -92,6 +85,11 @@ class Library:
         return collect_keys(self.clips)
 
     @cached_property
+    def cut_receptions(self) -> tuple[Key, ...]:
+        """Key moments of receptions that are cut out of dribbles; none where a recording is labelled with one."""
+        return find_cut_receptions(self.clips, self.frames, self.feet_in_contact, self.keys)
+
+    @cached_property
     def labels(self) -> frozenset[str]:
         """Every label that a clip carries."""
         return frozenset(word for clip in self.clips for row in clip.annotations for word in row.words)
@@ -133,15 +131,9 @@ class Library:
         return fit_normal_postures(self.frames, self._is_recorded, self.fps)
 
     @cached_property
-    def missing_motion(self) -> dict[str, str]:
-        """What the recordings lack: kind of motion -> a line for people (`coverage`)."""
-        return find_missing_motion(self.clips, self.frames, self.fps, self.strangeness)
-
-    @cached_property
-    def slowest_travel(self) -> float:
-        """The m/s below which hardly any recorded locomotion travels."""
-        belongs = select_locomotion_alone(self.frames, self.clips) & (self.strangeness <= 1.0)
-        return measure_slowest_travel(self.frames.speed[belongs], self.fps)
+    def coverage(self) -> Coverage:
+        """What the recordings lack of the motion that players need."""
+        return measure_coverage(self.clips, self.frames, self.fps, self.strangeness)
 
     @cached_property
     def manners(self) -> Manners:
@@ -187,11 +179,6 @@ class Library:
         frames = join_frames(self.frames, synthetic.frames)
         return replace(self, clips=(*self.clips, *synthetic.clips), frames=frames, clusters={})
 
-    @cached_property
-    def speed_gaps(self) -> tuple[tuple[float, float], ...]:
-        """(from, to) m/s of the speeds that recorded locomotion does not reach."""
-        return find_speed_gaps(self.frames.speed[select_locomotion(self.frames, self.clips)], self.fps)
-
     def needs_synthetic_clips(self, speed: np.ndarray, offset: np.ndarray, heading: np.ndarray,
                               key_speeds: np.ndarray, takes: np.ndarray) -> bool:
         """Whether a track needs the synthetic clips.
@@ -209,10 +196,10 @@ class Library:
         Returns:
             True if it does.
         """
-        inside = sum(int(np.sum((speed > low) & (speed < high))) for low, high in self.speed_gaps)
+        inside = sum(int(np.sum((speed > low) & (speed < high))) for low, high in self.coverage.speed_gaps)
         kick, take = (measure_touch_speed(self.frames, self.clips, self.keys, act)
                       for act in (KICK_LABELS, RECEIVE_LABELS))
-        too_fast = 1.3 * np.where(takes & np.isfinite(take), max(take, MIN_RECEIVE_SPEED), kick)
+        too_fast = KICK_STEP * np.where(takes & np.isfinite(take), max(take, MIN_RECEIVE_SPEED), kick)
         rests = np.sum(speed < RESTING_SPEED) >= MIN_STAND_SECONDS * self.fps
         runs = np.sum(speed > MIN_SPEED) >= MIN_RUN_SECONDS * self.fps
         aside = (speed > STANDING_SPEED) & (speed < 1.25 * BACK_SPEEDS[-1]) & (np.abs(offset) > np.pi / 3.0)
@@ -244,7 +231,7 @@ def _build_synthetic_library(library: Library) -> Library:
     speeds = {gait.label: gait.speed for gait in library.gaits if gait.label != STANDING}
     clips = []
     for synthetic in iter_synthetic_clips(library.clips, library.frames, library.fps, speeds, keys=library.keys,
-                                          strangeness=library.strangeness):
+                                          strangeness=library.strangeness, coverage=library.coverage):
         clip = Clip(path=synthetic.name, mirrored=False, motion=synthetic.motion, annotations=synthetic.rows,
                     heel_toe_contacts=synthetic.heel_toe_contacts)
         clips += [clip, clip.build_twin()]

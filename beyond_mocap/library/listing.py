@@ -14,6 +14,7 @@ from pathlib import Path
 import numpy as np
 
 from ..annotation import ClipAnnotation, sort_labels
+from ..base.content import open_file
 from ..base.errors import InputError
 from . import cache
 from .clip import Clip
@@ -157,9 +158,9 @@ def _compute_usual_jerk(jerk: np.ndarray, speed: np.ndarray) -> np.ndarray:
 def _read_length(path: Path) -> tuple[int, float]:
     """Read the number of frames and frames per second from a BVH file's header; zeros where it has none."""
     try:
-        with open(path, "rb") as file:
+        with open_file(path, "a BVH file") as file:
             head = file.read(_HEAD_BYTES).decode("ascii", "replace")
-    except OSError:
+    except (OSError, InputError):
         return 0, 0.0
     frames, step = re.search(r"Frames:\s*(\d+)", head), re.search(r"Frame Time:\s*([\d.eE+-]+)", head)
     try:

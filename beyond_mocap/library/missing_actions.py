@@ -84,7 +84,7 @@ def find_action(moment: ActionMoment) -> Action | None:
         low, high = action.heights or action.meets
         off = 0.0 if moment.height is None else max(low - moment.height, moment.height - high)
         is_unsuited = not action.suits[0] <= moment.speed <= action.suits[1]
-        return is_unsuited, off > _HEIGHT_SLACK, len(action.labels - requested)
+        return bool(action.varies), is_unsuited, off > _HEIGHT_SLACK, len(action.labels - requested)
 
     is_named = any(_names_action(word) for word in requested)
     return min(serving, key=rate_misfit, default=None) if is_named else None
@@ -222,7 +222,8 @@ def _find_clips(library: Library, path: str) -> tuple[Clip, Clip]:
 def _build_clip(library: Library, path: str) -> Clip:
     """Build the clip of a path."""
     action, numbers, sides = _parse_path(path)
-    gesture = action.build(replace(_find_setting(library), speed=numbers.get("speed", 0.0), height=numbers.get("height")))
+    speed, height = numbers.get("speed", 0.0), numbers.get("height")
+    gesture = action.build(replace(_find_setting(library), speed=speed, height=height))
     motion, first, last = gesture.motion, np.ceil(gesture.start * FPS), np.floor(gesture.end * FPS)
     last = min(last, len(motion) - 1)
     key = None if action.is_span else gesture.key * FPS

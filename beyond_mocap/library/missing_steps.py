@@ -1,12 +1,12 @@
 """Side steps, calm backward walks and turns on the spot, where a library's recordings lack them.
 
 Folders of motion capture walk forward; players who watch the ball go sideways and backward, and turn where they stand.
-Where too little of that is recorded, the library's own people do it: a recorded walk played backward in time is a
-backward walk (Winter, Pluck and Yang 1989: joint angles in backward walking are nearly those of forward walking in
-reverse), and side steps and turns have synthetic legs (`synthetic.steps`) below the trunk and arms of recorded frames:
-those of a calm stand, and of a walk at the same phase of the stride.
+Where too little of that is recorded (`coverage`), the library's own people do it: a recorded walk played backward in
+time is a backward walk (Winter, Pluck and Yang 1989: joint angles in backward walking are nearly those of forward
+walking in reverse), and side steps and turns have synthetic legs (`synthetic.steps`) below the trunk and arms of
+recorded frames: those of a calm stand, and of a walk at the same phase of the stride.
 
-Only frames that belong (`posture`) are counted and used. Mirrored twins give the other side.
+Only frames that belong (`posture`) are used. Mirrored twins give the other side.
 """
 
 from __future__ import annotations
@@ -17,45 +17,26 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.interpolate import CubicSpline, PchipInterpolator
 
-from ..annotation import DISCRETE
 from ..base.easing import smoothstep
-from ..base.time_series import find_runs, hann_smooth
-from ..base.vectors import arctan2
 from ..motion import quaternion
 from ..motion.foot_plant import plant_feet
 from ..motion.humanoid import compute_heading_from_positions, identify_joints
 from ..motion.motion import Motion, compute_local_rotations, forward_kinematics
-from ..motion.phase_blend import Strides, find_strides, repeat_strides
+from ..motion.phase_blend import Strides, repeat_strides
 from ..motion.retargeting.neutral import NeutralStance, build_neutral_stance
 from ..motion.retargeting.posture import to_motion
 from ..motion.retargeting.structure import list_descendants
 from ..motion.skeleton import Skeleton
 from ..motion.track import smooth_zero_phase_hann
 from ..synthetic.steps import StepSequence, build_side_walk, build_steps_in_place
+from .coverage import Coverage, find_calm_walks, select_calm_frames
 from .features import Frames
-from .loops.run_loops import MAX_MISMATCH, iter_steady_parts
 from .loops.standing_loops import iter_standing_loops
 
 BACK_PREFIX, SIDE_PREFIX, TURN_PREFIX, STEP_PREFIX = "back_", "side_", "turn_", "step_"
 """How the names of the clips begin."""
 
-BACK_SPEEDS = (0.4, 0.8, 1.2, 1.6)  # m/s
-# m/s, degrees from the heading to the left, and whether the feet cross
-SIDE_WALKS = ((0.5, 90, False), (0.8, 90, False), (1.1, 90, True), (1.5, 90, True), (0.5, 45, False), (0.9, 45, False),
-              (1.3, 45, False), (0.5, 135, False), (0.9, 135, False), (1.3, 135, False))
-TURNS = tuple(np.radians((45.0, 90.0, 135.0, 180.0)))
-MOVES = ((0.3, 0.0), (-0.3, 0.0), (0.0, 0.25), (0.0, 0.45))  # m ahead and to the left
-MIN_SECONDS = 15.0  # of recording at a speed in a direction from which on it does not lack
-MIN_TURN_SECONDS = 6.0  # of recorded turns on the spot from which on they do not lack
-MIN_MOVES = 3  # recorded moves from a stand to a stand from which on such moves do not lack
-_SPEED_RANGE, _DIRECTION_RANGE = (0.8, 1.25), np.radians(22.5)  # around a speed and a direction
-_RESTING_SPEED, _RESTING_TURN, _MOST_MOVE_SECONDS = 0.15, np.radians(20.0), 3.0  # m/s, rad/s and s
-_MOVE_RANGE, _MOST_TURN_OF_MOVE = 0.12, np.radians(22.5)  # m and rad around a move
-_ON_THE_SPOT, _LEAST_TURN_RATE, _MOST_TURN_RATE = 0.3, np.radians(60.0), np.radians(250.0)  # m/s and rad/s
-_STRANGE_SECONDS = 0.3  # reach of the window in which strangeness is averaged
 _LOOP_SECONDS = 4.5  # of a walk
-# of walks whose trunk, arms and legs are used: m/s, the best one, s, and how many
-_WALK_SPEEDS, _USUAL_SPEED, _MIN_WALK_SECONDS, _WALKS = (0.7, 1.9), 1.2, 1.5, 3
 _WALKS_OF_SPEED = 2
 _STEP_SHARE = 0.6  # exponent: how much of a change of speed is longer steps; the rest is tempo
 _BACK_STEP = 0.92  # a backward step against a forward one at the same speed
@@ -110,7 +91,8 @@ def compute_walk_share(speed: float) -> float:
 
 
 def iter_missing_steps(
-    clips: Sequence, frames: Frames, fps: float, strangeness: np.ndarray, example: Motion, rate: float
+    clips: Sequence, frames: Frames, fps: float, strangeness: np.ndarray, coverage: Coverage, example: Motion,
+    rate: float,
 ) -> Iterator[tuple[str, Motion, np.ndarray | None, float]]:
     """Iterate over the steps that a library lacks.
 
@@ -119,69 +101,29 @@ def iter_missing_steps(
         frames: their description, N frames.
         fps: of the frames.
         strangeness: (N,) how far each frame lies from normal locomotion (`posture`).
+        coverage: what the library lacks.
         example: a recording on the library's skeleton, for its neutral stance.
         rate: frames per second of the clips.
     Yields:
         Name, which begins with one of the prefixes; the motion; its contacts (T, 2, 2) bool of heels and toes,
         None where they have to be detected; and its speed, m/s, 0 from a stand to a stand.
     """
-    belongs = select_calm_frames(clips, frames, fps, strangeness)
-    walks = find_calm_walks(clips, frames, fps, belongs)
-    for speed in BACK_SPEEDS:
-        if walks and count_seconds(frames, fps, belongs, speed, np.pi) < MIN_SECONDS:
-            nearest = sorted(walks, key=lambda walk: abs(np.log(walk.speed / speed)))[:_WALKS_OF_SPEED]
-            for number, walk in enumerate(nearest):
-                yield f"{BACK_PREFIX}{speed:.1f}_{number + 1}", *reverse_walk(walk, speed, rate), speed
+    walks = find_calm_walks(clips, frames, fps, select_calm_frames(clips, frames, fps, strangeness))
+    for speed in coverage.back_speeds if walks else ():
+        nearest = sorted(walks, key=lambda walk: abs(np.log(walk.speed / speed)))[:_WALKS_OF_SPEED]
+        for number, walk in enumerate(nearest):
+            yield f"{BACK_PREFIX}{speed:.1f}_{number + 1}", *reverse_walk(walk, speed, rate), speed
     neutral = build_neutral_stance(example.skeleton, example)
     carriage = measure_carriage(clips, frames, fps, strangeness, walks=walks, rate=rate)
-    for speed, degrees, crosses in SIDE_WALKS if walks else ():
-        if count_seconds(frames, fps, belongs, speed, np.radians(degrees)) < MIN_SECONDS:
-            sequence = build_side_walk(speed, np.radians(degrees), _LOOP_SECONDS, rate, neutral,
-                                       crosses=crosses)
-            name = f"{SIDE_PREFIX}{degrees}_{speed:.1f}"
-            yield name, lend_upper_body(sequence, neutral, carriage, speed), None, speed
-    missing = list_missing_turns(frames, fps, belongs) + list_missing_moves(measure_moves(clips, frames, fps, belongs))
-    for name, move, turn in missing if carriage.stand is not None else ():
+    for speed, degrees, crosses in coverage.side_walks if walks else ():
+        sequence = build_side_walk(speed, np.radians(degrees), _LOOP_SECONDS, rate, neutral, crosses=crosses)
+        name = f"{SIDE_PREFIX}{degrees}_{speed:.1f}"
+        yield name, lend_upper_body(sequence, neutral, carriage, speed), None, speed
+    steps = [(f"{TURN_PREFIX}{np.degrees(turn):.0f}", (0.0, 0.0), turn) for turn in coverage.turns]
+    steps += [(f"{STEP_PREFIX}{move[0]:.1f}_{move[1]:.1f}", move, 0.0) for move in coverage.moves]
+    for name, move, turn in steps if coverage.has_stand else ():
         sequence = build_steps_in_place(move, turn, rate, neutral)
         yield name, lend_upper_body(sequence, neutral, carriage, 0.0), None, 0.0
-
-
-def select_calm_frames(clips: Sequence, frames: Frames, fps: float, strangeness: np.ndarray) -> np.ndarray:
-    """Select the frames (N,) bool of recordings, twins left out, that belong to locomotion and show no action.
-
-    What counts is the strangeness around a frame: at the ends of a swing a usual walk is strange for a moment.
-    """
-    actions = [i for i, word in enumerate(frames.vocabulary) if word in DISCRETE]
-    own = np.array([not clip.mirrored and not clip.is_synthetic for clip in clips])
-    parts = [slice(first, first + count) for first, count in zip(frames.first, frames.count)]
-    around = [hann_smooth(strangeness[at], int(_STRANGE_SECONDS * fps)) for at in parts]
-    return own[frames.clip] & (np.concatenate(around) <= 1.0) & ~frames.words[:, actions].any(axis=1)
-
-
-def count_seconds(frames: Frames, fps: float, belongs: np.ndarray, speed: float, direction: float) -> float:
-    """Count the seconds of frames `belongs` (N,) at about a speed in m/s and in a direction, rad, to either side."""
-    off = np.abs(arctan2(frames.velocity[:, 1], frames.velocity[:, 0])) - direction
-    low, high = (speed * share for share in _SPEED_RANGE)
-    near = (np.abs(off) < _DIRECTION_RANGE) & (frames.speed > low) & (frames.speed < high)
-    return float(np.sum(belongs & near) / fps)
-
-
-def find_calm_walks(clips: Sequence, frames: Frames, fps: float, belongs: np.ndarray) -> list[Strides]:
-    """Find steady walks of `belongs` (N,) bool that can be repeated, the most usual first, at most one of each clip."""
-    ahead = np.abs(arctan2(frames.velocity[:, 1], frames.velocity[:, 0])) < _DIRECTION_RANGE
-    walks = belongs & ahead & (frames.speed > _WALK_SPEEDS[0]) & (frames.speed < _WALK_SPEEDS[1])
-    found = []
-    for index, clip in enumerate(clips):
-        at = slice(frames.first[index], frames.first[index] + frames.count[index])
-        runs = [run for run in find_runs(walks[at]) if run[1] - run[0] >= _MIN_WALK_SECONDS * fps]
-        for first, end in sorted(runs, key=lambda run: run[0] - run[1])[:1]:
-            rows = slice(int(frames.source[at.start + first]), int(frames.source[at.start + end - 1]) + 1)
-            strides = find_strides(clip.motion.frames(rows.start, rows.stop), clip.heel_toe_contacts[rows])
-            parts = [] if strides is None else [one for one in iter_steady_parts(strides) if one[0] < MAX_MISMATCH]
-            if parts:
-                mismatch, part = min(parts, key=lambda one: one[0])
-                found.append((abs(np.log(part.speed / _USUAL_SPEED)) + mismatch / MAX_MISMATCH, index, part))
-    return [strides for *_, strides in sorted(found, key=lambda one: one[:2])[:_WALKS]]
 
 
 def measure_carriage(clips: Sequence, frames: Frames, fps: float, strangeness: np.ndarray, walks: list[Strides],
@@ -274,39 +216,3 @@ def _list_upper_joints(skeleton: Skeleton) -> list[int]:
             if {body.left.upper_leg, body.right.upper_leg} & set(list_descendants(skeleton.parents, j))]
     lower = {0, body.hips}.union(*(list_descendants(skeleton.parents, j) for j in legs))
     return [j for j in range(len(skeleton)) if j not in lower]
-
-
-def measure_moves(clips: Sequence, frames: Frames, fps: float, belongs: np.ndarray) -> np.ndarray:
-    """Measure recorded moves from a stand to a stand: (M, 3) m ahead, m to the left, and rad of turning."""
-    moves, speed = [], frames.speed  # computed over all frames at every access
-    for index in range(len(clips)):
-        at = slice(frames.first[index], frames.first[index] + frames.count[index])
-        turning = np.abs(np.gradient(frames.heading[at])) * fps if frames.count[index] > 1 else np.zeros(1)
-        rests = (speed[at] < _RESTING_SPEED) & (turning < _RESTING_TURN)
-        for first, end in find_runs(~rests):
-            inside = 0 < first and end < frames.count[index] and end - first <= _MOST_MOVE_SECONDS * fps
-            if inside and np.all(belongs[at][first:end]):
-                ends = at.start + np.array([first - 1, end])
-                way = quaternion.rotate_level(np.diff(frames.path[ends], axis=0), -frames.heading[ends[:1]])[0]
-                moves.append((*way, frames.heading[ends[1]] - frames.heading[ends[0]]))
-    return np.array(moves).reshape(-1, 3)
-
-
-def list_missing_turns(frames: Frames, fps: float, belongs: np.ndarray) -> list[tuple[str, tuple[float, float], float]]:
-    """List turns on the spot where frames `belongs` (N,) hardly have any: name, m ahead and left, rad."""
-    turning = np.abs(np.gradient(frames.heading)) * fps
-    same_clip = (np.gradient(frames.clip) == 0.0) & (turning < _MOST_TURN_RATE)
-    turns = belongs & same_clip & (frames.speed < _ON_THE_SPOT) & (turning > _LEAST_TURN_RATE)
-    if np.sum(turns) >= MIN_TURN_SECONDS * fps:
-        return []
-    return [(f"{TURN_PREFIX}{np.degrees(turn):.0f}", (0.0, 0.0), float(turn)) for turn in TURNS]
-
-
-def list_missing_moves(recorded: np.ndarray) -> list[tuple[str, tuple[float, float], float]]:
-    """List steps of MOVES that `recorded` (M, 3) hardly has to either side: name, m ahead and left, rad."""
-    missing = []
-    for move in MOVES:
-        off = np.linalg.norm(np.stack([recorded[:, 0], np.abs(recorded[:, 1])], axis=1) - move, axis=1)
-        if np.sum((off < _MOVE_RANGE) & (np.abs(recorded[:, 2]) < _MOST_TURN_OF_MOVE)) < MIN_MOVES:
-            missing.append((f"{STEP_PREFIX}{move[0]:.1f}_{move[1]:.1f}", move, 0.0))
-    return missing

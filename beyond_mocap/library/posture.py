@@ -46,6 +46,10 @@ PARTS = {"hips": slice(0, 1), "feet": slice(1, 2), "arms": slice(2, 14), "trunk"
 """The columns of a posture by what they describe; a skeleton without two arms has fewer."""
 
 _ARMS_AND_TRUNK = slice(PARTS["arms"].start, PARTS["trunk"].stop)
+# of calm standing and walking: hips in leg lengths, and the vertical component of trunk, upper arms and forearms; on a
+# library of five folders 98 % of what belongs below 1.2 m/s is so, and 20 % of the rest
+_CALM_HIPS, _CALM_TRUNK, _CALM_UPPER_ARM, _CALM_FOREARM = 0.85, 0.85, -0.7, -0.3
+
 
 def compute_postures(positions: np.ndarray, facing: np.ndarray, fps: float, body: Humanoid) -> np.ndarray:
     """Compute the posture of every frame: directions of arms and trunk, how fast the hands move, hips and step width.
@@ -151,6 +155,20 @@ class NormalPostures:
     def _find_class(self, kind: int) -> int:
         """Find the nearest class that has a region."""
         return min(self.regions, key=lambda other: (abs(other - kind), other))
+
+
+def select_calm_postures(posture: np.ndarray) -> np.ndarray:
+    """Select the postures (T, K) that are calm standing or walking for anybody: upright, with arms hanging.
+
+    Returns:
+        (T,) bool; arms and trunk count only where the skeleton has both arms.
+    """
+    calm = posture[:, 0] > _CALM_HIPS
+    if posture.shape[1] < PARTS["hands"].stop:
+        return calm
+    up = posture[:, PARTS["arms"]].reshape(-1, 2, 2, 3)[..., 2].max(axis=1)
+    trunk = posture[:, PARTS["trunk"].stop - 1]
+    return calm & (trunk > _CALM_TRUNK) & (up[:, 0] < _CALM_UPPER_ARM) & (up[:, 1] < _CALM_FOREARM)
 
 
 def fit_normal_postures(frames, is_recorded: np.ndarray, fps: float) -> NormalPostures:

@@ -17,9 +17,9 @@ Where all recordings run, or all walk slower, it generates walking the same way,
 stand: a run that is shortened to a walk's steps hops on the spot.
 
 Recorded kicks are seldom faster than a jog, and players who receive a ball with the foot in a recording hardly move;
-moved along at 8 m/s their supporting foot slides by metres. `synthetic.gestures` and `synthetic.actions.receptions`
-generate both on the run at the missing speeds; they substitute for recorded ones wherever they carry the labels by
-which those answer.
+moved along at 8 m/s their supporting foot slides by metres. `synthetic.recorded_kicks` and
+`synthetic.actions.receptions` generate both on the run at the missing speeds; they substitute for recorded ones that
+answer by the same labels.
 """
 
 from __future__ import annotations
@@ -29,19 +29,20 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ..annotation import DISCRETE, LOCOMOTION, ClipAnnotation, compute_gait_thresholds
+from ..annotation import LOCOMOTION, ClipAnnotation, compute_gait_thresholds
 from ..annotation.gaits import STANDING, TURNING
-from ..base.time_series import find_equal_runs, find_runs
+from ..base.time_series import find_equal_runs
 from ..base.vectors import arctan2, cross_product
 from ..motion import contacts, quaternion
 from ..motion.foot_plant import plant_feet
 from ..motion.humanoid import compute_heading_from_positions, identify_joints
 from ..motion.motion import Motion, forward_kinematics, sample_frames
 from ..motion.phase_blend import Strides, blend_strides, find_strides
-from ..synthetic import gestures
 from ..synthetic.actions.receptions import build_reception
 from ..synthetic.gait import build_gait
 from ..synthetic.gait_plan import GaitStyle
+from ..synthetic.recorded_kicks import KICK_LABELS, RunningKick, iter_running_kicks
+from .coverage import MAX_SPEED, MIN_SPEED_SECONDS, Coverage, select_locomotion
 from .features import Frames
 from .loops.run_loops import LOOP_SECONDS, iter_run_loops
 from .loops.standing_loops import LOOP_SECONDS as STAND_SECONDS
@@ -54,18 +55,13 @@ SYNTHETIC_FOLDER = f"{CACHE_FOLDER}/made-gait/"
 # folder
 BLEND_PREFIX, KICK_PREFIX, RECEIVE_PREFIX, STAND_PREFIX, LOOP_PREFIX = "blend_", "kick_", "receive_", "stand_", "loop_"
 WALK_PREFIX, STILL_PREFIX = "walk_", "still_"
-KICK_LABELS, RECEIVE_LABELS = frozenset({"kick"}), frozenset({"receive", "foot"})
+RECEIVE_LABELS = frozenset({"receive", "foot"})
 FPS = 60.0  # of synthetic clips
-MAX_SPEED = 9.4  # m/s
 # m/s: lowest speed of synthetic running (blends cover slower speeds), and of receiving a ball on the run
 _MIN_RUN_SPEED, MIN_RECEIVE_SPEED = 2.4, 1.7
-# range of playback rates of a clip
-_WARP = (0.875, 1.125)
-_SLOWEST = 1.6  # m/s, a walk: the slowest travel should not exceed it when it is played slower
-SLOWEST_RECORDED = _SLOWEST / _WARP[0]
-_MIN_SECONDS = 1.5  # seconds of recording at a speed from which on it is no gap
-_GRID = 1.03  # ratio of neighbouring speeds
-# ratios of neighbouring speeds of blends, of touches and of runs at an even speed
+# factor on the fastest recorded kick's speed from which on kicks are synthetic
+KICK_STEP = 1.3
+# ratios of neighbouring speeds of blends, of received balls and of runs at an even speed
 _BLEND_STEP, _TOUCH_STEP, _EVEN_STEP = 1.06, 1.4, 1.1
 _PAIRS = 3  # pairs of recordings blended into each gap, at most
 _MAX_SPEED_SPREAD = 0.15  # standard deviation of a steady stretch's speed, share of its mean
@@ -97,37 +93,6 @@ class SyntheticClip:
     heel_toe_contacts: np.ndarray
 
 
-def find_speed_gaps(speed: np.ndarray, fps: float) -> tuple[tuple[float, float], ...]:
-    """Find the ranges of speed that too few seconds of recorded locomotion reach within the time warp.
-
-    Args:
-        speed: (N,) m/s of frames of locomotion.
-        fps: of those frames.
-    Returns:
-        (from, to) m/s of all gaps, from the slowest recording's speed, if that is a walk, to a sprint.
-    """
-    grid = np.exp(np.arange(np.log(0.6), np.log(MAX_SPEED), np.log(_GRID)))
-    ordered = np.sort(speed)
-    reached = np.searchsorted(ordered, grid / _WARP[0]) - np.searchsorted(ordered, grid / _WARP[1])
-    lacking = reached < _MIN_SECONDS * fps
-    if lacking.all():
-        return ()
-    slowest = int(np.argmin(lacking))
-    lacking[:slowest] = grid[slowest] > _SLOWEST
-    ends = np.append(grid, MAX_SPEED)
-    return tuple((float(grid[a]), float(ends[b])) for a, b in find_runs(lacking))
-
-
-def select_locomotion(frames: Frames, clips: Sequence) -> np.ndarray:
-    """Select the frames (N,) bool of recordings, twins left out, that show locomotion and no action."""
-    named = {word: frames.words[:, column] for column, word in enumerate(frames.vocabulary)}
-    none = np.zeros(len(frames), bool)
-    moves = np.any([named.get(word, none) for word in _GAITS], axis=0)
-    acts = np.any([none, *(named[word] for word in DISCRETE if word in named)], axis=0)
-    own = np.array([not clip.mirrored and not clip.is_synthetic for clip in clips])
-    return moves & ~acts & own[frames.clip]
-
-
 def measure_touch_speed(frames: Frames, clips: Sequence, keys: Sequence, act: frozenset[str]) -> float:
     """Measure the fastest approach of a touch.
 
@@ -149,7 +114,7 @@ def measure_touch_speed(frames: Frames, clips: Sequence, keys: Sequence, act: fr
 
 def iter_synthetic_clips(
     clips: Sequence, frames: Frames, fps: float, gait_speeds: dict[str, float], keys: Sequence,
-    strangeness: np.ndarray
+    strangeness: np.ndarray, coverage: Coverage,
 ) -> Iterator[SyntheticClip]:
     """Iterate over all synthetic clips of a library.
 
@@ -160,6 +125,7 @@ def iter_synthetic_clips(
         gait_speeds: m/s of the recorded gaits.
         keys: the recordings' key moments.
         strangeness: (N,) how far each frame lies from normal locomotion (`posture`).
+        coverage: what the recordings lack.
     Yields:
         Clips whose names begin with SYNTHETIC_FOLDER: they are stored beside the cache.
     """
@@ -167,18 +133,17 @@ def iter_synthetic_clips(
               **{word: v for word, v in _DEFAULT_SPEEDS.items() if v > max(gait_speeds.values())}, **gait_speeds}
     example = sample_upright_example(clips)
     style = estimate_runner_style(clips, frames, example)
-    for low, high in find_speed_gaps(frames.speed[select_locomotion(frames, clips)], fps):
+    for low, high in coverage.speed_gaps:
         blends = list(_iter_blends(clips, frames, fps, low=low, high=high, speeds=speeds))
         yield from blends or _iter_walks(low, min(high, _MIN_RUN_SPEED), example, speeds)
         yield from _iter_runs(max(0.93 * low, _MIN_RUN_SPEED), min(1.05 * high, MAX_SPEED), example, style, speeds)
-    kinds = sorted({"inside" if "inside" in key.labels else "top" for key in keys if KICK_LABELS <= key.labels})
     fastest = measure_touch_speed(frames, clips, keys, KICK_LABELS)
-    yield from _iter_touches(KICK_PREFIX, _TOUCH_STEP * fastest, ("kick", "low"), kinds=kinds, example=example,
-                             speeds=speeds)
+    for kick in iter_running_kicks(clips, keys, KICK_STEP * fastest, example, style):
+        yield _build_kick_clip(kick, speeds)
     fastest = max(_TOUCH_STEP * measure_touch_speed(frames, clips, keys, RECEIVE_LABELS), MIN_RECEIVE_SPEED)
     yield from _iter_receptions(fastest, example, speeds)
     stands = [(STAND_PREFIX, motion) for _, motion in iter_standing_loops(clips, frames, fps, strangeness, FPS)]
-    if not stands:
+    if not coverage.has_stand:
         stands = [(STILL_PREFIX, build_gait(0.0, STAND_SECONDS, FPS, example.skeleton, example=example))]
     for number, (prefix, motion) in enumerate(stands):
         row = ClipAnnotation(0, len(motion) - 1, None, (STANDING,))
@@ -189,7 +154,7 @@ def iter_synthetic_clips(
         rows = _build_gait_rows(np.full(len(motion), speed), speeds)
         yield _ground_clip(f"{SYNTHETIC_FOLDER}{LOOP_PREFIX}{speed:.2f}.bvh", motion, contacts, rows, plants_feet=True)
     for name, motion, heel_toe_contacts, speed in iter_missing_steps(
-        clips, frames, fps, strangeness, example=example, rate=FPS
+        clips, frames, fps, strangeness, coverage=coverage, example=example, rate=FPS
     ):
         rows = _build_step_rows(name, len(motion), speed, speeds)
         yield _ground_clip(f"{SYNTHETIC_FOLDER}{name}.bvh", motion, heel_toe_contacts, rows)
@@ -217,7 +182,7 @@ def estimate_runner_style(clips: Sequence, frames: Frames, example: Motion) -> G
         The style; the default one where no clip runs.
     """
     rows = np.flatnonzero(select_locomotion(frames, clips) & (frames.speed > _MIN_RUN_SPEED))
-    if len(rows) < _MIN_SECONDS * 30.0:
+    if len(rows) < MIN_SPEED_SECONDS * 30.0:
         return GaitStyle()
     rows = rows[np.linspace(0, len(rows) - 1, 60).astype(int)]
     samples = [sample_frames(clips[frames.clip[row]].motion, frames.source[row : row + 1]) for row in rows]
@@ -336,21 +301,12 @@ def _iter_runs(low: float, high: float, example: Motion, style: GaitStyle,
         yield _ground_clip(f"{SYNTHETIC_FOLDER}{name}_{low:.1f}.bvh", motion, None, _build_gait_rows(speed, speeds))
 
 
-def _iter_touches(
-    name: str, speed: float, act: tuple[str, ...], kinds: Sequence[str], example: Motion, speeds: dict[str, float]
-) -> Iterator[SyntheticClip]:
-    """Iterate over touches with the right foot on the run, from `speed` m/s to a sprint, of each kind; `act`: their
-    labels.
-    """
-    while speed < MAX_SPEED:
-        for kind in kinds:
-            strike = gestures.build_strike(f"{' '.join(act)} {kind}", example.skeleton, FPS, example=example,
-                                           at_speed=speed)
-            words = (act[0], "right", *act[1:], kind, "running", "front")
-            row = ClipAnnotation(np.ceil(strike.start * FPS), np.floor(strike.end * FPS), strike.key * FPS, words)
-            gait_row = _build_gait_rows(np.full(len(strike.motion), speed), speeds)
-            yield _ground_clip(f"{SYNTHETIC_FOLDER}{name}{kind}_{speed:.1f}.bvh", strike.motion, None, (row, *gait_row))
-        speed *= _TOUCH_STEP
+def _build_kick_clip(kick: RunningKick, speeds: dict[str, float]) -> SyntheticClip:
+    """Build the clip of a kick on the run."""
+    gesture = kick.gesture
+    row = ClipAnnotation(np.ceil(gesture.start * FPS), np.floor(gesture.end * FPS), gesture.key * FPS, kick.words)
+    gait_row = _build_gait_rows(np.full(len(gesture.motion), kick.speed), speeds)
+    return _ground_clip(f"{SYNTHETIC_FOLDER}{KICK_PREFIX}{kick.name}.bvh", gesture.motion, None, (row, *gait_row))
 
 
 def _iter_receptions(speed: float, example: Motion, speeds: dict[str, float]) -> Iterator[SyntheticClip]:

@@ -19,9 +19,9 @@ from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 
+from ..base.content import read_bytes
 from ..base.errors import InputError
 from ..files.atomic import atomic_write
-from ..files.content import read_bytes
 from ..files.tables import to_plain
 from .request import compute_digest
 

@@ -16,9 +16,9 @@ from dataclasses import asdict, dataclass, fields, replace
 import numpy as np
 
 from ..annotation import KeyMoment, Span, Timeline
+from ..base.content import read_bytes
 from ..base.errors import InputError
 from ..files.atomic import atomic_write
-from ..files.content import read_bytes
 from ..files.json_values import (
     check_bool,
     check_list,

@@ -263,7 +263,7 @@ class _PlayerBuilder:
         """Build the plan that the take stores: the track of the player's path."""
         return Plan(track=Track(track.times, track.positions, track.ball), library=self.library.folder, fps=self.fps,
                     seam_window=2.0 * self.settings.transition, seed=self.settings.seed, made=False,
-                    watch=float(self.settings.watch))
+                    watch=float(self.settings.watch), solve_touches=False)
 
     def _compute_heading(self, track: SampledTrack, recorded: np.ndarray, source: SourceMotion) -> np.ndarray:
         """Compute the heading (T,) rad: as recorded in hit motions, and between them a compromise, turned the short

@@ -12,9 +12,9 @@ from dataclasses import fields, replace
 from typing import Any
 
 from ..ball.contact import Tool
+from ..base.content import read_utf8
 from ..base.errors import InputError
 from ..files.atomic import atomic_write
-from ..files.content import read_utf8
 from ..files.json_values import (
     check_bool,
     check_names,

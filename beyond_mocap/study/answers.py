@@ -7,8 +7,8 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+from ..base.content import read_utf8
 from ..base.errors import InputError
-from ..files.content import read_utf8
 from ..files.tables import read_rows
 from .form import ANSWER_COLUMNS, BACKGROUND, SAME, SCALE
 from .order import Study

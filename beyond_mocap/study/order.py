@@ -15,9 +15,9 @@ from pathlib import Path
 
 import numpy as np
 
+from ..base.content import read_utf8
 from ..base.digest import hex_digest
 from ..base.errors import InputError, format_count
-from ..files.content import read_utf8
 from ..files.tables import read_rows, write_report
 
 TRAINING = "training"

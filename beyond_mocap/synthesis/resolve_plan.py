@@ -1,6 +1,6 @@
 """Resolve a plan for a library: touches solved, the player in the library's size.
 
-    plan = resolve_plan(Plan(track=track, timeline=timeline, height=1.7, solve_touches=True), library)
+    plan = resolve_plan(Plan(track=track, timeline=timeline, height=1.7), library)
     request = build_request(library, plan)
 
 A player of s times the height of the library's skeleton who runs 5 m/s moves as the library does at 5 / s m/s. So the

@@ -1,6 +1,6 @@
 """Key moments moved to the solved touches of the ball, and the ball's trajectory by physics and by contact.
 
-    plan = resolve_touches(Plan(track=track, timeline=timeline, solve_touches=True))
+    plan = resolve_touches(Plan(track=track, timeline=timeline))
 
 This is what `synthesize` and `resynthesize` do with a solved ball (`solve_ball`): before the search, key moments move
 to solved touches; when the body is done, the ball passes through the places where it was met, as solved in between, and
@@ -13,16 +13,22 @@ from dataclasses import replace
 
 import numpy as np
 
-from ..annotation import KeyMoment, Timeline
+from ..annotation import KeyMoment, Span, Timeline
 from ..annotation.ball_contact import build_surfaces, find_striking_part
 from ..annotation.labels import list_labels
+from ..annotation.striking import measure_ball_gap
+from ..ball.tracked.carried import find_carried_stretches
 from ..ball.tracked.kinds import THROW_IN, TOUCH_KINDS
 from ..ball.tracked.solve import SolvedBall, SolvedTouch
 from ..base.errors import InputError, TimedMessage
-from ..motion.track import BALL_RADIUS
-from .construct.contact_geometry import add_flight_arc, lead_ball_through
+from ..base.time_series import find_runs
+from ..motion.motion import compute_pose
+from ..motion.track import BALL_RADIUS, Track
+from .construct.ball_detour import find_free_contact, lead_ball_around_body
+from .construct.contact_geometry import BALL_SECONDS, add_flight_arc, lead_ball_through
 from .construct.dribble import plan_dribbles
-from .construct.strike import compute_contact_frames
+from .construct.give import give_with_ball
+from .construct.strike import BALL_NOISE, compute_contact_frames, find_nearest_frame
 from .plan import Plan, PlayerTouch, ResolvedPlan, SolvedTrajectory
 from .take import DribbleTouch, KeyResult, Take
 
@@ -33,6 +39,8 @@ _WITHIN = 1.5  # m from the player within which a touch by an unknown player may
 # cost in seconds: player unknown, other part, other kind
 _UNKNOWN_PLAYER_COST, _OTHER_PART_COST, _OTHER_KIND_COST = 0.15, 0.25, 0.15
 _MAX_SAMPLE_GAP = 0.1  # s from the nearest measured sample beyond which the ball counts as filled in
+_CARRIED_MARGIN = 0.15  # s from the ends of such a stretch from which on its course shows no touches, only steering
+_MET_GAP = 0.03  # m between the surfaces up to which a part is at the ball
 _STEP = 0.004  # s between the points of a trajectory
 _SENDING, _TAKING = frozenset(list_labels(ball="sends")), frozenset(list_labels(ball="takes"))
 _CARRYING = frozenset(list_labels(ball="carries"))
@@ -61,7 +69,7 @@ def solve_track_ball(plan: Plan) -> SolvedTrajectory | None:
     from ..ball.tracked.solve import solve_ball
 
     try:
-        solved = solve_ball(plan.track)
+        solved = solve_ball(plan.track, only_own_flights=True)
     except InputError:
         return None
     return build_trajectory(solved, plan.track.name, plan)
@@ -91,8 +99,18 @@ def build_trajectory(solved: SolvedBall, player: str, plan: Plan) -> SolvedTraje
     ball = np.maximum(solved.ball.at(times), [-np.inf, -np.inf, BALL_RADIUS])
     ball = np.where(unknown[:, None], np.nan, ball)
     seen = solved.times[solved.measured]
-    return SolvedTrajectory(times, ball, _is_far(times, seen),
-                            tuple(_build_touch(touch, player, plan) for touch in inside))
+    carried = _find_carries(plan.track)
+    filled = _is_far(times, seen) | _is_within(times, carried)
+    moments = np.array([touch.time for touch in inside])
+    inside = [touch for touch, is_carried in zip(inside, _is_within(moments, carried, _CARRIED_MARGIN))
+              if not (is_carried and touch.player in ("", player))]
+    return SolvedTrajectory(times, ball, filled, tuple(_build_touch(touch, player, plan) for touch in inside))
+
+
+def _is_within(times: np.ndarray, stretches: list[tuple[float, float]], margin: float = 0.0) -> np.ndarray:
+    """Return (M,) bool: times within stretches, more than a margin in seconds from their ends."""
+    return np.any([(times >= first + margin) & (times <= last - margin) for first, last in stretches],
+                  axis=0) if stretches else np.zeros(len(times), bool)
 
 
 def _is_far(times: np.ndarray, seen: np.ndarray) -> np.ndarray:
@@ -168,72 +186,150 @@ def _restore_order(keys: list[KeyMoment]) -> list[KeyMoment]:
 
 
 def report_missing_touches(take: Take, plan: ResolvedPlan) -> list[str]:
-    """Report key moments that request a touch where the trajectory has none, and dribbles without a touch.
+    """Report what the ball has not: touches that key moments request, touches of dribbles, places of its own.
 
     Args:
         take: the take of `apply_trajectory`.
         plan: the resolved plan.
     """
+    touching = [key for key in plan.timeline.keys if find_striking_part(key.words) and not key.misses_ball]
+    dribbles = [span for span in plan.timeline.spans if _CARRYING.intersection(span.words)]
     if plan.trajectory is None:
         message = "the ball's touches are not solved: the track has no ball, or too few samples of it"
-        return [message] if plan.requested.solve_touches else []
-    missing: list[str] = [
-        TimedMessage(
-            f"{key.time:g} s: the ball's trajectory has no touch for '{' '.join(key.words)}' within "
-            f"{MAX_TOUCH_OFFSET:g} s; the key moment stays at its time", (key.time, key.time),
-        ) for key in plan.timeline.keys
-        if find_striking_part(key.words) and key.solved is None and not key.misses_ball
-    ]  # fmt: skip
+        return [message] if plan.requested.solve_touches and (touching or dribbles) else []
+    return [*_report_untouched_keys([key for key in touching if key.solved is None]),
+            *_report_carries(plan.requested.track), *_report_untouched_dribbles(take, dribbles)]
+
+
+def _report_untouched_keys(keys: list[KeyMoment]) -> list[str]:
+    """Report in one line the key moments for which the trajectory has no touch."""
+    if not keys:
+        return []
+    times = ", ".join(f"{key.time:g}" for key in keys)
+    words = ", ".join(dict.fromkeys(f"'{' '.join(key.words)}'" for key in keys))
+    stay = "the key moment stays at its time" if len(keys) == 1 else "these key moments stay at their times"
+    return [TimedMessage(f"{times} s: the ball's trajectory has no touch for {words} within {MAX_TOUCH_OFFSET:g} s; "
+                         f"{stay}", *((key.time, key.time) for key in keys))]
+
+
+def _report_carries(track: Track) -> list[str]:
+    """Report in one line where the feed has the ball at the player's place."""
+    carries = _find_carries(track)
+    times = ", ".join(f"{first:.1f}-{last:.1f}" for first, last in carries)
+    return [TimedMessage(f"{times} s: the feed has the ball at the player's own place; it is dribbled as the feet have "
+                         "it", *carries)] if carries else []
+
+
+def _report_untouched_dribbles(take: Take, dribbles: list[Span]) -> list[str]:
+    """Report the labelled dribbles in which no foot touches the ball."""
     touched = np.array([take.start_time + push.first / take.motion.fps for push in take.dribble_touches])
-    return missing + [
+    return [
         TimedMessage(
             f"{span.start:g}-{span.end:g} s: no foot touches the ball in this "
             f"'{' '.join(sorted(_CARRYING.intersection(span.words)))}': it is too short, or no foot "
             "is near the ball", (span.start, span.end),
-        ) for span in plan.timeline.spans
-        if _CARRYING.intersection(span.words) and not ((touched >= span.start) & (touched <= span.end)).any()
+        ) for span in dribbles if not ((touched >= span.start) & (touched <= span.end)).any()
     ]  # fmt: skip
 
 
-def apply_trajectory(take: Take, plan: ResolvedPlan) -> Take:
-    """Lead the ball of a take along its solved trajectory, through the places where it was met, and dribble it step by
-    step.
+def apply_trajectory(take: Take, plan: ResolvedPlan) -> tuple[Take, list[str]]:
+    """Lead the ball of a take along its solved trajectory, through the places where it was met and around the body, and
+    dribble it step by step.
 
     Args:
         take: the take with the ball as it was met.
         plan: the resolved plan.
     Returns:
-        The take; unchanged where nothing is solved.
+        The take, unchanged where nothing is solved, and messages about measured places that lie in the body.
     """
     if plan.trajectory is None or take.ball is None:
-        return replace(take, solved=plan.trajectory)
+        return replace(take, solved=plan.trajectory), []
     fps, contact_ball, times = take.motion.fps, take.ball.positions, take.ball.times
-    held = [compute_contact_frames(key.frame, len(contact_ball)) for key in _list_ball_keys(take)]
+    keys = _list_ball_keys(take)
+    held = [compute_contact_frames(key.frame, len(contact_ball)) for key in keys]
     course_changes = [(touch.time - take.start_time) * fps for touch in plan.trajectory.touches]
     trajectory, filled = plan.trajectory.interpolate(times)
     path = np.where(np.isfinite(trajectory), trajectory, contact_ball)
     known = np.interp(times, plan.track.times, plan.track.ball_height_known.astype(float)) > 0.5
     for number, pair in enumerate(held):
         path = add_flight_arc(path, float(np.mean(pair)), float(contact_ball[list(pair), 2].mean()), ~known, fps)
-        path = lead_ball_through(path, pair, contact_ball[list(pair)],
-                                 _find_course_changes(pair, held[:number] + held[number + 1 :], course_changes, fps))
-    stretches = [
-        ((span.start - take.start_time) * fps, (span.end - take.start_time) * fps)
-        for span in plan.timeline.spans if _CARRYING.intersection(span.words)
-    ]  # fmt: skip
+        bounds = _find_course_changes(pair, held[:number] + held[number + 1 :], course_changes, fps)
+        path = lead_ball_through(path, pair, contact_ball[list(pair)], bounds)
+        path = give_with_ball(take.motion.skeleton, take.motion.root_positions, take.motion.rotations, path, held=pair,
+                              words=keys[number].contact_labels, until=bounds[1], fps=fps)
+    stretches = [((first - take.start_time) * fps, (last - take.start_time) * fps)
+                 for first, last in _list_dribbles(plan)]
     foot_contacts = take.contacts if take.stepped is None else take.contacts | take.stepped
     dribbled = plan_dribbles(take.motion.skeleton, take.motion.root_positions, take.motion.rotations,
                              foot_contacts=foot_contacts, ball=path, stretches=stretches, held=held, fps=fps,
                              measured=take.ball.measured & ~filled, course_changes=course_changes)
     pushes = tuple(DribbleTouch(push.first, push.last, push.side) for push in dribbled.pushes)
-    ball = replace(take.ball, positions=dribbled.ball)
-    return replace(take, ball=ball, solved=plan.trajectory, contact_ball=take.ball, dribble_touches=pushes)
+    pushed = [(push.first, push.last) for push in pushes]
+    free, met = _free_met_ball(take, dribbled.ball, pushed)
+    around = lead_ball_around_body(take.motion.skeleton, take.motion.root_positions, take.motion.rotations, ball=free,
+                                   held=[*met, *pushed], fps=fps)
+    ball, far = replace(take.ball, positions=around), np.linalg.norm(around - dribbled.ball, axis=1)
+    messages = _report_detours(times, np.where(take.ball.measured & ~filled, far, 0.0))
+    return replace(take, ball=ball, solved=plan.trajectory, contact_ball=take.ball, dribble_touches=pushes), messages
+
+
+def _list_dribbles(plan: ResolvedPlan) -> list[tuple[float, float]]:
+    """List first and last second of each dribble: labelled ones, and where the feed has the ball at the player."""
+    labelled = [(span.start, span.end) for span in plan.timeline.spans if _CARRYING.intersection(span.words)]
+    out: list[tuple[float, float]] = []
+    for first, last in sorted([*labelled, *_find_carries(plan.requested.track)]):
+        joins = out and first <= out[-1][1]
+        out = [*out[:-1], (out[-1][0], max(out[-1][1], last))] if joins else [*out, (first, last)]
+    return out
+
+
+def _find_carries(track: Track) -> list[tuple[float, float]]:
+    """Find first and last second of each stretch in which the feed has the ball at the player's place."""
+    return find_carried_stretches(track.times, track.ball, track.positions)
+
+
+def _report_detours(times: np.ndarray, moved: np.ndarray) -> list[str]:
+    """Report where the ball goes farther round the body than its noise: `moved` (T,) m from where it was measured."""
+    return [
+        TimedMessage(
+            f"{times[first]:.1f}-{times[end - 1]:.1f} s: the measured ball is inside the body; it goes round it, up to "
+            f"{moved[first:end].max():.2f} m away", (float(times[first]), float(times[end - 1])),
+        ) for first, end in find_runs(moved > BALL_NOISE)
+    ]  # fmt: skip
 
 
 def _list_ball_keys(take: Take) -> list[KeyResult]:
     """List the key moments in which some part meets the ball, in order of time."""
     skeleton = take.motion.skeleton
     return sorted((key for key in take.keys if build_surfaces(skeleton, key.contact_labels)), key=lambda key: key.frame)
+
+
+def _free_met_ball(take: Take, ball: np.ndarray,
+                   pushes: list[tuple[int, int]]) -> tuple[np.ndarray, list[tuple[int, int]]]:
+    """Move the ball (T, 3) m out of the rest of the body where a part meets it at a key moment.
+
+    Args:
+        take: the take.
+        ball: (T, 3) m.
+        pushes: first and last frame of each touch of a dribble.
+    Returns:
+        The ball, and first and last frame of each such meeting.
+    """
+    out, met, skeleton, reach = ball, [], take.motion.skeleton, int(BALL_SECONDS * take.motion.fps)
+    for key in _list_ball_keys(take):
+        frame = find_nearest_frame(key.frame, len(ball))
+        places, world = (values[0] for values in compute_pose(skeleton, take.motion.root_positions[frame : frame + 1],
+                                                              take.motion.rotations[frame : frame + 1]))
+        surfaces = build_surfaces(skeleton, key.contact_labels)
+        gaps = [abs(measure_ball_gap(part.compute_line(places, world), part.radius, out[frame])) for part in surfaces]
+        if min(gaps) < _MET_GAP:
+            place = find_free_contact(skeleton, surfaces[int(np.argmin(gaps))], places, world, out[frame])
+            edges = [other for pair in (*pushes, *met) for other in pair]
+            bounds = (max([frame - reach, *(edge for edge in edges if edge < frame)]),
+                      min([frame + reach, *(edge for edge in edges if edge > frame)]))
+            out = lead_ball_through(out, (frame, frame), np.array([place, place]), bounds)
+            met.append((frame, frame))
+    return out, met
 
 
 def _find_course_changes(pair: tuple[int, int], others: list[tuple[int, int]], course_changes: list[float],

@@ -18,7 +18,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ..annotation import avoided_labels_per_frame
-from ..base.errors import InputError, TimedMessage, format_seconds
+from ..base.errors import InputError, TimedMessage, format_count, format_seconds
+from ..base.settings import find_setting
 from ..base.time_series import find_runs
 from ..library.library import Library
 from ..motion.foot_plant import PlantResult
@@ -229,11 +230,12 @@ def finish_take(
     """
     take = add_pins(to_player_size(take, plan.size, plan.requested, before), recordings)
     started = time.perf_counter()
-    take = _miss_ball(apply_trajectory(take, plan))
+    take, detours = apply_trajectory(take, plan)
+    take = _miss_ball(take)
     if plan.trajectory is not None:
         take = replace(take, seconds={**take.seconds, "ball": time.perf_counter() - started})
-    return add_warnings(take, recordings, request, hurried_from, more=report_missing_touches(take, plan),
-                        report_unmet=report_unmet)
+    return add_warnings(take, recordings, request, hurried_from, report_unmet=report_unmet,
+                        more=[*report_missing_touches(take, plan), *detours])
 
 
 def _miss_ball(take: Take) -> Take:
@@ -331,7 +333,13 @@ def _report_missed_pins(take: Take) -> list[str]:
 
 
 def _report_ignored_heading_keys(plan: Plan) -> list[str]:
-    """Report the heading keys before the start and after the end of the track, one line for each of the two."""
+    """Report the heading keys before the start and after the end of the track, one line for each of the two; all of
+    them where the method plans no heading.
+    """
+    if plan.heading_keys and plan.method != "path":
+        count = format_count(len(plan.heading_keys), "heading key")
+        titles = {name: title for name, title, _ in find_setting("synthesis", "method").choices}
+        return [f"{count}: the method {titles[plan.method]} plans no heading; ignored; choose {titles['path']}"]
     start, end = plan.track.times[0], plan.track.times[-1]
     messages = []
     for keys in ([key for key in plan.heading_keys if key.end < start],

@@ -145,7 +145,7 @@ def build_strike(
     Returns:
         The move.
     """
-    recipe = STRIKES[kind] if at_speed is None else _adapt_to_run(STRIKES[kind], at_speed)
+    recipe = STRIKES[kind] if at_speed is None else adapt_to_run(STRIKES[kind], at_speed)
     return build_touch(recipe, skeleton, fps, speed, seed, example=example)
 
 
@@ -181,7 +181,7 @@ def build_touch(
     return Gesture(to_motion(posture.frames(gait_plan.requested_slice), neutral), key, begin - 0.15, land + 0.1)
 
 
-def _adapt_to_run(recipe: StrikeRecipe, speed: float) -> StrikeRecipe:
+def adapt_to_run(recipe: StrikeRecipe, speed: float) -> StrikeRecipe:
     """Adapt a strike to a run at `speed` m/s.
 
     Steps keep their rhythm, arms and trunk swing less, and the touch falls in the middle of the support foot's short

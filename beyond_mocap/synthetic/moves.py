@@ -70,8 +70,10 @@ def build_header(
     key = 1.5
     gait_plan, steps, posture = build_standing(neutral, key + 1.9, fps, seed, width=0.10)
     times = gait_plan.times - key
-    air = _FLIGHT * np.sqrt(scale) if rise is None else np.sqrt(2.0 * max(rise - _SOFT_TOES * scale, 0.02) / tables.GRAVITY)
-    longer = 0.0 if rise is None else float(air) - _FLIGHT
+    air, longer = float(_FLIGHT * np.sqrt(scale)), 0.0
+    if rise is not None:
+        air = float(np.sqrt(2.0 * max(rise - _SOFT_TOES * scale, 0.02) / tables.GRAVITY))
+        longer = air - _FLIGHT
     table_times = _adapt_times(times, air, longer)
     trunk, arms = (np.radians(interpolate_rows(_HEADER[name], table_times)) for name in ("trunk", "arms"))
     ease = compute_envelope(table_times, -1.1, -0.8, 0.9, 1.4)

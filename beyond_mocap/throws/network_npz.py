@@ -14,9 +14,9 @@ from pathlib import Path
 
 import numpy as np
 
+from ..base.content import read_bytes
 from ..base.errors import InputError
 from ..files.atomic import atomic_write
-from ..files.content import read_bytes
 from ..files.json_values import (
     check_list,
     check_names,

@@ -12,8 +12,8 @@ import numpy as np
 from ..annotation import ClipAnnotation
 from ..annotation.labels import list_labels
 from ..ball.physics import BASEBALL, FOOTBALL, Ball
+from ..base.content import read_bytes
 from ..base.errors import InputError
-from ..files.content import read_bytes
 from ..files.tables import parse_number, read_rows
 from ..library.scan import Annotations
 from .networks.chains import EFFECTORS as LIMBS

@@ -13,6 +13,7 @@ from dataclasses import dataclass
 import bpy
 import numpy as np
 
+from ...beyond_mocap.annotation import DISCRETE
 from ...beyond_mocap.synthesis.take import Take
 from ..core import channels
 from ..core.action import PLACEMENT
@@ -55,14 +56,18 @@ def compute_blocks(take: Take, scene: bpy.types.Scene) -> tuple[Block, ...]:
     edges = [int(round(first + seam * rate)) for seam in transitions]
     edges[0], edges[-1] = int(np.ceil(first - 1e-4)), int(np.floor(first + (len(take.motion) - 1) * rate + 1e-4))
     found = []
-    for seam, start, end in zip(transitions, edges, edges[1:]):
+    for seam, until, start, end in zip(transitions, transitions[1:], edges, edges[1:]):
         if end > start:
-            found.append(Block(found[-1].end if found else start, end, build_strip_name(take, seam)))
+            found.append(Block(found[-1].end if found else start, end, build_strip_name(take, seam, until)))
     return tuple(found)
 
 
-def build_strip_name(take: Take, frame: int) -> str:
-    """Build the name of a strip that starts at a frame of the take: clip and labels."""
+def build_strip_name(take: Take, first: int, end: int) -> str:
+    """Build the name of the strip of the frames `first` to before `end` of a take: clip and labels.
+
+    The labels are those of its action if there is one: a kick on the run begins with a run-up.
+    """
+    frame = next((i for i in range(first, end) if DISCRETE.intersection(take.words[i])), first)
     clip = take.clips[take.clip[frame]].rpartition("/")[2].removesuffix(".bvh")
     mirrored = " (mirrored)" if take.mirrored[frame] else ""
     return f"{clip}{mirrored} {' '.join(take.words[frame])}".strip()[:60]

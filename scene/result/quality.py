@@ -49,6 +49,13 @@ FIGURES = (  # name, key path in the report, factor (a negative one counts from 
     ("Heading off plan, 90 %", "naturalness.off_plan_deg_p90", 1, "{:.0f}", "°"),
     ("Foot lifts standing", "naturalness.standing.foot_lifts_per_min", 1, "{:.0f}", " /min"),
     ("Both feet down standing", "naturalness.standing.both_down", 100, "{:.0f}", " %"),
+    ("Foot speed at receptions", "touches.reception.speed_m_s_median", 1, "{:.1f}", " m/s"),
+    ("Second strikes", "touches.second_strike_count", 1, "{:.0f}", ""),
+    ("Kicking foot's speed", "touches.kick.ankle_speed_m_s_median", 1, "{:.1f}", " m/s"),
+    ("Ball over foot speed", "touches.ball_speed.ratio_median", 1, "{:.2f}", " x"),
+    ("Touches that fit the ball", "touches.fit.fit_share", 100, "{:.0f}", " %"),
+    ("Ball inside the body", "touches.ball_inside.inside_frames", 1, "{:.0f}", " frames"),
+    ("Other labels shown", "touches.substituted_count", 1, "{:.0f}", " key moments"),
     ("Computing time", "seconds.total", 1, "{:.1f}", " s"),
 )
 ERROR_GROUP, ERROR_MARK = "Beyond Mocap", "beyond_mocap_error_curves"

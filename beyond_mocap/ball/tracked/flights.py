@@ -30,7 +30,7 @@ _MIN_AIR_HEIGHT = 0.35  # m of the centre above its rest: higher is a flight
 
 
 def replace_by_flights(samples: Samples, pieces: list[BallPiece], moments: np.ndarray, heights: bool,
-                       cancelled=None) -> list[BallPiece]:
+                       cancelled=None, ends: np.ndarray | None = None) -> list[BallPiece]:
     """Replace pieces between neighbouring touches by flights, where these fit.
 
     Args:
@@ -39,13 +39,14 @@ def replace_by_flights(samples: Samples, pieces: list[BallPiece], moments: np.nd
         moments: (K,) s of the touches.
         heights: whether the heights of the samples are used.
         cancelled: called between batches; True cancels the work.
+        ends: (E,) s of the touches of which a flight has to have one; None: any.
     Returns:
         The pieces with flights in place of those they explain.
     Raises:
         UserCancelledError: if `cancelled` returns True.
     """
     groups = _group_pieces(pieces, moments)
-    groups = [group for group in groups if _is_worth_fitting(group)]
+    groups = [group for group in groups if _is_worth_fitting(group) and (ends is None or _has_end(group, ends))]
     if not groups:
         return pieces
     spans = [_build_span(group, heights) for group in groups]
@@ -119,6 +120,11 @@ def _is_worth_fitting(group: list[BallPiece]) -> bool:
     seconds = group[-1].end - group[0].start
     way = sum(np.linalg.norm(piece.positions[-1, :2] - piece.positions[0, :2]) for piece in group)
     return bool(_SHORTEST <= seconds <= LONGEST and way >= _MIN_DISTANCE)
+
+
+def _has_end(group: list[BallPiece], ends: np.ndarray) -> bool:
+    """Return whether a group begins or ends at one of some touches (E,) s."""
+    return any(np.abs(ends - edge).min(initial=np.inf) < 1e-6 for edge in (group[0].start, group[-1].end))
 
 
 def _find_end_points(group: list[BallPiece]) -> tuple[np.ndarray, np.ndarray]:

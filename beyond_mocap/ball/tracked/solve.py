@@ -105,7 +105,7 @@ class SolvedBall:
 def solve_samples(times: np.ndarray, ball: np.ndarray, positions: np.ndarray, players: Sequence[str],
                   teams: Sequence[str] = (), pitch: tuple[float, float] = PITCH, where: str = "ball",
                   progress: Callable[[float, str], None] | None = None, cancelled: Callable[[], bool]
-                  | None = None) -> SolvedBall:
+                  | None = None, only_own_flights: bool = False) -> SolvedBall:
     """Solve the ball of a feed.
 
     Args:
@@ -118,6 +118,7 @@ def solve_samples(times: np.ndarray, ball: np.ndarray, positions: np.ndarray, pl
         where: the feed's name, for messages.
         progress: receives the share done and the step.
         cancelled: called between steps; True cancels the work.
+        only_own_flights: whether flights are fitted only from and to touches of `players`, which is sooner done.
     Returns:
         Touches, trajectory and exits.
     Raises:
@@ -143,7 +144,9 @@ def solve_samples(times: np.ndarray, ball: np.ndarray, positions: np.ndarray, pl
         progress(0.6, "flights")
     moments = np.array([touch.time for touch in solved])
     heights = _has_heights(samples)
-    path = SolvedTrajectory(tuple(replace_by_flights(samples, curves, moments, heights, cancelled)))
+    ends = np.array([touch.time for touch in solved if touch.player]) if only_own_flights else None
+    path = SolvedTrajectory(tuple(replace_by_flights(samples, curves, moments, heights, cancelled=cancelled,
+                                                     ends=ends)))
     solved = [_update_touch(touch, path, heights) for touch in solved]
     ends = find_ball_ends(samples.times, path.at(samples.times), *pitch)
     solved = _label_throw_ins(solved, ends, pitch[1])
@@ -388,7 +391,7 @@ def _add_last_player(end: BallEnd, solved: list[SolvedTouch]) -> BallEnd:
 
 def solve_ball(source: Match | Track, progress: Callable[[float, str], None] | None = None,
                cancelled: Callable[[], bool] | None = None, start: float | None = None,
-               end: float | None = None) -> SolvedBall:
+               end: float | None = None, only_own_flights: bool = False) -> SolvedBall:
     """Solve the ball of a match or of one player's track, whole or from `start` to `end`.
 
     A track has one player: touches by others have the player "". Referees do not touch the ball.
@@ -399,6 +402,7 @@ def solve_ball(source: Match | Track, progress: Callable[[float, str], None] | N
         cancelled: called between steps; True cancels the work.
         start: s. None: from the beginning.
         end: s. None: to the end.
+        only_own_flights: of a track, whether only flights from and to its player are fitted, which is sooner done.
     Returns:
         Touches, trajectory and exits.
     Raises:
@@ -414,7 +418,8 @@ def solve_ball(source: Match | Track, progress: Callable[[float, str], None] | N
         unknown = ~source.ball_height_known[:, None] & [False, False, True]
         ball = np.where(unknown, np.nan, source.ball)
         return solve_samples(source.times[part], ball[part], source.positions[None, part], [source.name],
-                             where=source.name, pitch=PITCH, progress=progress, cancelled=cancelled)
+                             where=source.name, pitch=PITCH, progress=progress, cancelled=cancelled,
+                             only_own_flights=only_own_flights)
     playing = [index for index, player in enumerate(source.players) if player.team != REFEREE]
     players = [source.players[index] for index in playing]
     return solve_samples(source.times[part], source.ball[part], source.positions[playing][:, part],

@@ -52,10 +52,11 @@ TABLES = {
                 "of the clustering for blocks and distance",
                 tooltip="Random seed of how the player watches the ball, and of the clustering for Blocks and Distance",
                 in_preset=True, option_more=dict(least=0, most=2**31 - 1), panel_more=dict(min=0)),
-        Setting(name="solve_touches", default=False, option="--solve-touches", help="move key moments to the touches "
-                "found in the ball's samples; the ball follows physics and is dribbled step by step",
+        Setting(name="solve_touches", default=True, option="--no-solve-touches", help="use the ball as in the track; "
+                "otherwise key moments move to the touches found in its samples, and it follows physics, is dribbled "
+                "step by step and keeps out of the body",
                 tooltip="Move key moments to the touches found in the ball's samples, within 0.4 s, and let the ball "
-                "follow physics and the dribbling feet", in_preset=True),
+                "follow physics and the dribbling feet, and keep out of the body", in_preset=True),
         Setting(name="alpha", default=0.2, least=0.0, most=1.0, expected=BETWEEN, option="--alpha", metavar="SHARE",
                 help="weight of labels against continuity; default %(default)g", title="Label Weight", tooltip="Weight "
                 "of labels against smooth transitions: 0 for smooth transitions only, 1 for labels only",

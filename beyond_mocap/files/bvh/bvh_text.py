@@ -15,8 +15,8 @@ from pathlib import Path
 
 import numpy as np
 
+from ...base.content import read_bytes
 from ...base.errors import InputError, format_count
-from ..content import read_bytes
 
 POSITIONS = ("Xposition", "Yposition", "Zposition")
 ROTATIONS = ("Xrotation", "Yrotation", "Zrotation")

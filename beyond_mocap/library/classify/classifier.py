@@ -10,13 +10,13 @@ import json
 import os
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from pathlib import Path
 
 import numpy as np
 from scipy.ndimage import uniform_filter1d
 from scipy.signal import find_peaks
 
 from ...annotation import LOCOMOTION, ClipAnnotation, swap_sides
+from ...base.content import read_bytes
 from ...base.errors import InputError, format_count
 from ...base.time_series import find_runs
 from ...files.atomic import atomic_write
@@ -297,18 +297,16 @@ def write_classifier(path: str | os.PathLike, known: Classifier) -> None:
 
 def read_classifier(path: str | os.PathLike) -> Classifier:
     """Read a classifier; InputError where the file is missing, damaged, or of another version."""
-    path = Path(path)
+    if not os.path.exists(path):
+        raise InputError(path, "no such file", "a file of learned labels", _NEXT_STEP)
     try:
-        if path.stat().st_size > _MAX_BYTES:
-            raise InputError(path, "more than 256 MiB", "a file of learned labels", _NEXT_STEP)
-        with np.load(path, allow_pickle=False) as stored:
+        content = io.BytesIO(read_bytes(path, "a file of learned labels", _MAX_BYTES))
+        with np.load(content, allow_pickle=False) as stored:
             arrays = {name: stored[name] for name in stored.files}
         header = json.loads(arrays["header"].tobytes())
         version = header["version"]
     except InputError:
         raise
-    except FileNotFoundError:
-        raise InputError(path, "no such file", "a file of learned labels", _NEXT_STEP) from None
     except Exception:  # a damaged file can raise any of zipfile's, numpy's and json's exceptions
         raise InputError(path, "a file that cannot be read", "a file of learned labels", _NEXT_STEP) from None
     if version != _FILE_VERSION:

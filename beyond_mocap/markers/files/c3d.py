@@ -16,8 +16,8 @@ from pathlib import Path
 
 import numpy as np
 
+from ...base.content import open_file
 from ...base.errors import InputError
-from ...files.content import open_file
 from ..trial import MAX_FPS, MIN_FPS, MarkerTrial
 from .raw_markers import RawMarkers, build_trial
 

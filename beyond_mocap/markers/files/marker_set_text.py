@@ -7,8 +7,8 @@ import re
 from pathlib import Path
 from typing import Any
 
+from ...base.content import read_utf8
 from ...base.errors import InputError
-from ...files.content import read_utf8
 from ..model.marker_set import MarkerSet
 from ..model.template import JOINTS, LANDMARKS
 

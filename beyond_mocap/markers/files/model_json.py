@@ -8,9 +8,9 @@ import os
 
 import numpy as np
 
+from ...base.content import read_utf8
 from ...base.errors import InputError
 from ...files.atomic import atomic_write
-from ...files.content import read_utf8
 from ...files.json_values import (
     check_bool,
     check_list,

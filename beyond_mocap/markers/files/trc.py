@@ -16,9 +16,9 @@ from pathlib import Path
 
 import numpy as np
 
+from ...base.content import read_bytes
 from ...base.errors import InputError, format_count
 from ...files.atomic import atomic_write
-from ...files.content import read_bytes
 from ..trial import MAX_FPS, MIN_FPS, MarkerTrial
 from .raw_markers import RawMarkers, build_trial
 

@@ -33,8 +33,10 @@ from ..player_edit import PlayerEdit
 from .units import Unit
 from .windows import Piece, search_window
 
-_MAX_NAMES, _MIN_NAMES = {"max", "support_max", "recordings"}, {"min"}
-_SUMS = re.compile(r".*frames|duration_s|.*count|seams|(source_)?(seconds|strides|stances)|slow_pieces")
+# the recordings' touches are those of the whole library in every stretch
+_MAXIMA, _MIN_NAMES = re.compile(r"(.*_)?max|recordings|source_(receptions|kicks|strike_count)"), {"min"}
+_SUMS = re.compile(r".*frames|duration_s|.*count|seams|(source_)?(seconds|strides|stances)|slow_pieces|receptions|"
+                   r"kicks|touches")
 
 
 @dataclass(frozen=True)
@@ -291,13 +293,13 @@ def _merge_values(name: str, values: list, weights: Sequence[float]):
     if isinstance(first, (bool, str)) or name in ("version", "seed", "fps"):
         return first
     numbers = np.array([value for value, _ in known], dtype=float)
-    is_sum = _SUMS.fullmatch(name) is not None
-    if name in _MAX_NAMES or name in _MIN_NAMES or is_sum:
-        merged = numbers.max() if name in _MAX_NAMES else numbers.min() if name in _MIN_NAMES else numbers.sum()
+    is_max, is_sum = _MAXIMA.fullmatch(name) is not None, _SUMS.fullmatch(name) is not None
+    if is_max or name in _MIN_NAMES or is_sum:
+        merged = numbers.max() if is_max else numbers.min() if name in _MIN_NAMES else numbers.sum()
     else:
         shares = np.array([weight for _, weight in known], dtype=float)
         merged = np.average(numbers, weights=shares if shares.any() else None)
-    return int(merged) if isinstance(first, int) and (is_sum or name in _MAX_NAMES) else float(merged)
+    return int(merged) if isinstance(first, int) and (is_sum or is_max) else float(merged)
 
 
 def _list_weights(name: str, groups: Sequence[tuple[dict, float]]) -> list[float]:

@@ -12,6 +12,7 @@ from pathlib import Path
 import numpy as np
 
 from ...base.errors import format_seconds
+from ...evaluation import naturalness_figures, touch_figures
 from ...evaluation.html_page import (
     Html,
     build_element,
@@ -25,8 +26,8 @@ from ...evaluation.html_page import (
     build_title,
     join_html,
 )
-from ...evaluation.naturalness_figures import TITLES
 from ...evaluation.report import flatten_report
+from ...evaluation.titles import Title
 from ...synthesis.quality.targets import find_target
 from .pictures import encode_png, render_heat_strip
 from .results import (
@@ -164,8 +165,9 @@ def _build_teams(match: MatchResults, span: tuple[float, float], anchors, shared
         members = [player for player in match.players if player.team == team.name]
         dot = build_element("span", class_="dot", style=f"background:{team.colour}") if team.colour else ""
         if members:
-            tables = build_team_table(members, strips, anchors, shared), build_naturalness_table(members, anchors)
-            parts.append(build_section(join_html(dot, team.name or "No team"), *tables))
+            tables = [build_group_table(title, members, anchors) for title in EYE_TABLES]
+            first = build_team_table(members, strips, anchors, shared)
+            parts.append(build_section(join_html(dot, team.name or "No team"), first, *tables))
     text = ("Strips: the worst figure of every second; green far below its limit, amber at it, red beyond, grey where "
             "the player has no motion. Green and red figures: target met or not.")  # fmt: skip
     return [*parts, build_element("p", text, class_="quiet")] if parts else []
@@ -273,9 +275,22 @@ COLUMNS = (
 _NATURALNESS = ("snap_turns_per_min", "spins_per_min", "pelvis_drops_per_min", "jolts_per_min", "cuts_per_min",
                 "dwell_s_median", "short_dwell_share", "unusual_posture_share", "off_plan_deg_p90",
                 "off_travel_deg_p90", "standing.foot_lifts_per_min", "standing.both_down")  # fmt: skip
-NATURALNESS_COLUMNS = tuple(Column(f"naturalness.{name}", TITLES[name].text.lower(), TITLES[name].unit,
-                                   TITLES[name].scale, TITLES[name].digits) for name in _NATURALNESS)
-"""The second table of a team: what the eye sees."""
+_TOUCHES = ("reception.receptions", "reception.speed_m_s_median", "second_strike_count", "kick.kicks",
+            "kick.ankle_speed_m_s_median", "kick.plant_in_range_share", "ball_speed.ratio_median", "fit.fit_share",
+            "ball_inside.inside_frames", "substituted_count", "synthetic_count")  # fmt: skip
+
+
+def _build_columns(group: str, names: Sequence[str], titles: Mapping[str, Title]) -> tuple[Column, ...]:
+    """Build the columns of some figures of a group."""
+    found = [(f"{group}.{name}", titles[name]) for name in names]
+    return tuple(Column(figure, title.text.lower(), title.unit, title.scale, title.digits) for figure, title in found)
+
+
+EYE_TABLES = {
+    "What the eye sees": ("naturalness", _build_columns("naturalness", _NATURALNESS, naturalness_figures.TITLES)),
+    "At the ball": ("touches", _build_columns("touches", _TOUCHES, touch_figures.TITLES)),
+}
+"""The further tables of a team: title -> group of the report, and columns."""
 _MAX_OVERLAP = 0.02  # m of overlap of two bodies that is accepted
 
 
@@ -358,28 +373,28 @@ def _find_worst_value(column: Column, values: Sequence[float]) -> float:
     return min(values) if target is not None and target.most is None and target.own is None else max(values)
 
 
-def build_naturalness_table(players: Sequence[PlayerResult], anchors: Mapping[str, str]) -> Html:
-    """Build a team's table of what the eye sees: a row per player, mean and worst; empty without such a report.
+def build_group_table(title: str, players: Sequence[PlayerResult], anchors: Mapping[str, str]) -> Html:
+    """Build a team's table of a group of figures: a row per player, mean and worst; empty without such a report.
 
     Args:
+        title: of EYE_TABLES.
         players: of the team.
         anchors: anchor of each player's part of the page, by id.
     Returns:
         The table.
     """
-    reported = [player for player in players if player.report.get("naturalness")]
+    group, columns = EYE_TABLES[title]
+    reported = [player for player in players if player.report.get(group)]
     if not reported:
         return Html()
     rows = []
     for player in reported:
         found = flatten_report({key: value for key, value in player.report.items() if key != "per_second"})
-        cells = [_build_cell(column, _find_value(player, column.figure, found), player, found)
-                 for column in NATURALNESS_COLUMNS]
+        cells = [_build_cell(column, _find_value(player, column.figure, found), player, found) for column in columns]
         rows.append(build_row(build_element("td", _build_link(player, anchors), class_="name"), *cells))
-    rows += [build_row(title, *cells, class_="sum")
-             for title, cells in _summarize_columns(NATURALNESS_COLUMNS, reported)]
-    titles = [build_title(column.title, column.unit) for column in NATURALNESS_COLUMNS]
-    return join_html(build_element("h3", "What the eye sees"), build_table(("player", *titles), rows))
+    rows += [build_row(name, *cells, class_="sum") for name, cells in _summarize_columns(columns, reported)]
+    titles = [build_title(column.title, column.unit) for column in columns]
+    return join_html(build_element("h3", title), build_table(("player", *titles), rows))
 
 
 def _find_value(player: PlayerResult, figure: str, found: Mapping[str, object]) -> float:

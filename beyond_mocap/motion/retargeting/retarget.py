@@ -29,7 +29,8 @@ from pathlib import Path
 
 import numpy as np
 
-from ...base.errors import InputError, build_read_error
+from ...base.content import read_utf8
+from ...base.errors import InputError
 from ...base.vectors import unit_vectors
 from .. import limb, quaternion
 from ..humanoid import Humanoid, Limb, build_humanoid, identify_joints, identify_posed_joints, list_roles
@@ -325,9 +326,7 @@ def read_bone_map(path: str | Path) -> dict[str, str]:
         InputError: if the file cannot be read or is not a JSON object of names.
     """
     try:
-        found = json.loads(Path(path).read_text(encoding="utf-8"))
-    except OSError as error:
-        raise build_read_error(path, "a bone map (JSON)", error) from None
+        found = json.loads(read_utf8(path, "a bone map (JSON)"))
     except (ValueError, RecursionError):
         raise InputError(path, "not JSON", _MAP_FORM, "correct the file") from None
     if not isinstance(found, dict) or not all(isinstance(name, str) for name in found.values()):

@@ -40,13 +40,13 @@ from .track_following import (
     absorb_foot_slide,
     add_sway,
     compute_missing_lean,
-    compute_turn_to_ball,
     compute_turning_firmness,
     fit_heading,
     lean_into_curves,
     pull_to_track,
 )
 from .transitions import blend_rotations, blend_values, compute_blend_share
+from .turn_to_ball import compute_turn_to_ball
 
 # s on either side of a key moment without a clip, in which the body reaches for the ball and returns
 REACH_SECONDS = 0.4

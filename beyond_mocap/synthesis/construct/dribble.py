@@ -15,10 +15,9 @@ import numpy as np
 
 from ...motion.skeleton import Skeleton
 from .contact_geometry import move_ball_at
-from .dribble_search import SOONEST, DribblePart, DribbleSearch, Legs, Push
+from .dribble_search import SOONEST, DribblePart, DribbleSearch, Push
 
 KEY_SECONDS = 0.5  # s from either end of a stretch within which a key moment begins or ends the dribble
-_BEYOND = 0.3  # s beyond an open end of a part in which the ball is still kept out of the body
 
 
 @dataclass(frozen=True, eq=False)
@@ -75,7 +74,6 @@ def plan_dribbles(
             touched = [*held, *((push.first, push.last) for push in pushes)]
             others = [*course_changes, *(edge for pair in touched for edge in pair)]
             path = _lead_open_ends(path, ball, part, first=before, last=after, others=others, fps=fps)
-            path = _keep_out_of_body(skeleton, root, rotations, path=path, part=part, held=touched, fps=fps)
     return DribbleResult(path, tuple(sorted(pushes, key=lambda push: push.first)))
 
 
@@ -109,26 +107,6 @@ def _lead_open_ends(path, feed, part: DribblePart, first: int, last: int, others
         anchor = min((frame for frame in others if frame > last), default=last + int(fps))
         path = _lead_to_touch(path, last, int(anchor), feed)
     return path
-
-
-def _keep_out_of_body(
-    skeleton: Skeleton, root, rotations, path: np.ndarray, part: DribblePart, held: Sequence[tuple[int, int]],
-    fps: float
-) -> np.ndarray:
-    """Lead the trajectory around the body; where the ball is `held` it stays.
-
-    At open ends this reaches a little further than the part, so that the ball does not jump there.
-    """
-    beyond = int(_BEYOND * fps)
-    low = part.low if part.is_met_at_start else max(part.low - beyond, 0)
-    high = part.high if part.is_met_at_end else min(part.high + beyond, len(path) - 1)
-    span, free = slice(low, high + 1), np.ones(len(path), bool)
-    free[[low, high]] = False
-    for first, last in held:
-        free[max(first, 0) : last + 1] = False
-    out = path.copy()
-    out[span] = Legs(skeleton, root[span], rotations[span], fps).keep_out(path[span], free[span])
-    return out
 
 
 def _lead_to_touch(path: np.ndarray, frame: int, anchor: int, feed: np.ndarray) -> np.ndarray:

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ...annotation.body_solid import BodySolid, build_leg_surfaces
 from ...annotation.striking import Surface, build_part_surfaces, find_nearest_point
 from ...ball.roll import compute_roll_speeds, simulate_rolls
 from ...base.time_series import find_runs
@@ -17,12 +18,12 @@ from ...motion.motion import compute_pose
 from ...motion.skeleton import Skeleton
 from ...motion.track import BALL_RADIUS, smooth_zero_phase_hann
 from .contact_geometry import find_touching_places
-from .move_body_part import foot_tip_line
 
-SOONEST, _LATEST = 0.2, 1.3  # s, shortest and longest roll from one touch to the next
+SOONEST, _LATEST = 0.2, 0.6  # s, shortest roll from one touch to the next, and longest beyond the `_LONG` below
 _ANGLES = np.radians([0.0, 35.0, -35.0, 65.0, -65.0])  # sides of the ball that are tried, from straight ahead
 _ALONG = 0.7  # share of the line from ankle to toes at which the ball is touched
 _RETURNING, _BEHIND = -0.5, 0.0  # least m/s of a touching foot relative to the body, and least m ahead of the pelvis
+_DEEPEST = 0.008  # m that a touched ball may be inside another part of the legs
 _LEVEL = 0.08  # m that the foot may be above or below the middle of the ball
 _PUSH_SECONDS = 0.11  # s, longest push
 _FROM_END = 0.9  # s from an open end within which the first or last touch lies
@@ -35,6 +36,9 @@ _INSIDE_COST = 60.0  # per metre of ball inside the body, for 1/30 s
 _NEAR, _FIT_COST = 0.25, 3.0  # per metre beyond this distance from its sample, for 1 s
 _BESIDE, _AHEAD_COST = 0.3, 4.0  # per metre less than this ahead of the pelvis, for 1 s
 _TOUCH_COST, _LONG, _LONG_COST = 0.04, 0.7, 4.0  # per touch, and per second beyond this to the next touch
+# A faster player knocks the ball farther ahead and reaches it after more steps, with a foot that is on its way back to
+# the ground but still moves forward over it: from _FAST on, for each m/s more, this is added to the values above.
+_FAST, _MORE_BESIDE, _MORE_TOUCH_COST, _MORE_LONG, _MORE_RETURNING = 3.0, 0.1, 0.06, 0.12, -0.8
 _ACROSS_COST, _BACK_COST, _SPEED_COST, _BRAKE_COST = 0.05, 0.3, 0.05, 0.6  # per m/s that such a foot cannot give
 _ANGLE_COST = 0.3  # per radian off straight ahead
 _PLANTED_COST = 0.3  # per touch by a planted foot
@@ -45,9 +49,7 @@ _LEAST_EXTRA = 0.5  # m/s by which it may leave slower, free of cost: a foot slo
 _KEPT = 6  # pushes of one swing from which the ball may roll on
 _START = -1  # node number of the part's beginning
 
-SHIN_RADIUS, TIP_RADIUS = 0.05, 0.0  # m around the lines of a shin and of the toes' tip that the ball stays out of
 SLOW = 0.6  # m/s below which the facing counts as the body's direction, not the velocity
-_ROUNDS, _CLOSE = 6, 5e-4  # most rounds of pushing a trajectory out of the body, and m at which they end
 
 
 @dataclass(frozen=True)
@@ -89,9 +91,7 @@ class Legs:
         pelvis: (W, 2) m, world.
         feet: striking surfaces of the left and right foot.
         lines: per foot both ends (W, 3) m of its surface's line.
-        start, along: (W, 6, 3) m, begin and extent of the lines of feet, shins and toes' tips.
-        squared: (W, 6) m^2, squared lengths of these lines.
-        least: (6,) m, radius of each part plus the ball's.
+        solid: feet, shins and toes' tips, which the ball stays out of.
         velocity: (W, 2) m/s of the pelvis without the sway of steps.
         speed: (W,) m/s of it.
         ahead: (W, 2) unit, direction of travel; the facing where the body is slower than SLOW.
@@ -111,14 +111,7 @@ class Legs:
         self.pelvis = places[:, body.hips, :2]
         self.feet: tuple[Surface, ...] = build_part_surfaces(skeleton, "foot")
         self.lines = [foot.compute_line(places, world) for foot in self.feet]
-        solid = [(line, foot.radius) for line, foot in zip(self.lines, self.feet)]
-        for limb in (body.left, body.right):
-            solid.append(((places[:, limb.lower_leg], places[:, limb.foot]), SHIN_RADIUS))
-            solid.append((foot_tip_line(skeleton, limb, places, world), TIP_RADIUS))
-        self.start = np.stack([line[0] for line, _ in solid], axis=1)  # (W, 6, 3)
-        self.along = np.stack([line[1] for line, _ in solid], axis=1) - self.start
-        self.squared = np.maximum(np.sum(self.along**2, axis=-1), 1e-12)
-        self.least = np.array([radius for _, radius in solid]) + BALL_RADIUS
+        self.solid = BodySolid.from_pose(build_leg_surfaces(skeleton), places, world)
         self.velocity = _smooth_velocity(self.pelvis, fps)
         self.speed = np.linalg.norm(self.velocity, axis=1)
         angle = compute_heading_from_positions(skeleton, places)
@@ -130,62 +123,6 @@ class Legs:
         """Compute the velocity (W, 2) m/s of the middle of a foot; side: 0 left, 1 right."""
         middle = np.mean(self.lines[side], axis=0)[:, :2]
         return np.gradient(middle, axis=0) * self.fps
-
-    def measure_gaps(self, balls: np.ndarray, frames: np.ndarray) -> np.ndarray:
-        """Measure the gaps between balls and the nearest part of the body.
-
-        Args:
-            balls: (N, 3) m, centres, world.
-            frames: (N,) frame of each.
-        Returns:
-            (N,) m, negative inside the body.
-        """
-        return np.min(self._offsets_and_gaps(balls, frames)[1], axis=1)
-
-    def keep_out(self, path: np.ndarray, free: np.ndarray) -> np.ndarray:
-        """Lead a ball's trajectory around the body.
-
-        Args:
-            path: (W, 3) m, world.
-            free: (W,) bool, where the ball may move.
-        Returns:
-            (W, 3) m; only x and y change.
-        """
-        every, aside, free = np.arange(len(path)), np.zeros((len(path), 2)), free[:, None]
-        for left in reversed(range(_ROUNDS)):
-            out = self.compute_way_out(path + np.pad(aside, ((0, 0), (0, 1))), every) * free
-            if np.abs(out).max(initial=0.0) < _CLOSE:
-                break
-            aside += out
-            # smooth with (1, 2, 1) / 4 between rounds, except after the last
-            if left:
-                padded = np.pad(aside, ((1, 1), (0, 0)), mode="edge")
-                aside = free * (0.25 * padded[:-2] + 0.5 * aside + 0.25 * padded[2:])
-        return path + np.pad(aside, ((0, 0), (0, 1)))
-
-    def compute_way_out(self, balls: np.ndarray, frames: np.ndarray) -> np.ndarray:
-        """Compute the shortest level move out of the part of the body that each ball is deepest in.
-
-        Args:
-            balls: (N, 3) m, centres, world.
-            frames: (N,) frame of each.
-        Returns:
-            (N, 2) m; zero outside the body.
-        """
-        away, gaps = self._offsets_and_gaps(balls, frames)
-        rows, part = np.arange(len(balls)), np.argmin(gaps, axis=1)
-        offset, level = away[rows, part], np.linalg.norm(away[rows, part, :2], axis=1)
-        needed = np.sqrt(np.maximum(self.least[part] ** 2 - offset[:, 2] ** 2, 0.0))
-        return offset[:, :2] * (np.maximum(needed - level, 0.0) / np.maximum(level, 1e-6))[:, None]
-
-    def _offsets_and_gaps(self, balls: np.ndarray, frames: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Compute the vectors (N, 6, 3) m from the nearest points of all parts to the balls, and the gaps (N, 6) m."""
-        start, along = self.start[frames], self.along[frames]
-        to = balls[:, None] - start
-        # nearest point of a line segment: projection, limited to its ends
-        share = np.clip(np.einsum("npk,npk->np", to, along) / self.squared[frames], 0.0, 1.0)
-        to -= share[..., None] * along
-        return to, np.sqrt(np.einsum("npk,npk->np", to, to)) - self.least
 
 
 def _smooth_velocity(places: np.ndarray, fps: float) -> np.ndarray:
@@ -219,6 +156,7 @@ class DribbleSearch:
         self.body = Legs(skeleton, root[span], rotations[span], fps)
         self.foot_contacts, self.feed, self.measured = foot_contacts[span], path[span], measured[span]
         self.pushes: list[Push] = []
+        self.haste = np.maximum(self.body.speed - _FAST, 0.0)  # (W,) m/s
         self._build_nodes()
 
     def _build_nodes(self) -> None:
@@ -249,12 +187,14 @@ class DribbleSearch:
         velocity = np.stack([self.body.foot_velocity(0), self.body.foot_velocity(1)])
         self.velocity = velocity[self.side, self.frame]
         forward = np.sum((self.velocity - self.body.velocity[self.frame]) * ahead, axis=1)
-        before = np.sum((np.mean(line, axis=0)[:, :2] - self.body.pelvis[self.frame]) * ahead, axis=1)
-        # a foot in the air has to swing forward and be ahead of the pelvis; a planted foot always counts
-        usable &= (forward > _RETURNING) & (before > _BEHIND) | (self.stood > 0)
+        # a foot in the air has to swing forward; a planted foot always counts
+        returning = _RETURNING + _MORE_RETURNING * self.haste[self.frame]
+        usable &= (forward > returning) | (self.stood > 0)
+        usable &= self.body.solid.measure_gaps(self.place, self.frame) > -_DEEPEST
         self._keep_nodes(usable)
         self.held = self._evaluate_places(self.place, self.frame)
         self.touch = _TOUCH_COST + _ANGLE_COST * np.abs(_ANGLES[self.angle]) + _PLANTED_COST * self.stood
+        self.touch += _MORE_TOUCH_COST * self.haste[self.frame]
 
     def _keep_nodes(self, usable: np.ndarray) -> None:
         """Keep the usable nodes, sorted by frame (ties in the order they were built)."""
@@ -264,13 +204,15 @@ class DribbleSearch:
             setattr(self, name, getattr(self, name)[order])
 
     def _list_swings(self, side: int) -> list[tuple[int, int, int, int]]:
-        """List the swings of a foot as (first, end, number, 0).
+        """List the swings of a foot as (first, end, number, 0), while it is ahead of the pelvis and not in contact.
 
         Where the player hardly moves, frames in contact are added as (frame, frame + 1, number, 1): there the foot may
         touch the ball without a swing. Numbers are unique over both feet.
         """
+        middle = np.mean(self.body.lines[side], axis=0)[:, :2]
+        is_ahead = np.einsum("wk,wk->w", middle - self.body.pelvis, self.body.ahead) > _BEHIND
         air = [(first, end, 2 * number + side, 0) for number,
-               (first, end) in enumerate(find_runs(~self.foot_contacts[:, side]))]
+               (first, end) in enumerate(find_runs(is_ahead & ~self.foot_contacts[:, side]))]
         step = max(int(_STANDING_STEP * self.fps), 1)
         still = [f for f in range(0, self.count, step) if self.foot_contacts[f, side] and self.body.speed[f] < SLOW]
         return [*air, *((frame, frame + 1, 2 * (self.count + frame) + side, 1) for frame in still)]
@@ -288,8 +230,9 @@ class DribbleSearch:
         off = balls[:, :2] - self.feed[frames, :2]
         fit = _FIT_COST * np.maximum(np.hypot(off[:, 0], off[:, 1]) - _NEAR, 0.0) * self.measured[frames]
         ahead = np.einsum("nk,nk->n", balls[:, :2] - self.body.pelvis[frames], self.body.ahead[frames])
-        beside = _AHEAD_COST * np.maximum(_BESIDE - ahead, 0.0)
-        inside = _INSIDE_COST * _RATE * np.maximum(-self.body.measure_gaps(balls, frames), 0.0)
+        least = _BESIDE + _MORE_BESIDE * self.haste[frames]
+        beside = _AHEAD_COST * np.maximum(least - ahead, 0.0)
+        inside = _INSIDE_COST * _RATE * np.maximum(-self.body.solid.measure_gaps(balls, frames), 0.0)
         return (fit + beside + inside) / self.fps
 
     def run(self) -> tuple[int, int, np.ndarray] | None:
@@ -311,7 +254,7 @@ class DribbleSearch:
             return self._trace_path() if self.part.is_met_at_start and self.part.is_met_at_end else None
         if not self.part.is_met_at_start:
             # an open beginning: any touch soon after it may be the first; before that the ball follows the samples
-            soon = np.flatnonzero(self.frame <= _FROM_END * self.fps)
+            soon = np.flatnonzero(self.frame <= max(_FROM_END * self.fps, self.frame[0]))
             self.roll_cost[soon] = _WAIT_COST * self.frame[soon] / self.fps + _FIT_COST * self._sample_distance(soon)
             self.roll_cost[soon] += np.append(0.0, np.cumsum(self._evaluate_samples()))[self.frame[soon]]
         # nodes are sorted by frame, so all rolls and pushes into a node come from nodes that are complete
@@ -355,7 +298,7 @@ class DribbleSearch:
         # after[n]: cost of following the samples from the frame behind node n to the end
         after = np.append(np.cumsum(self._evaluate_samples()[::-1])[::-1], 0.0)[self.frame + 1]
         whole = self.push_cost + after + _WAIT_COST * left + _FIT_COST * self._sample_distance(slice(None))
-        whole = np.where(left <= _FROM_END, whole, np.inf)
+        whole = np.where(left <= max(_FROM_END, left[-1]), whole, np.inf)
         if len(whole):
             self.best_cost, self.last_node = whole.min(), int(np.argmin(whole))
 
@@ -374,12 +317,16 @@ class DribbleSearch:
         """Return (N,) bool: nodes with the same foot, swing and side of the ball as this one."""
         return (self.side == self.side[node]) & (self.angle == self.angle[node]) & (self.swing == self.swing[node])
 
+    def _choose_longest(self, frame: int) -> float:
+        """Choose how long a roll that ends at a frame may take, in seconds, free of cost."""
+        return _LONG + _MORE_LONG * self.haste[frame]
+
     def _list_sources(self, frame: int) -> np.ndarray:
         """List the nodes from which the ball may roll to a frame: those within _LATEST, or else the latest ones."""
         found = np.array(self.sources, dtype=int)
         since = frame - np.where(found == _START, 0, self.frame[found])
         enough = since >= SOONEST * self.fps
-        soon = enough & (since <= _LATEST * self.fps)
+        soon = enough & (since <= (_LATEST + self._choose_longest(frame)) * self.fps)
         return found[soon if soon.any() else enough & (since == since[enough].min(initial=frame + 1))]
 
     def _find_rolls(self, nodes: np.ndarray, frame: int) -> None:
@@ -411,7 +358,7 @@ class DribbleSearch:
         speeds = compute_roll_speeds(starts[:, None], ends, frames[:, None] / self.fps)
         least = np.where(sources == _START, 0.0, self.push_cost[sources])[:, None] + self._evaluate_launch(sources,
                 speeds.start_velocity)
-        least += _LONG_COST * np.maximum(frames / self.fps - _LONG, 0.0)[:, None]
+        least += _LONG_COST * np.maximum(frames / self.fps - self._choose_longest(frame), 0.0)[:, None]
         if swing is not None:
             least[(self.swing[sources][:, None] == swing) & (sources != _START)[:, None]] = np.inf
         order = np.argsort(least, axis=0, kind="stable")

@@ -4,7 +4,7 @@ out.
 The body never leaves its track for the ball. First the ball moves, within the noise of its measurement, to where the
 recorded foot (head, chest, hand) strikes. The limb does the rest by two-bone inverse kinematics, or the spine by
 bending, within the reach of a body; what remains is reported. A kick lasts a hundredth of a second, so between the two
-frames around the key moment the ball moves with the foot.
+frames around the key moment the ball moves with the foot; a ball that is taken stays longer on it (`give`).
 """
 
 from __future__ import annotations
@@ -33,6 +33,7 @@ from .contact_geometry import (
     shift_ball_eased,
     solve_contacts,
 )
+from .give import give_with_ball
 from .move_body_part import (
     MAX_ANGLE,
     MAX_SWING,
@@ -52,12 +53,14 @@ from .move_body_part import (
 BALL_NOISE, FILLED_NOISE = 0.3, 1.0
 """Metres that the ball may be moved from its place, where it was measured and where the feed has filled it in."""
 
-MAX_SHIFT = {"foot": 0.45, "hand": 0.4, "head": 0.2, "chest": 0.12, "thigh": 0.1}  # m, largest move of a part from the recording
+# m, largest move of a part from the recording
+MAX_SHIFT = {"foot": 0.45, "hand": 0.4, "head": 0.2, "chest": 0.12, "thigh": 0.1}
 PELVIS_RANGE = (0.20, 0.64)  # m on the ground from pelvis to striking foot in measured kicks, unless recorded further
 OUT_OF_REACH = 0.15  # m of remaining gap above which the body does not reach at all, and plays as recorded
 MAX_DROP = 0.04  # m, largest drop of the pelvis
 _LONGEST_EASE, _SHORTEST_EASE = 0.5, 0.12  # s before and after a strike in which the body is eased
-_RISE = {"foot": 0.0, "hand": 0.0, "head": 0.6, "chest": 0.0, "thigh": 0.8}  # sine of the ball's elevation as seen from the part
+# sine of the ball's elevation as seen from the part
+_RISE = {"foot": 0.0, "hand": 0.0, "head": 0.6, "chest": 0.0, "thigh": 0.8}
 _IN_THE_AIR = 0.2  # m above which a ball may be met higher or lower
 _HANDS_APART = 0.6  # m between the hands beyond which one hand alone catches in a dive
 _STOPPING = frozenset(list_labels(ball="takes"))
@@ -144,6 +147,8 @@ def strike_ball(
         root[span], rotations[span] = reached.root, reached.rotations
         places = [scene.solve_ball(scene.compute_surface_lines(reached, frame), frame)[0] for frame in moment.held]
         path = shift_ball_eased(scene.ball, moment.held, np.array(places), moment.bounds, fps)
+        path = give_with_ball(skeleton, root, rotations, path, held=moment.held, words=moment.words,
+                              until=moment.bounds[1], fps=fps)
     gap, shift = _measure_gaps(skeleton, root, rotations, feed=samples, path=path, touches=touches)
     return StrikeResult(root, rotations, path, gap=gap, ball_shift=shift, moved=moved)
 
@@ -153,8 +158,8 @@ def _move_to_contact(skeleton: Skeleton, root, rotations, feed, touch: Touch, fp
 
     Only where the labels allow for that and the ball is out of reach at the key moment itself.
     """
-    first, last = _nearest_frame(touch.frame, len(root)), _nearest_frame(touch.frame + find_contact_window(touch.words)
-                                                                         * fps, len(root))
+    latest = touch.frame + find_contact_window(touch.words) * fps
+    first, last = (find_nearest_frame(frame, len(root)) for frame in (touch.frame, latest))
     if first == last or not np.isfinite(feed[first : last + 1]).all():
         return touch
     places, world = compute_pose(skeleton, root[first : last + 1], rotations[first : last + 1])
@@ -199,11 +204,11 @@ def _iter_touch_frames(skeleton: Skeleton, touches: Sequence[Touch], count: int,
         before, after = ends[place][1], ends[place + 2][0]
         low = max(int(first - np.clip(touch.entry, shortest, longest)), before)
         high = min(int(np.ceil(last + np.clip(touch.leave, shortest, longest))), after)
-        yield number, _TouchFrames(words=frozenset(touch.words), frame=_nearest_frame(frame, count), held=held[place],
-                                   low=low, high=high, bounds=(before, after))
+        yield number, _TouchFrames(words=frozenset(touch.words), frame=find_nearest_frame(frame, count),
+                                   held=held[place], low=low, high=high, bounds=(before, after))
 
 
-def _nearest_frame(frame: float, count: int) -> int:
+def find_nearest_frame(frame: float, count: int) -> int:
     """Return the whole frame, of `count`, nearest to a fractional one."""
     return int(np.clip(np.rint(frame), 0, count - 1))
 
@@ -213,9 +218,9 @@ def compute_contact_frames(frame: float, count: int) -> tuple[int, int]:
 
     Twice the same where the frame is nearly whole.
     """
-    if abs(frame - _nearest_frame(frame, count)) < 0.02:
-        frame = _nearest_frame(frame, count)
-    return _nearest_frame(np.floor(frame), count), _nearest_frame(np.ceil(frame), count)
+    if abs(frame - find_nearest_frame(frame, count)) < 0.02:
+        frame = find_nearest_frame(frame, count)
+    return find_nearest_frame(np.floor(frame), count), find_nearest_frame(np.ceil(frame), count)
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -489,7 +494,7 @@ def _move_parts(scene: _TouchProblem, body: Body, limbs: Sequence[LimbReference]
 
 def _measure_gaps(skeleton: Skeleton, root, rotations, feed, path, touches) -> tuple[np.ndarray, np.ndarray]:
     """Measure gap (K,) m and level shift of the ball (K,) m at the frame nearest to each touch."""
-    frames = np.array([_nearest_frame(touch.frame, len(root)) for touch in touches], dtype=int)
+    frames = np.array([find_nearest_frame(touch.frame, len(root)) for touch in touches], dtype=int)
     places, world = compute_pose(skeleton, root[frames], rotations[frames])
     rows = zip(places, world, touches, path[frames])
     gaps = [measure_contact_gap(skeleton, place, turn, touch.words, ball) for place, turn, touch, ball in rows]

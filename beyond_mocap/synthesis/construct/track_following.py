@@ -8,12 +8,8 @@ where its feet would slide.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-
 import numpy as np
 
-from ...annotation.ball_contact import build_surfaces
-from ...annotation.striking import trace_fastest_surface
 from ...base.banded_least_squares import BandedLeastSquares
 from ...base.time_series import find_runs
 from ...base.vectors import arctan2
@@ -23,7 +19,6 @@ from ...motion.humanoid import identify_joints
 from ...motion.motion import compute_pose, compute_world_rotation
 from ...motion.skeleton import Skeleton
 from ...motion.track import smooth_zero_phase_hann
-from .strike import Touch
 
 TURN_WEIGHT = 12.0  # weight of the recording's own turning per frame, against the direction of travel
 AIRBORNE_FIRMNESS = 40.0  # factor on it where the body flies, lies or kneels and so cannot turn at will
@@ -43,11 +38,6 @@ _HELD_ROUNDS = 3  # of holding what is beyond MAX_OFF_PLAN
 FAINT_WEIGHT = 1e-4  # weight of that pull at any speed, so that there is one solution
 GIVEN_HEADING_WEIGHT = 1e6  # weight of a given heading, so large that it stays
 ROOT_WINDOW = 1.5  # s, the window through which the root lies on the track
-
-MAX_TURN_TO_BALL = np.radians(60.0)
-_REACH = 0.25  # m between ball and part that the ball's noise and the limb make up for (`strike`)
-_BALL_TURN_SECONDS = 0.5  # s before and after the key frame over which the turn grows and fades
-_NEAR, _CLEAR = 0.1, 0.35  # m from the hips: below the first a direction has no weight, above the second all
 
 GRAVITY = 9.81
 LEGS_LEAN, TRUNK_LEAN = 0.5, 0.2
@@ -224,54 +214,6 @@ def pull_to_track(
     for _ in range(rounds):
         root = root - (smooth_zero_phase_hann(root, fps, window) - smooth)
     return root
-
-
-def compute_turn_to_ball(
-    skeleton: Skeleton, root: np.ndarray, rotations: np.ndarray, ball: np.ndarray, touches: Sequence[Touch], fps: float
-) -> np.ndarray:
-    """Compute the turn of the body about its root that points the striking foot at the ball.
-
-    Of two feet that may strike, the place of the faster one counts.
-
-    Args:
-        skeleton: the skeleton.
-        root: (T, 3) m, world.
-        rotations: (T, J, 4) local, the constructed motion.
-        ball: (T, 3) m, world, NaN where it is unknown.
-        touches: where the body may meet the ball.
-        fps: frames per second.
-    Returns:
-        (T,) rad, at most MAX_TURN_TO_BALL at any touch.
-    """
-    turn, at = np.zeros(len(root)), np.arange(len(root))
-    for touch in touches:
-        offset = _turn_at_touch(skeleton, root, rotations, ball, touch)
-        bump = np.clip(1.0 - np.abs(at - touch.frame) / (_BALL_TURN_SECONDS * fps), 0.0, 1.0)
-        # quintic ease; where two touches overlap the larger turn wins
-        grown = offset * bump**3 * (10.0 - 15.0 * bump + 6.0 * bump**2)
-        turn = np.where(np.abs(grown) > np.abs(turn), grown, turn)
-    return turn
-
-
-def _turn_at_touch(skeleton: Skeleton, root, rotations, ball, touch: Touch) -> float:
-    """Compute the turn, rad, at one touch; 0 without a foot that strikes or a known ball."""
-    frame = int(np.clip(round(touch.frame), 1, len(root) - 2)) if len(root) > 2 else 0
-    found = [surface for surface in build_surfaces(skeleton, touch.words) if surface.part == "foot"]
-    if len(root) < 3 or not found or not np.isfinite(ball[frame]).all():
-        return 0.0
-    places, world = compute_pose(skeleton, root[frame - 1 : frame + 2], rotations[frame - 1 : frame + 2])
-    part, goal = trace_fastest_surface(found, places, world)[1, :2] - root[frame, :2], ball[frame, :2] - root[frame, :2]
-    clear = np.clip((min(np.linalg.norm(part), np.linalg.norm(goal)) - _NEAR) / (_CLEAR - _NEAR), 0.0, 1.0)
-    apart = np.arctan2(part[0] * goal[1] - part[1] * goal[0], part @ goal)
-    return float(clear * np.clip(_least_turn(part, goal, apart), -MAX_TURN_TO_BALL, MAX_TURN_TO_BALL))
-
-
-def _least_turn(part: np.ndarray, goal: np.ndarray, apart: float) -> float:
-    """Compute the smallest part of `apart` that brings a part (2,) within _REACH of its goal (2,), or all of it."""
-    p, g = float(np.linalg.norm(part)), float(np.linalg.norm(goal))
-    # law of cosines: the angle at which part and goal are _REACH apart
-    free = np.arccos(np.clip((p * p + g * g - _REACH**2) / max(2.0 * p * g, 1e-9), 0.0, 1.0))
-    return float(np.sign(apart) * max(0.0, abs(apart) - free))
 
 
 def compute_missing_lean(

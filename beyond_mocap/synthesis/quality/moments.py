@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ...annotation import KeyMoment
-from ...annotation.ball_contact import choose_contact_labels, find_contact_window, measure_contact_gap
+from ...annotation.ball_contact import choose_contact_labels, find_contact_window, measure_contact_gap, takes_with_foot
 from ...annotation.striking import build_part_surfaces, measure_smallest_gap
 from ...library.library import Library
 from ...library.missing_actions import add_actions
@@ -100,7 +100,8 @@ def _find_key(played: Playback, run: np.ndarray, frame: int, key: KeyMoment, lib
     if library is None or played.clip[run[0]] < 0:
         return None
     path, side = played.clips[played.clip[run[0]]], bool(played.mirrored[run[0]])
-    own = [k for k in library.keys if library.clips[k.clip].path == path and library.clips[k.clip].mirrored == side]
+    known = (*library.keys, *library.cut_receptions) if takes_with_foot(key.words) else library.keys
+    own = [k for k in known if library.clips[k.clip].path == path and library.clips[k.clip].mirrored == side]
     own = [k for k in own if np.isfinite(find_crossing(played.clip_frame[run], played.times[run], k.frame))]
     carrying = [k for k in own if set(key.words) <= set(k.labels)] or own
     return min(carrying, key=lambda k: abs(k.frame - played.clip_frame[frame]), default=None)

@@ -365,18 +365,3 @@ def measure_heel_rest(feet: np.ndarray, contacts: np.ndarray) -> float:
     both = contacts.all(axis=1)
     heights = feet[both if both.any() else slice(None), :, 0, 2]
     return float(np.percentile(heights, 2)) if heights.size else np.nan
-
-
-def measure_planted_shift(feet: np.ndarray, placed: np.ndarray, contacts: np.ndarray) -> np.ndarray:
-    """Measure how far planted feet are from where the placed clip had them.
-
-    Mean distance of heel and toe joints, one value per planted foot and frame.
-
-    Args:
-        feet: (T, 2, 2, 3) m.
-        placed: (T, 2, 2, 3) m.
-        contacts: (T, 2) bool.
-    Returns:
-        (N,) m.
-    """
-    return np.linalg.norm(feet - placed, axis=-1).mean(axis=-1)[contacts]

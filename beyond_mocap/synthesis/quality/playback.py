@@ -15,6 +15,7 @@ import numpy as np
 from ...base.errors import InputError
 from ...library.landings import LANDING_FOLDER
 from ...library.library import Library
+from ...library.scan import CACHE_FOLDER
 from ...library.synthetic_clips import FPS as MADE_FPS
 from ...library.synthetic_clips import SYNTHETIC_FOLDER
 from ...motion import contacts as foot_contacts
@@ -94,6 +95,11 @@ class Playback:
     def feet(self) -> np.ndarray:
         """(T, 2, 2, 3) m, world positions: side, (heel, toe)."""
         return self.positions[:, list_foot_joints(self.motion.skeleton)]
+
+    def list_unknown_clips(self, library: Library) -> list[str]:
+        """List the clips that are neither in a library nor in its cache folder, where synthetic ones are."""
+        known = {clip.path for clip in library.clips}
+        return [clip for clip in self.clips if clip and clip not in known and not clip.startswith(CACHE_FOLDER)]
 
     def compute_stride(self, library: Library | None) -> np.ndarray:
         """Compute the source frames that pass per output frame at recorded speed.

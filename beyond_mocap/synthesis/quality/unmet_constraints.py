@@ -15,9 +15,10 @@ from collections import Counter
 import numpy as np
 
 from ...annotation import Timeline, labels_per_frame
+from ...annotation.ball_contact import takes_with_foot
 from ...base.errors import TimedMessage, format_seconds
 from ...base.time_series import find_runs, time_derivative
-from ...library.coverage import NEEDED_TURN_RATE, TRAVEL_SPEED, classify_steps, compute_turn_rate
+from ...library.coverage import CALM_SPEED, STEP_SPEEDS, classify_steps, compute_turn_rate, describe_lack
 from ...library.features import SMOOTH_SECONDS
 from ...library.landings import LANDING_FOLDER
 from ...library.library import RESTING_SPEED, Library
@@ -53,18 +54,26 @@ LABEL_SECONDS = 0.5  # shortest time of a missing label that is reported
 MAX_STRETCHES = 6  # stretches that a line lists
 _STANDS_AND_GOES_AHEAD = (STAND_PREFIX, STILL_PREFIX, WALK_PREFIX, BLEND_PREFIX)
 _TOLERANCE = 1e-3  # of rates and seconds, for rounding
+# how a clip's name begins, the kind of motion that recordings lack (`coverage`), and what is shown instead
+_SYNTHETIC_INSTEAD = (
+    (BLEND_PREFIX, "speeds", "a slower and a faster recording are blended"),
+    (WALK_PREFIX, "speeds", "synthetic walking is shown"),
+    ("", "speeds", "synthetic running is shown"),  # all others
+    (STILL_PREFIX, "stands", "a synthetic stand is shown"),
+    (BACK_PREFIX, "backward", "a walk is played backward"),
+    (SIDE_PREFIX, "sideways", "synthetic ones are shown"),
+    (TURN_PREFIX, "turns", "synthetic ones are shown"),
+    (STEP_PREFIX, "moves", "synthetic ones are shown"),
+)
 _SYNTHETIC_KINDS = (
-    (BLEND_PREFIX, "blended from a slower and a faster recording: none has the speed of the track"),
-    (KICK_PREFIX, "synthetic kick on the run: no recorded kick is as fast as the player"),
-    (RECEIVE_PREFIX, "synthetic reception: no recording takes the ball so, or at the player's speed"),
-    (STAND_PREFIX, "a recorded stand is played forward and backward: no recording stands for so long"),
-    (STILL_PREFIX, "synthetic standing: no recording stands calmly; add one"),
-    (WALK_PREFIX, "synthetic walking: no recording has the speed of the track; add one"),
-    (LOOP_PREFIX, "strides of a recorded run are repeated: no recording runs so steadily for so long"),
-    (BACK_PREFIX, "a recorded walk is played backward: hardly any recording goes backward at this speed"),
-    (SIDE_PREFIX, "synthetic side step: hardly any recording goes sideways or diagonally at this speed"),
-    (TURN_PREFIX, "synthetic turn on the spot: hardly any recording turns where it stands"),
-    (STEP_PREFIX, "synthetic step: hardly any recording takes it from a stand to a stand"),
+    (SYNTHETIC_FOLDER + KICK_PREFIX, "synthetic kick on the run: no recorded kick is as fast as the player"),
+    (SYNTHETIC_FOLDER + RECEIVE_PREFIX,
+     "synthetic reception: no recording takes the ball so, or at the player's speed"),
+    (SYNTHETIC_FOLDER + STAND_PREFIX,
+     "a recorded stand is played forward and backward: no recording stands for so long"),
+    (SYNTHETIC_FOLDER + LOOP_PREFIX,
+     "strides of a recorded run are repeated: no recording runs so steadily for so long"),
+    (LANDING_FOLDER, "synthetic landing and getting up: the recording ends in flight"),
 )
 
 
@@ -90,8 +99,9 @@ def report_unmet_constraints(
     source = played.clip, played.mirrored, played.clip_frame, stride
     keys = evaluate_moments(played, timeline.keys, stride, library) if timeline is not None else []
     lines = [
-        *_report_synthetic(played),
+        *_report_synthetic(played, library),
         *_report_missing_motion(played, library),
+        _report_cut_receptions(played, keys, library),
         _report_stretched_strides(played, track, library),
         _report_warp(played, source),
         _report_sliding(played),
@@ -160,18 +170,16 @@ def _frames_of_clips(played: Playback, *begins: str) -> np.ndarray:
     return table[played.clip]
 
 
-def _report_synthetic(played: Playback) -> list[TimedMessage | None]:
-    """Report each kind of synthetic clip."""
-    running = _frames_of_clips(played, SYNTHETIC_FOLDER) & ~_frames_of_clips(played, SYNTHETIC_FOLDER + ACTION_PREFIX)
-    kinds = [(there, f"synthetic {name}: no recorded one") for name, there in _list_shown_actions(played)]
-    for name, what in _SYNTHETIC_KINDS:
-        there = _frames_of_clips(played, SYNTHETIC_FOLDER + name)
-        kinds.append((there, what))
-        running = running & ~there
-    kinds += [
-        (running, "synthetic running: no recording has the speed of the track"),
-        (_frames_of_clips(played, LANDING_FOLDER), "synthetic landing and getting up: the recording ends in flight"),
-    ]
+def _report_synthetic(played: Playback, library: Library | None) -> list[TimedMessage | None]:
+    """Report each kind of synthetic clip, and what the recordings lack where that is why it is shown."""
+    describe = describe_lack if library is None else library.coverage.describe_lack
+    kinds = [(_frames_of_clips(played, prefix), what) for prefix, what in _SYNTHETIC_KINDS]
+    named = tuple(SYNTHETIC_FOLDER + prefix for prefix, *_ in _SYNTHETIC_INSTEAD if prefix)
+    others = _frames_of_clips(played, SYNTHETIC_FOLDER) & ~_frames_of_clips(
+        played, SYNTHETIC_FOLDER + ACTION_PREFIX, *named, *(prefix for prefix, _ in _SYNTHETIC_KINDS))
+    kinds += [(there, f"synthetic {name}: no recorded one") for name, there in _list_shown_actions(played)]
+    kinds += [(_frames_of_clips(played, SYNTHETIC_FOLDER + prefix) if prefix else others, describe(kind, instead))
+              for prefix, kind, instead in _SYNTHETIC_INSTEAD]
     return [_build_line(played.times, there, what, f" ({np.sum(there) / played.motion.fps:.1f} s in all)")
             for there, what in kinds]
 
@@ -182,30 +190,67 @@ def _list_shown_actions(played: Playback) -> list[tuple[str, np.ndarray]]:
     return [(str(name), (names == name)[played.clip]) for name in np.unique(names[names != ""])]
 
 
+def _report_cut_receptions(played: Playback, keys: list[KeyMomentResult], library: Library | None
+                           ) -> TimedMessage | None:
+    """Report receptions that are cut out of dribbles (`library.receptions`)."""
+    shown = np.zeros(len(played.times), bool)
+    cut = {(library.clips[key.clip].path, key.frame) for key in library.cut_receptions} if library and any(
+        takes_with_foot(moment.requested.words) for moment in keys) else set()
+    for moment in keys:
+        shown[moment.entry : moment.exit + 1] |= (moment.clip, moment.clip_frame) in cut
+    return _build_line(played.times, shown, "reception cut out of a dribble: no recording is labelled with one")
+
+
 def _report_missing_motion(played: Playback, library: Library | None) -> list[TimedMessage | None]:
-    """Report each kind of motion that the library lacks and the body needs for MISSING_SECONDS or more, where no
-    synthetic clip stands in.
+    """Report each kind of motion that the library lacks and the body needs for MISSING_SECONDS or more at a time, where
+    neither a synthetic clip stands in nor a recording shows it.
     """
-    if library is None or not library.missing_motion:
+    if library is None:
         return []
-    fps = played.motion.fps
+    fps, coverage = played.motion.fps, library.coverage
     heading = np.unwrap(compute_heading_from_positions(played.motion.skeleton, played.positions))
     path = smooth_zero_phase_hann(played.pelvis, fps, SMOOTH_SECONDS)
     velocity = quaternion.rotate_level(time_derivative(path, fps), -heading)
     speed = np.linalg.norm(velocity, axis=1)
-    slowest = WARP_LIMITS[0] * library.slowest_travel
-    shown = {
-        "belonging": np.ones(len(speed), bool), "stands": speed < RESTING_SPEED,
-        "slow": (speed > TRAVEL_SPEED) & (speed < slowest),
-        **classify_steps(velocity, compute_turn_rate(heading, fps), NEEDED_TURN_RATE),
-    }
     synthetic = _frames_of_clips(played, SYNTHETIC_FOLDER)
     ahead = _frames_of_clips(played, *(SYNTHETIC_FOLDER + name for name in _STANDS_AND_GOES_AHEAD))
-    lines = []
-    for kind, what in library.missing_motion.items():
-        lacks = shown[kind] & ~(synthetic & ~ahead if kind in ("turns", "sideways", "backward") else synthetic)
-        lines.append(_build_line(played.times, lacks, what) if lacks.sum() >= MISSING_SECONDS * fps else None)
-    return lines
+    stands = _frames_of_clips(played, SYNTHETIC_FOLDER + STAND_PREFIX)  # recorded ones, played to and fro
+    recorded = _classify_recorded_steps(played, library)
+    steps = classify_steps(velocity, compute_turn_rate(heading, fps))
+    needed = {
+        "belonging": ~(synthetic & ~stands) & (speed < CALM_SPEED), "stands": ~synthetic & (speed < RESTING_SPEED),
+        "speeds": ~synthetic & (speed > STEP_SPEEDS[0]) & (speed < coverage.slowest_speed),
+        **{kind: flags & ~(synthetic & ~ahead) & ~recorded[kind] for kind, flags in steps.items()},
+    }
+    return [_build_line(played.times, _drop_short_runs(there, MISSING_SECONDS * fps), coverage.lines[kind]
+                        if kind == "belonging" else coverage.describe_lack(kind, "the nearest recording is shown"))
+            for kind, there in needed.items() if coverage.lacks(kind)]
+
+
+def _drop_short_runs(flags: np.ndarray, least: float) -> np.ndarray:
+    """Keep the runs of True of flags (T,) that have at least so many frames."""
+    kept = np.zeros_like(flags)
+    for first, end in find_runs(flags):
+        kept[first:end] = end - first >= least
+    return kept
+
+
+def _classify_recorded_steps(played: Playback, library: Library) -> dict[str, np.ndarray]:
+    """Classify the recorded frames that are shown by `classify_steps`: kind -> (T,) bool."""
+    frames = library.frames
+    numbers = {(clip.path, clip.mirrored): number for number, clip in enumerate(library.clips)}
+    found = {kind: np.zeros(len(played.motion), bool) for kind in ("turns", "sideways", "backward")}
+    for index, mirrored in sorted(set(zip(played.clip.tolist(), played.mirrored.tolist()))):
+        number = numbers.get((played.clips[index].removeprefix(LANDING_FOLDER), mirrored)) if index >= 0 else None
+        if number is None:
+            continue
+        there = (played.clip == index) & (played.mirrored == mirrored)
+        part = slice(frames.first[number], frames.first[number] + frames.count[number])
+        nearest = np.searchsorted(frames.source[part], played.clip_frame[there])
+        rate = compute_turn_rate(frames.heading[part], library.fps)
+        for kind, flags in classify_steps(frames.velocity[part], rate).items():
+            found[kind][there] = flags[np.minimum(nearest, len(flags) - 1)]
+    return found
 
 
 def _report_stretched_strides(played: Playback, track: Track | None, library: Library | None) -> TimedMessage | None:

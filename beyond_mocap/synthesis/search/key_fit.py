@@ -1,7 +1,9 @@
-"""How well clips with the requested labels fit a key moment: where, how high and in which direction they strike.
+"""How well clips with the requested labels fit a key moment: where, how high, in which direction and how hard they
+strike.
 
-Everything is compared in the frame of travel: x along the player's direction of travel at the key moment, y to the
-left. Speed and turning are weighed by the search itself.
+A ball leaves an instep 1.06 to 1.3 times as fast as the foot (Kellis and Katis 2007, J Sports Sci Med 6, 154-165), so
+its speed says how fast the foot was. Everything is compared in the frame of travel: x along the player's direction of
+travel at the key moment, y to the left. Speed and turning are weighed by the search itself.
 """
 
 from __future__ import annotations
@@ -12,6 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ...annotation.ball_contact import build_surfaces
+from ...annotation.labels import list_labels
 from ...annotation.striking import trace_fastest_surface
 from ...base.vectors import arctan2
 from ...library.keys import Key
@@ -23,12 +26,31 @@ from .request import library_frame
 
 HEIGHT_COST = 0.8  # per metre of height beyond the noise
 PLACE_COST = 0.6  # per metre on the ground beyond the noise
+TURN_COST = 0.1  # per radian that the body has to turn to the ball, and m/s of the player
 ANGLE_COST = 0.2  # per radian between the part's velocity and the leaving ball
+FAR_ANGLE_COST = 0.6  # per radian beyond what a body turns to it
+LOFT_COST = 0.2  # per radian between the elevations of both, beyond the noise
+SPEED_COST = 0.7  # per unit of the logarithm of the ball's speed over the part's, outside of the usual range
+SPEED_RATIO = (1.06, 1.3)
+"""Speed of the leaving ball over that of the foot."""
+
+LEAVING_SECONDS = (0.06, 0.3)
+"""s after a key moment between which the leaving ball's velocity is measured."""
+
+FAST_BALL, FAST_PART = 3.0, 1.5
+"""m/s from which on the velocities of ball and part count."""
+
+MAX_TURN_TO_EXIT = np.radians(40.0)
+"""Largest turn of a body to the direction in which its ball leaves (`construct.turn_to_ball`)."""
+
+_FULL_TURN_SPEED = 1.5  # m/s up to which a body turns by all of it; the plant foot of a faster one would be dragged
+
 _NOISE = 0.15  # m by which a tracked ball may be off without saying anything about the clip
+TURN_REACH = 0.25  # m between part and ball that the ball's noise and the limb make up for
 _FARTHEST = 1.0  # m on the ground beyond which the cost does not grow
-_FAST_BALL, _FAST_PART = 3.0, 1.5  # m/s from which on the directions of ball and part count
+_LOFT_NOISE = np.radians(15.0)  # a foot that meets the ball below its middle lifts it by more than it rises itself
+_SENDING = frozenset(list_labels(ball="sends"))
 _MOMENT = 1.0 / 60.0  # s before and after a key frame between which velocities are measured
-_LEAVING = (0.06, 0.3)  # s after a key moment between which the ball's velocity is measured
 
 
 @dataclass(frozen=True, eq=False)
@@ -39,12 +61,14 @@ class BallMeasurement:
     Attributes:
         place: (2,) m from the player.
         height: m, NaN where it is not measured.
-        exit_velocity: (2,) m/s just after.
+        exit_velocity: (3,) m/s just after, upward NaN where heights are not measured.
+        speed: m/s of the player.
     """
 
     place: np.ndarray
     height: float
     exit_velocity: np.ndarray
+    speed: float = 0.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -54,12 +78,19 @@ class StrikeMeasurements:
     Attributes:
         place: (K, 2) m of the part's middle from the hips.
         height: (K,) m.
-        velocity: (K, 2) m/s.
+        velocity: (K, 3) m/s.
+        sends: (K,) bool, the labels say that the ball is sent: its speed is the part's.
     """
 
     place: np.ndarray
     height: np.ndarray
     velocity: np.ndarray
+    sends: np.ndarray
+
+    def play(self, choice: np.ndarray, rate: np.ndarray) -> "StrikeMeasurements":
+        """Return the same of clips `choice` (P,) played at playback rates (P,)."""
+        return StrikeMeasurements(self.place[choice], self.height[choice], rate[:, None] * self.velocity[choice],
+                                  self.sends[choice])
 
 
 def measure_ball(track: SampledTrack, frame: float, is_height_known: bool) -> BallMeasurement:
@@ -77,10 +108,12 @@ def measure_ball(track: SampledTrack, frame: float, is_height_known: bool) -> Ba
     here = int(np.clip(round(frame), 0, len(track.times) - 1))
     back = -float(track.direction[here])
     ball = interpolate_ball(0.0)
-    leaving = (interpolate_ball(_LEAVING[1]) - interpolate_ball(_LEAVING[0]))[:2] / (_LEAVING[1] - _LEAVING[0])
+    first, last = LEAVING_SECONDS
+    leaving = (interpolate_ball(last) - interpolate_ball(first)) / (last - first)
+    leaving[2] = leaving[2] if is_height_known else np.nan
     place = quaternion.rotate_level(ball[None, :2] - track.positions[here], np.array([back]))[0]
     height = float(ball[2]) if is_height_known else np.nan
-    return BallMeasurement(place, height, quaternion.rotate_level(leaving[None], np.array([back]))[0])
+    return BallMeasurement(place, height, _rotate_about_up(leaving, back), float(track.speed[here]))
 
 
 def measure_strikes(library: Library, keys: Sequence[Key]) -> StrikeMeasurements:
@@ -97,7 +130,8 @@ def measure_strikes(library: Library, keys: Sequence[Key]) -> StrikeMeasurements
     back = -_travel_direction(library, np.clip(frame, 0, len(library.frames) - 1))
     rows = [_measure_strike(library, key, p, r, a) for key, p, r, a in zip(keys, places, rotations, back)]
     place, height, velocity = zip(*rows)
-    return StrikeMeasurements(np.array(place), np.array(height), np.array(velocity))
+    sends = np.array([bool(_SENDING & key.labels) for key in keys])
+    return StrikeMeasurements(np.array(place), np.array(height), np.array(velocity), sends)
 
 
 def _fetch_poses_around(library: Library, key: Key):
@@ -115,23 +149,68 @@ def _travel_direction(library: Library, frame: np.ndarray) -> np.ndarray:
 
 
 def _measure_strike(library: Library, key: Key, places: np.ndarray, rotations: np.ndarray, back: float):
-    """Measure place (2,), height and velocity (2,) of the striking part; places (3, J, 3), rotations (3, J, 4)."""
+    """Measure place (2,), height and velocity (3,) of the striking part; places (3, J, 3), rotations (3, J, 4)."""
     found = build_surfaces(library.skeleton, key.labels)
     if not found:
-        return np.full(2, np.nan), np.nan, np.full(2, np.nan)
+        return np.full(2, np.nan), np.nan, np.full(3, np.nan)
     middle = trace_fastest_surface(found, places, rotations)
-    level = np.stack([(middle[1] - places[1, 0])[:2], (middle[2] - middle[0])[:2] / (2.0 * _MOMENT)])
-    place, velocity = quaternion.rotate_level(level, np.full(2, back))
-    return place, float(middle[1, 2]), velocity
+    place = quaternion.rotate_level((middle[1] - places[1, 0])[None, :2], np.array([back]))[0]
+    return place, float(middle[1, 2]), _rotate_about_up((middle[2] - middle[0]) / (2.0 * _MOMENT), back)
+
+
+def _rotate_about_up(vector: np.ndarray, angle: float) -> np.ndarray:
+    """Rotate a vector (3,) about the vertical by an angle, rad."""
+    return np.append(quaternion.rotate_level(vector[None, :2], np.array([angle]))[0], vector[2])
 
 
 def compute_key_misfit(found: StrikeMeasurements, ball: BallMeasurement) -> np.ndarray:
     """Compute the cost (K,) of serving a key moment with that ball by each clip; what is not known costs nothing."""
     apart = np.linalg.norm(found.place - ball.place, axis=1)
     cost = PLACE_COST * np.clip(apart - _NOISE, 0.0, _FARTHEST)
-    cost = np.nan_to_num(cost)
+    cost = np.nan_to_num(cost + TURN_COST * ball.speed * _compute_needed_turn(found.place, ball.place))
     cost += np.nan_to_num(HEIGHT_COST * np.maximum(np.abs(found.height - ball.height) - _NOISE, 0.0))
-    turned = arctan2(*found.velocity.T[::-1]) - arctan2(ball.exit_velocity[1], ball.exit_velocity[0])
+    return cost + _compute_exit_misfit(found, ball.exit_velocity, compute_free_turn(ball.speed))
+
+
+def _compute_needed_turn(place: np.ndarray, goal: np.ndarray) -> np.ndarray:
+    """Compute the turn (K,) rad about the hips that brings parts at (K, 2) m within TURN_REACH of a goal at (2,) m."""
+    apart = np.abs(arctan2(place[:, 0] * goal[1] - place[:, 1] * goal[0], place @ goal))
+    return np.maximum(apart - compute_free_angle(np.linalg.norm(place, axis=1), np.linalg.norm(goal), TURN_REACH), 0.0)
+
+
+def compute_free_angle(part, goal, reach: float) -> np.ndarray:
+    """Compute the angle, rad, at which a part and its goal, at distances from the hips, are `reach` apart.
+
+    Args:
+        part: (...) m.
+        goal: (...) m.
+        reach: m.
+    Returns:
+        (...) rad, 0 where they are farther apart at any angle, by the law of cosines.
+    """
+    return np.arccos(np.clip((part**2 + goal**2 - reach**2) / np.maximum(2.0 * part * goal, 1e-9), 0.0, 1.0))
+
+
+def compute_free_turn(speed: float) -> float:
+    """Compute how far a body at `speed` m/s can turn to the direction in which its ball leaves, rad.
+
+    Its feet move as they did in the clip, so a body that turns against its travel drags the plant foot by as much.
+    """
+    return float(MAX_TURN_TO_EXIT * min(1.0, _FULL_TURN_SPEED / max(speed, _FULL_TURN_SPEED)))
+
+
+def _compute_exit_misfit(found: StrikeMeasurements, leaving: np.ndarray, free_turn: float) -> np.ndarray:
+    """Compute the cost (K,) of clips for a ball that leaves with (3,) m/s, nothing where the ball or the part is slow.
+    """
+    velocity = found.velocity
+    level, speed = np.linalg.norm(velocity[:, :2], axis=1), np.linalg.norm(velocity, axis=1)
+    ball_level, ball_speed = np.hypot(leaving[:1], leaving[1:2]), np.linalg.norm(np.nan_to_num(leaving))
+    turned = arctan2(velocity[:, 1], velocity[:, 0]) - arctan2(leaving[1], leaving[0])
     turned = np.abs(quaternion.wrap_angle(turned))
-    fast = (np.linalg.norm(found.velocity, axis=1) > _FAST_PART) & (np.linalg.norm(ball.exit_velocity) > _FAST_BALL)
-    return cost + ANGLE_COST * np.where(fast, turned, 0.0)
+    cost = ANGLE_COST * turned + FAR_ANGLE_COST * np.maximum(turned - free_turn, 0.0)
+    loft = np.abs(arctan2(velocity[:, 2], level) - arctan2(leaving[2:], ball_level))
+    cost += np.nan_to_num(LOFT_COST * np.maximum(loft - _LOFT_NOISE, 0.0))
+    least, most = np.log(SPEED_RATIO)
+    ratio = np.log(np.maximum(ball_speed, FAST_BALL) / np.maximum(speed, FAST_PART))
+    cost += SPEED_COST * found.sends * (np.maximum(least - ratio, 0.0) + np.maximum(ratio - most, 0.0))
+    return np.where((speed > FAST_PART) & (ball_speed > FAST_BALL), cost, 0.0)

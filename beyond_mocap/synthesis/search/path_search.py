@@ -22,8 +22,8 @@ from .candidate_index import PLAYBACK_RATES, SLOT
 from .edit_list import EditList, PlacedKey, find_transitions, replace_stretch
 from .key_fit import compute_key_misfit, measure_ball, measure_strikes
 from .path_costs import YOUNG_SLOTS, BoneDistance, PathCosts, Weights
-from .preferences import UsedStretch, compute_weak_foot_cost
-from .request import SearchRequest
+from .preferences import UNUSUAL_FOOT_WEIGHT, UsedStretch, compute_weak_foot_cost, find_unusual_foot
+from .request import RequestedKey, SearchRequest
 from .slots import build_key_pieces, build_slot_edges, find_slot
 
 MEMORY_SLOTS = 15  # slots whose buckets a state remembers (4 s at 30 frames per second)
@@ -193,10 +193,17 @@ class PathSearch:
         for number in np.unique(self.pieces.number):
             key, at = self.request.keys[number], self.pieces.number == number
             ball = measure_ball(self.request.track, key.frame, key.is_ball_height_known)
-            costs[at] = compute_key_misfit(measure_strikes(self.library, key.choices), ball)[self.pieces.choice[at]]
-            costs[at] += compute_weak_foot_cost(key.requested.words, key.choices,
-                                                self.request.weak_foot)[self.pieces.choice[at]]
+            played = measure_strikes(self.library, key.choices).play(self.pieces.choice[at], self.pieces.rate[at])
+            costs[at] = compute_key_misfit(played, ball)
+            costs[at] += self._compute_foot_cost(key)[self.pieces.choice[at]]
         return costs
+
+    def _compute_foot_cost(self, key: RequestedKey) -> np.ndarray:
+        """Compute the cost (K,) of serving a key moment with the player's weak foot, or the library's unusual one."""
+        words, weak_foot = key.requested.words, self.request.weak_foot
+        if weak_foot:
+            return compute_weak_foot_cost(words, key.choices, weak_foot)
+        return compute_weak_foot_cost(words, key.choices, find_unusual_foot(self.library), UNUSUAL_FOOT_WEIGHT)
 
     def _build_first_states(self) -> BeamStates:
         """Build the states of the first slot."""

@@ -20,6 +20,7 @@ from ...annotation import (
     labels_per_frame,
     sort_labels,
 )
+from ...annotation.ball_contact import takes_with_foot
 from ...annotation.vocabulary import DIRECTIONS
 from ...base.errors import NotInLibraryError, TimedMessage, format_seconds
 from ...library.automatic_locomotion import build_automatic_labels
@@ -32,6 +33,9 @@ from ..requested_actions import read_moment_action
 from .preferences import LagPreference, build_lag_preference, compute_manner_cost, compute_style_cost
 
 PAPERS_OMEGA = 4.0  # Faustino 2016, §3.1.1
+RECEPTION_RATES = (0.7, 0.85, 1.0, 1.1)
+"""Playback rates at which the clip of a reception may be played: a foot that gives faster is a kick to the eye."""
+
 USE_NEAREST = "turn on Nearest Labels"
 """Last words of the error for missing labels; the command line names its option instead."""
 
@@ -133,7 +137,8 @@ def build_request(library: Library, plan: ResolvedPlan) -> SearchRequest:
         library, moment, track, asked=asked, gait=gait, allowed=allowed, use_nearest=settings.nearest,
         warnings=warnings,
     ) for moment, asked in zip(timeline.keys, actions))
-    keys = tuple(replace(key, is_ball_height_known=asked.height is not None) for key, asked in zip(keys, actions))
+    keys = tuple(replace(key, is_ball_height_known=asked.height is not None, rates=_choose_rates(key.requested))
+                 for key, asked in zip(keys, actions))
     requested_labels = _clear_around_keys(labels_per_frame(timeline, track.times), keys, library)
     warnings += _report_missing_labels(library, plan.timeline)
     avoided = tuple(avoided) if any(avoided) else ()
@@ -192,6 +197,9 @@ def _build_key(library, moment: KeyMoment, track, asked: ActionMoment, gait, all
                             choices=(*choices, *select_substitutes(choices, synthetic, moment.words)),
                             used_instead=None)
     choices = select_keys(actions, chosen) or select_keys(actions, moment.words)
+    if takes_with_foot(moment.words):
+        cut = [key for key in library.cut_receptions if allowed[key.clip] and not key.labels & set(moment.avoid)]
+        choices = (*select_keys(cut, chosen), *choices)
     if choices:
         return RequestedKey(requested=moment, frame=frame, choices=choices, used_instead=None)
     nearest = list_nearest_labels(usable, moment.words)
@@ -214,6 +222,11 @@ def _select_action_keys(library: Library, keys: list[Key], asked: ActionMoment) 
     actions = tuple(key for key in keys if is_action_clip(library.clips[key.clip]))
     paths = find_action_paths(asked)
     return tuple(key for key in actions if library.clips[key.clip].path in paths) or actions
+
+
+def _choose_rates(moment: KeyMoment) -> tuple[float, ...]:
+    """Choose the playback rates of a key moment's clip: one that takes the ball is not hurried."""
+    return RECEPTION_RATES if takes_with_foot(moment.words) else ()
 
 
 def _remove_avoided(moment: KeyMoment, usable: tuple[Key, ...], synthetic: tuple[Key, ...], warnings: list[str]):

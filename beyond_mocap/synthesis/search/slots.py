@@ -18,7 +18,7 @@ from .candidate_index import SLOT
 from .foot_drag import list_slot_ranges
 from .request import SearchRequest, compute_needed_frames, library_frame
 
-KEY_PLAYBACK_RATES = np.array([0.7, 0.85, 1.0, 1.15, 1.3])  # playback rates at which a key moment's clip may be played
+KEY_PLAYBACK_RATES = np.array([0.8, 0.9, 1.0, 1.12, 1.25])  # rates at which a key moment's clip may be played
 MIN_SLOT = 6  # frames of the shortest slot beside an extra edge
 MIN_KEY_MARGIN = 12
 """Least frames before and after a key frame that its clip is played, however short its annotated row: a nearer cut

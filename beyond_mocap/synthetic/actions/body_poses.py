@@ -137,7 +137,8 @@ def _blend_poses(poses: BodyPoses, setting: ActionSetting, times: np.ndarray, ru
     head = np.radians(read(poses.head))
     nothing = np.zeros(len(times))
     parts = {
-        "hips": hips, "heading": nothing, "knees": np.radians(read(poses.knees)), "pelvis": np.radians(read(poses.pelvis)),
+        "hips": hips, "heading": nothing, "knees": np.radians(read(poses.knees)),
+        "pelvis": np.radians(read(poses.pelvis)),
         "spine": np.radians(read(poses.spine)) + stand.spine, "head": stand.head + np.column_stack([nothing, head]),
         "arms": np.stack([_pose_arm(stand, read(rows), side) for side, rows in enumerate(poses.arms)], axis=1),
     }

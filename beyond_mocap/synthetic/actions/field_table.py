@@ -2,19 +2,30 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import partial
 
 import numpy as np
 
-from ..gestures import Gesture, build_strike
+from ..gestures import STRIKES, Gesture, adapt_to_run, build_strike, build_touch
 from ..kicks import AFTER, BEFORE, KICKS, build_kick
 from ..moves import build_get_up, build_throw_in
 from ..volleys import build_volley
 from .action import Action, ActionSetting
-from .floor import build_bicycle_kick, build_diving_header, build_fall, build_quick_get_up, build_slide_tackle
+from .ball_poses import BALL_POSES
+from .floor import (
+    build_bicycle_kick,
+    build_diving_header,
+    build_fall,
+    build_lying,
+    build_quick_get_up,
+    build_sitting,
+    build_slide_tackle,
+)
 from .headers import build_jumping_header, build_running_header, build_running_jump, build_standing_header
+from .pose_table import build_pose_actions
 
-
+_OUTSIDE_YAW = 34.0  # degrees that the toes are turned in where the outside of the foot meets the ball
 _BALL_LIFT = 0.1  # m that the foot is guided higher in a goal kick: its toes would be below the ground
 
 
@@ -22,8 +33,8 @@ def _build_get_up(setting: ActionSetting) -> Gesture:
     return build_get_up(setting.skeleton, setting.fps, example=setting.example)
 
 
-def _build_goal_kick(setting: ActionSetting) -> Gesture:
-    motion = build_kick(KICKS["instep"], setting.neutral, fps=setting.fps, lift=_BALL_LIFT)
+def _build_standing_kick(style: str, setting: ActionSetting) -> Gesture:
+    motion = build_kick(KICKS[style], setting.neutral, fps=setting.fps, lift=_BALL_LIFT)
     return Gesture(motion, BEFORE, 0.1, BEFORE + AFTER - 0.3)
 
 
@@ -35,12 +46,19 @@ def _build_kick(kind: str, setting: ActionSetting) -> Gesture:
     return build_strike(kind, setting.skeleton, setting.fps, at_speed=setting.speed, example=setting.example)
 
 
+def _build_outside_kick(setting: ActionSetting) -> Gesture:
+    recipe = STRIKES["kick low top"]
+    foot = tuple((*row[:5], row[5] + _OUTSIDE_YAW, row[6]) for row in recipe.foot)
+    return build_touch(adapt_to_run(replace(recipe, foot=foot), setting.speed), setting.skeleton, setting.fps,
+                       example=setting.example)
+
+
 def _build_throw_in(setting: ActionSetting) -> Gesture:
     return build_throw_in(setting.skeleton, setting.fps, example=setting.example)
 
 
 # m/s at which actions in a run are built, and of players who stand and who move
-_RUNS, _STANDS, _MOVES = (2.4, 3.4, 4.4, 5.6, 6.8), (0.0, 1.6), (1.6, np.inf)
+_RUNS, _STANDS, _MOVES = (2.2, 3.2, 4.4, 5.6, 6.8), (0.0, 1.1), (1.1, np.inf)
 
 FIELD_ACTIONS = (
     Action(name="standing header", labels=frozenset({"header", "head", "standing"}), build=build_standing_header,
@@ -69,13 +87,39 @@ FIELD_ACTIONS = (
     Action(name="jump in a run", labels=frozenset({"jump", "slide", "running"}), build=build_running_jump, speeds=_RUNS,
            suits=_MOVES),
     Action(name="goal kick", labels=frozenset({"goal_kick", "kick", "foot", "low", "top", "with_setup", "standing"}),
-           build=_build_goal_kick, has_side=True),
+           build=partial(_build_standing_kick, "instep"), has_side=True),
     Action(name="volley", labels=frozenset({"kick", "low", "volley", "standing", "foot", "pass"}), has_side=True,
-           build=partial(_build_volley, "pass")),
+           build=partial(_build_volley, "pass"), heights=(0.2, 0.6), suits=_STANDS),
     Action(name="high volley", labels=frozenset({"kick", "high", "top", "volley", "standing", "foot"}), has_side=True,
-           build=partial(_build_volley, "attack")),
+           build=partial(_build_volley, "attack"), heights=(0.5, 1.0), suits=_STANDS),
     *(Action(name=f"kick with the {part}", labels=frozenset({"kick", "low", label, "running", "foot"}), has_side=True,
              build=partial(_build_kick, kind), speeds=_RUNS)
       for part, label, kind in (("inside", "inside", "kick low inside"), ("instep", "top", "kick low top"))),
+    Action(name="lofted kick", labels=frozenset({"kick", "high", "top", "running", "foot"}), has_side=True,
+           build=partial(_build_kick, "kick low top"), speeds=_RUNS, heights=(0.1, 0.4), suits=_MOVES),
+    Action(name="lofted kick from a stand", labels=frozenset({"kick", "high", "top", "standing", "foot"}),
+           has_side=True, build=partial(_build_standing_kick, "instep"), heights=(0.1, 0.4), suits=_STANDS),
+    Action(name="side-foot kick from a stand", labels=frozenset({"kick", "low", "inside", "standing", "foot"}),
+           build=partial(_build_standing_kick, "inside"), has_side=True),
+    Action(name="instep kick from a stand", labels=frozenset({"kick", "low", "top", "standing", "foot"}),
+           build=partial(_build_standing_kick, "instep"), has_side=True),
+    Action(name="kick with the outside", labels=frozenset({"kick", "low", "outside", "running", "foot"}), has_side=True,
+           build=_build_outside_kick, speeds=_RUNS),
+    Action(name="kick with the outside from a stand", labels=frozenset({"kick", "low", "outside", "standing", "foot"}),
+           has_side=True, build=lambda setting: _build_outside_kick(replace(setting, speed=_RUNS[0])), suits=_STANDS),
+    Action(name="volley in a run", labels=frozenset({"kick", "low", "volley", "running", "foot"}), has_side=True,
+           build=partial(_build_kick, "kick low top"), speeds=_RUNS, heights=(0.1, 0.6), suits=_MOVES),
+    Action(name="lofted side-foot kick", labels=frozenset({"kick", "high", "inside", "running", "foot"}), has_side=True,
+           build=partial(_build_kick, "kick low inside"), speeds=_RUNS, suits=_MOVES),
+    Action(name="lofted side-foot kick from a stand", has_side=True, suits=_STANDS,
+           labels=frozenset({"kick", "high", "inside", "standing", "foot"}),
+           build=partial(_build_standing_kick, "inside")),
+    Action(name="sliding block", labels=frozenset({"block", "slide"}), build=build_slide_tackle, has_side=True,
+           speeds=_RUNS),
+    Action(name="sliding interception", labels=frozenset({"intercept", "slide"}), build=build_slide_tackle,
+           has_side=True, speeds=_RUNS),
+    Action(name="sitting", labels=frozenset({"sitting"}), build=build_sitting, is_span=True),
+    Action(name="lying", labels=frozenset({"ground"}), build=build_lying, is_span=True),
+    *build_pose_actions(BALL_POSES),
     Action(name="throw-in", labels=frozenset({"throwb", "throw", "high"}), build=_build_throw_in),
 )

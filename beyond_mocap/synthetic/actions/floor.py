@@ -7,10 +7,13 @@ m/s^2 (coefficient of friction of 0.5 to 0.6: Lake, Carre 2007 for skin and clot
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 
 from ..gait_tables import GRAVITY
 from ..gestures import Gesture
+from ..moves import build_get_up
 from .action import ActionSetting
 from .body_poses import NO_ARM, BodyPoses, build_body_poses
 
@@ -24,23 +27,28 @@ def _at(offset: float, rows) -> tuple:
 
 
 # seconds from the chest's landing: lying on the front, the hands push, a knee, the other foot, standing
-_UP_FRONT = {
+_UP_FRONT: dict[str, Any] = {
     "hips": ((0.0, 0, 0, 0.82), (0.55, 0, 0, 0.83), (0.95, -0.10, 0, 0.62), (1.25, -0.26, 0.02, 0.47),
              (1.6, -0.12, 0.02, 0.30), (1.95, -0.01, 0, 0.08), (2.3, 0, 0, 0)),
-    "pelvis": ((0.0, 0, 86, 0), (0.6, 0, 86, 0), (0.95, 0, 66, 0), (1.25, 0, 52, -6), (1.6, 0, 40, -4), (1.95, 0, 14, 0),
+    "pelvis": ((0.0, 0, 86, 0), (0.6, 0, 86, 0), (0.95, 0, 66, 0), (1.25, 0, 52, -6), (1.6, 0, 40, -4),
+               (1.95, 0, 14, 0),
                (2.3, 0, 0, 0)),
     "spine": ((0.0, 0, -14, 0), (0.55, 0, -8, 0), (0.95, 0, 6, 0), (1.25, 0, 22, 4), (1.6, 0, 26, 2), (1.95, 0, 10, 0),
               (2.3, 0, 0, 0)),
     "head": ((0.0, -38, 0), (0.6, -30, 0), (1.25, -26, 0), (1.6, -34, 0), (2.0, -14, 0), (2.3, 0, 0)),
-    "left_arm": ((0.0, 70, 66, -46, 84), (0.2, 20, 84, -76, 92), (0.5, 20, 78, -70, 100), (0.95, 84, 16, 10, 24), (1.25, 74, 12, 10, 12),
+    "left_arm": ((0.0, 70, 66, -46, 84), (0.2, 20, 84, -76, 92), (0.5, 20, 78, -70, 100), (0.95, 84, 16, 10, 24),
+                 (1.25, 74, 12, 10, 12),
                  (1.6, 34, 14, 12, 24), (2.3, *NO_ARM)),
-    "right_arm": ((0.0, 66, 70, -46, 88), (0.2, 20, 88, -76, 96), (0.5, 20, 82, -70, 104), (0.95, 82, 18, 10, 26), (1.25, 76, 12, 10, 14),
+    "right_arm": ((0.0, 66, 70, -46, 88), (0.2, 20, 88, -76, 96), (0.5, 20, 82, -70, 104), (0.95, 82, 18, 10, 26),
+                  (1.25, 76, 12, 10, 14),
                   (1.6, 38, 14, 12, 34), (2.3, *NO_ARM)),
     "left_foot": ((0.0, -0.84, 0.05, 0.06, 92, 0, 0), (0.95, -0.82, 0.05, 0.0, 80, 0, 0),
-                  (1.4, -0.80, 0.04, 0.0, 70, 0, 0), (1.6, -0.55, 0.04, 0.10, 50, 0, 0), (1.85, -0.06, 0.02, 0.05, 8, 0, 0),
+                  (1.4, -0.80, 0.04, 0.0, 70, 0, 0), (1.6, -0.55, 0.04, 0.10, 50, 0, 0),
+                  (1.85, -0.06, 0.02, 0.05, 8, 0, 0),
                   (1.97, 0, 0, 0, 0, 0, 0)),
     "right_foot": ((0.0, -0.82, -0.08, 0.08, 92, 0, 0), (0.8, -0.82, -0.07, 0.0, 84, 0, 0),
-                   (1.0, -0.62, -0.10, 0.10, 66, 0, 0), (1.22, -0.04, -0.06, 0.05, 8, 0, 0), (1.34, 0.0, 0, 0, 0, 0, 0)),
+                   (1.0, -0.62, -0.10, 0.10, 66, 0, 0), (1.22, -0.04, -0.06, 0.05, 8, 0, 0),
+                   (1.34, 0.0, 0, 0, 0, 0, 0)),
     "rests": ((0.0, 1), (0.6, 1), (0.85, 0), (2.3, 0)),
     "end": 2.15,
 }  # fmt: skip
@@ -64,10 +72,12 @@ def build_diving_header(setting: ActionSetting) -> Gesture:
     land = max((fall + np.sqrt(fall**2 + 2.0 * GRAVITY * max(hips_at_key - lies, 0.05))) / GRAVITY, 0.08)
     up, speed = _UP_FRONT, max(setting.speed, 2.0)
     stop = land + speed / _GRASS
-    fling = {side: ((-0.55, -20, 16, 10, 50), (-0.30, 40, 30, 10, 50), (0.0, 92, 42, 10, 48)) for side in ("left", "right")}
+    fling = {side: ((-0.55, -20, 16, 10, 50), (-0.30, 40, 30, 10, 50),
+                    (0.0, 92, 42, 10, 48)) for side in ("left", "right")}
     return build_body_poses(BodyPoses(
         speeds=((-2.0, setting.speed), (-0.6, speed), (land, 0.95 * speed), (stop, 0.0)),
-        hips=((-0.5, 0, 0, 0.05), (-before - 0.1, 0, 0, 0.08 + _STANDING_HIPS - leaves_at), (-before, 0.02, 0, _STANDING_HIPS - leaves_at),
+        hips=((-0.5, 0, 0, 0.05), (-before - 0.1, 0, 0, 0.08 + _STANDING_HIPS - leaves_at),
+              (-before, 0.02, 0, _STANDING_HIPS - leaves_at),
               (0.0, 0.02, 0, _STANDING_HIPS - hips_at_key), *_at(land, up["hips"])),
         pelvis=((-0.5, 0, 8, 0), (-before, 0, 34, -6), (0.0, 0, 74, 0), *_at(land, up["pelvis"])),
         spine=((-0.5, 0, 6, 0), (-before, 0, 2, 8), (-0.08, 0, -10, 0), (0.05, 0, 2, 0), *_at(land, up["spine"])),
@@ -121,7 +131,8 @@ def build_slide_tackle(setting: ActionSetting) -> Gesture:
                (stop + 0.25, 0.40, -0.02, 0.01, -6, -4, 0), (stop + 0.4, 0.30, -0.02, 0.0, 0, 0, 0),
                (stop + 0.75, 0.30, -0.02, 0.0, 0, 0, 0), (stop + 0.9, 0.14, -0.01, 0.08, 12, 0, 0),
                (stop + 1.1, 0, 0, 0, 0, 0, 0))),
-        knees=((-0.5, 0, 0), (-0.34, 22, 2), (-0.22, 46, 4), (-0.1, 60, 4), (stop, 58, 4), (stop + 0.5, 24, 4), (stop + 1.1, 0, 0)),
+        knees=((-0.5, 0, 0), (-0.34, 22, 2), (-0.22, 46, 4), (-0.1, 60, 4), (stop, 58, 4), (stop + 0.5, 24, 4),
+               (stop + 1.1, 0, 0)),
         rests=((-0.2, 0), (-0.06, 1), (stop, 1), (stop + 0.2, 0)),
         begin=(-0.5, -0.18), leaves=(-0.46, -0.46), push=-0.30, end=stop + 1.25,
     ), setting)  # fmt: skip
@@ -156,10 +167,11 @@ def build_fall(setting: ActionSetting) -> Gesture:
 
 
 # seconds from the back's landing: lying on the back, sitting up, feet drawn in, through the crouch
-_UP_BACK = {
+_UP_BACK: dict[str, Any] = {
     "hips": ((0.0, 0, 0, 0.80), (0.7, 0, 0, 0.81), (1.15, 0.02, 0, 0.80), (1.55, 0.12, 0, 0.70), (1.9, 0.32, 0, 0.46),
              (2.3, 0.42, 0, 0.20), (2.7, 0.45, 0, 0)),
-    "pelvis": ((0.0, 0, -86, 0), (0.55, 0, -82, 0), (1.15, 0, -32, 0), (1.5, 0, 12, 0), (1.9, 0, 40, 0), (2.3, 0, 28, 0),
+    "pelvis": ((0.0, 0, -86, 0), (0.55, 0, -82, 0), (1.15, 0, -32, 0), (1.5, 0, 12, 0), (1.9, 0, 40, 0),
+               (2.3, 0, 28, 0),
                (2.7, 0, 0, 0)),
     "spine": ((0.0, 0, 8, 0), (0.55, 0, 16, 0), (1.15, 0, 38, 0), (1.5, 0, 44, 0), (1.9, 0, 40, 0), (2.3, 0, 24, 0),
               (2.7, 0, 0, 0)),
@@ -188,11 +200,13 @@ def build_bicycle_kick(setting: ActionSetting) -> Gesture:
     off, hips_at_key, lies, up = 0.28, float(np.clip(ball - 0.75, 0.75, 1.15)), 0.16, _UP_BACK
     fall = (hips_at_key - _STANDING_HIPS) / off - 0.5 * GRAVITY * off
     land = (fall + np.sqrt(fall**2 + 2.0 * GRAVITY * (hips_at_key - lies))) / GRAVITY
-    arm = ((-0.8, *NO_ARM), (-0.45, -30, 20, 10, 20), (-0.22, 40, 60, 0, 20), (0.0, 6, 74, -10, 16), (0.5 * land, -20, 64, -10, 20))
+    arm = ((-0.8, *NO_ARM), (-0.45, -30, 20, 10, 20), (-0.22, 40, 60, 0, 20), (0.0, 6, 74, -10, 16),
+           (0.5 * land, -20, 64, -10, 20))
     ankle = 0.09
     return build_body_poses(BodyPoses(
         speeds=((-2.0, 0.0), (1.0, 0.0)),
-        hips=((-0.8, 0, 0, 0), (-0.5, -0.06, 0, 0.20), (-off, -0.12, 0, 0.0), (0.0, -0.22, 0, _STANDING_HIPS - hips_at_key),
+        hips=((-0.8, 0, 0, 0), (-0.5, -0.06, 0, 0.20), (-off, -0.12, 0, 0.0),
+              (0.0, -0.22, 0, _STANDING_HIPS - hips_at_key),
               *((t + land, x - 0.28 * (t < 1.3) - 0.28 * (t >= 1.3), y, low) for t, x, y, low in up["hips"])),
         pelvis=((-0.8, 0, 0, 0), (-0.5, 0, -6, 0), (-off, 0, -30, 0), (0.0, 0, -84, 0), *_at(land, up["pelvis"])),
         spine=((-0.8, 0, 2, 0), (-0.5, 0, 12, 0), (-off, 0, 6, 0), (0.0, 0, 14, 0), *_at(land, up["spine"])),
@@ -234,3 +248,47 @@ def build_quick_get_up(setting: ActionSetting) -> Gesture:
     cut = gesture.key + begin
     motion = gesture.motion.frames(int(cut * setting.fps), len(gesture.motion))
     return Gesture(motion, gesture.key - cut, 0.3, gesture.end - cut)
+
+
+def build_sitting(setting: ActionSetting) -> Gesture:
+    """Build sitting down on the ground, sitting for a while, and getting up.
+
+    Args:
+        setting: for whom.
+    Returns:
+        The movement; it has no key moment, and lasts while the body sits.
+    """
+    up, down, sits = _UP_BACK, -2.0, 2.0
+    later = {name: tuple((row[0] - 1.15 + sits, *row[1:]) for row in rows if row[0] >= 1.3)
+             for name, rows in up.items() if name != "end"}
+    spine, tilt, arm = 30, -24, (-34, 26, -10, 16)
+    arms = ((down - 0.2, *NO_ARM), (down + 0.4, 20, 20, 10, 20), (down + 1.0, *arm), (sits, *arm), *later["arm"])
+    still = ((down - 0.2, 0, 0, 0, 0, 0, 0), (sits + 2.0, 0, 0, 0, 0, 0, 0))
+    gesture = build_body_poses(BodyPoses(
+        speeds=((-4.0, 0.0), (4.0, 0.0)),
+        hips=((down - 0.2, 0, 0, 0), (down + 0.5, -0.14, 0, 0.50), (down + 1.0, -0.44, 0, 0.80), (sits, -0.44, 0, 0.80),
+              *((t, x - 0.45, y, low) for t, x, y, low in later["hips"])),
+        pelvis=((down - 0.2, 0, 0, 0), (down + 0.5, 0, 30, 0), (down + 1.0, 0, tilt, 0),
+                (sits, 0, tilt, 0), *later["pelvis"]),
+        spine=((down - 0.2, 0, 2, 0), (down + 0.5, 0, 30, 0), (down + 1.0, 0, spine, 0),
+               (sits, 0, spine, 0), *later["spine"]),
+        head=((down - 0.2, 0, 0), (down + 0.5, -20, 0), (down + 1.0, 0, 0), (sits, 4, 0), *later["head"]),
+        arms=(arms, arms), feet=(still, still),
+        knees=((down, 0, 0), (down + 1.0, 8, 8), (sits, 8, 8), (sits + 1.4, 0, 0)),
+        rests=((down + 0.8, 0), (down + 1.05, 1), (sits, 1), (sits + 0.3, 0)),
+        begin=(down - 0.2, down), leaves=(down - 0.2, down - 0.2), push=down - 0.3, end=sits + 1.5,
+    ), setting)  # fmt: skip
+    return Gesture(gesture.motion, None, gesture.key + down + 0.8, gesture.key + sits)
+
+
+def build_lying(setting: ActionSetting) -> Gesture:
+    """Build lying on the back for a while, and getting up.
+
+    Args:
+        setting: for whom.
+    Returns:
+        The movement; it has no key moment, and lasts while the body lies.
+    """
+    rest = 4.0
+    motion = build_get_up(setting.skeleton, setting.fps, rest=rest, example=setting.example).motion
+    return Gesture(motion, None, 0.0, rest)

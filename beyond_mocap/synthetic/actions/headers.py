@@ -109,11 +109,12 @@ def _build_jump_in_run(setting: ActionSetting, heads: bool) -> Gesture:
     posture = _whip_trunk(posture, times) if heads else posture
     hips = posture.hips.copy()
     usual = float(np.mean(hips[np.abs(times) > air + 0.3, 2]))
-    hips[:, 2] = blend_arrays(hips[:, 2], np.full(len(times), usual), compute_envelope(times, -air - 0.2, -air, air, air + 0.2))
+    ease = compute_envelope(times, -air - 0.2, -air, air, air + 0.2)
+    hips[:, 2] = blend_arrays(hips[:, 2], np.full(len(times), usual), ease)
     hips[:, 2] = compute_flight(times, hips[:, 2], -air, air)
     posture = plant_feet(posture.replace_arrays(hips=hips), plan.times, steps, neutral)
-    return Gesture(to_motion(posture.frames(plan.requested_slice), neutral), _STRIDE_BEFORE, _STRIDE_BEFORE - air - 0.35,
-                   _STRIDE_BEFORE + air + 0.3)
+    motion = to_motion(posture.frames(plan.requested_slice), neutral)
+    return Gesture(motion, _STRIDE_BEFORE, _STRIDE_BEFORE - air - 0.35, _STRIDE_BEFORE + air + 0.3)
 
 
 def _stretch_flight(plan: GaitPlan, key: float, air: float) -> GaitPlan:

@@ -4,9 +4,8 @@ The high dive over a step follows recordings of two goalkeepers and Ibrahim, Kin
 (J. Sports Sci. 37, 313-321): the body sinks to 0.74 m of hip height, the far leg gives most of the speed and swings up
 behind, the near foot leaves 0.2 s before the ball is met; then the centre of mass goes sideways at 3 to 4 m/s, and
 upward at 1 m/s in high dives and hardly in low ones. The trunk leans by 50 degrees when the hands meet a high ball, and
-lies level over a low one. A low ball near the body is met by a collapse: the near leg gives way,
-without flight. Landing
-runs over thigh, hip, trunk and arm; what follows (knees drawn in, up over one knee) is by judgement.
+lies level over a low one. A low ball near the body is met by a collapse: the near leg folds, without a flight.
+Landing runs over thigh, hip, trunk and arm; what follows (knees drawn in, up over one knee) is by judgement.
 """
 
 from __future__ import annotations

@@ -1,5 +1,4 @@
-"""The actions that are tables of key poses, one row each: at the ball, a goalkeeper's moves,
-celebrations and gestures."""
+"""The actions that are tables of key poses, one row each: a goalkeeper's moves, celebrations and gestures."""
 
 from __future__ import annotations
 
@@ -44,9 +43,10 @@ def _build_row(name: str, recipe: KeyPoses) -> Action:
                   heights=(1.9, 2.7) if hands else (), has_side=bool(labels & set(SIDES)), is_span=recipe.is_span)
 
 
-def _build_rows(*tables: Mapping[str, KeyPoses]) -> tuple[Action, ...]:
+def build_pose_actions(*tables: Mapping[str, KeyPoses]) -> tuple[Action, ...]:
+    """Build the actions of tables of key poses, by their names."""
     return tuple(_build_row(name, recipe) for table in tables for name, recipe in table.items())
 
 
-POSE_ACTIONS = _build_rows(SAVES, DIVES, THROWS, CELEBRATIONS, GESTURES)
+POSE_ACTIONS = build_pose_actions(SAVES, DIVES, THROWS, CELEBRATIONS, GESTURES)
 """Rows for `table.ACTIONS`."""

@@ -87,7 +87,7 @@ def hand(extension, ready, session, monkeypatch):  # noqa: F811
         button.seen, button.drawn, button.clock = None, 0.0, "timer"
         return button
 
-    def run(button, event=TIMER, limit=30.0, until=lambda: False):
+    def run(button, event=TIMER, limit=120.0, until=lambda: False):
         end = time.monotonic() + limit
         while time.monotonic() < end and not until():
             status = button.modal(hand.context, event)

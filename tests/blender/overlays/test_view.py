@@ -264,6 +264,7 @@ def test_events_are_lines_that_go_to_their_second(shown, room):
                                   "3.5 s: the body turns by more than 200 degrees within 2 s"],
         "warning_seconds": [[[1.2, 1.2], [4.0, 4.0]], [[3.5, 3.5]]],
         "naturalness": {"snap_turns_per_min": 2.0, "spins_per_min": 0.2, "standing": {"both_down": 0.9}},
+        "touches": {"reception": {"speed_m_s_median": 7.5}, "ball_inside": {"inside_frames": 0}},
     }  # fmt: skip
     quality, scene = room("result.quality"), bpy.context.scene
     player = scene.beyond_mocap.players[0]
@@ -276,7 +277,8 @@ def test_events_are_lines_that_go_to_their_second(shown, room):
     assert seen == pytest.approx([1.2, 4.0, 3.5], abs=0.03)
     assert quality.describe_quality(report).splitlines() == [
         "Snap turns: 2.0 /min\t≤ 0.6\tmissed", "Spins: 0.2 /min\t≤ 0.3\tmet",
-        "Both feet down standing: 90 %\t≥ 80\tmet"]
+        "Both feet down standing: 90 %\t≥ 80\tmet", "Foot speed at receptions: 7.5 m/s\t≤ 3.0\tmissed",
+        "Ball inside the body: 0 frames\t≤ 0\tmet"]
 
 
 def test_jump_at_another_frame_rate(shown):

@@ -110,12 +110,12 @@ def test_what_the_panel_lets_one_set_is_what_the_plan_asks(extension, ready, cor
         assert getattr(plain, name) == pytest.approx(getattr(planned, name))
         setattr(ready, name, value)
     ready.made, ready.gaits = False, "walking = walk.bvh; jogging=jog.bvh;"
-    assert not plain.solve_touches
-    ready.solve_touches = True
+    assert plain.solve_touches
+    ready.solve_touches = False
     plan = plans.build_plan(ready, player)[0]
     assert {name: getattr(plan, name) for name in numbers} == pytest.approx(numbers)
     assert (
-        plain.made and not plan.made and plan.solve_touches
+        plain.made and not plan.made and not plan.solve_touches
         and plan.gaits == (("walking", "walk.bvh"), ("jogging", "jog.bvh"))
     )  # fmt: skip
     ready.gaits = "walking"
@@ -197,7 +197,7 @@ def test_solved_touches_come_out_as_the_core_has_them(extension, ready, match, c
     lines = [",".join((*row[:3], f"{x:.3f}", f"{y:.3f}", "0.11")) for row, (x, y) in zip(rows, ball)]
     text = "\n".join(["time_s,x_m,y_m,ball_x_m,ball_y_m,ball_z_m", *lines])
     (match / "player1.csv").write_text(text + "\n")
-    ready.players[1].use, ready.solve_touches = False, True
+    ready.players[1].use = False
     assert_one_step(bpy.ops.beyond_mocap.synthesize)
     player = bpy.context.scene.beyond_mocap.players[0]
     made = session.find_take(player.take)
@@ -230,6 +230,7 @@ def test_accepting_again_replaces_the_take_only(extension, ready, session):
 
 def test_the_ball_lies_where_the_file_says_and_rolls(extension, ready, session):
     bpy.context.scene.render.fps = 10
+    ready.solve_touches = False
     bpy.ops.beyond_mocap.synthesize()
     bpy.ops.beyond_mocap.accept()
     ball = bpy.data.objects["Ball"]

@@ -1,6 +1,7 @@
 """Preview, Accept, Discard: what was there comes back to the last bit, and strips play what the action plays."""
 
 import importlib
+from types import SimpleNamespace
 
 import bpy
 import numpy as np
@@ -284,3 +285,11 @@ def test_strips_at_any_rate(one, fps, base):
     whole = poses(one.body, frames)
     bpy.ops.beyond_mocap.accept(form="STRIPS")
     np.testing.assert_allclose(poses(one.body, frames), whole, atol=1e-5)
+
+
+def test_a_strip_is_named_by_its_action_and_not_by_the_run_up(extension):
+    blocks = importlib.import_module(f"{extension.__name__}.scene.result.blocks")
+    words = (("sprinting", "front"),) * 2 + (("kick", "right"),) + (("sprinting", "front"),) * 3
+    take = SimpleNamespace(clips=("made-gait/kick_top_7.2.bvh",), clip=[0] * 6, mirrored=[False] * 6, words=words)
+    assert blocks.build_strip_name(take, 0, 6) == "kick_top_7.2 kick right"
+    assert blocks.build_strip_name(take, 3, 6) == "kick_top_7.2 sprinting front"

@@ -10,6 +10,7 @@ import sys
 import pytest
 
 from beyond_mocap.annotation import VOCABULARY, labels
+from beyond_mocap.annotation.ball_contact import choose_part_by_height
 from beyond_mocap.annotation.labels import find_label, list_gaits, list_labels
 from beyond_mocap.base.errors import InputError
 
@@ -19,6 +20,8 @@ SIDE_POKE = "side_poke,side poke,kicks with the side of the foot,discrete,,foot,
 SYNTHETIC = {  # builders of motions and matches, each of certain labels
     *(f"beyond_mocap/synthetic/{name}.py" for name in ("gait", "gait_tables", "gestures", "kicks", "moves", "volleys")),
     "beyond_mocap/synthetic/ground_truth/synthetic_match.py", "beyond_mocap/library/synthetic_clips.py",
+    "beyond_mocap/synthetic/actions/table.py", "beyond_mocap/synthetic/actions/receptions.py",
+    "beyond_mocap/library/receptions.py",
     "beyond_mocap/throws/synthetic_examples.py",
 }  # fmt: skip
 PACKAGES_OF_LABELS = ("beyond_mocap/annotation/", "beyond_mocap/synthetic/actions/")
@@ -131,3 +134,11 @@ def test_no_product_file_compares_labels_by_name():
                 offences[name] = compared(path.read_text(), known)
     assert {name for name, found in offences.items() if found} == set(ALLOWED)
     assert compared('x = word in {"kick", "hand"} or word == "receive"', known) == ["receive", "kick"]
+
+
+@pytest.mark.parametrize("height, part", [(0.11, "foot low"), (0.6, "foot high"), (0.9, "thigh"), (1.3, "body"),
+                                          (None, "")])
+def test_the_balls_height_chooses_the_part_of_a_plain_receive(height, part):
+    assert choose_part_by_height(("receive", "running"), height) == ("receive", "running", *part.split())
+    for words in (("receive", "foot"), ("receive", "body"), ("receive", "low"), ("kick",), ("catchb",)):
+        assert choose_part_by_height(words, height) == words

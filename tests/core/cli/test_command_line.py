@@ -124,7 +124,7 @@ def test_the_report_says_what_is_left_out_and_what_lacks(run, clips_folder, libr
     report = json.loads((tmp_path / "r.json").read_text())
     assert status == 0 and report["proposed_clips"] == 0
     lacking = {one["kind"] for one in report["lacks"]}
-    assert "turns" in lacking and "no turn in place: add one" in out
+    assert "turns" in lacking and "hardly any turns in place: add some" in out
     assert sum(one["seconds"] for one in report["locomotion"]) > 15.0 and report["locomotion"][-1]["to_m_s"] is None
     assert all(one["start_s"] <= one["end_s"] and one["why"] for one in report["left_out"])
 
@@ -184,6 +184,15 @@ def test_what_was_written_can_be_evaluated(synthesize, run, match, clips_folder,
     assert again["root_error_m"]["mean"] == pytest.approx(mine["root_error_m"]["mean"], abs=1e-3)
     assert again["keys"][0]["clip"] == mine["keys"][0]["clip"]
     assert again["frames"] == mine["frames"]
+    # what only the synthesis knows is left out with its reason, and not computed in another way
+    assert again["foot_correction_m"]["p95"] is None and mine["foot_correction_m"]["p95"] is not None
+    assert "not known: foot_correction_m.p95, known only while the take is made" in lines
+    head = "head_off_ball_deg_median"
+    assert again["naturalness"][head] == pytest.approx(mine["naturalness"][head], abs=0.1)
+    without = run("evaluate", tmp_path / "out.bvh", "--track", match / "track.csv", "--provenance", tmp_path / "p.csv",
+                  "--library", clips_folder, "--unit", 0.01, "--report", tmp_path / "n.json")
+    assert sum("no angle between head and ball; name it with --ball" in line for line in without[2]) == 1
+    assert head not in json.loads((tmp_path / "n.json").read_text())["naturalness"]
 
 
 def test_what_does_not_belong_together_is_told_by_evaluate(synthesize, run, match, clips_folder, tmp_path):
@@ -438,7 +447,7 @@ def test_what_the_library_lacks_is_status_3_and_the_nearest_0(synthesize, match,
     assert key["labels"] == ["header"] and key["used_instead"]
 
 
-def test_touches_are_solved_where_that_is_asked(synthesize, match, tmp_path, track_of):
+def test_touches_are_solved_unless_that_is_refused(synthesize, match, tmp_path, track_of):
     track = track_of(2.8, 8.0)
     since = track.times - 4.03
     ball = track.times * 0.0 + np.where(since < 0, -3.0, 12.0) * since + 4.03 * 2.8 + 0.45
@@ -449,11 +458,12 @@ def test_touches_are_solved_where_that_is_asked(synthesize, match, tmp_path, tra
     (tmp_path / "words.txt").write_text("0 8\n4.3 kick right\n")
     asked = {"track": tmp_path / "kicked.csv", "annotations": tmp_path / "words.txt", "report": tmp_path / "r.json"}
     keys = []
-    for more in ((), ("--solve-touches",)):
+    for more in (("--no-solve-touches",), ("--solve-touches",), ()):
         assert synthesize(*more, **asked)[0] == 0
         keys += json.loads((tmp_path / "r.json").read_text())["keys"]
-    assert [key["time_s"] for key in keys] == [4.3, 4.3] and keys[0]["solved_time_s"] is None
+    assert [key["time_s"] for key in keys] == [4.3] * 3 and keys[0]["solved_time_s"] is None
     assert keys[1]["solved_time_s"] == pytest.approx(4.03, abs=0.02) and keys[1]["contact_gap_m"] < 0.005
+    assert keys[1] == keys[2]
 
 
 def test_mirrors_can_be_forbidden(synthesize, tmp_path):
@@ -562,6 +572,18 @@ def test_the_second_ctrl_c_breaks_off_what_does_not_listen():
     assert (signal.getsignal(signal.SIGINT), signal.getsignal(signal.SIGTERM)) == before
 
 
+def test_the_first_ctrl_c_breaks_off_a_block_that_never_asks():
+    told = ProgressReporter(False)
+    with _InterruptHandler(told), pytest.raises(KeyboardInterrupt), told.stop_at_once():
+        signal.raise_signal(signal.SIGINT)
+        pytest.fail("the block went on")
+    with _InterruptHandler(told := ProgressReporter(False)):
+        with told.stop_at_once():
+            pass
+        signal.raise_signal(signal.SIGINT)
+        assert told.is_cancelled()
+
+
 def test_signals_that_python_did_not_set_are_left_as_the_system_has_them(monkeypatch):
     """Blender sets handlers of its own before Python: `signal.signal` then returns None, which it does not take
     back."""
@@ -640,6 +662,16 @@ def test_headings_are_planned_and_written_with_the_provenance(synthesize, tmp_pa
     assert json.loads((tmp_path / "r.json").read_text())["naturalness"]["off_plan_deg_median"] is not None
     (tmp_path / "headings.csv").write_text("time_s,heading_deg\n2,\n")
     assert_told(synthesize(headings=tmp_path / "headings.csv"), 2, "headings.csv:2", "no heading")
+
+
+@pytest.mark.parametrize("method, title", [("distance", "Distance"), ("blocks", "Blocks"), ("path", None)])
+def test_headings_of_a_method_that_plans_none_are_told(synthesize, tmp_path, method, title):
+    (tmp_path / "headings.csv").write_text("time_s,heading_deg\n2,120\n99,0\n")
+    status, _, error = synthesize(headings=tmp_path / "headings.csv", method=method)
+    told = [line for line in error if "heading key" in line]
+    assert status == 0 and len(told) == 1
+    assert (f"2 heading keys: the method {title} plans no heading" in told[0]) == bool(title)
+    assert "ignored" in told[0]
 
 
 def test_a_missing_package_of_the_core_is_told_in_one_line():

@@ -266,6 +266,20 @@ def test_the_command_compares_a_folder_of_takes(walks, tmp_path, capsys):
     assert 0.0 < found["subsets"]["all"]["auc"]["logistic_regression"] < 1.0 and found["groups"]["takes"] == 3
 
 
+def test_takes_of_another_library_are_refused_in_one_line(walks, tmp_path, capsys):
+    """Which recordings must not be learned from with them is unknown: an area would be wrong."""
+    takes, report = tmp_path / "takes", tmp_path / "r.json"
+    takes.mkdir()
+    for name, take in list(play_takes(walks).items())[:3]:
+        write_take(takes, name, take)
+    table = sorted(takes.glob("*.csv"))[1]
+    table.write_text(table.read_text().replace(".bvh", "_x.bvh"))
+    assert main(["evaluate", str(takes), "--against", walks.folder, "--report", str(report)]) == 2
+    errors = capsys.readouterr().err.strip().splitlines()
+    assert len(errors) == 1 and str(table).replace(".provenance.csv", ".bvh") in errors[0] and not report.exists()
+    assert "not have, such as" in errors[0] and "_x.bvh; expected a take synthesized from this library" in errors[0]
+
+
 @pytest.mark.parametrize("arguments, message", [
     (["empty", "--against", "L"], "empty: no BVH file in it; expected takes as NAME.bvh and NAME.provenance.csv"),
     (["a.bvh", "--against", "L"], "a.bvh: a.provenance.csv is missing; expected the table of its sources"),

@@ -77,7 +77,7 @@ def test_an_uncut_clip_scores_what_its_recording_scores(uncut, track_of, library
     assert skate["gmd_ratio"] == pytest.approx(skate["source_gmd_ratio"], abs=0.01)
     assert report["pelvis_error_m"]["mean"] == pytest.approx(report["pelvis_error_m"]["own"], abs=0.002)
     assert report["pelvis_surge_ratio"] == pytest.approx(1.0, abs=0.1)
-    assert report["foot_correction_m"]["p95"] < 1e-3 and report["pelvis_drop_m"] < 1e-3
+    assert report["pelvis_drop_m"] < 1e-3
     assert report["bone_change_m"] < 1e-6
     assert report["speed_coverage"] == {"above": 0.0, "below": 0.0}
     assert report["seam_jerk_ratio"]["median"] is None
@@ -88,7 +88,7 @@ def test_an_uncut_clip_scores_what_its_recording_scores(uncut, track_of, library
 def test_the_twin_scores_as_the_recording(cut, track_of, library, mirrored):
     take = cut(("run.bvh", 30, 200, 1.0, mirrored))
     report = evaluate(take, track_of(take), library)
-    assert report["foot_correction_m"]["p95"] < 1e-3
+    assert report["pelvis_drop_m"] < 1e-3
     assert report["skate"]["contact_cm_s"] == pytest.approx(report["skate"]["source_contact_cm_s"], rel=0.05)
 
 
@@ -113,7 +113,8 @@ def test_a_lowered_pelvis_and_moved_feet_are_told(uncut, track_of, library):
     lowered = replace(uncut.motion, root_positions=uncut.motion.root_positions - [0.0, 0.0, 0.03])
     report = evaluate(replace(uncut, motion=lowered), track_of(uncut), library)
     assert report["pelvis_drop_m"] == pytest.approx(0.03, abs=1e-3)
-    assert report["foot_correction_m"]["p95"] == pytest.approx(0.03, abs=1e-3)
+    assert report["foot_correction_m"]["p95"] is None  # a blend or an edit moves feet, too: not seen on the motion
+    assert report["unknown"]["foot_correction_m.p95"] == "known only while the take is made"
     assert report["ground_mm"]["min"] < -25
     told = replace(uncut, correction=np.full((len(uncut.motion), 2), 0.07))
     assert evaluate(told, track_of(uncut), library)["foot_correction_m"]["p95"] == 0.07
@@ -333,6 +334,7 @@ def test_no_own_figure_is_silently_empty(uncut, track_of, library):
     report = evaluate(synthetic_from(uncut, 0), track_of(uncut), library)
     flat = flatten_report(report)
     own = [name for name in flat if name.rpartition(".")[2].startswith("source_") or name.endswith(".own")]
+    own = [name for name in own if not name.startswith("touches.")]  # these are of the whole library
     empty = [name for name in own if flat[name] is None]
     assert {"skate.source_contact_cm_s", "pelvis_error_m.own", "pelvis_surge_m_s.own",
             "naturalness.source_snap_turns_per_min", "seam_jerk_ratio.source_share_above_real"} <= set(empty)

@@ -9,18 +9,11 @@ import numpy as np
 import pytest
 
 from beyond_mocap.annotation import KeyMoment, Timeline
-from beyond_mocap.base.errors import NotInLibraryError
 from beyond_mocap.files.bvh import bvh
 from beyond_mocap.library.build import build_library
+from beyond_mocap.library.coverage import MAX_SPEED, find_speed_gaps
 from beyond_mocap.library.keys import Key, select_substitutes
-from beyond_mocap.library.synthetic_clips import (
-    BLEND_PREFIX,
-    KICK_PREFIX,
-    MAX_SPEED,
-    RECEIVE_PREFIX,
-    SYNTHETIC_FOLDER,
-    find_speed_gaps,
-)
+from beyond_mocap.library.synthetic_clips import BLEND_PREFIX, KICK_PREFIX, RECEIVE_PREFIX, SYNTHETIC_FOLDER
 from beyond_mocap.motion.humanoid import identify_joints
 from beyond_mocap.motion.motion import forward_kinematics
 from beyond_mocap.motion.track import Track
@@ -62,7 +55,7 @@ def test_no_locomotion_no_gaps():
 def test_made_clips_fill_the_gaps_up_to_a_sprint(library, more):
     speed = np.concatenate([more.frames.speed[more.frames.clip == i] for i, c in enumerate(more.clips)
                             if c.is_synthetic])
-    for low, high in library.speed_gaps:
+    for low, high in library.coverage.speed_gaps:
         for wanted in np.linspace(low, min(high, 9.0), 9):
             assert np.sum(np.abs(np.log(speed / wanted)) < 0.12) > 10
     assert made(more, BLEND_PREFIX) and made(more, KICK_PREFIX)
@@ -109,7 +102,7 @@ def test_a_track_at_a_recorded_speed_uses_recordings_only(library):
 
 
 def test_a_track_between_two_recordings_is_played_by_a_blend(library):
-    (low, high), *_ = library.speed_gaps
+    (low, high), *_ = library.coverage.speed_gaps
     plan = Plan(track=straight(np.sqrt(low * high)))
     take = synthesize(library, plan)
     assert any(name.startswith(SYNTHETIC_FOLDER + BLEND_PREFIX) for name in take.clips)
@@ -158,14 +151,8 @@ def test_a_ball_taken_on_the_run_is_made_and_no_foot_slides(with_a_receive, spee
     assert measure_stance_travel(toes, list_stances(take.contacts)).max(initial=0.0) < 0.15
 
 
-def test_where_nobody_takes_a_ball_it_is_taken_by_a_made_reception(more):
-    timeline = Timeline(keys=(KeyMoment(3.0, ("receive", "foot", "low")),))
-    with pytest.raises(NotInLibraryError, match="receive foot low"):
-        synthesize(more, Plan(track=straight(1.4), timeline=timeline))
-    take = synthesize(more, Plan(track=straight(1.4), timeline=timeline, nearest=True))
-    (key,) = take.keys
-    assert key.clip.startswith(SYNTHETIC_FOLDER + RECEIVE_PREFIX) and {"receive", "foot", "low"} <= set(key.words)
-    assert key.used_instead is None and any("synthetic reception" in line for line in take.warnings)
+def test_where_nobody_takes_a_ball_none_is_made(more):
+    assert not made(more, RECEIVE_PREFIX)
 
 
 def test_made_kicks_stand_in_for_the_same_foot_only():

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from beyond_mocap.files.bvh import bvh
-from beyond_mocap.library import missing_steps as steps
+from beyond_mocap.library import coverage
 from beyond_mocap.library.build import build_library
 from beyond_mocap.library.missing_steps import BACK_PREFIX, SIDE_PREFIX, STEP_PREFIX, TURN_PREFIX, iter_missing_steps
 from beyond_mocap.library.synthetic_clips import SYNTHETIC_FOLDER, sample_upright_example
@@ -36,7 +36,8 @@ def forward(tmp_path_factory):
 
 def list_steps(library):
     example = sample_upright_example(library.clips)
-    return list(iter_missing_steps(library.clips, library.frames, library.fps, library.strangeness, example, 60.0))
+    return list(iter_missing_steps(library.clips, library.frames, library.fps, library.strangeness, library.coverage,
+                                   example, 60.0))
 
 
 def made(library, begins):
@@ -45,8 +46,8 @@ def made(library, begins):
 
 def test_a_library_that_only_walks_ahead_lacks_all_of_them(forward):
     names = [name for name, *_ in list_steps(forward)]
-    for prefix, count in ((BACK_PREFIX, 2 * len(steps.BACK_SPEEDS)), (SIDE_PREFIX, len(steps.SIDE_WALKS)),
-                          (TURN_PREFIX, len(steps.TURNS)), (STEP_PREFIX, len(steps.MOVES))):
+    for prefix, count in ((BACK_PREFIX, 2 * len(coverage.BACK_SPEEDS)), (SIDE_PREFIX, len(coverage.SIDE_WALKS)),
+                          (TURN_PREFIX, len(coverage.TURNS)), (STEP_PREFIX, len(coverage.MOVES))):
         assert sum(name.startswith(prefix) for name in names) == count
     assert len(set(names)) == len(names)
 
@@ -121,5 +122,7 @@ def test_a_player_who_goes_sideways_is_shown_side_steps_and_it_is_told(forward):
     take = synthesize(forward, plan)
     shown = np.array([name.startswith(f"{SYNTHETIC_FOLDER}{SIDE_PREFIX}90") for name in take.clips])
     assert shown.any()
-    assert any("synthetic side step: hardly any recording" in line for line in take.warnings)
-    assert not any("synthetic side step" in line for line in synthesize(forward, Plan(track=track)).warnings)
+    lack = forward.coverage.lines["sideways"]
+    assert "hardly any steps sideways or diagonally at 0.5 to 1.5 m/s" in lack
+    assert any(line.endswith(f"s in all): {lack}") for line in take.warnings)
+    assert not any("steps sideways" in line for line in synthesize(forward, Plan(track=track)).warnings)

@@ -6,8 +6,8 @@ import pytest
 from beyond_mocap.base.time_series import find_runs
 from beyond_mocap.files.bvh import bvh
 from beyond_mocap.library.build import build_library
+from beyond_mocap.library.coverage import select_locomotion
 from beyond_mocap.library.loops.run_loops import LOOP_SECONDS, iter_run_loops
-from beyond_mocap.library.synthetic_clips import select_locomotion
 from beyond_mocap.motion.contacts import detect_heel_toe_contacts
 from beyond_mocap.motion.humanoid import identify_joints
 from beyond_mocap.motion.motion import forward_kinematics

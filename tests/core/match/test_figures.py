@@ -46,6 +46,28 @@ def test_figures_of_stretches_weigh_by_what_they_rest_on():
     assert found["tempo"] == {"sd_ms": 12.0, "strides": 7}
 
 
+def test_touches_of_stretches_weigh_by_their_number():
+    """Two receptions of 3 m/s and one of 6; the library's kicks are the same in both stretches and counted once."""
+    own = {"source_kicks": 25, "source_ankle_speed_m_s_median": 9.0}
+    groups = [
+        {"reception": {"receptions": 2, "speed_m_s_median": 3.0, "speed_m_s_max": 4.0, "strike_count": 0},
+         "kick": {"kicks": 0, "ankle_speed_m_s_median": None, **own}, "second_strike_count": 1,
+         "ball_inside": {"ball_frames": 30, "inside_frames": 3, "inside_share": 0.1, "depth_mm_max": 20.0},
+         "substituted": [{"time_s": 1.0}]},
+        {"reception": {"receptions": 1, "speed_m_s_median": 6.0, "speed_m_s_max": 7.0, "strike_count": 1},
+         "kick": {"kicks": 4, "ankle_speed_m_s_median": 8.0, **own}, "second_strike_count": 2,
+         "ball_inside": {"ball_frames": 90, "inside_frames": 0, "inside_share": 0.0, "depth_mm_max": 0.0},
+         "substituted": []},
+    ]
+    found = merge_reports([{"touches": group} for group in groups], [30, 90])["touches"]
+    assert found["reception"] == {"receptions": 3, "speed_m_s_median": 4.0, "speed_m_s_max": 7.0, "strike_count": 1}
+    assert found["kick"] == {"kicks": 4, "ankle_speed_m_s_median": 8.0, **own}
+    assert found["ball_inside"] == {"ball_frames": 120, "inside_frames": 3, "inside_share": pytest.approx(0.025),
+                                    "depth_mm_max": 20.0}
+    assert found["second_strike_count"] == 3 and found["substituted"] == [{"time_s": 1.0}]
+    assert type(found["kick"]["source_kicks"]) is int
+
+
 def test_every_second_has_its_own_figures(take, library):
     played, track = playback_from_take(take), take.plan.track
     count = len(take.motion)

@@ -202,6 +202,19 @@ def test_what_the_eye_sees_has_a_table_of_its_own(tmp_path):
     assert "What the eye sees" not in build_match_page(written(tmp_path, {"a": report(), "c": report()}))
 
 
+def test_touches_have_a_table_of_their_own(tmp_path):
+    """Feet of 2.0 and 7.0 m/s at receptions: mean 4.5, worst 7.0; the ball inside a body in 0 and 41 frames."""
+    seen = [{"reception": {"receptions": count, "speed_m_s_median": speed}, "ball_inside": {"inside_frames": inside}}
+            for count, speed, inside in ((1, 2.0, 0), (3, 7.0, 41))]
+    text = build_match_page(written(tmp_path, {"a": {**report(), "touches": seen[0]}, "b": report(),
+                                               "c": {**report(), "touches": seen[1]}}))  # fmt: skip
+    assert text.count("At the ball") == 1
+    cells = [re.findall(r"<td class=[^>]*>([\d.–]+)", row) for row in text.split("<tr")
+             if "mean<" in row or "worst<" in row]
+    assert ["2", "4.5", "–", "–", "–", "–", "–", "–", "20", "–", "–"] in cells
+    assert ["3", "7.0", "–", "–", "–", "–", "–", "–", "41", "–", "–"] in cells
+
+
 def test_reports_without_seconds_still_make_a_page(tmp_path):
     one = report()
     del one["per_second"]

@@ -5,6 +5,12 @@ import pytest
 
 from beyond_mocap.files.bvh import bvh
 from beyond_mocap.library.build import build_library
+from beyond_mocap.library.missing_steps import TURN_PREFIX
+from beyond_mocap.library.synthetic_clips import SYNTHETIC_FOLDER
+from beyond_mocap.motion import quaternion
+from beyond_mocap.motion.humanoid import identify_joints
+from beyond_mocap.motion.motion import Motion, compute_local_rotations, forward_kinematics
+from beyond_mocap.motion.retargeting.structure import list_descendants
 from beyond_mocap.motion.track import Track, clean_track
 from beyond_mocap.synthesis.plan import Plan
 from beyond_mocap.synthesis.quality import movement
@@ -19,15 +25,28 @@ LIBRARIES = {
     "a walk": {"walk": (1.3, "walking")},
     "runs": {"run": (3.2, "running"), "fast": (4.6, "running")},
     "fights": {"fight": (FIGHT, "walking"), "push": (FIGHT[::-1] * 0.9, "walking")},
+    "boxing": {"box": (0.0, "standing"), "advance": (1.1, "walking"), "after": (1.4, "walking")},
     "no turn": {"walk": (1.3, "walking"), "stand": (0.0, "standing"), "run": (4.0, "running")},
 }
 
 
 def build(folder, name):
     for clip, (speed, words) in LIBRARIES[name].items():
-        bvh.write_bvh(folder / f"{clip}.bvh", build_gait(speed, None if np.ndim(speed) else 6.0, 30.0))
+        motion = build_gait(speed, None if np.ndim(speed) else 6.0, 30.0)
+        bvh.write_bvh(folder / f"{clip}.bvh", raise_fists(motion) if name == "boxing" else motion)
         (folder / f"{clip}.txt").write_text(f"0 6 {words}\n")
     return build_library(folder)
+
+
+def raise_fists(motion):
+    """Raise the arms of a body that faces +X into a guard: upper arms ahead, fists before the face."""
+    body, (_, world) = identify_joints(motion.skeleton), forward_kinematics(motion)
+    for joint, angle in ((body.left.upper_arm, 60.0), (body.right.upper_arm, 60.0), (body.left.lower_arm, 70.0),
+                         (body.right.lower_arm, 70.0)):
+        turn = quaternion.from_axis_angle(np.array([0.0, -1.0, 0.0]), np.radians(angle))
+        arm = [joint, *list_descendants(motion.skeleton.parents, joint)]
+        world[:, arm] = quaternion.multiply(turn, world[:, arm])
+    return Motion(motion.skeleton, motion.root_positions, compute_local_rotations(motion.skeleton, world), motion.fps)
 
 
 @pytest.fixture(scope="module")
@@ -90,17 +109,32 @@ def test_a_player_who_stands_for_minutes_stands(poor, name, standing):
     take = synthesize_path(poor(name), NOISE.normal(0.0, 0.005, (3000, 2)))
     feet = playback_from_take(take).feet[:, :, 1, :2]
     assert np.linalg.norm(feet - np.median(feet, axis=0), axis=-1).max() < 0.25
-    assert any("synthetic standing" in line for line in take.warnings) == standing
+    assert any("a synthetic stand is shown" in line for line in take.warnings) == standing
 
 
 def test_a_turn_that_the_library_lacks_is_told_with_its_seconds(poor):
     angle = np.interp(TIMES, [3.0, 6.0], [0.0, np.pi])
     ball = 5.0 * np.column_stack([np.cos(angle), np.sin(angle), np.full(len(TIMES), 0.02)])
     take = synthesize(poor("no turn"), Plan(track=Track(TIMES, np.zeros((len(TIMES), 2)), ball)))
-    line, = [line for line in take.warnings if "no turn in place: add one" in line or "synthetic turn" in line]
+    line, = [line for line in take.warnings if "hardly any turns in place: add some" in line]
     assert any(first < 6.0 and last > 3.0 for first, last in line.spans)
+    is_synthetic = any(name.startswith(SYNTHETIC_FOLDER + TURN_PREFIX) for name in take.clips)
+    assert line.endswith("until then synthetic ones are shown" if is_synthetic else "the nearest recording is shown")
 
 
-def test_a_library_with_fights_alone_says_that_nothing_is_known_to_belong(poor):
-    take = synthesize_path(poor("fights"), WALK)
-    assert any("no locomotion that surely belongs" in line for line in take.warnings)
+@pytest.mark.parametrize("name", ["fights", "boxing"])
+def test_a_library_with_fights_alone_says_that_nothing_is_known_to_belong(poor, name):
+    lack = poor(name).coverage.lines["belonging"]
+    assert lack.startswith("nothing recorded surely belongs to calm standing or walking")
+    assert lack.endswith("until then players move as these recordings do")
+    take = synthesize_path(poor(name), WALK)
+    line, = [line for line in take.warnings if line.endswith(lack)]
+    played = playback_from_take(take)
+    is_recorded = np.array([not name.startswith(SYNTHETIC_FOLDER) for name in played.clips])[played.clip]
+    seconds = np.sum(is_recorded) / take.motion.fps
+    assert seconds > 2.0 and sum(last - first for first, last in line.spans) == pytest.approx(seconds, abs=0.1)
+
+
+def test_a_library_that_walks_belongs_to_walking(poor):
+    assert "belonging" not in poor("a walk").coverage.lines
+    assert not any("surely belongs" in line for line in synthesize_path(poor("a walk"), WALK).warnings)

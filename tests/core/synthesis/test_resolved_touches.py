@@ -35,7 +35,7 @@ def planted(track_of):
         bare = track_of(2.8, seconds=10.0)
         course = course or course_of(bare)
         ball, _ = course.interpolate(bare.times)
-        return Plan(Track(bare.times, bare.positions, ball), timeline, solve_touches=True, solved=course, **more)
+        return Plan(Track(bare.times, bare.positions, ball), timeline, solved=course, **more)
 
     return make
 
@@ -65,7 +65,7 @@ def test_the_ball_keeps_its_course_but_for_an_even_change_of_velocity(kicked):
     assert np.allclose(kicked.ball.positions[:, 2], BALL_RADIUS)
 
 
-def test_default_takes_know_nothing_of_it(library, planted, timeline_of):
+def test_takes_without_solved_touches_know_nothing_of_it(library, planted, timeline_of):
     plan = planted(timeline_of((5.3, KICK)))
     plain = synthesize(library, replace(plan, solve_touches=False, solved=None))
     assert plain.keys[0].frame == pytest.approx(5.3 * 30.0, abs=0.5)
@@ -112,7 +112,7 @@ def test_a_track_without_a_ball_is_told(library, track_of, timeline_of, seen):
     ball = np.full((len(bare), 3), np.nan)
     ball[:: len(bare) // max(seen, 1)][:seen] = [1.0, 0.0, BALL_RADIUS]  # too far apart, if several
     track = Track(bare.times, bare.positions, ball)
-    take = synthesize(library, Plan(track, timeline_of((3.0, KICK)), solve_touches=True))
+    take = synthesize(library, Plan(track, timeline_of((3.0, KICK))))
     assert any("no ball" in line for line in take.warnings) and take.solved is None
 
 
@@ -129,7 +129,8 @@ def test_solved_from_the_samples_of_a_track(library, planted, timeline_of):
 
 def test_in_a_dribble_the_ball_is_touched_step_by_step(library, planted, timeline_of, track_of):
     bare = track_of(2.8, seconds=10.0)
-    lying = np.column_stack([bare.positions, np.full(len(bare), BALL_RADIUS)])
+    swaying = bare.positions + 0.25 * np.sin(4.0 * bare.times)[:, None]
+    lying = np.column_stack([swaying, np.full(len(bare), BALL_RADIUS)])
     course = SolvedTrajectory(bare.times, lying, np.zeros(len(bare), bool))
     plan = planted(timeline_of((2.0, 8.0, "dribble")), course=course)
     take = synthesize(library, plan)
@@ -176,3 +177,41 @@ def test_an_edit_makes_anew_what_it_touches(library, kicked, timeline_of):
     later = resynthesize(library, replace(kicked.plan, track=track, solved=course), kicked)
     assert later.keys[0].frame == pytest.approx(165.0, abs=0.5) and changed(kicked, later).any()
     assert evaluate(later, track, library)["keys"][0]["contact_gap_m"] < 0.005
+
+
+def test_a_ball_at_the_player_s_own_place_is_dribbled_and_told(library, track_of, timeline_of):
+    bare = track_of(2.8, seconds=10.0)
+    since = np.maximum(bare.times - 8.0, 0.0)
+    away = (since * (9.0 - since) + 0.03 * np.sin(40.0 * since))[:, None] * [1.0, 0.2]
+    ball = np.column_stack([bare.positions + away, np.full(len(bare), np.nan)])
+    plan = Plan(Track(bare.times, bare.positions, ball), timeline_of((8.0, KICK)))
+    take = synthesize(library, plan)
+    line, = (line for line in take.warnings if "own place" in line)
+    (first, last), = line.spans
+    assert first == pytest.approx(0.0, abs=0.1) and last == pytest.approx(8.0, abs=0.1)
+    during = (take.ball.times > 1.0) & (take.ball.times < 7.0)
+    assert not take.ball.measured[during].any() and take.ball.measured[take.ball.times > 8.5].any()
+    told = evaluate(take, plan.track, library)["dribbles"]
+    assert len(told) >= 6 and max(one["contact_gap_m"] for one in told) < 0.005
+    ahead = take.ball.positions[:, 0] - sample_track(plan.track, 30.0).raw[:, 0]
+    assert ahead[during].min() > 0.1 and ahead[during].max() < 2.0
+    plain = synthesize(library, replace(plan, solve_touches=False))
+    assert not any("own place" in line for line in plain.warnings) and plain.ball.measured[during].all()
+
+
+@pytest.mark.parametrize("place", [None, (0.0, 0.0, BALL_RADIUS), (40.0, 5.0, np.nan)])
+def test_a_ball_that_is_unknown_or_never_moves_does_no_harm(library, track_of, timeline_of, place):
+    bare = track_of()
+    ball = None if place is None else np.tile(place, (len(bare), 1))
+    track, words = Track(bare.times, bare.positions, ball), timeline_of((3.0, KICK))
+    take = synthesize(library, Plan(track, words))
+    plain = synthesize(library, Plan(track, words, solve_touches=False))
+    assert np.isfinite(take.motion.rotations).all()
+    assert len([line for line in take.warnings if "touch" in line]) - len(
+        [line for line in plain.warnings if "touch" in line]) == 1
+    if place is None:
+        assert np.array_equal(take.motion.rotations, plain.motion.rotations)
+
+
+def test_without_a_ball_and_without_labels_nothing_is_told(library, track_of, timeline_of):
+    assert not any("touches" in line for line in synthesize(library, Plan(track_of(), timeline_of())).warnings)

@@ -128,7 +128,8 @@ def test_where_only_the_ball_lies_elsewhere_the_same_clips_are_shown(library, ta
     track = Track(take.plan.track.times, take.plan.track.positions, ball)
     after = resynthesize(library, replace(take.plan, track=track), take)
     assert np.array_equal(after.edit.frame, take.edit.frame) and np.array_equal(after.clip_frame, take.clip_frame)
-    off = np.any(after.ball.positions != take.ball.positions, axis=1)
+    # its noise is solved over all samples
+    off = np.linalg.norm(after.ball.positions - take.ball.positions, axis=1) > 0.05
     assert off[150] and not off[: 3 * 30].any() and not off[7 * 30 :].any()
 
 

@@ -19,6 +19,7 @@ from beyond_mocap.synthetic.actions.keeper_throws import THROWS
 from beyond_mocap.synthetic.actions.key_poses import build_key_poses, mirror_foot
 from beyond_mocap.synthetic.actions.table import ACTIONS
 from beyond_mocap.synthetic.lying import iter_surface
+from beyond_mocap.synthetic.performers import build_body
 
 FPS = 60.0
 RECIPES = {**SAVES, **DIVES, **THROWS, **CELEBRATIONS, **GESTURES}
@@ -165,6 +166,15 @@ def test_a_jump_to_the_ball_is_as_high_as_the_ball(height):
     assert hands[frame] == pytest.approx(height - 0.1, abs=0.03)
     centre = compute_centre_of_mass(BODY, places)[:, 2]
     assert abs(int(centre.argmax()) - frame) <= 2
+
+
+@pytest.mark.parametrize("name", ["catch_low", "dive_short_low_catch", "dive_long_high_push", "knee_slide", "tying"])
+def test_a_small_body_with_other_proportions_stays_above_the_ground(name):
+    skeleton = build_body(1.62, np.random.default_rng(3))
+    motion = build_key_poses(RECIPES[name], skeleton, fps=FPS).motion
+    places, world = forward_kinematics(motion)
+    assert min(place[:, 2].min() for _, place, _ in iter_surface(skeleton, places, world)) > -0.03
+    assert places[-1, BODY.hips, 2] == pytest.approx(places[0, BODY.hips, 2], abs=0.02)
 
 
 def test_every_recipe_is_an_action_of_its_own_name():

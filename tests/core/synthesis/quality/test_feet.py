@@ -94,12 +94,6 @@ def test_support_height_takes_the_part_of_the_foot_that_is_down():
     assert np.isnan(movement.measure_support_height(planted, contacts, 0.08)[:, 1]).all()
 
 
-def test_planted_shift_is_how_far_the_lock_moved_the_foot():
-    planted, contacts = walk()
-    np.testing.assert_allclose(movement.measure_planted_shift(planted + [0.03, 0.04, 0.0], planted, contacts), 0.05)
-    assert len(movement.measure_planted_shift(planted, planted, contacts)) == contacts.sum()
-
-
 def test_foot_joints_are_ankle_and_toe():
     skeleton = build_adult_skeleton()
     names = [[skeleton.names[joint] for joint in side] for side in movement.list_foot_joints(skeleton)]

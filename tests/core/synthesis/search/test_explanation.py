@@ -20,7 +20,7 @@ from beyond_mocap.synthesis.synthesize import synthesize
 
 DATA = Path(__file__).resolve().parents[5] / "shared" / "data"
 RESOLVED = [
-    {"height": 1.5}, {"height": 2.0}, {"solve_touches": True},
+    {"height": 1.5}, {"height": 2.0}, {"solve_touches": False},
     {"height": 1.6, "pins": (Pin(2.0, "left_hand", (3.0, 0.3, 1.3)),), "solve_touches": True},
     {"height": 1.95, "style": ("jogging",), "style_weight": 2.0, "strong_foot": "left"},
 ]  # fmt: skip

@@ -1,5 +1,7 @@
 """Of several clips the one that strikes where the ball is, and sends it where it went."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -17,21 +19,47 @@ from beyond_mocap.synthesis.search.key_fit import (
 def three():
     """A low strike ahead, a high one ahead, a low one to the left."""
     place = np.array([[0.5, 0.0], [0.5, 0.0], [0.0, 0.5]])
-    return StrikeMeasurements(place, np.array([0.1, 0.9, 0.1]), np.array([[8.0, 0.0], [8.0, 0.0], [0.0, 8.0]]))
+    velocity = np.array([[8.0, 0.0, 0.0], [8.0, 0.0, 0.0], [0.0, 8.0, 0.0]])
+    return StrikeMeasurements(place, np.array([0.1, 0.9, 0.1]), velocity, np.ones(3, bool))
 
 
 @pytest.mark.parametrize("ball, best", [
-    (BallMeasurement(np.array([0.5, 0.0]), 0.11, np.array([15.0, 0.0])), 0),
-    (BallMeasurement(np.array([0.5, 0.0]), 1.0, np.array([15.0, 0.0])), 1),
-    (BallMeasurement(np.array([0.1, 0.6]), 0.11, np.array([0.0, 15.0])), 2),
+    (BallMeasurement(np.array([0.5, 0.0]), 0.11, np.array([9.5, 0.0, 0.0])), 0),
+    (BallMeasurement(np.array([0.5, 0.0]), 1.0, np.array([9.5, 0.0, 0.0])), 1),
+    (BallMeasurement(np.array([0.1, 0.6]), 0.11, np.array([0.0, 9.5, 0.0])), 2),
 ])
 def test_the_clip_that_fits_costs_least(three, ball, best):
     assert int(np.argmin(compute_key_misfit(three, ball))) == best
 
 
 def test_what_is_unknown_costs_nothing(three):
-    unknown = BallMeasurement(np.full(2, np.nan), np.nan, np.full(2, np.nan))
+    unknown = BallMeasurement(np.full(2, np.nan), np.nan, np.full(3, np.nan))
     assert not np.any(compute_key_misfit(three, unknown))
+
+
+@pytest.fixture(scope="module")
+def strengths():
+    """A side-foot pass, a shot, and a shot that rises, from one place."""
+    velocity = np.array([[6.0, 0.0, 0.0], [17.0, 0.0, 0.0], [15.0, 0.0, 8.0]])
+    return StrikeMeasurements(np.tile([0.5, 0.0], (3, 1)), np.full(3, 0.1), velocity, np.ones(3, bool))
+
+
+@pytest.mark.parametrize("leaving, best", [([7.0, 0.0, 0.0], 0), ([33.0, 0.0, 0.0], 1), ([20.0, 0.0, 14.0], 2)])
+def test_a_shot_is_no_side_foot_tap_and_a_pass_no_shot(strengths, leaving, best):
+    ball = BallMeasurement(np.array([0.5, 0.0]), 0.11, np.array(leaving))
+    assert int(np.argmin(compute_key_misfit(strengths, ball))) == best
+
+
+def test_a_reception_is_not_judged_by_the_speed_of_the_ball(strengths):
+    ball = BallMeasurement(np.array([0.5, 0.0]), 0.11, np.array([33.0, 0.0, 0.0]))
+    taken = compute_key_misfit(replace(strengths, sends=np.zeros(3, bool)), ball)
+    assert taken[0] == taken[1] < compute_key_misfit(strengths, ball)[0]
+
+
+def test_a_runner_can_turn_less_to_where_the_ball_goes(strengths):
+    ball = BallMeasurement(np.array([0.5, 0.0]), 0.11, np.array([12.0, 7.0, 0.0]))
+    standing, running = (compute_key_misfit(strengths, replace(ball, speed=speed))[1] for speed in (0.0, 7.0))
+    assert standing < running
 
 
 def test_the_ball_is_seen_along_the_way():

@@ -1,16 +1,23 @@
-"""Open and read files that users name; missing files, folders and files that are too large raise the same InputErrors.
+"""Open and read files that users name; missing files, folders, files that are too large and pipes into which nothing is
+written raise the same InputErrors.
 """
 
 from __future__ import annotations
 
+import io
 import os
+import select
+import stat
 from typing import BinaryIO
 
-from ..base.errors import InputError, build_read_error
+from .errors import InputError, build_read_error
+
+PIPE_SECONDS = 5.0
+"""Seconds until a pipe that no program writes to is refused; opening it like a file would wait for ever."""
 
 
 def open_file(path: str | os.PathLike, kind: str, max_bytes: int | None = None) -> BinaryIO:
-    """Open a file for reading bytes.
+    """Open a file for reading bytes; of a pipe, such as `<(...)` in a shell, the whole content.
 
     Args:
         path: the file.
@@ -19,17 +26,39 @@ def open_file(path: str | os.PathLike, kind: str, max_bytes: int | None = None) 
     Returns:
         The open file.
     Raises:
-        InputError: if it cannot be opened or is too large.
+        InputError: if it cannot be opened or is too large, or is a pipe to which no program writes.
     """
+    handle: BinaryIO
     try:
-        handle = open(path, "rb")
-        size = os.fstat(handle.fileno()).st_size
+        if stat.S_ISFIFO(os.stat(path).st_mode):
+            content = _read_pipe(path, kind)
+            handle, size = io.BytesIO(content), len(content)
+        else:
+            handle = open(path, "rb")
+            size = os.fstat(handle.fileno()).st_size
     except (OSError, ValueError) as error:
         raise build_read_error(path, kind, error) from None
     if max_bytes is not None and size > max_bytes:
         handle.close()
         raise InputError(path, f"has {size} bytes", f"{kind} of at most {max_bytes}", "choose another file")
     return handle
+
+
+def _read_pipe(path: str | os.PathLike, kind: str) -> bytes:
+    """Read a pipe until its writer closes it; InputError if none opens it within PIPE_SECONDS.
+
+    Opened without waiting, a pipe gives None while its writer has written nothing yet, and nothing without a writer.
+    """
+    with open(os.open(path, os.O_RDONLY | os.O_NONBLOCK), "rb", buffering=0) as pipe:
+        poller = select.poll()
+        poller.register(pipe, select.POLLIN)
+        has_writer = bool(poller.poll(1000.0 * PIPE_SECONDS))
+        begin = b"" if has_writer else pipe.read(1)
+        if not has_writer and begin == b"":
+            raise InputError(path, "is not a regular file but a pipe, into which no program writes", kind,
+                             "name a file, or start the program that writes")
+        os.set_blocking(pipe.fileno(), True)
+        return (begin or b"") + pipe.read()
 
 
 def read_bytes(path: str | os.PathLike, kind: str, max_bytes: int | None = None) -> bytes:

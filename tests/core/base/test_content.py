@@ -1,13 +1,15 @@
 """Files that cannot be opened are told in one line, whoever reads them."""
 
 import os
+import threading
 
 import pytest
 
 from beyond_mocap.annotation import read_annotation_csv, read_text
+from beyond_mocap.base import content
+from beyond_mocap.base.content import read_bytes, read_utf8
 from beyond_mocap.base.errors import InputError
 from beyond_mocap.files.bvh import bvh
-from beyond_mocap.files.content import read_bytes, read_utf8
 from beyond_mocap.files.obj import read_mesh
 from beyond_mocap.files.tables import read_ball
 from beyond_mocap.files.tracking.tracking import read_match, read_track_csv
@@ -57,3 +59,16 @@ def test_text_is_utf8_and_loses_the_mark_at_its_start(tmp_path):
         InputError, match="is not UTF-8 text; expected a thing; choose another file, or save it as UTF-8"
     ):
         read_utf8(tmp_path / "b", "a thing")
+
+
+@pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="Windows has no named pipes")
+def test_a_pipe_is_read_and_refused_without_a_writer(tmp_path, monkeypatch):
+    pipe = tmp_path / "pipe"
+    os.mkfifo(pipe)
+    writer = threading.Thread(target=pipe.write_bytes, args=(b"12345",), daemon=True)
+    writer.start()
+    assert read_bytes(pipe, "a thing") == b"12345"
+    writer.join(10)
+    monkeypatch.setattr(content, "PIPE_SECONDS", 0.1)
+    with pytest.raises(InputError, match="a pipe, into which no program writes; expected a thing"):
+        read_bytes(pipe, "a thing")

@@ -1,0 +1,87 @@
+"""Field players' actions: on the ground, at the ball, in free fall while in the air, and back on their feet."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from beyond_mocap.annotation import VOCABULARY
+from beyond_mocap.library.missing_actions import ActionMoment, find_action
+from beyond_mocap.motion.humanoid import identify_joints
+from beyond_mocap.motion.motion import forward_kinematics
+from beyond_mocap.motion.retargeting.adult import build_adult_skeleton
+from beyond_mocap.synthetic.actions.action import ActionSetting
+from beyond_mocap.synthetic.actions.field_table import FIELD_ACTIONS
+from beyond_mocap.synthetic.gait_tables import GRAVITY
+
+FPS = 60.0
+ADULT = ActionSetting(skeleton=build_adult_skeleton(), fps=FPS)
+BODY = identify_joints(ADULT.skeleton)
+ROWS = {action.name: action for action in FIELD_ACTIONS}
+WITHOUT_BODY = {
+    ("getting_up", "with"),  # the thesis lost the second half of this label
+    ("receive", "foot", "high", "inside"), ("catchb", "slide"),
+}  # fmt: skip
+
+
+def build(name: str, speed: float = 0.0, height: float | None = None):
+    setting = ActionSetting(skeleton=ADULT.skeleton, fps=FPS, speed=speed, height=height, neutral=ADULT.neutral)
+    gesture = ROWS[name].build(setting)
+    return gesture, forward_kinematics(gesture.motion)[0]
+
+
+def measure_fall(height: np.ndarray) -> np.ndarray:
+    return np.diff(height, 2) * FPS**2
+
+
+@pytest.mark.parametrize("name", sorted(ROWS))
+def test_an_action_stays_above_the_ground_and_begins_and_ends_on_its_feet(name):
+    action = ROWS[name]
+    speed = action.speeds[1] if action.speeds else 0.0
+    gesture, places = build(name, speed, float(np.mean(action.heights)) if action.heights else None)
+    assert np.isfinite(places).all() and places[..., 2].min() > -0.01
+    assert gesture.start < gesture.end <= gesture.motion.duration + 1e-6
+    assert action.is_span or gesture.start < gesture.key < gesture.end
+    stands = places[[0, -1], BODY.hips, 2] > 0.8
+    assert stands[1] and (stands[0] or "getting_up" in action.labels or action.is_span)
+
+
+@pytest.mark.parametrize("name, speed", [("jumping header", 0.0), ("running header", 4.4)])
+@pytest.mark.parametrize("height", [2.05, 2.3])
+def test_a_header_meets_the_ball_at_its_height_in_free_fall(name, speed, height):
+    gesture, places = build(name, speed, height)
+    key = round(gesture.key * FPS)
+    assert places[key, BODY.head, 2] == pytest.approx(height - 0.09, abs=0.05)
+    assert places[key - 8 : key + 9, [BODY.left.toe, BODY.right.toe], 2].min() > 0.1
+    assert measure_fall(places[key - 8 : key + 9, BODY.hips, 2]) == pytest.approx(-GRAVITY, abs=0.6)
+
+
+@pytest.mark.parametrize("height", [0.5, 0.8, 1.2])
+def test_a_dive_is_level_at_the_ball_and_lands_on_the_front(height):
+    gesture, places = build("diving header", 4.4, height)
+    key = round(gesture.key * FPS)
+    head, hips = places[key, BODY.head], places[key, BODY.hips]
+    assert head[2] == pytest.approx(height, abs=0.2) and head[0] - hips[0] > 0.45
+    lying = places[key + 28 : key + 42]
+    assert lying[:, BODY.hips, 2].max() < 0.3 and lying[:, BODY.head, 2].max() < 0.5
+
+
+def test_a_slide_reaches_ahead_near_the_ground_and_slows_down_as_grass_lets_it():
+    gesture, places = build("slide tackle", 5.6)
+    key = round(gesture.key * FPS)
+    foot, hips = places[key, BODY.right.foot], places[key, BODY.hips]
+    assert foot[0] - hips[0] > 0.7 and foot[2] < 0.2 and hips[2] < 0.35
+    speed = np.gradient(places[:, BODY.hips, 0]) * FPS
+    slowing = np.diff(speed[key : key + 45]) * FPS
+    assert -7.0 < np.median(slowing) < -4.0
+
+
+def test_every_label_of_a_key_moment_has_a_body():
+    def walk(tree, above=()):
+        for word, below in tree.items():
+            yield (*above, word)
+            yield from walk(below, (*above, word))
+
+    lacking = {words for words in walk(VOCABULARY["discrete"]) if find_action(ActionMoment(labels=frozenset(words)))
+               is None}
+    assert lacking <= WITHOUT_BODY
