@@ -74,8 +74,8 @@ def find_action(moment: ActionMoment) -> Action | None:
     Args:
         moment: the requested action.
     Returns:
-        The action that suits the player's speed and the ball's height, with the fewest other labels; None where there
-        is none, or where the labels name no action.
+        The first of the table that suits the player's speed and the ball's height; None where no action answers, or
+        where the labels name none.
     """
     requested = moment.labels - frozenset(SIDES)
     serving = [action for action in ACTIONS if action.is_span == moment.is_span and requested <= action.labels]
@@ -83,8 +83,7 @@ def find_action(moment: ActionMoment) -> Action | None:
     def rate_misfit(action: Action) -> tuple:
         low, high = action.heights or action.meets
         off = 0.0 if moment.height is None else max(low - moment.height, moment.height - high)
-        is_unsuited = not action.suits[0] <= moment.speed <= action.suits[1]
-        return bool(action.varies), is_unsuited, off > _HEIGHT_SLACK, len(action.labels - requested)
+        return bool(action.varies), not action.suits_speed(moment.speed), off > _HEIGHT_SLACK
 
     is_named = any(_names_action(word) for word in requested)
     return min(serving, key=rate_misfit, default=None) if is_named else None
