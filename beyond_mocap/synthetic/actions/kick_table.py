@@ -55,7 +55,7 @@ class _Kind:
 
 
 _KINDS = (
-    _Kind(name="inside kick", labels="low inside", style="inside", heights=_LOW),
+    _Kind(name="inside kick", labels="low inside pass", style="inside", heights=_LOW),
     _Kind(name="instep kick", labels="low top", style="instep", heights=_LOW, varies="inside kick"),
     _Kind(name="outside kick", labels="low outside", style="outside", heights=_LOW),
     _Kind(name="toe poke", labels="low toe", style="toe poke", heights=_LOW),
@@ -120,8 +120,8 @@ def _build_rows(kind: _Kind) -> tuple[Action, ...]:
 
 
 KICK_ACTIONS = (
+    *(row for kind in _KINDS for row in _build_rows(kind)),
     Action(name="goal kick", labels=frozenset({"goal_kick", "kick", "foot", "low", "top", "with_setup", "standing"}),
            build=partial(_build_from_a_stand, _KINDS[1]), has_side=True, meets=(-np.inf, _LOW[1])),
-    *(row for kind in _KINDS for row in _build_rows(kind)),
 )
 """The rows of `actions.table`."""
