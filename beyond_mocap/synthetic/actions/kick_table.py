@@ -28,7 +28,7 @@ _DIRECTIONS, _HIGH_DIRECTIONS = (-15.0, 30.0), (10.0,)  # degrees from the run, 
 _BALL_RADIUS = 0.11  # m
 _MOST_LIFT = 0.4  # m of an adult by which a swing at a resting ball can be guided higher
 _TOE_LIFT = 0.1  # m of an adult that the foot of a kick out of a stand is higher: its toes would be below the ground
-_LOW, _HIGH, _VOLLEY = (0.1, 0.4), (0.4, 1.0), (0.2, 0.6)  # m of the ball
+_LOW, _HIGH, _VOLLEY = (0.1, 0.4), (0.4, 2.0), (0.2, 0.6)  # m of the ball
 
 
 @dataclass(frozen=True, kw_only=True)
