@@ -6,13 +6,17 @@ import math
 from collections.abc import Callable
 from dataclasses import dataclass
 
-import numpy as np
-
 from ...motion.motion import Motion
 from ...motion.retargeting.neutral import NeutralStance, build_neutral_stance
 from ...motion.skeleton import Skeleton
 from .. import gait_tables as tables
 from ..gestures import Gesture
+
+STANDS, MOVES = (0.0, 1.1), (1.1, math.inf)
+"""Lowest and highest m/s of players who stand, and who move."""
+
+_PACES = frozenset({"standing", "running"})
+_SUITS = {frozenset({"standing"}): STANDS, frozenset({"running"}): MOVES}
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -57,7 +61,8 @@ class Action:
         has_side: whether it is done with or to one side; its mirrored twin shows the other one.
         speeds: m/s at which it is built, the nearest one to the player's; empty: it does not depend on speed.
         heights: lowest and highest m of the ball for which it is built; empty: it does not depend on the ball.
-        suits: lowest and highest m/s of players whom it suits; of several actions one that suits is taken.
+        suits: lowest and highest m/s of players whom it suits; of several actions one that suits is taken. Default: by
+            its labels, as standing and running actions do.
         meets: lowest and highest m of a ball that it can meet, where it is not built for the ball's height.
         is_span: whether it lasts (a celebration) instead of having a key moment; its clip carries the labels from the
             gesture's start to its end.
@@ -72,8 +77,13 @@ class Action:
     has_side: bool = False
     speeds: tuple[float, ...] = ()
     heights: tuple[float, ...] = ()
-    suits: tuple[float, float] = (0.0, np.inf)
-    meets: tuple[float, float] = (-np.inf, np.inf)
+    suits: tuple[float, float] | None = None
+    meets: tuple[float, float] = (-math.inf, math.inf)
     is_span: bool = False
     varies: str = ""
     most_ball_speed: float = math.inf
+
+    def suits_speed(self, speed: float) -> bool:
+        """Return whether the action suits a player at `speed` m/s."""
+        low, high = self.suits or _SUITS.get(self.labels & _PACES, (0.0, math.inf))
+        return low <= speed <= high

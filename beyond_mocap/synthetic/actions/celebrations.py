@@ -161,7 +161,7 @@ HEAD_DOWN = KeyPoses(
     spine=((-1.2, 0, 16, 0), (1.6, 0, 16, 0)),
 )
 CELEBRATIONS = dict(
-    arms_spread=ARMS_SPREAD, aeroplane=AEROPLANE, knee_slide=KNEE_SLIDE, jump_fist=JUMP_FIST, pointing_up=POINTING_UP,
-    fist_pump=FIST_PUMP, dance=DANCE, head_down=HEAD_DOWN,
+    arms_spread=ARMS_SPREAD, fist_pump=FIST_PUMP, aeroplane=AEROPLANE, jump_fist=JUMP_FIST, pointing_up=POINTING_UP,
+    knee_slide=KNEE_SLIDE, dance=DANCE, head_down=HEAD_DOWN,
 )
-"""Recipes by name."""
+"""Recipes by name: that of a plain celebration in a run first, then that in a stand."""

@@ -48,5 +48,5 @@ def build_pose_actions(*tables: Mapping[str, KeyPoses]) -> tuple[Action, ...]:
     return tuple(_build_row(name, recipe) for table in tables for name, recipe in table.items())
 
 
-POSE_ACTIONS = build_pose_actions(SAVES, DIVES, THROWS, CELEBRATIONS, GESTURES)
+POSE_ACTIONS = build_pose_actions(SAVES, DIVES, THROWS, GESTURES, CELEBRATIONS)
 """Rows for `table.ACTIONS`."""

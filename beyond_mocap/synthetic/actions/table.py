@@ -1,7 +1,7 @@
 """Every synthetic action: to add one, add a row to one of these tables.
 
 Of several rows that answer to the requested labels one that suits the player's speed and the ball's height is taken,
-then the one with the fewest other labels, then the first (`library.missing_actions.find_action`).
+then the first (`library.missing_actions.find_action`): the usual way to do it stands above the special ones.
 """
 
 from __future__ import annotations

@@ -43,8 +43,18 @@ def test_only_what_no_recording_carries_is_missing(library):
     assert describe_action(path) == "jumping header" and describe_action("kick.bvh") is None
 
 
-def test_a_label_alone_finds_the_action_with_the_fewest_others():
-    assert find_action(moment("throwb")).name == "throw-in" and find_action(moment("header", "left", "jump"))
+@pytest.mark.parametrize("height", [None, 0.11, 1.7])
+def test_a_label_alone_finds_the_usual_action_and_nothing_special(height):
+    names = [find_action(moment(label, speed=speed, height=height)).name
+             for label in ("kick", "tackle", "intercept", "throwb", "jump") for speed in (0.0, 4.0)]
+    assert names == ["side-foot kick from a stand", "kick with the inside", "block tackle", "slide tackle",
+                     "interception", "sliding interception", "throw-in", "throw-in", "jump", "jump in a run"]
+
+
+def test_without_a_ball_nobody_dives_for_a_header_and_a_foot_receives():
+    assert find_action(moment("header", speed=4.0)).name == "running header"
+    assert find_action(moment("receive")).name == "reception with the inside of the foot"
+    assert find_action(moment("header", "left", "jump")).name == "jumping header"
     assert find_action(moment("standing")) is find_action(moment("header", "sitting")) is None
 
 
