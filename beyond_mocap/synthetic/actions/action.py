@@ -65,7 +65,7 @@ class Action:
             its labels, as standing and running actions do.
         meets: lowest and highest m of a ball that it can meet, where it is not built for the ball's height.
         is_span: whether it lasts (a celebration) instead of having a key moment; its clip carries the labels from the
-            gesture's start to its end.
+            gesture's start to its end, where it begins to fade.
         varies: name of the action beside which it is offered, where the player is as fast as it needs, and the ball no
             faster than it can be done with; empty: it is offered alone.
         most_ball_speed: m/s of the ball before the key moment up to which it is offered so.
