@@ -114,7 +114,7 @@ def summarize_ball_speeds(kicks: Sequence[touches.Kick]) -> dict:
 
 def measure_fit(touch_view: TouchView) -> dict:
     """Measure the share of touches that are shown with a body part and side which fit the ball's height and place."""
-    moments = [one for one in touch_view.view.moments if find_striking_part(one.requested.words) is not None
+    moments = [one for one in touch_view.moments if find_striking_part(one.requested.words) is not None
                and np.isfinite(touch_view.ball[one.frame]).all()]
     fits = np.array([(fits_part(touch_view, one), fits_side(touch_view, one)) for one in moments], dtype=bool)
     shares = [float(column.mean()) for column in (fits.all(axis=1), *fits.T)] if len(fits) else [math.nan] * 3

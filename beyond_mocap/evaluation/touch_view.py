@@ -31,6 +31,7 @@ class TouchView:
     Attributes:
         view: the take beside its library.
         played: the take as played.
+        moments: key moments, without those that miss the ball by design.
         receptions: key moments that ask for a ball which a foot receives.
         body_receptions: those which ask for one that thigh, chest or head take.
         kicks: those which ask for one that a foot sends.
@@ -38,9 +39,10 @@ class TouchView:
 
     def __init__(self, view: View):
         self.view, self.played = view, view.played
-        self.receptions = [one for one in view.moments if touches.is_foot_reception(one.requested.words)]
-        self.body_receptions = [one for one in view.moments if touches.is_body_reception(one.requested.words)]
-        self.kicks = [one for one in view.moments if touches.is_kick(one.requested.words)]
+        self.moments = [one for one in view.moments if not one.requested.misses_ball]
+        self.receptions = [one for one in self.moments if touches.is_foot_reception(one.requested.words)]
+        self.body_receptions = [one for one in self.moments if touches.is_body_reception(one.requested.words)]
+        self.kicks = [one for one in self.moments if touches.is_kick(one.requested.words)]
 
     @cached_property
     def legs(self) -> touches.LegCourse:

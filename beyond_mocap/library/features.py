@@ -10,6 +10,7 @@ second later. Faustino drops each motion's first two frames, which lack derivati
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -73,7 +74,7 @@ class Frames:
         """(N,) frames that follow in the same clip."""
         return (self.first + self.count)[self.clip] - 1 - np.arange(len(self))
 
-    @property
+    @cached_property
     def speed(self) -> np.ndarray:
         """(N,) speed of the path without sway, m/s."""
         return np.linalg.norm(self.velocity, axis=1)

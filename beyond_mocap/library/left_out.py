@@ -84,7 +84,6 @@ def find_left_out(library: Library) -> tuple[LeftOut, ...]:
 def _find_left_out(library: Library) -> tuple[LeftOut, ...]:
     """Find the stretches of locomotion that do not belong to it."""
     frames = library.frames
-    speed = frames.speed  # computed over all frames at every access
     is_strange = select_locomotion_alone(frames, library.clips) & (library.strangeness > 1.0)
     found = []
     for index, clip in enumerate(library.clips):
@@ -93,7 +92,7 @@ def _find_left_out(library: Library) -> tuple[LeftOut, ...]:
         for start, end in _join_runs(runs, int(_JOINED * library.fps)):
             if end - start >= _SHORTEST * library.fps:
                 part = slice(first + start, first + end)
-                found.append(_describe_stretch(library, clip.path, part, speed[part], start=start / library.fps,
+                found.append(_describe_stretch(library, clip.path, part, frames.speed[part], start=start / library.fps,
                                                end=(end - 1) / library.fps))
     return tuple(found)
 

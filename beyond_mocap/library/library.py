@@ -6,6 +6,7 @@
 from __future__ import annotations
 
 from collections import Counter
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
@@ -174,10 +175,30 @@ class Library:
                 cache.save_library(*self.cache_location, synthetic, "made")
         else:
             write_synthetic_clips(self.cache_location[0], synthetic.clips, missing_only=True)
-        if not synthetic.clips:
-            return self
-        frames = join_frames(self.frames, synthetic.frames)
-        return replace(self, clips=(*self.clips, *synthetic.clips), frames=frames, clusters={})
+        return self._join(synthetic) if synthetic.clips else self
+
+    def append_synthetic_clips(self, clips: Sequence[Clip]) -> "Library":
+        """Append synthetic clips, described like its own.
+
+        What is known of the other clips is kept: a take asks for clips of its own, and all else takes seconds.
+
+        Args:
+            clips: on the library's skeleton.
+        Returns:
+            The library with them; it has no clusters. They define no gait.
+        """
+        added = replace(self, clips=tuple(clips), frames=build_frames(clips, self.frames), clusters={})
+        joined = self._join(added)
+        known = {name: getattr(self, name) for name in ("normal_postures", "cut_receptions", "gaits")}
+        known |= {name: np.concatenate([getattr(self, name), getattr(added, name)])
+                  for name in ("strangeness", "stance_seconds", "feet_in_contact")}
+        vars(joined).update(known)  # where cached properties keep their values
+        return joined
+
+    def _join(self, other: "Library") -> "Library":
+        """Return the library followed by the clips of another one; without clusters."""
+        frames = join_frames(self.frames, other.frames)
+        return replace(self, clips=(*self.clips, *other.clips), frames=frames, clusters={})
 
     def needs_synthetic_clips(self, speed: np.ndarray, offset: np.ndarray, heading: np.ndarray,
                               key_speeds: np.ndarray, takes: np.ndarray) -> bool:

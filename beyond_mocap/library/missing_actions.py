@@ -10,7 +10,7 @@ that few clips serve many moments. The clip's path says all of it, so that an ed
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from weakref import WeakKeyDictionary
 
@@ -29,7 +29,7 @@ from ..synthetic.actions.action import Action, ActionSetting
 from ..synthetic.actions.table import ACTIONS
 from .cache import write_synthetic_clips
 from .clip import Clip
-from .features import SMOOTH_SECONDS, build_frames, join_frames
+from .features import SMOOTH_SECONDS
 from .keys import select_keys
 from .library import Library
 from .synthetic_clips import FPS, SYNTHETIC_FOLDER, detect_still_points, sample_upright_example
@@ -138,7 +138,7 @@ def add_actions(library: Library, paths: Iterable[str]) -> Library:
     if added not in extended:
         while len(extended) >= _KEPT:
             del extended[next(iter(extended))]
-        extended[added] = _append_clips(library, [_find_clips(library, path) for path in added])
+        extended[added] = library.append_synthetic_clips([clip for path in added for clip in _find_clips(library, path)])
     return extended[added]
 
 
@@ -250,10 +250,3 @@ def _build_gait_rows(library: Library, motion, first: int, last: int) -> list[Cl
     parts = ((0, first), (last + 1, len(motion)))
     return [ClipAnnotation(low + a, low + b - 1, None, gaits[band[low + a]].labels)
             for low, high in parts if high - low > 1 for a, b in find_equal_runs(band[low:high])]
-
-
-def _append_clips(library: Library, pairs: Sequence[tuple[Clip, Clip]]) -> Library:
-    """Append clips to a library, described like its own."""
-    clips = [clip for pair in pairs for clip in pair]
-    frames = join_frames(library.frames, build_frames(clips, library.frames))
-    return replace(library, clips=(*library.clips, *clips), frames=frames, clusters={})

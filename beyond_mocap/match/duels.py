@@ -1,8 +1,8 @@
 """Duels for the ball: one player touches it, an opponent close to it reaches and misses by design.
 
 Tracking does not say who fights for a ball. An opponent whose leg could reach it at the moment of a touch, who has it
-ahead and does not touch it within half a second, is taken to reach for it; an event of his (a lost tackle or aerial)
-confirms it. His key moment excludes `touch`, so his body comes near the ball and never moves it
+ahead and does not touch it within half a second, is taken to reach for it; an event of their own (a lost tackle or
+aerial) confirms it. Their key moment excludes `touch`, so their body comes near the ball and never moves it
 (`synthesis.construct.near_miss`).
 """
 
@@ -24,11 +24,11 @@ from .event_clock import AlignedEvents
 from .moments import DUELS, MIN_DISTANCE_SECONDS, Moment, build_moment
 
 REACH, TOLD_REACH = 1.2, 2.0
-"""m from the ball within which an opponent may reach for it: a long step and a stretched leg; farther where his own
+"""m from the ball within which an opponent may reach for it: a long step and a stretched leg; farther where their own
 event says so."""
 
 APART_SECONDS = 2.0
-"""s between two duels of one player: nobody lunges at each touch of a dribble."""
+"""s between two duels of one player: no player lunges at each touch of a dribble."""
 
 RUNNING = "running"
 """Pace of a player who stretches a leg in the run instead of blocking from a stand."""
@@ -36,7 +36,7 @@ RUNNING = "running"
 _MIN_CONFIDENCE = 0.3  # of the touch
 _EVENT_SECONDS = 1.0  # s between a touch and the event of the opponent who lost it
 _DUEL_EVENTS = ("tackle", "aerial", "take-on", "interception")
-_TURNED_SPEED, _TURNED_ANGLE = 2.0, np.radians(100.0)  # m/s from which a player reaches for no ball behind his travel
+_TURNED_SPEED, _TURNED_ANGLE = 2.0, np.radians(100.0)  # m/s from which a player reaches for no ball behind them
 _SIDE_SPEED, _SIDE_ANGLE = 1.0, np.radians(25.0)  # m/s and rad off the travel from which the foot on that side reaches
 _UNCONTESTED = (kinds.THROW_IN, kinds.HAND, kinds.SAVE, kinds.CHEST_CONTROL)  # by a foot or a head
 
@@ -115,7 +115,7 @@ def label_lost_duels(
 
 
 class _DuelSearch:
-    """Where everybody is at each touch."""
+    """Where every player is at each touch."""
 
     def __init__(self, match: Match, touches: Sequence[SolvedTouch], keepers: frozenset[str],
                  aligned: AlignedEvents | None):
@@ -127,7 +127,7 @@ class _DuelSearch:
         self._distances = measure_player_distances(match.times, ball, match.positions, self._times)
 
     def find_duel(self, number: int) -> Duel | None:
-        """Find the duel at a touch, None if nobody contests it."""
+        """Find the duel at a touch, None if no opponent contests it."""
         touch = self._touches[number]
         if not touch.player or touch.confidence < _MIN_CONFIDENCE or touch.kind in _UNCONTESTED:
             return None

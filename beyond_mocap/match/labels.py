@@ -107,12 +107,9 @@ def label_match(
         if aligned:
             confident += _label_untouched_events(player.id, aligned, span, times=match.times, path=path, table=table,
                                                  others=found)
-        lost = {duel.time: {**find_gait_label(duel.time, match.times, path), **find_height_labels("foot", duel.height,
-                                                                                                  heights)}
-                for duel in duels if duel.loser == player.id}
-        confident += label_lost_duels(duels, player.id, table, lost)
         shots_at = list_shots_at(shots, player.id)
-        confident += label_missed_saves(shots_at, table, heights)
+        confident += [*label_lost_duels(duels, player.id, table, _find_lost_values(duels, match.times, path, heights)),
+                      *label_missed_saves(shots_at, table, heights)]
         selected = select_separate_moments(confident)
         left_out["doubtful"] += sum(moment.confidence < MIN_CONFIDENCE for moment in found)
         left_out["close"] += len(confident) - len(selected)
@@ -121,6 +118,13 @@ def label_match(
     notes = (*(events.notes if events else ()), *(aligned.notes if aligned else ()),
              *_describe_left_out(touches, left_out), *_describe_contests(duels, shots))
     return MatchLabels(players, notes, _measure_event_fit(aligned, touches, span) if aligned else {})
+
+
+def _find_lost_values(duels: Sequence[Duel], times: np.ndarray, path: np.ndarray,
+                      heights: bool) -> dict[float, dict[str, str]]:
+    """Find, by a duel's time, the labels that replace placeholders for a player on a path (N, 2) m."""
+    return {duel.time: {**find_gait_label(duel.time, times, path), **find_height_labels("foot", duel.height, heights)}
+            for duel in duels}
 
 
 def _label_untouched_events(player: str, aligned: AlignedEvents, span, times, path, table, others) -> list[Moment]:

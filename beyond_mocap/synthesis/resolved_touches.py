@@ -24,10 +24,12 @@ from ..base.errors import InputError, TimedMessage
 from ..base.time_series import find_runs
 from ..motion.motion import compute_pose
 from ..motion.track import BALL_RADIUS, Track
+from ..motion.track.ball_path import BallPath
 from .construct.ball_detour import find_free_contact, lead_ball_around_body
 from .construct.contact_geometry import BALL_SECONDS, add_flight_arc, lead_ball_through
 from .construct.dribble import plan_dribbles
 from .construct.give import give_with_ball
+from .construct.near_miss import miss_ball
 from .construct.strike import BALL_NOISE, compute_contact_frames, find_nearest_frame
 from .plan import Plan, PlayerTouch, ResolvedPlan, SolvedTrajectory
 from .take import DribbleTouch, KeyResult, Take
@@ -243,7 +245,7 @@ def apply_trajectory(take: Take, plan: ResolvedPlan) -> tuple[Take, list[str]]:
         The take, unchanged where nothing is solved, and messages about measured places that lie in the body.
     """
     if plan.trajectory is None or take.ball is None:
-        return replace(take, solved=plan.trajectory), []
+        return _miss_ball(replace(take, solved=plan.trajectory), take.ball), []
     fps, contact_ball, times = take.motion.fps, take.ball.positions, take.ball.times
     keys = _list_ball_keys(take)
     held = [compute_contact_frames(key.frame, len(contact_ball)) for key in keys]
@@ -265,12 +267,20 @@ def apply_trajectory(take: Take, plan: ResolvedPlan) -> tuple[Take, list[str]]:
                              measured=take.ball.measured & ~filled, course_changes=course_changes)
     pushes = tuple(DribbleTouch(push.first, push.last, push.side) for push in dribbled.pushes)
     pushed = [(push.first, push.last) for push in pushes]
+    take = _miss_ball(take, replace(take.ball, positions=dribbled.ball))
     free, met = _free_met_ball(take, dribbled.ball, pushed)
     around = lead_ball_around_body(take.motion.skeleton, take.motion.root_positions, take.motion.rotations, ball=free,
                                    held=[*met, *pushed], fps=fps)
     ball, far = replace(take.ball, positions=around), np.linalg.norm(around - dribbled.ball, axis=1)
     messages = _report_detours(times, np.where(take.ball.measured & ~filled, far, 0.0))
     return replace(take, ball=ball, solved=plan.trajectory, contact_ball=take.ball, dribble_touches=pushes), messages
+
+
+def _miss_ball(take: Take, ball: BallPath | None) -> Take:
+    """Keep the body off a ball at the key moments that miss it, before the ball goes round the body."""
+    if ball is None or not any(key.requested.misses_ball for key in take.keys):
+        return take
+    return replace(take, motion=miss_ball(take.motion, take.contacts, ball.positions, take.keys))
 
 
 def _list_dribbles(plan: ResolvedPlan) -> list[tuple[float, float]]:

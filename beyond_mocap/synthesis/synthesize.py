@@ -29,7 +29,6 @@ from .body_size import to_player_size
 from .construct.construction import Construction, build_key_results, find_touches
 from .construct.extra_steps import Steps
 from .construct.gaze import estimate_look
-from .construct.near_miss import miss_ball
 from .construct.pins import apply_pins
 from .construct.thesis_methods import construct_blocks
 from .plan import METHODS, Plan, ResolvedPlan
@@ -231,18 +230,10 @@ def finish_take(
     take = add_pins(to_player_size(take, plan.size, plan.requested, before), recordings)
     started = time.perf_counter()
     take, detours = apply_trajectory(take, plan)
-    take = _miss_ball(take)
     if plan.trajectory is not None:
         take = replace(take, seconds={**take.seconds, "ball": time.perf_counter() - started})
     return add_warnings(take, recordings, request, hurried_from, report_unmet=report_unmet,
                         more=[*report_missing_touches(take, plan), *detours])
-
-
-def _miss_ball(take: Take) -> Take:
-    """Keep the body off the ball at the key moments that miss it."""
-    if take.ball is None or not any(key.requested.misses_ball for key in take.keys):
-        return take
-    return replace(take, motion=miss_ball(take.motion, take.contacts, take.ball.positions, take.keys))
 
 
 def add_pins(take: Take, recordings: Library) -> Take:

@@ -1,4 +1,4 @@
-"""Where a goalkeeper stands while nobody has measured it: between the ball and the middle of the goal.
+"""Where a goalkeeper stands while it is not measured: between the ball and the middle of the goal.
 
 A ball within 25 m is faced from the line to it, some four metres out; the farther it is, the farther out the keeper
 comes and the nearer to the middle of the pitch. A measured keeper is never moved.

@@ -96,7 +96,7 @@ def _is_shot(touch: SolvedTouch, goal: float) -> bool:
 
 
 def _build_shot(match: Match, solved: SolvedBall, number: int, keeper: str, goal: float) -> Shot:
-    """Build the shot of a touch: follow the ball until somebody touches it or it leaves the pitch."""
+    """Build the shot of a touch: follow the ball until a player touches it or it leaves the pitch."""
     touch, following = solved.touches[number], solved.touches[number + 1 : number + 2]
     until = min([touch.time + _LONGEST, *(other.time for other in following)])
     left = next((end for end in solved.ends if touch.time < end.time <= until), None)
@@ -106,7 +106,7 @@ def _build_shot(match: Match, solved: SolvedBall, number: int, keeper: str, goal
     if is_save:
         arrival, place = following[0].time, following[0].position
     elif end == GOAL:
-        arrival, place = _find_passing(match, solved, keeper, touch.time, left, goal)
+        arrival, place = _find_passing(match, solved, keeper, touch.time, end=left, goal=goal)
     lateral = _measure_lateral(match, keeper, touch, float(arrival), place)
     return Shot(time=touch.time, shooter=touch.player, keeper=keeper, end=end, arrival=float(arrival),
                 place=(float(place[0]), float(place[1]), float(place[2])), lateral=lateral,

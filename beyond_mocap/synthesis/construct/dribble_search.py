@@ -23,6 +23,7 @@ SOONEST, _LATEST = 0.2, 0.6  # s, shortest roll from one touch to the next, and 
 _ANGLES = np.radians([0.0, 35.0, -35.0, 65.0, -65.0])  # sides of the ball that are tried, from straight ahead
 _ALONG = 0.7  # share of the line from ankle to toes at which the ball is touched
 _RETURNING, _BEHIND = -0.5, 0.0  # least m/s of a touching foot relative to the body, and least m ahead of the pelvis
+_DEEPEST = 0.008  # m that a touched ball may be inside another part of the legs
 _LEVEL = 0.08  # m that the foot may be above or below the middle of the ball
 _PUSH_SECONDS = 0.11  # s, longest push
 _FROM_END = 0.9  # s from an open end within which the first or last touch lies
@@ -189,6 +190,7 @@ class DribbleSearch:
         # a foot in the air has to swing forward; a planted foot always counts
         returning = _RETURNING + _MORE_RETURNING * self.haste[self.frame]
         usable &= (forward > returning) | (self.stood > 0)
+        usable &= self.body.solid.measure_gaps(self.place, self.frame) > -_DEEPEST
         self._keep_nodes(usable)
         self.held = self._evaluate_places(self.place, self.frame)
         self.touch = _TOUCH_COST + _ANGLE_COST * np.abs(_ANGLES[self.angle]) + _PLANTED_COST * self.stood

@@ -57,7 +57,9 @@ def miss_ball(
     return motion
 
 
-def measure_clearance(motion: Motion, ball: np.ndarray, labels: Sequence[str], frames: Sequence[int]) -> np.ndarray:
+def measure_clearance(
+    motion: Motion, ball: np.ndarray, labels: Sequence[str], frames: Sequence[int] | np.ndarray
+) -> np.ndarray:
     """Measure how far the parts of a body that may meet the ball are from it.
 
     Args:

@@ -16,7 +16,7 @@ _REST = (2, 9, 12, 16, 0)
 _RUN: Rows = ((-3.4, 2.4), (-2.0, 4.6), (1.6, 4.6), (3.2, 2.2))
 
 
-def _wave(first: float, last: float, period: float, *values: tuple[float, float]) -> Rows:
+def _wave(*values: tuple[float, float], first: float, last: float, period: float) -> Rows:
     """Build rows that swing: for each value (middle, amplitude), from `first` to `last` s, with a period in s."""
     times = np.arange(first, last + 1e-9, period / 4.0)
     swing = np.sin(2.0 * np.pi * (times - first) / period)
@@ -146,8 +146,8 @@ DANCE = KeyPoses(
     pelvis=_sway((10, 0), (0, 4), (8, 0), rest=(0, 0, 0)),
     spine=_sway((-14, 0), (0, 8), (-12, 0), rest=(0, 2, 0)),
     head=_sway((8, 0), (0, -2), (4, 0), rest=(0, 2, 0)),
-    left_arm=_wave(-1.6, 2.0, 0.75, (34, 26), (30, 8), (24, 10), (92, 10), (40, 0)),
-    right_arm=_wave(-1.6, 2.0, 0.75, (34, -26), (30, -8), (24, -10), (92, -10), (40, 0)),
+    left_arm=_wave((34, 26), (30, 8), (24, 10), (92, 10), (40, 0), first=-1.6, last=2.0, period=0.75),
+    right_arm=_wave((34, -26), (30, -8), (24, -10), (92, -10), (40, 0), first=-1.6, last=2.0, period=0.75),
     left_foot=_step((-1.25, 0.25, 1.75), 0.12),
     right_foot=_step((-0.5, 1.0), -0.12),
 )

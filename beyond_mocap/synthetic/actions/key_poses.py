@@ -186,7 +186,7 @@ def _lay_feet(posture: Posture, recipe: KeyPoses, times: np.ndarray, place: np.n
     for side, rows in ((LEFT, recipe.left_foot or rest), (RIGHT, recipe.right_foot or rest)):
         if rows is not None:
             values = interpolate_rows(rows, times)
-            posture = _lay_foot(posture, side, values, ease, place, neutral)
+            posture = _lay_foot(posture, side, values, ease, place=place, neutral=neutral)
             is_down[:, side] = (values[:, 2] < _FOOT_DOWN) & (ease == 1.0)
     return lower_hips(posture, is_down, neutral)
 
