@@ -79,7 +79,7 @@ class StrikeMeasurements:
         place: (K, 2) m of the part's middle from the hips.
         height: (K,) m.
         velocity: (K, 3) m/s.
-        sends: (K,) bool, the labels say that the ball is sent: its speed is the part's.
+        sends: (K,) bool, the labels say that the ball is sent: only its velocity follows the part's.
     """
 
     place: np.ndarray
@@ -200,7 +200,10 @@ def compute_free_turn(speed: float) -> float:
 
 
 def _compute_exit_misfit(found: StrikeMeasurements, leaving: np.ndarray, free_turn: float) -> np.ndarray:
-    """Compute the cost (K,) of clips for a ball that leaves with (3,) m/s, nothing where the ball or the part is slow.
+    """Compute the cost (K,) of clips for a ball that leaves with (3,) m/s.
+
+    Nothing where the ball or the part is slow, or the ball is not sent: after a reception it goes where the next touch
+    needs it.
     """
     velocity = found.velocity
     level, speed = np.linalg.norm(velocity[:, :2], axis=1), np.linalg.norm(velocity, axis=1)
@@ -212,5 +215,5 @@ def _compute_exit_misfit(found: StrikeMeasurements, leaving: np.ndarray, free_tu
     cost += np.nan_to_num(LOFT_COST * np.maximum(loft - _LOFT_NOISE, 0.0))
     least, most = np.log(SPEED_RATIO)
     ratio = np.log(np.maximum(ball_speed, FAST_BALL) / np.maximum(speed, FAST_PART))
-    cost += SPEED_COST * found.sends * (np.maximum(least - ratio, 0.0) + np.maximum(ratio - most, 0.0))
-    return np.where((speed > FAST_PART) & (ball_speed > FAST_BALL), cost, 0.0)
+    cost += SPEED_COST * (np.maximum(least - ratio, 0.0) + np.maximum(ratio - most, 0.0))
+    return np.where(found.sends & (speed > FAST_PART) & (ball_speed > FAST_BALL), cost, 0.0)

@@ -124,9 +124,7 @@ def build_key_poses(
         motion = keep_above_ground(motion, compute_envelope(times, *_widen(recipe.lies)))
     if recipe.hold is not None:
         motion = hold_ball(motion, interpolate_rows(recipe.hold, times), neutral)
-    # a search that fills a span would play the end of the action again and again, in which the body only stands
-    end = recipe.span[2] if recipe.is_span else recipe.span[3]
-    return Gesture(motion, key, key + recipe.span[0], key + end)
+    return Gesture(motion, key, key + recipe.span[0], key + recipe.span[3])
 
 
 def _is_lying(recipe: KeyPoses, time: float) -> bool:
