@@ -31,6 +31,7 @@ class ActionSetting:
         height: m of the ball's centre above the ground at the key moment; None where it is unknown.
         exit_speed: m/s with which the ball leaves; None where it is unknown, or the action does not depend on it.
         direction: degrees from the player's travel in which a right foot sends the ball, left positive.
+        seconds: s that an action lasts; None where its own time serves.
         neutral: the neutral stance of the body; measured on the example where it is not given.
     """
 
@@ -41,6 +42,7 @@ class ActionSetting:
     height: float | None = None
     exit_speed: float | None = None
     direction: float = 0.0
+    seconds: float | None = None
     neutral: NeutralStance = None  # type: ignore[assignment]
 
     def __post_init__(self):
@@ -74,6 +76,7 @@ class Action:
         meets: lowest and highest m of a ball that it can meet, where it is not built for the ball's height.
         is_span: whether it lasts (a celebration) instead of having a key moment; its clip carries the labels from the
             gesture's start to its end.
+        can_last: whether it is built for as long as it is requested.
         varies: name of the action beside which it is offered, where the player is as fast as it needs, and the ball no
             faster than it can be done with; empty: it is offered alone.
         most_ball_speed: m/s of the ball before the key moment up to which it is offered so.
@@ -91,6 +94,7 @@ class Action:
     suits: tuple[float, float] | None = None
     meets: tuple[float, float] = (-math.inf, math.inf)
     is_span: bool = False
+    can_last: bool = False
     varies: str = ""
     most_ball_speed: float = math.inf
 
