@@ -8,7 +8,8 @@ from functools import cached_property
 import numpy as np
 
 from ..annotation.ball_contact import find_striking_part, may_use_foot
-from ..annotation.body_surfaces import BodySurface, build_body_surfaces, measure_ball_depths
+from ..annotation.body_solid import BodySolid
+from ..annotation.body_surfaces import BodySurface, build_body_surfaces
 from ..annotation.labels import list_labels
 from ..annotation.striking import build_part_surfaces, measure_smallest_gap
 from ..annotation.vocabulary import SIDES
@@ -69,8 +70,8 @@ class TouchView:
         played, surfaces = self.played, build_body_surfaces(self.played.motion.skeleton)
         away = np.linalg.norm(self.ball - played.positions[:, played.body.hips], axis=1)
         near = np.flatnonzero(away < _NEAR_BALL * self.view.scale)
-        depths = measure_ball_depths(surfaces, played.positions[near], played.rotations[near], self.ball[near])
-        return near, depths, surfaces
+        solid = BodySolid.from_pose(surfaces, played.positions[near], played.rotations[near])
+        return near, solid.measure_depths(self.ball[near]), surfaces
 
     @cached_property
     def strikes(self) -> list[tuple[float, int]]:

@@ -19,6 +19,7 @@ SIDE_POKE = "side_poke,side poke,kicks with the side of the foot,discrete,,foot,
 
 SYNTHETIC = {  # builders of motions and matches, each of certain labels
     *(f"beyond_mocap/synthetic/{name}.py" for name in ("gait", "gait_tables", "gestures", "kicks", "moves", "volleys")),
+    "beyond_mocap/synthetic/kick_styles.py", "beyond_mocap/synthetic/recorded_kicks.py",
     "beyond_mocap/synthetic/ground_truth/synthetic_match.py", "beyond_mocap/library/synthetic_clips.py",
     "beyond_mocap/synthetic/actions/table.py", "beyond_mocap/synthetic/actions/receptions.py",
     "beyond_mocap/library/receptions.py", "beyond_mocap/synthetic/recorded_kicks.py",
