@@ -36,7 +36,7 @@ def test_a_kick_is_at_the_time_of_its_first_key():
 
 def test_the_first_key_counts_even_if_it_turns_the_page_or_skips():
     assert typed(["NEXT_PAGE", "2", "ENTER"])[1] == [AddMoment(9.7, ("catchb",))]
-    assert typed(["0", "NEXT_PAGE", "7", "ENTER"])[1] == [AddMoment(9.7, ("slide",))]
+    assert typed(["0", "NEXT_PAGE", "7", "ENTER"])[1] == [AddMoment(9.7, ("middle",))]
 
 
 def test_in_and_out_and_words_make_a_stretch():
@@ -109,7 +109,7 @@ def test_another_player_forgets_the_in_point():
 
 
 def test_a_digit_without_a_word_and_an_unknown_key_do_nothing():
-    assert typed(["2", "2", "6"]) == typed(["2", "2"])
+    assert typed(["4", "2", "6"]) == typed(["4", "2"])
     assert typed(["TAB"]) == (AnnotationState(), [])
 
 
