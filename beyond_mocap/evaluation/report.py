@@ -107,7 +107,9 @@ def _list_message_spans(lines: list[str]) -> list[list[list[float]]]:
 
 
 def round_values(value):
-    """Round all floats to five significant digits and convert to plain values.
+    """Round all floats to five significant digits, or three decimals where those are more, and convert to plain values.
+
+    A key moment late in a half keeps its frame.
 
     Args:
         value: a report or a part of it.
@@ -123,7 +125,9 @@ def round_values(value):
     if isinstance(value, (int, np.integer)):
         return int(value)
     if isinstance(value, (float, np.floating)):
-        return float(f"{round(float(value), 9) + 0.0:.5g}") if math.isfinite(value) else None
+        if not math.isfinite(value):
+            return None
+        return round(float(value), 3) if abs(value) >= 100.0 else float(f"{round(float(value), 9) + 0.0:.5g}")
     return value
 
 

@@ -9,6 +9,7 @@ in dribbles step by step from foot to foot (`synthesis.construct.dribble`).
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -16,7 +17,7 @@ import numpy as np
 from ..annotation import KeyMoment, Span, Timeline
 from ..annotation.ball_contact import build_surfaces, find_striking_part
 from ..annotation.labels import list_labels
-from ..annotation.striking import measure_ball_gap
+from ..annotation.striking import build_part_surfaces, measure_ball_gap
 from ..ball.tracked.carried import find_carried_stretches
 from ..ball.tracked.kinds import THROW_IN, TOUCH_KINDS
 from ..ball.tracked.solve import SolvedBall, SolvedTouch
@@ -268,7 +269,7 @@ def apply_trajectory(take: Take, plan: ResolvedPlan) -> tuple[Take, list[str]]:
     pushes = tuple(DribbleTouch(push.first, push.last, push.side) for push in dribbled.pushes)
     pushed = [(push.first, push.last) for push in pushes]
     take = _miss_ball(take, replace(take.ball, positions=dribbled.ball))
-    free, met = _free_met_ball(take, dribbled.ball, pushed)
+    free, met = _free_met_ball(take, dribbled.ball, pushes)
     around = lead_ball_around_body(take.motion.skeleton, take.motion.root_positions, take.motion.rotations, ball=free,
                                    held=[*met, *pushed], fps=fps)
     ball, far = replace(take.ball, positions=around), np.linalg.norm(around - dribbled.ball, axis=1)
@@ -315,26 +316,29 @@ def _list_ball_keys(take: Take) -> list[KeyResult]:
 
 
 def _free_met_ball(take: Take, ball: np.ndarray,
-                   pushes: list[tuple[int, int]]) -> tuple[np.ndarray, list[tuple[int, int]]]:
-    """Move the ball (T, 3) m out of the rest of the body where a part meets it at a key moment.
+                   pushes: Sequence[DribbleTouch]) -> tuple[np.ndarray, list[tuple[int, int]]]:
+    """Move the ball (T, 3) m out of the rest of the body where a part meets it: at a key moment, or for one frame of a
+    dribble.
 
     Args:
         take: the take.
         ball: (T, 3) m.
-        pushes: first and last frame of each touch of a dribble.
+        pushes: the touches of dribbles.
     Returns:
         The ball, and first and last frame of each such meeting.
     """
     out, met, skeleton, reach = ball, [], take.motion.skeleton, int(BALL_SECONDS * take.motion.fps)
-    for key in _list_ball_keys(take):
-        frame = find_nearest_frame(key.frame, len(ball))
+    meetings = [(find_nearest_frame(key.frame, len(ball)), build_surfaces(skeleton, key.contact_labels))
+                for key in _list_ball_keys(take)]
+    meetings += [(push.first, build_part_surfaces(skeleton, "foot", (push.side,)))
+                 for push in pushes if push.first == push.last]
+    for frame, surfaces in meetings:
         places, world = (values[0] for values in compute_pose(skeleton, take.motion.root_positions[frame : frame + 1],
                                                               take.motion.rotations[frame : frame + 1]))
-        surfaces = build_surfaces(skeleton, key.contact_labels)
         gaps = [abs(measure_ball_gap(part.compute_line(places, world), part.radius, out[frame])) for part in surfaces]
         if min(gaps) < _MET_GAP:
             place = find_free_contact(skeleton, surfaces[int(np.argmin(gaps))], places, world, out[frame])
-            edges = [other for pair in (*pushes, *met) for other in pair]
+            edges = [edge for pair in (*((push.first, push.last) for push in pushes), *met) for edge in pair]
             bounds = (max([frame - reach, *(edge for edge in edges if edge < frame)]),
                       min([frame + reach, *(edge for edge in edges if edge > frame)]))
             out = lead_ball_through(out, (frame, frame), np.array([place, place]), bounds)
