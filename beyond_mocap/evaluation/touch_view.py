@@ -22,6 +22,7 @@ _OWN_STRIKE_SECONDS = 0.25  # s about a reception in which a strike is that of i
 _AFTER_SECONDS = (1.0 / 30.0, 0.1)  # s after a kick between which the ball's speed is measured
 _NEAR_BALL = 1.6  # m from pelvis to ball within which a body may reach it
 _TAKES_OR_SENDS = frozenset((*list_labels(ball="takes"), *list_labels(ball="sends")))
+_CARRIES = frozenset(list_labels(ball="carries"))
 
 
 class TouchView:
@@ -144,4 +145,4 @@ class TouchView:
 
 def _carries_only(words) -> bool:
     """Return whether labels only say that the ball is carried, as in a dribble."""
-    return not (_TAKES_OR_SENDS & set(words)) and "dribble" in words
+    return not _TAKES_OR_SENDS.intersection(words) and bool(_CARRIES.intersection(words))

@@ -36,7 +36,8 @@ from .synthetic_clips import FPS, SYNTHETIC_FOLDER, detect_still_points, sample_
 
 ACTION_PREFIX = "action_"
 _FOLDER = SYNTHETIC_FOLDER + ACTION_PREFIX
-_NAME = re.compile(r"(?P<name>\w+?)(_v(?P<speed>[\d.]+))?(_z(?P<height>[\d.]+))?(?P<side>_side)?\.bvh")
+_NAME = re.compile(r"(?P<name>\w+?)(_v(?P<speed>[\d.]+))?(_z(?P<height>[\d.]+))?(_b(?P<exit_speed>[\d.]+))?"
+                   r"(_d(?P<direction>[+-]\d+))?(?P<side>_side)?\.bvh")
 _HEIGHT_SLACK = 0.15  # m by which the ball may be lower or higher than an action is built for
 _HEIGHT_STEP = 0.1  # m between the heights of the ball for which an action is built
 _SPEED_ROOM, _SPEED_SLACK = 1.2, 0.3  # factor and m/s by which a player may be slower or faster than a variant
@@ -58,6 +59,7 @@ class ActionMoment:
         speed: m/s of the player.
         height: m of the ball's centre, None where it is unknown.
         ball_speed: m/s of the ball before, 0 where it is unknown.
+        exit_speed: m/s with which the ball leaves, None where it is unknown.
         is_span: whether the labels are a span's.
     """
 
@@ -65,6 +67,7 @@ class ActionMoment:
     speed: float = 0.0
     height: float | None = None
     ball_speed: float = 0.0
+    exit_speed: float | None = None
     is_span: bool = False
 
 
@@ -79,11 +82,12 @@ def find_action(moment: ActionMoment) -> Action | None:
     """
     requested = moment.labels - frozenset(SIDES)
     serving = [action for action in ACTIONS if action.is_span == moment.is_span and requested <= action.labels]
+    names = {action.name for action in serving}
 
     def rate_misfit(action: Action) -> tuple:
         low, high = action.heights or action.meets
         off = 0.0 if moment.height is None else max(low - moment.height, moment.height - high)
-        return bool(action.varies), not action.suits_speed(moment.speed), off > _HEIGHT_SLACK
+        return action.varies in names, not action.suits_speed(moment.speed), off > _HEIGHT_SLACK
 
     is_named = any(_names_action(word) for word in requested)
     return min(serving, key=rate_misfit, default=None) if is_named else None
@@ -105,16 +109,23 @@ def find_missing_actions(library: Library, moments: Iterable[ActionMoment], mirr
 
 def find_action_paths(moment: ActionMoment) -> tuple[str, ...]:
     """Find the paths of the synthetic clips that answer to a requested action; none where no action does."""
-    return tuple(_name_clip(action, moment) for action in _list_actions(moment)) if find_action(moment) else ()
+    return tuple(path for action in _list_actions(moment) for path in _name_clips(action, moment)) if find_action(
+        moment) else ()
 
 
 def _list_actions(moment: ActionMoment) -> list[Action]:
     """List the action that answers best to a requested one, and those that vary it and fit the player and the ball."""
     best, requested = find_action(moment), moment.labels - frozenset(SIDES)
     return [best, *(one for one in ACTIONS if one.varies == best.name and requested <= one.labels
-                    and one.speeds[0] <= _SPEED_ROOM * moment.speed + _SPEED_SLACK
-                    and moment.speed <= _SPEED_ROOM * one.speeds[-1] + _SPEED_SLACK
-                    and moment.ball_speed <= one.most_ball_speed)]
+                    and _is_speed_near(one, moment.speed) and moment.ball_speed <= one.most_ball_speed)]
+
+
+def _is_speed_near(action: Action, speed: float) -> bool:
+    """Return whether a player at `speed` m/s is near the speeds for which an action is built."""
+    if not action.speeds:
+        return action.suits_speed(speed)
+    slowest, fastest = action.speeds[0], action.speeds[-1]
+    return slowest <= _SPEED_ROOM * speed + _SPEED_SLACK and speed <= _SPEED_ROOM * fastest + _SPEED_SLACK
 
 
 def add_actions(library: Library, paths: Iterable[str]) -> Library:
@@ -138,7 +149,8 @@ def add_actions(library: Library, paths: Iterable[str]) -> Library:
     if added not in extended:
         while len(extended) >= _KEPT:
             del extended[next(iter(extended))]
-        extended[added] = library.append_synthetic_clips([clip for path in added for clip in _find_clips(library, path)])
+        clips = [clip for path in added for clip in _find_clips(library, path)]
+        extended[added] = library.append_synthetic_clips(clips)
     return extended[added]
 
 
@@ -184,26 +196,29 @@ def _is_recorded(library: Library, moment: ActionMoment, mirror: bool) -> bool:
     return len(columns) == len(moment.labels - _GAITS) and bool(carries.any())
 
 
-def _name_clip(action: Action, moment: ActionMoment) -> str:
-    """Name the clip of an action that answers to a requested one."""
+def _name_clips(action: Action, moment: ActionMoment) -> list[str]:
+    """Name the clips of an action that answers to a requested one, one for each direction."""
     text = action.name.replace(" ", "_").replace("-", "_")
     if action.speeds:
         text += f"_v{min(action.speeds, key=lambda speed: abs(speed - moment.speed)):.1f}"
     if action.heights and moment.height is not None:
         height = min(max(moment.height, action.heights[0]), action.heights[1])
         text += f"_z{round(height / _HEIGHT_STEP) * _HEIGHT_STEP:.1f}"
-    asks_side = moment.labels & frozenset(SIDES) and not action.has_side
-    return f"{_FOLDER}{text}{'_side' if asks_side else ''}.bvh"
+    if action.exit_speeds and moment.exit_speed is not None:
+        text += f"_b{min(action.exit_speeds, key=lambda speed: abs(speed - moment.exit_speed)):.1f}"
+    end = "_side.bvh" if moment.labels & frozenset(SIDES) and not action.has_side else ".bvh"
+    ways = [f"_d{degrees:+.0f}" for degrees in action.directions] or [""]
+    return [f"{_FOLDER}{text}{way}{end}" for way in ways]
 
 
 def _parse_path(path: str) -> tuple[Action, dict[str, float], frozenset[str]]:
-    """Parse a clip's path: its action, speed and height where they count, and the sides that it carries."""
+    """Parse a clip's path: its action, what of the situation it is built for, and the sides that it carries."""
     found = _NAME.fullmatch(path.removeprefix(_FOLDER))
     named = {action.name.replace(" ", "_").replace("-", "_"): action for action in ACTIONS}
     if found is None or found["name"] not in named:
         raise InputError(path, "an unknown synthetic action", "one of this version's", "synthesize the take again")
     action = named[found["name"]]
-    numbers = {name: float(found[name]) for name in ("speed", "height") if found[name]}
+    numbers = {name: float(found[name]) for name in ("speed", "height", "exit_speed", "direction") if found[name]}
     return action, numbers, frozenset({_SIDE} if action.has_side or found["side"] else ())
 
 
@@ -221,8 +236,7 @@ def _find_clips(library: Library, path: str) -> tuple[Clip, Clip]:
 def _build_clip(library: Library, path: str) -> Clip:
     """Build the clip of a path."""
     action, numbers, sides = _parse_path(path)
-    speed, height = numbers.get("speed", 0.0), numbers.get("height")
-    gesture = action.build(replace(_find_setting(library), speed=speed, height=height))
+    gesture = action.build(replace(_find_setting(library), **numbers))
     motion, first, last = gesture.motion, np.ceil(gesture.start * FPS), np.floor(gesture.end * FPS)
     last = min(last, len(motion) - 1)
     key = None if action.is_span else gesture.key * FPS

@@ -9,7 +9,7 @@ from ..annotation.ball_contact import choose_part_by_height
 from ..library.missing_actions import ActionMoment
 from ..motion.track import SampledTrack, Track
 
-_ARRIVING = (0.3, 0.06)  # s before a key moment between which the arriving ball's speed is measured
+_ARRIVING, _LEAVING = (-0.3, -0.06), (0.06, 0.3)  # s from a key moment between which the ball's speeds are measured
 
 
 def read_moment_action(moment: KeyMoment, track: Track, sampled: SampledTrack) -> ActionMoment:
@@ -25,7 +25,8 @@ def read_moment_action(moment: KeyMoment, track: Track, sampled: SampledTrack) -
     height = float(track.ball[at, 2]) if track.ball_height_known[at] else None
     return ActionMoment(labels=frozenset(choose_part_by_height(moment.words, height)), height=height,
                         speed=float(np.interp(time, sampled.times, sampled.speed)),
-                        ball_speed=_measure_ball_speed(sampled, time))
+                        ball_speed=_measure_ball_speed(sampled, time, _ARRIVING) or 0.0,
+                        exit_speed=_measure_ball_speed(sampled, time, _LEAVING))
 
 
 def read_span_action(span: Span, sampled: SampledTrack) -> ActionMoment:
@@ -40,8 +41,9 @@ def read_span_action(span: Span, sampled: SampledTrack) -> ActionMoment:
     return ActionMoment(labels=frozenset(span.words), speed=speed, is_span=True)
 
 
-def _measure_ball_speed(track: SampledTrack, time: float) -> float:
-    """Measure the speed of the ball in m/s as it arrives at `time` s, 0 where it is unknown."""
-    before, after = (np.array([np.interp(time - early, track.times, column) for column in track.ball.T])
-                     for early in _ARRIVING)
-    return float(np.nan_to_num(np.linalg.norm(after - before) / (_ARRIVING[0] - _ARRIVING[1])))
+def _measure_ball_speed(track: SampledTrack, time: float, between: tuple[float, float]) -> float | None:
+    """Measure the speed of the ball in m/s `between` two s from `time`, None where it is unknown."""
+    first, last = (np.array([np.interp(time + second, track.times, column) for column in track.ball.T])
+                   for second in between)
+    moved = float(np.linalg.norm(last - first))
+    return moved / (between[1] - between[0]) if np.isfinite(moved) else None

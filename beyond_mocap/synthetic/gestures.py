@@ -65,7 +65,6 @@ class StrikeRecipe:
         at: share of the right foot's swing at which it touches.
         sink: rows (time, metres that the hips are lowered).
         head: nod in degrees.
-        blend_share: share of the arms' and trunk's rows that is blended over the run.
     """
 
     foot: tuple
@@ -78,7 +77,6 @@ class StrikeRecipe:
     at: float
     sink: tuple
     head: float = 14.0
-    blend_share: float = 1.0
 
 
 _KICK_SPEEDS = ((-2.6, 2.4), (-1.4, 2.9), (-0.6, 2.8), (0.0, 1.9), (0.45, 1.3), (1.0, 1.6), (2.2, 2.3))
@@ -115,20 +113,13 @@ STRIKES = {
 }
 
 
-# a kick at full run: shares of the run's speed; the body hardly slows down
-_RUNNING_SPEEDS = ((-0.8, 1.0), (-0.35, 1.0), (0.0, 0.96), (0.25, 0.95), (0.8, 1.0))
-# m/s between which a kick becomes one at full run; there: factor on cadence, and share of the support foot's
-# stance that has passed at the touch
-_FULL_RUN, _RUNNING_PACE, _RUNNING_STANCE_SHARE = (3.0, 6.0), 0.93, 0.45
-
-
 # s that the kicking foot needs to reach the ground
 _LANDING_SECONDS = 0.1
 
 
 def build_strike(
     kind: str, skeleton: Skeleton | None = None, fps: float = 60.0, speed: float = 1.0, seed: int = 0, *,
-    at_speed: float | None = None, example: Motion | None = None,
+    example: Motion | None = None,
 ) -> Gesture:
     """Build a strike of the right foot after an approach; the body faces and travels along +X and runs on.
 
@@ -140,13 +131,11 @@ def build_strike(
         fps: frames per second.
         speed: factor on the approach's speed.
         seed: of the gait's variation.
-        at_speed: m/s of a run in which the kick happens, instead of an approach that slows down.
         example: a recording on `skeleton`, for its neutral stance.
     Returns:
         The move.
     """
-    recipe = STRIKES[kind] if at_speed is None else adapt_to_run(STRIKES[kind], at_speed)
-    return build_touch(recipe, skeleton, fps, speed, seed, example=example)
+    return build_touch(STRIKES[kind], skeleton, fps, speed, seed, example=example)
 
 
 def build_touch(
@@ -181,22 +170,6 @@ def build_touch(
     return Gesture(to_motion(posture.frames(gait_plan.requested_slice), neutral), key, begin - 0.15, land + 0.1)
 
 
-def adapt_to_run(recipe: StrikeRecipe, speed: float) -> StrikeRecipe:
-    """Adapt a strike to a run at `speed` m/s.
-
-    Steps keep their rhythm, arms and trunk swing less, and the touch falls in the middle of the support foot's short
-    stance.
-    """
-    share = float(quintic_step((speed - _FULL_RUN[0]) / (_FULL_RUN[1] - _FULL_RUN[0])))
-    duty = float(tables.interpolate_figure("duty", speed))
-    at = (0.5 + (_RUNNING_STANCE_SHARE - 1.0) * duty) / (1.0 - duty)
-    return replace(
-        recipe, speeds=tuple((time, part * speed) for time, part in _RUNNING_SPEEDS),
-        pace=recipe.pace + (_RUNNING_PACE - recipe.pace) * share,
-        at=recipe.at + (max(at, recipe.at) - recipe.at) * share, blend_share=1.0 - 0.5 * share,
-    )
-
-
 def _adapt_phase(gait_plan: GaitPlan, key: float, recipe: StrikeRecipe) -> GaitPlan:
     """Adapt a plan: the cadence dips around the touch, and the right foot is in its swing then."""
     rate = np.gradient(gait_plan.phase, gait_plan.times)
@@ -223,13 +196,12 @@ def _blend_strike(posture: Posture, gait_plan: GaitPlan, steps, key: float, reci
     ease = compute_envelope(times, -0.42, -0.16, 0.26, 0.65)
     hips[:, 2] -= scale * ease * interpolate_rows(recipe.sink, times)[:, 0]
     posture = plant_feet(posture.replace_arrays(hips=hips), gait_plan.times, steps, neutral)
-    fling = recipe.blend_share * ease
-    pelvis = blend_arrays(posture.pelvis, np.radians(interpolate_rows(recipe.pelvis, times)), fling)
-    spine = blend_arrays(posture.spine, np.radians(interpolate_rows(recipe.spine, times)), fling)
+    pelvis = blend_arrays(posture.pelvis, np.radians(interpolate_rows(recipe.pelvis, times)), ease)
+    spine = blend_arrays(posture.spine, np.radians(interpolate_rows(recipe.spine, times)), ease)
     head = posture.head - (pelvis + spine - posture.pelvis - posture.spine) * np.array([0.8, 0.6, 0.95])
     arms = posture.arms.copy()
     for side, rows in ((LEFT, recipe.left_arm), (RIGHT, recipe.right_arm)):
-        arms[:, side, :4] = blend_arrays(arms[:, side, :4], np.radians(interpolate_rows(rows, times)), fling)
+        arms[:, side, :4] = blend_arrays(arms[:, side, :4], np.radians(interpolate_rows(rows, times)), ease)
     posture = posture.replace_arrays(pelvis=pelvis, spine=spine, head=head, arms=arms)
     if not recipe.foot:
         return posture

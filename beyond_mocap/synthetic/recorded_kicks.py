@@ -25,7 +25,9 @@ _SPEED_STEP = 1.5  # ratio of neighbouring speeds
 _SLOWEST_RUN = 2.4  # m/s
 _SOURCE_SECONDS = 0.35  # s of a recording before and after its key moment that a swing needs
 _HARD, _SOFT = 11.0, 6.5  # m/s of the ankle against the pelvis in a hard kick and in a soft pass
-_RATES = (0.6, 1.25)  # limits of a swing's playback rate: slower ones are those of soft passes
+PLAYBACK_RATES = (0.6, 1.25)
+"""Limits of a swing's playback rate: slower ones are those of soft passes."""
+
 _BESIDE, _AHEAD = (0.2, 0.37), (-0.05, 0.2)  # m, usual places of the plant foot from the kicking ankle
 _PLACE_COST, _PEAK_COST = 15.0, 60.0  # m/s of foot speed that a metre, or a second from the fastest moment, is worth
 _DIRECTIONS = np.radians([-15.0, 30.0])  # of low balls from the run, toward the plant leg's side
@@ -94,7 +96,7 @@ def choose_swing(clips: Sequence, keys: Sequence, neutral: NeutralStance, surfac
     swings = [swing for key in keys if {"kick", "right"} <= key.labels
               and (swing := _cut_swing(clips[key.clip], key.frame)) is not None]
     best = max(swings, key=_rate_swing, default=None)
-    if best is not None and measure_foot_speed(best) * _RATES[1] >= _SOFT:
+    if best is not None and measure_foot_speed(best) * PLAYBACK_RATES[1] >= _SOFT:
         return best
     return build_swing("inside" if surface == "inside" else "instep", neutral)
 
@@ -130,6 +132,6 @@ def _build_kicks(swing: Swing, speed: float, kind: tuple[str, ...], strengths: M
     for strength, rate in strengths.items():
         for direction in _DIRECTIONS if kind[0] == "low" else _HIGH_DIRECTIONS:
             gesture = build_running_kick(swing, speed, neutral, direction=float(direction),
-                                         rate=float(np.clip(rate, *_RATES)), style=style)
+                                         rate=float(np.clip(rate, *PLAYBACK_RATES)), style=style)
             yield RunningKick(name=f"{strength}{'_'.join(kind)}_{speed:.1f}_{np.degrees(direction):+.0f}",
                               gesture=gesture, speed=speed, words=("kick", "right", *kind, pace, "front"))

@@ -29,7 +29,8 @@ from .footsteps import Footsteps
 from .gait import build_upper_posture, plan_footsteps, plant_feet
 from .gait_plan import GaitPlan, GaitStyle, plan_gait
 from .gestures import LEFT, RIGHT, Gesture, compute_envelope
-from .kicks import BEFORE, KICKS, build_kick
+from .kick_styles import KICK_STYLES
+from .kicks import BEFORE, build_kick
 
 APPROACH_SECONDS, RUN_OUT_SECONDS = 1.25, 1.1
 """Seconds before and after the contact: three steps, and two that run out."""
@@ -84,15 +85,16 @@ class _SwingPoses:
     plant: np.ndarray
 
 
-def build_swing(kind: str, neutral: NeutralStance, rate: float = 1.0) -> Swing:
+def build_swing(kind: str, neutral: NeutralStance, rate: float = 1.0, lift: float = 0.0) -> Swing:
     """Build a swing from published kinematics, for a library without a kick.
 
     Args:
-        kind: one of `kicks.KICKS`.
+        kind: one of `kick_styles.KICK_STYLES`.
         neutral: neutral stance of the body.
         rate: playback rate: slower swings for softer kicks.
+        lift: metres of an adult by which the foot is guided higher at the contact.
     """
-    motion = build_kick(KICKS[kind], neutral, rate=rate)
+    motion = build_kick(KICK_STYLES[kind], neutral, lift=lift, rate=rate)
     return Swing(motion=motion, contact=BEFORE / rate * motion.fps)
 
 

@@ -3,7 +3,8 @@ strike.
 
 A ball leaves an instep 1.06 to 1.3 times as fast as the foot (Kellis and Katis 2007, J Sports Sci Med 6, 154-165), so
 its speed says how fast the foot was. Everything is compared in the frame of travel: x along the player's direction of
-travel at the key moment, y to the left. Speed and turning are weighed by the search itself.
+travel at the key moment (where they face, if they stand), y to the left. Speed and turning are weighed by the search
+itself.
 """
 
 from __future__ import annotations
@@ -50,6 +51,7 @@ TURN_REACH = 0.25  # m between part and ball that the ball's noise and the limb 
 _FARTHEST = 1.0  # m on the ground beyond which the cost does not grow
 _LOFT_NOISE = np.radians(15.0)  # a foot that meets the ball below its middle lifts it by more than it rises itself
 _SENDING = frozenset(list_labels(ball="sends"))
+_STILL_SPEED = 0.5  # m/s up to which a direction of travel is noise: there the body's facing stands for it
 _MOMENT = 1.0 / 60.0  # s before and after a key frame between which velocities are measured
 
 
@@ -79,7 +81,7 @@ class StrikeMeasurements:
         place: (K, 2) m of the part's middle from the hips.
         height: (K,) m.
         velocity: (K, 3) m/s.
-        sends: (K,) bool, the labels say that the ball is sent: its speed is the part's.
+        sends: (K,) bool, the labels say that the ball is sent: only its velocity follows the part's.
     """
 
     place: np.ndarray
@@ -106,7 +108,8 @@ def measure_ball(track: SampledTrack, frame: float, is_height_known: bool) -> Ba
         return np.array([np.interp(where, np.arange(len(track.times)), column) for column in track.ball.T])
 
     here = int(np.clip(round(frame), 0, len(track.times) - 1))
-    back = -float(track.direction[here])
+    is_still = track.heading is not None and track.speed[here] <= _STILL_SPEED
+    back = -float(track.heading[here] if is_still else track.direction[here])
     ball = interpolate_ball(0.0)
     first, last = LEAVING_SECONDS
     leaving = (interpolate_ball(last) - interpolate_ball(first)) / (last - first)
@@ -145,7 +148,7 @@ def _travel_direction(library: Library, frame: np.ndarray) -> np.ndarray:
     """Compute the direction of travel (K,) rad in the clips' own world, or the facing where they stand still."""
     velocity = library.frames.velocity[frame]
     aside = arctan2(velocity[:, 1], velocity[:, 0])
-    return library.frames.heading[frame] + np.where(np.linalg.norm(velocity, axis=1) > 0.5, aside, 0.0)
+    return library.frames.heading[frame] + np.where(np.linalg.norm(velocity, axis=1) > _STILL_SPEED, aside, 0.0)
 
 
 def _measure_strike(library: Library, key: Key, places: np.ndarray, rotations: np.ndarray, back: float):
@@ -200,7 +203,10 @@ def compute_free_turn(speed: float) -> float:
 
 
 def _compute_exit_misfit(found: StrikeMeasurements, leaving: np.ndarray, free_turn: float) -> np.ndarray:
-    """Compute the cost (K,) of clips for a ball that leaves with (3,) m/s, nothing where the ball or the part is slow.
+    """Compute the cost (K,) of clips for a ball that leaves with (3,) m/s.
+
+    Nothing where the ball or the part is slow, or the ball is not sent: after a reception it goes where the next touch
+    needs it.
     """
     velocity = found.velocity
     level, speed = np.linalg.norm(velocity[:, :2], axis=1), np.linalg.norm(velocity, axis=1)
@@ -212,5 +218,5 @@ def _compute_exit_misfit(found: StrikeMeasurements, leaving: np.ndarray, free_tu
     cost += np.nan_to_num(LOFT_COST * np.maximum(loft - _LOFT_NOISE, 0.0))
     least, most = np.log(SPEED_RATIO)
     ratio = np.log(np.maximum(ball_speed, FAST_BALL) / np.maximum(speed, FAST_PART))
-    cost += SPEED_COST * found.sends * (np.maximum(least - ratio, 0.0) + np.maximum(ratio - most, 0.0))
-    return np.where((speed > FAST_PART) & (ball_speed > FAST_BALL), cost, 0.0)
+    cost += SPEED_COST * (np.maximum(least - ratio, 0.0) + np.maximum(ratio - most, 0.0))
+    return np.where(found.sends & (speed > FAST_PART) & (ball_speed > FAST_BALL), cost, 0.0)

@@ -34,6 +34,7 @@ _ROUNDING = 1e-3  # m/s, for float32 speeds
 _CONTINUITY = ("switch", "other", "young", "pose", "rate_change")
 FREE_SPEED, FREE_TURN, FREE_ASIDE = (0.05, 0.06), np.radians(5.0), np.float32(np.radians(12.0))
 KEY_TURN = 0.2  # share of the weights of turning and facing within the pieces of key moments
+KEY_SLIDE = 0.5  # share of the weight of sliding there: the plant foot of a clip that is too slow is dragged
 RESTING_SPEED = 0.15  # m/s of a track from which on a lifted foot costs nothing
 YOUNG_SLOTS = 7  # slots after a cut before which another one costs more: 1.9 s, since a person keeps a gait for longer
 
@@ -214,8 +215,9 @@ class PathCosts:
         self.wanted_offset = compute_heading_offset(request.track)
         self._rate_cost = (weights.rate * np.abs(PLAYBACK_RATES - 1.0)).astype(np.float32)
         self._cached_costs: dict[tuple[frozenset[str], bool, frozenset[str]], np.ndarray] = {}
-        # a strike turns and steps as it was recorded: the body follows it there (`construct.construction`)
-        self._key_weights = replace(weights, turn=KEY_TURN * weights.turn, facing=KEY_TURN * weights.facing, slide=0.0)
+        # a strike turns as it was recorded: the body follows it there (`construct.construction`)
+        self._key_weights = replace(weights, turn=KEY_TURN * weights.turn, facing=KEY_TURN * weights.facing,
+                                    slide=KEY_SLIDE * weights.slide)
         self._cached_motion: dict[tuple[int, int], tuple[float, float]] = {}
 
     def round_frame(self, frame: np.ndarray) -> np.ndarray:
@@ -385,7 +387,11 @@ class PathCosts:
 
     def _iter_motion_terms(self, first: int, end: int, speed, turn, offset, long_stance,
                            lifted, weights: Weights | None = None) -> Iterator[Term]:
-        """Generate the terms of speed, turning and facing against the track; weights None: the search's own."""
+        """Generate the terms of speed, turning and facing against the track.
+
+        Args:
+            weights: those of key moments, whose bodies face as recorded; None: the search's own.
+        """
         wanted_speed, wanted_turn = self.requested_motion(first, end)
         w = weights or self.weights
         missed = np.abs(speed - wanted_speed)
@@ -401,7 +407,8 @@ class PathCosts:
         across = 2.0 * np.float32(wanted_speed) * speed * (1.0 - np.cos(aside))
         whole = np.sqrt(missed * missed + across)
         yield "facing", w.facing * (whole - missed)
-        yield "drag", w.slide * whole * whole
+        slid = whole if weights is None else missed
+        yield "drag", w.slide * slid * slid
 
     def iter_cut_terms(self, ends: np.ndarray, start: np.ndarray) -> Iterator[Term]:
         """Generate the terms of cuts between library frames, by name, each (B, K) or broadcast to it.

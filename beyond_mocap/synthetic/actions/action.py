@@ -29,6 +29,8 @@ class ActionSetting:
         fps: frames per second.
         speed: m/s of the player at the key moment; 0 for actions that do not depend on it.
         height: m of the ball's centre above the ground at the key moment; None where it is unknown.
+        exit_speed: m/s with which the ball leaves; None where it is unknown, or the action does not depend on it.
+        direction: degrees from the player's travel in which a right foot sends the ball, left positive.
         neutral: the neutral stance of the body; measured on the example where it is not given.
     """
 
@@ -37,6 +39,8 @@ class ActionSetting:
     fps: float = 60.0
     speed: float = 0.0
     height: float | None = None
+    exit_speed: float | None = None
+    direction: float = 0.0
     neutral: NeutralStance = None  # type: ignore[assignment]
 
     def __post_init__(self):
@@ -61,6 +65,9 @@ class Action:
         has_side: whether it is done with or to one side; its mirrored twin shows the other one.
         speeds: m/s at which it is built, the nearest one to the player's; empty: it does not depend on speed.
         heights: lowest and highest m of the ball for which it is built; empty: it does not depend on the ball.
+        exit_speeds: m/s of the leaving ball for which it is built, the nearest one to the player's; empty: it does not
+            depend on that.
+        directions: degrees in each of which it is built, for a choice; empty: straight ahead.
         suits: lowest and highest m/s of players whom it suits; of several actions one that suits is taken. Default: by
             its labels, as standing and running actions do.
         meets: lowest and highest m of a ball that it can meet, where it is not built for the ball's height.
@@ -77,6 +84,8 @@ class Action:
     has_side: bool = False
     speeds: tuple[float, ...] = ()
     heights: tuple[float, ...] = ()
+    exit_speeds: tuple[float, ...] = ()
+    directions: tuple[float, ...] = ()
     suits: tuple[float, float] | None = None
     meets: tuple[float, float] = (-math.inf, math.inf)
     is_span: bool = False

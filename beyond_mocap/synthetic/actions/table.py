@@ -7,7 +7,8 @@ then the first (`library.missing_actions.find_action`): the usual way to do it s
 from __future__ import annotations
 
 from .field_table import FIELD_ACTIONS
+from .kick_table import KICK_ACTIONS
 from .pose_table import POSE_ACTIONS
 from .receptions import RECEPTION_ACTIONS
 
-ACTIONS = (*FIELD_ACTIONS, *RECEPTION_ACTIONS, *POSE_ACTIONS)
+ACTIONS = (*KICK_ACTIONS, *FIELD_ACTIONS, *RECEPTION_ACTIONS, *POSE_ACTIONS)

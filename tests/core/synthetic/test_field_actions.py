@@ -12,12 +12,13 @@ from beyond_mocap.motion.motion import forward_kinematics
 from beyond_mocap.motion.retargeting.adult import build_adult_skeleton
 from beyond_mocap.synthetic.actions.action import ActionSetting
 from beyond_mocap.synthetic.actions.field_table import FIELD_ACTIONS
+from beyond_mocap.synthetic.actions.kick_table import KICK_ACTIONS
 from beyond_mocap.synthetic.gait_tables import GRAVITY
 
 FPS = 60.0
 ADULT = ActionSetting(skeleton=build_adult_skeleton(), fps=FPS)
 BODY = identify_joints(ADULT.skeleton)
-ROWS = {action.name: action for action in FIELD_ACTIONS}
+ROWS = {action.name: action for action in (*FIELD_ACTIONS, *KICK_ACTIONS)}
 WITHOUT_BODY = {
     ("getting_up", "with"),  # the thesis lost the second half of this label
     ("receive", "foot", "high", "inside"), ("catchb", "slide"),
@@ -37,7 +38,7 @@ def measure_fall(height: np.ndarray) -> np.ndarray:
 @pytest.mark.parametrize("name", sorted(ROWS))
 def test_an_action_stays_above_the_ground_and_begins_and_ends_on_its_feet(name):
     action = ROWS[name]
-    speed = action.speeds[1] if action.speeds else 0.0
+    speed = action.speeds[:2][-1] if action.speeds else 0.0
     gesture, places = build(name, speed, float(np.mean(action.heights)) if action.heights else None)
     assert np.isfinite(places).all() and places[..., 2].min() > -0.01
     assert gesture.start < gesture.end <= gesture.motion.duration + 1e-6

@@ -58,6 +58,17 @@ def test_words_that_lack_and_actions_that_nobody_asked_for_cost(library, order):
     assert np.all(unasked == 1.0)
 
 
+def test_a_kick_that_is_slower_than_the_player_drags_the_plant_foot(library, order, track_of):
+    key = next(key for key in library.keys if not library.clips[key.clip].mirrored)
+    start = library.frames.first[key.clip] + key.frame * 30.0 / library.clips[key.clip].motion.fps - SLOT / 2
+    dragged = []
+    for speed in (2.0, 3.5, 5.0):
+        found = costs(library, order(track=track_of(speed)), slide=1.0)
+        cost = found.compute_key_misfit(60, 60 + SLOT, np.array([key.clip]), np.array([start]), np.ones(1))
+        dragged.append(float(cost[0]))
+    assert dragged[0] < 0.2 and dragged[1] > 0.5 and dragged[2] > 3.0 * dragged[1]
+
+
 def test_a_cut_costs_what_the_standing_foot_would_jump(library, order):
     frames = frames_of(library, "walk.bvh")
     stands = library.feet_in_contact[frames]
