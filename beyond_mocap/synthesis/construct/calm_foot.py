@@ -21,6 +21,8 @@ CALM_SPEED = 2.6
 _AROUND_SECONDS = 0.16  # before and after the touch in which the foot is slow; the target holds for 0.13
 _CATCH_UP_SECONDS = 0.2  # before and after that in which it catches up with its own time
 _SLOWEST = 0.35  # factor on its speed
+_STRENGTHS = (0.0, 0.25, 0.5, 0.75, 1.0)  # shares of the slowing down that are tried
+_CATCH_UP_SPEED, _FASTER = 5.5, 1.15  # m/s up to which the foot may catch up, below a kick; factor on its own speed
 _SLOW_SHARE = 0.5  # of a swing too short for both that is slow
 
 
@@ -41,26 +43,38 @@ def calm_foot(body: Body, foot: Surface, held: tuple[int, int], is_in_contact: n
         return body
     away = body.places[:, chain[2]] - body.places[:, identify_joints(body.skeleton).hips]
     beyond = frames - np.clip(frames, *held)
-    near = np.abs(beyond) <= _AROUND_SECONDS * fps
-    fastest = _measure_fastest(away, near, fps)
+    slow = np.abs(beyond) <= _AROUND_SECONDS * fps
+    fastest = _measure_speed(away, fps)[slow].max()
     if fastest <= CALM_SPEED:
         return body
     lag = (1.0 - max(CALM_SPEED / fastest, _SLOWEST)) * beyond * _compute_share(beyond, is_in_contact, fps)
-    moves = np.where(lag[:, None] != 0.0, CubicSpline(frames, away)(frames - lag) - away, 0.0)
-    moves = limit_to_ground(body, foot, slice(None), moves)
-    if _measure_fastest(away + moves, near, fps) >= fastest:  # the swing is too short to catch up with
-        return body
-    rotations = move_limb(body, LimbReference.from_body(body, chain), moves)
-    return Body.from_pose(body.skeleton, body.root, rotations)
+    moves = [limit_to_ground(body, foot, slice(None), _delay(away, part * lag)) for part in _STRENGTHS]
+    moved = min(moves, key=lambda one: _rate_path(away, one, slow, fps))
+    rotations = move_limb(body, LimbReference.from_body(body, chain), moved)
+    return Body.from_pose(body.skeleton, body.root, rotations) if moved.any() else body
 
 
-def _measure_fastest(away: np.ndarray, near: np.ndarray, fps: float) -> float:
-    """Measure the largest speed, m/s, of a path (W, 3) m in the frames `near` (W,) bool."""
-    return float((np.linalg.norm(np.gradient(away, axis=0), axis=1) * fps)[near].max())
+def _delay(away: np.ndarray, lag: np.ndarray) -> np.ndarray:
+    """Compute the moves (W, 3) m of a point that passes its path (W, 3) m `lag` (W,) frames late; 0 where it does not.
+    """
+    frames = np.arange(len(away))
+    return np.where(lag[:, None] != 0.0, CubicSpline(frames, away)(frames - lag) - away, 0.0)
+
+
+def _rate_path(away: np.ndarray, moves: np.ndarray, slow: np.ndarray, fps: float) -> tuple[bool, float]:
+    """Rate moves (W, 3) m: whether the foot catches up too fast, and its largest speed in the frames `slow` (W,)."""
+    most = max(_FASTER * _measure_speed(away, fps).max(), _CATCH_UP_SPEED)
+    speed = _measure_speed(away + moves, fps)
+    return bool(speed.max() > most), float(speed[slow].max())
+
+
+def _measure_speed(away: np.ndarray, fps: float) -> np.ndarray:
+    """Measure the speed (W,) m/s along a path (W, 3) m."""
+    return np.linalg.norm(np.gradient(away, axis=0), axis=1) * fps
 
 
 def _compute_share(beyond: np.ndarray, is_in_contact: np.ndarray, fps: float) -> np.ndarray:
-    """Compute the share (W,) of its lag that a foot has: 1 around the touch, 0 where it catches up, or is on the ground.
+    """Compute the share (W,) of its lag that a foot has: 1 around the touch, 0 where it catches up, or on the ground.
 
     Args:
         beyond: (W,) frames from the touch, negative before it, 0 while it is held.

@@ -205,8 +205,8 @@ def _travel(reception: Reception, speed: float) -> StrikeRecipe:
     slowed, pace = (walking + run * (running - walking) for walking, running in (_SLOWED, _PACE))
     return StrikeRecipe(
         foot=reception.foot, pelvis=reception.pelvis, spine=reception.spine, left_arm=reception.left_arm,
-        right_arm=reception.right_arm, head=reception.nod, pace=pace * _interpolate_height(reception, (1.0, _HIGH_PACE)),
-        at=_interpolate_height(reception, _SWING_SHARE),
+        right_arm=reception.right_arm, head=reception.nod,
+        pace=pace * _interpolate_height(reception, (1.0, _HIGH_PACE)), at=_interpolate_height(reception, _SWING_SHARE),
         speeds=tuple((time, (1.0 - slowed * share) * speed) for time, share in _SLOWING),
         sink=((-0.15, 0.8 * low), (0.0, low), (0.25, 0.8 * low)),
     )
