@@ -19,7 +19,6 @@ from ..annotation.gaits import STANDING, STANDING_SPEED
 from ..annotation.vocabulary import DIRECTIONS
 from ..base.errors import InputError, format_count
 from ..motion.skeleton import Skeleton
-from ..synthetic.recorded_kicks import KICK_LABELS
 from . import cache
 from .cache import write_synthetic_clips
 from .clip import Clip
@@ -32,7 +31,7 @@ from .loops.standing_loops import MIN_STAND_SECONDS
 from .manners import Manners, measure_manners
 from .posture import NormalPostures, fit_normal_postures
 from .receptions import find_cut_receptions
-from .synthetic_clips import KICK_STEP, MIN_RECEIVE_SPEED, RECEIVE_LABELS, iter_synthetic_clips, measure_touch_speed
+from .synthetic_clips import KICK_STEP, iter_synthetic_clips, measure_kick_speed
 
 MIN_RUN_SECONDS = 2.0  # of a track's runs from which on long runs are needed
 RESTING_SPEED = 0.1  # m/s of a track below which a player stands
@@ -162,7 +161,7 @@ class Library:
     def with_synthetic_clips(self) -> "Library":
         """The recordings followed by the synthetic clips of `library.synthetic_clips`.
 
-        These add the speeds between and above the recordings, and kicks and received balls on the run. They are
+        These add the speeds between and above the recordings, and kicks on the run. They are
         generated on first use and cached. The result has no clusters. InputError where no recording shows locomotion.
         """
         measure_gaits(self)  # a library without locomotion raises InputError
@@ -201,32 +200,29 @@ class Library:
         return replace(self, clips=(*self.clips, *other.clips), frames=frames, clusters={})
 
     def needs_synthetic_clips(self, speed: np.ndarray, offset: np.ndarray, heading: np.ndarray,
-                              key_speeds: np.ndarray, takes: np.ndarray) -> bool:
+                              kick_speeds: np.ndarray) -> bool:
         """Whether a track needs the synthetic clips.
 
         It does if it stays in a speed gap for a fifth of a second or more, stands or runs for some seconds in all,
         goes sideways or backward while slow, turns where it stands, or has key moments that are faster than any
-        recorded kick or, for received balls, any recorded receiving with the foot can be played without sliding.
+        recorded kick can be played without sliding.
 
         Args:
             speed: (T,) m/s of the track at the library's rate.
             offset: (T,) rad from its direction of travel to its heading.
             heading: (T,) rad.
-            key_speeds: (K,) m/s at its key moments.
-            takes: (K,) bool, the key moment receives the ball.
+            kick_speeds: (K,) m/s at its key moments, without those that take the ball with a foot.
         Returns:
             True if it does.
         """
         inside = sum(int(np.sum((speed > low) & (speed < high))) for low, high in self.coverage.speed_gaps)
-        kick, take = (measure_touch_speed(self.frames, self.clips, self.keys, act)
-                      for act in (KICK_LABELS, RECEIVE_LABELS))
-        too_fast = KICK_STEP * np.where(takes & np.isfinite(take), max(take, MIN_RECEIVE_SPEED), kick)
+        too_fast = KICK_STEP * measure_kick_speed(self.frames, self.clips, self.keys)
         rests = np.sum(speed < RESTING_SPEED) >= MIN_STAND_SECONDS * self.fps
         runs = np.sum(speed > MIN_SPEED) >= MIN_RUN_SECONDS * self.fps
         aside = (speed > STANDING_SPEED) & (speed < 1.25 * BACK_SPEEDS[-1]) & (np.abs(offset) > np.pi / 3.0)
         turned = np.sum(np.abs(np.diff(heading))[speed[1:] < STANDING_SPEED])
         steps = np.sum(aside) >= 0.5 * self.fps or turned >= 0.5 * TURNS[0]
-        return inside >= 0.2 * self.fps or bool(rests | runs | steps) or bool(np.any(key_speeds > too_fast))
+        return inside >= 0.2 * self.fps or bool(rests | runs | steps) or bool(np.any(kick_speeds > too_fast))
 
     @cached_property
     def max_speed(self) -> float:

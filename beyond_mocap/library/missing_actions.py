@@ -17,20 +17,21 @@ from weakref import WeakKeyDictionary
 import numpy as np
 
 from ..annotation import ClipAnnotation, sort_labels
+from ..annotation.ball_contact import build_surfaces, takes_with_foot
 from ..annotation.gaits import compute_gait_thresholds
 from ..annotation.labels import find_label, list_gaits
 from ..annotation.vocabulary import SIDES
 from ..base.errors import InputError
 from ..base.time_series import find_equal_runs
 from ..motion import contacts
-from ..motion.motion import forward_kinematics
+from ..motion.motion import compute_pose, forward_kinematics, sample_frames
 from ..motion.track import smooth_zero_phase_hann
 from ..synthetic.actions.action import Action, ActionSetting
 from ..synthetic.actions.table import ACTIONS
 from .cache import write_synthetic_clips
 from .clip import Clip
 from .features import SMOOTH_SECONDS
-from .keys import select_keys
+from .keys import Key, select_keys
 from .library import Library
 from .synthetic_clips import FPS, SYNTHETIC_FOLDER, detect_still_points, sample_upright_example
 
@@ -41,6 +42,8 @@ _NAME = re.compile(r"(?P<name>\w+?)(_v(?P<speed>[\d.]+))?(_z(?P<height>[\d.]+))?
 _HEIGHT_SLACK = 0.15  # m by which the ball may be lower or higher than an action is built for
 _HEIGHT_STEP = 0.1  # m between the heights of the ball for which an action is built
 _SECONDS_STEP, _LONGEST = 0.5, 20.0  # s between the times for which an action is built that can last; more is repeated
+# factor on a recorded reception's speed, and m/s, up to which a player may be as fast: beyond, feet slide
+_RECEPTION_ROOM, _SLOW_RECEPTION = 1.4, 1.7
 _SPEED_ROOM, _SPEED_SLACK = 1.2, 0.3  # factor and m/s by which a player may be slower or faster than a variant
 _GAITS = frozenset(list_gaits())
 _SIDE = "right"  # of clips that are not mirrored
@@ -99,6 +102,8 @@ def find_action(moment: ActionMoment) -> Action | None:
 
 def find_missing_actions(library: Library, moments: Iterable[ActionMoment], mirror: bool = True) -> tuple[str, ...]:
     """Find the synthetic clips for the requested actions that no recording shows.
+
+    A recorded reception with the foot shows only one whose ball is about as high, and whose player about as fast.
 
     Args:
         library: the clips.
@@ -191,11 +196,26 @@ def _is_recorded(library: Library, moment: ActionMoment, mirror: bool) -> bool:
     """Return whether a recording carries all labels of a requested action."""
     shown = np.array([(mirror or not clip.mirrored) and not clip.is_synthetic for clip in library.clips])
     if not moment.is_span:
-        return bool(select_keys([key for key in library.keys if shown[key.clip]], moment.labels))
+        found = select_keys([key for key in library.keys if shown[key.clip]], moment.labels)
+        return bool(found) if not takes_with_foot(moment.labels) else any(
+            _suits_reception(library, key, moment) for key in found)
     frames = library.frames
     columns = [frames.vocabulary.index(word) for word in moment.labels - _GAITS if word in frames.vocabulary]
     carries = frames.words[:, columns].all(axis=1) & shown[frames.clip]
     return len(columns) == len(moment.labels - _GAITS) and bool(carries.any())
+
+
+def _suits_reception(library: Library, key: Key, moment: ActionMoment) -> bool:
+    """Return whether a recorded reception is played about as fast as the player moves, and as high as the ball is."""
+    motion = library.clips[key.clip].motion
+    frame = int(library.frames.first[key.clip] + key.frame * library.fps / motion.fps + 0.5)
+    if moment.speed > max(_RECEPTION_ROOM * library.frames.speed[frame], _SLOW_RECEPTION):
+        return False
+    if moment.height is None:
+        return True
+    places, world = compute_pose(motion.skeleton, *sample_frames(motion, np.array([key.frame])))
+    lines = [part.compute_line(places[0], world[0]) for part in build_surfaces(motion.skeleton, key.labels)]
+    return min((abs(np.mean(line, axis=0)[2] - moment.height) for line in lines), default=0.0) <= _HEIGHT_SLACK
 
 
 def _name_clips(action: Action, moment: ActionMoment) -> list[str]:

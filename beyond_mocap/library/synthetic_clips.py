@@ -38,7 +38,6 @@ from ..motion.foot_plant import plant_feet
 from ..motion.humanoid import compute_heading_from_positions, identify_joints
 from ..motion.motion import Motion, forward_kinematics, sample_frames
 from ..motion.phase_blend import Strides, blend_strides, find_strides
-from ..synthetic.actions.receptions import build_reception
 from ..synthetic.gait import build_gait
 from ..synthetic.gait_plan import GaitStyle
 from ..synthetic.recorded_kicks import KICK_LABELS, RunningKick, iter_running_kicks
@@ -53,16 +52,14 @@ from .scan import CACHE_FOLDER
 SYNTHETIC_FOLDER = f"{CACHE_FOLDER}/made-gait/"
 # how the file names of blends, kicks, received balls, long stands, long runs, walks and synthetic stands begin, in that
 # folder
-BLEND_PREFIX, KICK_PREFIX, RECEIVE_PREFIX, STAND_PREFIX, LOOP_PREFIX = "blend_", "kick_", "receive_", "stand_", "loop_"
+BLEND_PREFIX, KICK_PREFIX, STAND_PREFIX, LOOP_PREFIX = "blend_", "kick_", "stand_", "loop_"
 WALK_PREFIX, STILL_PREFIX = "walk_", "still_"
-RECEIVE_LABELS = frozenset({"receive", "foot"})
 FPS = 60.0  # of synthetic clips
-# m/s: lowest speed of synthetic running (blends cover slower speeds), and of receiving a ball on the run
-_MIN_RUN_SPEED, MIN_RECEIVE_SPEED = 2.4, 1.7
+_MIN_RUN_SPEED = 2.4  # m/s, lowest speed of synthetic running; blends cover slower speeds
 # factor on the fastest recorded kick's speed from which on kicks are synthetic
 KICK_STEP = 1.3
-# ratios of neighbouring speeds of blends, of received balls and of runs at an even speed
-_BLEND_STEP, _TOUCH_STEP, _EVEN_STEP = 1.06, 1.4, 1.1
+# ratios of neighbouring speeds of blends, and of runs at an even speed
+_BLEND_STEP, _EVEN_STEP = 1.06, 1.1
 _PAIRS = 3  # pairs of recordings blended into each gap, at most
 _MAX_SPEED_SPREAD = 0.15  # standard deviation of a steady stretch's speed, share of its mean
 _GAITS = LOCOMOTION[1:]
@@ -93,21 +90,19 @@ class SyntheticClip:
     heel_toe_contacts: np.ndarray
 
 
-def measure_touch_speed(frames: Frames, clips: Sequence, keys: Sequence, act: frozenset[str]) -> float:
-    """Measure the fastest approach of a touch.
+def measure_kick_speed(frames: Frames, clips: Sequence, keys: Sequence) -> float:
+    """Measure the fastest approach of a kick.
 
     Args:
         frames: of the library.
         clips: of the library.
         keys: its key moments.
-        act: labels that the touch carries.
     Returns:
-        m/s; infinite without any touch.
+        m/s; infinite without any kick.
     """
-    speed = frames.speed  # computed over all frames at every access
     found = [
-        speed[frames.first[key.clip] + int(key.frame / clips[key.clip].motion.fps * 30.0 + 0.5)]
-        for key in keys if act <= key.labels and not clips[key.clip].is_synthetic
+        frames.speed[frames.first[key.clip] + int(key.frame / clips[key.clip].motion.fps * 30.0 + 0.5)]
+        for key in keys if KICK_LABELS <= key.labels and not clips[key.clip].is_synthetic
     ]
     return float(max(found)) if found else np.inf
 
@@ -137,11 +132,9 @@ def iter_synthetic_clips(
         blends = list(_iter_blends(clips, frames, fps, low=low, high=high, speeds=speeds))
         yield from blends or _iter_walks(low, min(high, _MIN_RUN_SPEED), example, speeds)
         yield from _iter_runs(max(0.93 * low, _MIN_RUN_SPEED), min(1.05 * high, MAX_SPEED), example, style, speeds)
-    fastest = measure_touch_speed(frames, clips, keys, KICK_LABELS)
+    fastest = measure_kick_speed(frames, clips, keys)
     for kick in iter_running_kicks(clips, keys, KICK_STEP * fastest, example, style):
         yield _build_kick_clip(kick, speeds)
-    fastest = max(_TOUCH_STEP * measure_touch_speed(frames, clips, keys, RECEIVE_LABELS), MIN_RECEIVE_SPEED)
-    yield from _iter_receptions(fastest, example, speeds)
     stands = [(STAND_PREFIX, motion) for _, motion in iter_standing_loops(clips, frames, fps, strangeness, FPS)]
     if not coverage.has_stand:
         stands = [(STILL_PREFIX, build_gait(0.0, STAND_SECONDS, FPS, example.skeleton, example=example))]
@@ -307,18 +300,6 @@ def _build_kick_clip(kick: RunningKick, speeds: dict[str, float]) -> SyntheticCl
     row = ClipAnnotation(np.ceil(gesture.start * FPS), np.floor(gesture.end * FPS), gesture.key * FPS, kick.words)
     gait_row = _build_gait_rows(np.full(len(gesture.motion), kick.speed), speeds)
     return _ground_clip(f"{SYNTHETIC_FOLDER}{KICK_PREFIX}{kick.name}.bvh", gesture.motion, None, (row, *gait_row))
-
-
-def _iter_receptions(speed: float, example: Motion, speeds: dict[str, float]) -> Iterator[SyntheticClip]:
-    """Iterate over receptions with the inside of the right foot on the run, from `speed` m/s to a sprint."""
-    while speed < MAX_SPEED:
-        touch = build_reception("inside", example.skeleton, FPS, speed, example=example)
-        words = ("receive", "right", "foot", "low", "inside", "running", "front")
-        row = ClipAnnotation(np.ceil(touch.start * FPS), np.floor(touch.end * FPS), touch.key * FPS, words)
-        gait_row = _build_gait_rows(np.full(len(touch.motion), speed), speeds)
-        name = f"{SYNTHETIC_FOLDER}{RECEIVE_PREFIX}inside_{speed:.1f}.bvh"
-        yield _ground_clip(name, touch.motion, None, (row, *gait_row))
-        speed *= _TOUCH_STEP
 
 
 def _build_gait_rows(speed: np.ndarray, speeds: dict[str, float]) -> tuple[ClipAnnotation, ...]:

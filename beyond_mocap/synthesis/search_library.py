@@ -66,8 +66,7 @@ def _list_action_moments(library: Library, plan: ResolvedPlan) -> list[ActionMom
 def _lacks_speeds(library: Library, plan: ResolvedPlan) -> bool:
     """Return whether the recordings lack speeds of the track, or touches as fast as its key moments."""
     track = plan.sample_track(library.fps)
-    moments = np.array([key.resolved_time for key in plan.timeline.keys])
-    takes = np.array([takes_with_foot(key.words) for key in plan.timeline.keys], bool)
+    moments = [key.resolved_time for key in plan.timeline.keys if not takes_with_foot(key.words)]
     offset = compute_heading_offset(track)
     return library.needs_synthetic_clips(track.speed, offset, np.unwrap(track.direction + offset),
-                                         np.interp(moments, track.times, track.speed), takes)
+                                         np.interp(moments, track.times, track.speed))

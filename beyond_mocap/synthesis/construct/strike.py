@@ -24,6 +24,7 @@ from ...motion.humanoid import compute_heading_from_positions, identify_joints
 from ...motion.motion import compute_pose
 from ...motion.skeleton import Skeleton
 from ...motion.track import BALL_RADIUS
+from .calm_foot import calm_foot
 from .contact_geometry import (
     Aim,
     BallRange,
@@ -147,6 +148,7 @@ def strike_ball(
         scene = _build_problem(body, moment, span.start, contacts=contacts[span], path=path, measured=measured,
                                height_known=height_known, fps=fps)
         reached, moved[number] = _reach_ball(scene, body)
+        reached = _calm_taking_foot(scene, reached, contacts[span], fps)
         root[span], rotations[span] = reached.root, reached.rotations
         places = [scene.solve_ball(scene.compute_surface_lines(reached, frame), frame)[0] for frame in moment.held]
         path = shift_ball_eased(scene.ball, moment.held, np.array(places), moment.bounds, fps)
@@ -435,6 +437,14 @@ def _swing_to_ball(scene: _TouchProblem, body: Body) -> tuple[Body, np.ndarray, 
         moved_body = Body.from_pose(body.skeleton, moved_body.root,
                                     hold_foot(body, other, moved_body.root, moved_body.rotations))
     return moved_body, lines, scene.solve_ball(lines, scene.moment.frame)[1]
+
+
+def _calm_taking_foot(scene: _TouchProblem, body: Body, contacts: np.ndarray, fps: float) -> Body:
+    """Slow down the foot that takes a ball; contacts (W, 2) bool."""
+    part, (first, last) = scene.parts[0], scene.moment.held
+    if part.part != "foot" or not _STOPPING & scene.moment.words:
+        return body
+    return calm_foot(body, part, (first - scene.origin, last - scene.origin), _is_in_contact(contacts, part), fps)
 
 
 def _solve_shifts(scene: _TouchProblem, body: Body, lines: np.ndarray, shifts: np.ndarray) -> np.ndarray:

@@ -28,7 +28,6 @@ from ...library.synthetic_clips import (
     BLEND_PREFIX,
     KICK_PREFIX,
     LOOP_PREFIX,
-    RECEIVE_PREFIX,
     STAND_PREFIX,
     STILL_PREFIX,
     SYNTHETIC_FOLDER,
@@ -67,8 +66,6 @@ _SYNTHETIC_INSTEAD = (
 )
 _SYNTHETIC_KINDS = (
     (SYNTHETIC_FOLDER + KICK_PREFIX, "synthetic kick on the run: no recorded kick is as fast as the player"),
-    (SYNTHETIC_FOLDER + RECEIVE_PREFIX,
-     "synthetic reception: no recording takes the ball so, or at the player's speed"),
     (SYNTHETIC_FOLDER + STAND_PREFIX,
      "a recorded stand is played forward and backward: no recording stands for so long"),
     (SYNTHETIC_FOLDER + LOOP_PREFIX,
@@ -177,7 +174,7 @@ def _report_synthetic(played: Playback, library: Library | None) -> list[TimedMe
     named = tuple(SYNTHETIC_FOLDER + prefix for prefix, *_ in _SYNTHETIC_INSTEAD if prefix)
     others = _frames_of_clips(played, SYNTHETIC_FOLDER) & ~_frames_of_clips(
         played, SYNTHETIC_FOLDER + ACTION_PREFIX, *named, *(prefix for prefix, _ in _SYNTHETIC_KINDS))
-    kinds += [(there, f"synthetic {name}: no recorded one") for name, there in _list_shown_actions(played)]
+    kinds += [(there, f"synthetic {name}: no recorded one fits") for name, there in _list_shown_actions(played)]
     kinds += [(_frames_of_clips(played, SYNTHETIC_FOLDER + prefix) if prefix else others, describe(kind, instead))
               for prefix, kind, instead in _SYNTHETIC_INSTEAD]
     return [_build_line(played.times, there, what, f" ({np.sum(there) / played.motion.fps:.1f} s in all)")

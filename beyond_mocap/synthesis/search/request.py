@@ -193,9 +193,9 @@ def _build_key(library, moment: KeyMoment, track, asked: ActionMoment, gait, all
     chosen = asked.labels
     choices = select_keys(usable, chosen) or (() if select_keys(actions, chosen) else select_keys(usable, moment.words))
     if choices:
-        return RequestedKey(requested=moment, frame=frame,
-                            choices=(*choices, *select_substitutes(choices, synthetic, moment.words)),
-                            used_instead=None)
+        beside = select_keys(actions, chosen) if takes_with_foot(moment.words) else select_substitutes(
+            choices, synthetic, moment.words)
+        return RequestedKey(requested=moment, frame=frame, choices=(*choices, *beside), used_instead=None)
     choices = select_keys(actions, chosen) or select_keys(actions, moment.words)
     if takes_with_foot(moment.words):
         cut = [key for key in library.cut_receptions if allowed[key.clip] and not key.labels & set(moment.avoid)]

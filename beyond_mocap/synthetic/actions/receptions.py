@@ -32,8 +32,10 @@ _SLOWING = ((-1.3, 0.0), (-0.8, 0.0), (-0.25, 0.65), (0.05, 1.0), (0.4, 0.7), (0
 _SLOWED = (0.35, 0.15)  # share of its speed that a walking and a running body loses at the touch
 _PACE = (0.52, 0.77)  # factor on the cadence of a walk and a run around the touch
 _WALK, _RUN = 1.7, 3.3  # m/s of a walk, and of a run
-_LIFT_SECONDS = 0.28  # after the touch in which a lifted foot comes down
-_SWING_SHARE = 0.66  # of the foot's swing that has passed at the touch
+_LIFT_SECONDS = 0.28, 0.36  # after the touch in which a foot comes down, of a low and of a high ball
+_SWING_SHARE = 0.66, 0.56  # of the foot's swing that has passed at the touch of a low and of a high ball
+_LOW, _HIGH = 0.3, 0.7  # m of the ankle at a low and at a high ball
+_HIGH_PACE = 0.72  # factor on the cadence for a high ball: a foot that comes down from there slowly takes its time
 # seconds before and after the touch in which a standing body differs from standing
 _SPAN = (-0.75, 0.95)
 _LEFT_ARM = ((-0.20, 12, 34, 15, 42), (0.0, 16, 44, 15, 40), (0.25, 12, 38, 15, 45))
@@ -110,8 +112,8 @@ RECEPTIONS = {
         labels=("receive", "foot", "high", "top"), speeds=(0.0, 5.5), heights=(0.45, 0.75), height=0.46,
         foot=(
             (-0.16, 0.38, -0.12, 0.470, 12, -20, -4),
-            (0.0, 0.40, -0.12, 0.480, 10, -22, -6), (0.08, 0.36, -0.12, 0.400, 12, -22, -6),
-            (0.17, 0.28, -0.12, 0.270, 14, -18, -4), (0.28, 0.18, -0.12, 0.150, 8, -10, 0),
+            (0.0, 0.40, -0.12, 0.480, 10, -22, -6), (0.08, 0.36, -0.12, 0.420, 12, -22, -6),
+            (0.17, 0.29, -0.12, 0.340, 14, -18, -4), (0.34, 0.18, -0.12, 0.150, 8, -10, 0),
         ),
         low=0.04, left_arm=((-0.20, 14, 50, 10, 34), (0.0, 22, 64, 10, 30), (0.25, 14, 46, 12, 38)),
         right_arm=((-0.20, 4, 42, 12, 36), (0.0, -14, 54, 10, 30), (0.25, 0, 40, 12, 38)),
@@ -122,8 +124,8 @@ RECEPTIONS = {
         labels=("receive", "thigh"), speeds=(0.0, 4.0), heights=(0.75, 1.05), height=1.0,
         foot=(
             (-0.16, 0.22, -0.12, 0.490, 30, -8, 0),
-            (0.0, 0.24, -0.12, 0.520, 28, -8, 0), (0.08, 0.23, -0.12, 0.440, 28, -8, 0),
-            (0.17, 0.20, -0.12, 0.300, 22, -8, 0), (0.28, 0.16, -0.12, 0.150, 10, -8, 0),
+            (0.0, 0.24, -0.12, 0.520, 28, -8, 0), (0.08, 0.23, -0.12, 0.450, 28, -8, 0),
+            (0.17, 0.20, -0.12, 0.350, 22, -8, 0), (0.34, 0.16, -0.12, 0.150, 10, -8, 0),
         ),
         low=0.03, left_arm=((-0.20, 14, 50, 10, 36), (0.0, 18, 62, 10, 32), (0.25, 12, 44, 12, 40)),
         right_arm=((-0.20, 6, 46, 12, 36), (0.0, -8, 58, 10, 32), (0.25, 2, 42, 12, 40)),
@@ -168,9 +170,16 @@ def build_reception(
 def _lift(reception: Reception, height: float) -> Reception:
     """Lift the foot of a reception to a ball at `height` m; it is down again when the foot lands."""
     lift = min(max(height, reception.heights[0]), reception.heights[-1]) - reception.height
-    rows = [(row[0], row[1], row[2], row[3] + lift * (1.0 if row[0] <= 0.0 else max(1.0 - row[0] / _LIFT_SECONDS, 0.0)),
+    seconds = _interpolate_height(reception, _LIFT_SECONDS)
+    rows = [(row[0], row[1], row[2], row[3] + lift * (1.0 if row[0] <= 0.0 else max(1.0 - row[0] / seconds, 0.0)),
              *row[4:]) for row in reception.foot]
     return replace(reception, foot=tuple(rows))
+
+
+def _interpolate_height(reception: Reception, ends: tuple[float, float]) -> float:
+    """Interpolate between the values for a low and for a high ball by the ankle's height at the touch."""
+    height = next((row[3] for row in reception.foot if row[0] == 0.0), 0.0)
+    return float(np.interp(height, (_LOW, _HIGH), ends))
 
 
 def _stand(reception: Reception) -> Volley:
@@ -196,7 +205,8 @@ def _travel(reception: Reception, speed: float) -> StrikeRecipe:
     slowed, pace = (walking + run * (running - walking) for walking, running in (_SLOWED, _PACE))
     return StrikeRecipe(
         foot=reception.foot, pelvis=reception.pelvis, spine=reception.spine, left_arm=reception.left_arm,
-        right_arm=reception.right_arm, head=reception.nod, pace=pace, at=_SWING_SHARE,
+        right_arm=reception.right_arm, head=reception.nod,
+        pace=pace * _interpolate_height(reception, (1.0, _HIGH_PACE)), at=_interpolate_height(reception, _SWING_SHARE),
         speeds=tuple((time, (1.0 - slowed * share) * speed) for time, share in _SLOWING),
         sink=((-0.15, 0.8 * low), (0.0, low), (0.25, 0.8 * low)),
     )

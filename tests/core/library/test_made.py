@@ -13,7 +13,8 @@ from beyond_mocap.files.bvh import bvh
 from beyond_mocap.library.build import build_library
 from beyond_mocap.library.coverage import MAX_SPEED, find_speed_gaps
 from beyond_mocap.library.keys import Key, select_substitutes
-from beyond_mocap.library.synthetic_clips import BLEND_PREFIX, KICK_PREFIX, RECEIVE_PREFIX, SYNTHETIC_FOLDER
+from beyond_mocap.library.missing_actions import describe_action
+from beyond_mocap.library.synthetic_clips import BLEND_PREFIX, KICK_PREFIX, SYNTHETIC_FOLDER
 from beyond_mocap.motion.humanoid import identify_joints
 from beyond_mocap.motion.motion import forward_kinematics
 from beyond_mocap.motion.track import Track
@@ -143,7 +144,7 @@ def test_a_ball_taken_on_the_run_is_made_and_no_foot_slides(with_a_receive, spee
     timeline = Timeline(keys=(KeyMoment(3.0, ("receive", "foot", "low")),))
     take = synthesize(with_a_receive, Plan(track=straight(speed), timeline=timeline))
     (key,) = take.keys
-    assert key.clip.startswith(SYNTHETIC_FOLDER + RECEIVE_PREFIX) == is_made and key.used_instead is None
+    assert (describe_action(key.clip) is not None) == is_made and key.used_instead is None
     assert key.frame == pytest.approx(3.0 * take.motion.fps, abs=0.51)
     assert any("synthetic reception" in line for line in take.warnings) == is_made
     body, places = identify_joints(take.motion.skeleton), forward_kinematics(take.motion)[0]
@@ -151,8 +152,16 @@ def test_a_ball_taken_on_the_run_is_made_and_no_foot_slides(with_a_receive, spee
     assert measure_stance_travel(toes, list_stances(take.contacts)).max(initial=0.0) < 0.15
 
 
-def test_where_nobody_takes_a_ball_none_is_made(more):
-    assert not made(more, RECEIVE_PREFIX)
+@pytest.mark.parametrize("height, side, part", [(0.11, 0.5, None), (0.6, 0.2, "instep"), (0.9, 0.2, "thigh")])
+def test_the_ball_decides_between_a_recorded_reception_and_synthetic_ones(with_a_receive, height, side, part):
+    track = straight(1.2)
+    ball = np.column_stack([track.positions + [0.5, side], np.full(len(track.times), height)])
+    track = replace(track, ball=ball, ball_height_known=np.ones(len(ball), bool))
+    timeline = Timeline(keys=(KeyMoment(3.0, ("receive",)),))
+    take = synthesize(with_a_receive, Plan(track=track, timeline=timeline))
+    (key,) = take.keys
+    assert part in (describe_action(key.clip) or "") if part else describe_action(key.clip) is None
+    assert ("left" if side > 0.3 else "receive") in key.words
 
 
 def test_made_kicks_stand_in_for_the_same_foot_only():

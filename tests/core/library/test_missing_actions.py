@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -104,6 +106,16 @@ def test_actions_are_built_once_for_a_library_and_have_twins(library):
     assert "right" in right.labels_at(right.annotations[0].key) and left.mirrored
     assert "left" in left.labels_at(left.annotations[0].key)
     assert len(more.frames) > len(library.frames) and not any(map(is_action_clip, library.clips))
+
+
+def test_what_is_known_of_the_other_clips_is_kept(library):
+    more = add_actions(library, find_missing_actions(library, [moment(*HEADER, "left")]))
+    fresh = replace(more)  # knows nothing yet
+    for name in ("strangeness", "stance_seconds", "feet_in_contact"):
+        assert name in vars(more) and name not in vars(fresh)
+        np.testing.assert_array_equal(getattr(more, name), getattr(fresh, name))
+    assert more.normal_postures is library.normal_postures and more.gaits == fresh.gaits
+    assert more.cut_receptions == fresh.cut_receptions
 
 
 def test_a_take_shows_a_missing_action_on_time_and_says_so(library):
