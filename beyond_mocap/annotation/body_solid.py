@@ -1,4 +1,4 @@
-"""A moving body as solids that a ball stays out of: gaps between balls and body, and the way out.
+"""A moving body as solids: how deep a ball lies in them, gaps between balls and body, and the way out.
 
     solid = BodySolid.from_pose(build_body_surfaces(skeleton), positions, rotations)
     gaps = solid.measure_gaps(balls, frames)
@@ -85,6 +85,18 @@ class BodySolid:
         """Squared lengths (W, S) m^2 of the solids' lines."""
         return np.maximum(np.sum(self.along**2, axis=-1), 1e-12)
 
+    def measure_depths(self, balls: np.ndarray, frames: np.ndarray | None = None) -> np.ndarray:
+        """Measure how deep balls lie in each solid.
+
+        Args:
+            balls: (N, 3) m, centres, world frame.
+            frames: (N,) frame of each; None: one ball for each frame.
+        Returns:
+            (N, S) m, negative where they are apart, NaN without a ball.
+        """
+        away, least = self._compute_offsets(balls, np.arange(len(balls)) if frames is None else frames)
+        return least - np.sqrt(np.einsum("npk,npk->np", away, away))
+
     def measure_gaps(self, balls: np.ndarray, frames: np.ndarray) -> np.ndarray:
         """Measure the gaps between balls and the nearest part of the body.
 
@@ -94,8 +106,7 @@ class BodySolid:
         Returns:
             (N,) m, negative inside the body.
         """
-        away, least = self._compute_offsets(balls, frames)
-        return np.min(np.sqrt(np.einsum("npk,npk->np", away, away)) - least, axis=1)
+        return -np.max(self.measure_depths(balls, frames), axis=1)
 
     def compute_way_out(self, balls: np.ndarray, frames: np.ndarray) -> np.ndarray:
         """Compute the shortest level move out of the part of the body that each ball is deepest in.

@@ -1,4 +1,4 @@
-"""The surfaces of a whole body as simple bodies, and how deep the ball lies in them.
+"""The surfaces of a whole body as simple bodies; `body_solid` places them on a posed body.
 
 Limbs and trunk are capsules that taper from one joint to the next, with the girths of the drawn body
 (`appearance.body`); feet, head and hands are the surfaces that strike the ball (`striking`), so that a ball which
@@ -7,15 +7,13 @@ touches one of them is not inside it.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from ..motion.humanoid import Humanoid, Limb, identify_joints
 from ..motion.skeleton import Skeleton
-from ..motion.track import BALL_RADIUS
-from .striking import BODY_PARTS, Surface, build_part_surfaces, find_nearest_point
+from .striking import BODY_PARTS, Surface, build_part_surfaces
 
 # Metres at the first and the last joint: half depths of the drawn body. The trunk is wider than deep: capsules along
 # its flanks, across the hips and across the shoulders give it its width.
@@ -84,30 +82,3 @@ def _build_capsule(part: str, side: str, joints, radius: float, end_radius: floa
     start, end = joints
     return BodySurface(part=part, side=side, radius=radius, start=(start, _ORIGIN), end=(end, _ORIGIN),
                        end_radius=radius if end_radius is None else end_radius)
-
-
-def measure_ball_depths(
-    surfaces: Sequence[BodySurface], positions: np.ndarray, rotations: np.ndarray, ball: np.ndarray
-) -> np.ndarray:
-    """Measure how deep the ball lies in each surface.
-
-    Args:
-        surfaces: S surfaces, of `build_body_surfaces`.
-        positions: (T, J, 3) m, world frame.
-        rotations: (T, J, 4) quaternions, world frame.
-        ball: (T, 3) m, the ball's centre, world frame.
-    Returns:
-        (T, S) m, negative where they are apart, NaN without a ball.
-    """
-    depths = [_measure_depth(surface, positions, rotations, ball) for surface in surfaces]
-    return np.stack(depths, axis=1) if depths else np.zeros((len(ball), 0))
-
-
-def _measure_depth(surface: BodySurface, positions: np.ndarray, rotations: np.ndarray, ball: np.ndarray) -> np.ndarray:
-    """Measure how deep (T,) m the ball lies in one surface."""
-    start, end = surface.compute_line(positions, rotations)
-    nearest = find_nearest_point((start, end), ball)
-    length = np.linalg.norm(end - start, axis=-1)
-    share = np.linalg.norm(nearest - start, axis=-1) / np.maximum(length, 1e-9)
-    radius = surface.radius + share * (surface.end_radius - surface.radius)
-    return radius + BALL_RADIUS - np.linalg.norm(ball - nearest, axis=-1)

@@ -32,6 +32,7 @@ from ..synthesis.quality.moments import (
 from ..synthesis.quality.playback import find_replayed, list_warp_rates
 from ..synthesis.quality.unmet_constraints import report_unmet_constraints
 from . import realism
+from .contact_figures import find_reachable
 from .reference import View, compute_source_poses
 
 SPEED_NAMES = ("0-1", "1-2", "2-3", "3-4.5", "4.5+")
@@ -115,6 +116,7 @@ def _measure_key_moment(view: View, moment: KeyMomentResult) -> dict:
         "labels": list(moment.requested.words), "clip": moment.clip, "clip_frame": moment.clip_frame,
         "time_error_s": moment.played_at - time, **errors, "contact_gap_m": measure_ball_gap(played, moment),
         "met_s": contact_time, "met_gap_m": contact_gap, "missed_by_m": measure_miss(played, moment),
+        "reachable": find_reachable(view, moment),
         "used_instead": None if moment.used_instead is None else list(moment.used_instead),
     }
 

@@ -18,6 +18,7 @@ from ..motion import quaternion
 from ..synthesis.quality.moments import KeyMomentResult, list_contact_labels
 from ..synthesis.quality.unmet_constraints import format_stretches
 from . import touches
+from .contact_figures import measure_contacts
 from .naturalness import format_event
 from .reference import View
 from .titles import Title
@@ -43,7 +44,8 @@ FRAMES_KEYS = {
     **dict.fromkeys(("speed_m_s_median", "speed_m_s_max", "strike_count"), "receptions"),
     **dict.fromkeys(("ankle_speed_m_s_median", "plant_beside_m_median", "plant_ahead_m_median", "plant_in_range_share",
                      "stride_ratio_median", "run_up_m_s_median", "ratio_median", "ratio_in_range_share"), "kicks"),
-    **dict.fromkeys(("fit_share", "part_fit_share", "side_fit_share"), "touches"), "inside_share": "ball_frames",
+    **dict.fromkeys(("fit_share", "part_fit_share", "side_fit_share", "met_share"), "touches"),
+    "reachable_met_share": "reachable_touches", "inside_share": "ball_frames",
 }  # fmt: skip
 """What a figure rests on: a key beside it."""
 
@@ -69,6 +71,8 @@ TITLES = {
     "fit.fit_share": Title("Touches that fit the ball", "%", 100.0, 0),
     "fit.part_fit_share": Title("By body part", "%", 100.0, 0),
     "fit.side_fit_share": Title("By side", "%", 100.0, 0),
+    "contact.met_share": Title("Touches that meet the ball", "%", 100.0, 0),
+    "contact.reachable_met_share": Title("The same, of reachable balls", "%", 100.0, 0),
     "ball_inside.inside_frames": Title("Ball inside the body", "frames", digits=0),
     "ball_inside.inside_share": Title("The same, share", "%", 100.0, 2),
     "ball_inside.depth_mm_max": Title("Deepest", "mm", digits=0),
@@ -93,6 +97,7 @@ def measure_touches(touch_view: TouchView) -> dict:
         "kick": touches.summarize_kicks(kicks),
         "fast_kick": touches.summarize_kicks([kick for kick in kicks if kick.ball_speed > FAST_BALL]),
         "ball_speed": summarize_ball_speeds(kicks), "fit": measure_fit(touch_view),
+        "contact": measure_contacts(touch_view.view),
         "ball_inside": measure_ball_inside(touch_view), "second_strike_count": len(touch_view.second_strikes),
         "unasked_strike_count": len(touch_view.strikes), **list_substituted(touch_view.view),
     }

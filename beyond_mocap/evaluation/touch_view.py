@@ -8,7 +8,8 @@ from functools import cached_property
 import numpy as np
 
 from ..annotation.ball_contact import find_striking_part, may_use_foot
-from ..annotation.body_surfaces import BodySurface, build_body_surfaces, measure_ball_depths
+from ..annotation.body_solid import BodySolid
+from ..annotation.body_surfaces import BodySurface, build_body_surfaces
 from ..annotation.labels import list_labels
 from ..annotation.striking import build_part_surfaces, measure_smallest_gap
 from ..annotation.vocabulary import SIDES
@@ -22,6 +23,7 @@ _OWN_STRIKE_SECONDS = 0.25  # s about a reception in which a strike is that of i
 _AFTER_SECONDS = (1.0 / 30.0, 0.1)  # s after a kick between which the ball's speed is measured
 _NEAR_BALL = 1.6  # m from pelvis to ball within which a body may reach it
 _TAKES_OR_SENDS = frozenset((*list_labels(ball="takes"), *list_labels(ball="sends")))
+_CARRIES = frozenset(list_labels(ball="carries"))
 
 
 class TouchView:
@@ -68,8 +70,8 @@ class TouchView:
         played, surfaces = self.played, build_body_surfaces(self.played.motion.skeleton)
         away = np.linalg.norm(self.ball - played.positions[:, played.body.hips], axis=1)
         near = np.flatnonzero(away < _NEAR_BALL * self.view.scale)
-        depths = measure_ball_depths(surfaces, played.positions[near], played.rotations[near], self.ball[near])
-        return near, depths, surfaces
+        solid = BodySolid.from_pose(surfaces, played.positions[near], played.rotations[near])
+        return near, solid.measure_depths(self.ball[near]), surfaces
 
     @cached_property
     def strikes(self) -> list[tuple[float, int]]:
@@ -144,4 +146,4 @@ class TouchView:
 
 def _carries_only(words) -> bool:
     """Return whether labels only say that the ball is carried, as in a dribble."""
-    return not (_TAKES_OR_SENDS & set(words)) and "dribble" in words
+    return not _TAKES_OR_SENDS.intersection(words) and bool(_CARRIES.intersection(words))

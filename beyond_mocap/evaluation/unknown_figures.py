@@ -43,6 +43,7 @@ _REASONS = (
     (r"touches\.reception", "no key moment is a reception with the foot"),
     (r"touches\.fast_kick", "no ball leaves a kick faster than 18 m/s"),
     (r"touches\.ball_inside", "no ball"),
+    (r"touches\.contact", "no key moment has a ball in reach"),
     (r"touches\.ball_speed", "no ball leaves a kick faster than 5 m/s"),
     (r"annotation_similarity\.had_keys", "no key moment has a label that the library has"),
     (r"annotation_similarity\.(keys|eq18_keys)", "no key moments"),

@@ -37,9 +37,10 @@ from .synthetic_clips import FPS, SYNTHETIC_FOLDER, detect_still_points, sample_
 ACTION_PREFIX = "action_"
 _FOLDER = SYNTHETIC_FOLDER + ACTION_PREFIX
 _NAME = re.compile(r"(?P<name>\w+?)(_v(?P<speed>[\d.]+))?(_z(?P<height>[\d.]+))?(_b(?P<exit_speed>[\d.]+))?"
-                   r"(_d(?P<direction>[+-]\d+))?(?P<side>_side)?\.bvh")
+                   r"(_d(?P<direction>[+-]\d+))?(_t(?P<seconds>[\d.]+))?(?P<side>_side)?\.bvh")
 _HEIGHT_SLACK = 0.15  # m by which the ball may be lower or higher than an action is built for
 _HEIGHT_STEP = 0.1  # m between the heights of the ball for which an action is built
+_SECONDS_STEP, _LONGEST = 0.5, 20.0  # s between the times for which an action is built that can last; more is repeated
 _SPEED_ROOM, _SPEED_SLACK = 1.2, 0.3  # factor and m/s by which a player may be slower or faster than a variant
 _GAITS = frozenset(list_gaits())
 _SIDE = "right"  # of clips that are not mirrored
@@ -61,6 +62,7 @@ class ActionMoment:
         ball_speed: m/s of the ball before, 0 where it is unknown.
         exit_speed: m/s with which the ball leaves, None where it is unknown.
         is_span: whether the labels are a span's.
+        seconds: s that the span lasts.
     """
 
     labels: frozenset[str]
@@ -69,6 +71,7 @@ class ActionMoment:
     ball_speed: float = 0.0
     exit_speed: float | None = None
     is_span: bool = False
+    seconds: float = 0.0
 
 
 def find_action(moment: ActionMoment) -> Action | None:
@@ -81,7 +84,8 @@ def find_action(moment: ActionMoment) -> Action | None:
         where the labels name none.
     """
     requested = moment.labels - frozenset(SIDES)
-    serving = [action for action in ACTIONS if action.is_span == moment.is_span and requested <= action.labels]
+    serving = [action for action in ACTIONS
+               if action.is_span == moment.is_span and action.needs <= requested <= action.labels]
     names = {action.name for action in serving}
 
     def rate_misfit(action: Action) -> tuple:
@@ -122,9 +126,7 @@ def _list_actions(moment: ActionMoment) -> list[Action]:
 
 def _is_speed_near(action: Action, speed: float) -> bool:
     """Return whether a player at `speed` m/s is near the speeds for which an action is built."""
-    if not action.speeds:
-        return action.suits_speed(speed)
-    slowest, fastest = action.speeds[0], action.speeds[-1]
+    slowest, fastest = (action.speeds[0], action.speeds[-1]) if action.speeds else action.suited_speeds
     return slowest <= _SPEED_ROOM * speed + _SPEED_SLACK and speed <= _SPEED_ROOM * fastest + _SPEED_SLACK
 
 
@@ -206,7 +208,9 @@ def _name_clips(action: Action, moment: ActionMoment) -> list[str]:
         text += f"_z{round(height / _HEIGHT_STEP) * _HEIGHT_STEP:.1f}"
     if action.exit_speeds and moment.exit_speed is not None:
         text += f"_b{min(action.exit_speeds, key=lambda speed: abs(speed - moment.exit_speed)):.1f}"
-    end = "_side.bvh" if moment.labels & frozenset(SIDES) and not action.has_side else ".bvh"
+    seconds = max(round(moment.seconds / _SECONDS_STEP), 1) * _SECONDS_STEP
+    end = f"_t{min(seconds, _LONGEST):.1f}" if action.can_last else ""
+    end += "_side.bvh" if moment.labels & frozenset(SIDES) and not action.has_side else ".bvh"
     ways = [f"_d{degrees:+.0f}" for degrees in action.directions] or [""]
     return [f"{_FOLDER}{text}{way}{end}" for way in ways]
 
@@ -218,7 +222,8 @@ def _parse_path(path: str) -> tuple[Action, dict[str, float], frozenset[str]]:
     if found is None or found["name"] not in named:
         raise InputError(path, "an unknown synthetic action", "one of this version's", "synthesize the take again")
     action = named[found["name"]]
-    numbers = {name: float(found[name]) for name in ("speed", "height", "exit_speed", "direction") if found[name]}
+    numbers = {name: float(found[name]) for name in ("speed", "height", "exit_speed", "direction", "seconds")
+               if found[name]}
     return action, numbers, frozenset({_SIDE} if action.has_side or found["side"] else ())
 
 

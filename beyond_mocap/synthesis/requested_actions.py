@@ -38,7 +38,7 @@ def read_span_action(span: Span, sampled: SampledTrack) -> ActionMoment:
     """
     inside = (sampled.times >= span.start) & (sampled.times <= span.end)
     speed = float(sampled.speed[inside].mean()) if inside.any() else 0.0
-    return ActionMoment(labels=frozenset(span.words), speed=speed, is_span=True)
+    return ActionMoment(labels=frozenset(span.words), speed=speed, is_span=True, seconds=span.end - span.start)
 
 
 def _measure_ball_speed(track: SampledTrack, time: float, between: tuple[float, float]) -> float | None:

@@ -54,6 +54,7 @@ FIGURES = (  # name, key path in the report, factor (a negative one counts from 
     ("Kicking foot's speed", "touches.kick.ankle_speed_m_s_median", 1, "{:.1f}", " m/s"),
     ("Ball over foot speed", "touches.ball_speed.ratio_median", 1, "{:.2f}", " x"),
     ("Touches that fit the ball", "touches.fit.fit_share", 100, "{:.0f}", " %"),
+    ("Reachable balls met", "touches.contact.reachable_met_share", 100, "{:.0f}", " %"),
     ("Ball inside the body", "touches.ball_inside.inside_frames", 1, "{:.0f}", " frames"),
     ("Other labels shown", "touches.substituted_count", 1, "{:.0f}", " key moments"),
     ("Computing time", "seconds.total", 1, "{:.1f}", " s"),

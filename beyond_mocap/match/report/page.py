@@ -277,7 +277,7 @@ _NATURALNESS = ("snap_turns_per_min", "spins_per_min", "pelvis_drops_per_min", "
                 "off_travel_deg_p90", "standing.foot_lifts_per_min", "standing.both_down")  # fmt: skip
 _TOUCHES = ("reception.receptions", "reception.speed_m_s_median", "second_strike_count", "kick.kicks",
             "kick.ankle_speed_m_s_median", "kick.plant_in_range_share", "ball_speed.ratio_median", "fit.fit_share",
-            "ball_inside.inside_frames", "substituted_count", "synthetic_count")  # fmt: skip
+            "contact.reachable_met_share", "ball_inside.inside_frames", "substituted_count", "synthetic_count")
 
 
 def _build_columns(group: str, names: Sequence[str], titles: Mapping[str, Title]) -> tuple[Column, ...]:

@@ -1,9 +1,10 @@
 """Bring the ball and the striking part together: at each key moment the part is on the ball's surface, eased in and
 out.
 
-The body never leaves its track for the ball. First the ball moves, within the noise of its measurement, to where the
-recorded foot (head, chest, hand) strikes. The limb does the rest by two-bone inverse kinematics, or the spine by
-bending, within the reach of a body; what remains is reported. A kick lasts a hundredth of a second, so between the two
+First the ball moves, within the noise of its measurement, to where the recorded foot (head, chest, hand) strikes. The
+limb does the rest by two-bone inverse kinematics, or the spine by bending, within the reach of a body; where that is
+not enough the pelvis steps towards the ball within the noise of its own track (`step_to_ball`); what remains is
+reported. A kick lasts a hundredth of a second, so between the two
 frames around the key moment the ball moves with the foot; a ball that is taken stays longer on it (`give`).
 """
 
@@ -49,6 +50,7 @@ from .move_body_part import (
     solve_swing,
     swing_thigh,
 )
+from .step_to_ball import step_to_ball
 
 BALL_NOISE, FILLED_NOISE = 0.3, 1.0
 """Metres that the ball may be moved from its place, where it was measured and where the feed has filled it in."""
@@ -65,6 +67,7 @@ _IN_THE_AIR = 0.2  # m above which a ball may be met higher or lower
 _HANDS_APART = 0.6  # m between the hands beyond which one hand alone catches in a dive
 _STOPPING = frozenset(list_labels(ball="takes"))
 _HIGH = frozenset(list_labels(height="high"))
+_MISSED = 0.002  # m of remaining gap from which on the pelvis steps towards the ball
 _ROUNDS, _CLOSE = 4, 5e-4  # most rounds of an iteration, and m of change at which it ends
 
 
@@ -236,6 +239,7 @@ class _TouchProblem:
         aim: where the part strikes.
         avoid: (line, radius) that the ball must not lie in.
         origin: the first of the body's W frames.
+        fps: frames per second.
     """
 
     moment: _TouchFrames
@@ -246,6 +250,7 @@ class _TouchProblem:
     aim: Aim
     avoid: list[tuple]
     origin: int
+    fps: float
 
     @property
     def at(self) -> int:
@@ -294,7 +299,7 @@ def _build_problem(body: Body, moment: _TouchFrames, origin: int, contacts, path
     ahead = _choose_direction(body, parts[0], moment, at=at, path=path, fps=fps)
     avoid = _compute_other_leg_lines(body, parts[0], at) if parts[0].part == "foot" else []
     scene = _TouchProblem(moment=moment, parts=parts, shares=shares, ball=path, measured=measured, aim=Aim(ahead),
-                          avoid=avoid, origin=origin)
+                          avoid=avoid, origin=origin, fps=fps)
     if len(parts) == 2:
         return scene
     aim = choose_aim(line, radius, ahead, rise=_RISE[parts[0].part], ball=path[moment.frame],
@@ -391,30 +396,45 @@ def _level_vector(v: np.ndarray) -> np.ndarray:
 def _reach_ball(scene: _TouchProblem, body: Body) -> tuple[Body, float]:
     """Bring the parts of a body to the ball, within their reach; also return how far they were moved, m.
 
-    Requested shifts and what the body can do are solved alternately, since a nearly straight limb yields softly and a
-    spine moves on an arc.
+    Where the limb alone does not reach, the pelvis steps towards the ball.
     """
     own = scene.compute_surface_lines(body, scene.moment.frame)
     if np.linalg.norm(scene.solve_ball(own, scene.moment.frame)[1]) < _CLOSE:
         return body, 0.0
+    reached, lines, missing = _swing_to_ball(scene, body)
+    if np.linalg.norm(missing, axis=1).max() > _MISSED:
+        side = scene.parts[0].side if scene.parts[0].part in ("foot", "thigh") else ""
+        stepped = step_to_ball(body, side, scene.at, missing.mean(axis=0), scene.shares[0], scene.fps)
+        again = _swing_to_ball(scene, stepped)
+        if np.linalg.norm(again[2]) < np.linalg.norm(missing):
+            reached, lines, missing = again
+    if np.linalg.norm(missing, axis=1).min() > OUT_OF_REACH:
+        return body, 0.0
+    return reached, float(np.linalg.norm(np.mean(lines, axis=1) - np.mean(own, axis=1), axis=1).max())
+
+
+def _swing_to_ball(scene: _TouchProblem, body: Body) -> tuple[Body, np.ndarray, np.ndarray]:
+    """Move the parts of a body towards the ball; also return their lines and what they lack (P, 3) m there.
+
+    Requested shifts and what the body can do are solved alternately, since a nearly straight limb yields softly and a
+    spine moves on an arc.
+    """
+    lines = scene.compute_surface_lines(body, scene.moment.frame)
     limbs = [LimbReference.from_body(body, limb_chain(body.skeleton, part)) for part in scene.parts
              if part.part in MAX_SWING]
-    shifts, moved_body, lines = np.zeros((len(scene.parts), 3)), body, own
+    shifts, moved_body = np.zeros((len(scene.parts), 3)), body
     for _ in range(_ROUNDS):
         requested = _solve_shifts(scene, body, lines, shifts)
         if np.linalg.norm(requested - shifts) < _CLOSE:
             break
         moved_body, shifts = _move_parts(scene, body, limbs, requested), requested
         lines = scene.compute_surface_lines(moved_body, scene.moment.frame)
-    if np.linalg.norm(scene.solve_ball(lines, scene.moment.frame)[1], axis=1).min() > OUT_OF_REACH:
-        return body, 0.0
-    moved = np.linalg.norm(np.mean(lines, axis=1) - np.mean(own, axis=1), axis=1).max()
     if not np.array_equal(moved_body.root, body.root):  # the pelvis has sunk, the foot that does not strike stays
         human = identify_joints(body.skeleton)
         other = human.right if scene.parts[0].side == "left" else human.left
         moved_body = Body.from_pose(body.skeleton, moved_body.root,
                                     hold_foot(body, other, moved_body.root, moved_body.rotations))
-    return moved_body, float(moved)
+    return moved_body, lines, scene.solve_ball(lines, scene.moment.frame)[1]
 
 
 def _solve_shifts(scene: _TouchProblem, body: Body, lines: np.ndarray, shifts: np.ndarray) -> np.ndarray:

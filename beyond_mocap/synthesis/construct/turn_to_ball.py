@@ -18,12 +18,12 @@ from ...motion import quaternion
 from ...motion.motion import compute_pose
 from ...motion.skeleton import Skeleton
 from ..search.key_fit import FAST_BALL, FAST_PART, LEAVING_SECONDS, TURN_REACH, compute_free_angle, compute_free_turn
+from .step_to_ball import measure_level_speed
 from .strike import Touch
 
 MAX_TURN_TO_BALL = np.radians(60.0)
 _FULL_TURN_SPEED = 3.0  # m/s up to which a body turns by MAX_TURN_TO_BALL: a faster one would drag its plant foot
 _BALL_TURN_SECONDS = 0.5  # s before and after the key frame over which the turn grows and fades
-_SPEED_SECONDS = 0.25  # s before and after a touch over which the body's speed is measured
 _NEAR, _CLEAR = 0.1, 0.35  # m from the hips: below the first a direction has no weight, above the second all
 _SENDING = frozenset(list_labels(ball="sends"))
 
@@ -65,20 +65,13 @@ def _turn_at_touch(skeleton: Skeleton, root, rotations, *, ball, touch: Touch, f
     trace = trace_fastest_surface(found, places, world)[:, :2]
     part, goal = trace[1] - root[frame, :2], ball[frame, :2] - root[frame, :2]
     clear = np.clip((min(np.linalg.norm(part), np.linalg.norm(goal)) - _NEAR) / (_CLEAR - _NEAR), 0.0, 1.0)
-    exit_turn, speed = 0.0, _measure_speed(root, frame, fps)
+    exit_turn, speed = 0.0, measure_level_speed(root, frame, fps)
     if _SENDING.intersection(touch.words):
         exit_turn = _turn_to_exit(0.5 * fps * (trace[2] - trace[0]), _measure_exit_velocity(ball, frame, fps))
         exit_turn = np.clip(exit_turn, -compute_free_turn(speed), compute_free_turn(speed))
     turn = exit_turn + clear * (_limit_to_reach(exit_turn, part, goal) - exit_turn)
     most = MAX_TURN_TO_BALL * min(1.0, _FULL_TURN_SPEED / max(speed, _FULL_TURN_SPEED))
     return float(np.clip(turn, -most, most))
-
-
-def _measure_speed(root: np.ndarray, frame: int, fps: float) -> float:
-    """Measure the level speed, m/s, of a root (T, 3) m around a frame."""
-    around = int(round(_SPEED_SECONDS * fps))
-    first, last = max(frame - around, 0), min(frame + around, len(root) - 1)
-    return float(np.linalg.norm(root[last, :2] - root[first, :2]) * fps / max(last - first, 1))
 
 
 def _measure_exit_velocity(ball: np.ndarray, frame: int, fps: float) -> np.ndarray:

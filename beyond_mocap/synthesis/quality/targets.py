@@ -85,6 +85,7 @@ TARGETS = {
     "touches.fast_kick.plant_beside_m_median": Target(least=0.2, most=0.37),
     "touches.fast_kick.plant_ahead_m_median": Target(least=-0.05, most=0.2),
     "touches.ball_speed.ratio_median": Target(least=1.06, most=1.3),
+    "touches.contact.reachable_met_share": Target(least=0.95),
     "touches.ball_inside.inside_frames": Target(most=0.0),
     "pelvis_error_m.mean": Target(own="pelvis_error_m.own", beyond=0.015),
     "pelvis_surge_ratio": Target(most=1.3),

@@ -22,7 +22,7 @@ from ...library.coverage import CALM_SPEED, STEP_SPEEDS, classify_steps, compute
 from ...library.features import SMOOTH_SECONDS
 from ...library.landings import LANDING_FOLDER
 from ...library.library import RESTING_SPEED, Library
-from ...library.missing_actions import ACTION_PREFIX, describe_action
+from ...library.missing_actions import ACTION_PREFIX, describe_action, list_action_labels
 from ...library.missing_steps import BACK_PREFIX, SIDE_PREFIX, STEP_PREFIX, TURN_PREFIX
 from ...library.synthetic_clips import (
     BLEND_PREFIX,
@@ -337,13 +337,15 @@ def _build_moment_line(what: str, found: list[tuple[float, float]], form: str) -
 def _report_missing_labels(
     played: Playback, timeline: Timeline | None, keys: list[KeyMomentResult], library: Library | None
 ) -> TimedMessage | None:
-    """Report labels of the user's spans that clips carry, but that are not shown for LABEL_SECONDS or more.
+    """Report labels of the user's spans that clips or synthetic actions carry, but that are not shown for
+    LABEL_SECONDS or more.
 
     Entry and exit of key moments do not count.
     """
     if timeline is None or played.words is None or library is None:
         return None
-    available = [(words or frozenset()) & library.labels for words in labels_per_frame(timeline, played.times)]
+    known = library.labels.union(*list_action_labels(is_span=True))
+    available = [(words or frozenset()) & known for words in labels_per_frame(timeline, played.times)]
     missing = [want.difference(labels_shown) for want, labels_shown in zip(available, played.words)]
     for moment in keys:
         missing[moment.entry : moment.exit + 1] = [frozenset()] * (moment.exit + 1 - moment.entry)

@@ -3,7 +3,8 @@ strike.
 
 A ball leaves an instep 1.06 to 1.3 times as fast as the foot (Kellis and Katis 2007, J Sports Sci Med 6, 154-165), so
 its speed says how fast the foot was. Everything is compared in the frame of travel: x along the player's direction of
-travel at the key moment, y to the left. Speed and turning are weighed by the search itself.
+travel at the key moment (where they face, if they stand), y to the left. Speed and turning are weighed by the search
+itself.
 """
 
 from __future__ import annotations
@@ -50,6 +51,7 @@ TURN_REACH = 0.25  # m between part and ball that the ball's noise and the limb 
 _FARTHEST = 1.0  # m on the ground beyond which the cost does not grow
 _LOFT_NOISE = np.radians(15.0)  # a foot that meets the ball below its middle lifts it by more than it rises itself
 _SENDING = frozenset(list_labels(ball="sends"))
+_STILL_SPEED = 0.5  # m/s up to which a direction of travel is noise: there the body's facing stands for it
 _MOMENT = 1.0 / 60.0  # s before and after a key frame between which velocities are measured
 
 
@@ -106,7 +108,8 @@ def measure_ball(track: SampledTrack, frame: float, is_height_known: bool) -> Ba
         return np.array([np.interp(where, np.arange(len(track.times)), column) for column in track.ball.T])
 
     here = int(np.clip(round(frame), 0, len(track.times) - 1))
-    back = -float(track.direction[here])
+    is_still = track.heading is not None and track.speed[here] <= _STILL_SPEED
+    back = -float(track.heading[here] if is_still else track.direction[here])
     ball = interpolate_ball(0.0)
     first, last = LEAVING_SECONDS
     leaving = (interpolate_ball(last) - interpolate_ball(first)) / (last - first)
@@ -145,7 +148,7 @@ def _travel_direction(library: Library, frame: np.ndarray) -> np.ndarray:
     """Compute the direction of travel (K,) rad in the clips' own world, or the facing where they stand still."""
     velocity = library.frames.velocity[frame]
     aside = arctan2(velocity[:, 1], velocity[:, 0])
-    return library.frames.heading[frame] + np.where(np.linalg.norm(velocity, axis=1) > 0.5, aside, 0.0)
+    return library.frames.heading[frame] + np.where(np.linalg.norm(velocity, axis=1) > _STILL_SPEED, aside, 0.0)
 
 
 def _measure_strike(library: Library, key: Key, places: np.ndarray, rotations: np.ndarray, back: float):

@@ -31,6 +31,7 @@ class ActionSetting:
         height: m of the ball's centre above the ground at the key moment; None where it is unknown.
         exit_speed: m/s with which the ball leaves; None where it is unknown, or the action does not depend on it.
         direction: degrees from the player's travel in which a right foot sends the ball, left positive.
+        seconds: s that an action lasts; None where its own time serves.
         neutral: the neutral stance of the body; measured on the example where it is not given.
     """
 
@@ -41,6 +42,7 @@ class ActionSetting:
     height: float | None = None
     exit_speed: float | None = None
     direction: float = 0.0
+    seconds: float | None = None
     neutral: NeutralStance = None  # type: ignore[assignment]
 
     def __post_init__(self):
@@ -62,6 +64,7 @@ class Action:
         labels: every label that its key moment carries, without a side. A request for any of them is served, as long as
             it asks for no other.
         build: builds it, facing and travelling along +X, on a ground of height 0; an action with a side on the right.
+        needs: labels that a request has to name: an overhead kick is none that a plain kick gets.
         has_side: whether it is done with or to one side; its mirrored twin shows the other one.
         speeds: m/s at which it is built, the nearest one to the player's; empty: it does not depend on speed.
         heights: lowest and highest m of the ball for which it is built; empty: it does not depend on the ball.
@@ -73,6 +76,7 @@ class Action:
         meets: lowest and highest m of a ball that it can meet, where it is not built for the ball's height.
         is_span: whether it lasts (a celebration) instead of having a key moment; its clip carries the labels from the
             gesture's start to its end.
+        can_last: whether it is built for as long as it is requested.
         varies: name of the action beside which it is offered, where the player is as fast as it needs, and the ball no
             faster than it can be done with; empty: it is offered alone.
         most_ball_speed: m/s of the ball before the key moment up to which it is offered so.
@@ -81,6 +85,7 @@ class Action:
     name: str
     labels: frozenset[str]
     build: Callable[[ActionSetting], Gesture]
+    needs: frozenset[str] = frozenset()
     has_side: bool = False
     speeds: tuple[float, ...] = ()
     heights: tuple[float, ...] = ()
@@ -89,10 +94,15 @@ class Action:
     suits: tuple[float, float] | None = None
     meets: tuple[float, float] = (-math.inf, math.inf)
     is_span: bool = False
+    can_last: bool = False
     varies: str = ""
     most_ball_speed: float = math.inf
 
+    @property
+    def suited_speeds(self) -> tuple[float, float]:
+        """Lowest and highest m/s of players whom it suits."""
+        return self.suits or _SUITS.get(self.labels & _PACES, (0.0, math.inf))
+
     def suits_speed(self, speed: float) -> bool:
         """Return whether the action suits a player at `speed` m/s."""
-        low, high = self.suits or _SUITS.get(self.labels & _PACES, (0.0, math.inf))
-        return low <= speed <= high
+        return self.suited_speeds[0] <= speed <= self.suited_speeds[1]

@@ -42,12 +42,11 @@ _HEADERS = (
     Action(name="diving header", labels=frozenset({"header", "head", "dive"}), build=build_diving_header, speeds=_RUNS,
            heights=(0.4, 1.4), suits=MOVES),
 )  # fmt: skip
-_OVERHEADS = (
-    Action(name="overhead kick", labels=frozenset({"kick", "bicycle", "foot", "top", "back"}), build=build_bicycle_kick,
-           has_side=True, heights=(1.4, 2.0)),
-    Action(name="half overhead kick", labels=frozenset({"kick", "bicycle", "half", "foot", "top", "back"}),
-           build=build_bicycle_kick, has_side=True, heights=(1.4, 2.0)),
-)  # fmt: skip
+_OVERHEAD_KICKS = tuple(
+    Action(name=name, labels=frozenset({"kick", "bicycle", "foot", "top", "back", *more}), build=build_bicycle_kick,
+           needs=frozenset({"bicycle"}), has_side=True, heights=(1.4, 2.0))
+    for name, more in (("overhead kick", ()), ("half overhead kick", ("half",)))
+)
 _MOVES = (
     Action(name="jump", labels=frozenset({"jump", "standing"}), build=build_jumping_header),
     Action(name="jump in a run", labels=frozenset({"jump", "slide", "running"}), build=build_running_jump,
@@ -70,5 +69,5 @@ _REACHES = (
       for name, label in (("slide tackle", "tackle"), ("sliding block", "block"),
                           ("sliding interception", "intercept"))),
 )  # fmt: skip
-FIELD_ACTIONS = (*_MOVES, *_HEADERS, *_OVERHEADS, *_REACHES)
+FIELD_ACTIONS = (*_MOVES, *_HEADERS, *_OVERHEAD_KICKS, *_REACHES)
 """Rows for `table.ACTIONS`: of several that serve a request, the usual one first."""

@@ -31,6 +31,7 @@ from .ground import keep_above_ground, lower_hips, raise_hips
 
 Rows = tuple[tuple[float, ...], ...]
 _ROUNDING_SECONDS = 0.02  # s over which corners of the tables are rounded
+_LEAST_HELD = 0.3  # s in which an action that lasts is wholly shown
 _FOOT_DOWN = 0.004  # m above the ground up to which a foot stands on it
 _RESTING_FOOT: Rows = ((0.0,) * 7, (1.0,) + (0.0,) * 6)
 # rad of pitch between which a foot tips from its toes onto its instep, and of roll between which it lies on its side
@@ -93,10 +94,15 @@ class KeyPoses:
     hold: Rows | None = None
     style: GaitStyle = GaitStyle(life=0.6)
 
+    @property
+    def can_last(self) -> bool:
+        """Whether it can be shown for any time: a body that flies or lies does so for as long as physics says."""
+        return self.is_span and not self.flights and self.lies is None
+
 
 def build_key_poses(
     recipe: KeyPoses, skeleton: Skeleton | None = None, fps: float = 60.0, seed: int = 0, *,
-    example: Motion | None = None,
+    example: Motion | None = None, seconds: float | None = None,
 ) -> Gesture:
     """Build an action; the body begins at the origin and faces +X.
 
@@ -106,13 +112,15 @@ def build_key_poses(
         fps: frames per second.
         seed: of the variation of standing and walking.
         example: a recording on `skeleton`, for its neutral stance.
+        seconds: s from begin to end of an action that `can_last`; None: as its tables have it.
     Returns:
         The action.
     """
     neutral = build_neutral_stance(skeleton or build_adult_skeleton(), example)
     key = recipe.margin[0] - recipe.span[0]
-    count = int(round((key + recipe.span[3] + recipe.margin[1]) * fps)) + 1
-    times = np.arange(count) / fps - key
+    longer = 0.0 if seconds is None else _compute_longer(recipe, seconds)
+    count = int(round((key + recipe.span[3] + longer + recipe.margin[1]) * fps)) + 1
+    times = _hold_times(recipe, np.arange(count) / fps - key, longer)
     posture, place = _build_base(recipe, times, fps, neutral, seed)
     posture = _lay_upper_body(posture, recipe, times)
     posture = _lay_feet(posture, recipe, times, place, neutral)
@@ -124,7 +132,24 @@ def build_key_poses(
         motion = keep_above_ground(motion, compute_envelope(times, *_widen(recipe.lies)))
     if recipe.hold is not None:
         motion = hold_ball(motion, interpolate_rows(recipe.hold, times), neutral)
-    return Gesture(motion, key, key + recipe.span[0], key + recipe.span[3])
+    return Gesture(motion, key, key + recipe.span[0], key + recipe.span[3] + longer)
+
+
+def _compute_longer(recipe: KeyPoses, seconds: float) -> float:
+    """Compute the s by which an action is shown longer than its tables say, so that it lasts a number of seconds."""
+    begin, full, fades, end = recipe.span
+    return max(seconds - (end - begin), _LEAST_HELD - (fades - full))
+
+
+def _hold_times(recipe: KeyPoses, times: np.ndarray, longer: float) -> np.ndarray:
+    """Convert times (T,) s to those of the tables: what is wholly shown goes to and fro while the action lasts longer.
+    """
+    full, fades = recipe.span[1:3]
+    own, held = fades - full, fades - full + longer
+    passes = max(2 * round(0.5 * (held / own - 1.0)) + 1, 1)  # odd: it ends where it fades
+    phase = np.clip((times - full) / held, 0.0, 1.0) * passes
+    to_and_fro = 1.0 - np.abs(phase % 2.0 - 1.0)
+    return np.where(times < full, times, np.where(times > full + held, times - longer, full + own * to_and_fro))
 
 
 def _is_lying(recipe: KeyPoses, time: float) -> bool:

@@ -36,11 +36,12 @@ def _build_row(name: str, recipe: KeyPoses) -> Action:
 
     def build(setting: ActionSetting) -> Gesture:
         chosen = recipe if hands is None else _jump_to(recipe, hands, setting)
-        return build_key_poses(chosen, setting.skeleton, setting.fps, example=setting.example)
+        return build_key_poses(chosen, setting.skeleton, setting.fps, example=setting.example, seconds=setting.seconds)
 
     labels = frozenset(recipe.labels.split())
     return Action(name=name.replace("_", " "), labels=labels - set(SIDES), build=build, meets=recipe.meets,
-                  heights=(1.9, 2.7) if hands else (), has_side=bool(labels & set(SIDES)), is_span=recipe.is_span)
+                  heights=(1.9, 2.7) if hands else (), has_side=bool(labels & set(SIDES)), is_span=recipe.is_span,
+                  can_last=recipe.can_last)
 
 
 def build_pose_actions(*tables: Mapping[str, KeyPoses]) -> tuple[Action, ...]:

@@ -3,7 +3,8 @@
 import numpy as np
 import pytest
 
-from beyond_mocap.annotation.body_surfaces import build_body_surfaces, measure_ball_depths
+from beyond_mocap.annotation.body_solid import BodySolid
+from beyond_mocap.annotation.body_surfaces import build_body_surfaces
 from beyond_mocap.annotation.striking import build_part_surfaces
 from beyond_mocap.motion.humanoid import identify_joints
 from beyond_mocap.motion.motion import forward_kinematics
@@ -23,7 +24,7 @@ def find_deepest(stand, ball):
     """The deepest (depth m, part, side) of a ball at `ball` (3,)."""
     skeleton, positions, rotations, _ = stand
     surfaces = build_body_surfaces(skeleton)
-    depths = measure_ball_depths(surfaces, positions, rotations, np.asarray(ball)[None])[0]
+    depths = BodySolid.from_pose(surfaces, positions, rotations).measure_depths(np.asarray(ball)[None])[0]
     deepest = int(np.argmax(depths))
     return float(depths[deepest]), surfaces[deepest].part, surfaces[deepest].side
 
@@ -63,5 +64,6 @@ def test_a_ball_that_touches_a_striking_surface_is_not_inside(stand, part):
 
 def test_no_ball_has_no_depth(stand):
     skeleton, positions, rotations, _ = stand
-    depths = measure_ball_depths(build_body_surfaces(skeleton), positions, rotations, np.full((1, 3), np.nan))
+    solid = BodySolid.from_pose(build_body_surfaces(skeleton), positions, rotations)
+    depths = solid.measure_depths(np.full((1, 3), np.nan))
     assert np.isnan(depths).all()

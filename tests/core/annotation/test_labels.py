@@ -22,7 +22,7 @@ SYNTHETIC = {  # builders of motions and matches, each of certain labels
     "beyond_mocap/synthetic/kick_styles.py", "beyond_mocap/synthetic/recorded_kicks.py",
     "beyond_mocap/synthetic/ground_truth/synthetic_match.py", "beyond_mocap/library/synthetic_clips.py",
     "beyond_mocap/synthetic/actions/table.py", "beyond_mocap/synthetic/actions/receptions.py",
-    "beyond_mocap/library/receptions.py",
+    "beyond_mocap/library/receptions.py", "beyond_mocap/synthetic/recorded_kicks.py",
     "beyond_mocap/throws/synthetic_examples.py",
 }  # fmt: skip
 PACKAGES_OF_LABELS = ("beyond_mocap/annotation/", "beyond_mocap/synthetic/actions/")
@@ -32,6 +32,7 @@ ALLOWED = {
     "beyond_mocap/files/event_providers.py": "providers' kinds of events",
     "beyond_mocap/match/pieces/pool.py": "a cluster that is running",
     "beyond_mocap/library/common_skeleton.py": "arguments by name",
+    "beyond_mocap/evaluation/touch_figures.py": "a group of figures",
 }
 DOES = ("act", "action")
 SAID_OTHERWISE = {"block", "pass", "throw", "serve", "catch", "save", "jump", "tackle"}

@@ -304,3 +304,20 @@ def test_pages_show_the_group(kicker, library, track_of):
     assert not build_touch_section(report)
     assert all(f"touches.{name}" in flatten_report(evaluate(kicker, track_of(kicker), library))
                for name in touch_figures.TITLES)
+
+
+@pytest.mark.parametrize("away, height, is_reachable", [(0.5, 0.11, True), (1.05, 0.11, True), (1.3, 0.11, False),
+                                                        (0.5, 1.9, False)])
+def test_only_balls_in_reach_have_to_be_met(kicker, library, track_of, away, height, is_reachable):
+    """A running right kick reaches 1.1 m from its track, no ball above the head; the ball itself is met or not."""
+    track = track_of(kicker)
+    place = [np.interp(15.0, track.times, track.positions[:, axis]) for axis in (0, 1)]
+    ball = np.array([place[0] + away, place[1], height])
+    track = replace(track, ball=np.tile(ball, (len(track.times), 1)), ball_height_known=None)
+    take = replace(kicker, ball=lead_ball(kicker, {0: ball, 299: ball}))
+    report = evaluate(take, track, library)
+    found = report["touches"]["contact"]
+    assert report["keys"][0]["reachable"] is is_reachable
+    assert (found["touches"], found["reachable_touches"]) == (1, int(is_reachable))
+    met = float(report["keys"][0]["met_gap_m"] <= 0.005)
+    assert (found["met_share"], found["reachable_met_share"]) == (met, met if is_reachable else None)

@@ -275,17 +275,17 @@ def fastest_turn(rotations) -> float:
 
 def test_the_library_s_lacks_are_told_and_the_nearest_used_on_demand(take_of):
     with pytest.raises(NotInLibraryError) as told:
-        take_of((4.0, "kick high"))
+        take_of((4.0, "kick subtle"))
     assert told.value.exit_status == 3 and any("kick" in words for words in told.value.nearest)
     for method in METHODS:
-        key = take_of((4.0, "kick high"), nearest=True, method=method).keys[0]
+        key = take_of((4.0, "kick subtle"), nearest=True, method=method).keys[0]
         assert key.used_instead and "kick" in key.used_instead and key.clip == "kick.bvh"
         assert key.frame == pytest.approx(120.0, abs=0.5)
 
 
 @pytest.mark.parametrize("method", METHODS)
 def test_where_nothing_is_near_locomotion_goes_on_and_is_told(take_of, method):
-    take = take_of((4.0, "header"), nearest=True, method=method)
+    take = take_of((4.0, "header subtle"), nearest=True, method=method)
     assert take.keys[0].used_instead == ("walking",) and any("header" in warning for warning in take.warnings)
     assert_whole(take, 241)
 
@@ -295,10 +295,10 @@ def test_who_goes_on_walking_for_want_of_a_header_still_puts_his_head_to_a_ball_
     take_of, track_of, up, reached
 ):
     track = track_of()
-    plain = take_of((4.0, "header"), nearest=True, track=track)
+    plain = take_of((4.0, "header subtle"), nearest=True, track=track)
     head = head_at(plain, 120)
     ball = np.tile(head + [0.0, 0.1, up], (len(track.times), 1))
-    take = take_of((4.0, "header"), nearest=True, track=Track(track.times, track.positions, ball))
+    take = take_of((4.0, "header subtle"), nearest=True, track=Track(track.times, track.positions, ball))
     gap = np.linalg.norm(take.ball.positions[120] - head_at(take, 120)) - HEAD_RADIUS - BALL_RADIUS
     assert (abs(gap) < 0.005) == reached
     assert np.linalg.norm(take.ball.positions[120] - ball[0]) <= 0.3 + 1e-6

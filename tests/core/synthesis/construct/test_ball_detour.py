@@ -3,7 +3,8 @@
 import numpy as np
 import pytest
 
-from beyond_mocap.annotation.body_surfaces import build_body_surfaces, measure_ball_depths
+from beyond_mocap.annotation.body_solid import BodySolid
+from beyond_mocap.annotation.body_surfaces import build_body_surfaces
 from beyond_mocap.annotation.striking import build_part_surfaces, measure_ball_gap
 from beyond_mocap.motion.humanoid import identify_joints
 from beyond_mocap.motion.motion import compute_pose
@@ -21,7 +22,7 @@ def run():
 
 def depths(run, ball):
     posed = compute_pose(run.skeleton, run.root_positions, run.rotations)
-    return measure_ball_depths(build_body_surfaces(run.skeleton), *posed, ball).max(axis=1)
+    return BodySolid.from_pose(build_body_surfaces(run.skeleton), *posed).measure_depths(ball).max(axis=1)
 
 
 def passing(run, frame, height, velocity):

@@ -10,6 +10,7 @@ from beyond_mocap.annotation.striking import measure_ball_gap
 from beyond_mocap.motion.contacts import detect_contacts
 from beyond_mocap.motion.humanoid import identify_joints
 from beyond_mocap.motion.motion import Motion, compute_pose
+from beyond_mocap.synthesis.construct.step_to_ball import FAST_STEP, SLOW_STEP, compute_allowed_step
 from beyond_mocap.synthesis.construct.strike import BALL_NOISE, MAX_DROP, MAX_SHIFT, Touch, strike_ball
 from beyond_mocap.synthetic import gestures
 from beyond_mocap.synthetic.gait import build_gait
@@ -257,3 +258,23 @@ def test_what_is_no_dive_meets_the_ball_at_its_key_or_not_at_all(walk):
     struck = met(walk, ball, Touch(30.0, ("catchb", "high"), 10.0, 40.0))
     assert struck.gap[0] > 1.0
     assert np.array_equal(struck.rotations, walk.motion.rotations)
+
+
+def test_the_pelvis_steps_to_a_ball_that_a_standing_leg_just_misses(kick):
+    """Farther than the foot reaches, by less than the pelvis may step; the standing foot stays where it was."""
+    ball = natural_ball(kick)
+    places, _ = kinematics(kick.motion)
+    near, human = int(round(kick.key * FPS)), identify_joints(kick.motion.skeleton)
+    away = ball[:2] - places[near, human.hips, :2]
+    far = ball + [*(1.16 / np.linalg.norm(away) - 1.0) * away, 0.0]
+    struck = met(kick, far, touch(kick))
+    moved = np.linalg.norm(struck.root[:, :2] - kick.motion.root_positions[:, :2], axis=1)
+    assert struck.gap[0] < 0.005 and 0.01 < moved.max() <= SLOW_STEP + 1e-9
+    assert moved.argmax() in (near - 1, near, near + 1)
+    after = kinematics(kick.motion, struck)[0]
+    assert np.linalg.norm(after - places, axis=2)[:, human.left.foot].max() < 0.006
+
+
+def test_a_runner_steps_less_off_the_track():
+    assert compute_allowed_step(0.3) == SLOW_STEP and compute_allowed_step(5.0) == FAST_STEP
+    assert FAST_STEP < compute_allowed_step(1.5) < SLOW_STEP
