@@ -33,7 +33,7 @@ from .clip import Clip
 from .features import SMOOTH_SECONDS
 from .keys import Key, select_keys
 from .library import Library
-from .synthetic_clips import FPS, SYNTHETIC_FOLDER, detect_still_points, sample_upright_example
+from .synthetic_clips import FPS, KICK_PREFIX, SYNTHETIC_FOLDER, detect_still_points, sample_upright_example
 
 ACTION_PREFIX = "action_"
 _FOLDER = SYNTHETIC_FOLDER + ACTION_PREFIX
@@ -45,6 +45,7 @@ _SECONDS_STEP, _LONGEST = 0.5, 20.0  # s between the times for which an action i
 # factor on a recorded reception's speed, and m/s, up to which a player may be as fast: beyond, feet slide
 _RECEPTION_ROOM, _SLOW_RECEPTION = 1.4, 1.7
 _SPEED_ROOM, _SPEED_SLACK = 1.2, 0.3  # factor and m/s by which a player may be slower or faster than a variant
+_OWN_KICK_SPEED = 2.0  # m/s of players from which on a library's own kicker has kicks of any strength
 _GAITS = frozenset(list_gaits())
 _SIDE = "right"  # of clips that are not mirrored
 _KEPT = 4  # extended libraries that are kept for each library
@@ -110,10 +111,37 @@ def find_missing_actions(library: Library, moments: Iterable[ActionMoment], mirr
         moments: the requested actions.
         mirror: whether mirrored twins may be shown.
     Returns:
-        Paths of clips, sorted, each once; for `add_actions`.
+        Paths of clips, sorted, each once; for `add_actions`. They are those of the library's own kicker where he has
+        such a kick.
     """
     asked = [moment for moment in moments if find_action(moment) and not _is_recorded(library, moment, mirror)]
-    return tuple(sorted({path for moment in asked for path in find_action_paths(moment)}))
+    return tuple(sorted({path for moment in asked
+                         for path in _list_own_kicks(library, moment, mirror) or find_action_paths(moment)}))
+
+
+def _list_own_kicks(library: Library, moment: ActionMoment, mirror: bool) -> list[str]:
+    """List the paths of the clips of `select_own_kicks`; without building any for players that are too slow."""
+    if moment.is_span or moment.speed < _OWN_KICK_SPEED:
+        return []
+    library = library.with_synthetic_clips
+    return [library.clips[key.clip].path for key in select_own_kicks(library, moment, mirror)]
+
+
+def select_own_kicks(library: Library, moment: ActionMoment, mirror: bool = True) -> tuple[Key, ...]:
+    """Select the kicks on the run of a library's own kicker that answer to a requested action.
+
+    Args:
+        library: the clips, with synthetic ones.
+        moment: the requested action.
+        mirror: whether mirrored twins may be shown.
+    Returns:
+        Their key moments; empty where no swing is recorded, or the player is too slow for them.
+    """
+    if moment.is_span or moment.speed < _OWN_KICK_SPEED:
+        return ()
+    kicks = [key for key in library.keys if library.clips[key.clip].path.startswith(SYNTHETIC_FOLDER + KICK_PREFIX)
+             and (mirror or not library.clips[key.clip].mirrored)]
+    return select_keys(kicks, moment.labels)
 
 
 def find_action_paths(moment: ActionMoment) -> tuple[str, ...]:

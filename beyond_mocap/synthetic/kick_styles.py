@@ -74,10 +74,10 @@ def _build_half_volley() -> KickStyle:
 
 def _build_back_heel() -> KickStyle:
     """Build a back heel: the foot is lifted past the ball and swings back to it, toes up; the trunk leans forward."""
-    leg = ((-0.32, -6, 14), (-0.24, 14, 30), (-0.16, 30, 34), (-0.1, 33, 30), (-0.05, 22, 30), (0.0, 2, 34),
-           (0.05, -18, 46), (0.12, -28, 58), (0.24, -20, 44), (0.38, -4, 22), (0.5, 2, 14))
+    leg = ((-0.32, -6, 30), (-0.24, 20, 62), (-0.16, 36, 56), (-0.1, 36, 40), (-0.05, 22, 30), (0.0, 2, 34),
+           (0.05, -18, 46), (0.12, -28, 58), (0.24, -20, 52), (0.38, -2, 34), (0.5, 4, 18))
     plane = tuple((time, 0.2 * turn, 0.4 * out) for time, turn, out in _INSIDE.plane)
-    foot = ((-0.3, 5, 4), (-0.16, -4, 4), (0.0, -8, 2), (0.12, 0, 2), (0.42, 2, 4), (0.5, 0, 4))
+    foot = ((-0.3, 0, 4), (-0.16, -8, 4), (0.0, -8, 2), (0.12, 0, 2), (0.42, 2, 4), (0.5, 0, 4))
     still = {name: tuple((row[0], *(0.35 * value for value in row[1:3]), 0.15 * row[3])
                          for row in getattr(_INSIDE, name)) for name in ("pelvis", "spine")}
     return replace(_INSIDE, approach=0.0, leg=leg, plane=plane, foot=foot, pelvis=still["pelvis"],

@@ -26,7 +26,7 @@ from ...base.errors import NotInLibraryError, TimedMessage, format_seconds
 from ...library.automatic_locomotion import build_automatic_labels
 from ...library.keys import Key, list_nearest_labels, select_keys, select_nearest_keys, select_substitutes
 from ...library.library import Library
-from ...library.missing_actions import ActionMoment, find_action_paths, is_action_clip
+from ...library.missing_actions import ActionMoment, find_action_paths, is_action_clip, select_own_kicks
 from ...motion.track import SampledTrack
 from ..plan import Plan, ResolvedPlan
 from ..requested_actions import read_moment_action
@@ -188,7 +188,8 @@ def _build_key(library, moment: KeyMoment, track, asked: ActionMoment, gait, all
                       and not is_action_clip(library.clips[key.clip]))
     if moment.avoid:
         usable, synthetic = _remove_avoided(moment, usable, synthetic, warnings)
-    # recordings that carry the labels first, with synthetic clips; then synthetic actions; each time with the part that
+    # recordings that carry the labels first, with synthetic clips; then swings of the library's own kicker, then
+    # synthetic actions; each time with the part that
     # the ball's height asks for before any part
     chosen = asked.labels
     choices = select_keys(usable, chosen) or (() if select_keys(actions, chosen) else select_keys(usable, moment.words))
@@ -196,7 +197,8 @@ def _build_key(library, moment: KeyMoment, track, asked: ActionMoment, gait, all
         beside = select_keys(actions, chosen) if takes_with_foot(moment.words) else select_substitutes(
             choices, synthetic, moment.words)
         return RequestedKey(requested=moment, frame=frame, choices=(*choices, *beside), used_instead=None)
-    choices = select_keys(actions, chosen) or select_keys(actions, moment.words)
+    own = tuple(key for key in select_own_kicks(library, asked) if key in synthetic)
+    choices = own or select_keys(actions, chosen) or select_keys(actions, moment.words)
     if takes_with_foot(moment.words):
         cut = [key for key in library.cut_receptions if allowed[key.clip] and not key.labels & set(moment.avoid)]
         choices = (*select_keys(cut, chosen), *choices)

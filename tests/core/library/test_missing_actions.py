@@ -16,6 +16,7 @@ from beyond_mocap.library.missing_actions import (
     find_action,
     find_missing_actions,
     is_action_clip,
+    select_own_kicks,
 )
 from beyond_mocap.motion.humanoid import identify_joints
 from beyond_mocap.motion.motion import forward_kinematics
@@ -142,3 +143,17 @@ def test_an_action_of_another_version_is_reported(library):
     path, = find_missing_actions(library, [moment(*HEADER)])
     with pytest.raises(InputError, match="an unknown synthetic action"):
         add_actions(library, [path.replace("jumping", "levitating")])
+
+
+def test_a_librarys_own_kicker_comes_before_published_swings(library):
+    """As in libraries whose kicks do not say at which pace they are done."""
+    clips = tuple(replace(clip, annotations=tuple(
+        row if row.key is None else replace(row, words=tuple(word for word in row.words if word != "running"))
+        for row in clip.annotations)) for clip in library.clips)
+    bare = replace(library, clips=clips, cache_location=None)
+    more, asked = bare.with_synthetic_clips, ("kick", "low", "inside", "running")
+    own = {more.clips[key.clip].path for key in select_own_kicks(more, moment(*asked, speed=6.5))}
+    assert own and set(find_missing_actions(bare, [moment(*asked, speed=6.5)])) == own
+    for slow_or_other in (moment(*asked, speed=1.0), moment("kick", "outside", speed=6.5)):
+        paths = find_missing_actions(bare, [slow_or_other])
+        assert paths and all("action_" in path for path in paths)
