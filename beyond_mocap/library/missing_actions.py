@@ -12,6 +12,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
+from typing import Any
 from weakref import WeakKeyDictionary
 
 import numpy as np
@@ -263,7 +264,7 @@ def _name_clips(action: Action, moment: ActionMoment) -> list[str]:
     return [f"{_FOLDER}{text}{way}{end}" for way in ways]
 
 
-def _parse_path(path: str) -> tuple[Action, dict[str, float], frozenset[str]]:
+def _parse_path(path: str) -> tuple[Action, dict[str, Any], frozenset[str]]:
     """Parse a clip's path: its action, what of the situation it is built for, and the sides that it carries."""
     found = _NAME.fullmatch(path.removeprefix(_FOLDER))
     named = {action.name.replace(" ", "_").replace("-", "_"): action for action in ACTIONS}

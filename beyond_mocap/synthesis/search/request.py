@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from ...annotation import (
     AVOID_PREFIX,
+    CONTINUOUS,
+    DISCRETE,
     LOCOMOTION,
     STANDING_SPEED,
     TRANSITION,
@@ -21,6 +24,7 @@ from ...annotation import (
     sort_labels,
 )
 from ...annotation.ball_contact import takes_with_foot
+from ...annotation.labels import list_gaits
 from ...annotation.vocabulary import DIRECTIONS
 from ...base.errors import NotInLibraryError, TimedMessage, format_seconds
 from ...library.automatic_locomotion import build_automatic_labels
@@ -205,7 +209,7 @@ def _build_key(library, moment: KeyMoment, track, asked: ActionMoment, gait, all
     if choices:
         return RequestedKey(requested=moment, frame=frame, choices=choices, used_instead=None)
     nearest = list_nearest_labels(usable, moment.words)
-    problem = f"the library has no clip for '{' '.join(moment.words)}'"
+    problem = f"the library has no clip for '{' '.join(moment.words)}'{_describe_lasting(moment.words)}"
     text = f"{format_seconds(moment.time)} s: {problem}; nearest: {_format_labels(nearest)}"
     if not use_nearest:
         way_out = f"add such a clip, or {USE_NEAREST}"
@@ -217,6 +221,12 @@ def _build_key(library, moment: KeyMoment, track, asked: ActionMoment, gait, all
     warnings.append(TimedMessage(f"{text}; used instead: {instead}", (moment.time, moment.time)))
     return RequestedKey(requested=moment, frame=frame,
                         choices=(*choices, *select_substitutes(choices, synthetic, moment.words)), used_instead=used)
+
+
+def _describe_lasting(words: Iterable[str]) -> str:
+    """Describe which label of a key moment is that of a span; "" if none is."""
+    lasting = [word for word in words if word in CONTINUOUS - DISCRETE - frozenset(list_gaits())]
+    return f" as a key moment ('{lasting[0]}' lasts: give it a start and an end)" if lasting else ""
 
 
 def _select_action_keys(library: Library, keys: list[Key], asked: ActionMoment) -> tuple[Key, ...]:

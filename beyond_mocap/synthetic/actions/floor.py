@@ -105,8 +105,7 @@ def build_slide_tackle(setting: ActionSetting) -> Gesture:
         The movement; its key is the contact of the right foot.
     """
     speed = max(setting.speed, 2.5)
-    stop = -0.15 + speed / _GRASS
-    stop = max(stop, 0.35)
+    stop = max(speed / _GRASS - 0.15, 0.35)
     left_arm = ((-0.5, -10, 24, 10, 40), (-0.25, -34, 50, 0, 30), (-0.1, -34, 56, -10, 66), (0.1, -34, 58, -10, 74))
     right_arm = ((-0.5, 10, 20, 10, 40), (-0.2, 40, 48, 10, 30), (0.0, 46, 56, 10, 26), (0.3, 40, 50, 10, 30))
     return build_body_poses(BodyPoses(
@@ -207,24 +206,24 @@ def build_bicycle_kick(setting: ActionSetting) -> Gesture:
         speeds=((-2.0, 0.0), (1.0, 0.0)),
         hips=((-0.8, 0, 0, 0), (-0.5, -0.06, 0, 0.20), (-off, -0.12, 0, 0.0),
               (0.0, -0.22, 0, _STANDING_HIPS - hips_at_key),
-              *((t + land, x - 0.28 * (t < 1.3) - 0.28 * (t >= 1.3), y, low) for t, x, y, low in up["hips"])),
+              *_shift_rows(land, up["hips"], -0.28)),
         pelvis=((-0.8, 0, 0, 0), (-0.5, 0, -6, 0), (-off, 0, -30, 0), (0.0, 0, -84, 0), *_at(land, up["pelvis"])),
         spine=((-0.8, 0, 2, 0), (-0.5, 0, 12, 0), (-off, 0, 6, 0), (0.0, 0, 14, 0), *_at(land, up["spine"])),
         head=((-0.8, 0, 0), (-0.5, -14, 0), (-off, -8, 0), (0.0, 26, 0), *_at(land, up["head"])),
         arms=(arm + _at(land, up["arm"]), arm + _at(land, up["arm"])),
         feet=(((-0.62, 0, 0, 0, 10, 0, 0), (-0.4, 0.30, 0.0, 0.34, 30, 0, 0), (-0.2, 0.62, 0, 1.04, 0, 0, 0),
-               (0.0, 0.50, 0.0, 0.72, -10, 0, 0), *_shift_feet(land, up["foot"], -0.28)),
+               (0.0, 0.50, 0.0, 0.72, -10, 0, 0), *_shift_rows(land, up["foot"], -0.28)),
               ((-0.5, 0, 0, 0, 8, 0, 0), (-off, 0.0, 0, 0.02, 50, 0, 0), (-0.16, 0.30, 0, 0.52, 40, 0, 0),
                (-0.06, 0.22, 0.0, 1.26, -40, 0, 0), (0.0, -0.10, 0.0, ball - ankle - 0.10, -86, 0, 0),
-               (0.08, -0.36, 0, 1.30, -100, 0, 0), *_shift_feet(land, up["foot"], -0.28))),
+               (0.08, -0.36, 0, 1.30, -100, 0, 0), *_shift_rows(land, up["foot"], -0.28))),
         knees=((-0.3, 0, 0), (land, 4, 4), (land + 1.4, 10, 10), (land + 2.4, 0, 0)),
         rests=((land - 0.03, 0), *_at(land, up["rests"])),
         begin=(-0.8, -0.5), leaves=(-0.62, -0.5), push=-0.6, flight=(-off, land), end=land + up["end"],
     ), setting)  # fmt: skip
 
 
-def _shift_feet(offset: float, rows, ahead: float) -> tuple:
-    """Shift rows of feet in time and place."""
+def _shift_rows(offset: float, rows, ahead: float) -> tuple:
+    """Shift rows of hips or feet in time and place."""
     return tuple((row[0] + offset, row[1] + ahead, *row[2:]) for row in rows)
 
 
@@ -267,7 +266,7 @@ def build_sitting(setting: ActionSetting) -> Gesture:
     gesture = build_body_poses(BodyPoses(
         speeds=((-4.0, 0.0), (4.0, 0.0)),
         hips=((down - 0.2, 0, 0, 0), (down + 0.5, -0.14, 0, 0.50), (down + 1.0, -0.44, 0, 0.80), (sits, -0.44, 0, 0.80),
-              *((t, x - 0.45, y, low) for t, x, y, low in later["hips"])),
+              *_shift_rows(0.0, later["hips"], -0.45)),
         pelvis=((down - 0.2, 0, 0, 0), (down + 0.5, 0, 30, 0), (down + 1.0, 0, tilt, 0),
                 (sits, 0, tilt, 0), *later["pelvis"]),
         spine=((down - 0.2, 0, 2, 0), (down + 0.5, 0, 30, 0), (down + 1.0, 0, spine, 0),

@@ -139,6 +139,11 @@ def test_without_synthetic_clips_the_label_is_missing_as_before(library):
     assert take.keys[0].used_instead is not None
 
 
+def test_a_label_that_lasts_is_refused_as_a_key_moment(library):
+    with pytest.raises(NotInLibraryError, match="'drinking' lasts: give it a start and an end"):
+        synthesize(library, plan_walk(library, "drinking"))
+
+
 def test_an_action_of_another_version_is_reported(library):
     path, = find_missing_actions(library, [moment(*HEADER)])
     with pytest.raises(InputError, match="an unknown synthetic action"):
