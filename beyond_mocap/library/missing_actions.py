@@ -42,6 +42,7 @@ _NAME = re.compile(r"(?P<name>\w+?)(_v(?P<speed>[\d.]+))?(_z(?P<height>[\d.]+))?
                    r"(_d(?P<direction>[+-]\d+))?(_t(?P<seconds>[\d.]+))?(?P<side>_side)?\.bvh")
 _HEIGHT_SLACK = 0.15  # m by which the ball may be lower or higher than an action is built for
 _HEIGHT_STEP = 0.1  # m between the heights of the ball for which an action is built
+_FADE_SECONDS = 0.7  # s behind an action that can last: its fading shows neither it nor a gait, and has no labels
 _SECONDS_STEP, _LONGEST = 0.5, 20.0  # s between the times for which an action is built that can last; more is repeated
 # factor on a recorded reception's speed, and m/s, up to which a player may be as fast: beyond, feet slide
 _RECEPTION_ROOM, _SLOW_RECEPTION = 1.4, 1.7
@@ -296,7 +297,8 @@ def _build_clip(library: Library, path: str) -> Clip:
     key = None if action.is_span else gesture.key * FPS
     row = ClipAnnotation(first, last, key, sort_labels(action.labels | sides))
     touched = contacts.detect_heel_toe_contacts(motion) & detect_still_points(motion)
-    rows = (row, *_build_gait_rows(library, motion, int(first), int(last)))
+    fades = int(_FADE_SECONDS * FPS) if action.can_last else 0
+    rows = (row, *_build_gait_rows(library, motion, before=int(first), after=int(last) + 1 + fades))
     return Clip(path=path, mirrored=False, motion=motion, annotations=rows, heel_toe_contacts=touched)
 
 
@@ -309,12 +311,12 @@ def _find_setting(library: Library) -> ActionSetting:
     return _settings[library]
 
 
-def _build_gait_rows(library: Library, motion, first: int, last: int) -> list[ClipAnnotation]:
-    """Build rows with the gait before frame `first` and after frame `last`, by speed."""
+def _build_gait_rows(library: Library, motion, before: int, after: int) -> list[ClipAnnotation]:
+    """Build rows with the gait before a frame and from another one on, by speed."""
     gaits = library.gaits
     path = smooth_zero_phase_hann(forward_kinematics(motion)[0][:, 0, :2], motion.fps, SMOOTH_SECONDS)
     speed = np.linalg.norm(np.gradient(path, axis=0), axis=1) * motion.fps
     band = np.searchsorted(compute_gait_thresholds(np.array([gait.speed for gait in gaits])), speed, side="right")
-    parts = ((0, first), (last + 1, len(motion)))
+    parts = ((0, before), (after, len(motion)))
     return [ClipAnnotation(low + a, low + b - 1, None, gaits[band[low + a]].labels)
             for low, high in parts if high - low > 1 for a, b in find_equal_runs(band[low:high])]

@@ -75,7 +75,7 @@ class Action:
             its labels, as standing and running actions do.
         meets: lowest and highest m of a ball that it can meet, where it is not built for the ball's height.
         is_span: whether it lasts (a celebration) instead of having a key moment; its clip carries the labels from the
-            gesture's start to its end.
+            gesture's start to its end, where it fades.
         can_last: whether it is built for as long as it is requested.
         varies: name of the action beside which it is offered, where the player is as fast as it needs, and the ball no
             faster than it can be done with; empty: it is offered alone.

@@ -112,7 +112,7 @@ def build_key_poses(
         fps: frames per second.
         seed: of the variation of standing and walking.
         example: a recording on `skeleton`, for its neutral stance.
-        seconds: s from begin to end of an action that `can_last`; None: as its tables have it.
+        seconds: s until an action that `can_last` fades; None: as its tables have it.
     Returns:
         The action.
     """
@@ -132,13 +132,14 @@ def build_key_poses(
         motion = keep_above_ground(motion, compute_envelope(times, *_widen(recipe.lies)))
     if recipe.hold is not None:
         motion = hold_ball(motion, interpolate_rows(recipe.hold, times), neutral)
-    return Gesture(motion, key, key + recipe.span[0], key + recipe.span[3] + longer)
+    end = recipe.span[2] if recipe.can_last else recipe.span[3]
+    return Gesture(motion, key, key + recipe.span[0], key + end + longer)
 
 
 def _compute_longer(recipe: KeyPoses, seconds: float) -> float:
     """Compute the s by which an action is shown longer than its tables say, so that it lasts a number of seconds."""
-    begin, full, fades, end = recipe.span
-    return max(seconds - (end - begin), _LEAST_HELD - (fades - full))
+    begin, full, fades, _ = recipe.span
+    return max(seconds - (fades - begin), _LEAST_HELD - (fades - full))
 
 
 def _hold_times(recipe: KeyPoses, times: np.ndarray, longer: float) -> np.ndarray:
