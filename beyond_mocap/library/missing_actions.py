@@ -269,7 +269,9 @@ def _find_clips(library: Library, path: str) -> tuple[Clip, Clip]:
 def _build_clip(library: Library, path: str) -> Clip:
     """Build the clip of a path."""
     action, numbers, sides = _parse_path(path)
-    gesture = action.build(replace(_find_setting(library), **numbers))
+    gesture = action.build(replace(
+        _find_setting(library), speed=numbers.get("speed", 0.0), height=numbers.get("height"),
+        exit_speed=numbers.get("exit_speed"), direction=numbers.get("direction", 0.0)))
     motion, first, last = gesture.motion, np.ceil(gesture.start * FPS), np.floor(gesture.end * FPS)
     last = min(last, len(motion) - 1)
     key = None if action.is_span else gesture.key * FPS
