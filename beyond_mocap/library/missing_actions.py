@@ -12,6 +12,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
+from typing import Any
 from weakref import WeakKeyDictionary
 
 import numpy as np
@@ -243,7 +244,7 @@ def _name_clips(action: Action, moment: ActionMoment) -> list[str]:
     return [f"{_FOLDER}{text}{way}{end}" for way in ways]
 
 
-def _parse_path(path: str) -> tuple[Action, dict[str, float], frozenset[str]]:
+def _parse_path(path: str) -> tuple[Action, dict[str, Any], frozenset[str]]:
     """Parse a clip's path: its action, what of the situation it is built for, and the sides that it carries."""
     found = _NAME.fullmatch(path.removeprefix(_FOLDER))
     named = {action.name.replace(" ", "_").replace("-", "_"): action for action in ACTIONS}
@@ -269,9 +270,7 @@ def _find_clips(library: Library, path: str) -> tuple[Clip, Clip]:
 def _build_clip(library: Library, path: str) -> Clip:
     """Build the clip of a path."""
     action, numbers, sides = _parse_path(path)
-    gesture = action.build(replace(
-        _find_setting(library), speed=numbers.get("speed", 0.0), height=numbers.get("height"),
-        exit_speed=numbers.get("exit_speed"), direction=numbers.get("direction", 0.0)))
+    gesture = action.build(replace(_find_setting(library), **numbers))
     motion, first, last = gesture.motion, np.ceil(gesture.start * FPS), np.floor(gesture.end * FPS)
     last = min(last, len(motion) - 1)
     key = None if action.is_span else gesture.key * FPS
