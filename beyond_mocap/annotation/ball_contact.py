@@ -23,7 +23,7 @@ _FOOT_ON_BALL = tuple(
 )  # fmt: skip
 _FOOT_OR_OTHER = frozenset(label.name for label in read_labels().values() if "foot" in label.parts and not label.part)
 _FOOT_TAKES = frozenset(list_labels(ball="takes", part="foot", is_root=True))
-_TAKES, _SENDS = frozenset(list_labels(ball="takes")), frozenset(list_labels(ball="sends"))
+_TAKES, _SENDS, _CARRIES = (frozenset(list_labels(ball=what)) for what in ("takes", "sends", "carries"))
 _STATED = frozenset({"foot", *list_labels(group="height"), *list_labels(group="surface")})
 _PART_BY_HEIGHT = ((0.45, ("foot", "low")), (0.75, ("foot", "high")), (1.05, ("thigh",)), (np.inf, ("body",)))
 """Below which height in m of the ball which part takes it: the knee of an adult is at 0.5 m, the hip at 0.95 m."""
@@ -51,10 +51,13 @@ def choose_contact_labels(played: Iterable[str], requested: Iterable[str]) -> tu
         played: the labels of the clip.
         requested: the labels of the key moment.
     Returns:
-        The clip's labels if they name a part, otherwise the requested ones.
+        The clip's labels if they name a part, otherwise the requested ones. A dribble that plays where a touch is
+        requested does not name that touch's part.
     """
-    played = tuple(played)
-    return played if find_striking_part(played) else tuple(requested)
+    played, requested = tuple(played), tuple(requested)
+    only_carries = bool(_CARRIES.intersection(played)) and not (_TAKES | _SENDS).intersection(played)
+    is_other = only_carries and not _CARRIES.intersection(requested) and find_striking_part(requested) is not None
+    return played if find_striking_part(played) and not is_other else requested
 
 
 def find_contact_window(labels: Iterable[str]) -> float:

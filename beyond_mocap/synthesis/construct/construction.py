@@ -18,7 +18,7 @@ from functools import cached_property
 import numpy as np
 
 from ...annotation import sort_labels
-from ...annotation.ball_contact import find_striking_part
+from ...annotation.ball_contact import choose_contact_labels, find_striking_part
 from ...base.easing import smoothstep
 from ...library.library import Library
 from ...motion import quaternion
@@ -321,9 +321,10 @@ def find_touches(library: Library, fps: float, edit: EditList, keys: tuple[KeyRe
         served.add(placed.number)
     reach = REACH_SECONDS * fps
     for number, result in enumerate(keys):
-        is_missing = result.used_instead is not None and number not in served and not find_striking_part(result.words)
-        if is_missing and all(abs(result.frame - touch.frame) > reach for touch in found):
-            found.append(Touch(result.frame, result.requested.words, reach, reach, result.requested.misses_ball))
+        requested = result.requested.words
+        is_missing = result.used_instead is not None and choose_contact_labels(result.words, requested) == requested
+        if is_missing and number not in served and all(abs(result.frame - touch.frame) > reach for touch in found):
+            found.append(Touch(result.frame, requested, reach, reach, result.requested.misses_ball))
     return tuple(found)
 
 

@@ -10,7 +10,7 @@ import sys
 import pytest
 
 from beyond_mocap.annotation import VOCABULARY, labels
-from beyond_mocap.annotation.ball_contact import choose_part_by_height
+from beyond_mocap.annotation.ball_contact import choose_contact_labels, choose_part_by_height
 from beyond_mocap.annotation.labels import find_label, list_gaits, list_labels
 from beyond_mocap.base.errors import InputError
 
@@ -144,3 +144,13 @@ def test_the_balls_height_chooses_the_part_of_a_plain_receive(height, part):
     assert choose_part_by_height(("receive", "running"), height) == ("receive", "running", *part.split())
     for words in (("receive", "foot"), ("receive", "body"), ("receive", "low"), ("kick",), ("catchb",)):
         assert choose_part_by_height(words, height) == words
+
+
+@pytest.mark.parametrize("played, requested, expected", [
+    (("dribble", "jogging"), ("receive", "body", "high"), ("receive", "body", "high")),
+    (("dribble", "jogging"), ("dribble",), ("dribble", "jogging")),
+    (("jogging",), ("header",), ("header",)),
+    (("kick", "right"), ("kick",), ("kick", "right")),
+])
+def test_a_dribble_that_plays_at_a_touch_does_not_say_which_part_meets_the_ball(played, requested, expected):
+    assert choose_contact_labels(played, requested) == expected
