@@ -76,6 +76,8 @@ class Action:
         varies: name of the action beside which it is offered, where the player is as fast as it needs, and the ball no
             faster than it can be done with; empty: it is offered alone.
         most_ball_speed: m/s of the ball before the key moment up to which it is offered so.
+        least_lead: m/s by which the ball has to leave faster than the player, along their way; of several actions one
+            that asks for more is taken.
     """
 
     name: str
@@ -91,6 +93,7 @@ class Action:
     is_span: bool = False
     varies: str = ""
     most_ball_speed: float = math.inf
+    least_lead: float = -math.inf
 
     def suits_speed(self, speed: float) -> bool:
         """Return whether the action suits a player at `speed` m/s."""
