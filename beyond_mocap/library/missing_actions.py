@@ -67,6 +67,7 @@ class ActionMoment:
         height: m of the ball's centre, None where it is unknown.
         ball_speed: m/s of the ball before, 0 where it is unknown.
         exit_speed: m/s with which the ball leaves, None where it is unknown.
+        lead: m/s by which it leaves faster than the player, along their way; 0 where it is unknown.
         is_span: whether the labels are a span's.
         seconds: s that the span lasts.
     """
@@ -76,6 +77,7 @@ class ActionMoment:
     height: float | None = None
     ball_speed: float = 0.0
     exit_speed: float | None = None
+    lead: float = 0.0
     is_span: bool = False
     seconds: float = 0.0
 
@@ -90,14 +92,15 @@ def find_action(moment: ActionMoment) -> Action | None:
         where the labels name none.
     """
     requested = moment.labels - frozenset(SIDES)
-    serving = [action for action in ACTIONS
-               if action.is_span == moment.is_span and action.needs <= requested <= action.labels]
+serving = [action for action in ACTIONS
+               if action.is_span == moment.is_span and action.needs <= requested <= action.labels
+               and moment.lead >= action.least_lead]
     names = {action.name for action in serving}
 
     def rate_misfit(action: Action) -> tuple:
         low, high = action.heights or action.meets
         off = 0.0 if moment.height is None else max(low - moment.height, moment.height - high)
-        return action.varies in names, not action.suits_speed(moment.speed), off > _HEIGHT_SLACK
+        return action.varies in names, not action.suits_speed(moment.speed), off > _HEIGHT_SLACK, -action.least_lead
 
     is_named = any(_names_action(word) for word in requested)
     return min(serving, key=rate_misfit, default=None) if is_named else None

@@ -26,7 +26,7 @@ def read_moment_action(moment: KeyMoment, track: Track, sampled: SampledTrack) -
     return ActionMoment(labels=frozenset(choose_part_by_height(moment.words, height)), height=height,
                         speed=float(np.interp(time, sampled.times, sampled.speed)),
                         ball_speed=_measure_ball_speed(sampled, time, _ARRIVING) or 0.0,
-                        exit_speed=_measure_ball_speed(sampled, time, _LEAVING))
+                        exit_speed=_measure_ball_speed(sampled, time, _LEAVING), lead=_measure_lead(sampled, time))
 
 
 def read_span_action(span: Span, sampled: SampledTrack) -> ActionMoment:
@@ -41,9 +41,22 @@ def read_span_action(span: Span, sampled: SampledTrack) -> ActionMoment:
     return ActionMoment(labels=frozenset(span.words), speed=speed, is_span=True, seconds=span.end - span.start)
 
 
+def _measure_lead(track: SampledTrack, time: float) -> float:
+    """Measure by how many m/s the ball leaves faster than the player at `time` s, along their way; 0 where unknown."""
+    moved = _measure_ball_move(track, time, _LEAVING)
+    direction, speed = (np.interp(time, track.times, column) for column in (track.direction, track.speed))
+    ahead = float(moved[:2] @ (np.cos(direction), np.sin(direction))) / (_LEAVING[1] - _LEAVING[0])
+    return ahead - float(speed) if np.isfinite(ahead) else 0.0
+
+
 def _measure_ball_speed(track: SampledTrack, time: float, between: tuple[float, float]) -> float | None:
     """Measure the speed of the ball in m/s `between` two s from `time`, None where it is unknown."""
+    moved = float(np.linalg.norm(_measure_ball_move(track, time, between)))
+    return moved / (between[1] - between[0]) if np.isfinite(moved) else None
+
+
+def _measure_ball_move(track: SampledTrack, time: float, between: tuple[float, float]) -> np.ndarray:
+    """Measure how far the ball moves `between` two s from `time`: (3,) m, NaN where it is unknown."""
     first, last = (np.array([np.interp(time + second, track.times, column) for column in track.ball.T])
                    for second in between)
-    moved = float(np.linalg.norm(last - first))
-    return moved / (between[1] - between[0]) if np.isfinite(moved) else None
+    return last - first

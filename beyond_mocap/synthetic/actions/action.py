@@ -80,6 +80,8 @@ class Action:
         varies: name of the action beside which it is offered, where the player is as fast as it needs, and the ball no
             faster than it can be done with; empty: it is offered alone.
         most_ball_speed: m/s of the ball before the key moment up to which it is offered so.
+        least_lead: m/s by which the ball has to leave faster than the player, along their way; of several actions one
+            that asks for more is taken.
     """
 
     name: str
@@ -97,6 +99,7 @@ class Action:
     can_last: bool = False
     varies: str = ""
     most_ball_speed: float = math.inf
+    least_lead: float = -math.inf
 
     @property
     def suited_speeds(self) -> tuple[float, float]:

@@ -62,6 +62,8 @@ class Reception:
         left_arm: rows (time, flexion, abduction, inward, elbow).
         right_arm: rows (time, flexion, abduction, inward, elbow).
         nod: degrees by which the head looks down.
+        slows: share of the slowing down towards the touch that a body on its way shows.
+        least_lead: m/s by which the ball has to leave faster than the body, along its way.
     """
 
     name: str
@@ -77,6 +79,8 @@ class Reception:
     left_arm: tuple = _LEFT_ARM
     right_arm: tuple = _RIGHT_ARM
     nod: float = 24.0
+    slows: float = 1.0
+    least_lead: float = -np.inf
 
 
 RECEPTIONS = {
@@ -87,6 +91,16 @@ RECEPTIONS = {
             (0.0, 0.36, -0.14, 0.130, -4, -70, -6), (0.08, 0.29, -0.14, 0.125, -3, -70, -8),
             (0.17, 0.19, -0.14, 0.120, -2, -66, -6), (0.28, 0.14, -0.13, 0.110, 2, -44, 0),
         ),
+    ),
+    # the foot goes on with the ball instead of giving: the ball runs ahead, the body after it
+    "push": Reception(
+        name="first touch into the run", labels=("receive", "foot", "low", "inside"), speeds=(1.8, 9.4), slows=0.3,
+        foot=(
+            (-0.16, 0.22, -0.14, 0.140, -4, -56, -4),
+            (0.0, 0.30, -0.14, 0.130, -4, -62, -6), (0.08, 0.37, -0.14, 0.125, -3, -60, -6),
+            (0.17, 0.40, -0.13, 0.130, -2, -46, -4), (0.28, 0.33, -0.12, 0.110, 0, -20, 0),
+        ),
+        pelvis=((-0.20, 3, 3, -6), (0.0, 3, 2, -2), (0.20, 2, 4, 4)), nod=18.0, least_lead=1.0,
     ),
     "outside": Reception(
         name="reception with the outside of the foot", labels=("receive", "foot", "low", "outside"), speeds=(2.5, 5.5),
@@ -203,6 +217,7 @@ def _travel(reception: Reception, speed: float) -> StrikeRecipe:
     run = float(np.clip((speed - _WALK) / (_RUN - _WALK), 0.0, 1.0))
     low = reception.low * (1.0 - 0.8 * run)
     slowed, pace = (walking + run * (running - walking) for walking, running in (_SLOWED, _PACE))
+    slowed *= reception.slows
     return StrikeRecipe(
         foot=reception.foot, pelvis=reception.pelvis, spine=reception.spine, left_arm=reception.left_arm,
         right_arm=reception.right_arm, head=reception.nod,
@@ -222,6 +237,7 @@ def _build_row(kind: str) -> Action:
     one = RECEPTIONS[kind]
     return Action(
         name=one.name, labels=frozenset({*one.labels, "standing", "running", "front"}), has_side=True,
+        least_lead=one.least_lead, suits=(one.speeds[0], np.inf) if np.isfinite(one.least_lead) else None,
         build=partial(_build_action, kind), heights=one.heights, most_ball_speed=one.most_ball_speed,
         speeds=tuple(speed for speed in SPEEDS if one.speeds[0] <= speed <= one.speeds[1]),
         varies=RECEPTIONS["inside"].name if kind in ("outside", "sole") else "",
