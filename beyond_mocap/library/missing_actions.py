@@ -92,7 +92,7 @@ def find_action(moment: ActionMoment) -> Action | None:
         where the labels name none.
     """
     requested = moment.labels - frozenset(SIDES)
-serving = [action for action in ACTIONS
+    serving = [action for action in ACTIONS
                if action.is_span == moment.is_span and action.needs <= requested <= action.labels
                and moment.lead >= action.least_lead]
     names = {action.name for action in serving}

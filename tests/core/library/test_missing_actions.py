@@ -72,7 +72,8 @@ def test_of_several_actions_the_one_that_suits_speed_and_ball_is_taken():
 def test_a_ball_that_runs_ahead_is_taken_into_the_run():
     low = ("receive", "foot", "low")
     names = [find_action(moment(*words, speed=speed, lead=lead)).name
-             for words, speed, lead in ((low, 4.0, 0.5), (low, 4.0, 2.0), (low, 0.5, 2.0), (("receive", "thigh"), 4.0, 2.0))]
+             for words, speed, lead in ((low, 4.0, 0.5), (low, 4.0, 2.0), (low, 0.5, 2.0),
+                                         (("receive", "thigh"), 4.0, 2.0))]
     inside = "reception with the inside of the foot"
     assert names == [inside, "first touch into the run", inside, "reception with the thigh"]
 
