@@ -116,7 +116,7 @@ def find_missing_actions(library: Library, moments: Iterable[ActionMoment], mirr
         moments: the requested actions.
         mirror: whether mirrored twins may be shown.
     Returns:
-        Paths of clips, sorted, each once; for `add_actions`. They are those of the library's own kicker where he has
+        Paths of clips, sorted, each once; for `add_actions`. They are those of the library's own kicker where there is
         such a kick.
     """
     asked = [moment for moment in moments if find_action(moment) and not _is_recorded(library, moment, mirror)]

@@ -406,7 +406,7 @@ def _reach_ball(scene: _TouchProblem, body: Body) -> tuple[Body, float]:
     reached, lines, missing = _swing_to_ball(scene, body)
     if np.linalg.norm(missing, axis=1).max() > _MISSED:
         side = scene.parts[0].side if scene.parts[0].part in ("foot", "thigh") else ""
-        stepped = step_to_ball(body, side, scene.at, missing.mean(axis=0), scene.shares[0], scene.fps)
+        stepped = step_to_ball(body, side, scene.at, missing.mean(axis=0), share=scene.shares[0], fps=scene.fps)
         again = _swing_to_ball(scene, stepped)
         if np.linalg.norm(again[2]) < np.linalg.norm(missing):
             reached, lines, missing = again
