@@ -69,6 +69,28 @@ def test_of_several_actions_the_one_that_suits_speed_and_ball_is_taken():
     assert find_action(moment("header", "standing", speed=4.0)).name == "standing header"
 
 
+def test_an_action_with_an_avoided_label_is_not_taken():
+    names = [find_action(moment("tackle", speed=4.0, avoid=frozenset(avoid))).name for avoid in ((), ("slide",))]
+    assert names == ["slide tackle", "block tackle"]
+    for avoid in (("inside",), ("standing",)):
+        assert "inside" not in find_action(moment("kick", avoid=frozenset(avoid), speed=0.0)).distinct_labels & {*avoid}
+    assert find_action(moment("tackle", "slide", avoid=frozenset({"slide"}))) is None
+    # one reception serves a stand and a run alike: what it shows is up to the player's speed
+    assert find_action(moment("receive", avoid=frozenset({"running"}))) is find_action(moment("receive"))
+
+
+def test_an_action_stands_in_where_all_recordings_show_an_avoided_label(library):
+    recorded = [key.labels for key in library.keys if "kick" in key.labels]
+    avoid = frozenset({"inside", "top"}) & frozenset().union(*recorded)
+    assert avoid and all(labels & avoid for labels in recorded)
+    plan = plan_walk(library)
+    plan = replace(plan, timeline=Timeline(keys=(KeyMoment(2.5, ("kick",), avoid=tuple(sorted(avoid))),)))
+    take = synthesize(library, plan)
+    assert not avoid & set(take.keys[0].words) and take.keys[0].used_instead is None
+    assert "kick" in describe_action(take.keys[0].clip) or "volley" in describe_action(take.keys[0].clip)
+    assert not any("avoided label" in line for line in take.warnings)
+
+
 def test_a_ball_that_runs_ahead_is_taken_into_the_run():
     low = ("receive", "foot", "low")
     names = [find_action(moment(*words, speed=speed, lead=lead)).name
