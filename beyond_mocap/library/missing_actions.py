@@ -50,7 +50,7 @@ _SPEED_ROOM, _SPEED_SLACK = 1.2, 0.3  # factor and m/s by which a player may be 
 _OWN_KICK_SPEED = 2.0  # m/s of players from which on a library's own kicker has kicks of any strength
 _GAITS = frozenset(list_gaits())
 _SIDE = "right"  # of clips that are not mirrored
-_KEPT = 4  # extended libraries that are kept for each library
+_KEPT, _KEPT_CLIPS = 4, 400  # extended libraries and clips that are kept for each library; a clip has some 0.3 MB
 
 _clips: WeakKeyDictionary[Library, dict[str, tuple[Clip, Clip]]] = WeakKeyDictionary()
 _settings: WeakKeyDictionary[Library, ActionSetting] = WeakKeyDictionary()
@@ -195,8 +195,7 @@ def add_actions(library: Library, paths: Iterable[str]) -> Library:
         return library
     extended = _extended.setdefault(library, {})
     if added not in extended:
-        while len(extended) >= _KEPT:
-            del extended[next(iter(extended))]
+        _make_room(extended, _KEPT)
         clips = [clip for path in added for clip in _find_clips(library, path)]
         extended[added] = library.append_synthetic_clips(clips)
     return extended[added]
@@ -294,11 +293,18 @@ def _find_clips(library: Library, path: str) -> tuple[Clip, Clip]:
     """Find a clip and its twin among those built for a library, or build them."""
     known = _clips.setdefault(library, {})
     if path not in known:
+        _make_room(known, _KEPT_CLIPS)
         clip = _build_clip(library, path)
         known[path] = clip, clip.build_twin()
         if library.cache_location:
             write_synthetic_clips(library.cache_location[0], known[path], missing_only=True)
     return known[path]
+
+
+def _make_room(kept: dict, most: int) -> None:
+    """Remove the oldest entries so that one more makes `most` of them."""
+    while len(kept) >= most:
+        del kept[next(iter(kept))]
 
 
 def _build_clip(library: Library, path: str) -> Clip:

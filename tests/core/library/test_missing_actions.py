@@ -9,6 +9,7 @@ import pytest
 
 from beyond_mocap.annotation import KeyMoment, Span, Timeline
 from beyond_mocap.base.errors import InputError, NotInLibraryError
+from beyond_mocap.library import missing_actions
 from beyond_mocap.library.missing_actions import (
     ActionMoment,
     add_actions,
@@ -193,3 +194,14 @@ def test_a_librarys_own_kicker_comes_before_published_swings(library):
     for slow_or_other in (moment(*asked, speed=1.0), moment("kick", "outside", speed=6.5)):
         paths = find_missing_actions(bare, [slow_or_other])
         assert paths and all("action_" in path for path in paths)
+
+
+def test_a_clip_that_is_built_again_has_the_same_bits(library, monkeypatch):
+    monkeypatch.setattr(missing_actions, "_KEPT_CLIPS", 1)
+    monkeypatch.setattr(missing_actions, "_KEPT", 1)
+    first, other = (find_missing_actions(library, [moment(word, speed=3.0)]) for word in ("throwb", "tackle"))
+    shown = [add_actions(library, paths) for paths in (first, other, first)]
+    clips = [one.clips[-2].motion for one in shown]
+    assert shown[0] is not shown[2] and clips[0] is not clips[2]
+    np.testing.assert_array_equal(clips[0].rotations, clips[2].rotations)
+    assert len(missing_actions._clips[library]) == len(missing_actions._extended[library]) == 1
