@@ -4,8 +4,8 @@ out.
 First the ball moves, within the noise of its measurement, to where the recorded foot (head, chest, hand) strikes. The
 limb does the rest by two-bone inverse kinematics, or the spine by bending, within the reach of a body; where that is
 not enough the pelvis steps towards the ball within the noise of its own track (`step_to_ball`); what remains is
-reported. A kick lasts a hundredth of a second, so between the two
-frames around the key moment the ball moves with the foot; a ball that is taken stays longer on it (`give`).
+reported. A kick lasts a hundredth of a second, so between the two frames around the key moment the ball moves with the
+foot; a ball that is taken stays longer on it (`give`).
 """
 
 from __future__ import annotations
