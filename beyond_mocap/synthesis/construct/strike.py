@@ -280,7 +280,7 @@ class _TouchProblem:
     def compute_ball_range(self, frame: int) -> BallRange:
         """Return how far the ball may move; a ball on the ground stays there."""
         whole = BALL_NOISE if self.measured[frame] else FILLED_NOISE
-        return BallRange(whole, BALL_NOISE if self.ball[frame, 2] > _IN_THE_AIR else 0.0)
+        return BallRange(whole, whole if self.ball[frame, 2] > _IN_THE_AIR else 0.0)
 
 
 def _build_problem(body: Body, moment: _TouchFrames, origin: int, contacts, path, measured, height_known,
