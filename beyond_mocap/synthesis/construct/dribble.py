@@ -113,13 +113,17 @@ def _find_knocked_on(ball: np.ndarray, root: np.ndarray, measured: np.ndarray, f
 
 
 def _is_clear(skeleton: Skeleton, root, rotations, ball: np.ndarray, *, run: tuple[int, int], held, fps: float) -> bool:
-    """Return whether a ball (T, 3) m gets out of reach and back, a run of frames, without passing through the legs."""
-    margin = int(np.ceil(SOONEST * fps))
-    met = {frame for pair in held for frame in pair}
-    frames = np.array([frame for frame in range(max(run[0] - margin, 0), min(run[1] + margin, len(ball)))
-                       if frame not in met])
+    """Return whether a ball (T, 3) m that is out of reach for a run of frames does not pass through the legs on its
+    way from or to a key moment close by.
+    """
+    most, (first, end) = _ROLLS_SECONDS * fps, run
+    ways = [range(pair[1] + 1, first) for pair in held if 0 < first - pair[1] <= most]
+    ways += [range(end, pair[0]) for pair in held if 0 < pair[0] - end <= most]
+    frames = np.array([frame for way in ways for frame in way], dtype=int)
+    if not len(frames):
+        return True
     solid = BodySolid.from_pose(build_leg_surfaces(skeleton), *compute_pose(skeleton, root[frames], rotations[frames]))
-    return bool(solid.measure_gaps(ball[frames], np.arange(len(frames))).min(initial=np.inf) > -_THROUGH)
+    return bool(solid.measure_gaps(ball[frames], np.arange(len(frames))).min() > -_THROUGH)
 
 
 def _split_parts(low: float, high: float, held, knocked: Sequence[tuple[int, int]], course_changes: Sequence[float],
