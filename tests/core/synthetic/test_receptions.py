@@ -10,6 +10,7 @@ from beyond_mocap.motion.motion import forward_kinematics
 from beyond_mocap.synthetic.actions.receptions import RECEPTION_ACTIONS, RECEPTIONS, SPEEDS, build_reception
 
 FPS = 60.0
+FEET = [kind for kind, one in RECEPTIONS.items() if one.foot and "receive" in one.labels]
 CASES = [(kind, speed) for kind, one in RECEPTIONS.items() for speed in SPEEDS if one.speeds[0] <= speed
          <= one.speeds[1]]
 
@@ -25,7 +26,7 @@ def trace(kind, speed):
     return move, int(round(move.key * FPS)), places[:, body.right.foot] - hips, middle - hips, places, body
 
 
-@pytest.mark.parametrize("kind, speed", [case for case in CASES if case[0] != "chest"])
+@pytest.mark.parametrize("kind, speed", [case for case in CASES if case[0] in FEET])
 def test_the_foot_is_slow_against_the_pelvis_around_the_touch(kind, speed):
     move, key, ankle, *_ = trace(kind, speed)
     against = np.linalg.norm(np.gradient(ankle, axis=0), axis=1) * FPS
@@ -35,7 +36,7 @@ def test_the_foot_is_slow_against_the_pelvis_around_the_touch(kind, speed):
     assert move.start < move.key < move.end <= move.motion.duration
 
 
-@pytest.mark.parametrize("kind, speed", [case for case in CASES if case[0] not in ("chest", "push")])
+@pytest.mark.parametrize("kind, speed", [case for case in CASES if case[0] not in ("chest", "push", "let run")])
 def test_the_part_gives_with_the_ball(kind, speed):
     _, key, _, middle, *_ = trace(kind, speed)
     axis = 2 if kind in ("thigh", "top") else 0  # a falling ball is taken down, a rolling one backward
