@@ -16,10 +16,9 @@ from ..motion.humanoid import identify_joints
 from ..motion.skeleton import Skeleton
 from ..motion.track import BALL_RADIUS
 from .body_surfaces import BodySurface, build_body_surfaces
+from .striking import JOINT_ORIGIN
 
 _TIP_RADIUS = 0.0  # m: boots are thin there, and a ball that touches the foot may lie above its tip
-_ORIGIN = np.zeros(3)
-_ORIGIN.setflags(write=False)
 
 
 def build_leg_surfaces(skeleton: Skeleton) -> tuple[BodySurface, ...]:
@@ -46,7 +45,7 @@ def _build_tips(skeleton: Skeleton) -> list[BodySurface]:
     body, tips = identify_joints(skeleton), []
     for side in ("left", "right"):
         toe = getattr(body, side).toe_or_foot
-        tips.append(BodySurface(part="foot", side=side, radius=_TIP_RADIUS, start=(toe, _ORIGIN),
+        tips.append(BodySurface(part="foot", side=side, radius=_TIP_RADIUS, start=(toe, JOINT_ORIGIN),
                                 end=(toe, skeleton.tip_offset(toe)), end_radius=_TIP_RADIUS))
     return tips
 

@@ -189,7 +189,7 @@ def _restore_order(keys: list[KeyMoment]) -> list[KeyMoment]:
 
 
 def report_missing_touches(take: Take, plan: ResolvedPlan) -> list[str]:
-    """Report what the ball has not: touches that key moments request, touches of dribbles, places of its own.
+    """Report what the ball lacks: touches that key moments request, touches of dribbles, places of its own.
 
     Args:
         take: the take of `apply_trajectory`.

@@ -1,4 +1,4 @@
-"""Who loses a duel reaches for the ball, comes near it and does not touch it; the ball rolls on as if he were away."""
+"""Who loses a duel reaches for the ball, comes near it and does not touch it; the ball rolls on unmoved."""
 
 from dataclasses import replace
 
