@@ -124,8 +124,8 @@ class KeyMoment:
 
     @property
     def misses_ball(self) -> bool:
-        """Whether the body leaves the ball untouched by design: it reaches and misses, as the loser of a duel does, or lets
-        the ball pass.
+        """Whether the body leaves the ball untouched by design: it reaches and misses, as the loser of a duel does, or
+        lets the ball pass.
         """
         return TOUCH in self.avoid or avoids_ball(self.words)
 

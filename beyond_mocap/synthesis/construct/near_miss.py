@@ -1,7 +1,8 @@
 """Bring a part of the body near the ball without touching it: the player who loses a duel reaches and misses.
 
 The ball is not moved. The nearest part that the labels name reaches to within FARTHEST of the ball's surface at the key
-moment, if it can, unless the labels let the ball pass; then every part stays CLEARANCE away from the ball for WINDOW_SECONDS around it.
+moment, if it can, unless the labels let the ball pass; then every part stays CLEARANCE away from the ball for
+WINDOW_SECONDS around it.
 """
 
 from __future__ import annotations

@@ -163,9 +163,9 @@ RECEPTIONS = {
     # tall before the ball arrives; then knees, trunk and neck give, and it drops before the feet
     "head": Reception(
         name="reception with the head", labels=("receive", "head"), speeds=(0.0, 4.0), heights=(1.45, 1.9), height=1.75,
-        low=0.09, sink=((-0.30, 0.3), (-0.05, 0.2), (0.15, 1.0), (0.4, 0.7)),
-        pelvis=((-0.40, 0, 2, 0), (-0.05, 0, 2, 0), (0.12, 0, -5, 0), (0.3, 0, 0, 0), (0.5, 0, 2, 0)),
-        spine=((-0.40, 0, 2, 0), (-0.05, 0, 4, 0), (0.12, 0, -12, 0), (0.3, 0, 2, 0), (0.5, 0, 6, 0)),
+        low=0.09, sink=((-0.30, 0.3), (-0.05, 0.2), (0.18, 1.0), (0.4, 0.7)),
+        pelvis=((-0.40, 0, 2, 0), (-0.05, 0, 2, 0), (0.18, 0, -4, 0), (0.36, 0, 0, 0), (0.55, 0, 2, 0)),
+        spine=((-0.40, 0, 2, 0), (-0.05, 0, 4, 0), (0.18, 0, -9, 0), (0.36, 0, 2, 0), (0.55, 0, 6, 0)),
         left_arm=((-0.35, 8, 30, 10, 40), (0.0, 16, 48, 14, 58), (0.2, 4, 56, 8, 50)),
         right_arm=((-0.35, 8, 30, 10, 40), (0.0, 16, 48, 14, 58), (0.2, 4, 56, 8, 50)),
         nod=-8.0,
@@ -218,7 +218,9 @@ def _lift(reception: Reception, height: float) -> Reception:
     """
     lift = min(max(height, reception.heights[0]), reception.heights[-1]) - reception.height
     if not reception.foot:
-        return replace(reception, low=max(reception.low - lift, 0.0))
+        low, bent = max(reception.low, lift) - lift, max(-lift, 0.0)  # bent: before the ball arrives
+        sink = tuple((time, (share * (low - bent) + bent) / max(low, 1e-9)) for time, share in reception.sink)
+        return replace(reception, low=low, sink=sink)
     seconds = _interpolate_height(reception, _LIFT_SECONDS)
     rows = [(row[0], row[1], row[2], row[3] + lift * (1.0 if row[0] <= 0.0 else max(1.0 - row[0] / seconds, 0.0)),
              *row[4:]) for row in reception.foot]
