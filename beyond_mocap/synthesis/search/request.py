@@ -204,7 +204,8 @@ def _build_key(library, moment: KeyMoment, track, asked: ActionMoment, gait, all
     if choices:
         return RequestedKey(requested=moment, frame=frame, choices=choices, used_instead=None)
     gait_words = library.gaits[int(gait[int(round(frame))])].labels
-    return _build_nearest_key(moment, frame, usable, synthetic, gait_words, use_nearest, warnings)
+    return _build_nearest_key(moment, frame, usable, synthetic, gait_words=gait_words, use_nearest=use_nearest,
+                              warnings=warnings)
 
 
 def _choose_recorded(moment: KeyMoment, asked: ActionMoment, usable: tuple[Key, ...], synthetic: tuple[Key, ...],
