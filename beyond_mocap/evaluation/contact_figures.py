@@ -69,12 +69,12 @@ def find_reachable(view: View, moment: KeyMomentResult) -> bool | None:
     noise = BALL_NOISE if sampled.ball_measured[at] else FILLED_NOISE
     reach = _DIVE_REACH if find_contact_window(labels) else REACH[part] + BALL_RADIUS
     away = float(np.linalg.norm(sampled.ball[at, :2] - sampled.raw[at]))
-    return away <= reach + noise + compute_allowed_step(sampled.speed[at]) and _is_at_height(view.track, part, time,
-                                                                                             sampled.ball[at, 2])
+    is_near = away <= reach + noise + compute_allowed_step(sampled.speed[at])
+    return is_near and _is_at_height(view.track, part, time, sampled.ball[at, 2], noise)
 
 
-def _is_at_height(track: Track, part: str, time: float, height: float) -> bool:
-    """Return whether a part can touch a ball at a height, m; where it is not measured it may be any."""
+def _is_at_height(track: Track, part: str, time: float, height: float, noise: float) -> bool:
+    """Return whether a part can touch a ball at a height, m, give or take its noise, m; any where it is unknown."""
     least, most = HEIGHTS[part]
     is_known = bool(track.ball_height_known[np.abs(track.times - time).argmin()])
-    return not is_known or least - BALL_NOISE <= height <= most + BALL_NOISE
+    return not is_known or least - noise <= height <= most + noise

@@ -29,6 +29,7 @@ from ..motion.motion import compute_pose, forward_kinematics, sample_frames
 from ..motion.track import smooth_zero_phase_hann
 from ..synthetic.actions.action import Action, ActionSetting
 from ..synthetic.actions.table import ACTIONS
+from ..synthetic.lying import detect_lying_legs
 from .cache import write_synthetic_clips
 from .clip import Clip
 from .features import SMOOTH_SECONDS
@@ -117,7 +118,7 @@ def find_missing_actions(library: Library, moments: Iterable[ActionMoment], mirr
         moments: the requested actions.
         mirror: whether mirrored twins may be shown.
     Returns:
-        Paths of clips, sorted, each once; for `add_actions`. They are those of the library's own kicker where he has
+        Paths of clips, sorted, each once; for `add_actions`. They are those of the library's own kicker where there is
         such a kick.
     """
     asked = [moment for moment in moments if find_action(moment) and not _is_recorded(library, moment, mirror)]
@@ -315,7 +316,7 @@ def _build_clip(library: Library, path: str) -> Clip:
     last = min(last, len(motion) - 1)
     key = None if action.is_span else gesture.key * FPS
     row = ClipAnnotation(first, last, key, sort_labels(action.labels | sides))
-    touched = contacts.detect_heel_toe_contacts(motion) & detect_still_points(motion)
+    touched = contacts.detect_heel_toe_contacts(motion) & detect_still_points(motion) & ~detect_lying_legs(motion)
     fades = int(_FADE_SECONDS * FPS) if action.can_last else 0
     rows = (row, *_build_gait_rows(library, motion, before=int(first), after=int(last) + 1 + fades))
     return Clip(path=path, mirrored=False, motion=motion, annotations=rows, heel_toe_contacts=touched)

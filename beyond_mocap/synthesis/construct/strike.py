@@ -51,6 +51,7 @@ from .move_body_part import (
     solve_swing,
     swing_thigh,
 )
+from .place_plant_foot import place_plant_foot
 from .step_to_ball import step_to_ball
 
 BALL_NOISE, FILLED_NOISE = 0.3, 1.0
@@ -66,7 +67,7 @@ _LONGEST_EASE, _SHORTEST_EASE = 0.5, 0.12  # s before and after a strike in whic
 _RISE = {"foot": 0.0, "hand": 0.0, "head": 0.6, "chest": 0.0, "thigh": 0.8}
 _IN_THE_AIR = 0.2  # m above which a ball may be met higher or lower
 _HANDS_APART = 0.6  # m between the hands beyond which one hand alone catches in a dive
-_STOPPING = frozenset(list_labels(ball="takes"))
+_STOPPING, _SENDING = frozenset(list_labels(ball="takes")), frozenset(list_labels(ball="sends"))
 _HIGH = frozenset(list_labels(height="high"))
 _MISSED = 0.002  # m of remaining gap from which on the pelvis steps towards the ball
 _ROUNDS, _CLOSE = 4, 5e-4  # most rounds of an iteration, and m of change at which it ends
@@ -145,9 +146,14 @@ def strike_ball(
             continue
         span = slice(max(moment.low, 0), min(moment.high, count - 1) + 1)
         body = Body.from_pose(skeleton, root[span], rotations[span])
-        scene = _build_problem(body, moment, span.start, contacts=contacts[span], path=path, measured=measured,
-                               height_known=height_known, fps=fps)
+        build = partial(_build_problem, moment=moment, origin=span.start, contacts=contacts[span], path=path,
+                        measured=measured, height_known=height_known, fps=fps)
+        scene = build(body)
         reached, moved[number] = _reach_ball(scene, body)
+        planted = _place_plant_foot(scene, body, reached, contacts[span], fps)
+        if planted is not body:
+            scene = build(planted)
+            reached, moved[number] = _reach_ball(scene, planted)
         reached = _calm_taking_foot(scene, reached, contacts[span], fps)
         root[span], rotations[span] = reached.root, reached.rotations
         places = [scene.solve_ball(scene.compute_surface_lines(reached, frame), frame)[0] for frame in moment.held]
@@ -280,7 +286,7 @@ class _TouchProblem:
     def compute_ball_range(self, frame: int) -> BallRange:
         """Return how far the ball may move; a ball on the ground stays there."""
         whole = BALL_NOISE if self.measured[frame] else FILLED_NOISE
-        return BallRange(whole, BALL_NOISE if self.ball[frame, 2] > _IN_THE_AIR else 0.0)
+        return BallRange(whole, whole if self.ball[frame, 2] > _IN_THE_AIR else 0.0)
 
 
 def _build_problem(body: Body, moment: _TouchFrames, origin: int, contacts, path, measured, height_known,
@@ -406,7 +412,7 @@ def _reach_ball(scene: _TouchProblem, body: Body) -> tuple[Body, float]:
     reached, lines, missing = _swing_to_ball(scene, body)
     if np.linalg.norm(missing, axis=1).max() > _MISSED:
         side = scene.parts[0].side if scene.parts[0].part in ("foot", "thigh") else ""
-        stepped = step_to_ball(body, side, scene.at, missing.mean(axis=0), scene.shares[0], scene.fps)
+        stepped = step_to_ball(body, side, scene.at, missing.mean(axis=0), share=scene.shares[0], fps=scene.fps)
         again = _swing_to_ball(scene, stepped)
         if np.linalg.norm(again[2]) < np.linalg.norm(missing):
             reached, lines, missing = again
@@ -445,6 +451,15 @@ def _calm_taking_foot(scene: _TouchProblem, body: Body, contacts: np.ndarray, fp
     if part.part != "foot" or not _STOPPING & scene.moment.words:
         return body
     return calm_foot(body, part, (first - scene.origin, last - scene.origin), _is_in_contact(contacts, part), fps)
+
+
+def _place_plant_foot(scene: _TouchProblem, body: Body, reached: Body, contacts: np.ndarray, fps: float) -> Body:
+    """Place the plant foot of a kick; contacts (W, 2) bool. The body itself where nothing changes."""
+    part = scene.parts[0]
+    if part.part != "foot" or not _SENDING & scene.moment.words:
+        return body
+    is_standing = contacts[:, 0 if part.side == "right" else 1]
+    return place_plant_foot(body, reached, part.side, scene.at, is_standing, fps)
 
 
 def _solve_shifts(scene: _TouchProblem, body: Body, lines: np.ndarray, shifts: np.ndarray) -> np.ndarray:

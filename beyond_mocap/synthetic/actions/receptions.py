@@ -135,7 +135,7 @@ RECEPTIONS = {
     ),
     "thigh": Reception(
         name="reception with the thigh",
-        labels=("receive", "thigh"), speeds=(0.0, 4.0), heights=(0.75, 1.05), height=1.0,
+        labels=("receive", "thigh", "high"), speeds=(0.0, 4.0), heights=(0.75, 1.05), height=1.0,
         foot=(
             (-0.16, 0.22, -0.12, 0.490, 30, -8, 0),
             (0.0, 0.24, -0.12, 0.520, 28, -8, 0), (0.08, 0.23, -0.12, 0.450, 28, -8, 0),
@@ -147,7 +147,7 @@ RECEPTIONS = {
         spine=((-0.20, -5, 2, 2), (0.0, -6, 0, 0), (0.20, -3, 10, 2)),
     ),
     "chest": Reception(
-        name="reception with the chest", labels=("receive", "body"), speeds=(0.0, 4.0), heights=(), low=0.07,
+        name="reception with the chest", labels=("receive", "body", "high"), speeds=(0.0, 4.0), heights=(), low=0.07,
         pelvis=((-0.40, 0, 2, 0), (-0.05, 0, -12, 0), (0.10, 0, -10, 0), (0.25, 0, -2, 0), (0.5, 0, 2, 0)),
         spine=((-0.40, 0, 2, 0), (-0.05, 0, -20, 0), (0.08, 0, -12, 0), (0.22, 0, 6, 0), (0.5, 0, 6, 0)),
         left_arm=((-0.35, 6, 36, 8, 34), (0.0, -10, 62, 0, 50), (0.25, 2, 48, 5, 44)),

@@ -50,15 +50,17 @@ def test_only_what_no_recording_carries_is_missing(library):
 @pytest.mark.parametrize("height", [None, 0.11, 1.7])
 def test_a_label_alone_finds_the_usual_action_and_nothing_special(height):
     names = [find_action(moment(label, speed=speed, height=height)).name
-             for label in ("kick", "tackle", "intercept", "throwb", "jump") for speed in (0.0, 4.0)]
+             for label in ("kick", "tackle", "intercept", "throwb", "jump", "slide") for speed in (0.0, 4.0)]
     kick = "high instep kick" if height == 1.7 else "inside kick"
     assert names == [f"{kick} from a stand", f"{kick} on the run", "block tackle", "slide tackle",
-                     "interception", "sliding interception", "throw-in", "throw-in", "jump", "jump in a run"]
+                     "interception", "sliding interception", "throw-in", "throw-in", "jump", "jump in a run",
+                     "slide tackle", "slide tackle"]
 
 
 def test_without_a_ball_nobody_dives_for_a_header_and_a_foot_receives():
     assert find_action(moment("header", speed=4.0)).name == "running header"
     assert find_action(moment("receive")).name == "reception with the inside of the foot"
+    assert find_action(moment("receive", "body", "high")).name == "reception with the chest"
     assert find_action(moment("header", "left", "jump")).name == "jumping header"
     assert find_action(moment("standing")) is find_action(moment("header", "sitting")) is None
 
