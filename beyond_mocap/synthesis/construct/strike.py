@@ -459,7 +459,7 @@ def _place_plant_foot(scene: _TouchProblem, body: Body, reached: Body, contacts:
     if part.part != "foot" or not _SENDING & scene.moment.words:
         return body
     is_standing = contacts[:, 0 if part.side == "right" else 1]
-    return place_plant_foot(body, reached, part.side, scene.at, is_standing, fps)
+    return place_plant_foot(body, reached, part.side, scene.at, is_standing, fps=fps)
 
 
 def _solve_shifts(scene: _TouchProblem, body: Body, lines: np.ndarray, shifts: np.ndarray) -> np.ndarray:
