@@ -15,12 +15,7 @@ from dataclasses import replace
 import numpy as np
 
 from ..annotation import KeyMoment, Span, Timeline
-from ..annotation.ball_contact import (
-    build_surfaces,
-    find_contact_window,
-    find_striking_part,
-    measure_contact_gap,
-)
+from ..annotation.ball_contact import build_surfaces, find_contact_window, find_striking_part, measure_contact_gap
 from ..annotation.labels import list_labels
 from ..annotation.striking import build_part_surfaces, measure_ball_gap
 from ..ball.tracked.carried import find_carried_stretches
