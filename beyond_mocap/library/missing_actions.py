@@ -104,7 +104,7 @@ def find_action(moment: ActionMoment) -> Action | None:
         off = 0.0 if moment.height is None else max(low - moment.height, moment.height - high)
         return action.varies in names, not action.suits_speed(moment.speed), off > _HEIGHT_SLACK, -action.least_lead
 
-    is_named = any(_names_action(word) for word in requested)
+    is_named = any(names_action(word) for word in requested)
     return min(serving, key=rate_misfit, default=None) if is_named else None
 
 
@@ -227,8 +227,12 @@ def is_action_clip(clip: Clip) -> bool:
     return clip.path.startswith(_FOLDER)
 
 
-def _names_action(word: str) -> bool:
-    """Return whether a label names an action, not how or at which pace it is done."""
+def names_action(word: str) -> bool:
+    """Return whether a label names an action, not how or at which pace it is done.
+
+    Args:
+        word: the label.
+    """
     label = find_label(word)
     return word not in _GAITS and bool(label.is_root or label.parts or label.ball or label.in_flight)
 

@@ -71,7 +71,7 @@ def plan_dribbles(
     knocked = [run for run in _find_knocked_on(path, root, measured, fps)
                if _is_clear(skeleton, root, rotations, path, run=run, held=held, fps=fps)] if stretches else []
     for low, high in stretches:
-        for part in _split_parts(low, high, held, knocked, course_changes, len(path), fps):
+        for part in _split_parts(low, high, held, knocked, course_changes, count=len(path), fps=fps):
             if not np.isfinite(path[part.low : part.high + 1]).all():
                 continue
             search = DribbleSearch(skeleton, root, rotations, foot_contacts=foot_contacts, path=path, measured=measured,
