@@ -48,7 +48,7 @@ def compute_lowest_root(skeleton: Skeleton, rotations: np.ndarray, arms: bool = 
 
 
 def detect_lying_legs(motion: Motion) -> np.ndarray:
-    """Detect legs that lie or kneel: their feet carry nobody, and a foot that is held would push its knee below.
+    """Detect legs that lie or kneel: their feet bear no weight, and a foot that is held would push its knee below.
 
     Args:
         motion: T frames on a ground of height 0.

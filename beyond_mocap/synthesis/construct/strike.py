@@ -151,7 +151,7 @@ def strike_ball(
                         measured=measured, height_known=height_known, fps=fps)
         scene = build(body)
         reached, moved[number] = _reach_ball(scene, body)
-        if _place_plant_foot(scene, reached, root, rotations, contacts, fps):
+        if _place_plant_foot(scene, reached, root, rotations, contacts=contacts, fps=fps):
             body = Body.from_pose(skeleton, root[span], rotations[span])
             scene = build(body)
             reached, moved[number] = _reach_ball(scene, body)
@@ -476,7 +476,7 @@ def _place_plant_foot(scene: _TouchProblem, reached: Body, root, rotations, cont
     body = Body.from_pose(reached.skeleton, root[low : high + 1], rotations[low : high + 1])
     shift = compute_step_shift(reached, part.side, scene.at)
     standing = contacts[low : high + 1, 0 if part.side == "right" else 1]
-    placed = place_plant_foot(body, shift, part.side, moment.frame - low, standing, fps)
+    placed = place_plant_foot(body, shift, part.side, at=moment.frame - low, is_standing=standing, fps=fps)
     rotations[low : high + 1] = placed.rotations
     return placed is not body
 

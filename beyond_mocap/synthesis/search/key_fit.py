@@ -96,6 +96,7 @@ class StrikeMeasurements:
         sends: (K,) bool, the labels say that the ball is sent: only its velocity follows the part's.
         plant_off: (K,) m by which the plant foot of a kick is off its usual place, 0 where it is not known.
         rate: (K,) playback rate of the clips, already part of the velocity.
+        keeps_rate: (K,) bool, the swing is played no faster or slower than the rest of its clip.
     """
 
     place: np.ndarray
@@ -104,12 +105,14 @@ class StrikeMeasurements:
     sends: np.ndarray
     plant_off: np.ndarray | float = 0.0
     rate: np.ndarray | float = 1.0
+    keeps_rate: np.ndarray | bool = False
 
     def play(self, choice: np.ndarray, rate: np.ndarray) -> "StrikeMeasurements":
         """Return the same of clips `choice` (P,) played at playback rates (P,)."""
-        off = np.broadcast_to(self.plant_off, self.height.shape)[choice]
+        off, keeps_rate = (np.broadcast_to(values, self.height.shape)[choice]
+                           for values in (self.plant_off, self.keeps_rate))
         return StrikeMeasurements(self.place[choice], self.height[choice], rate[:, None] * self.velocity[choice],
-                                  self.sends[choice], off, rate)
+                                  self.sends[choice], plant_off=off, rate=rate, keeps_rate=keeps_rate)
 
 
 def measure_ball(track: SampledTrack, frame: float, is_height_known: bool) -> BallMeasurement:
@@ -217,7 +220,7 @@ def compute_key_misfit(found: StrikeMeasurements, ball: BallMeasurement) -> np.n
 def compute_swing_rates(found: StrikeMeasurements, ball: BallMeasurement) -> np.ndarray:
     """Compute how much faster (K,) than the rest of their clips swings are played, as fast as their ball needs.
 
-    1 where the ball is not sent, or its speed is not known.
+    1 where the ball is not sent, or its speed is not known, or the swing keeps its rate.
     """
     carried, velocity = np.array([ball.speed, 0.0, 0.0]), np.nan_to_num(found.velocity)
     own, leaving = np.linalg.norm(velocity + carried, axis=1), float(np.linalg.norm(np.nan_to_num(ball.exit_velocity)))
@@ -228,7 +231,8 @@ def compute_swing_rates(found: StrikeMeasurements, ball: BallMeasurement) -> np.
     limits = (np.maximum(limit, limit / found.rate) if limit < 1.0 else np.minimum(limit, limit / found.rate)
               for limit in SWING_RATES)
     rates = np.clip((root - along) / np.maximum(square, 1e-9), *limits)
-    return np.where(found.sends & (np.sqrt(square) > FAST_PART) & (leaving > FAST_BALL), rates, 1.0)
+    is_retimed = found.sends & ~np.asarray(found.keeps_rate) & (np.sqrt(square) > FAST_PART) & (leaving > FAST_BALL)
+    return np.where(is_retimed, rates, 1.0)
 
 
 def _compute_needed_turn(place: np.ndarray, goal: np.ndarray) -> np.ndarray:

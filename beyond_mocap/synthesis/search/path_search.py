@@ -24,7 +24,7 @@ from .key_fit import compute_key_misfit, compute_swing_rates, measure_ball, meas
 from .path_costs import YOUNG_SLOTS, BoneDistance, PathCosts, Weights
 from .preferences import UNUSUAL_FOOT_WEIGHT, UsedStretch, compute_weak_foot_cost, find_unusual_foot
 from .request import RequestedKey, SearchRequest
-from .slots import build_key_pieces, build_slot_edges, find_slot
+from .slots import build_key_pieces, build_slot_edges, find_slot, list_playback_rates
 from .swing_rate import retime_swing
 
 MEMORY_SLOTS = 15  # slots whose buckets a state remembers (4 s at 30 frames per second)
@@ -198,7 +198,9 @@ class PathSearch:
         for number in np.unique(self.pieces.number):
             key, at = self.request.keys[number], self.pieces.number == number
             ball = measure_ball(self.request.track, key.frame, key.is_ball_height_known)
-            played = measure_strikes(self.library, key.choices).play(self.pieces.choice[at], self.pieces.rate[at])
+            keeps_rate = np.array([len(list_playback_rates(self.library, key, one)) == 1 for one in key.choices])
+            strikes = replace(measure_strikes(self.library, key.choices), keeps_rate=keeps_rate)
+            played = strikes.play(self.pieces.choice[at], self.pieces.rate[at])
             costs[at], self.swing_rates[at] = compute_key_misfit(played, ball), compute_swing_rates(played, ball)
             costs[at] += self._compute_foot_cost(key)[self.pieces.choice[at]]
         return costs

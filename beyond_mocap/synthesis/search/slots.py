@@ -134,7 +134,7 @@ def _build_pieces(library: Library, request: SearchRequest, edges: np.ndarray, n
     rows = []
     for choice, option in enumerate(key.choices):
         entry, leave = np.maximum(compute_needed_frames(library, option), MIN_KEY_MARGIN)
-        for rate in _list_playback_rates(library, key, option):
+        for rate in list_playback_rates(library, key, option):
             # the last edge before the entry and the first one after the exit, both a little trimmed
             first = int(np.searchsorted(edges, key.frame - entry / rate + _TRIMMED, side="right")) - 1
             end = int(np.searchsorted(edges, key.frame + leave / rate - _TRIMMED))
@@ -148,8 +148,16 @@ def _build_pieces(library: Library, request: SearchRequest, edges: np.ndarray, n
     return rows
 
 
-def _list_playback_rates(library: Library, key: RequestedKey, option: Key) -> Sequence[float] | np.ndarray:
-    """List the playback rates of a clip: a body in the air, and one that falls or slides, keeps gravity's time."""
+def list_playback_rates(library: Library, key: RequestedKey, option: Key) -> Sequence[float] | np.ndarray:
+    """List the playback rates of a clip: a body in the air, and one that falls or slides, keeps gravity's time.
+
+    Args:
+        library: the clips.
+        key: the requested key moment.
+        option: the library's key moment that serves it.
+    Returns:
+        The rates; one alone is that of the swing too.
+    """
     reach = int(_OFF_FEET_WITHIN * library.fps)
     at, first = library_frame(library, option), library.frames.first[option.clip]
     low, high = np.clip([round(at) - reach, round(at) + reach], first, first + library.frames.count[option.clip] - 1)

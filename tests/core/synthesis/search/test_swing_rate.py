@@ -1,5 +1,7 @@
 """A swing is played faster or slower around its touch only, as its ball needs."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -55,3 +57,10 @@ def test_a_reception_and_an_unknown_ball_leave_the_swing_alone():
     unknown = BallMeasurement(np.full(2, np.nan), np.nan, np.full(3, np.nan))
     assert np.all(compute_swing_rates(build_shots(sends=False), ball) == 1.0)
     assert np.all(compute_swing_rates(build_shots(), unknown) == 1.0)
+
+
+def test_a_swing_that_keeps_its_rate_is_left_alone():
+    ball = BallMeasurement(np.array([0.5, 0.0]), 0.11, np.array([18.0, 0.0, 0.0]))
+    shots = replace(build_shots(), keeps_rate=np.array([False, True, False]))
+    played = shots.play(np.array([1, 0, 2]), np.ones(3))
+    assert list(compute_swing_rates(played, ball) == 1.0) == [True, False, False]
