@@ -12,6 +12,7 @@ from .floor import (
     build_bicycle_kick,
     build_diving_header,
     build_fall,
+    build_half_bicycle_kick,
     build_lying,
     build_quick_get_up,
     build_sitting,
@@ -40,9 +41,12 @@ _HEADERS = (
            heights=(0.4, 1.4), suits=MOVES),
 )  # fmt: skip
 _OVERHEAD_KICKS = tuple(
-    Action(name=name, labels=frozenset({"kick", "bicycle", "foot", "top", "back", *more}), build=build_bicycle_kick,
-           needs=frozenset({"bicycle"}), has_side=True, heights=(1.4, 2.0))
-    for name, more in (("overhead kick", ()), ("half overhead kick", ("half",)))
+    Action(name=name, labels=frozenset({"kick", "bicycle", "foot", "top", *more}), build=build,
+           needs=frozenset({"bicycle"}), has_side=True, heights=heights)
+    for name, more, build, heights in (
+        ("overhead kick", ("back",), build_bicycle_kick, (1.4, 2.0)),
+        ("half overhead kick", ("half",), build_half_bicycle_kick, (0.9, 1.5)),
+    )
 )
 _MOVES = (
     Action(name="jump", labels=frozenset({"jump", "standing"}), build=build_jumping_header),

@@ -224,6 +224,46 @@ def build_bicycle_kick(setting: ActionSetting) -> Gesture:
     ), setting)  # fmt: skip
 
 
+def build_half_bicycle_kick(setting: ActionSetting) -> Gesture:
+    """Build a half overhead kick with the right foot: the body lies in the air on its left side, the right leg swings
+    level across it; it lands on hip and hand and rolls onto its back.
+
+    Args:
+        setting: for whom; height: of the ball.
+    Returns:
+        The movement; its key is the contact. It faces across the way of the ball.
+    """
+    ball = 1.2 if setting.height is None else setting.height / setting.scale
+    off, hips_at_key, lies, up = 0.24, float(np.clip(ball - 0.22, 0.72, 1.05)), 0.16, _UP_BACK
+    fall = (hips_at_key - _STANDING_HIPS) / off - 0.5 * GRAVITY * off
+    land = (fall + np.sqrt(fall**2 + 2.0 * GRAVITY * (hips_at_key - lies))) / GRAVITY
+    left_arm = ((-0.8, *NO_ARM), (-0.45, -10, 30, 10, 20), (-0.2, 10, 84, 0, 20), (0.0, 0, 96, -10, 14),
+                (0.6 * land, -10, 84, -10, 24))
+    right_arm = ((-0.8, *NO_ARM), (-0.45, 20, 40, 10, 30), (-0.2, 40, 60, 10, 30), (0.0, -26, 70, 0, 30),
+                 (0.6 * land, -10, 50, 0, 30))
+    return build_body_poses(BodyPoses(
+        speeds=((-2.0, 0.0), (1.0, 0.0)),
+        hips=((-0.8, 0, 0, 0), (-0.5, -0.02, 0.03, 0.18), (-off, -0.04, 0.08, 0.0),
+              (0.0, -0.06, 0.18, _STANDING_HIPS - hips_at_key), *_shift_rows(land, up["hips"], -0.16)),
+        pelvis=((-0.8, 0, 0, 0), (-0.5, -6, 0, -20), (-off, -30, -4, -30), (0.0, -74, -12, 6),
+                (0.5 * land, -66, -34, 30), (land, -16, -80, 6), *_at(land, up["pelvis"][1:])),
+        spine=((-0.8, 0, 2, 0), (-0.5, 4, 8, -20), (-off, 8, 4, -24), (0.0, 10, 6, 8), *_at(land, up["spine"])),
+        head=((-0.8, 0, 0), (-0.5, -10, -20), (-off, 0, -24), (0.0, 6, -10), *_at(land, up["head"])),
+        arms=(left_arm + _at(land, up["arm"]), right_arm + _at(land, up["arm"])),
+        feet=(((-0.5, 0, 0, 0, 8, 0, 0), (-off, 0.0, 0.0, 0.02, 50, 0, 0), (-0.1, 0.02, -0.18, 0.30, 40, 10, 30),
+               (0.0, 0.10, -0.38, 0.36, 30, 10, 60), (0.6 * land, 0.40, -0.22, 0.20, 10, 0, 40),
+               *_shift_rows(land, up["foot"], -0.16)),
+              ((-0.6, 0, 0, 0, 10, 0, 0), (-0.4, -0.14, -0.20, 0.20, 50, -20, 0),
+               (-0.2, -0.34, -0.44, 0.62, 70, -40, 30),
+               (-0.08, 0.10, -0.72, hips_at_key - 0.16, 60, -10, 60), (0.0, 0.44, -0.62, ball - 0.20, 50, 20, 70),
+               (0.07, 0.66, -0.30, ball - 0.16, 40, 50, 60), (0.6 * land, 0.70, 0.0, 0.50, 10, 20, 20),
+               *_shift_rows(land, up["foot"], -0.16))),
+        knees=((-0.3, 0, 0), (land, 4, 4), (land + 1.4, 10, 10), (land + 2.4, 0, 0)),
+        rests=((land - 0.03, 0), *_at(land, up["rests"])),
+        begin=(-0.8, -0.5), leaves=(-0.5, -0.6), push=-0.6, flight=(-off, land), end=land + up["end"],
+    ), setting)  # fmt: skip
+
+
 def _shift_rows(offset: float, rows, ahead: float) -> tuple:
     """Shift rows of hips or feet in time and place."""
     return tuple((row[0] + offset, row[1] + ahead, *row[2:]) for row in rows)
