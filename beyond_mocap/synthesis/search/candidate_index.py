@@ -29,7 +29,7 @@ ACTING = CONTINUOUS - {TURNING, *list_gaits(), *list_labels(ball="carries")}
 """Labels of what a body does for a while besides going, turning and carrying the ball; synthetic clips show it only
 where it is requested (recordings of it are judged by their posture)."""
 STRIKES, STRIKE_COST = frozenset(list_labels(ball="sends")), 4.0
-"""Labels of a ball that is struck, and how many times as much they cost as other actions that nobody asked for: a kick
+"""Labels of a ball that is struck, and how many times as much they cost as other actions that are not requested: a kick
 without a ball is the last thing to fill a run with."""
 
 _SHOWN = 14  # library frames that a long slot shows at the fastest playback rate
@@ -150,7 +150,7 @@ class CandidateIndex:
             words: the labels.
         Returns:
             (N,) share of them that each frame lacks; (N,) 1 where a slot from there on shows an action (a jump) that is
-            not requested, or nothing that is annotated, STRIKE_COST where it strikes a ball that nobody plays, else 0.
+            not requested, or nothing that is annotated, STRIKE_COST where it strikes a ball without a request, else 0.
         """
         if words not in self._by_words:
             names, frames = self.frames.vocabulary, self.frames
