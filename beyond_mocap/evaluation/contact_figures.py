@@ -8,7 +8,7 @@ import numpy as np
 
 from ..annotation.ball_contact import find_contact_window, find_striking_part
 from ..annotation.striking import CHEST_RADIUS, FOOT_RADIUS, HAND_RADIUS, HEAD_RADIUS, THIGH_RADIUS
-from ..motion.track import BALL_RADIUS, Track, sample_track
+from ..motion.track import BALL_RADIUS, Track
 from ..synthesis.construct.step_to_ball import compute_allowed_step
 from ..synthesis.construct.strike import BALL_NOISE, FILLED_NOISE, PELVIS_RANGE
 from ..synthesis.quality.moments import KeyMomentResult, list_contact_labels, measure_contact
@@ -64,7 +64,7 @@ def find_reachable(view: View, moment: KeyMomentResult) -> bool | None:
     part = find_striking_part(labels)
     if part is None or view.track is None or not np.isfinite(view.track.ball[:, :2]).all(axis=1).any():
         return None
-    sampled, time = sample_track(view.track, view.fps), view.played.times[moment.frame]
+    sampled, time = view.sampled_track, view.played.times[moment.frame]
     at = int(np.argmin(np.abs(sampled.times - time)))
     noise = BALL_NOISE if sampled.ball_measured[at] else FILLED_NOISE
     reach = _DIVE_REACH if find_contact_window(labels) else REACH[part] + BALL_RADIUS

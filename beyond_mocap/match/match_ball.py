@@ -15,7 +15,7 @@ import numpy as np
 from ..annotation.ball_contact import build_surfaces, measure_contact_gap
 from ..annotation.striking import measure_ball_gap
 from ..ball.tracked.solve import SolvedBall
-from ..base.time_series import interpolate_columns
+from ..base.time_series import find_runs, interpolate_columns
 from ..motion.motion import Motion, compute_pose
 from ..motion.track import BALL_RADIUS, Track, clean_track
 from ..motion.track.ball_path import BallPath
@@ -23,13 +23,14 @@ from ..motion.track.match_data import Match
 from ..synthesis.construct.ball_detour import lead_ball_around_body
 from ..synthesis.construct.contact_geometry import BALL_SECONDS
 from ..synthesis.construct.near_miss import miss_ball
-from ..synthesis.construct.strike import compute_contact_frames, find_nearest_frame
+from ..synthesis.construct.strike import find_nearest_frame
 from ..synthesis.construct.strike_fixed_ball import FixedStrike, strike_fixed_ball
 from ..synthesis.plan import Plan
-from ..synthesis.resolved_touches import MET_GAP, build_trajectory
+from ..synthesis.resolved_touches import AT_BALL_GAP, build_trajectory
 from ..synthesis.take import KeyResult, Take
 
 _ROUNDING = 1e-4  # m, positions are rounded to this, as in files
+_HELD_SECONDS = 4.0  # s before and after a key moment in which a ball may be held
 
 MAX_CLOSED_GAP = 0.15
 """m: the largest gap that is closed, the same as in `synthesis.construct.strike`; a player who misses the ball by more
@@ -174,18 +175,20 @@ def _list_met_frames(take: Take) -> np.ndarray:
     """List the frames (N,) in which a part of the body is at the take's ball, ascending."""
     if take.ball is None:
         return np.zeros(0, int)
-    count = len(take.motion)
-    keys = [at for key in take.keys if _is_met(take, key) for at in compute_contact_frames(key.frame, count)]
+    keys = [at for key in take.keys for at in _find_meeting(take, key)]
     pushes = [at for push in take.dribble_touches for at in range(push.first, push.last + 1)]
     return np.unique(np.array([*keys, *pushes], dtype=int))
 
 
-def _is_met(take: Take, key: KeyResult) -> bool:
-    """Return whether the part that a key moment names is at the take's ball."""
-    motion, frame = take.motion, find_nearest_frame(key.frame, len(take.motion))
-    pose = compute_pose(motion.skeleton, motion.root_positions[frame], motion.rotations[frame])
-    gap = measure_contact_gap(motion.skeleton, *pose, key.contact_labels, take.ball.positions[frame])
-    return bool(np.abs(gap) < MET_GAP)
+def _find_meeting(take: Take, key: KeyResult) -> range:
+    """Find the frames around a key moment in which the part that it names stays at the take's ball."""
+    motion, reach = take.motion, round(_HELD_SECONDS * take.motion.fps)
+    frame = find_nearest_frame(key.frame, len(motion))
+    near = slice(max(frame - reach, 0), frame + reach + 1)
+    pose = compute_pose(motion.skeleton, motion.root_positions[near], motion.rotations[near])
+    gaps = measure_contact_gap(motion.skeleton, *pose, key.contact_labels, take.ball.positions[near])
+    runs = [(first + near.start, end + near.start) for first, end in find_runs(np.abs(gaps) < AT_BALL_GAP)]
+    return next((range(first, end) for first, end in runs if first <= frame < end), range(0))
 
 
 def restore_ball_contact(take: Take, ball: np.ndarray) -> Take:

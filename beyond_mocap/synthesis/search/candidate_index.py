@@ -25,9 +25,9 @@ JERK_REACH = 8  # frames to either side over which the jerk of a transition is m
 _SPEED_CLASSES = (1.0, 2.0, 3.0, 4.5)  # m/s between the classes in which jerk is compared
 USUAL_STANCE = 0.3  # s with both feet on the ground, in a walk
 _LONGEST_STANCE = 2.0  # s beyond the usual stance at which its cost stops growing
-# labels of what a body does for a while besides going, turning and carrying the ball; synthetic clips show it only
-# where it is requested (recordings of it are judged by their posture)
-_ACTING = CONTINUOUS - {TURNING, *list_gaits(), *list_labels(ball="carries")}
+ACTING = CONTINUOUS - {TURNING, *list_gaits(), *list_labels(ball="carries")}
+"""Labels of what a body does for a while besides going, turning and carrying the ball; synthetic clips show it only
+where it is requested (recordings of it are judged by their posture)."""
 _SHOWN = 14  # library frames that a long slot shows at the fastest playback rate
 
 
@@ -152,7 +152,7 @@ class CandidateIndex:
             names, frames = self.frames.vocabulary, self.frames
             missing = self.annotation.compute_missing_share(words) if words else np.zeros(len(frames))
             actions, spans = ([i for i, word in enumerate(names) if word in kind and word not in words]
-                              for kind in (DISCRETE, _ACTING))
+                              for kind in (DISCRETE, ACTING))
             acts = frames.words[:, actions].any(axis=1) | (frames.words[:, spans].any(axis=1) & self.is_synthetic)
             acts = maximum_filter1d(acts, SLOT + 1, origin=-(SLOT // 2), mode="nearest")
             self._by_words[words] = missing.astype(np.float32), acts | ~frames.words.any(axis=1)
