@@ -139,6 +139,18 @@ RECEPTIONS = {
         right_arm=((-0.20, 4, 42, 12, 36), (0.0, -14, 54, 10, 30), (0.25, 0, 40, 12, 38)),
         spine=((-0.20, -4, 2, 4), (0.0, -6, 2, 0), (0.20, -3, 10, 4)),
     ),
+    "high inside": Reception(
+        name="reception with the raised inside of the foot",
+        labels=("receive", "foot", "high", "inside"), speeds=(0.0, 2.5), heights=(0.45, 0.75), height=0.5,
+        foot=(
+            (-0.16, 0.36, -0.15, 0.400, -2, -58, -6),
+            (0.0, 0.38, -0.15, 0.390, -2, -64, -8), (0.08, 0.32, -0.15, 0.350, -2, -64, -8),
+            (0.17, 0.24, -0.15, 0.280, 0, -54, -6), (0.34, 0.16, -0.13, 0.140, 4, -24, 0),
+        ),
+        low=0.04, left_arm=((-0.20, 14, 46, 10, 36), (0.0, 20, 58, 10, 32), (0.25, 12, 42, 12, 40)),
+        right_arm=((-0.20, 6, 42, 12, 36), (0.0, -8, 52, 10, 32), (0.25, 2, 38, 12, 40)),
+        spine=((-0.20, -5, 4, 6), (0.0, -7, 6, 4), (0.20, -3, 11, 4)),
+    ),
     "thigh": Reception(
         name="reception with the thigh",
         labels=("receive", "thigh", "high"), speeds=(0.0, 4.0), heights=(0.75, 1.05), height=1.0,
@@ -153,7 +165,8 @@ RECEPTIONS = {
         spine=((-0.20, -5, 2, 2), (0.0, -6, 0, 0), (0.20, -3, 10, 2)),
     ),
     "chest": Reception(
-        name="reception with the chest", labels=("receive", "body", "high"), speeds=(0.0, 4.0), heights=(), low=0.07,
+        name="reception with the chest", labels=("receive", "body", "chest", "high"), speeds=(0.0, 4.0), heights=(),
+        low=0.07,
         pelvis=((-0.40, 0, 2, 0), (-0.05, 0, -12, 0), (0.10, 0, -10, 0), (0.25, 0, -2, 0), (0.5, 0, 2, 0)),
         spine=((-0.40, 0, 2, 0), (-0.05, 0, -20, 0), (0.08, 0, -12, 0), (0.22, 0, 6, 0), (0.5, 0, 6, 0)),
         left_arm=((-0.35, 6, 36, 8, 34), (0.0, -10, 62, 0, 50), (0.25, 2, 48, 5, 44)),
