@@ -39,12 +39,14 @@ from .take import DribbleTouch, KeyResult, Take
 MAX_TOUCH_OFFSET = 0.4
 """Seconds from a key moment within which its touch is searched."""
 
+AT_BALL_GAP = 0.03
+"""Metres between the surfaces up to which a part is at the ball."""
+
 _WITHIN = 1.5  # m from the player within which a touch by an unknown player may be this player's
 # cost in seconds: player unknown, other part, other kind
 _UNKNOWN_PLAYER_COST, _OTHER_PART_COST, _OTHER_KIND_COST = 0.15, 0.25, 0.15
 _MAX_SAMPLE_GAP = 0.1  # s from the nearest measured sample beyond which the ball counts as filled in
 _CARRIED_MARGIN = 0.15  # s from the ends of such a stretch from which on its course shows no touches, only steering
-_MET_GAP = 0.03  # m between the surfaces up to which a part is at the ball
 _LISTED_TIMES = 6  # key moments that a line lists
 _STEP = 0.004  # s between the points of a trajectory
 _SENDING, _TAKING = frozenset(list_labels(ball="sends")), frozenset(list_labels(ball="takes"))
@@ -364,7 +366,7 @@ def _free_met_ball(take: Take, ball: np.ndarray,
         places, world = (values[0] for values in compute_pose(skeleton, take.motion.root_positions[frame : frame + 1],
                                                               take.motion.rotations[frame : frame + 1]))
         gaps = [abs(measure_ball_gap(part.compute_line(places, world), part.radius, out[frame])) for part in surfaces]
-        if min(gaps) < _MET_GAP:
+        if min(gaps) < AT_BALL_GAP:
             place = find_free_contact(skeleton, surfaces[int(np.argmin(gaps))], places, world, out[frame])
             edges = [edge for pair in (*((push.first, push.last) for push in pushes), *met) for edge in pair]
             bounds = (max([frame - reach, *(edge for edge in edges if edge < frame)]),
