@@ -45,6 +45,7 @@ _UNKNOWN_PLAYER_COST, _OTHER_PART_COST, _OTHER_KIND_COST = 0.15, 0.25, 0.15
 _MAX_SAMPLE_GAP = 0.1  # s from the nearest measured sample beyond which the ball counts as filled in
 _CARRIED_MARGIN = 0.15  # s from the ends of such a stretch from which on its course shows no touches, only steering
 _MET_GAP = 0.03  # m between the surfaces up to which a part is at the ball
+_LISTED_TIMES = 6  # key moments that a line lists
 _STEP = 0.004  # s between the points of a trajectory
 _SENDING, _TAKING = frozenset(list_labels(ball="sends")), frozenset(list_labels(ball="takes"))
 _CARRYING, _HOLDING = (frozenset(list_labels(ball=what)) for what in ("carries", "holds"))
@@ -190,7 +191,7 @@ def _restore_order(keys: list[KeyMoment]) -> list[KeyMoment]:
 
 
 def report_missing_touches(take: Take, plan: ResolvedPlan) -> list[str]:
-    """Report what the ball has not: touches that key moments request, touches of dribbles, places of its own.
+    """Report what the ball lacks: touches that key moments request, touches of dribbles, places of its own.
 
     Args:
         take: the take of `apply_trajectory`.
@@ -209,7 +210,8 @@ def _report_untouched_keys(keys: list[KeyMoment]) -> list[str]:
     """Report in one line the key moments for which the trajectory has no touch."""
     if not keys:
         return []
-    times = ", ".join(f"{key.time:g}" for key in keys)
+    more = len(keys) - _LISTED_TIMES
+    times = ", ".join(f"{key.time:g}" for key in keys[:_LISTED_TIMES]) + (f" and {more} more" if more > 0 else "")
     words = ", ".join(dict.fromkeys(f"'{' '.join(key.words)}'" for key in keys))
     stay = "the key moment stays at its time" if len(keys) == 1 else "these key moments stay at their times"
     return [TimedMessage(f"{times} s: the ball's trajectory has no touch for {words} within {MAX_TOUCH_OFFSET:g} s; "

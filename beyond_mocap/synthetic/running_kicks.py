@@ -21,6 +21,7 @@ from ..motion import quaternion
 from ..motion.foot_plant import plant_feet as lift_feet
 from ..motion.humanoid import compute_heading_from_positions, identify_joints
 from ..motion.motion import Motion, compute_pose, sample_frames_cubic
+from ..motion.plant_place import measure_plant_place
 from ..motion.retargeting.neutral import NeutralStance
 from ..motion.retargeting.posture import Posture, to_motion
 from ..motion.retargeting.structure import list_descendants
@@ -101,7 +102,7 @@ def build_swing(kind: str, neutral: NeutralStance, rate: float = 1.0, lift: floa
 def measure_foot_speed(swing: Swing) -> float:
     """Measure how fast the kicking ankle moves against the pelvis at the contact, m/s."""
     body = identify_joints(swing.motion.skeleton)
-    places = _compute_places(swing, np.array([-_SPEED_SECONDS, _SPEED_SECONDS]))
+    places = compute_places(swing, np.array([-_SPEED_SECONDS, _SPEED_SECONDS]))
     apart = places[:, body.right.foot] - places[:, body.hips]
     return float(np.linalg.norm(apart[1] - apart[0]) / (2.0 * _SPEED_SECONDS))
 
@@ -109,10 +110,7 @@ def measure_foot_speed(swing: Swing) -> float:
 def measure_plant_foot(swing: Swing) -> np.ndarray:
     """Measure the plant foot's place (2,) m at the contact, from the kicking ankle: ahead as the body faces, and left.
     """
-    body = identify_joints(swing.motion.skeleton)
-    places = _compute_places(swing, np.zeros(1))
-    facing = compute_heading_from_positions(swing.motion.skeleton, places)
-    return quaternion.rotate_level((places[:, body.left.foot] - places[:, body.right.foot])[:, :2], -facing)[0]
+    return measure_plant_place(swing.motion.skeleton, compute_places(swing, np.zeros(1))[0], "right")
 
 
 def build_running_kick(
@@ -195,11 +193,11 @@ def _read_swing(swing: Swing, times: np.ndarray, neutral: NeutralStance, directi
     The plant foot is where the recording has it, within the usual range.
     """
     body, motion = identify_joints(swing.motion.skeleton), swing.motion
-    around = _compute_places(swing, np.array([-_SPEED_SECONDS, _SPEED_SECONDS]))[:, body.right.foot]
+    around = compute_places(swing, np.array([-_SPEED_SECONDS, _SPEED_SECONDS]))[:, body.right.foot]
     angle = direction - np.arctan2(*(around[1] - around[0])[1::-1])
     turn = quaternion.from_up_angle(np.array(angle))
     plant = np.clip(measure_plant_foot(swing), *(neutral.leg / tables.LEG * np.array([_AHEAD, _BESIDE]).T))
-    facing = compute_heading_from_positions(motion.skeleton, _compute_places(swing, np.zeros(1))) + angle
+    facing = compute_heading_from_positions(motion.skeleton, compute_places(swing, np.zeros(1))) + angle
     root, rotations = sample_frames_cubic(motion, swing.contact + times * motion.fps)
     places, world = compute_pose(motion.skeleton, root, rotations)
     middle = 0.5 * (places[:, body.left.upper_leg] + places[:, body.right.upper_leg])
@@ -209,8 +207,8 @@ def _read_swing(swing: Swing, times: np.ndarray, neutral: NeutralStance, directi
                        plant=quaternion.rotate_level(plant[None], facing)[0])
 
 
-def _compute_places(swing: Swing, times: np.ndarray) -> np.ndarray:
-    """Compute all joints (T, J, 3) m at seconds (T,) from the contact."""
+def compute_places(swing: Swing, times: np.ndarray) -> np.ndarray:
+    """Compute all joints (T, J, 3) m of a swing at seconds (T,) from its contact."""
     root, rotations = sample_frames_cubic(swing.motion, swing.contact + times * swing.motion.fps)
     return compute_pose(swing.motion.skeleton, root, rotations)[0]
 

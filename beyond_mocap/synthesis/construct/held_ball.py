@@ -15,6 +15,7 @@ import numpy as np
 from ...annotation.ball_contact import find_striking_part, uses_both_hands
 from ...annotation.body_solid import BodySolid
 from ...annotation.body_surfaces import build_body_surfaces
+from ...annotation.labels import list_labels
 from ...annotation.striking import HAND_RADIUS
 from ...base.easing import smoothstep
 from ...base.time_series import find_runs
@@ -35,6 +36,8 @@ _DROP_SECONDS = (0.08, 0.9)  # s of a fall from the hands to a foot, at least an
 _SOLID = frozenset({"trunk", "head", "neck", "thigh", "shank"})
 _ARMS_SHARE = 1.5  # how much more the forearms say than the chest where the front of both hands is
 _ROUNDS = 3
+_FROM_HANDS = frozenset(list_labels(part="foot", ball="sends", height="high", is_root=True))
+"""Kicks whose ball comes from the hands: those that are high by their first label alone."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -67,7 +70,7 @@ def carry_in_hands(motion: Motion, ball: np.ndarray, touches: Sequence[HandTouch
     out, held = ball, []
     for touch in touches:
         part, span = find_striking_part(touch.words), _limit_span(ball, touch, motion.fps)
-        if part not in ("hand", "foot") or span is None:
+        if part != "hand" and not _FROM_HANDS.intersection(touch.words) or span is None:
             continue
         hands = _build_hands(motion, span, touch, out)
         if hands is None:

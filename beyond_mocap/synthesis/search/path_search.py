@@ -20,11 +20,12 @@ from ...library.library import Library
 from .beam_transitions import SAME_FRAME, BeamTransitions, SlotCandidates
 from .candidate_index import ACTING, PLAYBACK_RATES, SLOT
 from .edit_list import EditList, PlacedKey, find_transitions, replace_stretch
-from .key_fit import compute_key_misfit, measure_ball, measure_strikes
+from .key_fit import compute_key_misfit, compute_swing_rates, measure_ball, measure_strikes
 from .path_costs import YOUNG_SLOTS, BoneDistance, PathCosts, Weights
 from .preferences import UNUSUAL_FOOT_WEIGHT, UsedStretch, compute_weak_foot_cost, find_unusual_foot
 from .request import RequestedKey, SearchRequest
 from .slots import build_key_pieces, build_slot_edges, find_slot
+from .swing_rate import retime_swing
 
 MEMORY_SLOTS = 15  # slots whose buckets a state remembers (4 s at 30 frames per second)
 _ACTING_SHARE = 4  # of the beam, one part in this many is kept for states that show a requested action
@@ -146,6 +147,7 @@ class PathSearch:
         self.edges = build_slot_edges(library, request, *((stretch.first, stretch.end) if stretch else (0, None)),
                                       on_grid)
         self.pieces = build_key_pieces(library, request, self.edges)
+        self.swing_rates = np.ones(len(self.pieces.number))
         self.choice_cost = weights.strike * self._compute_choice_costs()
         self._closed_slots = {find_slot(self.edges, request.keys[number].frame) for number in self.pieces.number}
         self.width = SearchWidth()
@@ -189,13 +191,15 @@ class PathSearch:
             self.width, self.hurried_from = NARROW, int(self.edges[slot])
 
     def _compute_choice_costs(self) -> np.ndarray:
-        """Compute (P,) how badly each piece's clip strikes the ball that the track has at its key moment."""
+        """Compute (P,) how badly each piece's clip strikes the ball that the track has at its key moment, at its best
+        rate of the swing.
+        """
         costs = np.zeros(len(self.pieces.number))
         for number in np.unique(self.pieces.number):
             key, at = self.request.keys[number], self.pieces.number == number
             ball = measure_ball(self.request.track, key.frame, key.is_ball_height_known)
             played = measure_strikes(self.library, key.choices).play(self.pieces.choice[at], self.pieces.rate[at])
-            costs[at] = compute_key_misfit(played, ball)
+            costs[at], self.swing_rates[at] = compute_key_misfit(played, ball), compute_swing_rates(played, ball)
             costs[at] += self._compute_foot_cost(key)[self.pieces.choice[at]]
         return costs
 
@@ -395,17 +399,20 @@ class PathSearch:
         """Trace the cheapest last state back to the first, as an edit list."""
         state = int(np.argmin(layers[-1].cost))
         clip, frame = np.empty(len(self.request), int), np.empty(len(self.request))
-        placed: dict[int, PlacedKey] = {}
+        shown: dict[int, int] = {}  # number of a key moment -> its piece
         for slot, states in reversed(list(enumerate(layers))):
             low, high = self.edges[slot : slot + 2]
             frame[low:high] = states.start[state] + states.rate[state] * np.arange(high - low)
             clip[low:high] = states.clip[state]
             piece = int(states.piece[state])
             if piece >= 0:
-                number = int(self.pieces.number[piece])
-                placed[number] = PlacedKey(number, self.pieces.key(self.request, piece))
+                shown[int(self.pieces.number[piece])] = piece
             state = int(states.back[state])
-        keys = tuple(placed[number] for number in sorted(placed))
+        for number, piece in shown.items():
+            low, high = self.edges[[self.pieces.first[piece], self.pieces.end[piece]]]
+            frame[low:high] = retime_swing(frame[low:high], self.request.keys[number].frame - low, self.library.fps,
+                                           float(self.swing_rates[piece]))
+        keys = tuple(PlacedKey(number, self.pieces.key(self.request, shown[number])) for number in sorted(shown))
         if self.stretch:
             return replace_stretch(self.stretch.edit, int(self.edges[0]), int(self.edges[-1]), clip=clip, frame=frame,
                                    keys=keys)

@@ -148,7 +148,7 @@ def _build_pieces(library: Library, request: SearchRequest, edges: np.ndarray, n
     return rows
 
 
-def _list_playback_rates(library: Library, key: RequestedKey, option: Key) -> Sequence[float]:
+def _list_playback_rates(library: Library, key: RequestedKey, option: Key) -> Sequence[float] | np.ndarray:
     """List the playback rates of a clip: a body in the air, and one that falls or slides, keeps gravity's time."""
     reach = int(_OFF_FEET_WITHIN * library.fps)
     at, first = library_frame(library, option), library.frames.first[option.clip]

@@ -255,11 +255,11 @@ def retime_flight(recipe: KeyPoses, half: float) -> KeyPoses:
     def retime(time: float) -> float:
         return time * half / own if abs(time) <= own else time + float(np.sign(time)) * (half - own)
 
-    tables: dict[str, Any] = {
+    moved: dict[str, Any] = {
         field.name: tuple((retime(row[0]), *row[1:]) for row in rows) for field in fields(recipe)
         if field.type == "Rows | None" and (rows := getattr(recipe, field.name)) is not None
     }
-    return replace(recipe, flights=((-half, half),), **{**tables, "span": tuple(map(retime, recipe.span))})
+    return replace(recipe, flights=((-half, half),), **{**moved, "span": tuple(map(retime, recipe.span))})
 
 
 def mirror_foot(rows: Rows) -> Rows:
