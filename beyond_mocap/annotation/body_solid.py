@@ -83,8 +83,9 @@ class BodySolid:
         """
         start, end = (_place_points([getattr(surface, name) for surface in surfaces], positions, rotations)
                       for name in ("start", "end"))
-        radius = np.array([surface.radius for surface in surfaces])
-        return cls(start, end - start, radius + BALL_RADIUS, np.array([surface.end_radius for surface in surfaces]) - radius)
+        radius, end_radius = (np.array([getattr(surface, name) for surface in surfaces])
+                              for name in ("radius", "end_radius"))
+        return cls(start, end - start, radius + BALL_RADIUS, end_radius - radius)
 
     @cached_property
     def _line_squares(self) -> np.ndarray:
