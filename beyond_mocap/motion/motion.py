@@ -76,7 +76,8 @@ def forward_kinematics(motion: Motion) -> tuple[np.ndarray, np.ndarray]:
 def compute_pose(skeleton: Skeleton, root: np.ndarray, local: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Compute world positions and rotations of poses.
 
-    Works joint by joint on component-first arrays: one contiguous run per component is what makes numpy fast here.
+    Works on component-first arrays, one contiguous run per component, and on all joints of a depth at once: this is
+    what makes numpy fast for long motions and for a few frames.
 
     Args:
         skeleton: J joints.
@@ -89,31 +90,25 @@ def compute_pose(skeleton: Skeleton, root: np.ndarray, local: np.ndarray) -> tup
     flat = np.ascontiguousarray(local.reshape(-1, len(skeleton), 4).transpose(1, 2, 0))
     world = np.empty_like(flat)
     places = np.empty((len(skeleton), 3, flat.shape[2]))
-    for joint, parent in enumerate(skeleton.parents):
-        if parent < 0:
-            world[joint] = flat[joint]
-            places[joint] = root.reshape(-1, 3).T
-            continue
-        aw, ax, ay, az = world[parent]
-        bw, bx, by, bz = flat[joint]
+    world[0], places[0] = flat[0], root.reshape(-1, 3).T
+    for joints, parents in skeleton.levels:
+        aw, ax, ay, az = world[parents].transpose(1, 0, 2)
+        bw, bx, by, bz = flat[joints].transpose(1, 0, 2)
         # the quaternion product parent x local, written out by component
-        world[joint, 0] = aw * bw - ax * bx - ay * by - az * bz
-        world[joint, 1] = aw * bx + ax * bw + ay * bz - az * by
-        world[joint, 2] = aw * by - ax * bz + ay * bw + az * bx
-        world[joint, 3] = aw * bz + ax * by - ay * bx + az * bw
-        places[joint] = places[parent] + _rotate_vector(world[parent], skeleton.offsets[joint])
+        world[joints, 0] = aw * bw - ax * bx - ay * by - az * bz
+        world[joints, 1] = aw * bx + ax * bw + ay * bz - az * by
+        world[joints, 2] = aw * by - ax * bz + ay * bw + az * bx
+        world[joints, 3] = aw * bz + ax * by - ay * bx + az * bw
+        # and the offset, rotated by the parent
+        vx, vy, vz = skeleton.offsets[joints].T[..., None]
+        tx, ty, tz = 2 * (ay * vz - az * vy), 2 * (az * vx - ax * vz), 2 * (ax * vy - ay * vx)
+        places[joints, 0] = places[parents, 0] + (vx + aw * tx + ay * tz - az * ty)
+        places[joints, 1] = places[parents, 1] + (vy + aw * ty + az * tx - ax * tz)
+        places[joints, 2] = places[parents, 2] + (vz + aw * tz + ax * ty - ay * tx)
     return (
         places.transpose(2, 0, 1).reshape(*lead, len(skeleton), 3),
         world.transpose(2, 0, 1).reshape(*lead, len(skeleton), 4),
     )
-
-
-def _rotate_vector(q: np.ndarray, v: np.ndarray) -> np.ndarray:
-    """Rotate one constant vector (3,) by component-first rotations (4, N): (3, N)."""
-    w, x, y, z = q
-    vx, vy, vz = v
-    tx, ty, tz = 2 * (y * vz - z * vy), 2 * (z * vx - x * vz), 2 * (x * vy - y * vx)
-    return np.stack([vx + w * tx + y * tz - z * ty, vy + w * ty + z * tx - x * tz, vz + w * tz + x * ty - y * tx])
 
 
 def compute_local_rotations(skeleton: Skeleton, world: np.ndarray) -> np.ndarray:

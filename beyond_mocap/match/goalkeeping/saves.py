@@ -24,6 +24,9 @@ one the hands meet the ball 1.2 to 1.4 m aside, in a long one 2.5 m (`synthetic.
 MISSED_REACH = 2.5
 """m aside up to which a keeper dives for a ball that goes in."""
 
+WRONG_FOOTED = 0.3
+"""m that a keeper moves to the other side while the ball passes, beyond which they dive for it no more."""
+
 READY = "ready"
 """Label of the set position."""
 
@@ -83,10 +86,15 @@ def label_missed_saves(shots: Sequence[Shot], table: EventLabelTable, heights: b
     """
     out = []
     for shot in shots:
-        if shot.end == GOAL and abs(shot.lateral) < MISSED_REACH:
+        if shot.end == GOAL and abs(shot.lateral) < MISSED_REACH and not _is_wrong_footed(shot):
             labels = table.find_labels("save", "hand", ("parried",), find_save_values(shot, heights))
             out.append(build_moment(shot.arrival, (*labels, AVOID_PREFIX + TOUCH), SHOTS, shot.confidence))
     return [moment for moment in out if moment is not None]
+
+
+def _is_wrong_footed(shot: Shot) -> bool:
+    """Say whether the keeper's own track goes to the other side than the ball."""
+    return bool(shot.moved * shot.lateral < 0.0 and abs(shot.moved) > WRONG_FOOTED)
 
 
 def label_set_positions(shots: Sequence[Shot], moments: Sequence[Moment]) -> list[Moment]:

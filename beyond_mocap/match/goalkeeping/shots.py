@@ -40,6 +40,7 @@ class Shot:
         place: (3,) m of the ball's centre then, NaN as above.
         lateral: m from the goalkeeper's place before they move for it to the ball, square to its way; to their left
             positive.
+        moved: m that the goalkeeper moves from the shot until then, as `lateral`.
         save: index of the touch that saves it, -1 without one.
         confidence: 0 to 1.
     """
@@ -51,6 +52,7 @@ class Shot:
     arrival: float
     place: tuple[float, float, float]
     lateral: float
+    moved: float
     save: int
     confidence: float
 
@@ -107,9 +109,9 @@ def _build_shot(match: Match, solved: SolvedBall, number: int, keeper: str, goal
         arrival, place = following[0].time, following[0].position
     elif end == GOAL:
         arrival, place = _find_passing(match, solved, keeper, touch.time, end=left, goal=goal)
-    lateral = _measure_lateral(match, keeper, touch, float(arrival), place)
+    lateral, moved = _measure_lateral(match, keeper, touch, float(arrival), place)
     return Shot(time=touch.time, shooter=touch.player, keeper=keeper, end=end, arrival=float(arrival),
-                place=(float(place[0]), float(place[1]), float(place[2])), lateral=lateral,
+                place=(float(place[0]), float(place[1]), float(place[2])), lateral=lateral, moved=moved,
                 save=number + 1 if is_save else -1,
                 confidence=min([touch.confidence, *(other.confidence for other in following if is_save)]))
 
@@ -124,14 +126,19 @@ def _find_passing(match: Match, solved: SolvedBall, keeper: str, start: float, e
     return float(times[passed]), ball[passed]
 
 
-def _measure_lateral(match: Match, keeper: str, touch: SolvedTouch, arrival: float, place: np.ndarray) -> float:
-    """Measure how far the ball passes from where the goalkeeper waits, m, to their left positive."""
+def _measure_lateral(match: Match, keeper: str, touch: SolvedTouch, arrival: float,
+                     place: np.ndarray) -> tuple[float, float]:
+    """Measure how far the ball passes from where the goalkeeper waits, and how far they move meanwhile, m, to their
+    left positive.
+    """
     if not np.isfinite(arrival):
-        return np.nan
-    waits = _find_place(match, keeper, np.array([max(touch.time, arrival - _LAUNCH_SECONDS)]))[0]
+        return np.nan, np.nan
+    times = np.array([touch.time, max(touch.time, arrival - _LAUNCH_SECONDS), arrival])
+    before, waits, after = _find_place(match, keeper, times)
     way = place[:2] - touch.position[:2]
     way = way / max(float(np.linalg.norm(way)), 1e-9)
-    return float((place[:2] - waits) @ np.array([way[1], -way[0]]))
+    left = np.array([way[1], -way[0]])
+    return float((place[:2] - waits) @ left), float((after - before) @ left)
 
 
 def _find_place(match: Match, player: str, times: np.ndarray) -> np.ndarray:

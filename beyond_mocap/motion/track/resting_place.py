@@ -15,6 +15,7 @@ from dataclasses import replace
 import numpy as np
 
 from ...base.easing import smoothstep
+from ...base.time_series import find_runs
 from .data import SampledTrack
 from .sampling import compute_travel_direction, smooth_zero_phase_hann
 
@@ -116,7 +117,7 @@ def find_rests(positions: np.ndarray, fps: float, half_diagonal: float = REST_HA
     """
     found: list[tuple[int, int]] = []
     least = max(int(round(seconds * fps)), 2)
-    length = measure_rest_lengths(positions, half_diagonal)
+    length = measure_rest_lengths(positions, half_diagonal, least)
     queue: list[tuple[int, int, int, int]] = []
     _push_longest(queue, length, 0, len(positions))
     while queue and -queue[0][0] >= least:
@@ -136,17 +137,41 @@ def _push_longest(queue: list[tuple[int, int, int, int]], length: np.ndarray, fi
         heapq.heappush(queue, (-int(inside[best]), first + best, first, end))
 
 
-def measure_rest_lengths(positions: np.ndarray, half_diagonal: float) -> np.ndarray:
-    """Measure for every frame how many frames from it on fit the box: (T,) int.
+def measure_rest_lengths(positions: np.ndarray, half_diagonal: float, least: int = 1) -> np.ndarray:
+    """Measure for every frame how many frames from it on fit the box.
+
+    Args:
+        positions: (T, 2) m.
+        half_diagonal: m from the box's middle to its corner.
+        least: frames; what is shorter may be given as 0. It costs much less where a player hardly rests.
+    Returns:
+        (T,) int.
+    """
+    out, limit = np.zeros(len(positions), dtype=int), (2.0 * half_diagonal) ** 2
+    values = {(axis, sign): (sign * positions[:, axis]).tolist() for axis in (0, 1) for sign in (1.0, -1.0)}
+    for first, end in find_runs(_may_rest(positions, limit, least)):
+        out[first:end] = _measure_run(values, range(first, end), limit)
+    return out
+
+
+def _may_rest(positions: np.ndarray, limit: float, least: int) -> np.ndarray:
+    """Return (T,) bool: frames from which on so many frames fit the box with the squared diagonal `limit`, about."""
+    may, count = np.zeros(len(positions), bool), len(positions) - least + 1
+    if count > 0:
+        windows = np.lib.stride_tricks.sliding_window_view(positions, least, axis=0)
+        size = windows.max(axis=2) - windows.min(axis=2)
+        may[:count] = np.sum(size**2, axis=1) <= limit * (1.0 + 1e-9)
+    return may
+
+
+def _measure_run(values: dict[tuple[int, float], list[float]], run: range, limit: float) -> list[int]:
+    """Measure how many frames fit the box from each frame of a run on.
 
     Two ends move forwards, with the extremes between them in queues, so the time is linear.
     """
-    count, limit = len(positions), (2.0 * half_diagonal) ** 2
-    out = np.zeros(count, dtype=int)
-    queues = [(axis, sign, deque()) for axis in (0, 1) for sign in (1.0, -1.0)]
-    values = {(axis, sign): (sign * positions[:, axis]).tolist() for axis, sign, _ in queues}
-    end = 0
-    for first in range(count):
+    count, out, end = len(values[0, 1.0]), [], run[0]
+    queues = [(axis, sign, deque()) for axis, sign in values]
+    for first in run:
         while end < count and _fits(queues, values, end, limit):
             for axis, sign, queue in queues:
                 row = values[axis, sign]
@@ -154,7 +179,7 @@ def measure_rest_lengths(positions: np.ndarray, half_diagonal: float) -> np.ndar
                     queue.pop()
                 queue.append(end)
             end += 1
-        out[first] = end - first
+        out.append(end - first)
         for _, _, queue in queues:
             if queue and queue[0] == first:
                 queue.popleft()

@@ -22,6 +22,13 @@ def test_the_lengths_of_all_stretches():
     assert found.tolist() == [longest_by_trying(walk, first, 0.1) for first in range(len(walk))]
 
 
+def test_lengths_below_the_least_that_counts_may_be_left_out():
+    walk = np.cumsum(np.random.default_rng(4).normal(0.0, 0.02, (600, 2)), axis=0)
+    whole, found = measure_rest_lengths(walk, 0.1), measure_rest_lengths(walk, 0.1, 18)
+    assert 10 < np.count_nonzero(whole >= 18) < 590
+    assert np.array_equal(np.where(whole >= 18, whole, 0), np.where(found >= 18, found, 0))
+
+
 def test_stands_do_not_overlap_and_fit_their_box():
     walk = np.cumsum(np.random.default_rng(5).normal(0.0, 0.01, (900, 2)), axis=0)
     rests = find_rests(walk, FPS)

@@ -75,6 +75,14 @@ def test_a_beaten_keeper_dives_and_misses():
     assert not keeper_moments(match_of(MISSED_REACH + 0.6, 0.5))  # nobody dives for that one
 
 
+@pytest.mark.parametrize("moved, dives", [(-0.8, 1), (0.2, 1), (0.8, 0)])
+def test_a_keeper_whose_track_goes_the_other_way_dives_no_more(moved, dives):
+    match = match_of(1.6, 0.5)  # to their left, -y
+    positions = match.positions.copy()
+    positions[5, :, 1] = moved * np.clip((TIMES - SHOT_TIME) / 0.6, 0.0, 1.0)
+    assert len(keeper_moments(replace(match, positions=positions))) == dives
+
+
 def test_a_keeper_is_set_before_a_shot_that_nobody_touches():
     match = match_of(4.4, 0.5)  # wide
     (shot,) = find_shots(match, solve_ball(match), find_kept_lines(match))
