@@ -12,6 +12,7 @@ from functools import cached_property
 
 import numpy as np
 
+from ..motion import quaternion
 from ..motion.humanoid import identify_joints
 from ..motion.skeleton import Skeleton
 from ..motion.track import BALL_RADIUS
@@ -50,6 +51,12 @@ def _build_tips(skeleton: Skeleton) -> list[BodySurface]:
     return tips
 
 
+def _place_points(points: Sequence[tuple[int, np.ndarray]], positions: np.ndarray, rotations: np.ndarray) -> np.ndarray:
+    """Place points that joints carry, each with its joint's index: (W, S, 3) m."""
+    joints, offsets = [joint for joint, _ in points], np.array([offset for _, offset in points])
+    return positions[:, joints] + quaternion.rotate(rotations[:, joints], offsets)
+
+
 @dataclass(frozen=True, eq=False)
 class BodySolid:
     """S solids of a body over W frames.
@@ -73,11 +80,11 @@ class BodySolid:
             positions: (W, J, 3) m, world frame.
             rotations: (W, J, 4) quaternions, world frame.
         """
-        lines = [surface.compute_line(positions, rotations) for surface in surfaces]
-        start = np.stack([line[0] for line in lines], axis=1)
-        along = np.stack([line[1] for line in lines], axis=1) - start
+        start, end = (_place_points([getattr(surface, name) for surface in surfaces], positions, rotations)
+                      for name in ("start", "end"))
         radius = np.array([surface.radius for surface in surfaces])
-        return cls(start, along, radius + BALL_RADIUS, np.array([surface.end_radius for surface in surfaces]) - radius)
+        end_radius = np.array([surface.end_radius for surface in surfaces])
+        return cls(start, end - start, radius + BALL_RADIUS, end_radius - radius)
 
     @cached_property
     def _line_squares(self) -> np.ndarray:

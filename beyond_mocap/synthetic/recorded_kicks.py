@@ -38,7 +38,7 @@ PLAYBACK_RATES = (0.6, 1.25)
 """Limits of a swing's playback rate: slower ones are those of soft passes."""
 
 _PLACE_COST, _PEAK_COST = 15.0, 60.0  # m/s of foot speed that a metre, or a second from the fastest moment, is worth
-_FOLLOW_SECONDS, _FOLLOW_HEIGHT = (0.1, 0.25), 0.45
+_FOLLOW_SECONDS, _FOLLOW_HEIGHT = (0.1, 0.25), 0.6
 """Seconds after the contact in which a foot follows through, and shares of the leg to which its ankle then rises."""
 
 _FOLLOW_COST = 12.0  # m/s of foot speed that a leg's length of it is worth

@@ -24,21 +24,36 @@ _HELD = 0.005  # m by which the foot may miss it
 _NEAR = 1  # frames from the contact with the ball in which the foot may leave the ground or reach it
 
 
-def place_plant_foot(body: Body, reached: Body, side: str, at: int, is_standing: np.ndarray, fps: float) -> Body:
-    """Move the plant foot of a kick into the usual range.
+def compute_step_shift(body: Body, side: str, at: int) -> np.ndarray:
+    """Compute the shift (3,) m, world, of a kick's plant foot into its usual range, at most MAX_PLANT_SHIFT.
 
     Args:
-        body: the body before its foot is brought to the ball, W frames.
-        reached: the same with the foot at the ball.
+        body: the body with its foot at the ball, W frames.
+        side: of the kicking foot.
+        at: frame of the contact with the ball.
+    """
+    place = measure_plant_place(body.skeleton, body.places[at], side)
+    ahead, beside = compute_plant_shift(body.skeleton, place, _MARGIN)
+    heading = compute_heading_from_positions(body.skeleton, body.places[at])
+    level = np.array([ahead, beside if side == "right" else -beside])
+    level *= min(1.0, MAX_PLANT_SHIFT / max(float(np.linalg.norm(level)), 1e-9))
+    return np.append(quaternion.rotate_level(level[None], np.atleast_1d(heading))[0], 0.0)
+
+
+def place_plant_foot(body: Body, shift: np.ndarray, side: str, at: int, is_standing: np.ndarray, fps: float) -> Body:
+    """Move the plant foot of a kick for the stance in which it kicks.
+
+    Args:
+        body: the body, W frames.
+        shift: (3,) m, world.
         side: of the kicking foot.
         at: frame of the contact with the ball.
         is_standing: (W,) bool, the plant foot is in contact with the ground.
         fps: frames per second.
     Returns:
-        The body; itself where the foot stands in range, or does not step within these frames.
+        The body; itself where the foot does not step within these frames, or the leg does not follow.
     """
     share = _compute_share(is_standing, at, _LEAST_SECONDS * fps)
-    shift = _compute_shift(reached, side, at)
     if share is None or not shift.any():
         return body
     human = identify_joints(body.skeleton)
@@ -50,16 +65,6 @@ def place_plant_foot(body: Body, reached: Body, side: str, at: int, is_standing:
         if np.linalg.norm(moved.places[:, foot] - body.places[:, foot] - moves, axis=1).max() < _HELD:
             return moved
     return body
-
-
-def _compute_shift(body: Body, side: str, at: int) -> np.ndarray:
-    """Compute the shift (3,) m, world, of the plant foot into its range, at most MAX_PLANT_SHIFT."""
-    place = measure_plant_place(body.skeleton, body.places[at], side)
-    ahead, beside = compute_plant_shift(body.skeleton, place, _MARGIN)
-    heading = compute_heading_from_positions(body.skeleton, body.places[at])
-    level = np.array([ahead, beside if side == "right" else -beside])
-    level *= min(1.0, MAX_PLANT_SHIFT / max(float(np.linalg.norm(level)), 1e-9))
-    return np.append(quaternion.rotate_level(level[None], np.atleast_1d(heading))[0], 0.0)
 
 
 def _compute_share(is_standing: np.ndarray, at: int, least: float) -> np.ndarray | None:

@@ -51,7 +51,7 @@ from .move_body_part import (
     solve_swing,
     swing_thigh,
 )
-from .place_plant_foot import place_plant_foot
+from .place_plant_foot import compute_step_shift, place_plant_foot
 from .step_to_ball import step_to_ball
 
 BALL_NOISE, FILLED_NOISE = 0.3, 1.0
@@ -150,10 +150,10 @@ def strike_ball(
                         measured=measured, height_known=height_known, fps=fps)
         scene = build(body)
         reached, moved[number] = _reach_ball(scene, body)
-        planted = _place_plant_foot(scene, body, reached, contacts[span], fps)
-        if planted is not body:
-            scene = build(planted)
-            reached, moved[number] = _reach_ball(scene, planted)
+        if _place_plant_foot(scene, reached, root, rotations, contacts, fps):
+            body = Body.from_pose(skeleton, root[span], rotations[span])
+            scene = build(body)
+            reached, moved[number] = _reach_ball(scene, body)
         reached = _calm_taking_foot(scene, reached, contacts[span], fps)
         root[span], rotations[span] = reached.root, reached.rotations
         places = [scene.solve_ball(scene.compute_surface_lines(reached, frame), frame)[0] for frame in moment.held]
@@ -192,6 +192,7 @@ class _TouchFrames:
         low: frame before which the body does not change.
         high: frame after which it does not.
         bounds: held frames of the touches before and after.
+        whole: first and last frame of the clip's entry and exit, between them.
     """
 
     words: frozenset[str]
@@ -200,6 +201,7 @@ class _TouchFrames:
     low: int
     high: int
     bounds: tuple[int, int]
+    whole: tuple[int, int]
 
 
 def _iter_touch_frames(skeleton: Skeleton, touches: Sequence[Touch], count: int, fps: float):
@@ -215,8 +217,9 @@ def _iter_touch_frames(skeleton: Skeleton, touches: Sequence[Touch], count: int,
         before, after = ends[place][1], ends[place + 2][0]
         low = max(int(first - np.clip(touch.entry, shortest, longest)), before)
         high = min(int(np.ceil(last + np.clip(touch.leave, shortest, longest))), after)
+        whole = min(low, max(int(first - touch.entry), before)), max(high, min(int(last + touch.leave), after))
         yield number, _TouchFrames(words=frozenset(touch.words), frame=find_nearest_frame(frame, count),
-                                   held=held[place], low=low, high=high, bounds=(before, after))
+                                   held=held[place], low=low, high=high, bounds=(before, after), whole=whole)
 
 
 def find_nearest_frame(frame: float, count: int) -> int:
@@ -284,9 +287,10 @@ class _TouchProblem:
         return solved.ball[0], solved.need
 
     def compute_ball_range(self, frame: int) -> BallRange:
-        """Return how far the ball may move; a ball on the ground stays there."""
+        """Return how far the ball may move; a ball on the ground stays there, and one just above it nearly so: a feed's
+        heights are noisy, and a ball lifted to a foot would hop there by itself."""
         whole = BALL_NOISE if self.measured[frame] else FILLED_NOISE
-        return BallRange(whole, whole if self.ball[frame, 2] > _IN_THE_AIR else 0.0)
+        return BallRange(whole, float(np.clip(self.ball[frame, 2] - _IN_THE_AIR, 0.0, whole)))
 
 
 def _build_problem(body: Body, moment: _TouchFrames, origin: int, contacts, path, measured, height_known,
@@ -453,13 +457,27 @@ def _calm_taking_foot(scene: _TouchProblem, body: Body, contacts: np.ndarray, fp
     return calm_foot(body, part, (first - scene.origin, last - scene.origin), _is_in_contact(contacts, part), fps)
 
 
-def _place_plant_foot(scene: _TouchProblem, body: Body, reached: Body, contacts: np.ndarray, fps: float) -> Body:
-    """Place the plant foot of a kick; contacts (W, 2) bool. The body itself where nothing changes."""
-    part = scene.parts[0]
-    if part.part != "foot" or not _SENDING & scene.moment.words:
-        return body
-    is_standing = contacts[:, 0 if part.side == "right" else 1]
-    return place_plant_foot(body, reached, part.side, scene.at, is_standing, fps=fps)
+def _place_plant_foot(scene: _TouchProblem, reached: Body, root, rotations, contacts, fps: float) -> bool:
+    """Place the plant foot of a kick within its clip's entry and exit; return whether it has changed `rotations`.
+
+    Args:
+        scene: the kick.
+        reached: the body with its foot at the ball.
+        root: (T, 3) m of the take.
+        rotations: (T, J, 4) local, changed in place.
+        contacts: (T, 2) bool.
+        fps: frames per second.
+    """
+    part, moment = scene.parts[0], scene.moment
+    if part.part != "foot" or not _SENDING & moment.words:
+        return False
+    low, high = max(moment.whole[0], 0), min(moment.whole[1], len(root) - 1)
+    body = Body.from_pose(reached.skeleton, root[low : high + 1], rotations[low : high + 1])
+    shift = compute_step_shift(reached, part.side, scene.at)
+    standing = contacts[low : high + 1, 0 if part.side == "right" else 1]
+    placed = place_plant_foot(body, shift, part.side, moment.frame - low, standing, fps)
+    rotations[low : high + 1] = placed.rotations
+    return placed is not body
 
 
 def _solve_shifts(scene: _TouchProblem, body: Body, lines: np.ndarray, shifts: np.ndarray) -> np.ndarray:

@@ -15,14 +15,17 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ...annotation.ball_contact import build_surfaces
+from ...annotation.ball_contact import build_surfaces, find_striking_part
 from ...annotation.labels import list_labels
 from ...annotation.striking import trace_fastest_surface
+from ...annotation.vocabulary import SIDES
 from ...base.vectors import arctan2
 from ...library.keys import Key
 from ...library.library import Library
 from ...motion import quaternion
 from ...motion.motion import compute_pose, sample_frames
+from ...motion.plant_place import compute_plant_shift, measure_plant_place
+from ...motion.skeleton import Skeleton
 from ...motion.track import SampledTrack
 from .request import library_frame
 
@@ -39,6 +42,8 @@ SPEED_RATIO = (1.06, 1.3)
 SWING_RATES = (0.65, 1.4)
 """Limits of the playback rate of a swing at its touch, and of its share of the clip's own rate."""
 
+PLANT_COST = 1.5  # per metre that a kick's plant foot is off its usual place, beyond what its step can go elsewhere
+_FREE_PLANT = 0.08  # m
 _RATIO_SOUGHT = (1.1, 1.25)  # of speeds: what a swing is played for, within SPEED_RATIO
 _SWING_COST = 0.25  # per unit of the logarithm of a swing's own rate
 
@@ -89,6 +94,7 @@ class StrikeMeasurements:
         height: (K,) m.
         velocity: (K, 3) m/s against the player's travel.
         sends: (K,) bool, the labels say that the ball is sent: only its velocity follows the part's.
+        plant_off: (K,) m by which the plant foot of a kick is off its usual place, 0 where it is not known.
         rate: (K,) playback rate of the clips, already part of the velocity.
     """
 
@@ -96,12 +102,14 @@ class StrikeMeasurements:
     height: np.ndarray
     velocity: np.ndarray
     sends: np.ndarray
+    plant_off: np.ndarray | float = 0.0
     rate: np.ndarray | float = 1.0
 
     def play(self, choice: np.ndarray, rate: np.ndarray) -> "StrikeMeasurements":
         """Return the same of clips `choice` (P,) played at playback rates (P,)."""
+        off = np.broadcast_to(self.plant_off, self.height.shape)[choice]
         return StrikeMeasurements(self.place[choice], self.height[choice], rate[:, None] * self.velocity[choice],
-                                  self.sends[choice], rate)
+                                  self.sends[choice], off, rate)
 
 
 def measure_ball(track: SampledTrack, frame: float, is_height_known: bool) -> BallMeasurement:
@@ -142,10 +150,10 @@ def measure_strikes(library: Library, keys: Sequence[Key]) -> StrikeMeasurements
     frame = np.clip(frame, 0, len(library.frames) - 1)
     back = -_travel_direction(library, frame)
     rows = [_measure_strike(library, key, p, r, a) for key, p, r, a in zip(keys, places, rotations, back)]
-    place, height, velocity = (np.array(values) for values in zip(*rows))
+    place, height, velocity, plant_off = (np.array(values) for values in zip(*rows))
     velocity[:, 0] -= np.linalg.norm(library.frames.velocity[frame], axis=1)
     sends = np.array([bool(_SENDING & key.labels) for key in keys])
-    return StrikeMeasurements(place, height, velocity, sends)
+    return StrikeMeasurements(place, height, velocity, sends, np.where(sends, plant_off, 0.0))
 
 
 def _fetch_poses_around(library: Library, key: Key):
@@ -163,13 +171,29 @@ def _travel_direction(library: Library, frame: np.ndarray) -> np.ndarray:
 
 
 def _measure_strike(library: Library, key: Key, places: np.ndarray, rotations: np.ndarray, back: float):
-    """Measure place (2,), height and velocity (3,) of the striking part; places (3, J, 3), rotations (3, J, 4)."""
+    """Measure place (2,), height and velocity (3,) of the striking part, and how far off the plant foot is.
+
+    Args:
+        places: (3, J, 3) m, world, a moment before, at, and a moment after the strike.
+        rotations: (3, J, 4), world.
+        back: rad that turn the clip's world into the frame of travel.
+    """
     found = build_surfaces(library.skeleton, key.labels)
     if not found:
-        return np.full(2, np.nan), np.nan, np.full(3, np.nan)
+        return np.full(2, np.nan), np.nan, np.full(3, np.nan), 0.0
     middle = trace_fastest_surface(found, places, rotations)
     place = quaternion.rotate_level((middle[1] - places[1, 0])[None, :2], np.array([back]))[0]
-    return place, float(middle[1, 2]), _rotate_about_up((middle[2] - middle[0]) / (2.0 * _MOMENT), back)
+    velocity = _rotate_about_up((middle[2] - middle[0]) / (2.0 * _MOMENT), back)
+    return place, float(middle[1, 2]), velocity, _measure_plant_off(library.skeleton, places[1], key.labels)
+
+
+def _measure_plant_off(skeleton: Skeleton, places: np.ndarray, labels: frozenset[str]) -> float:
+    """Measure how far, m, the plant foot is off its usual place, joints at (J, 3) m; 0 without one foot that kicks."""
+    sides = [side for side in SIDES if side in labels]
+    if len(sides) != 1 or find_striking_part(labels) != "foot":
+        return 0.0
+    shift = compute_plant_shift(skeleton, measure_plant_place(skeleton, places, sides[0]))
+    return float(np.linalg.norm(shift))
 
 
 def _rotate_about_up(vector: np.ndarray, angle: float) -> np.ndarray:
@@ -182,6 +206,7 @@ def compute_key_misfit(found: StrikeMeasurements, ball: BallMeasurement) -> np.n
     apart = np.linalg.norm(found.place - ball.place, axis=1)
     cost = PLACE_COST * np.clip(apart - _NOISE, 0.0, _FARTHEST)
     cost = np.nan_to_num(cost + TURN_COST * ball.speed * _compute_needed_turn(found.place, ball.place))
+    cost += PLANT_COST * np.maximum(found.plant_off - _FREE_PLANT, 0.0)
     cost += np.nan_to_num(HEIGHT_COST * np.maximum(np.abs(found.height - ball.height) - _NOISE, 0.0))
     swing = compute_swing_rates(found, ball)
     velocity = swing[:, None] * found.velocity + [ball.speed, 0.0, 0.0]

@@ -63,10 +63,14 @@ def test_keepers_are_those_who_stand_deepest():
     assert find_keepers(positions, ["home"] * 4 + ["away"] * 4) == {"home": 0, "away": 4}
 
 
-def test_a_ball_leaves_the_line_inward():
-    assert is_from_touch_line(np.array([10.0, 33.8, 2.0]), np.array([5.0, -8.0, 2.0]), 68.0)
-    assert not is_from_touch_line(np.array([10.0, 33.8, 2.0]), np.array([5.0, 8.0, 2.0]), 68.0)
-    assert not is_from_touch_line(np.array([10.0, 20.0, 2.0]), np.array([5.0, -8.0, 2.0]), 68.0)
+@pytest.mark.parametrize("place, after, is_thrown", [
+    ((10.0, 33.8, 2.0), (5.0, -8.0, 2.0), True), ((10.0, 33.8, 2.0), (5.0, 8.0, 2.0), False),
+    ((10.0, 20.0, 2.0), (5.0, -8.0, 2.0), False), ((52.0, 33.8, 0.11), (-2.0, -19.0, 9.0), False),
+    ((52.0, 33.8, 2.0), (-2.0, -9.0, 4.0), True), ((10.0, 33.8, 0.11), (-2.0, -29.0, 9.0), False),
+])  # fmt: skip
+def test_a_throw_leaves_the_touch_line_inward_not_from_a_corner_and_no_faster_than_a_person_throws(place, after,
+                                                                                                   is_thrown):
+    assert is_from_touch_line(np.array(place), np.array(after), (105.0, 68.0)) == is_thrown
 
 
 def test_the_ball_over_the_touch_line_comes_back_by_a_throw_in():

@@ -106,6 +106,13 @@ def test_a_ball_that_runs_ahead_is_taken_into_the_run():
     assert names == [inside, "first touch into the run", inside, "reception with the thigh"]
 
 
+def test_a_high_ball_is_taken_with_the_head_and_one_that_is_let_run_without_a_turn():
+    assert find_action(moment("receive", "head", height=1.7)).name == "reception with the head"
+    assert find_action(moment("receive", "head", height=2.3)).name == "reception with the head in a jump"
+    assert {find_action(moment("letgo", speed=speed)).name for speed in (0.0, 4.0)} == {"letting the ball run"}
+    assert find_action(moment("turning", "letgo", speed=1.5)).name == "turn that lets the ball run"
+
+
 def test_a_keeper_meets_the_ball_where_it_is():
     names = [find_action(moment("catchb", *words, height=height)).name
              for words, height in (((), 0.2), ((), 1.2), ((), 2.3), (("dive",), 0.3), (("dive",), 1.5))]
