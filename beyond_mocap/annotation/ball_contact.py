@@ -136,7 +136,7 @@ def choose_part_by_height(labels: Iterable[str], height: float | None) -> tuple[
     """
     labels = tuple(labels)
     is_open = takes_with_foot(labels) and find_striking_part(labels) == "foot" and not _STATED & set(labels)
-    if not is_open or height is None:
+    if not is_open or height is None or shows_foot_on_ball(frozenset(labels)):
         return labels
     return (*labels, *next(part for most, part in _PART_BY_HEIGHT if height < most))
 

@@ -29,7 +29,8 @@ ACTIONS = ("throw", "kick")
 
 _ALLOWED_VALUES = {
     "kind": KINDS, "group": GROUPS, "part": (*BODY_PARTS, "thigh", "hands", "tool"), "flight": ("yes",),
-    "ball": ("sends", "takes", "carries", "avoids", "never"), "height": ("low", "middle", "high"), "action": ACTIONS,
+    "ball": ("sends", "takes", "carries", "avoids", "holds", "never"), "height": ("low", "middle", "high"),
+    "action": ACTIONS,
 }  # fmt: skip
 _COLUMNS = (
     "label", "title", "meaning", "kind", "group", "part", "part_with", "ball", "gait_m_s", "height", "flight", "action",
@@ -50,7 +51,7 @@ class Label:
         parts: body parts that may meet the ball, of `BODY_PARTS`, "thigh" or "tool".
         both_hands: whether both hands meet it together.
         part_with: labels of which one must be present for the part to be certain.
-        ball: "sends", "takes", "carries", "avoids", "never" or "".
+        ball: "sends", "takes", "carries", "avoids", "holds", "never" or "".
         gait: m/s from which the gait applies if a library has no own speed for it; None if it is no gait.
         height: of the ball at contact, or "".
         in_flight: whether the body flies to the ball.

@@ -30,7 +30,7 @@ from .construct.ball_detour import find_free_contact, lead_ball_around_body
 from .construct.contact_geometry import BALL_SECONDS, add_flight_arc, lead_ball_through
 from .construct.dribble import plan_dribbles
 from .construct.give import give_with_ball
-from .construct.held_ball import HandTouch, carry_in_hands
+from .construct.held_ball import HandTouch, carry_in_hands, hold_in_spans
 from .construct.near_miss import miss_ball
 from .construct.strike import BALL_NOISE, compute_contact_frames, find_nearest_frame
 from .plan import Plan, PlayerTouch, ResolvedPlan, SolvedTrajectory
@@ -48,7 +48,7 @@ _MET_GAP = 0.03  # m between the surfaces up to which a part is at the ball
 _LISTED_TIMES = 6  # key moments that a line lists
 _STEP = 0.004  # s between the points of a trajectory
 _SENDING, _TAKING = frozenset(list_labels(ball="sends")), frozenset(list_labels(ball="takes"))
-_CARRYING = frozenset(list_labels(ball="carries"))
+_CARRYING, _HOLDING = (frozenset(list_labels(ball=what)) for what in ("carries", "holds"))
 _SENDING_KINDS = {kind.name for kind in TOUCH_KINDS if kind.ball in ("sends", "carries")}
 _TAKING_KINDS = {kind.name for kind in TOUCH_KINDS if kind.ball == "takes"}
 
@@ -274,6 +274,8 @@ def apply_trajectory(take: Take, plan: ResolvedPlan) -> tuple[Take, list[str]]:
     take = _miss_ball(take, replace(take.ball, positions=dribbled.ball))
     free, met = _free_met_ball(take, dribbled.ball, pushes)
     free, carried = carry_in_hands(take.motion, free, [_build_hand_touch(take, key) for key in keys])
+    free, holds = hold_in_spans(take.motion, free, _find_shown(take, _HOLDING))
+    carried += holds
     around = lead_ball_around_body(take.motion.skeleton, take.motion.root_positions, take.motion.rotations, ball=free,
                                    held=[*met, *pushed, *carried], fps=fps)
     ball, far = replace(take.ball, positions=around), np.linalg.norm(around - dribbled.ball, axis=1)
@@ -313,6 +315,11 @@ def _report_detours(times: np.ndarray, moved: np.ndarray) -> list[str]:
             f"{moved[first:end].max():.2f} m away", (float(times[first]), float(times[end - 1])),
         ) for first, end in find_runs(moved > BALL_NOISE)
     ]  # fmt: skip
+
+
+def _find_shown(take: Take, labels: frozenset[str]) -> list[tuple[int, int]]:
+    """Find first and last frame of each stretch in which a take shows one of some labels."""
+    return [(first, end - 1) for first, end in find_runs(np.array([bool(labels & set(words)) for words in take.words]))]
 
 
 def _build_hand_touch(take: Take, key: KeyResult) -> HandTouch:

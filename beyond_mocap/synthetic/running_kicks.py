@@ -141,7 +141,8 @@ def build_running_kick(
     times = gait_plan.times[kept] - APPROACH_SECONDS
     posture = build_upper_posture(gait_plan, neutral, style, 0).frames(kept)
     poses = _read_swing(swing, rate * times - earlier, neutral, direction)
-    motion = _lay_swing(posture, times, tuple(steps), poses, neutral, landing=landings[2])
+    leaves = _LEG_OUT * min(rate, 1.0)  # a soft pass follows through less
+    motion = _lay_swing(posture, times, tuple(steps), poses, neutral, back=(leaves, landings[2]))
     start, end = APPROACH_SECONDS + landings[0] - 0.1, APPROACH_SECONDS + landings[2] + 0.1
     return Gesture(motion.frames(_MARGIN, len(motion) - _MARGIN), APPROACH_SECONDS, start, end)
 
@@ -230,15 +231,15 @@ def _place_plant_foot(steps: Footsteps, gait_plan: GaitPlan, landing: float, pos
 
 
 def _lay_swing(posture: Posture, times: np.ndarray, steps: tuple[Footsteps, ...], poses: _SwingPoses,
-               neutral: NeutralStance, landing: float) -> Motion:
-    """Lay a swing onto a run, both at s from the contact (T,); the kicking foot lands at `landing` s."""
+               neutral: NeutralStance, back: tuple[float, float]) -> Motion:
+    """Lay a swing onto a run, both at s from the contact (T,); the kicking leg returns to the run between `back` s."""
     share = compute_envelope(times, *_BODY)
     hips = posture.hips.copy()
     hips[:, 2] += share * (poses.height - hips[:, 2])
     pelvis = quaternion.slerp(quaternion.from_rotation_vector(posture.pelvis), poses.pelvis, share)
     posture = posture.replace_arrays(hips=hips, pelvis=quaternion.to_rotation_vector(pelvis))
     run = to_motion(plant_feet(posture, times + APPROACH_SECONDS, steps, neutral), neutral)
-    mixed = _blend_joints(run, poses.rotations, times, share=share, steps=steps[RIGHT], landing=landing)
+    mixed = _blend_joints(run, poses.rotations, times, share=share, steps=steps[RIGHT], back=back)
     # the hips of a run may be lower than the kick's own, so that its foot would go through the ground
     nowhere = np.zeros((len(mixed), 2, 2), bool)
     lifted = lift_feet(run.skeleton, run.root_positions, mixed, nowhere, run.fps)
@@ -246,13 +247,13 @@ def _lay_swing(posture: Posture, times: np.ndarray, steps: tuple[Footsteps, ...]
 
 
 def _blend_joints(run: Motion, kick: np.ndarray, times: np.ndarray, *, share: np.ndarray, steps: Footsteps,
-                  landing: float) -> np.ndarray:
+                  back: tuple[float, float]) -> np.ndarray:
     """Blend a run's local rotations (T, J, 4) into a kick's `kick`: trunk and arms by `share`, the leg in its swing."""
     body, skeleton = identify_joints(run.skeleton), run.skeleton
     legs = [set(list_descendants(skeleton.parents, side.upper_leg)) for side in (body.left, body.right)]
     above = set(list_descendants(skeleton.parents, body.hips)) - legs[LEFT] - legs[RIGHT] - {body.hips}
     before = steps.off[steps.off - APPROACH_SECONDS < 0.0].max() - APPROACH_SECONDS
-    swinging = compute_envelope(times, before + _LEG_IN[0], before + _LEG_IN[1], _LEG_OUT, landing)
+    swinging = compute_envelope(times, before + _LEG_IN[0], before + _LEG_IN[1], *back)
     out = run.rotations.copy()
     for joints, weight in ((sorted(above), share), (sorted(legs[RIGHT]), swinging)):
         out[:, joints] = quaternion.slerp(out[:, joints], kick[:, joints], weight[:, None])

@@ -15,8 +15,10 @@ import numpy as np
 from ...annotation.ball_contact import find_striking_part, uses_both_hands
 from ...annotation.body_solid import BodySolid
 from ...annotation.body_surfaces import build_body_surfaces
+from ...annotation.labels import list_labels
 from ...annotation.striking import HAND_RADIUS
 from ...base.easing import smoothstep
+from ...base.time_series import find_runs
 from ...base.vectors import cross_product, unit_vectors
 from ...motion import quaternion
 from ...motion.humanoid import identify_joints
@@ -34,6 +36,8 @@ _DROP_SECONDS = (0.08, 0.9)  # s of a fall from the hands to a foot, at least an
 _SOLID = frozenset({"trunk", "head", "neck", "thigh", "shank"})
 _ARMS_SHARE = 1.5  # how much more the forearms say than the chest where the front of both hands is
 _ROUNDS = 3
+_FROM_HANDS = frozenset(list_labels(part="foot", ball="sends", height="high", is_root=True))
+"""Kicks whose ball comes from the hands: those that are high by their first label alone."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -66,7 +70,7 @@ def carry_in_hands(motion: Motion, ball: np.ndarray, touches: Sequence[HandTouch
     out, held = ball, []
     for touch in touches:
         part, span = find_striking_part(touch.words), _limit_span(ball, touch, motion.fps)
-        if part not in ("hand", "foot") or span is None:
+        if part != "hand" and not _FROM_HANDS.intersection(touch.words) or span is None:
             continue
         hands = _build_hands(motion, span, touch, out)
         if hands is None:
@@ -79,6 +83,29 @@ def carry_in_hands(motion: Motion, ball: np.ndarray, touches: Sequence[HandTouch
                 out = out if found is None else hands.carry(out, found, meets=True)
                 held += [] if found is None else [found]
         held += [(found[0], touch.frames[0])] if part == "foot" and found is not None else []
+    return out, held
+
+
+def hold_in_spans(motion: Motion, ball: np.ndarray, spans: Sequence[tuple[int, int]]
+                  ) -> tuple[np.ndarray, list[tuple[int, int]]]:
+    """Let the ball go with the hands while an action shows that it is held.
+
+    Args:
+        motion: T frames.
+        ball: (T, 3) m, its centre.
+        spans: first and last frame of each such action.
+    Returns:
+        The ball, and first and last frame of each time that it is held.
+    """
+    out, held = ball, []
+    for first, last in spans:
+        touch = HandTouch(frames=(first, first), words=(), low=first, high=last)
+        span = _limit_span(ball, touch, motion.fps * (last - first + 1))
+        hands = None if span is None else _build_hands(motion, span, touch, ball)
+        found = () if hands is None else hands.find_closed(out)
+        for low, high in found:
+            out = hands.carry(out, (low, high), meets=False)
+            held.append((low, high))
     return out, held
 
 
@@ -135,6 +162,11 @@ class _Hands:
         last = first + int(open_hands[0]) - 1 if len(open_hands) else self.low + len(self.holds) - 1
         is_held = last - first >= _SHORTEST * self.fps and self._is_near(ball, first + int(_NEAR_SECONDS * self.fps))
         return (first, last) if is_held else None
+
+    def find_closed(self, ball: np.ndarray) -> list[tuple[int, int]]:
+        """Find first and last frame of each time that both hands are closed around a ball that is near."""
+        runs = [(self.low + a, self.low + b - 1) for a, b in find_runs(self.holds)]
+        return [(a, b) for a, b in runs if b - a >= _SHORTEST * self.fps and self._is_near(ball, (a + b) // 2)]
 
     def find_drop(self, ball: np.ndarray) -> tuple[int, int] | None:
         """Find first and last frame in which the hands hold the ball before they drop it to the foot."""

@@ -21,7 +21,7 @@ _MARGIN = 0.02  # m inside the range
 _LEAST_SECONDS = 0.1  # in the air before and after the stance, in which the foot gets there and back
 _SHARES = (1.0, 0.75, 0.5, 0.25)  # of the shift, the first of which the leg follows
 _HELD = 0.005  # m by which the foot may miss it
-_NEAR = 1  # frames from the contact with the ball in which the foot may leave the ground or reach it
+_NEAR_SECONDS = 0.1  # s from the contact with the ball in which the foot may reach the ground or leave it
 
 
 def compute_step_shift(body: Body, side: str, at: int) -> np.ndarray:
@@ -53,7 +53,7 @@ def place_plant_foot(body: Body, shift: np.ndarray, side: str, at: int, is_stand
     Returns:
         The body; itself where the foot does not step within these frames, or the leg does not follow.
     """
-    share = _compute_share(is_standing, at, _LEAST_SECONDS * fps)
+    share = _compute_share(is_standing, at, fps)
     if share is None or not shift.any():
         return body
     human = identify_joints(body.skeleton)
@@ -67,21 +67,32 @@ def place_plant_foot(body: Body, shift: np.ndarray, side: str, at: int, is_stand
     return body
 
 
-def _compute_share(is_standing: np.ndarray, at: int, least: float) -> np.ndarray | None:
-    """Compute the share (W,) of its shift that the foot has: 1 while it stands at frame `at`, 0 in other stances.
+def _compute_share(is_standing: np.ndarray, at: int, fps: float) -> np.ndarray | None:
+    """Compute the share (W,) of its shift that the foot has: 1 while it stands about frame `at`, 0 in other stances.
 
-    None where it does not stand there, or has not `least` frames to get there and back.
+    None where it does not stand there, or has no time to get there and back.
     """
-    stances = find_runs(is_standing)
-    mine = [number for number, (first, end) in enumerate(stances) if first - _NEAR <= at < end + _NEAR]
-    if not mine:
+    near = _NEAR_SECONDS * fps
+    stances = _join_stances(find_runs(is_standing), near)
+    mine = next((number for number, (first, end) in enumerate(stances) if first - near <= at < end + near), None)
+    if mine is None:
         return None
-    first, end = stances[mine[0]]
-    before = max((stop - 1 for _, stop in stances if stop <= first), default=0)
-    after = min((start for start, _ in stances if start >= end), default=len(is_standing) - 1)
-    if first - before < least or after - (end - 1) < least:
+    first, last = min(stances[mine][0], at), max(stances[mine][1] - 1, at)
+    before = stances[mine - 1][1] - 1 if mine else 0
+    after = stances[mine + 1][0] if mine + 1 < len(stances) else len(is_standing) - 1
+    if min(first - before, after - last) < _LEAST_SECONDS * fps:
         return None
     frames = np.arange(len(is_standing))
-    rise = np.clip((frames - before) / (first - before), 0.0, 1.0)
-    fall = np.clip((after - frames) / (after - (end - 1)), 0.0, 1.0)
-    return smoothstep(np.minimum(rise, fall))
+    rise, fall = (frames - before) / (first - before), (after - frames) / (after - last)
+    return smoothstep(np.clip(np.minimum(rise, fall), 0.0, 1.0))
+
+
+def _join_stances(stances: list[tuple[int, int]], longest: float) -> list[tuple[int, int]]:
+    """Join stances (first frame, end) between which a foot leaves the ground for at most `longest` frames."""
+    joined: list[tuple[int, int]] = []
+    for first, end in stances:
+        if joined and first - joined[-1][1] <= longest:
+            joined[-1] = (joined[-1][0], end)
+        else:
+            joined.append((first, end))
+    return joined

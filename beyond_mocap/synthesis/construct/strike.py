@@ -63,6 +63,7 @@ PELVIS_RANGE = (0.20, 0.64)  # m on the ground from pelvis to striking foot in m
 OUT_OF_REACH = 0.15  # m of remaining gap above which the body does not reach at all, and plays as recorded
 MAX_DROP = 0.04  # m, largest drop of the pelvis
 _LONGEST_EASE, _SHORTEST_EASE = 0.5, 0.12  # s before and after a strike in which the body is eased
+_STEP_SECONDS = (0.5, 0.8)  # s before and after a kick in which its plant foot gets to its place and back
 # sine of the ball's elevation as seen from the part
 _RISE = {"foot": 0.0, "hand": 0.0, "head": 0.6, "chest": 0.0, "thigh": 0.8}
 _IN_THE_AIR = 0.2  # m above which a ball may be met higher or lower
@@ -192,7 +193,7 @@ class _TouchFrames:
         low: frame before which the body does not change.
         high: frame after which it does not.
         bounds: held frames of the touches before and after.
-        whole: first and last frame of the clip's entry and exit, between them.
+        around: first and last frame, between them, in which the foot that stands may step elsewhere.
     """
 
     words: frozenset[str]
@@ -201,7 +202,7 @@ class _TouchFrames:
     low: int
     high: int
     bounds: tuple[int, int]
-    whole: tuple[int, int]
+    around: tuple[int, int]
 
 
 def _iter_touch_frames(skeleton: Skeleton, touches: Sequence[Touch], count: int, fps: float):
@@ -217,9 +218,9 @@ def _iter_touch_frames(skeleton: Skeleton, touches: Sequence[Touch], count: int,
         before, after = ends[place][1], ends[place + 2][0]
         low = max(int(first - np.clip(touch.entry, shortest, longest)), before)
         high = min(int(np.ceil(last + np.clip(touch.leave, shortest, longest))), after)
-        whole = min(low, max(int(first - touch.entry), before)), max(high, min(int(last + touch.leave), after))
+        around = max(int(first - _STEP_SECONDS[0] * fps), before), min(int(last + _STEP_SECONDS[1] * fps), after)
         yield number, _TouchFrames(words=frozenset(touch.words), frame=find_nearest_frame(frame, count),
-                                   held=held[place], low=low, high=high, bounds=(before, after), whole=whole)
+                                   held=held[place], low=low, high=high, bounds=(before, after), around=around)
 
 
 def find_nearest_frame(frame: float, count: int) -> int:
@@ -458,7 +459,7 @@ def _calm_taking_foot(scene: _TouchProblem, body: Body, contacts: np.ndarray, fp
 
 
 def _place_plant_foot(scene: _TouchProblem, reached: Body, root, rotations, contacts, fps: float) -> bool:
-    """Place the plant foot of a kick within its clip's entry and exit; return whether it has changed `rotations`.
+    """Place the plant foot of a kick; return whether that has changed `rotations`.
 
     Args:
         scene: the kick.
@@ -471,7 +472,7 @@ def _place_plant_foot(scene: _TouchProblem, reached: Body, root, rotations, cont
     part, moment = scene.parts[0], scene.moment
     if part.part != "foot" or not _SENDING & moment.words:
         return False
-    low, high = max(moment.whole[0], 0), min(moment.whole[1], len(root) - 1)
+    low, high = max(moment.around[0], 0), min(moment.around[1], len(root) - 1)
     body = Body.from_pose(reached.skeleton, root[low : high + 1], rotations[low : high + 1])
     shift = compute_step_shift(reached, part.side, scene.at)
     standing = contacts[low : high + 1, 0 if part.side == "right" else 1]

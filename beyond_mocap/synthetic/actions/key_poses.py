@@ -67,6 +67,8 @@ class KeyPoses:
         flights: seconds of take-off and landing of each flight.
         lies: seconds between which the body lies or rolls on the ground.
         hold: rows (time, share, m between both hands' joints): hands that meet around a ball.
+        varies: name of the action beside which it is offered (`Action`).
+        style: of the gait below.
     """
 
     labels: str
@@ -92,6 +94,7 @@ class KeyPoses:
     flights: tuple[tuple[float, float], ...] = ()
     lies: tuple[float, float] | None = None
     hold: Rows | None = None
+    varies: str = ""
     style: GaitStyle = GaitStyle(life=0.6)
 
     @property

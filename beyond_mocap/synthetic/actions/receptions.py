@@ -29,6 +29,7 @@ SLOWEST = 0.7
 SPEEDS = (0.0, 1.2, 1.8, 2.5, 3.5, 4.9, 6.9)
 """Speeds in m/s of the body at which receptions are built; from one to the next up to 1.4 times, as kicks."""
 
+_MOVES_FROM = 0.9  # m/s of players from which on a feint or a tackle is on the way
 # a ball taken on the way: seconds from the touch, and share of the slowing down towards it that is reached
 _SLOWING = ((-1.3, 0.0), (-0.8, 0.0), (-0.25, 0.65), (0.05, 1.0), (0.4, 0.7), (0.9, 0.0), (1.4, 0.0))
 _SLOWED = (0.35, 0.15)  # share of its speed that a walking and a running body loses at the touch
@@ -139,6 +140,18 @@ RECEPTIONS = {
         right_arm=((-0.20, 4, 42, 12, 36), (0.0, -14, 54, 10, 30), (0.25, 0, 40, 12, 38)),
         spine=((-0.20, -4, 2, 4), (0.0, -6, 2, 0), (0.20, -3, 10, 4)),
     ),
+    "high inside": Reception(
+        name="reception with the raised inside of the foot",
+        labels=("receive", "foot", "high", "inside"), speeds=(0.0, 2.5), heights=(0.45, 0.75), height=0.5,
+        foot=(
+            (-0.16, 0.36, -0.15, 0.400, -2, -58, -6),
+            (0.0, 0.38, -0.15, 0.390, -2, -64, -8), (0.08, 0.32, -0.15, 0.350, -2, -64, -8),
+            (0.17, 0.24, -0.15, 0.280, 0, -54, -6), (0.34, 0.16, -0.13, 0.140, 4, -24, 0),
+        ),
+        low=0.04, left_arm=((-0.20, 14, 46, 10, 36), (0.0, 20, 58, 10, 32), (0.25, 12, 42, 12, 40)),
+        right_arm=((-0.20, 6, 42, 12, 36), (0.0, -8, 52, 10, 32), (0.25, 2, 38, 12, 40)),
+        spine=((-0.20, -5, 4, 6), (0.0, -7, 6, 4), (0.20, -3, 11, 4)),
+    ),
     "thigh": Reception(
         name="reception with the thigh",
         labels=("receive", "thigh", "high"), speeds=(0.0, 4.0), heights=(0.75, 1.05), height=1.0,
@@ -153,7 +166,8 @@ RECEPTIONS = {
         spine=((-0.20, -5, 2, 2), (0.0, -6, 0, 0), (0.20, -3, 10, 2)),
     ),
     "chest": Reception(
-        name="reception with the chest", labels=("receive", "body", "high"), speeds=(0.0, 4.0), heights=(), low=0.07,
+        name="reception with the chest", labels=("receive", "body", "chest", "high"), speeds=(0.0, 4.0), heights=(),
+        low=0.07,
         pelvis=((-0.40, 0, 2, 0), (-0.05, 0, -12, 0), (0.10, 0, -10, 0), (0.25, 0, -2, 0), (0.5, 0, 2, 0)),
         spine=((-0.40, 0, 2, 0), (-0.05, 0, -20, 0), (0.08, 0, -12, 0), (0.22, 0, 6, 0), (0.5, 0, 6, 0)),
         left_arm=((-0.35, 6, 36, 8, 34), (0.0, -10, 62, 0, 50), (0.25, 2, 48, 5, 44)),
@@ -282,12 +296,60 @@ def _build_row(kind: str) -> Action:
     )  # fmt: skip
 
 
+# what a foot does at the ball in a walk or a run beside taking it; out of a stand these are tables of key poses
+_ON_THE_WAY = {
+    "scissors": Reception(
+        name="scissors feint on the way", labels=("scissors",), speeds=(1.2, 4.9), heights=(), slows=0.5,
+        foot=(
+            (-0.16, 0.30, -0.04, 0.170, 8, 10, 0),
+            (0.0, 0.44, -0.06, 0.290, 4, 4, 0), (0.08, 0.42, -0.20, 0.250, 2, -8, 0),
+            (0.17, 0.30, -0.30, 0.160, 2, -10, 0), (0.28, 0.16, -0.26, 0.100, 0, -8, 0),
+        ),
+        pelvis=((-0.20, 2, 5, 10), (0.0, 0, 5, 0), (0.20, -4, 5, -14)),
+        spine=((-0.20, 4, 12, 4), (0.05, -2, 14, -4), (0.22, -8, 14, -4)), nod=18.0,
+    ),
+    "block": Reception(
+        name="block tackle on the way", labels=("tackle", "block", "foot", "inside", "low"), speeds=(1.2, 4.9),
+        heights=(), low=0.10,
+        foot=(
+            (-0.16, 0.18, -0.14, 0.160, 0, -50, -2),
+            (0.0, 0.38, -0.10, 0.125, -2, -74, -4), (0.08, 0.42, -0.09, 0.125, -2, -74, -4),
+            (0.17, 0.34, -0.11, 0.140, 0, -56, -2), (0.28, 0.20, -0.12, 0.110, 0, -20, 0),
+        ),
+        pelvis=((-0.20, 0, 8, -12), (0.0, -2, 8, -4), (0.20, -2, 8, 4)),
+        spine=((-0.20, 0, 16, 8), (0.0, 2, 20, 2), (0.20, 2, 18, -2)), nod=20.0,
+    ),
+    "intercept": Reception(
+        name="interception on the way", labels=("intercept", "foot", "inside", "short_duration"),
+        speeds=(1.2, 6.9), heights=(), low=0.06, slows=0.3,
+        foot=(
+            (-0.16, 0.36, -0.14, 0.150, 0, -40, -2),
+            (0.0, 0.50, -0.15, 0.125, -4, -60, -4), (0.08, 0.44, -0.15, 0.125, -3, -60, -4),
+            (0.17, 0.32, -0.14, 0.125, -2, -46, -2), (0.28, 0.18, -0.12, 0.110, 0, -16, 0),
+        ),
+        pelvis=((-0.20, 2, 6, 8), (0.0, 2, 8, 12), (0.20, 2, 4, 0)), nod=20.0,
+    ),
+}  # fmt: skip
+
+
+def _build_moving_row(kind: str) -> Action:
+    """Build the row of what a foot does on the way: players who move have it instead of the one out of a stand."""
+    one = _ON_THE_WAY[kind]
+    return Action(
+        name=one.name, labels=frozenset({*one.labels, "running", "front"}), has_side=True, suits=(_MOVES_FROM, np.inf),
+        build=lambda setting: build_touch(_travel(one, setting.speed), setting.skeleton, setting.fps,
+                                          example=setting.example),
+        speeds=tuple(speed for speed in SPEEDS if one.speeds[0] <= speed <= one.speeds[1]),
+    )  # fmt: skip
+
+
 _JUMPS = (
     Action(name="reception with the head in a jump", labels=frozenset({"receive", "head", "standing", "jump", "front"}),
            build=build_jumping_header, heights=(1.9, 2.6)),
     Action(name="reception with the head in a jump on the run", build=build_running_jump, speeds=SPEEDS[3:],
            labels=frozenset({"receive", "head", "running", "jump", "front"}), heights=(1.9, 2.6)),
 )  # fmt: skip
-RECEPTION_ACTIONS = (*(_build_row(kind) for kind in RECEPTIONS if kind != "let run"), *_JUMPS)
+RECEPTION_ACTIONS = (*(_build_row(kind) for kind in RECEPTIONS if kind != "let run"), *_JUMPS,
+                     *map(_build_moving_row, _ON_THE_WAY))
 LET_RUN_ACTIONS = (_build_row("let run"),)
 """Rows of `actions.table`."""

@@ -45,7 +45,7 @@ def test_the_foot_is_slow_against_the_pelvis_around_the_touch(kind, speed):
 @pytest.mark.parametrize("kind, speed", [case for case in CASES if case[0] not in ("chest", "push", "let run")])
 def test_the_part_gives_with_the_ball(kind, speed):
     _, key, _, middle, *_ = trace(kind, speed)
-    axis = 2 if kind in ("thigh", "top") else 0  # a falling ball is taken down, a rolling one backward
+    axis = 2 if kind in ("thigh", "top", "high inside") else 0  # a falling ball is taken down, a rolling one backward
     later = key + int(0.1 * FPS)
     assert 0.03 < middle[key, axis] - middle[later, axis] < 0.35
 
@@ -58,7 +58,7 @@ def test_a_first_touch_into_the_run_goes_on_with_the_ball(speed):
     assert body[key - 20 : key + 20].min() > 0.75 * speed  # it hardly slows down
 
 
-@pytest.mark.parametrize("kind", ["top", "thigh"])
+@pytest.mark.parametrize("kind", ["top", "high inside", "thigh"])
 @pytest.mark.parametrize("speed", [0.0, 1.2, 1.8, 2.5])
 def test_a_high_ball_is_taken_as_calmly(kind, speed):
     move = build_reception(kind, fps=FPS, speed=speed, height=RECEPTIONS[kind].heights[1])
@@ -83,7 +83,7 @@ def test_every_part_has_a_row_with_its_labels():
     rows = {action.name: action for action in (*RECEPTION_ACTIONS, *LET_RUN_ACTIONS)}
     parts = {kind: find_striking_part(rows[one.name].labels) for kind, one in RECEPTIONS.items()}
     assert parts == {"inside": "foot", "push": "foot", "outside": "foot", "sole": "foot", "top": "foot",
-                     "thigh": "thigh", "chest": "chest", "head": "head", "let run": None}
+                     "high inside": "foot", "thigh": "thigh", "chest": "chest", "head": "head", "let run": None}
     assert all(action.labels <= set(read_labels()) and (action.speeds or action.heights) for action in rows.values())
 
 
