@@ -116,7 +116,6 @@ def find_label(name: str) -> Label:
     return read_labels().get(name) or Label(name=name, title=string.capwords(name.replace("_", " ")))
 
 
-@lru_cache(maxsize=64)
 def avoids_ball(names: Iterable[str]) -> bool:
     """Return whether a label says that the body lets the ball pass untouched.
 
@@ -126,6 +125,7 @@ def avoids_ball(names: Iterable[str]) -> bool:
     return any(find_label(name).ball == "avoids" for name in names)
 
 
+@lru_cache(maxsize=64)
 def list_labels(**required: object) -> tuple[str, ...]:
     """List the labels with certain attributes.
 

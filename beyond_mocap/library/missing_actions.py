@@ -301,8 +301,8 @@ def _find_clips(library: Library, path: str) -> tuple[Clip, Clip]:
         _make_room(known, _KEPT_CLIPS)
         clip = _build_clip(library, path)
         known[path] = clip, clip.build_twin()
-        if library.cache_location:
-            write_synthetic_clips(library.cache_location[0], known[path], missing_only=True)
+        if library.cache_location:  # over a file of another version of the program
+            write_synthetic_clips(library.cache_location[0], known[path])
     return known[path]
 
 

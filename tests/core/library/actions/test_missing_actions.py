@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
 
 from beyond_mocap.annotation import KeyMoment, Span, Timeline
 from beyond_mocap.base.errors import InputError, NotInLibraryError
+from beyond_mocap.files.bvh import bvh
 from beyond_mocap.library import missing_actions
 from beyond_mocap.library.missing_actions import (
     ActionMoment,
@@ -19,6 +21,7 @@ from beyond_mocap.library.missing_actions import (
     is_action_clip,
     select_own_kicks,
 )
+from beyond_mocap.library.scan import CACHE_FOLDER
 from beyond_mocap.motion.humanoid import identify_joints
 from beyond_mocap.motion.motion import forward_kinematics
 from beyond_mocap.motion.track import Track
@@ -214,3 +217,14 @@ def test_a_clip_that_is_built_again_has_the_same_bits(library, monkeypatch):
     assert shown[0] is not shown[2] and clips[0] is not clips[2]
     np.testing.assert_array_equal(clips[0].rotations, clips[2].rotations)
     assert len(missing_actions._clips[library]) == len(missing_actions._extended[library]) == 1
+
+
+def test_a_file_of_another_version_beside_the_cache_is_replaced(library):
+    path, = find_missing_actions(library, [moment("tackle", "block")])
+    file = library.cache_location[0] / Path(path).relative_to(CACHE_FOLDER)
+    file.parent.mkdir(parents=True, exist_ok=True)
+    file.write_text("another version")
+    missing_actions._clips.pop(library, None)
+    missing_actions._extended.pop(library, None)
+    clip = next(clip for clip in add_actions(library, [path]).clips if is_action_clip(clip))
+    assert len(bvh.read_bvh(file).motion) == len(clip.motion)
