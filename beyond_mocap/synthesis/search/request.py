@@ -246,8 +246,8 @@ def _build_nearest_key(moment: KeyMoment, frame: float, usable: tuple[Key, ...],
     text = (f"{format_seconds(moment.time)} s: {problem}; nearest: {_format_labels(nearest)}"
             f"{_describe_synthetic(moment.words) if has_synthetic else ''}")
     if not use_nearest:
-        way_out = f"add such a clip, or {USE_NEAREST}"
-        raise NotInLibraryError(f"{text}; use one of these, {way_out}", nearest, moment.line)
+        way_out = ("use one of these, " if nearest else "") + f"add such a clip, or {USE_NEAREST}"
+        raise NotInLibraryError(f"{text}; {way_out}", nearest, moment.line)
     choices = select_nearest_keys(usable, moment.words)
     used = sort_labels(choices[0].labels) if choices else gait_words
     instead = " ".join(used) if choices else "locomotion continues there"
