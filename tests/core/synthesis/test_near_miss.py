@@ -93,5 +93,5 @@ def test_the_text_of_a_miss():
     assert timeline.keys[0].misses_ball and format_timeline(timeline) == "5 tackle right -touch\n"
     check_timeline(timeline)
     for wrong in ("5 touch\n", "4 6 walking -touch\n"):
-        with pytest.raises(InputError, match="'touch' is not in the vocabulary"):
+        with pytest.raises(InputError, match="'touch' is of recordings only"):
             check_timeline(parse_timeline(wrong))
