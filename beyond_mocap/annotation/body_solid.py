@@ -12,14 +12,14 @@ from functools import cached_property
 
 import numpy as np
 
+from ..motion import quaternion
 from ..motion.humanoid import identify_joints
 from ..motion.skeleton import Skeleton
 from ..motion.track import BALL_RADIUS
 from .body_surfaces import BodySurface, build_body_surfaces
+from .striking import JOINT_ORIGIN
 
 _TIP_RADIUS = 0.0  # m: boots are thin there, and a ball that touches the foot may lie above its tip
-_ORIGIN = np.zeros(3)
-_ORIGIN.setflags(write=False)
 
 
 def build_leg_surfaces(skeleton: Skeleton) -> tuple[BodySurface, ...]:
@@ -46,9 +46,15 @@ def _build_tips(skeleton: Skeleton) -> list[BodySurface]:
     body, tips = identify_joints(skeleton), []
     for side in ("left", "right"):
         toe = getattr(body, side).toe_or_foot
-        tips.append(BodySurface(part="foot", side=side, radius=_TIP_RADIUS, start=(toe, _ORIGIN),
+        tips.append(BodySurface(part="foot", side=side, radius=_TIP_RADIUS, start=(toe, JOINT_ORIGIN),
                                 end=(toe, skeleton.tip_offset(toe)), end_radius=_TIP_RADIUS))
     return tips
+
+
+def _place_points(points: Sequence[tuple[int, np.ndarray]], positions: np.ndarray, rotations: np.ndarray) -> np.ndarray:
+    """Place points that joints carry, each with its joint's index: (W, S, 3) m."""
+    joints, offsets = [joint for joint, _ in points], np.array([offset for _, offset in points])
+    return positions[:, joints] + quaternion.rotate(rotations[:, joints], offsets)
 
 
 @dataclass(frozen=True, eq=False)
@@ -74,11 +80,11 @@ class BodySolid:
             positions: (W, J, 3) m, world frame.
             rotations: (W, J, 4) quaternions, world frame.
         """
-        lines = [surface.compute_line(positions, rotations) for surface in surfaces]
-        start = np.stack([line[0] for line in lines], axis=1)
-        along = np.stack([line[1] for line in lines], axis=1) - start
+        start, end = (_place_points([getattr(surface, name) for surface in surfaces], positions, rotations)
+                      for name in ("start", "end"))
         radius = np.array([surface.radius for surface in surfaces])
-        return cls(start, along, radius + BALL_RADIUS, np.array([surface.end_radius for surface in surfaces]) - radius)
+        end_radius = np.array([surface.end_radius for surface in surfaces])
+        return cls(start, end - start, radius + BALL_RADIUS, end_radius - radius)
 
     @cached_property
     def _line_squares(self) -> np.ndarray:

@@ -10,7 +10,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from ..base.errors import InputError, format_seconds
-from .labels import read_labels
+from .labels import avoids_ball, read_labels
 from .vocabulary import (
     CONTINUOUS,
     DISCRETE,
@@ -125,8 +125,10 @@ class KeyMoment:
 
     @property
     def misses_ball(self) -> bool:
-        """Whether the body reaches for the ball and misses it by design, as the loser of a duel does."""
-        return TOUCH in self.avoid
+        """Whether the body leaves the ball untouched by design: it reaches and misses, as the loser of a duel does, or
+        lets the ball pass.
+        """
+        return TOUCH in self.avoid or avoids_ball(self.words)
 
 
 @dataclass(frozen=True)

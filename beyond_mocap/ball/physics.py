@@ -152,9 +152,9 @@ def compute_grip(velocity: np.ndarray, spin: np.ndarray, ball: Ball) -> tuple[np
 
 def compute_slip(velocity: np.ndarray, spin: np.ndarray, ball: Ball) -> np.ndarray:
     """Compute the horizontal velocity (..., 3) m/s of the ball's lowest point relative to the ground."""
-    out = np.zeros(np.broadcast_shapes(velocity.shape, spin.shape))
-    out[..., 0] = velocity[..., 0] - ball.radius * spin[..., 1]
-    out[..., 1] = velocity[..., 1] + ball.radius * spin[..., 0]
+    along = velocity[..., 0] - ball.radius * spin[..., 1]
+    out = np.zeros((*along.shape, 3))
+    out[..., 0], out[..., 1] = along, velocity[..., 1] + ball.radius * spin[..., 0]
     return out
 
 

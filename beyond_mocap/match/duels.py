@@ -3,7 +3,7 @@
 Tracking does not say who fights for a ball. An opponent whose leg could reach it at the moment of a touch, who has it
 ahead and does not touch it within half a second, is taken to reach for it; an event of their own (a lost tackle or
 aerial) confirms it. Their key moment excludes `touch`, so their body comes near the ball and never moves it
-(`synthesis.construct.near_miss`).
+(`synthesis.construct.near_miss`). An opponent whom a kick hits within BLOCK_SECONDS blocks it.
 """
 
 from __future__ import annotations
@@ -30,6 +30,10 @@ event says so."""
 APART_SECONDS = 2.0
 """s between two duels of one player: no player lunges at each touch of a dribble."""
 
+BLOCK_SECONDS, BLOCKED_SPEED = 0.35, 12.0
+"""s after a kick within which an opponent has no time for a swing of their own, and m/s of the ball then: who meets it
+blocks it."""
+
 RUNNING = "running"
 """Pace of a player who stretches a leg in the run instead of blocking from a stand."""
 
@@ -38,6 +42,7 @@ _EVENT_SECONDS = 1.0  # s between a touch and the event of the opponent who lost
 _DUEL_EVENTS = ("tackle", "aerial", "take-on", "interception")
 _TURNED_SPEED, _TURNED_ANGLE = 2.0, np.radians(100.0)  # m/s from which a player reaches for no ball behind them
 _SIDE_SPEED, _SIDE_ANGLE = 1.0, np.radians(25.0)  # m/s and rad off the travel from which the foot on that side reaches
+_HIGHEST_BLOCK, _BLOCK_GAIN = 0.45, 1.2  # m of the ball's centre; factor on its speed by which no block speeds it up
 _UNCONTESTED = (kinds.THROW_IN, kinds.HAND, kinds.SAVE, kinds.CHEST_CONTROL)  # by a foot or a head
 
 
@@ -112,6 +117,29 @@ def label_lost_duels(
             labels = table.find_labels(kind, "head" if kind == "aerial" else "foot", (*duel.details, "lost"), found)
             out.append(build_moment(duel.time, (*labels, AVOID_PREFIX + TOUCH), DUELS, duel.confidence))
     return [moment for moment in out if moment is not None]
+
+
+def find_blocks(match: Match, touches: Sequence[SolvedTouch]) -> frozenset[int]:
+    """Find the touches with which an opponent blocks a kick with the foot.
+
+    Args:
+        match: the match.
+        touches: solved, in order of time.
+    Returns:
+        Their indices.
+    """
+    teams = {player.id: player.team for player in match.players}
+    return frozenset(number + 1 for number, (kick, touch) in enumerate(zip(touches, touches[1:]))
+                     if kick.player and touch.player and teams[kick.player] != teams[touch.player]
+                     and _is_block(kick, touch))
+
+
+def _is_block(kick: SolvedTouch, touch: SolvedTouch) -> bool:
+    """Say whether a touch by an opponent blocks a kick."""
+    before, after = (float(np.linalg.norm(velocity)) for velocity in (touch.before, touch.after))
+    return (kick.kind == kinds.KICK and touch.kind in (kinds.KICK, kinds.DEFLECTION) and touch.part == "foot"
+            and touch.time - kick.time <= BLOCK_SECONDS and touch.position[2] <= _HIGHEST_BLOCK
+            and before >= BLOCKED_SPEED and after <= _BLOCK_GAIN * before)
 
 
 class _DuelSearch:

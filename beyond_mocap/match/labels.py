@@ -18,7 +18,7 @@ from ..ball.tracked.solve import SolvedBall, SolvedTouch
 from ..base.errors import format_count
 from ..files.event_data import CERTAIN_TOUCHES, MatchEvent, MatchEvents
 from ..motion.track.match_data import Match
-from .duels import Duel, find_duels, label_lost_duels
+from .duels import RUNNING, Duel, find_blocks, find_duels, label_lost_duels
 from .event_clock import AlignedEvents, align_events
 from .goalkeeping.saves import find_save_event, find_save_values, label_missed_saves, label_set_positions
 from .goalkeeping.shots import GOAL, SAVED, Shot, find_shots, list_shots_at
@@ -47,6 +47,7 @@ _MIN_DRIBBLE = 0.8  # s of a dribble
 _DOUBT_WITH_EVENT = 0.2  # share of a touch's doubt that remains if an event confirms it
 _EVENT_CONFIDENCE = 0.4  # confidence of an event without a touch
 _SAME_MOMENT_SECONDS = 0.5  # s around an event without a touch in which another moment of the player stands for it
+_BLOCK, _BLOCK_IN_RUN = ("deflection", ("blocked",)), ("receive", ())  # kind and details: no lunge out of a run
 _TOUCH_EVENTS = {kind.name: (kind.event, kind.details) for kind in kinds.TOUCH_KINDS}
 _DRIBBLE = next(kind for kind in kinds.TOUCH_KINDS if kind.name == kinds.DRIBBLE)
 
@@ -74,8 +75,9 @@ def label_match(
     A touch becomes a key moment with the labels that the table has for it, or for the event paired with it; its time is
     the touch's. Consecutive touches of one player are a stretch of dribble. A pass, shot or save without a touch
     becomes a key moment at its time on the corrected clock. Of two within MIN_DISTANCE_SECONDS the more certain one
-    stays. Who loses a duel reaches and misses (`duels`); goalkeepers wait for shots and save them as the ball comes
-    (`goalkeeping`). Unknown details (the foot, a height without heights in the feed) are left out of the labels.
+    stays. Who loses a duel reaches and misses, who is hit by a kick blocks it (`duels`); goalkeepers wait for shots and
+    save them as the ball comes (`goalkeeping`). Unknown details (the foot, a height without heights in the feed) are
+    left out of the labels.
 
     Args:
         match: the match.
@@ -96,12 +98,12 @@ def label_match(
     goal_lines = find_kept_lines(match) if solved else {}
     shots = find_shots(match, solved, goal_lines) if solved else ()
     saves = {shot.save: shot for shot in shots if shot.save >= 0}
-    duels = find_duels(match, touches, goal_lines, aligned)
+    duels, blocks = find_duels(match, touches, goal_lines, aligned), find_blocks(match, touches)
     for player, path in zip(match.players, match.positions):
         player_touches = [(i, touch) for i, touch in enumerate(touches) if touch.player == player.id]
         found = [moment for i, touch in player_touches if (moment := build_touch_moment(
             touch, match.times, path, heights, table, event=aligned.events[event_by_touch[i]] if i in event_by_touch
-            else None, shot=saves.get(i),
+            else None, shot=saves.get(i), is_block=i in blocks,
         ))]  # fmt: skip
         confident = [moment for moment in found if moment.confidence >= MIN_CONFIDENCE]
         if aligned:
@@ -164,7 +166,7 @@ def has_heights(match: Match) -> bool:
 
 def build_touch_moment(
     touch: SolvedTouch, times: np.ndarray, path: np.ndarray, heights: bool, table: EventLabelTable,
-    event: MatchEvent | None = None, shot: Shot | None = None,
+    event: MatchEvent | None = None, shot: Shot | None = None, is_block: bool = False,
 ) -> Moment | None:  # fmt: skip
     """Build the key moment of a touch.
 
@@ -176,6 +178,7 @@ def build_touch_moment(
         table: labels by event.
         event: the event paired with the touch; its labels take precedence.
         shot: the shot that the touch saves, None for another touch.
+        is_block: whether the touch blocks a kick.
     Returns:
         The key moment, None if the table has no labels for it.
     """
@@ -188,6 +191,8 @@ def build_touch_moment(
         details = (*details, "parried")
     values = {**find_gait_label(touch.time, times, path), **find_height_labels(own_part, touch.position[2], heights),
               **({} if shot is None else find_save_values(shot, heights))}
+    if is_block and shot is None:
+        kind, details = _BLOCK_IN_RUN if values.get("gait") == RUNNING else _BLOCK
     if event is None:
         labels = table.find_labels(kind, own_part, details, values)
         return build_moment(touch.time, labels, TOUCHES if shot is None else SHOTS, touch.confidence)

@@ -181,7 +181,7 @@ class Plan:
     strong_foot: str = ""
     style: tuple[str, ...] = ()
     style_weight: float = _DEFAULTS["style_weight"]
-    solve_touches: bool = field(default=_DEFAULTS["solve_touches"], metadata=LATER)
+    solve_touches: bool = field(default=_DEFAULTS["solve_touches"], metadata={**LATER, "was": False})
     variety: float = field(default=_DEFAULTS["variety"], metadata=LATER)
     lag: float = field(default=_DEFAULTS["lag"], metadata=LATER)
     manner: int = field(default=_DEFAULTS["manner"], metadata=LATER)
@@ -276,6 +276,7 @@ class ResolvedPlan:
     size: float
     known_path: HeadingPath | None = None
     _sampled: dict[tuple[float, bool], SampledTrack] = field(default_factory=dict, init=False, repr=False)
+    _rested: dict[tuple[float, bool], SampledTrack] = field(default_factory=dict, init=False, repr=False)
 
     @property
     def method(self) -> str:
@@ -300,13 +301,13 @@ class ResolvedPlan:
         Returns:
             The planned heading, the same whatever frame rate it is read at.
         """
-        return plan_heading_path(rest_track(self._sample_ball_track(FPS)), self._build_heading_request(play))
+        return plan_heading_path(self._rest_track(FPS), self._build_heading_request(play))
 
     def update_heading(self, old: ResolvedPlan) -> ResolvedPlan:
         """Return the plan with the planned heading of an old one, changed only where track, ball or keys have."""
         if self.method != "path" or self.requested.heading_path is not None:
             return self
-        tracks = [rest_track(plan._sample_ball_track(FPS)) for plan in (self, old)]
+        tracks = [plan._rest_track(FPS) for plan in (self, old)]
         requests = [plan._build_heading_request(None) for plan in (self, old)]
         path = update_heading_path(old.heading_path, tracks[0], requests[0], tracks[1], requests[1])
         return replace(self, known_path=path)
@@ -338,13 +339,19 @@ class ResolvedPlan:
             rests: whether the body of a slow track may rest (`motion.track.resting_place`); method "path" only.
         """
         if (fps, rests) not in self._sampled:
-            sampled = self._sample_ball_track(fps)
             if self.method == "path":
-                sampled = rest_track(sampled, rests)
+                sampled = self._rest_track(fps, rests)
                 heading, held = sample_heading(self.heading_path, self._find_heading_keys(), sampled)
-                sampled = replace(sampled, heading=heading, held=held)
-            self._sampled[fps, rests] = sampled
+                self._sampled[fps, rests] = replace(sampled, heading=heading, held=held)
+            else:
+                self._sampled[fps, rests] = self._sample_ball_track(fps)
         return self._sampled[fps, rests]
+
+    def _rest_track(self, fps: float, rests: bool = True) -> SampledTrack:
+        """Sample the track with the places of the body, once for each rate: headings are planned from it too."""
+        if (fps, rests) not in self._rested:
+            self._rested[fps, rests] = rest_track(self._sample_ball_track(fps), rests)
+        return self._rested[fps, rests]
 
     def _sample_ball_track(self, fps: float) -> SampledTrack:
         """Sample the track, with the solved ball, in the library's size, as it was measured."""

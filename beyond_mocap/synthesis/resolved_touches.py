@@ -15,7 +15,7 @@ from dataclasses import replace
 import numpy as np
 
 from ..annotation import KeyMoment, Span, Timeline
-from ..annotation.ball_contact import build_surfaces, find_striking_part
+from ..annotation.ball_contact import build_surfaces, find_contact_window, find_striking_part, measure_contact_gap
 from ..annotation.labels import list_labels
 from ..annotation.striking import build_part_surfaces, measure_ball_gap
 from ..ball.tracked.carried import find_carried_stretches
@@ -30,6 +30,7 @@ from .construct.ball_detour import find_free_contact, lead_ball_around_body
 from .construct.contact_geometry import BALL_SECONDS, add_flight_arc, lead_ball_through
 from .construct.dribble import plan_dribbles
 from .construct.give import give_with_ball
+from .construct.held_ball import HandTouch, carry_in_hands, hold_in_spans
 from .construct.near_miss import miss_ball
 from .construct.strike import BALL_NOISE, compute_contact_frames, find_nearest_frame
 from .plan import Plan, PlayerTouch, ResolvedPlan, SolvedTrajectory
@@ -47,7 +48,7 @@ _MET_GAP = 0.03  # m between the surfaces up to which a part is at the ball
 _LISTED_TIMES = 6  # key moments that a line lists
 _STEP = 0.004  # s between the points of a trajectory
 _SENDING, _TAKING = frozenset(list_labels(ball="sends")), frozenset(list_labels(ball="takes"))
-_CARRYING = frozenset(list_labels(ball="carries"))
+_CARRYING, _HOLDING = (frozenset(list_labels(ball=what)) for what in ("carries", "holds"))
 _SENDING_KINDS = {kind.name for kind in TOUCH_KINDS if kind.ball in ("sends", "carries")}
 _TAKING_KINDS = {kind.name for kind in TOUCH_KINDS if kind.ball == "takes"}
 
@@ -190,7 +191,7 @@ def _restore_order(keys: list[KeyMoment]) -> list[KeyMoment]:
 
 
 def report_missing_touches(take: Take, plan: ResolvedPlan) -> list[str]:
-    """Report what the ball has not: touches that key moments request, touches of dribbles, places of its own.
+    """Report what the ball lacks: touches that key moments request, touches of dribbles, places of its own.
 
     Args:
         take: the take of `apply_trajectory`.
@@ -272,9 +273,14 @@ def apply_trajectory(take: Take, plan: ResolvedPlan) -> tuple[Take, list[str]]:
     pushed = [(push.first, push.last) for push in pushes]
     take = _miss_ball(take, replace(take.ball, positions=dribbled.ball))
     free, met = _free_met_ball(take, dribbled.ball, pushes)
+    free, carried = carry_in_hands(take.motion, free, [_build_hand_touch(take, key) for key in keys])
+    free, holds = hold_in_spans(take.motion, free, _find_shown(take, _HOLDING))
+    carried += holds
     around = lead_ball_around_body(take.motion.skeleton, take.motion.root_positions, take.motion.rotations, ball=free,
-                                   held=[*met, *pushed], fps=fps)
+                                   held=[*met, *pushed, *carried], fps=fps)
     ball, far = replace(take.ball, positions=around), np.linalg.norm(around - dribbled.ball, axis=1)
+    for first, last in carried:
+        far[first : last + 1] = 0.0
     messages = _report_detours(times, np.where(take.ball.measured & ~filled, far, 0.0))
     return replace(take, ball=ball, solved=plan.trajectory, contact_ball=take.ball, dribble_touches=pushes), messages
 
@@ -309,6 +315,26 @@ def _report_detours(times: np.ndarray, moved: np.ndarray) -> list[str]:
             f"{moved[first:end].max():.2f} m away", (float(times[first]), float(times[end - 1])),
         ) for first, end in find_runs(moved > BALL_NOISE)
     ]  # fmt: skip
+
+
+def _find_shown(take: Take, labels: frozenset[str]) -> list[tuple[int, int]]:
+    """Find first and last frame of each stretch in which a take shows one of some labels."""
+    return [(first, end - 1) for first, end in find_runs(np.array([bool(labels & set(words)) for words in take.words]))]
+
+
+def _build_hand_touch(take: Take, key: KeyResult) -> HandTouch:
+    """Build the touch of a key moment, within the clip that plays there; in a dive it may be later (`strike`)."""
+    frame, words = find_nearest_frame(key.frame, len(take.clip)), key.contact_labels
+    others, frames = np.flatnonzero(take.clip != take.clip[frame]), compute_contact_frames(key.frame, len(take.clip))
+    window = slice(frame, frame + int(find_contact_window(words) * take.motion.fps) + 1)
+    if find_contact_window(words):
+        places, world = compute_pose(take.motion.skeleton, take.motion.root_positions[window],
+                                     take.motion.rotations[window])
+        gaps = np.abs(measure_contact_gap(take.motion.skeleton, places, world, words, take.ball.positions[window]))
+        frames = (frame + int(np.argmin(np.where(np.isfinite(gaps), gaps, np.inf))),) * 2
+    return HandTouch(frames=frames, words=words,
+                     low=int(max(others[others < frame], default=-1)) + 1,
+                     high=int(min(others[others > frame], default=len(take.clip))) - 1)
 
 
 def _list_ball_keys(take: Take) -> list[KeyResult]:

@@ -2,8 +2,8 @@
 
 All stretches are fitted together by damped least squares. The unknowns are the start position (slightly), velocity and
 spin. Heights follow from the fit where the feed has none, because a ball slows differently in the air and on the
-ground. Fits simulate thousands of flights, so they use coarse steps, about one sample apart, in which a ball may bounce
-once. `batch.simulate_trajectories` is the reference: at 0.04 s the two agree within some centimetres over a second.
+ground. Fits simulate thousands of flights, so they use coarse steps (`coarse_flight`) and the reference physics
+(`batch.simulate_trajectories`) in the last round alone.
 """
 
 from __future__ import annotations
@@ -17,18 +17,8 @@ from ...base.easing import hermite
 from ...base.errors import UserCancelledError
 from ...base.vectors import unit_vectors
 from ..batch import simulate_trajectories
-from ..physics import (
-    FOOTBALL,
-    Ball,
-    compute_air_acceleration,
-    compute_bounce,
-    compute_deceleration,
-    compute_grip,
-    compute_rolling_spin,
-    compute_sliding,
-    compute_slip,
-    vector_length,
-)
+from ..physics import FOOTBALL, Ball
+from .coarse_flight import simulate_coarse_trajectories
 
 GRID = 0.04  # s between the simulated moments of a flight
 LONGEST = 5.0  # s, the longest stretch that is fitted
@@ -48,8 +38,6 @@ _USUAL_END_HEIGHT, _MAX_END_HEIGHT = 1.5, 2.2  # m, usual and highest likely hei
 _MIN_GAIN = 0.01  # share of the cost; the iteration stops when it gains less
 _BATCH = 300  # stretches fitted together, to limit memory
 _MAX_SAMPLES = 40  # samples used per stretch
-
-_MIN_HOP_SPEED = 0.35  # m/s upward after a bounce: a lower hop ends within one step
 
 
 @dataclass(frozen=True, eq=False)
@@ -149,35 +137,34 @@ def fit_launches(stretches: Stretches, ball: Ball = FOOTBALL, cancelled: Callabl
         UserCancelledError: if `cancelled` returns True.
     """
     if np.isfinite(stretches.velocity[:, 2]).all():
-        starts = [_build_guess(stretches, stretches.velocity[:, 2])]
+        starts = _build_guess(stretches, stretches.velocity[:, 2])[None]
     else:
         starts = _choose_starts(stretches, ball, cancelled)
-    fitted = [_fit_batches(stretches, start, ball, rounds=_ROUNDS, simulate=_simulate_coarse, cancelled=cancelled)
-              for start in starts]
-    best, cost = fitted[0]
-    for other, costs in fitted[1:]:
-        is_better = costs < _LOFT_COST_SHARE * cost - _LOFT_COST_MARGIN  # when in doubt, keep the lower launch
-        best, cost = np.where(is_better[:, None], other, best), np.where(is_better, costs, cost)
-    best, cost = _fit_batches(stretches, best, ball, rounds=_FINE_ROUNDS, simulate=_simulate_fine, cancelled=cancelled)
-    return Launches(*_build_launches(stretches, best, ball), cost)
+    fits, costs = _fit_batches(stretches, starts, ball, rounds=_ROUNDS, simulate=_simulate_coarse, cancelled=cancelled)
+    best, cost = fits[0], costs[0]
+    for other, other_cost in zip(fits[1:], costs[1:]):
+        is_better = other_cost < _LOFT_COST_SHARE * cost - _LOFT_COST_MARGIN  # when in doubt, keep the lower launch
+        best, cost = np.where(is_better[:, None], other, best), np.where(is_better, other_cost, cost)
+    fits, costs = _fit_batches(stretches, best[None], ball, rounds=_FINE_ROUNDS, simulate=_simulate_fine,
+                               cancelled=cancelled)
+    return Launches(*_build_launches(stretches, fits[0], ball), costs[0])
 
 
-def _choose_starts(stretches: Stretches, ball: Ball, cancelled) -> list[np.ndarray]:
-    """Choose two initial unknowns (S, 7): the best after some rounds from low and from high upward speeds."""
+def _choose_starts(stretches: Stretches, ball: Ball, cancelled) -> np.ndarray:
+    """Choose initial unknowns (U, S, 7): the best after some rounds from low and from high upward speeds."""
     row = np.arange(len(stretches))
     start = _build_guess(stretches, np.zeros(len(stretches)))
     far = np.flatnonzero(np.linalg.norm((stretches.end - stretches.start)[:, :2], axis=1) > _SHORT_DISTANCE)
     if not len(far):
-        return [start]
+        return start[None]
     far_stretches = stretches.select_rows(far)
     most = 0.5 * ball.gravity * far_stretches.seconds + 2.0  # with this speed the ball is down again at the end
-    fits = [_fit_batches(far_stretches, _build_guess(far_stretches, np.minimum(upward, most)), ball,
-                         rounds=_COARSE_ROUNDS, simulate=_simulate_coarse, cancelled=cancelled)
-            for upward in _UPWARD_SPEEDS]  # fmt: skip
-    costs, found = np.array([cost for _, cost in fits]), np.stack([unknown for unknown, _ in fits])
+    guesses = np.stack([_build_guess(far_stretches, np.minimum(upward, most)) for upward in _UPWARD_SPEEDS])
+    found, costs = _fit_batches(far_stretches, guesses, ball, rounds=_COARSE_ROUNDS, simulate=_simulate_coarse,
+                                cancelled=cancelled)
     low = np.argmin(costs[:_LOW_COUNT], axis=0)
     high = _LOW_COUNT + np.argmin(costs[_LOW_COUNT:], axis=0)
-    both = [start.copy(), start.copy()]
+    both = np.stack([start, start])
     for chosen, unknown in zip((low, high), both):
         unknown[far] = found[chosen, row[: len(far)]]
     return both
@@ -269,29 +256,40 @@ def _soften_residuals(off: np.ndarray) -> np.ndarray:
 _DIFFERENCE_STEPS = np.array([0.01, 0.01, 0.02, 0.02, 0.05, 0.5, 0.5])
 
 
-def _fit_batches(stretches: Stretches, unknown, ball: Ball, rounds: int, simulate, cancelled) -> tuple[np.ndarray,
-        np.ndarray]:
-    """Fit stretches in batches of about equal length; return unknowns (S, 7) and costs (S,)."""
+def _fit_batches(stretches: Stretches, starts: np.ndarray, ball: Ball, rounds: int, simulate,
+                 cancelled) -> tuple[np.ndarray, np.ndarray]:
+    """Fit stretches from each of some initial unknowns (U, S, 7), in batches of about equal length.
+
+    Returns:
+        Unknowns (U, S, 7) and costs (U, S).
+    """
     order = np.argsort(stretches.seconds, kind="stable")
-    out, costs = unknown.copy(), np.zeros(len(unknown))
+    out, costs = starts.copy(), np.zeros(starts.shape[:2])
     for low in range(0, len(order), _BATCH):
         if cancelled is not None and cancelled():
             raise UserCancelledError("solving the ball: cancelled")
         some = order[low : low + _BATCH]
-        rows = stretches.select_rows(some)
-        out[some], costs[some] = _solve_least_squares(rows, unknown[some], ball, rounds, simulate)
+        rows = stretches.select_rows(np.tile(some, len(starts)))
+        out[:, some], costs[:, some] = _solve_least_squares(rows, starts[:, some], ball, rounds, simulate)
     return out, costs
 
 
-def _solve_least_squares(stretches: Stretches, unknown, ball: Ball, rounds: int, simulate) -> tuple[np.ndarray,
-        np.ndarray]:
-    """Solve the least-squares fit by the Levenberg-Marquardt method, each stretch with its own damping."""
-    stretches, count = _crop_columns(stretches), unknown.shape[1]
-    off = _compute_residuals(stretches, unknown, *_simulate_to_samples(stretches, unknown, ball, simulate))
+def _solve_least_squares(stretches: Stretches, starts: np.ndarray, ball: Ball, rounds: int,
+                         simulate) -> tuple[np.ndarray, np.ndarray]:
+    """Solve the least-squares fit by the Levenberg-Marquardt method, each stretch with its own damping.
+
+    Args:
+        stretches: U times S stretches.
+        starts: (U, S, 7) initial unknowns; the S of each go on while one of them gains.
+        ball: the ball's physics.
+        rounds: at most.
+        simulate: `_simulate_coarse` or `_simulate_fine`.
+    """
+    stretches, unknown, count = _crop_columns(stretches), starts.reshape(-1, starts.shape[-1]), starts.shape[-1]
+    off, slope = _linearize(stretches, unknown, ball, simulate)
     cost = (off**2).sum(axis=1)
-    damping = np.full(len(unknown), 1e-2)
-    for _ in range(rounds):
-        slope = _compute_jacobian(stretches, unknown, ball)
+    damping, goes_on = np.full(len(unknown), 1e-2), np.ones(len(unknown), bool)
+    for number in range(rounds):
         # i, j: unknowns; s: stretch; r: residual. Normal equations per stretch.
         normal = np.einsum("isr,jsr->sij", slope, slope)
         right = -np.einsum("isr,sr->si", slope, off)
@@ -299,21 +297,30 @@ def _solve_least_squares(stretches: Stretches, unknown, ball: Ball, rounds: int,
         damped = normal + (damping[:, None] * diagonal)[..., None] * np.eye(count)
         step = np.linalg.solve(damped, right[..., None])[..., 0]
         tried = unknown + np.clip(step, -6.0 * _USUAL_SPIN, 6.0 * _USUAL_SPIN)
-        off_tried = _compute_residuals(stretches, tried, *_simulate_to_samples(stretches, tried, ball, simulate))
+        if number + 1 < rounds:
+            off_tried, slope_tried = _linearize(stretches, tried, ball, simulate)
+        else:  # the slope after the last round is not needed
+            off_tried, slope_tried = _simulate_residuals(stretches, tried, ball, simulate), slope
         cost_tried = (off_tried**2).sum(axis=1)
-        good = cost_tried < cost
+        good = goes_on & (cost_tried < cost)
         better = np.where(good, cost - cost_tried, 0.0) > _MIN_GAIN * cost
         unknown, off = np.where(good[:, None], tried, unknown), np.where(good[:, None], off_tried, off)
-        cost = np.where(good, cost_tried, cost)
+        slope, cost = np.where(good[:, None], slope_tried, slope), np.where(good, cost_tried, cost)
         # Less damping after a success, more after a failure.
         damping = np.clip(np.where(good, damping / 5.0, damping * 8.0), 1e-6, 1e4)
-        if not better.any():
+        goes_on = np.repeat(better.reshape(starts.shape[:2]).any(axis=1), starts.shape[1])
+        if not goes_on.any():
             break
-    return unknown, cost
+    return unknown.reshape(starts.shape), cost.reshape(starts.shape[:2])
 
 
-def _compute_jacobian(stretches: Stretches, unknown: np.ndarray, ball: Ball) -> np.ndarray:
-    """Compute (7, S, R): the change of the residuals with each unknown, by coarse steps.
+def _simulate_residuals(stretches: Stretches, unknown: np.ndarray, ball: Ball, simulate) -> np.ndarray:
+    """Simulate the balls; return their residuals (S, R)."""
+    return _compute_residuals(stretches, unknown, *_simulate_to_samples(stretches, unknown, ball, simulate))
+
+
+def _linearize(stretches: Stretches, unknown: np.ndarray, ball: Ball, simulate) -> tuple[np.ndarray, np.ndarray]:
+    """Compute the residuals (S, R), and (7, S, R): their change with each unknown, by coarse steps.
 
     Rows s, S + s, 2 S + s ... of the simulation are stretch s with none and with one of the unknowns 2..6 changed; a
     change of the start position (unknowns 0, 1) moves the whole trajectory and needs no simulation.
@@ -329,7 +336,9 @@ def _compute_jacobian(stretches: Stretches, unknown: np.ndarray, ball: Ball) -> 
         shift = _DIFFERENCE_STEPS[axis] * np.eye(3)[axis]
         shifted = unknown + _DIFFERENCE_STEPS[axis] * np.eye(7)[axis]
         moved.append(_compute_residuals(stretches, shifted, seen[:count] + shift, end[:count] + shift))
-    return (np.concatenate([np.stack(moved), residuals[1:]]) - residuals[0]) / _DIFFERENCE_STEPS[:, None, None]
+    slope = (np.concatenate([np.stack(moved), residuals[1:]]) - residuals[0]) / _DIFFERENCE_STEPS[:, None, None]
+    is_coarse = simulate is _simulate_coarse
+    return residuals[0] if is_coarse else _simulate_residuals(stretches, unknown, ball, simulate), slope
 
 
 def _crop_columns(stretches: Stretches) -> Stretches:
@@ -339,84 +348,3 @@ def _crop_columns(stretches: Stretches) -> Stretches:
     wide = {name: getattr(stretches, name)[:, :last] for name in ("since", "points", "weight", "weight_z")}
     rest = {name: getattr(stretches, name) for name in ("seconds", "start", "end", "velocity")}
     return Stretches(**rest, **wide)
-
-
-def simulate_coarse_trajectories(place: np.ndarray, velocity: np.ndarray, spin: np.ndarray, ball: Ball, step: float,
-                                 count: int) -> tuple[np.ndarray, np.ndarray]:
-    """Simulate balls in coarse steps.
-
-    Args:
-        place: (B, 3) m at the launch.
-        velocity: (B, 3) m/s at the launch.
-        spin: (B, 3) rad/s at the launch.
-        ball: the ball's physics.
-        step: s between the moments.
-        count: number of steps.
-    Returns:
-        Positions (B, count + 1, 3) m and velocities (B, count + 1, 3) m/s.
-    """
-    place, velocity, spin = place.copy(), velocity.copy(), spin.copy()
-    places, velocities = np.empty((count + 1, *place.shape)), np.empty((count + 1, *place.shape))
-    low = ball.radius
-    place[:, 2] = np.maximum(place[:, 2], low)
-    lies = (place[:, 2] <= low) & (velocity[:, 2] <= _MIN_HOP_SPEED)
-    velocity[lies, 2] = 0.0
-    places[0], velocities[0] = place, velocity
-    for index in range(1, count + 1):
-        flies, stays = np.flatnonzero(~lies), np.flatnonzero(lies)
-        if len(flies):
-            place[flies], velocity[flies], spin[flies], lies[flies] = _step_air(
-                place[flies], velocity[flies], spin[flies], ball=ball, step=step, low=low)  # fmt: skip
-        if len(stays):
-            rolling = _step_ground(place[stays], velocity[stays], spin[stays], ball, step)
-            place[stays], velocity[stays], spin[stays] = rolling
-        places[index], velocities[index] = place, velocity
-    return places.transpose(1, 0, 2), velocities.transpose(1, 0, 2)
-
-
-def _step_air(place, velocity, spin, ball: Ball, step: float, low: float):
-    """Step balls in the air by Heun's method; a ball that crosses the ground bounces once within the step.
-
-    `lies` marks balls that stay on the ground from there.
-    """
-    first = compute_air_acceleration(velocity, spin, ball)
-    then = compute_air_acceleration(velocity + step * first, spin, ball)
-    after = velocity + 0.5 * step * (first + then)
-    there = place + step * velocity + step**2 / 6.0 * (2.0 * first + then)
-    lies = np.zeros(len(place), bool)
-    down = np.flatnonzero((there[:, 2] <= low) & (after[:, 2] < 0.0))
-    if len(down):
-        fall, pull = velocity[down, 2], first[down, 2]
-        deep = np.maximum(place[down, 2] - low, 0.0)
-        # Time to the ground from a parabola, then the rest of the step after the bounce.
-        until = (fall + np.sqrt(np.maximum(fall**2 - 2.0 * pull * deep, 0.0))) / np.minimum(-pull, -1e-6)
-        until = np.clip(np.abs(until), 0.0, step)[:, None]
-        impact_velocity = velocity[down] + until * first[down]
-        flat = place[down] + until * 0.5 * (velocity[down] + impact_velocity)
-        rebound, turned = compute_bounce(impact_velocity, spin[down], ball)
-        low_hop = rebound[:, 2] < _MIN_HOP_SPEED
-        rebound[low_hop, 2] = 0.0
-        left = step - until
-        pulled = np.where(low_hop, 0.0, -ball.gravity)
-        there[down] = flat + left * rebound
-        there[down, 2] = low + np.maximum(left[:, 0] * rebound[:, 2] + 0.5 * pulled * left[:, 0] ** 2, 0.0)
-        rebound[:, 2] += pulled * left[:, 0]
-        after[down], spin[down], lies[down] = rebound, turned, low_hop
-    return there, after, spin, lies
-
-
-def _step_ground(place, velocity, spin, ball: Ball, step: float):
-    """Step balls on the ground: slide while there is slip, else roll."""
-    before = compute_slip(velocity, spin, ball)
-    rubs = vector_length(before) > 1e-6
-    faster, turning = compute_sliding(velocity, spin, ball)
-    sliding_velocity, turned = velocity + step * faster, spin + step * turning
-    stops = ~rubs | ((compute_slip(sliding_velocity, turned, ball) * before).sum(axis=1) <= 0.0)
-    grip, spun = compute_grip(velocity, spin, ball)
-    speed = vector_length(grip)
-    slower = np.maximum(speed - step * compute_deceleration(speed, ball), 0.0)
-    rolling_velocity = grip * (slower / np.maximum(speed, 1e-9))[:, None]
-    after = np.where(stops[:, None], rolling_velocity, sliding_velocity)
-    spun = np.where(stops[:, None], compute_rolling_spin(rolling_velocity, ball) + spun * [0.0, 0.0, 1.0], turned)
-    middle = np.where(stops[:, None], 0.5 * (grip + rolling_velocity), 0.5 * (velocity + sliding_velocity))
-    return place + step * middle, after, spun

@@ -32,11 +32,13 @@ class TouchKind:
 
 
 KICK, RECEIVE, DRIBBLE, HEADER, CHEST_CONTROL = "kick", "receive", "dribble", "header", "chest"
+HEAD_CONTROL = "head"
 THROW_IN, HAND, SAVE, DEFLECTION = "throw-in", "hand", "save", "deflection"
 
 TOUCH_KINDS = (TouchKind(KICK, "sends", ("kick",), "pass"), TouchKind(RECEIVE, "takes", ("receive", "foot"), "receive"),
                TouchKind(DRIBBLE, "carries", ("dribble",), "dribble"), TouchKind(HEADER, "sends", ("header",), "pass"),
                TouchKind(CHEST_CONTROL, "takes", ("receive", "body"), "receive"),
+               TouchKind(HEAD_CONTROL, "takes", ("receive", "head"), "receive"),
                TouchKind(THROW_IN, "sends", ("throwb",), "pass", ("throw-in",)),
                TouchKind(HAND, "takes", ("catchb",), "catch"), TouchKind(SAVE, "takes", ("catchb",), "save"),
                TouchKind(DEFLECTION, "", (), "deflection"))
@@ -48,6 +50,8 @@ _DEFLECTION_COSINE = np.cos(np.radians(50.0))  # a deflection changes direction 
 _THROW_IN_DISTANCE = 1.2  # m from the touch line, within which a throw-in is taken
 _ON_LINE_DISTANCE = 0.35  # m inside the line, where a ball that was out is placed
 _THROW_IN_PAUSE = 0.5  # s between the previous touch and a throw-in
+_CORNER_DISTANCE = 1.5  # m from both lines within which a ball on the ground is kicked: the corner's arc, and noise
+_FASTEST_THROW = 25.0  # m/s: the longest throw-ins, of some 50 m, leave with 21 to 23 m/s
 AREA_DEPTH, AREA_WIDTH, GOAL_WIDTH = 16.5, 40.32, 7.32  # m
 _MIN_SHOT_SPEED, _GOAL_MARGIN = 10.0, 1.5  # m/s towards the goal line; m beside the goal
 _FOOT_HEIGHT, _HAND_HEIGHT = 0.35, 0.6  # m of the ball's centre: below, the foot; above, a keeper's hands
@@ -74,7 +78,7 @@ def choose_touch_kind(part: str, before: np.ndarray, after: np.ndarray, same_nex
     """
     fast_in, fast_out = np.linalg.norm(before[:2]), np.linalg.norm(after[:2])
     if part == "head":
-        return HEADER
+        return HEAD_CONTROL if same_next and fast_out < _MIN_PASS_SPEED else HEADER
     if _is_deflection(before, after, fast_in, fast_out, same_next):
         return DEFLECTION
     if part == "chest" and fast_out < _MAX_DRIBBLE_SPEED:
@@ -90,7 +94,8 @@ def _is_deflection(before, after, fast_in, fast_out, same_next) -> bool:
     return float(before[:2] @ after[:2]) > _DEFLECTION_COSINE * fast_in * fast_out
 
 
-def is_throw_in(place: np.ndarray, before: np.ndarray, after: np.ndarray, since: float, width: float) -> bool:
+def is_throw_in(place: np.ndarray, before: np.ndarray, after: np.ndarray, since: float,
+                pitch: tuple[float, float]) -> bool:
     """Say whether a touch is a throw-in: a slow ball on the line or held, untouched for a while, that enters the pitch.
 
     Args:
@@ -98,20 +103,29 @@ def is_throw_in(place: np.ndarray, before: np.ndarray, after: np.ndarray, since:
         before: (3,) m/s before the touch.
         after: (3,) m/s after it.
         since: s since the previous touch.
-        width: m of the pitch.
+        pitch: length and width m.
     Returns:
         True for a throw-in.
     """
-    on_line = abs(place[1]) > width / 2.0 - _ON_LINE_DISTANCE
+    on_line = abs(place[1]) > pitch[1] / 2.0 - _ON_LINE_DISTANCE
     held = place[2] > CHEST_HEIGHT
     slow = np.linalg.norm(before[:2]) < _MIN_PASS_SPEED
-    return bool(since > _THROW_IN_PAUSE and slow and (on_line or held) and is_from_touch_line(place, after, width))
+    return bool(since > _THROW_IN_PAUSE and slow and (on_line or held) and is_from_touch_line(place, after, pitch))
 
 
-def is_from_touch_line(place: np.ndarray, after: np.ndarray, width: float) -> bool:
-    """Say whether a ball at `place` (3,) m with velocity `after` (3,) m/s enters the pitch from its touch line."""
+def is_from_touch_line(place: np.ndarray, after: np.ndarray, pitch: tuple[float, float]) -> bool:
+    """Say whether a ball is thrown into the pitch from its touch line; one on the ground at a corner is kicked.
+
+    Args:
+        place: (3,) m of the ball.
+        after: (3,) m/s after the touch.
+        pitch: length and width m.
+    """
+    from_end, from_side = (half / 2.0 - abs(at) for half, at in zip(pitch, place))
     inward = -np.sign(place[1]) * after[1] > 0.0
-    return bool(abs(place[1]) > width / 2.0 - _THROW_IN_DISTANCE and inward and np.linalg.norm(after[:2]) > 3.0)
+    is_corner = max(from_end, from_side) < _CORNER_DISTANCE and not place[2] > CHEST_HEIGHT
+    return bool(from_side < _THROW_IN_DISTANCE and inward and not is_corner
+                and 3.0 < np.linalg.norm(after[:2]) < _FASTEST_THROW)
 
 
 def choose_keeper_kind(place: np.ndarray, before: np.ndarray, goal: float, known_height: bool) -> tuple[str,

@@ -149,7 +149,7 @@ def solve_samples(times: np.ndarray, ball: np.ndarray, positions: np.ndarray, pl
                                                      ends=ends)))
     solved = [_update_touch(touch, path, heights) for touch in solved]
     ends = find_ball_ends(samples.times, path.at(samples.times), *pitch)
-    solved = _label_throw_ins(solved, ends, pitch[1])
+    solved = _label_throw_ins(solved, ends, pitch)
     residuals = np.where(samples.known, path.residuals(samples.times, samples.positions), np.nan)
     confidence = float(np.mean([touch.confidence for touch in solved])) if solved else 0.0
     return SolvedBall(times=samples.times, touches=tuple(solved), ball=path, filled=samples.filled,
@@ -261,11 +261,12 @@ def _label_touches(samples, found, positions, players, teams, pitch, untracked_c
         return []
     away = touches.measure_player_distances(samples.times, place[:, :2], positions, time)
     chosen = touches.choose_players(away, time, _measure_mean_distance(samples, positions, time), untracked_cost)
-    all_tracked = np.isfinite(away).sum(axis=0) >= _FULL_TRACKING
-    kept = np.flatnonzero((chosen >= 0) | ~all_tracked)
+    all_tracked, known_height = np.isfinite(away).sum(axis=0) >= _FULL_TRACKING, _has_heights(samples)
+    is_in_reach = ~(place[:, 2] > touches.OUT_OF_REACH) if known_height else np.ones(len(time), bool)
+    kept = np.flatnonzero(((chosen >= 0) | ~all_tracked) & is_in_reach)
     time, spread, margin, place = time[kept], spread[kept], margin[kept], place[kept]
     before, after, away, chosen = before[kept], after[kept], away[:, kept], chosen[kept]
-    known_height, goals = _has_heights(samples), find_goal_lines(positions, teams, pitch[0])
+    goals = find_goal_lines(positions, teams, pitch[0])
     out = []
     for k in range(len(time)):
         player = int(chosen[k])
@@ -275,7 +276,7 @@ def _label_touches(samples, found, positions, players, teams, pitch, untracked_c
         same_before = k > 0 and chosen[k - 1] == player and time[k] - time[k - 1] < 3.0
         kind = kinds.choose_touch_kind(part, before[k] - moving, after[k] - moving, same_next, same_before)
         since = time[k] - time[k - 1] if k else np.inf
-        if kinds.is_throw_in(place[k], before[k], after[k], since, pitch[1]):
+        if kinds.is_throw_in(place[k], before[k], after[k], since, pitch):
             part, kind = "hand", kinds.THROW_IN
         elif player in goals:
             part, kind = kinds.choose_keeper_kind(place[k], before[k], goals[player], known_height) or (part, kind)
@@ -312,13 +313,14 @@ def find_goal_lines(positions: np.ndarray, teams: Sequence[str], length: float) 
     return {keeper: float(np.sign(x)) * length / 2.0 for keeper, x in places.items() if abs(x) > length / 5.0}
 
 
-def _label_throw_ins(solved: list[SolvedTouch], ends: list[BallEnd], width: float) -> list[SolvedTouch]:
+def _label_throw_ins(solved: list[SolvedTouch], ends: list[BallEnd],
+                     pitch: tuple[float, float]) -> list[SolvedTouch]:
     """Label throw-ins: the first touch from the touch line after each ball over it."""
     out = list(solved)
     for end in ends:
         later = [k for k, touch in enumerate(solved) if end.time < touch.time < end.time + _RESTART]
         takes = (k for k in later if out[k].position[1] * end.y > 0.0)
-        first = next((k for k in takes if kinds.is_from_touch_line(out[k].position, out[k].after, width)), None)
+        first = next((k for k in takes if kinds.is_from_touch_line(out[k].position, out[k].after, pitch)), None)
         if end.kind == "touch line" and first is not None:
             out[first] = replace(out[first], part="hand", kind=kinds.THROW_IN)
     return out

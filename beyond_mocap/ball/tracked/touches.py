@@ -28,6 +28,7 @@ _SHORT_SECONDS, _SHORT_COST = 0.24, 6.0  # s, shorter pieces are unlikely; nats 
 REACH = 0.6  # m from a player's centre within which a touch has no cost
 REACH_DEVIATION = 0.45  # m, deviation beyond REACH by bodies and tracking
 HIGHEST = 2.4  # m of the ball's centre, up to which a header has no cost
+OUT_OF_REACH = 3.5  # m of the ball's centre: higher than a keeper's hands in a jump, with the noise of heights
 UNTRACKED_COST = 9.0  # nats for a touch by no tracked player, in a match
 SINGLE_UNTRACKED_COST = 4.0  # the same if only one player is tracked
 _RISE = 0.3  # m, deviation of jumps and heights beyond HIGHEST

@@ -4,8 +4,8 @@ out.
 First the ball moves, within the noise of its measurement, to where the recorded foot (head, chest, hand) strikes. The
 limb does the rest by two-bone inverse kinematics, or the spine by bending, within the reach of a body; where that is
 not enough the pelvis steps towards the ball within the noise of its own track (`step_to_ball`); what remains is
-reported. A kick lasts a hundredth of a second, so between the two
-frames around the key moment the ball moves with the foot; a ball that is taken stays longer on it (`give`).
+reported. A kick lasts a hundredth of a second, so between the two frames around the key moment the ball moves with the
+foot; a ball that is taken stays longer on it (`give`).
 """
 
 from __future__ import annotations
@@ -51,6 +51,7 @@ from .move_body_part import (
     solve_swing,
     swing_thigh,
 )
+from .place_plant_foot import compute_step_shift, place_plant_foot
 from .step_to_ball import step_to_ball
 
 BALL_NOISE, FILLED_NOISE = 0.3, 1.0
@@ -62,11 +63,12 @@ PELVIS_RANGE = (0.20, 0.64)  # m on the ground from pelvis to striking foot in m
 OUT_OF_REACH = 0.15  # m of remaining gap above which the body does not reach at all, and plays as recorded
 MAX_DROP = 0.04  # m, largest drop of the pelvis
 _LONGEST_EASE, _SHORTEST_EASE = 0.5, 0.12  # s before and after a strike in which the body is eased
+_STEP_SECONDS = (0.5, 0.8)  # s before and after a kick in which its plant foot gets to its place and back
 # sine of the ball's elevation as seen from the part
 _RISE = {"foot": 0.0, "hand": 0.0, "head": 0.6, "chest": 0.0, "thigh": 0.8}
 _IN_THE_AIR = 0.2  # m above which a ball may be met higher or lower
 _HANDS_APART = 0.6  # m between the hands beyond which one hand alone catches in a dive
-_STOPPING = frozenset(list_labels(ball="takes"))
+_STOPPING, _SENDING = frozenset(list_labels(ball="takes")), frozenset(list_labels(ball="sends"))
 _HIGH = frozenset(list_labels(height="high"))
 _MISSED = 0.002  # m of remaining gap from which on the pelvis steps towards the ball
 _ROUNDS, _CLOSE = 4, 5e-4  # most rounds of an iteration, and m of change at which it ends
@@ -145,9 +147,14 @@ def strike_ball(
             continue
         span = slice(max(moment.low, 0), min(moment.high, count - 1) + 1)
         body = Body.from_pose(skeleton, root[span], rotations[span])
-        scene = _build_problem(body, moment, span.start, contacts=contacts[span], path=path, measured=measured,
-                               height_known=height_known, fps=fps)
+        build = partial(_build_problem, moment=moment, origin=span.start, contacts=contacts[span], path=path,
+                        measured=measured, height_known=height_known, fps=fps)
+        scene = build(body)
         reached, moved[number] = _reach_ball(scene, body)
+        if _place_plant_foot(scene, reached, root, rotations, contacts, fps):
+            body = Body.from_pose(skeleton, root[span], rotations[span])
+            scene = build(body)
+            reached, moved[number] = _reach_ball(scene, body)
         reached = _calm_taking_foot(scene, reached, contacts[span], fps)
         root[span], rotations[span] = reached.root, reached.rotations
         places = [scene.solve_ball(scene.compute_surface_lines(reached, frame), frame)[0] for frame in moment.held]
@@ -186,6 +193,7 @@ class _TouchFrames:
         low: frame before which the body does not change.
         high: frame after which it does not.
         bounds: held frames of the touches before and after.
+        around: first and last frame, between them, in which the foot that stands may step elsewhere.
     """
 
     words: frozenset[str]
@@ -194,6 +202,7 @@ class _TouchFrames:
     low: int
     high: int
     bounds: tuple[int, int]
+    around: tuple[int, int]
 
 
 def _iter_touch_frames(skeleton: Skeleton, touches: Sequence[Touch], count: int, fps: float):
@@ -209,8 +218,9 @@ def _iter_touch_frames(skeleton: Skeleton, touches: Sequence[Touch], count: int,
         before, after = ends[place][1], ends[place + 2][0]
         low = max(int(first - np.clip(touch.entry, shortest, longest)), before)
         high = min(int(np.ceil(last + np.clip(touch.leave, shortest, longest))), after)
+        around = max(int(first - _STEP_SECONDS[0] * fps), before), min(int(last + _STEP_SECONDS[1] * fps), after)
         yield number, _TouchFrames(words=frozenset(touch.words), frame=find_nearest_frame(frame, count),
-                                   held=held[place], low=low, high=high, bounds=(before, after))
+                                   held=held[place], low=low, high=high, bounds=(before, after), around=around)
 
 
 def find_nearest_frame(frame: float, count: int) -> int:
@@ -278,9 +288,10 @@ class _TouchProblem:
         return solved.ball[0], solved.need
 
     def compute_ball_range(self, frame: int) -> BallRange:
-        """Return how far the ball may move; a ball on the ground stays there."""
+        """Return how far the ball may move; a ball on the ground stays there, and one just above it nearly so: a feed's
+        heights are noisy, and a ball lifted to a foot would hop there by itself."""
         whole = BALL_NOISE if self.measured[frame] else FILLED_NOISE
-        return BallRange(whole, BALL_NOISE if self.ball[frame, 2] > _IN_THE_AIR else 0.0)
+        return BallRange(whole, float(np.clip(self.ball[frame, 2] - _IN_THE_AIR, 0.0, whole)))
 
 
 def _build_problem(body: Body, moment: _TouchFrames, origin: int, contacts, path, measured, height_known,
@@ -406,7 +417,7 @@ def _reach_ball(scene: _TouchProblem, body: Body) -> tuple[Body, float]:
     reached, lines, missing = _swing_to_ball(scene, body)
     if np.linalg.norm(missing, axis=1).max() > _MISSED:
         side = scene.parts[0].side if scene.parts[0].part in ("foot", "thigh") else ""
-        stepped = step_to_ball(body, side, scene.at, missing.mean(axis=0), scene.shares[0], scene.fps)
+        stepped = step_to_ball(body, side, scene.at, missing.mean(axis=0), share=scene.shares[0], fps=scene.fps)
         again = _swing_to_ball(scene, stepped)
         if np.linalg.norm(again[2]) < np.linalg.norm(missing):
             reached, lines, missing = again
@@ -445,6 +456,29 @@ def _calm_taking_foot(scene: _TouchProblem, body: Body, contacts: np.ndarray, fp
     if part.part != "foot" or not _STOPPING & scene.moment.words:
         return body
     return calm_foot(body, part, (first - scene.origin, last - scene.origin), _is_in_contact(contacts, part), fps)
+
+
+def _place_plant_foot(scene: _TouchProblem, reached: Body, root, rotations, contacts, fps: float) -> bool:
+    """Place the plant foot of a kick; return whether that has changed `rotations`.
+
+    Args:
+        scene: the kick.
+        reached: the body with its foot at the ball.
+        root: (T, 3) m of the take.
+        rotations: (T, J, 4) local, changed in place.
+        contacts: (T, 2) bool.
+        fps: frames per second.
+    """
+    part, moment = scene.parts[0], scene.moment
+    if part.part != "foot" or not _SENDING & moment.words:
+        return False
+    low, high = max(moment.around[0], 0), min(moment.around[1], len(root) - 1)
+    body = Body.from_pose(reached.skeleton, root[low : high + 1], rotations[low : high + 1])
+    shift = compute_step_shift(reached, part.side, scene.at)
+    standing = contacts[low : high + 1, 0 if part.side == "right" else 1]
+    placed = place_plant_foot(body, shift, part.side, moment.frame - low, standing, fps)
+    rotations[low : high + 1] = placed.rotations
+    return placed is not body
 
 
 def _solve_shifts(scene: _TouchProblem, body: Body, lines: np.ndarray, shifts: np.ndarray) -> np.ndarray:

@@ -190,7 +190,11 @@ def _replace_avoided_gaits(library: Library, gait: np.ndarray, speed: np.ndarray
 
 def _build_key(library, moment: KeyMoment, track, asked: ActionMoment, gait, allowed, use_nearest: bool,
                has_synthetic: bool, warnings: list[str]) -> RequestedKey:
-    """Build one key moment: its frame and the clips that may serve it."""
+    """Build one key moment: its frame and the clips that may serve it.
+
+    Recordings that carry the labels come first, with synthetic clips beside them; then receptions that are cut out of
+    dribbles, swings of the library's own kicker, synthetic actions; then the nearest labels.
+    """
     warnings += _report_no_action(moment)
     frame = float(np.clip((moment.resolved_time - track.times[0]) * library.fps, 0, len(track.times) - 1))
     may_show = [key for key in library.keys if allowed[key.clip]]
@@ -199,23 +203,44 @@ def _build_key(library, moment: KeyMoment, track, asked: ActionMoment, gait, all
     synthetic = tuple(key for key in may_show if library.clips[key.clip].is_synthetic
                       and not is_action_clip(library.clips[key.clip]))
     if moment.avoid:
-        usable, synthetic = _remove_avoided(moment, usable, synthetic, warnings)
-    # recordings that carry the labels first, with synthetic clips; then swings of the library's own kicker, then
-    # synthetic actions; each time with the part that
-    # the ball's height asks for before any part
-    chosen = asked.labels
-    choices = select_keys(usable, chosen) or (() if select_keys(actions, chosen) else select_keys(usable, moment.words))
-    if choices:
-        beside = select_keys(actions, chosen) if takes_with_foot(moment.words) else select_substitutes(
-            choices, synthetic, moment.words)
-        return RequestedKey(requested=moment, frame=frame, choices=(*choices, *beside), used_instead=None)
-    own = tuple(key for key in select_own_kicks(library, asked) if key in synthetic)
-    choices = own or select_keys(actions, chosen) or select_keys(actions, moment.words)
-    if takes_with_foot(moment.words):
-        cut = [key for key in library.cut_receptions if allowed[key.clip] and not key.labels & set(moment.avoid)]
-        choices = (*select_keys(cut, chosen), *choices)
+        usable, synthetic = _remove_avoided(moment, usable, synthetic, actions, warnings)
+    choices = _choose_recorded(moment, asked, usable, synthetic, actions)
+    if not choices:
+        own = tuple(key for key in select_own_kicks(library, asked) if key in synthetic)
+        cut = [key for key in library.cut_receptions if allowed[key.clip] and not key.labels & asked.avoid]
+        choices = _choose_synthetic(moment, asked, own, actions, cut)
     if choices:
         return RequestedKey(requested=moment, frame=frame, choices=choices, used_instead=None)
+    gait_words = library.gaits[int(gait[int(round(frame))])].labels
+    return _build_nearest_key(moment, frame, usable, synthetic, gait_words=gait_words, use_nearest=use_nearest,
+                              has_synthetic=has_synthetic, warnings=warnings)
+
+
+def _choose_recorded(moment: KeyMoment, asked: ActionMoment, usable: tuple[Key, ...], synthetic: tuple[Key, ...],
+                     actions: tuple[Key, ...]) -> tuple[Key, ...]:
+    """Choose recordings that carry the labels, with the part that the ball's height asks for before any part, and
+    synthetic clips that may stand beside them; none where no recording does.
+    """
+    fitting = select_keys(actions, asked.labels)
+    choices = select_keys(usable, asked.labels) or (() if fitting else select_keys(usable, moment.words))
+    if not choices:
+        return ()
+    beside = fitting if takes_with_foot(moment.words) else select_substitutes(choices, synthetic, moment.words)
+    return (*choices, *beside)
+
+
+def _choose_synthetic(moment: KeyMoment, asked: ActionMoment, own: tuple[Key, ...], actions: tuple[Key, ...],
+                      cut: list[Key]) -> tuple[Key, ...]:
+    """Choose the `own` kicker's swings, else synthetic actions; for a reception also those that are `cut` out."""
+    choices = own or select_keys(actions, asked.labels) or select_keys(actions, moment.words)
+    return (*select_keys(cut, asked.labels), *choices) if takes_with_foot(moment.words) else choices
+
+
+def _build_nearest_key(moment: KeyMoment, frame: float, usable: tuple[Key, ...], synthetic: tuple[Key, ...],
+                       gait_words: tuple[str, ...], use_nearest: bool, has_synthetic: bool,
+                       warnings: list[str]) -> RequestedKey:
+    """Build a key moment that the nearest labels serve, or the gait, with a warning; or raise where that is not wanted.
+    """
     nearest = list_nearest_labels(usable, moment.words)
     problem = f"the library has no clip for '{' '.join(moment.words)}'{_describe_lasting(moment.words)}"
     text = (f"{format_seconds(moment.time)} s: {problem}; nearest: {_format_labels(nearest)}"
@@ -224,7 +249,6 @@ def _build_key(library, moment: KeyMoment, track, asked: ActionMoment, gait, all
         way_out = ("use one of these, " if nearest else "") + f"add such a clip, or {USE_NEAREST}"
         raise NotInLibraryError(f"{text}; {way_out}", nearest, moment.line)
     choices = select_nearest_keys(usable, moment.words)
-    gait_words = library.gaits[int(gait[int(round(frame))])].labels
     used = sort_labels(choices[0].labels) if choices else gait_words
     instead = " ".join(used) if choices else "locomotion continues there"
     warnings.append(TimedMessage(f"{text}; used instead: {instead}", (moment.time, moment.time)))
@@ -256,10 +280,11 @@ def _report_no_action(moment: KeyMoment) -> list[TimedMessage]:
 
 
 def _select_action_keys(library: Library, keys: list[Key], asked: ActionMoment) -> tuple[Key, ...]:
-    """Select the synthetic actions that were built for a requested one; any where none was."""
+    """Select the synthetic actions that were built for a requested one; any that are not avoided where none was."""
     actions = tuple(key for key in keys if is_action_clip(library.clips[key.clip]))
-    paths = find_action_paths(asked)
-    return tuple(key for key in actions if library.clips[key.clip].path in paths) or actions
+    paths, sides = find_action_paths(asked), asked.avoid & frozenset(SIDES)
+    built = tuple(key for key in actions if library.clips[key.clip].path in paths and not key.labels & sides)
+    return built or tuple(key for key in actions if not key.labels & asked.avoid)
 
 
 def _choose_rates(moment: KeyMoment) -> tuple[float, ...]:
@@ -267,14 +292,16 @@ def _choose_rates(moment: KeyMoment) -> tuple[float, ...]:
     return RECEPTION_RATES if takes_with_foot(moment.words) else ()
 
 
-def _remove_avoided(moment: KeyMoment, usable: tuple[Key, ...], synthetic: tuple[Key, ...], warnings: list[str]):
+def _remove_avoided(moment: KeyMoment, usable: tuple[Key, ...], synthetic: tuple[Key, ...], actions: tuple[Key, ...],
+                    warnings: list[str]):
     """Remove recorded and synthetic keys with labels that the moment avoids.
 
-    Where no recorded one with its labels would be left, all stay and a warning is added.
+    Where no recorded one with its labels would be left, and no action has them, all stay and a warning is added.
     """
     remaining = tuple(tuple(key for key in keys if not key.labels.intersection(moment.avoid))
                       for keys in (usable, synthetic))
-    if select_keys(usable, moment.words) and not select_keys(remaining[0], moment.words):
+    left = (*remaining[0], *actions)
+    if select_keys(usable, moment.words) and not select_keys(left, moment.words):
         avoided = " ".join(AVOID_PREFIX + word for word in moment.avoid)
         problem = f"no clip for '{' '.join(moment.words)}' is {avoided}"
         text = f"{format_seconds(moment.time)} s: {problem}; a clip with an avoided label is used"

@@ -13,11 +13,13 @@ import numpy as np
 
 from ..gait_tables import GRAVITY
 from ..gestures import Gesture
-from ..moves import build_get_up
 from .action import ActionSetting
 from .body_poses import NO_ARM, BodyPoses, build_body_poses
 
 _GRASS = 5.5  # m/s^2 by which a sliding body slows down
+_UP_HALFWAY = 1.2  # s from the chest's landing to the middle of getting up
+_LYING_DOWN = 2.0  # s of sitting and lying down
+_UP_BACK_LIES, _UP_BACK_HALFWAY = 0.55, 1.0  # s of `_UP_BACK` that lie, and from there to its middle
 _STANDING_HIPS = 0.93  # m above the ground, of an adult who stands
 
 
@@ -230,23 +232,15 @@ def _shift_rows(offset: float, rows, ahead: float) -> tuple:
 def build_quick_get_up(setting: ActionSetting) -> Gesture:
     """Build getting up from lying on the front: the hands push, a foot steps under, the body rises.
 
+    The fall before it belongs to it, for players who are not yet on the ground.
+
     Args:
         setting: for whom.
     Returns:
         The movement; its key is halfway.
     """
-    up, begin = _UP_FRONT, -1.2
-    poses = BodyPoses(
-        speeds=((-2.0, 0.0), (1.0, 0.0)), hips=_at(begin, up["hips"]), pelvis=_at(begin, up["pelvis"]),
-        spine=_at(begin, up["spine"]), head=_at(begin, up["head"]),
-        arms=(_at(begin, up["left_arm"]), _at(begin, up["right_arm"])),
-        feet=(_at(begin, up["left_foot"]), _at(begin, up["right_foot"])), rests=_at(begin, up["rests"]),
-        begin=(begin - 1.0, begin - 0.9), leaves=(begin - 1.0, begin - 1.0), push=begin - 1.0, end=begin + up["end"],
-    )
-    gesture = build_body_poses(poses, setting)
-    cut = gesture.key + begin
-    motion = gesture.motion.frames(int(cut * setting.fps), len(gesture.motion))
-    return Gesture(motion, gesture.key - cut, 0.3, gesture.end - cut)
+    fall = build_fall(setting)
+    return Gesture(fall.motion, fall.key + _UP_HALFWAY, fall.start, fall.end)
 
 
 def build_sitting(setting: ActionSetting) -> Gesture:
@@ -281,13 +275,48 @@ def build_sitting(setting: ActionSetting) -> Gesture:
 
 
 def build_lying(setting: ActionSetting) -> Gesture:
-    """Build lying on the back for a while, and getting up.
+    """Build sitting down, lying on the back for a while, and getting up.
 
     Args:
         setting: for whom.
     Returns:
         The movement; it has no key moment, and lasts while the body lies.
     """
-    rest = 4.0
-    motion = build_get_up(setting.skeleton, setting.fps, rest=rest, example=setting.example).motion
-    return Gesture(motion, None, 0.0, rest)
+    gesture = _build_lie_down(setting, 3.5)
+    return Gesture(gesture.motion, None, gesture.key - 3.5 - _LYING_DOWN, gesture.key)
+
+
+def build_slow_get_up(setting: ActionSetting) -> Gesture:
+    """Build getting up from lying on the back, with sitting and lying down for players who are not yet on the ground.
+
+    Args:
+        setting: for whom.
+    Returns:
+        The movement; its key is halfway.
+    """
+    gesture = _build_lie_down(setting, 0.4)
+    return Gesture(gesture.motion, gesture.key + _UP_BACK_HALFWAY, gesture.start, gesture.end)
+
+
+def _build_lie_down(setting: ActionSetting, rest: float) -> Gesture:
+    """Build sitting down, lying on the back for `rest` s, and getting up; its key is when the body begins to."""
+    down, up = -rest - _LYING_DOWN, _UP_BACK
+    later = {name: _at(-_UP_BACK_LIES, [row for row in rows if row[0] > 0.0]) for name, rows in up.items()
+             if name != "end"}
+    arms = ((down, *NO_ARM), (down + 0.6, 20, 20, 10, 20), (down + 1.2, -34, 26, -10, 16), (-rest, *up["arm"][0][1:]),
+            *later["arm"])
+    still = ((down, 0, 0, 0, 0, 0, 0), (down + 1.3, 0, 0, 0, 0, 0, 0), (down + 1.55, 0.16, 0, 0.04, -6, 0, 0),
+             (-rest, 0.31, 0.02, 0.02, -46, 0, 0), *_shift_rows(0.0, later["foot"], -0.45))
+    return build_body_poses(BodyPoses(
+        speeds=((-9.0, 0.0), (9.0, 0.0)),
+        hips=((down, 0, 0, 0), (down + 0.7, -0.14, 0, 0.50), (down + 1.2, -0.44, 0, 0.80), (-rest, -0.45, 0, 0.80),
+              *_shift_rows(0.0, later["hips"], -0.45)),
+        pelvis=((down, 0, 0, 0), (down + 0.7, 0, 30, 0), (down + 1.2, 0, -24, 0), (-rest, 0, -84, 0),
+                *later["pelvis"]),
+        spine=((down, 0, 2, 0), (down + 0.7, 0, 30, 0), (down + 1.2, 0, 30, 0), (-rest, 0, 10, 0), *later["spine"]),
+        head=((down, 0, 0), (down + 0.7, -20, 0), (down + 1.2, 0, 0), (-rest, 20, 0), *later["head"]),
+        arms=(arms, arms), feet=(still, still),
+        knees=((down, 0, 0), (down + 1.2, 8, 8), (0.6, 8, 8), (2.0, 0, 0)),
+        rests=((down + 0.95, 0), (down + 1.2, 1), *later["rests"]),
+        begin=(down, down + 0.2), leaves=(down, down), push=down - 0.1, end=up["end"] - _UP_BACK_LIES,
+    ), setting)  # fmt: skip

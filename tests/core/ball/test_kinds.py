@@ -33,6 +33,12 @@ def test_words_by_what_the_ball_does(before, after, next_, earlier, kind):
     assert choose_touch_kind("foot", np.array([*before, 0.0]), np.array([*after, 0.0]), next_, earlier) == kind
 
 
+@pytest.mark.parametrize("after, next_, kind", [((2.0, 0.5), True, "head"), ((2.0, 0.5), False, "header"),
+                                                ((9.0, 0.0), True, "header")])
+def test_a_header_that_keeps_the_ball_is_a_reception(after, next_, kind):
+    assert choose_touch_kind("head", np.array([-9.0, 0.0, -3.0]), np.array([*after, 0.0]), next_, False) == kind
+
+
 def test_goal_and_out_are_told_apart():
     times = np.arange(100) * 0.04
     def way(start, velocity):
@@ -63,10 +69,14 @@ def test_keepers_are_those_who_stand_deepest():
     assert find_keepers(positions, ["home"] * 4 + ["away"] * 4) == {"home": 0, "away": 4}
 
 
-def test_a_ball_leaves_the_line_inward():
-    assert is_from_touch_line(np.array([10.0, 33.8, 2.0]), np.array([5.0, -8.0, 2.0]), 68.0)
-    assert not is_from_touch_line(np.array([10.0, 33.8, 2.0]), np.array([5.0, 8.0, 2.0]), 68.0)
-    assert not is_from_touch_line(np.array([10.0, 20.0, 2.0]), np.array([5.0, -8.0, 2.0]), 68.0)
+@pytest.mark.parametrize("place, after, is_thrown", [
+    ((10.0, 33.8, 2.0), (5.0, -8.0, 2.0), True), ((10.0, 33.8, 2.0), (5.0, 8.0, 2.0), False),
+    ((10.0, 20.0, 2.0), (5.0, -8.0, 2.0), False), ((52.0, 33.8, 0.11), (-2.0, -19.0, 9.0), False),
+    ((52.0, 33.8, 2.0), (-2.0, -9.0, 4.0), True), ((10.0, 33.8, 0.11), (-2.0, -29.0, 9.0), False),
+])  # fmt: skip
+def test_a_throw_leaves_the_touch_line_inward_not_from_a_corner_and_no_faster_than_a_person_throws(place, after,
+                                                                                                   is_thrown):
+    assert is_from_touch_line(np.array(place), np.array(after), (105.0, 68.0)) == is_thrown
 
 
 def test_the_ball_over_the_touch_line_comes_back_by_a_throw_in():

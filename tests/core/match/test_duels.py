@@ -1,13 +1,16 @@
 """Two players, one ball: the nearest opponent who has it ahead reaches and misses, and nobody else."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from beyond_mocap.annotation.event_labels import read_event_labels
 from beyond_mocap.ball.tracked.solve import SolvedTouch
 from beyond_mocap.files.event_data import MatchEvent
-from beyond_mocap.match.duels import APART_SECONDS, REACH, TOLD_REACH, find_duels, label_lost_duels
+from beyond_mocap.match.duels import APART_SECONDS, REACH, TOLD_REACH, find_blocks, find_duels, label_lost_duels
 from beyond_mocap.match.event_clock import AlignedEvents
+from beyond_mocap.match.labels import build_touch_moment
 from beyond_mocap.match.moments import DUELS, build_timeline, read_labels, write_labels
 from beyond_mocap.motion.track.match_data import Match, MatchPlayer
 
@@ -102,3 +105,25 @@ def test_the_side_is_that_of_a_ball_beside_the_way():
     for across, side in ((0.6, "left"), (-0.6, "right"), (0.0, "")):
         match = match_of(home_1=WINNER, away_1=((-0.7, -across), np.array([4.0, 0.0])))
         assert [duel.side for duel in find_duels(match, [touch()])] == [side]
+
+
+@pytest.mark.parametrize("player, seconds, changes, expected", [
+    ("away_1", 0.2, {}, True),
+    ("away_1", 0.5, {}, False),  # time for a swing
+    ("home_2", 0.2, {}, False),  # a pass
+    ("away_1", 0.2, {"after": [22.0, 0.0, 0.0]}, False),  # struck
+    ("away_1", 0.2, {"before": [8.0, 0.0, 0.0]}, False),
+    ("away_1", 0.2, {"position": [3.0, 0.0, 0.9]}, False),
+])
+def test_a_foot_that_a_kick_hits_at_once_blocks_it(player, seconds, changes, expected):
+    match = match_of(home_1=WINNER, home_2=((3.0, 0.0), STILL), away_1=((3.0, 0.0), STILL))
+    values = {"before": [15.0, 0.0, 0.0], "after": [-6.0, 0.0, 0.0], **changes}
+    hit = replace(touch(player, time=5.0 + seconds), **{name: np.array(value) for name, value in values.items()})
+    assert find_blocks(match, [touch(), hit]) == ({1} if expected else set())
+
+
+@pytest.mark.parametrize("speed, expected", [(0.0, ("tackle", "block")), (4.0, ("receive", "foot", "low"))])
+def test_who_blocks_a_kick_stands_firm_or_takes_it_in_the_run(speed, expected):
+    path = np.array([3.0, 0.0]) + (TIMES[:, None] - 5.0) * [speed, 0.0]
+    moment = build_touch_moment(touch("away_1"), TIMES, path, True, read_event_labels(), is_block=True)
+    assert moment.labels == expected
