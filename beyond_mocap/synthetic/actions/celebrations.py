@@ -6,6 +6,8 @@ gravity, as knees on wet grass do.
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from ..gait_plan import GaitStyle
@@ -108,6 +110,7 @@ HANDS_ON_BADGE = KeyPoses(
     arms=((-0.8, *_REST), (-0.4, 20, 16, 30, 90, 40), *((float(time), 20, 14, 50, 124 - 16 * (beat % 2), 60)
           for beat, time in enumerate(np.arange(0.0, 1.51, 0.25))), (1.9, 14, 14, 26, 70, 20), (2.2, *_REST)),
 )
+BADGE_ON_THE_RUN = replace(HANDS_ON_BADGE, labels="celebration running arms inside", speeds=_RUN)
 POINTING_UP = KeyPoses(
     labels="celebration walking pointing arms",
     is_span=True,
@@ -193,6 +196,6 @@ HEAD_DOWN = KeyPoses(
 CELEBRATIONS = dict(
     arms_spread=ARMS_SPREAD, fist_pump=FIST_PUMP, aeroplane=AEROPLANE, jump_fist=JUMP_FIST,
     arms_raised=ARMS_RAISED, hands_on_badge=HANDS_ON_BADGE, pointing_to_the_sky=POINTING_TO_THE_SKY,
-    pointing_up=POINTING_UP, knee_slide=KNEE_SLIDE, dance=DANCE, head_down=HEAD_DOWN,
+    pointing_up=POINTING_UP, badge_on_the_run=BADGE_ON_THE_RUN, knee_slide=KNEE_SLIDE, dance=DANCE, head_down=HEAD_DOWN,
 )
 """Recipes by name: that of a plain celebration in a run first, then that in a stand."""

@@ -228,3 +228,32 @@ def test_a_file_of_another_version_beside_the_cache_is_replaced(library):
     missing_actions._extended.pop(library, None)
     clip = next(clip for clip in add_actions(library, [path]).clips if is_action_clip(clip))
     assert len(bvh.read_bvh(file).motion) == len(clip.motion)
+
+
+@pytest.mark.parametrize("words", ["tying", "sitting", "ground", "celebration jump", "hold middle", "dejected"])
+def test_a_span_whose_action_begins_with_an_effort_is_shown(library, words):
+    times = np.arange(0.0, 8.0, 0.1)
+    speed = 1.1 if words == "dejected" else 0.0
+    track = Track(times, np.stack([speed * times, 0.0 * times], axis=1))
+    plan = Plan(track=track, library=library.folder, timeline=Timeline(spans=(Span(3.0, 6.0, tuple(words.split())),)))
+    take = synthesize(library, plan)
+    shown = [set(words.split()) <= set(take.words[int(time * take.motion.fps)]) for time in np.arange(3.0, 6.0, 0.1)]
+    assert np.mean(shown) > (0.3 if "jump" in words else 0.6)
+
+
+def test_a_jump_is_played_at_its_own_pace_and_falls_freely(library):
+    take = synthesize(library, replace(plan_walk(library, *HEADER), nearest=True))
+    (key,) = take.keys
+    frame = int(round(key.frame))
+    steps = np.diff(take.clip_frame[frame - 6 : frame + 7])
+    own_fps = next(clip.motion.fps for clip in add_actions(library.with_synthetic_clips, [key.clip]).clips
+                   if clip.path == key.clip)
+    assert steps == pytest.approx(own_fps / take.motion.fps, abs=0.02)
+
+
+def test_lying_legs_are_not_planted(library):
+    clips = add_actions(library.with_synthetic_clips, find_missing_actions(library, [moment("fall")])).clips
+    fall = next(clip for clip in clips if is_action_clip(clip))
+    body = identify_joints(fall.motion.skeleton)
+    hips = forward_kinematics(fall.motion)[0][:, body.hips, 2]
+    assert not fall.heel_toe_contacts[hips < 0.25].any() and fall.heel_toe_contacts[hips > 0.8].any()
