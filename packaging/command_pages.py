@@ -39,7 +39,9 @@ KINDS = {
     "continuous": ("Spans", "What a player does for a while."),
     "discrete": ("Key moments", "What happens at one instant."),
     "modifier": ("Details", "They stand beside another label and make it more precise."),
-    "": ("Other labels", "They stand below the labels above, or are used by annotations of recordings."),
+    "": ("Other labels", "They stand below the labels above."),
+    "recordings": ("Labels of recordings", "Annotations of recordings use them. A player has one only where a "
+                   "clip of the library\nhas it, apart from `-touch`."),
 }
 
 
@@ -87,10 +89,18 @@ def build_labels_page(labels: Iterable[Label]) -> str:
         The page as Markdown.
     """
     parts = [LABELS_HEAD]
+    rows = list(labels)
     for kind, (title, text) in KINDS.items():
         parts.append(f"\n## {title}\n\n{text}\n\n{TABLE_HEAD}")
-        parts.extend(_format_label(label) for label in labels if (kind in label.kinds if kind else not label.kinds))
+        parts.extend(_format_label(label) for label in rows if kind in _list_kinds(label))
     return "\n".join(part.rstrip("\n") for part in parts) + "\n"
+
+
+def _list_kinds(label: Label) -> tuple[str, ...]:
+    """List the tables of `KINDS` that show a label."""
+    from beyond_mocap.annotation import list_vocabulary
+
+    return label.kinds or ("" if label.name in list_vocabulary() else "recordings",)
 
 
 def _format_label(label: Label) -> str:

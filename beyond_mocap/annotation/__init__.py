@@ -2,6 +2,7 @@
 
 - `labels`        what each label means, from one table (`vocabulary.csv`)
 - `ball_contact`  what labels say about the ball: which body part meets it, and when
+- `striking`      the surfaces that strike a ball; `body_surfaces` and `body_solid` the whole body
 - `vocabulary`    the decision tree of labels (Faustino, Appendix A), nearest labels, left and right
 - `timeline`      spans and key moments, validation, automatic locomotion where nothing is annotated
 - `text`          the text form of timelines (Faustino §4.2.2)

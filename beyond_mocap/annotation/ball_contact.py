@@ -25,8 +25,11 @@ _FOOT_OR_OTHER = frozenset(label.name for label in read_labels().values() if "fo
 _FOOT_TAKES = frozenset(list_labels(ball="takes", part="foot", is_root=True))
 _TAKES, _SENDS, _CARRIES = (frozenset(list_labels(ball=what)) for what in ("takes", "sends", "carries"))
 _STATED = frozenset({"foot", *list_labels(group="height"), *list_labels(group="surface")})
-_PART_BY_HEIGHT = ((0.45, ("foot", "low")), (0.75, ("foot", "high")), (1.05, ("thigh",)), (np.inf, ("body",)))
-"""Below which height in m of the ball which part takes it: the knee of an adult is at 0.5 m, the hip at 0.95 m."""
+_PART_BY_HEIGHT = (
+    (0.45, ("foot", "low")), (0.75, ("foot", "high")), (1.05, ("thigh",)), (1.55, ("body",)), (np.inf, ("head",)),
+)  # fmt: skip
+"""Below which height in m of the ball which part takes it: the knee of an adult is at 0.5 m, the hip at 0.95 m, the
+middle of the chest at 1.3 m, the forehead at 1.65 m."""
 _FLIGHT_SECONDS = 0.6  # from take-off to ball contact at most, in dives by hand
 
 
@@ -133,7 +136,7 @@ def choose_part_by_height(labels: Iterable[str], height: float | None) -> tuple[
     """
     labels = tuple(labels)
     is_open = takes_with_foot(labels) and find_striking_part(labels) == "foot" and not _STATED & set(labels)
-    if not is_open or height is None:
+    if not is_open or height is None or shows_foot_on_ball(frozenset(labels)):
         return labels
     return (*labels, *next(part for most, part in _PART_BY_HEIGHT if height < most))
 

@@ -17,10 +17,9 @@ from ..motion.humanoid import identify_joints
 from ..motion.skeleton import Skeleton
 from ..motion.track import BALL_RADIUS
 from .body_surfaces import BodySurface, build_body_surfaces
+from .striking import JOINT_ORIGIN
 
 _TIP_RADIUS = 0.0  # m: boots are thin there, and a ball that touches the foot may lie above its tip
-_ORIGIN = np.zeros(3)
-_ORIGIN.setflags(write=False)
 
 
 def build_leg_surfaces(skeleton: Skeleton) -> tuple[BodySurface, ...]:
@@ -47,7 +46,7 @@ def _build_tips(skeleton: Skeleton) -> list[BodySurface]:
     body, tips = identify_joints(skeleton), []
     for side in ("left", "right"):
         toe = getattr(body, side).toe_or_foot
-        tips.append(BodySurface(part="foot", side=side, radius=_TIP_RADIUS, start=(toe, _ORIGIN),
+        tips.append(BodySurface(part="foot", side=side, radius=_TIP_RADIUS, start=(toe, JOINT_ORIGIN),
                                 end=(toe, skeleton.tip_offset(toe)), end_radius=_TIP_RADIUS))
     return tips
 
@@ -83,8 +82,8 @@ class BodySolid:
         """
         start, end = (_place_points([getattr(surface, name) for surface in surfaces], positions, rotations)
                       for name in ("start", "end"))
-        radius, end_radius = (np.array([getattr(surface, name) for surface in surfaces])
-                              for name in ("radius", "end_radius"))
+        radius = np.array([surface.radius for surface in surfaces])
+        end_radius = np.array([surface.end_radius for surface in surfaces])
         return cls(start, end - start, radius + BALL_RADIUS, end_radius - radius)
 
     @cached_property

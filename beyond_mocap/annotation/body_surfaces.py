@@ -9,11 +9,9 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-import numpy as np
-
 from ..motion.humanoid import Humanoid, Limb, identify_joints
 from ..motion.skeleton import Skeleton
-from .striking import BODY_PARTS, Surface, build_part_surfaces
+from .striking import BODY_PARTS, JOINT_ORIGIN, Surface, build_part_surfaces
 
 # Metres at the first and the last joint: half depths of the drawn body. The trunk is wider than deep: capsules along
 # its flanks, across the hips and across the shoulders give it its width.
@@ -22,8 +20,6 @@ _LIMBS = {
     "upper arm": ("upper_arm", "lower_arm", 0.046, 0.039), "forearm": ("lower_arm", "hand", 0.039, 0.026),
 }  # fmt: skip
 _HIPS_RADIUS, _SPINE_RADIUS, _SHOULDER_RADIUS, _FLANK_RADIUS, _NECK_RADIUS = 0.09, 0.105, 0.07, 0.05, 0.055
-_ORIGIN = np.zeros(3)
-_ORIGIN.setflags(write=False)
 
 
 @dataclass(frozen=True, eq=False)
@@ -80,5 +76,5 @@ def _list_trunk(body: Humanoid) -> list[BodySurface]:
 def _build_capsule(part: str, side: str, joints, radius: float, end_radius: float | None = None) -> BodySurface:
     """Build the capsule between two joints, of one radius if no other is given for its end."""
     start, end = joints
-    return BodySurface(part=part, side=side, radius=radius, start=(start, _ORIGIN), end=(end, _ORIGIN),
+    return BodySurface(part=part, side=side, radius=radius, start=(start, JOINT_ORIGIN), end=(end, JOINT_ORIGIN),
                        end_radius=radius if end_radius is None else end_radius)

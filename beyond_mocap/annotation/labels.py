@@ -12,6 +12,7 @@ from __future__ import annotations
 import csv
 import re
 import string
+from collections.abc import Iterable
 from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
@@ -28,7 +29,8 @@ ACTIONS = ("throw", "kick")
 
 _ALLOWED_VALUES = {
     "kind": KINDS, "group": GROUPS, "part": (*BODY_PARTS, "thigh", "hands", "tool"), "flight": ("yes",),
-    "ball": ("sends", "takes", "carries", "never"), "height": ("low", "middle", "high"), "action": ACTIONS,
+    "ball": ("sends", "takes", "carries", "avoids", "holds", "never"), "height": ("low", "middle", "high"),
+    "action": ACTIONS,
 }  # fmt: skip
 _COLUMNS = (
     "label", "title", "meaning", "kind", "group", "part", "part_with", "ball", "gait_m_s", "height", "flight", "action",
@@ -49,7 +51,7 @@ class Label:
         parts: body parts that may meet the ball, of `BODY_PARTS`, "thigh" or "tool".
         both_hands: whether both hands meet it together.
         part_with: labels of which one must be present for the part to be certain.
-        ball: "sends", "takes", "carries", "never" or "".
+        ball: "sends", "takes", "carries", "avoids", "holds", "never" or "".
         gait: m/s from which the gait applies if a library has no own speed for it; None if it is no gait.
         height: of the ball at contact, or "".
         in_flight: whether the body flies to the ball.
@@ -112,6 +114,15 @@ def find_label(name: str) -> Label:
         The label; one without any meaning if the table has none.
     """
     return read_labels().get(name) or Label(name=name, title=string.capwords(name.replace("_", " ")))
+
+
+def avoids_ball(names: Iterable[str]) -> bool:
+    """Return whether a label says that the body lets the ball pass untouched.
+
+    Args:
+        names: the labels of a motion.
+    """
+    return any(find_label(name).ball == "avoids" for name in names)
 
 
 @lru_cache(maxsize=64)

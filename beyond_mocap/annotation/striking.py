@@ -21,8 +21,9 @@ BODY_PARTS = ("foot", "head", "chest", "hand")
 # Metres.
 FOOT_RADIUS, THIGH_RADIUS, HEAD_RADIUS, CHEST_RADIUS, HAND_RADIUS = 0.05, 0.08, 0.10, 0.12, 0.05
 _THIGH_SHARE = 0.6  # of the thigh from hip to knee, where a ball lands on it
-_ORIGIN = np.zeros(3)
-_ORIGIN.setflags(write=False)
+JOINT_ORIGIN = np.zeros(3)
+JOINT_ORIGIN.setflags(write=False)
+"""(3,) m, a joint's own place in its own frame."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -74,10 +75,11 @@ def build_part_surfaces(skeleton: Skeleton, part: str, sides: Iterable[str] = ("
         return tuple(_build_thigh(skeleton, side, getattr(body, side)) for side in sides)
     if part == "hand":
         hands = [(side, getattr(body, side).hand) for side in sides if getattr(body, side).hand is not None]
-        return tuple(Surface("hand", side, HAND_RADIUS, (hand, _ORIGIN), (hand, _ORIGIN)) for side, hand in hands)
+        lines = [(side, (hand, JOINT_ORIGIN)) for side, hand in hands]
+        return tuple(Surface("hand", side, HAND_RADIUS, middle, middle) for side, middle in lines)
     if part == "head" and body.head is not None:
         return (_build_head(skeleton, body),)
-    chest = (body.chest, _ORIGIN)
+    chest = (body.chest, JOINT_ORIGIN)
     return (Surface("chest", "", CHEST_RADIUS, chest, chest),) if part == "chest" else ()
 
 
@@ -146,8 +148,8 @@ def measure_smallest_gap(
 def _build_foot(skeleton: Skeleton, side: str, limb: Limb) -> Surface:
     """Build the foot from the ankle to the toe joint, or to the foot's end site if there is no toe joint."""
     if limb.toe is not None:
-        return Surface("foot", side, FOOT_RADIUS, (limb.foot, _ORIGIN), (limb.toe, _ORIGIN))
-    return Surface("foot", side, FOOT_RADIUS, (limb.foot, _ORIGIN), (limb.foot, skeleton.tip_offset(limb.foot)))
+        return Surface("foot", side, FOOT_RADIUS, (limb.foot, JOINT_ORIGIN), (limb.toe, JOINT_ORIGIN))
+    return Surface("foot", side, FOOT_RADIUS, (limb.foot, JOINT_ORIGIN), (limb.foot, skeleton.tip_offset(limb.foot)))
 
 
 def _build_thigh(skeleton: Skeleton, side: str, limb: Limb) -> Surface:

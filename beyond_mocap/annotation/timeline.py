@@ -10,10 +10,12 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from ..base.errors import InputError, format_seconds
+from .labels import avoids_ball, read_labels
 from .vocabulary import (
     CONTINUOUS,
     DISCRETE,
     TRANSITION,
+    find_labels_of_part,
     find_nearest_labels,
     find_similar_labels,
     list_labels_below,
@@ -123,8 +125,10 @@ class KeyMoment:
 
     @property
     def misses_ball(self) -> bool:
-        """Whether the body reaches for the ball and misses it by design, as the loser of a duel does."""
-        return TOUCH in self.avoid
+        """Whether the body leaves the ball untouched by design: it reaches and misses, as the loser of a duel does, or
+        lets the ball pass.
+        """
+        return TOUCH in self.avoid or avoids_ball(self.words)
 
 
 @dataclass(frozen=True)
@@ -324,12 +328,14 @@ def _build_unknown_label_error(label: str, item: Span | KeyMoment, known: frozen
     """Build the error of an unknown label; suggest similar labels and those that the tree has below the line's others.
     """
     others = [other for other in item.words if other in known]
-    similar = find_similar_labels(label, known)
+    is_of_recordings = label in read_labels()
+    similar = (find_labels_of_part(label, known) if is_of_recordings else ()) or find_similar_labels(label, known)
     roots = sorted(DISCRETE if isinstance(item, KeyMoment) else CONTINUOUS)
     offers = dict.fromkeys((*similar, *(list_labels_below(others)[:5] if others else roots * (not similar))))
     return InputError(
         place,
-        f"the label {label!r} is not in the vocabulary",
+        f"the label {label!r} is " + ("of recordings only, and no clip of the library has it" if is_of_recordings
+                                      else "not in the vocabulary"),
         f"one like {', '.join(offers)}" if offers else "a label of the vocabulary",
         "correct it, or use it in an annotation of the library",
     )

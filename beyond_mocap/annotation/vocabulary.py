@@ -115,6 +115,23 @@ def find_similar_labels(label: str, known: Iterable[str], count: int = 3) -> tup
     return tuple(other for distance, other in ranked[:count] if distance <= max(1, (len(label) + 1) // 2))
 
 
+def find_labels_of_part(label: str, known: Iterable[str], count: int = 3) -> tuple[str, ...]:
+    """Find the labels that bring the same part of the body to the ball: "chest" leads to "body", "trap" to "receive".
+
+    Args:
+        label: a label of the table.
+        known: the labels to choose from.
+        count: number of labels at most.
+    Returns:
+        The labels, those that do the same with the ball first, then roots, then the table's order.
+    """
+    rows = read_labels()
+    wanted, offered = rows[label], set(known)
+    same = [row for name, row in rows.items() if name in offered and row.parts and row.parts == wanted.parts]
+    same.sort(key=lambda row: (row.ball != wanted.ball, not row.is_root))
+    return tuple(row.name for row in same[:count])
+
+
 def compute_edit_distance(a: str, b: str) -> int:
     """Count the letters to insert, delete or replace at least to turn `a` into `b` (Levenshtein distance).
 

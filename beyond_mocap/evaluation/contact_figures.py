@@ -8,7 +8,7 @@ import numpy as np
 
 from ..annotation.ball_contact import find_contact_window, find_striking_part
 from ..annotation.striking import CHEST_RADIUS, FOOT_RADIUS, HAND_RADIUS, HEAD_RADIUS, THIGH_RADIUS
-from ..motion.track import BALL_RADIUS, Track, sample_track
+from ..motion.track import BALL_RADIUS, Track
 from ..synthesis.construct.step_to_ball import compute_allowed_step
 from ..synthesis.construct.strike import BALL_NOISE, FILLED_NOISE, PELVIS_RANGE
 from ..synthesis.quality.moments import KeyMomentResult, list_contact_labels, measure_contact
@@ -64,17 +64,17 @@ def find_reachable(view: View, moment: KeyMomentResult) -> bool | None:
     part = find_striking_part(labels)
     if part is None or view.track is None or not np.isfinite(view.track.ball[:, :2]).all(axis=1).any():
         return None
-    sampled, time = sample_track(view.track, view.fps), view.played.times[moment.frame]
+    sampled, time = view.sampled_track, view.played.times[moment.frame]
     at = int(np.argmin(np.abs(sampled.times - time)))
     noise = BALL_NOISE if sampled.ball_measured[at] else FILLED_NOISE
     reach = _DIVE_REACH if find_contact_window(labels) else REACH[part] + BALL_RADIUS
     away = float(np.linalg.norm(sampled.ball[at, :2] - sampled.raw[at]))
-    return away <= reach + noise + compute_allowed_step(sampled.speed[at]) and _is_at_height(view.track, part, time,
-                                                                                             sampled.ball[at, 2])
+    is_near = away <= reach + noise + compute_allowed_step(sampled.speed[at])
+    return is_near and _is_at_height(view.track, part, time, sampled.ball[at, 2], noise)
 
 
-def _is_at_height(track: Track, part: str, time: float, height: float) -> bool:
-    """Return whether a part can touch a ball at a height, m; where it is not measured it may be any."""
+def _is_at_height(track: Track, part: str, time: float, height: float, noise: float) -> bool:
+    """Return whether a part can touch a ball at a height, m, give or take its noise, m; any where it is unknown."""
     least, most = HEIGHTS[part]
     is_known = bool(track.ball_height_known[np.abs(track.times - time).argmin()])
-    return not is_known or least - BALL_NOISE <= height <= most + BALL_NOISE
+    return not is_known or least - noise <= height <= most + noise

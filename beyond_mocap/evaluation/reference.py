@@ -26,7 +26,7 @@ from ..library.library import Library
 from ..motion.humanoid import Humanoid, estimate_stature, identify_joints
 from ..motion.motion import compute_pose, forward_kinematics, resample, sample_frames
 from ..motion.skeleton import Skeleton
-from ..motion.track import Track, smooth_zero_phase_hann
+from ..motion.track import SampledTrack, Track, sample_track, smooth_zero_phase_hann
 from ..synthesis.quality import movement
 from ..synthesis.quality.moments import evaluate_moments
 from ..synthesis.quality.playback import Playback, find_transitions
@@ -411,6 +411,11 @@ class View:
     def course(self) -> BodyCourse:
         """Where the body faces and goes."""
         return measure_course(self.played.motion.skeleton, self.played.positions, self.fps)
+
+    @cached_property
+    def sampled_track(self) -> SampledTrack:
+        """The track, which has to be known, at the take's rate."""
+        return sample_track(self.track, self.fps)
 
     @property
     def source(self) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:

@@ -17,6 +17,7 @@ from ..library.synthetic_clips import SYNTHETIC_FOLDER
 from ..motion import quaternion
 from ..synthesis.quality.moments import KeyMomentResult, list_contact_labels
 from ..synthesis.quality.unmet_constraints import format_stretches
+from ..synthesis.search.key_fit import SPEED_RATIO
 from . import touches
 from .contact_figures import measure_contacts
 from .naturalness import format_event
@@ -26,7 +27,6 @@ from .touch_view import TouchView
 
 FAST_BALL = 18.0  # m/s of the ball just after a kick, from which on it is a fast one
 LEAST_BALL = 5.0  # m/s from which on ball and foot speed are compared; slower balls are nudged, or taken along
-RATIO = (1.06, 1.3)  # ball speed over foot speed of kicks: Kellis and Katis 2007, J. Sports Sci. Med. 6, 154-165
 DEPTH = 0.010  # m that the ball may lie in the body: it is soft, and so are people
 _ACROSS = 0.15  # m by which a ball may lie on the other side of the body's middle from the foot that touches it
 
@@ -112,7 +112,7 @@ def measure_touches(touch_view: TouchView) -> dict:
 def summarize_ball_speeds(kicks: Sequence[touches.Kick]) -> dict:
     """Summarize the ball's speed over that of the foot, of kicks whose ball leaves faster than LEAST_BALL."""
     ratios = np.array([kick.ball_speed / max(kick.foot_speed, 0.1) for kick in kicks if kick.ball_speed > LEAST_BALL])
-    in_range = (ratios >= RATIO[0]) & (ratios <= RATIO[1])
+    in_range = (ratios >= SPEED_RATIO[0]) & (ratios <= SPEED_RATIO[1])
     return {"kicks": len(ratios), "ratio_median": float(np.median(ratios)) if len(ratios) else math.nan,
             "ratio_in_range_share": float(in_range.mean()) if len(ratios) else math.nan}
 

@@ -18,6 +18,7 @@ from ..annotation.labels import list_labels
 from ..annotation.vocabulary import SIDES
 from ..base.time_series import find_runs, time_derivative
 from ..motion.humanoid import identify_joints, measure_leg_length
+from ..motion.plant_place import PLANT_AHEAD, PLANT_BESIDE
 from ..motion.skeleton import Skeleton
 from .naturalness import FPS, LEG_LENGTH, BodyCourse, resample_positions
 
@@ -34,9 +35,6 @@ _RUN_UP_SECONDS = 0.5  # s before a kick over which its run-up is measured
 _STEP_SECONDS = 2.0  # s before a kick in which its last three landings lie
 _LIFTED_SECONDS = 0.1  # s before a kick up to which its plant foot may have left the ground
 _STRIDE_LEAST = 0.05  # m of the stride before the last; shorter ones are steps on the spot
-
-PLANT_BESIDE, PLANT_AHEAD = (0.20, 0.37), (-0.05, 0.20)
-"""Metres of the plant foot beside and ahead of the kicking ankle (`../shared/metrics.md`, row *kick*)."""
 
 _SENDS, _TAKES = frozenset(list_labels(ball="sends")), frozenset(list_labels(ball="takes"))
 _RECEPTIONS = frozenset(("receive", "trap"))  # a foot that blocks takes the ball too, but does not give with it

@@ -161,8 +161,8 @@ class Library:
     def with_synthetic_clips(self) -> "Library":
         """The recordings followed by the synthetic clips of `library.synthetic_clips`.
 
-        These add the speeds between and above the recordings, and kicks on the run. They are
-        generated on first use and cached. The result has no clusters. InputError where no recording shows locomotion.
+        These add the speeds between and above the recordings, and kicks on the run. They are generated on first use and
+        cached. The result has no clusters. InputError where no recording shows locomotion.
         """
         measure_gaits(self)  # a library without locomotion raises InputError
         cached = cache.load_library(*self.cache_location, "made") if self.cache_location else None

@@ -29,6 +29,7 @@ from ..motion.motion import compute_pose, forward_kinematics, sample_frames
 from ..motion.track import smooth_zero_phase_hann
 from ..synthetic.actions.action import Action, ActionSetting
 from ..synthetic.actions.table import ACTIONS
+from ..synthetic.lying import detect_lying_legs
 from .cache import write_synthetic_clips
 from .clip import Clip
 from .features import SMOOTH_SECONDS
@@ -50,7 +51,7 @@ _SPEED_ROOM, _SPEED_SLACK = 1.2, 0.3  # factor and m/s by which a player may be 
 _OWN_KICK_SPEED = 2.0  # m/s of players from which on a library's own kicker has kicks of any strength
 _GAITS = frozenset(list_gaits())
 _SIDE = "right"  # of clips that are not mirrored
-_KEPT = 4  # extended libraries that are kept for each library
+_KEPT, _KEPT_CLIPS = 4, 400  # extended libraries and clips that are kept for each library; a clip has some 0.3 MB
 
 _clips: WeakKeyDictionary[Library, dict[str, tuple[Clip, Clip]]] = WeakKeyDictionary()
 _settings: WeakKeyDictionary[Library, ActionSetting] = WeakKeyDictionary()
@@ -63,6 +64,7 @@ class ActionMoment:
 
     Attributes:
         labels: the requested labels.
+        avoid: labels that it must not show.
         speed: m/s of the player.
         height: m of the ball's centre, None where it is unknown.
         ball_speed: m/s of the ball before, 0 where it is unknown.
@@ -73,6 +75,7 @@ class ActionMoment:
     """
 
     labels: frozenset[str]
+    avoid: frozenset[str] = frozenset()
     speed: float = 0.0
     height: float | None = None
     ball_speed: float = 0.0
@@ -93,8 +96,7 @@ def find_action(moment: ActionMoment) -> Action | None:
     """
     requested = moment.labels - frozenset(SIDES)
     serving = [action for action in ACTIONS
-               if action.is_span == moment.is_span and action.needs <= requested <= action.labels
-               and moment.lead >= action.least_lead]
+               if action.is_span == moment.is_span and _answers(action, moment) and moment.lead >= action.least_lead]
     names = {action.name for action in serving}
 
     def rate_misfit(action: Action) -> tuple:
@@ -102,7 +104,7 @@ def find_action(moment: ActionMoment) -> Action | None:
         off = 0.0 if moment.height is None else max(low - moment.height, moment.height - high)
         return action.varies in names, not action.suits_speed(moment.speed), off > _HEIGHT_SLACK, -action.least_lead
 
-    is_named = any(_names_action(word) for word in requested)
+    is_named = any(names_action(word) for word in requested)
     return min(serving, key=rate_misfit, default=None) if is_named else None
 
 
@@ -116,7 +118,7 @@ def find_missing_actions(library: Library, moments: Iterable[ActionMoment], mirr
         moments: the requested actions.
         mirror: whether mirrored twins may be shown.
     Returns:
-        Paths of clips, sorted, each once; for `add_actions`. They are those of the library's own kicker where he has
+        Paths of clips, sorted, each once; for `add_actions`. They are those of the library's own kicker where there is
         such a kick.
     """
     asked = [moment for moment in moments if find_action(moment) and not _is_recorded(library, moment, mirror)]
@@ -145,21 +147,28 @@ def select_own_kicks(library: Library, moment: ActionMoment, mirror: bool = True
     if moment.is_span or moment.speed < _OWN_KICK_SPEED:
         return ()
     kicks = [key for key in library.keys if library.clips[key.clip].path.startswith(SYNTHETIC_FOLDER + KICK_PREFIX)
-             and (mirror or not library.clips[key.clip].mirrored)]
+             and (mirror or not library.clips[key.clip].mirrored) and not key.labels & moment.avoid]
     return select_keys(kicks, moment.labels)
 
 
 def find_action_paths(moment: ActionMoment) -> tuple[str, ...]:
     """Find the paths of the synthetic clips that answer to a requested action; none where no action does."""
-    return tuple(path for action in _list_actions(moment) for path in _name_clips(action, moment)) if find_action(
-        moment) else ()
+    return tuple(path for action in _list_actions(moment) for path in _name_clips(action, moment))
 
 
 def _list_actions(moment: ActionMoment) -> list[Action]:
     """List the action that answers best to a requested one, and those that vary it and fit the player and the ball."""
-    best, requested = find_action(moment), moment.labels - frozenset(SIDES)
-    return [best, *(one for one in ACTIONS if one.varies == best.name and requested <= one.labels
+    best = find_action(moment)
+    if best is None:
+        return []
+    return [best, *(one for one in ACTIONS if one.varies == best.name and _answers(one, moment)
                     and _is_speed_near(one, moment.speed) and moment.ball_speed <= one.most_ball_speed)]
+
+
+def _answers(action: Action, moment: ActionMoment) -> bool:
+    """Return whether an action has the requested labels and none of the avoided ones."""
+    requested = moment.labels - frozenset(SIDES)
+    return action.needs <= requested <= action.labels and not action.distinct_labels & moment.avoid
 
 
 def _is_speed_near(action: Action, speed: float) -> bool:
@@ -187,8 +196,7 @@ def add_actions(library: Library, paths: Iterable[str]) -> Library:
         return library
     extended = _extended.setdefault(library, {})
     if added not in extended:
-        while len(extended) >= _KEPT:
-            del extended[next(iter(extended))]
+        _make_room(extended, _KEPT)
         clips = [clip for path in added for clip in _find_clips(library, path)]
         extended[added] = library.append_synthetic_clips(clips)
     return extended[added]
@@ -219,8 +227,12 @@ def is_action_clip(clip: Clip) -> bool:
     return clip.path.startswith(_FOLDER)
 
 
-def _names_action(word: str) -> bool:
-    """Return whether a label names an action, not how or at which pace it is done."""
+def names_action(word: str) -> bool:
+    """Return whether a label names an action, not how or at which pace it is done.
+
+    Args:
+        word: the label.
+    """
     label = find_label(word)
     return word not in _GAITS and bool(label.is_root or label.parts or label.ball or label.in_flight)
 
@@ -229,12 +241,14 @@ def _is_recorded(library: Library, moment: ActionMoment, mirror: bool) -> bool:
     """Return whether a recording carries all labels of a requested action."""
     shown = np.array([(mirror or not clip.mirrored) and not clip.is_synthetic for clip in library.clips])
     if not moment.is_span:
-        found = select_keys([key for key in library.keys if shown[key.clip]], moment.labels)
+        found = select_keys([key for key in library.keys if shown[key.clip] and not key.labels & moment.avoid],
+                            moment.labels)
         return bool(found) if not takes_with_foot(moment.labels) else any(
             _suits_reception(library, key, moment) for key in found)
     frames = library.frames
     columns = [frames.vocabulary.index(word) for word in moment.labels - _GAITS if word in frames.vocabulary]
-    carries = frames.words[:, columns].all(axis=1) & shown[frames.clip]
+    avoided = [frames.vocabulary.index(word) for word in moment.avoid if word in frames.vocabulary]
+    carries = frames.words[:, columns].all(axis=1) & ~frames.words[:, avoided].any(axis=1) & shown[frames.clip]
     return len(columns) == len(moment.labels - _GAITS) and bool(carries.any())
 
 
@@ -284,11 +298,18 @@ def _find_clips(library: Library, path: str) -> tuple[Clip, Clip]:
     """Find a clip and its twin among those built for a library, or build them."""
     known = _clips.setdefault(library, {})
     if path not in known:
+        _make_room(known, _KEPT_CLIPS)
         clip = _build_clip(library, path)
         known[path] = clip, clip.build_twin()
-        if library.cache_location:
-            write_synthetic_clips(library.cache_location[0], known[path], missing_only=True)
+        if library.cache_location:  # over a file of another version of the program
+            write_synthetic_clips(library.cache_location[0], known[path])
     return known[path]
+
+
+def _make_room(kept: dict, most: int) -> None:
+    """Remove the oldest entries so that one more makes `most` of them."""
+    while len(kept) >= most:
+        del kept[next(iter(kept))]
 
 
 def _build_clip(library: Library, path: str) -> Clip:
@@ -299,7 +320,7 @@ def _build_clip(library: Library, path: str) -> Clip:
     last = min(last, len(motion) - 1)
     key = None if action.is_span else gesture.key * FPS
     row = ClipAnnotation(first, last, key, sort_labels(action.labels | sides))
-    touched = contacts.detect_heel_toe_contacts(motion) & detect_still_points(motion)
+    touched = contacts.detect_heel_toe_contacts(motion) & detect_still_points(motion) & ~detect_lying_legs(motion)
     fades = int(_FADE_SECONDS * FPS) if action.can_last else 0
     rows = (row, *_build_gait_rows(library, motion, before=int(first), after=int(last) + 1 + fades))
     return Clip(path=path, mirrored=False, motion=motion, annotations=rows, heel_toe_contacts=touched)

@@ -1,4 +1,4 @@
-"""Synthetic clips that complete the recordings: speeds between and above them, kicks and received balls on the run.
+"""Synthetic clips that complete the recordings: speeds between and above them, stands, steps and kicks on the run.
 
 Tracked players move at any speed up to 9 m/s; recordings leave gaps (../shared/data/README.md). A clip played at 0.875
 to 1.125 of its rate covers some speeds around its own; a speed that too few seconds reach that way is in a gap.
@@ -16,10 +16,9 @@ figures and lose the look: knees pop, the body floats.
 Where all recordings run, or all walk slower, it generates walking the same way, and where no clip stands calmly a
 stand: a run that is shortened to a walk's steps hops on the spot.
 
-Recorded kicks are seldom faster than a jog, and players who receive a ball with the foot in a recording hardly move;
-moved along at 8 m/s their supporting foot slides by metres. `synthetic.recorded_kicks` and
-`synthetic.actions.receptions` generate both on the run at the missing speeds; they substitute for recorded ones that
-answer by the same labels.
+Recorded kicks are seldom faster than a jog; moved along at 8 m/s the kicker's plant foot slides by metres.
+`synthetic.recorded_kicks` generates them on the run at the missing speeds; they substitute for recorded ones that
+answer by the same labels. What only some takes ask for, receptions among it, is built when they do (`missing_actions`).
 """
 
 from __future__ import annotations
@@ -50,8 +49,7 @@ from .missing_steps import BACK_PREFIX, STEP_PREFIX, TURN_PREFIX, iter_missing_s
 from .scan import CACHE_FOLDER
 
 SYNTHETIC_FOLDER = f"{CACHE_FOLDER}/made-gait/"
-# how the file names of blends, kicks, received balls, long stands, long runs, walks and synthetic stands begin, in that
-# folder
+# how the file names of blends, kicks, long stands, long runs, walks and synthetic stands begin, in that folder
 BLEND_PREFIX, KICK_PREFIX, STAND_PREFIX, LOOP_PREFIX = "blend_", "kick_", "stand_", "loop_"
 WALK_PREFIX, STILL_PREFIX = "walk_", "still_"
 FPS = 60.0  # of synthetic clips

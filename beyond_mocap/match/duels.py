@@ -23,7 +23,7 @@ from ..motion.track.match_data import REFEREE, Match
 from .event_clock import AlignedEvents
 from .moments import DUELS, MIN_DISTANCE_SECONDS, Moment, build_moment
 
-REACH, TOLD_REACH = 1.2, 2.0
+REACH, EVENT_REACH = 1.2, 2.0
 """m from the ball within which an opponent may reach for it: a long step and a stretched leg; farther where their own
 event says so."""
 
@@ -162,7 +162,7 @@ class _DuelSearch:
         is_opponent = np.array([player.team != self._teams[touch.player] for player in self._match.players])
         distances = np.where(is_opponent & self._may_lose, self._distances[:, number], np.inf)
         for row in np.argsort(distances, kind="stable"):
-            if distances[row] > TOLD_REACH:
+            if distances[row] > EVENT_REACH:
                 break
             duel = self._build_duel(touch, int(row), float(distances[row]))
             if duel is not None:
@@ -173,13 +173,13 @@ class _DuelSearch:
         """Build the duel with an opponent; None if they do not reach for the ball."""
         loser = self._match.players[row].id
         event = self._find_event(loser, touch.time)
-        if distance > (REACH if event is None else TOLD_REACH) or self._touches_near(loser, touch.time):
+        if distance > (REACH if event is None else EVENT_REACH) or self._touches_near(loser, touch.time):
             return None
         bearing = self._measure_bearing(row, touch)
         if bearing is not None and bearing[1] > _TURNED_SPEED and abs(bearing[0]) > _TURNED_ANGLE:
             return None
         is_aside = bearing is not None and bearing[1] > _SIDE_SPEED and abs(bearing[0]) > _SIDE_ANGLE
-        doubt = 0.5 * distance / (REACH if event is None else TOLD_REACH)
+        doubt = 0.5 * distance / (REACH if event is None else EVENT_REACH)
         return Duel(time=touch.time, winner=touch.player, loser=loser, details=() if event is None else event.details,
                     kind="aerial" if touch.part == "head" else "tackle", distance=distance,
                     side=("left" if bearing[0] > 0.0 else "right") if is_aside else "", height=float(touch.position[2]),

@@ -12,21 +12,25 @@ from dataclasses import replace
 
 import numpy as np
 
-from ..annotation.ball_contact import build_surfaces
+from ..annotation.ball_contact import build_surfaces, measure_contact_gap
 from ..annotation.striking import measure_ball_gap
 from ..ball.tracked.solve import SolvedBall
-from ..base.time_series import interpolate_columns
+from ..base.time_series import find_runs, interpolate_columns
 from ..motion.motion import Motion, compute_pose
 from ..motion.track import BALL_RADIUS, Track, clean_track
 from ..motion.track.ball_path import BallPath
 from ..motion.track.match_data import Match
+from ..synthesis.construct.ball_detour import lead_ball_around_body
+from ..synthesis.construct.contact_geometry import BALL_SECONDS
 from ..synthesis.construct.near_miss import miss_ball
+from ..synthesis.construct.strike import find_nearest_frame
 from ..synthesis.construct.strike_fixed_ball import FixedStrike, strike_fixed_ball
 from ..synthesis.plan import Plan
-from ..synthesis.resolved_touches import build_trajectory
+from ..synthesis.resolved_touches import AT_BALL_GAP, build_trajectory
 from ..synthesis.take import KeyResult, Take
 
 _ROUNDING = 1e-4  # m, positions are rounded to this, as in files
+_HELD_SECONDS = 4.0  # s before and after a key moment in which a ball may be held
 
 MAX_CLOSED_GAP = 0.15
 """m: the largest gap that is closed, the same as in `synthesis.construct.strike`; a player who misses the ball by more
@@ -84,16 +88,21 @@ def find_led_ball(take: Take) -> tuple[np.ndarray, np.ndarray]:
     if take.ball is None:
         return np.zeros(0, int), np.zeros((0, 3))
     offset = take.ball.positions - sample_ball(take.plan, take.ball.times).positions
+    return _list_moved(offset, round(take.start_time * take.motion.fps))
+
+
+def _list_moved(offset: np.ndarray, first: int) -> tuple[np.ndarray, np.ndarray]:
+    """List the frames (K,) of the match's clock, counted from `first`, with an offset (T, 3) m, and these (K, 3)."""
     offset = np.where(np.isfinite(offset), offset, 0.0)
     affected = np.flatnonzero(np.abs(offset).max(axis=1) > 0.5 * _ROUNDING)
-    return affected + round(take.start_time * take.motion.fps), offset[affected]
+    return affected + first, offset[affected]
 
 
 def apply_led_ball(ball: BallPath, first: int, led: Iterable[tuple[np.ndarray, np.ndarray]]) -> BallPath:
     """Apply to the ball what all players' `find_led_ball` found.
 
-    A player moves the ball only between the touches before and after their own, so several players' offsets add up
-    without changing another player's touch.
+    A player does not move the ball where another one meets it (`lead_ball_between_players`), so several players'
+    offsets add up without changing a touch.
 
     Args:
         ball: T frames.
@@ -102,11 +111,84 @@ def apply_led_ball(ball: BallPath, first: int, led: Iterable[tuple[np.ndarray, n
     Returns:
         The ball path.
     """
-    places = np.array(ball.positions)
+    places, is_led = np.array(ball.positions), np.zeros(len(ball.times), bool)
     for frames, offset in led:
         inside = (frames >= first) & (frames < first + len(places))
         np.add.at(places, frames[inside] - first, offset[inside])
+        is_led[frames[inside] - first] = True
+    places[is_led, 2] = np.maximum(places[is_led, 2], BALL_RADIUS)
     return BallPath(ball.times, np.round(places / _ROUNDING) * _ROUNDING, ball.measured)
+
+
+def lead_ball_between_players(
+    takes: Sequence[Take], motions: Sequence[Motion], firsts: Sequence[int],
+    led: Sequence[tuple[np.ndarray, np.ndarray]],
+) -> list[tuple[np.ndarray, np.ndarray]]:
+    """Lead the ball from one player's touch to the next one's, and around the bodies of all.
+
+    A take's own ball knows no other player's touches of a dribble, and goes round its own body only.
+
+    Args:
+        takes: of all players.
+        motions: the same after collision avoidance.
+        firsts: frame of the match's clock of each one's first frame.
+        led: what each moves the ball by (`find_led_ball`).
+    Returns:
+        The same, faded out where another player meets the ball, with the moves around each body added to that player's.
+    """
+    met = [first + _list_met_frames(take) for take, first in zip(takes, firsts)]
+    touched, out = np.unique(np.concatenate([np.zeros(0, int), *met])), []
+    for (frames, offset), own, take in zip(led, met, takes):
+        share = _compute_led_share(frames, own, np.setdiff1d(touched, own), BALL_SECONDS * take.motion.fps)
+        out.append((frames, share[:, None] * offset))
+    for number, (take, motion, first) in enumerate(zip(takes, motions, firsts)):
+        if take.ball is None:
+            continue
+        ball = apply_led_ball(sample_ball(take.plan, take.ball.times), first, out).positions
+        held = [(at, at) for at in touched - first if 0 <= at < len(ball)]
+        around = lead_ball_around_body(motion.skeleton, motion.root_positions, motion.rotations, ball, held, motion.fps)
+        frames, offset = _list_moved(around - ball, first)
+        out[number] = np.concatenate([out[number][0], frames]), np.concatenate([out[number][1], offset])
+    return out
+
+
+def _compute_led_share(frames: np.ndarray, own: np.ndarray, others: np.ndarray, reach: float) -> np.ndarray:
+    """Compute the share (K,) of a player's offsets at frames that stays: all at `own` touches, none at `others`.
+
+    It fades over `reach` frames, or from the touch before to the one after if these are closer.
+    """
+    before, after = _find_neighbours(own, frames)
+    low, high = _find_neighbours(others, frames)
+    rising = np.where(low > before, (frames - low) / np.minimum(after - low, reach), 1.0)
+    falling = np.where(high < after, (high - frames) / np.minimum(high - before, reach), 1.0)
+    return np.clip(np.minimum(rising, falling), 0.0, 1.0)
+
+
+def _find_neighbours(touches: np.ndarray, frames: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Find the last touch up to each of K frames and the first one from it on: (K,), -inf and inf where there is none.
+    """
+    ends = np.array([-np.inf, *touches, np.inf])
+    return ends[np.searchsorted(ends, frames, side="right") - 1], ends[np.searchsorted(ends, frames, side="left")]
+
+
+def _list_met_frames(take: Take) -> np.ndarray:
+    """List the frames (N,) in which a part of the body is at the take's ball, ascending."""
+    if take.ball is None:
+        return np.zeros(0, int)
+    keys = [at for key in take.keys for at in _find_meeting(take, key)]
+    pushes = [at for push in take.dribble_touches for at in range(push.first, push.last + 1)]
+    return np.unique(np.array([*keys, *pushes], dtype=int))
+
+
+def _find_meeting(take: Take, key: KeyResult) -> range:
+    """Find the frames around a key moment in which the part that it names stays at the take's ball."""
+    motion, reach = take.motion, round(_HELD_SECONDS * take.motion.fps)
+    frame = find_nearest_frame(key.frame, len(motion))
+    near = slice(max(frame - reach, 0), frame + reach + 1)
+    pose = compute_pose(motion.skeleton, motion.root_positions[near], motion.rotations[near])
+    gaps = measure_contact_gap(motion.skeleton, *pose, key.contact_labels, take.ball.positions[near])
+    runs = [(first + near.start, end + near.start) for first, end in find_runs(np.abs(gaps) < AT_BALL_GAP)]
+    return next((range(first, end) for first, end in runs if first <= frame < end), range(0))
 
 
 def restore_ball_contact(take: Take, ball: np.ndarray) -> Take:

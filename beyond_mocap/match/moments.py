@@ -19,6 +19,7 @@ import numpy as np
 
 from ..annotation import KeyMoment, Span, Timeline, check_timeline, format_timeline, parse_timeline, read_text
 from ..annotation.ball_contact import takes_with_foot
+from ..annotation.labels import avoids_ball
 from ..annotation.timeline import AVOID_PREFIX, TOUCH
 from ..base.digest import hex_digest
 from ..files.atomic import atomic_write
@@ -54,8 +55,8 @@ class Moment:
 
     @property
     def misses_ball(self) -> bool:
-        """Whether the player reaches for the ball and misses it by design."""
-        return TOUCH in self.avoid
+        """Whether the player leaves the ball untouched by design."""
+        return TOUCH in self.avoid or avoids_ball(self.labels)
 
 
 def build_moment(

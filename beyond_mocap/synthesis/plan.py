@@ -181,7 +181,7 @@ class Plan:
     strong_foot: str = ""
     style: tuple[str, ...] = ()
     style_weight: float = _DEFAULTS["style_weight"]
-    solve_touches: bool = field(default=_DEFAULTS["solve_touches"], metadata=LATER)
+    solve_touches: bool = field(default=_DEFAULTS["solve_touches"], metadata={**LATER, "was": False})
     variety: float = field(default=_DEFAULTS["variety"], metadata=LATER)
     lag: float = field(default=_DEFAULTS["lag"], metadata=LATER)
     manner: int = field(default=_DEFAULTS["manner"], metadata=LATER)

@@ -23,8 +23,8 @@ def read_moment_action(moment: KeyMoment, track: Track, sampled: SampledTrack) -
     time = moment.resolved_time
     at = int(np.argmin(np.abs(track.times - time)))
     height = float(track.ball[at, 2]) if track.ball_height_known[at] else None
-    return ActionMoment(labels=frozenset(choose_part_by_height(moment.words, height)), height=height,
-                        speed=float(np.interp(time, sampled.times, sampled.speed)),
+    return ActionMoment(labels=frozenset(choose_part_by_height(moment.words, height)), avoid=frozenset(moment.avoid),
+                        height=height, speed=float(np.interp(time, sampled.times, sampled.speed)),
                         ball_speed=_measure_ball_speed(sampled, time, _ARRIVING) or 0.0,
                         exit_speed=_measure_ball_speed(sampled, time, _LEAVING), lead=_measure_lead(sampled, time))
 
@@ -38,7 +38,8 @@ def read_span_action(span: Span, sampled: SampledTrack) -> ActionMoment:
     """
     inside = (sampled.times >= span.start) & (sampled.times <= span.end)
     speed = float(sampled.speed[inside].mean()) if inside.any() else 0.0
-    return ActionMoment(labels=frozenset(span.words), speed=speed, is_span=True, seconds=span.end - span.start)
+    return ActionMoment(labels=frozenset(span.words), avoid=frozenset(span.avoid), speed=speed, is_span=True,
+                        seconds=span.end - span.start)
 
 
 def _measure_lead(track: SampledTrack, time: float) -> float:

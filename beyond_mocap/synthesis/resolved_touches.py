@@ -15,7 +15,7 @@ from dataclasses import replace
 import numpy as np
 
 from ..annotation import KeyMoment, Span, Timeline
-from ..annotation.ball_contact import build_surfaces, find_striking_part
+from ..annotation.ball_contact import build_surfaces, find_contact_window, find_striking_part, measure_contact_gap
 from ..annotation.labels import list_labels
 from ..annotation.striking import build_part_surfaces, measure_ball_gap
 from ..ball.tracked.carried import find_carried_stretches
@@ -30,6 +30,7 @@ from .construct.ball_detour import find_free_contact, lead_ball_around_body
 from .construct.contact_geometry import BALL_SECONDS, add_flight_arc, lead_ball_through
 from .construct.dribble import plan_dribbles
 from .construct.give import give_with_ball
+from .construct.held_ball import HandTouch, carry_in_hands, hold_in_spans
 from .construct.near_miss import miss_ball
 from .construct.strike import BALL_NOISE, compute_contact_frames, find_nearest_frame
 from .plan import Plan, PlayerTouch, ResolvedPlan, SolvedTrajectory
@@ -38,15 +39,18 @@ from .take import DribbleTouch, KeyResult, Take
 MAX_TOUCH_OFFSET = 0.4
 """Seconds from a key moment within which its touch is searched."""
 
+AT_BALL_GAP = 0.03
+"""Metres between the surfaces up to which a part is at the ball."""
+
 _WITHIN = 1.5  # m from the player within which a touch by an unknown player may be this player's
 # cost in seconds: player unknown, other part, other kind
 _UNKNOWN_PLAYER_COST, _OTHER_PART_COST, _OTHER_KIND_COST = 0.15, 0.25, 0.15
 _MAX_SAMPLE_GAP = 0.1  # s from the nearest measured sample beyond which the ball counts as filled in
 _CARRIED_MARGIN = 0.15  # s from the ends of such a stretch from which on its course shows no touches, only steering
-_MET_GAP = 0.03  # m between the surfaces up to which a part is at the ball
+_LISTED_TIMES = 6  # key moments that a line lists
 _STEP = 0.004  # s between the points of a trajectory
 _SENDING, _TAKING = frozenset(list_labels(ball="sends")), frozenset(list_labels(ball="takes"))
-_CARRYING = frozenset(list_labels(ball="carries"))
+_CARRYING, _HOLDING = (frozenset(list_labels(ball=what)) for what in ("carries", "holds"))
 _SENDING_KINDS = {kind.name for kind in TOUCH_KINDS if kind.ball in ("sends", "carries")}
 _TAKING_KINDS = {kind.name for kind in TOUCH_KINDS if kind.ball == "takes"}
 
@@ -189,7 +193,7 @@ def _restore_order(keys: list[KeyMoment]) -> list[KeyMoment]:
 
 
 def report_missing_touches(take: Take, plan: ResolvedPlan) -> list[str]:
-    """Report what the ball has not: touches that key moments request, touches of dribbles, places of its own.
+    """Report what the ball lacks: touches that key moments request, touches of dribbles, places of its own.
 
     Args:
         take: the take of `apply_trajectory`.
@@ -208,7 +212,8 @@ def _report_untouched_keys(keys: list[KeyMoment]) -> list[str]:
     """Report in one line the key moments for which the trajectory has no touch."""
     if not keys:
         return []
-    times = ", ".join(f"{key.time:g}" for key in keys)
+    more = len(keys) - _LISTED_TIMES
+    times = ", ".join(f"{key.time:g}" for key in keys[:_LISTED_TIMES]) + (f" and {more} more" if more > 0 else "")
     words = ", ".join(dict.fromkeys(f"'{' '.join(key.words)}'" for key in keys))
     stay = "the key moment stays at its time" if len(keys) == 1 else "these key moments stay at their times"
     return [TimedMessage(f"{times} s: the ball's trajectory has no touch for {words} within {MAX_TOUCH_OFFSET:g} s; "
@@ -270,9 +275,14 @@ def apply_trajectory(take: Take, plan: ResolvedPlan) -> tuple[Take, list[str]]:
     pushed = [(push.first, push.last) for push in pushes]
     take = _miss_ball(take, replace(take.ball, positions=dribbled.ball))
     free, met = _free_met_ball(take, dribbled.ball, pushes)
+    free, carried = carry_in_hands(take.motion, free, [_build_hand_touch(take, key) for key in keys])
+    free, holds = hold_in_spans(take.motion, free, _find_shown(take, _HOLDING))
+    carried += holds
     around = lead_ball_around_body(take.motion.skeleton, take.motion.root_positions, take.motion.rotations, ball=free,
-                                   held=[*met, *pushed], fps=fps)
+                                   held=[*met, *pushed, *carried], fps=fps)
     ball, far = replace(take.ball, positions=around), np.linalg.norm(around - dribbled.ball, axis=1)
+    for first, last in carried:
+        far[first : last + 1] = 0.0
     messages = _report_detours(times, np.where(take.ball.measured & ~filled, far, 0.0))
     return replace(take, ball=ball, solved=plan.trajectory, contact_ball=take.ball, dribble_touches=pushes), messages
 
@@ -309,6 +319,26 @@ def _report_detours(times: np.ndarray, moved: np.ndarray) -> list[str]:
     ]  # fmt: skip
 
 
+def _find_shown(take: Take, labels: frozenset[str]) -> list[tuple[int, int]]:
+    """Find first and last frame of each stretch in which a take shows one of some labels."""
+    return [(first, end - 1) for first, end in find_runs(np.array([bool(labels & set(words)) for words in take.words]))]
+
+
+def _build_hand_touch(take: Take, key: KeyResult) -> HandTouch:
+    """Build the touch of a key moment, within the clip that plays there; in a dive it may be later (`strike`)."""
+    frame, words = find_nearest_frame(key.frame, len(take.clip)), key.contact_labels
+    others, frames = np.flatnonzero(take.clip != take.clip[frame]), compute_contact_frames(key.frame, len(take.clip))
+    window = slice(frame, frame + int(find_contact_window(words) * take.motion.fps) + 1)
+    if find_contact_window(words):
+        places, world = compute_pose(take.motion.skeleton, take.motion.root_positions[window],
+                                     take.motion.rotations[window])
+        gaps = np.abs(measure_contact_gap(take.motion.skeleton, places, world, words, take.ball.positions[window]))
+        frames = (frame + int(np.argmin(np.where(np.isfinite(gaps), gaps, np.inf))),) * 2
+    return HandTouch(frames=frames, words=words,
+                     low=int(max(others[others < frame], default=-1)) + 1,
+                     high=int(min(others[others > frame], default=len(take.clip))) - 1)
+
+
 def _list_ball_keys(take: Take) -> list[KeyResult]:
     """List the key moments in which some part meets the ball, in order of time."""
     skeleton = take.motion.skeleton
@@ -336,7 +366,7 @@ def _free_met_ball(take: Take, ball: np.ndarray,
         places, world = (values[0] for values in compute_pose(skeleton, take.motion.root_positions[frame : frame + 1],
                                                               take.motion.rotations[frame : frame + 1]))
         gaps = [abs(measure_ball_gap(part.compute_line(places, world), part.radius, out[frame])) for part in surfaces]
-        if min(gaps) < _MET_GAP:
+        if min(gaps) < AT_BALL_GAP:
             place = find_free_contact(skeleton, surfaces[int(np.argmin(gaps))], places, world, out[frame])
             edges = [edge for pair in (*((push.first, push.last) for push in pushes), *met) for edge in pair]
             bounds = (max([frame - reach, *(edge for edge in edges if edge < frame)]),

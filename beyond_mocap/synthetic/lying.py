@@ -11,7 +11,7 @@ from scipy.ndimage import maximum_filter1d, uniform_filter1d
 from ..base.vectors import unit_vectors
 from ..motion import quaternion
 from ..motion.humanoid import identify_joints
-from ..motion.motion import compute_pose
+from ..motion.motion import Motion, compute_pose, forward_kinematics
 from ..motion.retargeting.neutral import NeutralStance
 from ..motion.retargeting.posture import Posture, to_motion
 from ..motion.skeleton import Skeleton
@@ -26,6 +26,8 @@ THICKNESS = {
 
 _OTHER_THICKNESS, _TIP_THICKNESS = 0.02, 0.01  # m: thickness at other joints and at tips
 _ARM_ANGLES = np.radians(np.arange(0.0, 100.0, 1.0))  # rad by which an arm can be turned up
+# shares of the leg's length below which the knee of a kneeling leg is, and hips and knee of a lying one
+_KNEELING, _LYING_HIPS, _LYING_KNEE = 0.16, 0.38, 0.25
 _SMOOTH_SECONDS = 0.3  # s over which corrections are smoothed
 
 
@@ -43,6 +45,22 @@ def compute_lowest_root(skeleton: Skeleton, rotations: np.ndarray, arms: bool = 
     without = set() if arms else {joint for chain in _list_arms(skeleton) for joint in chain}
     points = [(place, thick) for joint, place, thick in iter_surface(skeleton, places, world) if joint not in without]
     return -np.min([place[:, 2] - thick for place, thick in points], axis=0)
+
+
+def detect_lying_legs(motion: Motion) -> np.ndarray:
+    """Detect legs that lie or kneel: their feet bear no weight, and a foot that is held would push its knee below.
+
+    Args:
+        motion: T frames on a ground of height 0.
+    Returns:
+        (T, 2, 1) bool, left and right leg; not one with its knee up, as in sitting.
+    """
+    body, (places, _) = identify_joints(motion.skeleton), forward_kinematics(motion)
+    legs = [float(np.linalg.norm(motion.skeleton.offsets[[side.lower_leg, side.foot]], axis=1).sum())
+            for side in (body.left, body.right)]
+    hips, knees = (places[:, joints, 2] / legs
+                   for joints in ([body.hips], [body.left.lower_leg, body.right.lower_leg]))
+    return ((knees < _KNEELING) | ((hips < _LYING_HIPS) & (knees < _LYING_KNEE)))[..., None]
 
 
 def raise_arms(skeleton: Skeleton, root: np.ndarray, rotations: np.ndarray, fps: float) -> np.ndarray:

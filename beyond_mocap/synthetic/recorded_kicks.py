@@ -13,11 +13,20 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..annotation.labels import list_labels
+from ..motion.humanoid import identify_joints, measure_leg_length
 from ..motion.motion import Motion
+from ..motion.plant_place import compute_plant_shift
 from ..motion.retargeting.neutral import NeutralStance, build_neutral_stance
 from .gait_plan import GaitStyle
 from .gestures import Gesture
-from .running_kicks import Swing, build_running_kick, build_swing, measure_foot_speed, measure_plant_foot
+from .running_kicks import (
+    Swing,
+    build_running_kick,
+    build_swing,
+    compute_places,
+    measure_foot_speed,
+    measure_plant_foot,
+)
 
 KICK_LABELS = frozenset({"kick"})
 MAX_KICK_SPEED = 8.0  # m/s: faster players do not strike a ball but push it on
@@ -28,8 +37,11 @@ _HARD, _SOFT = 11.0, 6.5  # m/s of the ankle against the pelvis in a hard kick a
 PLAYBACK_RATES = (0.6, 1.25)
 """Limits of a swing's playback rate: slower ones are those of soft passes."""
 
-_BESIDE, _AHEAD = (0.2, 0.37), (-0.05, 0.2)  # m, usual places of the plant foot from the kicking ankle
 _PLACE_COST, _PEAK_COST = 15.0, 60.0  # m/s of foot speed that a metre, or a second from the fastest moment, is worth
+_FOLLOW_SECONDS, _FOLLOW_HEIGHT = (0.1, 0.25), 0.6
+"""Seconds after the contact in which a foot follows through, and shares of the leg to which its ankle then rises."""
+
+_FOLLOW_COST = 12.0  # m/s of foot speed that a leg's length of it is worth
 _DIRECTIONS = np.radians([-15.0, 30.0])  # of low balls from the run, toward the plant leg's side
 _HIGH_DIRECTIONS, _HIGH_SPEEDS = np.radians([10.0]), 2
 _PASS = ("low", "inside")
@@ -116,13 +128,23 @@ def _cut_swing(clip, frame: float) -> Swing | None:
 
 
 def _rate_swing(swing: Swing) -> float:
-    """Rate a swing by the foot's speed, the plant foot's place, and whether the foot is fastest at the contact."""
+    """Rate a swing by the foot's speed, the plant foot's place, its follow-through, and whether the foot is fastest at
+    the contact.
+    """
     around = np.arange(-3, 4) / 60.0
     speeds = [measure_foot_speed(Swing(motion=swing.motion, contact=swing.contact + s * swing.motion.fps))
               for s in around]
-    plant = measure_plant_foot(swing)
-    off = sum(max(low - value, value - high, 0.0) for value, (low, high) in zip(plant, (_AHEAD, _BESIDE)))
-    return speeds[3] - _PLACE_COST * off - _PEAK_COST * abs(float(around[int(np.argmax(speeds))]))
+    off = float(np.abs(compute_plant_shift(swing.motion.skeleton, measure_plant_foot(swing))).sum())
+    lacking = max(_FOLLOW_HEIGHT - _measure_follow_through(swing), 0.0)
+    late = abs(float(around[int(np.argmax(speeds))]))
+    return speeds[3] - _PLACE_COST * off - _FOLLOW_COST * lacking - _PEAK_COST * late
+
+
+def _measure_follow_through(swing: Swing) -> float:
+    """Measure how high the kicking ankle rises after the contact, in shares of the leg: the median of its heights."""
+    body = identify_joints(swing.motion.skeleton)
+    places = compute_places(swing, np.linspace(*_FOLLOW_SECONDS, 7))
+    return float(np.median(places[:, body.right.foot, 2])) / measure_leg_length(swing.motion.skeleton)
 
 
 def _build_kicks(swing: Swing, speed: float, kind: tuple[str, ...], strengths: Mapping[str, float], *,

@@ -21,6 +21,7 @@ from ..motion import quaternion
 from ..motion.foot_plant import plant_feet as lift_feet
 from ..motion.humanoid import compute_heading_from_positions, identify_joints
 from ..motion.motion import Motion, compute_pose, sample_frames_cubic
+from ..motion.plant_place import measure_plant_place
 from ..motion.retargeting.neutral import NeutralStance
 from ..motion.retargeting.posture import Posture, to_motion
 from ..motion.retargeting.structure import list_descendants
@@ -101,7 +102,7 @@ def build_swing(kind: str, neutral: NeutralStance, rate: float = 1.0, lift: floa
 def measure_foot_speed(swing: Swing) -> float:
     """Measure how fast the kicking ankle moves against the pelvis at the contact, m/s."""
     body = identify_joints(swing.motion.skeleton)
-    places = _compute_places(swing, np.array([-_SPEED_SECONDS, _SPEED_SECONDS]))
+    places = compute_places(swing, np.array([-_SPEED_SECONDS, _SPEED_SECONDS]))
     apart = places[:, body.right.foot] - places[:, body.hips]
     return float(np.linalg.norm(apart[1] - apart[0]) / (2.0 * _SPEED_SECONDS))
 
@@ -109,10 +110,7 @@ def measure_foot_speed(swing: Swing) -> float:
 def measure_plant_foot(swing: Swing) -> np.ndarray:
     """Measure the plant foot's place (2,) m at the contact, from the kicking ankle: ahead as the body faces, and left.
     """
-    body = identify_joints(swing.motion.skeleton)
-    places = _compute_places(swing, np.zeros(1))
-    facing = compute_heading_from_positions(swing.motion.skeleton, places)
-    return quaternion.rotate_level((places[:, body.left.foot] - places[:, body.right.foot])[:, :2], -facing)[0]
+    return measure_plant_place(swing.motion.skeleton, compute_places(swing, np.zeros(1))[0], "right")
 
 
 def build_running_kick(
@@ -143,7 +141,8 @@ def build_running_kick(
     times = gait_plan.times[kept] - APPROACH_SECONDS
     posture = build_upper_posture(gait_plan, neutral, style, 0).frames(kept)
     poses = _read_swing(swing, rate * times - earlier, neutral, direction)
-    motion = _lay_swing(posture, times, tuple(steps), poses, neutral, landing=landings[2])
+    leaves = _LEG_OUT * min(rate, 1.0)  # a soft pass follows through less
+    motion = _lay_swing(posture, times, tuple(steps), poses, neutral, back=(leaves, landings[2]))
     start, end = APPROACH_SECONDS + landings[0] - 0.1, APPROACH_SECONDS + landings[2] + 0.1
     return Gesture(motion.frames(_MARGIN, len(motion) - _MARGIN), APPROACH_SECONDS, start, end)
 
@@ -195,11 +194,11 @@ def _read_swing(swing: Swing, times: np.ndarray, neutral: NeutralStance, directi
     The plant foot is where the recording has it, within the usual range.
     """
     body, motion = identify_joints(swing.motion.skeleton), swing.motion
-    around = _compute_places(swing, np.array([-_SPEED_SECONDS, _SPEED_SECONDS]))[:, body.right.foot]
+    around = compute_places(swing, np.array([-_SPEED_SECONDS, _SPEED_SECONDS]))[:, body.right.foot]
     angle = direction - np.arctan2(*(around[1] - around[0])[1::-1])
     turn = quaternion.from_up_angle(np.array(angle))
     plant = np.clip(measure_plant_foot(swing), *(neutral.leg / tables.LEG * np.array([_AHEAD, _BESIDE]).T))
-    facing = compute_heading_from_positions(motion.skeleton, _compute_places(swing, np.zeros(1))) + angle
+    facing = compute_heading_from_positions(motion.skeleton, compute_places(swing, np.zeros(1))) + angle
     root, rotations = sample_frames_cubic(motion, swing.contact + times * motion.fps)
     places, world = compute_pose(motion.skeleton, root, rotations)
     middle = 0.5 * (places[:, body.left.upper_leg] + places[:, body.right.upper_leg])
@@ -209,8 +208,8 @@ def _read_swing(swing: Swing, times: np.ndarray, neutral: NeutralStance, directi
                        plant=quaternion.rotate_level(plant[None], facing)[0])
 
 
-def _compute_places(swing: Swing, times: np.ndarray) -> np.ndarray:
-    """Compute all joints (T, J, 3) m at seconds (T,) from the contact."""
+def compute_places(swing: Swing, times: np.ndarray) -> np.ndarray:
+    """Compute all joints (T, J, 3) m of a swing at seconds (T,) from its contact."""
     root, rotations = sample_frames_cubic(swing.motion, swing.contact + times * swing.motion.fps)
     return compute_pose(swing.motion.skeleton, root, rotations)[0]
 
@@ -232,15 +231,15 @@ def _place_plant_foot(steps: Footsteps, gait_plan: GaitPlan, landing: float, pos
 
 
 def _lay_swing(posture: Posture, times: np.ndarray, steps: tuple[Footsteps, ...], poses: _SwingPoses,
-               neutral: NeutralStance, landing: float) -> Motion:
-    """Lay a swing onto a run, both at s from the contact (T,); the kicking foot lands at `landing` s."""
+               neutral: NeutralStance, back: tuple[float, float]) -> Motion:
+    """Lay a swing onto a run, both at s from the contact (T,); the kicking leg returns to the run between `back` s."""
     share = compute_envelope(times, *_BODY)
     hips = posture.hips.copy()
     hips[:, 2] += share * (poses.height - hips[:, 2])
     pelvis = quaternion.slerp(quaternion.from_rotation_vector(posture.pelvis), poses.pelvis, share)
     posture = posture.replace_arrays(hips=hips, pelvis=quaternion.to_rotation_vector(pelvis))
     run = to_motion(plant_feet(posture, times + APPROACH_SECONDS, steps, neutral), neutral)
-    mixed = _blend_joints(run, poses.rotations, times, share=share, steps=steps[RIGHT], landing=landing)
+    mixed = _blend_joints(run, poses.rotations, times, share=share, steps=steps[RIGHT], back=back)
     # the hips of a run may be lower than the kick's own, so that its foot would go through the ground
     nowhere = np.zeros((len(mixed), 2, 2), bool)
     lifted = lift_feet(run.skeleton, run.root_positions, mixed, nowhere, run.fps)
@@ -248,13 +247,13 @@ def _lay_swing(posture: Posture, times: np.ndarray, steps: tuple[Footsteps, ...]
 
 
 def _blend_joints(run: Motion, kick: np.ndarray, times: np.ndarray, *, share: np.ndarray, steps: Footsteps,
-                  landing: float) -> np.ndarray:
+                  back: tuple[float, float]) -> np.ndarray:
     """Blend a run's local rotations (T, J, 4) into a kick's `kick`: trunk and arms by `share`, the leg in its swing."""
     body, skeleton = identify_joints(run.skeleton), run.skeleton
     legs = [set(list_descendants(skeleton.parents, side.upper_leg)) for side in (body.left, body.right)]
     above = set(list_descendants(skeleton.parents, body.hips)) - legs[LEFT] - legs[RIGHT] - {body.hips}
     before = steps.off[steps.off - APPROACH_SECONDS < 0.0].max() - APPROACH_SECONDS
-    swinging = compute_envelope(times, before + _LEG_IN[0], before + _LEG_IN[1], _LEG_OUT, landing)
+    swinging = compute_envelope(times, before + _LEG_IN[0], before + _LEG_IN[1], *back)
     out = run.rotations.copy()
     for joints, weight in ((sorted(above), share), (sorted(legs[RIGHT]), swinging)):
         out[:, joints] = quaternion.slerp(out[:, joints], kick[:, joints], weight[:, None])

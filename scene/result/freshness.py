@@ -70,7 +70,8 @@ def _feed_digest(digest, value: Any) -> None:
     """Feed a value and its structure to a digest."""
     if is_dataclass(value):
         for place in fields(value):
-            if place.metadata.get("later") and getattr(value, place.name) == place.default:
+            before = place.metadata.get("was", place.default)
+            if place.metadata.get("later") and getattr(value, place.name) == before:
                 continue  # files saved before this setting existed are not out of date because of it
             digest.update(place.name.encode())
             _feed_digest(digest, getattr(value, place.name))

@@ -25,7 +25,6 @@ from ...beyond_mocap.annotation.key_commands import (
     ShowMessage,
 )
 from ...beyond_mocap.base.errors import InputError
-from ...beyond_mocap.library.missing_actions import list_action_labels
 from ..core import session
 from ..core.measure import Clock, build_scene_clock
 from ..core.settings import find_active_player, to_absolute_path
@@ -117,6 +116,8 @@ def _run_command(context: bpy.types.Context, command: Command) -> CommandResult:
 
 
 def _collect_combinations(library, mirror: bool, has_synthetic: bool) -> LibraryCombinations:
+    from ...beyond_mocap.library.missing_actions import list_action_labels
+
     is_allowed = np.array([mirror or not clip.mirrored for clip in library.clips])
     recorded = [key for key in library.keys if is_allowed[key.clip] and not library.clips[key.clip].is_synthetic]
     frames = library.frames

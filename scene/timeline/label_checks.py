@@ -8,7 +8,6 @@ import bpy
 
 from ...beyond_mocap.annotation import KeyMoment, Span, Timeline, find_missing_keys, find_problems
 from ...beyond_mocap.base.errors import InputError
-from ...beyond_mocap.library.missing_actions import list_action_labels
 from ..core import session
 from ..core.settings import to_absolute_path
 from . import label_tracks as lanes
@@ -140,6 +139,8 @@ def _list_conflicts(target: bpy.types.Object, items: list) -> list[tuple[int, st
 
 def _describe_missing(scene: bpy.types.Scene, timeline: Timeline, library) -> list[str]:
     """Find the nearest labels of the library for key moments that it lacks."""
+    from ...beyond_mocap.library.missing_actions import list_action_labels
+
     mirror, has_synthetic = scene.beyond_mocap.mirror, scene.beyond_mocap.made
     choices = [key.labels for key in library.keys if mirror or not library.clips[key.clip].mirrored]
     choices += list_action_labels() if has_synthetic else ()

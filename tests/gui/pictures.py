@@ -144,11 +144,11 @@ def check_overlays():
 
 
 def check_menu_of_labels():
-    """The menu after `2` (kick), in which the library lacks something."""
+    """The menu after `=` and `2` (catchb), in which neither recordings nor synthetic actions have everything."""
     area, annotate = window.find_area("VIEW_3D"), import_module("operators.annotate")
     region = next(region for region in area.regions if region.type == "WINDOW")
     yield from window.move_pointer(area.x + area.width // 3, area.y + area.height // 2)
-    for key in ("J", "TWO"):
+    for key in ("J", "EQUAL", "TWO"):
         yield from window.press_key(key)
         yield 1
     x0, y0, x1, y1 = (int(value) for value in annotate._menu["box"].box)

@@ -60,5 +60,5 @@ def _measure_speeds(times: np.ndarray, offset: np.ndarray, seconds: float) -> np
 def _is_carried(times: np.ndarray, offset: np.ndarray, positions: np.ndarray) -> bool:
     """Return whether a stretch is long enough, and moves, or has ball and player at one place."""
     apart = np.linalg.norm(offset, axis=1)
-    far = np.linalg.norm(positions - positions[0], axis=1).max() >= _WAY
+    far = np.nanmax(np.linalg.norm(positions - positions[0], axis=1)) >= _WAY
     return bool(times[-1] - times[0] >= _SHORTEST and (far or np.nanmedian(apart) < _SAME_PLACE))

@@ -299,7 +299,7 @@ def _solve_least_squares(stretches: Stretches, starts: np.ndarray, ball: Ball, r
         tried = unknown + np.clip(step, -6.0 * _USUAL_SPIN, 6.0 * _USUAL_SPIN)
         if number + 1 < rounds:
             off_tried, slope_tried = _linearize(stretches, tried, ball, simulate)
-        else:  # nobody asks for the slope after the last round
+        else:  # the slope after the last round is not needed
             off_tried, slope_tried = _simulate_residuals(stretches, tried, ball, simulate), slope
         cost_tried = (off_tried**2).sum(axis=1)
         good = goes_on & (cost_tried < cost)

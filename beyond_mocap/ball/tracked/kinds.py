@@ -32,11 +32,13 @@ class TouchKind:
 
 
 KICK, RECEIVE, DRIBBLE, HEADER, CHEST_CONTROL = "kick", "receive", "dribble", "header", "chest"
+HEAD_CONTROL = "head"
 THROW_IN, HAND, SAVE, DEFLECTION = "throw-in", "hand", "save", "deflection"
 
 TOUCH_KINDS = (TouchKind(KICK, "sends", ("kick",), "pass"), TouchKind(RECEIVE, "takes", ("receive", "foot"), "receive"),
                TouchKind(DRIBBLE, "carries", ("dribble",), "dribble"), TouchKind(HEADER, "sends", ("header",), "pass"),
                TouchKind(CHEST_CONTROL, "takes", ("receive", "body"), "receive"),
+               TouchKind(HEAD_CONTROL, "takes", ("receive", "head"), "receive"),
                TouchKind(THROW_IN, "sends", ("throwb",), "pass", ("throw-in",)),
                TouchKind(HAND, "takes", ("catchb",), "catch"), TouchKind(SAVE, "takes", ("catchb",), "save"),
                TouchKind(DEFLECTION, "", (), "deflection"))
@@ -76,7 +78,7 @@ def choose_touch_kind(part: str, before: np.ndarray, after: np.ndarray, same_nex
     """
     fast_in, fast_out = np.linalg.norm(before[:2]), np.linalg.norm(after[:2])
     if part == "head":
-        return HEADER
+        return HEAD_CONTROL if same_next and fast_out < _MIN_PASS_SPEED else HEADER
     if _is_deflection(before, after, fast_in, fast_out, same_next):
         return DEFLECTION
     if part == "chest" and fast_out < _MAX_DRIBBLE_SPEED:

@@ -11,7 +11,8 @@ from ..errors import InputError
 BETWEEN = "between {least} and {most}"
 WHOLE = "a whole number from {least} to {most}"
 LATER = {"later": True}
-"""Metadata of fields that were added after files had stored fingerprints of the other fields."""
+"""Metadata of fields that were added after files had stored fingerprints of the other fields; with "was" where their
+default has changed since: the value that files without them have."""
 POSITIVE: dict[str, Any] = {"least": 1e-9, "most": 1e6, "unit": "metres", "expected": "a positive number"}
 
 # Choices shared by settings of several features: identifier, title, tooltip[, icon, number].

@@ -55,19 +55,28 @@ def read_track_csv(path: str | os.PathLike) -> Track:
     Returns:
         The track.
     Raises:
-        InputError: with the line, for missing columns, cells that are not numbers or beyond 10 km, fewer than two
-            samples with a position, and rates outside 5 to 100 Hz.
+        InputError: with the line, for missing columns (also one of the ball's two on the ground), cells that are
+            not numbers or beyond 10 km, fewer than two samples with a position, and rates outside 5 to 100 Hz.
     """
     rows = list(read_rows(path, ("time_s", "x_m", "y_m")))
     names = rows[0][1] if rows else {}
     player = _parse_cells(rows, ("time_s", "x_m", "y_m"))
     ball = np.full((len(rows), 3), np.nan)
-    if "ball_x_m" in names and "ball_y_m" in names:
+    if "ball_x_m" in names or "ball_y_m" in names:
+        _check_ball_columns(names, path)
         ball = _parse_cells(rows, [name for name in _BALL if name in names])
         ball = np.pad(ball, ((0, 0), (0, 3 - ball.shape[1])), constant_values=np.nan)
     track = Track(player[:, 0], player[:, 1:], ball, name=Path(path).name)
     _check_rate(track, path)
     return track
+
+
+def _check_ball_columns(names, path) -> None:
+    """Raise an error where a column names one coordinate of the ball's place on the ground and none the other."""
+    lacking = [name for name in _BALL[:2] if name not in names]
+    if lacking:
+        raise InputError(path, f"no column {lacking[0]!r}", "both of 'ball_x_m' and 'ball_y_m', or neither",
+                         f"add {lacking[0]!r}, or rename the other")
 
 
 def _parse_cells(rows, names) -> np.ndarray:

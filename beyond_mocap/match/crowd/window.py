@@ -18,7 +18,7 @@ from ...library.features import FPS
 from ...library.library import Library
 from ...motion.motion import Motion
 from ...synthesis.take import Take
-from ..match_ball import apply_led_ball, find_led_ball, restore_ball_contact, sample_ball
+from ..match_ball import apply_led_ball, find_led_ball, lead_ball_between_players, restore_ball_contact, sample_ball
 from ..pieces.named_edit import cut_named_edit
 from ..pieces.units import cut_plan
 from ..player_edit import PlayerEdit, Stretch
@@ -109,9 +109,9 @@ def resolve_window(library: Library, edits: Sequence[PlayerEdit], start: float, 
         motions_before, contacts = [take.motion for take in flat], [take.contacts for take in flat]
         corrections = resolve_collisions(motions_before, contacts, firsts, fps,
                                          [_compute_firmness(take) for take in flat])
-        led = [find_led_ball(take) for take in flat]
         motions = [apply_correction(motion, *player_takes) for motion,
                    player_takes in zip(motions_before, zip(corrections, firsts))]
+        led = lead_ball_between_players(flat, motions, firsts, [find_led_ball(take) for take in flat])
         motions = [_restore_ball_contact(*player_takes, led) for player_takes in zip(flat, motions, firsts)]
         before = measure_overlap_depths(motions_before, firsts)
         after = measure_overlap_depths(motions, firsts)

@@ -155,7 +155,7 @@ def _remove_ball_sentinels(ball: np.ndarray, notes: list[str]) -> tuple[np.ndarr
     seen, wrong = np.isfinite(ball[:, :2]).all(axis=1), is_ball_sentinel(ball)
     if wrong.any():
         count = format_count(np.count_nonzero(wrong), "sample")
-        notes = [*notes, f"{count} with the ball at a sentinel set to unknown"]
+        notes = [*notes, f"{count} without a ball (below the ground, far off the pitch, or parked at the origin)"]
     ball = np.where((seen & ~wrong)[:, None], ball, np.nan)
     return ball, notes
 

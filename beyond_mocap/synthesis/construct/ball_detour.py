@@ -125,21 +125,26 @@ def lead_ball_around_body(skeleton: Skeleton, root: np.ndarray, rotations: np.nd
         if not len(inside):
             return path
         for group in body.group(inside):
-            path += _compute_detour(body, path, group)
+            span, move = _compute_detour(body, path, group)
+            path[span] += move
     return _push_out(body, path)
 
 
-def _compute_detour(body: _NearBody, path: np.ndarray, group: np.ndarray) -> np.ndarray:
-    """Compute the move (T, 3) m of the whole trajectory that leads it out of the body in some frames."""
+def _compute_detour(body: _NearBody, path: np.ndarray, group: np.ndarray) -> tuple[slice, np.ndarray | float]:
+    """Compute which frames of the trajectory move, and by how much (W, 3) m, to lead it out of the body in a group's.
+    """
     directions = np.array(_LEVEL + _RISING if path[group, 2].mean() > _IN_THE_AIR else _LEVEL)
     lengths = _measure_ways_out(body, path, group, directions)
     longest = lengths.max(axis=0)
     best = int(np.argmin(longest))
     if not np.isfinite(longest[best]):
-        return np.zeros_like(path)
+        return slice(0), 0.0
     low, high = _find_ends(body, group)
-    shares = np.array([_build_profile(len(path), frame, low, high, body.fps) for frame in group])
-    return np.max(shares * lengths[:, best, None], axis=0)[:, None] * directions[best]
+    reach = int(np.ceil(DETOUR_SECONDS * body.fps))
+    frames = np.arange(max(group[0] - reach, 0), min(group[-1] + reach + 1, len(path)))
+    shares = np.array([_build_profile(frames, frame, low, high, body.fps) for frame in group])
+    move = np.max(shares * lengths[:, best, None], axis=0)[:, None] * directions[best]
+    return slice(frames[0], frames[-1] + 1), move
 
 
 def _measure_ways_out(body: _NearBody, path: np.ndarray, group: np.ndarray, directions: np.ndarray) -> np.ndarray:
@@ -161,12 +166,12 @@ def _find_ends(body: _NearBody, group: np.ndarray) -> tuple[int | None, int | No
     return low, int(group[-1] + 1 + after[0]) if len(after) else None
 
 
-def _build_profile(count: int, frame: int, low: int | None, high: int | None, fps: float) -> np.ndarray:
-    """Build the share (T,) of a move that is whole at a frame: 0 from its ends on.
+def _build_profile(frames: np.ndarray, frame: int, low: int | None, high: int | None, fps: float) -> np.ndarray:
+    """Build the share (W,) at `frames` (W,) of a move that is whole at a frame: 0 from its ends on.
 
     At a touch the ball changes its course anyway, so there the share begins with a slope; elsewhere it eases in.
     """
-    frames, reach = np.arange(count), DETOUR_SECONDS * fps
+    reach = DETOUR_SECONDS * fps
     before = (frames - (frame - reach if low is None else low)) / (reach if low is None else frame - low)
     after = ((frame + reach if high is None else high) - frames) / (reach if high is None else high - frame)
     sides = ((np.minimum(side, 1.0), end) for side, end in ((before, low), (after, high)))

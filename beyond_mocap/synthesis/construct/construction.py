@@ -13,7 +13,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, partial
 
 import numpy as np
 
@@ -34,6 +34,7 @@ from ..take import KeyResult
 from .edit_blending import OldMotion
 from .extra_steps import Steps, add_steps
 from .gaze import compute_release, estimate_look, hide_lost_ball, watch_ball
+from .place_plant_foot import place_plant_feet
 from .settling import SPEEDS, measure_foot_moves, measure_rest, settle_on_track
 from .strike import Touch, strike_ball
 from .track_following import (
@@ -168,9 +169,13 @@ class Construction:
         skeleton, root, ball = self.library.skeleton, planted.root, track.ball
         if size != 1.0:  # solved in the player's size: the ball is the same for tall and short players
             skeleton, root, ball = skeleton.scale(size), root * size, scale_ball(ball, size)
-        contact = strike_ball(skeleton, root, planted.rotations, contacts=steps_taken.heel_toe_contacts.any(axis=2),
-                              ball=ball, touches=self.touches, fps=self.plan.fps, measured=track.ball_measured,
-                              height_known=is_height_known)
+        contacts, rotations = steps_taken.heel_toe_contacts.any(axis=2), planted.rotations
+        meet = partial(strike_ball, skeleton, root, contacts=contacts, ball=ball, touches=self.touches,
+                       fps=self.plan.fps, measured=track.ball_measured, height_known=is_height_known)
+        contact = meet(rotations)
+        placed = place_plant_feet(skeleton, root, rotations, contact, contacts, self.touches, self.plan.fps)
+        if placed is not rotations:
+            contact = meet(placed)
         root, ball = (contact.root, contact.ball) if size == 1.0 else (contact.root / size, contact.ball / size)
         return replace(planted, root=root, rotations=contact.rotations), ball
 

@@ -171,7 +171,7 @@ def find_touching_places(line: Line, radius: float, start: np.ndarray, direction
 
 def place_between_hands(hands: np.ndarray, radius: float, ball: np.ndarray, ball_range: BallRange) -> tuple[np.ndarray,
         np.ndarray]:
-    """Place a ball between both hands.
+    """Place a ball between both hands, or as far towards there as it may move.
 
     Args:
         hands: (2, 2, 3) m, ends of the line of each hand.
@@ -183,10 +183,10 @@ def place_between_hands(hands: np.ndarray, radius: float, ball: np.ndarray, ball
     """
     places = np.array([0.5 * (start + end) for start, end in hands])
     middle = places.mean(axis=0)
-    height = max(np.clip(middle[2], ball[2] - ball_range.vertical, ball[2] + ball_range.vertical), BALL_RADIUS)
-    level = np.sqrt(max(ball_range.total**2 - (height - ball[2]) ** 2, 0.0))
-    away = middle[:2] - ball[:2]
-    place = np.array([*(ball[:2] + away * min(1.0, level / max(np.linalg.norm(away), 1e-12))), height])
+    away = middle - ball
+    away[2] = np.clip(away[2], -ball_range.vertical, ball_range.vertical)
+    place = ball + away * min(1.0, ball_range.total / max(np.linalg.norm(away), 1e-12))
+    place[2] = max(place[2], BALL_RADIUS)
     out = unit_vectors(places - middle)
     return place, place + (radius + BALL_RADIUS) * out - places
 

@@ -34,6 +34,7 @@ _STANDING_STEP = 0.3  # s between two touches by a planted foot
 # costs, in one common unit
 _INSIDE_COST = 60.0  # per metre of ball inside the body, for 1/30 s
 _NEAR, _FIT_COST = 0.25, 3.0  # per metre beyond this distance from its sample, for 1 s
+_ASIDE = 0.5  # m from the line of travel up to which a ball without a sample rolls free of that cost
 _BESIDE, _AHEAD_COST = 0.3, 4.0  # per metre less than this ahead of the pelvis, for 1 s
 _TOUCH_COST, _LONG, _LONG_COST = 0.04, 0.7, 4.0  # per touch, and per second beyond this to the next touch
 # A faster player knocks the ball farther ahead and reaches it after more steps, with a foot that is on its way back to
@@ -224,12 +225,14 @@ class DribbleSearch:
             balls: (N, 3) m, centres.
             frames: (N,) frame of each.
         Returns:
-            (N,) cost for one frame each: distance from the sample, too little lead on the pelvis, depth inside the
-            body.
+            (N,) cost for one frame each: distance from the sample or, without one, from the line of travel; too little
+            lead on the pelvis, depth inside the body.
         """
         off = balls[:, :2] - self.feed[frames, :2]
-        fit = _FIT_COST * np.maximum(np.hypot(off[:, 0], off[:, 1]) - _NEAR, 0.0) * self.measured[frames]
-        ahead = np.einsum("nk,nk->n", balls[:, :2] - self.body.pelvis[frames], self.body.ahead[frames])
+        away, travel = balls[:, :2] - self.body.pelvis[frames], self.body.ahead[frames]
+        ahead, aside = np.einsum("nk,nk->n", away, travel), away[:, 1] * travel[:, 0] - away[:, 0] * travel[:, 1]
+        fit = _FIT_COST * np.where(self.measured[frames], np.maximum(np.hypot(off[:, 0], off[:, 1]) - _NEAR, 0.0),
+                                   np.maximum(np.abs(aside) - _ASIDE, 0.0))
         least = _BESIDE + _MORE_BESIDE * self.haste[frames]
         beside = _AHEAD_COST * np.maximum(least - ahead, 0.0)
         inside = _INSIDE_COST * _RATE * np.maximum(-self.body.solid.measure_gaps(balls, frames), 0.0)

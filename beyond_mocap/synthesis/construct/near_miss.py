@@ -1,7 +1,8 @@
 """Bring a part of the body near the ball without touching it: the player who loses a duel reaches and misses.
 
 The ball is not moved. The nearest part that the labels name reaches to within FARTHEST of the ball's surface at the key
-moment, if it can; then every part stays CLEARANCE away from the ball for WINDOW_SECONDS around it.
+moment, if it can, unless the labels let the ball pass; then every part stays CLEARANCE away from the ball for
+WINDOW_SECONDS around it.
 """
 
 from __future__ import annotations
@@ -11,6 +12,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from ...annotation.ball_contact import build_surfaces, choose_contact_labels
+from ...annotation.labels import avoids_ball
 from ...annotation.striking import Surface, build_part_surfaces, measure_ball_gap
 from ...annotation.vocabulary import SIDES
 from ...motion.motion import Motion, compute_pose
@@ -50,7 +52,7 @@ def miss_ball(
         frames = _find_frames(key.frame, met, len(motion), motion.fps)
         if key.requested.misses_ball and len(frames) and np.isfinite(ball[frames]).all():
             labels = choose_contact_labels(key.words, key.requested.words)
-            if reaches:
+            if reaches and not avoids_ball(labels):
                 at = int(frames[np.abs(frames - key.frame).argmin()])
                 motion = _reach_near(motion, foot_contacts, ball, labels, at)
             motion = _keep_clear(motion, foot_contacts, ball, labels, frames)

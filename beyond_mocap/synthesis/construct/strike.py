@@ -4,8 +4,8 @@ out.
 First the ball moves, within the noise of its measurement, to where the recorded foot (head, chest, hand) strikes. The
 limb does the rest by two-bone inverse kinematics, or the spine by bending, within the reach of a body; where that is
 not enough the pelvis steps towards the ball within the noise of its own track (`step_to_ball`); what remains is
-reported. A kick lasts a hundredth of a second, so between the two
-frames around the key moment the ball moves with the foot; a ball that is taken stays longer on it (`give`).
+reported. A kick lasts a hundredth of a second, so between the two frames around the key moment the ball moves with the
+foot; a ball that is taken stays longer on it (`give`).
 """
 
 from __future__ import annotations
@@ -278,9 +278,10 @@ class _TouchProblem:
         return solved.ball[0], solved.need
 
     def compute_ball_range(self, frame: int) -> BallRange:
-        """Return how far the ball may move; a ball on the ground stays there."""
+        """Return how far the ball may move; a ball on the ground stays there, and one just above it nearly so: a feed's
+        heights are noisy, and a ball lifted to a foot would hop there by itself."""
         whole = BALL_NOISE if self.measured[frame] else FILLED_NOISE
-        return BallRange(whole, BALL_NOISE if self.ball[frame, 2] > _IN_THE_AIR else 0.0)
+        return BallRange(whole, float(np.clip(self.ball[frame, 2] - _IN_THE_AIR, 0.0, whole)))
 
 
 def _build_problem(body: Body, moment: _TouchFrames, origin: int, contacts, path, measured, height_known,
@@ -406,7 +407,7 @@ def _reach_ball(scene: _TouchProblem, body: Body) -> tuple[Body, float]:
     reached, lines, missing = _swing_to_ball(scene, body)
     if np.linalg.norm(missing, axis=1).max() > _MISSED:
         side = scene.parts[0].side if scene.parts[0].part in ("foot", "thigh") else ""
-        stepped = step_to_ball(body, side, scene.at, missing.mean(axis=0), scene.shares[0], scene.fps)
+        stepped = step_to_ball(body, side, scene.at, missing.mean(axis=0), share=scene.shares[0], fps=scene.fps)
         again = _swing_to_ball(scene, stepped)
         if np.linalg.norm(again[2]) < np.linalg.norm(missing):
             reached, lines, missing = again

@@ -10,9 +10,9 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from ...annotation.ball_contact import build_surfaces
+from ...annotation.ball_contact import build_surfaces, find_contact_window
 from ...annotation.labels import list_labels
-from ...annotation.striking import trace_fastest_surface
+from ...annotation.striking import Surface, trace_fastest_surface
 from ...base.vectors import arctan2
 from ...motion import quaternion
 from ...motion.motion import compute_pose
@@ -23,17 +23,23 @@ from .strike import Touch
 
 MAX_TURN_TO_BALL = np.radians(60.0)
 _FULL_TURN_SPEED = 3.0  # m/s up to which a body turns by MAX_TURN_TO_BALL: a faster one would drag its plant foot
-_BALL_TURN_SECONDS = 0.5  # s before and after the key frame over which the turn grows and fades
+_TURNED_SECONDS = (0.15, 0.3)
+"""Seconds before and after the key frame in which the whole turn stays: the other foot stands, a turning body would
+drag it."""
+
+_EASE_SECONDS = 0.7  # s before and after that over which the turn grows and fades
 _NEAR, _CLEAR = 0.1, 0.35  # m from the hips: below the first a direction has no weight, above the second all
 _SENDING = frozenset(list_labels(ball="sends"))
+_TURNING = frozenset({"foot", "hand"})
 
 
 def compute_turn_to_ball(
     skeleton: Skeleton, root: np.ndarray, rotations: np.ndarray, ball: np.ndarray, touches: Sequence[Touch], fps: float
 ) -> np.ndarray:
-    """Compute the turn of the body about its root that points the striking foot at the ball, and a kick to its exit.
+    """Compute the turn of the body about its root that points the striking part at the ball, and a kick to its exit.
 
-    Of two feet that may strike, the place of the faster one counts.
+    Feet and hands turn the body; in a dive the flight has its direction. Of two feet that may strike, the place of the
+    faster one counts, of two hands the middle between both.
 
     Args:
         skeleton: the skeleton.
@@ -48,7 +54,9 @@ def compute_turn_to_ball(
     turn, at = np.zeros(len(root)), np.arange(len(root))
     for touch in touches:
         offset = _turn_at_touch(skeleton, root, rotations, ball=ball, touch=touch, fps=fps)
-        bump = np.clip(1.0 - np.abs(at - touch.frame) / (_BALL_TURN_SECONDS * fps), 0.0, 1.0)
+        away = at - touch.frame
+        beyond = np.maximum(-away - _TURNED_SECONDS[0] * fps, away - _TURNED_SECONDS[1] * fps)
+        bump = np.clip(1.0 - beyond / (_EASE_SECONDS * fps), 0.0, 1.0)
         # quintic ease; where two touches overlap the larger turn wins
         grown = offset * bump**3 * (10.0 - 15.0 * bump + 6.0 * bump**2)
         turn = np.where(np.abs(grown) > np.abs(turn), grown, turn)
@@ -56,13 +64,14 @@ def compute_turn_to_ball(
 
 
 def _turn_at_touch(skeleton: Skeleton, root, rotations, *, ball, touch: Touch, fps: float) -> float:
-    """Compute the turn, rad, at one touch; 0 without a foot that strikes or a known ball."""
+    """Compute the turn, rad, at one touch; 0 without a part that turns the body, or a known ball."""
     frame = int(np.clip(round(touch.frame), 1, len(root) - 2)) if len(root) > 2 else 0
-    found = [surface for surface in build_surfaces(skeleton, touch.words) if surface.part == "foot"]
+    found = [] if find_contact_window(touch.words) else [surface for surface in build_surfaces(skeleton, touch.words)
+                                                         if surface.part in _TURNING]
     if len(root) < 3 or not found or not np.isfinite(ball[frame]).all():
         return 0.0
     places, world = compute_pose(skeleton, root[frame - 1 : frame + 2], rotations[frame - 1 : frame + 2])
-    trace = trace_fastest_surface(found, places, world)[:, :2]
+    trace = _trace_part(found, places, world)[:, :2]
     part, goal = trace[1] - root[frame, :2], ball[frame, :2] - root[frame, :2]
     clear = np.clip((min(np.linalg.norm(part), np.linalg.norm(goal)) - _NEAR) / (_CLEAR - _NEAR), 0.0, 1.0)
     exit_turn, speed = 0.0, measure_level_speed(root, frame, fps)
@@ -72,6 +81,13 @@ def _turn_at_touch(skeleton: Skeleton, root, rotations, *, ball, touch: Touch, f
     turn = exit_turn + clear * (_limit_to_reach(exit_turn, part, goal) - exit_turn)
     most = MAX_TURN_TO_BALL * min(1.0, _FULL_TURN_SPEED / max(speed, _FULL_TURN_SPEED))
     return float(np.clip(turn, -most, most))
+
+
+def _trace_part(surfaces: Sequence[Surface], places: np.ndarray, world: np.ndarray) -> np.ndarray:
+    """Trace (T, 3) m the place that points at the ball: between both hands, or the middle of the faster foot."""
+    if surfaces[0].part != "hand":
+        return trace_fastest_surface(surfaces, places, world)
+    return np.mean([line for surface in surfaces for line in surface.compute_line(places, world)], axis=0)
 
 
 def _measure_exit_velocity(ball: np.ndarray, frame: int, fps: float) -> np.ndarray:

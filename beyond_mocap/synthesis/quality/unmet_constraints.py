@@ -326,9 +326,14 @@ def _report_contact_gaps(played: Playback, keys: list[KeyMomentResult]) -> Timed
 
 
 def _build_moment_line(what: str, found: list[tuple[float, float]], form: str) -> TimedMessage | None:
-    """Build the line "what: 4.2 s by 0.13 m, ..." for (second, by how much) of key moments; None without any."""
-    listed = ", ".join(f"{format_seconds(time)} s by {form.format(value)}" for time, value in found)
-    return TimedMessage(f"{what}: {listed}", *((time, time) for time, _ in found)) if found else None
+    """Build the line "what: 4.2 s by 0.13 m, ..." for (second, by how much) of key moments; None without any.
+
+    Of more than MAX_STRETCHES the largest are listed.
+    """
+    largest = sorted(sorted(range(len(found)), key=lambda i: -abs(found[i][1]))[:MAX_STRETCHES])
+    listed = ", ".join(f"{format_seconds(found[i][0])} s by {form.format(found[i][1])}" for i in largest)
+    left = f" and {len(found) - len(largest)} by less" if len(found) > len(largest) else ""
+    return TimedMessage(f"{what}: {listed}{left}", *((time, time) for time, _ in found)) if found else None
 
 
 def _report_missing_labels(

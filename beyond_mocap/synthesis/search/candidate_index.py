@@ -25,9 +25,13 @@ JERK_REACH = 8  # frames to either side over which the jerk of a transition is m
 _SPEED_CLASSES = (1.0, 2.0, 3.0, 4.5)  # m/s between the classes in which jerk is compared
 USUAL_STANCE = 0.3  # s with both feet on the ground, in a walk
 _LONGEST_STANCE = 2.0  # s beyond the usual stance at which its cost stops growing
-# labels of what a body does for a while besides going, turning and carrying the ball; synthetic clips show it only
-# where it is requested (recordings of it are judged by their posture)
-_ACTING = CONTINUOUS - {TURNING, *list_gaits(), *list_labels(ball="carries")}
+ACTING = CONTINUOUS - {TURNING, *list_gaits(), *list_labels(ball="carries")}
+"""Labels of what a body does for a while besides going, turning and carrying the ball; synthetic clips show it only
+where it is requested (recordings of it are judged by their posture)."""
+STRIKES, STRIKE_COST = frozenset(list_labels(ball="sends")), 4.0
+"""Labels of a ball that is struck, and how many times as much they cost as other actions that are not requested: a kick
+without a ball is the last thing to fill a run with."""
+
 _SHOWN = 14  # library frames that a long slot shows at the fastest playback rate
 
 
@@ -145,17 +149,20 @@ class CandidateIndex:
         Args:
             words: the labels.
         Returns:
-            (N,) share of them that each frame lacks; (N,) bool, whether a slot from there on shows an action (a kick, a
-            jump) that is not requested, or nothing that is annotated.
+            (N,) share of them that each frame lacks; (N,) 1 where a slot from there on shows an action (a jump) that is
+            not requested, or nothing that is annotated, STRIKE_COST where it strikes a ball without a request, else 0.
         """
         if words not in self._by_words:
             names, frames = self.frames.vocabulary, self.frames
             missing = self.annotation.compute_missing_share(words) if words else np.zeros(len(frames))
             actions, spans = ([i for i, word in enumerate(names) if word in kind and word not in words]
-                              for kind in (DISCRETE, _ACTING))
+                              for kind in (DISCRETE, ACTING))
             acts = frames.words[:, actions].any(axis=1) | (frames.words[:, spans].any(axis=1) & self.is_synthetic)
-            acts = maximum_filter1d(acts, SLOT + 1, origin=-(SLOT // 2), mode="nearest")
-            self._by_words[words] = missing.astype(np.float32), acts | ~frames.words.any(axis=1)
+            strikes = frames.words[:, [i for i, word in enumerate(names) if word in STRIKES - words]].any(axis=1)
+            shown = np.where(strikes, STRIKE_COST, acts)
+            lacking = np.maximum(maximum_filter1d(shown, SLOT + 1, origin=-(SLOT // 2), mode="nearest"),
+                                 ~frames.words.any(axis=1))
+            self._by_words[words] = missing.astype(np.float32), lacking.astype(np.float32)
         return self._by_words[words]
 
 

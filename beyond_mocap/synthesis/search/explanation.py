@@ -186,7 +186,8 @@ def _read_slot_choices(search: PathSearch, edit: EditList) -> _SlotChoices:
 
 
 def _restore_piece(search: PathSearch, edit: EditList, placed, frame: np.ndarray, piece_at: np.ndarray) -> None:
-    """Restore where the search had a key moment's piece, before it was shifted by a part of a frame to be on time.
+    """Restore where the search had a key moment's piece, before it was shifted by a part of a frame to be on time, and
+    its swing was played at another rate.
 
     Written into frame (T,), the library frames, and into piece_at (T,), the number of the search's piece.
     """
@@ -201,6 +202,7 @@ def _restore_piece(search: PathSearch, edit: EditList, placed, frame: np.ndarray
     low, high = next(span for span in edit.pieces if span[0] <= at < span[1])
     frame[low:high] -= off
     bound = slice(search.edges[pieces.first[row]], search.edges[pieces.end[row]])
+    frame[bound] = pieces.start[row] + pieces.rate[row] * np.arange(bound.stop - bound.start)
     piece_at[bound] = row
 
 

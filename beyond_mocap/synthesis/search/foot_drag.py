@@ -96,6 +96,8 @@ def _report_clip(library: Library, request: SearchRequest, edit: EditList, key: 
     low, high = next(piece for piece in edit.pieces if piece[0] <= at < piece[1])
     entry, leave = compute_needed_frames(library, key)
     rate = (edit.frame[high - 1] - edit.frame[low]) / max(high - 1 - low, 1)
+    if rate <= 0.0:  # a single frame between other key moments: nothing of the clip is played
+        return []
     # the whole clip would run from whole[0] to whole[1]; it is shown from low to high
     whole = round(moment.frame - entry / rate), round(moment.frame + leave / rate)
     start, words = float(request.track.times[0]), " ".join(moment.requested.words)

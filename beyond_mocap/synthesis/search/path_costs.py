@@ -282,6 +282,11 @@ class PathCosts:
                                    count=count)
         return pairs.number[best], pairs.frame[best], cost
 
+    def list_asked_labels(self, first: int, end: int) -> frozenset[str]:
+        """Return the labels that the user asks for in the middle of a slot."""
+        words, is_asked = self._requested_labels(first, end)
+        return words if is_asked else frozenset()
+
     def _requested_labels(self, first: int, end: int) -> tuple[frozenset[str], bool]:
         """Return the labels requested in the middle of a slot, and whether the user has asked for them."""
         middle = (first + end) // 2

@@ -18,15 +18,17 @@ import numpy as np
 from ...base.errors import InputError, UserCancelledError
 from ...library.library import Library
 from .beam_transitions import SAME_FRAME, BeamTransitions, SlotCandidates
-from .candidate_index import PLAYBACK_RATES, SLOT
+from .candidate_index import ACTING, PLAYBACK_RATES, SLOT
 from .edit_list import EditList, PlacedKey, find_transitions, replace_stretch
-from .key_fit import compute_key_misfit, measure_ball, measure_strikes
+from .key_fit import compute_key_misfit, compute_swing_rates, measure_ball, measure_strikes
 from .path_costs import YOUNG_SLOTS, BoneDistance, PathCosts, Weights
 from .preferences import UNUSUAL_FOOT_WEIGHT, UsedStretch, compute_weak_foot_cost, find_unusual_foot
 from .request import RequestedKey, SearchRequest
-from .slots import build_key_pieces, build_slot_edges, find_slot
+from .slots import build_key_pieces, build_slot_edges, find_slot, list_playback_rates
+from .swing_rate import retime_swing
 
 MEMORY_SLOTS = 15  # slots whose buckets a state remembers (4 s at 30 frames per second)
+_ACTING_SHARE = 4  # of the beam, one part in this many is kept for states that show a requested action
 _LEAD_IN = 2  # slots ahead of a piece in which frames that lead into it are candidates
 
 
@@ -145,6 +147,7 @@ class PathSearch:
         self.edges = build_slot_edges(library, request, *((stretch.first, stretch.end) if stretch else (0, None)),
                                       on_grid)
         self.pieces = build_key_pieces(library, request, self.edges)
+        self.swing_rates = np.ones(len(self.pieces.number))
         self.choice_cost = weights.strike * self._compute_choice_costs()
         self._closed_slots = {find_slot(self.edges, request.keys[number].frame) for number in self.pieces.number}
         self.width = SearchWidth()
@@ -188,13 +191,17 @@ class PathSearch:
             self.width, self.hurried_from = NARROW, int(self.edges[slot])
 
     def _compute_choice_costs(self) -> np.ndarray:
-        """Compute (P,) how badly each piece's clip strikes the ball that the track has at its key moment."""
+        """Compute (P,) how badly each piece's clip strikes the ball that the track has at its key moment, at its best
+        rate of the swing.
+        """
         costs = np.zeros(len(self.pieces.number))
         for number in np.unique(self.pieces.number):
             key, at = self.request.keys[number], self.pieces.number == number
             ball = measure_ball(self.request.track, key.frame, key.is_ball_height_known)
-            played = measure_strikes(self.library, key.choices).play(self.pieces.choice[at], self.pieces.rate[at])
-            costs[at] = compute_key_misfit(played, ball)
+            keeps_rate = np.array([len(list_playback_rates(self.library, key, one)) == 1 for one in key.choices])
+            strikes = replace(measure_strikes(self.library, key.choices), keeps_rate=keeps_rate)
+            played = strikes.play(self.pieces.choice[at], self.pieces.rate[at])
+            costs[at], self.swing_rates[at] = compute_key_misfit(played, ball), compute_swing_rates(played, ball)
             costs[at] += self._compute_foot_cost(key)[self.pieces.choice[at]]
         return costs
 
@@ -209,9 +216,9 @@ class PathSearch:
         """Build the states of the first slot."""
         to = self.collect_candidates(0)
         recent = np.full((len(to.clip), MEMORY_SLOTS), -1)
-        return self._prune_states(BeamStates(to.clip, to.start, to.rate, cost=to.cost, back=np.zeros(len(to.clip), int),
-                                             piece=to.piece, recent=recent,
-                                             age=np.full(len(to.clip), YOUNG_SLOTS)))
+        states = BeamStates(to.clip, to.start, to.rate, cost=to.cost, back=np.zeros(len(to.clip), int), piece=to.piece,
+                            recent=recent, age=np.full(len(to.clip), YOUNG_SLOTS))
+        return self._prune_states(0, states)
 
     def _build_arrival(self) -> tuple[BeamStates, int]:
         """Build the state from which a stretch starts, the frame before it; and that state's length, 1."""
@@ -262,17 +269,34 @@ class PathSearch:
         clip, start, rate, cost, back, piece = (np.concatenate(parts) for parts in zip(*options))
         goes_on = (clip == before.clip[back]) & (np.abs(start - ends[back]) < SAME_FRAME)
         age = np.where(goes_on, np.minimum(before.age[back] + 1, YOUNG_SLOTS), 1)
-        return self._prune_states(BeamStates(clip, start, rate, cost=cost, back=back, piece=piece,
-                                             recent=np.roll(before.recent[back], -1, axis=1), age=age))
+        return self._prune_states(slot, BeamStates(clip, start, rate, cost=cost, back=back, piece=piece,
+                                                   recent=np.roll(before.recent[back], -1, axis=1), age=age))
 
-    def _prune_states(self, states: BeamStates) -> BeamStates:
-        """Keep the cheapest free and the cheapest bound states, a beam of each, and update their memory."""
-        order = np.argsort(states.cost, kind="stable")
-        free = states.piece[order] < 0
-        best = states.select(np.concatenate([order[free][: self.width.beam_width],
-                                             order[~free][: self.width.beam_width]]))
+    def _prune_states(self, slot: int, states: BeamStates) -> BeamStates:
+        """Keep the cheapest free and the cheapest bound states, a beam of each, and update their memory.
+
+        Beside them the cheapest ones are kept that show a requested action: while a body kneels down or turns to jog
+        backward, one that does nothing costs less for a moment, in more ways than a beam holds.
+        """
+        width, order = self.width.beam_width, np.argsort(states.cost, kind="stable")
+        free, acts = states.piece[order] < 0, self._shows_requested_action(slot, states.start[order])
+        kept = (order[free][:width], order[~free][:width])
+        acting = np.setdiff1d(order[free & acts][: self._acting_width], kept[0])
+        best = states.select(np.concatenate([*kept, acting]))
         best.recent[:, -1] = self.index.bucket[self.costs.round_frame(best.start)]
         return best
+
+    @property
+    def _acting_width(self) -> int:
+        """How many states of a requested action are kept in any case."""
+        return self.width.beam_width // _ACTING_SHARE
+
+    def _shows_requested_action(self, slot: int, start: np.ndarray) -> np.ndarray:
+        """Return (K,) bool: whether library frames (K,) show an action that the user asks for in a slot."""
+        words = self.costs.list_asked_labels(self.edges[slot], self.edges[slot + 1]) & ACTING
+        if not words:
+            return np.zeros(len(start), bool)
+        return self.index.shows_labels(words)[self.costs.round_frame(start)]
 
     def collect_candidates(self, slot: int) -> SlotCandidates:
         """Collect the candidates that can begin in a slot.
@@ -332,9 +356,14 @@ class PathSearch:
         Args:
             known: (L,) costs of other ways to fill the slot.
         """
-        to = self.collect_candidates(slot)
-        which, cost, state = self.build_transitions(before, free, ends[free]).find_cheapest(to, known,
-                self.width.beam_width)
+        to, transitions = self.collect_candidates(slot), self.build_transitions(before, free, ends[free])
+        which, cost, state = transitions.find_cheapest(to, known, self.width.beam_width)
+        acting = np.flatnonzero(self._shows_requested_action(slot, to.start) & (to.piece < 0))
+        if len(acting):
+            more, *rest = transitions.find_cheapest(to.select(acting), np.zeros(0), self._acting_width)
+            new = ~np.isin(acting[more], which)
+            which, cost, state = (np.concatenate(pair) for pair in zip(
+                (which, cost, state), (acting[more][new], *(values[new] for values in rest))))
         return to.clip[which], to.start[which], to.rate[which], cost, free[state], to.piece[which]
 
     def build_transitions(self, before: BeamStates, free: np.ndarray, ends: np.ndarray) -> BeamTransitions:
@@ -372,17 +401,20 @@ class PathSearch:
         """Trace the cheapest last state back to the first, as an edit list."""
         state = int(np.argmin(layers[-1].cost))
         clip, frame = np.empty(len(self.request), int), np.empty(len(self.request))
-        placed: dict[int, PlacedKey] = {}
+        shown: dict[int, int] = {}  # number of a key moment -> its piece
         for slot, states in reversed(list(enumerate(layers))):
             low, high = self.edges[slot : slot + 2]
             frame[low:high] = states.start[state] + states.rate[state] * np.arange(high - low)
             clip[low:high] = states.clip[state]
             piece = int(states.piece[state])
             if piece >= 0:
-                number = int(self.pieces.number[piece])
-                placed[number] = PlacedKey(number, self.pieces.key(self.request, piece))
+                shown[int(self.pieces.number[piece])] = piece
             state = int(states.back[state])
-        keys = tuple(placed[number] for number in sorted(placed))
+        for number, piece in shown.items():
+            low, high = self.edges[[self.pieces.first[piece], self.pieces.end[piece]]]
+            frame[low:high] = retime_swing(frame[low:high], self.request.keys[number].frame - low, self.library.fps,
+                                           float(self.swing_rates[piece]))
+        keys = tuple(PlacedKey(number, self.pieces.key(self.request, shown[number])) for number in sorted(shown))
         if self.stretch:
             return replace_stretch(self.stretch.edit, int(self.edges[0]), int(self.edges[-1]), clip=clip, frame=frame,
                                    keys=keys)

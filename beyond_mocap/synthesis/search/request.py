@@ -24,13 +24,20 @@ from ...annotation import (
     sort_labels,
 )
 from ...annotation.ball_contact import takes_with_foot
-from ...annotation.labels import list_gaits
-from ...annotation.vocabulary import DIRECTIONS
+from ...annotation.labels import list_gaits, read_labels
+from ...annotation.vocabulary import DIRECTIONS, SIDES, find_nearest_labels
 from ...base.errors import NotInLibraryError, TimedMessage, format_seconds
 from ...library.automatic_locomotion import build_automatic_labels
 from ...library.keys import Key, list_nearest_labels, select_keys, select_nearest_keys, select_substitutes
 from ...library.library import Library
-from ...library.missing_actions import ActionMoment, find_action_paths, is_action_clip, select_own_kicks
+from ...library.missing_actions import (
+    ActionMoment,
+    find_action_paths,
+    is_action_clip,
+    list_action_labels,
+    names_action,
+    select_own_kicks,
+)
 from ...motion.track import SampledTrack
 from ..plan import Plan, ResolvedPlan
 from ..requested_actions import read_moment_action
@@ -139,7 +146,7 @@ def build_request(library: Library, plan: ResolvedPlan) -> SearchRequest:
     actions = [read_moment_action(moment, plan.track, track) for moment in timeline.keys]
     keys = tuple(_build_key(
         library, moment, track, asked=asked, gait=gait, allowed=allowed, use_nearest=settings.nearest,
-        warnings=warnings,
+        has_synthetic=plan.method == "path" and settings.made, warnings=warnings,
     ) for moment, asked in zip(timeline.keys, actions))
     keys = tuple(replace(key, is_ball_height_known=asked.height is not None, rates=_choose_rates(key.requested))
                  for key, asked in zip(keys, actions))
@@ -182,8 +189,13 @@ def _replace_avoided_gaits(library: Library, gait: np.ndarray, speed: np.ndarray
 
 
 def _build_key(library, moment: KeyMoment, track, asked: ActionMoment, gait, allowed, use_nearest: bool,
-               warnings: list[str]) -> RequestedKey:
-    """Build one key moment: its frame and the clips that may serve it."""
+               has_synthetic: bool, warnings: list[str]) -> RequestedKey:
+    """Build one key moment: its frame and the clips that may serve it.
+
+    Recordings that carry the labels come first, with synthetic clips beside them; then receptions that are cut out of
+    dribbles, swings of the library's own kicker, synthetic actions; then the nearest labels.
+    """
+    warnings += _report_no_action(moment)
     frame = float(np.clip((moment.resolved_time - track.times[0]) * library.fps, 0, len(track.times) - 1))
     may_show = [key for key in library.keys if allowed[key.clip]]
     usable = tuple(key for key in may_show if not library.clips[key.clip].is_synthetic)
@@ -191,31 +203,52 @@ def _build_key(library, moment: KeyMoment, track, asked: ActionMoment, gait, all
     synthetic = tuple(key for key in may_show if library.clips[key.clip].is_synthetic
                       and not is_action_clip(library.clips[key.clip]))
     if moment.avoid:
-        usable, synthetic = _remove_avoided(moment, usable, synthetic, warnings)
-    # recordings that carry the labels first, with synthetic clips; then swings of the library's own kicker, then
-    # synthetic actions; each time with the part that
-    # the ball's height asks for before any part
-    chosen = asked.labels
-    choices = select_keys(usable, chosen) or (() if select_keys(actions, chosen) else select_keys(usable, moment.words))
-    if choices:
-        beside = select_keys(actions, chosen) if takes_with_foot(moment.words) else select_substitutes(
-            choices, synthetic, moment.words)
-        return RequestedKey(requested=moment, frame=frame, choices=(*choices, *beside), used_instead=None)
-    own = tuple(key for key in select_own_kicks(library, asked) if key in synthetic)
-    choices = own or select_keys(actions, chosen) or select_keys(actions, moment.words)
-    if takes_with_foot(moment.words):
-        cut = [key for key in library.cut_receptions if allowed[key.clip] and not key.labels & set(moment.avoid)]
-        choices = (*select_keys(cut, chosen), *choices)
+        usable, synthetic = _remove_avoided(moment, usable, synthetic, actions, warnings)
+    choices = _choose_recorded(moment, asked, usable, synthetic, actions)
+    if not choices:
+        own = tuple(key for key in select_own_kicks(library, asked) if key in synthetic)
+        cut = [key for key in library.cut_receptions if allowed[key.clip] and not key.labels & asked.avoid]
+        choices = _choose_synthetic(moment, asked, own, actions, cut)
     if choices:
         return RequestedKey(requested=moment, frame=frame, choices=choices, used_instead=None)
+    gait_words = library.gaits[int(gait[int(round(frame))])].labels
+    return _build_nearest_key(moment, frame, usable, synthetic, gait_words=gait_words, use_nearest=use_nearest,
+                              has_synthetic=has_synthetic, warnings=warnings)
+
+
+def _choose_recorded(moment: KeyMoment, asked: ActionMoment, usable: tuple[Key, ...], synthetic: tuple[Key, ...],
+                     actions: tuple[Key, ...]) -> tuple[Key, ...]:
+    """Choose recordings that carry the labels, with the part that the ball's height asks for before any part, and
+    synthetic clips that may stand beside them; none where no recording does.
+    """
+    fitting = select_keys(actions, asked.labels)
+    choices = select_keys(usable, asked.labels) or (() if fitting else select_keys(usable, moment.words))
+    if not choices:
+        return ()
+    beside = fitting if takes_with_foot(moment.words) else select_substitutes(choices, synthetic, moment.words)
+    return (*choices, *beside)
+
+
+def _choose_synthetic(moment: KeyMoment, asked: ActionMoment, own: tuple[Key, ...], actions: tuple[Key, ...],
+                      cut: list[Key]) -> tuple[Key, ...]:
+    """Choose the `own` kicker's swings, else synthetic actions; for a reception also those that are `cut` out."""
+    choices = own or select_keys(actions, asked.labels) or select_keys(actions, moment.words)
+    return (*select_keys(cut, asked.labels), *choices) if takes_with_foot(moment.words) else choices
+
+
+def _build_nearest_key(moment: KeyMoment, frame: float, usable: tuple[Key, ...], synthetic: tuple[Key, ...],
+                       gait_words: tuple[str, ...], use_nearest: bool, has_synthetic: bool,
+                       warnings: list[str]) -> RequestedKey:
+    """Build a key moment that the nearest labels serve, or the gait, with a warning; or raise where that is not wanted.
+    """
     nearest = list_nearest_labels(usable, moment.words)
     problem = f"the library has no clip for '{' '.join(moment.words)}'{_describe_lasting(moment.words)}"
-    text = f"{format_seconds(moment.time)} s: {problem}; nearest: {_format_labels(nearest)}"
+    text = (f"{format_seconds(moment.time)} s: {problem}; nearest: {_format_labels(nearest)}"
+            f"{_describe_synthetic(moment.words) if has_synthetic else ''}")
     if not use_nearest:
-        way_out = f"add such a clip, or {USE_NEAREST}"
-        raise NotInLibraryError(f"{text}; use one of these, {way_out}", nearest, moment.line)
+        way_out = ("use one of these, " if nearest else "") + f"add such a clip, or {USE_NEAREST}"
+        raise NotInLibraryError(f"{text}; {way_out}", nearest, moment.line)
     choices = select_nearest_keys(usable, moment.words)
-    gait_words = library.gaits[int(gait[int(round(frame))])].labels
     used = sort_labels(choices[0].labels) if choices else gait_words
     instead = " ".join(used) if choices else "locomotion continues there"
     warnings.append(TimedMessage(f"{text}; used instead: {instead}", (moment.time, moment.time)))
@@ -229,11 +262,29 @@ def _describe_lasting(words: Iterable[str]) -> str:
     return f" as a key moment ('{lasting[0]}' lasts: give it a start and an end)" if lasting else ""
 
 
+def _describe_synthetic(words: Iterable[str]) -> str:
+    """Describe the synthetic actions nearest to a key moment's labels; "" where none is of their kind."""
+    requested = set(words) & DISCRETE
+    choices = {sort_labels(labels - {*SIDES, *list_gaits()}) for labels in list_action_labels() if labels & requested}
+    nearest = find_nearest_labels(words, sorted(choices))
+    return f"; synthetic: {' | '.join(map(' '.join, nearest))}" if nearest else ""
+
+
+def _report_no_action(moment: KeyMoment) -> list[TimedMessage]:
+    """Report a key moment whose labels say how, but not what: any action with them may be shown."""
+    if any(names_action(word) or word not in read_labels() for word in moment.words):
+        return []
+    found = f"'{' '.join(moment.words)}' names no action, so any key moment with it may be shown"
+    return [TimedMessage(f"{format_seconds(moment.time)} s: {found}; add one, such as kick or receive",
+                         (moment.time, moment.time))]
+
+
 def _select_action_keys(library: Library, keys: list[Key], asked: ActionMoment) -> tuple[Key, ...]:
-    """Select the synthetic actions that were built for a requested one; any where none was."""
+    """Select the synthetic actions that were built for a requested one; any that are not avoided where none was."""
     actions = tuple(key for key in keys if is_action_clip(library.clips[key.clip]))
-    paths = find_action_paths(asked)
-    return tuple(key for key in actions if library.clips[key.clip].path in paths) or actions
+    paths, sides = find_action_paths(asked), asked.avoid & frozenset(SIDES)
+    built = tuple(key for key in actions if library.clips[key.clip].path in paths and not key.labels & sides)
+    return built or tuple(key for key in actions if not key.labels & asked.avoid)
 
 
 def _choose_rates(moment: KeyMoment) -> tuple[float, ...]:
@@ -241,14 +292,16 @@ def _choose_rates(moment: KeyMoment) -> tuple[float, ...]:
     return RECEPTION_RATES if takes_with_foot(moment.words) else ()
 
 
-def _remove_avoided(moment: KeyMoment, usable: tuple[Key, ...], synthetic: tuple[Key, ...], warnings: list[str]):
+def _remove_avoided(moment: KeyMoment, usable: tuple[Key, ...], synthetic: tuple[Key, ...], actions: tuple[Key, ...],
+                    warnings: list[str]):
     """Remove recorded and synthetic keys with labels that the moment avoids.
 
-    Where no recorded one with its labels would be left, all stay and a warning is added.
+    Where no recorded one with its labels would be left, and no action has them, all stay and a warning is added.
     """
     remaining = tuple(tuple(key for key in keys if not key.labels.intersection(moment.avoid))
                       for keys in (usable, synthetic))
-    if select_keys(usable, moment.words) and not select_keys(remaining[0], moment.words):
+    left = (*remaining[0], *actions)
+    if select_keys(usable, moment.words) and not select_keys(left, moment.words):
         avoided = " ".join(AVOID_PREFIX + word for word in moment.avoid)
         problem = f"no clip for '{' '.join(moment.words)}' is {avoided}"
         text = f"{format_seconds(moment.time)} s: {problem}; a clip with an avoided label is used"

@@ -8,15 +8,17 @@ that neither crosses.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
+from ...base.time_series import find_runs
 from ...library.keys import Key
 from ...library.library import Library
 from .candidate_index import SLOT
 from .foot_drag import list_slot_ranges
-from .request import SearchRequest, compute_needed_frames, library_frame
+from .request import RequestedKey, SearchRequest, compute_needed_frames, library_frame
 
 KEY_PLAYBACK_RATES = np.array([0.8, 0.9, 1.0, 1.12, 1.25])  # rates at which a key moment's clip may be played
 MIN_SLOT = 6  # frames of the shortest slot beside an extra edge
@@ -24,6 +26,8 @@ MIN_KEY_MARGIN = 12
 """Least frames before and after a key frame that its clip is played, however short its annotated row: a nearer cut
 would be inside the swing itself."""
 
+# s without a foot on the ground, longer than a runner's flight, and s from the key moment within which it counts
+_OFF_FEET_SECONDS, _OFF_FEET_WITHIN = 0.25, 0.6
 _CROWDED = 3 * SLOT  # frames between key moments below which they are close together
 _TRIMMED = 2.5  # frames of an entry or exit that may be cut off, so that they do not bind one more slot
 
@@ -130,7 +134,7 @@ def _build_pieces(library: Library, request: SearchRequest, edges: np.ndarray, n
     rows = []
     for choice, option in enumerate(key.choices):
         entry, leave = np.maximum(compute_needed_frames(library, option), MIN_KEY_MARGIN)
-        for rate in key.rates or KEY_PLAYBACK_RATES:
+        for rate in list_playback_rates(library, key, option):
             # the last edge before the entry and the first one after the exit, both a little trimmed
             first = int(np.searchsorted(edges, key.frame - entry / rate + _TRIMMED, side="right")) - 1
             end = int(np.searchsorted(edges, key.frame + leave / rate - _TRIMMED))
@@ -142,6 +146,25 @@ def _build_pieces(library: Library, request: SearchRequest, edges: np.ndarray, n
                 start = library_frame(library, option) - rate * (key.frame - edges[a])
                 rows.append((number, choice, option.clip, rate, a, b, start))
     return rows
+
+
+def list_playback_rates(library: Library, key: RequestedKey, option: Key) -> Sequence[float] | np.ndarray:
+    """List the playback rates of a clip: a body in the air, and one that falls or slides, keeps gravity's time.
+
+    Args:
+        library: the clips.
+        key: the requested key moment.
+        option: the library's key moment that serves it.
+    Returns:
+        The rates; one alone is that of the swing too.
+    """
+    reach = int(_OFF_FEET_WITHIN * library.fps)
+    at, first = library_frame(library, option), library.frames.first[option.clip]
+    low, high = np.clip([round(at) - reach, round(at) + reach], first, first + library.frames.count[option.clip] - 1)
+    off = find_runs(~library.feet_in_contact[low : high + 1].any(axis=1))
+    if any(b - a >= _OFF_FEET_SECONDS * library.fps for a, b in off):
+        return (1.0,)
+    return key.rates or KEY_PLAYBACK_RATES
 
 
 def find_slot(edges: np.ndarray, frame: float) -> int:

@@ -102,6 +102,11 @@ class Action:
     least_lead: float = -math.inf
 
     @property
+    def distinct_labels(self) -> frozenset[str]:
+        """The labels that it shows whatever the player does: one for a stand and a run alike has neither pace."""
+        return self.labels - _PACES if _PACES <= self.labels else self.labels
+
+    @property
     def suited_speeds(self) -> tuple[float, float]:
         """Lowest and highest m/s of players whom it suits."""
         return self.suits or _SUITS.get(self.labels & _PACES, (0.0, math.inf))

@@ -8,6 +8,8 @@ knee opens at the contact; the ball is met at knee height, ahead of the body.
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 from ..gait_plan import GaitStyle
 from .key_poses import KeyPoses
 
@@ -128,6 +130,27 @@ JOCKEY = KeyPoses(
     arms=((-2.4, *_HANG), (-1.9, 14, 34, 12, 52, 0), (1.9, 14, 36, 12, 50, 0), (2.5, *_HANG)),
     head=((-2.4, 0, 0, 0), (-1.9, 0, 2, 16), (1.9, 0, 2, 16), (2.5, 0, 0, 0)),
 )
+JOCKEY_BACKWARD = replace(JOCKEY, labels="jockey back", direction=180.0, varies="jockeying")
+JOCKEY_SIDEWAYS = replace(JOCKEY, direction=-90.0, varies="jockeying")
+_HOLD_BEGINS, _HOLD_ENDS = (-0.8, -0.2), (1.2, 1.8)  # s of holding a ball
+
+
+def _hold(labels: str, arm: tuple[float, ...], *, hips: tuple[float, float, float] = (0, 0, 0), tilt: float = 2,
+          flexion: float = 4, nod: float = 0) -> KeyPoses:
+    """Build holding a ball in both hands: one pose of both arms, hips (ahead, left, up), trunk and head."""
+    (begins, begun), (ends, ended) = _HOLD_BEGINS, _HOLD_ENDS
+    return KeyPoses(
+        labels=labels, is_span=True, span=(begins, begun, ends, ended),
+        hips=((begins, 0, 0, 0), (begun, *hips), (ends, *hips), (ended, 0, 0, 0)),
+        pelvis=((begins, 0, 2, 0), (begun, 0, tilt, 0), (ends, 0, tilt, 0), (ended, 0, 2, 0)),
+        spine=((begins, 0, 4, 0), (begun, 0, flexion, 0), (0.5, 0, flexion, 4), (ends, 0, flexion, 0),
+               (ended, 0, 4, 0)),
+        head=((begins, 0, 0, 0), (begun, 0, nod, 0), (0.5, 0, nod, 12), (ends, 0, nod, -6), (ended, 0, 0, 0)),
+        arms=((begins, *_HANG), (begun, *arm), (ends, *arm), (ended, *_HANG)),
+        hold=((begins, 0, 0.26), (begun, 1, 0.26), (ends, 1, 0.26), (ended, 0, 0.3)),
+    )
+
+
 THROW_IN = KeyPoses(
     labels="throwb throw high running front",
     span=(-1.7, -1.3, 0.7, 1.3),
@@ -177,4 +200,11 @@ BALL_POSES = {
     "scissors feint": SCISSORS,
     "shielding": SHIELD,
     "jockeying": JOCKEY,
+    "jockeying backward": JOCKEY_BACKWARD,
+    "jockeying sideways": JOCKEY_SIDEWAYS,
+    "holding the ball": _hold("hold middle standing", (24, 10, 30, 88, 50)),
+    "holding the ball high": _hold("hold high standing", (164, 6, 16, 18, 50), nod=-8),
+    "holding the ball low": _hold("hold low standing", (22, 8, 20, 30, 30), flexion=10, nod=8),
+    "holding the ball on the ground": _hold("hold ground", (78, 8, 14, 14, 0), hips=(-0.06, 0, -0.40), tilt=42,
+                                            flexion=44, nod=-24),
 }

@@ -25,6 +25,7 @@ from ..gestures import LEFT, RIGHT, Gesture, blend_arrays, compute_envelope, int
 from ..lying import compute_lowest_root, raise_arms, smooth_above
 from ..moves import build_standing
 from .action import ActionSetting
+from .flight import apply_flight
 
 _ROUNDING_SECONDS = 0.02  # s over which corners of the tables are rounded
 _FOOT_EASE = 0.16  # s in which a foot passes from its step to the key poses
@@ -155,7 +156,11 @@ def _blend_poses(poses: BodyPoses, setting: ActionSetting, times: np.ndarray, ru
         ankles[:, side] = blend_arrays(ankles[:, side], target, own)
         feet[:, side] = blend_arrays(feet[:, side], angles, own)
         toes[:, side] = toes[:, side] * (1.0 - own)
-    return run.replace_arrays(ankles=ankles, feet=feet, toes=toes, **blended)
+    posture = run.replace_arrays(ankles=ankles, feet=feet, toes=toes, **blended)
+    if poses.flight is None:
+        return posture
+    # the limbs swing about the hips, and what falls freely is the centre of mass
+    return apply_flight(posture, times, poses.flight, setting.neutral, lands_on_feet=False)
 
 
 def build_still_stand(setting: ActionSetting, count: int) -> Posture:

@@ -71,18 +71,42 @@ KNEE_SLIDE = KeyPoses(
                 (2.3, -0.42, -0.02, 0.0, 70, 0, 0), (2.5, -0.05, 0, 0.10, 40, 0, 0), (2.75, 0.35, 0, 0, 0, 0, 0),
                 (3.3, 0.35, 0, 0, 0, 0, 0)),
 )
+_HOP_FOOT: Rows = ((-1.0, 0, 0, 0, 0, 0, 0), (-0.48, 0, 0, 0, 10, 0, 0), (-0.25, 0, 0, 0, 58, 0, 0),
+                   (-0.08, -0.12, 0, 0.12, 66, 0, 0), (0.08, -0.10, 0, 0.12, 54, 0, 0), (0.25, 0, 0, 0, 26, 0, 0),
+                   (0.36, 0, 0, 0, 0, 0, 0), (1.2, 0, 0, 0, 0, 0, 0))
 JUMP_FIST = KeyPoses(
     labels="celebration jump fist",
     is_span=True,
-    span=(-1.0, -0.75, 1.2, 1.9),
-    hips=CATCH_HIGH.hips, pelvis=CATCH_HIGH.pelvis, spine=CATCH_HIGH.spine,
-    left_foot=CATCH_HIGH.left_foot, right_foot=CATCH_HIGH.right_foot, flights=CATCH_HIGH.flights,
-    head=((-0.8, 0, -10, 0), (0.0, 0, -18, -10), (0.4, 0, 4, 0), (1.2, 0, 2, 0)),
+    span=(-0.9, -0.7, 0.34, 0.75),  # standing behind it would be all that a calm search shows
+    hips=((-0.9, 0, 0, 0), (-0.5, -0.03, 0, -0.24), (-0.25, 0, 0, 0.06), (0.0, 0, 0, 0.1), (0.25, 0, 0, 0.03),
+          (0.42, -0.03, 0, -0.20), (0.8, 0, 0, -0.03), (1.0, 0, 0, 0)),
+    pelvis=CATCH_HIGH.pelvis, spine=CATCH_HIGH.spine, left_foot=_HOP_FOOT, right_foot=mirror_foot(_HOP_FOOT),
+    flights=CATCH_HIGH.flights,
+    head=((-0.8, 0, -10, 0), (0.0, 0, -18, -10), (0.4, 0, 4, 0), (1.0, 0, 2, 0)),
     right_arm=((-0.75, 6, 16, 12, 50, 10), (-0.46, -30, 22, 14, 80, 10), (-0.22, 70, 20, 20, 110, 40),
                (0.0, 160, 6, 10, 30, 40), (0.12, 164, 4, 10, 24, 40), (0.32, 60, 20, 20, 110, 40),
-               (0.46, 14, 18, 16, 112, 30), (0.7, 30, 20, 20, 104, 30), (1.2, 8, 12, 12, 40, 5), (1.8, *_REST)),
+               (0.46, 14, 18, 16, 112, 30), (1.0, *_REST)),
     left_arm=((-0.75, 6, 16, 12, 50, 10), (-0.46, -24, 24, 14, 60, 10), (-0.1, 30, 36, 14, 96, 20),
-              (0.1, 10, 34, 14, 100, 20), (0.46, 20, 30, 16, 70, 20), (1.2, 4, 12, 12, 30, 5), (1.8, *_REST)),
+              (0.1, 10, 34, 14, 100, 20), (0.46, 20, 30, 16, 70, 20), (1.0, *_REST)),
+)
+ARMS_RAISED = KeyPoses(
+    labels="celebration standing arms outside",
+    is_span=True,
+    span=(-0.9, -0.3, 1.5, 2.2),
+    hips=((-0.9, 0, 0, 0), (-0.4, 0, 0, -0.03), (0.0, 0, 0, 0.0), (0.5, 0, 0, -0.02), (1.0, 0, 0, 0.0), (2.0, 0, 0, 0)),
+    spine=((-0.4, 0, 2, 0), (0.0, 0, -10, 0), (0.7, 0, -8, 6), (1.4, 0, -10, -6), (2.1, 0, 2, 0)),
+    head=((-0.4, 0, -4, 0), (0.0, 0, -24, 0), (0.7, 0, -18, 14), (1.4, 0, -22, -10), (2.1, 0, 2, 0)),
+    arms=((-0.8, *_REST), (-0.3, 12, 92, -10, 30, 50), (0.0, 8, 136, -16, 16, 70), (0.5, 8, 126, -16, 22, 70),
+          (1.0, 8, 140, -16, 12, 70), (1.5, 8, 128, -16, 20, 70), (1.9, 10, 60, 0, 30, 30), (2.2, *_REST)),
+)
+HANDS_ON_BADGE = KeyPoses(
+    labels="celebration standing arms inside",
+    is_span=True,
+    span=(-0.9, -0.3, 1.5, 2.2),
+    spine=((-0.4, 0, 2, 0), (0.0, 0, -6, 0), (1.4, 0, -4, 0), (2.1, 0, 2, 0)),
+    head=((-0.4, 0, -4, 0), (0.0, 0, -16, 10), (0.8, 0, -14, -14), (1.4, 0, -16, 4), (2.1, 0, 2, 0)),
+    arms=((-0.8, *_REST), (-0.4, 20, 16, 30, 90, 40), *((float(time), 20, 14, 50, 124 - 16 * (beat % 2), 60)
+          for beat, time in enumerate(np.arange(0.0, 1.51, 0.25))), (1.9, 14, 14, 26, 70, 20), (2.2, *_REST)),
 )
 POINTING_UP = KeyPoses(
     labels="celebration walking pointing arms",
@@ -97,6 +121,12 @@ POINTING_UP = KeyPoses(
     right_arm=((-1.8, 40, 16, 10, 50, 20), (-1.0, 140, -6, 6, 34, 30), (-0.4, 160, -14, 4, 10, 30),
                (1.0, 160, -14, 4, 10, 30),
                (1.5, 100, 4, 10, 60, 20), (2.1, *_REST)),
+)
+POINTING_TO_THE_SKY = KeyPoses(
+    labels="celebration standing pointing arms",
+    is_span=True,
+    span=(-1.4, -0.6, 1.4, 2.2),
+    head=POINTING_UP.head, spine=POINTING_UP.spine, left_arm=POINTING_UP.left_arm, right_arm=POINTING_UP.right_arm,
 )
 FIST_PUMP = KeyPoses(
     labels="celebration standing fist",
@@ -161,7 +191,8 @@ HEAD_DOWN = KeyPoses(
     spine=((-1.2, 0, 16, 0), (1.6, 0, 16, 0)),
 )
 CELEBRATIONS = dict(
-    arms_spread=ARMS_SPREAD, fist_pump=FIST_PUMP, aeroplane=AEROPLANE, jump_fist=JUMP_FIST, pointing_up=POINTING_UP,
-    knee_slide=KNEE_SLIDE, dance=DANCE, head_down=HEAD_DOWN,
+    arms_spread=ARMS_SPREAD, fist_pump=FIST_PUMP, aeroplane=AEROPLANE, jump_fist=JUMP_FIST,
+    arms_raised=ARMS_RAISED, hands_on_badge=HANDS_ON_BADGE, pointing_to_the_sky=POINTING_TO_THE_SKY,
+    pointing_up=POINTING_UP, knee_slide=KNEE_SLIDE, dance=DANCE, head_down=HEAD_DOWN,
 )
 """Recipes by name: that of a plain celebration in a run first, then that in a stand."""

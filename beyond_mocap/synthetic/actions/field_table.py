@@ -5,24 +5,22 @@ from __future__ import annotations
 import math
 
 from ..gestures import Gesture
-from ..moves import build_get_up, build_throw_in
+from ..moves import build_throw_in
 from .action import MOVES, Action, ActionSetting
 from .ball_poses import BALL_POSES
 from .floor import (
     build_bicycle_kick,
     build_diving_header,
     build_fall,
+    build_half_bicycle_kick,
     build_lying,
     build_quick_get_up,
     build_sitting,
     build_slide_tackle,
+    build_slow_get_up,
 )
 from .headers import build_jumping_header, build_running_header, build_running_jump, build_standing_header
 from .pose_table import build_pose_actions
-
-
-def _build_get_up(setting: ActionSetting) -> Gesture:
-    return build_get_up(setting.skeleton, setting.fps, example=setting.example)
 
 
 def _build_throw_in(setting: ActionSetting) -> Gesture:
@@ -43,29 +41,34 @@ _HEADERS = (
            heights=(0.4, 1.4), suits=MOVES),
 )  # fmt: skip
 _OVERHEAD_KICKS = tuple(
-    Action(name=name, labels=frozenset({"kick", "bicycle", "foot", "top", "back", *more}), build=build_bicycle_kick,
-           needs=frozenset({"bicycle"}), has_side=True, heights=(1.4, 2.0))
-    for name, more in (("overhead kick", ()), ("half overhead kick", ("half",)))
+    Action(name=name, labels=frozenset({"kick", "bicycle", "foot", "top", *more}), build=build,
+           needs=frozenset({"bicycle"}), has_side=True, heights=heights)
+    for name, more, build, heights in (
+        ("overhead kick", ("back",), build_bicycle_kick, (1.4, 2.0)),
+        ("half overhead kick", ("half",), build_half_bicycle_kick, (0.9, 1.5)),
+    )
 )
 _MOVES = (
     Action(name="jump", labels=frozenset({"jump", "standing"}), build=build_jumping_header),
     Action(name="jump in a run", labels=frozenset({"jump", "slide", "running"}), build=build_running_jump,
-           speeds=_RUNS),
+           needs=frozenset({"jump"}), speeds=_RUNS),
     Action(name="fall", labels=frozenset({"fall", "standing"}), build=build_fall),
-    Action(name="fall in a run", labels=frozenset({"fall", "slide", "running"}), build=build_fall, speeds=_RUNS),
-    Action(name="flight after a tackle", labels=frozenset({"fly", "slide"}), build=build_diving_header, speeds=_RUNS),
+    Action(name="fall in a run", labels=frozenset({"fall", "slide", "running"}), build=build_fall,
+           needs=frozenset({"fall"}), speeds=_RUNS),
+    Action(name="flight after a tackle", labels=frozenset({"fly", "slide"}), build=build_diving_header,
+           needs=frozenset({"fly"}), speeds=_RUNS),
     Action(name="getting up from the front", labels=frozenset({"getting_up", "short_duration"}),
            build=build_quick_get_up),
     Action(name="getting up from the back", labels=frozenset({"getting_up", "long_duration", "back"}),
-           build=_build_get_up),
+           build=build_slow_get_up),
     Action(name="sitting", labels=frozenset({"sitting"}), build=build_sitting, is_span=True),
     Action(name="lying", labels=frozenset({"ground"}), build=build_lying, is_span=True),
 )
 _REACHES = (
     Action(name="throw-in", labels=frozenset({"throwb", "throw", "high"}), build=_build_throw_in),
     *build_pose_actions(BALL_POSES),
-    *(Action(name=name, labels=frozenset({label, "slide"}), build=build_slide_tackle, has_side=True, speeds=_RUNS,
-             suits=_SLIDES)
+    *(Action(name=name, labels=frozenset({label, "slide", "foot", "low", "running", "front"}), has_side=True,
+             build=build_slide_tackle, speeds=_RUNS, suits=_SLIDES)
       for name, label in (("slide tackle", "tackle"), ("sliding block", "block"),
                           ("sliding interception", "intercept"))),
 )  # fmt: skip

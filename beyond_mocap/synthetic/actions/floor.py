@@ -13,11 +13,13 @@ import numpy as np
 
 from ..gait_tables import GRAVITY
 from ..gestures import Gesture
-from ..moves import build_get_up
 from .action import ActionSetting
 from .body_poses import NO_ARM, BodyPoses, build_body_poses
 
 _GRASS = 5.5  # m/s^2 by which a sliding body slows down
+_UP_HALFWAY = 1.2  # s from the chest's landing to the middle of getting up
+_LYING_DOWN = 2.0  # s of sitting and lying down
+_UP_BACK_LIES, _UP_BACK_HALFWAY = 0.55, 1.0  # s of `_UP_BACK` that lie, and from there to its middle
 _STANDING_HIPS = 0.93  # m above the ground, of an adult who stands
 
 
@@ -222,6 +224,46 @@ def build_bicycle_kick(setting: ActionSetting) -> Gesture:
     ), setting)  # fmt: skip
 
 
+def build_half_bicycle_kick(setting: ActionSetting) -> Gesture:
+    """Build a half overhead kick with the right foot: the body lies in the air on its left side, the right leg swings
+    level across it; it lands on hip and hand and rolls onto its back.
+
+    Args:
+        setting: for whom; height: of the ball.
+    Returns:
+        The movement; its key is the contact. It faces across the way of the ball.
+    """
+    ball = 1.2 if setting.height is None else setting.height / setting.scale
+    off, hips_at_key, lies, up = 0.24, float(np.clip(ball - 0.22, 0.72, 1.05)), 0.16, _UP_BACK
+    fall = (hips_at_key - _STANDING_HIPS) / off - 0.5 * GRAVITY * off
+    land = (fall + np.sqrt(fall**2 + 2.0 * GRAVITY * (hips_at_key - lies))) / GRAVITY
+    left_arm = ((-0.8, *NO_ARM), (-0.45, -10, 30, 10, 20), (-0.2, 10, 84, 0, 20), (0.0, 0, 96, -10, 14),
+                (0.6 * land, -10, 84, -10, 24))
+    right_arm = ((-0.8, *NO_ARM), (-0.45, 20, 40, 10, 30), (-0.2, 40, 60, 10, 30), (0.0, -26, 70, 0, 30),
+                 (0.6 * land, -10, 50, 0, 30))
+    return build_body_poses(BodyPoses(
+        speeds=((-2.0, 0.0), (1.0, 0.0)),
+        hips=((-0.8, 0, 0, 0), (-0.5, -0.02, 0.03, 0.18), (-off, -0.04, 0.08, 0.0),
+              (0.0, -0.06, 0.18, _STANDING_HIPS - hips_at_key), *_shift_rows(land, up["hips"], -0.16)),
+        pelvis=((-0.8, 0, 0, 0), (-0.5, -6, 0, -20), (-off, -30, -4, -30), (0.0, -74, -12, 6),
+                (0.5 * land, -66, -34, 30), (land, -16, -80, 6), *_at(land, up["pelvis"][1:])),
+        spine=((-0.8, 0, 2, 0), (-0.5, 4, 8, -20), (-off, 8, 4, -24), (0.0, 10, 6, 8), *_at(land, up["spine"])),
+        head=((-0.8, 0, 0), (-0.5, -10, -20), (-off, 0, -24), (0.0, 6, -10), *_at(land, up["head"])),
+        arms=(left_arm + _at(land, up["arm"]), right_arm + _at(land, up["arm"])),
+        feet=(((-0.5, 0, 0, 0, 8, 0, 0), (-off, 0.0, 0.0, 0.02, 50, 0, 0), (-0.1, 0.02, -0.18, 0.30, 40, 10, 30),
+               (0.0, 0.10, -0.38, 0.36, 30, 10, 60), (0.6 * land, 0.40, -0.22, 0.20, 10, 0, 40),
+               *_shift_rows(land, up["foot"], -0.16)),
+              ((-0.6, 0, 0, 0, 10, 0, 0), (-0.4, -0.14, -0.20, 0.20, 50, -20, 0),
+               (-0.2, -0.34, -0.44, 0.62, 70, -40, 30),
+               (-0.08, 0.10, -0.72, hips_at_key - 0.16, 60, -10, 60), (0.0, 0.44, -0.62, ball - 0.20, 50, 20, 70),
+               (0.07, 0.66, -0.30, ball - 0.16, 40, 50, 60), (0.6 * land, 0.70, 0.0, 0.50, 10, 20, 20),
+               *_shift_rows(land, up["foot"], -0.16))),
+        knees=((-0.3, 0, 0), (land, 4, 4), (land + 1.4, 10, 10), (land + 2.4, 0, 0)),
+        rests=((land - 0.03, 0), *_at(land, up["rests"])),
+        begin=(-0.8, -0.5), leaves=(-0.5, -0.6), push=-0.6, flight=(-off, land), end=land + up["end"],
+    ), setting)  # fmt: skip
+
+
 def _shift_rows(offset: float, rows, ahead: float) -> tuple:
     """Shift rows of hips or feet in time and place."""
     return tuple((row[0] + offset, row[1] + ahead, *row[2:]) for row in rows)
@@ -230,23 +272,15 @@ def _shift_rows(offset: float, rows, ahead: float) -> tuple:
 def build_quick_get_up(setting: ActionSetting) -> Gesture:
     """Build getting up from lying on the front: the hands push, a foot steps under, the body rises.
 
+    The fall before it belongs to it, for players who are not yet on the ground.
+
     Args:
         setting: for whom.
     Returns:
         The movement; its key is halfway.
     """
-    up, begin = _UP_FRONT, -1.2
-    poses = BodyPoses(
-        speeds=((-2.0, 0.0), (1.0, 0.0)), hips=_at(begin, up["hips"]), pelvis=_at(begin, up["pelvis"]),
-        spine=_at(begin, up["spine"]), head=_at(begin, up["head"]),
-        arms=(_at(begin, up["left_arm"]), _at(begin, up["right_arm"])),
-        feet=(_at(begin, up["left_foot"]), _at(begin, up["right_foot"])), rests=_at(begin, up["rests"]),
-        begin=(begin - 1.0, begin - 0.9), leaves=(begin - 1.0, begin - 1.0), push=begin - 1.0, end=begin + up["end"],
-    )
-    gesture = build_body_poses(poses, setting)
-    cut = gesture.key + begin
-    motion = gesture.motion.frames(int(cut * setting.fps), len(gesture.motion))
-    return Gesture(motion, gesture.key - cut, 0.3, gesture.end - cut)
+    fall = build_fall(setting)
+    return Gesture(fall.motion, fall.key + _UP_HALFWAY, fall.start, fall.end)
 
 
 def build_sitting(setting: ActionSetting) -> Gesture:
@@ -281,13 +315,48 @@ def build_sitting(setting: ActionSetting) -> Gesture:
 
 
 def build_lying(setting: ActionSetting) -> Gesture:
-    """Build lying on the back for a while, and getting up.
+    """Build sitting down, lying on the back for a while, and getting up.
 
     Args:
         setting: for whom.
     Returns:
         The movement; it has no key moment, and lasts while the body lies.
     """
-    rest = 4.0
-    motion = build_get_up(setting.skeleton, setting.fps, rest=rest, example=setting.example).motion
-    return Gesture(motion, None, 0.0, rest)
+    gesture = _build_lie_down(setting, 3.5)
+    return Gesture(gesture.motion, None, gesture.key - 3.5 - _LYING_DOWN, gesture.key)
+
+
+def build_slow_get_up(setting: ActionSetting) -> Gesture:
+    """Build getting up from lying on the back, with sitting and lying down for players who are not yet on the ground.
+
+    Args:
+        setting: for whom.
+    Returns:
+        The movement; its key is halfway.
+    """
+    gesture = _build_lie_down(setting, 0.4)
+    return Gesture(gesture.motion, gesture.key + _UP_BACK_HALFWAY, gesture.start, gesture.end)
+
+
+def _build_lie_down(setting: ActionSetting, rest: float) -> Gesture:
+    """Build sitting down, lying on the back for `rest` s, and getting up; its key is when the body begins to."""
+    down, up = -rest - _LYING_DOWN, _UP_BACK
+    later = {name: _at(-_UP_BACK_LIES, [row for row in rows if row[0] > 0.0]) for name, rows in up.items()
+             if name != "end"}
+    arms = ((down, *NO_ARM), (down + 0.6, 20, 20, 10, 20), (down + 1.2, -34, 26, -10, 16), (-rest, *up["arm"][0][1:]),
+            *later["arm"])
+    still = ((down, 0, 0, 0, 0, 0, 0), (down + 1.3, 0, 0, 0, 0, 0, 0), (down + 1.55, 0.16, 0, 0.04, -6, 0, 0),
+             (-rest, 0.31, 0.02, 0.02, -46, 0, 0), *_shift_rows(0.0, later["foot"], -0.45))
+    return build_body_poses(BodyPoses(
+        speeds=((-9.0, 0.0), (9.0, 0.0)),
+        hips=((down, 0, 0, 0), (down + 0.7, -0.14, 0, 0.50), (down + 1.2, -0.44, 0, 0.80), (-rest, -0.45, 0, 0.80),
+              *_shift_rows(0.0, later["hips"], -0.45)),
+        pelvis=((down, 0, 0, 0), (down + 0.7, 0, 30, 0), (down + 1.2, 0, -24, 0), (-rest, 0, -84, 0),
+                *later["pelvis"]),
+        spine=((down, 0, 2, 0), (down + 0.7, 0, 30, 0), (down + 1.2, 0, 30, 0), (-rest, 0, 10, 0), *later["spine"]),
+        head=((down, 0, 0), (down + 0.7, -20, 0), (down + 1.2, 0, 0), (-rest, 20, 0), *later["head"]),
+        arms=(arms, arms), feet=(still, still),
+        knees=((down, 0, 0), (down + 1.2, 8, 8), (0.6, 8, 8), (2.0, 0, 0)),
+        rests=((down + 0.95, 0), (down + 1.2, 1), *later["rests"]),
+        begin=(down, down + 0.2), leaves=(down, down), push=down - 0.1, end=up["end"] - _UP_BACK_LIES,
+    ), setting)  # fmt: skip

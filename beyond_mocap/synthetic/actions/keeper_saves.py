@@ -30,7 +30,7 @@ READY = KeyPoses(
     head=((-0.3, 0, -14, 0), (0.14, 0, -36, 0), (1.4, 0, -34, 0), (2.0, 0, 2, 0)),
     arms=((-0.3, 16, 20, 18, 50, 20), (-0.1, 34, 32, 22, 66, 30), (0.14, *SET_ARMS), (1.4, *SET_ARMS),
           (2.0, 2, 9, 12, 16, 0)),
-    flights=((-0.16, 0.0),),
+    left_foot=_READY_LEFT, right_foot=_READY_RIGHT, flights=((-0.16, 0.0),),
 )
 
 # the body waits in a low stance, meets the ball before its chest and wraps it

@@ -67,6 +67,8 @@ class KeyPoses:
         flights: seconds of take-off and landing of each flight.
         lies: seconds between which the body lies or rolls on the ground.
         hold: rows (time, share, m between both hands' joints): hands that meet around a ball.
+        varies: name of the action beside which it is offered (`Action`).
+        style: of the gait below.
     """
 
     labels: str
@@ -92,6 +94,7 @@ class KeyPoses:
     flights: tuple[tuple[float, float], ...] = ()
     lies: tuple[float, float] | None = None
     hold: Rows | None = None
+    varies: str = ""
     style: GaitStyle = GaitStyle(life=0.6)
 
     @property
@@ -252,11 +255,11 @@ def retime_flight(recipe: KeyPoses, half: float) -> KeyPoses:
     def retime(time: float) -> float:
         return time * half / own if abs(time) <= own else time + float(np.sign(time)) * (half - own)
 
-    tables: dict[str, Any] = {
+    moved: dict[str, Any] = {
         field.name: tuple((retime(row[0]), *row[1:]) for row in rows) for field in fields(recipe)
         if field.type == "Rows | None" and (rows := getattr(recipe, field.name)) is not None
     }
-    return replace(recipe, flights=((-half, half),), **{**tables, "span": tuple(map(retime, recipe.span))})
+    return replace(recipe, flights=((-half, half),), **{**moved, "span": tuple(map(retime, recipe.span))})
 
 
 def mirror_foot(rows: Rows) -> Rows:

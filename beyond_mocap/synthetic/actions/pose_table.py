@@ -41,7 +41,7 @@ def _build_row(name: str, recipe: KeyPoses) -> Action:
     labels = frozenset(recipe.labels.split())
     return Action(name=name.replace("_", " "), labels=labels - set(SIDES), build=build, meets=recipe.meets,
                   heights=(1.9, 2.7) if hands else (), has_side=bool(labels & set(SIDES)), is_span=recipe.is_span,
-                  can_last=recipe.can_last)
+                  can_last=recipe.can_last, varies=recipe.varies)
 
 
 def build_pose_actions(*tables: Mapping[str, KeyPoses]) -> tuple[Action, ...]:

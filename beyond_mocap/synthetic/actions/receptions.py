@@ -1,4 +1,5 @@
-"""Synthetic receptions: the right foot (inside, outside, sole, top), thigh or chest takes the ball and gives with it.
+"""Synthetic receptions: the right foot (inside, outside, sole, top), thigh, chest or head takes the ball and gives with
+it.
 
 Each is one table of key poses over seconds from the touch, played out of standing (`volleys`) or over walking and
 running (`gestures`). There is no backswing and no follow-through: the foot is out before the ball arrives, gives with
@@ -20,6 +21,7 @@ from ...motion.skeleton import Skeleton
 from ..gestures import Gesture, StrikeRecipe, build_touch
 from ..volleys import Volley, build_standing_touch
 from .action import Action, ActionSetting
+from .headers import build_jumping_header, build_running_jump
 
 SLOWEST = 0.7
 """Speed in m/s of a body below which it stands while it takes a ball."""
@@ -38,6 +40,8 @@ _LOW, _HIGH = 0.3, 0.7  # m of the ankle at a low and at a high ball
 _HIGH_PACE = 0.72  # factor on the cadence for a high ball: a foot that comes down from there slowly takes its time
 # seconds before and after the touch in which a standing body differs from standing
 _SPAN = (-0.75, 0.95)
+# seconds from the touch, share by which the hips are lowered: standing, and on the way
+_STANDING_SINK, _SINK = ((-0.36, 0.6), (0.0, 1.0), (0.3, 0.8)), ((-0.15, 0.8), (0.0, 1.0), (0.25, 0.8))
 _LEFT_ARM = ((-0.20, 12, 34, 15, 42), (0.0, 16, 44, 15, 40), (0.25, 12, 38, 15, 45))
 _RIGHT_ARM = ((-0.20, 6, 32, 15, 42), (0.0, -6, 40, 15, 38), (0.25, 4, 34, 15, 42))
 _PELVIS = ((-0.20, 3, 3, -6), (0.0, 3, 2, -2), (0.20, 2, 3, -10))
@@ -57,6 +61,7 @@ class Reception:
         most_ball_speed: m/s of the arriving ball up to which it is done.
         foot: rows (time, ahead of the hips, left of them, ankle height, pitch, yaw, roll); () leaves both feet.
         low: metres by which the hips are lowered at the touch.
+        sink: rows (time, share of `low`); () as usual: the body is low before the ball arrives.
         pelvis: rows (time, list, tilt, turn).
         spine: rows (time, list, tilt, turn).
         left_arm: rows (time, flexion, abduction, inward, elbow).
@@ -74,6 +79,7 @@ class Reception:
     most_ball_speed: float = np.inf
     foot: tuple = ()
     low: float = 0.05
+    sink: tuple = ()
     pelvis: tuple = _PELVIS
     spine: tuple = _SPINE
     left_arm: tuple = _LEFT_ARM
@@ -133,9 +139,21 @@ RECEPTIONS = {
         right_arm=((-0.20, 4, 42, 12, 36), (0.0, -14, 54, 10, 30), (0.25, 0, 40, 12, 38)),
         spine=((-0.20, -4, 2, 4), (0.0, -6, 2, 0), (0.20, -3, 10, 4)),
     ),
+    "high inside": Reception(
+        name="reception with the raised inside of the foot",
+        labels=("receive", "foot", "high", "inside"), speeds=(0.0, 2.5), heights=(0.45, 0.75), height=0.5,
+        foot=(
+            (-0.16, 0.36, -0.15, 0.400, -2, -58, -6),
+            (0.0, 0.38, -0.15, 0.390, -2, -64, -8), (0.08, 0.32, -0.15, 0.350, -2, -64, -8),
+            (0.17, 0.24, -0.15, 0.280, 0, -54, -6), (0.34, 0.16, -0.13, 0.140, 4, -24, 0),
+        ),
+        low=0.04, left_arm=((-0.20, 14, 46, 10, 36), (0.0, 20, 58, 10, 32), (0.25, 12, 42, 12, 40)),
+        right_arm=((-0.20, 6, 42, 12, 36), (0.0, -8, 52, 10, 32), (0.25, 2, 38, 12, 40)),
+        spine=((-0.20, -5, 4, 6), (0.0, -7, 6, 4), (0.20, -3, 11, 4)),
+    ),
     "thigh": Reception(
         name="reception with the thigh",
-        labels=("receive", "thigh"), speeds=(0.0, 4.0), heights=(0.75, 1.05), height=1.0,
+        labels=("receive", "thigh", "high"), speeds=(0.0, 4.0), heights=(0.75, 1.05), height=1.0,
         foot=(
             (-0.16, 0.22, -0.12, 0.490, 30, -8, 0),
             (0.0, 0.24, -0.12, 0.520, 28, -8, 0), (0.08, 0.23, -0.12, 0.450, 28, -8, 0),
@@ -147,14 +165,39 @@ RECEPTIONS = {
         spine=((-0.20, -5, 2, 2), (0.0, -6, 0, 0), (0.20, -3, 10, 2)),
     ),
     "chest": Reception(
-        name="reception with the chest", labels=("receive", "body"), speeds=(0.0, 4.0), heights=(), low=0.07,
+        name="reception with the chest", labels=("receive", "body", "chest", "high"), speeds=(0.0, 4.0), heights=(),
+        low=0.07,
         pelvis=((-0.40, 0, 2, 0), (-0.05, 0, -12, 0), (0.10, 0, -10, 0), (0.25, 0, -2, 0), (0.5, 0, 2, 0)),
         spine=((-0.40, 0, 2, 0), (-0.05, 0, -20, 0), (0.08, 0, -12, 0), (0.22, 0, 6, 0), (0.5, 0, 6, 0)),
         left_arm=((-0.35, 6, 36, 8, 34), (0.0, -10, 62, 0, 50), (0.25, 2, 48, 5, 44)),
         right_arm=((-0.35, 6, 36, 8, 34), (0.0, -10, 62, 0, 50), (0.25, 2, 48, 5, 44)),
         nod=18.0,
     ),
+    # tall before the ball arrives; then knees, trunk and neck give, and it drops before the feet
+    "head": Reception(
+        name="reception with the head", labels=("receive", "head"), speeds=(0.0, 4.0), heights=(1.45, 1.9), height=1.75,
+        low=0.09, sink=((-0.30, 0.3), (-0.05, 0.2), (0.18, 1.0), (0.4, 0.7)),
+        pelvis=((-0.40, 0, 2, 0), (-0.05, 0, 2, 0), (0.18, 0, -4, 0), (0.36, 0, 0, 0), (0.55, 0, 2, 0)),
+        spine=((-0.40, 0, 2, 0), (-0.05, 0, 4, 0), (0.18, 0, -9, 0), (0.36, 0, 2, 0), (0.55, 0, 6, 0)),
+        left_arm=((-0.35, 8, 30, 10, 40), (0.0, 16, 48, 14, 58), (0.2, 4, 56, 8, 50)),
+        right_arm=((-0.35, 8, 30, 10, 40), (0.0, 16, 48, 14, 58), (0.2, 4, 56, 8, 50)),
+        nod=-8.0,
+    ),
+    # no reception, but built alike: the foot is lifted out of the way, the eyes follow the ball
+    "let run": Reception(
+        name="letting the ball run", labels=("letgo",), speeds=(0.0, 6.9), heights=(), low=0.05, slows=0.3,
+        foot=(
+            (-0.20, 0.10, -0.20, 0.240, 18, -14, 0), (-0.06, 0.16, -0.26, 0.330, 12, -14, 0),
+            (0.0, 0.20, -0.27, 0.340, 10, -14, 0), (0.10, 0.26, -0.25, 0.310, 6, -14, 0),
+            (0.22, 0.28, -0.20, 0.200, 2, -12, 0),
+        ),
+        pelvis=((-0.20, 3, 3, -6), (0.0, 5, 4, -10), (0.20, 3, 3, -6)),
+        left_arm=((-0.20, 14, 44, 12, 40), (0.0, 18, 56, 12, 36), (0.25, 12, 40, 12, 42)),
+        right_arm=((-0.20, 4, 40, 12, 40), (0.0, -8, 50, 12, 36), (0.25, 4, 36, 12, 42)),
+    ),
 }  # fmt: skip
+
+_LOOKS_DOWN = 24.0  # degrees by which the head looks down at a ball that has dropped from it
 
 
 def build_reception(
@@ -178,12 +221,19 @@ def build_reception(
     reception = reception if height is None or not reception.heights else _lift(reception, height)
     if speed < SLOWEST:
         return build_standing_touch(_stand(reception), skeleton, fps, seed, example=example)
-    return build_touch(_travel(reception, speed), skeleton, fps, seed=seed, example=example)
+    return build_touch(travel_with_ball(reception, speed), skeleton, fps, seed=seed, example=example)
 
 
 def _lift(reception: Reception, height: float) -> Reception:
-    """Lift the foot of a reception to a ball at `height` m; it is down again when the foot lands."""
+    """Lift the foot of a reception to a ball at `height` m; it is down again when the foot lands.
+
+    A body that takes it with both feet down is lower for a lower ball.
+    """
     lift = min(max(height, reception.heights[0]), reception.heights[-1]) - reception.height
+    if not reception.foot:
+        low, bent = max(reception.low, lift) - lift, max(-lift, 0.0)  # bent: before the ball arrives
+        sink = tuple((time, (share * (low - bent) + bent) / max(low, 1e-9)) for time, share in reception.sink)
+        return replace(reception, low=low, sink=sink)
     seconds = _interpolate_height(reception, _LIFT_SECONDS)
     rows = [(row[0], row[1], row[2], row[3] + lift * (1.0 if row[0] <= 0.0 else max(1.0 - row[0] / seconds, 0.0)),
              *row[4:]) for row in reception.foot]
@@ -198,17 +248,18 @@ def _interpolate_height(reception: Reception, ends: tuple[float, float]) -> floa
 
 def _stand(reception: Reception) -> Volley:
     """Convert a reception to one out of standing: the weight shifts to the left foot, or stays between both."""
-    beside, low = 0.075 if reception.foot else 0.0, reception.low
+    beside, low, nod = 0.075 if reception.foot else 0.0, reception.low, reception.nod
+    hips = tuple((time, 0, beside * (1.0 if time == 0.0 else 0.8), share * low)
+                 for time, share in reception.sink or _STANDING_SINK)
     return Volley(
         labels=" ".join(reception.labels), span=_SPAN, foot=reception.foot or None,
-        hips=((_SPAN[0], 0, 0, 0), (-0.36, 0, 0.8 * beside, 0.6 * low), (0.0, 0, beside, low),
-              (0.3, 0, 0.8 * beside, 0.8 * low), (_SPAN[1], 0, 0, 0)),
+        hips=((_SPAN[0], 0, 0, 0), *hips, (_SPAN[1], 0, 0, 0)),
         pelvis=reception.pelvis, spine=reception.spine, left_arm=reception.left_arm, right_arm=reception.right_arm,
-        head=((-0.6, 4, 0), (0.0, reception.nod, 0), (0.4, reception.nod, 0), (_SPAN[1], 0, 0)),
+        head=((-0.6, 4, 0), (0.0, nod, 0), (0.4, nod if nod > 0.0 else _LOOKS_DOWN, 0), (_SPAN[1], 0, 0)),
     )  # fmt: skip
 
 
-def _travel(reception: Reception, speed: float) -> StrikeRecipe:
+def travel_with_ball(reception: Reception, speed: float) -> StrikeRecipe:
     """Convert a reception to one on the way at `speed` m/s.
 
     The body slows down, and the step in which it takes the ball lasts longer, most of all a walker's, whose swing is
@@ -223,7 +274,7 @@ def _travel(reception: Reception, speed: float) -> StrikeRecipe:
         right_arm=reception.right_arm, head=reception.nod,
         pace=pace * _interpolate_height(reception, (1.0, _HIGH_PACE)), at=_interpolate_height(reception, _SWING_SHARE),
         speeds=tuple((time, (1.0 - slowed * share) * speed) for time, share in _SLOWING),
-        sink=((-0.15, 0.8 * low), (0.0, low), (0.25, 0.8 * low)),
+        sink=tuple((time, share * low) for time, share in reception.sink or _SINK),
     )
 
 
@@ -236,7 +287,7 @@ def _build_row(kind: str) -> Action:
     """Build the row of a reception: the inside of the foot serves most balls, outside and sole some as well."""
     one = RECEPTIONS[kind]
     return Action(
-        name=one.name, labels=frozenset({*one.labels, "standing", "running", "front"}), has_side=True,
+        name=one.name, labels=frozenset({*one.labels, "standing", "running", "front"}), has_side=kind != "head",
         least_lead=one.least_lead, suits=(one.speeds[0], np.inf) if np.isfinite(one.least_lead) else None,
         build=partial(_build_action, kind), heights=one.heights, most_ball_speed=one.most_ball_speed,
         speeds=tuple(speed for speed in SPEEDS if one.speeds[0] <= speed <= one.speeds[1]),
@@ -244,5 +295,12 @@ def _build_row(kind: str) -> Action:
     )  # fmt: skip
 
 
-RECEPTION_ACTIONS = tuple(map(_build_row, RECEPTIONS))
-"""The rows of `actions.table`."""
+_JUMPS = (
+    Action(name="reception with the head in a jump", labels=frozenset({"receive", "head", "standing", "jump", "front"}),
+           build=build_jumping_header, heights=(1.9, 2.6)),
+    Action(name="reception with the head in a jump on the run", build=build_running_jump, speeds=SPEEDS[3:],
+           labels=frozenset({"receive", "head", "running", "jump", "front"}), heights=(1.9, 2.6)),
+)  # fmt: skip
+RECEPTION_ACTIONS = (*(_build_row(kind) for kind in RECEPTIONS if kind != "let run"), *_JUMPS)
+LET_RUN_ACTIONS = (_build_row("let run"),)
+"""Rows of `actions.table`."""

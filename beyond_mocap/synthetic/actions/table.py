@@ -8,7 +8,9 @@ from __future__ import annotations
 
 from .field_table import FIELD_ACTIONS
 from .kick_table import KICK_ACTIONS
+from .on_the_way import ON_THE_WAY_ACTIONS
 from .pose_table import POSE_ACTIONS
-from .receptions import RECEPTION_ACTIONS
+from .receptions import LET_RUN_ACTIONS, RECEPTION_ACTIONS
 
-ACTIONS = (*KICK_ACTIONS, *FIELD_ACTIONS, *RECEPTION_ACTIONS, *POSE_ACTIONS)
+ACTIONS = (*KICK_ACTIONS, *LET_RUN_ACTIONS, *FIELD_ACTIONS, *ON_THE_WAY_ACTIONS, *RECEPTION_ACTIONS,
+           *POSE_ACTIONS)

@@ -57,7 +57,7 @@ def test_exit_status(run, order, tmp_path, capfd):
     assert run(["no-such-verb"]) == 2
     assert run([*order, "--out", str(tmp_path / "player.xyz")]) == 2
     assert run([*order, "--out", str(tmp_path / "nowhere" / "player.blend")]) == 2
-    (tmp_path / "words.txt").write_text("2 header\n")
+    (tmp_path / "words.txt").write_text("2 header subtle\n")
     assert run([*order[:-1], str(tmp_path / "words.txt"), "--out", str(tmp_path / "player.blend")]) == 3
     assert "Traceback" not in capfd.readouterr().err
     assert list(tmp_path.glob("player*")) == []

@@ -297,12 +297,12 @@ def test_bad_tracking(tmp_path, content, found):
 
 
 def test_words_that_the_library_lacks(ready, match):
-    (match / "player1.txt").write_text("6.0 header\n")
+    (match / "player1.txt").write_text("6.0 header subtle\n")
     bpy.ops.beyond_mocap.read_words()
-    refused(bpy.ops.beyond_mocap.synthesize, "strips of player1: .*6 s: .*header")
+    refused(bpy.ops.beyond_mocap.synthesize, "strips of player1: .*6 s: .*header subtle")
     ready.nearest = True
     assert bpy.ops.beyond_mocap.synthesize() == {"FINISHED"}
-    assert ready.players[0].moments.startswith("6.0 s  header, replaced by ")
+    assert ready.players[0].moments.startswith("6.0 s  header subtle, replaced by ")
 
 
 def test_a_take_of_another_session(ready, session):

@@ -173,3 +173,18 @@ def test_fingerprints(extension):
     assert one == freshness.compute_fingerprint({"b": (1, "x", None), "a": np.arange(3)})
     assert one != freshness.compute_fingerprint({"a": np.arange(3.0), "b": (1, "x", None)})
     assert freshness.compute_fingerprint(("ab", "c")) != freshness.compute_fingerprint(("a", "bc"))
+
+
+def test_a_take_of_0_1_is_out_of_date_where_a_default_has_changed_since(extension):
+    """Version 0.1 did not solve touches by default and left such settings out of its fingerprints."""
+    freshness = importlib.import_module(f"{extension.__name__}.scene.result.freshness")
+    plan = importlib.import_module(f"{extension.__name__}.beyond_mocap.synthesis.plan").Plan
+    track = importlib.import_module(f"{extension.__name__}.beyond_mocap.motion.track").Track
+    walk = track(np.arange(3.0), np.zeros((3, 2)))
+    seen = {}
+    for solves in (False, True):
+        names = []
+        digest = type("Digest", (), {"update": lambda self, content, names=names: names.append(content)})()
+        freshness._feed_digest(digest, plan(track=walk, solve_touches=solves))
+        seen[solves] = b"solve_touches" in names
+    assert seen == {False: False, True: True}

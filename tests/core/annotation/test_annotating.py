@@ -36,7 +36,7 @@ def test_a_kick_is_at_the_time_of_its_first_key():
 
 def test_the_first_key_counts_even_if_it_turns_the_page_or_skips():
     assert typed(["NEXT_PAGE", "2", "ENTER"])[1] == [AddMoment(9.7, ("catchb",))]
-    assert typed(["0", "NEXT_PAGE", "7", "ENTER"])[1] == [AddMoment(9.7, ("middle",))]
+    assert typed(["0", "NEXT_PAGE", "8", "ENTER"])[1] == [AddMoment(9.7, ("middle",))]
 
 
 def test_in_and_out_and_words_make_a_stretch():

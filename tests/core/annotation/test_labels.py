@@ -139,7 +139,7 @@ def test_no_product_file_compares_labels_by_name():
 
 
 @pytest.mark.parametrize("height, part", [(0.11, "foot low"), (0.6, "foot high"), (0.9, "thigh"), (1.3, "body"),
-                                          (None, "")])
+                                          (1.75, "head"), (None, "")])
 def test_the_balls_height_chooses_the_part_of_a_plain_receive(height, part):
     assert choose_part_by_height(("receive", "running"), height) == ("receive", "running", *part.split())
     for words in (("receive", "foot"), ("receive", "body"), ("receive", "low"), ("kick",), ("catchb",)):

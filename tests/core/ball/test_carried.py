@@ -35,7 +35,7 @@ def test_a_measured_far_unknown_or_briefly_met_ball_is_not(ball):
     assert find_carried_stretches(TIMES, ball, RUN) == []
 
 
-def test_a_ball_that_lies_before_a_waiting_player_is_measured_and_one_inside_him_is_not():
+def test_a_ball_that_lies_before_a_waiting_player_is_measured_and_one_inside_them_is_not():
     waits = np.zeros_like(RUN)
     assert find_carried_stretches(TIMES, waits + [0.25, 0.0], waits) == []
     assert find_carried_stretches(TIMES, waits + [0.01, 0.0], waits) == [pytest.approx((0.0, TIMES[-1]))]

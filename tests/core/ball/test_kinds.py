@@ -33,6 +33,12 @@ def test_words_by_what_the_ball_does(before, after, next_, earlier, kind):
     assert choose_touch_kind("foot", np.array([*before, 0.0]), np.array([*after, 0.0]), next_, earlier) == kind
 
 
+@pytest.mark.parametrize("after, next_, kind", [((2.0, 0.5), True, "head"), ((2.0, 0.5), False, "header"),
+                                                ((9.0, 0.0), True, "header")])
+def test_a_header_that_keeps_the_ball_is_a_reception(after, next_, kind):
+    assert choose_touch_kind("head", np.array([-9.0, 0.0, -3.0]), np.array([*after, 0.0]), next_, False) == kind
+
+
 def test_goal_and_out_are_told_apart():
     times = np.arange(100) * 0.04
     def way(start, velocity):

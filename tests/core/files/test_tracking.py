@@ -97,6 +97,7 @@ def test_a_track_needs_no_ball(tmp_path):
         ("\n \n", "the file is empty"),
         ("time,x,y\n0,1,2\n", "no column time_s, x_m, y_m"),
         ("time_s;x_m;y_m\n0;1;2\n", "no column time_s"),
+        ("time_s,x_m,y_m,ball_x_m\n0,1,2,3\n", "no column 'ball_y_m'"),
         ("time_s,x_m,y_m\n", "0 samples"),
         ("time_s,x_m,y_m\n0,1,2\n", "1 sample "),
         ("time_s,x_m,y_m\n0,1,2\n0,1,2\n", "2 samples"),

@@ -8,7 +8,7 @@ import pytest
 from beyond_mocap.annotation.event_labels import read_event_labels
 from beyond_mocap.ball.tracked.solve import SolvedTouch
 from beyond_mocap.files.event_data import MatchEvent
-from beyond_mocap.match.duels import APART_SECONDS, REACH, TOLD_REACH, find_blocks, find_duels, label_lost_duels
+from beyond_mocap.match.duels import APART_SECONDS, EVENT_REACH, REACH, find_blocks, find_duels, label_lost_duels
 from beyond_mocap.match.event_clock import AlignedEvents
 from beyond_mocap.match.labels import build_touch_moment
 from beyond_mocap.match.moments import DUELS, build_timeline, read_labels, write_labels
@@ -48,15 +48,15 @@ def test_the_nearest_opponent_in_reach_loses():
 @pytest.mark.parametrize("place, velocity, expected", [
     ((REACH - 0.1, 0.0), STILL, True),
     ((REACH + 0.1, 0.0), STILL, False),
-    ((0.8, 0.0), (-4.0, 0.0), True),  # he runs at the ball
-    ((0.8, 0.0), (4.0, 0.0), False),  # he has run past it
+    ((0.8, 0.0), (-4.0, 0.0), True),  # they run at the ball
+    ((0.8, 0.0), (4.0, 0.0), False),  # they have run past it
     ((0.8, 0.0), (1.0, 0.0), True),  # slow enough to turn
 ])
 def test_who_reaches(place, velocity, expected):
     assert bool(losers(match_of(home_1=WINNER, away_1=(place, np.array(velocity))), touch())) == expected
 
 
-def test_keepers_throw_ins_doubtful_touches_and_who_touches_it_himself_are_left_out():
+def test_keepers_throw_ins_doubtful_touches_and_who_touch_it_themselves_are_left_out():
     match = match_of(home_1=WINNER, away_1=((0.7, 0.0), STILL))
     assert losers(match, touch()) == ["away_1"]
     assert not losers(match, touch(), keepers=["away_1"])
@@ -74,7 +74,7 @@ def test_nobody_lunges_at_each_touch_of_a_dribble():
 
 
 def test_an_event_of_the_loser_reaches_farther():
-    match = match_of(home_1=WINNER, away_1=((TOLD_REACH - 0.2, 0.0), STILL))
+    match = match_of(home_1=WINNER, away_1=((EVENT_REACH - 0.2, 0.0), STILL))
     event = MatchEvent(time=5.4, period=1, player="away_1", team="away", kind="tackle", details=("sliding", "lost"))
     aligned = AlignedEvents(events=(event,), times=np.array([5.4]), touches=np.array([-1]), clocks={})
     assert not losers(match, touch())

@@ -62,6 +62,7 @@ def running(speed):
     ("receive", "foot", 0.2, 5.0, False, "receive foot"),
     ("header", "head", 1.8, 0.0, True, "header standing"),
     ("header", "head", 2.3, 4.0, True, "header running jump"),
+    ("head", "head", 1.8, 0.0, True, "receive head standing"),
     ("chest", "chest", 1.2, 0.0, True, "receive body"),
     ("throw-in", "hand", 2.0, 0.0, False, "throwb high"),
     ("hand", "hand", 1.0, 0.0, True, "catchb middle"),

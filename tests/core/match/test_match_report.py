@@ -211,8 +211,8 @@ def test_touches_have_a_table_of_their_own(tmp_path):
     assert text.count("At the ball") == 1
     cells = [re.findall(r"<td class=[^>]*>([\d.–]+)", row) for row in text.split("<tr")
              if "mean<" in row or "worst<" in row]
-    assert ["2", "4.5", "–", "–", "–", "–", "–", "–", "20", "–", "–"] in cells
-    assert ["3", "7.0", "–", "–", "–", "–", "–", "–", "41", "–", "–"] in cells
+    assert ["2", "4.5", "–", "–", "–", "–", "–", "–", "–", "20", "–", "–"] in cells
+    assert ["3", "7.0", "–", "–", "–", "–", "–", "–", "–", "41", "–", "–"] in cells
 
 
 def test_reports_without_seconds_still_make_a_page(tmp_path):

@@ -1,6 +1,7 @@
 """A plan in windows: their place on the clock, and that a cut plan asks for what the whole one does."""
 
 import pickle
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -9,12 +10,16 @@ from hypothesis import strategies as st
 
 from beyond_mocap.annotation import KeyMoment, Span, Timeline
 from beyond_mocap.base.errors import InputError, UserCancelledError
+from beyond_mocap.library.missing_actions import describe_action
 from beyond_mocap.match.pieces.units import build_units, build_window_edges, count_frames, cut_plan, cut_track
-from beyond_mocap.match.pieces.windows import search_window
+from beyond_mocap.match.pieces.windows import join_pieces, search_window
 from beyond_mocap.match.player_edit import to_stored_plan
+from beyond_mocap.match.player_motion import construct_player
 from beyond_mocap.motion.track import Track, sample_track
 from beyond_mocap.synthesis.plan import Plan, PlayerTouch, SolvedTrajectory
 from beyond_mocap.synthesis.search.candidate_index import SLOT
+
+HEADER_TIME = 20.5
 
 
 @given(st.floats(0.0, 500.0), st.integers(60, 20000), st.sampled_from([10.0, 30.0, 60.0]))
@@ -133,3 +138,19 @@ def test_a_cut_course_is_the_same_where_it_is_needed(weaving_plan, start, length
     cut = cut_plan(plan, start, start + length)
     at = np.linspace(start, start + length, 50)
     assert np.array_equal(cut.solved.interpolate(at)[0], plan.solved.interpolate(at)[0], equal_nan=True)
+
+
+@pytest.fixture(scope="module")
+def header_player(library, weaving_plan):
+    plan = replace(weaving_plan, timeline=Timeline(keys=(KeyMoment(HEADER_TIME, ("header",)),)))
+    pieces = [search_window(library, unit) for unit in build_units(plan, window=8.0, overlap=3.0)]
+    return join_pieces(library, [plan], pieces, 8.0)[0]
+
+
+def test_a_match_shows_a_missing_action_at_its_time(library, header_player):
+    edit = header_player.stretches[0].edit
+    (key,) = edit.keys
+    assert key.time == HEADER_TIME and describe_action(edit.clips[key.clip][0]).endswith("header")
+    (take,) = construct_player(library, header_player, HEADER_TIME - 2.0, HEADER_TIME + 2.0)
+    shown = take.clips[take.clip[round((HEADER_TIME - take.start_time) * take.motion.fps)]]
+    assert describe_action(shown) == describe_action(edit.clips[key.clip][0])

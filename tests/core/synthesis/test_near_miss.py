@@ -1,4 +1,4 @@
-"""Who loses a duel reaches for the ball, comes near it and does not touch it; the ball rolls on as if he were away."""
+"""Who loses a duel reaches for the ball, comes near it and does not touch it; the ball rolls on unmoved."""
 
 from dataclasses import replace
 
@@ -29,11 +29,11 @@ def course_of(track, side) -> SolvedTrajectory:
 @pytest.fixture(scope="module")
 def reach(library, track_of):
     """reach(side, avoid=...) -> the take of a player who reaches for such a ball, and its course."""
-    def make(side, avoid=("touch",)):
+    def make(side, avoid=("touch",), words=KICK):
         bare = track_of(2.8, seconds=10.0)
         course = course_of(bare, side)
         track = Track(bare.times, bare.positions, course.interpolate(bare.times)[0])
-        timeline = Timeline((), (KeyMoment(TIME, KICK, avoid=avoid),))
+        timeline = Timeline((), (KeyMoment(TIME, words, avoid=avoid),))
         return synthesize(library, Plan(track, timeline, solve_touches=True, solved=course)), course
 
     return make
@@ -52,6 +52,16 @@ def test_the_ball_is_not_moved(reach):
     (take, course), (met, _) = reach(0.1), reach(0.1, avoid=())
     moved, led = (np.abs(one.ball.positions - course.interpolate(one.ball.times)[0]).max(axis=1) for one in (take, met))
     assert moved.max() < 0.002 and led.max() > 0.02
+
+
+@pytest.mark.parametrize("words", [("letgo",), ("turning", "letgo")])
+def test_a_ball_that_is_let_run_is_not_touched_and_not_moved(reach, words):
+    take, course = reach(0.1, avoid=(), words=words)
+    at = round(take.keys[0].frame)
+    clear = measure_clearance(take.motion, take.ball.positions, ("foot",), np.arange(at - 6, at + 7))
+    assert clear.min() >= CLEARANCE - 0.002 and take.keys[0].requested.misses_ball
+    assert np.abs(take.ball.positions - course.interpolate(take.ball.times)[0]).max() < 0.3
+    assert not [line for line in take.warnings if "the ball's trajectory has no touch" in line]
 
 
 def test_a_miss_is_no_poor_contact_and_no_missing_touch(reach, library):
@@ -83,5 +93,5 @@ def test_the_text_of_a_miss():
     assert timeline.keys[0].misses_ball and format_timeline(timeline) == "5 tackle right -touch\n"
     check_timeline(timeline)
     for wrong in ("5 touch\n", "4 6 walking -touch\n"):
-        with pytest.raises(InputError, match="'touch' is not in the vocabulary"):
+        with pytest.raises(InputError, match="'touch' is of recordings only"):
             check_timeline(parse_timeline(wrong))

@@ -21,7 +21,7 @@ BODY = identify_joints(ADULT.skeleton)
 ROWS = {action.name: action for action in (*FIELD_ACTIONS, *KICK_ACTIONS)}
 WITHOUT_BODY = {
     ("getting_up", "with"),  # the thesis lost the second half of this label
-    ("receive", "foot", "high", "inside"), ("catchb", "slide"),
+    ("catchb", "slide"),
 }  # fmt: skip
 
 

@@ -5,7 +5,13 @@ import pytest
 
 from beyond_mocap.annotation.striking import FOOT_RADIUS, measure_ball_gap
 from beyond_mocap.motion.track import BALL_RADIUS
-from beyond_mocap.synthesis.construct.contact_geometry import Aim, BallRange, choose_aim, solve_contacts
+from beyond_mocap.synthesis.construct.contact_geometry import (
+    Aim,
+    BallRange,
+    choose_aim,
+    place_between_hands,
+    solve_contacts,
+)
 
 FOOT = np.array([[0.0, 0.0, 0.11], [0.16, 0.0, 0.11]])
 ASIDE, AHEAD = np.array([0.0, 1.0, 0.0]), np.array([1.0, 0.0, 0.0])
@@ -50,3 +56,13 @@ def test_the_aim_is_one_that_the_body_can_make():
     ]
     assert lacks[1] < lacks[0] - 0.02
     assert np.degrees(np.arccos(stiff.direction @ AHEAD)) <= 60.0 + 1e-6
+
+
+@pytest.mark.parametrize("off, moved", [((0.0, 0.4, 0.3), 0.3), ((0.0, 0.1, 0.1), np.hypot(0.1, 0.1))])
+def test_a_ball_comes_straight_towards_the_hands(off, moved):
+    hands = np.array([[[-0.1, 0.0, 1.8]] * 2, [[0.1, 0.0, 1.8]] * 2])
+    ball = hands.mean(axis=(0, 1)) + off
+    place, needs = place_between_hands(hands, 0.05, ball, BallRange(0.3, 0.3))
+    assert ball - place == pytest.approx(moved * np.array(off) / np.linalg.norm(off))
+    touching = hands[:, 0] + needs
+    assert np.linalg.norm(touching - place, axis=1) == pytest.approx([0.16, 0.16])

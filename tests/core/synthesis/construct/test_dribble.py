@@ -100,6 +100,47 @@ def test_key_moments_stay_where_the_ball_was_met():
     assert found.pushes
 
 
+def knocked_on_ball(motion, most=2.5, low=40, high=85):
+    """The ball in reach of the feet, and up to `most` m ahead between two frames."""
+    frames = np.arange(len(motion))
+    knocked = np.clip(np.minimum(frames - low, high - frames) / 8.0, 0.0, 1.0)
+    return planted_ball(motion, ahead=0.5) + np.outer((most - 0.5) * knocked, [1.0, 0.0, 0.0]), knocked >= 0.5
+
+
+def test_a_ball_that_was_measured_far_ahead_runs_there():
+    motion = build_gait(5.0, 4.0, FPS)
+    ball, is_far = knocked_on_ball(motion)
+    found = dribbled(motion, ball)
+    assert np.allclose(found.ball[is_far], ball[is_far], atol=0.3)
+    assert not any(is_far[push.first] for push in found.pushes) and found.pushes
+    # where the feed has filled it in, the feet have it
+    filled = dribbled(motion, ball, measured=~is_far)
+    assert (filled.ball - pelvis(motion))[is_far, 0].max() < 1.5
+
+
+def test_a_ball_that_would_leave_a_key_moment_through_the_legs_is_not_knocked_on():
+    motion = build_gait(5.0, 4.0, FPS)
+    ball, is_far = knocked_on_ball(motion)
+    at = np.clip(np.arange(len(motion)) - 35, -1, 6)
+    ball[at < 6] = planted_ball(motion, ahead=-0.5)[at < 6]  # met behind the body, it runs to the front
+    ball[:, 0] += np.where((at >= 0) & (at < 6), 1.0 * at / 6, 0.0)
+    is_met = dribbled(motion, ball, held=[(35, 36)])
+    assert (is_met.ball - pelvis(motion))[is_far, 0].mean() < 1.5
+    assert (dribbled(motion, ball).ball - pelvis(motion))[is_far, 0].mean() > 1.8
+
+
+def test_without_a_sample_the_ball_stays_near_the_line_of_travel():
+    motion = build_gait(5.0, 4.0, FPS, turn_rate=0.9)
+    ball = planted_ball(motion)
+    found = dribbled(motion, ball, measured=np.zeros(len(ball), bool))
+    first, last = found.pushes[0].first, found.pushes[-1].last
+    velocity = np.gradient(pelvis(motion)[:, :2], axis=0)[first:last]
+    velocity /= np.linalg.norm(velocity, axis=1)[:, None]
+    away = (found.ball - pelvis(motion))[first:last, :2]
+    aside = np.abs(away[:, 1] * velocity[:, 0] - away[:, 0] * velocity[:, 1])
+    assert aside.max() < 0.8
+
+
 @pytest.mark.parametrize("held", [[(19, 20)], [(88, 89)], [(50, 51)], [(20, 20), (40, 41), (89, 89)]])
 def test_wherever_the_ball_is_met_the_dribble_goes_on_around_it(held):
     motion = build_gait(2.8, 4.0, FPS)

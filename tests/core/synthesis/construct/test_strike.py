@@ -154,6 +154,12 @@ def test_a_filled_ball_comes_further(kick):
     assert struck.gap[0] < 0.005 and BALL_NOISE < struck.ball_shift[0] < 1.0
 
 
+def test_a_filled_ball_in_the_air_comes_down_to_a_low_foot(kick):
+    ball = natural_ball(kick) + [0.0, 0.0, 0.7]
+    struck = met(kick, ball, touch(kick), measured=np.zeros(len(kick.motion), bool))
+    assert struck.gap[0] < 0.005 and struck.moved[0] < 0.05
+
+
 def test_a_ball_in_the_air_stays_near_its_height(kick):
     ball = natural_ball(kick) + [0.0, 0.0, 0.4]
     struck = met(kick, ball, touch(kick))

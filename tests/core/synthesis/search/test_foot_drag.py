@@ -1,5 +1,7 @@
 """A clip that stands around its key moment, on a track that runs there, stops there, or stands."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -77,3 +79,10 @@ def test_only_a_search_that_leaves_it_out_says_so(with_header, track_of, timelin
     track = track_of(lambda t: np.full(len(t), 4.5))
     take = synthesize(with_header, Plan(track=track, timeline=timeline_of(*moments), method=method))
     assert any("is left out" in line for line in take.warnings) == (method == "path")
+
+
+def test_a_clip_that_is_shown_for_a_single_frame_says_nothing(search):
+    looked = search(lambda t: np.where(t < KEY, 4.5, 0.0))
+    at, edit = round(KEY * looked.library.fps), looked.run()
+    crowded = replace(edit, transitions=np.union1d(edit.transitions, [at, at + 1]))
+    assert report_left_out(looked.library, looked.request, crowded) == []

@@ -109,3 +109,14 @@ def test_a_key_s_place_among_the_frames(library):
         assert np.interp(at, np.arange(len(library.frames)), library.frames.source) == pytest.approx(
             key.frame, abs=1e-6
         )
+
+
+def test_the_nearest_synthetic_actions_are_told_too(order):
+    with pytest.raises(NotInLibraryError, match="; synthetic: .*tackle slide.*; use one of these"):
+        order((4.0, "tackle slide block"))
+
+
+def test_a_key_moment_that_names_no_action_is_told(order):
+    told = [line for line in order((4.0, "low")).warnings if "names no action" in line]
+    assert len(told) == 1 and told[0].startswith("4 s: 'low'")
+    assert not any("names no action" in line for line in order((4.0, "kick")).warnings)

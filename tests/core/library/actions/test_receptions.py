@@ -52,7 +52,7 @@ def test_without_a_dribble_or_with_a_labelled_reception_nothing_is_cut_out(tmp_p
         assert build(tmp_path / name, clip_file, row)[0].cut_receptions == ()
 
 
-def test_a_cut_out_serves_a_reception_and_is_told(dribbles):
+def test_a_cut_out_serves_a_reception_and_is_reported(dribbles):
     library, _ = dribbles
     times = np.arange(0.0, 6.0, 0.1)
     timeline = Timeline(keys=(KeyMoment(3.0, ("receive", "foot", "low")),))

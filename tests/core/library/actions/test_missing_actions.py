@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
 
 from beyond_mocap.annotation import KeyMoment, Span, Timeline
 from beyond_mocap.base.errors import InputError, NotInLibraryError
+from beyond_mocap.files.bvh import bvh
+from beyond_mocap.library import missing_actions
 from beyond_mocap.library.missing_actions import (
     ActionMoment,
     add_actions,
@@ -18,6 +21,7 @@ from beyond_mocap.library.missing_actions import (
     is_action_clip,
     select_own_kicks,
 )
+from beyond_mocap.library.scan import CACHE_FOLDER
 from beyond_mocap.motion.humanoid import identify_joints
 from beyond_mocap.motion.motion import forward_kinematics
 from beyond_mocap.motion.track import Track
@@ -49,15 +53,17 @@ def test_only_what_no_recording_carries_is_missing(library):
 @pytest.mark.parametrize("height", [None, 0.11, 1.7])
 def test_a_label_alone_finds_the_usual_action_and_nothing_special(height):
     names = [find_action(moment(label, speed=speed, height=height)).name
-             for label in ("kick", "tackle", "intercept", "throwb", "jump") for speed in (0.0, 4.0)]
+             for label in ("kick", "tackle", "intercept", "throwb", "jump", "slide") for speed in (0.0, 4.0)]
     kick = "high instep kick" if height == 1.7 else "inside kick"
     assert names == [f"{kick} from a stand", f"{kick} on the run", "block tackle", "slide tackle",
-                     "interception", "sliding interception", "throw-in", "throw-in", "jump", "jump in a run"]
+                     "interception", "sliding interception", "throw-in", "throw-in", "jump", "jump in a run",
+                     "slide tackle", "slide tackle"]
 
 
 def test_without_a_ball_nobody_dives_for_a_header_and_a_foot_receives():
     assert find_action(moment("header", speed=4.0)).name == "running header"
     assert find_action(moment("receive")).name == "reception with the inside of the foot"
+    assert find_action(moment("receive", "body", "high")).name == "reception with the chest"
     assert find_action(moment("header", "left", "jump")).name == "jumping header"
     assert find_action(moment("standing")) is find_action(moment("header", "sitting")) is None
 
@@ -69,6 +75,28 @@ def test_of_several_actions_the_one_that_suits_speed_and_ball_is_taken():
     assert find_action(moment("header", "standing", speed=4.0)).name == "standing header"
 
 
+def test_an_action_with_an_avoided_label_is_not_taken():
+    names = [find_action(moment("tackle", speed=4.0, avoid=frozenset(avoid))).name for avoid in ((), ("slide",))]
+    assert names == ["slide tackle", "block tackle"]
+    for avoid in (("inside",), ("standing",)):
+        assert "inside" not in find_action(moment("kick", avoid=frozenset(avoid), speed=0.0)).distinct_labels & {*avoid}
+    assert find_action(moment("tackle", "slide", avoid=frozenset({"slide"}))) is None
+    # one reception serves a stand and a run alike: what it shows is up to the player's speed
+    assert find_action(moment("receive", avoid=frozenset({"running"}))) is find_action(moment("receive"))
+
+
+def test_an_action_stands_in_where_all_recordings_show_an_avoided_label(library):
+    recorded = [key.labels for key in library.keys if "kick" in key.labels]
+    avoid = frozenset({"inside", "top"}) & frozenset().union(*recorded)
+    assert avoid and all(labels & avoid for labels in recorded)
+    plan = plan_walk(library)
+    plan = replace(plan, timeline=Timeline(keys=(KeyMoment(2.5, ("kick",), avoid=tuple(sorted(avoid))),)))
+    take = synthesize(library, plan)
+    assert not avoid & set(take.keys[0].words) and take.keys[0].used_instead is None
+    assert "kick" in describe_action(take.keys[0].clip) or "volley" in describe_action(take.keys[0].clip)
+    assert not any("avoided label" in line for line in take.warnings)
+
+
 def test_a_ball_that_runs_ahead_is_taken_into_the_run():
     low = ("receive", "foot", "low")
     names = [find_action(moment(*words, speed=speed, lead=lead)).name
@@ -76,6 +104,13 @@ def test_a_ball_that_runs_ahead_is_taken_into_the_run():
                                          (("receive", "thigh"), 4.0, 2.0))]
     inside = "reception with the inside of the foot"
     assert names == [inside, "first touch into the run", inside, "reception with the thigh"]
+
+
+def test_a_high_ball_is_taken_with_the_head_and_one_that_is_let_run_without_a_turn():
+    assert find_action(moment("receive", "head", height=1.7)).name == "reception with the head"
+    assert find_action(moment("receive", "head", height=2.3)).name == "reception with the head in a jump"
+    assert {find_action(moment("letgo", speed=speed)).name for speed in (0.0, 4.0)} == {"letting the ball run"}
+    assert find_action(moment("turning", "letgo", speed=1.5)).name == "turn that lets the ball run"
 
 
 def test_a_keeper_meets_the_ball_where_it_is():
@@ -171,3 +206,25 @@ def test_a_librarys_own_kicker_comes_before_published_swings(library):
     for slow_or_other in (moment(*asked, speed=1.0), moment("kick", "outside", speed=6.5)):
         paths = find_missing_actions(bare, [slow_or_other])
         assert paths and all("action_" in path for path in paths)
+
+
+def test_a_clip_that_is_built_again_has_the_same_bits(library, monkeypatch):
+    monkeypatch.setattr(missing_actions, "_KEPT_CLIPS", 1)
+    monkeypatch.setattr(missing_actions, "_KEPT", 1)
+    first, other = (find_missing_actions(library, [moment(word, speed=3.0)]) for word in ("throwb", "tackle"))
+    shown = [add_actions(library, paths) for paths in (first, other, first)]
+    clips = [one.clips[-2].motion for one in shown]
+    assert shown[0] is not shown[2] and clips[0] is not clips[2]
+    np.testing.assert_array_equal(clips[0].rotations, clips[2].rotations)
+    assert len(missing_actions._clips[library]) == len(missing_actions._extended[library]) == 1
+
+
+def test_a_file_of_another_version_beside_the_cache_is_replaced(library):
+    path, = find_missing_actions(library, [moment("tackle", "block")])
+    file = library.cache_location[0] / Path(path).relative_to(CACHE_FOLDER)
+    file.parent.mkdir(parents=True, exist_ok=True)
+    file.write_text("another version")
+    missing_actions._clips.pop(library, None)
+    missing_actions._extended.pop(library, None)
+    clip = next(clip for clip in add_actions(library, [path]).clips if is_action_clip(clip))
+    assert len(bvh.read_bvh(file).motion) == len(clip.motion)
