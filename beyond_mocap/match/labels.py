@@ -116,7 +116,7 @@ def label_match(
         left_out["doubtful"] += sum(moment.confidence < MIN_CONFIDENCE for moment in found)
         left_out["close"] += len(confident) - len(selected)
         selected += find_dribbles([touch for _, touch in player_touches])
-        players[player.id] = sort_moments([*selected, *label_set_positions(shots_at, selected)])
+        players[player.id] = sort_moments([*selected, *label_set_positions(shots_at, selected, match.times, path)])
     notes = (*(events.notes if events else ()), *(aligned.notes if aligned else ()),
              *_describe_left_out(touches, left_out), *_describe_contests(duels, shots))
     return MatchLabels(players, notes, _measure_event_fit(aligned, touches, span) if aligned else {})

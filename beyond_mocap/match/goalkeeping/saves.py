@@ -14,6 +14,7 @@ import numpy as np
 from ...annotation import AVOID_PREFIX
 from ...annotation.event_labels import EventLabelTable
 from ...annotation.timeline import TOUCH
+from ...base.time_series import interpolate_columns
 from ..moments import SHOTS, Moment, build_moment
 from .shots import GOAL, SAVED, Shot
 
@@ -27,8 +28,12 @@ MISSED_REACH = 2.5
 WRONG_FOOTED = 0.3
 """m that a keeper moves to the other side while the ball passes, beyond which they dive for it no more."""
 
-READY = "ready"
-"""Label of the set position."""
+READY, SHUFFLE = "ready", "shuffle"
+"""Labels of the set position, and of steps sideways in it."""
+
+RESTING_PACE, LOW_PACE = 0.42, 1.6
+"""m/s up to which a keeper waits in the set position, and up to which they go sideways in it; a faster one runs. At the
+shots of a half the search shows a standing position up to 0.40 m/s, and not from 0.45 on."""
 
 READY_BEFORE, READY_AFTER = 0.4, 0.6
 """s before a shot at which the set position begins, a short hop that ends as the ball is struck, and s after it at
@@ -38,6 +43,7 @@ _DIVE_ENTRY, _STANDING_ENTRY = 1.15, 0.7  # s before the ball with which dives a
 _LOW_DIVE, _PUNCH_HEIGHT = 0.9, 1.9  # m of the ball's centre: dives for lower balls are low; higher ones are punched
 _SLOWEST_PARRY = 3.0  # m/s of the ball after a save: a slower ball was caught
 _FARTHEST = 4.0  # m aside; a ball that is solved farther away says nothing of the keeper
+_PACE_STEP = 0.2  # s between the places that give a keeper's pace: the noise of tracks is faster
 _MIN_READY = 0.8  # s: a shorter wait is part of the save itself
 
 
@@ -97,12 +103,15 @@ def _is_wrong_footed(shot: Shot) -> bool:
     return bool(shot.moved * shot.lateral < 0.0 and abs(shot.moved) > WRONG_FOOTED)
 
 
-def label_set_positions(shots: Sequence[Shot], moments: Sequence[Moment]) -> list[Moment]:
-    """Label the stretches in which one goalkeeper waits low for a shot.
+def label_set_positions(shots: Sequence[Shot], moments: Sequence[Moment], times: np.ndarray,
+                        path: np.ndarray) -> list[Moment]:
+    """Label the stretches in which one goalkeeper waits low for a shot, where they do not run.
 
     Args:
         shots: at them, in order of time.
         moments: their other moments; a stretch ends before the entry of the next one, and is left out if it is short.
+        times: (N,) s of their path.
+        path: (N, 2) m, NaN while they are absent.
     Returns:
         Stretches, none over another.
     """
@@ -112,9 +121,18 @@ def label_set_positions(shots: Sequence[Shot], moments: Sequence[Moment]) -> lis
         arrival = shot.arrival if np.isfinite(shot.arrival) else shot.time + READY_AFTER
         end = min([max(arrival, shot.time + READY_AFTER), *(_find_entry(other) for other in moments
                                                              if _find_end(other) > start)])
-        if end - start >= _MIN_READY:
-            out += filter(None, [build_moment(start, (READY,), SHOTS, shot.confidence, round(end, 3))])
+        pace = _measure_pace(times, path, start, end) if end - start >= _MIN_READY else np.inf
+        if not pace > LOW_PACE:
+            labels = (SHUFFLE if pace > RESTING_PACE else READY,)
+            out += filter(None, [build_moment(start, labels, SHOTS, shot.confidence, round(end, 3))])
     return out
+
+
+def _measure_pace(times: np.ndarray, path: np.ndarray, start: float, end: float) -> float:
+    """Measure the mean speed, m/s, on a path (N, 2) m at `times` (N,) s between two seconds; NaN where unknown."""
+    at = np.arange(start, end, _PACE_STEP)
+    steps = np.diff(interpolate_columns(at, times, path, fill_value=np.nan), axis=0)
+    return float(np.linalg.norm(steps, axis=1).sum() / (at[-1] - at[0]))
 
 
 def _find_entry(moment: Moment) -> float:

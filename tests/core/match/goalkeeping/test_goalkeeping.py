@@ -94,6 +94,15 @@ def test_a_keeper_is_set_before_a_shot_that_nobody_touches():
         check_timeline(build_timeline(labels.players[player.id]), start=0.0, end=8.0)
 
 
+@pytest.mark.parametrize("pace, expected", [(0.2, ["ready"]), (1.0, ["shuffle"]), (3.0, [])])
+def test_a_keeper_who_moves_is_set_in_steps_and_a_running_one_runs(pace, expected):
+    match = match_of(4.4, 0.5)
+    positions = match.positions.copy()
+    positions[5, :, 1] += pace * (TIMES - SHOT_TIME)
+    match = replace(match, positions=positions)
+    assert [word for one in label_match(match, solve_ball(match)).players["away_1"] for word in one.labels] == expected
+
+
 def test_passes_of_the_own_team_slow_balls_and_wide_ones_are_no_shots():
     match = match_of(0.1, 0.3, (0.0, 0.0, 0.0))
     solved, lines = solve_ball(match), find_kept_lines(match)
