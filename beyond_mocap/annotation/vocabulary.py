@@ -13,7 +13,7 @@ dribble. The continuous list names dribble and turning without branches, and fal
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping
-from functools import lru_cache
+from functools import cache, lru_cache
 
 from .labels import KINDS, list_labels, read_labels
 
@@ -196,21 +196,20 @@ def sort_labels(labels: Iterable[str]) -> tuple[str, ...]:
 def _sort_labels(labels: frozenset[str]) -> tuple[str, ...]:
     sides = [word for word in SIDES if word in labels]
     directions = [word for word in list_labels(group="way") if word in labels]
-    actions = [word for _, word in _rank_in_tree(labels & DISCRETE, "discrete")]
+    actions = [word for word in VOCABULARY["discrete"] if word in labels]
     rest = [word for _, word in _rank_in_tree(labels - DISCRETE - {*sides, *directions})]
     return (*actions, *sides, *rest, *directions) if actions else (*rest, *directions, *sides)
 
 
-def _rank_in_tree(labels: frozenset[str], kind: str | None = None) -> list[tuple[int, str]]:
-    """Rank labels by where the tree, or only its branch of one kind, names them first."""
-    order = _build_tree_order(kind)
+def _rank_in_tree(labels: frozenset[str]) -> list[tuple[int, str]]:
+    """Rank labels by where the tree names them first."""
+    order = _build_tree_order()
     return sorted((order.get(word, len(order)), word) for word in labels)
 
 
-@lru_cache(maxsize=2)
-def _build_tree_order(kind: str | None) -> dict[str, int]:
-    tree = VOCABULARY[kind] if kind else VOCABULARY
-    return {word: place for place, word in enumerate(dict.fromkeys(path[-1] for path in _iter_paths(tree)))}
+@cache
+def _build_tree_order() -> dict[str, int]:
+    return {word: place for place, word in enumerate(dict.fromkeys(path[-1] for path in _iter_paths(VOCABULARY)))}
 
 
 def _iter_paths(tree: Mapping[str, dict], above: tuple[str, ...] = ()) -> Iterator[tuple[str, ...]]:

@@ -77,7 +77,7 @@ def test_of_several_actions_the_one_that_suits_speed_and_ball_is_taken():
 
 def test_an_action_with_an_avoided_label_is_not_taken():
     names = [find_action(moment("tackle", speed=4.0, avoid=frozenset(avoid))).name for avoid in ((), ("slide",))]
-    assert names == ["slide tackle", "block tackle"]
+    assert names == ["slide tackle", "block tackle on the way"]
     for avoid in (("inside",), ("standing",)):
         assert "inside" not in find_action(moment("kick", avoid=frozenset(avoid), speed=0.0)).distinct_labels & {*avoid}
     assert find_action(moment("tackle", "slide", avoid=frozenset({"slide"}))) is None
