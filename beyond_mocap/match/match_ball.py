@@ -146,7 +146,8 @@ def lead_ball_between_players(
             continue
         ball = apply_led_ball(sample_ball(take.plan, take.ball.times), first, out).positions
         held = [(at, at) for at in touched - first if 0 <= at < len(ball)]
-        around = lead_ball_around_body(motion.skeleton, motion.root_positions, motion.rotations, ball, held, motion.fps)
+        around = lead_ball_around_body(motion.skeleton, motion.root_positions, motion.rotations, ball, held=held,
+                                       fps=motion.fps)
         frames, offset = _list_moved(around - ball, first)
         out[number] = np.concatenate([out[number][0], frames]), np.concatenate([out[number][1], offset])
     return out

@@ -347,5 +347,5 @@ def _report_unmet(library: Library, plan: Plan, take: Take) -> list[TimedMessage
     played = playback_from_take(take)
     return report_unmet_constraints(
         played, track=plan.track, timeline=take.timeline, library=library, ik_miss=take.ik_miss,
-        user_timeline=plan.timeline
+        user_timeline=plan.timeline, has_actions=plan.method == "path" and plan.made,
     )

@@ -173,7 +173,7 @@ class Construction:
         meet = partial(strike_ball, skeleton, root, contacts=contacts, ball=ball, touches=self.touches,
                        fps=self.plan.fps, measured=track.ball_measured, height_known=is_height_known)
         contact = meet(rotations)
-        placed = place_plant_feet(skeleton, root, rotations, contact, contacts, self.touches, self.plan.fps)
+        placed = place_plant_feet(skeleton, root, rotations, contact, contacts, touches=self.touches, fps=self.plan.fps)
         if placed is not rotations:
             contact = meet(placed)
         root, ball = (contact.root, contact.ball) if size == 1.0 else (contact.root / size, contact.ball / size)

@@ -53,7 +53,8 @@ def place_plant_feet(skeleton: Skeleton, root: np.ndarray, rotations: np.ndarray
         met = Body.from_pose(skeleton, reached.root[at : at + 1], reached.rotations[at : at + 1])
         body = Body.from_pose(skeleton, root[low:end], out[low:end])
         standing = contacts[low:end, 0 if side == "right" else 1]
-        placed = place_plant_foot(body, compute_step_shift(met, side, 0), side, at - low, standing, fps)
+        shift = compute_step_shift(met, side, 0)
+        placed = place_plant_foot(body, shift, side, at=at - low, is_standing=standing, fps=fps)
         if placed is not body:
             out = np.concatenate([out[:low], placed.rotations, out[end:]])
     return out

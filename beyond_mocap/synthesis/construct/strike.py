@@ -279,9 +279,10 @@ class _TouchProblem:
 
     def compute_ball_range(self, frame: int) -> BallRange:
         """Return how far the ball may move; a ball on the ground stays there, and one just above it nearly so: a feed's
-        heights are noisy, and a ball lifted to a foot would hop there by itself."""
-        whole = BALL_NOISE if self.measured[frame] else FILLED_NOISE
-        return BallRange(whole, float(np.clip(self.ball[frame, 2] - _IN_THE_AIR, 0.0, whole)))
+        heights are noisy, and a ball lifted to a foot would hop there by itself. A filled one may come down to the
+        ground."""
+        whole, lowest = (BALL_NOISE, _IN_THE_AIR) if self.measured[frame] else (FILLED_NOISE, BALL_RADIUS)
+        return BallRange(whole, float(np.clip(self.ball[frame, 2] - lowest, 0.0, whole)))
 
 
 def _build_problem(body: Body, moment: _TouchFrames, origin: int, contacts, path, measured, height_known,

@@ -76,7 +76,7 @@ _SYNTHETIC_KINDS = (
 
 def report_unmet_constraints(
     played: Playback, *, track: Track | None = None, timeline: Timeline | None = None, library: Library | None = None,
-    ik_miss: np.ndarray | None = None, user_timeline: Timeline | None = None,
+    ik_miss: np.ndarray | None = None, user_timeline: Timeline | None = None, has_actions: bool = True,
 ) -> list[TimedMessage]:
     """Report each kind of constraint that is not met, with its seconds on the track's clock.
 
@@ -89,6 +89,7 @@ def report_unmet_constraints(
         library: the recordings, without synthetic clips.
         ik_miss: (T, 2) m that each leg was short of where its foot should be.
         user_timeline: the user's own labels, where `timeline` has automatic ones beside them.
+        has_actions: whether synthetic actions could be shown; their labels are those of the library, too.
     Returns:
         A line for each kind.
     """
@@ -106,7 +107,8 @@ def report_unmet_constraints(
         _report_root_error(played, track),
         _report_key_times(played, keys),
         _report_contact_gaps(played, keys),
-        _report_missing_labels(played, user_timeline if user_timeline is not None else timeline, keys, library),
+        _report_missing_labels(played, user_timeline if user_timeline is not None else timeline, keys, library=library,
+                               has_actions=has_actions),
         _report_below_ground(played),
     ]
     return [line for line in lines if line]
@@ -337,7 +339,7 @@ def _build_moment_line(what: str, found: list[tuple[float, float]], form: str) -
 
 
 def _report_missing_labels(
-    played: Playback, timeline: Timeline | None, keys: list[KeyMomentResult], library: Library | None
+    played: Playback, timeline: Timeline | None, keys: list[KeyMomentResult], library: Library | None, has_actions: bool
 ) -> TimedMessage | None:
     """Report labels of the user's spans that clips or synthetic actions carry, but that are not shown for
     LABEL_SECONDS or more.
@@ -346,7 +348,7 @@ def _report_missing_labels(
     """
     if timeline is None or played.words is None or library is None:
         return None
-    known = library.labels.union(*list_action_labels(is_span=True))
+    known = library.labels.union(*(list_action_labels(is_span=True) if has_actions else ()))
     available = [(words or frozenset()) & known for words in labels_per_frame(timeline, played.times)]
     missing = [want.difference(labels_shown) for want, labels_shown in zip(available, played.words)]
     for moment in keys:
