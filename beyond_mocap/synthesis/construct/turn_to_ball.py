@@ -23,11 +23,7 @@ from .strike import Touch
 
 MAX_TURN_TO_BALL = np.radians(60.0)
 _FULL_TURN_SPEED = 3.0  # m/s up to which a body turns by MAX_TURN_TO_BALL: a faster one would drag its plant foot
-_TURNED_SECONDS = (0.15, 0.3)
-"""Seconds before and after the key frame in which the whole turn stays: the other foot stands, a turning body would
-drag it."""
-
-_EASE_SECONDS = 0.7  # s before and after that over which the turn grows and fades
+_BALL_TURN_SECONDS = 0.5  # s before and after the key frame over which the turn grows and fades
 _NEAR, _CLEAR = 0.1, 0.35  # m from the hips: below the first a direction has no weight, above the second all
 _SENDING = frozenset(list_labels(ball="sends"))
 _TURNING = frozenset({"foot", "hand"})
@@ -54,9 +50,7 @@ def compute_turn_to_ball(
     turn, at = np.zeros(len(root)), np.arange(len(root))
     for touch in touches:
         offset = _turn_at_touch(skeleton, root, rotations, ball=ball, touch=touch, fps=fps)
-        away = at - touch.frame
-        beyond = np.maximum(-away - _TURNED_SECONDS[0] * fps, away - _TURNED_SECONDS[1] * fps)
-        bump = np.clip(1.0 - beyond / (_EASE_SECONDS * fps), 0.0, 1.0)
+        bump = np.clip(1.0 - np.abs(at - touch.frame) / (_BALL_TURN_SECONDS * fps), 0.0, 1.0)
         # quintic ease; where two touches overlap the larger turn wins
         grown = offset * bump**3 * (10.0 - 15.0 * bump + 6.0 * bump**2)
         turn = np.where(np.abs(grown) > np.abs(turn), grown, turn)

@@ -155,6 +155,8 @@ class CandidateIndex:
         if words not in self._by_words:
             names, frames = self.frames.vocabulary, self.frames
             missing = self.annotation.compute_missing_share(words) if words else np.zeros(len(frames))
+            if ACTING & words:  # a slot that begins with the last frame of an action does not show it
+                missing = uniform_filter1d(missing, SLOT, origin=-(SLOT // 2), mode="nearest")
             actions, spans = ([i for i, word in enumerate(names) if word in kind and word not in words]
                               for kind in (DISCRETE, ACTING))
             acts = frames.words[:, actions].any(axis=1) | (frames.words[:, spans].any(axis=1) & self.is_synthetic)

@@ -16,7 +16,7 @@ from ...annotation.gaits import TURNING, compute_heading_offset
 from ...annotation.vocabulary import DIRECTIONS
 from ...library.library import Library
 from ..plan import Plan
-from .candidate_index import PLAYBACK_RATES, SLOT, CandidateIndex, RatePairs
+from .candidate_index import ACTING, PLAYBACK_RATES, SLOT, CandidateIndex, RatePairs
 from .preferences import UsedStretch, compute_reuse_cost
 from .request import SearchRequest
 
@@ -403,7 +403,7 @@ class PathCosts:
         free = FREE_SPEED[0] + FREE_SPEED[1] * wanted_speed
         yield "speed", np.maximum(missed - free, 0.0) * (w.speed + w.drag * long_stance)
         resting = 1.0 - wanted_speed / RESTING_SPEED
-        if resting > 0.0:
+        if resting > 0.0 and not ACTING & self.list_asked_labels(first, end):  # who celebrates may lift a foot
             yield "lift", np.float32(w.lift * resting) * lifted
         yield "turn", w.turn * np.maximum(np.abs(turn - wanted_turn) - FREE_TURN, 0.0)
         # what the velocity in the body's frame misses beyond its speed: sideways or backward for forward
