@@ -70,8 +70,7 @@ def build_diving_header(setting: ActionSetting) -> Gesture:
     ball = 0.75 if setting.height is None else setting.height / setting.scale
     before, hips_at_key, lies = 0.30, ball - 0.22, 0.13
     leaves_at = min(_STANDING_HIPS - 0.08, hips_at_key + 0.45)
-    fall = (hips_at_key - leaves_at) / before - 0.5 * GRAVITY * before
-    land = max((fall + np.sqrt(fall**2 + 2.0 * GRAVITY * max(hips_at_key - lies, 0.05))) / GRAVITY, 0.08)
+    land = _compute_landing_time(leaves_at, before, hips_at_key, lies)
     up, speed = _UP_FRONT, max(setting.speed, 2.0)
     stop = land + speed / _GRASS
     fling = {side: ((-0.55, -20, 16, 10, 50), (-0.30, 40, 30, 10, 50),
@@ -186,6 +185,15 @@ _UP_BACK: dict[str, Any] = {
 }  # fmt: skip
 
 
+def _compute_landing_time(leaves_at: float, before: float, hips_at_key: float, lies: float) -> float:
+    """Compute when (s after the contact) falling hips reach the height, m, in which the body lies.
+
+    leaves_at, hips_at_key: m, their heights at the take-off, `before` s ahead of the contact, and at the contact.
+    """
+    fall = (hips_at_key - leaves_at) / before - 0.5 * GRAVITY * before
+    return max((fall + np.sqrt(fall**2 + 2.0 * GRAVITY * max(hips_at_key - lies, 0.05))) / GRAVITY, 0.08)
+
+
 def build_bicycle_kick(setting: ActionSetting) -> Gesture:
     """Build an overhead kick with the right foot: the left leg swings up first, the body lies in the air, arms land it.
 
@@ -199,8 +207,7 @@ def build_bicycle_kick(setting: ActionSetting) -> Gesture:
     """
     ball = 1.75 if setting.height is None else setting.height / setting.scale
     off, hips_at_key, lies, up = 0.28, float(np.clip(ball - 0.75, 0.75, 1.15)), 0.16, _UP_BACK
-    fall = (hips_at_key - _STANDING_HIPS) / off - 0.5 * GRAVITY * off
-    land = (fall + np.sqrt(fall**2 + 2.0 * GRAVITY * (hips_at_key - lies))) / GRAVITY
+    land = _compute_landing_time(_STANDING_HIPS, off, hips_at_key, lies)
     arm = ((-0.8, *NO_ARM), (-0.45, -30, 20, 10, 20), (-0.22, 40, 60, 0, 20), (0.0, 6, 74, -10, 16),
            (0.5 * land, -20, 64, -10, 20))
     ankle = 0.09
@@ -235,8 +242,7 @@ def build_half_bicycle_kick(setting: ActionSetting) -> Gesture:
     """
     ball = 1.2 if setting.height is None else setting.height / setting.scale
     off, hips_at_key, lies, up = 0.24, float(np.clip(ball - 0.22, 0.72, 1.05)), 0.16, _UP_BACK
-    fall = (hips_at_key - _STANDING_HIPS) / off - 0.5 * GRAVITY * off
-    land = (fall + np.sqrt(fall**2 + 2.0 * GRAVITY * (hips_at_key - lies))) / GRAVITY
+    land = _compute_landing_time(_STANDING_HIPS, off, hips_at_key, lies)
     left_arm = ((-0.8, *NO_ARM), (-0.45, -10, 30, 10, 20), (-0.2, 10, 84, 0, 20), (0.0, 0, 96, -10, 14),
                 (0.6 * land, -10, 84, -10, 24))
     right_arm = ((-0.8, *NO_ARM), (-0.45, 20, 40, 10, 30), (-0.2, 40, 60, 10, 30), (0.0, -26, 70, 0, 30),
