@@ -69,20 +69,20 @@ def carry_in_hands(motion: Motion, ball: np.ndarray, touches: Sequence[HandTouch
     """
     out, held = ball, []
     for touch in touches:
-        part, span = find_striking_part(touch.words), _limit_span(ball, touch, motion.fps)
-        if part != "hand" and not _FROM_HANDS.intersection(touch.words) or span is None:
+        is_kick = bool(_FROM_HANDS.intersection(touch.words))
+        span = _limit_span(ball, touch, int(_LONGEST * motion.fps))
+        if span is None or not is_kick and find_striking_part(touch.words) != "hand":
             continue
         hands = _build_hands(motion, span, touch, out)
         if hands is None:
             continue
-        if part == "foot":
-            found = hands.find_drop(out)
-            out = out if found is None else hands.drop(out, found)
-        else:
+        if is_kick and (found := hands.find_drop(out)) is not None:
+            out = hands.drop(out, found)
+            held.append((found[0], touch.frames[0]))
+        elif not is_kick:
             for found in (hands.find_before(out), hands.find_after(out)):
                 out = out if found is None else hands.carry(out, found, meets=True)
                 held += [] if found is None else [found]
-        held += [(found[0], touch.frames[0])] if part == "foot" and found is not None else []
     return out, held
 
 
@@ -100,7 +100,7 @@ def hold_in_spans(motion: Motion, ball: np.ndarray, spans: Sequence[tuple[int, i
     out, held = ball, []
     for first, last in spans:
         touch = HandTouch(frames=(first, first), words=(), low=first, high=last)
-        span = _limit_span(ball, touch, motion.fps * (last - first + 1))
+        span = _limit_span(ball, touch, last - first)
         hands = None if span is None else _build_hands(motion, span, touch, ball)
         found = () if hands is None else hands.find_closed(out)
         for low, high in found:
@@ -109,13 +109,12 @@ def hold_in_spans(motion: Motion, ball: np.ndarray, spans: Sequence[tuple[int, i
     return out, held
 
 
-def _limit_span(ball: np.ndarray, touch: HandTouch, fps: float) -> tuple[int, int] | None:
-    """Return the first and the last frame around a touch in which the ball is known and may be held."""
+def _limit_span(ball: np.ndarray, touch: HandTouch, reach: int) -> tuple[int, int] | None:
+    """Return the first and the last frame, up to `reach` from a touch, in which the ball is known and may be held."""
     first, last = touch.frames
     unknown = np.flatnonzero(~np.isfinite(ball).all(axis=1))
     if np.any((unknown >= first) & (unknown <= last)):
         return None
-    reach = int(_LONGEST * fps)
     low = max([touch.low, first - reach, 0, *(unknown[unknown < first] + 1)])
     return int(low), int(min([touch.high, last + reach, len(ball) - 1, *(unknown[unknown > last] - 1)]))
 
