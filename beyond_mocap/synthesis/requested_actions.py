@@ -9,7 +9,9 @@ from ..annotation.ball_contact import choose_part_by_height
 from ..library.missing_actions import ActionMoment
 from ..motion.track import SampledTrack, Track
 
-_ARRIVING, _LEAVING = (-0.3, -0.06), (0.06, 0.3)  # s from a key moment between which the ball's speeds are measured
+_ARRIVING = (-0.3, -0.06)  # s from a key moment between which the arriving ball's speed is measured
+LEAVING_SECONDS = (0.06, 0.3)
+"""s after a key moment between which the leaving ball's velocity is measured."""
 
 
 def read_moment_action(moment: KeyMoment, track: Track, sampled: SampledTrack) -> ActionMoment:
@@ -26,7 +28,8 @@ def read_moment_action(moment: KeyMoment, track: Track, sampled: SampledTrack) -
     return ActionMoment(labels=frozenset(choose_part_by_height(moment.words, height)), avoid=frozenset(moment.avoid),
                         height=height, speed=float(np.interp(time, sampled.times, sampled.speed)),
                         ball_speed=_measure_ball_speed(sampled, time, _ARRIVING) or 0.0,
-                        exit_speed=_measure_ball_speed(sampled, time, _LEAVING), lead=_measure_lead(sampled, time))
+                        exit_speed=_measure_ball_speed(sampled, time, LEAVING_SECONDS),
+                        lead=_measure_lead(sampled, time))
 
 
 def read_span_action(span: Span, sampled: SampledTrack) -> ActionMoment:
@@ -44,9 +47,9 @@ def read_span_action(span: Span, sampled: SampledTrack) -> ActionMoment:
 
 def _measure_lead(track: SampledTrack, time: float) -> float:
     """Measure by how many m/s the ball leaves faster than the player at `time` s, along their way; 0 where unknown."""
-    moved = _measure_ball_move(track, time, _LEAVING)
+    moved = _measure_ball_move(track, time, LEAVING_SECONDS)
     direction, speed = (np.interp(time, track.times, column) for column in (track.direction, track.speed))
-    ahead = float(moved[:2] @ (np.cos(direction), np.sin(direction))) / (_LEAVING[1] - _LEAVING[0])
+    ahead = float(moved[:2] @ (np.cos(direction), np.sin(direction))) / (LEAVING_SECONDS[1] - LEAVING_SECONDS[0])
     return ahead - float(speed) if np.isfinite(ahead) else 0.0
 
 

@@ -17,7 +17,8 @@ from ...base.vectors import arctan2
 from ...motion import quaternion
 from ...motion.motion import compute_pose
 from ...motion.skeleton import Skeleton
-from ..search.key_fit import FAST_BALL, FAST_PART, LEAVING_SECONDS, TURN_REACH, compute_free_angle, compute_free_turn
+from ..requested_actions import LEAVING_SECONDS
+from ..search.key_fit import FAST_BALL, FAST_PART, TURN_REACH, compute_free_angle, compute_free_turn
 from .step_to_ball import measure_level_speed
 from .strike import Touch
 

@@ -27,6 +27,7 @@ from ...motion.motion import compute_pose, sample_frames
 from ...motion.plant_place import compute_plant_shift, measure_plant_place
 from ...motion.skeleton import Skeleton
 from ...motion.track import SampledTrack
+from ..requested_actions import LEAVING_SECONDS
 from .request import library_frame
 
 HEIGHT_COST = 0.8  # per metre of height beyond the noise
@@ -46,9 +47,6 @@ PLANT_COST = 1.5  # per metre that a kick's plant foot is off its usual place, b
 _FREE_PLANT = 0.08  # m
 _RATIO_SOUGHT = (1.1, 1.25)  # of speeds: what a swing is played for, within SPEED_RATIO
 _SWING_COST = 0.25  # per unit of the logarithm of a swing's own rate
-
-LEAVING_SECONDS = (0.06, 0.3)
-"""s after a key moment between which the leaving ball's velocity is measured."""
 
 FAST_BALL, FAST_PART = 3.0, 1.5
 """m/s from which on the velocities of ball and part count."""
