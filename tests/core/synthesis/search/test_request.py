@@ -117,6 +117,6 @@ def test_the_nearest_synthetic_actions_are_told_too(order):
 
 
 def test_a_key_moment_that_names_no_action_is_told(order):
-    told = [line for line in order((4.0, "low")).warnings if "names no action" in line]
-    assert len(told) == 1 and told[0].startswith("4 s: 'low'")
+    messages = [line for line in order((4.0, "low")).warnings if "names no action" in line]
+    assert len(messages) == 1 and messages[0].startswith("4 s: 'low'")
     assert not any("names no action" in line for line in order((4.0, "kick")).warnings)
