@@ -14,7 +14,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..base.time_series import find_runs, hann_smooth
+from ..base.time_series import find_runs, hann_smooth, time_derivative
 from .humanoid import Limb, identify_joints
 from .skeleton import Skeleton
 
@@ -26,6 +26,7 @@ _RUNNING = 2.0  # m/s from which stances are lengthened
 _CONTACT_SHARE = 0.95  # of the norm towards which they are lengthened: recordings spread by 5 % about it
 _LONGEST_STRETCH = 1.0 / 60.0  # s by which either end of a stance is lengthened at most: half a frame of a take
 _FALLING = 0.4  # of gravity that a body falls with, at least, if it is in the air
+_STRIDE_FLIGHT = 0.3  # s that a runner's flight lasts at most, beyond doubt
 _SPEED_SECONDS = 0.25  # s to either side over which the speed is smoothed
 _CONTACT_SPEEDS = (2.0, 3.0, 4.5, 6.0, 7.0, 8.0, 9.0, 10.0)  # m/s
 _CONTACT_SECONDS = (0.31, 0.25, 0.20, 0.16, 0.143, 0.125, 0.112, 0.104)  # s: Weyand 2000, Morin 2005
@@ -112,9 +113,9 @@ def find_stances(skeleton: Skeleton, positions: np.ndarray, fps: float) -> Stanc
 def find_support_phases(stances: Stances, centre: np.ndarray, fps: float) -> np.ndarray:
     """Find the phases in which at least one foot carries weight.
 
-    A stretch between them in which the body hardly falls is no flight: something else carries it (hands, a lying
-    body, a foot that the threshold missed), and the phases around it are joined. So is what lies before the first and
-    behind the last stance.
+    A long stretch between them, or one of a slow body, in which the body hardly falls is no flight: something else
+    carries it (hands, a lying body, a foot that the threshold missed), and the phases around it are joined. So is what
+    lies before the first and behind the last stance.
 
     Args:
         stances: the stances.
@@ -123,17 +124,25 @@ def find_support_phases(stances: Stances, centre: np.ndarray, fps: float) -> np.
     Returns:
         (P, 2) frames, first and last of each phase, ascending.
     """
-    end = float(len(centre) - 1)
+    end, speed, fall = float(len(centre) - 1), measure_speed(centre, fps), time_derivative(centre[:, 2], fps)
+
+    def is_flight(first: float, last: float) -> bool:
+        seconds, at = (last - first) / fps, np.arange(len(fall))
+        if 0.0 < seconds < _STRIDE_FLIGHT and np.interp(0.5 * (first + last), at, speed) > _RUNNING:
+            return True
+        before, after = np.interp([first, last], at, fall)
+        return seconds > 0.0 and after - before < -_FALLING * GRAVITY * seconds
+
     phases: list[list[float]] = []
     for start, stop in zip(stances.start, stances.stop):
-        if phases and (start <= phases[-1][1] or not _is_falling(centre[:, 2], phases[-1][1], start, fps)):
+        if phases and (start <= phases[-1][1] or not is_flight(phases[-1][1], start)):
             phases[-1][1] = max(phases[-1][1], stop)
         else:
             phases.append([start, stop])
     if not phases:
         return np.array([[0.0, end]])
     for edge, near, far in ((0, 0.0, phases[0][0]), (1, phases[-1][1], end)):
-        if not _is_falling(centre[:, 2], near, far, fps):
+        if not is_flight(near, far):
             phases[-edge][edge] = (near, far)[edge]
     return np.array(phases)
 
@@ -191,10 +200,3 @@ def _lengthen_stances(start: np.ndarray, stop: np.ndarray, speed: np.ndarray, fp
     lacks = np.where(pace > _RUNNING, np.minimum(lacks, _LONGEST_STRETCH * fps), 0.0)
     return np.maximum(start - lacks, 0.0), np.minimum(stop + lacks, last)
 
-
-def _is_falling(height: np.ndarray, start: float, stop: float, fps: float) -> bool:
-    """Whether a point (T,) m changes its vertical speed between two frames as a falling body does, in part at least."""
-    at, rate = np.arange(len(height)), np.gradient(height) * fps if len(height) > 1 else np.zeros(1)
-    before, after = np.interp([start, stop], at, rate)
-    seconds = (stop - start) / fps
-    return seconds > 0.0 and after - before < -_FALLING * GRAVITY * seconds
