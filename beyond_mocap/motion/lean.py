@@ -1,0 +1,174 @@
+"""How far a body leans into what it is about to do: bends, starts and stops.
+
+While a foot pushes a body sideways or ahead with an acceleration a, its force passes through the centre of mass only if
+that lies off the foot by a / g of its height, over a stride on average. `measure_lean` tells how far it does;
+`compute_footprint_shifts` and `tilt_body` give what is missing: the footprints move outward below a centre of mass that
+stays, and the body turns about it by half the angle, as recorded trunks do (slope .5 in bends, .7 and more in starts).
+
+Source: ../shared/prototype-momentum.md, measured on recordings; Greene 1985, J Biomech Eng 107: the lean of runners in
+bends is atan(v^2 / (r g)).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..base.easing import quintic_step, smoothstep
+from ..base.time_series import hann_smooth, time_derivative
+from ..base.vectors import unit_vectors
+from . import quaternion
+from .humanoid import Humanoid
+from .supports import GRAVITY, Stances
+
+MOST_ACCELERATION = 0.5 * GRAVITY  # m/s^2 that a lean answers; recordings' 99th percentile is .33 to .57 g
+_ACCELERATION_SECONDS = 0.35  # s to either side over which the acceleration of the centre of mass is smoothed
+_NEIGHBOUR_SECONDS = 0.8  # s within which stances are one run
+_DEAD_ZONE = (0.03, 0.02)  # m ahead and aside that are no error: one stance tells no more
+_MOST_SHIFT = (0.14, 0.14)  # m ahead and aside that footprints move at most; more turns a step into a lunge
+_SPEEDS = (1.2, 2.2)  # m/s between which the lean of a step begins to count
+_TRUNK_SHARE = 0.5  # of the missing angle by which the body turns
+_TILT_SECONDS = 0.12  # s to either side over which that turn is smoothed
+
+
+@dataclass(frozen=True, eq=False)
+class Lean:
+    """How each of S stances leans, averaged over the stance as its force is, and over its neighbours.
+
+    Attributes:
+        offset: (S, 2) m from the middle of the standing foot to the centre of mass, level.
+        height: (S,) m of the centre of mass over the ground.
+        acceleration: (S, 2) m/s^2 of the centre of mass, level, without its steps.
+        velocity: (S, 2) m/s of the centre of mass.
+    """
+
+    offset: np.ndarray
+    height: np.ndarray
+    acceleration: np.ndarray
+    velocity: np.ndarray
+
+    @property
+    def missing(self) -> np.ndarray:
+        """(S, 2) m by which the centre of mass should lie farther from the foot."""
+        size = np.linalg.norm(self.acceleration, axis=1, keepdims=True)
+        asked = self.acceleration * np.minimum(1.0, MOST_ACCELERATION / np.maximum(size, 1e-9))
+        return self.height[:, None] * asked / GRAVITY - self.offset
+
+    @property
+    def travel(self) -> np.ndarray:
+        """(S, 2) unit direction of travel."""
+        return unit_vectors(self.velocity, np.array([1.0, 0.0]))
+
+
+def measure_lean(body: Humanoid, positions: np.ndarray, centre: np.ndarray, stances: Stances, fps: float) -> Lean:
+    """Measure the lean of each stance.
+
+    Args:
+        body: which joint is what.
+        positions: (T, J, 3) m, world.
+        centre: (T, 3) m, the centre of mass, world.
+        stances: the stances.
+        fps: frames per second.
+    Returns:
+        The lean of each stance.
+    """
+    reach = max(int(round(_ACCELERATION_SECONDS * fps)), 1)
+    smooth = np.stack([hann_smooth(centre[:, axis], reach) for axis in (0, 1)], axis=1)
+    velocity = time_derivative(smooth, fps)
+    curves = np.concatenate([centre, time_derivative(velocity, fps), velocity], axis=1)
+    feet = [0.5 * (positions[:, limb.foot] + positions[:, limb.toe_or_foot]) for limb in (body.left, body.right)]
+    rows = [_average_stance(np.concatenate([curves, feet[side]], axis=1), start, stop)
+            for side, start, stop in zip(stances.side, stances.start, stances.stop)]
+    means = _average_neighbours(np.array(rows).reshape(-1, 10), stances.middle / fps)
+    return Lean(means[:, 0:2] - means[:, 7:9], means[:, 2] - means[:, 9], means[:, 3:5], means[:, 5:7])
+
+
+def choose_shifts(lean: Lean, share: np.ndarray) -> np.ndarray:
+    """Choose by how much each stance leans more.
+
+    Args:
+        lean: the S stances.
+        share: (S,) from 0, nothing, to 1.
+    Returns:
+        (S, 2) m by which the centre of mass comes to lie farther from the foot, world.
+    """
+    ahead = lean.travel
+    aside = np.stack([-ahead[:, 1], ahead[:, 0]], axis=1)
+    speed = np.linalg.norm(lean.velocity, axis=1)
+    counts = share * smoothstep(speed, *_SPEEDS)
+    shift = np.zeros_like(lean.offset)
+    for direction, dead, most in zip((ahead, aside), _DEAD_ZONE, _MOST_SHIFT):
+        lacks = np.sum(lean.missing * direction, axis=1)
+        wanted = most * np.tanh(np.maximum(np.abs(lacks) - dead, 0.0) / most)
+        shift += (counts * np.sign(lacks) * wanted)[:, None] * direction
+    return shift
+
+
+def compute_footprint_shifts(stances: Stances, shifts: np.ndarray, count: int) -> np.ndarray:
+    """Compute how both feet move so that their stances lean more: constant in a stance, eased while the foot swings.
+
+    Args:
+        stances: S stances.
+        shifts: (S, 2) m of `choose_shifts`.
+        count: T frames.
+    Returns:
+        (T, 2, 2) m, left and right foot, world.
+    """
+    out, at = np.zeros((count, 2, 2)), np.arange(count)
+    for side in (0, 1):
+        own = stances.side == side
+        if own.any():
+            times = np.stack([stances.start[own], stances.stop[own]], axis=1).ravel()
+            values = np.repeat(-shifts[own], 2, axis=0)
+            place = np.interp(at, times, np.arange(len(times)))
+            segment = np.minimum(place.astype(int), len(times) - 2)
+            share = quintic_step(place - segment)[:, None]
+            out[:, side] = values[segment] + share * (values[segment + 1] - values[segment])
+    return out
+
+
+def tilt_body(
+    root: np.ndarray, rotations: np.ndarray, centre: np.ndarray, stances: Stances, slopes: np.ndarray, fps: float
+) -> tuple[np.ndarray, np.ndarray]:
+    """Turn a body about its centre of mass by half the angle that its stances lack.
+
+    Args:
+        root: (T, 3) m, world.
+        rotations: (T, J, 4) local rotations.
+        centre: (T, 3) m, the centre of mass, world.
+        stances: S stances.
+        slopes: (S, 2) shift over height of the centre of mass, world.
+        fps: frames per second.
+    Returns:
+        Root (T, 3) m and rotations (T, J, 4).
+    """
+    at, reach = np.arange(len(root)), max(int(round(_TILT_SECONDS * fps)), 1)
+    curve = np.stack([hann_smooth(np.interp(at, stances.middle, slope), reach) for slope in slopes.T], axis=1)
+    # leaning towards (x, y) is a turn about (-y, x)
+    axis = np.column_stack([-curve[:, 1], curve[:, 0], np.zeros(len(root))])
+    turn = quaternion.from_rotation_vector(_TRUNK_SHARE * axis)
+    out = rotations.copy()
+    out[:, 0] = quaternion.multiply(turn, rotations[:, 0])
+    return centre + quaternion.rotate(turn, root - centre), out
+
+
+def _average_stance(values: np.ndarray, start: float, stop: float) -> np.ndarray:
+    """Average curves (T, K) over a stance in frames, weighted by the half sine of its force."""
+    first, end = int(np.ceil(start)), int(np.floor(stop)) + 1
+    if end - first < 2:
+        return values[min(int(round(0.5 * (start + stop))), len(values) - 1)]
+    weight = np.sin(np.pi * (np.arange(first, end) - start + 0.5) / (stop - start + 1.0))
+    return weight @ values[first:end] / weight.sum()
+
+
+def _average_neighbours(values: np.ndarray, times: np.ndarray) -> np.ndarray:
+    """Average each of (S, K) rows with those before and after, 1-2-1, where they are of one run; times (S,) s."""
+    if len(values) < 2:
+        return values
+    near = (np.diff(times) < _NEIGHBOUR_SECONDS)[:, None]
+    step = np.where(near, np.diff(values, axis=0), 0.0)
+    out = values.copy()
+    out[:-1] += 0.25 * step
+    out[1:] -= 0.25 * step
+    return out
