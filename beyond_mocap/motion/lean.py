@@ -16,18 +16,20 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..base.easing import quintic_step, smoothstep
-from ..base.time_series import hann_smooth, time_derivative
-from ..base.vectors import unit_vectors
+from ..base.time_series import hann_smooth, interpolate_columns, time_derivative
+from ..base.vectors import cross_on_ground, unit_vectors
 from . import quaternion
-from .humanoid import Humanoid
-from .supports import GRAVITY, Stances
+from .humanoid import Humanoid, identify_joints
+from .mass import compute_centre_of_mass
+from .skeleton import Skeleton
+from .supports import GRAVITY, Stances, find_stances
 
 MOST_ACCELERATION = 0.5 * GRAVITY  # m/s^2 that a lean answers; recordings' 99th percentile is .33 to .57 g
 _ACCELERATION_SECONDS = 0.35  # s to either side over which the acceleration of the centre of mass is smoothed
 _NEIGHBOUR_SECONDS = 0.8  # s within which stances are one run
 _DEAD_ZONE = (0.03, 0.02)  # m ahead and aside that are no error: one stance tells no more
 _MOST_SHIFT = (0.14, 0.14)  # m ahead and aside that footprints move at most; more turns a step into a lunge
-_SPEEDS = (1.2, 2.2)  # m/s between which the lean of a step begins to count
+LEAN_SPEEDS = (1.2, 2.2)  # m/s between which the lean of a step begins to count
 _TRUNK_SHARE = 0.5  # of the missing angle by which the body turns
 _TILT_SECONDS = 0.12  # s to either side over which that turn is smoothed
 
@@ -84,6 +86,25 @@ def measure_lean(body: Humanoid, positions: np.ndarray, centre: np.ndarray, stan
     return Lean(means[:, 0:2] - means[:, 7:9], means[:, 2] - means[:, 9], means[:, 3:5], means[:, 5:7])
 
 
+def compute_lean_slopes(skeleton: Skeleton, positions: np.ndarray, fps: float) -> np.ndarray:
+    """Compute how far a body leans in every frame: the lean of its stances, interpolated.
+
+    Args:
+        skeleton: J joints.
+        positions: (T, J, 3) m, world.
+        fps: frames per second.
+    Returns:
+        (T, 2) slope ahead and to the left of its travel; 0 without stances.
+    """
+    body, stances = identify_joints(skeleton), find_stances(skeleton, positions, fps)
+    if not len(stances):
+        return np.zeros((len(positions), 2))
+    lean = measure_lean(body, positions, compute_centre_of_mass(body, positions), stances, fps)
+    slope, ahead = lean.offset / lean.height[:, None], lean.travel
+    own = np.stack([np.sum(slope * ahead, axis=1), cross_on_ground(ahead, slope)], axis=1)
+    return interpolate_columns(np.arange(len(positions)), stances.middle, own)
+
+
 def choose_shifts(lean: Lean, share: np.ndarray) -> np.ndarray:
     """Choose by how much each stance leans more.
 
@@ -96,7 +117,7 @@ def choose_shifts(lean: Lean, share: np.ndarray) -> np.ndarray:
     ahead = lean.travel
     aside = np.stack([-ahead[:, 1], ahead[:, 0]], axis=1)
     speed = np.linalg.norm(lean.velocity, axis=1)
-    counts = share * smoothstep(speed, *_SPEEDS)
+    counts = share * smoothstep(speed, *LEAN_SPEEDS)
     shift = np.zeros_like(lean.offset)
     for direction, dead, most in zip((ahead, aside), _DEAD_ZONE, _MOST_SHIFT):
         lacks = np.sum(lean.missing * direction, axis=1)
@@ -144,7 +165,7 @@ def tilt_body(
         Root (T, 3) m and rotations (T, J, 4).
     """
     at, reach = np.arange(len(root)), max(int(round(_TILT_SECONDS * fps)), 1)
-    curve = np.stack([hann_smooth(np.interp(at, stances.middle, slope), reach) for slope in slopes.T], axis=1)
+    curve = np.stack([hann_smooth(slope, reach) for slope in interpolate_columns(at, stances.middle, slopes).T], axis=1)
     # leaning towards (x, y) is a turn about (-y, x)
     axis = np.column_stack([-curve[:, 1], curve[:, 0], np.zeros(len(root))])
     turn = quaternion.from_rotation_vector(_TRUNK_SHARE * axis)
