@@ -29,7 +29,7 @@ _ACCELERATION_SECONDS = 0.35  # s to either side over which the acceleration of 
 _NEIGHBOUR_SECONDS = 0.8  # s within which stances are one run
 _DEAD_ZONE = (0.03, 0.02)  # m ahead and aside that are no error: one stance tells no more
 _MOST_SHIFT = (0.14, 0.14)  # m ahead and aside that footprints move at most; more turns a step into a lunge
-LEAN_SPEEDS = (1.2, 2.2)  # m/s between which the lean of a step begins to count
+_SPEEDS = (1.2, 2.2)  # m/s between which the lean of a step begins to count
 _TRUNK_SHARE = 0.5  # of the missing angle by which the body turns
 _TILT_SECONDS = 0.12  # s to either side over which that turn is smoothed
 
@@ -117,7 +117,7 @@ def choose_shifts(lean: Lean, share: np.ndarray) -> np.ndarray:
     ahead = lean.travel
     aside = np.stack([-ahead[:, 1], ahead[:, 0]], axis=1)
     speed = np.linalg.norm(lean.velocity, axis=1)
-    counts = share * smoothstep(speed, *LEAN_SPEEDS)
+    counts = share * smoothstep(speed, *_SPEEDS)
     shift = np.zeros_like(lean.offset)
     for direction, dead, most in zip((ahead, aside), _DEAD_ZONE, _MOST_SHIFT):
         lacks = np.sum(lean.missing * direction, axis=1)

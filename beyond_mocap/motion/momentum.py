@@ -34,6 +34,7 @@ _FLIGHT_SECONDS, _FLIGHT_FADE = 0.4, 0.2  # s beside a flight in which momentum 
 _WEIGHT_ELSEWHERE = 1e-4  # far from flights, where a body walks or stands, its recording knows better
 _CLAMP_UP, _CLAMP_LEVEL = 1e3, 1e2  # weights of forces beyond strength and friction; friction is soft: tracks brake so
 _CLAMP_ROUNDS = 2
+_FEW = 1e-8  # on forces, that of a parabolic pulse is free where momentum does not count
 _HOLD = 1e4  # a curve that stays is held within a tenth of a millimetre
 _FEWEST_SEGMENTS = 3  # of a phase of support, between knots of the force
 
@@ -133,6 +134,9 @@ class MomentumPlanner:
         squares = BandedLeastSquares(len(self._frame_index) + len(self._knot_index), reach=reach, columns=columns)
         squares.add_rows(*law, self._weight[1:-1] / _EXACT**2, np.full((len(law[0]), columns), gravity))
         squares.add_rows(*forces, np.full(len(forces[0]), smooth**-2), np.zeros((len(forces[0]), columns)))
+        weights = np.zeros(squares.count)
+        weights[self._knot_index] = _FEW
+        squares.add_value(weights)
         return squares
 
     @cached_property

@@ -11,11 +11,12 @@ import numpy as np
 from ...base.easing import smoothstep
 from ...base.time_series import hann_smooth, time_derivative
 from ...motion import quaternion
-from ...motion.lean import LEAN_SPEEDS, MOST_ACCELERATION
+from ...motion.lean import MOST_ACCELERATION
 from ...motion.supports import GRAVITY
 from ...motion.track import SampledTrack
 
 FREE_LEAN = 0.05  # slope, 3 degrees, that costs nothing: a single stance of a recording tells no more
+_SPEEDS = (1.8, 2.8)  # m/s between which a lean begins to count: a walk's tells little, and its labels and pose more
 _ACCELERATION_SECONDS = 0.35  # s to either side over which the track's acceleration is smoothed
 
 
@@ -33,7 +34,7 @@ def compute_wanted_lean(track: SampledTrack) -> tuple[np.ndarray, np.ndarray]:
     acceleration = quaternion.rotate_level(time_derivative(smooth, track.fps), -track.direction)
     size = np.linalg.norm(acceleration, axis=1, keepdims=True)
     slope = acceleration * np.minimum(1.0, MOST_ACCELERATION / np.maximum(size, 1e-9)) / GRAVITY
-    return slope, smoothstep(track.speed, *LEAN_SPEEDS) * track.valid
+    return slope, smoothstep(track.speed, *_SPEEDS) * track.valid
 
 
 def compute_lean_cost(lean: np.ndarray, wanted: np.ndarray) -> np.ndarray:
