@@ -3,7 +3,8 @@
 While a foot pushes a body sideways or ahead with an acceleration a, its force passes through the centre of mass only if
 that lies off the foot by a / g of its height, over a stride on average. `measure_lean` tells how far it does;
 `compute_footprint_shifts` and `tilt_body` give what is missing: the footprints move outward below a centre of mass that
-stays, and the body turns about it by half the angle, as recorded trunks do (slope .5 in bends, .7 and more in starts).
+stays, and the body turns about it, in bends by half the angle, in starts and stops by a little more than all of it: so do
+recorded trunks (slope .5 aside, .7 to 1.4 ahead).
 
 Source: ../shared/prototype-momentum.md, measured on recordings; Greene 1985, J Biomech Eng 107: the lean of runners in
 bends is atan(v^2 / (r g)).
@@ -28,9 +29,9 @@ MOST_ACCELERATION = 0.5 * GRAVITY  # m/s^2 that a lean answers; recordings' 99th
 _ACCELERATION_SECONDS = 0.35  # s to either side over which the acceleration of the centre of mass is smoothed
 _NEIGHBOUR_SECONDS = 0.8  # s within which stances are one run
 _DEAD_ZONE = (0.03, 0.02)  # m ahead and aside that are no error: one stance tells no more
-_MOST_SHIFT = (0.14, 0.14)  # m ahead and aside that footprints move at most; more turns a step into a lunge
+_MOST_SHIFT = (0.18, 0.14)  # m ahead and aside that footprints move at most; more turns a step into a lunge
 _SPEEDS = (1.2, 2.2)  # m/s between which the lean of a step begins to count
-_TRUNK_SHARE = 0.5  # of the missing angle by which the body turns
+_TURN_SHARE = (1.2, 0.5)  # of the missing angle ahead and aside by which the body turns, as recorded trunks do
 _TILT_SECONDS = 0.12  # s to either side over which that turn is smoothed
 
 
@@ -126,6 +127,20 @@ def choose_shifts(lean: Lean, share: np.ndarray) -> np.ndarray:
     return shift
 
 
+def choose_angles(lean: Lean, shifts: np.ndarray) -> np.ndarray:
+    """Choose by how much the body turns with the shifts of its stances.
+
+    Args:
+        lean: the S stances.
+        shifts: (S, 2) m of `choose_shifts`.
+    Returns:
+        (S, 2) rad by which the body tilts towards x and y, world.
+    """
+    slope, ahead = shifts / lean.height[:, None], lean.travel
+    along = np.sum(slope * ahead, axis=1, keepdims=True) * ahead
+    return _TURN_SHARE[0] * along + _TURN_SHARE[1] * (slope - along)
+
+
 def compute_footprint_shifts(stances: Stances, shifts: np.ndarray, count: int) -> np.ndarray:
     """Compute how both feet move so that their stances lean more: constant in a stance, eased while the foot swings.
 
@@ -150,25 +165,25 @@ def compute_footprint_shifts(stances: Stances, shifts: np.ndarray, count: int) -
 
 
 def tilt_body(
-    root: np.ndarray, rotations: np.ndarray, centre: np.ndarray, stances: Stances, slopes: np.ndarray, fps: float
+    root: np.ndarray, rotations: np.ndarray, centre: np.ndarray, stances: Stances, angles: np.ndarray, fps: float
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Turn a body about its centre of mass by half the angle that its stances lack.
+    """Turn a body about its centre of mass, smoothly over its stances.
 
     Args:
         root: (T, 3) m, world.
         rotations: (T, J, 4) local rotations.
         centre: (T, 3) m, the centre of mass, world.
         stances: S stances.
-        slopes: (S, 2) shift over height of the centre of mass, world.
+        angles: (S, 2) rad of `choose_angles`.
         fps: frames per second.
     Returns:
         Root (T, 3) m and rotations (T, J, 4).
     """
     at, reach = np.arange(len(root)), max(int(round(_TILT_SECONDS * fps)), 1)
-    curve = np.stack([hann_smooth(slope, reach) for slope in interpolate_columns(at, stances.middle, slopes).T], axis=1)
+    curve = np.stack([hann_smooth(angle, reach) for angle in interpolate_columns(at, stances.middle, angles).T], axis=1)
     # leaning towards (x, y) is a turn about (-y, x)
     axis = np.column_stack([-curve[:, 1], curve[:, 0], np.zeros(len(root))])
-    turn = quaternion.from_rotation_vector(_TRUNK_SHARE * axis)
+    turn = quaternion.from_rotation_vector(axis)
     out = rotations.copy()
     out[:, 0] = quaternion.multiply(turn, rotations[:, 0])
     return centre + quaternion.rotate(turn, root - centre), out

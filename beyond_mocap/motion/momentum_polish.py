@@ -19,7 +19,7 @@ import numpy as np
 from . import quaternion
 from .foot_plant import AIR_RESERVE, Foot, build_foot, solve_heel_rise, spread_peaks
 from .humanoid import Humanoid, identify_joints
-from .lean import choose_shifts, compute_footprint_shifts, measure_lean, tilt_body
+from .lean import choose_angles, choose_shifts, compute_footprint_shifts, measure_lean, tilt_body
 from .limb import solve_posed_limb
 from .mass import compute_centre_of_mass
 from .momentum import STRENGTH, MomentumPlanner
@@ -85,7 +85,7 @@ class _Legs:
         moves = compute_footprint_shifts(self.stances, shifts, len(root))
         self._feet = [foot.move(np.column_stack([moves[:, side], np.zeros(len(root))]))
                       for side, foot in enumerate(self._feet)]
-        return tilt_body(root, rotations, centre, self.stances, shifts / lean.height[:, None], self.fps)
+        return tilt_body(root, rotations, centre, self.stances, choose_angles(lean, shifts), self.fps)
 
     def follow(self, planner: MomentumPlanner, root, rotations) -> tuple[np.ndarray, np.ndarray]:
         """Move the root so that the centre of mass follows its plan; feet stay where they stand."""
