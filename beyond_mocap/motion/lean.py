@@ -3,7 +3,7 @@
 While a foot pushes a body sideways or ahead with an acceleration a, its force passes through the centre of mass only if
 that lies off the foot by a / g of its height, over a stride on average. `measure_lean` tells how far it does;
 `compute_footprint_shifts` and `tilt_body` give what is missing: the footprints move outward below a centre of mass that
-stays, and the body turns about it, in bends by half the angle, in starts and stops by a little more than all of it: so do
+stays, and the body tilts, in bends by half the angle, in starts and stops by a little more than all of it: so do
 recorded trunks (slope .5 aside, .7 to 1.4 ahead).
 
 Source: ../shared/prototype-momentum.md, measured on recordings; Greene 1985, J Biomech Eng 107: the lean of runners in
@@ -164,29 +164,24 @@ def compute_footprint_shifts(stances: Stances, shifts: np.ndarray, count: int) -
     return out
 
 
-def tilt_body(
-    root: np.ndarray, rotations: np.ndarray, centre: np.ndarray, stances: Stances, angles: np.ndarray, fps: float
-) -> tuple[np.ndarray, np.ndarray]:
-    """Turn a body about its centre of mass, smoothly over its stances.
+def tilt_body(rotations: np.ndarray, stances: Stances, angles: np.ndarray, fps: float) -> np.ndarray:
+    """Tilt a body about its root, which stays on its track, smoothly over its stances.
 
     Args:
-        root: (T, 3) m, world.
         rotations: (T, J, 4) local rotations.
-        centre: (T, 3) m, the centre of mass, world.
         stances: S stances.
         angles: (S, 2) rad of `choose_angles`.
         fps: frames per second.
     Returns:
-        Root (T, 3) m and rotations (T, J, 4).
+        (T, J, 4) local rotations.
     """
-    at, reach = np.arange(len(root)), max(int(round(_TILT_SECONDS * fps)), 1)
+    at, reach = np.arange(len(rotations)), max(int(round(_TILT_SECONDS * fps)), 1)
     curve = np.stack([hann_smooth(angle, reach) for angle in interpolate_columns(at, stances.middle, angles).T], axis=1)
     # leaning towards (x, y) is a turn about (-y, x)
-    axis = np.column_stack([-curve[:, 1], curve[:, 0], np.zeros(len(root))])
-    turn = quaternion.from_rotation_vector(axis)
+    turn = quaternion.from_rotation_vector(np.column_stack([-curve[:, 1], curve[:, 0], np.zeros(len(curve))]))
     out = rotations.copy()
     out[:, 0] = quaternion.multiply(turn, rotations[:, 0])
-    return centre + quaternion.rotate(turn, root - centre), out
+    return out
 
 
 def _average_stance(values: np.ndarray, start: float, stop: float) -> np.ndarray:

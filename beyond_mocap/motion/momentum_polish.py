@@ -1,9 +1,9 @@
 """A body that obeys momentum: the last polish of a construction, after its feet are planted.
 
-Stances are found anew (`supports`), bends, starts and stops get their lean (`lean`), a centre of mass is planned that
+Stances are found again (`supports`), bends, starts and stops get their lean (`lean`), a centre of mass is planned that
 flies on parabolas and is pushed only by feet on the ground (`momentum`), and the body follows it: its root moves,
 standing feet stay, swinging feet go with the pelvis, heels rise where a leg does not reach. Where that is not enough
-the plan is made anew with a lower body.
+the plan is made again with a lower body.
 
 The root takes the whole correction. With a third of it in the trunk the head accelerates 9 % more, with two thirds 25 %
 (../shared/prototype-momentum.md); a metric over the skeleton's graph, as ProjFlow has it for corrections of single
@@ -61,7 +61,7 @@ def obey_momentum(
     if not len(stances) or (len(phases) == 1 and phases[0, 0] <= 0.0 and phases[0, 1] >= len(root) - 1):
         return root, rotations
     legs = _Legs(skeleton, body, places, world, stances, fps)
-    root, rotations = legs.lean(root, rotations, share)
+    rotations = legs.lean(rotations, share)
     planner = MomentumPlanner(phases, len(root), fps, share, strength)
     return legs.follow(planner, root, rotations)
 
@@ -77,15 +77,15 @@ class _Legs:
                       for limb, standing in zip((body.left, body.right), self._standing)]
         self._spread = max(int(round(_SPREAD_FRAMES * fps / 30.0)), 1)
 
-    def lean(self, root, rotations, share) -> tuple[np.ndarray, np.ndarray]:
-        """Move the footprints and turn the body about its centre of mass, by what its stances lack."""
+    def lean(self, rotations, share) -> np.ndarray:
+        """Move the footprints and tilt the body by what its stances lack."""
         centre = compute_centre_of_mass(self.body, self._places)
         lean = measure_lean(self.body, self._places, centre, self.stances, self.fps)
         shifts = choose_shifts(lean, np.interp(self.stances.middle, np.arange(len(share)), share))
-        moves = compute_footprint_shifts(self.stances, shifts, len(root))
-        self._feet = [foot.move(np.column_stack([moves[:, side], np.zeros(len(root))]))
+        moves = compute_footprint_shifts(self.stances, shifts, len(rotations))
+        self._feet = [foot.move(np.column_stack([moves[:, side], np.zeros(len(rotations))]))
                       for side, foot in enumerate(self._feet)]
-        return tilt_body(root, rotations, centre, self.stances, choose_angles(lean, shifts), self.fps)
+        return tilt_body(rotations, self.stances, choose_angles(lean, shifts), self.fps)
 
     def follow(self, planner: MomentumPlanner, root, rotations) -> tuple[np.ndarray, np.ndarray]:
         """Move the root so that the centre of mass follows its plan; feet stay where they stand."""
