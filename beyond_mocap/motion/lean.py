@@ -16,7 +16,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..base.easing import quintic_step, smoothstep
-from ..base.time_series import hann_smooth, time_derivative
+from ..base.time_series import find_runs, hann_smooth, time_derivative
 from ..base.vectors import unit_vectors
 from . import quaternion
 from .humanoid import Humanoid
@@ -27,6 +27,7 @@ _ACCELERATION_SECONDS = 0.35  # s to either side over which the acceleration of 
 _NEIGHBOUR_SECONDS = 0.8  # s within which stances are one run
 _DEAD_ZONE = (0.03, 0.02)  # m ahead and aside that are no error: one stance tells no more
 _MOST_SHIFT = (0.14, 0.14)  # m ahead and aside that footprints move at most; more turns a step into a lunge
+_LEAST_HEIGHT = 0.5  # m of a centre of mass over the foot for which shifts are turned into angles: bodies lie and slide
 _SPEEDS = (1.2, 2.2)  # m/s between which the lean of a step begins to count
 _TRUNK_SHARE = 0.5  # of the missing angle by which the body turns
 _TILT_SECONDS = 0.12  # s to either side over which that turn is smoothed
@@ -54,6 +55,11 @@ class Lean:
         size = np.linalg.norm(self.acceleration, axis=1, keepdims=True)
         asked = self.acceleration * np.minimum(1.0, MOST_ACCELERATION / np.maximum(size, 1e-9))
         return self.height[:, None] * asked / GRAVITY - self.offset
+
+    @property
+    def lever(self) -> np.ndarray:
+        """(S,) m of the centre of mass over the ground, as of a body on its feet."""
+        return np.maximum(self.height, _LEAST_HEIGHT)
 
     @property
     def travel(self) -> np.ndarray:
@@ -105,22 +111,27 @@ def choose_shifts(lean: Lean, share: np.ndarray) -> np.ndarray:
     return shift
 
 
-def compute_footprint_shifts(stances: Stances, shifts: np.ndarray, count: int) -> np.ndarray:
+def compute_footprint_shifts(stances: Stances, shifts: np.ndarray, share: np.ndarray) -> np.ndarray:
     """Compute how both feet move so that their stances lean more: constant in a stance, eased while the foot swings.
+
+    A foot that swings through frames without a share is where it was in them.
 
     Args:
         stances: S stances.
-        shifts: (S, 2) m of `choose_shifts`.
-        count: T frames.
+        shifts: (S, 2) m of `choose_shifts`, zero for stances that touch frames without a share.
+        share: (T,) from 0 to 1.
     Returns:
         (T, 2, 2) m, left and right foot, world.
     """
-    out, at = np.zeros((count, 2, 2)), np.arange(count)
+    out, at = np.zeros((len(share), 2, 2)), np.arange(len(share))
+    rests = np.array(find_runs(share <= 0.0)).reshape(-1, 2) - [0, 1]
     for side in (0, 1):
         own = stances.side == side
         if own.any():
-            times = np.stack([stances.start[own], stances.stop[own]], axis=1).ravel()
-            values = np.repeat(-shifts[own], 2, axis=0)
+            spans = np.concatenate([np.stack([stances.start[own], stances.stop[own]], axis=1), rests])
+            values = np.repeat(np.concatenate([-shifts[own], np.zeros(rests.shape)]), 2, axis=0)
+            order = np.argsort(spans.ravel(), kind="stable")
+            times, values = spans.ravel()[order], values[order]
             place = np.interp(at, times, np.arange(len(times)))
             segment = np.minimum(place.astype(int), len(times) - 2)
             share = quintic_step(place - segment)[:, None]
@@ -129,7 +140,8 @@ def compute_footprint_shifts(stances: Stances, shifts: np.ndarray, count: int) -
 
 
 def tilt_body(
-    root: np.ndarray, rotations: np.ndarray, centre: np.ndarray, stances: Stances, slopes: np.ndarray, fps: float
+    root: np.ndarray, rotations: np.ndarray, centre: np.ndarray, stances: Stances, slopes: np.ndarray,
+    share: np.ndarray, fps: float,
 ) -> tuple[np.ndarray, np.ndarray]:
     """Turn a body about its centre of mass by half the angle that its stances lack.
 
@@ -139,15 +151,21 @@ def tilt_body(
         centre: (T, 3) m, the centre of mass, world.
         stances: S stances.
         slopes: (S, 2) shift over height of the centre of mass, world.
+        share: (T,) from 0, where the body does not turn, to 1.
         fps: frames per second.
     Returns:
         Root (T, 3) m and rotations (T, J, 4).
     """
     at, reach = np.arange(len(root)), max(int(round(_TILT_SECONDS * fps)), 1)
-    curve = np.stack([hann_smooth(np.interp(at, stances.middle, slope), reach) for slope in slopes.T], axis=1)
+    # a long stance keeps its angle: a body that comes to stand straightens as it puts its feet down
+    half = np.minimum(0.5 * (stances.stop - stances.start), reach)
+    times = np.concatenate([stances.start + half, stances.stop - half])
+    order = np.argsort(times, kind="stable")
+    curve = np.stack([hann_smooth(np.interp(at, times[order], np.tile(slope, 2)[order]), reach) for slope in slopes.T],
+                     axis=1)
     # leaning towards (x, y) is a turn about (-y, x)
     axis = np.column_stack([-curve[:, 1], curve[:, 0], np.zeros(len(root))])
-    turn = quaternion.from_rotation_vector(_TRUNK_SHARE * axis)
+    turn = quaternion.from_rotation_vector(_TRUNK_SHARE * share[:, None] * axis)
     out = rotations.copy()
     out[:, 0] = quaternion.multiply(turn, rotations[:, 0])
     return centre + quaternion.rotate(turn, root - centre), out

@@ -1,9 +1,9 @@
 """A body that obeys momentum: the last polish of a construction, after its feet are planted.
 
-Stances are found anew (`supports`), bends, starts and stops get their lean (`lean`), a centre of mass is planned that
+Stances are found again (`supports`), bends, starts and stops get their lean (`lean`), a centre of mass is planned that
 flies on parabolas and is pushed only by feet on the ground (`momentum`), and the body follows it: its root moves,
 standing feet stay, swinging feet go with the pelvis, heels rise where a leg does not reach. Where that is not enough
-the plan is made anew with a lower body.
+the plan is made again with a lower body.
 
 The root takes the whole correction. With a third of it in the trunk the head accelerates 9 % more, with two thirds 25 %
 (../shared/prototype-momentum.md); a metric over the skeleton's graph, as ProjFlow has it for corrections of single
@@ -61,9 +61,11 @@ def obey_momentum(
     if not len(stances) or (len(phases) == 1 and phases[0, 0] <= 0.0 and phases[0, 1] >= len(root) - 1):
         return root, rotations
     legs = _Legs(skeleton, body, places, world, stances, fps)
-    root, rotations = legs.lean(root, rotations, share)
     planner = MomentumPlanner(phases, len(root), fps, share, strength)
-    return legs.follow(planner, root, rotations)
+    new_root, new_rotations = legs.follow(planner, *legs.lean(root, rotations, share))
+    stays = share <= 0.0
+    new_rotations = quaternion.match_signs(new_rotations, rotations)
+    return np.where(stays[:, None], root, new_root), np.where(stays[:, None, None], rotations, new_rotations)
 
 
 class _Legs:
@@ -81,11 +83,13 @@ class _Legs:
         """Move the footprints and turn the body about its centre of mass, by what its stances lack."""
         centre = compute_centre_of_mass(self.body, self._places)
         lean = measure_lean(self.body, self._places, centre, self.stances, self.fps)
-        shifts = choose_shifts(lean, np.interp(self.stances.middle, np.arange(len(share)), share))
-        moves = compute_footprint_shifts(self.stances, shifts, len(root))
+        least = [share[int(start) : int(np.ceil(stop)) + 1].min()
+                 for start, stop in zip(self.stances.start, self.stances.stop)]
+        shifts = choose_shifts(lean, np.array(least))
+        moves = compute_footprint_shifts(self.stances, shifts, share)
         self._feet = [foot.move(np.column_stack([moves[:, side], np.zeros(len(root))]))
                       for side, foot in enumerate(self._feet)]
-        return tilt_body(root, rotations, centre, self.stances, shifts / lean.height[:, None], self.fps)
+        return tilt_body(root, rotations, centre, self.stances, shifts / lean.lever[:, None], share, self.fps)
 
     def follow(self, planner: MomentumPlanner, root, rotations) -> tuple[np.ndarray, np.ndarray]:
         """Move the root so that the centre of mass follows its plan; feet stay where they stand."""
@@ -105,7 +109,7 @@ class _Legs:
             goal, firmness = goal - planner.share * lacks, np.where(lacks > 0.0, _FIRMNESS, firmness)
         posed = self._solve_legs(places, world, rotations, move)
         move = move + plan - self._measure_centre(root + move, posed)
-        return root + move, quaternion.unify_signs(self._solve_legs(places, world, rotations, move))
+        return root + move, self._solve_legs(places, world, rotations, move)
 
     def _measure_centre(self, root, rotations) -> np.ndarray:
         """Measure the centre of mass (T, 3) m of a pose."""
