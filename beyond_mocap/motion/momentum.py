@@ -187,8 +187,9 @@ class MomentumPlanner:
         weights[self._frame_index], goals[self._frame_index] = weight * (1.0 + _HOLD * (1.0 - self.share)), curve
         squares.add_value(weights, goal=goals)
         samples = self._block_frames.shape[1]
-        squares.add_rows(self._block_index, np.full(samples, 1.0 / samples),
-                         np.full(len(self._block_index), self.fps / _RATE / block**2), curve[self._block_frames].mean(axis=1))
+        firm = np.full(len(self._block_index), self.fps / _RATE / block**2)
+        squares.add_rows(self._block_index, np.full(samples, 1.0 / samples), firm,
+                         curve[self._block_frames].mean(axis=1))
         return squares
 
     def _hold_forces(self, squares: BandedLeastSquares, weight: np.ndarray, goal: np.ndarray) -> None:
