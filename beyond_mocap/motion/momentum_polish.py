@@ -25,7 +25,7 @@ from .mass import compute_centre_of_mass
 from .momentum import STRENGTH, MomentumPlanner
 from .motion import compute_pose
 from .skeleton import Skeleton
-from .supports import Stances, find_stances, find_support_phases
+from .supports import Stances, find_lying_stretches, find_stances, find_support_phases
 
 _FADE_FRAMES = 3.0  # frames at 30 fps outside of a stance over which a foot comes to go with the pelvis
 _PELVIS_GAIN = 1.12  # m that the root moves per metre of the centre of mass: standing legs and feet stay behind
@@ -58,7 +58,8 @@ def obey_momentum(
     body = identify_joints(skeleton)
     places, world = compute_pose(skeleton, root, rotations)
     stances = find_stances(skeleton, places, fps)
-    phases = find_support_phases(stances, compute_centre_of_mass(body, places), fps)
+    centre = compute_centre_of_mass(body, places)
+    phases = find_support_phases(stances, centre, fps, find_lying_stretches(skeleton, places))
     if not len(stances) or (len(phases) == 1 and phases[0, 0] <= 0.0 and phases[0, 1] >= len(root) - 1):
         return root, rotations
     legs = _Legs(skeleton, body, (places, world), stances, fps)
@@ -118,7 +119,7 @@ class _Legs:
         return compute_centre_of_mass(self.body, compute_pose(self.skeleton, root, rotations)[0])
 
     def _aim_feet(self, places, move):
-        """Yield (foot, hip (T, 3), ankle goal (T, 3), its rotation (T, 4), standing (T,)), the root moved by (T, 3) m."""
+        """Yield each foot, its hip and ankle goal (T, 3) m, its rotation (T, 4) and standing (T,), the root moved."""
         for foot, standing in zip(self._feet, self._standing):
             hip = places[:, foot.limb.upper_leg] + move
             carried = (1.0 - standing)[:, None] * move

@@ -27,6 +27,7 @@ _CONTACT_SHARE = 0.95  # of the norm towards which they are lengthened: recordin
 _LONGEST_STRETCH = 1.0 / 60.0  # s by which either end of a stance is lengthened at most: half a frame of a take
 _FALLING = 0.4  # of gravity that a body falls with, at least, if it is in the air
 _STRIDE_FLIGHT = 0.3  # s that a runner's flight lasts at most, beyond doubt
+_LYING_TRUNK, _LYING_ARM = 0.3, 0.1  # m of hips or neck, and of elbows or hands, that lie on the ground
 _SPEED_SECONDS = 0.25  # s to either side over which the speed is smoothed
 _CONTACT_SPEEDS = (2.0, 3.0, 4.5, 6.0, 7.0, 8.0, 9.0, 10.0)  # m/s
 _CONTACT_SECONDS = (0.31, 0.25, 0.20, 0.16, 0.143, 0.125, 0.112, 0.104)  # s: Weyand 2000, Morin 2005
@@ -110,8 +111,26 @@ def find_stances(skeleton: Skeleton, positions: np.ndarray, fps: float) -> Stanc
     return Stances(side[order].astype(int), start[order], stop[order])
 
 
-def find_support_phases(stances: Stances, centre: np.ndarray, fps: float) -> np.ndarray:
-    """Find the phases in which at least one foot carries weight.
+def find_lying_stretches(skeleton: Skeleton, positions: np.ndarray) -> np.ndarray:
+    """Find the stretches in which the trunk or an arm lies on the ground: after dives, falls and slides.
+
+    Args:
+        skeleton: J joints.
+        positions: (T, J, 3) m, world.
+    Returns:
+        (L, 2) frames, first and last of each.
+    """
+    body = identify_joints(skeleton)
+    arms = [joint for limb in (body.left, body.right) for joint in (limb.hand, limb.lower_arm) if joint is not None]
+    is_lying = positions[:, [body.hips, body.neck_or_chest], 2].min(axis=1) < _LYING_TRUNK
+    if arms:
+        is_lying |= positions[:, arms, 2].min(axis=1) < _LYING_ARM
+    return np.array(find_runs(is_lying), float).reshape(-1, 2) - [0.0, 1.0]
+
+
+def find_support_phases(stances: Stances, centre: np.ndarray, fps: float, lying: np.ndarray | None = None
+                        ) -> np.ndarray:
+    """Find the phases in which a foot, or a body that lies, carries weight.
 
     A long stretch between them, or one of a slow body, in which the body hardly falls is no flight: something else
     carries it (hands, a lying body, a foot that the threshold missed), and the phases around it are joined. So is what
@@ -121,6 +140,7 @@ def find_support_phases(stances: Stances, centre: np.ndarray, fps: float) -> np.
         stances: the stances.
         centre: (T, 3) m, the centre of mass, world.
         fps: frames per second.
+        lying: (L, 2) frames of `find_lying_stretches`; None for none.
     Returns:
         (P, 2) frames, first and last of each phase, ascending.
     """
@@ -134,7 +154,9 @@ def find_support_phases(stances: Stances, centre: np.ndarray, fps: float) -> np.
         return seconds > 0.0 and after - before < -_FALLING * GRAVITY * seconds
 
     phases: list[list[float]] = []
-    for start, stop in zip(stances.start, stances.stop):
+    spans = np.stack([stances.start, stances.stop], axis=1)
+    spans = spans if lying is None else np.concatenate([spans, lying])
+    for start, stop in spans[np.argsort(spans[:, 0], kind="stable")].tolist():
         if phases and (start <= phases[-1][1] or not is_flight(phases[-1][1], start)):
             phases[-1][1] = max(phases[-1][1], stop)
         else:

@@ -144,6 +144,8 @@ class Construction:
             return planted
         at, share = np.arange(len(self.track)), np.ones(len(self.track))
         for touch in self.touches:
+            if find_striking_part(touch.words) not in ("foot", "thigh"):
+                continue  # headers, dives and throws fly as all bodies do
             away = (np.abs(at - touch.frame) / self.plan.fps - KICK_SECONDS) / KICK_FADE
             share = np.minimum(share, smoothstep(np.clip(away, 0.0, 1.0)))
         # gravity holds in the player's size: a child's flights are shorter in the library's
