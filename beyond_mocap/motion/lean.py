@@ -20,7 +20,7 @@ from ..base.time_series import find_runs, hann_smooth, time_derivative
 from ..base.vectors import unit_vectors
 from . import quaternion
 from .humanoid import Humanoid
-from .supports import GRAVITY, Stances
+from .supports import GRAVITY, Stances, smooth_level
 
 MOST_ACCELERATION = 0.5 * GRAVITY  # m/s^2 that a lean answers; recordings' 99th percentile is .33 to .57 g
 _ACCELERATION_SECONDS = 0.35  # s to either side over which the acceleration of the centre of mass is smoothed
@@ -79,9 +79,7 @@ def measure_lean(body: Humanoid, positions: np.ndarray, centre: np.ndarray, stan
     Returns:
         The lean of each stance.
     """
-    reach = max(int(round(_ACCELERATION_SECONDS * fps)), 1)
-    smooth = np.stack([hann_smooth(centre[:, axis], reach) for axis in (0, 1)], axis=1)
-    velocity = time_derivative(smooth, fps)
+    velocity = time_derivative(smooth_level(centre, _ACCELERATION_SECONDS, fps), fps)
     curves = np.concatenate([centre, time_derivative(velocity, fps), velocity], axis=1)
     feet = [0.5 * (positions[:, limb.foot] + positions[:, limb.toe_or_foot]) for limb in (body.left, body.right)]
     rows = [_average_stance(np.concatenate([curves, feet[side]], axis=1), start, stop)

@@ -116,7 +116,7 @@ class _Legs:
         return compute_centre_of_mass(self.body, compute_pose(self.skeleton, root, rotations)[0])
 
     def _aim_feet(self, places, move):
-        """Yield (foot, hip (T, 3), ankle goal (T, 3), its rotation (T, 4), standing (T,)), the root moved by (T, 3) m."""
+        """Yield (foot, hip (T, 3), ankle (T, 3), its rotation (T, 4), standing (T,)), the root moved by (T, 3) m."""
         for foot, standing in zip(self._feet, self._standing):
             hip = places[:, foot.limb.upper_leg] + move
             carried = (1.0 - standing)[:, None] * move
