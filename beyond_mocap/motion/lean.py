@@ -23,7 +23,7 @@ from . import quaternion
 from .humanoid import Humanoid, identify_joints
 from .mass import compute_centre_of_mass
 from .skeleton import Skeleton
-from .supports import GRAVITY, Stances, find_stances
+from .supports import GRAVITY, Stances, find_stances, smooth_level
 
 MOST_ACCELERATION = 0.5 * GRAVITY  # m/s^2 that a lean answers; recordings' 99th percentile is .33 to .57 g
 _ACCELERATION_SECONDS = 0.35  # s to either side over which the acceleration of the centre of mass is smoothed
@@ -82,9 +82,7 @@ def measure_lean(body: Humanoid, positions: np.ndarray, centre: np.ndarray, stan
     Returns:
         The lean of each stance.
     """
-    reach = max(int(round(_ACCELERATION_SECONDS * fps)), 1)
-    smooth = np.stack([hann_smooth(centre[:, axis], reach) for axis in (0, 1)], axis=1)
-    velocity = time_derivative(smooth, fps)
+    velocity = time_derivative(smooth_level(centre, _ACCELERATION_SECONDS, fps), fps)
     curves = np.concatenate([centre, time_derivative(velocity, fps), velocity], axis=1)
     feet = [0.5 * (positions[:, limb.foot] + positions[:, limb.toe_or_foot]) for limb in (body.left, body.right)]
     rows = [_average_stance(np.concatenate([curves, feet[side]], axis=1), start, stop)

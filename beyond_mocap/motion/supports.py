@@ -14,9 +14,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..base.time_series import find_runs, hann_smooth, time_derivative
+from ..base.time_series import find_runs, time_derivative
 from .humanoid import Limb, identify_joints
 from .skeleton import Skeleton
+from .track import smooth_zero_phase_hann
 
 GRAVITY = 9.81  # m/s^2
 LOW = 0.03  # m above its own usual lowest height below which a foot carries weight (../shared/metrics.md: flight)
@@ -178,11 +179,21 @@ def measure_speed(points: np.ndarray, fps: float) -> np.ndarray:
     Returns:
         (T,) m/s.
     """
-    if len(points) < 2:
-        return np.zeros(len(points))
-    reach = max(int(round(_SPEED_SECONDS * fps)), 1)
-    level = np.stack([hann_smooth(points[:, axis], reach) for axis in (0, 1)], axis=1)
-    return np.linalg.norm(np.gradient(level, axis=0), axis=1) * fps
+    return np.linalg.norm(time_derivative(smooth_level(points, _SPEED_SECONDS, fps), fps), axis=1)
+
+
+def smooth_level(points: np.ndarray, reach: float, fps: float) -> np.ndarray:
+    """Smooth the level path of a point; it goes on beyond the ends as it came.
+
+    Args:
+        points: (T, 3) m, world.
+        reach: s of the window to either side.
+        fps: frames per second.
+    Returns:
+        (T, 2) m, world.
+    """
+    frames = max(int(round(reach * fps)), 1) + 1
+    return smooth_zero_phase_hann(points[:, :2], fps, 2.0 * frames / fps)
 
 
 def measure_foot_height(positions: np.ndarray, limb: Limb) -> np.ndarray:
