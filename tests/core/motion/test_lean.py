@@ -80,7 +80,8 @@ def test_slow_bodies_and_stances_without_a_share_do_not_lean_more():
                              np.ones(len(stances)))[2:-2].any()
     fast = measure_lean(BODY, *place_body(run_circle(6.0, 12.0), stances), stances, FPS)
     assert not choose_shifts(fast, np.zeros(len(stances))).any()
-    assert choose_shifts(fast, np.full(len(stances), 0.5)) == pytest.approx(0.5 * choose_shifts(fast, np.ones(len(stances))))
+    half, whole = (choose_shifts(fast, np.full(len(stances), share)) for share in (0.5, 1.0))
+    assert half == pytest.approx(0.5 * whole)
 
 
 @pytest.mark.parametrize("rest, is_averaged", [(0.3, True), (2.0, False)])

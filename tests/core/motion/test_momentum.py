@@ -14,7 +14,8 @@ def build_run(fps, contact=CONTACT, bounce=0.05):
     times, middles = np.arange(int(round(SECONDS * fps)) + 1) / fps, np.arange(0.0, SECONDS + STEP, STEP)
     phases = np.clip(np.stack([middles - 0.5 * contact, middles + 0.5 * contact], axis=1), 0.0, SECONDS) * fps
     turn = 2.0 * np.pi * times / STEP
-    centre = np.column_stack([6.0 * times + 0.0135 * np.sin(turn), 0.01 * np.sin(0.5 * turn), 1.0 - bounce * np.cos(turn)])
+    ground = [6.0 * times + 0.0135 * np.sin(turn), 0.01 * np.sin(0.5 * turn)]
+    centre = np.column_stack([*ground, 1.0 - bounce * np.cos(turn)])
     return phases[phases[:, 1] > phases[:, 0]], centre
 
 

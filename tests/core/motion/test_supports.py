@@ -7,7 +7,12 @@ from beyond_mocap.motion.humanoid import identify_joints
 from beyond_mocap.motion.retargeting.adult import build_adult_skeleton
 from beyond_mocap.motion.retargeting.neutral import build_neutral_stance
 from beyond_mocap.motion.supports import (
-    GRAVITY, Stances, find_stances, find_support_phases, interpolate_contact_seconds, measure_speed,
+    GRAVITY,
+    Stances,
+    find_stances,
+    find_support_phases,
+    interpolate_contact_seconds,
+    measure_speed,
 )  # fmt: skip
 
 LIFT_SPEED = 3.0  # m/s at which the feet of these bodies leave the ground

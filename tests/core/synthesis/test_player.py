@@ -9,7 +9,9 @@ from beyond_mocap.base.errors import InputError
 from beyond_mocap.evaluation.report import evaluate
 from beyond_mocap.library.build import build_library
 from beyond_mocap.motion.humanoid import estimate_stature, identify_joints
+from beyond_mocap.motion.mass import compute_centre_of_mass
 from beyond_mocap.motion.motion import forward_kinematics
+from beyond_mocap.motion.supports import GRAVITY, find_stances, find_support_phases
 from beyond_mocap.synthesis.plan import METHODS, Pin, Plan
 from beyond_mocap.synthesis.resynthesize import resynthesize
 from beyond_mocap.synthesis.search.preferences import matches_pattern
@@ -63,6 +65,18 @@ def test_a_pin_out_of_reach_is_told_and_reported(library, track, take):
     report = evaluate(found, track, library)
     assert report["pins"][0]["miss"] > 0.5 and report["pins"][1]["miss"] is None and "pins" not in evaluate(take, track,
                                                                                                             library)
+
+
+def test_small_players_fall_as_fast_as_tall_ones(library, track_of):
+    plan = Plan(track=track_of(5.0, seconds=6.0))
+    for height in (0.0, 1.45):
+        motion = synthesize(library, replace(plan, height=height)).motion
+        body, (places, _) = identify_joints(motion.skeleton), forward_kinematics(motion)
+        centre, stances = compute_centre_of_mass(body, places), find_stances(motion.skeleton, places, motion.fps)
+        phases, at = find_support_phases(stances, centre, motion.fps), np.arange(1, len(motion) - 1)
+        flies = np.all([(at <= start - 1.0) | (at >= stop + 1.0) for start, stop in phases], axis=0)
+        fall = np.diff(centre[:, 2], 2)[flies] * motion.fps**2
+        assert len(fall) > 10 and np.median(fall) == pytest.approx(-GRAVITY, abs=0.4)
 
 
 @pytest.mark.parametrize("method", METHODS)
