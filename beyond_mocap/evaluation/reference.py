@@ -31,6 +31,7 @@ from ..synthesis.quality import movement
 from ..synthesis.quality.moments import evaluate_moments
 from ..synthesis.quality.playback import Playback, find_transitions
 from . import realism
+from .body_physics import BodyPhysics, measure_body_physics
 from .naturalness import FPS as COURSE_FPS
 from .naturalness import BodyCourse, find_stands, measure_course
 from .touches import Kick, find_side, is_foot_reception, is_kick, measure_kick, measure_legs, measure_reception
@@ -62,6 +63,7 @@ class Recording:
         course: where its body faces and goes, at 30 frames per second.
         kicks: those that its labels name.
         receptions: m/s of the foot at receptions that its labels name.
+        physics: how its mass moves, at 30 frames per second.
     """
 
     path: str
@@ -84,6 +86,7 @@ class Recording:
     course: BodyCourse
     kicks: tuple[Kick, ...]
     receptions: tuple[float, ...]
+    physics: BodyPhysics
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -110,7 +113,7 @@ class LibraryReference:
         fastest: highest speed of a root, smoothed with a 1 s window, m/s.
         slowest: speed of the slowest gait, m/s.
         courses: of all recordings.
-        kicks, receptions: of all recordings, see `Recording`.
+        kicks, receptions, physics: of all recordings, see `Recording`.
     """
 
     fps: float
@@ -142,6 +145,7 @@ class LibraryReference:
     courses: tuple[BodyCourse, ...]
     kicks: tuple[Kick, ...]
     receptions: tuple[float, ...]
+    physics: tuple[BodyPhysics, ...]
 
     def find_rows(self, clips: tuple[str, ...], clip: np.ndarray, clip_frame: np.ndarray) -> np.ndarray:
         """Find the row of each output frame's source.
@@ -231,7 +235,8 @@ def build_reference(library: Library, fps: float) -> LibraryReference:
         fastest=float(joined["speed"].max()), slowest=_find_slowest_speed(library),
         courses=tuple(recording.course for recording in measured),
         kicks=tuple(kick for recording in measured for kick in recording.kicks),
-        receptions=tuple(speed for recording in measured for speed in recording.receptions), **joined,
+        receptions=tuple(speed for recording in measured for speed in recording.receptions),
+        physics=tuple(recording.physics for recording in measured), **joined,
     )  # fmt: skip
 
 
@@ -283,6 +288,7 @@ def measure_recording(clip: Clip, fps: float) -> Recording:
         smoothness=np.append(realism.measure_smoothness(skeleton, positions, fps), np.nan), stances=spans,
         travel=movement.measure_stance_travel(feet[:, :, 1], spans), course=course, kicks=kicks, receptions=receptions,
         stands=find_stands(smooth_zero_phase_hann(pelvis, fps, movement.ROOT_WINDOW), fps), contacts=contacts,
+        physics=measure_body_physics(motion, positions, rotations, course),
     )  # fmt: skip
 
 
