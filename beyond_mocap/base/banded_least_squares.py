@@ -98,12 +98,14 @@ class BandedLeastSquares:
             index: (R, M) int, the unknowns of each row, within `reach` frames of each other.
             values: (R, M) or (M,), the coefficients.
             weight: (R,).
-            goal: (R,) or one number, in the unknowns' unit.
+            goal: (R,) or one number, or (R, columns) where there are columns, in the unknowns' unit.
         """
         values = np.broadcast_to(values, index.shape)
         weighted_values = weight[:, None] * values
         size = len(self.right)
-        self.right += np.bincount(index.ravel(), (weighted_values * np.reshape(goal, (-1, 1))).ravel(), size)
+        goals = np.reshape(goal, (-1, 1 if self.right.ndim == 1 else self.right.shape[1]))
+        for column, sums in zip(goals.T, self.right.reshape(size, -1).T):
+            sums += np.bincount(index.ravel(), (weighted_values * column[:, None]).ravel(), size)
         for a in range(index.shape[1]):
             # Keep the pairs on or below the diagonal. Diagonal d and column c of the band are element d * size + c of
             # the flat band, so one bincount sums repeated entries.

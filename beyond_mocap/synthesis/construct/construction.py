@@ -23,7 +23,9 @@ from ...base.easing import smoothstep
 from ...library.library import Library
 from ...motion import quaternion
 from ...motion.foot_plant import PlantResult, plant_feet
+from ...motion.momentum_polish import obey_momentum
 from ...motion.motion import Motion
+from ...motion.toe_roll import roll_toes
 from ...motion.track import SampledTrack
 from ..body_size import scale_ball
 from ..plan import ResolvedPlan
@@ -57,6 +59,10 @@ HEADER_SECONDS, RELEASE_SECONDS = 0.3, 0.5
 FREE_SECONDS, FREE_FADE = 0.4, 0.4
 """Seconds before and after a touch, within the entry and exit of its clip, in which the clip decides how the body
 faces, and seconds over which the plan takes over: a run-up that turned as it was recorded spun on sharp turns."""
+
+KICK_SECONDS, KICK_FADE = 0.3, 0.3
+"""Seconds beside a touch in which a kick's own balance stays, and seconds over which momentum takes over: a kick stands
+on one leg and throws the other, which a plan for runners moves by up to 10 cm."""
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -122,7 +128,26 @@ class Construction:
         if not self.is_planned:
             ground, pose = self._pull_to_track(ground), self._lean_into_curves(pose)
         planted, steps_taken = self._plant_feet(np.column_stack([ground, self.smooth_source.height]), pose)
-        return self._watch_ball(planted), steps_taken
+        planted = self._obey_momentum(self._watch_ball(planted))
+        return replace(planted, rotations=self._roll_toes(planted.root, planted.rotations)), steps_taken
+
+    def _roll_toes(self, root: np.ndarray, rotations: np.ndarray) -> np.ndarray:
+        """Bend the toes (T, J, 4) where their tips would be below the ground."""
+        return roll_toes(self.library.neutral_stance, root, rotations)
+
+    def _obey_momentum(self, planted: PlantResult) -> PlantResult:
+        """Let the centre of mass fly on parabolas and lean as it is pushed, except where a foot meets the ball.
+
+        A planned path keeps its root exactly, so there the body stays as it is.
+        """
+        if self.is_planned:
+            return planted
+        at, share = np.arange(len(self.track)), np.ones(len(self.track))
+        for touch in self.touches:
+            away = (np.abs(at - touch.frame) / self.plan.fps - KICK_SECONDS) / KICK_FADE
+            share = np.minimum(share, smoothstep(np.clip(away, 0.0, 1.0)))
+        root, rotations = obey_momentum(self.library.skeleton, planted.root, planted.rotations, self.plan.fps, share)
+        return replace(planted, root=root, rotations=rotations)
 
     def _compute_given_root(self, heading: np.ndarray) -> np.ndarray:
         """Compute where the root has to be (T, 2) m, NaN where it is free, for a heading (T,) rad.
@@ -177,7 +202,7 @@ class Construction:
         if placed is not rotations:
             contact = meet(placed)
         root, ball = (contact.root, contact.ball) if size == 1.0 else (contact.root / size, contact.ball / size)
-        return replace(planted, root=root, rotations=contact.rotations), ball
+        return replace(planted, root=root, rotations=self._roll_toes(root, contact.rotations)), ball
 
     def _solve_heading(self) -> np.ndarray:
         """Solve the heading (T,) rad from given values, track and source, turned to the ball at touches."""

@@ -1,0 +1,210 @@
+"""How far a body leans into what it is about to do: bends, starts and stops.
+
+While a foot pushes a body sideways or ahead with an acceleration a, its force passes through the centre of mass only if
+that lies off the foot by a / g of its height, over a stride on average. `measure_lean` tells how far it does;
+`compute_footprint_shifts` and `tilt_body` give what is missing: the footprints move outward below a centre of mass that
+stays, and the body turns about it, in bends by half the angle, in starts and stops by a little more than all of it: so do
+recorded trunks (slope .5 aside, .7 to 1.4 ahead).
+
+Source: ../shared/prototype-momentum.md, measured on recordings; Greene 1985, J Biomech Eng 107: the lean of runners in
+bends is atan(v^2 / (r g)).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..base.easing import quintic_step, smoothstep
+from ..base.time_series import hann_smooth, interpolate_columns, time_derivative
+from ..base.vectors import cross_on_ground, unit_vectors
+from . import quaternion
+from .humanoid import Humanoid, identify_joints
+from .mass import compute_centre_of_mass
+from .skeleton import Skeleton
+from .supports import GRAVITY, Stances, find_stances
+
+MOST_ACCELERATION = 0.5 * GRAVITY  # m/s^2 that a lean answers; recordings' 99th percentile is .33 to .57 g
+_ACCELERATION_SECONDS = 0.35  # s to either side over which the acceleration of the centre of mass is smoothed
+_NEIGHBOUR_SECONDS = 0.8  # s within which stances are one run
+_DEAD_ZONE = (0.03, 0.02)  # m ahead and aside that are no error: one stance tells no more
+_MOST_SHIFT = (0.18, 0.14)  # m ahead and aside that footprints move at most; more turns a step into a lunge
+_SPEEDS = (1.2, 2.2)  # m/s between which the lean of a step begins to count
+_TURN_SHARE = (1.2, 0.5)  # of the missing angle ahead and aside by which the body turns, as recorded trunks do
+_TILT_SECONDS = 0.12  # s to either side over which that turn is smoothed
+
+
+@dataclass(frozen=True, eq=False)
+class Lean:
+    """How each of S stances leans, averaged over the stance as its force is, and over its neighbours.
+
+    Attributes:
+        offset: (S, 2) m from the middle of the standing foot to the centre of mass, level.
+        height: (S,) m of the centre of mass over the ground.
+        acceleration: (S, 2) m/s^2 of the centre of mass, level, without its steps.
+        velocity: (S, 2) m/s of the centre of mass.
+    """
+
+    offset: np.ndarray
+    height: np.ndarray
+    acceleration: np.ndarray
+    velocity: np.ndarray
+
+    @property
+    def missing(self) -> np.ndarray:
+        """(S, 2) m by which the centre of mass should lie farther from the foot."""
+        size = np.linalg.norm(self.acceleration, axis=1, keepdims=True)
+        asked = self.acceleration * np.minimum(1.0, MOST_ACCELERATION / np.maximum(size, 1e-9))
+        return self.height[:, None] * asked / GRAVITY - self.offset
+
+    @property
+    def travel(self) -> np.ndarray:
+        """(S, 2) unit direction of travel."""
+        return unit_vectors(self.velocity, np.array([1.0, 0.0]))
+
+
+def measure_lean(body: Humanoid, positions: np.ndarray, centre: np.ndarray, stances: Stances, fps: float) -> Lean:
+    """Measure the lean of each stance.
+
+    Args:
+        body: which joint is what.
+        positions: (T, J, 3) m, world.
+        centre: (T, 3) m, the centre of mass, world.
+        stances: the stances.
+        fps: frames per second.
+    Returns:
+        The lean of each stance.
+    """
+    reach = max(int(round(_ACCELERATION_SECONDS * fps)), 1)
+    smooth = np.stack([hann_smooth(centre[:, axis], reach) for axis in (0, 1)], axis=1)
+    velocity = time_derivative(smooth, fps)
+    curves = np.concatenate([centre, time_derivative(velocity, fps), velocity], axis=1)
+    feet = [0.5 * (positions[:, limb.foot] + positions[:, limb.toe_or_foot]) for limb in (body.left, body.right)]
+    rows = [_average_stance(np.concatenate([curves, feet[side]], axis=1), start, stop)
+            for side, start, stop in zip(stances.side, stances.start, stances.stop)]
+    means = _average_neighbours(np.array(rows).reshape(-1, 10), stances.middle / fps)
+    return Lean(means[:, 0:2] - means[:, 7:9], means[:, 2] - means[:, 9], means[:, 3:5], means[:, 5:7])
+
+
+def compute_lean_slopes(skeleton: Skeleton, positions: np.ndarray, fps: float) -> np.ndarray:
+    """Compute how far a body leans in every frame: the lean of its stances, interpolated.
+
+    Args:
+        skeleton: J joints.
+        positions: (T, J, 3) m, world.
+        fps: frames per second.
+    Returns:
+        (T, 2) slope ahead and to the left of its travel; 0 without stances.
+    """
+    body, stances = identify_joints(skeleton), find_stances(skeleton, positions, fps)
+    if not len(stances):
+        return np.zeros((len(positions), 2))
+    lean = measure_lean(body, positions, compute_centre_of_mass(body, positions), stances, fps)
+    slope, ahead = lean.offset / lean.height[:, None], lean.travel
+    own = np.stack([np.sum(slope * ahead, axis=1), cross_on_ground(ahead, slope)], axis=1)
+    return interpolate_columns(np.arange(len(positions)), stances.middle, own)
+
+
+def choose_shifts(lean: Lean, share: np.ndarray) -> np.ndarray:
+    """Choose by how much each stance leans more.
+
+    Args:
+        lean: the S stances.
+        share: (S,) from 0, nothing, to 1.
+    Returns:
+        (S, 2) m by which the centre of mass comes to lie farther from the foot, world.
+    """
+    ahead = lean.travel
+    aside = np.stack([-ahead[:, 1], ahead[:, 0]], axis=1)
+    speed = np.linalg.norm(lean.velocity, axis=1)
+    counts = share * smoothstep(speed, *_SPEEDS)
+    shift = np.zeros_like(lean.offset)
+    for direction, dead, most in zip((ahead, aside), _DEAD_ZONE, _MOST_SHIFT):
+        lacks = np.sum(lean.missing * direction, axis=1)
+        wanted = most * np.tanh(np.maximum(np.abs(lacks) - dead, 0.0) / most)
+        shift += (counts * np.sign(lacks) * wanted)[:, None] * direction
+    return shift
+
+
+def choose_angles(lean: Lean, shifts: np.ndarray) -> np.ndarray:
+    """Choose by how much the body turns with the shifts of its stances.
+
+    Args:
+        lean: the S stances.
+        shifts: (S, 2) m of `choose_shifts`.
+    Returns:
+        (S, 2) rad by which the body tilts towards x and y, world.
+    """
+    slope, ahead = shifts / lean.height[:, None], lean.travel
+    along = np.sum(slope * ahead, axis=1, keepdims=True) * ahead
+    return _TURN_SHARE[0] * along + _TURN_SHARE[1] * (slope - along)
+
+
+def compute_footprint_shifts(stances: Stances, shifts: np.ndarray, count: int) -> np.ndarray:
+    """Compute how both feet move so that their stances lean more: constant in a stance, eased while the foot swings.
+
+    Args:
+        stances: S stances.
+        shifts: (S, 2) m of `choose_shifts`.
+        count: T frames.
+    Returns:
+        (T, 2, 2) m, left and right foot, world.
+    """
+    out, at = np.zeros((count, 2, 2)), np.arange(count)
+    for side in (0, 1):
+        own = stances.side == side
+        if own.any():
+            times = np.stack([stances.start[own], stances.stop[own]], axis=1).ravel()
+            values = np.repeat(-shifts[own], 2, axis=0)
+            place = np.interp(at, times, np.arange(len(times)))
+            segment = np.minimum(place.astype(int), len(times) - 2)
+            share = quintic_step(place - segment)[:, None]
+            out[:, side] = values[segment] + share * (values[segment + 1] - values[segment])
+    return out
+
+
+def tilt_body(
+    root: np.ndarray, rotations: np.ndarray, centre: np.ndarray, stances: Stances, angles: np.ndarray, fps: float
+) -> tuple[np.ndarray, np.ndarray]:
+    """Turn a body about its centre of mass, smoothly over its stances.
+
+    Args:
+        root: (T, 3) m, world.
+        rotations: (T, J, 4) local rotations.
+        centre: (T, 3) m, the centre of mass, world.
+        stances: S stances.
+        angles: (S, 2) rad of `choose_angles`.
+        fps: frames per second.
+    Returns:
+        Root (T, 3) m and rotations (T, J, 4).
+    """
+    at, reach = np.arange(len(root)), max(int(round(_TILT_SECONDS * fps)), 1)
+    curve = np.stack([hann_smooth(angle, reach) for angle in interpolate_columns(at, stances.middle, angles).T], axis=1)
+    # leaning towards (x, y) is a turn about (-y, x)
+    axis = np.column_stack([-curve[:, 1], curve[:, 0], np.zeros(len(root))])
+    turn = quaternion.from_rotation_vector(axis)
+    out = rotations.copy()
+    out[:, 0] = quaternion.multiply(turn, rotations[:, 0])
+    return centre + quaternion.rotate(turn, root - centre), out
+
+
+def _average_stance(values: np.ndarray, start: float, stop: float) -> np.ndarray:
+    """Average curves (T, K) over a stance in frames, weighted by the half sine of its force."""
+    first, end = int(np.ceil(start)), int(np.floor(stop)) + 1
+    if end - first < 2:
+        return values[min(int(round(0.5 * (start + stop))), len(values) - 1)]
+    weight = np.sin(np.pi * (np.arange(first, end) - start + 0.5) / (stop - start + 1.0))
+    return weight @ values[first:end] / weight.sum()
+
+
+def _average_neighbours(values: np.ndarray, times: np.ndarray) -> np.ndarray:
+    """Average each of (S, K) rows with those before and after, 1-2-1, where they are of one run; times (S,) s."""
+    if len(values) < 2:
+        return values
+    near = (np.diff(times) < _NEIGHBOUR_SECONDS)[:, None]
+    step = np.where(near, np.diff(values, axis=0), 0.0)
+    out = values.copy()
+    out[:-1] += 0.25 * step
+    out[1:] -= 0.25 * step
+    return out
