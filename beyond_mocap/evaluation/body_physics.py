@@ -99,7 +99,8 @@ def _summarize_flights(flights: Flights) -> dict:
     accelerating = flights.select((flights.speed >= SLOW_SPEED) & (flights.path > ACCELERATING))
     by_speed = {name: {"flights": len(part), "vertical_m_s2_median": _median(part.vertical),
                        "level_m_s2_median": _median(part.level)} for name, part in _split_by_speed(flights).items()}
-    return {**by_speed, "accelerating": {"flights": len(accelerating), "level_m_s2_median": _median(accelerating.level)}}
+    by_path = {"flights": len(accelerating), "level_m_s2_median": _median(accelerating.level)}
+    return {**by_speed, "accelerating": by_path}
 
 
 def _summarize_steps(steps: Steps) -> dict:
@@ -121,9 +122,9 @@ def _summarize_leans(leans: Leans) -> dict:
         large, some = np.abs(wanted) > LEANING, np.abs(wanted) > LEANING_LITTLE
         is_enough = np.count_nonzero(some) >= FEWEST
         out[name] = {
-            "strides": int(np.count_nonzero(large)),
+            "stances": int(np.count_nonzero(large)),
             "lean_error_deg_median": _median(np.degrees(np.abs(angle - wanted)[large])),
-            "slope_strides": int(np.count_nonzero(some)),
+            "slope_stances": int(np.count_nonzero(some)),
             "lean_slope": float(angle[some] @ wanted[some] / (wanted[some] @ wanted[some])) if is_enough else math.nan,
         }
     return out

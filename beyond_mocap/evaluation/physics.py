@@ -3,7 +3,7 @@
 A body that no foot supports flies on a parabola: its centre of mass falls at 9.81 m/s^2 and keeps its speed. What it
 needs to stay up, and to turn, start and stop, its feet have to push while they are on the ground, so it leans as it is
 accelerated. The same code measures takes and recordings, both at 30 frames per second. Speeds are those of the pelvis
-for a leg of 0.86 m (`naturalness`); accelerations are of the body as it is, since gravity is the same for everybody.
+for a leg of 0.86 m (`naturalness`); accelerations are of the body as it is, since all bodies have the same gravity.
 
 Sources: Reitsma and Pollard 2003, "Perceptual metrics for character animation"; Weyand, Sternlight, Bellizzi and Wright
 2000, J Appl Physiol 89; Morin, Dalleau, Kyrolainen, Jeannin and Belli 2005, J Appl Biomech 21.
@@ -18,9 +18,10 @@ from typing import TypeVar
 
 import numpy as np
 
-from ..base.time_series import find_runs, interpolate_columns, time_derivative
-from ..base.vectors import unit_vectors
+from ..base.time_series import find_runs, time_derivative
+from ..base.vectors import cross_on_ground
 from ..motion.humanoid import identify_joints
+from ..motion.lean import Lean, measure_lean
 from ..motion.mass import compute_centre_of_mass
 from ..motion.skeleton import Skeleton
 from ..motion.supports import GRAVITY, LOW, Stances, find_stances, interpolate_contact_seconds, measure_foot_height
@@ -30,10 +31,7 @@ from .naturalness import FPS, SLOW_SPEED, BodyCourse, resample_positions
 
 FLIGHT_FRAMES = 5  # frames of the shortest flight that is measured
 PATH_SECONDS = 1.0  # of the window through which the path of the centre of mass accelerates in flight
-LEAN_SECONDS = 0.7  # of the window through which it accelerates in a stride: as long as a stride of a slow run
 STEP_SECONDS = (0.15, 0.6)  # shortest and longest step of a run; others are missed or counted twice
-_SAMPLES = (np.arange(12) + 0.5) / 12.0  # shares of a stance at which its lean is sampled
-_PUSH = np.sin(np.pi * _SAMPLES)  # how a stance's force grows and fades
 
 E = TypeVar("E", bound="Events")
 
@@ -88,10 +86,10 @@ class Steps(Events):
 
 @dataclass(frozen=True, eq=False)
 class Leans(Events):
-    """Strides, two stances each.
+    """Stances of a run, each averaged with its neighbours.
 
     Attributes:
-        angle: (N, 2) rad from the vertical of the line from the standing feet to the centre of mass: sideways (left is
+        angle: (N, 2) rad from the vertical of the line from the standing foot to the centre of mass: sideways (left is
             positive) and forward, relative to the travel.
         wanted: (N, 2) rad, the same by which the acceleration has to lean: atan(a / g).
     """
@@ -106,17 +104,17 @@ class MassCourse:
 
     Attributes:
         centre: (T, 3) m, the centre of mass.
-        feet: (T, 2, 2) m, the middle of ankle and toe on the ground, left and right.
         foot_height: (T, 2) m, lower one of ankle and toe over its own usual lowest height.
         speed: (T,) m/s of the pelvis.
         stances: when feet carry weight.
+        lean: how far each stance leans.
     """
 
     centre: np.ndarray
-    feet: np.ndarray
     foot_height: np.ndarray
     speed: np.ndarray
     stances: Stances
+    lean: Lean
 
 
 def measure_mass_course(skeleton: Skeleton, positions: np.ndarray, fps: float, course: BodyCourse) -> MassCourse:
@@ -129,13 +127,10 @@ def measure_mass_course(skeleton: Skeleton, positions: np.ndarray, fps: float, c
         course: of the same positions.
     """
     positions, body = resample_positions(positions, fps), identify_joints(skeleton)
-    limbs = (body.left, body.right)
-    return MassCourse(
-        centre=compute_centre_of_mass(body, positions), speed=course.speed,
-        feet=np.stack([0.5 * (positions[:, limb.foot, :2] + positions[:, limb.toe_or_foot, :2]) for limb in limbs], 1),
-        foot_height=np.stack([measure_foot_height(positions, limb) for limb in limbs], axis=1),
-        stances=find_stances(skeleton, positions, FPS),
-    )
+    centre, stances = compute_centre_of_mass(body, positions), find_stances(skeleton, positions, FPS)
+    heights = [measure_foot_height(positions, limb) for limb in (body.left, body.right)]
+    return MassCourse(centre=centre, foot_height=np.stack(heights, axis=1), speed=course.speed, stances=stances,
+                      lean=measure_lean(body, positions, centre, stances, FPS))
 
 
 def join_events(parts: Sequence[E]) -> E:
@@ -154,7 +149,7 @@ def measure_flights(body: MassCourse) -> Flights:
     found = np.array([_fit_acceleration(body.centre[first:end]) for first, end in runs]).reshape(-1, 3)
     middle = np.array([(first + end - 1) // 2 for first, end in runs], dtype=int)
     return Flights(middle, body.speed[middle], vertical=found[:, 2], level=np.linalg.norm(found[:, :2], axis=1),
-                   path=np.linalg.norm(compute_path_acceleration(body.centre, PATH_SECONDS)[middle], axis=1))
+                   path=np.linalg.norm(_compute_path_acceleration(body.centre)[middle], axis=1))
 
 
 def _fit_acceleration(points: np.ndarray) -> np.ndarray:
@@ -164,16 +159,10 @@ def _fit_acceleration(points: np.ndarray) -> np.ndarray:
     return 2.0 * (square @ points) / (square @ square)
 
 
-def compute_path_acceleration(centre: np.ndarray, seconds: float) -> np.ndarray:
-    """Compute the level acceleration of a path without the steps in it.
-
-    Args:
-        centre: (T, 3) m at 30 frames per second.
-        seconds: of the window that smooths it.
-    Returns:
-        (T, 2) m/s^2.
-    """
-    return time_derivative(time_derivative(smooth_zero_phase_hann(centre[:, :2], FPS, seconds), FPS), FPS)
+def _compute_path_acceleration(centre: np.ndarray) -> np.ndarray:
+    """Compute the level acceleration (T, 2) m/s^2 of the path of a centre of mass (T, 3) m, without the steps in it."""
+    path = smooth_zero_phase_hann(centre[:, :2], FPS, PATH_SECONDS)
+    return time_derivative(time_derivative(path, FPS), FPS)
 
 
 def measure_steps(body: MassCourse) -> Steps:
@@ -201,43 +190,16 @@ def _flag_steps(stances: Stances) -> np.ndarray:
 
 
 def measure_leans(body: MassCourse) -> Leans:
-    """Measure how far each stride above 2 m/s leans, and how far its acceleration asks it to.
-
-    The lean is the direction from the middle of ankle and toe to the centre of mass over both stances, weighted as the
-    force of a stance grows and fades.
-    """
-    first = np.flatnonzero(_flag_steps(body.stances))
-    middle = np.rint(0.5 * (body.stances.middle[first] + body.stances.middle[first + 1])).astype(int)
-    speed = body.speed[middle]
-    first, middle, speed = (values[speed > SLOW_SPEED] for values in (first, middle, speed))
-    offset, height = _sample_stances(body)
-    angle = np.arctan((offset[first] + offset[first + 1]) / (height[first] + height[first + 1])[:, None])
-    pull = np.arctan(_average_over(compute_path_acceleration(body.centre, LEAN_SECONDS), body.stances, first) / GRAVITY)
-    course = smooth_zero_phase_hann(body.centre[:, :2], FPS, LEAN_SECONDS)
-    ahead = unit_vectors(time_derivative(course, FPS)[middle])
-    return Leans(middle, speed, angle=_turn_to_travel(angle, ahead), wanted=_turn_to_travel(pull, ahead))
-
-
-def _sample_stances(body: MassCourse) -> tuple[np.ndarray, np.ndarray]:
-    """Sum the offset (S, 2) m of the centre of mass from the standing foot, and its height (S,) m, over each stance."""
-    stances, frames = body.stances, np.arange(len(body.centre))
-    at = stances.start[:, None] + _SAMPLES * (stances.stop - stances.start)[:, None]
-    relative = np.concatenate([body.centre[:, None, :2] - body.feet, np.repeat(body.centre[:, None, 2:], 2, 1)], axis=2)
-    by_side = [interpolate_columns(at, frames, relative[:, side]) for side in (0, 1)]
-    sums = np.einsum("k,skc->sc", _PUSH, np.where((stances.side == 0)[:, None, None], *by_side))
-    return sums[:, :2], sums[:, 2]
-
-
-def _average_over(values: np.ndarray, stances: Stances, first: np.ndarray) -> np.ndarray:
-    """Average values (T, K) over two stances each (N,), from the first one's start to the second one's end: (N, K)."""
-    at = stances.start[first][:, None] + _SAMPLES * (stances.stop[first + 1] - stances.start[first])[:, None]
-    return interpolate_columns(at, np.arange(len(values)), values).mean(axis=1)
-
-
-def _turn_to_travel(vectors: np.ndarray, ahead: np.ndarray) -> np.ndarray:
-    """Express ground vectors (N, 2) sideways (left) and forward of unit directions (N, 2)."""
-    left = np.stack([-ahead[:, 1], ahead[:, 0]], axis=1)
-    return np.stack([np.sum(vectors * left, axis=1), np.sum(vectors * ahead, axis=1)], axis=1)
+    """Measure how far each stance of a run faster than 2 m/s leans, and how far its acceleration asks it to."""
+    lean = body.lean
+    is_run = np.append(_flag_steps(body.stances), False)[: len(body.stances)]
+    middle = np.rint(body.stances.middle).astype(int)
+    is_run &= body.speed[middle] > SLOW_SPEED
+    angle, wanted = np.arctan(lean.offset / lean.height[:, None]), np.arctan(lean.acceleration / GRAVITY)
+    found = Leans(middle, body.speed[middle], *(
+        np.stack([cross_on_ground(lean.travel, part), np.sum(lean.travel * part, axis=1)], axis=1)
+        for part in (angle, wanted)))
+    return found.select(is_run)
 
 
 def compute_bounce(step_seconds: np.ndarray, contact_seconds: np.ndarray) -> np.ndarray:

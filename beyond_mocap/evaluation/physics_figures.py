@@ -13,9 +13,9 @@ from .titles import Title
 FRAMES_KEYS = {
     **dict.fromkeys(("vertical_m_s2_median", "level_m_s2_median"), "flights"),
     **dict.fromkeys(("force_ratio_median", "force_in_range_share"), "steps"),
-    **dict.fromkeys(("lean_error_deg_median", "knee_flexion_deg_median", "ankle_lift_m_median",
+    "lean_error_deg_median": "stances", "lean_slope": "slope_stances",
+    **dict.fromkeys(("knee_flexion_deg_median", "ankle_lift_m_median",
                      "trunk_lean_deg_median", "bounce_m_median", "bounce_ratio_median"), "strides"),
-    "lean_slope": "slope_strides",
 }  # fmt: skip
 """What a figure rests on: a key beside it."""
 
