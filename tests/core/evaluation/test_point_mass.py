@@ -12,6 +12,9 @@ from beyond_mocap.motion.mass import compute_centre_of_mass
 from beyond_mocap.motion.momentum_polish import obey_momentum
 from beyond_mocap.motion.motion import compute_pose
 from beyond_mocap.motion.supports import GRAVITY, find_stances, find_support_phases
+from beyond_mocap.motion.track import Track
+from beyond_mocap.synthesis.plan import Plan
+from beyond_mocap.synthesis.synthesize import synthesize
 from beyond_mocap.synthetic.gait import build_gait
 
 FPS = 30.0
@@ -37,3 +40,33 @@ def measure_drift(skeleton, root, rotations):
             before, place = place, 2.0 * place - before + (force[frame] + gravity) / FPS**2
         drifts.append(place - centre[first + second])
     return np.array(drifts)
+
+
+def accelerate():
+    """Speeds (T,) m/s of a run that accelerates to 7 m/s and slows down."""
+    return np.concatenate([np.linspace(3.0, 7.0, 100), np.full(50, 7.0), np.linspace(7.0, 4.0, 60)])
+
+
+@pytest.mark.parametrize("speed, seconds, turn", [
+    (3.5, 6.0, 0.0), (5.0, 6.0, 0.0), (5.0, 6.0, 0.5), (7.0, 6.0, 0.0), (accelerate(), None, 0.0),
+], ids=["jog", "run", "bend", "sprint", "start and stop"])
+def test_a_run_that_obeys_momentum_comes_back_within_a_centimetre_a_second(speed, seconds, turn):
+    motion = build_gait(speed, seconds, FPS, turn_rate=turn)
+    off = np.abs(measure_drift(motion.skeleton, motion.root_positions, motion.rotations))
+    assert np.median(np.linalg.norm(off[:, :2], axis=1)) > 0.1  # the synthetic pelvis does not know of its mass
+    obeying = obey_momentum(motion.skeleton, motion.root_positions, motion.rotations, FPS, np.ones(len(motion)))
+    drift = measure_drift(motion.skeleton, *obeying)
+    assert np.linalg.norm(drift[:, :2], axis=1).max() < 0.01
+    assert np.percentile(np.abs(drift[:, 2]), 90) < 0.01
+
+
+def test_a_take_comes_back_within_a_centimetre_a_second(library):
+    """A jog that becomes a run and turns, through search and construction."""
+    times = np.arange(0.0, 8.01, 0.1)
+    heading = 0.12 * np.clip(times - 3.0, 0.0, 3.0) ** 2
+    path = np.cumsum(0.1 * np.interp(times, [0.0, 3.0], [2.8, 4.2])[:, None]
+                     * np.stack([np.cos(heading), np.sin(heading)], axis=1), axis=0)
+    take = synthesize(library, Plan(track=Track(times, path), nearest=True))
+    drift = measure_drift(take.motion.skeleton, take.motion.root_positions, take.motion.rotations)
+    drift = np.linalg.norm(drift, axis=1)
+    assert take.motion.fps == FPS and drift.max() < 0.01
