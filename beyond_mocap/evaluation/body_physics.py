@@ -8,6 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ..appearance.body import BodyMesh
 from ..motion.motion import Motion
 from .boots import DEEP, measure_boot_heights
 from .naturalness import SLOW_SPEED, BodyCourse
@@ -50,7 +51,7 @@ class BodyPhysics:
 
 
 def measure_body_physics(motion: Motion, positions: np.ndarray, rotations: np.ndarray,
-                         course: BodyCourse) -> BodyPhysics:
+                         course: BodyCourse, boots: BodyMesh) -> BodyPhysics:
     """Measure one body.
 
     Args:
@@ -58,12 +59,13 @@ def measure_body_physics(motion: Motion, positions: np.ndarray, rotations: np.nd
         positions: (N, J, 3) m, its joints, world.
         rotations: (N, J, 4), the same.
         course: of the same motion.
+        boots: of its body.
     """
     mass = measure_mass_course(motion.skeleton, positions, motion.fps, course)
     return BodyPhysics(
         flights=measure_flights(mass), steps=measure_steps(mass), leans=measure_leans(mass),
         sprint=measure_sprint_strides(motion.skeleton, positions, motion.fps, course, mass),
-        boots=measure_boot_heights(motion, positions, rotations),
+        boots=measure_boot_heights(boots, motion, positions, rotations),
     )
 
 

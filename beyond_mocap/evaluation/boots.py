@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..appearance.body import BodyMesh, build_boots
+from ..appearance.body import BodyMesh
 from ..motion import quaternion
 from ..motion.motion import Motion
 from .naturalness import FPS
@@ -16,10 +16,11 @@ from .naturalness import FPS
 DEEP = 0.02  # m below the ground from which a boot counts: grass and soles hide less
 
 
-def measure_boot_heights(motion: Motion, positions: np.ndarray, rotations: np.ndarray) -> np.ndarray:
+def measure_boot_heights(boots: BodyMesh, motion: Motion, positions: np.ndarray, rotations: np.ndarray) -> np.ndarray:
     """Measure the height of the lowest point of both boots, at 30 frames per second: the nearest frames count.
 
     Args:
+        boots: of a body with the motion's skeleton (`appearance.body.build_boots`).
         motion: N frames on a skeleton of J joints.
         positions: (N, J, 3) m, its joints, world.
         rotations: (N, J, 4), the same.
@@ -28,7 +29,6 @@ def measure_boot_heights(motion: Motion, positions: np.ndarray, rotations: np.nd
     """
     count = int((len(motion) - 1) / motion.fps * FPS + 1e-6) + 1
     rows = np.minimum(np.rint(np.arange(count) * motion.fps / FPS).astype(int), len(motion) - 1)
-    boots = build_boots(motion.skeleton, example=motion)
     return measure_lowest_point(boots, motion.skeleton.rest_positions, positions[rows], rotations[rows])
 
 

@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 
 import numpy as np
 
+from ..appearance.body import BodyMesh, build_boots
 from .body_physics import SPEED_CLASSES, measure_body_physics, summarize_physics
 from .reference import View
 from .titles import Title
@@ -54,11 +56,18 @@ def measure_physics(view: View) -> dict:
         The report's group.
     """
     played = view.played
-    body = measure_body_physics(played.motion, played.positions, played.rotations, view.course)
+    body = measure_body_physics(played.motion, played.positions, played.rotations, view.course, _build_boots(view))
     out = summarize_physics([body], [np.ones(len(body.boots), dtype=bool)])
     if view.reference is not None:
         _add_source_figures(out, summarize_physics(view.reference.physics, view.reference.split_by_course(view.used)))
     return {"physics": out}
+
+
+def _build_boots(view: View) -> BodyMesh:
+    """Build the boots of the take's body: those of the library's, as tall as it is, so that both are compared alike."""
+    if view.reference is None:
+        return build_boots(view.played.motion.skeleton, example=view.played.motion)
+    return replace(view.reference.boots, vertices=view.scale * view.reference.boots.vertices)
 
 
 def _add_source_figures(out: dict, own: Mapping) -> None:

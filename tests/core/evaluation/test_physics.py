@@ -12,12 +12,15 @@ from beyond_mocap.evaluation.boots import measure_boot_heights, measure_lowest_p
 from beyond_mocap.evaluation.html import build_physics_section
 from beyond_mocap.evaluation.naturalness import measure_course
 from beyond_mocap.evaluation.physics import MassCourse, compute_bounce, measure_flights, measure_leans, measure_steps
+from beyond_mocap.evaluation.physics_figures import measure_physics
+from beyond_mocap.evaluation.reference import View
 from beyond_mocap.evaluation.report import evaluate, flatten_report
 from beyond_mocap.evaluation.sprint_form import measure_knee_flexion, measure_trunk_lean
 from beyond_mocap.motion.humanoid import identify_joints
 from beyond_mocap.motion.lean import Lean
 from beyond_mocap.motion.motion import forward_kinematics, place_motion
 from beyond_mocap.motion.supports import Stances
+from beyond_mocap.synthesis.quality.playback import playback_from_tables
 from beyond_mocap.synthetic.gait import build_gait
 
 FPS, COUNT = 30.0, 300
@@ -93,7 +96,8 @@ def test_leans_are_sideways_and_forward_of_the_travel(travel, side, fore, pull_s
 def measure(motion):
     positions, rotations = forward_kinematics(motion)
     course = measure_course(motion.skeleton, positions, motion.fps)
-    return measure_body_physics(motion, positions, rotations, course)
+    boots = build_boots(motion.skeleton, example=motion)
+    return measure_body_physics(motion, positions, rotations, course, boots)
 
 
 def summarize(motion):
@@ -155,7 +159,7 @@ def test_boots_are_those_of_the_body():
 @pytest.mark.parametrize("fps", [25.0, 30.0, 60.0])
 def test_boots_below_the_ground_are_counted_at_any_rate(fps):
     motion = build_gait(0.0, 4.0, fps)
-    heights = measure_boot_heights(motion, *forward_kinematics(motion))
+    heights = measure_boot_heights(build_boots(motion.skeleton, example=motion), motion, *forward_kinematics(motion))
     assert len(heights) == len(measure_course(motion.skeleton, forward_kinematics(motion)[0], fps).heading)
     assert heights == pytest.approx(0.0, abs=0.015)
     shifts = np.where((np.arange(len(motion)) / fps < 1.0)[:, None], [0.0, 0.0, -0.05], [0.0, 0.0, 0.0])
@@ -196,3 +200,13 @@ def test_a_report_has_the_group_beside_the_recordings(cut, track_of, library):
     assert build_physics_section({}) == ""
     empty = [name for name, value in flatten_report(report).items() if name.startswith("physics") and value is None]
     assert empty and all(unknown.get(name, "") != "nothing to measure" for name in empty)
+
+
+def test_a_taller_body_has_taller_boots(cut, library):
+    """A body 1.2 times as large is as deep in the ground as the library's, 1.2 times as far."""
+    take = cut(("jog.bvh", 0, 60))
+    tall = replace(take.motion, skeleton=take.motion.skeleton.scale(1.2), root_positions=1.2 * take.motion.root_positions)
+    here, there = (measure_physics(View(playback_from_tables(motion), None, None, library))["physics"]["boots"]
+                   for motion in (place_motion(take.motion, offset=(0.0, 0.0, -0.02)),
+                                  place_motion(tall, offset=(0.0, 0.0, -0.02))))
+    assert here["frames"] == there["frames"] and there["below_share"] == pytest.approx(here["below_share"], abs=0.1)
