@@ -205,7 +205,8 @@ def test_a_report_has_the_group_beside_the_recordings(cut, track_of, library):
 def test_a_taller_body_has_taller_boots(cut, library):
     """A body 1.2 times as large is as deep in the ground as the library's, 1.2 times as far."""
     take = cut(("jog.bvh", 0, 60))
-    tall = replace(take.motion, skeleton=take.motion.skeleton.scale(1.2), root_positions=1.2 * take.motion.root_positions)
+    tall = replace(take.motion, skeleton=take.motion.skeleton.scale(1.2),
+                   root_positions=1.2 * take.motion.root_positions)
     here, there = (measure_physics(View(playback_from_tables(motion), None, None, library))["physics"]["boots"]
                    for motion in (place_motion(take.motion, offset=(0.0, 0.0, -0.02)),
                                   place_motion(tall, offset=(0.0, 0.0, -0.02))))
