@@ -211,7 +211,7 @@ def join_frames(a: Frames, b: Frames) -> Frames:
         words[rows, [vocabulary.index(word) for word in frames.vocabulary]] = frames.words
     parts = {
         name: np.concatenate([getattr(a, name), getattr(b, name)])
-        for name in ("source", "count", "root", "heading", "path", "velocity", "feet", "jerk", "lean", "features", "posture")
+        for name in ("count", *(column for column in _COLUMNS if column not in ("clip", "words")))
     }
     clip, first = np.append(a.clip, b.clip + len(a.first)), np.append(a.first, b.first + len(a))
     return Frames(clip=clip, first=first, mean=a.mean, basis=a.basis, words=words, vocabulary=vocabulary, **parts)

@@ -30,11 +30,13 @@ _EXACT = 0.5  # m/s^2 of acceleration that no force explains
 _SMOOTH_LEVEL, _SMOOTH_UP = 10.0, 20.0  # m/s^2 of a force's third difference: a parabolic pulse costs nothing
 _BLOCK_SECONDS, _BLOCK_LEVEL, _BLOCK_UP = 0.75, 0.004, 0.02  # m that the mean over a block may move: keeps the track
 _BLOCK_SAMPLE = 1.0 / 10.0  # s between the frames of which a block's mean is taken
+_STEP_FLIGHT = 0.2  # s; a longer flight is no step: what it moves grows with the square of its time
 _FLIGHT_SECONDS, _FLIGHT_FADE = 0.4, 0.2  # s beside a flight in which momentum counts, and over which it fades
 _WEIGHT_ELSEWHERE = 1e-4  # far from flights, where a body walks or stands, its recording knows better
 _CLAMP_UP, _CLAMP_LEVEL = 1e3, 1e2  # weights of forces beyond strength and friction; friction is soft: tracks brake so
 _CLAMP_ROUNDS = 2
-_FEW = 1e-8  # on forces, that of a parabolic pulse is free where momentum does not count
+_REST = 1e-9  # of a force that no term determines: it is 0
+_RATE = 30.0  # frames per second at which the terms above have these weights
 _HOLD = 1e4  # a curve that stays is held within a tenth of a millimetre
 _FEWEST_SEGMENTS = 3  # of a phase of support, between knots of the force
 
@@ -117,26 +119,40 @@ class MomentumPlanner:
         return self._build_motion(2, 0.0, _SMOOTH_LEVEL)
 
     @cached_property
+    def _flights(self) -> np.ndarray:
+        """(F, 2) frames, first and last of each flight."""
+        edges = np.stack([np.append(0.0, self.phases[:, 1]), np.append(self.phases[:, 0], self.count - 1.0)], axis=1)
+        return edges[edges[:, 0] < edges[:, 1]]
+
+    @cached_property
     def _weight(self) -> np.ndarray:
         """(T,) how much momentum counts: within and beside flights."""
-        at, away, last = np.arange(self.count), np.full(self.count, np.inf), self.count - 1.0
-        starts, stops = np.append(0.0, self.phases[:, 1]), np.append(self.phases[:, 0], last)
-        for start, stop in zip(starts, stops):
-            if start < stop:
-                away = np.minimum(away, np.maximum(np.maximum(start - at, at - stop), 0.0))
-        beyond = (away / self.fps - _FLIGHT_SECONDS) / _FLIGHT_FADE
-        return self.share * _WEIGHT_ELSEWHERE ** smoothstep(np.minimum(beyond, 1.0))
+        at, flights = np.arange(self.count), np.concatenate([[[-np.inf] * 2], self._flights, [[np.inf] * 2]])
+        after = np.searchsorted(flights[:, 0], at, side="right")  # the first flight that begins behind a frame
+        away = np.minimum(flights[after, 0] - at, np.maximum(at - flights[after - 1, 1], 0.0)) / self.fps
+        beyond = (away - _FLIGHT_SECONDS) / _FLIGHT_FADE
+        return self.share * _WEIGHT_ELSEWHERE ** smoothstep(np.clip(beyond, 0.0, 1.0))
+
+    @cached_property
+    def _looseness(self) -> np.ndarray:
+        """(T,) by how many times farther the curve may leave the constructed one: in long flights, and beside them."""
+        loose, reach = np.ones(self.count), _FLIGHT_SECONDS * self.fps
+        for start, stop in self._flights[np.diff(self._flights, axis=1)[:, 0] > _STEP_FLIGHT * self.fps]:
+            at = np.arange(max(int(start - reach), 0), min(int(stop + reach) + 1, self.count))
+            away = np.maximum(np.maximum(start - at, at - stop), 0.0)
+            near = smoothstep(np.clip(1.0 - away / reach, 0.0, 1.0))
+            loose[at] = np.maximum(loose[at], ((stop - start) / self.fps / _STEP_FLIGHT) ** (2.0 * near))
+        return loose
 
     def _build_motion(self, columns: int, gravity: float, smooth: float) -> BandedLeastSquares:
         """Build the terms of Newton's law and of smooth forces."""
         law, forces = self._law_rows, self._force_rows
         reach = max(int(np.ptp(index, axis=1).max(initial=1)) for index in (law[0], forces[0], self._block_index))
         squares = BandedLeastSquares(len(self._frame_index) + len(self._knot_index), reach=reach, columns=columns)
-        squares.add_rows(*law, self._weight[1:-1] / _EXACT**2, np.full((len(law[0]), columns), gravity))
-        squares.add_rows(*forces, np.full(len(forces[0]), smooth**-2), np.zeros((len(forces[0]), columns)))
-        weights = np.zeros(squares.count)
-        weights[self._knot_index] = _FEW
-        squares.add_value(weights)
+        squares.add_rows(*law, self._weight[1:-1] / _EXACT**2, gravity)
+        # sums over frames grow with the rate, and third differences shrink with its third power
+        squares.add_rows(*forces, np.full(len(forces[0]), (self.fps / _RATE) ** 6 / smooth**2))
+        self._hold_forces(squares, np.full(len(self._knots), _REST), np.zeros((len(self._knots), columns)))
         return squares
 
     @cached_property
@@ -184,11 +200,13 @@ class MomentumPlanner:
         """Add that x is near a curve (T, columns), in every frame and on average over blocks."""
         squares = motion.copy()
         weights, goals = np.zeros(squares.count), np.zeros((squares.count, curve.shape[1]))
-        weights[self._frame_index], goals[self._frame_index] = weight * (1.0 + _HOLD * (1.0 - self.share)), curve
+        held = weight / self._looseness**2 * (1.0 + _HOLD * (1.0 - self.share))
+        weights[self._frame_index], goals[self._frame_index] = held, curve
         squares.add_value(weights, goal=goals)
         samples = self._block_frames.shape[1]
-        squares.add_rows(self._block_index, np.full(samples, 1.0 / samples),
-                         np.full(len(self._block_index), block**-2), curve[self._block_frames].mean(axis=1))
+        firm = np.full(len(self._block_index), self.fps / _RATE / block**2)
+        squares.add_rows(self._block_index, np.full(samples, 1.0 / samples), firm,
+                         curve[self._block_frames].mean(axis=1))
         return squares
 
     def _hold_forces(self, squares: BandedLeastSquares, weight: np.ndarray, goal: np.ndarray) -> None:

@@ -14,9 +14,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..base.time_series import find_runs, hann_smooth, time_derivative
+from ..base.time_series import find_runs, time_derivative
 from .humanoid import Limb, identify_joints
 from .skeleton import Skeleton
+from .track import smooth_zero_phase_hann
 
 GRAVITY = 9.81  # m/s^2
 LOW = 0.03  # m above its own usual lowest height below which a foot carries weight (../shared/metrics.md: flight)
@@ -27,6 +28,7 @@ _CONTACT_SHARE = 0.95  # of the norm towards which they are lengthened: recordin
 _LONGEST_STRETCH = 1.0 / 60.0  # s by which either end of a stance is lengthened at most: half a frame of a take
 _FALLING = 0.4  # of gravity that a body falls with, at least, if it is in the air
 _STRIDE_FLIGHT = 0.3  # s that a runner's flight lasts at most, beyond doubt
+_LYING_TRUNK, _LYING_ARM = 0.3, 0.1  # m of hips or neck, and of elbows or hands, that lie on the ground
 _SPEED_SECONDS = 0.25  # s to either side over which the speed is smoothed
 _CONTACT_SPEEDS = (2.0, 3.0, 4.5, 6.0, 7.0, 8.0, 9.0, 10.0)  # m/s
 _CONTACT_SECONDS = (0.31, 0.25, 0.20, 0.16, 0.143, 0.125, 0.112, 0.104)  # s: Weyand 2000, Morin 2005
@@ -110,8 +112,26 @@ def find_stances(skeleton: Skeleton, positions: np.ndarray, fps: float) -> Stanc
     return Stances(side[order].astype(int), start[order], stop[order])
 
 
-def find_support_phases(stances: Stances, centre: np.ndarray, fps: float) -> np.ndarray:
-    """Find the phases in which at least one foot carries weight.
+def find_lying_stretches(skeleton: Skeleton, positions: np.ndarray) -> np.ndarray:
+    """Find the stretches in which the trunk or an arm lies on the ground: after dives, falls and slides.
+
+    Args:
+        skeleton: J joints.
+        positions: (T, J, 3) m, world.
+    Returns:
+        (L, 2) frames, first and last of each.
+    """
+    body = identify_joints(skeleton)
+    arms = [joint for limb in (body.left, body.right) for joint in (limb.hand, limb.lower_arm) if joint is not None]
+    is_lying = positions[:, [body.hips, body.neck_or_chest], 2].min(axis=1) < _LYING_TRUNK
+    if arms:
+        is_lying |= positions[:, arms, 2].min(axis=1) < _LYING_ARM
+    return np.array(find_runs(is_lying), float).reshape(-1, 2) - [0.0, 1.0]
+
+
+def find_support_phases(stances: Stances, centre: np.ndarray, fps: float, lying: np.ndarray | None = None
+                        ) -> np.ndarray:
+    """Find the phases in which a foot, or a body that lies, carries weight.
 
     A long stretch between them, or one of a slow body, in which the body hardly falls is no flight: something else
     carries it (hands, a lying body, a foot that the threshold missed), and the phases around it are joined. So is what
@@ -121,6 +141,7 @@ def find_support_phases(stances: Stances, centre: np.ndarray, fps: float) -> np.
         stances: the stances.
         centre: (T, 3) m, the centre of mass, world.
         fps: frames per second.
+        lying: (L, 2) frames of `find_lying_stretches`; None for none.
     Returns:
         (P, 2) frames, first and last of each phase, ascending.
     """
@@ -134,7 +155,9 @@ def find_support_phases(stances: Stances, centre: np.ndarray, fps: float) -> np.
         return seconds > 0.0 and after - before < -_FALLING * GRAVITY * seconds
 
     phases: list[list[float]] = []
-    for start, stop in zip(stances.start, stances.stop):
+    spans = np.stack([stances.start, stances.stop], axis=1)
+    spans = spans if lying is None else np.concatenate([spans, lying])
+    for start, stop in spans[np.argsort(spans[:, 0], kind="stable")].tolist():
         if phases and (start <= phases[-1][1] or not is_flight(phases[-1][1], start)):
             phases[-1][1] = max(phases[-1][1], stop)
         else:
@@ -156,11 +179,21 @@ def measure_speed(points: np.ndarray, fps: float) -> np.ndarray:
     Returns:
         (T,) m/s.
     """
-    if len(points) < 2:
-        return np.zeros(len(points))
-    reach = max(int(round(_SPEED_SECONDS * fps)), 1)
-    level = np.stack([hann_smooth(points[:, axis], reach) for axis in (0, 1)], axis=1)
-    return np.linalg.norm(np.gradient(level, axis=0), axis=1) * fps
+    return np.linalg.norm(time_derivative(smooth_level(points, _SPEED_SECONDS, fps), fps), axis=1)
+
+
+def smooth_level(points: np.ndarray, reach: float, fps: float) -> np.ndarray:
+    """Smooth the level path of a point; it goes on beyond the ends as it came.
+
+    Args:
+        points: (T, 3) m, world.
+        reach: s of the window to either side.
+        fps: frames per second.
+    Returns:
+        (T, 2) m, world.
+    """
+    frames = max(int(round(reach * fps)), 1) + 1
+    return smooth_zero_phase_hann(points[:, :2], fps, 2.0 * frames / fps)
 
 
 def measure_foot_height(positions: np.ndarray, limb: Limb) -> np.ndarray:
@@ -188,7 +221,7 @@ def _find_low_stretches(height: np.ndarray, fps: float) -> list[tuple[float, flo
         if found and start - found[-1][1] < _SHORTEST_GAP * fps:
             start = found.pop()[0]
         found.append((start, stop))
-    return found
+    return [(start, stop) for start, stop in found if stop > start]
 
 
 def _lengthen_stances(start: np.ndarray, stop: np.ndarray, speed: np.ndarray, fps: float

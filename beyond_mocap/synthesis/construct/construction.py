@@ -144,10 +144,15 @@ class Construction:
             return planted
         at, share = np.arange(len(self.track)), np.ones(len(self.track))
         for touch in self.touches:
+            if find_striking_part(touch.words) not in ("foot", "thigh"):
+                continue  # headers, dives and throws fly as all bodies do
             away = (np.abs(at - touch.frame) / self.plan.fps - KICK_SECONDS) / KICK_FADE
             share = np.minimum(share, smoothstep(np.clip(away, 0.0, 1.0)))
-        root, rotations = obey_momentum(self.library.skeleton, planted.root, planted.rotations, self.plan.fps, share)
-        return replace(planted, root=root, rotations=rotations)
+        # gravity holds in the player's size: a child's flights are shorter in the library's
+        size, skeleton = self.plan.size, self.library.skeleton
+        root, rotations = obey_momentum(skeleton if size == 1.0 else skeleton.scale(size), size * planted.root,
+                                        planted.rotations, self.plan.fps, share)
+        return replace(planted, root=root / size, rotations=rotations)
 
     def _compute_given_root(self, heading: np.ndarray) -> np.ndarray:
         """Compute where the root has to be (T, 2) m, NaN where it is free, for a heading (T,) rad.

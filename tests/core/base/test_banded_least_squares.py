@@ -72,3 +72,16 @@ def test_a_curve_too_short_for_a_difference_is_left_alone():
     squares.add_value(1.0, goal=np.array([3.0, 4.0]))
     squares.add_difference(3, 5.0)
     assert squares.solve()[:, 0] == pytest.approx([3.0, 4.0])
+
+
+@pytest.mark.parametrize("goal", [0.7, np.array([1.0, -2.0]), np.array([[1.0, 0.3], [-2.0, 0.5]])])
+def test_rows_have_one_goal_or_one_per_row_or_one_per_column(goal):
+    squares, index, values = BandedLeastSquares(5, reach=2, columns=2), np.array([[0, 2], [3, 4]]), [1.0, -3.0]
+    squares.add_value(0.5)
+    squares.add_rows(index, np.array(values), np.array([2.0, 4.0]), goal)
+    rows = np.zeros((2, 5))
+    rows[0, [0, 2]], rows[1, [3, 4]] = values, values
+    goals = np.broadcast_to(goal if np.ndim(goal) == 2 else np.reshape(goal, (-1, 1)), (2, 2))
+    expected = dense(np.vstack([rows, np.eye(5)]), np.vstack([goals, np.zeros((5, 2))]),
+                     np.concatenate([[2.0, 4.0], np.full(5, 0.5)]))
+    assert squares.solve() == pytest.approx(expected, abs=1e-9)
