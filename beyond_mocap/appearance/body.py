@@ -57,11 +57,7 @@ def build_body(skeleton: Skeleton, height: float | None = None, example: Motion 
     Raises:
         InputError: if the skeleton has no hips or legs.
     """
-    neutral = build_neutral_stance(skeleton, example)
-    if example is not None and is_rest_upright(skeleton):
-        neutral = _level_head(neutral, build_neutral_stance(skeleton))
-    builder = _BodyBuilder(neutral, identify_joints(skeleton), neutral.leg / ADULT_LEG if height is None else height
-                           / 1.80)
+    builder = _begin_body(skeleton, height, example)
     builder.add_torso()
     builder.add_head()
     for side, limb in ((1.0, builder.body.left), (-1.0, builder.body.right)):
@@ -70,10 +66,32 @@ def build_body(skeleton: Skeleton, height: float | None = None, example: Motion 
         if None not in (limb.upper_arm, limb.lower_arm, limb.hand):
             builder.add_arm(limb)
             builder.add_hand(limb, side)
-    vertices, joints, weights = (np.concatenate(rows) for rows in (builder.vertices, builder.joints, builder.weights))
-    rest = _to_rest(neutral, vertices, joints, weights)
-    arrays = (freeze_array(rest), tuple(builder.faces), freeze_array(joints, int), freeze_array(weights))
-    return BodyMesh(*arrays, freeze_array(builder.material, int))
+    return builder.build_mesh()
+
+
+def build_boots(skeleton: Skeleton, height: float | None = None, example: Motion | None = None) -> BodyMesh:
+    """Build the boots of a player's body alone.
+
+    Args:
+        skeleton, height, example: as in `build_body`.
+    Returns:
+        The mesh.
+    Raises:
+        InputError: if the skeleton has no hips or legs.
+    """
+    builder = _begin_body(skeleton, height, example)
+    builder.add_boot(builder.body.left, 1.0)
+    builder.add_boot(builder.body.right, -1.0)
+    return builder.build_mesh()
+
+
+def _begin_body(skeleton: Skeleton, height: float | None, example: Motion | None) -> "_BodyBuilder":
+    """Begin a body without any part, in the neutral stance."""
+    neutral = build_neutral_stance(skeleton, example)
+    if example is not None and is_rest_upright(skeleton):
+        neutral = _level_head(neutral, build_neutral_stance(skeleton))
+    scale = neutral.leg / ADULT_LEG if height is None else height / 1.80
+    return _BodyBuilder(neutral, identify_joints(skeleton), scale)
 
 
 def _level_head(neutral: NeutralStance, rest: NeutralStance) -> NeutralStance:
@@ -141,6 +159,13 @@ class _BodyBuilder:
         self.vertices, self.joints, self.weights = [], [], []
         self.faces: list[tuple[int, ...]] = []
         self.material: list[int] = []
+
+    def build_mesh(self) -> BodyMesh:
+        """Build the mesh of all parts, in the skeleton's rest pose."""
+        vertices, joints, weights = (np.concatenate(rows) for rows in (self.vertices, self.joints, self.weights))
+        rest = _to_rest(self.neutral, vertices, joints, weights)
+        arrays = (freeze_array(rest), tuple(self.faces), freeze_array(joints, int), freeze_array(weights))
+        return BodyMesh(*arrays, freeze_array(self.material, int))
 
     def joint_position(self, joint: int) -> np.ndarray:
         """Return a joint's position (3,) m in the neutral stance."""

@@ -5,6 +5,8 @@
 - `reference`  a library's own scores, once per library and frame rate, and a take beside them
 - `naturalness` and `touches` what the eye sees: of the body's course, and at the ball; their groups of figures in
                `naturalness_figures`, `touch_figures`, how pages name them in `titles`
+- `physics`, `sprint_form` and `boots` how a body's mass, limbs and soles move; one body in `body_physics`, the group of
+               figures in `physics_figures`
 - `touch_view` the touches of a take, measured once; `contact_figures` whether they meet the ball, and can
 - `per_frame`  figures of every frame, footprints, key moments in space, for overlays and curves
 - `report`     the report as JSON, reports side by side as a table, and which targets are met

@@ -20,7 +20,7 @@ from ..synthesis.quality import movement
 from ..synthesis.quality.movement import measure_contact_speeds
 from ..synthesis.quality.playback import Playback
 from ..synthesis.quality.targets import find_target
-from . import naturalness_figures, plots, touch_figures
+from . import naturalness_figures, physics_figures, plots, touch_figures
 from .html_page import (
     Html,
     build_element,
@@ -74,7 +74,8 @@ def build_html_report(
     return build_page(
         title, _build_head(view, report, title), _build_warnings(report), build_section("Over time", over_time),
         _build_clips(view), _build_labels(view), _build_moments(view, report), _build_worst(view),
-        build_naturalness_section(report), build_touch_section(report), _build_figures(report), style=_STYLE,
+        build_naturalness_section(report), build_physics_section(report), build_touch_section(report),
+        _build_figures(report), style=_STYLE,
     )  # fmt: skip
 
 
@@ -178,6 +179,12 @@ def build_naturalness_section(report: Mapping) -> Html:
     """Build the section of the group `naturalness`, with readable names; empty for a report without it."""
     table = _build_titled_table(report, "naturalness", naturalness_figures.TITLES)
     return build_section("What the eye sees", table) if table else Html()
+
+
+def build_physics_section(report: Mapping) -> Html:
+    """Build the section of the group `physics`, with readable names; empty for a report without it."""
+    table = _build_titled_table(report, "physics", physics_figures.TITLES)
+    return build_section("Physics", table) if table else Html()
 
 
 def build_touch_section(report: Mapping) -> Html:

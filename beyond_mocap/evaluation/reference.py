@@ -19,23 +19,26 @@ import numpy as np
 
 from ..annotation import Timeline
 from ..annotation.gaits import STANDING
+from ..appearance.body import BodyMesh, build_boots
 from ..base.errors import InputError
 from ..library.clip import Clip
 from ..library.keys import collect_keys
 from ..library.library import Library
 from ..motion.humanoid import Humanoid, estimate_stature, identify_joints
-from ..motion.motion import compute_pose, forward_kinematics, resample, sample_frames
+from ..motion.motion import compute_pose, concatenate_motions, forward_kinematics, resample, sample_frames
 from ..motion.skeleton import Skeleton
 from ..motion.track import SampledTrack, Track, sample_track, smooth_zero_phase_hann
 from ..synthesis.quality import movement
 from ..synthesis.quality.moments import evaluate_moments
 from ..synthesis.quality.playback import Playback, find_transitions
 from . import realism
+from .body_physics import BodyPhysics, measure_body_physics
 from .naturalness import FPS as COURSE_FPS
 from .naturalness import BodyCourse, find_stands, measure_course
 from .touches import Kick, find_side, is_foot_reception, is_kick, measure_kick, measure_legs, measure_reception
 
 POSES_PER_SECOND = 10.0  # of a recording that are compared with
+EXAMPLE_FPS = 1.0  # poses per second of recordings that show how boots hang on the skeleton
 LEFT_OUT_POSES = 3000  # poses at most in the leave-one-clip-out estimate
 
 
@@ -62,6 +65,7 @@ class Recording:
         course: where its body faces and goes, at 30 frames per second.
         kicks: those that its labels name.
         receptions: m/s of the foot at receptions that its labels name.
+        physics: how its mass moves, at 30 frames per second.
     """
 
     path: str
@@ -84,6 +88,7 @@ class Recording:
     course: BodyCourse
     kicks: tuple[Kick, ...]
     receptions: tuple[float, ...]
+    physics: BodyPhysics
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -110,7 +115,8 @@ class LibraryReference:
         fastest: highest speed of a root, smoothed with a 1 s window, m/s.
         slowest: speed of the slowest gait, m/s.
         courses: of all recordings.
-        kicks, receptions: of all recordings, see `Recording`.
+        kicks, receptions, physics: of all recordings, see `Recording`.
+        boots: of the library's body.
     """
 
     fps: float
@@ -142,6 +148,8 @@ class LibraryReference:
     courses: tuple[BodyCourse, ...]
     kicks: tuple[Kick, ...]
     receptions: tuple[float, ...]
+    physics: tuple[BodyPhysics, ...]
+    boots: BodyMesh
 
     def find_rows(self, clips: tuple[str, ...], clip: np.ndarray, clip_frame: np.ndarray) -> np.ndarray:
         """Find the row of each output frame's source.
@@ -211,7 +219,9 @@ def build_reference(library: Library, fps: float) -> LibraryReference:
         The reference.
     """
     originals, twins = _select_originals(library.clips)
-    measured = [measure_recording(clip, fps) for clip in originals]
+    examples = concatenate_motions([resample(clip.recording, EXAMPLE_FPS) for clip in originals])
+    boots = build_boots(library.skeleton, example=examples)
+    measured = [measure_recording(clip, fps, boots) for clip in originals]
     lengths = [len(recording.sway) for recording in measured]
     first = np.concatenate([[0], np.cumsum(lengths)])
     windows = [movement.collect_uncut_windows(recording.jerk, recording.speed) for recording in measured]
@@ -231,7 +241,8 @@ def build_reference(library: Library, fps: float) -> LibraryReference:
         fastest=float(joined["speed"].max()), slowest=_find_slowest_speed(library),
         courses=tuple(recording.course for recording in measured),
         kicks=tuple(kick for recording in measured for kick in recording.kicks),
-        receptions=tuple(speed for recording in measured for speed in recording.receptions), **joined,
+        receptions=tuple(speed for recording in measured for speed in recording.receptions),
+        physics=tuple(recording.physics for recording in measured), boots=boots, **joined,
     )  # fmt: skip
 
 
@@ -252,12 +263,13 @@ def _select_originals(clips: tuple[Clip, ...]) -> tuple[list[Clip], np.ndarray]:
     return list(chosen.values()), np.array([count[path] > 1 for path in chosen])
 
 
-def measure_recording(clip: Clip, fps: float) -> Recording:
+def measure_recording(clip: Clip, fps: float, boots: BodyMesh) -> Recording:
     """Measure one clip, uncut, frame by frame.
 
     Args:
         clip: the clip.
         fps: frames per second of the output.
+        boots: of the library's body.
     Returns:
         Its figures.
     """
@@ -283,6 +295,7 @@ def measure_recording(clip: Clip, fps: float) -> Recording:
         smoothness=np.append(realism.measure_smoothness(skeleton, positions, fps), np.nan), stances=spans,
         travel=movement.measure_stance_travel(feet[:, :, 1], spans), course=course, kicks=kicks, receptions=receptions,
         stands=find_stands(smooth_zero_phase_hann(pelvis, fps, movement.ROOT_WINDOW), fps), contacts=contacts,
+        physics=measure_body_physics(motion, positions, rotations, course, boots),
     )  # fmt: skip
 
 

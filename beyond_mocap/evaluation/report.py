@@ -17,8 +17,9 @@ from ..synthesis.quality.moments import measure_dribble_touches
 from ..synthesis.quality.playback import Playback, playback_from_take
 from ..synthesis.quality.targets import find_target
 from ..synthesis.take import Take
-from . import figures, naturalness_figures, touch_figures
+from . import figures, naturalness_figures, physics_figures, touch_figures
 from .naturalness_figures import find_planned_headings, list_naturalness_messages, measure_naturalness
+from .physics_figures import measure_physics
 from .reference import View
 from .touch_figures import list_touch_messages, measure_touches
 from .touch_view import TouchView
@@ -28,7 +29,7 @@ VERSION = 1
 MAX_DEPTH = 30
 """Nesting depth that no report reaches."""
 
-FRAMES_KEYS = {**naturalness_figures.FRAMES_KEYS, **touch_figures.FRAMES_KEYS}
+FRAMES_KEYS = {**naturalness_figures.FRAMES_KEYS, **touch_figures.FRAMES_KEYS, **physics_figures.FRAMES_KEYS}
 """What a figure rests on where that is not its group's `frames`: a key beside it."""
 
 SECONDS = ("load", "library", "search", "construct", "polish", "total")
@@ -91,7 +92,7 @@ def evaluate_played(
         "keys": figures.measure_key_moments(view), **figures.measure_feet(view),
         **figures.measure_corrections(view, ik_miss), **figures.measure_transitions(view),
         **figures.measure_poses(view), **measure_naturalness(view, heading, user_timeline),
-        **measure_touches(touch_view),
+        **measure_physics(view), **measure_touches(touch_view),
         "annotation_similarity": figures.measure_annotation_similarity(view),
         "warnings": [*figures.list_warnings(view, ik_miss, requested), *events, *list_touch_messages(touch_view)],
         "notes": notes,

@@ -26,7 +26,7 @@ FRICTION = 1.0
 """Greatest level force as a share of the vertical one: boots on grass hold about that."""
 
 _NEAR_LEVEL, _NEAR_UP = 0.02, 0.03  # m by which the curve may leave the constructed one, level and up
-_EXACT = 1.0  # m/s^2 of acceleration that no force explains
+_EXACT = 0.5  # m/s^2 of acceleration that no force explains
 _SMOOTH_LEVEL, _SMOOTH_UP = 10.0, 20.0  # m/s^2 of a force's third difference: a parabolic pulse costs nothing
 _BLOCK_SECONDS, _BLOCK_LEVEL, _BLOCK_UP = 0.75, 0.004, 0.02  # m that the mean over a block may move: keeps the track
 _BLOCK_SAMPLE = 1.0 / 10.0  # s between the frames of which a block's mean is taken

@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 
 from ...base.errors import format_seconds
-from ...evaluation import naturalness_figures, touch_figures
+from ...evaluation import naturalness_figures, physics_figures, touch_figures
 from ...evaluation.html_page import (
     Html,
     build_element,
@@ -275,6 +275,9 @@ COLUMNS = (
 _NATURALNESS = ("snap_turns_per_min", "spins_per_min", "pelvis_drops_per_min", "jolts_per_min", "cuts_per_min",
                 "dwell_s_median", "short_dwell_share", "unusual_posture_share", "off_plan_deg_p90",
                 "off_travel_deg_p90", "standing.foot_lifts_per_min", "standing.both_down")  # fmt: skip
+_PHYSICS = ("flight.2-4.vertical_m_s2_median", "flight.4-6.vertical_m_s2_median", "flight.2-4.level_m_s2_median",
+            "flight.4-6.level_m_s2_median", "flight.accelerating.level_m_s2_median", "lean.side.lean_error_deg_median",
+            "lean.fore.lean_error_deg_median", "boots.below_share")
 _TOUCHES = ("reception.receptions", "reception.speed_m_s_median", "second_strike_count", "kick.kicks",
             "kick.ankle_speed_m_s_median", "kick.plant_in_range_share", "ball_speed.ratio_median", "fit.fit_share",
             "contact.reachable_met_share", "ball_inside.inside_frames", "substituted_count", "synthetic_count")
@@ -288,6 +291,7 @@ def _build_columns(group: str, names: Sequence[str], titles: Mapping[str, Title]
 
 EYE_TABLES = {
     "What the eye sees": ("naturalness", _build_columns("naturalness", _NATURALNESS, naturalness_figures.TITLES)),
+    "Physics": ("physics", _build_columns("physics", _PHYSICS, physics_figures.TITLES)),
     "At the ball": ("touches", _build_columns("touches", _TOUCHES, touch_figures.TITLES)),
 }
 """The further tables of a team: title -> group of the report, and columns."""
@@ -368,8 +372,13 @@ def _summarize_columns(columns: Sequence[Column], reported: Sequence[PlayerResul
 
 
 def _find_worst_value(column: Column, values: Sequence[float]) -> float:
-    """Find the worst of a column's values: the smallest where the target is a lower limit."""
+    """Find the worst of a column's values: the smallest where the target is a lower limit, the farthest from the middle
+    of a range.
+    """
     target = find_target(column.figure, 30.0)
+    if target is not None and target.least is not None and target.most is not None:
+        middle = 0.5 * (target.least + target.most)
+        return max(values, key=lambda value: abs(value - middle))
     return min(values) if target is not None and target.most is None and target.own is None else max(values)
 
 

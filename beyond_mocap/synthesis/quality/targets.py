@@ -77,6 +77,18 @@ TARGETS = {
     "naturalness.off_plan_deg_median": Target(most=10.0),
     "naturalness.off_plan_deg_p90": Target(most=25.0),
     "naturalness.jolts_per_min": Target(most=1.0),
+    **{f"physics.flight.{speed}.vertical_m_s2_median": Target(least=-10.81, most=-8.81)
+       for speed in ("2-4", "4-6", "6+")},
+    **{f"physics.flight.{speed}.level_m_s2_median": Target(most=1.4) for speed in ("2-4", "4-6", "6+")},
+    "physics.flight.accelerating.level_m_s2_median": Target(most=1.6),
+    **{f"physics.step_force.{speed}.force_ratio_median": Target(least=0.85, most=1.15)
+       for speed in ("2-4", "4-6", "6+")},
+    "physics.lean.side.lean_error_deg_median": Target(most=3.0),
+    "physics.lean.fore.lean_error_deg_median": Target(most=3.0),
+    "physics.sprint_form.knee_flexion_deg_median": Target(least=139.0, most=151.0),
+    "physics.sprint_form.ankle_lift_m_median": Target(least=0.67, most=0.79),
+    "physics.sprint_form.trunk_lean_deg_median": Target(least=-2.0, most=8.0),
+    "physics.boots.below_share": Target(most=0.10),
     "touches.reception.speed_m_s_median": Target(most=3.0),
     "touches.reception.strike_count": Target(most=0.0),
     "touches.second_strike_count": Target(most=0.0),

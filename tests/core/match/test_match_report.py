@@ -202,6 +202,19 @@ def test_what_the_eye_sees_has_a_table_of_its_own(tmp_path):
     assert "What the eye sees" not in build_match_page(written(tmp_path, {"a": report(), "c": report()}))
 
 
+def test_physics_has_a_table_of_its_own(tmp_path):
+    """Falls of -9.0 and -13.0 m/s²: mean -11.0, worst -13.0, which is farther from -9.81."""
+    seen = [{"flight": {"4-6": {"vertical_m_s2_median": fall}}, "boots": {"below_share": share}}
+            for fall, share in ((-9.0, 0.4), (-13.0, 0.02))]
+    text = build_match_page(written(tmp_path, {"a": {**report(), "physics": seen[0]}, "b": report(),
+                                               "c": {**report(), "physics": seen[1]}}))  # fmt: skip
+    assert text.count("<h3>Physics") == 1
+    cells = [re.findall(r"<td class=[^>]*>(-?[\d.–]+)", row) for row in text.split("<tr")
+             if "mean<" in row or "worst<" in row]
+    assert ["–", "-11.0", "–", "–", "–", "–", "–", "21"] in cells
+    assert ["–", "-13.0", "–", "–", "–", "–", "–", "40"] in cells
+
+
 def test_touches_have_a_table_of_their_own(tmp_path):
     """Feet of 2.0 and 7.0 m/s at receptions: mean 4.5, worst 7.0; the ball inside a body in 0 and 41 frames."""
     seen = [{"reception": {"receptions": count, "speed_m_s_median": speed}, "ball_inside": {"inside_frames": inside}}

@@ -1,0 +1,79 @@
+"""The report's group `physics`: whether a take moves as its mass has to, beside the recordings that it uses."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+
+import numpy as np
+
+from ..appearance.body import BodyMesh, build_boots
+from .body_physics import SPEED_CLASSES, measure_body_physics, summarize_physics
+from .reference import View
+from .titles import Title
+
+FRAMES_KEYS = {
+    **dict.fromkeys(("vertical_m_s2_median", "level_m_s2_median"), "flights"),
+    **dict.fromkeys(("force_ratio_median", "force_in_range_share"), "steps"),
+    "lean_error_deg_median": "stances", "lean_slope": "slope_stances",
+    **dict.fromkeys(("knee_flexion_deg_median", "ankle_lift_m_median",
+                     "trunk_lean_deg_median", "bounce_m_median", "bounce_ratio_median"), "strides"),
+}  # fmt: skip
+"""What a figure rests on: a key beside it."""
+
+_SPEED_TEXTS = {"2-4": "2 to 4 m/s", "4-6": "4 to 6 m/s", "6+": "above 6 m/s"}
+
+TITLES = {
+    **{f"flight.{name}.vertical_m_s2_median": Title(f"Vertical acceleration in flight, {_SPEED_TEXTS[name]}", "m/s²")
+       for name in SPEED_CLASSES},
+    **{f"flight.{name}.level_m_s2_median": Title(f"Level acceleration in flight, {_SPEED_TEXTS[name]}", "m/s²")
+       for name in SPEED_CLASSES},
+    "flight.accelerating.level_m_s2_median": Title("The same while the path accelerates", "m/s²"),
+    **{f"step_force.{name}.force_ratio_median": Title(f"Force in contact over that of runners, {_SPEED_TEXTS[name]}",
+                                                      "", digits=2) for name in SPEED_CLASSES},
+    **{f"step_force.{name}.force_in_range_share": Title(f"Steps within 15 % of it, {_SPEED_TEXTS[name]}", "%", 100.0, 0)
+       for name in SPEED_CLASSES},
+    "lean.side.lean_error_deg_median": Title("Lean in bends off", "°"),
+    "lean.side.lean_slope": Title("Share of the lean that bends ask for", "%", 100.0, 0),
+    "lean.fore.lean_error_deg_median": Title("Lean at starts and stops off", "°"),
+    "lean.fore.lean_slope": Title("Share of the lean that starts and stops ask for", "%", 100.0, 0),
+    "sprint_form.knee_flexion_deg_median": Title("Largest knee flexion in sprints", "°", digits=0),
+    "sprint_form.ankle_lift_m_median": Title("Highest ankle in sprints", "cm", 100.0, 0),
+    "sprint_form.trunk_lean_deg_median": Title("Forward lean of the trunk in sprints", "°", digits=0),
+    "sprint_form.bounce_m_median": Title("Bounce of the centre of mass in sprints", "cm", 100.0),
+    "sprint_form.bounce_ratio_median": Title("The same over that of its contacts and flights", "", digits=2),
+    "boots.below_share": Title("Boots more than 2 cm below the ground", "%", 100.0, 0),
+}  # fmt: skip
+"""Figure of the group -> how pages show it."""
+
+
+def measure_physics(view: View) -> dict:
+    """Measure whether a take moves as its mass has to, beside the same of the recordings that it uses.
+
+    Args:
+        view: the take beside its library and track.
+    Returns:
+        The report's group.
+    """
+    played = view.played
+    body = measure_body_physics(played.motion, played.positions, played.rotations, view.course, _build_boots(view))
+    out = summarize_physics([body], [np.ones(len(body.boots), dtype=bool)])
+    if view.reference is not None:
+        _add_source_figures(out, summarize_physics(view.reference.physics, view.reference.split_by_course(view.used)))
+    return {"physics": out}
+
+
+def _build_boots(view: View) -> BodyMesh:
+    """Build the boots of the take's body: those of the library's, as tall as it is, so that both are compared alike."""
+    if view.reference is None:
+        return build_boots(view.played.motion.skeleton, example=view.played.motion)
+    return replace(view.reference.boots, vertices=view.scale * view.reference.boots.vertices)
+
+
+def _add_source_figures(out: dict, own: Mapping) -> None:
+    """Add the figures of the recordings as twins, group by group."""
+    for name, value in own.items():
+        if isinstance(value, Mapping):
+            _add_source_figures(out[name], value)
+        else:
+            out[f"source_{name}"] = value
