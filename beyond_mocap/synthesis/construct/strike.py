@@ -16,7 +16,13 @@ from functools import partial
 
 import numpy as np
 
-from ...annotation.ball_contact import build_surfaces, find_contact_window, measure_contact_gap, uses_both_hands
+from ...annotation.ball_contact import (
+    build_surfaces,
+    comes_from_hands,
+    find_contact_window,
+    measure_contact_gap,
+    uses_both_hands,
+)
 from ...annotation.labels import list_labels
 from ...annotation.striking import Surface, build_part_surfaces, measure_ball_gap
 from ...base.vectors import unit_vector
@@ -36,6 +42,7 @@ from .contact_geometry import (
     solve_contacts,
 )
 from .give import give_with_ball
+from .held_ball import HELD_DISTANCE
 from .move_body_part import (
     MAX_ANGLE,
     MAX_SWING,
@@ -238,6 +245,7 @@ class _TouchProblem:
         shares: (W,) of the shift per frame, for each part.
         ball: (T, 3) m, the ball's trajectory.
         measured: (T,) bool.
+        is_held: whether the hands have held the ball until the touch.
         aim: where the part strikes.
         avoid: (line, radius) that the ball must not lie in.
         origin: the first of the body's W frames.
@@ -249,6 +257,7 @@ class _TouchProblem:
     shares: tuple[np.ndarray, ...]
     ball: np.ndarray
     measured: np.ndarray
+    is_held: bool
     aim: Aim
     avoid: list[tuple]
     origin: int
@@ -280,7 +289,9 @@ class _TouchProblem:
     def compute_ball_range(self, frame: int) -> BallRange:
         """Return how far the ball may move; a ball on the ground stays there, and one just above it nearly so: a feed's
         heights are noisy, and a ball lifted to a foot would hop there by itself. A filled one may come down to the
-        ground."""
+        ground. A ball that the hands have held is where they are, at any height."""
+        if self.is_held:
+            return BallRange(np.inf, np.inf)
         whole, lowest = (BALL_NOISE, _IN_THE_AIR) if self.measured[frame] else (FILLED_NOISE, BALL_RADIUS)
         return BallRange(whole, float(np.clip(self.ball[frame, 2] - lowest, 0.0, whole)))
 
@@ -302,14 +313,20 @@ def _build_problem(body: Body, moment: _TouchFrames, origin: int, contacts, path
         path = add_flight_arc(path, moment.frame, float(height), ~height_known, fps)
     ahead = _choose_direction(body, parts[0], moment, at=at, path=path, fps=fps)
     avoid = _compute_other_leg_lines(body, parts[0], at) if parts[0].part == "foot" else []
-    scene = _TouchProblem(moment=moment, parts=parts, shares=shares, ball=path, measured=measured, aim=Aim(ahead),
-                          avoid=avoid, origin=origin, fps=fps)
+    is_held = comes_from_hands(moment.words) and _measure_distance(body, at, path[moment.frame]) < HELD_DISTANCE
+    scene = _TouchProblem(moment=moment, parts=parts, shares=shares, ball=path, measured=measured,
+                          is_held=is_held, aim=Aim(ahead), avoid=avoid, origin=origin, fps=fps)
     if len(parts) == 2:
         return scene
     aim = choose_aim(line, radius, ahead, rise=_RISE[parts[0].part], ball=path[moment.frame],
                      ball_range=scene.compute_ball_range(moment.frame), avoid=avoid,
                      possible=partial(_limit_shift, body, parts[0], at))
     return replace(scene, aim=aim)
+
+
+def _measure_distance(body: Body, at: int, ball: np.ndarray) -> float:
+    """Measure the distance on the ground from pelvis to ball, m."""
+    return float(np.linalg.norm(_level_vector(ball - body.places[at, identify_joints(body.skeleton).hips])))
 
 
 def _compute_other_leg_lines(body: Body, foot: Surface, at: int) -> list[tuple]:

@@ -202,6 +202,15 @@ def test_head_chest_and_hands_meet_a_ball_of_unknown_height(walk, words):
     assert struck.ball[near - 20, 2] == struck.ball[near + 20, 2] == 0.11
 
 
+@pytest.mark.parametrize("away, is_met", [(2.3, True), (2.7, False)])
+def test_a_ball_that_is_thrown_is_in_the_hands_where_the_feed_has_it_beside_the_player(walk, away, is_met):
+    near = int(walk.key * FPS)
+    place = kinematics(walk.motion)[0][near, identify_joints(walk.motion.skeleton).hips] * [1.0, 1.0, 0.0]
+    struck = met(walk, place + [0.0, away, 0.11], touch(walk, ("throwb", "high")))
+    assert (struck.gap[0] < 0.005) == (struck.ball_shift[0] > 1.5) == is_met
+    assert met(walk, place + [0.0, 2.3, 0.11], touch(walk, ("punch", "high"))).gap[0] > 1.0
+
+
 def test_a_ball_of_unknown_height_flies_freely(walk):
     ball = kinematics(walk.motion)[0][30, identify_joints(walk.motion.skeleton).head] * [1.0, 1.0, 0.0] + [0.25, 0.0,
             0.11]
