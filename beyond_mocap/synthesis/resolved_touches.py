@@ -275,8 +275,10 @@ def apply_trajectory(take: Take, plan: ResolvedPlan) -> tuple[Take, list[str]]:
     pushed = [(push.first, push.last) for push in pushes]
     take = _miss_ball(take, replace(take.ball, positions=dribbled.ball))
     free, met = _free_met_ball(take, dribbled.ball, pushes)
-    free, carried = carry_in_hands(take.motion, free, [_build_hand_touch(take, key) for key in keys])
-    free, holds = hold_in_spans(take.motion, free, _find_shown(take, _HOLDING))
+    touches = [_build_hand_touch(take, key) for key in keys]
+    free, carried = carry_in_hands(take.motion, free, touches)
+    free, holds = hold_in_spans(take.motion, free, _find_shown(take, _HOLDING),
+                                met=[frame for touch in touches for frame in touch.frames])
     carried += holds
     around = lead_ball_around_body(take.motion.skeleton, take.motion.root_positions, take.motion.rotations, ball=free,
                                    held=[*met, *pushed, *carried], fps=fps)

@@ -92,21 +92,24 @@ def carry_in_hands(motion: Motion, ball: np.ndarray, touches: Sequence[HandTouch
     return out, held
 
 
-def hold_in_spans(motion: Motion, ball: np.ndarray, spans: Sequence[tuple[int, int]]
-                  ) -> tuple[np.ndarray, list[tuple[int, int]]]:
+def hold_in_spans(motion: Motion, ball: np.ndarray, spans: Sequence[tuple[int, int]],
+                  met: Sequence[int] = ()) -> tuple[np.ndarray, list[tuple[int, int]]]:
     """Let the ball go with the hands while an action shows that it is held.
 
     Args:
         motion: T frames.
         ball: (T, 3) m, its centre.
         spans: first and last frame of each such action.
+        met: frames in which the ball is met; it is back there.
     Returns:
         The ball, and first and last frame of each time that it is held.
     """
     out, held = ball, []
     for first, last in spans:
         touch = HandTouch(frames=(first, first), words=(), low=first, high=last)
-        span = _limit_span(ball, touch, last - first)
+        wide = _widen(touch, max([0, *(frame for frame in met if frame < first)]),
+                      min([len(ball) - 1, *(frame for frame in met if frame > last)]), motion.fps)
+        span = _limit_span(ball, wide, wide.high - wide.low)
         hands = None if span is None else _build_hands(motion, span, touch, ball)
         found = () if hands is None else hands.find_closed(out)
         for low, high in found:

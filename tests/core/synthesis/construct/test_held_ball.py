@@ -42,7 +42,7 @@ def play(name, words, passes=False, at=(0.35, 0.0, 1.1), low=0.0):
 @pytest.mark.parametrize("name, words, seconds", [
     ("throw-in with a run-up", "throwb high", -0.3), ("chest throw", "throwb middle", -0.4),
     ("catch chest", "catchb middle", 0.6), ("catch low", "catchb low", 0.6),
-    ("dive long low catch", "catchb dive low right", 0.5),
+    ("dive long low catch", "catchb dive low right", 0.5), ("catch slide", "catchb low slide", 0.6),
 ])  # fmt: skip
 def test_a_held_ball_touches_both_hands(name, words, seconds):
     ball, _, key, hands, held = play(name, words)
@@ -95,11 +95,13 @@ def test_a_ball_that_comes_and_goes_is_not_held(name, words):
     assert held == [] and np.array_equal(ball, feed)
 
 
-def test_a_ball_is_held_while_a_span_shows_it():
-    action = next(one for one in ACTIONS if one.name == "holding the ball")
-    motion = action.build(ActionSetting(skeleton=SKELETON, fps=FPS)).motion
+@pytest.mark.parametrize("name", ["holding the ball", "sitting with the ball"])
+def test_a_ball_is_held_while_a_span_shows_it(name):
+    action = next(one for one in ACTIONS if one.name == name)
+    gesture = action.build(ActionSetting(skeleton=SKELETON, fps=FPS))
+    motion = gesture.motion
     feed = motion.root_positions * [1.0, 1.0, 0.0] + [0.4, 0.0, BALL_RADIUS]
-    ball, held = hold_in_spans(motion, feed, [(0, len(feed) - 1)])
+    ball, held = hold_in_spans(motion, feed, [(round(gesture.start * FPS), round(gesture.end * FPS))])
     (first, last), = held
     hands = forward_kinematics(motion)[0][:, [BODY.left.hand, BODY.right.hand]]
     middle = (first + last) // 2
