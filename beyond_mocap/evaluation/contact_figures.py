@@ -9,9 +9,10 @@ import numpy as np
 from ..annotation.ball_contact import comes_from_hands, find_contact_window, find_striking_part
 from ..annotation.striking import CHEST_RADIUS, FOOT_RADIUS, HAND_RADIUS, HEAD_RADIUS, THIGH_RADIUS
 from ..motion.track import BALL_RADIUS, Track
+from ..synthesis.construct.ball_touch.part_reach import PELVIS_RANGE
+from ..synthesis.construct.ball_touch.touch_problem import BALL_NOISE, FILLED_NOISE
 from ..synthesis.construct.held_ball import HELD_DISTANCE
 from ..synthesis.construct.step_to_ball import compute_allowed_step
-from ..synthesis.construct.strike import BALL_NOISE, FILLED_NOISE, PELVIS_RANGE
 from ..synthesis.quality.moments import KeyMomentResult, list_contact_labels, measure_contact
 from .reference import View
 

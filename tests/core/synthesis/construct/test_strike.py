@@ -10,8 +10,11 @@ from beyond_mocap.annotation.striking import measure_ball_gap
 from beyond_mocap.motion.contacts import detect_contacts
 from beyond_mocap.motion.humanoid import identify_joints
 from beyond_mocap.motion.motion import Motion, compute_pose
+from beyond_mocap.synthesis.construct.ball_touch.part_reach import MAX_DROP, MAX_SHIFT
+from beyond_mocap.synthesis.construct.ball_touch.touch_frames import Touch
+from beyond_mocap.synthesis.construct.ball_touch.touch_problem import BALL_NOISE
 from beyond_mocap.synthesis.construct.step_to_ball import FAST_STEP, SLOW_STEP, compute_allowed_step
-from beyond_mocap.synthesis.construct.strike import BALL_NOISE, MAX_DROP, MAX_SHIFT, Touch, strike_ball
+from beyond_mocap.synthesis.construct.strike import strike_ball
 from beyond_mocap.synthetic import gestures
 from beyond_mocap.synthetic.gait import build_gait
 
