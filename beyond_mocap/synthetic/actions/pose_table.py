@@ -51,5 +51,5 @@ def build_pose_actions(*tables: Mapping[str, KeyPoses]) -> tuple[Action, ...]:
     return tuple(_build_row(name, recipe) for table in tables for name, recipe in table.items())
 
 
-POSE_ACTIONS = build_pose_actions(SAVES, DIVES, SLIDES, THROWS, GESTURES, CELEBRATIONS)
+POSE_ACTIONS = build_pose_actions(SAVES, DIVES | SLIDES, THROWS, GESTURES, CELEBRATIONS)
 """Rows for `table.ACTIONS`."""
