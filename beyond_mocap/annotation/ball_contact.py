@@ -16,6 +16,7 @@ _BY_PART = {part: frozenset(list_labels(part=part)) for part in ("head", "chest"
 
 _BOTH_HANDS = frozenset(list_labels(both_hands=True))
 _IN_FLIGHT = frozenset(list_labels(in_flight=True))
+_FROM_HANDS = frozenset(list_labels(from_hands=True))
 _FOOT_ON_BALL = tuple(
     {label.name, other} if other else {label.name}
     for label in read_labels().values() if label.is_root and label.part == "foot"
@@ -85,6 +86,15 @@ def uses_both_hands(labels: Iterable[str]) -> bool:
         labels: the labels of a motion.
     """
     return bool(_BOTH_HANDS & set(labels))
+
+
+def comes_from_hands(labels: Iterable[str]) -> bool:
+    """Return whether the labels send a ball that the hands have held until then: a throw or a punt, not a punch.
+
+    Args:
+        labels: the labels of a motion.
+    """
+    return bool(_FROM_HANDS & set(labels))
 
 
 def shows_foot_on_ball(labels: frozenset[str]) -> bool:

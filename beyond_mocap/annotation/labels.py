@@ -29,7 +29,7 @@ ACTIONS = ("throw", "kick")
 
 _ALLOWED_VALUES = {
     "kind": KINDS, "group": GROUPS, "part": (*BODY_PARTS, "thigh", "hands", "tool"), "flight": ("yes",),
-    "ball": ("sends", "takes", "carries", "avoids", "holds", "never"), "height": ("low", "middle", "high"),
+    "ball": ("sends", "takes", "carries", "avoids", "holds", "never", "held"), "height": ("low", "middle", "high"),
     "action": ACTIONS,
 }  # fmt: skip
 _COLUMNS = (
@@ -52,6 +52,7 @@ class Label:
         both_hands: whether both hands meet it together.
         part_with: labels of which one must be present for the part to be certain.
         ball: "sends", "takes", "carries", "avoids", "holds", "never" or "".
+        from_hands: whether the ball comes out of the hands that have held it.
         gait: m/s from which the gait applies if a library has no own speed for it; None if it is no gait.
         height: of the ball at contact, or "".
         in_flight: whether the body flies to the ball.
@@ -68,6 +69,7 @@ class Label:
     both_hands: bool = False
     part_with: tuple[str, ...] = ()
     ball: str = ""
+    from_hands: bool = False
     gait: float | None = None
     height: str = ""
     in_flight: bool = False
@@ -160,7 +162,8 @@ def _parse_label(cells: dict[str, str], place: str) -> Label:
     return Label(
         name=cells["label"], title=cells["title"], meaning=cells["meaning"], kinds=values["kind"], group=cells["group"],
         parts=tuple("hand" if part == "hands" else part for part in values["part"]),
-        both_hands="hands" in values["part"], part_with=values["part_with"], ball=cells["ball"],
+        both_hands="hands" in values["part"], part_with=values["part_with"],
+        ball=(values["ball"] or ("",))[0], from_hands="held" in values["ball"],
         gait=float(cells["gait_m_s"]) if cells["gait_m_s"] else None, height=cells["height"],
         in_flight=bool(cells["flight"]), action=cells["action"], below=_parse_tree(cells["below"]),
     )  # fmt: skip

@@ -12,6 +12,9 @@ from .physics import FOOTBALL, compute_deceleration
 _GRAVITY, _BOUNCE = 9.81, 0.55
 _ON_GROUND = 0.03  # m above its radius up to which a ball counts as rolling
 _MIN_HOP_HEIGHT = 0.02  # m; a lower hop counts as rolling
+# m above the ground up to which the ground alone lifts a rolling ball to a foot: half its size; feeds' heights of
+# rolling balls are off by as much
+_BOBBLE = 0.1
 
 
 @dataclass(frozen=True, eq=False)
@@ -69,7 +72,8 @@ def compute_roll_speeds(starts: np.ndarray, ends: np.ndarray, seconds: np.ndarra
 def simulate_rolls(starts: np.ndarray, ends: np.ndarray, frames: np.ndarray, fps: float) -> RollResult:
     """Simulate balls that roll from `starts` to `ends`.
 
-    A ball that starts high falls and hops; a ball that ends high is sent upward to arrive there.
+    A ball that starts high falls and hops; a ball that ends high is sent upward to arrive there. One that rolls, and
+    ends just above the ground, bobbles up there at the end.
 
     Args:
         starts: (P, 3) m.
@@ -95,7 +99,9 @@ def _compute_heights(starts: np.ndarray, ends: np.ndarray, seconds, at: np.ndarr
     out, height_error = np.full((len(ends), len(at)), BALL_RADIUS), np.zeros(len(ends))
     for pair in np.flatnonzero(np.maximum(starts, ends) > BALL_RADIUS + _ON_GROUND):
         start, end, until = starts[pair], ends[pair], seconds[pair]
-        if end > BALL_RADIUS + _ON_GROUND:
+        if max(start - _ON_GROUND, end - _BOBBLE) <= BALL_RADIUS:
+            out[pair] = _simulate_bobble(end, until, at)
+        elif end > BALL_RADIUS + _ON_GROUND:
             upward = (end - start) / until + 0.5 * _GRAVITY * until
             out[pair] = np.maximum(start + upward * at - 0.5 * _GRAVITY * at**2, BALL_RADIUS)
             height_error[pair] = max(out[pair, at < until].max(initial=0.0) - max(start, end), 0.0)
@@ -103,6 +109,11 @@ def _compute_heights(starts: np.ndarray, ends: np.ndarray, seconds, at: np.ndarr
             out[pair] = _simulate_hops(start, at)
             height_error[pair] = abs(np.interp(until, at, out[pair]) - end)
     return out, height_error
+
+
+def _simulate_bobble(end: float, until: float, at: np.ndarray) -> np.ndarray:
+    """Simulate a rolling ball that rises last, with its top `end` m at `until` s; (D,) m at times `at` (D,) s."""
+    return np.maximum(end - 0.5 * _GRAVITY * (until - at) ** 2, BALL_RADIUS)
 
 
 def _simulate_hops(start: float, at: np.ndarray) -> np.ndarray:

@@ -6,11 +6,13 @@ import math
 
 import numpy as np
 
-from ..annotation.ball_contact import find_contact_window, find_striking_part
+from ..annotation.ball_contact import comes_from_hands, find_contact_window, find_striking_part
 from ..annotation.striking import CHEST_RADIUS, FOOT_RADIUS, HAND_RADIUS, HEAD_RADIUS, THIGH_RADIUS
 from ..motion.track import BALL_RADIUS, Track
+from ..synthesis.construct.ball_touch.part_reach import PELVIS_RANGE
+from ..synthesis.construct.ball_touch.touch_problem import BALL_NOISE, FILLED_NOISE
+from ..synthesis.construct.held_ball import HELD_DISTANCE
 from ..synthesis.construct.step_to_ball import compute_allowed_step
-from ..synthesis.construct.strike import BALL_NOISE, FILLED_NOISE, PELVIS_RANGE
 from ..synthesis.quality.moments import KeyMomentResult, list_contact_labels, measure_contact
 from .reference import View
 
@@ -57,8 +59,8 @@ def find_reachable(view: View, moment: KeyMomentResult) -> bool | None:
         view: the take beside its track.
         moment: the key moment.
     Returns:
-        Whether the ball lies within the part's reach from the tracked pelvis, on the ground and in height; None without
-        a part, a track or a ball.
+        Whether the ball lies within the part's reach from the tracked pelvis, on the ground and in height, or beside
+        who throws or punts it; None without a part, a track or a ball.
     """
     labels = list_contact_labels(moment)
     part = find_striking_part(labels)
@@ -69,6 +71,8 @@ def find_reachable(view: View, moment: KeyMomentResult) -> bool | None:
     noise = BALL_NOISE if sampled.ball_measured[at] else FILLED_NOISE
     reach = _DIVE_REACH if find_contact_window(labels) else REACH[part] + BALL_RADIUS
     away = float(np.linalg.norm(sampled.ball[at, :2] - sampled.raw[at]))
+    if comes_from_hands(labels):
+        return away < HELD_DISTANCE
     is_near = away <= reach + noise + compute_allowed_step(sampled.speed[at])
     return is_near and _is_at_height(view.track, part, time, sampled.ball[at, 2], noise)
 

@@ -21,9 +21,9 @@ from ..motion.track import BALL_RADIUS, Track, clean_track
 from ..motion.track.ball_path import BallPath
 from ..motion.track.match_data import Match
 from ..synthesis.construct.ball_detour import lead_ball_around_body
+from ..synthesis.construct.ball_touch.touch_frames import find_nearest_frame
 from ..synthesis.construct.contact_geometry import BALL_SECONDS
 from ..synthesis.construct.near_miss import miss_ball
-from ..synthesis.construct.strike import find_nearest_frame
 from ..synthesis.construct.strike_fixed_ball import FixedStrike, strike_fixed_ball
 from ..synthesis.plan import Plan
 from ..synthesis.resolved_touches import AT_BALL_GAP, build_trajectory
@@ -33,7 +33,7 @@ _ROUNDING = 1e-4  # m, positions are rounded to this, as in files
 _HELD_SECONDS = 4.0  # s before and after a key moment in which a ball may be held
 
 MAX_CLOSED_GAP = 0.15
-"""m: the largest gap that is closed, the same as in `synthesis.construct.strike`; a player who misses the ball by more
+"""m: the largest gap that is closed, as `OUT_OF_REACH` in `ball_touch.reach_ball`; a player who misses the ball by more
 is not corrected."""
 
 MIN_GAP = 1e-3

@@ -28,8 +28,8 @@ from ..motion.motion import Motion
 from ..motion.track import BALL_RADIUS, SampledTrack, Track
 from ..motion.track.ball_path import BallPath
 from ..motion.track.sampling import compute_travel_direction
+from ..synthesis.construct.ball_touch.touch_frames import Touch
 from ..synthesis.construct.construction import Construction
-from ..synthesis.construct.strike import Touch
 from ..synthesis.construct.strike_fixed_ball import FixedStrike, FixedStrikeResult, strike_fixed_ball
 from ..synthesis.construct.track_following import IN_PLACE_SPEED, follow_turning
 from ..synthesis.plan import Plan

@@ -27,12 +27,13 @@ from ..motion.motion import compute_pose
 from ..motion.track import BALL_RADIUS, Track
 from ..motion.track.ball_path import BallPath
 from .construct.ball_detour import find_free_contact, lead_ball_around_body
+from .construct.ball_touch.touch_frames import compute_contact_frames, find_nearest_frame
+from .construct.ball_touch.touch_problem import BALL_NOISE
 from .construct.contact_geometry import BALL_SECONDS, add_flight_arc, lead_ball_through
 from .construct.dribble import plan_dribbles
 from .construct.give import give_with_ball
 from .construct.held_ball import HandTouch, carry_in_hands, hold_in_spans
 from .construct.near_miss import miss_ball
-from .construct.strike import BALL_NOISE, compute_contact_frames, find_nearest_frame
 from .plan import Plan, PlayerTouch, ResolvedPlan, SolvedTrajectory
 from .take import DribbleTouch, KeyResult, Take
 
@@ -275,8 +276,10 @@ def apply_trajectory(take: Take, plan: ResolvedPlan) -> tuple[Take, list[str]]:
     pushed = [(push.first, push.last) for push in pushes]
     take = _miss_ball(take, replace(take.ball, positions=dribbled.ball))
     free, met = _free_met_ball(take, dribbled.ball, pushes)
-    free, carried = carry_in_hands(take.motion, free, [_build_hand_touch(take, key) for key in keys])
-    free, holds = hold_in_spans(take.motion, free, _find_shown(take, _HOLDING))
+    touches = [_build_hand_touch(take, key) for key in keys]
+    free, carried = carry_in_hands(take.motion, free, touches)
+    free, holds = hold_in_spans(take.motion, free, _find_shown(take, _HOLDING),
+                                met=[frame for touch in touches for frame in touch.frames])
     carried += holds
     around = lead_ball_around_body(take.motion.skeleton, take.motion.root_positions, take.motion.rotations, ball=free,
                                    held=[*met, *pushed, *carried], fps=fps)

@@ -33,12 +33,13 @@ from ..search.edit_list import EditList
 from ..search.request import SearchRequest, compute_needed_frames
 from ..search.source_frames import SourceFrames, SourceMotion, fetch_overlap
 from ..take import KeyResult
+from .ball_touch.touch_frames import Touch
 from .edit_blending import OldMotion
 from .extra_steps import Steps, add_steps
 from .gaze import compute_release, estimate_look, hide_lost_ball, watch_ball
 from .place_plant_foot import place_plant_feet
 from .settling import SPEEDS, measure_foot_moves, measure_rest, settle_on_track
-from .strike import Touch, strike_ball
+from .strike import strike_ball
 from .track_following import (
     absorb_foot_slide,
     add_sway,

@@ -18,8 +18,9 @@ from ...motion import quaternion
 from ...motion.humanoid import compute_heading_from_positions, identify_joints
 from ...motion.plant_place import compute_plant_shift, measure_plant_place
 from ...motion.skeleton import Skeleton
+from .ball_touch.touch_frames import Touch, find_nearest_frame
 from .move_body_part import Body, LimbReference, leg_chain, move_limb
-from .strike import StrikeResult, Touch, find_nearest_frame
+from .strike import StrikeResult
 
 MAX_PLANT_SHIFT = 0.12
 """Metres by which the step onto the plant foot goes elsewhere than recorded."""

@@ -19,8 +19,8 @@ from ...motion.motion import compute_pose
 from ...motion.skeleton import Skeleton
 from ..requested_actions import LEAVING_SECONDS
 from ..search.key_fit import FAST_BALL, FAST_PART, TURN_REACH, compute_free_angle, compute_free_turn
+from .ball_touch.touch_frames import Touch
 from .step_to_ball import measure_level_speed
-from .strike import Touch
 
 MAX_TURN_TO_BALL = np.radians(60.0)
 _FULL_TURN_SPEED = 3.0  # m/s up to which a body turns by MAX_TURN_TO_BALL: a faster one would drag its plant foot

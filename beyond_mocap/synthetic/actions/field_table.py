@@ -16,6 +16,7 @@ from .floor import (
     build_lying,
     build_quick_get_up,
     build_sitting,
+    build_sitting_with_ball,
     build_slide_tackle,
     build_slow_get_up,
 )
@@ -67,6 +68,8 @@ _MOVES = (
 _REACHES = (
     Action(name="throw-in", labels=frozenset({"throwb", "throw", "high"}), build=_build_throw_in),
     *build_pose_actions(BALL_POSES),
+    Action(name="sitting with the ball", labels=frozenset({"hold", "sitting"}), build=build_sitting_with_ball,
+           needs=frozenset({"hold", "sitting"}), is_span=True),
     *(Action(name=name, labels=frozenset({label, "slide", "foot", "low", "running", "front"}), has_side=True,
              build=build_slide_tackle, speeds=_RUNS, suits=_SLIDES)
       for name, label in (("slide tackle", "tackle"), ("sliding block", "block"),

@@ -7,17 +7,20 @@ m/s^2 (coefficient of friction of 0.5 to 0.6: Lake, Carre 2007 for skin and clot
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
 from ..gait_tables import GRAVITY
-from ..gestures import Gesture
+from ..gestures import Gesture, interpolate_rows
 from .action import ActionSetting
+from .ball_hands import hold_ball
 from .body_poses import NO_ARM, BodyPoses, build_body_poses
 
 _GRASS = 5.5  # m/s^2 by which a sliding body slows down
 _UP_HALFWAY = 1.2  # s from the chest's landing to the middle of getting up
+_SITS_DOWN, _SITS = -2.0, 2.0  # s from the middle of sitting at which the body begins to sit down, and to get up
 _LYING_DOWN = 2.0  # s of sitting and lying down
 _UP_BACK_LIES, _UP_BACK_HALFWAY = 0.55, 1.0  # s of `_UP_BACK` that lie, and from there to its middle
 _STANDING_HIPS = 0.93  # m above the ground, of an adult who stands
@@ -297,10 +300,29 @@ def build_sitting(setting: ActionSetting) -> Gesture:
     Returns:
         The movement; it has no key moment, and lasts while the body sits.
     """
-    up, down, sits = _UP_BACK, -2.0, 2.0
+    return _build_seat(setting, arm=(-34, 26, -10, 16), down=_SITS_DOWN)
+
+
+def build_sitting_with_ball(setting: ActionSetting) -> Gesture:
+    """Build sitting down on the ground with a ball in both hands, as `build_sitting` otherwise, and getting up.
+
+    Args:
+        setting: for whom.
+    Returns:
+        The movement; it has no key moment, and lasts while the body sits.
+    """
+    gesture = _build_seat(setting, arm=(44, 8, 20, 66), down=_SITS_DOWN)
+    times = np.arange(len(gesture.motion)) / setting.fps - gesture.end
+    rows = ((_SITS_DOWN - _SITS, 0, 0.26), (_SITS_DOWN - _SITS + 0.4, 1, 0.26), (0.0, 1, 0.26), (0.4, 0, 0.3))
+    return replace(gesture, motion=hold_ball(gesture.motion, interpolate_rows(rows, times), setting.neutral))
+
+
+def _build_seat(setting: ActionSetting, arm: tuple[float, ...], down: float) -> Gesture:
+    """Build sitting down from `down` s on, with a pose of both arms, and getting up; it lasts while the body sits."""
+    up, sits = _UP_BACK, _SITS
     later = {name: tuple((row[0] - 1.15 + sits, *row[1:]) for row in rows if row[0] >= 1.3)
              for name, rows in up.items() if name != "end"}
-    spine, tilt, arm = 30, -24, (-34, 26, -10, 16)
+    spine, tilt = 30, -24
     arms = ((down - 0.2, *NO_ARM), (down + 0.4, 20, 20, 10, 20), (down + 1.0, *arm), (sits, *arm), *later["arm"])
     still = ((down - 0.2, 0, 0, 0, 0, 0, 0), (sits + 2.0, 0, 0, 0, 0, 0, 0))
     gesture = build_body_poses(BodyPoses(

@@ -67,6 +67,7 @@ class KeyPoses:
         flights: seconds of take-off and landing of each flight.
         lies: seconds between which the body lies or rolls on the ground.
         hold: rows (time, share, m between both hands' joints): hands that meet around a ball.
+        needs: labels that a request has to name (`Action`).
         varies: name of the action beside which it is offered (`Action`).
         style: of the gait below.
     """
@@ -94,6 +95,7 @@ class KeyPoses:
     flights: tuple[tuple[float, float], ...] = ()
     lies: tuple[float, float] | None = None
     hold: Rows | None = None
+    needs: str = ""
     varies: str = ""
     style: GaitStyle = GaitStyle(life=0.6)
 

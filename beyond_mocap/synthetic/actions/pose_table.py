@@ -14,6 +14,7 @@ from .body_gestures import GESTURES
 from .celebrations import CELEBRATIONS
 from .keeper_dives import DIVES
 from .keeper_saves import HANDS_AT_TOP, SAVES
+from .keeper_slide import SLIDES
 from .keeper_throws import THROWS
 from .key_poses import KeyPoses, build_key_poses, retime_flight
 
@@ -40,7 +41,8 @@ def _build_row(name: str, recipe: KeyPoses) -> Action:
 
     labels = frozenset(recipe.labels.split())
     return Action(name=name.replace("_", " "), labels=labels - set(SIDES), build=build, meets=recipe.meets,
-                  heights=(1.9, 2.7) if hands else (), has_side=bool(labels & set(SIDES)), is_span=recipe.is_span,
+                  needs=frozenset(recipe.needs.split()), heights=(1.9, 2.7) if hands else (),
+                  has_side=bool(labels & set(SIDES)), is_span=recipe.is_span,
                   can_last=recipe.can_last, varies=recipe.varies)
 
 
@@ -49,5 +51,5 @@ def build_pose_actions(*tables: Mapping[str, KeyPoses]) -> tuple[Action, ...]:
     return tuple(_build_row(name, recipe) for table in tables for name, recipe in table.items())
 
 
-POSE_ACTIONS = build_pose_actions(SAVES, DIVES, THROWS, GESTURES, CELEBRATIONS)
+POSE_ACTIONS = build_pose_actions(SAVES, DIVES | SLIDES, THROWS, GESTURES, CELEBRATIONS)
 """Rows for `table.ACTIONS`."""

@@ -118,6 +118,12 @@ def test_a_keeper_meets_the_ball_where_it_is():
              for words, height in (((), 0.2), ((), 1.2), ((), 2.3), (("dive",), 0.3), (("dive",), 1.5))]
     assert names == ["catch low", "catch chest", "catch high", "dive short low catch", "dive short high catch"]
     assert find_action(moment("stomp", "dive", "long_duration", "left")).name == "dive long high push"
+    assert find_action(moment("catchb", "slide", speed=4.0)).name == "catch slide"
+
+
+def test_who_holds_the_ball_sits_only_where_both_labels_ask_for_it():
+    names = [find_action(moment(*words, is_span=True)).name for words in (("hold",), ("sitting",), ("hold", "sitting"))]
+    assert names == ["holding the ball", "sitting", "sitting with the ball"]
 
 
 def test_a_gesture_is_shown_where_it_is_requested_and_nowhere_else(library):

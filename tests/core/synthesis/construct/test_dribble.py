@@ -199,6 +199,17 @@ def test_a_ball_from_the_chest_falls_and_hops():
     assert np.flatnonzero(height <= BALL_RADIUS + 0.05)[0] / FPS == pytest.approx(np.sqrt(2 * 0.89 / 9.81), abs=0.05)
 
 
+@pytest.mark.parametrize("end, frames, most", [(0.2, 18, 0.2), (0.15, 30, 0.15), (0.4, 18, 0.8), (0.2, 3, 0.2)])
+def test_a_rolling_ball_bobbles_up_to_a_low_foot_and_is_lifted_to_a_high_one(end, frames, most):
+    start = np.array([[0.0, 0.0, BALL_RADIUS]])
+    found = simulate_rolls(start, np.array([[1.5, 0.0, end]]), np.array([frames]), FPS)
+    height = np.append(BALL_RADIUS, found.balls[0, :, 2])
+    assert height[-1] == pytest.approx(end) and height.max() <= most + 1e-9
+    flies = height[:-2] > BALL_RADIUS + 1e-6
+    assert np.abs(np.diff(height, 2)[flies] + 9.81 / FPS**2).max() < 1e-9
+    assert found.height_error[0] == pytest.approx(height.max() - end)
+
+
 def test_led_through_a_place_a_flight_stays_a_flight():
     times = np.arange(60) / FPS
     flight = np.stack([8.0 * times, 0.0 * times, 3.0 + 9.0 * times - 4.905 * times**2], axis=1)

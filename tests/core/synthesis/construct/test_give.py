@@ -6,8 +6,9 @@ import pytest
 from beyond_mocap.annotation.ball_contact import build_surfaces, measure_contact_gap
 from beyond_mocap.annotation.striking import BALL_RADIUS
 from beyond_mocap.motion.motion import forward_kinematics
+from beyond_mocap.synthesis.construct.ball_touch.touch_frames import Touch
 from beyond_mocap.synthesis.construct.give import ROLL_SECONDS, give_with_ball
-from beyond_mocap.synthesis.construct.strike import Touch, strike_ball
+from beyond_mocap.synthesis.construct.strike import strike_ball
 from beyond_mocap.synthetic.actions.receptions import RECEPTIONS, build_reception
 
 FPS = 60.0

@@ -17,18 +17,23 @@ BODY = identify_joints(SKELETON)
 REACH = 0.16  # m from a hand's joint to the centre of a ball that it touches
 
 
-def play(name, words, passes=False):
-    """An action with the feed's ball at the player: ball, key frame, hands (T, 2, 3), and when it is held."""
+def play(name, words, passes=False, at=(0.35, 0.0, 1.1), low=0.0):
+    """An action with the feed's ball at the player: ball, key frame, hands (T, 2, 3), and when it is held.
+
+    at: m, the ball from the pelvis' place on the ground; low: s before the key at which the clip begins, 0 all of it.
+    """
     action = next(one for one in ACTIONS if one.name == name)
     gesture = action.build(ActionSetting(skeleton=SKELETON, fps=FPS))
     places, _ = forward_kinematics(gesture.motion)
     hands, key = places[:, [BODY.left.hand, BODY.right.hand]], round(gesture.key * FPS)
-    feed = places[:, BODY.hips] * [1.0, 1.0, 0.0] + [0.35, 0.0, 1.1]
+    feed = places[:, BODY.hips] * [1.0, 1.0, 0.0] + at
     if passes:
         feed = feed + np.outer(np.arange(len(feed)) - key, [-8.0 / FPS, 0.0, 0.0])
-    meets = places[key, BODY.right.toe] + [0.1, 0.0, 0.1] if name == "punt" else hands[key].mean(axis=0)
+    in_hand = hands[key, 1] + [0.0, 0.0, REACH] if "out " in words else hands[key].mean(axis=0)
+    meets = places[key, BODY.right.toe] + [0.1, 0.0, 0.1] if name == "punt" else in_hand
     feed[key] = meets
-    touch = HandTouch(frames=(key, key), words=tuple(words.split()), low=0, high=len(feed) - 1)
+    touch = HandTouch(frames=(key, key), words=tuple(words.split()), high=len(feed) - 1,
+                      low=key - round(low * FPS) if low else 0)
     ball, held = carry_in_hands(gesture.motion, feed, [touch])
     assert np.array_equal(ball[key], meets)
     return ball, feed, key, hands, held
@@ -37,7 +42,7 @@ def play(name, words, passes=False):
 @pytest.mark.parametrize("name, words, seconds", [
     ("throw-in with a run-up", "throwb high", -0.3), ("chest throw", "throwb middle", -0.4),
     ("catch chest", "catchb middle", 0.6), ("catch low", "catchb low", 0.6),
-    ("dive long low catch", "catchb dive low right", 0.5),
+    ("dive long low catch", "catchb dive low right", 0.5), ("catch slide", "catchb low slide", 0.6),
 ])  # fmt: skip
 def test_a_held_ball_touches_both_hands(name, words, seconds):
     ball, _, key, hands, held = play(name, words)
@@ -45,6 +50,27 @@ def test_a_held_ball_touches_both_hands(name, words, seconds):
     assert any(first <= at <= last for first, last in held)
     away = np.linalg.norm(hands[at] - ball[at], axis=1)
     assert REACH - 0.01 < away.min() and away.max() < REACH + 0.12  # a trunk or a knee may be between them
+
+
+BESIDE = [("throw-in", "throwb high", 0.3), ("throw out", "throwout right", 0.3), ("roll out", "rollout right", 0.3),
+          ("punt", "punt foot top right", 0.45)]
+
+
+@pytest.mark.parametrize("name, words, seconds", BESIDE)
+def test_who_throws_or_punts_has_a_ball_that_the_feed_leaves_on_the_line(name, words, seconds):
+    ball, feed, key, hands, held = play(name, words, at=(0.3, 2.3, BALL_RADIUS))
+    at = key - round(seconds * FPS)
+    assert len(held) == 1 and held[0][0] <= at
+    away = np.linalg.norm(hands[at] - ball[at], axis=1).min()
+    assert away < REACH + 0.12
+    _, far, *_, held = play(name, words, at=(0.3, 2.8, BALL_RADIUS))
+    assert held == []
+
+
+def test_a_ball_comes_into_the_hands_before_the_clip_that_holds_it():
+    ball, *_, key, _, held = play("throw-in", "throwb high", at=(0.3, 2.3, BALL_RADIUS), low=0.5)
+    assert held == [(key - round(0.5 * FPS), key)]
+    assert np.linalg.norm(np.diff(ball[: held[0][0] + 1], axis=0), axis=1).max() * FPS < 6.0
 
 
 def test_a_ball_that_is_thrown_overarm_swings_with_the_hand():
@@ -69,11 +95,13 @@ def test_a_ball_that_comes_and_goes_is_not_held(name, words):
     assert held == [] and np.array_equal(ball, feed)
 
 
-def test_a_ball_is_held_while_a_span_shows_it():
-    action = next(one for one in ACTIONS if one.name == "holding the ball")
-    motion = action.build(ActionSetting(skeleton=SKELETON, fps=FPS)).motion
+@pytest.mark.parametrize("name", ["holding the ball", "sitting with the ball"])
+def test_a_ball_is_held_while_a_span_shows_it(name):
+    action = next(one for one in ACTIONS if one.name == name)
+    gesture = action.build(ActionSetting(skeleton=SKELETON, fps=FPS))
+    motion = gesture.motion
     feed = motion.root_positions * [1.0, 1.0, 0.0] + [0.4, 0.0, BALL_RADIUS]
-    ball, held = hold_in_spans(motion, feed, [(0, len(feed) - 1)])
+    ball, held = hold_in_spans(motion, feed, [(round(gesture.start * FPS), round(gesture.end * FPS))])
     (first, last), = held
     hands = forward_kinematics(motion)[0][:, [BODY.left.hand, BODY.right.hand]]
     middle = (first + last) // 2

@@ -10,8 +10,11 @@ from beyond_mocap.annotation.striking import measure_ball_gap
 from beyond_mocap.motion.contacts import detect_contacts
 from beyond_mocap.motion.humanoid import identify_joints
 from beyond_mocap.motion.motion import Motion, compute_pose
+from beyond_mocap.synthesis.construct.ball_touch.part_reach import MAX_DROP, MAX_SHIFT
+from beyond_mocap.synthesis.construct.ball_touch.touch_frames import Touch
+from beyond_mocap.synthesis.construct.ball_touch.touch_problem import BALL_NOISE
 from beyond_mocap.synthesis.construct.step_to_ball import FAST_STEP, SLOW_STEP, compute_allowed_step
-from beyond_mocap.synthesis.construct.strike import BALL_NOISE, MAX_DROP, MAX_SHIFT, Touch, strike_ball
+from beyond_mocap.synthesis.construct.strike import strike_ball
 from beyond_mocap.synthetic import gestures
 from beyond_mocap.synthetic.gait import build_gait
 
@@ -200,6 +203,15 @@ def test_head_chest_and_hands_meet_a_ball_of_unknown_height(walk, words):
     check_whole(walk.motion, struck)
     assert max(map(abs, gaps(walk.motion, struck, near, words))) < 0.005
     assert struck.ball[near - 20, 2] == struck.ball[near + 20, 2] == 0.11
+
+
+@pytest.mark.parametrize("away, is_met", [(2.3, True), (2.7, False)])
+def test_a_ball_that_is_thrown_is_in_the_hands_where_the_feed_has_it_beside_the_player(walk, away, is_met):
+    near = int(walk.key * FPS)
+    place = kinematics(walk.motion)[0][near, identify_joints(walk.motion.skeleton).hips] * [1.0, 1.0, 0.0]
+    struck = met(walk, place + [0.0, away, 0.11], touch(walk, ("throwb", "high")))
+    assert (struck.gap[0] < 0.005) == (struck.ball_shift[0] > 1.5) == is_met
+    assert met(walk, place + [0.0, 2.3, 0.11], touch(walk, ("punch", "high"))).gap[0] > 1.0
 
 
 def test_a_ball_of_unknown_height_flies_freely(walk):

@@ -5,8 +5,8 @@ import pytest
 
 from beyond_mocap.annotation.ball_contact import build_surfaces
 from beyond_mocap.motion.motion import compute_pose
+from beyond_mocap.synthesis.construct.ball_touch.touch_frames import Touch
 from beyond_mocap.synthesis.construct.construction import apply_heading
-from beyond_mocap.synthesis.construct.strike import Touch
 from beyond_mocap.synthesis.construct.turn_to_ball import MAX_TURN_TO_BALL, compute_turn_to_ball
 from beyond_mocap.synthetic.gestures import build_strike as made_strike
 
