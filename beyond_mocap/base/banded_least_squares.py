@@ -98,13 +98,15 @@ class BandedLeastSquares:
             index: (R, M) int, the unknowns of each row, within `reach` frames of each other.
             values: (R, M) or (M,), the coefficients.
             weight: (R,).
-            goal: (R,) or one number, or (R, columns) where there are columns, in the unknowns' unit.
+            goal: (R,) or one number, or (R, columns) where there are columns, in the unknowns' unit; (R,) is the goal
+                of every column.
         """
         values = np.broadcast_to(values, index.shape)
         weighted_values = weight[:, None] * values
         size = len(self.right)
-        goals = np.reshape(goal, (-1, 1 if self.right.ndim == 1 else self.right.shape[1]))
-        for column, sums in zip(goals.T, self.right.reshape(size, -1).T):
+        columns = self.right.reshape(size, -1)
+        goals = goal if np.ndim(goal) == 2 else np.reshape(goal, (-1, 1))
+        for column, sums in zip(np.broadcast_to(goals, (len(index), columns.shape[1])).T, columns.T):
             sums += np.bincount(index.ravel(), (weighted_values * column[:, None]).ravel(), size)
         for a in range(index.shape[1]):
             # Keep the pairs on or below the diagonal. Diagonal d and column c of the band are element d * size + c of

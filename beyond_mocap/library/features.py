@@ -17,6 +17,7 @@ import numpy as np
 from ..base.time_series import time_derivative
 from ..motion import quaternion
 from ..motion.humanoid import compute_heading_from_positions, identify_joints
+from ..motion.lean import compute_lean_slopes
 from ..motion.motion import compute_pose, sample_frames
 from ..motion.skeleton import Skeleton
 from ..motion.track import smooth_zero_phase_hann
@@ -42,6 +43,7 @@ class Frames:
         velocity: (N, 2) of that path, m/s, in the heading frame (x forward, y left).
         feet: (N, 4) metres from the path to the left and the right toe (ankle where there is none), heading frame.
         jerk: (N,) m/s^3 of the joint that has most, from the third difference around each frame.
+        lean: (N, 2) how far the body leans ahead and to the left of its travel, as a slope, over the stances around.
         features: (N, D) float32, metres.
         posture: (N, K) float32, see `posture.compute_postures`.
         mean, basis: (K,) and (K, D), which convert raw features.
@@ -59,6 +61,7 @@ class Frames:
     velocity: np.ndarray
     feet: np.ndarray
     jerk: np.ndarray
+    lean: np.ndarray
     features: np.ndarray
     posture: np.ndarray
     mean: np.ndarray
@@ -172,6 +175,7 @@ def _build_frames(clips, reference: Frames | None) -> Frames:
             quaternion.rotate_level(time_derivative(path, FPS), -facing),
             _compute_feet(positions, toes, path, facing),
             compute_max_jerk(positions, FPS),
+            compute_lean_slopes(skeleton, positions, FPS).astype(np.float32),
             compute_raw_features(positions[:, joints], facing, FPS).astype(np.float32),
             compute_postures(positions, facing, FPS, body),
             build_label_matrix(clip, source, vocabulary),
@@ -207,13 +211,14 @@ def join_frames(a: Frames, b: Frames) -> Frames:
         words[rows, [vocabulary.index(word) for word in frames.vocabulary]] = frames.words
     parts = {
         name: np.concatenate([getattr(a, name), getattr(b, name)])
-        for name in ("source", "count", "root", "heading", "path", "velocity", "feet", "jerk", "features", "posture")
+        for name in ("source", "count", "root", "heading", "path", "velocity", "feet", "jerk", "lean", "features", "posture")
     }
     clip, first = np.append(a.clip, b.clip + len(a.first)), np.append(a.first, b.first + len(a))
     return Frames(clip=clip, first=first, mean=a.mean, basis=a.basis, words=words, vocabulary=vocabulary, **parts)
 
 
-_COLUMNS = ("clip", "source", "root", "heading", "path", "velocity", "feet", "jerk", "features", "posture", "words")
+_COLUMNS = ("clip", "source", "root", "heading", "path", "velocity", "feet", "jerk", "lean", "features", "posture",
+            "words")
 
 
 def _compute_feet(positions: np.ndarray, toes: list[int], path: np.ndarray, facing: np.ndarray) -> np.ndarray:

@@ -18,6 +18,7 @@ from ..annotation import LOCOMOTION, ClipAnnotation, estimate_gait_thresholds
 from ..annotation.gaits import STANDING, STANDING_SPEED
 from ..annotation.vocabulary import DIRECTIONS
 from ..base.errors import InputError, format_count
+from ..motion.retargeting.neutral import NeutralStance, build_neutral_stance
 from ..motion.skeleton import Skeleton
 from . import cache
 from .cache import write_synthetic_clips
@@ -31,7 +32,7 @@ from .loops.standing_loops import MIN_STAND_SECONDS
 from .manners import Manners, measure_manners
 from .posture import NormalPostures, fit_normal_postures
 from .receptions import find_cut_receptions
-from .synthetic_clips import KICK_STEP, iter_synthetic_clips, measure_kick_speed
+from .synthetic_clips import KICK_STEP, iter_synthetic_clips, measure_kick_speed, sample_upright_example
 
 MIN_RUN_SECONDS = 2.0  # of a track's runs from which on long runs are needed
 RESTING_SPEED = 0.1  # m/s of a track below which a player stands
@@ -131,6 +132,12 @@ class Library:
         return fit_normal_postures(self.frames, self._is_recorded, self.fps)
 
     @cached_property
+    def neutral_stance(self) -> NeutralStance:
+        """How people of this library stand."""
+        recordings = [clip for clip in self.clips if not clip.is_synthetic] or self.clips
+        return build_neutral_stance(self.skeleton, sample_upright_example(recordings))
+
+    @cached_property
     def coverage(self) -> Coverage:
         """What the recordings lack of the motion that players need."""
         return measure_coverage(self.clips, self.frames, self.fps, self.strangeness)
@@ -188,7 +195,7 @@ class Library:
         """
         added = replace(self, clips=tuple(clips), frames=build_frames(clips, self.frames), clusters={})
         joined = self._join(added)
-        known = {name: getattr(self, name) for name in ("normal_postures", "cut_receptions", "gaits")}
+        known = {name: getattr(self, name) for name in ("normal_postures", "cut_receptions", "gaits", "neutral_stance")}
         known |= {name: np.concatenate([getattr(self, name), getattr(added, name)])
                   for name in ("strangeness", "stance_seconds", "feet_in_contact")}
         vars(joined).update(known)  # where cached properties keep their values

@@ -3,7 +3,8 @@
 While a foot pushes a body sideways or ahead with an acceleration a, its force passes through the centre of mass only if
 that lies off the foot by a / g of its height, over a stride on average. `measure_lean` tells how far it does;
 `compute_footprint_shifts` and `tilt_body` give what is missing: the footprints move outward below a centre of mass that
-stays, and the body turns about it by half the angle, as recorded trunks do (slope .5 in bends, .7 and more in starts).
+stays, and the body tilts, in bends by half the angle, in starts and stops by a little more than all of it: so do
+recorded trunks (slope .5 aside, .7 to 1.4 ahead).
 
 Source: ../shared/prototype-momentum.md, measured on recordings; Greene 1985, J Biomech Eng 107: the lean of runners in
 bends is atan(v^2 / (r g)).
@@ -16,19 +17,22 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..base.easing import quintic_step, smoothstep
-from ..base.time_series import hann_smooth, time_derivative
-from ..base.vectors import unit_vectors
+from ..base.time_series import find_runs, hann_smooth, interpolate_columns, time_derivative
+from ..base.vectors import cross_on_ground, unit_vectors
 from . import quaternion
-from .humanoid import Humanoid
-from .supports import GRAVITY, Stances
+from .humanoid import Humanoid, identify_joints
+from .mass import compute_centre_of_mass
+from .skeleton import Skeleton
+from .supports import GRAVITY, Stances, find_stances
 
 MOST_ACCELERATION = 0.5 * GRAVITY  # m/s^2 that a lean answers; recordings' 99th percentile is .33 to .57 g
 _ACCELERATION_SECONDS = 0.35  # s to either side over which the acceleration of the centre of mass is smoothed
 _NEIGHBOUR_SECONDS = 0.8  # s within which stances are one run
 _DEAD_ZONE = (0.03, 0.02)  # m ahead and aside that are no error: one stance tells no more
-_MOST_SHIFT = (0.14, 0.14)  # m ahead and aside that footprints move at most; more turns a step into a lunge
+_MOST_SHIFT = (0.18, 0.14)  # m ahead and aside that footprints move at most; more turns a step into a lunge
+_LEAST_HEIGHT = 0.5  # m of a centre of mass over the foot for which shifts are turned into angles: bodies lie and slide
 _SPEEDS = (1.2, 2.2)  # m/s between which the lean of a step begins to count
-_TRUNK_SHARE = 0.5  # of the missing angle by which the body turns
+_TURN_SHARE = (1.2, 0.5)  # of the missing angle ahead and aside by which the body turns, as recorded trunks do
 _TILT_SECONDS = 0.12  # s to either side over which that turn is smoothed
 
 
@@ -54,6 +58,11 @@ class Lean:
         size = np.linalg.norm(self.acceleration, axis=1, keepdims=True)
         asked = self.acceleration * np.minimum(1.0, MOST_ACCELERATION / np.maximum(size, 1e-9))
         return self.height[:, None] * asked / GRAVITY - self.offset
+
+    @property
+    def lever(self) -> np.ndarray:
+        """(S,) m of the centre of mass over the ground, as of a body on its feet."""
+        return np.maximum(self.height, _LEAST_HEIGHT)
 
     @property
     def travel(self) -> np.ndarray:
@@ -84,6 +93,25 @@ def measure_lean(body: Humanoid, positions: np.ndarray, centre: np.ndarray, stan
     return Lean(means[:, 0:2] - means[:, 7:9], means[:, 2] - means[:, 9], means[:, 3:5], means[:, 5:7])
 
 
+def compute_lean_slopes(skeleton: Skeleton, positions: np.ndarray, fps: float) -> np.ndarray:
+    """Compute how far a body leans in every frame: the lean of its stances, interpolated.
+
+    Args:
+        skeleton: J joints.
+        positions: (T, J, 3) m, world.
+        fps: frames per second.
+    Returns:
+        (T, 2) slope ahead and to the left of its travel; 0 without stances.
+    """
+    body, stances = identify_joints(skeleton), find_stances(skeleton, positions, fps)
+    if not len(stances):
+        return np.zeros((len(positions), 2))
+    lean = measure_lean(body, positions, compute_centre_of_mass(body, positions), stances, fps)
+    slope, ahead = lean.offset / lean.height[:, None], lean.travel
+    own = np.stack([np.sum(slope * ahead, axis=1), cross_on_ground(ahead, slope)], axis=1)
+    return interpolate_columns(np.arange(len(positions)), stances.middle, own)
+
+
 def choose_shifts(lean: Lean, share: np.ndarray) -> np.ndarray:
     """Choose by how much each stance leans more.
 
@@ -105,52 +133,73 @@ def choose_shifts(lean: Lean, share: np.ndarray) -> np.ndarray:
     return shift
 
 
-def compute_footprint_shifts(stances: Stances, shifts: np.ndarray, count: int) -> np.ndarray:
+def choose_angles(lean: Lean, shifts: np.ndarray) -> np.ndarray:
+    """Choose by how much the body turns with the shifts of its stances.
+
+    Args:
+        lean: the S stances.
+        shifts: (S, 2) m of `choose_shifts`.
+    Returns:
+        (S, 2) rad by which the body tilts towards x and y, world.
+    """
+    slope, ahead = shifts / lean.lever[:, None], lean.travel
+    along = np.sum(slope * ahead, axis=1, keepdims=True) * ahead
+    return _TURN_SHARE[0] * along + _TURN_SHARE[1] * (slope - along)
+
+
+def compute_footprint_shifts(stances: Stances, shifts: np.ndarray, share: np.ndarray) -> np.ndarray:
     """Compute how both feet move so that their stances lean more: constant in a stance, eased while the foot swings.
+
+    A foot that swings through frames without a share is where it was in them.
 
     Args:
         stances: S stances.
-        shifts: (S, 2) m of `choose_shifts`.
-        count: T frames.
+        shifts: (S, 2) m of `choose_shifts`, zero for stances that touch frames without a share.
+        share: (T,) from 0 to 1.
     Returns:
         (T, 2, 2) m, left and right foot, world.
     """
-    out, at = np.zeros((count, 2, 2)), np.arange(count)
+    out, at = np.zeros((len(share), 2, 2)), np.arange(len(share))
+    rests = np.array(find_runs(share <= 0.0)).reshape(-1, 2) - [0, 1]
     for side in (0, 1):
         own = stances.side == side
         if own.any():
-            times = np.stack([stances.start[own], stances.stop[own]], axis=1).ravel()
-            values = np.repeat(-shifts[own], 2, axis=0)
+            spans = np.concatenate([np.stack([stances.start[own], stances.stop[own]], axis=1), rests])
+            values = np.repeat(np.concatenate([-shifts[own], np.zeros(rests.shape)]), 2, axis=0)
+            order = np.argsort(spans.ravel(), kind="stable")
+            times, values = spans.ravel()[order], values[order]
             place = np.interp(at, times, np.arange(len(times)))
             segment = np.minimum(place.astype(int), len(times) - 2)
-            share = quintic_step(place - segment)[:, None]
-            out[:, side] = values[segment] + share * (values[segment + 1] - values[segment])
+            eased = quintic_step(place - segment)[:, None]
+            out[:, side] = values[segment] + eased * (values[segment + 1] - values[segment])
     return out
 
 
-def tilt_body(
-    root: np.ndarray, rotations: np.ndarray, centre: np.ndarray, stances: Stances, slopes: np.ndarray, fps: float
-) -> tuple[np.ndarray, np.ndarray]:
-    """Turn a body about its centre of mass by half the angle that its stances lack.
+def tilt_body(rotations: np.ndarray, stances: Stances, angles: np.ndarray, share: np.ndarray, fps: float
+              ) -> np.ndarray:
+    """Tilt a body about its root, which stays on its track, smoothly over its stances.
 
     Args:
-        root: (T, 3) m, world.
         rotations: (T, J, 4) local rotations.
-        centre: (T, 3) m, the centre of mass, world.
         stances: S stances.
-        slopes: (S, 2) shift over height of the centre of mass, world.
+        angles: (S, 2) rad of `choose_angles`.
+        share: (T,) from 0, where the body does not tilt, to 1.
         fps: frames per second.
     Returns:
-        Root (T, 3) m and rotations (T, J, 4).
+        (T, J, 4) local rotations.
     """
-    at, reach = np.arange(len(root)), max(int(round(_TILT_SECONDS * fps)), 1)
-    curve = np.stack([hann_smooth(np.interp(at, stances.middle, slope), reach) for slope in slopes.T], axis=1)
+    at, reach = np.arange(len(rotations)), max(int(round(_TILT_SECONDS * fps)), 1)
+    # a long stance keeps its angle: a body that comes to stand straightens as it puts its feet down
+    half = np.minimum(0.5 * (stances.stop - stances.start), reach)
+    times = np.concatenate([stances.start + half, stances.stop - half])
+    order = np.argsort(times, kind="stable")
+    held = interpolate_columns(at, times[order], np.tile(angles, (2, 1))[order])
+    curve = share[:, None] * np.stack([hann_smooth(angle, reach) for angle in held.T], axis=1)
     # leaning towards (x, y) is a turn about (-y, x)
-    axis = np.column_stack([-curve[:, 1], curve[:, 0], np.zeros(len(root))])
-    turn = quaternion.from_rotation_vector(_TRUNK_SHARE * axis)
+    turn = quaternion.from_rotation_vector(np.column_stack([-curve[:, 1], curve[:, 0], np.zeros(len(curve))]))
     out = rotations.copy()
     out[:, 0] = quaternion.multiply(turn, rotations[:, 0])
-    return centre + quaternion.rotate(turn, root - centre), out
+    return out
 
 
 def _average_stance(values: np.ndarray, start: float, stop: float) -> np.ndarray:

@@ -34,6 +34,8 @@ _FLIGHT_SECONDS, _FLIGHT_FADE = 0.4, 0.2  # s beside a flight in which momentum 
 _WEIGHT_ELSEWHERE = 1e-4  # far from flights, where a body walks or stands, its recording knows better
 _CLAMP_UP, _CLAMP_LEVEL = 1e3, 1e2  # weights of forces beyond strength and friction; friction is soft: tracks brake so
 _CLAMP_ROUNDS = 2
+_REST = 1e-9  # of a force that no term determines: it is 0
+_RATE = 30.0  # frames per second at which the terms above have these weights
 _HOLD = 1e4  # a curve that stays is held within a tenth of a millimetre
 _FEWEST_SEGMENTS = 3  # of a phase of support, between knots of the force
 
@@ -131,8 +133,10 @@ class MomentumPlanner:
         law, forces = self._law_rows, self._force_rows
         reach = max(int(np.ptp(index, axis=1).max(initial=1)) for index in (law[0], forces[0], self._block_index))
         squares = BandedLeastSquares(len(self._frame_index) + len(self._knot_index), reach=reach, columns=columns)
-        squares.add_rows(*law, self._weight[1:-1] / _EXACT**2, np.full((len(law[0]), columns), gravity))
-        squares.add_rows(*forces, np.full(len(forces[0]), smooth**-2), np.zeros((len(forces[0]), columns)))
+        squares.add_rows(*law, self._weight[1:-1] / _EXACT**2, gravity)
+        # sums over frames grow with the rate, and third differences shrink with its third power
+        squares.add_rows(*forces, np.full(len(forces[0]), (self.fps / _RATE) ** 6 / smooth**2))
+        self._hold_forces(squares, np.full(len(self._knots), _REST), np.zeros((len(self._knots), columns)))
         return squares
 
     @cached_property
@@ -183,8 +187,9 @@ class MomentumPlanner:
         weights[self._frame_index], goals[self._frame_index] = weight * (1.0 + _HOLD * (1.0 - self.share)), curve
         squares.add_value(weights, goal=goals)
         samples = self._block_frames.shape[1]
-        squares.add_rows(self._block_index, np.full(samples, 1.0 / samples),
-                         np.full(len(self._block_index), block**-2), curve[self._block_frames].mean(axis=1))
+        firm = np.full(len(self._block_index), self.fps / _RATE / block**2)
+        squares.add_rows(self._block_index, np.full(samples, 1.0 / samples), firm,
+                         curve[self._block_frames].mean(axis=1))
         return squares
 
     def _hold_forces(self, squares: BandedLeastSquares, weight: np.ndarray, goal: np.ndarray) -> None:

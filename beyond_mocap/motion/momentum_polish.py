@@ -1,9 +1,9 @@
 """A body that obeys momentum: the last polish of a construction, after its feet are planted.
 
-Stances are found anew (`supports`), bends, starts and stops get their lean (`lean`), a centre of mass is planned that
+Stances are found again (`supports`), bends, starts and stops get their lean (`lean`), a centre of mass is planned that
 flies on parabolas and is pushed only by feet on the ground (`momentum`), and the body follows it: its root moves,
 standing feet stay, swinging feet go with the pelvis, heels rise where a leg does not reach. Where that is not enough
-the plan is made anew with a lower body.
+the plan is made again with a lower body.
 
 The root takes the whole correction. With a third of it in the trunk the head accelerates 9 % more, with two thirds 25 %
 (../shared/prototype-momentum.md); a metric over the skeleton's graph, as ProjFlow has it for corrections of single
@@ -19,7 +19,7 @@ import numpy as np
 from . import quaternion
 from .foot_plant import AIR_RESERVE, Foot, build_foot, solve_heel_rise, spread_peaks
 from .humanoid import Humanoid, identify_joints
-from .lean import choose_shifts, compute_footprint_shifts, measure_lean, tilt_body
+from .lean import choose_angles, choose_shifts, compute_footprint_shifts, measure_lean, tilt_body
 from .limb import solve_posed_limb
 from .mass import compute_centre_of_mass
 from .momentum import STRENGTH, MomentumPlanner
@@ -30,6 +30,7 @@ from .supports import Stances, find_stances, find_support_phases
 _FADE_FRAMES = 3.0  # frames at 30 fps outside of a stance over which a foot comes to go with the pelvis
 _PELVIS_GAIN = 1.12  # m that the root moves per metre of the centre of mass: standing legs and feet stay behind
 _REACH_ROUNDS, _REACH_TOLERANCE = 3, 0.004  # plans, and metres that a leg may lack
+_HEEL_REACH = 0.01  # m of reach that a rising heel gives; for more the body is lowered, since heels that rise skate
 _FIRMNESS = 9.0  # by which a lowered height weighs more than others
 _SPREAD_FRAMES = 2  # frames at 30 fps over which it is spread
 
@@ -60,16 +61,19 @@ def obey_momentum(
     phases = find_support_phases(stances, compute_centre_of_mass(body, places), fps)
     if not len(stances) or (len(phases) == 1 and phases[0, 0] <= 0.0 and phases[0, 1] >= len(root) - 1):
         return root, rotations
-    legs = _Legs(skeleton, body, places, world, stances, fps)
-    root, rotations = legs.lean(root, rotations, share)
+    legs = _Legs(skeleton, body, (places, world), stances, fps)
     planner = MomentumPlanner(phases, len(root), fps, share, strength)
-    return legs.follow(planner, root, rotations)
+    new_root, new_rotations = legs.follow(planner, root, legs.lean(rotations, share))
+    stays = share <= 0.0
+    new_rotations = quaternion.match_signs(new_rotations, rotations)
+    return np.where(stays[:, None], root, new_root), np.where(stays[:, None, None], rotations, new_rotations)
 
 
 class _Legs:
     """The feet of a body before its correction, and how legs follow a root that moves."""
 
-    def __init__(self, skeleton: Skeleton, body: Humanoid, places, world, stances: Stances, fps: float):
+    def __init__(self, skeleton: Skeleton, body: Humanoid, pose, stances: Stances, fps: float):
+        places, world = pose
         self.skeleton, self.body, self.stances, self.fps = skeleton, body, stances, fps
         self._places, count = places, len(places)
         self._standing = [stances.compute_share(side, count, _FADE_FRAMES * fps / 30.0) for side in (0, 1)]
@@ -77,15 +81,17 @@ class _Legs:
                       for limb, standing in zip((body.left, body.right), self._standing)]
         self._spread = max(int(round(_SPREAD_FRAMES * fps / 30.0)), 1)
 
-    def lean(self, root, rotations, share) -> tuple[np.ndarray, np.ndarray]:
-        """Move the footprints and turn the body about its centre of mass, by what its stances lack."""
+    def lean(self, rotations, share) -> np.ndarray:
+        """Move the footprints and tilt the body by what its stances lack."""
         centre = compute_centre_of_mass(self.body, self._places)
         lean = measure_lean(self.body, self._places, centre, self.stances, self.fps)
-        shifts = choose_shifts(lean, np.interp(self.stances.middle, np.arange(len(share)), share))
-        moves = compute_footprint_shifts(self.stances, shifts, len(root))
-        self._feet = [foot.move(np.column_stack([moves[:, side], np.zeros(len(root))]))
+        least = [share[int(start) : int(np.ceil(stop)) + 1].min()
+                 for start, stop in zip(self.stances.start, self.stances.stop)]
+        shifts = choose_shifts(lean, np.array(least))
+        moves = compute_footprint_shifts(self.stances, shifts, share)
+        self._feet = [foot.move(np.column_stack([moves[:, side], np.zeros(len(rotations))]))
                       for side, foot in enumerate(self._feet)]
-        return tilt_body(root, rotations, centre, self.stances, shifts / lean.height[:, None], self.fps)
+        return tilt_body(rotations, self.stances, choose_angles(lean, shifts), share=share, fps=self.fps)
 
     def follow(self, planner: MomentumPlanner, root, rotations) -> tuple[np.ndarray, np.ndarray]:
         """Move the root so that the centre of mass follows its plan; feet stay where they stand."""
@@ -105,14 +111,14 @@ class _Legs:
             goal, firmness = goal - planner.share * lacks, np.where(lacks > 0.0, _FIRMNESS, firmness)
         posed = self._solve_legs(places, world, rotations, move)
         move = move + plan - self._measure_centre(root + move, posed)
-        return root + move, quaternion.unify_signs(self._solve_legs(places, world, rotations, move))
+        return root + move, self._solve_legs(places, world, rotations, move)
 
     def _measure_centre(self, root, rotations) -> np.ndarray:
         """Measure the centre of mass (T, 3) m of a pose."""
         return compute_centre_of_mass(self.body, compute_pose(self.skeleton, root, rotations)[0])
 
     def _aim_feet(self, places, move):
-        """Yield (foot, hip (T, 3), ankle goal (T, 3), foot's rotation (T, 4), standing (T,)) for a root moved (T, 3)."""
+        """Yield (foot, hip (T, 3), ankle goal (T, 3), its rotation (T, 4), standing (T,)), the root moved by (T, 3) m."""
         for foot, standing in zip(self._feet, self._standing):
             hip = places[:, foot.limb.upper_leg] + move
             carried = (1.0 - standing)[:, None] * move
@@ -122,9 +128,12 @@ class _Legs:
             yield foot, hip, ankle, quaternion.multiply(roll, foot.rotation), standing
 
     def _measure_shortfall(self, places, move) -> np.ndarray:
-        """Measure the metres (T,) that standing legs lack for a root moved by (T, 3) m."""
-        return np.max([np.where(standing >= 1.0, np.linalg.norm(ankle - hip, axis=1) - foot.max_reach, 0.0).clip(0.0)
-                       for foot, hip, ankle, _, standing in self._aim_feet(places, move)], axis=0)
+        """Measure the metres (T,) that standing legs lack for a root moved by (T, 3) m, beyond what a heel may rise."""
+        lacks = np.zeros(len(move))
+        for foot, standing in zip(self._feet, self._standing):
+            far = np.linalg.norm(foot.heel - places[:, foot.limb.upper_leg] - move, axis=1)
+            lacks = np.maximum(lacks, np.where(standing >= 1.0, far - foot.max_reach - _HEEL_REACH, 0.0))
+        return lacks
 
     def _solve_legs(self, places, world, rotations, move) -> np.ndarray:
         """Solve the rotations (T, J, 4) with which both legs reach their feet from a root moved by (T, 3) m."""

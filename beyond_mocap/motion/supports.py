@@ -188,7 +188,7 @@ def _find_low_stretches(height: np.ndarray, fps: float) -> list[tuple[float, flo
         if found and start - found[-1][1] < _SHORTEST_GAP * fps:
             start = found.pop()[0]
         found.append((start, stop))
-    return found
+    return [(start, stop) for start, stop in found if stop > start]
 
 
 def _lengthen_stances(start: np.ndarray, stop: np.ndarray, speed: np.ndarray, fps: float

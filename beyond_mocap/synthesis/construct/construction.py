@@ -25,6 +25,7 @@ from ...motion import quaternion
 from ...motion.foot_plant import PlantResult, plant_feet
 from ...motion.momentum_polish import obey_momentum
 from ...motion.motion import Motion
+from ...motion.toe_roll import roll_toes
 from ...motion.track import SampledTrack
 from ..body_size import scale_ball
 from ..plan import ResolvedPlan
@@ -127,7 +128,12 @@ class Construction:
         if not self.is_planned:
             ground, pose = self._pull_to_track(ground), self._lean_into_curves(pose)
         planted, steps_taken = self._plant_feet(np.column_stack([ground, self.smooth_source.height]), pose)
-        return self._obey_momentum(self._watch_ball(planted)), steps_taken
+        planted = self._obey_momentum(self._watch_ball(planted))
+        return replace(planted, rotations=self._roll_toes(planted.root, planted.rotations)), steps_taken
+
+    def _roll_toes(self, root: np.ndarray, rotations: np.ndarray) -> np.ndarray:
+        """Bend the toes (T, J, 4) where their tips would be below the ground."""
+        return roll_toes(self.library.neutral_stance, root, rotations)
 
     def _obey_momentum(self, planted: PlantResult) -> PlantResult:
         """Let the centre of mass fly on parabolas and lean as it is pushed, except where a foot meets the ball.
@@ -140,8 +146,11 @@ class Construction:
         for touch in self.touches:
             away = (np.abs(at - touch.frame) / self.plan.fps - KICK_SECONDS) / KICK_FADE
             share = np.minimum(share, smoothstep(np.clip(away, 0.0, 1.0)))
-        root, rotations = obey_momentum(self.library.skeleton, planted.root, planted.rotations, self.plan.fps, share)
-        return replace(planted, root=root, rotations=rotations)
+        # gravity holds in the player's size: a child's flights are shorter in the library's
+        size, skeleton = self.plan.size, self.library.skeleton
+        root, rotations = obey_momentum(skeleton if size == 1.0 else skeleton.scale(size), size * planted.root,
+                                        planted.rotations, self.plan.fps, share)
+        return replace(planted, root=root / size, rotations=rotations)
 
     def _compute_given_root(self, heading: np.ndarray) -> np.ndarray:
         """Compute where the root has to be (T, 2) m, NaN where it is free, for a heading (T,) rad.
@@ -196,7 +205,7 @@ class Construction:
         if placed is not rotations:
             contact = meet(placed)
         root, ball = (contact.root, contact.ball) if size == 1.0 else (contact.root / size, contact.ball / size)
-        return replace(planted, root=root, rotations=contact.rotations), ball
+        return replace(planted, root=root, rotations=self._roll_toes(root, contact.rotations)), ball
 
     def _solve_heading(self) -> np.ndarray:
         """Solve the heading (T,) rad from given values, track and source, turned to the ball at touches."""

@@ -47,6 +47,7 @@ class RatePairs:
         offset: (K,) rad from the direction of travel to the facing.
         long_stance: (K,) s of contact of both feet beyond that of a walk.
         lifted: (K,) share of the slot without both feet on the ground.
+        lean: (K, 2) slopes ahead and to the left of the travel, over the slot.
     """
 
     number: np.ndarray
@@ -56,6 +57,7 @@ class RatePairs:
     offset: np.ndarray
     long_stance: np.ndarray
     lifted: np.ndarray
+    lean: np.ndarray
 
     def slice_pairs(self, which: slice) -> "RatePairs":
         """Select a slice of the pairs."""
@@ -72,7 +74,7 @@ class CandidateIndex:
         turn: (R, N) rad over a slot.
         valid: (R, N) bool, whether the clip lasts that long and is allowed.
         by_speed: (K,) the valid pairs, flat indices into (R, N), in order of their speeds.
-        offset, long_stance, lifted: (N,), see `RatePairs`.
+        offset, long_stance, lifted, lean: (N, ...), see `RatePairs`.
         is_synthetic: (N,) bool, frames of synthetic clips.
         strange: (N,) float32, how far outside of normal locomotion a slot from there on is, up to MOST_STRANGE.
         recording: (N,) int, the same for a clip and its mirrored twin.
@@ -115,6 +117,7 @@ class CandidateIndex:
         self.is_in_contact = library.feet_in_contact
         lifted = (~self.is_in_contact.all(axis=1)).astype(np.float32)
         self.lifted = uniform_filter1d(lifted, SLOT, origin=-(SLOT // 2), mode="nearest")
+        self.lean = uniform_filter1d(library.frames.lean, SLOT, axis=0, origin=-(SLOT // 2), mode="nearest")
         self.wild_before, self.wild_after = measure_wildness(library)
         self._by_words: dict[frozenset[str], tuple[np.ndarray, np.ndarray]] = {}
         self._sorted: dict[frozenset[str], RatePairs] = {}
@@ -123,7 +126,8 @@ class CandidateIndex:
     def build_pairs(self, number: np.ndarray, frame: np.ndarray) -> RatePairs:
         """Build the pairs of PLAYBACK_RATES[number (K,)] and library frame (K,)."""
         played = self.speed[number, frame], self.turn[number, frame]
-        return RatePairs(number, frame, *played, self.offset[frame], self.long_stance[frame], self.lifted[frame])
+        return RatePairs(number, frame, *played, self.offset[frame], self.long_stance[frame], self.lifted[frame],
+                         self.lean[frame])
 
     def pairs_by_speed(self, avoid: frozenset[str] = frozenset()) -> RatePairs:
         """Return all valid pairs in order of their speeds, without those that show a label of `avoid` unless all do."""

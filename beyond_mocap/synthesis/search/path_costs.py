@@ -17,6 +17,7 @@ from ...annotation.vocabulary import DIRECTIONS
 from ...library.library import Library
 from ..plan import Plan
 from .candidate_index import ACTING, PLAYBACK_RATES, SLOT, CandidateIndex, RatePairs
+from .lean_cost import compute_lean_cost, compute_wanted_lean
 from .preferences import UsedStretch, compute_reuse_cost
 from .request import SearchRequest
 
@@ -91,6 +92,7 @@ TERMS = {
     "turn": "turning differs from the track",
     "facing": "faces another direction",
     "drag": "feet on the ground are dragged",
+    "lean": "leans otherwise than the track is accelerated",
     "words": "requested labels that the clip lacks",
     "unasked": "an action not requested, or no labels at all",
     "strange": "not how people stand, walk or run in this library",
@@ -123,6 +125,7 @@ class Weights:
         lift: for a slot without both feet on the ground where the track rests.
         facing: per m/s of missed velocity in the body's frame beyond the missed speed.
         slide: per (m/s)^2 of missed velocity, by which a foot on the ground is dragged.
+        lean: per unit of slope by which the body leans otherwise than its track is accelerated.
         words: for lacking all labels that the user asks for.
         automatic_words: for lacking all labels of automatic locomotion.
         unasked: for frames of an action that is not requested, or that carry no label.
@@ -149,6 +152,7 @@ class Weights:
     lift: float = 2.0
     facing: float = 1.0
     slide: float = 2.0
+    lean: float = 3.0
     words: float = 3.0
     automatic_words: float = 1.0
     unasked: float = 2.0
@@ -213,6 +217,7 @@ class PathCosts:
         self.bone_distance = bone_distance
         self.frames, self.index = library.frames, CandidateIndex.for_library(library, request.allowed)
         self.wanted_offset = compute_heading_offset(request.track)
+        self.wanted_lean, self.lean_counts = compute_wanted_lean(request.track)
         self._rate_cost = (weights.rate * np.abs(PLAYBACK_RATES - 1.0)).astype(np.float32)
         self._cached_costs: dict[tuple[frozenset[str], bool, frozenset[str]], np.ndarray] = {}
         # a strike turns as it was recorded: the body follows it there (`construct.construction`)
@@ -298,6 +303,10 @@ class PathCosts:
         turn = pairs.turn * np.float32((end - first) / SLOT)
         yield from self._iter_motion_terms(first, end, pairs.speed, turn=turn, offset=pairs.offset,
                                            long_stance=pairs.long_stance, lifted=pairs.lifted)
+        middle = (first + end) // 2
+        if self.lean_counts[middle] > 0.0:
+            weight = np.float32(self.weights.lean * self.lean_counts[middle])
+            yield "lean", weight * compute_lean_cost(pairs.lean, self.wanted_lean[first : end + 1].mean(axis=0))
         yield "rate", self._rate_cost[pairs.number]
         if self.request.lag_preference is not None:
             yield "variety", self.request.lag_preference.compute_cost(first, pairs.frame)

@@ -1,0 +1,65 @@
+"""Toes that stay on the ground while the heel rises: a boot rolls over its ball and does not dig its tip in.
+
+Recordings seldom bend the toe joint (many suits and markers do not see it), and a heel that rises about the toe joint
+takes a stiff tip down with it, by up to 6 cm. Here the toe bends up by what is missing, in every frame alone: nothing
+hangs on a toe, so nothing else moves. Without a toe joint the whole foot turns up about its ankle, by a little.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from . import quaternion
+from .humanoid import Limb, identify_joints
+from .motion import compute_pose
+from .retargeting.neutral import NeutralStance
+
+DEEPEST = 0.005  # m below the ground that a tip may be: grass gives, and floors of recordings are uneven by as much
+MOST_BEND = np.radians(60.0)  # of a toe joint; running shoes bend by 30 to 50 degrees at toe-off
+MOST_FOOT_TURN = np.radians(20.0)  # of a foot without a toe joint: its ankle has its own part in the step
+_TIP_THICKNESS = 0.008  # share of the leg's length, of the sole at the tip below its middle
+
+
+def roll_toes(neutral: NeutralStance, root: np.ndarray, rotations: np.ndarray) -> np.ndarray:
+    """Bend the toes up where the tips of the feet would be below the ground, z = 0.
+
+    Args:
+        neutral: the skeleton in its neutral stance, which shows how a flat foot lies.
+        root: (T, 3) m, world.
+        rotations: (T, J, 4) local rotations.
+    Returns:
+        (T, J, 4) local rotations; those that need no bend are unchanged.
+    """
+    skeleton = neutral.skeleton
+    places, world = compute_pose(skeleton, root, rotations)
+    body, out = identify_joints(skeleton), rotations.copy()
+    for limb in (body.left, body.right):
+        joint = limb.toe_or_foot
+        bend = _measure_bend(neutral, limb, places[:, joint], world[:, joint])
+        below = np.flatnonzero(bend > 0.0)
+        if len(below):
+            ahead = _point_ahead(neutral, joint, world[below, joint])
+            left = np.cross(np.array([0.0, 0.0, 1.0]), ahead)
+            turned = quaternion.multiply(quaternion.from_axis_angle(left, -bend[below]), world[below, joint])
+            parent = world[below, skeleton.parents[joint]]
+            out[below, joint] = quaternion.multiply(quaternion.inverse(parent), turned)
+    return quaternion.unify_signs(out)
+
+
+def _measure_bend(neutral: NeutralStance, limb: Limb, place: np.ndarray, world: np.ndarray) -> np.ndarray:
+    """Measure by how many radians (T,) a tip has to turn up; place (T, 3) m and rotation (T, 4) of its joint."""
+    joint = limb.toe_or_foot
+    length = neutral.tip if limb.toe is not None else float(np.linalg.norm(neutral.ball[0])) + neutral.tip
+    sole = neutral.positions[joint, 2] - _TIP_THICKNESS * neutral.leg
+    most = MOST_BEND if limb.toe is not None else MOST_FOOT_TURN
+    slope = np.arcsin(np.clip(_point_ahead(neutral, joint, world)[:, 2], -1.0, 1.0))
+    # the tip lies `length` ahead of the joint and `sole` below it: its height is length sin(a) - sole cos(a)
+    reach, phase = np.hypot(length, sole), np.arctan2(sole, length)
+    least = np.arcsin(np.clip((-DEEPEST - place[:, 2]) / reach, -1.0, 0.0)) + phase
+    return np.clip(least - slope, 0.0, most)
+
+
+def _point_ahead(neutral: NeutralStance, joint: int, world: np.ndarray) -> np.ndarray:
+    """Compute where a foot points (T, 3) that points along X in the neutral stance; world (T, 4) of its joint."""
+    turn = quaternion.multiply(world, quaternion.inverse(neutral.rotations[joint]))
+    return quaternion.rotate(turn, np.array([1.0, 0.0, 0.0]))
