@@ -132,7 +132,11 @@ def _compute_momentum(scene: bpy.types.Scene, body: bpy.types.Object, digest: tu
     check_finite(body, motion)
     if len(motion) < 2:
         raise InputError(f"armature {body.name}", "a single pose", "a motion", "import one, or choose an action")
-    return ShownMomentum(trace_momentum(motion), first, digest)
+    try:
+        return ShownMomentum(trace_momentum(motion), first, digest)
+    except InputError as error:  # it has no legs
+        raise InputError(f"armature {body.name}", "has no legs that can be found", "a humanoid",
+                         "select another armature, or name its bones as common rigs do") from error
 
 
 def _read_visible_motion(scene: bpy.types.Scene, body: bpy.types.Object) -> tuple["Motion", int]:
