@@ -7,6 +7,7 @@ it flies, and its force meets the ground within the support polygon. Where that 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -79,12 +80,12 @@ class MomentumTrace:
         points[:, 2] += 0.5 * GRAVITY / self.fps**2 * (frames - first) * (last - frames)
         return points
 
-    def measure_deviation(self, flight: int) -> float:
-        """Measure the greatest distance in metres of the centre of mass from a flight's parabola."""
-        first, last = self.flights[flight]
-        frames = np.arange(int(np.ceil(first)), int(last) + 1)
-        away = self.sample_parabola(flight, frames) - self.centre[frames]
-        return float(np.linalg.norm(away, axis=1).max(initial=0.0))
+    @cached_property
+    def deviations(self) -> np.ndarray:
+        """(F,) m, greatest distance of the centre of mass from the parabola of each flight."""
+        frames = [np.arange(int(np.ceil(first)), int(last) + 1) for first, last in self.flights]
+        away = [self.sample_parabola(flight, at) - self.centre[at] for flight, at in enumerate(frames)]
+        return np.array([np.linalg.norm(one, axis=1).max(initial=0.0) for one in away])
 
     def build_support_polygon(self, frame: int) -> np.ndarray:
         """Build the support polygon: the convex hull of all that stands on the ground.
@@ -194,18 +195,21 @@ def _build_convex_hull(points: np.ndarray) -> np.ndarray:
 
     Source: Andrew 1979, "Another efficient algorithm for convex hulls in two dimensions", Inf. Process. Lett. 9.
     """
-    ordered = np.unique(points, axis=0)
+    ordered = sorted({(x, y) for x, y in points.tolist()})  # few points: faster without numpy
     if len(ordered) < 3:
-        return ordered
-    chains = []
+        return np.array(ordered).reshape(-1, 2)
+    corners = []
     for line in (ordered, ordered[::-1]):
-        chain: list[np.ndarray] = []
-        for point in line:
-            while len(chain) > 1 and cross_on_ground(chain[-1] - chain[-2], point - chain[-1]) <= 0.0:
+        chain: list[tuple[float, float]] = []
+        for x, y in line:
+            while len(chain) > 1:
+                (a, b), (c, d) = chain[-2:]
+                if (c - a) * (y - d) - (d - b) * (x - c) > 0.0:
+                    break
                 chain.pop()
-            chain.append(point)
-        chains += chain[:-1]
-    return np.array(chains)
+            chain.append((x, y))
+        corners += chain[:-1]
+    return np.array(corners)
 
 
 def _find_nearest_point(polygon: np.ndarray, point: np.ndarray) -> np.ndarray:

@@ -1,12 +1,13 @@
 """Overlay of an armature's momentum at the current frame: centre of mass with the parabolas of its flights, support
 polygon, and ground force.
 
-Lines within the time range are drawn with it. A force while nothing carries the body has no cause: it has a colour of
+Lines within the time range are drawn with it, second by second. A force while nothing carries the body has no cause: it has a colour of
 its own and begins at the centre of mass. Independent of gpu.
 """
 
 from __future__ import annotations
 
+from functools import partial
 from typing import TYPE_CHECKING
 
 import bpy
@@ -31,10 +32,17 @@ STEPS = 12  # of a parabola
 
 
 def list_items(scene: bpy.types.Scene) -> list[DrawItem]:
-    """List everything to draw at the current frame."""
+    """List everything to draw at the current frame: lines by the second, which stay while the animation plays."""
     world, reach = Matrix.Scale(units_per_metre(scene), 4), scene.beyond_mocap.view.reach
-    return [DrawItem((shown, row, reach), lambda shown=shown, row=row: build_meshes(shown.trace, row, reach), world)
-            for shown, row in list_current_rows(scene)]
+    found = []
+    for shown, row in list_current_rows(scene):
+        trace = shown.trace
+        ball = world @ Matrix.Translation(trace.centre[row].tolist())
+        found += [DrawItem((shown, "second", second), partial(build_lines, trace, second), world)
+                  for second in _list_seconds(trace, row, reach)]
+        found += [DrawItem((shown, "frame", row), partial(build_frame, trace, row), world),
+                  DrawItem(("", "centre of mass"), _build_ball, ball)]
+    return found
 
 
 def list_labels(scene: bpy.types.Scene) -> list[tuple[Vector, str]]:
@@ -62,28 +70,40 @@ def describe_momentum(trace: "MomentumTrace", row: int) -> str:
     if flight is None:
         return f"ground force {np.linalg.norm(trace.force[row]) / GRAVITY:.1f} x weight"
     seconds = np.ptp(trace.flights[flight]) / trace.fps
-    return f"flight {seconds:.2f} s, up to {1000.0 * trace.measure_deviation(flight):.0f} mm off its parabola"
+    return f"flight {seconds:.2f} s, up to {1000.0 * trace.deviations[flight]:.0f} mm off its parabola"
 
 
-def build_meshes(trace: "MomentumTrace", row: int, reach: float) -> list[Mesh]:
-    """Build all meshes of a frame.
-
-    Args:
-        trace: the trace.
-        row: its frame.
-        reach: seconds to either side within which the path and the parabolas are drawn.
-    """
-    frames = round(reach * trace.fps)
-    centre, path = trace.centre[row], trace.centre[max(row - frames, 0) : row + frames + 1]
+def build_lines(trace: "MomentumTrace", second: int) -> list[Mesh]:
+    """Build the path of the centre of mass in one second of a trace, and the parabolas of flights that begin in it."""
+    start, end = (round(at * trace.fps) for at in (second, second + 1))
+    path = trace.centre[start : end + 1]
     meshes = [] if len(path) < 2 else [build_line_mesh(path, colours.WHITE, THIN, 0.8)]
-    near = (trace.flights[:, 0] <= row + frames) & (trace.flights[:, 1] >= row - frames)
-    for flight in np.flatnonzero(near):
-        points = trace.sample_parabola(flight, np.linspace(*trace.flights[flight], STEPS))
-        meshes.append(build_line_mesh(points, colours.FLIGHT, WIDE))
+    begins = (trace.flights[:, 0] >= start) & (trace.flights[:, 0] < end)
+    lines = [shapes.build_polyline(trace.sample_parabola(flight, np.linspace(*trace.flights[flight], STEPS)))
+             for flight in np.flatnonzero(begins)]
+    return [*meshes, *([build_uniform_mesh(np.concatenate(lines), colours.FLIGHT, WIDE)] if lines else [])]
+
+
+def build_frame(trace: "MomentumTrace", row: int) -> list[Mesh]:
+    """Build the polygon, the line below the centre of mass and the force of a frame."""
+    centre = trace.centre[row]
     below = np.append(centre[:2], trace.ground)
-    return [*meshes, *_build_polygon(trace, row), build_segments_mesh(centre, below, colours.GREY, THIN, 0.8),
-            build_uniform_mesh(shapes.build_circle(centre, BALL, up=True).astype(np.float32), colours.WHITE, MIDDLE),
+    return [*_build_polygon(trace, row), build_segments_mesh(centre, below, colours.GREY, THIN, 0.8),
             *_build_force(trace, row)]
+
+
+def _list_seconds(trace: "MomentumTrace", row: int, reach: float) -> range:
+    """List the seconds of a trace that are within the time range of a row; none for a range of 0."""
+    if reach <= 0.0:
+        return range(0)
+    first, last = max(row / trace.fps - reach, 0.0), min(row / trace.fps + reach, (len(trace) - 1) / trace.fps)
+    return range(int(first), int(last) + 1)
+
+
+def _build_ball() -> list[Mesh]:
+    """Build the centre of mass, at the origin."""
+    points = shapes.build_circle(np.zeros(3), BALL, up=True).astype(np.float32)
+    return [build_uniform_mesh(points, colours.WHITE, MIDDLE)]
 
 
 def _build_polygon(trace: "MomentumTrace", row: int) -> list[Mesh]:

@@ -73,12 +73,29 @@ def test_the_polygon_lies_under_the_standing_foot_and_the_arrow_begins_in_it(run
     shown, momentum = traces.find_momentum(runner), room("overlays.momentum")
     standing = np.flatnonzero(shown.trace.is_down.any(axis=(1, 2)))[::9]
     for row in standing:
-        meshes = momentum.build_meshes(shown.trace, int(row), 0.0)
+        meshes = momentum.build_frame(shown.trace, int(row))
         fill = next(mesh for mesh in meshes if mesh.kind == "TRIS")
         middle = shown.trace.corners[row][shown.trace.is_down[row]].mean(axis=0)[:2]
         assert np.linalg.norm(fill.points[:, :2].mean(axis=0) - middle) < 0.2
         arrow = meshes[-1].points
         assert arrow[0, 2] == pytest.approx(shown.trace.ground, abs=1e-6) and arrow[1, 2] > arrow[0, 2]
+
+
+def test_lines_are_built_once_a_second_and_end_with_the_time_range(runner, traces, room):
+    bpy.ops.beyond_mocap.show_momentum()
+    scene, momentum = bpy.context.scene, room("overlays.momentum")
+    shown = traces.find_momentum(runner)
+    keys = []
+    for frame, reach in ((61, 1.0), (62, 1.0), (61, 0.0)):
+        scene.frame_set(shown.first + frame)
+        scene.beyond_mocap.view.reach = reach
+        keys.append({item.key for item in momentum.list_items(scene) if item.key[1] == "second"})
+    assert keys[0] == keys[1] == {(shown, "second", second) for second in (1, 2, 3)} and not keys[2]
+    lines = [mesh for second in range(9) for mesh in momentum.build_lines(shown.trace, second)]
+    path = np.concatenate([mesh.points for mesh in lines if mesh.width == momentum.THIN])
+    np.testing.assert_allclose(path[::2], shown.trace.centre[:-1], atol=1e-6)  # no gap between two seconds
+    flights = np.concatenate([mesh.points for mesh in lines if mesh.width == momentum.WIDE])
+    assert len(flights) == len(shown.trace.flights) * 2 * (momentum.STEPS - 1)
 
 
 def test_nothing_is_drawn_outside_the_motion_or_switched_off(runner, traces, room):

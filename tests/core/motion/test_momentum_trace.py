@@ -33,7 +33,7 @@ def test_a_hop_is_one_flight_on_its_parabola(hop):
     assert len(hop.flights) == 1
     first, last = hop.flights[0] / FPS
     assert 1.0 <= first < 1.06 and 1.44 < last <= 1.5  # a foot stands up to 3 cm above the ground
-    assert hop.measure_deviation(0) < 1e-3
+    assert hop.deviations[0] < 1e-3
     frames = np.arange(65, 86)
     np.testing.assert_allclose(hop.sample_parabola(0, frames), hop.centre[frames], atol=1e-3)
 
@@ -49,7 +49,7 @@ def test_a_body_that_falls_too_fast_leaves_its_parabola_and_is_pushed_in_the_air
     trace = trace_momentum(build_hop(fall=1.4 * GRAVITY))
     free = [frame for frame in range(len(trace)) if trace.is_force_of_flight(frame)]
     np.testing.assert_allclose(trace.force[free, 2], -0.4 * GRAVITY, atol=1e-3)
-    assert trace.measure_deviation(0) > 0.03
+    assert trace.deviations[0] > 0.03
 
 
 @pytest.mark.parametrize("fps", [25.0, 30.0, 100.0, 120.0])
