@@ -149,7 +149,7 @@ def _draw_shapes():
         projection[2] -= BIAS * projection[3]
         gpu.matrix.load_projection_matrix(projection)
         gpu.state.blend_set("ALPHA")
-        gpu.state.depth_test_set("NONE" if view.in_front else "LESS_EQUAL")
+        _set_depth_test(view.in_front)
         gpu.state.depth_mask_set(False)
         try:
             for drawn in found:
@@ -158,6 +158,7 @@ def _draw_shapes():
                     for name in view.list_overlays():
                         _draw_overlay(context, view, name, drawn)
             for item in path_items:
+                _set_depth_test(view.in_front or item.in_front)
                 with gpu.matrix.push_pop():
                     gpu.matrix.multiply_matrix(item.world)
                     _draw_batches(context, _build_batches(item.key, item.meshes))
@@ -165,6 +166,10 @@ def _draw_shapes():
             gpu.state.depth_mask_set(True)
             gpu.state.depth_test_set("NONE")
             gpu.state.blend_set("NONE")
+
+
+def _set_depth_test(in_front: bool) -> None:
+    gpu.state.depth_test_set("NONE" if in_front else "LESS_EQUAL")
 
 
 def _draw_overlay(context, view, name: str, shown: DrawnTake) -> None:

@@ -1,8 +1,8 @@
 """Overlay of an armature's momentum at the current frame: centre of mass with the parabolas of its flights, support
 polygon, and ground force.
 
-Lines within the time range are drawn with it, second by second. A force while nothing carries the body has no cause: it has a colour of
-its own and begins at the centre of mass. Independent of gpu.
+Lines within the time range are drawn second by second. A force while nothing carries the body has no cause: it has a
+colour of its own and begins at the centre of mass. Independent of gpu.
 """
 
 from __future__ import annotations
@@ -40,8 +40,8 @@ def list_items(scene: bpy.types.Scene) -> list[DrawItem]:
         ball = world @ Matrix.Translation(trace.centre[row].tolist())
         found += [DrawItem((shown, "second", second), partial(build_lines, trace, second), world)
                   for second in _list_seconds(trace, row, reach)]
-        found += [DrawItem((shown, "frame", row), partial(build_frame, trace, row), world),
-                  DrawItem(("", "centre of mass"), _build_ball, ball)]
+        found += [DrawItem((shown, "frame", row), partial(build_frame, trace, row), world, in_front=True),
+                  DrawItem(("", "centre of mass"), _build_ball, ball, in_front=True)]
     return found
 
 

@@ -19,7 +19,7 @@ from ..core.live import Watcher, call_or_describe
 from ..path_editing.armature_adapter import PlainAdapter, check_finite
 from ..path_editing.edited_bodies import find_computed_edit
 from ..path_editing.rig_source import sample_visible_motion
-from ..path_editing.rigs import choose_adapter, is_plain
+from ..path_editing.rigs import choose_adapter, is_keyed_on_bones
 
 if TYPE_CHECKING:
     from ...beyond_mocap.motion.momentum_trace import MomentumTrace
@@ -144,7 +144,7 @@ def _read_visible_motion(scene: bpy.types.Scene, body: bpy.types.Object) -> tupl
     edit = find_computed_edit(body)
     if edit is not None:
         return edit.edited.motion, edit.first
-    if body.beyond_mocap_ride.on or not is_plain(body):
+    if body.beyond_mocap_ride.on or not is_keyed_on_bones(body):
         return sample_visible_motion(body, scene)
     read = PlainAdapter(body).read_motion(scene)
     return read.motion, read.first

@@ -188,6 +188,31 @@ def test_a_body_on_its_new_path_is_traced_there(runner, traces):
     assert abs(traces.find_momentum(runner).trace.centre[10, 1] - shown.trace.centre[10, 1]) > 2.5
 
 
+def test_a_skeleton_that_rests_folded_is_read_as_it_moves(traces, core, tmp_path):
+    """As LAFAN1's, whose limbs all lie along X at rest: here every rest offset of the legs is turned by a quarter."""
+    turn = core("motion.quaternion").from_axis_angle(np.array([0.0, 1.0, 0.0]), np.pi / 2)
+    gait = core("synthetic.gait").build_gait(3.0, 2.0, fps=30.0)
+    skeleton, quaternion = gait.skeleton, core("motion.quaternion")
+    legs = [joint for joint, name in enumerate(skeleton.names) if any(part in name for part in ("Leg", "Foot", "Toe"))]
+    below = [joint for joint in legs if skeleton.parents[joint] in legs]  # their offsets turn with the thigh
+    offsets, rotations = skeleton.offsets.copy(), gait.rotations.copy()
+    offsets[below] = quaternion.rotate(turn, offsets[below])
+    tops = [joint for joint in legs if joint not in below]
+    back = quaternion.inverse(turn)
+    rotations[:, tops] = quaternion.multiply(rotations[:, tops], back)
+    rotations[:, below] = quaternion.multiply(quaternion.multiply(turn, rotations[:, below]), back)
+    folded = core("motion.motion").Motion(core("motion.skeleton").Skeleton(skeleton.names, skeleton.parents, offsets),
+                                          gait.root_positions, rotations, gait.fps)
+    core("files.bvh.bvh").write_bvh(tmp_path / "folded.bvh", folded)
+    bpy.context.scene.render.fps = 30
+    bpy.ops.beyond_mocap.import_clips(filepath=str(tmp_path / "folded.bvh"))
+    body = bpy.context.view_layer.objects.active
+    worlds.select_objects(body)
+    bpy.ops.beyond_mocap.show_momentum()
+    np.testing.assert_allclose(traces.find_momentum(body).trace.centre,
+                               core("motion.momentum_trace").trace_momentum(gait).centre, atol=5e-3)
+
+
 def test_the_mesh_of_a_character_stands_for_its_armature(runner, traces):
     mesh = bpy.data.objects.new("Skin", bpy.data.meshes.new("Skin"))
     bpy.context.scene.collection.objects.link(mesh)
