@@ -5,11 +5,11 @@ from __future__ import annotations
 import bpy
 
 from ..scene.core.settings import find_active_player
-from .tab import TabPanel
+from .tab import TabPanel, draw_paragraph
 
 ICONS = {"track": "CURVE_PATH", "footprints": "MOD_DYNAMICPAINT", "contacts": "PIVOT_CURSOR", "seams": "SEQUENCE",
          "moments": "KEYTYPE_KEYFRAME_VEC", "speed": "DRIVER_DISTANCE", "heading": "ORIENTATION_LOCAL",
-         "ghosts": "GHOST_ENABLED", "shots": "CON_TRACKTO"}
+         "ghosts": "GHOST_ENABLED", "shots": "CON_TRACKTO", "momentum": "PHYSICS"}
 
 
 class BEYOND_MOCAP_PT_view(TabPanel, bpy.types.Panel):
@@ -39,9 +39,21 @@ class BEYOND_MOCAP_PT_view(TabPanel, bpy.types.Panel):
             if view.ghosts_at == "STEP":
                 more.prop(view, "ghost_step")
         more.prop(view, "in_front")
+        self.draw_momentum(context)
         row = layout.row(align=True)
         row.operator("beyond_mocap.error_curves", icon="GRAPH")
         player = find_active_player(settings)
         shown = player is not None and player.body is not None and player.body.type == "ARMATURE"
         if shown and "Root Error (cm)" in player.body.data:
             row.operator("beyond_mocap.error_curves", text="", icon="X").remove = True
+
+    def draw_momentum(self, context):
+        """Draw the button that shows the momentum of the selected armatures, and why it cannot be drawn."""
+        row = self.layout.row(align=True)
+        row.operator("beyond_mocap.show_momentum", icon="PHYSICS")
+        active = context.view_layer.objects.active
+        momentum = active.beyond_mocap_momentum if active is not None and active.type == "ARMATURE" else None
+        if momentum is not None and momentum.show:
+            row.operator("beyond_mocap.show_momentum", text="", icon="X").remove = True
+            if momentum.message:
+                draw_paragraph(self.layout, momentum.message, "ERROR")

@@ -7,5 +7,7 @@
 - `store`          prepares takes in a thread, once each, and drops them when no player shows them; their place
 - `path_overlays`  paths, trackers, residuals and the original motion of edited bodies
 - `ball_paths`     trajectories of aimed balls and passing scenes, with strikes and bounces
+- `momentum_traces` which armatures show their momentum, and its trace, once for each change of the motion
+- `momentum`       centre of mass, flights, support polygon and ground force at the current frame
 - `draw`           the handlers of the view, which only look up; the legend
 """

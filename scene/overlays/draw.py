@@ -18,7 +18,7 @@ from mathutils import Matrix, Vector
 from ..core import window
 from ..core.live import Watcher
 from ..core.settings import find_active_player
-from . import ball_paths, colours, path_overlays, shapes, store
+from . import ball_paths, colours, momentum, path_overlays, shapes, store
 from .prepare import Mesh, PreparedTake
 
 BIAS = 1e-5
@@ -126,10 +126,11 @@ def _free_unused(now: dict[str, PreparedTake]) -> None:
 
 
 def _list_path_items(context) -> list[path_overlays.DrawItem]:
-    """List the path and ball overlays of this view, and free the batches of those no longer drawn."""
+    """List the overlays of paths, balls and momentum of this view, and free the batches of those no longer drawn."""
     items = []
     if context.space_data.overlay.show_overlays and getattr(context.scene, "beyond_mocap", None) is not None:
-        items = [*path_overlays.list_items(context.scene), *ball_paths.list_items(context.scene)]
+        items = [*path_overlays.list_items(context.scene), *ball_paths.list_items(context.scene),
+                 *momentum.list_items(context.scene)]
     now = {item.key for item in items}
     for key in [key for key in _batches if not isinstance(key[0], str) and key not in now]:
         del _batches[key]
@@ -137,7 +138,7 @@ def _list_path_items(context) -> list[path_overlays.DrawItem]:
 
 
 def _draw_shapes():
-    """Draw all shapes of the view: overlays of takes, then those of paths and balls."""
+    """Draw all shapes of the view: overlays of takes, then those of paths, balls and momentum."""
     context = bpy.context
     found, path_items = _list_takes(context), _list_path_items(context)
     if not found and not path_items:
@@ -148,7 +149,7 @@ def _draw_shapes():
         projection[2] -= BIAS * projection[3]
         gpu.matrix.load_projection_matrix(projection)
         gpu.state.blend_set("ALPHA")
-        gpu.state.depth_test_set("NONE" if view.in_front else "LESS_EQUAL")
+        _set_depth_test(view.in_front)
         gpu.state.depth_mask_set(False)
         try:
             for drawn in found:
@@ -157,6 +158,7 @@ def _draw_shapes():
                     for name in view.list_overlays():
                         _draw_overlay(context, view, name, drawn)
             for item in path_items:
+                _set_depth_test(view.in_front or item.in_front)
                 with gpu.matrix.push_pop():
                     gpu.matrix.multiply_matrix(item.world)
                     _draw_batches(context, _build_batches(item.key, item.meshes))
@@ -164,6 +166,10 @@ def _draw_shapes():
             gpu.state.depth_mask_set(True)
             gpu.state.depth_test_set("NONE")
             gpu.state.blend_set("NONE")
+
+
+def _set_depth_test(in_front: bool) -> None:
+    gpu.state.depth_test_set("NONE" if in_front else "LESS_EQUAL")
 
 
 def _draw_overlay(context, view, name: str, shown: DrawnTake) -> None:
@@ -243,7 +249,8 @@ def _draw_texts():
     found, over = _list_takes(context), context.space_data.overlay.show_overlays
     has_paths, has_balls = over and path_overlays.list_visible_edits(context.scene), over and ball_paths.has_items(
         context.scene)
-    if not found and not has_paths and not has_balls:
+    labels = momentum.list_labels(context.scene) if over else []
+    if not found and not has_paths and not has_balls and not labels:
         return
     view = context.scene.beyond_mocap.view
     on = view.list_overlays()
@@ -254,8 +261,10 @@ def _draw_texts():
                 _draw_labels(context, view, shown)
             if "seams" in on:
                 _draw_reasons(context, view, shown)
+        for place, text in labels:
+            _draw_text(context, place, (text,), 1.0, (14, 14))
         draw_legend(context, [*(on if found else ()), *(["paths"] if has_paths else ()),
-                              *(["shots"] if has_balls else ())])
+                              *(["shots"] if has_balls else ()), *(["momentum"] if labels else ())])
     finally:
         gpu.state.blend_set("NONE")
 
@@ -351,5 +360,9 @@ ROWS = {
     "shots": _build_key_row(("ball trajectory", colours.WHITE), ("other candidates", colours.BLACK),
                             ("after the target", colours.VERMILION), ("striking part", colours.SKY),
                             ("strike", colours.STRIKE), ("bounce", colours.ORANGE)),
+    "momentum": _build_key_row(("centre of mass", colours.WHITE), ("flight's parabola", colours.FLIGHT),
+                               ("support polygon", colours.SUPPORT), ("ground force: 0.4 m for the weight",
+                                                                      colours.FORCE),
+                               ("force in the air", colours.UNSUPPORTED_FORCE)),
     "moments": _build_key_row(("strike point", colours.STRIKE), ("ball", colours.BALL), ("gap", colours.GAP)),
 }

@@ -36,11 +36,13 @@ class DrawItem(NamedTuple):
         key: stays the same while its look does.
         meshes: builds its meshes, in metres.
         world: matrix to the scene.
+        in_front: whether it is drawn in front of all objects in any case, since it is inside of a body.
     """
 
     key: tuple
     meshes: Callable[[], list[Mesh]]
     world: Matrix
+    in_front: bool = False
 
 
 def list_items(scene: bpy.types.Scene) -> list[DrawItem]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import bpy
-from bpy.props import StringProperty
+from bpy.props import BoolProperty, StringProperty
 
 from ..core import window
 from ..core.properties import with_settings
@@ -34,6 +34,15 @@ class BeyondMocapView(bpy.types.PropertyGroup):
     def list_path_overlays(self) -> list[str]:
         """List the names of the path overlays to draw."""
         return [name for name in PATH_OVERLAYS if getattr(self, name)] if self.show else []
+
+
+class BeyondMocapMomentum(bpy.types.PropertyGroup):
+    """Whether an armature shows its momentum."""
+
+    attached_to = ("Object.beyond_mocap_momentum",)
+    show: BoolProperty(name="Show Momentum", options={"HIDDEN"},
+                       description="Draw the armature's centre of mass, flights, support polygon and ground force")
+    message: StringProperty(name="Message", options={"HIDDEN"}, description="Why the momentum cannot be drawn")
 
 
 class BeyondMocapPlayhead(bpy.types.PropertyGroup):

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
+from ...beyond_mocap.base.vectors import cross_product, unit_vector
+
 SOLE = np.array([  # outline of a left shoe, length 1, heel at x = 0, toes at x = 1, the body's middle at -y
     (0.02, 0.00), (0.05, 0.10), (0.17, 0.15), (0.32, 0.14), (0.48, 0.15), (0.65, 0.19), (0.80, 0.18), (0.92, 0.11),
     (0.99, -0.01), (0.98, -0.11), (0.90, -0.17), (0.76, -0.18), (0.60, -0.14), (0.44, -0.10), (0.28, -0.11),
@@ -121,6 +123,14 @@ def build_arrows(places: np.ndarray, headings: np.ndarray, length: float, height
     tips, back = places + length * ahead, places + (length - BARB[0]) * ahead
     corners = [places, tips, tips, back + BARB[1] * aside, tips, back - BARB[1] * aside]
     return place_on_ground(np.stack(corners, axis=1).reshape(-1, 2), height)
+
+
+def build_arrow(start: np.ndarray, tip: np.ndarray) -> np.ndarray:
+    """Build an upright arrow from start to tip, both (3,) m: lines (6, 3), shaft and two barbs."""
+    way = unit_vector(tip - start)
+    aside = unit_vector(cross_product(way, np.array([0.0, 0.0, 1.0])), np.array([1.0, 0.0, 0.0]), 1e-3)
+    back = tip - min(BARB[0], 0.5 * float(np.linalg.norm(tip - start))) * way
+    return np.stack([start, tip, tip, back + BARB[1] * aside, tip, back - BARB[1] * aside]).astype(np.float32)
 
 
 def list_figure_pairs(parents) -> np.ndarray:

@@ -9,6 +9,7 @@ import numpy as np
 
 from ...beyond_mocap.base.errors import InputError
 from ...beyond_mocap.motion import quaternion
+from ...beyond_mocap.motion.motion import Motion
 from ..core import channels
 from ..core.measure import frames_per_second, units_per_metre
 from ..rigs import control_study
@@ -44,8 +45,7 @@ class RigSource:
         self.units = units_per_metre(scene)
         with rig_look.create_private_scene(rig, scene) as side:
             samples = rig_look.sample_rig(rig, side, played.frames, sorted(played.others))
-            parts = rig_parts.identify_parts(rig) or rig_parts.build_single_part(rig, samples, self.units)
-            self.motion = rig_parts.build_motion(rig, parts, samples, self.units, frames_per_second(scene))
+            parts, self.motion = _build_visible_motion(rig, scene, samples)
             controls = _list_controls(rig, side, parts, played)
             dependencies = control_study.find_carriers(rig, side, controls, list(parts.visible_bones.values()))
         self._rows: SourceRows | None = None
@@ -135,6 +135,30 @@ class RigSource:
         location = basis[:, :3, 3] - np.array(rig.delta_location)
         return split_channels("location", location) | split_channels(find_rotation_channel(mode),
                                                                      to_channel_values(mode, rotations, table[0]))
+
+
+def sample_visible_motion(rig: bpy.types.Object, scene: bpy.types.Scene) -> tuple[Motion, int]:
+    """Sample the motion that an armature of any kind shows.
+
+    Args:
+        rig: the armature.
+        scene: says frame rate and unit scale.
+    Returns:
+        The motion, metres, world, and the scene frame of its first frame.
+    Raises:
+        InputError: if it plays nothing.
+    """
+    frames = PlayedAnimation(rig, scene).frames
+    with rig_look.create_private_scene(rig, scene) as side:
+        samples = rig_look.sample_rig(rig, side, frames)
+        return _build_visible_motion(rig, scene, samples)[1], int(frames[0])
+
+
+def _build_visible_motion(rig: bpy.types.Object, scene: bpy.types.Scene, samples):
+    """Build the parts of a rig's body, and the motion of these, from its samples."""
+    units = units_per_metre(scene)
+    parts = rig_parts.identify_parts(rig) or rig_parts.build_single_part(rig, samples, units)
+    return parts, rig_parts.build_motion(rig, parts, samples, units, frames_per_second(scene))
 
 
 class PlayedAnimation:

@@ -183,6 +183,14 @@ def is_edited_as_rig(body: bpy.types.Object) -> bool:
 
 
 def is_plain(body: bpy.types.Object) -> bool:
+    """Return whether an armature is an upright body that shows exactly the channels of its bones."""
+    if not is_keyed_on_bones(body):
+        return False
+    humanoid = rig_parts.identify_parts(body)
+    return humanoid is not None and body.data.bones[humanoid.controls["hips"]].parent is None
+
+
+def is_keyed_on_bones(body: bpy.types.Object) -> bool:
     """Return whether an armature shows exactly the channels of its bones, of which only the topmost travels."""
     data = body.animation_data
     if data is None or is_layered(body) or is_carried(body):
@@ -210,8 +218,7 @@ def is_plain(body: bpy.types.Object) -> bool:
         moves = path in CHANNELS or posed is not None and posed[2] in ("location", "scale") and not path.startswith(top)
         if (moves or posed is not None and posed[2] == "scale") and _has_variation(curve):
             return False
-    humanoid = rig_parts.identify_parts(body)
-    return humanoid is not None and body.data.bones[humanoid.controls["hips"]].parent is None
+    return True
 
 
 def _is_displaced(bone: bpy.types.PoseBone, least: float) -> bool:

@@ -461,6 +461,7 @@ ROWS = {
     "set_static": Row("imported", prepare=two_clouds),
     "set_speed": Row("imported", lambda places: {"speed": 2.0}, draw),
     "show_match": Row("imported", prepare=a_made_match),
+    "show_momentum": Row("accepted"),
     "show_timeline": Row("imported", changes=False),
     "show_video": Row("video", changes=False),
     "solve_ball": Row("imported"),

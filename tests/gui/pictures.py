@@ -143,6 +143,24 @@ def check_overlays():
         setattr(settings.view, name, False)
 
 
+def check_momentum():
+    """A runner who pushes off, with the momentum of their body."""
+    bpy.ops.wm.read_homefile(use_empty=True, load_ui=False)
+    yield 1
+    bpy.context.scene.render.fps = 30
+    bpy.ops.beyond_mocap.import_clips(filepath=str(copy_sample() / "library" / "running_4_2.bvh"))
+    runner = create_person(bpy.context.object)
+    run_operator("beyond_mocap.show_momentum")
+    trace = import_module("scene.overlays.momentum_traces").find_momentum(runner).trace
+    takes_off = next(first for first, _ in trace.flights if first > 40.0)
+    bpy.context.scene.frame_set(1 + int(takes_off) - 2)
+    view = window.find_area("VIEW_3D").spaces.active.region_3d
+    hips = runner.matrix_world @ runner.pose.bones[0].head
+    view.view_perspective, view.view_distance, view.view_location = "PERSP", 4.5, (hips.x, hips.y, 0.8)
+    view.view_rotation = Euler((1.4, 0.0, 0.35)).to_quaternion()
+    yield from save_view_picture("momentum")
+
+
 def check_menu_of_labels():
     """The menu after `=` and `2` (catchb), in which neither recordings nor synthetic actions have everything."""
     area, annotate = window.find_area("VIEW_3D"), import_module("operators.annotate")

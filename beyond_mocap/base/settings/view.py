@@ -42,11 +42,14 @@ TABLES = {
                 "figure at the current frame"),
         Setting(name="shots", default=True, title="Ball Trajectories", tooltip="Possible and chosen trajectories of "
                 "aimed and passed balls, with strikes and bounces"),
+        Setting(name="momentum", default=True, tooltip="Centre of mass, the parabola of each flight, support polygon "
+                "and ground force of the armatures that show their momentum"),
         Setting(name="ghosts_at", default="STEP", choices=GHOSTS, title="Ghosts At", tooltip="Where the ghosts are"),
         Setting(name="ghost_step", default=0.5, least=0.05, most=10.0, unit="seconds", title="Seconds",
                 tooltip="Time between two ghost figures"),
         Setting(name="reach", default=2.0, least=0.0, most=60.0, unit="seconds", title="Time Range",
-                tooltip="Draw ghosts and texts within this time of the current frame; 0 draws none", precision=1),
+                tooltip="Draw ghosts, texts and the centre of mass's path within this time of the current frame; 0 "
+                "draws none", precision=1),
         Setting(name="in_front", default=False, tooltip="Draw the overlays in front of all objects"),
     ),
 }
