@@ -21,7 +21,7 @@ from .foot_plant import AIR_RESERVE, Foot, build_foot, solve_heel_rise, spread_p
 from .humanoid import Humanoid, identify_joints
 from .lean import choose_angles, choose_shifts, compute_footprint_shifts, measure_lean, tilt_body
 from .limb import solve_posed_limb
-from .mass import compute_centre_of_mass
+from .mass import SEGMENT_MASSES, SegmentMasses, compute_centre_of_mass
 from .momentum import STRENGTH, MomentumPlanner
 from .motion import compute_pose
 from .skeleton import Skeleton
@@ -36,7 +36,7 @@ _SPREAD_FRAMES = 2  # frames at 30 fps over which it is spread
 
 def obey_momentum(
     skeleton: Skeleton, root: np.ndarray, rotations: np.ndarray, fps: float, share: np.ndarray,
-    strength: float = STRENGTH,
+    strength: float = STRENGTH, masses: SegmentMasses = SEGMENT_MASSES["men"],
 ) -> tuple[np.ndarray, np.ndarray]:
     """Correct a body so that its centre of mass obeys momentum and leans as it is accelerated.
 
@@ -49,6 +49,7 @@ def obey_momentum(
         fps: frames per second.
         share: (T,) from 0, where the body stays as it is, to 1.
         strength: greatest vertical force of the legs in body weights.
+        masses: of the body's segments.
     Returns:
         Root (T, 3) m and local rotations (T, J, 4).
     Raises:
@@ -57,10 +58,10 @@ def obey_momentum(
     body = identify_joints(skeleton)
     places, world = compute_pose(skeleton, root, rotations)
     stances = find_stances(skeleton, places, fps)
-    phases = find_support_phases(stances, compute_centre_of_mass(body, places), fps)
+    phases = find_support_phases(stances, compute_centre_of_mass(body, places, masses), fps)
     if not len(stances) or (len(phases) == 1 and phases[0, 0] <= 0.0 and phases[0, 1] >= len(root) - 1):
         return root, rotations
-    legs = _Legs(skeleton, body, places, world, stances, fps)
+    legs = _Legs(skeleton, body, masses, places, world, stances, fps)
     root, rotations = legs.lean(root, rotations, share)
     planner = MomentumPlanner(phases, len(root), fps, share, strength)
     return legs.follow(planner, root, rotations)
@@ -69,8 +70,9 @@ def obey_momentum(
 class _Legs:
     """The feet of a body before its correction, and how legs follow a root that moves."""
 
-    def __init__(self, skeleton: Skeleton, body: Humanoid, places, world, stances: Stances, fps: float):
-        self.skeleton, self.body, self.stances, self.fps = skeleton, body, stances, fps
+    def __init__(self, skeleton: Skeleton, body: Humanoid, masses: SegmentMasses, places, world, stances: Stances,
+                 fps: float):
+        self.skeleton, self.body, self.masses, self.stances, self.fps = skeleton, body, masses, stances, fps
         self._places, count = places, len(places)
         self._standing = [stances.compute_share(side, count, _FADE_FRAMES * fps / 30.0) for side in (0, 1)]
         self._feet = [build_foot(places, world, limb, np.repeat(standing[:, None] > 0.0, 2, axis=1))
@@ -79,7 +81,7 @@ class _Legs:
 
     def lean(self, root, rotations, share) -> tuple[np.ndarray, np.ndarray]:
         """Move the footprints and turn the body about its centre of mass, by what its stances lack."""
-        centre = compute_centre_of_mass(self.body, self._places)
+        centre = compute_centre_of_mass(self.body, self._places, self.masses)
         lean = measure_lean(self.body, self._places, centre, self.stances, self.fps)
         shifts = choose_shifts(lean, np.interp(self.stances.middle, np.arange(len(share)), share))
         moves = compute_footprint_shifts(self.stances, shifts, len(root))
@@ -109,7 +111,7 @@ class _Legs:
 
     def _measure_centre(self, root, rotations) -> np.ndarray:
         """Measure the centre of mass (T, 3) m of a pose."""
-        return compute_centre_of_mass(self.body, compute_pose(self.skeleton, root, rotations)[0])
+        return compute_centre_of_mass(self.body, compute_pose(self.skeleton, root, rotations)[0], self.masses)
 
     def _aim_feet(self, places, move):
         """Yield (foot, hip (T, 3), ankle goal (T, 3), foot's rotation (T, 4), standing (T,)) for a root moved (T, 3)."""

@@ -23,6 +23,7 @@ from ...base.easing import smoothstep
 from ...library.library import Library
 from ...motion import quaternion
 from ...motion.foot_plant import PlantResult, plant_feet
+from ...motion.mass import SEGMENT_MASSES
 from ...motion.momentum_polish import obey_momentum
 from ...motion.motion import Motion
 from ...motion.toe_roll import roll_toes
@@ -146,7 +147,9 @@ class Construction:
         for touch in self.touches:
             away = (np.abs(at - touch.frame) / self.plan.fps - KICK_SECONDS) / KICK_FADE
             share = np.minimum(share, smoothstep(np.clip(away, 0.0, 1.0)))
-        root, rotations = obey_momentum(self.library.skeleton, planted.root, planted.rotations, self.plan.fps, share)
+        requested = self.plan.requested
+        root, rotations = obey_momentum(self.library.skeleton, planted.root, planted.rotations, self.plan.fps, share,
+                                        requested.strength, SEGMENT_MASSES[requested.masses])
         return replace(planted, root=root, rotations=rotations)
 
     def _compute_given_root(self, heading: np.ndarray) -> np.ndarray:
