@@ -157,7 +157,7 @@ def _build_plan(role: Role, number: int, moments, solved: SolvedBall | None, req
         track=track, timeline=timeline, library=str(request.library), nearest=request.nearest,
         seed=request.seed + role.number, fps=request.fps, solve_touches=solved is not None, variety=request.variety,
         lag=role.lag, manner=role.number, watch=request.watch, strength=request.strength,
-        masses=request.masses,
+        masses=request.masses, fatigue=request.fatigue,
     )
     return to_stored_plan(plan if solved is None
                           else replace(plan, solved=build_trajectory(solved, role.player.id, plan)))

@@ -78,6 +78,7 @@ class MatchRequest:
     watch: float = _DEFAULTS["watch"]
     strength: float = _DEFAULTS["strength"]
     masses: str = _DEFAULTS["masses"]
+    fatigue: float = _DEFAULTS["fatigue"]
     annotations: Path | None = None
     bvh: bool = _DEFAULTS["bvh"]
     figures: bool = _DEFAULTS["figures"]
@@ -112,7 +113,7 @@ class MatchRequest:
 
 
 _RESULTS = ("provider", "start", "end", "players", "fps", "seed", "nearest", "solve_touches", "watch", "strength",
-            "masses", "window", "overlap", "variety", "events_provider")
+            "masses", "fatigue", "window", "overlap", "variety", "events_provider")
 _FILES = ("tracking", "meta", "events", "events_meta")
 
 

@@ -48,6 +48,10 @@ BODY = (
     Setting(name="masses", default="men", choices=MASSES, option="--masses", help="whose segment masses the body has; "
             "default %(default)s", title="Segment Masses", tooltip="Whose segment masses decide where the body's "
             "centre of mass is"),
+    Setting(name="fatigue", default=0.0, least=0.0, most=1.0, expected=BETWEEN, option="--fatigue", metavar="SHARE",
+            help="how deeply the body breathes after sprints ('path'), 0 for not at all; default %(default)g",
+            tooltip="For Path Following: how deeply chest and shoulders breathe, and how far the trunk slumps, after "
+            "sprints; 0 keeps them as in the clips"),
 )
 """Of a player's body; in a match they hold for all players."""
 
@@ -106,6 +110,8 @@ TABLES = {
                 "the clock, so that neighbours differ"),
         Setting(name="manner", default=-1, least=-1, most=100000, help="number of the recording whose manner of "
                 "walking a player of a match keeps; -1 for none"),
+        Setting(name="exertion", default=0.0, least=0.0, most=1000.0, unit="metres", help="exertion of a player of a "
+                "match at the start of a part of it: what they have gained on 5.5 m/s and not recovered from"),
         Setting(name="gaits", default=(), option="--gait", metavar="LABEL=CLIP", help="the clip that represents a "
                 "gait, such as walking=folder/walk.bvh; once for each gait", title="Gait Clips", tuning="any",
                 tooltip="Clips that represent the gaits, such as walking=folder/walk.bvh; jogging=folder/jog.bvh",
