@@ -7,7 +7,7 @@ only decide how deep it is. It fades while the body runs, as arms and trunk swin
 Source: at exhaustion people take 49 breaths a minute and half of each breath is inspiration ("The respiratory time and
 flow profile at volitional exercise termination", J. Sports Sci.). At rest the upper ribs move 3 to 5 mm up and ahead
 (De Groote 1997, J. Appl. Physiol. 83), less than a third of a deep breath (Kaneko and Horie 2012, Respir. Care 57): the
-turns below move collarbones and shoulders by 10 to 15 mm. The slump has no source but the eye.
+deepest breath here moves neck and shoulders by 2 cm. The slump has no source but the eye.
 """
 
 from __future__ import annotations
@@ -25,14 +25,15 @@ from .gaze import measure_trunk, turn_spine
 
 RATES = (0.5, 0.8)
 """Breaths per second, least and most."""
-CHEST_ANGLE, SHOULDER_ANGLE = np.radians(3.0), np.radians(5.0)
+CHEST_ANGLE, SHOULDER_ANGLE = np.radians(4.0), np.radians(7.0)
 """By how much the deepest breath bends the spine back and raises the shoulders."""
-SLUMP_ANGLE = np.radians(6.0)
+SLUMP_ANGLE = np.radians(8.0)
 """By how much the spine of an exhausted body bends forward."""
 DEEP_EXERTION = 6.0
-"""m of exertion after which the breath has 63 % of its depth: some two sprints."""
-CALM_SPEEDS, CALM_SECONDS = (3.5, 2.0), 0.5
-"""m/s between which the breath begins to show, and s to either side over which that is smoothed."""
+"""m of exertion after which the breath has 63 % of its depth: two or three sprints. Field players of a match have more
+in less than a tenth of the time, at most 6 to 18 m."""
+CALM_SPEEDS, CALM_SECONDS = (5.0, 1.5), 0.8
+"""m/s from which down to which the breath comes to show, and s to either side over which that is smoothed."""
 
 _MEAN_RATES = (0.58, 0.72)  # breaths per second, of different players
 _WAVES = ((0.05, 11.3), (0.03, 17.9))  # breaths per second by which the rate wanders, and the period in s
@@ -83,9 +84,10 @@ def breathe(motion: Motion, depth: np.ndarray, times: np.ndarray, seed: int = 0)
     if not depth.any():
         return motion
     body, (joints, world) = identify_joints(motion.skeleton), forward_kinematics(motion)
-    heading = measure_trunk(motion.skeleton, joints, motion.fps).heading
-    ahead = quaternion.rotate_about_up(np.tile([1.0, 0.0, 0.0], (len(motion), 1)), heading)
-    left = quaternion.rotate_about_up(np.tile([0.0, 1.0, 0.0], (len(motion), 1)), heading)
+    trunk = measure_trunk(motion.skeleton, joints, motion.fps)
+    facing = trunk.heading + trunk.twist  # of the shoulders: both are bent and raised alike
+    ahead, left = (np.column_stack([np.cos(angle), np.sin(angle), 0.0 * angle])
+                   for angle in (facing, facing + 0.5 * np.pi))
     full = compute_breath(times, seed)
     bent, _ = turn_spine(motion, world, left, depth * (SLUMP_ANGLE - CHEST_ANGLE * full))
     raised = _raise_shoulders(bent, body, world, ahead, depth * SHOULDER_ANGLE * full)

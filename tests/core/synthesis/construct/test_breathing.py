@@ -6,13 +6,7 @@ import pytest
 from beyond_mocap.motion.humanoid import identify_joints
 from beyond_mocap.motion.motion import forward_kinematics
 from beyond_mocap.motion.track import Track
-from beyond_mocap.synthesis.construct.breathing import (
-    RATES,
-    SLUMP_ANGLE,
-    breathe,
-    compute_breath,
-    compute_breath_depth,
-)
+from beyond_mocap.synthesis.construct.breathing import RATES, SLUMP_ANGLE, breathe, compute_breath, compute_breath_depth
 from beyond_mocap.synthesis.exertion import RECOVERY_SECONDS, compute_exertion, measure_exertion
 from beyond_mocap.synthetic.gait import build_gait
 
