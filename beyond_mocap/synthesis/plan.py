@@ -193,6 +193,7 @@ class Plan:
     strength: float = field(default=_DEFAULTS["strength"], metadata=LATER)
     masses: str = field(default=_DEFAULTS["masses"], metadata=LATER)
     fatigue: float = field(default=_DEFAULTS["fatigue"], metadata=LATER)
+    exertion: float = field(default=_DEFAULTS["exertion"], metadata=LATER)
 
     def __post_init__(self):
         object.__setattr__(self, "pins", tuple(sorted(self.pins, key=lambda pin: (pin.time, pin.part))))
