@@ -91,7 +91,7 @@ def draw_processing(layout, scene) -> None:
     """Draw how the work is done."""
     match = scene.beyond_mocap_match
     column = create_value_column(layout)
-    for name in ("solve_touches", "workers", "scheduler", "first_frame"):
+    for name in ("solve_touches", "strength", "masses", "fatigue", "workers", "scheduler", "first_frame"):
         column.prop(match, name)
     column.prop(scene.beyond_mocap, "rate")
     column.prop(scene.beyond_mocap, "watch", slider=True)

@@ -102,10 +102,10 @@ def draw_curve_settings(column, player) -> None:
 
 
 def draw_player_settings(layout, player) -> None:
-    """Draw the settings of this player: height, foot, style."""
+    """Draw the settings of this player: height, foot, style, body."""
     if body := draw_header(layout, "player_own", "Player"):
         body.use_property_split, body.use_property_decorate = True, False
-        for name in ("height", "strong_foot", "style", "style_weight"):
+        for name in ("height", "strong_foot", "style", "style_weight", "strength", "masses", "fatigue"):
             body.prop(player, name)
 
 

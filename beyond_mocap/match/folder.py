@@ -254,6 +254,7 @@ _FIELD_NAMES = {
     "events_meta": "events metadata", "events_provider": "events provider",
     "solve_touches": "touch solving", "players": "list of players", "fps": "frame rate", "seed": "seed",
     "watch": "strength of watching the ball", "nearest": "nearest labels setting", "provider": "provider",
+    "strength": "strength of the legs", "masses": "segment masses", "fatigue": "fatigue",
     "form": "version", "software": "version",
 }
 

@@ -156,7 +156,8 @@ def _build_plan(role: Role, number: int, moments, solved: SolvedBall | None, req
     plan = Plan(
         track=track, timeline=timeline, library=str(request.library), nearest=request.nearest,
         seed=request.seed + role.number, fps=request.fps, solve_touches=solved is not None, variety=request.variety,
-        lag=role.lag, manner=role.number, watch=request.watch,
+        lag=role.lag, manner=role.number, watch=request.watch, strength=request.strength,
+        masses=request.masses, fatigue=request.fatigue,
     )
     return to_stored_plan(plan if solved is None
                           else replace(plan, solved=build_trajectory(solved, role.player.id, plan)))

@@ -76,6 +76,9 @@ class MatchRequest:
     nearest: bool = _DEFAULTS["nearest"]
     solve_touches: bool = _DEFAULTS["solve_touches"]
     watch: float = _DEFAULTS["watch"]
+    strength: float = _DEFAULTS["strength"]
+    masses: str = _DEFAULTS["masses"]
+    fatigue: float = _DEFAULTS["fatigue"]
     annotations: Path | None = None
     bvh: bool = _DEFAULTS["bvh"]
     figures: bool = _DEFAULTS["figures"]
@@ -109,8 +112,8 @@ class MatchRequest:
         return {name: value.as_posix() if isinstance(value, Path) else value for name, value in asdict(self).items()}
 
 
-_RESULTS = ("provider", "start", "end", "players", "fps", "seed", "nearest", "solve_touches", "watch", "window",
-            "overlap", "variety", "events_provider")
+_RESULTS = ("provider", "start", "end", "players", "fps", "seed", "nearest", "solve_touches", "watch", "strength",
+            "masses", "fatigue", "window", "overlap", "variety", "events_provider")
 _FILES = ("tracking", "meta", "events", "events_meta")
 
 

@@ -21,7 +21,7 @@ from .foot_plant import AIR_RESERVE, Foot, build_foot, solve_heel_rise, spread_p
 from .humanoid import Humanoid, identify_joints
 from .lean import choose_angles, choose_shifts, compute_footprint_shifts, measure_lean, tilt_body
 from .limb import solve_posed_limb
-from .mass import compute_centre_of_mass
+from .mass import SEGMENT_MASSES, SegmentMasses, compute_centre_of_mass
 from .momentum import STRENGTH, MomentumPlanner
 from .motion import compute_pose
 from .skeleton import Skeleton
@@ -37,7 +37,7 @@ _SPREAD_FRAMES = 2  # frames at 30 fps over which it is spread
 
 def obey_momentum(
     skeleton: Skeleton, root: np.ndarray, rotations: np.ndarray, fps: float, share: np.ndarray,
-    strength: float = STRENGTH,
+    strength: float = STRENGTH, masses: SegmentMasses = SEGMENT_MASSES["men"],
 ) -> tuple[np.ndarray, np.ndarray]:
     """Correct a body so that its centre of mass obeys momentum and leans as it is accelerated.
 
@@ -50,6 +50,7 @@ def obey_momentum(
         fps: frames per second.
         share: (T,) from 0, where the body stays as it is, to 1.
         strength: greatest vertical force of the legs in body weights.
+        masses: of the body's segments.
     Returns:
         Root (T, 3) m and local rotations (T, J, 4).
     Raises:
@@ -58,11 +59,11 @@ def obey_momentum(
     body = identify_joints(skeleton)
     places, world = compute_pose(skeleton, root, rotations)
     stances = find_stances(skeleton, places, fps)
-    centre = compute_centre_of_mass(body, places)
+    centre = compute_centre_of_mass(body, places, masses)
     phases = find_support_phases(stances, centre, fps, find_lying_stretches(skeleton, places))
     if not len(stances) or (len(phases) == 1 and phases[0, 0] <= 0.0 and phases[0, 1] >= len(root) - 1):
         return root, rotations
-    legs = _Legs(skeleton, body, (places, world), stances, fps)
+    legs = _Legs(skeleton, body, masses, (places, world), stances=stances, fps=fps)
     planner = MomentumPlanner(phases, len(root), fps, share, strength)
     new_root, new_rotations = legs.follow(planner, root, legs.lean(rotations, share))
     stays = share <= 0.0
@@ -73,9 +74,9 @@ def obey_momentum(
 class _Legs:
     """The feet of a body before its correction, and how legs follow a root that moves."""
 
-    def __init__(self, skeleton: Skeleton, body: Humanoid, pose, stances: Stances, fps: float):
+    def __init__(self, skeleton: Skeleton, body: Humanoid, masses: SegmentMasses, pose, stances: Stances, fps: float):
         places, world = pose
-        self.skeleton, self.body, self.stances, self.fps = skeleton, body, stances, fps
+        self.skeleton, self.body, self.masses, self.stances, self.fps = skeleton, body, masses, stances, fps
         self._places, count = places, len(places)
         self._standing = [stances.compute_share(side, count, _FADE_FRAMES * fps / 30.0) for side in (0, 1)]
         self._feet = [build_foot(places, world, limb, np.repeat(standing[:, None] > 0.0, 2, axis=1))
@@ -84,7 +85,7 @@ class _Legs:
 
     def lean(self, rotations, share) -> np.ndarray:
         """Move the footprints and tilt the body by what its stances lack."""
-        centre = compute_centre_of_mass(self.body, self._places)
+        centre = compute_centre_of_mass(self.body, self._places, self.masses)
         lean = measure_lean(self.body, self._places, centre, self.stances, self.fps)
         least = [share[int(start) : int(np.ceil(stop)) + 1].min()
                  for start, stop in zip(self.stances.start, self.stances.stop)]
@@ -116,7 +117,7 @@ class _Legs:
 
     def _measure_centre(self, root, rotations) -> np.ndarray:
         """Measure the centre of mass (T, 3) m of a pose."""
-        return compute_centre_of_mass(self.body, compute_pose(self.skeleton, root, rotations)[0])
+        return compute_centre_of_mass(self.body, compute_pose(self.skeleton, root, rotations)[0], self.masses)
 
     def _aim_feet(self, places, move):
         """Yield each foot, its hip and ankle goal (T, 3) m, its rotation (T, 4) and standing (T,), the root moved."""

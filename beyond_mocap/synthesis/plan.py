@@ -36,6 +36,7 @@ GAZE = "gaze"
 PARTS = ("left_hand", "right_hand", "left_foot", "right_foot", GAZE)
 FEET = ("", "left", "right")
 METHODS = find_setting("synthesis", "method").choice_names
+MASSES = find_setting("player", "masses").choice_names
 _DEFAULTS = collect_defaults("synthesis", "player")
 _HEIGHT = find_setting("player", "height")
 _SAME = 1e-5  # s by which the end of a hold and the next key may differ where both are meant to be one time
@@ -145,6 +146,7 @@ class Plan:
         gaits: (gait label, clip) pairs; other gaits are found among all clips.
         height: m, of the player; 0 for the library's.
         strong_foot: one of FEET.
+        masses: one of MASSES.
         style: labels, or names or patterns of folders and clips ("academy", "lmd/*").
         solved: the ball's trajectory where it is known already, such as from a whole match.
         heading_path: the planned heading where it is known already, such as over a whole match.
@@ -188,6 +190,10 @@ class Plan:
     solved: SolvedTrajectory | None = field(default=None, compare=False, repr=False, metadata=LATER)
     heading_path: HeadingPath | None = field(default=None, compare=False, repr=False, metadata=LATER)
     watch: float = field(default=_DEFAULTS["watch"], metadata=LATER)
+    strength: float = field(default=_DEFAULTS["strength"], metadata=LATER)
+    masses: str = field(default=_DEFAULTS["masses"], metadata=LATER)
+    fatigue: float = field(default=_DEFAULTS["fatigue"], metadata=LATER)
+    exertion: float = field(default=_DEFAULTS["exertion"], metadata=LATER)
 
     def __post_init__(self):
         object.__setattr__(self, "pins", tuple(sorted(self.pins, key=lambda pin: (pin.time, pin.part))))
@@ -201,6 +207,8 @@ class Plan:
             raise InputError("height", f"{self.height:g} m", limits)
         if self.strong_foot not in FEET:
             raise InputError("strong foot", repr(self.strong_foot), "left, right, or empty for any")
+        if self.masses not in MASSES:
+            raise InputError("masses", repr(self.masses), f"one of {', '.join(MASSES)}")
         self._check_pins()
         self._check_heading_keys()
 

@@ -165,6 +165,8 @@ def _build_arguments(scene: bpy.types.Scene) -> list[str]:
     out += _build_player_arguments(match)
     out += [] if match.solve_touches else ["--no-solve-touches"]
     out += ["--fps", format_float(settings.rate), "--seed", str(settings.seed), "--watch", format_float(settings.watch)]
+    out += ["--strength", format_float(match.strength), "--masses", match.masses,
+            "--fatigue", format_float(match.fatigue)]
     return out + (["--unit", format_float(settings.library_unit)] if settings.library_unit else [])
 
 

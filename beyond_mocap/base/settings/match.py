@@ -4,6 +4,7 @@
 from pathlib import Path
 
 from .setting import BETWEEN, Setting
+from .synthesis import BODY
 
 TABLES = {
     "match.section": (
@@ -39,6 +40,7 @@ TABLES = {
                 "instead of using the nearest ones"),
         Setting(name="watch", default=1.0, least=0.0, most=1.0, expected=BETWEEN, option="--watch", metavar="SHARE",
                 help="how much heads and shoulders turn to the ball, 0 for not at all; default %(default)g"),
+        *BODY,
         Setting(name="first_frame", default=1, tooltip="Scene frame on which the stretch starts"),
     ),
     "touches": (

@@ -15,6 +15,9 @@ FEET = (
     ("any", "Any", "No preferred foot"), ("left", "Left", "Key moments without a side prefer clips of the left foot"),
     ("right", "Right", "Key moments without a side prefer clips of the right foot"),
 )
+MASSES = (
+    ("men", "Men", "Mean shares of men (de Leva 1996)"), ("women", "Women", "Mean shares of women (de Leva 1996)"),
+)
 FORMS = (
     ("ACTION", "Action", "One action on the body"),
     ("STRIPS", "Strips", "NLA strips on the body, one for each piece of a clip, named by clip and labels"),
@@ -37,6 +40,20 @@ def parse_gait_clips(texts: Iterable[str]) -> tuple[tuple[str, str], ...]:
         pairs.append((label.lower(), clip.replace("\\", "/")))
     return tuple(pairs)
 
+
+BODY = (
+    Setting(name="strength", default=4.5, least=2.0, most=8.0, unit="body weights", option="--strength",
+            metavar="WEIGHTS", help="greatest vertical force of the legs in body weights; default %(default)g",
+            tooltip="Greatest vertical force of the legs in body weights: weak legs fly lower, and land softer"),
+    Setting(name="masses", default="men", choices=MASSES, option="--masses", help="whose segment masses the body has; "
+            "default %(default)s", title="Segment Masses", tooltip="Whose segment masses decide where the body's "
+            "centre of mass is"),
+    Setting(name="fatigue", default=0.0, least=0.0, most=1.0, expected=BETWEEN, option="--fatigue", metavar="SHARE",
+            help="how deeply the body breathes after sprints ('path'), 0 for not at all; default %(default)g",
+            tooltip="For Path Following: how deeply chest and shoulders breathe, and how far the trunk slumps, after "
+            "sprints; 0 keeps them as in the clips"),
+)
+"""Of a player's body; in a match they hold for all players."""
 
 TABLES = {
     "synthesis": (
@@ -93,6 +110,8 @@ TABLES = {
                 "the clock, so that neighbours differ"),
         Setting(name="manner", default=-1, least=-1, most=100000, help="number of the recording whose manner of "
                 "walking a player of a match keeps; -1 for none"),
+        Setting(name="exertion", default=0.0, least=0.0, most=1000.0, unit="metres", help="exertion of a player of a "
+                "match at the start of a part of it: what they have gained on 5.5 m/s and not recovered from"),
         Setting(name="gaits", default=(), option="--gait", metavar="LABEL=CLIP", help="the clip that represents a "
                 "gait, such as walking=folder/walk.bvh; once for each gait", title="Gait Clips", tuning="any",
                 tooltip="Clips that represent the gaits, such as walking=folder/walk.bvh; jogging=folder/jog.bvh",
@@ -122,6 +141,7 @@ TABLES = {
                 metavar="NUMBER", help="missed speed in m/s that is accepted for a clip of the style; default "
                 "%(default)g",
                 tooltip="Missed speed in m/s that is accepted for a clip of the style"),
+        *BODY,
         Setting(name="drawn_start", default=0.0, unit="seconds", title="Begins At", tooltip="Second on the clock at "
                 "which a drawn curve begins; a moving object has its own frames"),
     ),

@@ -15,6 +15,7 @@ from ...annotation import Timeline
 from ...base.errors import InputError
 from ...library.features import FPS
 from ...motion.track import Track
+from ...synthesis.exertion import measure_exertion
 from ...synthesis.heading_plan import HOLD_FADE
 from ...synthesis.plan import Plan, SolvedTrajectory
 from ...synthesis.search.candidate_index import SLOT
@@ -140,6 +141,7 @@ def cut_plan(plan: Plan, start: float, end: float) -> Plan:
         plan,
         track=cut_track(plan.track, start, end),
         timeline=Timeline(tuple(spans), tuple(inside)),
+        exertion=measure_exertion(plan.track, start, plan.exertion) if plan.fatigue else plan.exertion,
         pins=tuple(pin for pin in plan.pins if pin.time <= end and pin.end >= start),
         heading_keys=tuple(key for key in plan.heading_keys if key.is_within(start - HOLD_FADE, end + HOLD_FADE)),
         heading_path=None if plan.heading_path is None else plan.heading_path.cut_span(start - HOLD_FADE,

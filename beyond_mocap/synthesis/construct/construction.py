@@ -23,17 +23,20 @@ from ...base.easing import smoothstep
 from ...library.library import Library
 from ...motion import quaternion
 from ...motion.foot_plant import PlantResult, plant_feet
+from ...motion.mass import SEGMENT_MASSES
 from ...motion.momentum_polish import obey_momentum
 from ...motion.motion import Motion
 from ...motion.toe_roll import roll_toes
 from ...motion.track import SampledTrack
 from ..body_size import scale_ball
+from ..exertion import compute_exertion
 from ..plan import ResolvedPlan
 from ..search.edit_list import EditList
 from ..search.request import SearchRequest, compute_needed_frames
 from ..search.source_frames import SourceFrames, SourceMotion, fetch_overlap
 from ..take import KeyResult
 from .ball_touch.touch_frames import Touch
+from .breathing import breathe, compute_breath_depth
 from .edit_blending import OldMotion
 from .extra_steps import Steps, add_steps
 from .gaze import compute_release, estimate_look, hide_lost_ball, watch_ball
@@ -129,7 +132,7 @@ class Construction:
         if not self.is_planned:
             ground, pose = self._pull_to_track(ground), self._lean_into_curves(pose)
         planted, steps_taken = self._plant_feet(np.column_stack([ground, self.smooth_source.height]), pose)
-        planted = self._obey_momentum(self._watch_ball(planted))
+        planted = self._obey_momentum(self._breathe(self._watch_ball(planted)))
         return replace(planted, rotations=self._roll_toes(planted.root, planted.rotations)), steps_taken
 
     def _roll_toes(self, root: np.ndarray, rotations: np.ndarray) -> np.ndarray:
@@ -150,9 +153,10 @@ class Construction:
             away = (np.abs(at - touch.frame) / self.plan.fps - KICK_SECONDS) / KICK_FADE
             share = np.minimum(share, smoothstep(np.clip(away, 0.0, 1.0)))
         # gravity holds in the player's size: a child's flights are shorter in the library's
-        size, skeleton = self.plan.size, self.library.skeleton
+        size, skeleton, requested = self.plan.size, self.library.skeleton, self.plan.requested
         root, rotations = obey_momentum(skeleton if size == 1.0 else skeleton.scale(size), size * planted.root,
-                                        planted.rotations, self.plan.fps, share)
+                                        planted.rotations, self.plan.fps, share, strength=requested.strength,
+                                        masses=SEGMENT_MASSES[requested.masses])
         return replace(planted, root=root / size, rotations=rotations)
 
     def _compute_given_root(self, heading: np.ndarray) -> np.ndarray:
@@ -175,15 +179,33 @@ class Construction:
             return planted
         heads = [(touch.frame - HEADER_SECONDS * fps, touch.frame + HEADER_SECONDS * fps) for touch in self.touches
                  if find_striking_part(touch.words) == "head"]
-        bodies = [(touch.frame - touch.entry, touch.frame + touch.leave) for touch in self.touches]
-        head, shoulders = (strength * compute_release(touches, len(track), RELEASE_SECONDS * fps)
-                           for touches in (heads, bodies))
+        head = strength * compute_release(heads, len(track), RELEASE_SECONDS * fps)
         motion = watch_ball(
             Motion(self.library.skeleton, planted.root, planted.rotations, fps),
             ball, look=estimate_look(self.library), speed=track.speed, seed=self.plan.requested.seed,
-            start=float(track.times[0]), head_share=head, shoulder_share=shoulders,
+            start=float(track.times[0]), head_share=head,
+            shoulder_share=strength * self._shoulder_release,
         )
         return replace(planted, rotations=motion.rotations)
+
+    def _breathe(self, planted: PlantResult) -> PlantResult:
+        """Let chest and shoulders breathe after sprints by the plan's share, except within the clips of touches."""
+        requested = self.plan.requested
+        if not requested.fatigue:
+            return planted
+        whole = self.plan.sample_track(self.plan.fps)  # sprints long before a part that is edited count
+        speed = whole.speed * self.plan.size
+        depth = compute_breath_depth(compute_exertion(speed, whole.fps, requested.exertion), speed, whole.fps)
+        depth = requested.fatigue * np.interp(self.track.times, whole.times, depth) * self._shoulder_release
+        motion = breathe(Motion(self.library.skeleton, planted.root, planted.rotations, self.plan.fps), depth,
+                         self.track.times, requested.seed)
+        return replace(planted, rotations=motion.rotations)
+
+    @property
+    def _shoulder_release(self) -> np.ndarray:
+        """(T,) share in which the upper body is free: none within the clips of touches."""
+        bodies = [(touch.frame - touch.entry, touch.frame + touch.leave) for touch in self.touches]
+        return compute_release(bodies, len(self.track), RELEASE_SECONDS * self.plan.fps)
 
     def solve_ball_contact(self, planted: PlantResult, steps_taken: Steps) -> tuple[PlantResult, np.ndarray]:
         """Bring the striking part to the ball at every touch.

@@ -108,7 +108,7 @@ def watch_ball(
 
     twist = compute_twist(see(habits.delay + SHOULDER_DELAY), trunk.twist, fps)
     twist = twist * eased * shoulder_share * (1.0 - SPRINT_LOSS * sprint)
-    motion, twist = _twist_spine(motion, world, twist)
+    motion, twist = turn_spine(motion, world, np.array([0.0, 0.0, 1.0]), twist)
     if body.neck is None and body.head is None:
         return motion
     world = quaternion.multiply(quaternion.from_up_angle(twist)[:, None], world)  # of all joints above the spine
@@ -322,22 +322,29 @@ def _fade_beside_gaps(known: np.ndarray, fps: float) -> np.ndarray:
     return smoothstep(_measure_distance(~known) / (_FADE_SECONDS * fps))
 
 
-def _twist_spine(motion: Motion, world: np.ndarray, twist: np.ndarray) -> tuple[Motion, np.ndarray]:
-    """Twist the spine about the vertical by angles (T,), shared by its joints; return also the twist that it takes.
+def turn_spine(motion: Motion, world: np.ndarray, axis: np.ndarray, angle: np.ndarray) -> tuple[Motion, np.ndarray]:
+    """Turn the spine about an axis, shared by its joints.
 
-    world: (T, J, 4) of the motion's joints.
+    Args:
+        motion: T frames.
+        world: (T, J, 4) rotations of its joints in the world.
+        axis: (3,) or (T, 3) unit, world.
+        angle: (T,) rad; frames with 0 keep their bits.
+    Returns:
+        The motion, and the turn (T,) rad that it takes: 0 without a spine.
     """
     body, parents = identify_joints(motion.skeleton), motion.skeleton.parents
     spine = [joint for joint in body.spine if joint not in (body.neck, body.head)]
     if not spine:
-        return motion, np.zeros_like(twist)
-    rotations, moved, up = np.array(motion.rotations), twist != 0.0, np.array([0.0, 0.0, 1.0])
+        return motion, np.zeros_like(angle)
+    rotations, moved = np.array(motion.rotations), angle != 0.0
+    axis = np.broadcast_to(axis, (len(motion), 3))[moved]
     for joint in spine:
-        # turns about the vertical do not change how it lies in a joint's frame
-        axis = quaternion.rotate(quaternion.inverse(world[moved, parents[joint]]), up)
-        turn = quaternion.from_axis_angle(axis, twist[moved] / len(spine))
+        # turns about the axis do not change how it lies in a joint's frame
+        local = quaternion.rotate(quaternion.inverse(world[moved, parents[joint]]), axis)
+        turn = quaternion.from_axis_angle(local, angle[moved] / len(spine))
         rotations[moved, joint] = quaternion.multiply(turn, rotations[moved, joint])
-    return replace(motion, rotations=rotations), twist
+    return replace(motion, rotations=rotations), angle
 
 
 def _remove_nods(sight: np.ndarray, heading: np.ndarray, fps: float) -> np.ndarray:

@@ -92,12 +92,14 @@ def test_ticks_by_team_and_alone(place):
 def test_the_command_that_makes_it(place):
     match = a_match(place, place / "out")
     match.start, match.end, match.workers, match.solve_touches = 3.0, 9.5, 3, False
+    match.strength, match.masses, match.fatigue = 4.0, "women", 0.5
     match.players[0].use = False
     arguments = room("request").build_command(bpy.context.scene)
     text = " ".join(arguments)
     assert text.startswith(f"match --tracking {TRACKING} --library {place / 'library'}")
     assert f"--out {place / 'out'}" in text
     assert "--from 3 --to 9.5" in text and "--workers 3" in text and "--no-solve-touches" in text
+    assert "--strength 4 --masses women --fatigue 0.5" in text
     players = arguments[arguments.index("--players") + 1 :][:8]
     assert "home_1" not in players and set(players) == {player.feed_id for player in match.players if player.use}
     match.scheduler = "tcp://here:8786"

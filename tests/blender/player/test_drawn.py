@@ -231,9 +231,12 @@ def test_what_is_a_players_own_is_in_his_plan(extension, scene):
     plain = plans.build_plan(scene.beyond_mocap, player)[0]
     assert (plain.height, plain.strong_foot, plain.style, plain.pins) == (0.0, "", (), ())
     player.height, player.strong_foot, player.style, player.style_weight = 1.9, "left", " lmd/* ; running", 2.0
+    player.strength, player.masses, player.fatigue = 4.0, "women", 0.5
     plan = plans.build_plan(scene.beyond_mocap, player)[0]
     assert plan.height == pytest.approx(1.9) and plan.style == ("lmd/*", "running")
     assert (plan.strong_foot, plan.style_weight) == ("left", 2.0)
+    assert (plain.strength, plain.masses, plain.fatigue) == (4.5, "men", 0.0)
+    assert (plan.strength, plan.masses, plan.fatigue) == (4.0, "women", 0.5)
 
 
 def test_a_drawn_player_is_synthesized_updated_and_pinned(extension, scene, core, tmp_path):

@@ -14,6 +14,8 @@ from beyond_mocap.base.settings import TABLES, find_setting
 from beyond_mocap.base.settings.options import option_values
 from beyond_mocap.base.settings.setting import Setting, check_limits
 from beyond_mocap.cli.main import build_parser
+from beyond_mocap.motion.mass import SEGMENT_MASSES
+from beyond_mocap.motion.momentum import STRENGTH
 from beyond_mocap.path_editing.path_frame import FRAMES
 from beyond_mocap.synthesis.plan import Plan
 from command_pages import iter_commands
@@ -112,4 +114,6 @@ def test_what_the_table_names_is_what_the_core_knows():
     """The base cannot import them."""
     assert find_setting("markers", "ball").choice_names == tuple(THROWN_BALLS)
     assert find_setting("path_editing", "frame").choice_names == FRAMES
+    assert find_setting("player", "strength").default == STRENGTH
+    assert find_setting("player", "masses").choice_names == tuple(SEGMENT_MASSES)
     assert {row.name for row in TABLES["synthesis"]} <= set(Plan.__dataclass_fields__)

@@ -50,7 +50,8 @@ def test_what_decides_the_results_is_in_the_identity_and_nothing_else(order, tmp
             {"tracking": tmp_path / "same.dat"}, {"annotations": tmp_path}]  # fmt: skip
     assert {compute_digest(build_identity(changed(order, **more), "key")) for more in same} == {own}
     other = [{"seed": 1}, {"start": 0.0}, {"end": 9.0}, {"fps": 25.0}, {"players": ("a",)}, {"nearest": False},
-             {"solve_touches": False}, {"window": 30.0}, {"events": tmp_path / "same.dat"}]  # fmt: skip
+             {"solve_touches": False}, {"strength": 4.0}, {"masses": "women"}, {"fatigue": 0.5}, {"window": 30.0},
+             {"events": tmp_path / "same.dat"}]  # fmt: skip
     found = [compute_digest(build_identity(changed(order, **more), "key")) for more in other]
     (tmp_path / "t.dat").write_text("other tracking")
     found += [compute_digest(build_identity(order, name)) for name in ("other", "key")]

@@ -8,6 +8,8 @@ import pytest
 
 from beyond_mocap.base.errors import InputError
 from beyond_mocap.match.player_motion import construct_player
+from beyond_mocap.motion import quaternion
+from beyond_mocap.motion.humanoid import identify_joints
 from beyond_mocap.motion.motion import forward_kinematics
 from beyond_mocap.motion.track import sample_track
 from beyond_mocap.synthesis.quality.playback import playback_from_take
@@ -71,6 +73,23 @@ def test_two_windows_meet_without_a_jump(library, weaving_player):
         at = int(round((edge - take.start_time) * 30.0))
         near[at - 3 : at + 63] = True
     assert jerk[near].max() <= 1.2 * jerk[~near].max()
+
+
+def test_an_exhausted_player_breathes_on_through_windows(library, weaving_player):
+    """Chest and shoulders go alike in windows of 8 s and in one, where the player has recovered for a while."""
+    (stretch,), chest = weaving_player.stretches, identify_joints(library.skeleton).chest
+
+    def measure_turn(window):
+        """(T, 3) rotation vectors by which the chest is turned otherwise than that of a rested player."""
+        stretches = [replace(stretch, plan=replace(stretch.plan, fatigue=share, exertion=6.0)) for share in (0.0, 1.0)]
+        takes = [construct_player(library, replace(weaving_player, window=window, stretches=(one,)), 5.0, 30.0)[0]
+                 for one in stretches]
+        rested, tired = (forward_kinematics(take.motion)[1][:, chest] for take in takes)
+        return quaternion.to_rotation_vector(quaternion.multiply(tired, quaternion.inverse(rested)))
+
+    cut, whole = measure_turn(8.0), measure_turn(60.0)
+    assert np.degrees(np.linalg.norm(whole, axis=1)).max() > 3.0
+    assert np.degrees(np.linalg.norm(cut - whole, axis=1)).max() < 0.5
 
 
 def test_one_window_is_what_synthesize_makes(library, weaving_plan):

@@ -105,6 +105,16 @@ def test_a_cut_plan_keeps_what_reaches_into_it(weaving_plan):
     assert plan.timeline == Timeline(spans[:1], keys[1:])
 
 
+def test_a_cut_plan_goes_on_with_the_exertion_of_its_start():
+    times = np.arange(0.0, 60.0, 0.04)
+    ahead = np.cumsum(np.where(times < 10.0, 7.0, 1.0)) * 0.04
+    plan = Plan(track=Track(times, np.column_stack([ahead, 0.0 * times])), fatigue=0.5)
+    once = cut_plan(plan, 30.0, 50.0)
+    assert 5.0 < once.exertion < 15.0
+    assert cut_plan(once, 40.0, 50.0).exertion == pytest.approx(cut_plan(plan, 40.0, 50.0).exertion, rel=1e-3)
+    assert cut_plan(replace(plan, fatigue=0.0), 30.0, 50.0).exertion == 0.0
+
+
 def with_course(plan: Plan) -> Plan:
     times = np.arange(5.0, 30.0, 0.004)
     ball = np.column_stack([times, np.sin(times), 1.2 + np.sin(times)])

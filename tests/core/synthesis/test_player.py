@@ -134,6 +134,7 @@ def test_folders_clips_and_patterns_name_clips():
 
 @pytest.mark.parametrize("wrong", [
     {"height": 0.2}, {"height": 9.0}, {"strong_foot": "both"}, {"style_weight": -1.0},
+    {"strength": 1.0}, {"strength": float("nan")}, {"masses": "children"},
 ])
 def test_what_makes_no_sense_is_refused(track, wrong):
     with pytest.raises(InputError):
