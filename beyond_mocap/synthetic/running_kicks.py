@@ -27,7 +27,8 @@ from ..motion.retargeting.posture import Posture, to_motion
 from ..motion.retargeting.structure import list_descendants
 from . import gait_tables as tables
 from .footsteps import Footsteps
-from .gait import build_upper_posture, plan_footsteps, plant_feet
+from .gait import build_upper_posture, plan_footsteps
+from .gait_legs import plant_feet
 from .gait_plan import GaitPlan, GaitStyle, plan_gait
 from .gestures import LEFT, RIGHT, Gesture, compute_envelope
 from .kick_styles import KICK_STYLES
