@@ -25,6 +25,7 @@ from ..motion.skeleton import Skeleton
 from . import gait_tables as tables
 from .footsteps import Footsteps
 from .gait_legs import plant_feet
+from .gait_mass import follow_mass
 from .gait_plan import GaitPlan, GaitStyle, compute_wander, plan_gait
 from .gait_tables import compute_run_share, interpolate_figure
 
@@ -164,7 +165,8 @@ def build_posture(
     Returns:
         The posture, N rows.
     """
-    return plant_feet(build_upper_posture(gait_plan, neutral, style, seed), gait_plan.times, steps, neutral)
+    posture = plant_feet(build_upper_posture(gait_plan, neutral, style, seed), gait_plan.times, steps, neutral)
+    return follow_mass(posture, gait_plan, steps, neutral)
 
 
 def build_upper_posture(gait_plan: GaitPlan, neutral: NeutralStance, style: GaitStyle, seed: int) -> Posture:

@@ -30,7 +30,7 @@ def plant_feet(posture: Posture, times: np.ndarray, steps: tuple[Footsteps, ...]
         The posture with feet.
     """
     hips = posture.hips.copy()
-    hips[:, 2] -= _compute_hip_drop(posture, times, steps, neutral)
+    hips[:, 2] -= compute_hip_drop(posture, times, steps, neutral)
     posture = posture.replace_arrays(hips=hips)
     tops = compute_hip_positions(posture, neutral)
     paths = [compute_foot_path(steps[s], times, tops[:, s], heading=posture.heading, neutral=neutral,
@@ -88,7 +88,7 @@ def measure_leg(neutral: NeutralStance, side: int) -> tuple[float, float]:
     return float(np.linalg.norm(knee - hip)), float(np.linalg.norm(ankle - knee))
 
 
-def _compute_hip_drop(posture: Posture, times: np.ndarray, steps, neutral: NeutralStance) -> np.ndarray:
+def compute_hip_drop(posture: Posture, times: np.ndarray, steps, neutral: NeutralStance) -> np.ndarray:
     """Compute how far (T,) m to lower the hips so that feet in contact are in reach, smooth in time."""
     tops = compute_hip_positions(posture, neutral)
     drop = np.zeros(len(times))
