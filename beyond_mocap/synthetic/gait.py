@@ -29,8 +29,8 @@ from .gait_mass import follow_mass
 from .gait_plan import GaitPlan, GaitStyle, compute_wander, plan_gait
 from .gait_tables import compute_run_share, interpolate_figure
 
-# farthest that a flat foot is ahead of and behind the hips, shares of the leg's length
-_LONGEST_AHEAD, _LONGEST_BEHIND = 0.41, 0.72
+# farthest that a flat foot is ahead of and behind the hips, shares of the leg's length; a sprinter's is farther behind
+_LONGEST_AHEAD, _LONGEST_BEHIND, _SPRINT_BEHIND = 0.41, 0.72, 0.86
 
 
 def build_gait(
@@ -119,22 +119,22 @@ def plan_footsteps(gait_plan: GaitPlan, neutral: NeutralStance, style: GaitStyle
     )
     place = place - _compute_lean_shift(gait_plan, neutral, middle)
     toe_out = sign * (np.radians(interpolate_figure("toe_out", adult_speed)) + style.toe_out)
-    on, off = _limit_stances(gait_plan, place, on, off, neutral.leg)
+    on, off = _limit_stances(gait_plan, place, on, off, adult_speed, neutral.leg)
     return Footsteps(side=side, on=on, off=off, place=place, yaw=heading + toe_out, speed=adult_speed,
                      direction=direction)
 
 
 def _limit_stances(
-    gait_plan: GaitPlan, place: np.ndarray, on: np.ndarray, off: np.ndarray, leg: float
+    gait_plan: GaitPlan, place: np.ndarray, on: np.ndarray, off: np.ndarray, adult_speed: np.ndarray, leg: float
 ) -> tuple[np.ndarray, np.ndarray]:
     """Cut stances (K,) where the hips are too far from the foot: when speed changes in a stance, feet lift earlier."""
     share = np.linspace(0.0, 0.5, 26)
+    behind = _LONGEST_BEHIND + (_SPRINT_BEHIND - _LONGEST_BEHIND) * tables.compute_sprint_share(adult_speed)[:, None]
     ends = []
-    for edge, sign in ((on, -1.0), (off, 1.0)):
+    for edge, sign, farthest in ((on, -1.0, _LONGEST_AHEAD), (off, 1.0, behind)):
         at = 0.5 * (on + off)[:, None] + sign * share * (off - on)[:, None]
         hips = interpolate_columns(at, gait_plan.times, gait_plan.path)
-        is_near = np.linalg.norm(hips - place[:, None], axis=-1) <= (_LONGEST_AHEAD if sign < 0
-                                                                     else _LONGEST_BEHIND) * leg
+        is_near = np.linalg.norm(hips - place[:, None], axis=-1) <= farthest * leg
         last = np.where(is_near.all(axis=1), len(share) - 1, np.argmin(is_near, axis=1))
         ends.append(
             np.where(is_near.all(axis=1), edge, np.take_along_axis(at, np.maximum(last, 8)[:, None], axis=1)[:, 0])

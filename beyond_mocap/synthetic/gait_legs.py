@@ -13,7 +13,7 @@ from .footsteps import Footsteps, compute_foot_path
 
 # longest reach of a leg, walking and running, share of its length: runners' knees stay bent by about 20
 # degrees (V, and recordings), and a knee that snaps straight is the most visible error
-_LONGEST_REACH = (0.9955, 0.984)
+_LONGEST_REACH, _SPRINT_REACH = (0.9955, 0.984), 0.99
 # share of the leg's length below that limit from which a swinging leg eases toward it
 _EASE_SHARE = 0.03
 
@@ -45,7 +45,9 @@ def plant_feet(posture: Posture, times: np.ndarray, steps: tuple[Footsteps, ...]
 def _compute_longest_reach(steps: Footsteps, times: np.ndarray) -> np.ndarray:
     """Compute the longest reach of a leg at `times` (T,): (T,) share of its length."""
     walking, running = _LONGEST_REACH
-    return walking + (running - walking) * tables.compute_run_share(steps.speed[steps.find_stance(times)])
+    speed = steps.speed[steps.find_stance(times)]
+    longest = walking + (running - walking) * tables.compute_run_share(speed)
+    return longest + (_SPRINT_REACH - running) * tables.compute_sprint_share(speed)
 
 
 def limit_leg_reach(ankle: np.ndarray, hip: np.ndarray, times: np.ndarray, steps: Footsteps, leg: float) -> np.ndarray:

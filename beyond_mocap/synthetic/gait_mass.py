@@ -13,7 +13,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..base.time_series import interpolate_columns
+from ..base.time_series import hann_smooth, interpolate_columns
 from ..motion.humanoid import identify_joints
 from ..motion.mass import compute_centre_of_mass
 from ..motion.motion import forward_kinematics
@@ -26,8 +26,14 @@ from .gait_plan import GaitPlan
 
 # m/s by which a runner slows down on landing and speeds up until the foot leaves (V)
 _BRAKING = 0.25
-# passes in which hips follow the centre of mass, and by how much more than it is off: legs on the ground stay
-_PASSES, _GAIN = 4, 1.1
+# passes in which hips follow the centre of mass, in those that are marked it is lowered where legs lack reach; and by
+# how much more than it is off they follow: legs on the ground stay
+_PASSES, _GAIN = (False, True, True, False, False), 1.1
+
+# steps over which a body that a leg's reach lowers is lowered evenly
+_SPREAD = 3
+# first and last flights of a plan, whose strides it does not know in full
+_EDGE = 2
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -70,19 +76,18 @@ def follow_mass(posture: Posture, plan: GaitPlan, steps: tuple[Footsteps, ...], 
     """
     flights = find_flights(steps)
     share = tables.compute_sprint_share(plan.adult_speed)
-    share = share * ((plan.times > flights.middle[0]) & (plan.times < flights.middle[-1]))
+    share = share * ((plan.times > flights.middle[_EDGE]) & (plan.times < flights.middle[-1 - _EDGE]))
     if not np.any(share):
         return posture
-    mass = measure_mass(posture, neutral)
-    lowered = np.zeros(len(flights.middle))
-    base = _compute_base(mass, plan, flights)
-    for _ in range(_PASSES):
-        wanted = plan_mass_path(plan, flights, base - lowered[:, None] * [0.0, 0.0, 1.0])
-        hips = posture.hips + _GAIN * share[:, None] * (wanted - mass)
+    base = _compute_base(measure_mass(posture, neutral), plan, flights)
+    for reach in _PASSES:
+        wanted = plan_mass_path(plan, flights, base)
+        hips = posture.hips + _GAIN * share[:, None] * (wanted - measure_mass(posture, neutral))
         posture = posture.replace_arrays(hips=hips)
-        lowered = lowered + _spread_drop(compute_hip_drop(posture, plan.times, steps, neutral) * share, plan, flights)
+        if reach:
+            drop = compute_hip_drop(posture, plan.times, steps, neutral) * share
+            base = base - _spread_drop(drop, plan, flights)[:, None] * [0.0, 0.0, 1.0]
         posture = plant_feet(posture, plan.times, steps, neutral)
-        mass = measure_mass(posture, neutral)
     return posture
 
 
@@ -117,11 +122,11 @@ def _compute_rise(flights: Flights) -> np.ndarray:
 
 
 def _spread_drop(drop: np.ndarray, plan: GaitPlan, flights: Flights) -> np.ndarray:
-    """Compute how far (F,) m flights are lowered so that no leg lacks reach in the contacts beside them."""
-    number = np.searchsorted(flights.middle, plan.times)
+    """Compute how far (F,) m flights are lowered so that no leg lacks reach: evenly over the strides around each."""
     most = np.zeros(len(flights.middle) + 1)
-    np.maximum.at(most, number, drop)
-    return np.maximum(most[1:], most[:-1])
+    np.maximum.at(most, np.searchsorted(flights.middle, plan.times), drop)
+    around = np.lib.stride_tricks.sliding_window_view(np.pad(most, _SPREAD, mode="edge"), 2 * _SPREAD + 1).max(axis=1)
+    return hann_smooth(np.maximum(around[1:], around[:-1]), _SPREAD)
 
 
 def plan_mass_path(plan: GaitPlan, flights: Flights, base: np.ndarray) -> np.ndarray:

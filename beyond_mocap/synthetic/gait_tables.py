@@ -90,7 +90,10 @@ _SPEEDS: dict[str, list[tuple[float, float]]] = {
 # a sprinter's figures, which replace those above from _SPRINT on; walking and jogging do not depend on them
 _SPRINT_SPEEDS: dict[str, list[tuple[float, float]]] = {
     # contact times of D and Y times frequency: .20 s at 4.5, .16 at 6, .143 at 7, .125 at 8, .112 at 9 m/s
-    "duty": [(4.1, 0.296), (4.5, 0.292), (5.2, 0.276), (6.0, 0.259), (7.0, 0.252), (8.0, 0.245), (9.5, 0.242)],
+    "duty": [(4.1, 0.29), (4.5, 0.285), (5.2, 0.269), (6.0, 0.253), (7.0, 0.246), (8.0, 0.239), (9.5, 0.236)],
+    # R: 43 and 41 at 3.5 and 9.4 m/s
+    "knee_mid": [(4.1, 52), (5.2, 48), (7.0, 46), (9.5, 46)],
+    "ahead": [(4.1, -0.175), (5.2, -0.175), (7.0, -0.175), (9.5, -0.175)],
     # the line from hips to neck: nearly upright (V, R)
     "lean": [(4.1, 7.5), (5.2, 5.5), (6.0, 3.5), (7.0, 3.0), (8.0, 3.2), (9.5, 4.2)],
     "arm_swing": [(4.1, 29), (5.2, 34), (7.0, 45), (9.5, 59)],
