@@ -94,12 +94,16 @@ _SPRINT_SPEEDS: dict[str, list[tuple[float, float]]] = {
     # R: 43 and 41 at 3.5 and 9.4 m/s
     "knee_mid": [(4.1, 52), (5.2, 48), (7.0, 46), (9.5, 46)],
     "ahead": [(4.1, -0.175), (5.2, -0.175), (7.0, -0.175), (9.5, -0.175)],
-    # the line from hips to neck: nearly upright (V, R)
-    "lean": [(4.1, 7.5), (5.2, 5.5), (6.0, 3.5), (7.0, 3.0), (8.0, 3.2), (9.5, 4.2)],
+    # forward lean of the line from hips to neck, and how far it nods either way in each step (V, R)
+    "trunk": [(4.1, 8.0), (5.2, 6.0), (6.0, 4.0), (7.0, 3.0), (8.0, 3.0), (9.5, 4.0)],
+    "nod": [(4.1, 2.2), (9.5, 3.3)],
     "arm_swing": [(4.1, 29), (5.2, 34), (7.0, 45), (9.5, 59)],
     "arm_middle": [(4.1, -13), (7.0, -15), (9.5, -13)],
-    "elbow": [(4.1, 92), (5.2, 90), (7.0, 87), (9.5, 84)],
-    "elbow_swing": [(4.1, 18), (5.2, 28), (7.0, 36), (9.5, 38)],
+    # second wave of the arms, twice a stride (R)
+    "arm_second": [(4.1, 6), (9.5, 12)],
+    "elbow": [(4.1, 86), (5.2, 81), (9.5, 79)],
+    "elbow_swing": [(4.1, 24), (5.2, 34), (7.0, 38), (9.5, 39)],
+    "elbow_second": [(4.1, 13), (5.2, 16), (9.5, 18)],
 }
 # m/s of an adult between which a runner takes a sprinter's form; the trunk comes up more slowly
 _SPRINT, _UPRIGHT = (4.1, 5.2), (4.1, 6.5)
