@@ -18,6 +18,8 @@ from . import gait_tables as tables
 
 # rad of pitch beyond which the ball of the foot leaves the ground and the toe tip stays
 _TOE_LIFT_PITCH = np.radians(42.0)
+# share of that excess by which a sprinter's toes leave the ground, too: they push off over the tip of the boot
+_SPRINT_TIP = 1.0
 # m for an adult: a step this long is a full one; shorter ones roll and lift less
 _FULL_STEP = 0.55
 
@@ -91,7 +93,8 @@ def compute_stance(steps: Footsteps, which: np.ndarray, share: np.ndarray, neutr
     after = np.concatenate([sizes, sizes[-1:]])[which]
     amount = before + (after - before) * quintic_step((share - 0.2) / 0.3)
     pitch = amount * _compute_pitch(share, steps.speed[which], steps.direction[which])
-    tip_pitch = 0.6 * np.maximum(pitch - _TOE_LIFT_PITCH, 0.0)
+    tip_share = 0.6 + (_SPRINT_TIP - 0.6) * tables.compute_sprint_share(steps.speed[which])
+    tip_pitch = tip_share * np.maximum(pitch - _TOE_LIFT_PITCH, 0.0)
     forward, up = roll_foot(pitch, tip_pitch, neutral, steps.side)
     yaw = steps.yaw[which]
     ankle = np.stack(

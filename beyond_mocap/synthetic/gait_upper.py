@@ -214,5 +214,5 @@ def _bend_sprinting_elbow(gait_plan: GaitPlan, turn: np.ndarray, size: np.ndarra
     wave = first * np.cos(turn) + second * np.cos(4.0 * np.pi * gait_plan.phase - 2.0 * np.pi * _ELBOW_PEAK)
     middle = middle + np.clip(style.elbow, -_SPRINT_ELBOW, _SPRINT_ELBOW)
     least, most = np.radians(tables.ELBOW_RANGE)
-    room = np.where(wave > 0.0, (most - middle) / (first + 0.9 * second), (middle - least) / (0.55 * (first + second)))
+    room = np.where(wave > 0.0, (most - middle) / (first + 0.95 * second), (middle - least) / (0.55 * (first + second)))
     return middle + wave * size * np.clip(room, 0.0, 1.0)
