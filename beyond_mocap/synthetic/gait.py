@@ -30,7 +30,7 @@ from .gait_tables import interpolate_figure
 from .gait_upper import pose_arms, pose_trunk
 
 # farthest that a flat foot is ahead of and behind the hips, shares of the leg's length; a sprinter's is farther behind
-_LONGEST_AHEAD, _LONGEST_BEHIND, _SPRINT_BEHIND = 0.41, 0.72, 0.86
+_LONGEST_AHEAD, _LONGEST_BEHIND, _SPRINT_BEHIND = 0.41, 0.72, 0.78
 
 
 def build_gait(

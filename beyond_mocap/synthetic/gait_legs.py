@@ -14,6 +14,8 @@ from .footsteps import Footsteps, compute_foot_path
 # longest reach of a leg, walking and running, share of its length: runners' knees stay bent by about 20
 # degrees (V, and recordings), and a knee that snaps straight is the most visible error
 _LONGEST_REACH, _SPRINT_REACH = (0.9955, 0.984), 0.99
+# how close a sprinter's ankle comes to the hip, shares of the leg's length: knees bent by 143 and 150 degrees
+_CLOSEST = (0.317, 0.259)
 # share of the leg's length below that limit from which a swinging leg eases toward it
 _EASE_SHARE = 0.03
 
@@ -51,7 +53,8 @@ def _compute_longest_reach(steps: Footsteps, times: np.ndarray) -> np.ndarray:
 
 
 def limit_leg_reach(ankle: np.ndarray, hip: np.ndarray, times: np.ndarray, steps: Footsteps, leg: float) -> np.ndarray:
-    """Pull the ankle toward its hip where the leg would be too straight in swing.
+    """Pull the ankle toward its hip where the leg would be too straight in swing, and away where a sprinter's knee
+    would bend too far.
 
     Args:
         ankle: (T, 3) m.
@@ -65,7 +68,15 @@ def limit_leg_reach(ankle: np.ndarray, hip: np.ndarray, times: np.ndarray, steps
     away = ankle - hip
     far = np.linalg.norm(away, axis=1)
     share = ease_reach(far, (_compute_longest_reach(steps, times) + 0.006 - _EASE_SHARE) * leg, _EASE_SHARE * leg)
+    share = share * _ease_flexion(far / leg, tables.compute_sprint_share(steps.speed[steps.find_stance(times)]))
     return hip + away * np.where(steps.is_in_contact(times), 1.0, share)[:, None]
+
+
+def _ease_flexion(far: np.ndarray, sprint: np.ndarray) -> np.ndarray:
+    """Compute by which factors (T,) to lengthen a leg of `far` (T,) shares of its length whose knee bends too far."""
+    begin, end = _CLOSEST
+    eased = begin - (begin - end) * np.tanh((begin - far) / (begin - end))
+    return 1.0 + sprint * np.where(far < begin, eased / np.maximum(far, 1e-9) - 1.0, 0.0)
 
 
 def ease_reach(far: np.ndarray, begin: float | np.ndarray, soft: float) -> np.ndarray:

@@ -32,6 +32,8 @@ _PASSES, _GAIN = (False, True, True, False, False), 1.1
 
 # steps over which a body that a leg's reach lowers is lowered evenly
 _SPREAD = 3
+# s before and after in which hips come to follow the centre of mass
+_ONSET = 0.8
 # first and last flights of a plan, whose strides it does not know in full
 _EDGE = 2
 
@@ -75,7 +77,9 @@ def follow_mass(posture: Posture, plan: GaitPlan, steps: tuple[Footsteps, ...], 
         The posture, feet planted.
     """
     flights = find_flights(steps)
-    share = tables.compute_sprint_share(plan.adult_speed)
+    # a runner who gains speed comes to it over some steps
+    rate = 1.0 / (plan.times[1] - plan.times[0])
+    share = hann_smooth(tables.compute_flight_share(plan.adult_speed), int(_ONSET * rate))
     share = share * ((plan.times > flights.middle[_EDGE]) & (plan.times < flights.middle[-1 - _EDGE]))
     if not np.any(share):
         return posture

@@ -105,8 +105,9 @@ _SPRINT_SPEEDS: dict[str, list[tuple[float, float]]] = {
     "elbow_swing": [(4.1, 24), (5.2, 34), (7.0, 38), (9.5, 39)],
     "elbow_second": [(4.1, 13), (5.2, 16), (9.5, 18)],
 }
-# m/s of an adult between which a runner takes a sprinter's form; the trunk comes up more slowly
-_SPRINT, _UPRIGHT = (4.1, 5.2), (4.1, 6.5)
+# m/s of an adult between which a runner takes a sprinter's form; the trunk comes up more slowly, and the centre of mass
+# flies from the lowest speed on that leaves walking and jogging as they are
+_SPRINT, _UPRIGHT, _FLYING = (4.1, 5.2), (4.1, 6.5), (4.1, 4.5)
 # degrees: farthest that elbows bend and stretch in a sprint
 ELBOW_RANGE = (40.0, 135.0)
 
@@ -125,12 +126,21 @@ def _build_sprint_curve(name: str) -> PchipInterpolator:
 
 def compute_sprint_share(speed: float | np.ndarray) -> np.ndarray:
     """Compute how far a runner has taken a sprinter's form, 0 to 1, at `speed` (...,) m/s."""
-    return quintic_step((np.asarray(speed) - _SPRINT[0]) / (_SPRINT[1] - _SPRINT[0]))
+    return _ease_between(speed, _SPRINT)
 
 
 def compute_upright_share(speed: float | np.ndarray) -> np.ndarray:
     """Compute how far a sprinter's trunk has come up, 0 to 1, at `speed` (...,) m/s."""
-    return quintic_step((np.asarray(speed) - _UPRIGHT[0]) / (_UPRIGHT[1] - _UPRIGHT[0]))
+    return _ease_between(speed, _UPRIGHT)
+
+
+def compute_flight_share(speed: float | np.ndarray) -> np.ndarray:
+    """Compute how far hips follow the centre of mass, 0 to 1, at `speed` (...,) m/s."""
+    return _ease_between(speed, _FLYING)
+
+
+def _ease_between(speed: float | np.ndarray, ends: tuple[float, float]) -> np.ndarray:
+    return quintic_step((np.asarray(speed) - ends[0]) / (ends[1] - ends[0]))
 
 
 def interpolate_figure(name: str, speed: float | np.ndarray) -> np.ndarray:
