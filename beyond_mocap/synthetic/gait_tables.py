@@ -99,11 +99,10 @@ _SPRINT_SPEEDS: dict[str, list[tuple[float, float]]] = {
     "nod": [(4.1, 2.2), (9.5, 3.3)],
     "arm_swing": [(4.1, 29), (5.2, 34), (7.0, 45), (9.5, 59)],
     "arm_middle": [(4.1, -13), (7.0, -15), (9.5, -13)],
-    # second wave of the arms, twice a stride (R)
+    # second wave of the upper arm, twice a stride (R)
     "arm_second": [(4.1, 6), (9.5, 12)],
-    "elbow": [(4.1, 86), (5.2, 81), (9.5, 79)],
+    "elbow": [(4.1, 86), (5.2, 81), (9.5, 78)],
     "elbow_swing": [(4.1, 24), (5.2, 34), (7.0, 38), (9.5, 39)],
-    "elbow_second": [(4.1, 13), (5.2, 16), (9.5, 18)],
 }
 # m/s of an adult between which a runner takes a sprinter's form; the trunk comes up more slowly, and the centre of mass
 # flies from the lowest speed on that leaves walking and jogging as they are

@@ -17,8 +17,10 @@ from .gait_tables import compute_run_share, compute_sprint_share, interpolate_fi
 
 # rad by which a sprinter's trunk and elbows keep to the style, at most
 _SPRINT_LEAN, _SPRINT_ELBOW = np.radians(2.0), np.radians(15.0)
-# share of the step at which a sprinter's trunk leans most, and of which the arm's second wave peaks: upper arm, elbow
-_NOD_PEAK, _ARM_PEAK, _ELBOW_PEAK = 0.2, 0.29, 0.76
+# share of the step at which a sprinter's trunk leans most, and at which the upper arm's second wave peaks
+_NOD_PEAK, _ARM_PEAK = 0.2, 0.29
+# size of the elbow's second wave, share of the first, and rad after the first at which it peaks
+_ELBOW_SECOND, _ELBOW_PEAK = 0.46, 0.19
 
 
 def pose_trunk(gait_plan: GaitPlan, neutral: NeutralStance, style: GaitStyle, seed: int) -> dict[str, np.ndarray]:
@@ -209,10 +211,20 @@ def _bend_sprinting_elbow(gait_plan: GaitPlan, turn: np.ndarray, size: np.ndarra
 
     Arms of another style swing around their own middle, as far as the elbow's range lets them.
     """
-    middle, first, second = (np.radians(interpolate_sprint_figure(name, gait_plan.adult_speed))
-                             for name in ("elbow", "elbow_swing", "elbow_second"))
-    wave = first * np.cos(turn) + second * np.cos(4.0 * np.pi * gait_plan.phase - 2.0 * np.pi * _ELBOW_PEAK)
+    middle, swing = (np.radians(interpolate_sprint_figure(name, gait_plan.adult_speed))
+                     for name in ("elbow", "elbow_swing"))
     middle = middle + np.clip(style.elbow, -_SPRINT_ELBOW, _SPRINT_ELBOW)
+    wave = _shape_elbow_wave(turn)
     least, most = np.radians(tables.ELBOW_RANGE)
-    room = np.where(wave > 0.0, (most - middle) / (first + 0.95 * second), (middle - least) / (0.55 * (first + second)))
-    return middle + wave * size * np.clip(room, 0.0, 1.0)
+    lowest, highest = _ELBOW_EXTREMES
+    room = np.minimum((most - middle) / (highest * swing), (least - middle) / (lowest * swing))
+    return middle + swing * wave * np.minimum(size, room)
+
+
+def _shape_elbow_wave(turn: np.ndarray) -> np.ndarray:
+    """Compute how an elbow bends, (...,) about its middle, at `turn` (...,) rad from where its arm is in front."""
+    return np.cos(turn) + _ELBOW_SECOND * np.cos(2.0 * (turn - _ELBOW_PEAK))
+
+
+_WHOLE_WAVE = _shape_elbow_wave(np.linspace(0.0, 2.0 * np.pi, 721))
+_ELBOW_EXTREMES = float(_WHOLE_WAVE.min()), float(_WHOLE_WAVE.max())
