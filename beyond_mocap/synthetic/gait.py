@@ -165,12 +165,13 @@ def build_posture(
     Returns:
         The posture, N rows.
     """
-    posture = plant_feet(build_upper_posture(gait_plan, neutral, style, seed), gait_plan.times, steps, neutral)
-    return follow_mass(posture, gait_plan, steps, neutral)
+    return plant_feet(build_upper_posture(gait_plan, neutral, style, seed), gait_plan.times, steps, neutral)
 
 
 def build_upper_posture(gait_plan: GaitPlan, neutral: NeutralStance, style: GaitStyle, seed: int) -> Posture:
     """Build the posture at all moments of a plan without feet, which `plant_feet` sets.
+
+    The hips of a runner are where the centre of mass flies between the plan's own contacts (`gait_mass`).
 
     Args:
         gait_plan: the plan.
@@ -183,8 +184,12 @@ def build_upper_posture(gait_plan: GaitPlan, neutral: NeutralStance, style: Gait
     above = pose_trunk(gait_plan, neutral, style, seed)
     count = len(gait_plan.times)
     rate = 1.0 / (gait_plan.times[1] - gait_plan.times[0])
-    return Posture(
+    posture = Posture(
         fps=round(rate / gait_plan.stride, 6), heading=gait_plan.heading, arms=pose_arms(gait_plan, style, seed),
         wrists=np.full((count, 2), np.radians(8.0)), ankles=np.zeros((count, 2, 3)), feet=np.zeros((count, 2, 3)),
         toes=np.zeros((count, 2)), knees=np.full((count, 2), np.radians(2.0)), **above,
     )
+    if not np.any(tables.compute_flight_share(gait_plan.adult_speed)):
+        return posture
+    steps = tuple(plan_footsteps(gait_plan, neutral, style, side) for side in (0, 1))
+    return follow_mass(posture, gait_plan, steps, neutral)

@@ -66,10 +66,10 @@ def find_flights(steps: tuple[Footsteps, ...]) -> Flights:
 
 
 def follow_mass(posture: Posture, plan: GaitPlan, steps: tuple[Footsteps, ...], neutral: NeutralStance) -> Posture:
-    """Move the hips of a runner so that the centre of mass flies between contacts; nothing below a sprinter's speed.
+    """Move the hips of a runner so that the centre of mass flies between contacts.
 
     Args:
-        posture: N moments, feet planted.
+        posture: N moments; its feet are not read.
         plan: the plan.
         steps: stances of the left and the right foot.
         neutral: neutral stance of the body.
@@ -81,8 +81,7 @@ def follow_mass(posture: Posture, plan: GaitPlan, steps: tuple[Footsteps, ...], 
     rate = 1.0 / (plan.times[1] - plan.times[0])
     share = hann_smooth(tables.compute_flight_share(plan.adult_speed), int(_ONSET * rate))
     share = share * ((plan.times > flights.middle[_EDGE]) & (plan.times < flights.middle[-1 - _EDGE]))
-    if not np.any(share):
-        return posture
+    posture = plant_feet(posture, plan.times, steps, neutral)
     base = _compute_base(measure_mass(posture, neutral), plan, flights)
     for reach in _PASSES:
         wanted = plan_mass_path(plan, flights, base)

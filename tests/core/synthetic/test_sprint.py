@@ -24,8 +24,9 @@ GAINING = np.linspace(5.0, 9.0, 160)
 def bend(motion: Motion, first: str, second: str, third: str) -> np.ndarray:
     """Flexion (T, 2) in degrees of the joint `second` of both sides."""
     places, body = forward_kinematics(motion)[0], identify_joints(motion.skeleton)
-    upper, lower = (np.stack([places[:, getattr(limb, b)] - places[:, getattr(limb, a)]
-                              for limb in (body.left, body.right)], axis=1) for a, b in ((first, second), (second, third)))
+    limbs = (body.left, body.right)
+    upper, lower = (np.stack([places[:, getattr(limb, b)] - places[:, getattr(limb, a)] for limb in limbs], axis=1)
+                    for a, b in ((first, second), (second, third)))
     cross, dot = np.linalg.norm(np.cross(upper, lower), axis=-1), np.sum(upper * lower, axis=-1)
     return np.degrees(np.arctan2(cross, dot))
 
@@ -129,7 +130,7 @@ def test_hips_keep_their_height_and_no_sole_goes_below_the_ground(speed):
     assert 0.91 < hips.min() / measure_leg_length(motion.skeleton) and np.ptp(hips) < 0.13
 
 
-@pytest.mark.parametrize("speed", [1.4, 2.6, 3.9, np.concatenate([np.linspace(0.0, 3.9, 90), np.linspace(3.9, 1.0, 60)])])
+@pytest.mark.parametrize("speed", [1.4, 2.6, 3.9, np.concatenate([np.linspace(0.0, 3.9, 90), np.linspace(3.9, 1, 60)])])
 def test_walking_and_jogging_do_not_depend_on_a_sprinters_form(speed, monkeypatch):
     motion = build_gait(speed, None if np.ndim(speed) else 3.0, FPS)
     for name, figures in gait_tables._SPRINT_SPEEDS.items():
