@@ -18,8 +18,8 @@ from . import gait_tables as tables
 
 # rad of pitch beyond which the ball of the foot leaves the ground and the toe tip stays
 _TOE_LIFT_PITCH = np.radians(42.0)
-# share of that excess by which a sprinter's toes leave the ground, too: they push off over the tip of the boot
-_SPRINT_TIP = 1.0
+# rad of pitch around it over which a sprinter's toes begin to lift
+_SPRINT_SOFT = np.radians(6.0)
 # m for an adult: a step this long is a full one; shorter ones roll and lift less
 _FULL_STEP = 0.55
 
@@ -93,8 +93,10 @@ def compute_stance(steps: Footsteps, which: np.ndarray, share: np.ndarray, neutr
     after = np.concatenate([sizes, sizes[-1:]])[which]
     amount = before + (after - before) * quintic_step((share - 0.2) / 0.3)
     pitch = amount * _compute_pitch(share, steps.speed[which], steps.direction[which])
-    tip_share = 0.6 + (_SPRINT_TIP - 0.6) * tables.compute_sprint_share(steps.speed[which])
-    tip_pitch = tip_share * np.maximum(pitch - _TOE_LIFT_PITCH, 0.0)
+    tip_pitch = 0.6 * np.maximum(pitch - _TOE_LIFT_PITCH, 0.0)
+    # a sprinter pushes off over the tip of the boot: toes leave the ground with all of that excess, softly
+    soft = _SPRINT_SOFT * np.logaddexp(0.0, (pitch - _TOE_LIFT_PITCH) / _SPRINT_SOFT)
+    tip_pitch = tip_pitch + tables.compute_sprint_share(steps.speed[which]) * (soft - tip_pitch)
     forward, up = roll_foot(pitch, tip_pitch, neutral, steps.side)
     yaw = steps.yaw[which]
     ankle = np.stack(
