@@ -2,7 +2,8 @@
 skeleton.
 
 Speed decides cadence, stance and swing, bounce, lean and arms by published figures (`gait_tables`). Feet are planned
-and planted first (`footsteps`), then the pelvis passes over them and the legs follow by inverse kinematics. Bodies of
+and planted first (`footsteps`), then the pelvis passes over them and the legs follow by inverse kinematics
+(`gait_legs`). Above a jog the pelvis is where the centre of mass flies between contacts (`gait_mass`). Bodies of
 another size move alike at the same Froude number v^2 / (g leg) (Alexander 1989): lengths grow with the leg, times with
 its root.
 

@@ -16,7 +16,7 @@ from .gait_plan import GaitPlan, GaitStyle, compute_wander
 from .gait_tables import compute_run_share, compute_sprint_share, interpolate_figure, interpolate_sprint_figure
 
 # rad by which a sprinter's trunk and elbows keep to the style, at most
-_SPRINT_LEAN, _SPRINT_ELBOW = np.radians(2.0), np.radians(15.0)
+_SPRINT_LEAN, _SPRINT_ELBOW = np.radians(2.0), np.radians(6.0)
 # share of the step at which a sprinter's trunk leans most, and at which the upper arm's second wave peaks
 _NOD_PEAK, _ARM_PEAK = 0.2, 0.29
 # size of the elbow's second wave, share of the first, and rad after the first at which it peaks
