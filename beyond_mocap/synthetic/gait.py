@@ -30,8 +30,9 @@ from .gait_plan import GaitPlan, GaitStyle, plan_gait
 from .gait_tables import interpolate_figure
 from .gait_upper import pose_arms, pose_trunk
 
-# farthest that a flat foot is ahead of and behind the hips, shares of the leg's length; a sprinter's is farther behind
-_LONGEST_AHEAD, _LONGEST_BEHIND, _SPRINT_BEHIND = 0.41, 0.72, 0.78
+# farthest that a flat foot is ahead of and behind the hips, shares of the leg's length: in walking and running, and in
+# a sprint, where it lands less far ahead and leaves farther behind
+_LONGEST_AHEAD, _LONGEST_BEHIND = (0.41, 0.37), (0.72, 0.78)
 
 
 def build_gait(
@@ -130,12 +131,13 @@ def _limit_stances(
 ) -> tuple[np.ndarray, np.ndarray]:
     """Cut stances (K,) where the hips are too far from the foot: when speed changes in a stance, feet lift earlier."""
     share = np.linspace(0.0, 0.5, 26)
-    behind = _LONGEST_BEHIND + (_SPRINT_BEHIND - _LONGEST_BEHIND) * tables.compute_sprint_share(adult_speed)[:, None]
+    sprint = tables.compute_sprint_share(adult_speed)[:, None]
     ends = []
-    for edge, sign, farthest in ((on, -1.0, _LONGEST_AHEAD), (off, 1.0, behind)):
+    for edge, sign, (running, sprinting) in ((on, -1.0, _LONGEST_AHEAD), (off, 1.0, _LONGEST_BEHIND)):
         at = 0.5 * (on + off)[:, None] + sign * share * (off - on)[:, None]
         hips = interpolate_columns(at, gait_plan.times, gait_plan.path)
-        is_near = np.linalg.norm(hips - place[:, None], axis=-1) <= farthest * leg
+        farthest = (running + (sprinting - running) * sprint) * leg
+        is_near = np.linalg.norm(hips - place[:, None], axis=-1) <= farthest
         last = np.where(is_near.all(axis=1), len(share) - 1, np.argmin(is_near, axis=1))
         ends.append(
             np.where(is_near.all(axis=1), edge, np.take_along_axis(at, np.maximum(last, 8)[:, None], axis=1)[:, 0])
