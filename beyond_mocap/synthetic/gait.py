@@ -24,7 +24,7 @@ from ..motion.retargeting.posture import Posture, to_motion
 from ..motion.skeleton import Skeleton
 from . import gait_tables as tables
 from .footsteps import Footsteps
-from .gait_legs import plant_feet
+from .gait_legs import measure_push_off, plant_feet
 from .gait_mass import follow_mass
 from .gait_plan import GaitPlan, GaitStyle, plan_gait
 from .gait_tables import interpolate_figure
@@ -121,22 +121,24 @@ def plan_footsteps(gait_plan: GaitPlan, neutral: NeutralStance, style: GaitStyle
     )
     place = place - _compute_lean_shift(gait_plan, neutral, middle)
     toe_out = sign * (np.radians(interpolate_figure("toe_out", adult_speed)) + style.toe_out)
-    on, off = _limit_stances(gait_plan, place, on, off, adult_speed, neutral.leg)
+    on, off = _limit_stances(gait_plan, place, on, off, adult_speed, neutral)
     return Footsteps(side=side, on=on, off=off, place=place, yaw=heading + toe_out, speed=adult_speed,
                      direction=direction)
 
 
 def _limit_stances(
-    gait_plan: GaitPlan, place: np.ndarray, on: np.ndarray, off: np.ndarray, adult_speed: np.ndarray, leg: float
+    gait_plan: GaitPlan, place: np.ndarray, on: np.ndarray, off: np.ndarray, adult_speed: np.ndarray,
+    neutral: NeutralStance
 ) -> tuple[np.ndarray, np.ndarray]:
     """Cut stances (K,) where the hips are too far from the foot: when speed changes in a stance, feet lift earlier."""
     share = np.linspace(0.0, 0.5, 26)
     sprint = tables.compute_sprint_share(adult_speed)[:, None]
     ends = []
-    for edge, sign, (running, sprinting) in ((on, -1.0, _LONGEST_AHEAD), (off, 1.0, _LONGEST_BEHIND)):
+    farthest_behind = _LONGEST_BEHIND[0], min(_LONGEST_BEHIND[1], measure_push_off(neutral))
+    for edge, sign, (running, sprinting) in ((on, -1.0, _LONGEST_AHEAD), (off, 1.0, farthest_behind)):
         at = 0.5 * (on + off)[:, None] + sign * share * (off - on)[:, None]
         hips = interpolate_columns(at, gait_plan.times, gait_plan.path)
-        farthest = (running + (sprinting - running) * sprint) * leg
+        farthest = (running + (sprinting - running) * sprint) * neutral.leg
         is_near = np.linalg.norm(hips - place[:, None], axis=-1) <= farthest
         last = np.where(is_near.all(axis=1), len(share) - 1, np.argmin(is_near, axis=1))
         ends.append(

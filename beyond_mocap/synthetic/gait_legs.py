@@ -9,11 +9,13 @@ from ..motion.humanoid import identify_joints
 from ..motion.retargeting.neutral import NeutralStance
 from ..motion.retargeting.posture import Posture, compute_hip_positions
 from . import gait_tables as tables
-from .footsteps import Footsteps, compute_foot_path
+from .footsteps import TOE_LIFT_PITCH, Footsteps, compute_foot_path, roll_foot
 
 # longest reach of a leg, walking and running, share of its length: runners' knees stay bent by about 20
 # degrees (V, and recordings), and a knee that snaps straight is the most visible error
 _LONGEST_REACH, _SPRINT_REACH = (0.9955, 0.984), 0.99
+# height of a sprinter's hips when a foot leaves the ground, share of what it is in standing
+_SPRINT_HEIGHT = 0.94
 # how close a sprinter's ankle comes to the hip, shares of the leg's length: knees bent by 143 and 150 degrees
 _CLOSEST = (0.317, 0.259)
 # share of the leg's length below that limit from which a swinging leg eases toward it
@@ -99,6 +101,16 @@ def measure_leg(neutral: NeutralStance, side: int) -> tuple[float, float]:
     joints = (body.left, body.right)[side]
     hip, knee, ankle = (neutral.positions[j] for j in (joints.upper_leg, joints.lower_leg, joints.foot))
     return float(np.linalg.norm(knee - hip)), float(np.linalg.norm(ankle - knee))
+
+
+def measure_push_off(neutral: NeutralStance) -> float:
+    """Measure how far behind the hips a sprinter's flat foot has been when it leaves the ground, share of the leg's
+    length: short feet leave earlier, so that hips keep their height.
+    """
+    pitch = tables.interpolate_stance_pitch(np.ones(1), np.array([tables.FASTEST]))
+    ahead, up = roll_foot(pitch, pitch - TOE_LIFT_PITCH, neutral, 0)
+    below = _SPRINT_HEIGHT * (neutral.leg + neutral.ankle_height) - up
+    return float(ahead[0] + np.sqrt(max((_SPRINT_REACH * neutral.leg) ** 2 - below[0] ** 2, 0.0))) / neutral.leg
 
 
 def compute_hip_drop(posture: Posture, times: np.ndarray, steps, neutral: NeutralStance) -> np.ndarray:
