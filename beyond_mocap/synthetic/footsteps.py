@@ -17,7 +17,9 @@ from ..motion.retargeting.neutral import NeutralStance
 from . import gait_tables as tables
 
 # rad of pitch beyond which the ball of the foot leaves the ground and the toe tip stays
-_TOE_LIFT_PITCH = np.radians(42.0)
+TOE_LIFT_PITCH = np.radians(42.0)
+# rad of pitch around it over which a sprinter's toes begin to lift
+_SPRINT_SOFT = np.radians(6.0)
 # m for an adult: a step this long is a full one; shorter ones roll and lift less
 _FULL_STEP = 0.55
 
@@ -91,7 +93,10 @@ def compute_stance(steps: Footsteps, which: np.ndarray, share: np.ndarray, neutr
     after = np.concatenate([sizes, sizes[-1:]])[which]
     amount = before + (after - before) * quintic_step((share - 0.2) / 0.3)
     pitch = amount * _compute_pitch(share, steps.speed[which], steps.direction[which])
-    tip_pitch = 0.6 * np.maximum(pitch - _TOE_LIFT_PITCH, 0.0)
+    tip_pitch = 0.6 * np.maximum(pitch - TOE_LIFT_PITCH, 0.0)
+    # a sprinter pushes off over the tip of the boot: toes leave the ground with all of that excess, softly
+    soft = _SPRINT_SOFT * np.logaddexp(0.0, (pitch - TOE_LIFT_PITCH) / _SPRINT_SOFT)
+    tip_pitch = tip_pitch + tables.compute_sprint_share(steps.speed[which]) * (soft - tip_pitch)
     forward, up = roll_foot(pitch, tip_pitch, neutral, steps.side)
     yaw = steps.yaw[which]
     ankle = np.stack(
@@ -121,7 +126,7 @@ def roll_foot(pitch: np.ndarray, tip_pitch: np.ndarray, neutral: NeutralStance, 
     """Compute how far the ankle is ahead of its flat place and above the ground, (T,) m each, when the sole pitches."""
     ball_ahead, drop = neutral.ball[side, 0], -neutral.ball[side, 2]
     ball_up = neutral.ankle_height - drop
-    # toes down: the foot turns about its ball and, beyond _TOE_LIFT_PITCH, about the toe tip
+    # toes down: the foot turns about its ball and, beyond TOE_LIFT_PITCH, about the toe tip
     tip = neutral.tip
     lifted_ahead = ball_ahead + tip * (1.0 - np.cos(tip_pitch))
     lifted_up = ball_up + tip * np.sin(tip_pitch)

@@ -2,7 +2,8 @@
 skeleton.
 
 Speed decides cadence, stance and swing, bounce, lean and arms by published figures (`gait_tables`). Feet are planned
-and planted first (`footsteps`), then the pelvis passes over them and the legs follow by inverse kinematics. Bodies of
+and planted first (`footsteps`), then the pelvis passes over them and the legs follow by inverse kinematics
+(`gait_legs`). Above a jog the pelvis is where the centre of mass flies between contacts (`gait_mass`). Bodies of
 another size move alike at the same Froude number v^2 / (g leg) (Alexander 1989): lengths grow with the leg, times with
 its root.
 
@@ -15,26 +16,23 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..base.easing import quintic_step
-from ..base.time_series import hann_smooth, interpolate_columns
-from ..motion.humanoid import identify_joints
+from ..base.time_series import interpolate_columns
 from ..motion.motion import Motion
 from ..motion.retargeting.adult import build_adult_skeleton
 from ..motion.retargeting.neutral import NeutralStance, build_neutral_stance
-from ..motion.retargeting.posture import Posture, compute_hip_positions, to_motion
+from ..motion.retargeting.posture import Posture, to_motion
 from ..motion.skeleton import Skeleton
 from . import gait_tables as tables
-from .footsteps import Footsteps, compute_foot_path
-from .gait_plan import GaitPlan, GaitStyle, compute_wander, plan_gait
-from .gait_tables import compute_run_share, interpolate_figure
+from .footsteps import Footsteps
+from .gait_legs import measure_push_off, plant_feet
+from .gait_mass import follow_mass
+from .gait_plan import GaitPlan, GaitStyle, plan_gait
+from .gait_tables import interpolate_figure
+from .gait_upper import pose_arms, pose_trunk
 
-# farthest that a flat foot is ahead of and behind the hips, shares of the leg's length
-_LONGEST_AHEAD, _LONGEST_BEHIND = 0.41, 0.72
-# longest reach of a leg, walking and running, share of its length: runners' knees stay bent by about 20
-# degrees (V, and recordings), and a knee that snaps straight is the most visible error
-_LONGEST_REACH = (0.9955, 0.984)
-# share of the leg's length below that limit from which a swinging leg eases toward it
-_EASE_SHARE = 0.03
+# farthest that a flat foot is ahead of and behind the hips, shares of the leg's length: in walking and running, and in
+# a sprint, where it lands less far ahead and leaves farther behind
+_LONGEST_AHEAD, _LONGEST_BEHIND = (0.41, 0.37), (0.72, 0.78)
 
 
 def build_gait(
@@ -123,22 +121,25 @@ def plan_footsteps(gait_plan: GaitPlan, neutral: NeutralStance, style: GaitStyle
     )
     place = place - _compute_lean_shift(gait_plan, neutral, middle)
     toe_out = sign * (np.radians(interpolate_figure("toe_out", adult_speed)) + style.toe_out)
-    on, off = _limit_stances(gait_plan, place, on, off, neutral.leg)
+    on, off = _limit_stances(gait_plan, place, on, off, adult_speed, neutral)
     return Footsteps(side=side, on=on, off=off, place=place, yaw=heading + toe_out, speed=adult_speed,
                      direction=direction)
 
 
 def _limit_stances(
-    gait_plan: GaitPlan, place: np.ndarray, on: np.ndarray, off: np.ndarray, leg: float
+    gait_plan: GaitPlan, place: np.ndarray, on: np.ndarray, off: np.ndarray, adult_speed: np.ndarray,
+    neutral: NeutralStance
 ) -> tuple[np.ndarray, np.ndarray]:
     """Cut stances (K,) where the hips are too far from the foot: when speed changes in a stance, feet lift earlier."""
     share = np.linspace(0.0, 0.5, 26)
+    sprint = tables.compute_sprint_share(adult_speed)[:, None]
     ends = []
-    for edge, sign in ((on, -1.0), (off, 1.0)):
+    farthest_behind = _LONGEST_BEHIND[0], min(_LONGEST_BEHIND[1], measure_push_off(neutral))
+    for edge, sign, (running, sprinting) in ((on, -1.0, _LONGEST_AHEAD), (off, 1.0, farthest_behind)):
         at = 0.5 * (on + off)[:, None] + sign * share * (off - on)[:, None]
         hips = interpolate_columns(at, gait_plan.times, gait_plan.path)
-        is_near = np.linalg.norm(hips - place[:, None], axis=-1) <= (_LONGEST_AHEAD if sign < 0
-                                                                     else _LONGEST_BEHIND) * leg
+        farthest = (running + (sprinting - running) * sprint) * neutral.leg
+        is_near = np.linalg.norm(hips - place[:, None], axis=-1) <= farthest
         last = np.where(is_near.all(axis=1), len(share) - 1, np.argmin(is_near, axis=1))
         ends.append(
             np.where(is_near.all(axis=1), edge, np.take_along_axis(at, np.maximum(last, 8)[:, None], axis=1)[:, 0])
@@ -175,6 +176,8 @@ def build_posture(
 def build_upper_posture(gait_plan: GaitPlan, neutral: NeutralStance, style: GaitStyle, seed: int) -> Posture:
     """Build the posture at all moments of a plan without feet, which `plant_feet` sets.
 
+    The hips of a runner are where the centre of mass flies between the plan's own contacts (`gait_mass`).
+
     Args:
         gait_plan: the plan.
         neutral: neutral stance of the body.
@@ -186,248 +189,12 @@ def build_upper_posture(gait_plan: GaitPlan, neutral: NeutralStance, style: Gait
     above = pose_trunk(gait_plan, neutral, style, seed)
     count = len(gait_plan.times)
     rate = 1.0 / (gait_plan.times[1] - gait_plan.times[0])
-    return Posture(
+    posture = Posture(
         fps=round(rate / gait_plan.stride, 6), heading=gait_plan.heading, arms=pose_arms(gait_plan, style, seed),
         wrists=np.full((count, 2), np.radians(8.0)), ankles=np.zeros((count, 2, 3)), feet=np.zeros((count, 2, 3)),
         toes=np.zeros((count, 2)), knees=np.full((count, 2), np.radians(2.0)), **above,
     )
-
-
-def plant_feet(posture: Posture, times: np.ndarray, steps: tuple[Footsteps, ...], neutral: NeutralStance) -> Posture:
-    """Set the feet of a posture; the hips are lowered where a leg would not reach.
-
-    Args:
-        posture: the posture.
-        times: (T,) s.
-        steps: stances of the left and the right foot.
-        neutral: neutral stance of the body.
-    Returns:
-        The posture with feet.
-    """
-    hips = posture.hips.copy()
-    hips[:, 2] -= _compute_hip_drop(posture, times, steps, neutral)
-    posture = posture.replace_arrays(hips=hips)
-    tops = compute_hip_positions(posture, neutral)
-    paths = [compute_foot_path(steps[s], times, tops[:, s], heading=posture.heading, neutral=neutral,
-                               thigh_shank=measure_leg(neutral, s)) for s in (0, 1)]
-    ankles = [limit_leg_reach(paths[s].ankle, tops[:, s], times, steps[s], sum(measure_leg(neutral, s)))
-              for s in (0, 1)]
-    feet = np.stack([np.stack([np.zeros_like(p.pitch), p.pitch, p.yaw], axis=-1) for p in paths], axis=1)
-    return posture.replace_arrays(ankles=np.stack(ankles, axis=1), feet=feet,
-                                  toes=np.stack([p.bend for p in paths], axis=1))
-
-
-def _compute_longest_reach(steps: Footsteps, times: np.ndarray) -> np.ndarray:
-    """Compute the longest reach of a leg at `times` (T,): (T,) share of its length."""
-    walking, running = _LONGEST_REACH
-    return walking + (running - walking) * tables.compute_run_share(steps.speed[steps.find_stance(times)])
-
-
-def limit_leg_reach(ankle: np.ndarray, hip: np.ndarray, times: np.ndarray, steps: Footsteps, leg: float) -> np.ndarray:
-    """Pull the ankle toward its hip where the leg would be too straight in swing.
-
-    Args:
-        ankle: (T, 3) m.
-        hip: (T, 3) m.
-        times: (T,) s.
-        steps: stances of the foot.
-        leg: length of the leg, m.
-    Returns:
-        (T, 3) m.
-    """
-    away = ankle - hip
-    far = np.linalg.norm(away, axis=1)
-    share = ease_reach(far, (_compute_longest_reach(steps, times) + 0.006 - _EASE_SHARE) * leg, _EASE_SHARE * leg)
-    return hip + away * np.where(steps.is_in_contact(times), 1.0, share)[:, None]
-
-
-def ease_reach(far: np.ndarray, begin: float | np.ndarray, soft: float) -> np.ndarray:
-    """Compute by which factors to shorten distances so that they approach a limit softly.
-
-    Args:
-        far: (T,) m, distances.
-        begin: m from which on they are shortened.
-        soft: m, most that they exceed `begin`.
-    Returns:
-        (T,) factors, 1 below `begin`.
-    """
-    eased = begin + soft * np.tanh((far - begin) / soft)
-    return np.where(far < begin, 1.0, eased / np.maximum(far, 1e-9))
-
-
-def measure_leg(neutral: NeutralStance, side: int) -> tuple[float, float]:
-    """Measure the lengths of thigh and shank (m) of one side (0 left, 1 right)."""
-    body = identify_joints(neutral.skeleton)
-    joints = (body.left, body.right)[side]
-    hip, knee, ankle = (neutral.positions[j] for j in (joints.upper_leg, joints.lower_leg, joints.foot))
-    return float(np.linalg.norm(knee - hip)), float(np.linalg.norm(ankle - knee))
-
-
-def _compute_hip_drop(posture: Posture, times: np.ndarray, steps, neutral: NeutralStance) -> np.ndarray:
-    """Compute how far (T,) m to lower the hips so that feet in contact are in reach, smooth in time."""
-    tops = compute_hip_positions(posture, neutral)
-    drop = np.zeros(len(times))
-    for side in (0, 1):
-        path = compute_foot_path(steps[side], times, tops[:, side], heading=posture.heading, neutral=neutral,
-                                 thigh_shank=measure_leg(neutral, side))
-        longest = _compute_longest_reach(steps[side], times) * sum(measure_leg(neutral, side))
-        flat = np.sum((tops[:, side, :2] - path.ankle[:, :2]) ** 2, axis=-1)
-        highest = path.ankle[:, 2] + np.sqrt(np.maximum(longest**2 - flat, 0.0))
-        drop = np.maximum(drop, np.where(steps[side].is_in_contact(times), tops[:, side, 2] - highest, 0.0))
-    width = max(int(0.06 / (times[1] - times[0])), 1)
-    # the greatest need around each frame, then smoothed: never less than needed
-    around = np.lib.stride_tricks.sliding_window_view(np.pad(drop, width, mode="edge"), 2 * width + 1)
-    return hann_smooth(np.max(around, axis=-1), width)
-
-
-def pose_trunk(gait_plan: GaitPlan, neutral: NeutralStance, style: GaitStyle, seed: int) -> dict[str, np.ndarray]:
-    """Compute hips, pelvis, spine and head at all N moments.
-
-    Args:
-        gait_plan: the plan.
-        neutral: neutral stance of the body.
-        style: style of the gait.
-        seed: of the variation.
-    Returns:
-        Arrays of a `Posture` by name.
-    """
-    adult_speed, phase = gait_plan.adult_speed, gait_plan.phase
-    scale = neutral.leg / tables.LEG
-    turn = 2.0 * np.pi * phase
-    ahead = 1.0 - 0.6 * np.sin(0.5 * gait_plan.direction) ** 2
-    idle = style.life * (1.0 - quintic_step(adult_speed / 0.7))
-    middle = 0.5 * interpolate_figure("duty", adult_speed)
-    sway = scale * interpolate_figure("sway", adult_speed) * np.cos(turn - 2.0 * np.pi
-                                                                    * middle) + idle * 0.014 * compute_wander(
-        gait_plan.times, seed + 1, 6.0
-    )
-    surge = _compute_surge(gait_plan, middle)
-    across = gait_plan.heading
-    hips = np.empty((len(adult_speed), 3))
-    hips[:, 0] = gait_plan.path[:, 0] + surge * np.cos(across + gait_plan.direction) - sway * np.sin(across)
-    hips[:, 1] = gait_plan.path[:, 1] + surge * np.sin(across + gait_plan.direction) + sway * np.cos(across)
-    hips[:, 2] = compute_hip_height(gait_plan, neutral, style)
-    lean = _compute_lean(gait_plan)
-    wobble = 1.0 + 0.06 * style.life * compute_wander(gait_plan.times, seed + 2, 2.3)
-    angle = {
-        name: np.radians(interpolate_figure(name, adult_speed)) * ahead * wobble
-        for name in ("pelvis_turn", "chest_turn", "list", "tilt", "lean")
-    }
-    pelvis = np.stack(
-        [
-            angle["list"] * np.cos(turn - 2.0 * np.pi * 0.2)
-            + 0.35 * lean[:, 0]
-            + idle * 0.02 * compute_wander(gait_plan.times, seed + 1, 6.0),
-            angle["tilt"] + 0.35 * lean[:, 1] + np.radians(1.0) * compute_run_share(adult_speed) * np.cos(2.0 * turn),
-            -angle["pelvis_turn"] * np.cos(turn + 2.0 * np.pi * 0.18 * compute_run_share(adult_speed)),
-        ],
-        axis=-1,
-    )
-    breath = idle * np.radians(0.9) * np.sin(2.0 * np.pi * 0.24 * gait_plan.times + seed)
-    spine = np.stack(
-        [
-            -0.85 * (angle["list"] * np.cos(turn - 2.0 * np.pi * 0.2)) + 0.35 * lean[:, 0],
-            angle["lean"]
-            - angle["tilt"]
-            + style.lean
-            + 0.35 * lean[:, 1]
-            - breath
-            + 0.02 * np.sin(2.0 * turn) * compute_run_share(adult_speed),
-            style.twist * angle["chest_turn"] * np.cos(turn) - pelvis[:, 2],
-        ],
-        axis=-1,
-    )
-    look = np.stack([0.0 * adult_speed, np.radians(4.0) + style.head + 0.0 * adult_speed, 0.0 * adult_speed], axis=-1)
-    turn_rate = np.gradient(gait_plan.heading, gait_plan.times)
-    look[:, 2] += idle * np.radians(9.0) * compute_wander(gait_plan.times, seed + 3, 4.0) + 0.12 * np.tanh(turn_rate)
-    head = -(pelvis + spine) * np.array([0.8, 0.85, 0.95]) + look
-    return {"hips": hips, "pelvis": pelvis, "spine": spine, "head": head}
-
-
-def _compute_surge(gait_plan: GaitPlan, middle: np.ndarray) -> np.ndarray:
-    """Compute how far (N,) m the hips are ahead of a steady pace: slowest in mid-stance (braking, then pushing)."""
-    swing = np.minimum(0.07 * gait_plan.speed, 0.16)
-    frequency = np.maximum(np.gradient(gait_plan.phase, gait_plan.times), 0.3)
-    return -swing / (4.0 * np.pi * frequency) * np.sin(4.0 * np.pi * (gait_plan.phase - middle))
-
-
-def _compute_lean(gait_plan: GaitPlan) -> np.ndarray:
-    """Compute the extra lean (N, 2) rad of the body into its acceleration: list (about X, right down positive) and tilt
-    (about Y).
-    """
-    cos, sin = np.cos(gait_plan.heading), np.sin(gait_plan.heading)
-    forward = gait_plan.acceleration[:, 0] * cos + gait_plan.acceleration[:, 1] * sin
-    left = -gait_plan.acceleration[:, 0] * sin + gait_plan.acceleration[:, 1] * cos
-    return np.stack([-0.42 * np.tanh(left / 4.5), 0.42 * np.tanh(forward / 5.0)], axis=-1)
-
-
-def compute_hip_height(gait_plan: GaitPlan, neutral: NeutralStance, style: GaitStyle) -> np.ndarray:
-    """Compute the height of the hip joints: in mid-stance by the knee's flexion there, plus the bounce.
-
-    Args:
-        gait_plan: the plan.
-        neutral: neutral stance of the body.
-        style: style of the gait.
-    Returns:
-        (N,) m.
-    """
-    adult_speed, phase = gait_plan.adult_speed, gait_plan.phase
-    scale = neutral.leg / tables.LEG
-    knee = np.radians(interpolate_figure("knee_mid", adult_speed)) + style.crouch
-    half = 0.5 * neutral.leg
-    chord = 2.0 * half * np.cos(0.5 * knee)
-    ahead = interpolate_figure("ahead", adult_speed) * scale
-    heel_up = (
-        np.maximum(np.sin(tables.interpolate_stance_pitch(np.full_like(adult_speed, 0.5), adult_speed)), 0.0)
-        * neutral.ball[0, 0]
-        * compute_run_share(adult_speed)
-    )
-    at_middle = neutral.ankle_height + heel_up + np.sqrt(chord**2 - ahead**2)
-    duty = interpolate_figure("duty", adult_speed)
-    step_time = 0.5 / np.maximum(np.gradient(phase, gait_plan.times), 0.3)
-    share = np.clip(2.0 * duty, 0.4, 1.0)
-    run = compute_run_share(adult_speed)
-    walking = scale * interpolate_figure("bob", adult_speed)
-    bob = (1.0 - run) * walking * np.cos(4.0 * np.pi * (phase - 0.5 * duty))
-    bob = bob + run * tables.compute_bounce(2.0 * phase, share, step_time)
-    bob_middle = (1.0 - run) * walking + run * tables.compute_bounce(share * 0.5, share, step_time)
-    return at_middle + style.bounce * (1.0 - 0.4 * np.sin(0.5 * gait_plan.direction) ** 2) * (bob - bob_middle)
-
-
-def pose_arms(gait_plan: GaitPlan, style: GaitStyle, seed: int) -> np.ndarray:
-    """Compute the arms: each swings forward together with the other side's leg.
-
-    Args:
-        gait_plan: the plan.
-        style: style of the gait.
-        seed: of the variation.
-    Returns:
-        (N, 2, 5) rad as in `Posture`.
-    """
-    adult_speed = gait_plan.adult_speed
-    run = compute_run_share(adult_speed)
-    less = (1.0 - 0.5 * np.sin(0.5 * gait_plan.direction) ** 2) * (1.0 - 0.4 * np.sin(gait_plan.direction) ** 2)
-    figures = {
-        n: np.radians(interpolate_figure(n, adult_speed))
-        for n in ("arm_swing", "arm_middle", "elbow", "elbow_swing", "abduct", "inward")
-    }
-    idle = style.life * (1.0 - quintic_step(adult_speed / 0.7))
-    sides = []
-    for side, shift in ((0, 0.5), (1, 0.0)):
-        uneven = 1.0 + style.life * (0.08 * compute_wander(gait_plan.times, seed + 5 + side, 2.6) + (0.04, -0.04)[side])
-        turn = 2.0 * np.pi * (gait_plan.phase - shift - 0.02 + 0.17 * run)
-        wave = np.cos(turn) * uneven * less * style.arm_swing
-        slow = idle * np.radians(2.0) * compute_wander(gait_plan.times, seed + 7 + side, 5.0)
-        sides.append(
-            np.stack(
-                [
-                    figures["arm_middle"] + figures["arm_swing"] * wave + slow,
-                    figures["abduct"] + style.abduct - np.radians(3.0) * run * wave + 0.5 * slow,
-                    figures["inward"] + np.radians(9.0) * run * wave,
-                    figures["elbow"] + style.elbow + figures["elbow_swing"] * np.cos(turn - 0.3) * uneven * less,
-                    np.radians(18.0) * np.ones_like(adult_speed),
-                ],
-                axis=-1,
-            )
-        )
-    return np.stack(sides, axis=1)
+    if not np.any(tables.compute_flight_share(gait_plan.adult_speed)):
+        return posture
+    steps = tuple(plan_footsteps(gait_plan, neutral, style, side) for side in (0, 1))
+    return follow_mass(posture, gait_plan, steps, neutral)

@@ -30,13 +30,13 @@ class GaitStyle:
 
     Attributes:
         cadence: factor on steps per second (longer or shorter strides).
-        bounce: factor on the vertical movement of the hips.
+        bounce: factor on the vertical movement of the hips, below a sprint, where contacts decide it.
         arm_swing: factor.
         twist: factor on the turn of shoulders against pelvis.
-        lean: rad added to the trunk's forward lean.
+        lean: rad added to the trunk's forward lean, in a sprint 0.035 at most.
         head: rad added to the head's nod.
         abduct: rad added to how far the arms are held away.
-        elbow: rad added to the elbows' flexion.
+        elbow: rad added to the elbows' flexion, in a sprint 0.1 at most.
         width: m added between the feet.
         toe_out: rad added to the outward turn of the feet.
         crouch: rad added to the knees' flexion in stance.

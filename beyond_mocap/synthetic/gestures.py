@@ -27,7 +27,8 @@ from ..motion.retargeting.posture import Posture, compute_hip_positions, to_moti
 from ..motion.skeleton import Skeleton
 from . import gait_tables as tables
 from .footsteps import Footsteps, compute_ground_lift
-from .gait import build_posture, limit_leg_reach, measure_leg, plan_footsteps, plant_feet
+from .gait import build_posture, plan_footsteps
+from .gait_legs import limit_leg_reach, measure_leg, plant_feet
 from .gait_plan import GaitPlan, GaitStyle, plan_gait
 
 LEFT, RIGHT = 0, 1

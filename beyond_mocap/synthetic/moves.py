@@ -16,7 +16,8 @@ from ..motion.retargeting.posture import to_motion
 from ..motion.skeleton import Skeleton
 from . import gait_tables as tables
 from .footsteps import Footsteps
-from .gait import build_posture, plan_footsteps, plant_feet
+from .gait import build_posture, plan_footsteps
+from .gait_legs import plant_feet
 from .gait_plan import GaitPlan, GaitStyle, plan_gait
 from .gestures import LEFT, RIGHT, Gesture, blend_arrays, compute_envelope, interpolate_rows
 

@@ -27,7 +27,8 @@ from ..motion.retargeting.posture import Posture, to_motion
 from ..motion.retargeting.structure import list_descendants
 from . import gait_tables as tables
 from .footsteps import Footsteps
-from .gait import build_upper_posture, plan_footsteps, plant_feet
+from .gait import build_upper_posture, plan_footsteps
+from .gait_legs import plant_feet
 from .gait_plan import GaitPlan, GaitStyle, plan_gait
 from .gestures import LEFT, RIGHT, Gesture, compute_envelope
 from .kick_styles import KICK_STYLES
@@ -221,13 +222,17 @@ def _place_plant_foot(steps: Footsteps, gait_plan: GaitPlan, landing: float, pos
     contact = int(np.argmin(np.abs(gait_plan.times - APPROACH_SECONDS)))
     offset = poses.ankle[0, :2] + poses.plant
     offset[0] = min(offset[0], reach)
-    place, yaw, speed, off = (values.copy() for values in (steps.place, steps.yaw, steps.speed, steps.off))
+    place, yaw, speed = (values.copy() for values in (steps.place, steps.yaw, steps.speed))
+    on, off = steps.on.copy(), steps.off.copy()
+    # a last stride is longer than a sprinter's own, whose feet land later where they would be too far ahead
+    late = np.maximum(on[which] - APPROACH_SECONDS - landing, 0.0)
+    on[which] -= tables.compute_sprint_share(steps.speed[which]) * late
     place[which] = gait_plan.path[contact] + offset
     near = gait_plan.path[:, 0] - place[which, 0] < _LONGEST_BEHIND * leg
     off[which] = min(off[which], gait_plan.times[near].max())
     yaw[which] += _PLANT_YAW * direction
     speed[which] = _FLAT_STANCE
-    return replace(steps, place=place, yaw=yaw, speed=speed, off=off)
+    return replace(steps, on=on, place=place, yaw=yaw, speed=speed, off=off)
 
 
 def _lay_swing(posture: Posture, times: np.ndarray, steps: tuple[Footsteps, ...], poses: _SwingPoses,

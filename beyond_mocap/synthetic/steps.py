@@ -18,7 +18,8 @@ from ..motion.retargeting.neutral import NeutralStance
 from ..motion.retargeting.posture import Posture
 from . import gait_tables as tables
 from .footsteps import Footsteps
-from .gait import build_upper_posture, plan_footsteps, plant_feet
+from .gait import build_upper_posture, plan_footsteps
+from .gait_legs import plant_feet
 from .gait_plan import GaitPlan, GaitStyle, plan_gait
 from .gait_tables import interpolate_figure
 

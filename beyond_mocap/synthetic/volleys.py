@@ -18,7 +18,7 @@ from ..motion.retargeting.posture import Posture, compute_hip_positions, to_moti
 from ..motion.skeleton import Skeleton
 from . import gait_tables as tables
 from .footsteps import Footsteps, compute_ground_lift
-from .gait import ease_reach, measure_leg, plant_feet
+from .gait_legs import ease_reach, measure_leg, plant_feet
 from .gait_plan import GaitPlan
 from .gestures import LEFT, RIGHT, Gesture, blend_arrays, compute_envelope, interpolate_rows
 from .moves import build_standing, build_steps

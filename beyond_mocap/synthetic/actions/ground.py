@@ -8,7 +8,7 @@ from ...motion.humanoid import identify_joints
 from ...motion.motion import Motion, compute_pose
 from ...motion.retargeting.neutral import NeutralStance
 from ...motion.retargeting.posture import Posture, compute_hip_positions, to_motion
-from ..gait import measure_leg
+from ..gait_legs import measure_leg
 from ..lying import compute_lowest_root, iter_surface, raise_arms, smooth_above
 
 _ROUNDS = 3

@@ -15,7 +15,8 @@ from ...base.time_series import hann_smooth
 from ...motion.humanoid import identify_joints
 from ...motion.retargeting.posture import Posture, to_motion
 from .. import gait_tables as tables
-from ..gait import build_upper_posture, plan_footsteps, plant_feet
+from ..gait import build_upper_posture, plan_footsteps
+from ..gait_legs import plant_feet
 from ..gait_plan import GaitPlan, GaitStyle, plan_gait
 from ..gestures import LEFT, RIGHT, Gesture, blend_arrays, compute_envelope, interpolate_rounded
 from ..moves import build_header
