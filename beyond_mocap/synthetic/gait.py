@@ -186,15 +186,26 @@ def build_upper_posture(gait_plan: GaitPlan, neutral: NeutralStance, style: Gait
     Returns:
         The posture, N rows.
     """
-    above = pose_trunk(gait_plan, neutral, style, seed)
-    count = len(gait_plan.times)
-    rate = 1.0 / (gait_plan.times[1] - gait_plan.times[0])
-    posture = Posture(
-        fps=round(rate / gait_plan.stride, 6), heading=gait_plan.heading, arms=pose_arms(gait_plan, style, seed),
-        wrists=np.full((count, 2), np.radians(8.0)), ankles=np.zeros((count, 2, 3)), feet=np.zeros((count, 2, 3)),
-        toes=np.zeros((count, 2)), knees=np.full((count, 2), np.radians(2.0)), **above,
-    )
+    posture = pose_upper_body(gait_plan, neutral, style, seed)
     if not np.any(tables.compute_flight_share(gait_plan.adult_speed)):
         return posture
     steps = tuple(plan_footsteps(gait_plan, neutral, style, side) for side in (0, 1))
     return follow_mass(posture, gait_plan, steps, neutral)
+
+
+def pose_upper_body(gait_plan: GaitPlan, neutral: NeutralStance, style: GaitStyle, seed: int) -> Posture:
+    """Pose hips, trunk and arms as the tables have them, for moves whose flights are not those of a run.
+
+    Args:
+        gait_plan, neutral, style, seed: as for `build_upper_posture`.
+    Returns:
+        The posture, N rows.
+    """
+    above = pose_trunk(gait_plan, neutral, style, seed)
+    count = len(gait_plan.times)
+    rate = 1.0 / (gait_plan.times[1] - gait_plan.times[0])
+    return Posture(
+        fps=round(rate / gait_plan.stride, 6), heading=gait_plan.heading, arms=pose_arms(gait_plan, style, seed),
+        wrists=np.full((count, 2), np.radians(8.0)), ankles=np.zeros((count, 2, 3)), feet=np.zeros((count, 2, 3)),
+        toes=np.zeros((count, 2)), knees=np.full((count, 2), np.radians(2.0)), **above,
+    )

@@ -15,7 +15,7 @@ from ...base.time_series import hann_smooth
 from ...motion.humanoid import identify_joints
 from ...motion.retargeting.posture import Posture, to_motion
 from .. import gait_tables as tables
-from ..gait import build_upper_posture, plan_footsteps
+from ..gait import plan_footsteps, pose_upper_body
 from ..gait_legs import plant_feet
 from ..gait_plan import GaitPlan, GaitStyle, plan_gait
 from ..gestures import LEFT, RIGHT, Gesture, blend_arrays, compute_envelope, interpolate_rounded
@@ -106,7 +106,7 @@ def _build_jump_in_run(setting: ActionSetting, heads: bool) -> Gesture:
     plan = _stretch_flight(set_push(plan, _STRIDE_BEFORE - air, LEFT), _STRIDE_BEFORE, air)
     steps = tuple(plan_footsteps(plan, neutral, style, side) for side in (LEFT, RIGHT))
     times = plan.times - _STRIDE_BEFORE
-    posture = build_upper_posture(plan, neutral, style, 0)
+    posture = pose_upper_body(plan, neutral, style, 0)
     posture = _whip_trunk(posture, times) if heads else posture
     hips = posture.hips.copy()
     usual = float(np.mean(hips[np.abs(times) > air + 0.3, 2]))
