@@ -33,9 +33,11 @@ STEPS = 12  # of a parabola
 
 def list_items(scene: bpy.types.Scene) -> list[DrawItem]:
     """List everything to draw at the current frame: lines by the second, which stay while the animation plays."""
+    rows, found = list_current_rows(scene), []
+    if not rows:
+        return found
     world, reach = Matrix.Scale(units_per_metre(scene), 4), scene.beyond_mocap.view.reach
-    found = []
-    for shown, row in list_current_rows(scene):
+    for shown, row in rows:
         trace = shown.trace
         ball = world @ Matrix.Translation(trace.centre[row].tolist())
         found += [DrawItem((shown, "second", second), partial(build_lines, trace, second), world)
@@ -47,15 +49,18 @@ def list_items(scene: bpy.types.Scene) -> list[DrawItem]:
 
 def list_labels(scene: bpy.types.Scene) -> list[tuple[Vector, str]]:
     """List a place in the scene's units and a line of text for every armature that shows its momentum."""
-    units = units_per_metre(scene)
+    rows = list_current_rows(scene)
+    units = units_per_metre(scene) if rows else 1.0
     return [(units * Vector(shown.trace.centre[row].tolist()), describe_momentum(shown.trace, row))
-            for shown, row in list_current_rows(scene)]
+            for shown, row in rows]
 
 
 def list_current_rows(scene: bpy.types.Scene) -> list[tuple[ShownMomentum, int]]:
     """List the traces to draw, each with its row at the current frame."""
+    if not has_traces():  # most redraws end here
+        return []
     view = scene.beyond_mocap.view
-    if not has_traces() or not (view.show and view.momentum):
+    if not (view.show and view.momentum):
         return []
     found = [find_momentum(body) for body in list_showing_armatures(scene) if body.visible_get()]
     rows = [(shown, round(scene.frame_current_final - shown.first)) for shown in found if shown is not None]
