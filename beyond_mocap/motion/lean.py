@@ -28,8 +28,8 @@ from .supports import GRAVITY, Stances, find_stances, smooth_level
 MOST_ACCELERATION = 0.5 * GRAVITY  # m/s^2 that a lean answers; recordings' 99th percentile is .33 to .57 g
 _ACCELERATION_SECONDS = 0.35  # s to either side over which the acceleration of the centre of mass is smoothed
 _NEIGHBOUR_SECONDS = 0.8  # s within which stances are one run
-_DEAD_ZONE = (0.03, 0.02)  # m ahead and aside that are no error: one stance tells no more
-_MOST_SHIFT = (0.18, 0.14)  # m ahead and aside that footprints move at most; more turns a step into a lunge
+_DEAD_ZONE = (0.01, 0.01)  # m ahead and aside that are no error: a stance tells no more
+_MOST_SHIFT = (0.18, 0.15)  # m ahead and aside that footprints move at most; more turns a step into a lunge
 _LEAST_HEIGHT = 0.5  # m of a centre of mass over the foot for which shifts are turned into angles: bodies lie and slide
 _SPEEDS = (1.2, 2.2)  # m/s between which the lean of a step begins to count
 _TURN_SHARE = (1.2, 0.5)  # of the missing angle ahead and aside by which the body turns, as recorded trunks do

@@ -1,5 +1,7 @@
 """A constructed body obeys momentum: its flights are free falls, feet stand where they stood, and walks stay."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -33,7 +35,10 @@ def measure_flights(motion, root, rotations):
 
 @pytest.fixture(scope="module")
 def run():
-    return build_gait(6.5, 4.0, 30.0)
+    """A run whose pelvis sways as no body is pushed in the air."""
+    motion = build_gait(6.5, 4.0, 30.0)
+    sway = 0.015 * np.sin(20.0 * np.arange(len(motion)) / 30.0)[:, None] * [1.0, 1.0, 0.0]
+    return replace(motion, root_positions=motion.root_positions + sway)
 
 
 @pytest.fixture(scope="module")
@@ -115,7 +120,7 @@ def test_frames_without_a_share_stay_bit_for_bit_and_join_without_a_jump(run, br
             motion.skeleton, root, rotations)[0]
         beside = np.flatnonzero(np.diff(stays.astype(int)))
         moved = np.linalg.norm(after - before, axis=-1).max(axis=1)
-        assert moved.max() > 0.02 and np.maximum(moved[beside], moved[beside + 1]).max() < 0.015
+        assert moved.max() > 0.02 and np.maximum(moved[beside], moved[beside + 1]).max() < 0.02
 
 
 def test_a_body_that_stopped_stands_as_it_stood(braking):
