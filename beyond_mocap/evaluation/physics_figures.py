@@ -8,6 +8,10 @@ from dataclasses import replace
 import numpy as np
 
 from ..appearance.body import BodyMesh, build_boots
+from ..base.errors import TimedMessage
+from ..base.time_series import time_derivative
+from ..motion.track import smooth_zero_phase_hann
+from ..synthesis.quality.unmet_constraints import report_hard_pushes
 from .body_physics import SPEED_CLASSES, measure_body_physics, summarize_physics
 from .reference import View
 from .titles import Title
@@ -21,6 +25,8 @@ FRAMES_KEYS = {
 }  # fmt: skip
 """What a figure rests on: a key beside it."""
 
+_PUSH_SECONDS = 0.7  # s of the window through which a track's acceleration is seen: about two steps
+_FEWEST_FRAMES = 5  # of a take whose acceleration is known
 _SPEED_TEXTS = {"2-4": "2 to 4 m/s", "4-6": "4 to 6 m/s", "6+": "above 6 m/s"}
 
 TITLES = {
@@ -61,6 +67,20 @@ def measure_physics(view: View) -> dict:
     if view.reference is not None:
         _add_source_figures(out, summarize_physics(view.reference.physics, view.reference.split_by_course(view.used)))
     return {"physics": out}
+
+
+def list_physics_notes(view: View) -> list[TimedMessage]:
+    """List a line where the track asks for more than a body on the ground can do: the track rules, the body leans less.
+
+    Args:
+        view: the take beside its library and track.
+    """
+    if view.target is None or view.count < _FEWEST_FRAMES:
+        return []
+    path = smooth_zero_phase_hann(view.target, view.fps, _PUSH_SECONDS)
+    acceleration = time_derivative(time_derivative(path, view.fps), view.fps)
+    line = report_hard_pushes(view.played.times, np.linalg.norm(acceleration, axis=1))
+    return [] if line is None else [line]
 
 
 def _build_boots(view: View) -> BodyMesh:

@@ -19,7 +19,7 @@ from ..synthesis.quality.targets import find_target
 from ..synthesis.take import Take
 from . import figures, naturalness_figures, physics_figures, touch_figures
 from .naturalness_figures import find_planned_headings, list_naturalness_messages, measure_naturalness
-from .physics_figures import measure_physics
+from .physics_figures import list_physics_notes, measure_physics
 from .reference import View
 from .touch_figures import list_touch_messages, measure_touches
 from .touch_view import TouchView
@@ -95,7 +95,7 @@ def evaluate_played(
         **measure_physics(view), **measure_touches(touch_view),
         "annotation_similarity": figures.measure_annotation_similarity(view),
         "warnings": [*figures.list_warnings(view, ik_miss, requested), *events, *list_touch_messages(touch_view)],
-        "notes": notes,
+        "notes": [*notes, *list_physics_notes(view)],
     }
     out = round_values(report)
     return {**out, "warning_seconds": _list_message_spans(report["warnings"]),

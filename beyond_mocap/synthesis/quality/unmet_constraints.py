@@ -35,6 +35,7 @@ from ...library.synthetic_clips import (
 )
 from ...motion import quaternion
 from ...motion.humanoid import compute_heading_from_positions
+from ...motion.supports import GRAVITY
 from ...motion.track import Track, smooth_zero_phase_hann
 from . import movement
 from .moments import KeyMomentResult, evaluate_moments, measure_contact
@@ -47,6 +48,8 @@ SLOW_ROOT_ERROR_LIMIT = 1.5 * TARGETS["slow_root_error_m.max"].most  # m; a cree
 LEG_MISS_LIMIT = 0.005  # m that a leg may be short without a line
 GROUND_LIMIT = -TARGETS["ground_mm.min"].least / 1000.0
 CONTACT_GAP_LIMIT = KEY_TARGETS["contact_gap_m"].most
+HARDEST_PUSH = 0.6 * GRAVITY
+"""m/s^2 of a body over a step; of recordings' bends, starts and stops one in a hundred exceeds .33 to .57 g."""
 JOIN_SECONDS = 0.4  # stretches closer than this are one
 MISSING_SECONDS = 0.5  # shortest time of a motion that the library lacks that is reported
 LABEL_SECONDS = 0.5  # shortest time of a missing label that is reported
@@ -126,6 +129,20 @@ def report_jolts(times: np.ndarray, flags: np.ndarray, most: float) -> TimedMess
     """
     hardest = f"{most:.2f} times as hard as recordings of that speed"
     return _build_line(times, flags, f"the body jolts up to {hardest} (target {TARGETS['seam_jerk_ratio.max'].most:g})")
+
+
+def report_hard_pushes(times: np.ndarray, acceleration: np.ndarray) -> TimedMessage | None:
+    """Report where a track is accelerated harder than boots on grass can push a body.
+
+    Args:
+        times: (T,) s.
+        acceleration: (T,) m/s^2 of the track, level, smoothed over a step.
+    Returns:
+        A line, None where it never is.
+    """
+    most = f"up to {acceleration.max(initial=0.0) / GRAVITY:.1f} g"
+    return _build_line(times, acceleration > HARDEST_PUSH, f"the track asks for {most} in a bend, start or stop, more "
+                       f"than players get ({HARDEST_PUSH / GRAVITY:.1f} g); the body stays on it and leans less")
 
 
 def format_stretches(times: np.ndarray, flags: np.ndarray) -> str:

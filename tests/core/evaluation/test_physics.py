@@ -14,12 +14,13 @@ from beyond_mocap.evaluation.naturalness import measure_course
 from beyond_mocap.evaluation.physics import MassCourse, compute_bounce, measure_flights, measure_leans, measure_steps
 from beyond_mocap.evaluation.physics_figures import measure_physics
 from beyond_mocap.evaluation.reference import View
-from beyond_mocap.evaluation.report import evaluate, flatten_report
+from beyond_mocap.evaluation.report import evaluate, evaluate_played, flatten_report
 from beyond_mocap.evaluation.sprint_form import measure_knee_flexion, measure_trunk_lean
 from beyond_mocap.motion.humanoid import identify_joints
 from beyond_mocap.motion.lean import Lean
 from beyond_mocap.motion.motion import forward_kinematics, place_motion
 from beyond_mocap.motion.supports import Stances
+from beyond_mocap.motion.track import Track
 from beyond_mocap.synthesis.quality.playback import playback_from_tables
 from beyond_mocap.synthetic.gait import build_gait
 
@@ -211,3 +212,12 @@ def test_a_taller_body_has_taller_boots(cut, library):
                    for motion in (place_motion(take.motion, offset=(0.0, 0.0, -0.02)),
                                   place_motion(tall, offset=(0.0, 0.0, -0.02))))
     assert here["frames"] == there["frames"] and there["below_share"] == pytest.approx(here["below_share"], abs=0.1)
+
+
+@pytest.mark.parametrize("radius, is_named", [(4.0, True), (30.0, False)])
+def test_a_note_names_where_the_track_asks_for_more_than_the_ground_gives(radius, is_named):
+    motion, times = build_gait(6.0, 4.0, FPS), np.arange(120) / FPS
+    angle = 6.0 / radius * times  # 36 / 4 m/s^2 is .9 g
+    track = Track(times, radius * np.stack([np.cos(angle), np.sin(angle)], axis=1))
+    notes = evaluate_played(playback_from_tables(motion), track=track)["notes"]
+    assert any("the track asks for up to 0.9 g" in note for note in notes) == is_named
