@@ -61,7 +61,7 @@ def obey_momentum(
     phases = find_support_phases(stances, compute_centre_of_mass(body, places, masses), fps)
     if not len(stances) or (len(phases) == 1 and phases[0, 0] <= 0.0 and phases[0, 1] >= len(root) - 1):
         return root, rotations
-    legs = _Legs(skeleton, body, masses, places, world, stances, fps)
+    legs = _Legs(skeleton, body, masses, places, world, stances=stances, fps=fps)
     root, rotations = legs.lean(root, rotations, share)
     planner = MomentumPlanner(phases, len(root), fps, share, strength)
     return legs.follow(planner, root, rotations)

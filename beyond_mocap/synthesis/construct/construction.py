@@ -151,7 +151,7 @@ class Construction:
             share = np.minimum(share, smoothstep(np.clip(away, 0.0, 1.0)))
         requested = self.plan.requested
         root, rotations = obey_momentum(self.library.skeleton, planted.root, planted.rotations, self.plan.fps, share,
-                                        requested.strength, SEGMENT_MASSES[requested.masses])
+                                        strength=requested.strength, masses=SEGMENT_MASSES[requested.masses])
         return replace(planted, root=root, rotations=rotations)
 
     def _compute_given_root(self, heading: np.ndarray) -> np.ndarray:
