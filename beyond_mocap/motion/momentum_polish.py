@@ -31,6 +31,8 @@ _FADE_FRAMES = 3.0  # frames at 30 fps outside of a stance over which a foot com
 _PELVIS_GAIN = 1.12  # m that the root moves per metre of the centre of mass: standing legs and feet stay behind
 _REACH_ROUNDS, _REACH_TOLERANCE = 3, 0.004  # plans, and metres that a leg may lack
 _HEEL_REACH = 0.02  # m of reach that a rising heel gives; for more the body is lowered, since heels that rise skate
+_MOST_MOVE, _MOST_LOWERED = 0.25, 0.12
+"""m that the centre of mass is moved, and lowered for its legs, at most: tracks that leap ask for what no body can do."""
 _FIRMNESS = 9.0  # by which a lowered height weighs more than others
 _SPREAD_FRAMES = 2  # frames at 30 fps over which it is spread
 
@@ -104,13 +106,14 @@ class _Legs:
         goal, firmness = centre[:, 2].copy(), np.ones(len(root))
         for _ in range(_REACH_ROUNDS):
             height, force = planner.plan_height(goal, firmness)
-            plan = np.column_stack([planner.plan_ground(centre[:, :2], force), height])
+            plan = centre + _limit_moves(np.column_stack([planner.plan_ground(centre[:, :2], force), height]) - centre)
             move = _PELVIS_GAIN * (plan - centre)
             lacks = self._measure_shortfall(places, move)
             if lacks.max() < _REACH_TOLERANCE:
                 break
             lacks = spread_peaks(lacks, self._spread)
-            goal, firmness = goal - planner.share * lacks, np.where(lacks > 0.0, _FIRMNESS, firmness)
+            goal = np.maximum(goal - planner.share * lacks, centre[:, 2] - _MOST_LOWERED)
+            firmness = np.where(lacks > 0.0, _FIRMNESS, firmness)
         posed = self._solve_legs(places, world, rotations, move)
         move = move + plan - self._measure_centre(root + move, posed)
         return root + move, self._solve_legs(places, world, rotations, move)
@@ -155,3 +158,8 @@ def _measure_excess(foot: Foot, reach: np.ndarray, standing: np.ndarray) -> np.n
     far = np.linalg.norm(reach, axis=1)
     longest = foot.length - np.minimum(AIR_RESERVE, foot.recorded_slack)
     return np.maximum(far - longest, 0.0) / far * (1.0 - standing)
+
+
+def _limit_moves(moves: np.ndarray) -> np.ndarray:
+    """Limit moves (T, 3) m to _MOST_MOVE."""
+    return moves * np.minimum(1.0, _MOST_MOVE / np.maximum(np.linalg.norm(moves, axis=1, keepdims=True), 1e-9))
