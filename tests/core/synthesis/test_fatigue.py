@@ -80,7 +80,7 @@ def test_an_edit_breathes_on(library, track, takes):
     moved = Track(track.times, track.positions + bump, track.ball)
     calm, tired = (resynthesize(library, Plan(track=moved, fatigue=fatigue), takes[fatigue]) for fatigue in (0.0, 1.0))
     is_new = np.any(tired.motion.root_positions != takes[1.0].motion.root_positions, axis=1)
-    assert is_new[315:345].all() and not is_new[:240].any()
+    assert is_new[315:345].all() and not is_new[:225].any()
     turned = measure_turn(library, calm, tired)
     assert turned[is_new].mean() > 1.0
     assert np.abs(np.diff(turned)).max() < 0.3
