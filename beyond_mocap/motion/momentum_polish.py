@@ -30,7 +30,7 @@ from .supports import Stances, find_lying_stretches, find_stances, find_support_
 _FADE_FRAMES = 3.0  # frames at 30 fps outside of a stance over which a foot comes to go with the pelvis
 _PELVIS_GAIN = 1.12  # m that the root moves per metre of the centre of mass: standing legs and feet stay behind
 _REACH_ROUNDS, _REACH_TOLERANCE = 3, 0.004  # plans, and metres that a leg may lack
-_HEEL_REACH = 0.02  # m of reach that a rising heel gives; for more the body is lowered, since heels that rise skate
+_HEEL_REACH = 0.02  # m of reach that a rising heel gives; for more the body is lowered: heels that rise skate
 _MOST_MOVE, _MOST_LOWERED = 0.25, 0.12
 """m that the centre of mass is moved, and lowered for its legs, at most: tracks that leap ask for what no body can do."""
 _FIRMNESS = 9.0  # by which a lowered height weighs more than others

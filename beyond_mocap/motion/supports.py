@@ -26,8 +26,8 @@ _SHORTEST_GAP = 2.0 / 30.0  # s; shorter gaps within a stance are noise
 _RUNNING = 2.0  # m/s from which stances are lengthened
 _CONTACT_SHARE = 0.95  # of the norm towards which they are lengthened: recordings spread by 5 % about it
 _LONGEST_STRETCH = 1.0 / 60.0  # s by which either end of a stance is lengthened at most: half a frame of a take
-_FALLING = 0.4  # of gravity that a body falls with, at least, if it is in the air
-_STRIDE_FLIGHT = 0.3  # s that a runner's flight lasts at most, beyond doubt
+_FALLING = 0.85  # of a free fall's height that a longer flight has, at least; else clips hold both feet too high
+_STRIDE_FLIGHT = 0.2  # s that a runner's flight lasts at most, beyond doubt
 _LYING_TRUNK, _LYING_ARM = 0.3, 0.1  # m of hips or neck, and of elbows or hands, that lie on the ground
 _SPEED_SECONDS = 0.25  # s to either side over which the speed is smoothed
 _CONTACT_SPEEDS = (2.0, 3.0, 4.5, 6.0, 7.0, 8.0, 9.0, 10.0)  # m/s
@@ -145,14 +145,15 @@ def find_support_phases(stances: Stances, centre: np.ndarray, fps: float, lying:
     Returns:
         (P, 2) frames, first and last of each phase, ascending.
     """
-    end, speed, fall = float(len(centre) - 1), measure_speed(centre, fps), time_derivative(centre[:, 2], fps)
+    end, speed = float(len(centre) - 1), measure_speed(centre, fps)
 
     def is_flight(first: float, last: float) -> bool:
-        seconds, at = (last - first) / fps, np.arange(len(fall))
+        seconds, at = (last - first) / fps, np.arange(len(centre))
         if 0.0 < seconds < _STRIDE_FLIGHT and np.interp(0.5 * (first + last), at, speed) > _RUNNING:
             return True
-        before, after = np.interp([first, last], at, fall)
-        return seconds > 0.0 and after - before < -_FALLING * GRAVITY * seconds
+        # a body in free fall is g T^2 / 8 above the line between its ends, half-way
+        start, middle, stop = np.interp([first, 0.5 * (first + last), last], at, centre[:, 2])
+        return seconds > 0.0 and middle - 0.5 * (start + stop) > _FALLING * GRAVITY * seconds**2 / 8.0
 
     phases: list[list[float]] = []
     spans = np.stack([stances.start, stances.stop], axis=1)
