@@ -41,6 +41,15 @@ def test_no_more_is_asked_for_than_legs_answer(track_of):
     assert np.linalg.norm(wanted[MIDDLE], axis=1) == pytest.approx(MOST_ACCELERATION / GRAVITY, abs=1e-6)
 
 
+def test_small_players_lean_as_they_are_accelerated_in_their_own_size(order, track_of):
+    def measure(**plan):
+        request = order(track=track_of(4.0, turn=0.6), **plan)
+        return compute_wanted_lean(request.track, request.size)[0][MIDDLE, 1], request.size
+
+    (tall, one), (small, size) = measure(), measure(height=1.4)
+    assert one == 1.0 and size < 0.9 and small == pytest.approx(tall, abs=1e-6)
+
+
 @pytest.mark.parametrize("speed, share", [(0.0, 0.0), (1.4, 0.0), (1.7, 0.0), (2.3, 0.5), (3.0, 1.0)])
 def test_the_lean_of_slow_bodies_does_not_count(track_of, speed, share):
     _, counts = compute_wanted_lean(sample_track(track_of(speed, turn=0.4), FPS))
