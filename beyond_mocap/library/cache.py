@@ -31,7 +31,7 @@ from .repair import RepairFigures
 from .scan import CACHE_FOLDER
 
 # raised whenever what is computed or stored changes, so that old caches are not used
-VERSION = 38
+VERSION = 39
 _FRAME_ARRAYS = tuple(field.name for field in fields(Frames) if field.name != "vocabulary")
 
 

@@ -42,7 +42,7 @@ class Lean:
 
     Attributes:
         offset: (S, 2) m from the middle of the standing foot to the centre of mass, level.
-        height: (S,) m of the centre of mass over the ground.
+        height: (S,) m from the middle of the standing foot up to the centre of mass.
         acceleration: (S, 2) m/s^2 of the centre of mass, level, without its steps.
         velocity: (S, 2) m/s of the centre of mass.
     """
@@ -61,7 +61,7 @@ class Lean:
 
     @property
     def lever(self) -> np.ndarray:
-        """(S,) m of the centre of mass over the ground, as of a body on its feet."""
+        """(S,) m of that height, as of a body on its feet: those of bodies that lie tell nothing."""
         return np.maximum(self.height, _LEAST_HEIGHT)
 
     @property
@@ -105,7 +105,7 @@ def compute_lean_slopes(skeleton: Skeleton, positions: np.ndarray, fps: float) -
     if not len(stances):
         return np.zeros((len(positions), 2))
     lean = measure_lean(body, positions, compute_centre_of_mass(body, positions), stances, fps)
-    slope, ahead = lean.offset / lean.height[:, None], lean.travel
+    slope, ahead = lean.offset / lean.lever[:, None], lean.travel
     own = np.stack([np.sum(slope * ahead, axis=1), cross_on_ground(ahead, slope)], axis=1)
     return interpolate_columns(np.arange(len(positions)), stances.middle, own)
 

@@ -17,7 +17,7 @@ import numpy as np
 
 from ..base.banded_least_squares import BandedLeastSquares
 from ..base.easing import smoothstep
-from .supports import GRAVITY
+from .supports import GRAVITY, list_flights
 
 STRENGTH = 4.5
 """Greatest vertical force of the legs in body weights: sprinters reach 4.4 at top speed (Weyand 2000)."""
@@ -121,8 +121,7 @@ class MomentumPlanner:
     @cached_property
     def _flights(self) -> np.ndarray:
         """(F, 2) frames, first and last of each flight."""
-        edges = np.stack([np.append(0.0, self.phases[:, 1]), np.append(self.phases[:, 0], self.count - 1.0)], axis=1)
-        return edges[edges[:, 0] < edges[:, 1]]
+        return list_flights(self.phases, self.count)
 
     @cached_property
     def _weight(self) -> np.ndarray:

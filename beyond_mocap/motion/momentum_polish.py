@@ -12,7 +12,7 @@ joints, spreads a level shift evenly over the body, which is a shift of the root
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -32,7 +32,8 @@ _PELVIS_GAIN = 1.12  # m that the root moves per metre of the centre of mass: st
 _REACH_ROUNDS, _REACH_TOLERANCE = 3, 0.004  # plans, and metres that a leg may lack
 _HEEL_REACH = 0.02  # m of reach that a rising heel gives; for more the body is lowered: heels that rise skate
 _MOST_MOVE, _MOST_LOWERED = 0.25, 0.12
-"""m that the centre of mass is moved, and lowered for its legs, at most: tracks that leap ask for what no body can do."""
+"""m that the centre of mass is moved, and lowered for its legs, at most: tracks that leap ask for more than any body can
+do."""
 _FIRMNESS = 9.0  # by which a lowered height weighs more than others
 _SPREAD_FRAMES = 2  # frames at 30 fps over which it is spread
 
@@ -65,37 +66,61 @@ def obey_momentum(
     phases = find_support_phases(stances, centre, fps, find_lying_stretches(skeleton, places))
     if not len(stances) or (len(phases) == 1 and phases[0, 0] <= 0.0 and phases[0, 1] >= len(root) - 1):
         return root, rotations
-    legs = _Legs(skeleton, body, masses, (places, world), stances=stances, fps=fps)
+    legs = _build_legs(skeleton, body, masses, (places, world), stances=stances, fps=fps)
+    shifts, tilted = _lean_into_pushes(body, places, centre, rotations, stances, share=share, fps=fps)
     planner = MomentumPlanner(phases, len(root), fps, share, strength)
-    new_root, new_rotations = legs.follow(planner, root, legs.lean(rotations, share))
+    new_root, new_rotations = legs.move(shifts).follow(planner, root, tilted)
     stays = share <= 0.0
     new_rotations = quaternion.match_signs(new_rotations, rotations)
     return np.where(stays[:, None], root, new_root), np.where(stays[:, None, None], rotations, new_rotations)
 
 
+def _lean_into_pushes(body: Humanoid, places: np.ndarray, centre: np.ndarray, rotations: np.ndarray, stances: Stances,
+                      share: np.ndarray, fps: float) -> tuple[np.ndarray, np.ndarray]:
+    """Compute how both feet move (T, 2, 2) m and rotations (T, J, 4) of a body that tilts, by what its stances lack."""
+    lean = measure_lean(body, places, centre, stances, fps)
+    least = [share[int(start) : int(np.ceil(stop)) + 1].min() for start, stop in zip(stances.start, stances.stop)]
+    shifts = choose_shifts(lean, np.array(least))
+    tilted = tilt_body(rotations, stances, choose_angles(lean, shifts), share=share, fps=fps)
+    return compute_footprint_shifts(stances, shifts, share), tilted
+
+
+def _build_legs(skeleton: Skeleton, body: Humanoid, masses: SegmentMasses, pose: tuple[np.ndarray, np.ndarray],
+                stances: Stances, fps: float) -> _Legs:
+    """Build the legs of a body with a pose: positions (T, J, 3) m and rotations (T, J, 4), world."""
+    places, world = pose
+    limbs, scale = (body.left, body.right), fps / 30.0
+    standing = tuple(stances.compute_share(side, len(places), _FADE_FRAMES * scale) for side in (0, 1))
+    feet = tuple(build_foot(places, world, limb, np.repeat(stands[:, None] > 0.0, 2, axis=1))
+                 for limb, stands in zip(limbs, standing))
+    return _Legs(skeleton, body, masses, feet, standing, spread=max(int(round(_SPREAD_FRAMES * scale)), 1))
+
+
+@dataclass(frozen=True, eq=False)
 class _Legs:
-    """The feet of a body before its correction, and how legs follow a root that moves."""
+    """Where the feet of a body stand, and how its legs follow a root that moves.
 
-    def __init__(self, skeleton: Skeleton, body: Humanoid, masses: SegmentMasses, pose, stances: Stances, fps: float):
-        places, world = pose
-        self.skeleton, self.body, self.masses, self.stances, self.fps = skeleton, body, masses, stances, fps
-        self._places, count = places, len(places)
-        self._standing = [stances.compute_share(side, count, _FADE_FRAMES * fps / 30.0) for side in (0, 1)]
-        self._feet = [build_foot(places, world, limb, np.repeat(standing[:, None] > 0.0, 2, axis=1))
-                      for limb, standing in zip((body.left, body.right), self._standing)]
-        self._spread = max(int(round(_SPREAD_FRAMES * fps / 30.0)), 1)
+    Attributes:
+        skeleton: J joints.
+        body: which joint is what.
+        masses: of its segments.
+        feet: left and right, before the root moves.
+        standing: (T,) of each foot, from 0, where it goes with the pelvis, to 1.
+        spread: frames over which peaks of a drop or of a rising heel are spread.
+    """
 
-    def lean(self, rotations, share) -> np.ndarray:
-        """Move the footprints and tilt the body by what its stances lack."""
-        centre = compute_centre_of_mass(self.body, self._places, self.masses)
-        lean = measure_lean(self.body, self._places, centre, self.stances, self.fps)
-        least = [share[int(start) : int(np.ceil(stop)) + 1].min()
-                 for start, stop in zip(self.stances.start, self.stances.stop)]
-        shifts = choose_shifts(lean, np.array(least))
-        moves = compute_footprint_shifts(self.stances, shifts, share)
-        self._feet = [foot.move(np.column_stack([moves[:, side], np.zeros(len(rotations))]))
-                      for side, foot in enumerate(self._feet)]
-        return tilt_body(rotations, self.stances, choose_angles(lean, shifts), share=share, fps=self.fps)
+    skeleton: Skeleton
+    body: Humanoid
+    masses: SegmentMasses
+    feet: tuple[Foot, ...]
+    standing: tuple[np.ndarray, ...]
+    spread: int
+
+    def move(self, shifts: np.ndarray) -> _Legs:
+        """Move the feet over the ground, by shifts (T, 2, 2) m of the left and the right one."""
+        level = np.zeros(len(shifts))
+        return replace(self, feet=tuple(foot.move(np.column_stack([shifts[:, side], level]))
+                                        for side, foot in enumerate(self.feet)))
 
     def follow(self, planner: MomentumPlanner, root, rotations) -> tuple[np.ndarray, np.ndarray]:
         """Move the root so that the centre of mass follows its plan; feet stay where they stand."""
@@ -111,7 +136,7 @@ class _Legs:
             lacks = self._measure_shortfall(places, move)
             if lacks.max() < _REACH_TOLERANCE:
                 break
-            lacks = spread_peaks(lacks, self._spread)
+            lacks = spread_peaks(lacks, self.spread)
             goal = np.maximum(goal - planner.share * lacks, centre[:, 2] - _MOST_LOWERED)
             firmness = np.where(lacks > 0.0, _FIRMNESS, firmness)
         posed = self._solve_legs(places, world, rotations, move)
@@ -124,10 +149,10 @@ class _Legs:
 
     def _aim_feet(self, places, move):
         """Yield each foot, its hip and ankle goal (T, 3) m, its rotation (T, 4) and standing (T,), the root moved."""
-        for foot, standing in zip(self._feet, self._standing):
+        for foot, standing in zip(self.feet, self.standing):
             hip = places[:, foot.limb.upper_leg] + move
             carried = (1.0 - standing)[:, None] * move
-            rise = spread_peaks(solve_heel_rise(replace(foot, hip=hip), carried) * standing, self._spread)
+            rise = spread_peaks(solve_heel_rise(replace(foot, hip=hip), carried) * standing, self.spread)
             roll = quaternion.from_axis_angle(foot.left, rise)
             ankle = foot.toe + carried + quaternion.rotate(roll, foot.heel - foot.toe)
             yield foot, hip, ankle, quaternion.multiply(roll, foot.rotation), standing
@@ -135,7 +160,7 @@ class _Legs:
     def _measure_shortfall(self, places, move) -> np.ndarray:
         """Measure the metres (T,) that standing legs lack for a root moved by (T, 3) m, beyond what a heel may rise."""
         lacks = np.zeros(len(move))
-        for foot, standing in zip(self._feet, self._standing):
+        for foot, standing in zip(self.feet, self.standing):
             far = np.linalg.norm(foot.heel - places[:, foot.limb.upper_leg] - move, axis=1)
             lacks = np.maximum(lacks, np.where(standing >= 1.0, far - foot.max_reach - _HEEL_REACH, 0.0))
         return lacks

@@ -18,7 +18,7 @@ from .humanoid import Humanoid, identify_joints
 from .mass import compute_centre_of_mass
 from .motion import Motion, forward_kinematics
 from .retargeting.neutral import NeutralStance, build_neutral_stance
-from .supports import GRAVITY, LOW, Stances, find_stances, find_support_phases
+from .supports import GRAVITY, LOW, Stances, find_lying_stretches, find_stances, find_support_phases, list_flights
 
 FORCE_SECONDS = 1.0 / 30.0
 """Seconds to either side over which the ground force is a mean, weighted by a triangle; at least a frame."""
@@ -122,12 +122,13 @@ def trace_momentum(motion: Motion) -> MomentumTrace:
     body = identify_joints(motion.skeleton)
     positions, rotations = forward_kinematics(motion)
     centre = compute_centre_of_mass(body, positions)
-    stances = find_stances(motion.skeleton, positions, motion.fps)
+    stances, ground = find_stances(motion.skeleton, positions, motion.fps), estimate_recorded_floor(motion)[0]
+    lying = find_lying_stretches(motion.skeleton, positions - [0.0, 0.0, ground])
+    phases = find_support_phases(stances, centre, motion.fps, lying)
     corners = _place_soles(body, build_neutral_stance(motion.skeleton, motion), positions, rotations)
     return MomentumTrace(fps=motion.fps, centre=centre, force=measure_ground_force(centre, motion.fps),
-                         flights=_list_flights(find_support_phases(stances, centre, motion.fps), len(motion)),
-                         corners=corners, is_down=_find_standing_corners(corners[..., 2], stances),
-                         ground=estimate_recorded_floor(motion)[0])
+                         flights=list_flights(phases, len(motion)), corners=corners,
+                         is_down=_find_standing_corners(corners[..., 2], stances), ground=ground)
 
 
 def measure_ground_force(centre: np.ndarray, fps: float) -> np.ndarray:
@@ -152,12 +153,6 @@ def measure_ground_force(centre: np.ndarray, fps: float) -> np.ndarray:
 def _count_reach(fps: float) -> int:
     """Count the frames to either side over which the force is a mean."""
     return max(int(round(FORCE_SECONDS * fps)), 1)
-
-
-def _list_flights(phases: np.ndarray, count: int) -> np.ndarray:
-    """List (first, last) frames of the gaps (F, 2) between phases of support (P, 2), and before and behind them."""
-    edges = np.concatenate([[0.0], phases.ravel(), [count - 1.0]]).reshape(-1, 2)
-    return edges[edges[:, 1] > edges[:, 0]]
 
 
 def _place_soles(body: Humanoid, neutral: NeutralStance, positions: np.ndarray, rotations: np.ndarray) -> np.ndarray:

@@ -119,14 +119,15 @@ def find_lying_stretches(skeleton: Skeleton, positions: np.ndarray) -> np.ndarra
         skeleton: J joints.
         positions: (T, J, 3) m, world.
     Returns:
-        (L, 2) frames, first and last of each.
+        (L, 2) frames between which it lies: half a frame to either side, so that one that lies for a frame is pushed.
     """
     body = identify_joints(skeleton)
     arms = [joint for limb in (body.left, body.right) for joint in (limb.hand, limb.lower_arm) if joint is not None]
     is_lying = positions[:, [body.hips, body.neck_or_chest], 2].min(axis=1) < _LYING_TRUNK
     if arms:
         is_lying |= positions[:, arms, 2].min(axis=1) < _LYING_ARM
-    return np.array(find_runs(is_lying), float).reshape(-1, 2) - [0.0, 1.0]
+    edges = np.array(find_runs(is_lying), float).reshape(-1, 2) - 0.5
+    return np.clip(edges, 0.0, len(positions) - 1.0)
 
 
 def find_support_phases(stances: Stances, centre: np.ndarray, fps: float, lying: np.ndarray | None = None
@@ -169,6 +170,19 @@ def find_support_phases(stances: Stances, centre: np.ndarray, fps: float, lying:
         if not is_flight(near, far):
             phases[-edge][edge] = (near, far)[edge]
     return np.array(phases)
+
+
+def list_flights(phases: np.ndarray, count: int) -> np.ndarray:
+    """List the flights: what lies between phases of support, before the first and behind the last one.
+
+    Args:
+        phases: (P, 2) frames of `find_support_phases`.
+        count: T frames.
+    Returns:
+        (F, 2) frames, first and last of each, ascending.
+    """
+    edges = np.concatenate([[0.0], phases.ravel(), [count - 1.0]]).reshape(-1, 2)
+    return edges[edges[:, 0] < edges[:, 1]]
 
 
 def measure_speed(points: np.ndarray, fps: float) -> np.ndarray:

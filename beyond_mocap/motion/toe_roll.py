@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from ..base.vectors import unit_vectors
 from . import quaternion
 from .humanoid import Limb, identify_joints
 from .motion import compute_pose
@@ -39,17 +40,18 @@ def roll_toes(neutral: NeutralStance, root: np.ndarray, rotations: np.ndarray) -
         below = np.flatnonzero(bend > 0.0)
         if len(below):
             ahead = _point_ahead(neutral, joint, world[below, joint])
-            left = np.cross(np.array([0.0, 0.0, 1.0]), ahead)
+            left = unit_vectors(np.cross(np.array([0.0, 0.0, 1.0]), ahead), np.array([0.0, 1.0, 0.0]))
             turned = quaternion.multiply(quaternion.from_axis_angle(left, -bend[below]), world[below, joint])
             parent = world[below, skeleton.parents[joint]]
-            out[below, joint] = quaternion.multiply(quaternion.inverse(parent), turned)
-    return quaternion.unify_signs(out)
+            local = quaternion.multiply(quaternion.inverse(parent), turned)
+            out[below, joint] = quaternion.match_signs(local, rotations[below, joint])
+    return out
 
 
 def _measure_bend(neutral: NeutralStance, limb: Limb, place: np.ndarray, world: np.ndarray) -> np.ndarray:
     """Measure by how many radians (T,) a tip has to turn up; place (T, 3) m and rotation (T, 4) of its joint."""
     joint = limb.toe_or_foot
-    length = neutral.tip if limb.toe is not None else float(np.linalg.norm(neutral.ball[0])) + neutral.tip
+    length = neutral.tip if limb.toe is not None else neutral.ball[0, 0] + neutral.tip
     sole = neutral.positions[joint, 2] - _TIP_THICKNESS * neutral.leg
     most = MOST_BEND if limb.toe is not None else MOST_FOOT_TURN
     slope = np.arcsin(np.clip(_point_ahead(neutral, joint, world)[:, 2], -1.0, 1.0))

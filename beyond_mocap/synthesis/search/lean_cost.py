@@ -20,18 +20,19 @@ _SPEEDS = (1.8, 2.8)  # m/s between which a lean begins to count: a walk's tells
 _ACCELERATION_SECONDS = 0.35  # s to either side over which the track's acceleration is smoothed
 
 
-def compute_wanted_lean(track: SampledTrack) -> tuple[np.ndarray, np.ndarray]:
+def compute_wanted_lean(track: SampledTrack, size: float = 1.0) -> tuple[np.ndarray, np.ndarray]:
     """Compute how far a body leans on a track.
 
     Args:
-        track: T frames.
+        track: T frames, in the library's size.
+        size: how many times as tall as the library's skeleton the player is: gravity is the same for all.
     Returns:
         (T, 2) slope ahead and to the left of the travel, a / g up to half of gravity; and (T,) from 0 to 1, how much
         it counts: not for a slow body, whose steps decide, nor where the track is not known.
     """
     reach = max(int(round(_ACCELERATION_SECONDS * track.fps)), 1)
     smooth = np.stack([hann_smooth(axis, reach) for axis in track.velocity.T], axis=1)
-    acceleration = quaternion.rotate_level(time_derivative(smooth, track.fps), -track.direction)
+    acceleration = size * quaternion.rotate_level(time_derivative(smooth, track.fps), -track.direction)
     size = np.linalg.norm(acceleration, axis=1, keepdims=True)
     slope = acceleration * np.minimum(1.0, MOST_ACCELERATION / np.maximum(size, 1e-9)) / GRAVITY
     return slope, smoothstep(track.speed, *_SPEEDS) * track.valid

@@ -217,7 +217,7 @@ class PathCosts:
         self.bone_distance = bone_distance
         self.frames, self.index = library.frames, CandidateIndex.for_library(library, request.allowed)
         self.wanted_offset = compute_heading_offset(request.track)
-        self.wanted_lean, self.lean_counts = compute_wanted_lean(request.track)
+        self.wanted_lean, self.lean_counts = compute_wanted_lean(request.track, request.size)
         self._rate_cost = (weights.rate * np.abs(PLAYBACK_RATES - 1.0)).astype(np.float32)
         self._cached_costs: dict[tuple[frozenset[str], bool, frozenset[str]], np.ndarray] = {}
         # a strike turns as it was recorded: the body follows it there (`construct.construction`)

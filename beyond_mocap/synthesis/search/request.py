@@ -94,6 +94,7 @@ class SearchRequest:
         manner_cost: (N,) float32, cost per slot of library frames that move unlike the player, None for no manner.
         weak_foot: side of the foot that key moments without a side avoid, or "".
         lag_preference: the player's preference for a lag, None for none.
+        size: how many times as tall as the library's skeleton the player is; the track is in the library's size.
     """
 
     plan: Plan
@@ -110,6 +111,7 @@ class SearchRequest:
     manner_cost: np.ndarray | None = None
     weak_foot: str = ""
     lag_preference: LagPreference | None = None
+    size: float = 1.0
 
     def __len__(self) -> int:
         return len(self.track.times)
@@ -161,7 +163,7 @@ def build_request(library: Library, plan: ResolvedPlan) -> SearchRequest:
                          gait=gait,
                          timeline=timeline, keys=keys, allowed=allowed, warnings=tuple(warnings), avoided=avoided,
                          style_cost=off_style, manner_cost=compute_manner_cost(library, settings.manner),
-                         weak_foot=weak_foot, lag_preference=lag_preference)
+                         weak_foot=weak_foot, lag_preference=lag_preference, size=plan.size)
 
 
 def _find_asked(timeline: Timeline, times: np.ndarray, requested_labels: list[Labels]) -> np.ndarray:

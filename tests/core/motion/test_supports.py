@@ -9,9 +9,11 @@ from beyond_mocap.motion.retargeting.neutral import build_neutral_stance
 from beyond_mocap.motion.supports import (
     GRAVITY,
     Stances,
+    find_lying_stretches,
     find_stances,
     find_support_phases,
     interpolate_contact_seconds,
+    list_flights,
     measure_speed,
 )  # fmt: skip
 
@@ -124,3 +126,20 @@ def test_speed_is_level_and_without_steps():
     points = np.column_stack([6.0 * times + 0.01 * np.sin(20.0 * times), 0.0 * times, 3.0 * times])
     assert measure_speed(points, 30.0) == pytest.approx(6.0, abs=0.1)
     assert measure_speed(points[:1], 30.0).tolist() == [0.0]
+
+
+def test_who_lies_for_one_frame_lies_half_a_frame_to_either_side(skeleton):
+    places = np.repeat(build_neutral_stance(skeleton).positions[None], 20, axis=0)
+    assert find_lying_stretches(skeleton, places).shape == (0, 2)
+    places[[7, 19], identify_joints(skeleton).left.hand, 2] = 0.05
+    places[10:14, identify_joints(skeleton).hips, 2] = 0.2
+    assert find_lying_stretches(skeleton, places) == pytest.approx(np.array([[6.5, 7.5], [9.5, 13.5], [18.5, 19.0]]))
+
+
+def test_a_hand_that_touches_the_ground_for_a_frame_ends_one_flight_and_begins_another():
+    times = np.arange(41) / 30.0
+    centre = np.column_stack([3.0 * times, 0.0 * times, 2.0 + 3.0 * times - 0.5 * GRAVITY * times**2])
+    no_feet, lying = Stances(np.zeros(0, int), np.zeros(0), np.zeros(0)), np.array([[19.5, 20.5]])
+    phases = find_support_phases(no_feet, centre, 30.0, lying)
+    assert np.array_equal(phases, lying)
+    assert np.array_equal(list_flights(phases, 41), [[0.0, 19.5], [20.5, 40.0]])
