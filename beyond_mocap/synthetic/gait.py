@@ -121,7 +121,7 @@ def plan_footsteps(gait_plan: GaitPlan, neutral: NeutralStance, style: GaitStyle
     )
     place = place - _compute_lean_shift(gait_plan, neutral, middle)
     toe_out = sign * (np.radians(interpolate_figure("toe_out", adult_speed)) + style.toe_out)
-    on, off = _limit_stances(gait_plan, place, on, off, adult_speed, neutral)
+    on, off = _limit_stances(gait_plan, place, on, off, adult_speed=adult_speed, neutral=neutral)
     return Footsteps(side=side, on=on, off=off, place=place, yaw=heading + toe_out, speed=adult_speed,
                      direction=direction)
 
