@@ -18,12 +18,20 @@ from .humanoid import Humanoid, identify_joints
 from .mass import compute_centre_of_mass
 from .motion import Motion, forward_kinematics
 from .retargeting.neutral import NeutralStance, build_neutral_stance
-from .supports import GRAVITY, LOW, Stances, find_lying_stretches, find_stances, find_support_phases, list_flights
+from .supports import (
+    GRAVITY,
+    LOW,
+    LOWEST,
+    Stances,
+    find_lying_stretches,
+    find_stances,
+    find_support_phases,
+    list_flights,
+)
 
 FORCE_SECONDS = 1.0 / 30.0
 """Seconds to either side over which the ground force is a mean, weighted by a triangle; at least a frame."""
 
-_USUAL = 5.0  # percentile of a corner's heights that is its usual lowest one, as for stances
 _TOUCHES = 0.01  # m above a foot's lowest corner up to which others touch the ground with it
 _HALF_WIDTHS = 0.042, 0.055, 0.026  # of the leg's length: of a boot at heel, ball and tip (`appearance.body`)
 _LEAST_SUPPORT = 0.2 * GRAVITY  # m/s^2 of vertical force below which its line says nothing about the ground
@@ -177,11 +185,8 @@ def _find_standing_corners(heights: np.ndarray, stances: Stances) -> np.ndarray:
     """Find which corners (T, 2, 6) of soles, heights in metres, stand on the ground: low ones of feet that carry
     weight.
     """
-    frames = np.arange(len(heights))
-    limit = np.maximum(np.percentile(heights, _USUAL, axis=0) + LOW, heights.min(axis=2, keepdims=True) + _TOUCHES)
-    stands = np.zeros((len(heights), 2), dtype=bool)
-    for side, start, stop in zip(stances.side, stances.start, stances.stop):
-        stands[:, side] |= (start <= frames) & (frames <= stop)
+    limit = np.maximum(np.percentile(heights, LOWEST, axis=0) + LOW, heights.min(axis=2, keepdims=True) + _TOUCHES)
+    stands = np.stack([stances.compute_share(side, len(heights), 1.0) >= 1.0 for side in (0, 1)], axis=1)
     return stands[..., None] & (heights < limit)
 
 

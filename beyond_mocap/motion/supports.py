@@ -21,7 +21,7 @@ from .track import smooth_zero_phase_hann
 
 GRAVITY = 9.81  # m/s^2
 LOW = 0.03  # m above its own usual lowest height below which a foot carries weight (../shared/metrics.md: flight)
-_LOWEST = 5.0  # percentile of a joint's heights that is its usual lowest one
+LOWEST = 5.0  # percentile of a joint's heights that is its usual lowest one
 _SHORTEST_GAP = 2.0 / 30.0  # s; shorter gaps within a stance are noise
 _RUNNING = 2.0  # m/s from which stances are lengthened
 _CONTACT_SHARE = 0.95  # of the norm towards which they are lengthened: recordings spread by 5 % about it
@@ -221,7 +221,7 @@ def measure_foot_height(positions: np.ndarray, limb: Limb) -> np.ndarray:
         (T,) m.
     """
     heights = positions[:, [limb.foot, limb.toe_or_foot], 2]
-    return (heights - np.percentile(heights, _LOWEST, axis=0)).min(axis=1)
+    return (heights - np.percentile(heights, LOWEST, axis=0)).min(axis=1)
 
 
 def _find_low_stretches(height: np.ndarray, fps: float) -> list[tuple[float, float]]:
