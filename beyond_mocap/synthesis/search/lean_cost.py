@@ -47,5 +47,6 @@ def compute_lean_cost(lean: np.ndarray, wanted: np.ndarray) -> np.ndarray:
     Returns:
         (K,) slope.
     """
-    apart = lean - wanted.astype(np.float32)
-    return np.maximum(np.sqrt(np.einsum("kd,kd->k", apart, apart)) - np.float32(FREE_LEAN), 0.0)
+    # column by column: einsum over pairs takes four times as long, and this runs over the whole library in every slot
+    ahead, left = (column - value for column, value in zip(lean.T, wanted.astype(np.float32)))
+    return np.maximum(np.sqrt(ahead * ahead + left * left) - np.float32(FREE_LEAN), 0.0)

@@ -73,3 +73,10 @@ def test_a_piece_that_leans_as_the_bend_asks_is_chosen(library, order, track_of,
     _, _, walking = PathCosts(library, order(track=track_of(1.4, turn=rate)), ONLY_LEAN).find_cheapest(
         90, 90 + SLOT, everything, everything)
     assert not walking[np.isfinite(walking)].any()
+
+
+def test_leans_cost_by_how_far_they_are_in_any_direction():
+    wanted = np.array([0.1, -0.2])
+    away = np.array([[0.3, 0.0], [0.0, 0.3], [-0.18, 0.24], [0.0, 0.0], [0.03, 0.04]])
+    cost = compute_lean_cost((wanted + away).astype(np.float32), wanted)
+    assert np.allclose(cost, [0.3 - FREE_LEAN] * 3 + [0.0, 0.0], atol=1e-6) and cost.dtype == np.float32
