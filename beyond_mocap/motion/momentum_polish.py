@@ -32,7 +32,7 @@ _PELVIS_GAIN = 1.12  # m that the root moves per metre of the centre of mass: st
 _REACH_ROUNDS, _REACH_TOLERANCE = 3, 0.004  # plans, and metres that a leg may lack
 _HEEL_REACH = 0.02  # m of reach that a rising heel gives; for more the body is lowered: heels that rise skate
 _MOST_MOVE, _MOST_LOWERED = 0.25, 0.12
-"""m that the centre of mass is moved, and lowered for its legs, at most: tracks that leap ask for more than a body can."""
+"""m that the centre of mass is moved, and lowered for its legs, at most: tracks that leap ask for more."""
 _FIRMNESS = 9.0  # by which a lowered height weighs more than others
 _SPREAD_FRAMES = 2  # frames at 30 fps over which it is spread
 
