@@ -6,6 +6,7 @@ ones.
 
 from __future__ import annotations
 
+import time
 from dataclasses import dataclass
 
 import bpy
@@ -13,11 +14,14 @@ import numpy as np
 
 from . import label_tracks as lanes
 from . import nla_rows
-from .label_groups import LabelGroup, find_group, split_labels
+from .label_groups import LabelGroup, find_group_of_name
 from .moment_names import DrawnName, find_frame_pixels, is_visible, list_names
 from .strip_lines import remove_name_suffix
 
+PLAYING_SECONDS = 0.5  # between two looks at the rows while the animation plays
+
 _rows: dict[int, dict[tuple[str, str], int]] = {}  # region -> (object, NLA track) -> row, as last drawn
+_looked: dict[int, float] = {}  # region -> when its rows were found
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -48,7 +52,7 @@ class DrawnStrip:
     @property
     def group(self) -> LabelGroup:
         """The kind of action."""
-        return find_group(split_labels(self.name))
+        return find_group_of_name(self.name)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -94,7 +98,11 @@ def find_at(context: bpy.types.Context, region: bpy.types.Region, x: float, y: f
 
 
 def update_rows(context: bpy.types.Context, region: bpy.types.Region) -> None:
-    """Find the rows of all timelines in what Blender has just drawn in this NLA editor."""
+    """Find the rows of all timelines in what Blender has just drawn in this NLA editor; now and then while it plays."""
+    waited = time.monotonic() - _looked.get(region.as_pointer(), 0.0)
+    if context.screen.is_animation_playing and waited < PLAYING_SECONDS:
+        return
+    _looked[region.as_pointer()] = time.monotonic()
     targets = _list_targets(context)
     blocks = [(target, tracks) for target in targets for tracks in _list_blocks(context, target)]
     lines, known = _read_lines(context, region)
@@ -108,6 +116,7 @@ def update_rows(context: bpy.types.Context, region: bpy.types.Region) -> None:
 def forget_rows() -> None:
     """Forget all rows."""
     _rows.clear()
+    _looked.clear()
 
 
 def _list_targets(context: bpy.types.Context) -> list[bpy.types.Object]:
