@@ -14,6 +14,7 @@ import numpy as np
 TOLERANCE = 4  # steps of 255 by which a pixel of a strip may differ from the theme's colour
 ENOUGH = 0.8  # share of the looked-at places that must fit
 LEAST = 4  # pixels: narrower strips and gaps are not looked at
+NEAR = (-4, -2, 0, 2, 4)  # pixels around a place on a strip, of which one may fit: Blender draws markers over strips
 MOST = 12  # strips, and gaps, of a track that are looked at
 LOOK_AT = 0.2  # of a row's height from its edges: within the outline, beside the text
 
@@ -105,7 +106,8 @@ def _list_fits(track: TrackPattern, lines: np.ndarray, colours: np.ndarray, limi
     seen = _thin([one for one in seen if one[1] - one[0] >= LEAST])
     places = [int(left + share * (right - left)) for left, right, _ in seen for share in (0.3, 0.7)]
     wanted = [colour for _, _, colour in seen for _ in range(2)]
-    on_strips = _is_near(lines[:, :, places], np.array(wanted, np.int16).reshape(-1, 3))
+    around = np.clip(np.array(places, int).reshape(-1, 1) + NEAR, 0, lines.shape[2] - 1)
+    on_strips = _is_near(lines[:, :, around], np.array(wanted, np.int16).reshape(-1, 1, 3)).any(axis=3)
     beside = ~_is_near(lines[:, :, _list_gaps(track.strips, limits), None], colours).any(axis=3)
     return (True, on_strips.reshape(len(lines), -1)), (False, beside.reshape(len(lines), -1))
 

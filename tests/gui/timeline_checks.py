@@ -321,10 +321,11 @@ def check_many_names_do_not_overlap():
     region = next(region for region in find_nla().regions if region.type == "WINDOW")
     with override_nla():
         boxes = [one.box for one in list_names(region) if one.text]
+        diamonds = [one for one in list_names(region) if one.y is not None]
     window.save_picture(PICTURES / "timeline-many.png")
     bpy.context.preferences.view.ui_scale = 1.0
     yield 0.5
-    assert len(boxes) > 5
+    assert len(boxes) > 5 and len(diamonds) >= 80, "the row of key moments is not found under so many ticks"
     for number, a in enumerate(boxes):
         assert 0 <= a[0] and a[2] <= region.width and a[3] < region.height
         for b in boxes[:number]:
