@@ -16,6 +16,8 @@ ENOUGH = 0.8  # share of the looked-at places that must fit
 LEAST = 4  # pixels: narrower strips and gaps are not looked at
 NEAR = (-4, -2, 0, 2, 4)  # pixels around a place on a strip, of which one may fit: Blender draws markers over strips
 MOST = 12  # strips, and gaps, of a track that are looked at
+LEAST_TINT = 0.05  # of a theme's colour, from grey: with less, rows of keys cannot be told
+BAND_STEP, BAND_SHARE = 7, 0.98  # every so many pixels of a line; share of them that are tinted
 LOOK_AT = 0.2  # of a row's height from its edges: within the outline, beside the text
 
 
@@ -85,6 +87,25 @@ def find_rows(blocks: list[list[TrackPattern]], lines: np.ndarray, known: np.nda
         found.append(row)
         first = first if row is None else row + len(block)
     return found
+
+
+def find_bands(lines: np.ndarray, known: np.ndarray, colour: tuple[float, ...]) -> list[int]:
+    """Find the rows of objects' own keys, which Blender tints from end to end.
+
+    Args:
+        lines: as for `find_rows`.
+        known: as for `find_rows`.
+        colour: (red, green, blue, alpha) of the theme's active action, 0 to 1.
+    Returns:
+        The rows, from top to bottom.
+    """
+    tint, alpha = np.array(colour[:3]) - np.mean(colour[:3]), max(colour[3], 1e-3)
+    if np.linalg.norm(tint) < LEAST_TINT:
+        return []
+    pixels = lines[:, :, ::BAND_STEP] / 255.0
+    shares = (pixels - pixels.mean(axis=-1, keepdims=True)) @ tint / (tint @ tint)  # of the tint in each pixel
+    is_tinted = (shares > 0.6 * alpha).mean(axis=(1, 2)) >= BAND_SHARE
+    return [int(row) for row in np.flatnonzero(is_tinted & known)]
 
 
 def _find_block(fits, known: np.ndarray, first: int) -> int | None:

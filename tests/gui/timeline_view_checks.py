@@ -148,7 +148,7 @@ def check_the_dots_own_keys_are_covered():
     """Where Blender draws 1200 diamonds in orange, one grey bar is left."""
     yield from open_sample()
     lanes, region = build_layout().lanes, find_region()
-    assert {name for name, _ in lanes} == {"player1 dot", "player2 dot"}, lanes
+    assert {name for name, _ in lanes} == {"Ball dot", "player1 dot", "player2 dot"}, lanes
     screen = read_screen()
     for _, (_, bottom, _, top) in lanes:
         row = screen[int(region.y + 0.5 * (bottom + top)), region.x + region.width // 2:region.x + region.width - 30]
