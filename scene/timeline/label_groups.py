@@ -19,6 +19,8 @@ PARTS = {"foot": "F", "head": "H", "chest": "C", "thigh": "T", "hand": "A", "han
 PART_TITLES = {"foot": "Foot", "head": "Head", "chest": "Chest", "thigh": "Thigh", "hand": "Hand",
                "hands": "Both Hands", "tool": "Racquet or Bat"}
 
+FAST, DARKEST = 5.5, 0.5  # m/s of a sprint; share of black in the colour of who stands
+
 Colour = tuple[float, float, float]
 
 
@@ -82,6 +84,15 @@ def find_group(words: tuple[str, ...]) -> LabelGroup:
 def find_group_of_name(name: str) -> LabelGroup:
     """Find the kind of action that the name of a strip or marker names."""
     return find_group(split_labels(name))
+
+
+@lru_cache(maxsize=4096)
+def find_colour(name: str) -> Colour:
+    """Find the colour of a strip or key moment by its name: its group's; on foot, the darker the slower."""
+    words, group = split_labels(name), find_group_of_name(name)
+    gaits = [label.gait for word in words if (label := read_labels().get(word)) and label.gait is not None]
+    slow = 1.0 - min(min(gaits, default=0.0) / FAST, 1.0)
+    return mix(group.colour, colours.BLACK, DARKEST * slow) if group is RUN else group.colour
 
 
 @lru_cache(maxsize=4096)

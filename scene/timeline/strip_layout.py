@@ -14,7 +14,7 @@ import numpy as np
 
 from . import label_tracks as lanes
 from . import nla_rows
-from .label_groups import LabelGroup, find_group_of_name
+from .label_groups import Colour, LabelGroup, find_colour, find_group_of_name
 from .moment_names import DrawnName, find_frame_pixels, is_visible, list_names
 from .strip_lines import remove_name_suffix
 
@@ -54,6 +54,11 @@ class DrawnStrip:
     def group(self) -> LabelGroup:
         """The kind of action."""
         return find_group_of_name(self.name)
+
+    @property
+    def colour(self) -> Colour:
+        """The colour of its action."""
+        return find_colour(self.name)
 
 
 @dataclass(frozen=True, kw_only=True)

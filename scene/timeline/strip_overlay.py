@@ -185,7 +185,7 @@ def _add_strip(canvas: Canvas, strip: DrawnStrip, look: Look) -> None:
         return
     dim = strip.is_muted or strip.kind == "automatic"
     is_lane = strip.kind == "moments"
-    colour = strip.group.colour
+    colour = strip.colour
     paper = mix(look.back, look.ink, 0.14) if is_lane else mix(look.back, colour, 0.4) if dim else colour
     canvas.add_box(box, paper)
     if dim and not is_lane:
@@ -204,7 +204,7 @@ def _add_strip(canvas: Canvas, strip: DrawnStrip, look: Look) -> None:
 
 def _add_moment(canvas: Canvas, name: DrawnName, look: Look) -> None:
     """Add a key moment: its diamond and the name beside it, or its name at the foot with a line up to it."""
-    size, colour = TEXT * look.scale, name.group.colour
+    size, colour = TEXT * look.scale, name.colour
     alpha = 0.5 if name.is_muted else 1.0
     if name.is_at_foot:
         left, bottom, right, top = name.box

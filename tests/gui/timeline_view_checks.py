@@ -73,7 +73,7 @@ def list_faulty_strips():
     spans = [(one, right) for one, right in ends if right - max(one.box[0], 0.0) > 16]
     for strip, right in spans:
         x, y = int(region.x + right - 3), int(region.y + strip.box[1] + 4)  # right of the text, within the outline
-        seen, wanted = screen[y, x], np.array(strip.group.colour) * 255
+        seen, wanted = screen[y, x], np.array(strip.colour) * 255
         share = 0.4 if strip.kind == "automatic" else 1.0
         back = np.array(bpy.context.preferences.themes[0].nla_editor.space.back[:3]) * 255
         if np.abs(seen - (share * wanted + (1 - share) * back)).max() > 6:

@@ -48,14 +48,22 @@ def test_groups_are_told_apart_also_without_red_or_green(room):
         assert nearest > 0.15, (kind, nearest)
 
 
+def test_who_goes_slower_is_darker(room):
+    find_colour = room("timeline.label_groups").find_colour
+    sums = [sum(find_colour(name)) for name in ("standing", "walking back", "jogging", "running left", "sprinting")]
+    assert sums == sorted(sums) and len(set(sums)) == 5
+    assert find_colour("kick standing low") == find_colour("kick running low")
+
+
 def test_letters_are_readable_on_every_colour(room):
     groups = room("timeline.label_groups")
-    for group in groups.GROUPS:
-        light = [x / 12.92 if x <= 0.04045 else ((x + 0.055) / 1.055) ** 2.4 for x in group.colour]
+    for colour in (*(group.colour for group in groups.GROUPS), groups.find_colour("standing"),
+                   groups.find_colour("walking"), groups.find_colour("jogging")):
+        light = [x / 12.92 if x <= 0.04045 else ((x + 0.055) / 1.055) ** 2.4 for x in colour]
         paper = float(np.dot([0.2126, 0.7152, 0.0722], light))
-        ink = groups.choose_ink(group.colour)[0]
+        ink = groups.choose_ink(colour)[0]
         contrast = (max(paper, ink) + 0.05) / (min(paper, ink) + 0.05)
-        assert contrast >= 4.5, (group.title, contrast)
+        assert contrast >= 4.5, (colour, contrast)
 
 
 @pytest.mark.parametrize(("labels", "letter", "contact"), [
