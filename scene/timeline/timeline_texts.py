@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import bpy
 
+from ..core.live import is_running
 from ..core.measure import Clock, build_scene_clock
 from ..player import dots
 from . import label_tracks as lanes
@@ -13,6 +14,7 @@ from .moment_names import DrawnName
 from .strip_layout import DrawnStrip, Layout
 from .strip_lines import format_labels, read_recorded_span
 
+MOVES_MOMENT = ("BEYOND_MOCAP_OT_pick_moment",)
 MOVED = 0.5  # frames from which a strip counts as dragged
 KEYS = {
     "NLA_EDITOR": ("NLA Editor", (
@@ -94,7 +96,7 @@ def describe_drag(context: bpy.types.Context, layout: Layout) -> tuple[list[str]
             if lines:
                 return lines, (max(strip.box[0], 0.0), strip.box[3])
     moved = [name for name in layout.names if name.is_selected]
-    if moved:
+    if moved and is_running(MOVES_MOMENT):
         return _describe_moved_moment(context, moved[0]), (moved[0].box[0], moved[0].box[3])
     return [], (0.0, 0.0)
 
