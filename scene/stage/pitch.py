@@ -50,7 +50,7 @@ def cut_faces(polygons: list, kinds: list[int]) -> tuple[np.ndarray, list, np.nd
     points = [Vector(point) for polygon in polygons for point in polygon]
     ends = np.cumsum([len(polygon) for polygon in polygons])
     rows = [list(range(end - len(polygon), end)) for polygon, end in zip(polygons, ends)]
-    corners, _, faces, _, _, sources = delaunay_2d_cdt(points, [], rows, TRIANGLES, 1e-5, True)
+    corners, _, faces, _, _, sources = delaunay_2d_cdt(points, [], rows, TRIANGLES, 1e-5)
     found = np.array([max(kinds[source] for source in given) for given in sources], np.int32)
     return np.array([tuple(corner) for corner in corners]), faces, found
 
