@@ -151,8 +151,9 @@ glTF and USD clips are converted first, and the result is cached"""
         running, queue = context.window_manager.beyond_mocap_work, self.queue
         done = queue.total - len(queue.remaining)
         text = f"Converting {queue.remaining[0].name}" if queue.remaining else "Converted"
+        text += f" {done} of {queue.total}"
         running.kind, running.fraction, running.text = self.kind, done / max(queue.total, 1), text
-        context.workspace.status_text_set(f"{text}   {done} of {queue.total}   ESC: cancel")
+        context.workspace.status_text_set(f"{text}   ESC: cancel")
         window.redraw_editors()
 
     def cancel(self, context):

@@ -209,10 +209,10 @@ class BackgroundOperator(BaseOperator):
     def show(self, context):
         """Show the progress in the status bar, at the pointer and in the panel."""
         running = context.window_manager.beyond_mocap_work
-        text = self.job.text or f"{self.bl_label} ..."
+        text = self.job.describe_progress()
         running.kind, running.fraction, running.text = self.kind, self.job.fraction, text
         context.window_manager.progress_update(int(100 * self.job.fraction))
-        context.workspace.status_text_set(f"{text}   {self.job.fraction:.0%}   ESC: cancel")
+        context.workspace.status_text_set(f"{text}   ESC: cancel")
         window.redraw_editors()
 
     def stop_polling(self, context):

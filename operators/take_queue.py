@@ -25,11 +25,18 @@ from .library import describe_gaps, describe_library
 from .operator_base import NEEDS_LIBRARY, BaseOperator
 
 
+def show_library(scene, order) -> None:
+    """Show what the library of an order holds, if it was built."""
+    library = session.find_library(order.folder, order.unit)
+    if library is not None:
+        scene.beyond_mocap.library_holds = describe_library(library)
+        scene.beyond_mocap.library_gaps = describe_gaps(library)
+
+
 def store_result(context, player, order, result) -> None:
     """Store the takes of a result in the session, show the first of them, and update what depends on it."""
     session.store_library(result.library, order.unit)
-    context.scene.beyond_mocap.library_holds = describe_library(result.library)
-    context.scene.beyond_mocap.library_gaps = describe_gaps(result.library)
+    show_library(context.scene, order)
     stored = []
     for one in result.takes:
         lines = {"quality": quality.describe_quality(one.report),
@@ -97,11 +104,23 @@ class TakeOperator(BaseOperator):
 
     def do(self, context):
         """Process all players at once: generate everything first, then store everything."""
-        window = context.window_manager
+        entries = self.build_entries(context)
+        try:
+            results = self.process_entries(context.window_manager, entries)
+        except BeyondMocapError:
+            show_library(context.scene, entries[0].request)
+            raise
+        for entry, result in zip(entries, results):
+            store_result(context, context.scene.beyond_mocap.players[entry.player], entry.request, result)
+        players = [context.scene.beyond_mocap.players[entry.player] for entry in entries]
+        names = ", ".join(player.name for player in players)
+        self.report({"INFO"}, f"Generated: {names}{_describe_kept_keys(players)}; press Apply or Revert")
+
+    def process_entries(self, window, entries) -> list[orders.RequestResult]:
+        """Generate the takes of all entries, with the progress at the pointer."""
+        results: list[orders.RequestResult] = []
         window.progress_begin(0, 100)
         try:
-            entries = self.build_entries(context)
-            results = []
             for number, entry in enumerate(entries):
                 def on_progress(done, text, number=number):
                     window.progress_update(int(100 * (number + done) / len(entries)))
@@ -111,11 +130,7 @@ class TakeOperator(BaseOperator):
                                                       lambda: False))
         finally:
             window.progress_end()
-        for entry, result in zip(entries, results):
-            store_result(context, context.scene.beyond_mocap.players[entry.player], entry.request, result)
-        players = [context.scene.beyond_mocap.players[entry.player] for entry in entries]
-        names = ", ".join(player.name for player in players)
-        self.report({"INFO"}, f"Generated: {names}{_describe_kept_keys(players)}; press Apply or Revert")
+        return results
 
     def invoke(self, context, event):
         """Queue the players, and process the queue if no other operator does."""
@@ -157,7 +172,7 @@ class TakeOperator(BaseOperator):
         elif event.type != "TIMER":
             return {"PASS_THROUGH"}
         if self.job is not None and not self.job.poll() and not self.job.is_ended and not self.job.is_stale:
-            self.show(context, self.job.text)
+            self.show(context, self.job.describe_progress())
             return {"RUNNING_MODAL"}
         if self.job is not None and not self.store_arrived(context):
             return {"RUNNING_MODAL"}
@@ -197,6 +212,8 @@ class TakeOperator(BaseOperator):
             if not isinstance(job.error, (BeyondMocapError, OSError)):
                 raise job.error
             self.add_message(str(job.error), "ERROR")
+            if (scene := _find_scene(entry)) is not None:
+                show_library(scene, entry.request)
             return True
         scene = _find_scene(entry)
         if scene is None:
@@ -272,7 +289,7 @@ class TakeOperator(BaseOperator):
         context.window_manager.progress_update(int(100 * fraction))
         waiting = f"   then {', '.join(queue.list_players())}" if queue.list_players() else ""
         if context.workspace is not None:
-            context.workspace.status_text_set(f"{running.text}   {fraction:.0%}{waiting}   ESC: cancel")
+            context.workspace.status_text_set(f"{running.text}{waiting}   ESC: cancel")
         _redraw_sidebars(context)
 
     def close_progress(self, context):

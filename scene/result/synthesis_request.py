@@ -130,7 +130,7 @@ def build_request(settings: BeyondMocapSettings, player: BeyondMocapPlayer, mode
 
 
 def process_request(request: Request, library: "Library | None", progress, cancelled, hurry) -> RequestResult:
-    """Process a request. Never accesses bpy.
+    """Process a request. Never accesses bpy. A library that it builds is stored at once, whatever comes after.
 
     Args:
         request: the request.
@@ -143,8 +143,11 @@ def process_request(request: Request, library: "Library | None", progress, cance
     """
     from ...beyond_mocap.library.build import build_library
 
-    clips = library or build_library(request.folder, unit=request.unit, **request.build, progress=progress,
-                                     cancelled=lambda: cancelled() or hurry())
+    clips = library
+    if clips is None:
+        clips = build_library(request.folder, unit=request.unit, **request.build, progress=progress,
+                              cancelled=lambda: cancelled() or hurry())
+        session.store_library(clips, request.unit)
     plan = request.plan
     check_timeline(plan.timeline, clips.labels, float(plan.track.times[0]), float(plan.track.times[-1]), request.where)
     callbacks = progress, cancelled, hurry
