@@ -17,6 +17,7 @@ from ..result.result import BeyondMocapResult, BeyondMocapShared
 from ..rigs.rig import BeyondMocapRig
 from ..timeline.video import BeyondMocapVideo, tag_update
 from .properties import find_active_row, with_settings
+from .sample import find_moved_path
 
 FILE = {"subtype": "FILE_PATH", "options": {"PATH_SUPPORTS_BLEND_RELATIVE"}}
 
@@ -133,8 +134,8 @@ class BeyondMocapWork(bpy.types.PropertyGroup):
 
 
 def to_absolute_path(path: str) -> str:
-    """Return a path from a setting as an absolute one; empty stays empty."""
-    return bpy.path.abspath(path) if path else ""
+    """Return a path from a setting as an absolute one; empty stays empty, and the sample is found where it is now."""
+    return find_moved_path(bpy.path.abspath(path)) if path else ""
 
 
 def to_setting_path(path: str) -> str:
