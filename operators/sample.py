@@ -32,6 +32,7 @@ class Sample:
             ended.
         find: finds in a scene what has been generated, to be shown (called with the scene); nothing if a step failed.
         next_step: what to try then.
+        seconds: length of the scene; what is longer extends it.
         is_played_on_pitch: the scene's camera follows it over a pitch.
     """
 
@@ -40,6 +41,7 @@ class Sample:
     steps: tuple[Callable[[bpy.types.Context, str], None], ...]
     find: Callable[[bpy.types.Scene], list[bpy.types.Object]]
     next_step: str
+    seconds: float = 1.0
     is_played_on_pitch: bool = False
 
 
@@ -131,15 +133,15 @@ def find_throw(scene: bpy.types.Scene) -> list[bpy.types.Object]:
 SAMPLES = {
     "PLAYER": Sample("Player", "The track and labels of a player who dribbles, passes and runs on",
                      (import_player, synthesize_player), find_bodies,
-                     "move a strip in the NLA editor and press Update", True),
+                     "move a strip in the NLA editor and press Update", is_played_on_pitch=True),
     "MATCH": Sample("Match", "Eight seconds of a match with nine players and a ball", (read_match, make_match),
-                    find_bodies, "choose another time and press Make Match", True),
+                    find_bodies, "choose another time and press Make Match", is_played_on_pitch=True),
     "PATH": Sample("Path", "A recorded run that follows a winding path", (bend_path,), find_bodies,
-                   "press Tab and move a point of the curve; the run follows"),
+                   "press Tab and move a point of the curve; the run follows", seconds=10.0),
     "PASSES": Sample("Passes", "Three players who pass a ball", (fill_passes, make_passes), find_bodies,
                      "move a player's Empty; the passes follow"),
     "THROW": Sample("Throw", "A player who throws a ball at a target", (place_thrower, throw_at_target), find_throw,
-                    "move the target; the throw follows"),
+                    "move the target; the throw follows", seconds=4.0),
     "MARKERS": Sample("Markers", "A walk recorded with optical markers", (import_markers, reconstruct_body),
                       find_bodies, "see the figures under Reconstruct"),
 }
@@ -223,7 +225,8 @@ def prepare_scene(context, wanted: Sample, task: str) -> None:
     if not is_free(context.scene):
         context.window.scene = bpy.data.scenes.new(f"Sample {wanted.title}")
     scene = bpy.context.scene
-    scene.render.fps, scene.render.fps_base, scene.frame_start = FPS, 1.0, 1
+    scene.render.fps, scene.render.fps_base = FPS, 1.0
+    scene.frame_start, scene.frame_end = 1, round(FPS * wanted.seconds)
     scene.beyond_mocap.library_folder = str(sample.find_sample_path("library"))
     if task != "MATCH":  # which brings its own pitch
         stage.create_stage(bpy.context, True)

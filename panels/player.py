@@ -5,6 +5,7 @@ from __future__ import annotations
 import bpy
 
 from ..scene.core.settings import find_active_player
+from .sample import draw_load_sample
 from .tab import TabPanel, create_value_column, draw_header, draw_paragraph
 
 
@@ -43,6 +44,7 @@ class BEYOND_MOCAP_PT_players(TabPanel, bpy.types.Panel):
         player = find_active_player(settings)
         if player is None:
             draw_paragraph(layout, "Import a tracking file, drop one into the view, or draw a track", "INFO")
+            draw_load_sample(layout, "PLAYER")
             return
         column = create_value_column(layout)
         column.prop(player, "drawn_track")
