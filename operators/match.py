@@ -11,12 +11,13 @@ from ..beyond_mocap.base.errors import InputError, format_count
 from ..scene.core import channels, session, window
 from ..scene.core.measure import frames_per_second
 from ..scene.core.settings import to_setting_path
-from ..scene.match import cameras, load, show
+from ..scene.match import load, show
 from ..scene.match import command_process as child
 from ..scene.match import match_objects as ours
 from ..scene.match import request as order
 from ..scene.match.settings import find_active_player, format_float
 from ..scene.rigs import export, rig
+from ..scene.stage import cameras, eyes, stage
 from .operator_base import NEEDS_LIBRARY, BackgroundOperator, BaseOperator, ExportOperator, ViewDropHandler
 
 SYNTHESIS_SHARE = 0.85
@@ -243,15 +244,11 @@ class BEYOND_MOCAP_OT_match_camera(ShownMatchVerb, bpy.types.Operator):
         """Make it the scene's camera, and look through it in the 3D view."""
         scene = context.scene
         if self.which == "EYES":
-            camera = cameras.create_eyes_camera(scene, self.find_body(context), show.find_ball(scene))
+            camera = eyes.create_eyes_camera(scene, self.find_body(context), show.find_ball(scene))
         else:
-            camera = cameras.find_broadcast_camera(scene)
-        if camera is None:
-            raise InputError("match", "no camera in the stand", "the match's camera", "press Show Match again")
+            camera = cameras.get_camera(scene, "BROADCAST")
         scene.camera = camera
-        area = None if bpy.app.background else window.find_largest_editor(context.window.screen, "VIEW_3D")
-        if area is not None:
-            _look_through(context, area)
+        window.look_through_camera(context)
 
     def find_body(self, context) -> bpy.types.Object:
         """Find the armature that is named, selected, or active in the list."""
@@ -263,14 +260,6 @@ class BEYOND_MOCAP_OT_match_camera(ShownMatchVerb, bpy.types.Operator):
         chosen = find_active_player(context.scene.beyond_mocap_match)
         return _find_body(context.scene, self.player
                           or (chosen.feed_id if chosen else shown[0].get(ours.PLAYER_PROPERTY)))
-
-
-def _look_through(context, area: bpy.types.Area) -> None:
-    """Show the scene's camera in the 3D view, with its whole frame."""
-    area.spaces.active.region_3d.view_perspective = "CAMERA"
-    region = next(region for region in area.regions if region.type == "WINDOW")
-    with context.temp_override(area=area, region=region):
-        bpy.ops.view3d.view_center_camera()
 
 
 FORMATS = [one for one in rig.FORMATS if one[0] != "BVH"]
@@ -298,7 +287,7 @@ scene is not changed"""
             count = format_count(len(armatures) - len(bodies), "player")
             self.report({"WARNING"}, f"{count} left out: in an excluded collection")
         wanted = export.ExportOptions(path, self.format, self.engine, None, self.root)
-        things = ours.find_meshes(scene, "ball") + (ours.find_meshes(scene, "pitch") if self.pitch else [])
+        things = ours.find_meshes(scene, "ball") + (stage.find_pitch(scene) if self.pitch else [])
         for line in export.export_motion(context, bodies, wanted, things):
             self.report({"INFO"}, line)
         self.report({"INFO"}, f"Written: {path}")

@@ -8,6 +8,7 @@ from __future__ import annotations
 from collections.abc import Callable
 
 import bpy
+import numpy as np
 
 _draw_handlers: list[tuple[type, Callable, object]] = []  # type of space, function, Blender's handle
 _timers: list[bpy.types.Timer] = []
@@ -74,6 +75,67 @@ def select_only(context: bpy.types.Context, *things: bpy.types.Object) -> None:
     for thing in things:
         thing.select_set(True)
     context.view_layer.objects.active = things[0]
+
+
+def find_view(context: bpy.types.Context) -> bpy.types.Area | None:
+    """Return the 3D view in which a key or button was pressed, or the largest; None without a window."""
+    window = context.window or next(iter(context.window_manager.windows), None)
+    if bpy.app.background or window is None:
+        return None
+    if context.area is not None and context.area.type == "VIEW_3D":
+        return context.area
+    return find_largest_editor(window.screen, "VIEW_3D")
+
+
+def look_through_camera(context: bpy.types.Context) -> None:
+    """Look through the scene's camera in the 3D view, with its whole frame; nothing happens without a window."""
+    area = find_view(context)
+    if area is None:
+        return
+    area.spaces.active.region_3d.view_perspective = "CAMERA"
+    region = next(region for region in area.regions if region.type == "WINDOW")
+    with context.temp_override(area=area, region=region):
+        bpy.ops.view3d.view_center_camera()
+
+
+FRAME_SHARE = 0.62  # of the 3D view's height or width that framed objects fill
+
+
+def frame_objects(context: bpy.types.Context, things: list[bpy.types.Object]) -> None:
+    """Move the 3D view so that objects fill a good part of it; its direction stays.
+
+    A view through a camera is left alone, and nothing happens without a window.
+
+    Args:
+        context: the context.
+        things: armatures, with the meshes that they move, and other objects, as they are on the current frame.
+    """
+    area = find_view(context)
+    corners = _list_corners(context, things) if area is not None else np.empty((0, 3))
+    if not len(corners) or area.spaces.active.region_3d.view_perspective == "CAMERA":
+        return
+    view = area.spaces.active.region_3d
+    region = next(region for region in area.regions if region.type == "WINDOW")
+    left, bottom, right, top = find_free_region(area, region)
+    share = FRAME_SHARE * np.array([(right - left) / region.width, (top - bottom) / region.height])
+    view.view_location = 0.5 * (corners.min(axis=0) + corners.max(axis=0))
+    seen = (corners - np.array(view.view_location)) @ np.array(view.view_rotation.to_matrix())
+    scale = np.abs([view.window_matrix[0][0], view.window_matrix[1][1]])
+    if view.view_perspective == "PERSP":  # a corner fits where its offset is less than its depth by the scale
+        view.view_distance = float(np.max(np.abs(seen[:, :2]) * scale / share + seen[:, 2:]))
+    else:
+        view.view_distance *= float(np.max(np.abs(seen[:, :2]) * scale / share))
+
+
+def _list_corners(context: bpy.types.Context, things: list[bpy.types.Object]) -> np.ndarray:
+    """List the corners (N, 3) of the boxes around evaluated objects and what they carry; of an empty its place."""
+    depsgraph = context.evaluated_depsgraph_get()
+    parts = {part for thing in things for part in (thing, *thing.children)}
+    shown = [part.evaluated_get(depsgraph) for part in parts if part.name in context.view_layer.objects
+             and part.visible_get()]
+    boxes = [np.array(part.matrix_world) @ np.column_stack([np.array(part.bound_box), np.ones(8)]).T for part in shown
+             if part.type != "ARMATURE" or len(part.data.bones)]
+    return np.concatenate([box[:3].T for box in boxes]) if boxes else np.empty((0, 3))
 
 
 def open_editor(context: bpy.types.Context, kind: str, direction: str, factor: float) -> bpy.types.Area | None:

@@ -16,7 +16,8 @@ from ..core.saved_state import discard_saved_state, restore_nla, restore_playbac
 from ..core.settings import BeyondMocapPlayer
 from ..passes import possession
 from ..path_editing import edited_bodies
-from ..stage import stage
+from ..stage import cameras
+from ..stage.stage_collection import find_focus
 from . import bake, blocks, quality
 from . import manual_keys as hand_keys
 from .bake import MARK
@@ -213,7 +214,7 @@ def _apply_shared_objects(context: bpy.types.Context) -> None:
             "ACCEPTED")
     if not has_other_previews or bake.find_ball(takes, context.scene.beyond_mocap) is not None:
         discard_saved_state(shared.ball, MARK)
-    discard_saved_state(shared.camera, stage.MARK)
+    discard_saved_state(shared.camera, cameras.MARK)
     shared.end_set = 0
     if has_other_previews:
         _update_followers(context, takes)
@@ -242,15 +243,12 @@ def _update_shared_objects(context: bpy.types.Context) -> None:
     previews = any(player.result.state == "PREVIEW" for player in settings.players)
     room = scene.collection.children.get(bake.COLLECTION)
     ball = room.objects.get(bake.BALL) if room is not None else None
-    focus = stage.find_focus(scene)
     if not previews:
-        _restore_shared(scene, shared, ball, focus)
+        _restore_shared(scene, shared, ball)
         return
     is_new, wanted = ball is None, bake.find_ball(takes, settings) is not None
     if wanted and not is_new and not shared.ball.kept:
         save_playback(shared.ball, ball)
-    if takes and focus is not None and not shared.camera.kept:
-        save_playback(shared.camera, focus)
     _update_followers(context, takes)
     if wanted and is_new:
         shared.ball.kept = shared.ball.made = True
@@ -267,24 +265,25 @@ def _update_followers(context: bpy.types.Context, takes: list) -> None:
     path = bake.find_ball(takes, context.scene.beyond_mocap)
     if path is not None:
         bake.write_ball(context, path)
-    if takes and stage.find_focus(context.scene) is not None:
-        bake.write_camera(context.scene, takes)
+    cameras.update_cameras(context.scene)
 
 
-def _restore_shared(scene: bpy.types.Scene, shared, ball, focus) -> None:
-    """Restore ball, camera and scene length to their state before any preview."""
+def _restore_shared(scene: bpy.types.Scene, shared, ball) -> None:
+    """Restore ball and scene length to their state before any preview; the cameras follow the bodies that are left."""
     if shared.ball.kept and ball is not None:
         if shared.ball.made:
             _remove_object(ball)
         else:
             restore_playback(shared.ball, ball, MARK)
-    if shared.camera.kept and focus is not None:
-        restore_playback(shared.camera, focus, stage.MARK)
+    focus = find_focus(scene)
+    if shared.camera.kept and focus is not None:  # by version 0.1
+        restore_playback(shared.camera, focus, cameras.MARK)
     discard_saved_state(shared.ball, MARK)
-    discard_saved_state(shared.camera, stage.MARK)
+    discard_saved_state(shared.camera, cameras.MARK)
     if shared.end_set and scene.frame_end == shared.end_set:
         scene.frame_end = shared.end_before
     shared.end_set = 0
+    cameras.update_cameras(scene)
 
 
 def _store_state(context: bpy.types.Context, player: BeyondMocapPlayer, new_take: session.StoredTake) -> None:
