@@ -301,6 +301,7 @@ class BEYOND_MOCAP_OT_import_clip(ClipOperator, bpy.types.Operator):
 
     bl_idname = "beyond_mocap.import_clip"
     bl_label = "Import Clip"
+    presents = True
 
     def do(self, context):
         """Read the file, then create the armature."""

@@ -33,6 +33,7 @@ the NLA editor; Save Labels writes them to the library"""
 
     bl_idname = "beyond_mocap.annotate_clip"
     bl_label = "Annotate Clip"
+    presents = True
 
     def do(self, context):
         """Read clip and labels, then create armature and strips."""

@@ -11,8 +11,8 @@ from ..beyond_mocap.base.errors import InputError, format_count
 from ..scene.core import channels, session, window
 from ..scene.core.measure import frames_per_second
 from ..scene.core.settings import to_setting_path
-from ..scene.match import load, show
 from ..scene.match import command_process as child
+from ..scene.match import load, show
 from ..scene.match import match_objects as ours
 from ..scene.match import request as order
 from ..scene.match.settings import find_active_player, format_float
@@ -28,6 +28,11 @@ class MatchVerb(BackgroundOperator):
     """An operator that ends with a stretch of a match in the scene."""
 
     bl_options = {"REGISTER", "UNDO"}
+
+    @property
+    def presents(self):
+        """The first stretch that is shown is framed; one in place of another is not."""
+        return not ours.find_armatures(bpy.context.scene)
 
     def find_library(self, wanted: load.DisplayRequest):
         """Find the library if this session has it."""

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+from contextlib import nullcontext
 from pathlib import Path
 
 import bpy
@@ -12,6 +13,7 @@ from bpy_extras.io_utils import ExportHelper, ImportHelper
 from ..beyond_mocap.base.errors import BeyondMocapError, InputError
 from ..scene.core import background, window
 from ..scene.rigs import export
+from ..scene.stage.presenting import present_new_objects
 
 NEEDS_LIBRARY = ("Choose the library's folder first",
                  lambda context: bool(context.scene.beyond_mocap.library_folder))
@@ -26,10 +28,12 @@ class BaseOperator:
     Attributes:
         needs: pairs of a message for the user while the operator is disabled, and a function of the context that
             returns whether it is enabled; they are checked in order.
+        presents: whether the 3D view moves to the objects that it adds, and the stage's cameras follow them.
     """
 
     bl_options = {"REGISTER", "UNDO"}
     needs = ()
+    presents = False
 
     @classmethod
     def poll(cls, context):
@@ -47,7 +51,8 @@ class BaseOperator:
     def attempt(self, action):
         """Run `action`: FINISHED if it succeeds, else a report and CANCELLED."""
         try:
-            action()
+            with present_new_objects(bpy.context) if self.presents else nullcontext():
+                action()
         except BeyondMocapError as error:
             return self.report_failure(str(error))
         except OSError as error:

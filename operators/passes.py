@@ -137,6 +137,7 @@ leads from one player's strike to the next"""
 
     bl_idname = "beyond_mocap.passes_make"
     bl_label = "Make Scene"
+    presents = True
     kind = "passes"
     live: BoolProperty(name="Live", options={"HIDDEN", "SKIP_SAVE"},
                        description="Start as an update after an edit, with errors shown in the panel")

@@ -9,9 +9,10 @@ from bpy.props import EnumProperty, StringProperty
 
 from ..beyond_mocap.base.errors import InputError
 from ..beyond_mocap.files.tracking.providers import PROVIDERS
+from ..scene.core import frame_range
 from ..scene.core.settings import find_active_player, to_setting_path
 from ..scene.player import dots, pins, tracks
-from ..scene.result import bake, preview
+from ..scene.result import preview
 from ..scene.timeline import label_checks as word_checks
 from ..scene.timeline import strip_events, strips
 from ..scene.timeline.strips import show_player
@@ -27,6 +28,7 @@ SkillCorner, Sportec, Second Spectrum, Stats Perform); a text file with the name
 
     bl_idname = "beyond_mocap.import_tracking"
     bl_label = "Import Tracking"
+    presents = True
     filename_ext = ".csv"
     filter_glob: StringProperty(default="*.csv;*.txt;*.dat;*.json;*.jsonl;*.xml", options={"HIDDEN"})
     metadata: StringProperty(
@@ -102,7 +104,7 @@ SkillCorner, Sportec, Second Spectrum, Stats Perform); a text file with the name
         for player in players:
             frames = dots.find_key_range(player.dot) if player.use and player.dot is not None else None
             if frames is not None:
-                bake.extend_scene(scene, frames[1])
+                frame_range.fit_range(scene, frames[1], dots.list_dots(scene))
         if scene.frame_end != before:
             self.report({"INFO"}, f"Scene end set to frame {scene.frame_end}, the end of the tracks")
 

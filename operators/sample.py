@@ -2,22 +2,25 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass
 
 import bpy
 from bpy.props import EnumProperty
+from mathutils import Euler
 
 from ..scene.core import sample, window
 from ..scene.library import recordings
 from ..scene.result import queue
-from ..scene.stage import sample_view, stage
+from ..scene.stage.view_style import style_view
 from .operator_base import BaseOperator
 
 FPS = 30  # frames per second of the sample's scene, those of its clips
 MATCH_SECONDS = (0.0, 8.0)  # s of the match that are shown
-BENDS = (0.0, 2.5, -2.5, 2.5, 0.0)  # m by which the points of the path are moved aside
-TARGET = (14.0, 3.0, 1.2)  # m, where the throw's target is
+WINDING = ((0.0, 0.0), (4.6, 0.0), (8.0, 2.4), (6.2, 5.8), (1.2, 4.6), (-2.4, 6.8), (-5.6, 5.2))  # m, of a path
+TARGET = (9.0, 2.0, 1.2)  # m, where the throw's target is
+TILT = math.radians(70.0)  # of the free view, from straight down
 NLA_SHARE = 0.3  # of the 3D view's height, for the NLA editor
 
 
@@ -32,8 +35,9 @@ class Sample:
             ended.
         find: finds in a scene what has been generated, to be shown (called with the scene); nothing if a step failed.
         next_step: what to try then.
+        task: the task of the tab that it belongs to.
+        heading: rad, direction of the free view; None looks through the scene's camera.
         seconds: length of the scene; what is longer extends it.
-        is_played_on_pitch: the scene's camera follows it over a pitch.
     """
 
     title: str
@@ -41,8 +45,9 @@ class Sample:
     steps: tuple[Callable[[bpy.types.Context, str], None], ...]
     find: Callable[[bpy.types.Scene], list[bpy.types.Object]]
     next_step: str
+    task: str
+    heading: float | None = None
     seconds: float = 1.0
-    is_played_on_pitch: bool = False
 
 
 def import_player(_context, _how) -> None:
@@ -70,10 +75,11 @@ def make_match(context, how) -> None:
 def bend_path(context, _how) -> None:
     """Show a recorded run, and let it follow a winding path."""
     show_clip(context, "jogging_2_9.bvh")
-    bpy.ops.beyond_mocap.edit_path(count=len(BENDS))
-    for point, aside in zip(context.view_layer.objects.active.data.splines[0].bezier_points, BENDS):
-        for place in (point.co, point.handle_left, point.handle_right):
-            place.y += aside
+    bpy.ops.beyond_mocap.edit_path(count=len(WINDING))
+    points = context.view_layer.objects.active.data.splines[0].bezier_points
+    for point, place in zip(points, WINDING):
+        point.handle_left_type = point.handle_right_type = "AUTO"
+        point.co.xy = place
     bpy.ops.beyond_mocap.update_path()
 
 
@@ -124,6 +130,12 @@ def find_bodies(scene: bpy.types.Scene) -> list[bpy.types.Object]:
             and thing.animation_data.action is not None]
 
 
+def find_path(scene: bpy.types.Scene) -> list[bpy.types.Object]:
+    """Find the armatures that follow a path, with their curves."""
+    bodies = [thing for thing in find_bodies(scene) if thing.beyond_mocap_ride.on]
+    return [*bodies, *(body.beyond_mocap_ride.curve for body in bodies)]
+
+
 def find_throw(scene: bpy.types.Scene) -> list[bpy.types.Object]:
     """Find the armatures that throw, with their targets."""
     bodies = [thing for thing in find_bodies(scene) if thing.beyond_mocap_throw.made]
@@ -132,18 +144,19 @@ def find_throw(scene: bpy.types.Scene) -> list[bpy.types.Object]:
 
 SAMPLES = {
     "PLAYER": Sample("Player", "The track and labels of a player who dribbles, passes and runs on",
-                     (import_player, synthesize_player), find_bodies,
-                     "move a strip in the NLA editor and press Update", is_played_on_pitch=True),
+                     (import_player, synthesize_player), find_bodies, "move a strip in the NLA editor and press Update",
+                     task="PLAYER"),
     "MATCH": Sample("Match", "Eight seconds of a match with nine players and a ball", (read_match, make_match),
-                    find_bodies, "choose another time and press Make Match", is_played_on_pitch=True),
-    "PATH": Sample("Path", "A recorded run that follows a winding path", (bend_path,), find_bodies,
-                   "press Tab and move a point of the curve; the run follows", seconds=10.0),
+                    find_bodies, "choose another time and press Make Match", task="MATCH"),
+    "PATH": Sample("Path", "A recorded run that follows a winding path", (bend_path,), find_path,
+                   "press Tab and move a point of the curve; the run follows", task="PATH", heading=math.radians(20.0),
+                   seconds=10.0),
     "PASSES": Sample("Passes", "Three players who pass a ball", (fill_passes, make_passes), find_bodies,
-                     "move a player's Empty; the passes follow"),
+                     "move a player's Empty; the passes follow", task="BALL", heading=math.radians(28.0)),
     "THROW": Sample("Throw", "A player who throws a ball at a target", (place_thrower, throw_at_target), find_throw,
-                    "move the target; the throw follows", seconds=4.0),
+                    "move the target; the throw follows", task="BALL", heading=math.radians(-50.0), seconds=4.0),
     "MARKERS": Sample("Markers", "A walk recorded with optical markers", (import_markers, reconstruct_body),
-                      find_bodies, "see the figures under Reconstruct"),
+                      find_bodies, "see the figures under Reconstruct", task="MARKERS", heading=math.radians(28.0)),
 }
 
 
@@ -155,7 +168,8 @@ scene of its own"""
     bl_label = "Load Sample"
     which: EnumProperty(name="Sample", items=[(key, one.title, one.text) for key, one in SAMPLES.items()],
                         description="Task whose sample to load")
-    needs = "Leave edit mode first (Tab)", lambda context: context.mode == "OBJECT"
+    needs = ("Leave edit mode first (Tab)", lambda context: context.mode == "OBJECT",
+             "Wait for the work that is running", lambda context: not context.window_manager.beyond_mocap_work.kind)
 
     @classmethod
     def description(cls, _context, properties):
@@ -164,7 +178,7 @@ scene of its own"""
     def do(self, context):
         """Take all steps at once."""
         wanted = SAMPLES[self.which]
-        prepare_scene(context, wanted, self.which)
+        prepare_scene(context, wanted)
         for step in wanted.steps:
             step(bpy.context, "EXEC_DEFAULT")
         self.show(bpy.context)
@@ -182,7 +196,7 @@ scene of its own"""
             return self.execute(context)
         wanted = SAMPLES[self.which]
         self.steps, self.has_waited = list(wanted.steps), False
-        if self.attempt(lambda: prepare_scene(context, wanted, self.which)) != {"FINISHED"}:
+        if self.attempt(lambda: prepare_scene(context, wanted)) != {"FINISHED"}:
             return {"CANCELLED"}
         show_first(bpy.context, wanted)
         self.scene = bpy.context.scene.session_uid
@@ -219,46 +233,47 @@ scene of its own"""
         self.report({"INFO"}, f"{wanted.title} sample: {wanted.next_step}")
 
 
-def prepare_scene(context, wanted: Sample, task: str) -> None:
+def prepare_scene(context, wanted: Sample) -> None:
     """Prepare a scene without content for a sample: library, frame rate, pitch and light."""
-    sample.find_sample_path("library")
+    library = sample.find_sample_path("library")
     if not is_free(context.scene):
         context.window.scene = bpy.data.scenes.new(f"Sample {wanted.title}")
     scene = bpy.context.scene
     scene.render.fps, scene.render.fps_base = FPS, 1.0
     scene.frame_start, scene.frame_end = 1, round(FPS * wanted.seconds)
-    scene.beyond_mocap.library_folder = str(sample.find_sample_path("library"))
-    if task != "MATCH":  # which brings its own pitch
-        stage.create_stage(bpy.context, True)
+    scene.beyond_mocap.library_folder, scene.beyond_mocap.task = str(library), wanted.task
+    if wanted.task != "MATCH":  # which adds the pitch of its own size
+        bpy.ops.beyond_mocap.add_stage()
 
 
 def is_free(scene: bpy.types.Scene) -> bool:
-    """Return whether a scene has no content: no objects and no chosen library other than the sample."""
+    """Return whether a scene has no content: no objects, players, or library other than the sample's."""
     folder = scene.beyond_mocap.library_folder
     return not scene.objects and not scene.beyond_mocap.players and (not folder or sample.is_in_sample(folder))
 
 
-def find_view(context) -> bpy.types.Area | None:
-    """Find the largest 3D view; None without a window."""
-    return None if bpy.app.background else window.find_largest_editor(context.window.screen, "VIEW_3D")
-
-
 def show_first(context, wanted: Sample) -> None:
     """Prepare the window while the motion is generated."""
-    if (area := find_view(context)) is not None:
-        sample_view.style_view(area.spaces.active)
-        if wanted.title == "Player":
-            window.open_editor(context, "NLA_EDITOR", "HORIZONTAL", NLA_SHARE)
+    if (area := window.find_view(context)) is None:
+        return
+    style_view(area.spaces.active, shows_helpers=wanted.heading is not None)
+    if wanted.task == "PLAYER":
+        window.open_editor(context, "NLA_EDITOR", "HORIZONTAL", NLA_SHARE)
 
 
 def show_last(context, wanted: Sample) -> None:
     """Look at what was generated, and play it."""
-    if (area := find_view(context)) is None:
+    if (area := window.find_view(context)) is None:
         return
-    if wanted.is_played_on_pitch and context.scene.camera is not None:
-        sample_view.look_through_camera(context, area)
+    scene = context.scene
+    if wanted.heading is None:
+        window.look_through_camera(context)
     else:
-        sample_view.look_at(context, area, wanted.find(context.scene))
+        view = area.spaces.active.region_3d
+        view.view_perspective, view.view_rotation = "PERSP", Euler((TILT, 0.0, wanted.heading)).to_quaternion()
+        scene.frame_set((scene.frame_start + scene.frame_end) // 2)  # what moves is then in the middle of the view
+        window.frame_objects(context, wanted.find(scene))
+        scene.frame_set(scene.frame_start)
     if not context.screen.is_animation_playing:
         with context.temp_override(area=area):
             bpy.ops.screen.animation_play()

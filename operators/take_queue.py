@@ -68,6 +68,13 @@ class TakeOperator(BaseOperator):
 
     player: StringProperty(name="Player", options={"SKIP_SAVE"}, description="Name of a player; empty for all selected")
     kind = "whole"
+    stored_count = 0
+
+    @property
+    def presents(self):
+        """The first body of a queue is framed; those that arrive later move no view."""
+        return not self.stored_count
+
     needs = (*NEEDS_LIBRARY, "Import tracking and select a player in step 2 first",
              lambda context: any(player.use for player in context.scene.beyond_mocap.players))
 

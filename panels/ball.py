@@ -6,7 +6,6 @@ import bpy
 
 from ..scene.ball.settings import find_aimed_ball
 from ..scene.passes.settings import find_active_row, find_armature, find_ball, find_picture_icon, parse_lines
-from .sample import draw_load_sample
 from .tab import TabPanel, create_value_column, draw_paragraph, draw_section, draw_table
 
 LINE = 20.0  # pixels of a line of the interface, at a scale of 1
@@ -220,8 +219,6 @@ def draw_passing_scene(panel, layout, context) -> None:
     row.operator_menu_enum("beyond_mocap.passes_sample", "sample", icon="PRESET")
     row.operator("beyond_mocap.passes_from_json", text="", icon="IMPORT")
     row.operator("beyond_mocap.passes_to_json", text="", icon="EXPORT")
-    if not settings.players:
-        draw_load_sample(layout, "PASSES")
     draw_list(layout, "passers", settings, rows="players", active="active_player", operator="passes_list")
     if player := find_active_row(settings.players, settings.active_player):
         draw_player(layout, player)

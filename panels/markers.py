@@ -5,7 +5,6 @@ from __future__ import annotations
 import bpy
 
 from ..scene.markers.settings import find_active_label, find_target_cloud
-from .sample import draw_load_sample
 from .tab import TabPanel, create_value_column, draw_paragraph, draw_section, draw_table
 
 MAX_MESSAGES = 6  # messages that are shown
@@ -43,7 +42,6 @@ class BEYOND_MOCAP_PT_markers(TabPanel, bpy.types.Panel):
         if cloud is None or settings.unit:
             create_value_column(layout).prop(settings, "unit")
         if cloud is None:
-            draw_load_sample(layout, "MARKERS")
             return
         properties = cloud.beyond_mocap_cloud
         row = layout.row(align=True)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import bpy
 
-from .sample import draw_load_sample
 from .tab import TabPanel, create_value_column, draw_paragraph, draw_section
 
 MAX_LINES = 12  # lines of a report shown in the panel
@@ -41,7 +40,6 @@ class BEYOND_MOCAP_PT_match(TabPanel, bpy.types.Panel):
         self.draw_progress(context, "match file")
         if not match.tracking_file:
             draw_paragraph(layout, "Choose a provider's tracking file, or drop it into the view", "INFO")
-            draw_load_sample(layout, "MATCH")
         if match.players:
             draw_players(layout, match)
         if match.report:

@@ -11,7 +11,6 @@ import bpy
 
 from ..scene.core.settings import find_active_player
 from ..scene.path_editing.settings import list_target_bodies
-from .sample import draw_load_sample
 from .tab import TabPanel, create_value_column, draw_figures, draw_paragraph, draw_section
 
 OVERLAYS = {"path_source": "CURVE_PATH", "path_new": "CURVE_NCURVE", "path_trackers": "EMPTY_SINGLE_ARROW",
@@ -56,7 +55,6 @@ class BEYOND_MOCAP_PT_path(TabPanel, bpy.types.Panel):
         layout, body = self.layout, find_subject(context)
         if body is None:
             draw_paragraph(layout, "Select an armature with a motion", "INFO")
-            draw_load_sample(layout, "PATH")
         else:
             edit = body.beyond_mocap_ride
             draw_armature(layout, body, edit)

@@ -5,7 +5,6 @@ from __future__ import annotations
 import bpy
 
 from ..scene.core.settings import find_active_player
-from .sample import draw_load_sample
 from .tab import StepPanel, TabPanel, create_value_column, draw_header, draw_paragraph, draw_section
 
 
@@ -40,7 +39,6 @@ class BEYOND_MOCAP_PT_players(StepPanel, bpy.types.Panel):
         if player is None:
             draw_sources(layout)
             draw_paragraph(layout, "Import a tracking file, drop one into the view, or draw a track", "INFO")
-            draw_load_sample(layout, "PLAYER")
             return
         draw_players(layout, settings)
         draw_section(layout, "player_add", "Add Player", draw_sources)

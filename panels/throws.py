@@ -5,7 +5,6 @@ from __future__ import annotations
 import bpy
 
 from ..scene.throws.settings import find_thrower
-from .sample import draw_load_sample
 from .tab import TabPanel, create_value_column, draw_paragraph, draw_section, draw_table
 
 
@@ -22,7 +21,6 @@ class BEYOND_MOCAP_PT_throws(TabPanel, bpy.types.Panel):
         layout, body = self.layout, find_thrower(context)
         if body is None:
             draw_paragraph(layout, "Select the armature that throws or kicks", "INFO")
-            draw_load_sample(layout, "THROW")
             return
         settings = body.beyond_mocap_throw
         layout.label(text=body.name, icon="ARMATURE_DATA")

@@ -138,6 +138,11 @@ def _list_corners(context: bpy.types.Context, things: list[bpy.types.Object]) ->
     return np.concatenate([box[:3].T for box in boxes]) if boxes else np.empty((0, 3))
 
 
+def find_middle(thing: bpy.types.Object) -> np.ndarray:
+    """Find the middle (3,) of an evaluated object's box, in Blender units."""
+    return np.array(thing.matrix_world) @ np.append(np.mean(thing.bound_box, axis=0), 1.0)
+
+
 def open_editor(context: bpy.types.Context, kind: str, direction: str, factor: float) -> bpy.types.Area | None:
     """Return the largest editor of a kind; without one, turn the left or lower part of the largest 3D view into one.
 

@@ -19,11 +19,10 @@ from mathutils import Matrix
 
 from ...beyond_mocap.base.errors import InputError
 from ...beyond_mocap.motion import quaternion
-from ..core import action, channels, sample
+from ..core import action, channels, frame_range, sample
 from ..core.measure import frames_per_second, units_per_metre
 from ..core.properties import read_property_values
 from ..core.settings import to_absolute_path
-from ..result import bake
 from ..rigs import armature
 from ..stage import ball as balls
 from ..stage import body
@@ -145,7 +144,7 @@ def show_reconstruction(context: bpy.types.Context, cloud: bpy.types.Object,
     action.write_motion(thing, played, scene, clouds.find_start_frame(cloud), cloud.name,
                         generated=True)[RECONSTRUCTED] = True
     thing.matrix_world = cloud.matrix_world
-    bake.extend_scene(scene, clouds.find_start_frame(cloud) + played.duration * frames_per_second(scene))
+    frame_range.extend_range(scene, clouds.find_start_frame(cloud) + played.duration * frames_per_second(scene))
     properties.made, properties.figures, properties.messages = store_reconstruction(reconstruction), "\n".join(
         list_figures(reconstruction)), "\n".join(reconstruction.warnings)
     store_model(cloud, reconstruction.model)

@@ -12,9 +12,8 @@ import bpy
 import numpy as np
 
 from ...beyond_mocap.motion.track.ball_path import BallPath
-from ..core import action, channels
+from ..core import action, channels, frame_range
 from ..core.measure import frames_per_second, units_per_metre
-from ..result import bake
 from ..stage import ball, cameras, stage
 from . import match_objects as ours
 from .characters import CharacterBuilder
@@ -50,7 +49,7 @@ def show_match(context: bpy.types.Context, section: MatchSection, first: int) ->
         camera = cameras.get_camera(scene, "BROADCAST")
     if scene.camera is None or cameras.is_own(scene, scene.camera):
         scene.camera = camera
-    bake.extend_scene(scene, last)
+    frame_range.extend_range(scene, last)
     return durations
 
 

@@ -108,6 +108,12 @@ def add_player_for_dot(settings: BeyondMocapSettings, dot: bpy.types.Object, nam
     return player
 
 
+def list_dots(scene: bpy.types.Scene) -> list[bpy.types.Object]:
+    """List the dots of a scene, the ball's too, that move as their tracks say."""
+    playing = ((thing, channels.find_playing_action(thing)[0]) for thing in scene.objects)
+    return [thing for thing, action in playing if action is not None and action.get(MARK)]
+
+
 def find_first_second(dot: bpy.types.Object) -> float:
     """Return the track's time in seconds at the dot's first key."""
     clock, frames = Clock.from_text(dot.beyond_mocap_dot.clock), find_key_range(dot)

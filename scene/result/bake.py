@@ -9,6 +9,7 @@ from ...beyond_mocap.motion.track import sample_track
 from ...beyond_mocap.motion.track.ball_path import BallPath
 from ...beyond_mocap.synthesis.take import Take
 from ..core import action, channels
+from ..core.frame_range import extend_range
 from ..core.material import get_material
 from ..core.measure import frames_per_second, units_per_metre
 from ..core.session import StoredTake
@@ -55,7 +56,7 @@ def write_take(context: bpy.types.Context, owner: BeyondMocapPlayer, result: Sto
     if settings.make_paths:
         ground = sample_track(result.plan.track, result.plan.fps).positions
         write_ribbon(context, build_track_name(owner), ground, tuple(owner.shirt), room)
-    extend_scene(scene, start + take.motion.duration * frames_per_second(scene))
+    extend_range(scene, start + take.motion.duration * frames_per_second(scene))
     return target
 
 
@@ -93,11 +94,6 @@ def is_matching(target: bpy.types.Object, take: Take, scene: bpy.types.Scene) ->
     if target.type != "ARMATURE" or target.name not in scene.objects or not target.data.bones:
         return False
     return armature.build_skeleton(target, scene).has_same_bones(take.motion.skeleton)
-
-
-def extend_scene(scene: bpy.types.Scene, last: float) -> None:
-    """Extend the scene's frame range to `last`."""
-    scene.frame_end = max(scene.frame_end, int(np.floor(last + 1e-4)))
 
 
 def write_ribbon(context: bpy.types.Context, name: str, points: np.ndarray, rgb, collection) -> bpy.types.Object:

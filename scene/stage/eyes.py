@@ -14,7 +14,7 @@ from ...beyond_mocap.motion import quaternion
 from ...beyond_mocap.motion.humanoid import identify_joints
 from ...beyond_mocap.motion.motion import Motion, forward_kinematics
 from ..core import action, channels
-from ..core.measure import frames_per_second, units_per_metre
+from ..core.measure import units_per_metre
 from .meshes import create_object
 from .stage_collection import STAGE_MARK, find_stage, get_stage, list_own_objects
 

@@ -18,7 +18,7 @@ PREVIOUS = "beyond_mocap_world_before"
 WORLD = "Stage sky"
 DAYLIGHT, FLOODLIGHT = "DAYLIGHT", "FLOODLIGHT"
 
-SUN_STRENGTH, SUN_ANGLE = 3.1, 0.035  # W/m2, rad: a little softer than the real sun
+SUN_STRENGTH, SUN_ANGLE = 3.6, 0.035  # W/m2, rad: a little softer than the real sun
 MAST = (0.5, 14.0, 0.5, 12.0, 38.0)  # masts: half length + m, half width + m, as shares and metres; m of height
 LAMP_SIZE = (9.0, 5.0)  # metres of a mast's head
 LAMP_IRRADIANCE = 1.15  # W/m2 that each mast gives at the centre spot

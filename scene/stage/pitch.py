@@ -15,6 +15,7 @@ from . import surfaces
 from .meshes import create_mesh, create_object
 
 SIZE, LINE_WIDTH = (105.0, 68.0), 0.12  # metres; International Football Association Board, Laws of the Game, Law 1
+SPOT = 0.11  # metres, radius of the centre mark and the penalty marks
 STRIPE = 5.5  # metres, about: the depth of a goal area, so that the boxes end with a stripe
 BEYOND = 6.0  # metres of grass beyond the lines
 CHORD = 3.0  # degrees, an arc's longest chord
@@ -27,6 +28,7 @@ def create_pitch(collection: bpy.types.Collection, units: float,
     """Create the grass of a pitch of `size` (length, width) metres, a little larger than its lines."""
     stripes = _build_stripes(*size)
     lines = [quad for stroke in _build_strokes(*size) for quad in _build_ribbon(np.array(stroke, float))]
+    lines += [np.array(_build_arc((x, 0.0), SPOT, 0, 360)[:-1]) for x in (0.0, size[0] / 2 - 11.0, 11.0 - size[0] / 2)]
     corners, faces, materials = cut_faces([*stripes, *lines], [*(i % 2 for i in range(len(stripes))),
                                                                *(LINES for _ in lines)])
     mesh = create_mesh("Grass", np.column_stack([corners, np.zeros(len(corners))]) * units, faces)
@@ -48,7 +50,7 @@ def cut_faces(polygons: list, kinds: list[int]) -> tuple[np.ndarray, list, np.nd
     points = [Vector(point) for polygon in polygons for point in polygon]
     ends = np.cumsum([len(polygon) for polygon in polygons])
     rows = [list(range(end - len(polygon), end)) for polygon, end in zip(polygons, ends)]
-    corners, _, faces, _, _, sources = delaunay_2d_cdt(points, [], rows, TRIANGLES, 1e-5, True)
+    corners, _, faces, _, _, sources = delaunay_2d_cdt(points, [], rows, TRIANGLES, 1e-5)
     found = np.array([max(kinds[source] for source in given) for given in sources], np.int32)
     return np.array([tuple(corner) for corner in corners]), faces, found
 
@@ -63,16 +65,15 @@ def _build_stripes(length: float, width: float) -> list[np.ndarray]:
 
 
 def _build_strokes(length: float, width: float) -> list:
-    """Build the centre lines of all markings, each a list of points (x, y) in metres."""
-    x, y, spot = length / 2, width / 2, LINE_WIDTH / 2
-    strokes = [_build_box(-x, -y, x, y), [(0, -y), (0, y)], _build_arc((0, 0), 9.15, 0, 360),
-               _build_arc((0, 0), spot, 0, 360)]
+    """Build the centre lines of all markings but the spots, each a list of points (x, y) in metres."""
+    x, y = length / 2, width / 2
+    strokes = [_build_box(-x, -y, x, y), [(0, -y), (0, y)], _build_arc((0, 0), 9.15, 0, 360)]
     for side in (-1, 1):
         goal, mark, inward = side * x, side * (x - 11.0), 180 if side > 0 else 0
         for half_width, depth in ((20.16, 16.5), (9.16, 5.5)):
             front = goal - side * depth
             strokes.append([(goal, half_width), (front, half_width), (front, -half_width), (goal, -half_width)])
-        strokes += [_build_arc((mark, 0), 9.15, inward - 53, inward + 53), _build_arc((mark, 0), spot, 0, 360)]
+        strokes.append(_build_arc((mark, 0), 9.15, inward - 53, inward + 53))
         for touch in (-1, 1):
             middle = np.degrees(np.arctan2(-touch, -side))
             strokes.append(_build_arc((goal, touch * y), 1.0, middle - 45, middle + 45))

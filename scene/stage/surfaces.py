@@ -6,13 +6,13 @@ import bpy
 
 from ..core.material import get_material
 
-STRIPES = {"Pitch grass": ((0.016, 0.062, 0.008), (0.040, 0.125, 0.018)),
-           "Pitch grass mown": ((0.026, 0.088, 0.012), (0.062, 0.170, 0.028))}  # linear RGB, dark and light blades
+STRIPES = {"Pitch grass": ((0.026, 0.086, 0.013), (0.062, 0.165, 0.027)),
+           "Pitch grass mown": ((0.042, 0.122, 0.018), (0.095, 0.225, 0.038))}  # linear RGB, dark and light blades
 PAINT = "Pitch line"
 GRAIN = ((0.09, 0.32), (1.3, 0.23), (30.0, 0.45))  # per metre, weight: patches, tufts, blades
 CROWD, SEAT = "Stand crowd", (0.5, 0.8)  # metres of a seat, along the row and up the rows
-SHIRTS = ((0.02, 0.025, 0.04), (0.30, 0.02, 0.025), (0.55, 0.55, 0.52), (0.03, 0.06, 0.22), (0.10, 0.10, 0.11),
-          (0.40, 0.28, 0.06), (0.25, 0.03, 0.03))  # linear RGB of what the crowd wears
+SHIRTS = ((0.015, 0.018, 0.03), (0.17, 0.025, 0.028), (0.30, 0.30, 0.29), (0.03, 0.045, 0.12), (0.06, 0.06, 0.07),
+          (0.20, 0.15, 0.06), (0.13, 0.03, 0.03), (0.02, 0.02, 0.024))  # linear RGB of what the crowd wears
 BOARDS = ((0.01, 0.03, 0.16), (0.62, 0.62, 0.60), (0.30, 0.01, 0.02), (0.01, 0.01, 0.012), (0.02, 0.18, 0.10))
 
 

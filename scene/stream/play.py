@@ -14,12 +14,11 @@ import bpy
 
 from ...beyond_mocap.base.errors import BeyondMocapError, InputError
 from ...beyond_mocap.passes.hits import HitMotion
-from ..core import action, background, channels
+from ..core import action, background, channels, frame_range
 from ..core.live import Watcher
 from ..core.measure import frames_per_second
 from ..passes import generate as make
 from ..passes.settings import PLAYED
-from ..result import bake
 from . import follow
 
 if TYPE_CHECKING:
@@ -204,7 +203,7 @@ def _apply_players(scene, one: Rally, names: list[str]) -> None:
         played = one.players[name]
         make.apply_motion(scene, rows[name], SimpleNamespace(motion=played.motion, start_time=played.start), start)
     make.apply_ball(scene, SimpleNamespace(ball=one.ball, kind=build_ball(one.scene)), start)
-    bake.extend_scene(scene, start + float(one.ball.times[-1]) * frames_per_second(scene))
+    frame_range.extend_range(scene, start + float(one.ball.times[-1]) * frames_per_second(scene))
 
 
 def _update_target(scene) -> None:
