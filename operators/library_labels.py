@@ -9,7 +9,7 @@ import bpy
 from bpy.props import BoolProperty, EnumProperty, FloatProperty, IntProperty, StringProperty
 
 from ..beyond_mocap.base.errors import BeyondMocapError, InputError, format_count
-from ..scene.core import preferences, session
+from ..scene.core import preferences, sample, session
 from ..scene.core.settings import to_absolute_path
 from ..scene.core.window import clear_status
 from ..scene.library import clips, recordings
@@ -288,6 +288,7 @@ table; existing labels are replaced only after you confirm"""
         rig = context.object
         rows = recordings.read_labels(rig)
         clip, folder = recordings.find_source_file(rig)
+        sample.check_not_sample(clip)
         target = write_labels(clip, folder, rows, fps=rig[recordings.RATE], overwrite=self.overwrite,
                               sources=proposals.collect_sources(rig))
         clips.update_labels(context.window_manager, recordings.find_shown_clip(rig), rows)

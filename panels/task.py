@@ -14,7 +14,7 @@ class BEYOND_MOCAP_PT_task(TabPanel, bpy.types.Panel):
     """The tasks, one of them chosen."""
 
     bl_label = "Task"
-    bl_order = 0
+    bl_order = -1
     bl_options = {"HIDE_HEADER"}
 
     def draw(self, context):

@@ -25,6 +25,7 @@ from ..result.result import BeyondMocapResult, BeyondMocapShared
 from ..rigs.rig import BeyondMocapRig
 from ..timeline.video import BeyondMocapVideo, tag_update
 from .properties import find_active_row, with_settings
+from .sample import find_moved_path
 
 TASKS = (  # what the tab in the sidebar is for just now; items of an EnumProperty
     ("PLAYER", "Player", "Animate players along their tracks: library, track, labels, take, rig", "ARMATURE_DATA", 0),
@@ -150,8 +151,8 @@ class BeyondMocapWork(bpy.types.PropertyGroup):
 
 
 def to_absolute_path(path: str) -> str:
-    """Return a path from a setting as an absolute one; empty stays empty."""
-    return bpy.path.abspath(path) if path else ""
+    """Return a path from a setting as an absolute one; empty stays empty, and the sample is found where it is now."""
+    return find_moved_path(bpy.path.abspath(path)) if path else ""
 
 
 def to_setting_path(path: str) -> str:

@@ -19,7 +19,7 @@ from mathutils import Matrix
 
 from ...beyond_mocap.base.errors import InputError
 from ...beyond_mocap.motion import quaternion
-from ..core import action, channels, frame_range
+from ..core import action, channels, frame_range, sample
 from ..core.measure import frames_per_second, units_per_metre
 from ..core.properties import read_property_values
 from ..core.settings import to_absolute_path
@@ -118,6 +118,7 @@ def find_clip_path(scene: bpy.types.Scene, name: str) -> Path:
     folder = scene.beyond_mocap.library_folder
     if not folder:
         raise InputError("library", "no folder", "a library folder", "choose one in step 1")
+    sample.check_not_sample(to_absolute_path(folder))
     return find_free_file(Path(to_absolute_path(folder)), bpy.path.clean_name(name))
 
 

@@ -12,7 +12,7 @@ import bpy
 
 from ...beyond_mocap.base.digest import hex_digest
 from ...beyond_mocap.base.errors import InputError
-from ..core import preferences
+from ..core import preferences, sample
 from ..core.settings import to_absolute_path, to_setting_path
 from ..player import tracks
 from .kits import DEFAULT_COLOURS, to_linear
@@ -58,7 +58,9 @@ def choose_output_folder(scene: bpy.types.Scene) -> str:
         return to_absolute_path(match.folder)
     tracking = Path(to_absolute_path(match.tracking_file))
     parent = Path(bpy.data.filepath).parent if bpy.data.is_saved else tracking.parent
-    if not os.access(parent, os.W_OK):
+    if sample.is_in_sample(parent):
+        parent = sample.find_cache_base()
+    elif not os.access(parent, os.W_OK):
         parent = Path(bpy.app.tempdir)
     digest = hex_digest("\0".join(_build_arguments(scene)), digits=6)
     return str(parent / f"{tracking.stem} {format_float(match.start)}-{format_float(match.end)} s {digest}")
