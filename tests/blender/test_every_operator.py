@@ -433,6 +433,7 @@ ROWS = {
     "path_camera": Row("imported", lambda places: {"which": "SIDE"}, lay_cameras),
     "path_cameras": Row("accepted", prepare=ride),
     "path_curve": Row("accepted", lambda places: {"count": 7}, ride),
+    "hover_timeline": Row("imported", changes=False, window=True),
     "pick_moment": Row("imported", changes=False, window=True),
     "place_players": Row("imported", prepare=forget_dots),
     "player_from_dot": Row("imported", prepare=lose_a_player),
