@@ -11,7 +11,8 @@ import numpy as np
 from ..base.vectors import unit_vectors
 from ..motion.humanoid import compute_heading_from_positions
 from ..motion.motion import Motion, forward_kinematics, place_motion
-from .body import MATERIALS, build_body, deform_body
+from .body import build_body
+from .mesh import MATERIALS, deform_body
 
 COLOURS = {
     "skin": (0.75, 0.55, 0.43), "shirt": (0.78, 0.16, 0.14), "shorts": (0.92, 0.92, 0.90), "socks": (0.16, 0.24, 0.59),
