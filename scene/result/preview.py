@@ -75,6 +75,7 @@ def show_preview(context: bpy.types.Context, player: BeyondMocapPlayer, take: st
         body = bake.write_take(context, player, result_take)
     action, slot = channels.find_playing_action(body)
     blocks.store_blocks(action, result_take.take, context.scene)
+    bake.store_record(action, result_take.take, context.scene)
     hand_keys.store_generated(action, slot, build_scene_clock(context.scene))
     shift = hand_keys.compute_shift(clock, build_scene_clock(context.scene))
     result.hand_keys = hand_keys.write_manual_keys(action, slot, recorded_keys, shift) if shift is not None else 0
