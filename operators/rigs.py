@@ -10,7 +10,7 @@ from bpy_extras.io_utils import ExportHelper, ImportHelper
 
 from ..beyond_mocap.base.errors import InputError
 from ..beyond_mocap.files.bvh import bvh
-from ..scene.core import action, channels, take_record
+from ..scene.core import action, channels, take_record, window
 from ..scene.core.settings import find_active_player
 from ..scene.rigs import armature, bone_maps, export, rig, rig_bake
 from ..scene.rigs.driven import DrivenRig, check_rig
@@ -137,6 +137,8 @@ planted; the rig's previous action is kept"""
             if settings.rig.reduces:
                 baked.messages.append(reduce_rig_keys(target, table, settings.rig))
             lines += [f"{prepared.name} on {target.name}: {len(baked.frames)} frames", *baked.messages]
+        if not all(export.list_meshes(scene, target) for _, target, _ in work):
+            window.show_bones()  # without a mesh, bones are all there is to see
         settings.rig.messages = "\n".join(lines)
         for line in lines[:1] if len(work) == 1 else lines:
             self.report({"INFO"}, line)
