@@ -64,6 +64,7 @@ class BEYOND_MOCAP_PT_players(TabPanel, bpy.types.Panel):
         draw_player_settings(layout, player)
         draw_pins(layout, player)
         draw_heading_keys(layout, player)
+        draw_contact_edits(layout, player)
 
 
 class BEYOND_MOCAP_UL_pins(bpy.types.UIList):
@@ -77,6 +78,16 @@ class BEYOND_MOCAP_UL_pins(bpy.types.UIList):
             return
         row.prop(item, "time", text="")
         row.prop(item, "hold", text="")
+
+
+class BEYOND_MOCAP_UL_contact_edits(bpy.types.UIList):
+    """A player's edited contacts: the foot, what is done, and when."""
+
+    def draw_item(self, _context, layout, _data, item, _icon, _active_data, _active_property):
+        row = layout.row(align=True)
+        row.prop(item, "foot", text="", emboss=False)
+        row.prop(item, "kind", text="", emboss=False)
+        row.prop(item, "time", text="", emboss=False)
 
 
 class BEYOND_MOCAP_UL_heading_keys(bpy.types.UIList):
@@ -132,6 +143,25 @@ def draw_heading_keys(layout, player) -> None:
         name = "beyond_mocap.add_heading_key"
         row.operator(name, text="Face Direction", icon="ORIENTATION_LOCAL").faces = "DIRECTION"
         row.operator(name, text="Face This", icon="CON_TRACKTO").faces = "OBJECT"
+
+
+def draw_contact_edits(layout, player) -> None:
+    """Draw the edited contacts of the feet."""
+    count = len(player.contact_edits)
+    if body := draw_header(layout, "player_contacts", f"Foot Contacts: {count}" if count else "Foot Contacts"):
+        body.operator("beyond_mocap.fix_foot", icon="MOD_DYNAMICPAINT")
+        if not count:
+            return
+        row = body.row()
+        row.template_list("BEYOND_MOCAP_UL_contact_edits", "", player, "contact_edits", player,
+                          active_propname="active_contact_edit", rows=2)
+        row.column(align=True).operator("beyond_mocap.remove_contact_edit", text="", icon="REMOVE")
+        edit = player.contact_edits[min(player.active_contact_edit, count - 1)]
+        if edit.kind != "delete":
+            column = body.column()
+            column.use_property_split, column.use_property_decorate = True, False
+            for name in ("start", "end", "offset"):
+                column.prop(edit, name)
 
 
 class BEYOND_MOCAP_PT_annotate(TabPanel, bpy.types.Panel):

@@ -1,4 +1,4 @@
-"""What a bake and an export need of a take, stored on the actions that play it: contacts of the feet, and the take's rate.
+"""What a bake and an export need of a take, stored on the actions that play it: contacts of the feet, and its rate.
 
 Actions are saved with the file, takes of the session are not: what is read from the action is the same after the file
 is opened again.

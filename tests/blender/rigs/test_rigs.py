@@ -26,8 +26,8 @@ FAMILIES = {"mixamo": rigs.create_mixamo, "unreal": rigs.create_unreal, "metahum
 @pytest.fixture
 def rooms(extension):
     return {name: importlib.import_module(f"{extension.__name__}.scene.{name}")
-            for name in ("rigs.armature", "core.action", "core.channels", "core.take_record", "rigs.bone_maps", "rigs.rig_bake",
-                         "rigs.control_study", "rigs.fit", "rigs.key_reduction", "rigs.rig")}
+            for name in ("rigs.armature", "core.action", "core.channels", "core.take_record", "rigs.bone_maps",
+                         "rigs.rig_bake", "rigs.control_study", "rigs.fit", "rigs.key_reduction", "rigs.rig")}
 
 
 @pytest.fixture(scope="session")
