@@ -92,18 +92,25 @@ def convert_to_strips(body: bpy.types.Object) -> bpy.types.NlaTrack:
             hand_keys.write_generated(action, generated.select_frames(block.start, block.end))
         action[MARK], action[BLOCKS] = True, json.dumps([[block.start, block.end, block.name]])
         _copy_record(whole, action)
-        strip = track.strips.new(block.name, block.start, action)
-        strip.action_slot = part
-        strip.use_sync_length = False
-        strip.action_frame_start, strip.action_frame_end = block.start, block.end
-        strip.frame_start, strip.frame_end = block.start, block.end
-        strip.blend_type = "REPLACE"
+        strip = add_strip(track, action, part, block.start, last=block.end, name=block.name)
         strip.extrapolation = "HOLD" if number == 0 else "HOLD_FORWARD"
-        strip.name = block.name
     data.use_nla = True
     if not whole.users - whole.use_fake_user:
         remove_unused_action(whole, MARK)
     return track
+
+
+def add_strip(track: bpy.types.NlaTrack, action: bpy.types.Action, slot, first: int, last: int,
+              name: str) -> bpy.types.NlaStrip:
+    """Add a strip that plays the frames `first` to `last` of an action where they are."""
+    strip = track.strips.new(name, first, action)
+    strip.action_slot = slot
+    strip.use_sync_length = False
+    strip.action_frame_start, strip.action_frame_end = first, last
+    strip.frame_start, strip.frame_end = first, last
+    strip.blend_type = "REPLACE"
+    strip.name = name
+    return strip
 
 
 def convert_to_action(body: bpy.types.Object) -> bpy.types.Action | None:

@@ -96,6 +96,18 @@ def move_a_contact():
     edit.time, edit.offset = 3.0, (0.1, 0.0)
 
 
+def key_a_pose():
+    body = bpy.context.scene.beyond_mocap.players[0].body
+    bpy.context.scene.frame_set(20)
+    body.pose.bones[0].location.z += 0.1
+    body.pose.bones[0].keyframe_insert("location")
+
+
+def keep_a_layer():
+    key_a_pose()
+    bpy.ops.beyond_mocap.keep_as_layer()
+
+
 def pin_a_hand():
     bpy.ops.beyond_mocap.add_pin(part="right_hand")
 
@@ -451,6 +463,8 @@ ROWS = {
     "relink_library": Row("imported", lambda places: {"directory": f"{moved(places.clips)}/"}),
     "remove_clip": Row("clip"),
     "remove_heading_key": Row("imported", prepare=face_ball),
+    "keep_as_layer": Row("accepted", prepare=key_a_pose),
+    "remove_layer": Row("accepted", prepare=keep_a_layer),
     "remove_contact_edit": Row("synthesized", prepare=move_a_contact),
     "remove_pin": Row("synthesized", prepare=pin_a_hand),
     "remove_player": Row("imported"),
