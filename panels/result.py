@@ -6,6 +6,7 @@ import bpy
 
 from ..scene.core.settings import find_active_player
 from ..scene.result.verdict import judge_take
+from .edits import draw_edits
 from .tab import (
     StepPanel,
     TabPanel,
@@ -52,6 +53,7 @@ class BEYOND_MOCAP_PT_result(StepPanel, bpy.types.Panel):
         row.operator("beyond_mocap.discard", icon="X")
         column.row(align=True).prop(settings, "accept_as", expand=True)
         draw_section(layout, "result_others", "Alternatives", lambda opened: draw_alternatives(opened, player))
+        draw_section(layout, "result_edits", "Edits", lambda opened: draw_edits(opened, player))
         draw_section(layout, "result_more", "Options", lambda opened: draw_options(opened, settings))
         if stale is not None:
             draw_section(layout, "result_stale", "What Has Changed", lambda opened: draw_changes(opened, stale))

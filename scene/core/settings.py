@@ -19,6 +19,7 @@ from bpy.props import (
 
 from ...beyond_mocap.base.settings import list_settings
 from ..overlays.settings import BeyondMocapView
+from ..player.contact_edits import BeyondMocapContactEdit
 from ..player.heading_keys import BeyondMocapHeadingKey
 from ..player.pins import BeyondMocapPin
 from ..result.result import BeyondMocapResult, BeyondMocapShared
@@ -75,6 +76,10 @@ class BeyondMocapPlayer(bpy.types.PropertyGroup):
     active_pin: IntProperty(name="Pin", min=0, description="The pin shown below the list")
     heading_keys: CollectionProperty(type=BeyondMocapHeadingKey,
                                      description="Directions and objects that the body faces, with their times")
+    contact_edits: CollectionProperty(type=BeyondMocapContactEdit,
+                                      description="Contacts of the feet that are moved, longer, shorter, left out or "
+                                      "added")
+    active_contact_edit: IntProperty(name="Contact", min=0, description="The edited contact chosen in the list")
     active_heading_key: IntProperty(name="Heading Key", min=0, description="The heading key chosen in the list")
     annotation_file: StringProperty(
         name="Labels", **FILE,

@@ -68,6 +68,15 @@ def clear_windows() -> None:
     clear_status()
 
 
+def show_bones() -> None:
+    """Show bones in all 3D views of the open windows."""
+    for window in bpy.context.window_manager.windows:
+        for area in window.screen.areas:
+            for space in area.spaces:
+                if space.type == "VIEW_3D":
+                    space.overlay.show_bones = True
+
+
 def select_only(context: bpy.types.Context, *things: bpy.types.Object) -> None:
     """Select these objects alone, and make the first one active."""
     for other in context.selected_objects:

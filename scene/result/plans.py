@@ -14,7 +14,7 @@ from ...beyond_mocap.synthesis.plan import Plan
 from ..core.measure import build_scene_clock
 from ..core.properties import read_property_values
 from ..core.settings import BeyondMocapPlayer, BeyondMocapSettings, find_active_player, to_absolute_path
-from ..player import drawn_track, pins
+from ..player import contact_edits, drawn_track, pins
 from ..player.tracks import read_track
 from ..timeline import label_tracks as lanes
 from ..timeline import strips
@@ -46,6 +46,7 @@ def build_plan(settings: BeyondMocapSettings, player: BeyondMocapPlayer,
     plan = Plan(track=track, timeline=read_timeline(player, settings.rate, track),
                 library=to_absolute_path(settings.library_folder), pins=pins.read_pins(player.id_data, player),
                 heading_keys=read_heading_keys(settings, player, still),
+                contact_edits=contact_edits.read_contact_edits(player),
                 **read_property_values(Plan, settings, "synthesis"), **read_property_values(Plan, player, "player"))
     return plan, found.warnings
 

@@ -18,7 +18,7 @@ from ..passes import possession
 from ..path_editing import edited_bodies
 from ..stage import cameras
 from ..stage.stage_collection import find_focus
-from . import bake, blocks, quality
+from . import bake, blocks, key_layers, quality
 from . import manual_keys as hand_keys
 from .bake import MARK
 
@@ -60,6 +60,7 @@ def show_preview(context: bpy.types.Context, player: BeyondMocapPlayer, take: st
     result_take, result = session.find_take(take), player.result
     check_body(player)
     reverted = revert_path_edit(player)
+    key_layers.unstack_layers(player.body, uses_nla=result.state != "PREVIEW")
     if result.state != "NONE" and not is_shown(context.scene, player):
         drop_preview(player)
     recorded_keys, clock = hand_keys.ManualKeys(), ""
@@ -76,10 +77,12 @@ def show_preview(context: bpy.types.Context, player: BeyondMocapPlayer, take: st
         body = bake.write_take(context, player, result_take)
     action, slot = channels.find_playing_action(body)
     blocks.store_blocks(action, result_take.take, context.scene)
+    bake.store_record(action, result_take.take, context.scene)
     hand_keys.store_generated(action, slot, build_scene_clock(context.scene))
     shift = hand_keys.compute_shift(clock, build_scene_clock(context.scene))
     result.hand_keys = hand_keys.write_manual_keys(action, slot, recorded_keys, shift) if shift is not None else 0
     result.state = "PREVIEW"
+    key_layers.stack_layers(body)
     quality.update_error_curves(context.scene, player)
     update_shared(context)
     return body
@@ -92,6 +95,7 @@ def apply_preview(context: bpy.types.Context, player: BeyondMocapPlayer, form: s
     """
     result, body = player.result, player.body
     revert_path_edit(player)
+    key_layers.unstack_layers(body)
     if result.motion.kept and body.animation_data is not None:
         restore_nla(result.motion, body.animation_data)
     if form == "STRIPS":
@@ -102,6 +106,7 @@ def apply_preview(context: bpy.types.Context, player: BeyondMocapPlayer, form: s
     result.state = "ACCEPTED"
     _apply_shared(context)
     _rename_datablocks(context, player)
+    key_layers.stack_layers(body)
     return body
 
 
@@ -109,10 +114,12 @@ def revert_preview(context: bpy.types.Context, player: BeyondMocapPlayer) -> Non
     """Revert the preview of a player: the previous state is restored, bit for bit."""
     result, body = player.result, player.body
     revert_path_edit(player)
+    key_layers.unstack_layers(body, uses_nla=False)
     accepted = result.was_accepted
     if body is not None and body == result.body and result.motion.kept:
         _remove_preview_objects(context, player)
         restore_playback(result.motion, body, MARK)
+        key_layers.stack_layers(body)
     else:
         _remove_preview_objects(context, player)
         if body is not None:

@@ -93,7 +93,7 @@ def export_motion(
         frames_per_second(scene) / rate)
     things = [] if options.format == "BVH" else list(things)
     sampled = _sample_poses(scene, rigs, times, things)
-    meshes_by_rig = {rig.name: _list_meshes(scene, rig)
+    meshes_by_rig = {rig.name: list_meshes(scene, rig)
                      for rig in rigs} if options.meshes and options.format != "BVH" else {}
     messages = []
     with _export_scene(context, rate, len(times)) as stage:
@@ -295,7 +295,7 @@ def _compute_channels(matrices: np.ndarray) -> dict[str, np.ndarray]:
     return found | ({"scale": size} if np.abs(size - 1.0).max() > _SCALE_TOLERANCE else {})
 
 
-def _list_meshes(scene: bpy.types.Scene, rig: bpy.types.Object) -> list[bpy.types.Object]:
+def list_meshes(scene: bpy.types.Scene, rig: bpy.types.Object) -> list[bpy.types.Object]:
     """List the meshes that an armature moves, visible now or at some other time by their keys."""
     moved = [thing for thing in scene.objects if thing.type == "MESH" and (
         thing.parent == rig or any(m.type == "ARMATURE" and m.object == rig for m in thing.modifiers))]

@@ -91,6 +91,23 @@ def two_variants():
     bpy.ops.beyond_mocap.variants(count=2)
 
 
+def move_a_contact():
+    edit = bpy.context.scene.beyond_mocap.players[0].contact_edits.add()
+    edit.time, edit.offset = 3.0, (0.1, 0.0)
+
+
+def key_a_pose():
+    body = bpy.context.scene.beyond_mocap.players[0].body
+    bpy.context.scene.frame_set(20)
+    body.pose.bones[0].location.z += 0.1
+    body.pose.bones[0].keyframe_insert("location")
+
+
+def keep_a_layer():
+    key_a_pose()
+    bpy.ops.beyond_mocap.keep_as_layer()
+
+
 def pin_a_hand():
     bpy.ops.beyond_mocap.add_pin(part="right_hand")
 
@@ -382,6 +399,7 @@ ROWS = {
         "accepted", lambda places: {"filepath": f"{places.out}/out.glb", "format": "GLB"}, changes=False
     ),
     "export_words": Row("imported", lambda places: {"filepath": f"{places.out}/out.txt"}, changes=False),
+    "fix_foot": Row("synthesized", lambda places: {"time": 3.0, "offset": (0.05, 0.0)}),
     "find_release": Row("imported", prepare=a_body_of_markers),
     "free_ball": Row("accepted", prepare=carry),
     "go_to_strike": Row("accepted", lambda places: {"frame": 7}, analyse),
@@ -446,6 +464,9 @@ ROWS = {
     "relink_library": Row("imported", lambda places: {"directory": f"{moved(places.clips)}/"}),
     "remove_clip": Row("clip"),
     "remove_heading_key": Row("imported", prepare=face_ball),
+    "keep_as_layer": Row("accepted", prepare=key_a_pose),
+    "remove_layer": Row("accepted", prepare=keep_a_layer),
+    "remove_contact_edit": Row("synthesized", prepare=move_a_contact),
     "remove_pin": Row("synthesized", prepare=pin_a_hand),
     "remove_player": Row("imported"),
     "remove_video": Row("video"),
