@@ -73,7 +73,7 @@ class BEYOND_MOCAP_OT_annotate(BaseOperator, bpy.types.Operator):
             self.player_name = describe_subject(context)
             compute_now(context)
         except BeyondMocapError as error:
-            return self.report_failure(str(error))
+            return self.report_failure(error)
         self.pointer, self.is_folded = None, False
         _start_drawing()
         context.window_manager.modal_handler_add(self)
