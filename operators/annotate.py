@@ -77,7 +77,7 @@ class BEYOND_MOCAP_OT_annotate(BaseOperator, bpy.types.Operator):
         self.pointer, self.is_folded = None, False
         _start_drawing()
         context.window_manager.modal_handler_add(self)
-        context.workspace.status_text_set(STATUS)
+        window.show_status(STATUS)
         self.update_menu(context, event)
         return {"RUNNING_MODAL"}
 

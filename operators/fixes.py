@@ -7,7 +7,7 @@ from pathlib import Path
 import bpy
 from bpy.props import IntProperty
 
-from ..beyond_mocap.base.errors import InputError
+from ..beyond_mocap.base.errors import BeyondMocapError, InputError
 from ..scene.core import notices
 from ..scene.result import bake
 from ..scene.timeline import strips
@@ -19,6 +19,15 @@ class NoticeOperator(BaseOperator):
 
     notice: IntProperty(name="Notice", options={"SKIP_SAVE"}, description="Number of the notice; 0 for the newest")
     needs = "Nothing has failed", lambda context: notices.find_notice(context.scene) is not None
+
+    def attempt(self, action):
+        """Run `action`; an operator that it calls and that fails has left a notice, so its line is enough here."""
+        try:
+            action()
+        except (BeyondMocapError, RuntimeError) as error:
+            self.report({"ERROR"}, str(error).strip().removeprefix("Error: "))
+            return {"CANCELLED"}
+        return {"FINISHED"}
 
     def find_notice(self, context):
         """Find the notice; InputError if it is gone."""
@@ -85,9 +94,9 @@ def _use_nearest(context, _row, _value) -> bool:
     return True
 
 
-def _show_clips(context, _row, labels) -> bool:
-    """Show the clips with these labels in the list of the library's panel."""
-    context.window_manager.beyond_mocap_clips.find = labels
+def _show_clips(context, _row, label) -> bool:
+    """Show the clips with this label in the list of the library's panel."""
+    context.window_manager.beyond_mocap_clips.find = label
     if context.window_manager.beyond_mocap_clips.total == 0:
         bpy.ops.beyond_mocap.list_clips()
     return False
@@ -150,7 +159,7 @@ APPLY = {"use_nearest": _use_nearest, "show_clips": _show_clips, "show_label": _
 """Kind of a fix -> (context, notice, value of the fix), which returns whether the failed operator may run again."""
 
 TOOLTIPS = {"use_nearest": "Turn on Nearest Labels, and run {failed} again",
-            "show_clips": "Show the library's clips with the labels {value}",
+            "show_clips": "Show the library's clips with the label {value}",
             "show_label": "Go to the time of the label, and select its strips",
             "choose_library": "Choose the folder of clips, and run {failed} again",
             "relink_library": "Find the library beside this file or choose its folder, and run {failed} again",

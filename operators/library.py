@@ -154,7 +154,7 @@ glTF and USD clips are converted first, and the result is cached"""
         done = queue.total - len(queue.remaining)
         text = f"Converting {queue.remaining[0].name}" if queue.remaining else "Converted"
         running.kind, running.fraction, running.text = self.kind, done / max(queue.total, 1), text
-        context.workspace.status_text_set(f"{text}   {done} of {queue.total}   ESC: cancel")
+        window.show_status(f"{text}   {done} of {queue.total}   ESC: cancel")
         window.redraw_editors()
 
     def cancel(self, context):

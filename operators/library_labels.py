@@ -12,7 +12,7 @@ from ..beyond_mocap.base.errors import BeyondMocapError, InputError, format_coun
 from ..beyond_mocap.base.fixes import Fix
 from ..scene.core import preferences, session
 from ..scene.core.settings import to_absolute_path
-from ..scene.core.window import clear_status
+from ..scene.core.window import clear_status, show_status
 from ..scene.library import clips, recordings
 from ..scene.timeline import label_tracks as lanes
 from ..scene.timeline import proposals
@@ -202,7 +202,7 @@ and Down step, Esc finishes"""
         """Show the last result, the current proposal and the keys in the status bar."""
         one = proposals.find_active(context.object)
         now = f"{one.name}, confidence {one.confidence:.0%}" if one is not None else ""
-        context.workspace.status_text_set("   |   ".join(part for part in (message, now, STATUS_TEXT) if part))
+        show_status("   |   ".join(part for part in (message, now, STATUS_TEXT) if part))
         for area in context.window.screen.areas:
             area.tag_redraw()
 

@@ -48,7 +48,10 @@ class BaseOperator:
         """Run the operator now; where it mends what a notice is about, run what failed again."""
         result = self.attempt(lambda: self.do(context))
         if result == {"FINISHED"} and self.resumes:
-            notices.run_again(context.scene, self.resumes)
+            try:
+                notices.run_again(context.scene, self.resumes)
+            except RuntimeError as error:  # what ran again has failed; this has not
+                self.report({"WARNING"}, str(error).strip().removeprefix("Error: "))
         return result
 
     def attempt(self, action):
@@ -267,7 +270,7 @@ class BackgroundOperator(BaseOperator):
         text = self.job.text or f"{self.bl_label} ..."
         running.kind, running.fraction, running.text = self.kind, self.job.fraction, text
         context.window_manager.progress_update(int(100 * self.job.fraction))
-        context.workspace.status_text_set(f"{text}   {self.job.fraction:.0%}   ESC: cancel")
+        window.show_status(f"{text}   {self.job.fraction:.0%}   ESC: cancel")
         window.redraw_editors()
 
     def stop_polling(self, context):

@@ -106,7 +106,7 @@ SkillCorner, Sportec, Second Spectrum, Stats Perform); a text file with the name
         names = " or ".join(file.name for file in found[:MOST_OFFERED])
         fixes = *(Fix("use_labels", str(file)) for file in found[:MOST_OFFERED]), Fix("choose_labels")
         error = InputError(player.name, f"no file {Path(path).with_suffix('.txt').name} beside the track",
-                           "", f"{names} may have its labels", fixes=fixes)
+                           "", f"the file {names} may have its labels", fixes=fixes)
         subject = notices.Subject(topic=f"labels {player.name}", room=self.find_room(), title=self.bl_label,
                                   player=player.name)
         self.offers.append(notices.post_notice(context.scene, subject, error, is_error=False))

@@ -16,7 +16,7 @@ from bpy.props import StringProperty
 from ..beyond_mocap.annotation import Timeline
 from ..beyond_mocap.base.errors import BeyondMocapError, InputError, format_count
 from ..scene.core import background, notices, session
-from ..scene.core.window import start_timer, stop_timer
+from ..scene.core.window import show_status, start_timer, stop_timer
 from ..scene.player import dots
 from ..scene.result import freshness, plans, preview, quality, queue
 from ..scene.result import synthesis_request as orders
@@ -262,7 +262,8 @@ class TakeOperator(BaseOperator):
     def add_failure(self, entry: queue.QueueEntry, error):
         """Post a notice of a failed entry, and store its line for the end."""
         self.failed.append(self.post_failure(error, player=entry.player))
-        self.add_message(f"{entry.player}: {describe_error(error)}", "WARNING")
+        line = str(describe_error(error))
+        self.add_message(line if entry.player in line else f"{entry.player}: {line}", "WARNING")
 
     def clear_failures(self, scene, *players: str):
         """Clear the notices about earlier failures of these players."""
@@ -292,8 +293,7 @@ class TakeOperator(BaseOperator):
         self.seen, self.drawn = seen, perf_counter()
         context.window_manager.progress_update(int(100 * fraction))
         waiting = f"   then {', '.join(queue.list_players())}" if queue.list_players() else ""
-        if context.workspace is not None:
-            context.workspace.status_text_set(f"{running.text}   {fraction:.0%}{waiting}   ESC: cancel")
+        show_status(f"{running.text}   {fraction:.0%}{waiting}   ESC: cancel")
         _redraw_sidebars(context)
 
     def close_progress(self, context):

@@ -8,7 +8,7 @@ import bpy
 
 from .tab import wrap_text
 
-POPUP_WIDTH, POPUP_LETTERS = 19, 58  # the pop-up's width in units of the interface, and letters in a line of it
+POPUP_WIDTH, POPUP_LETTERS = 21, 70  # the pop-up's width in units of the interface, and letters in a line of it
 
 
 class BEYOND_MOCAP_PT_notices(bpy.types.Panel):
@@ -52,9 +52,9 @@ def draw_notice(column, row, wrap) -> None:
     """
     _draw_lines(column, wrap(row.found), "ERROR" if row.is_error else "INFO")
     if row.step:
-        step = column.column()
-        step.active = False
-        _draw_lines(step, wrap(row.step[0].upper() + row.step[1:]), "BLANK1")
+        column.separator(factor=0.4)
+        _draw_lines(column, wrap(row.step[0].upper() + row.step[1:]), "BLANK1")
+    column.separator(factor=0.4)
     buttons = column.column(align=True)
     for index, fix in enumerate(row.fixes):
         button = buttons.operator("beyond_mocap.apply_fix", text=fix.name, icon=fix.icon)

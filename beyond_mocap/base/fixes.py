@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 KINDS = frozenset({
     "use_nearest",  # continue with the nearest labels that the library has
-    "show_clips",  # value: words that find clips of the library
+    "show_clips",  # value: a label that clips of the library have
     "show_label",  # value: seconds on the track's clock
     "choose_library",  # choose the library's folder
     "relink_library",  # find or choose the library's folder, which is not where it was

@@ -250,7 +250,7 @@ def _build_nearest_key(moment: KeyMoment, frame: float, usable: tuple[Key, ...],
             f"{_describe_synthetic(moment.words) if has_synthetic else ''}")
     if not use_nearest:
         way_out = ("use one of these, " if nearest else "") + f"add such a clip, or {USE_NEAREST}"
-        fixes = (Fix("use_nearest"), *([Fix("show_clips", nearest[0])] if nearest else []),
+        fixes = (Fix("use_nearest"), *([Fix("show_clips", nearest[0].split()[0])] if nearest else []),
                  Fix("show_label", repr(moment.time)))
         raise NotInLibraryError(f"{text}; {way_out}", nearest, moment.line, fixes)
     choices = select_nearest_keys(usable, moment.words)

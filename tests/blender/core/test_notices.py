@@ -8,6 +8,8 @@ import pytest
 import worlds
 from conftest import EXTENSION
 
+SMALL = Path(__file__).resolve().parents[3] / "sample_blend" / "match" / "small"
+
 
 @pytest.fixture(scope="module")
 def places(tmp_path_factory):
@@ -40,7 +42,7 @@ def import_player(places, labels):
 @pytest.fixture
 def lacking(places):
     """A player with a key moment that the library lacks, and the line of the failure."""
-    player = import_player(places, "2.0 header\n")
+    player = import_player(places, "2.0 scissors left back\n")
     with pytest.raises(RuntimeError) as told:
         bpy.ops.beyond_mocap.synthesize()
     return player, str(told.value).strip()
@@ -72,8 +74,8 @@ def test_show_the_label_goes_to_its_time(lacking):
 
 def test_show_clips_lists_those_with_the_nearest_labels(lacking):
     assert apply_fix("show_clips") == {"FINISHED"}
-    shown = bpy.context.window_manager.beyond_mocap_clips.shown
-    assert shown and all("kick" in row.words for row in shown), [row.words for row in shown]
+    listing = bpy.context.window_manager.beyond_mocap_clips
+    assert listing.find in list_notices()[-1].found and 0 < len(listing.shown) < listing.total
 
 
 def test_a_label_that_does_not_exist_is_shown_too(places):
@@ -137,20 +139,23 @@ def test_labels_named_otherwise_are_offered_and_not_guessed(places, tmp_path):
     assert player.dot.animation_data.nla_tracks["Words"].strips
 
 
-def test_use_all_players(places):
-    import_player(places, "")
-    player = bpy.context.scene.beyond_mocap.players[0]
-    bpy.ops.beyond_mocap.synthesize()
-    player.use = False
-    with pytest.raises(RuntimeError, match="no players are selected"):
-        bpy.ops.beyond_mocap.synthesize("EXEC_DEFAULT", player="")
+def test_use_all_players_of_a_match(places):
+    bpy.context.scene.beyond_mocap.library_folder = str(places.clips)
+    match = bpy.context.scene.beyond_mocap_match
+    bpy.ops.beyond_mocap.read_match(directory=f"{SMALL}/", files=[{"name": "small_Home.csv"}])
+    bpy.ops.beyond_mocap.tick_match(whom="NONE")
+    with pytest.raises(RuntimeError, match="no players selected"):
+        bpy.ops.beyond_mocap.make_match()
+    match.start, match.end = 3.0, 2.0  # it ends at once when it runs again
+    with pytest.raises(RuntimeError, match="a later time"):
+        apply_fix("use_all_players")
+    assert all(player.use for player in match.players) and len(list_notices()) == 1
 
 
-@pytest.mark.parametrize("unit, kept", [(0.1, 0.0), (10.0, 0.0)])
-def test_a_wrong_unit_is_replaced_by_that_of_the_file(places, unit, kept):
+def test_a_wrong_unit_is_replaced_by_that_of_the_file(places):
     files = {"directory": str(places.match), "files": [{"name": "walk.trc"}]}
     with pytest.raises(RuntimeError, match="unit"):
-        bpy.ops.beyond_mocap.import_markers(unit=unit * 100, **files)
+        bpy.ops.beyond_mocap.import_markers(unit=10.0, **files)
     assert list_kinds(list_notices()[-1]) == ["use_unit"]
     assert apply_fix("use_unit") == {"FINISHED"}
     assert list_notices() == [] and any(thing.beyond_mocap_cloud.file for thing in bpy.data.objects)
