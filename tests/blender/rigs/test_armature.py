@@ -82,3 +82,13 @@ def test_the_active_object_and_its_mode_stay(core, armature):
 def test_not_an_armature(core, armature):
     with pytest.raises(core("base.errors").InputError, match="select one"):
         armature.build_skeleton(None, bpy.context.scene)
+
+
+def test_fingers_are_kept_but_not_displayed(core, armature):
+    sample = importlib.import_module("worlds").SAMPLE
+    skeleton = core("files.bvh.bvh").read_bvh(sample / "walking_1_2.bvh").motion.skeleton
+    body = armature.create_armature(bpy.context, skeleton, "Body")
+    hidden = {bone.name for bone in body.data.bones if bone.collections and not any(
+        one.is_visible for one in bone.collections)}
+    assert hidden == {"LeftFingerBase", "LeftHandIndex1", "LThumb", "RightFingerBase", "RightHandIndex1", "RThumb"}
+    assert_same(armature.build_skeleton(body, bpy.context.scene), skeleton, 0.0)
