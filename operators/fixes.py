@@ -96,6 +96,7 @@ def _use_nearest(context, _row, _value) -> bool:
 
 def _show_clips(context, _row, label) -> bool:
     """Show the clips with this label in the list of the library's panel."""
+    context.scene.beyond_mocap.task = "LIBRARY"
     context.window_manager.beyond_mocap_clips.find = label
     if context.window_manager.beyond_mocap_clips.total == 0:
         bpy.ops.beyond_mocap.list_clips()

@@ -6,8 +6,14 @@ import textwrap
 
 import bpy
 
-from .tab import wrap_text
+from .wrapping import wrap_text
 
+TASKS = {  # feature -> the task below whose switch its notices are shown; a step of that name shows its own
+    "library": "LIBRARY", "library_labels": "LIBRARY", "clips": "LIBRARY", "match": "MATCH", "path_editing": "PATH",
+    "ball": "BALL", "passes": "BALL", "throws": "BALL", "markers": "MARKERS", "stream": "MARKERS",
+    "player": "", "track": "", "timeline": "", "timeline_labels": "", "annotate": "", "synthesis": "", "result": "",
+    "rigs": "",
+}
 POPUP_WIDTH, POPUP_LETTERS = 21, 70  # the pop-up's width in units of the interface, and letters in a line of it
 
 
@@ -29,7 +35,7 @@ class BEYOND_MOCAP_PT_notices(bpy.types.Panel):
                 draw_notice(self.layout.column(), row, lambda text: textwrap.wrap(text, POPUP_LETTERS))
 
 
-def draw_notices(layout, context, *rooms: str) -> None:
+def draw_notices(layout, context, rooms: tuple[str, ...]) -> None:
     """Draw the notices of some features in boxes; nothing where there are none.
 
     Args:
@@ -40,6 +46,19 @@ def draw_notices(layout, context, *rooms: str) -> None:
     for row in context.window_manager.beyond_mocap_notices.rows:
         if row.room in rooms and row.scene == str(context.scene.session_uid):
             draw_notice(layout.box().column(), row, wrap_text)
+
+
+def draw_task_notices(layout, context) -> None:
+    """Draw the notices of the task that is chosen, below the switch: those that no step shows.
+
+    Args:
+        layout: the layout to draw into.
+        context: Blender's context.
+    """
+    task = context.scene.beyond_mocap.task
+    rows = context.window_manager.beyond_mocap_notices.rows
+    rooms = {row.room for row in rows if TASKS.get(row.room, task) == task}
+    draw_notices(layout, context, tuple(rooms))
 
 
 def draw_notice(column, row, wrap) -> None:

@@ -5,16 +5,8 @@ from __future__ import annotations
 import bpy
 
 from ..scene.core.settings import find_active_player
-from .tab import (
-    StepPanel,
-    TabPanel,
-    create_value_column,
-    draw_figures,
-    draw_header,
-    draw_paragraph,
-    draw_section,
-    wrap_text,
-)
+from .tab import StepPanel, TabPanel, create_value_column, draw_figures, draw_header, draw_paragraph, draw_section
+from .wrapping import wrap_text
 
 STATES = {"NONE": ("Not Shown", "BLANK1"),
           "PREVIEW": ("Preview", "HIDE_OFF"),
@@ -30,6 +22,7 @@ class BEYOND_MOCAP_PT_result(StepPanel, bpy.types.Panel):
 
     bl_label = "4  Result"
     task = "PLAYER"
+    rooms = ("result",)
     bl_order = 4
 
     def find_state(self, context):
