@@ -97,7 +97,7 @@ class BEYOND_MOCAP_OT_fix_foot(TakeOperator, bpy.types.Operator):
             return {"CANCELLED"}
         self.view, self.region = context.area, next(one for one in context.area.regions if one.type == "WINDOW")
         context.window_manager.modal_handler_add(self)
-        context.workspace.status_text_set(STATUS)
+        window.show_status(STATUS)
         return {"RUNNING_MODAL"}
 
     def show_contacts(self, context):
@@ -151,12 +151,12 @@ class BEYOND_MOCAP_OT_fix_foot(TakeOperator, bpy.types.Operator):
             self.handles.offset = np.zeros(2)
             by = self.measure_time_drag(event)
             contact = self.handles.contacts[self.handles.chosen]
-            context.workspace.status_text_set(f"{contact.foot} foot: {contact.start + by:.2f} to "
+            window.show_status(f"{contact.foot} foot: {contact.start + by:.2f} to "
                                               f"{contact.end + by:.2f} s ({by:+.2f} s)")
         elif place is not None:
             self.handles.offset = place - start
             length = 100.0 * float(np.linalg.norm(self.handles.offset))
-            context.workspace.status_text_set(f"{length:.0f} cm   Esc: cancel   {STATUS}")
+            window.show_status(f"{length:.0f} cm   Esc: cancel   {STATUS}")
         self.view.tag_redraw()
         return {"RUNNING_MODAL"}
 
@@ -180,7 +180,7 @@ class BEYOND_MOCAP_OT_fix_foot(TakeOperator, bpy.types.Operator):
         else:
             self.handles.offset = np.zeros(2)
         self.drag = None
-        context.workspace.status_text_set(STATUS)
+        window.show_status(STATUS)
         return {"RUNNING_MODAL"}
 
     def handle_key(self, context, event):

@@ -8,6 +8,7 @@ import bpy
 from bpy.props import BoolProperty, CollectionProperty, EnumProperty, FloatProperty, StringProperty
 
 from ..beyond_mocap.base.errors import InputError, format_count
+from ..beyond_mocap.base.fixes import Fix
 from ..scene.core import channels, session, window
 from ..scene.core.measure import frames_per_second
 from ..scene.core.settings import to_setting_path
@@ -204,7 +205,8 @@ page"""
             end = shown.shown_start + (last - shown.shown_first) / rate
             expected = f"{format_float(shown.shown_start)} to {format_float(end)} s"
             raise InputError("match", f"{format_float(self.seconds)} s is not shown", expected,
-                             "choose From and To around it and press Show Match")
+                             "choose From and To around it and press Show Match",
+                             fixes=(Fix("press", "beyond_mocap.show_match"),))
         body = _find_body(scene, self.player) if self.player else None
         scene.frame_set(frame)
         if body is not None and body.name in context.view_layer.objects and context.mode == "OBJECT":
@@ -216,7 +218,7 @@ def _find_body(scene: bpy.types.Scene, player: str) -> bpy.types.Object:
     known = {thing.get(ours.PLAYER_PROPERTY): thing for thing in ours.find_armatures(scene)}
     if player not in known:
         raise InputError("match", f"{player} is not shown", f"one of {', '.join(map(str, known))}",
-                         "select the player and press Show Match")
+                         "select the player and press Show Match", fixes=(Fix("press", "beyond_mocap.show_match"),))
     return known[player]
 
 

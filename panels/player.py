@@ -26,6 +26,7 @@ class BEYOND_MOCAP_PT_players(StepPanel, bpy.types.Panel):
 
     bl_label = "2  Track & Labels"
     task = "PLAYER"
+    rooms = ("player", "track", "timeline", "timeline_labels", "annotate")
     bl_order = 2
 
     def find_state(self, context):

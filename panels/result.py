@@ -7,16 +7,8 @@ import bpy
 from ..scene.core.settings import find_active_player
 from ..scene.result.verdict import judge_take
 from .edits import draw_edits
-from .tab import (
-    StepPanel,
-    TabPanel,
-    create_value_column,
-    draw_figures,
-    draw_header,
-    draw_paragraph,
-    draw_section,
-    wrap_text,
-)
+from .tab import StepPanel, TabPanel, create_value_column, draw_figures, draw_header, draw_paragraph, draw_section
+from .wrapping import wrap_text
 
 VERDICT_ICONS = {"Good": "CHECKMARK", "Fair": "INFO", "Poor": "ERROR"}
 STATES = {"NONE": ("Not Shown", "BLANK1"),
@@ -33,6 +25,7 @@ class BEYOND_MOCAP_PT_result(StepPanel, bpy.types.Panel):
 
     bl_label = "4  Result"
     task = "PLAYER"
+    rooms = ("result",)
     bl_order = 4
 
     def find_state(self, context):

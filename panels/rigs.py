@@ -24,6 +24,7 @@ class BEYOND_MOCAP_PT_rig(StepPanel, bpy.types.Panel):
 
     bl_label = "5  Rig & Export"
     task = "PLAYER"
+    rooms = ("rigs",)
     bl_order = 6
 
     def find_state(self, context):

@@ -2,13 +2,10 @@
 
 from __future__ import annotations
 
-import textwrap
+from .notices import draw_notices
+from .wrapping import wrap_text
 
-import bpy
-
-LETTER_WIDTH = 5.7  # mean width of an interface letter in pixels, at a scale of 1
 MARKS = {"met": "CHECKMARK", "missed": "ERROR", "": "BLANK1"}
-MARGIN = 70  # pixels of a sidebar without text: tabs, the box and its icon
 
 
 def draw_table(layout, lines) -> None:
@@ -47,12 +44,6 @@ def draw_figures(layout, text: str) -> None:
         target_row = right.row()
         target_row.active = False
         target_row.label(text=target)
-
-
-def wrap_text(text: str) -> list[str]:
-    """Wrap text to the sidebar's width."""
-    width = bpy.context.region.width / bpy.context.preferences.system.ui_scale
-    return textwrap.wrap(text, max(16, int((width - MARGIN) / LETTER_WIDTH)))
 
 
 def draw_header(layout, name: str, title: str, closed: bool = True, icon: str = "NONE"):
@@ -114,12 +105,14 @@ class TabPanel:
 
     Attributes:
         task: the task that shows the panel, see `TASKS`; "" for every task.
+        rooms: names of the operators' modules whose notices the panel shows.
     """
 
     bl_space_type = "VIEW_3D"
     bl_region_type = "UI"
     bl_category = "Beyond Mocap"
     task = ""
+    rooms: tuple[str, ...] = ()
 
     @classmethod
     def poll(cls, context):
@@ -147,6 +140,7 @@ class StepPanel(TabPanel):
         body = draw_step(self.layout, type(self).__name__, self.bl_label, state, summary)
         if body:
             self.draw_step(body, context)
+        draw_notices(self.layout, context, self.rooms)
 
 
 def draw_step(layout, name: str, title: str, state: str, summary: str = ""):

@@ -11,7 +11,7 @@ from ...beyond_mocap.synthesis.take import Take
 from ..core import action, channels, take_record
 from ..core.frame_range import extend_range
 from ..core.material import get_material
-from ..core.measure import frames_per_second, units_per_metre
+from ..core.measure import frames_per_second, units_per_metre, whole_frames
 from ..core.session import StoredTake
 from ..core.settings import BeyondMocapPlayer, BeyondMocapSettings
 from ..rigs import armature

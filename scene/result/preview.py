@@ -10,6 +10,7 @@ import bpy
 import numpy as np
 
 from ...beyond_mocap.base.errors import InputError
+from ...beyond_mocap.base.fixes import Fix
 from ..core import channels, session
 from ..core.measure import build_scene_clock
 from ..core.saved_state import discard_saved_state, restore_nla, restore_playback, save_playback
@@ -193,11 +194,13 @@ def show_variant(context: bpy.types.Context, player: BeyondMocapPlayer, number: 
     """Preview variant `number`, from 0. Raises InputError if the session does not have it."""
     variants = player.result.variants
     if not 0 <= number < len(variants):
-        raise InputError("variant", f"number {number + 1}", f"1 to {len(variants)}", "press Variants first")
+        raise InputError("variant", f"number {number + 1}", f"1 to {len(variants)}", "press Variants first",
+                         fixes=(Fix("press", "beyond_mocap.variants"),))
     variant = variants[number]
     if session.find_take(variant.name) is None:
         found = "is not in this session: it is from before the file was opened"
-        raise InputError("variant", found, "variants of this session", "press Variants again")
+        raise InputError("variant", found, "variants of this session", "press Variants again",
+                         fixes=(Fix("press", "beyond_mocap.variants"),))
     show_preview(context, player, variant.name, {line: getattr(variant, line) for line in VARIANT_LINES})
 
 
