@@ -72,8 +72,7 @@ def create_copy(original: bpy.types.Object, name: str, collection: bpy.types.Col
     body.delta_location, body.delta_scale = (0.0, 0.0, 0.0), (1.0, 1.0, 1.0)
     body.delta_rotation_euler, body.delta_rotation_quaternion = (0.0, 0.0, 0.0), (1.0, 0.0, 0.0, 0.0)
     body.matrix_basis = Matrix.LocRotScale((0.0, 0.0, 0.0), turn, scale)
-    for bone in body.pose.bones:
-        bone.matrix_basis.identity()
+    reset_pose(body)
     for thing in family[1:]:
         if thing.parent not in copies:
             copies[thing].parent, copies[thing].matrix_parent_inverse = body, Matrix.Identity(4)
@@ -82,6 +81,14 @@ def create_copy(original: bpy.types.Object, name: str, collection: bpy.types.Col
         _show_copy(thing, copies[thing])
         copies[thing][COPY_OF] = original
     return [copies[thing] for thing in family]
+
+
+def reset_pose(body: bpy.types.Object) -> None:
+    """Put a copy into its rest pose, playing nothing."""
+    if body.animation_data is not None:
+        body.animation_data.action = None
+    for bone in body.pose.bones:
+        bone.matrix_basis = Matrix.Identity(4)
 
 
 def find_world_matrix(thing: bpy.types.Object) -> Matrix:

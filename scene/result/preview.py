@@ -10,6 +10,7 @@ import bpy
 import numpy as np
 
 from ...beyond_mocap.base.errors import InputError
+from ..characters.player_character import update_character
 from ..core import channels, session
 from ..core.measure import build_scene_clock
 from ..core.saved_state import discard_saved_state, restore_nla, restore_playback, save_playback
@@ -81,6 +82,7 @@ def show_preview(context: bpy.types.Context, player: BeyondMocapPlayer, take: st
     result.state = "PREVIEW"
     quality.update_error_curves(context.scene, player)
     update_shared(context)
+    update_character(player, context)
     return body
 
 
@@ -126,6 +128,7 @@ def revert_preview(context: bpy.types.Context, player: BeyondMocapPlayer) -> Non
     result.state = "ACCEPTED" if accepted else "NONE"
     quality.update_error_curves(context.scene, player)
     update_shared(context)
+    update_character(player, context)
 
 
 def is_shown(scene: bpy.types.Scene, player: BeyondMocapPlayer) -> bool:
