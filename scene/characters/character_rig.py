@@ -14,7 +14,7 @@ from ...beyond_mocap.motion import quaternion
 from ...beyond_mocap.motion.motion import Motion
 from ...beyond_mocap.motion.skeleton import Skeleton
 from ..rigs import bone_maps
-from ..rigs.bone_curves import build_bone_curves, build_setting_curves, compute_bone_poses
+from ..rigs.bone_curves import build_bone_curves, compute_bone_poses
 from ..rigs.driven import DrivenRig
 from ..rigs.fit import SourceMotion, add_head_tip
 from .ball_touches import BallTouch, build_part_touches
@@ -77,7 +77,14 @@ class CharacterRig:
         turns, places, _ = compute_bone_poses(self.driven, motion, frames, "KEEP")
         basis, _ = self.driven.controls.compute_channels(turns, places)
         basis |= {one.bone: (self._compute_twist_channel(one, motion), None) for one in self.twist_bones}
-        return frames, build_bone_curves(self.driven.rig, basis) | build_setting_curves(self.driven, False), motion
+        return frames, build_bone_curves(self.driven.rig, basis), motion
+
+    def set_switches(self, body: bpy.types.Object) -> None:
+        """Set a copy to follow its keys: IK switches to FK, and constraints off that would override driven bones."""
+        for switch in self.driven.controls.switches:
+            body.pose.bones[switch.bone][switch.name] = switch.value
+        for one in self.driven.overrides:
+            body.pose.bones[one.bone].constraints[one.constraint].influence = 0.0
 
     def fit_motion(self, source: SourceMotion, touches: tuple[BallTouch, ...] = ()) -> Motion:
         """Fit a motion to the character: directions kept, feet on the source's spots, striking parts at the ball."""

@@ -63,6 +63,7 @@ def show_character(context: bpy.types.Context, player) -> list[str]:
     context.view_layer.update()
     rig = CharacterRig(body, copies.list_meshes(body), scene)
     source, touches = read_player_motion(scene, player)
+    rig.set_switches(body)
     frames, curves, _ = rig.build_keys(source, touches)
     channels.create_action(body, f"{player.name} character", frames, curves)[MARK] = True
     dress(body, player.name, {"shirt": tuple(player.shirt)})
@@ -78,6 +79,11 @@ def remove_character(player) -> None:
         body, player.character_body = player.character_body, None
         copies.remove_copy(body)
     _show_builtin(player, True)
+
+
+def find_shown_body(player) -> bpy.types.Object | None:
+    """Find the armature that shows a player's motion: their rig, their character, or the built-in body."""
+    return player.rig or player.character_body or player.body
 
 
 def update_kit(player) -> None:

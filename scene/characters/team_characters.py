@@ -71,6 +71,7 @@ class TeamCharacters:
             self.chosen = {group: one for group, one in self.chosen.items() if one != original}
             return None
         self._originals[things[0]] = original
+        self._rigs[original].set_switches(things[0])
         return things
 
     def _analyse(self, original: bpy.types.Object, things: list[bpy.types.Object]) -> bool:

@@ -219,7 +219,7 @@ def compute_root_motion(rig: bpy.types.Object, sampled, options, messages: list[
     if root_bone is not None:
         rest = np.array(rig.data.bones[root_bone].matrix_local)
         return table["hips"], root_bone, inward @ path @ _compute_upright_matrix(rig, table) @ rest, None
-    messages.append(f"{rig.name} has no root bone: the file contains an added one named {ROOT_BONE!r}")
+    messages.append(f"no root bone on the armature: the file has an added one named {ROOT_BONE!r}")
     return table["hips"], None, inward @ path @ _compute_upright_matrix(rig, table), None
 
 
