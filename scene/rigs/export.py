@@ -530,7 +530,7 @@ def _export_usd(path: str, engine: str, selected: bool) -> None:
 def _export_alembic(path: str, _engine: str, selected: bool) -> None:
     scene = bpy.context.scene
     bpy.ops.wm.alembic_export(filepath=path, check_existing=False, selected=selected, start=scene.frame_start,
-                              end=scene.frame_end, visible_objects_only=True, as_background_job=False)
+                              end=scene.frame_end, as_background_job=False)
 
 
 EXPORTERS = {"FBX": _export_fbx, "GLB": _export_glb, "USD": _export_usd, "ABC": _export_alembic}
