@@ -268,7 +268,7 @@ stays unchanged"""
 
     bl_idname = "beyond_mocap.export_motion"
     bl_label = "Export Motion"
-    filter_glob: StringProperty(default="*.fbx;*.glb;*.usdc;*.bvh", options={"HIDDEN"})
+    filter_glob: StringProperty(default="*.fbx;*.glb;*.usdc;*.abc;*.bvh", options={"HIDDEN"})
     format: EnumProperty(name="Format", items=rig.FORMATS, default="FBX", description="Format of the file")
     engine: EnumProperty(name="For", items=rig.ENGINES, default="BLENDER", description="Program to export for")
     who: EnumProperty(name="Export", items=rig.EXPORT_CHOICES, default="ACTIVE", description="Armatures to export")

@@ -54,18 +54,28 @@ def show_character(context: bpy.types.Context, player) -> list[str]:
         InputError: if the character cannot be a body.
     """
     copies.check_character(player.character)
-    if player.character_body is None:
+    source, touches = read_player_motion(context.scene, player)
+    body, is_new = player.character_body, player.character_body is None
+    if is_new:
         home = player.body.users_collection[0]
-        player.character_body = copies.create_copy(player.character, f"{player.name} {player.character.name}", home)[0]
-    body, scene = player.character_body, context.scene
-    channels.remove_marked_action(body, MARK)
-    copies.reset_pose(body)
-    context.view_layer.update()
-    rig = CharacterRig(body, copies.list_meshes(body), scene)
-    source, touches = read_player_motion(scene, player)
+        body = copies.create_copy(player.character, f"{player.name} {player.character.name}", home)[0]
+    played = channels.find_playing_action(body)
+    try:
+        copies.reset_pose(body)
+        context.view_layer.update()
+        rig = CharacterRig(body, copies.list_meshes(body), context.scene)
+        frames, curves, _ = rig.build_keys(source, touches)
+    except BeyondMocapError:
+        if is_new:
+            copies.remove_copy(body)
+        elif played[0] is not None:
+            channels.assign_action(body, *played)
+        raise
     rig.set_switches(body)
-    frames, curves, _ = rig.build_keys(source, touches)
+    player.character_body = body
     channels.create_action(body, f"{player.name} character", frames, curves)[MARK] = True
+    if played[0] is not None and played[0].get(MARK) and not played[0].users:
+        bpy.data.actions.remove(played[0])
     dress(body, player.name, {"shirt": tuple(player.shirt)})
     _show_builtin(player, False)
     copies.update_original(player.character)
