@@ -278,7 +278,7 @@ scene is not changed"""
 
     bl_idname = "beyond_mocap.match_export"
     bl_label = "Export Match"
-    filter_glob: StringProperty(default="*.fbx;*.glb;*.usdc", options={"HIDDEN"})
+    filter_glob: StringProperty(default="*.fbx;*.glb;*.usdc;*.abc", options={"HIDDEN"})
     format: EnumProperty(name="Format", items=FORMATS, default="GLB", description="File format")
     engine: EnumProperty(name="For", items=rig.ENGINES, default="BLENDER", description="Target program")
     root: EnumProperty(name="Root Motion", items=rig.ROOTS, default="KEEP", description="Motion of the root bone")

@@ -10,6 +10,7 @@ from bpy_extras.io_utils import ExportHelper, ImportHelper
 
 from ..beyond_mocap.base.errors import InputError
 from ..beyond_mocap.files.bvh import bvh
+from ..scene.characters.player_character import find_shown_body
 from ..scene.core import action, channels, take_record, window
 from ..scene.core.settings import find_active_player
 from ..scene.rigs import armature, bone_maps, export, rig, rig_bake
@@ -247,7 +248,7 @@ stays unchanged"""
 
     bl_idname = "beyond_mocap.export_motion"
     bl_label = "Export Motion"
-    filter_glob: StringProperty(default="*.fbx;*.glb;*.usdc;*.bvh", options={"HIDDEN"})
+    filter_glob: StringProperty(default="*.fbx;*.glb;*.usdc;*.abc;*.bvh", options={"HIDDEN"})
     format: EnumProperty(name="Format", items=rig.FORMATS, default="FBX", description="Format of the file")
     engine: EnumProperty(name="For", items=rig.ENGINES, default="BLENDER", description="Program to export for")
     who: EnumProperty(name="Export", items=rig.EXPORT_CHOICES, default="ACTIVE", description="Armatures to export")
@@ -281,13 +282,13 @@ stays unchanged"""
         if self.who == "SELECTED":
             return [one for one in context.selected_objects if one.type == "ARMATURE"]
         if self.who == "PLAYERS":
-            chosen = [player.rig or player.body for player in settings.players if player.use]
+            chosen = [find_shown_body(player) for player in settings.players if player.use]
             return [one for one in chosen if one is not None]
         player = find_active_player(settings)
         if settings.rig.target is not None and (settings.rig.source or player is None or player.rig is None):
             return [settings.rig.target]
-        if player is not None and (player.rig or player.body) is not None:
-            return [player.rig or player.body]
+        if player is not None and find_shown_body(player) is not None:
+            return [find_shown_body(player)]
         active = context.object
         return [active] if active is not None and active.type == "ARMATURE" else []
 

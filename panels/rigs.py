@@ -85,3 +85,4 @@ def draw_export(layout, rig) -> None:
     row = layout.row()
     row.scale_y = 1.3
     row.operator("beyond_mocap.export_motion", icon="EXPORT")
+    row.operator("beyond_mocap.deliver", text="Deliver to Engine", icon="FILE_FOLDER")

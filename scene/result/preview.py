@@ -11,6 +11,7 @@ import numpy as np
 
 from ...beyond_mocap.base.errors import InputError
 from ...beyond_mocap.base.fixes import Fix
+from ..characters.player_character import update_character
 from ..core import channels, session
 from ..core.measure import build_scene_clock
 from ..core.saved_state import discard_saved_state, restore_nla, restore_playback, save_playback
@@ -86,6 +87,7 @@ def show_preview(context: bpy.types.Context, player: BeyondMocapPlayer, take: st
     key_layers.stack_layers(body)
     quality.update_error_curves(context.scene, player)
     update_shared(context)
+    update_character(player, context)
     return body
 
 
@@ -135,6 +137,7 @@ def revert_preview(context: bpy.types.Context, player: BeyondMocapPlayer) -> Non
     result.state = "ACCEPTED" if accepted else "NONE"
     quality.update_error_curves(context.scene, player)
     update_shared(context)
+    update_character(player, context)
 
 
 def is_shown(scene: bpy.types.Scene, player: BeyondMocapPlayer) -> bool:

@@ -254,11 +254,25 @@ def copy_rig(rig: bpy.types.Object, name: str) -> bpy.types.Object:
     The copy is in the original's collections, or in the scene's own where these are linked. Pointers within the family
     point to the copies; the copy plays nothing.
     """
-    family = [rig, *rig.children_recursive]
+    return copy_objects([rig, *rig.children_recursive], name)[rig]
+
+
+def copy_objects(family: list[bpy.types.Object], name: str,
+                 home: bpy.types.Collection | None = None) -> dict[bpy.types.Object, bpy.types.Object]:
+    """Copy an armature object and others of its family, which share their data with the originals.
+
+    Args:
+        family: the armature, then the others.
+        name: of the armature's copy.
+        home: where the copies go; None for the originals' collections.
+    Returns:
+        Original -> copy. Pointers within the family point to the copies; the armature's copy plays nothing.
+    """
+    rig = family[0]
     copies = {original: original.copy() for original in family}
     for original, copied in copies.items():
         copied.name = name if original == rig else f"{name} {original.name}"
-        for collection in _list_editable_collections(original):
+        for collection in [home] if home is not None else _list_editable_collections(original):
             collection.objects.link(copied)
         if original.parent in copies:
             inverse = original.matrix_parent_inverse.copy()
@@ -269,7 +283,7 @@ def copy_rig(rig: bpy.types.Object, name: str) -> bpy.types.Object:
         data.action = None
         for track in list(data.nla_tracks):
             data.nla_tracks.remove(track)
-    return copies[rig]
+    return copies
 
 
 def _list_editable_collections(thing: bpy.types.Object) -> list[bpy.types.Collection]:

@@ -19,6 +19,7 @@ import bpy
 import cached_work
 import numpy as np
 import pytest
+import sample_characters as characters
 import sample_rigs as rigs
 import worlds
 from conftest import EXTENSION, find_free_port
@@ -256,6 +257,15 @@ def bake_it():
     bpy.ops.beyond_mocap.bake_to_rig()
 
 
+def a_still_character():
+    """The first player's body is a character that has lost its keys."""
+    rig, player = rigs.create_mixamo(), bpy.context.scene.beyond_mocap.players[0]
+    characters.add_mesh(rig, EXTENSION)
+    player.character = rig
+    player.character_body.animation_data.action = None
+    worlds.select_objects(player.body)
+
+
 def a_target(act="throw"):
     """Something far away to aim at: the 3D cursor; and a model that is quickly read."""
     bpy.context.scene.cursor.location = (20.0, 1.0, 1.0)
@@ -393,6 +403,7 @@ ROWS = {
     "draw_track": Row("imported"),
     "edit_path": Row("accepted"),
     "edit_words": Row("imported", lambda places: {"words": "header"}, pick_a_moment),
+    "deliver": Row("accepted", lambda places: {"directory": f"{places.out}/", "preset": "GODOT"}, changes=False),
     "error_curves": Row("synthesized"),
     "export_bvh": Row("accepted", lambda places: {"filepath": f"{places.out}/out.bvh"}, changes=False),
     "export_motion": Row(
@@ -506,6 +517,7 @@ ROWS = {
     "update_path": Row("accepted", prepare=ride_elsewhere),
     "update_live": Row("synthesized", lambda places: {"player": "player1", "kind": "quick"}),
     "use_marker_set": Row("imported", lambda places: {"which": "plug_in_gait_legs"}, a_cloud),
+    "update_character": Row("accepted", prepare=a_still_character),
     "use_selected_rig": Row("rig", prepare=another_rig),
     "variants": Row("synthesized", lambda places: {"count": 2}),
     "words_to_text": Row("imported"),
