@@ -68,7 +68,7 @@ class Play:
 
 STATIONS = {"BROADCAST": Station(26.0, 17.0, 0.9, (15.0, 36.0)),
             "TACTICAL": Station(34.0, 23.0, 1.5, (30.0, 105.0), shows_all=True),
-            "GOAL": Station(9.0, 4.2, 0.7, (11.0, 34.0))}
+            "GOAL": Station(12.0, 6.0, 0.7, (11.0, 34.0))}
 
 
 def find_camera(scene: bpy.types.Scene, view: str) -> bpy.types.Object | None:

@@ -22,7 +22,7 @@ SUN_STRENGTH, SUN_ANGLE = 3.6, 0.035  # W/m2, rad: a little softer than the real
 MAST = (0.5, 14.0, 0.5, 12.0, 38.0)  # masts: half length + m, half width + m, as shares and metres; m of height
 LAMP_SIZE = (9.0, 5.0)  # metres of a mast's head
 LAMP_IRRADIANCE = 1.15  # W/m2 that each mast gives at the centre spot
-SKIES = {DAYLIGHT: (((0.085, 0.12, 0.055), (0.55, 0.66, 0.80), (0.13, 0.30, 0.66)), 0.85),
+SKIES = {DAYLIGHT: (((0.085, 0.12, 0.055), (0.55, 0.66, 0.80), (0.13, 0.30, 0.66)), 1.1),
          FLOODLIGHT: (((0.010, 0.014, 0.010), (0.020, 0.026, 0.045), (0.004, 0.006, 0.016)), 1.0)}
 """Colours (linear RGB) below the horizon, at it and above, and strength."""
 
