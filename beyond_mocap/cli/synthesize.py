@@ -107,7 +107,7 @@ def run_synthesize(options, reporter: ProgressReporter, writers: Mapping[str, Wr
     if annotations and not options.annotations:
         reporter.show_note(f"{options.track}: with the labels of {annotations}")
     if candidates := find_label_candidates(options.track) if not annotations else ():
-        reporter.show_note(f"{options.track}: without labels; {candidates[0]} may have them, name it with --annotations")
+        reporter.show_note(f"{options.track}: no labels; {candidates[0]} may have them, name it with --annotations")
     if library.notes:
         notes = f"{format_count(len(library.notes), 'note')} on how its recordings were read and repaired"
         reporter.show_note(f"{options.library}: {notes}; the command 'library' prints all")
