@@ -275,7 +275,7 @@ class BEYOND_MOCAP_OT_relink_library(BaseOperator, bpy.types.Operator):
     bl_label = "Relink Library"
     directory: StringProperty(subtype="DIR_PATH", options={"SKIP_SAVE", "HIDDEN"})
     filter_folder: bpy.props.BoolProperty(default=True, options={"HIDDEN"})
-    resumes: IntProperty(options={"SKIP_SAVE", "HIDDEN"}, description="Number of the notice that it mends")
+    resumes: IntProperty(options={"SKIP_SAVE", "HIDDEN"}, description="Number of the notice that it fixes")
 
     def invoke(self, context, _event):
         """Search beside the file first; open the file browser where nothing is found."""

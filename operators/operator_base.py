@@ -30,7 +30,7 @@ class BaseOperator:
             returns whether it is enabled; they are checked in order.
         presents: whether the 3D view moves to the objects that it adds, and the stage's cameras follow them.
         pops_up: whether a pop-up shows a failure, beside the panel.
-        resumes: number of the notice that it mends, 0 for none.
+        resumes: number of the notice that it fixes, 0 for none.
     """
 
     bl_options = {"REGISTER", "UNDO"}
@@ -49,7 +49,7 @@ class BaseOperator:
         return True
 
     def execute(self, context):
-        """Run the operator now; where it mends what a notice is about, run what failed again."""
+        """Run the operator now; where it repairs what a notice is about, run what failed again."""
         result = self.attempt(lambda: self.do(context))
         if result == {"FINISHED"} and self.resumes:
             try:
@@ -134,7 +134,7 @@ class ImportOperator(BaseOperator, ImportHelper):
     bl_options = {"REGISTER", "UNDO", "PRESET"}
     directory: StringProperty(subtype="DIR_PATH", options={"SKIP_SAVE", "HIDDEN"})
     files: CollectionProperty(type=bpy.types.OperatorFileListElement, options={"SKIP_SAVE", "HIDDEN"})
-    resumes: IntProperty(options={"SKIP_SAVE", "HIDDEN"}, description="Number of the notice that it mends")
+    resumes: IntProperty(options={"SKIP_SAVE", "HIDDEN"}, description="Number of the notice that it fixes")
 
     def invoke(self, context, event):
         """Import dropped files at once; otherwise open the file browser."""

@@ -20,7 +20,7 @@ class BeyondMocapError(Exception):
 
     Attributes:
         exit_status: exit status of the command.
-        fixes: steps that mend it and that an interface can offer.
+        fixes: steps that repair it and that an interface can offer.
         parts: what is wrong and where, then what to do about it, which may be "".
     """
 
@@ -32,7 +32,7 @@ class BeyondMocapError(Exception):
         return str(self), ""
 
     def offer(self, *fixes: Fix) -> Self:
-        """Add steps that mend it.
+        """Add steps that repair it.
 
         Args:
             fixes: after those that it has.
@@ -59,7 +59,7 @@ class InputError(BeyondMocapError):
             found: what was found there.
             expected: what was expected; "" for nothing to say.
             next_step: what to do next; "" for nothing to say. All three are short phrases without a full stop.
-            fixes: steps that mend it and that an interface can offer.
+            fixes: steps that repair it and that an interface can offer.
         """
         parts = [f"{where}: {found}"]
         if expected:
@@ -94,7 +94,7 @@ class NotInLibraryError(BeyondMocapError):
             message: one line; what to do is after its last semicolon.
             nearest: the nearest label combinations that the library has.
             line: line of the annotations, None if unknown.
-            fixes: steps that mend it and that an interface can offer.
+            fixes: steps that repair it and that an interface can offer.
         """
         super().__init__(" ".join(message.split()))
         self.nearest = tuple(nearest)

@@ -24,7 +24,7 @@ KINDS = frozenset({
 
 @dataclass(frozen=True)
 class Fix:
-    """A step that mends what an error describes.
+    """A step that repairs what an error describes.
 
     Attributes:
         kind: one of KINDS.

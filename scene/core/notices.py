@@ -1,4 +1,4 @@
-"""What went wrong, kept until it is mended or dismissed: the line, its fixes as buttons, and the call that failed.
+"""What went wrong, kept until it is fixed or dismissed: the line, its fixes as buttons, and the call that failed.
 
 The rows are on the window manager: neither saved with a file nor undone. Panels draw them, operators post and clear
 them.
