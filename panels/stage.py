@@ -15,5 +15,9 @@ class BEYOND_MOCAP_PT_stage(TabPanel, bpy.types.Panel):
     bl_options = {"DEFAULT_CLOSED"}
 
     def draw(self, context):
-        """Draw the button that adds the stage."""
+        """Draw the buttons that add the stage and render pictures of it."""
         self.layout.operator("beyond_mocap.add_stage", icon="VIEW_CAMERA")
+        row = self.layout.row(align=True)
+        row.operator("beyond_mocap.preview_movie", icon="FILE_MOVIE")
+        row.operator("beyond_mocap.contact_sheet", icon="IMGDISPLAY")
+        self.draw_progress(context, "pictures")
