@@ -1,10 +1,13 @@
 """A small picture of one pose: the low-poly body on a transparent background, drawn with numpy alone.
 
 Faces are filled from far to near at twice the size and averaged down. This needs no graphics card and gives the same
-pixels on every machine.
+pixels on every machine. Also pictures in a grid, and PNG files.
 """
 
 from __future__ import annotations
+
+import struct
+import zlib
 
 import numpy as np
 
@@ -54,6 +57,42 @@ def render_pose(motion: Motion, frame: int, size: int = 256) -> np.ndarray:
     canvas = np.zeros((canvas_size, canvas_size, 4))
     _draw_faces(canvas, skin, pixels, quads=quads, material=np.asarray(body.material), to_camera=to_camera)
     return _downsample(canvas, size)
+
+
+def arrange_grid(pictures: list[np.ndarray], columns: int) -> np.ndarray:
+    """Arrange pictures side by side, row below row, on white.
+
+    Args:
+        pictures: N of (H, W, C), of one size and type, the upper row first.
+        columns: pictures in a row.
+    Returns:
+        (rows * H, columns * W, C).
+    """
+    height, width, channels = pictures[0].shape
+    columns = min(columns, len(pictures))
+    white = 255 if pictures[0].dtype == np.uint8 else 1
+    sheet = np.full((-(-len(pictures) // columns) * height, columns * width, channels), white, pictures[0].dtype)
+    for number, picture in enumerate(pictures):
+        row, column = divmod(number, columns)
+        sheet[row * height : (row + 1) * height, column * width : (column + 1) * width] = picture
+    return sheet
+
+
+def encode_png(pixels: np.ndarray) -> bytes:
+    """Encode a picture as a PNG (ISO/IEC 15948): one chunk of rows without filter.
+
+    Args:
+        pixels: (H, W, 3) or (H, W, 4) uint8, the upper row first.
+    Returns:
+        The file's bytes.
+    """
+    high, wide, channels = pixels.shape
+    head = struct.pack(">IIBBBBB", wide, high, 8, 2 if channels == 3 else 6, 0, 0, 0)
+    rows = np.concatenate([np.zeros((high, 1), np.uint8), np.ascontiguousarray(pixels).reshape(high, -1)], axis=1)
+    chunks = ((b"IHDR", head), (b"IDAT", zlib.compress(rows.tobytes(), 9)), (b"IEND", b""))
+    return b"\x89PNG\r\n\x1a\n" + b"".join(
+        struct.pack(">I", len(data)) + kind + data + struct.pack(">I", zlib.crc32(kind + data)) for kind, data in chunks
+    )
 
 
 def _build_camera() -> tuple[np.ndarray, np.ndarray, np.ndarray]:

@@ -89,7 +89,8 @@ meanwhile"""
     bl_label = "Contact Sheet"
     filename_ext = ".png"
     filter_glob: StringProperty(default="*.png", options={"HIDDEN"})
-    height: IntProperty(name="Height", default=270, min=16, max=2160, subtype="PIXEL", description="Height of a picture")
+    height: IntProperty(name="Height", default=270, min=16, max=2160, subtype="PIXEL",
+                        description="Height of a picture")
     count: IntProperty(name="Pictures", default=12, min=1, max=100, description="Number of pictures")
     columns: IntProperty(name="Columns", default=4, min=1, max=20, description="Pictures in a row")
 
