@@ -37,7 +37,8 @@ def create_stage(scene: bpy.types.Scene, size: tuple[float, float] | None = None
     create_goals(stage, units, size[0])
     if scene.beyond_mocap_stage.stands:
         create_stands(stage, units, size)
-    lighting.create_lights(stage, units, size, scene.beyond_mocap_stage.light)
+    settings = scene.beyond_mocap_stage
+    lighting.create_lights(stage, units, size, settings.light, masts=not settings.stands)
     for thing in stage.objects:
         thing[STAGE_MARK] = True
     lighting.set_sky(scene, scene.beyond_mocap_stage.light)

@@ -173,9 +173,9 @@ def test_light_and_stands_can_be_changed_and_nothing_is_left_twice(walker):
     scene.beyond_mocap_stage.light = "FLOODLIGHT"
     lamps = [thing for thing in scene.objects if thing.type == "LIGHT"]
     assert len(lamps) == 4 and {lamp.data.type for lamp in lamps} == {"AREA"}
-    scene.beyond_mocap_stage.stands = False
-    assert "Stands" not in scene.objects
-    scene.beyond_mocap_stage.light, scene.beyond_mocap_stage.stands = "DAYLIGHT", True
+    scene.beyond_mocap_stage.stands = True
+    assert "Stands" in scene.objects and not [thing for thing in scene.objects if "mast" in thing.name]
+    scene.beyond_mocap_stage.light, scene.beyond_mocap_stage.stands = "DAYLIGHT", False
     assert len(scene.objects) == before
     assert not [mesh for mesh in bpy.data.meshes if not mesh.users]
     assert not [light for light in bpy.data.lights if not light.users]
