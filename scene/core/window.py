@@ -145,7 +145,7 @@ def _list_corners(context: bpy.types.Context, things: list[bpy.types.Object]) ->
 
 def find_middle(thing: bpy.types.Object) -> np.ndarray:
     """Find the middle (3,) of an evaluated object's box, in Blender units."""
-    return np.array(thing.matrix_world) @ np.append(np.mean(thing.bound_box, axis=0), 1.0)
+    return (np.array(thing.matrix_world) @ np.append(np.mean(thing.bound_box, axis=0), 1.0))[:3]
 
 
 def open_editor(context: bpy.types.Context, kind: str, direction: str, factor: float) -> bpy.types.Area | None:

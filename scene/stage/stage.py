@@ -28,8 +28,8 @@ def create_stage(scene: bpy.types.Scene, size: tuple[float, float] | None = None
         The collection.
     """
     size = tuple(size or find_pitch_size(scene))
-    is_new = find_stage(scene) is None
     stage = get_stage(scene)
+    is_new = PITCH_SIZE not in stage  # none, only cameras, or one of version 0.1
     _remove_objects([thing for thing in list_own_objects(stage) if not cameras.is_part_of_view(thing)])
     stage[STAGE_MARK], stage[PITCH_SIZE] = True, size
     units, before = units_per_metre(scene), set(stage.objects)
