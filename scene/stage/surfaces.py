@@ -9,7 +9,7 @@ from ..core.material import get_material
 
 STRIPES = {"Pitch grass": ((0.026, 0.086, 0.013), (0.062, 0.165, 0.027)),
            "Pitch grass mown": ((0.042, 0.122, 0.018), (0.095, 0.225, 0.038))}  # linear RGB, dark and light blades
-PAINT = "Pitch line"
+PAINT, WHITE = "Pitch line", ((0.42, 0.50, 0.38), (0.86, 0.86, 0.83))
 GRAIN = ((0.09, 0.32), (1.3, 0.23), (30.0, 0.45))  # per metre, weight: patches, tufts, blades
 CROWD, SEAT = "Stand crowd", (0.5, 0.8)  # metres of a seat, along the row and up the rows
 SHIRTS = ((0.015, 0.018, 0.03), (0.17, 0.025, 0.028), (0.30, 0.30, 0.29), (0.03, 0.045, 0.12), (0.06, 0.06, 0.07),
@@ -19,10 +19,10 @@ BOARDS = ((0.01, 0.03, 0.16), (0.62, 0.62, 0.60), (0.30, 0.01, 0.02), (0.01, 0.0
 
 def get_pitch_materials(units: float) -> list[bpy.types.Material]:
     """Return the materials of both stripes and of the lines; `units` are Blender units in a metre."""
-    return [*(_get_material(name, tuple(np.mean([dark, light], axis=0)), lambda tree, pair=(dark, light): _paint_grass(tree, pair, units))
-              for name, (dark, light) in STRIPES.items()),
-            _get_material(PAINT, (0.80, 0.80, 0.78), lambda tree: _paint_grass(
-                tree, ((0.42, 0.50, 0.38), (0.86, 0.86, 0.83)), units))]
+    blades = {**STRIPES, PAINT: WHITE}
+    plain = {**{name: tuple(np.mean(pair, axis=0)) for name, pair in STRIPES.items()}, PAINT: WHITE[1]}
+    return [_get_material(name, plain[name], lambda tree, pair=pair: _paint_grass(tree, pair, units))
+            for name, pair in blades.items()]
 
 
 def get_crowd_material() -> bpy.types.Material:

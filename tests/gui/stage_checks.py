@@ -35,7 +35,6 @@ def count_white(clip_start, name):
 def check_lines_hold_from_near_to_far():
     bpy.ops.wm.read_homefile(use_empty=True)
     yield 0.5
-    window.window.scene.beyond_mocap_stage.stands = False
     run_operator("beyond_mocap.add_stage", "EXEC_DEFAULT")
     area, view, _ = find_view()
     area.spaces.active.overlay.show_overlays = False
@@ -65,7 +64,8 @@ def measure_height(body):
 def check_an_imported_clip_is_in_view():
     bpy.ops.wm.read_homefile()
     yield 0.5
-    run_operator("beyond_mocap.import_clips", "EXEC_DEFAULT", filepath=str(copy_sample() / "library" / "walking_1_2.bvh"))
+    run_operator("beyond_mocap.import_clips", "EXEC_DEFAULT",
+                 filepath=str(copy_sample() / "library" / "walking_1_2.bvh"))
     yield 0.5
     share, inside = measure_height(bpy.context.view_layer.objects.active)
     window.save_picture(PICTURES / "framed-clip.png")
