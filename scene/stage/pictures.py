@@ -91,7 +91,8 @@ def order_sheet(scene: bpy.types.Scene, out: Path, look: PictureLook, count: int
         InputError: as for `order_movie`.
     """
     settings = [*_list_settings(scene, look), *render_child.PICTURE_OUTPUT, ("render.use_stamp", True),
-                ("render.use_stamp_note", True), ("render.stamp_font_size", max(8, look.height // 16)),
+                ("render.use_stamp_note", True), ("render.stamp_font_size", max(8, look.height // 14)),
+                ("render.stamp_foreground", (1.0, 1.0, 1.0, 1.0)), ("render.stamp_background", (0.0, 0.0, 0.0, 0.5)),
                 *((f"render.use_stamp_{name}", False) for name in STAMPS)]
     order = _build_order(scene, out, settings, columns)
     clock = build_scene_clock(scene)

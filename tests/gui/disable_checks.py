@@ -6,7 +6,7 @@ import threading
 
 import addon_utils
 import bpy
-from tab import EXTENSION, copy_sample, get_settings, import_module, run_operator, wait_until, window
+from tab import EXTENSION, PICTURES, copy_sample, get_settings, import_module, run_operator, wait_until, window
 
 
 def open_scene():
@@ -104,3 +104,13 @@ def check_disabled_with_overlays():
 def check_disabled_during_annotation():
     yield from disable_while(lambda: run_operator("beyond_mocap.annotate"),
                              lambda: import_module("operators.annotate")._running)
+
+
+def check_disabled_while_pictures_are_rendered():
+    def start():
+        bpy.ops.beyond_mocap.import_clip(path="walking_1_2.bvh")
+        run_operator("beyond_mocap.preview_movie", filepath=str((PICTURES / "disabled.mp4").resolve()), is_chosen=True,
+                     engine="CYCLES", samples=500)
+
+    yield from disable_while(start, lambda: import_module("scene.match.command_process")._running)
+    assert not list(PICTURES.glob("*disabled*"))
