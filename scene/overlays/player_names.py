@@ -19,13 +19,11 @@ from ..core.settings import find_active_player
 from ..player.dots import BALL
 from . import draw
 from .colours import BLACK, WHITE
+from .text_places import Box, find_free_box
 
 HEAD, DOT = 2.1, 0.6  # metres above the ground: over a body, over a dot alone
 SIZE, PAD, GAP = 11, 5, 2  # points: letters, around them, between two names
-MOST_STEPS = 8  # rows that a name may be moved up to be free of others
 FONT = 0
-
-Box = tuple[float, float, float, float]
 
 
 class NameLabel(NamedTuple):
@@ -61,12 +59,10 @@ def place_names(labels: list[NameLabel], measure, height: float, scale: float) -
     placed: list[tuple[NameLabel, Box]] = []
     for label in sorted(labels, key=lambda one: (not one.is_active, one.depth, one.text)):
         half = 0.5 * measure(label.text) + PAD * scale
-        for step in range(MOST_STEPS):
-            bottom = label.y + step * (height + GAP * scale)
-            box = (label.x - half, bottom, label.x + half, bottom + height)
-            if all(box[2] <= a or c <= box[0] or box[3] <= b or d <= box[1] for _, (a, b, c, d) in placed):
-                placed.append((label, box))
-                break
+        own = (label.x - half, label.y, label.x + half, label.y + height)
+        box = find_free_box(own, [taken for _, taken in placed], GAP * scale)
+        if box is not None:
+            placed.append((label, box))
     return placed
 
 

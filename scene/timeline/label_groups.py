@@ -79,6 +79,12 @@ def find_group(words: tuple[str, ...]) -> LabelGroup:
 
 
 @lru_cache(maxsize=4096)
+def find_group_of_name(name: str) -> LabelGroup:
+    """Find the kind of action that the name of a strip or marker names."""
+    return find_group(split_labels(name))
+
+
+@lru_cache(maxsize=4096)
 def find_part_letter(words: tuple[str, ...]) -> str:
     """Find the letter of a key moment's diamond: L or R for a side, else the part that meets the ball, else "".
 
@@ -105,6 +111,7 @@ def split_labels(name: str) -> tuple[str, ...]:
     return tuple(word for word in name.lower().split() if word[0] not in "-(")
 
 
+@lru_cache(maxsize=1024)
 def mix(a: Colour, b: Colour, share: float) -> Colour:
     """Mix two colours; share: of the second."""
     return tuple((1.0 - share) * x + share * y for x, y in zip(a, b))

@@ -14,7 +14,7 @@ import bpy
 
 from ..core import window
 from . import label_tracks as lanes
-from .label_groups import LabelGroup, elide, find_group, find_part_letter, split_labels
+from .label_groups import LabelGroup, elide, find_group_of_name, find_part_letter, split_labels
 from .strips import find_target
 
 TEXT, ROW, PAD, GAP = 11, 18, 5, 4  # points: letters, height of a row, around the text, between two names
@@ -61,7 +61,7 @@ class DrawnName:
     @property
     def group(self) -> LabelGroup:
         """The kind of action."""
-        return find_group(split_labels(self.name))
+        return find_group_of_name(self.name)
 
     @property
     def letter(self) -> str:

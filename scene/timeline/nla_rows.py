@@ -14,7 +14,10 @@ import numpy as np
 TOLERANCE = 4  # steps of 255 by which a pixel of a strip may differ from the theme's colour
 ENOUGH = 0.8  # share of the looked-at places that must fit
 LEAST = 4  # pixels: narrower strips and gaps are not looked at
-MOST_GAPS = 24
+NEAR = (-4, -2, 0, 2, 4)  # pixels around a place on a strip, of which one may fit: Blender draws markers over strips
+MOST = 12  # strips, and gaps, of a track that are looked at
+LEAST_TINT = 0.05  # of a theme's colour, from grey: with less, rows of keys cannot be told
+BAND_STEP, BAND_SHARE = 7, 0.98  # every so many pixels of a line; share of them that are tinted
 LOOK_AT = 0.2  # of a row's height from its edges: within the outline, beside the text
 
 
@@ -86,6 +89,25 @@ def find_rows(blocks: list[list[TrackPattern]], lines: np.ndarray, known: np.nda
     return found
 
 
+def find_bands(lines: np.ndarray, known: np.ndarray, colour: tuple[float, ...]) -> list[int]:
+    """Find the rows of objects' own keys, which Blender tints from end to end.
+
+    Args:
+        lines: as for `find_rows`.
+        known: as for `find_rows`.
+        colour: (red, green, blue, alpha) of the theme's active action, 0 to 1.
+    Returns:
+        The rows, from top to bottom.
+    """
+    tint, alpha = np.array(colour[:3]) - np.mean(colour[:3]), max(colour[3], 1e-3)
+    if np.linalg.norm(tint) < LEAST_TINT:
+        return []
+    pixels = lines[:, :, ::BAND_STEP] / 255.0
+    shares = (pixels - pixels.mean(axis=-1, keepdims=True)) @ tint / (tint @ tint)  # of the tint in each pixel
+    is_tinted = (shares > 0.6 * alpha).mean(axis=(1, 2)) >= BAND_SHARE
+    return [int(row) for row in np.flatnonzero(is_tinted & known)]
+
+
 def _find_block(fits, known: np.ndarray, first: int) -> int | None:
     """Find the first row from `first` on at which all tracks of a block fit."""
     rows = len(known)
@@ -100,13 +122,13 @@ def _find_block(fits, known: np.ndarray, first: int) -> int | None:
 
 def _list_fits(track: TrackPattern, lines: np.ndarray, colours: np.ndarray, limits: tuple[float, float]):
     """List where a track's strips, then its gaps, fit: pairs of whether these are strips, and (R, places)."""
-    places, wanted, (low, high) = [], [], limits
-    for (left, right), colour in zip(track.strips, track.colours):
-        left, right = max(left, low), min(right, high)
-        if right - left >= LEAST:
-            places += [int(left + share * (right - left)) for share in (0.3, 0.5, 0.7)]
-            wanted += [colour] * 3
-    on_strips = _is_near(lines[:, :, places], np.array(wanted, np.int16).reshape(-1, 3))
+    low, high = limits
+    seen = [(max(left, low), min(right, high), colour) for (left, right), colour in zip(track.strips, track.colours)]
+    seen = _thin([one for one in seen if one[1] - one[0] >= LEAST])
+    places = [int(left + share * (right - left)) for left, right, _ in seen for share in (0.3, 0.7)]
+    wanted = [colour for _, _, colour in seen for _ in range(2)]
+    around = np.clip(np.array(places, int).reshape(-1, 1) + NEAR, 0, lines.shape[2] - 1)
+    on_strips = _is_near(lines[:, :, around], np.array(wanted, np.int16).reshape(-1, 1, 3)).any(axis=3)
     beside = ~_is_near(lines[:, :, _list_gaps(track.strips, limits), None], colours).any(axis=3)
     return (True, on_strips.reshape(len(lines), -1)), (False, beside.reshape(len(lines), -1))
 
@@ -120,4 +142,9 @@ def _list_gaps(strips, limits: tuple[float, float]) -> list[int]:
     """List places between the strips, and beside them."""
     edges = [limits[0], *(edge for strip in strips for edge in strip), limits[1]]
     gaps = [(max(a, limits[0]), min(b, limits[1])) for a, b in zip(edges[::2], edges[1::2])]
-    return [int(0.5 * (a + b)) for a, b in gaps if b - a >= 2 * LEAST][:MOST_GAPS]
+    return _thin([int(0.5 * (a + b)) for a, b in gaps if b - a >= 2 * LEAST])
+
+
+def _thin(items: list) -> list:
+    """Choose at most MOST of the items, evenly."""
+    return items if len(items) <= MOST else [items[number * (len(items) - 1) // (MOST - 1)] for number in range(MOST)]

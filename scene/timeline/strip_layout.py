@@ -6,6 +6,7 @@ ones.
 
 from __future__ import annotations
 
+import time
 from dataclasses import dataclass
 
 import bpy
@@ -13,11 +14,15 @@ import numpy as np
 
 from . import label_tracks as lanes
 from . import nla_rows
-from .label_groups import LabelGroup, find_group, split_labels
+from .label_groups import LabelGroup, find_group_of_name
 from .moment_names import DrawnName, find_frame_pixels, is_visible, list_names
 from .strip_lines import remove_name_suffix
 
+OWN = ""  # in place of a track's name: the row of an object's own keys
+PLAYING_SECONDS = 0.5  # between two looks at the rows while the animation plays
+
 _rows: dict[int, dict[tuple[str, str], int]] = {}  # region -> (object, NLA track) -> row, as last drawn
+_looked: dict[int, float] = {}  # region -> when its rows were found
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -48,7 +53,7 @@ class DrawnStrip:
     @property
     def group(self) -> LabelGroup:
         """The kind of action."""
-        return find_group(split_labels(self.name))
+        return find_group_of_name(self.name)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -94,26 +99,52 @@ def find_at(context: bpy.types.Context, region: bpy.types.Region, x: float, y: f
 
 
 def update_rows(context: bpy.types.Context, region: bpy.types.Region) -> None:
-    """Find the rows of all timelines in what Blender has just drawn in this NLA editor."""
+    """Find the rows of all timelines in what Blender has just drawn in this NLA editor; now and then while it plays."""
+    waited = time.monotonic() - _looked.get(region.as_pointer(), 0.0)
+    if context.screen.is_animation_playing and waited < PLAYING_SECONDS:
+        return
+    _looked[region.as_pointer()] = time.monotonic()
     targets = _list_targets(context)
     blocks = [(target, tracks) for target in targets for tracks in _list_blocks(context, target)]
     lines, known = _read_lines(context, region)
     patterns = [[_build_pattern(context, region, track) for track in tracks] for _, tracks in blocks]
     found = nla_rows.find_rows(patterns, lines, known, _find_limits(context, region))
-    _rows[region.as_pointer()] = {(target.name, track.name): row + number
-                                  for (target, tracks), row in zip(blocks, found) if row is not None
-                                  for number, track in enumerate(tracks)}
+    rows = {(target.name, track.name): row + number for (target, tracks), row in zip(blocks, found)
+            if row is not None for number, track in enumerate(tracks)}
+    bands = nla_rows.find_bands(lines, known, tuple(context.preferences.themes[0].nla_editor.active_action))
+    _rows[region.as_pointer()] = {**rows, **_find_own_rows(context, rows, bands)}
 
 
 def forget_rows() -> None:
     """Forget all rows."""
     _rows.clear()
+    _looked.clear()
+
+
+def _find_own_rows(context, rows: dict[tuple[str, str], int], bands: list[int]) -> dict[tuple[str, str], int]:
+    """Find the rows of the dots' own keys: in the order of the tinted rows where each has its object, else just above
+    the topmost track.
+    """
+    players = [target for target in _list_targets(context) if target.beyond_mocap_dot.player]
+    above = {(target.name, OWN): row - 1 for target in players if target.animation_data.action is not None
+             if (row := rows.get((target.name, target.animation_data.nla_tracks[-1].name)))}
+    owners = [thing for thing in _list_shown(context) if thing.animation_data and thing.animation_data.action]
+    bands = [row for row in bands if row not in rows.values()]
+    if len(owners) != len(bands):
+        return above
+    told = {(thing.name, OWN): row for thing, row in zip(owners, bands) if thing.beyond_mocap_dot.clock}
+    return told if above.items() <= told.items() else above
 
 
 def _list_targets(context: bpy.types.Context) -> list[bpy.types.Object]:
     """List the objects with label tracks that the editor may show, in its order."""
+    return [target for target in _list_shown(context) if lanes.has_label_tracks(target)]
+
+
+def _list_shown(context: bpy.types.Context) -> list[bpy.types.Object]:
+    """List the objects that the editor may show, in its order."""
     sheet, objects = context.space_data.dopesheet, context.view_layer.objects
-    found = [target for target in objects if lanes.has_label_tracks(target)
+    found = [target for target in objects if target.animation_data is not None
              and (target.select_get() or not sheet.show_only_selected)
              and (sheet.show_hidden or target.visible_get())]
     return sorted(found, key=lambda target: target.name.encode()) if sheet.use_datablock_sort else found
@@ -203,15 +234,11 @@ def _list_strips(context, region, spans) -> list[DrawnStrip]:
 
 
 def _list_lanes(context, region, rows) -> list[tuple[str, tuple[float, float, float, float]]]:
-    """List the rows of the objects' own keys: Blender draws them just above the topmost NLA track."""
+    """List the rows of the dots' own keys; Blender draws them a little higher than others."""
     grid, heights, found = _build_grid(context), _find_height_pixels(region), []
-    for name in dict.fromkeys(name for name, _ in rows):
-        target = context.scene.objects[name]
-        row = rows.get((name, target.animation_data.nla_tracks[-1].name))
-        if row and target.animation_data.action is not None and target.beyond_mocap_dot.player:
-            low, high = _compute_pixels(heights, grid, row - 1)
-            unit = grid.skip * (high - low) / grid.height
-            found.append((name, (0.0, low, float(region.width), high + unit)))
+    for name, row in [(name, row) for (name, track), row in rows.items() if track == OWN]:
+        low, high = _compute_pixels(heights, grid, row)
+        found.append((name, (0.0, low, float(region.width), high + grid.skip * (high - low) / grid.height)))
     return found
 
 

@@ -185,18 +185,19 @@ def _add_strip(canvas: Canvas, strip: DrawnStrip, look: Look) -> None:
         return
     dim = strip.is_muted or strip.kind == "automatic"
     is_lane = strip.kind == "moments"
-    paper = mix(look.back, look.ink, 0.14) if is_lane else strip.group.colour
-    paper = mix(look.back, paper, 0.4) if dim and not is_lane else paper
+    colour = strip.group.colour
+    paper = mix(look.back, look.ink, 0.14) if is_lane else mix(look.back, colour, 0.4) if dim else colour
     canvas.add_box(box, paper)
     if dim and not is_lane:
-        canvas.add_box((box[0], box[1], min(box[0] + 3 * look.scale, box[2]), box[3]), strip.group.colour)
+        canvas.add_box((box[0], box[1], min(box[0] + 3 * look.scale, box[2]), box[3]), colour)
     if strip.is_selected and not is_lane:
         canvas.add_frame(box, EDGE * look.scale + 1, choose_ink(paper))
     if strip.is_selected:
         canvas.add_frame(box, EDGE * look.scale, look.selected)
     if not is_lane:
         size, pad = TEXT * look.scale, (PAD + 2 * dim) * look.scale
-        text = elide(strip.name, box[2] - box[0] - 2 * pad, lambda part: measure(part, size))
+        room = box[2] - box[0] - 2 * pad
+        text = elide(strip.name, room, lambda part: measure(part, size)) if room > size else ""
         canvas.add_text((box[0] + pad, look.compute_baseline(box[1], box[3], size)), text, size, choose_ink(paper),
                         0.8 if dim else 1.0)
 

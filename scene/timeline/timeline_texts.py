@@ -49,11 +49,11 @@ def forget_keys() -> None:
 def describe_track(target: str) -> tuple[str, float]:
     """Describe the row of a dot's own keys: "Track of player1, 0.00 to 50.00 s", and the frame of the first."""
     dot = bpy.context.scene.objects[target]
-    ends, clock = dots.find_key_range(dot), find_clock(dot)
+    ends, clock, owner = dots.find_key_range(dot), find_clock(dot), dot.beyond_mocap_dot.player or "the ball"
     if ends is None:
-        return f"Track of {dot.beyond_mocap_dot.player}", 0.0
+        return f"Track of {owner}", 0.0
     seconds = [clock.to_seconds(end) for end in ends]
-    return f"Track of {dot.beyond_mocap_dot.player}, {seconds[0]:.2f} to {seconds[1]:.2f} s", ends[0]
+    return f"Track of {owner}, {seconds[0]:.2f} to {seconds[1]:.2f} s", ends[0]
 
 
 def find_clock(target: bpy.types.Object) -> Clock:

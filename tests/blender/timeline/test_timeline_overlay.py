@@ -121,6 +121,18 @@ def test_nothing_is_found_where_the_strips_differ(room):
         assert nla_rows.find_rows(blocks, paint({2: strips}, 6), np.ones(6, bool), (0.0, 200.0)) == [None], strips
 
 
+def test_rows_of_own_keys_are_found_by_their_tint(room):
+    nla_rows = room("timeline.nla_rows")
+    tint = (0.53, 0.35, 0.1, 0.3)
+    lines = paint({1: [(0, 200, BACK)], 3: [(20, 120, ORANGE)]}, 6)
+    for row, dark in ((2, 1.0), (4, 0.8)):  # beyond the scene's frames the background is darker
+        lines[row] = [int(255 * (0.7 * dark * 0.19 + 0.3 * part)) for part in tint[:3]]
+        lines[row, :, 50:150] = [int(255 * (0.3 * 0.19 + 0.7 * part)) for part in tint[:3]]
+    assert nla_rows.find_bands(lines, np.ones(6, bool), tint) == [2, 4]
+    assert nla_rows.find_bands(lines, np.arange(6) < 4, tint) == [2]
+    assert nla_rows.find_bands(lines, np.ones(6, bool), (0.5, 0.5, 0.5, 0.3)) == []
+
+
 @pytest.mark.parametrize(("scale", "pixel_size", "has_curves", "step"), [
     (1.0416666269302368, 1.0, True, 27.3), (1.0416666269302368, 1.0, False, 18.9),
     (1.5555555820465088, 1.0, True, 39.0), (2.0833332538604736, 2.0, True, 54.6),
