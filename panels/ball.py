@@ -1,6 +1,4 @@
-"""Panel "Ball & Passes" and its sections: players who pass a ball; the ball tracked, struck, carried and aimed; live
-streams, which receive a user's motion while it is performed.
-"""
+"""Panel "Ball & Passes" and its sections: players who pass a ball; the ball tracked, struck, carried and aimed."""
 
 from __future__ import annotations
 
@@ -11,8 +9,6 @@ from ..scene.passes.settings import find_active_row, find_armature, find_ball, f
 from .tab import TabPanel, create_value_column, draw_paragraph, draw_section, draw_table
 
 LINE = 20.0  # pixels of a line of the interface, at a scale of 1
-
-STREAM_ICONS = {"receiving": "CHECKMARK", "waiting": "SORTTIME", "stopped": "BLANK1"}
 
 PART_ICONS = {
     "foot": "MOD_DYNAMICPAINT", "head": "USER", "chest": "OUTLINER_OB_ARMATURE", "hand": "VIEW_PAN", "tool": "MOD_BEVEL"
@@ -35,8 +31,8 @@ class BEYOND_MOCAP_PT_ball(TabPanel, bpy.types.Panel):
     """The ball and the players who pass it."""
 
     bl_label = "Ball & Passes"
+    task = "BALL"
     bl_order = 8
-    bl_options = {"DEFAULT_CLOSED"}
 
     def draw(self, context):
         """Draw the sections; most are closed at first."""
@@ -48,8 +44,6 @@ class BEYOND_MOCAP_PT_ball(TabPanel, bpy.types.Panel):
         draw_section(layout, "ball_hits", "Hit Analysis", lambda opened: draw_hit_analysis(opened, context))
         draw_section(layout, "ball_hold", "Carried Ball", lambda opened: draw_carried_ball(opened, context))
         draw_section(layout, "ball_aim", "Aim Ball", lambda opened: draw_aim(opened, context))
-        draw_section(layout, "ball_stream", "Live Stream", lambda opened: draw_stream(opened, context))
-        draw_section(layout, "ball_live", "Play Live", lambda opened: draw_play_live(self, opened, context))
 
 
 def draw_tracked_ball(panel, layout, context) -> None:
@@ -177,43 +171,6 @@ def draw_physics(layout, context, ball) -> None:
     else:
         text = f"To Physics from Frame {context.scene.frame_current}"
         row.operator("beyond_mocap.ball_to_physics", icon="PHYSICS", text=text)
-
-
-def draw_stream(layout, context) -> None:
-    """Draw the settings of the stream, its status, and the last strike."""
-    settings, status = context.scene.beyond_mocap_stream, context.window_manager.beyond_mocap_streaming
-    column = create_value_column(layout)
-    chosen = column.column()
-    chosen.enabled = not status.on
-    for name in ("protocol", "port", "clip", "unit", "part", "side", "threshold"):
-        chosen.prop(settings, name)
-    column.prop(settings, "body")
-    row = layout.row(align=True)
-    row.operator("beyond_mocap.stream_start", icon="PLAY")
-    row.operator("beyond_mocap.stream_stop", icon="SNAP_FACE")
-    if status.line:
-        draw_paragraph(layout, status.line, STREAM_ICONS.get(status.state, "ERROR"))
-    if not status.on:
-        return
-    draw_table(layout, status.figures.splitlines())
-    if status.hit:
-        layout.label(text=f"Last strike: {status.hit}", icon="KEYTYPE_EXTREME_VEC")
-    layout.operator("beyond_mocap.stream_keep", icon="REC")
-
-
-def draw_play_live(panel, layout, context) -> None:
-    """Draw the settings of Play Live and the state of the rally."""
-    settings, status = context.scene.beyond_mocap_stream, context.window_manager.beyond_mocap_streaming
-    column = create_value_column(layout)
-    column.prop_search(settings, "target", context.scene.beyond_mocap_passes, "players")
-    column.prop(settings, "bounces")
-    row = layout.row(align=True)
-    row.operator("beyond_mocap.stream_play", icon="OUTLINER_OB_ARMATURE")
-    row.operator("beyond_mocap.stream_end", icon="SNAP_FACE")
-    layout.operator("beyond_mocap.stream_act", icon="ARMATURE_DATA")
-    panel.draw_progress(context, "live")
-    for line in status.played.splitlines():
-        draw_paragraph(layout, line, "BLANK1")
 
 
 class BEYOND_MOCAP_UL_passers(bpy.types.UIList):

@@ -1,10 +1,10 @@
-"""Step 1: the library of clips."""
+"""The library of clips: a step of a player's take, and the task in which its clips are seen and worked on."""
 
 from __future__ import annotations
 
 import bpy
 
-from .tab import TabPanel, draw_header, draw_paragraph, draw_table
+from .tab import StepPanel, TabPanel, draw_header, draw_paragraph, draw_table, with_progress
 
 QUALITY_ICONS = ("STRIP_COLOR_04", "STRIP_COLOR_02", "STRIP_COLOR_01", "BLANK1")  # green, orange, red, not measured
 STATE_ICONS = {"OPEN": "RADIOBUT_OFF", "ACCEPTED": "CHECKMARK", "REFUSED": "X"}
@@ -41,25 +41,39 @@ class BEYOND_MOCAP_UL_proposals(bpy.types.UIList):
         """Draw nothing: the list is short."""
 
 
+class BEYOND_MOCAP_PT_library_step(StepPanel, bpy.types.Panel):
+    """Step 1 of a take: the library's folder, and the button that builds it."""
+
+    bl_label = "1  Library"
+    task = "PLAYER"
+    bl_order = 1
+
+    def find_state(self, context):
+        """Return whether a library is built, and what it holds."""
+        settings = context.scene.beyond_mocap
+        first = settings.library_holds.partition("\n")[0]
+        listing = context.window_manager.beyond_mocap_clips
+        is_current = bool(settings.library_folder) and listing.folder in ("", settings.library_folder)
+        summary = ", ".join(first.split(", ")[:2])
+        return ("done", summary) if first and is_current and not listing.missing else ("next", "")
+
+    def draw_step(self, layout, context):
+        """Draw folder and button."""
+        draw_folder(layout, context)
+
+
 class BEYOND_MOCAP_PT_library(TabPanel, bpy.types.Panel):
     """The library's folder, its content, its clips, and tools."""
 
-    bl_label = "1  Library"
+    bl_label = "Library"
+    task = "LIBRARY"
     bl_order = 1
 
     def draw(self, context):
         """Draw folder, button, content and clips."""
         layout, settings = self.layout, context.scene.beyond_mocap
         listing = context.window_manager.beyond_mocap_clips
-        layout.prop(settings, "library_folder", text="")
-        if listing.missing:
-            box = layout.box()
-            draw_paragraph(box, "This folder does not exist", "ERROR")
-            box.operator("beyond_mocap.relink_library", icon="FILE_FOLDER")
-        row = layout.row(align=True)
-        row.scale_y = 1.3
-        row.operator("beyond_mocap.build_library", icon="ASSET_MANAGER")
-        self.draw_progress(context, "library")
+        draw_folder(layout, context)
         current = listing.folder == settings.library_folder
         if current and listing.news:
             box = layout.box()
@@ -81,6 +95,19 @@ class BEYOND_MOCAP_PT_library(TabPanel, bpy.types.Panel):
         self.draw_progress(context, "learning")
         if body := draw_header(layout, "library_more", "Tools"):
             draw_tools(body, settings)
+
+
+def draw_folder(layout, context) -> None:
+    """Draw the library's folder, the button that builds it, and below them what is wrong with it."""
+    settings = context.scene.beyond_mocap
+    column = layout.column()
+    column.label(text="Folder of Clips")
+    column.prop(settings, "library_folder", text="")
+    with_progress(layout, context, "library", lambda row: row.operator("beyond_mocap.build_library",
+                  icon="ASSET_MANAGER"))
+    if context.window_manager.beyond_mocap_clips.missing:
+        draw_paragraph(layout, "This folder does not exist", "ERROR")
+        layout.operator("beyond_mocap.relink_library", icon="FILE_FOLDER")
 
 
 def draw_clips(layout, settings, listing, current) -> None:

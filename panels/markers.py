@@ -31,8 +31,8 @@ class BEYOND_MOCAP_PT_markers(TabPanel, bpy.types.Panel):
     """Recordings of optical markers, and their reconstruction."""
 
     bl_label = "Optical Markers"
+    task = "MARKERS"
     bl_order = 11
-    bl_options = {"DEFAULT_CLOSED"}
 
     def draw(self, context):
         """Draw the active cloud, section by section."""

@@ -27,8 +27,8 @@ class BEYOND_MOCAP_PT_match(TabPanel, bpy.types.Panel):
     """Files, players, time and result of a match."""
 
     bl_label = "Match"
+    task = "MATCH"
     bl_order = 10
-    bl_options = {"DEFAULT_CLOSED"}
 
     def draw(self, context):
         """Draw files, list, time and buttons."""

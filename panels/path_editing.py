@@ -47,8 +47,8 @@ class BEYOND_MOCAP_PT_path(TabPanel, bpy.types.Panel):
     """The armature, its curve, and how its motion follows the curve."""
 
     bl_label = "Path Editing"
+    task = "PATH"
     bl_order = 7
-    bl_options = {"DEFAULT_CLOSED"}
 
     def draw(self, context):
         """Draw the armature, its path, its figures, cameras and overlays."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 import bpy
 
 from ..scene.core.settings import find_active_player
-from .tab import TabPanel, create_value_column, draw_header, draw_paragraph
+from .tab import StepPanel, TabPanel, create_value_column, draw_header, draw_paragraph, draw_section
 
 
 class BEYOND_MOCAP_UL_players(bpy.types.UIList):
@@ -21,49 +21,71 @@ class BEYOND_MOCAP_UL_players(bpy.types.UIList):
         row.label(text="", icon="CHECKMARK" if item.take else "BLANK1")
 
 
-class BEYOND_MOCAP_PT_players(TabPanel, bpy.types.Panel):
-    """The players, their tracks and their labels."""
+class BEYOND_MOCAP_PT_players(StepPanel, bpy.types.Panel):
+    """Step 2: the players, their tracks and their labels."""
 
     bl_label = "2  Track & Labels"
+    task = "PLAYER"
     bl_order = 2
 
-    def draw(self, context):
-        """Draw the list of players, and the files of the active one."""
-        layout, settings = self.layout, context.scene.beyond_mocap
-        layout.operator("beyond_mocap.import_tracking", icon="IMPORT")
-        row = layout.row(align=True)
-        row.operator("beyond_mocap.draw_track", icon="CURVE_BEZCURVE")
-        row.operator("beyond_mocap.track_object", text="From Object", icon="EMPTY_AXIS")
-        row = layout.row()
-        row.template_list("BEYOND_MOCAP_UL_players", "", settings, "players", settings, active_propname="active_player",
-                          rows=3)
-        row.column(align=True).operator("beyond_mocap.remove_player", text="", icon="REMOVE")
-        if any(player.dot is None for player in settings.players):
-            layout.operator("beyond_mocap.place_players", icon="NLA")
+    def find_state(self, context):
+        """Return "next": the list of players is used all the time."""
+        return "next", ""
+
+    def draw_step(self, layout, context):
+        """Draw the list of players, and the settings of the active one, closed at first."""
+        settings = context.scene.beyond_mocap
         player = find_active_player(settings)
         if player is None:
+            draw_sources(layout)
             draw_paragraph(layout, "Import a tracking file, drop one into the view, or draw a track", "INFO")
             return
-        column = create_value_column(layout)
-        column.prop(player, "drawn_track")
-        if player.drawn_track is not None:
-            draw_curve_settings(column, player)
-        else:
-            column.prop(player, "tracking_file")
-        if player.feed_id:
-            column.prop(player, "feed_id")
-            column.prop(settings, "section_start")
-            column.prop(settings, "section_end")
-        file = column.column()
-        file.active = player.annotation_text is None  # the text has priority
-        file.prop(player, "annotation_file")
-        row = column.row(align=True)
-        row.prop(player, "annotation_text")
-        row.operator("beyond_mocap.read_words", text="", icon="NLA")
-        column.prop(player, "body")
-        draw_player_settings(layout, player)
-        draw_pins(layout, player)
-        draw_heading_keys(layout, player)
+        draw_players(layout, settings)
+        draw_section(layout, "player_add", "Add Player", draw_sources)
+        draw_section(layout, "player_active", "Player Settings", lambda opened: draw_player(opened, settings, player))
+
+
+def draw_sources(layout) -> None:
+    """Draw what a player can be made from."""
+    row = layout.row()
+    row.scale_y = 1.3
+    row.operator("beyond_mocap.import_tracking", icon="IMPORT")
+    row = layout.row(align=True)
+    row.operator("beyond_mocap.draw_track", icon="CURVE_BEZCURVE")
+    row.operator("beyond_mocap.track_object", text="From Object", icon="EMPTY_AXIS")
+
+
+def draw_players(layout, settings) -> None:
+    """Draw the list of players."""
+    row = layout.row()
+    row.template_list("BEYOND_MOCAP_UL_players", "", settings, "players", settings, active_propname="active_player",
+                      rows=3)
+    row.column(align=True).operator("beyond_mocap.remove_player", text="", icon="REMOVE")
+
+
+def draw_player(layout, settings, player) -> None:
+    """Draw the sections of the active player's settings."""
+    layout.label(text=player.name, icon="USER")
+    draw_section(layout, "player_files", "Track", lambda opened: draw_files(opened, settings, player), closed=False)
+    draw_section(layout, "player_own", "Body & Style", lambda opened: draw_player_settings(opened, player))
+    draw_pins(layout, player)
+    draw_heading_keys(layout, player)
+
+
+def draw_files(layout, settings, player) -> None:
+    """Draw where the active player's track comes from."""
+    column = create_value_column(layout)
+    column.prop(player, "drawn_track")
+    if player.drawn_track is not None:
+        draw_curve_settings(column, player)
+    else:
+        column.prop(player, "tracking_file")
+    if player.feed_id:
+        column.prop(player, "feed_id")
+        column.prop(settings, "section_start")
+        column.prop(settings, "section_end")
+    if any(one.dot is None for one in settings.players):
+        column.operator("beyond_mocap.place_players", icon="NLA")
 
 
 class BEYOND_MOCAP_UL_pins(bpy.types.UIList):
@@ -102,11 +124,10 @@ def draw_curve_settings(column, player) -> None:
 
 
 def draw_player_settings(layout, player) -> None:
-    """Draw the settings of this player: height, foot, style, body."""
-    if body := draw_header(layout, "player_own", "Player"):
-        body.use_property_split, body.use_property_decorate = True, False
-        for name in ("height", "strong_foot", "style", "style_weight", "strength", "masses", "fatigue"):
-            body.prop(player, name)
+    """Draw the settings of this player: body, height, foot, style."""
+    column = create_value_column(layout)
+    for name in ("body", "height", "strong_foot", "style", "style_weight", "strength", "masses", "fatigue"):
+        column.prop(player, name)
 
 
 def draw_pins(layout, player) -> None:
@@ -135,17 +156,36 @@ def draw_heading_keys(layout, player) -> None:
 
 
 class BEYOND_MOCAP_PT_annotate(TabPanel, bpy.types.Panel):
-    """Start of annotation."""
+    """The labels of the active player."""
 
-    bl_label = "Annotate"
+    bl_label = "Labels"
     bl_parent_id = "BEYOND_MOCAP_PT_players"
+    task = "PLAYER"
+
+    @classmethod
+    def poll(cls, context):
+        """Return whether there is a player."""
+        return super().poll(context) and bool(context.scene.beyond_mocap.players)
 
     def draw(self, context):
-        """Draw the button that starts annotation, and one for the strip editor."""
-        row = self.layout.row(align=True)
+        """Draw the buttons that annotate, and the files of labels."""
+        layout, player = self.layout, find_active_player(context.scene.beyond_mocap)
+        row = layout.row(align=True)
         row.scale_y = 1.3
         row.operator("beyond_mocap.annotate", icon="SYNTAX_ON", text="Annotate by Keys")
-        row.operator("beyond_mocap.show_timeline", icon="NLA", text="")
+        row.operator("beyond_mocap.show_timeline", icon="NLA", text="Timeline")
+        if player is not None:
+            draw_section(layout, "player_words", "Label Files", lambda opened: draw_label_files(opened, player))
+
+
+def draw_label_files(layout, player) -> None:
+    """Draw where the labels are read from."""
+    column = create_value_column(layout)
+    file = column.column()
+    file.active = player.annotation_text is None  # the text has priority
+    file.prop(player, "annotation_file")
+    column.prop(player, "annotation_text")
+    layout.operator("beyond_mocap.read_words", icon="NLA")
 
 
 class BEYOND_MOCAP_PT_video(TabPanel, bpy.types.Panel):
@@ -154,6 +194,7 @@ class BEYOND_MOCAP_PT_video(TabPanel, bpy.types.Panel):
     bl_label = "Reference Video"
     bl_parent_id = "BEYOND_MOCAP_PT_players"
     bl_options = {"DEFAULT_CLOSED"}
+    task = "PLAYER"
 
     def draw(self, context):
         """Draw the load button, and the video's settings."""
@@ -164,8 +205,7 @@ class BEYOND_MOCAP_PT_video(TabPanel, bpy.types.Panel):
             return
         row.operator("beyond_mocap.remove_video", text="", icon="X")
         layout.operator("beyond_mocap.show_video", icon="WINDOW")
-        column = layout.column(align=True)
-        column.use_property_split, column.use_property_decorate = True, False
+        column = create_value_column(layout)
         row = column.row(align=True)
         row.prop(video, "begins")
         row.operator("beyond_mocap.move_video", text="", icon="TRIA_LEFT").frames = -1

@@ -5,7 +5,16 @@ from __future__ import annotations
 import bpy
 
 from ..scene.core.settings import find_active_player
-from .tab import TabPanel, draw_figures, draw_header, draw_paragraph, wrap_text
+from .tab import (
+    StepPanel,
+    TabPanel,
+    create_value_column,
+    draw_figures,
+    draw_header,
+    draw_paragraph,
+    draw_section,
+    wrap_text,
+)
 
 STATES = {"NONE": ("Not Shown", "BLANK1"),
           "PREVIEW": ("Preview", "HIDE_OFF"),
@@ -16,86 +25,115 @@ UPDATE_BUTTONS = {  # label and icon of the button that updates a player
 }
 
 
-class BEYOND_MOCAP_PT_result(TabPanel, bpy.types.Panel):
-    """Apply or revert; alternatives; what is out of date."""
+class BEYOND_MOCAP_PT_result(StepPanel, bpy.types.Panel):
+    """Step 4: apply or revert; alternatives; what is out of date."""
 
     bl_label = "4  Result"
+    task = "PLAYER"
     bl_order = 4
 
-    def draw(self, context):
-        """Draw the state, the buttons and the options."""
-        layout, settings = self.layout, context.scene.beyond_mocap
+    def find_state(self, context):
+        """Return whether there is a take to apply."""
+        player = find_active_player(context.scene.beyond_mocap)
+        return ("next" if player is not None and player.take else "later"), ""
+
+    def draw_step(self, layout, context):
+        """Draw the state, the buttons, and below them what the state changes."""
+        settings = context.scene.beyond_mocap
         player = find_active_player(settings)
-        if player is not None and player.take:
-            text, icon = STATES[player.result.state]
-            layout.label(text=f"{player.name}: {text}", icon=icon)
-            self.draw_out_of_date(context, player)
+        stale = find_stale_entry(context, player)
+        draw_state(layout, player, stale)
         column = layout.column(align=True)
         row = column.row(align=True)
         row.scale_y = 1.3
         row.operator("beyond_mocap.accept", icon="CHECKMARK").form = settings.accept_as
         row.operator("beyond_mocap.discard", icon="X")
         column.row(align=True).prop(settings, "accept_as", expand=True)
-        self.draw_alternatives(player)
-        row = layout.row(align=True)
-        for name in ("make_bodies", "make_ball", "make_paths"):
-            row.prop(settings, name, toggle=True)
-        if body := draw_header(layout, "result_more", "Time & Stage"):
-            body.use_property_split, body.use_property_decorate = True, False
-            body.prop(settings, "keep_hand_keys")
-            body.prop(settings, "start_frame")
-            body.prop(settings, "start_time")
-            body.operator("beyond_mocap.add_stage", icon="VIEW_CAMERA")
+        draw_section(layout, "result_others", "Alternatives", lambda opened: draw_alternatives(opened, player))
+        draw_section(layout, "result_more", "Options", lambda opened: draw_options(opened, settings))
+        if stale is not None:
+            draw_section(layout, "result_stale", "What Has Changed", lambda opened: draw_changes(opened, stale))
 
-    def draw_out_of_date(self, context, player):
-        """Draw what is out of date, with the button that updates it."""
-        scene = context.scene.session_uid
-        entries = context.window_manager.beyond_mocap_stale
-        entry = next((entry for entry in entries if entry.name == player.name and entry.scene == scene), None)
-        if entry is None or not (entry.lines or entry.notes):
-            return
-        box = self.layout.box().column(align=True)
-        if entry.lines:
-            box.label(text="Out of Date", icon="ERROR")
-        for line in entry.lines.splitlines():
-            draw_paragraph(box, line, "DOT")
-        for line in entry.notes.splitlines():
-            draw_paragraph(box, line, "KEYFRAME")
-        if entry.mend in UPDATE_BUTTONS:
-            text, icon = UPDATE_BUTTONS[entry.mend]
-            button = box.operator(f"beyond_mocap.{entry.mend}", text=text, icon=icon)
-            if entry.mend == "update":
-                button.player = player.name
 
-    def draw_alternatives(self, player):
-        """Draw the alternatives: of a range of time, of the whole take."""
-        column = self.layout.column(align=True)
-        column.operator("beyond_mocap.resynthesize_stretch", icon="UV_SYNC_SELECT")
-        column.operator("beyond_mocap.variants", icon="RENDERLAYERS")
-        variants = player.result.variants if player is not None else ()
-        if not variants:
-            return
-        row = column.row(align=True)
-        for number, variant in enumerate(variants, 1):
-            shown = variant.name == player.take
-            button = row.operator("beyond_mocap.preview", text=str(number), depress=shown)
-            button.number, button.player = number, player.name
-        for number, variant in enumerate(variants, 1):
-            row = column.row()
-            row.active = variant.name == player.take
-            row.label(text=f"{number}: {variant.summary}")
+def find_stale_entry(context, player):
+    """Find what is out of date of a player's take; None where nothing is."""
+    scene, entries = context.scene.session_uid, context.window_manager.beyond_mocap_stale
+    if player is None or not player.take:
+        return None
+    return next((entry for entry in entries if entry.name == player.name and entry.scene == scene
+                 and (entry.lines or entry.notes)), None)
+
+
+def draw_state(layout, player, stale) -> None:
+    """Draw one line: the state of the active player's take, or that it is out of date, with the button that updates
+    it.
+    """
+    row = layout.row()
+    if player is None or not player.take:
+        row.label(text="No take yet: press Synthesize", icon="INFO")
+        return
+    text, icon = STATES[player.result.state]
+    if stale is None or not stale.lines:
+        row.label(text=f"{player.name}: {text}", icon=icon)
+        return
+    row.label(text=f"{player.name}: Out of Date", icon="ERROR")
+    if stale.mend in UPDATE_BUTTONS:
+        text, icon = UPDATE_BUTTONS[stale.mend]
+        button = row.operator(f"beyond_mocap.{stale.mend}", text=text, icon=icon)
+        if stale.mend == "update":
+            button.player = player.name
+
+
+def draw_changes(layout, stale) -> None:
+    """Draw what has changed since the take was made."""
+    for lines, icon in ((stale.lines, "DOT"), (stale.notes, "KEYFRAME")):
+        for line in lines.splitlines():
+            draw_paragraph(layout, line, icon)
+
+
+def draw_options(layout, settings) -> None:
+    """Draw what a result consists of, and when it begins."""
+    column = create_value_column(layout)
+    column = column.column(heading="Create")
+    for name in ("make_bodies", "make_ball", "make_paths"):
+        column.prop(settings, name)
+    column = create_value_column(layout)
+    for name in ("keep_hand_keys", "start_frame", "start_time"):
+        column.prop(settings, name)
+
+
+def draw_alternatives(layout, player) -> None:
+    """Draw the alternatives: of a range of time, of the whole take."""
+    column = layout.column(align=True)
+    column.operator("beyond_mocap.resynthesize_stretch", icon="UV_SYNC_SELECT")
+    column.operator("beyond_mocap.variants", icon="RENDERLAYERS")
+    variants = player.result.variants if player is not None else ()
+    if not variants:
+        return
+    row = column.row(align=True)
+    for number, variant in enumerate(variants, 1):
+        shown = variant.name == player.take
+        button = row.operator("beyond_mocap.preview", text=str(number), depress=shown)
+        button.number, button.player = number, player.name
+    for number, variant in enumerate(variants, 1):
+        row = column.row()
+        row.active = variant.name == player.take
+        row.label(text=f"{number}: {variant.summary}")
 
 
 class BEYOND_MOCAP_PT_quality(TabPanel, bpy.types.Panel):
     """Figures, key moments and warnings of the active player's take; a line with a time goes there."""
 
     bl_label = "Quality"
-    bl_order = 6
+    task = "PLAYER"
+    bl_order = 5
     bl_options = {"DEFAULT_CLOSED"}
 
     @classmethod
     def poll(cls, context):
         """Return whether the active player has figures."""
+        if not super().poll(context):
+            return False
         player = find_active_player(context.scene.beyond_mocap)
         return player is not None and bool(player.quality)
 

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import bpy
 
-from .tab import TabPanel, create_value_column, draw_header, draw_paragraph
+from ..scene.core.settings import find_active_player
+from .tab import StepPanel, create_value_column, draw_paragraph, draw_section
 
 
 class BEYOND_MOCAP_UL_bones(bpy.types.UIList):
@@ -18,55 +19,68 @@ class BEYOND_MOCAP_UL_bones(bpy.types.UIList):
             row.prop_search(item, "bone", target.data, "bones", text="", icon="BONE_DATA")
 
 
-class BEYOND_MOCAP_PT_rig(TabPanel, bpy.types.Panel):
-    """The rig, its bones, bake settings and export."""
+class BEYOND_MOCAP_PT_rig(StepPanel, bpy.types.Panel):
+    """Step 5: the rig, its bones, bake settings and export."""
 
     bl_label = "5  Rig & Export"
-    bl_order = 5
+    task = "PLAYER"
+    bl_order = 6
 
-    def draw(self, context):
-        layout, rig = self.layout, context.scene.beyond_mocap.rig
+    def find_state(self, context):
+        """Return whether there is a result to bring to a rig."""
+        player = find_active_player(context.scene.beyond_mocap)
+        return ("next" if player is not None and player.result.state == "ACCEPTED" else "later"), ""
+
+    def draw_step(self, layout, context):
+        """Draw rig and buttons, and below them what depends on the rig."""
+        rig = context.scene.beyond_mocap.rig
         column = create_value_column(layout)
-        row = column.row(align=True)
-        row.prop(rig, "target")
-        row.operator("beyond_mocap.use_selected_rig", text="", icon="EYEDROPPER")
-        column.prop(rig, "source", placeholder="The active player's body")
-        if rig.target is not None:
-            self.draw_map(layout, rig)
-        column = create_value_column(layout)
-        for name in ("root", "steps", "ik", "plants", "reduces"):
-            column.prop(rig, name)
-        if rig.reduces:
-            column.prop(rig, "tolerance")
-            column.prop(rig, "turn_tolerance")
+        column.prop(rig, "target")
+        column.prop(rig, "source", placeholder="Active Player's Body")
         row = layout.row(align=True)
         row.scale_y = 1.3
         row.operator("beyond_mocap.bake_to_rig", icon="ARMATURE_DATA").targets = "CHOSEN"
-        row.operator("beyond_mocap.unbake", text="", icon="X")
-        row.operator("beyond_mocap.reduce_keys", text="", icon="MOD_DECIM")
+        row.operator("beyond_mocap.unbake", text="Remove", icon="X")
         row = layout.row(align=True)
         row.operator("beyond_mocap.bake_to_rig", text="Selected Rigs").targets = "SELECTED"
         row.operator("beyond_mocap.bake_to_rig", text="All Players").targets = "PLAYERS"
+        draw_section(layout, "rig_bake", "Bake Settings", lambda opened: draw_bake_settings(opened, rig))
+        draw_section(layout, "bone_map", "Bone Map", lambda opened: draw_map(opened, rig))
+        draw_section(layout, "export", "Export", lambda opened: draw_export(opened, rig), closed=False)
         for line in rig.messages.splitlines():
             draw_paragraph(layout, line, "INFO")
-        self.draw_export(layout, rig)
 
-    def draw_map(self, layout, rig) -> None:
-        """Draw the bone map."""
-        if body := draw_header(layout, "bone_map", "Bone Map"):
-            body.template_list("BEYOND_MOCAP_UL_bones", "", rig, "bones", rig, active_propname="active_bone", rows=8)
-            row = body.row(align=True)
-            row.operator("beyond_mocap.map_bones", text="Map", icon="FILE_REFRESH")
-            row.operator("beyond_mocap.keep_bone_map", text="Store", icon="PINNED")
-            row.operator("beyond_mocap.load_bone_map", text="", icon="FILEBROWSER")
-            row.operator("beyond_mocap.save_bone_map", text="", icon="FILE_TICK")
 
-    def draw_export(self, layout, rig) -> None:
-        """Draw the export settings."""
-        if body := draw_header(layout, "export", "Export", closed=False):
-            body.use_property_split, body.use_property_decorate = True, False
-            for name in ("format", "engine", "who", "own_rate", "deform_only", "meshes"):
-                body.prop(rig, name)
-            row = body.row()
-            row.scale_y = 1.3
-            row.operator("beyond_mocap.export_motion", icon="EXPORT")
+def draw_bake_settings(layout, rig) -> None:
+    """Draw how a motion is baked, and the button that simplifies keys."""
+    layout.operator("beyond_mocap.use_selected_rig", text="Use the Selected Rig", icon="EYEDROPPER")
+    column = create_value_column(layout)
+    for name in ("root", "steps", "ik", "plants", "reduces"):
+        column.prop(rig, name)
+    tolerances = column.column()
+    tolerances.active = rig.reduces
+    for name in ("tolerance", "turn_tolerance"):
+        tolerances.prop(rig, name)
+    layout.operator("beyond_mocap.reduce_keys", icon="MOD_DECIM")
+
+
+def draw_map(layout, rig) -> None:
+    """Draw the bone map; without a rig it is greyed out."""
+    layout.active = rig.target is not None
+    layout.template_list("BEYOND_MOCAP_UL_bones", "", rig, "bones", rig, active_propname="active_bone", rows=8)
+    row = layout.row(align=True)
+    row.operator("beyond_mocap.map_bones", text="Map", icon="FILE_REFRESH")
+    row.operator("beyond_mocap.keep_bone_map", text="Store", icon="PINNED")
+    row = layout.row(align=True)
+    row.operator("beyond_mocap.load_bone_map", text="Load", icon="FILEBROWSER")
+    row.operator("beyond_mocap.save_bone_map", text="Save", icon="FILE_TICK")
+
+
+def draw_export(layout, rig) -> None:
+    """Draw the export settings."""
+    column = create_value_column(layout)
+    for name in ("format", "engine", "who", "own_rate", "deform_only", "meshes"):
+        column.prop(rig, name)
+    row = layout.row()
+    row.scale_y = 1.3
+    row.operator("beyond_mocap.export_motion", icon="EXPORT")

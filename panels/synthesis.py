@@ -5,7 +5,7 @@ from __future__ import annotations
 import bpy
 from bl_ui.utils import PresetPanel
 
-from .tab import TabPanel, draw_header
+from .tab import StepPanel, draw_header
 
 
 class BEYOND_MOCAP_MT_presets(bpy.types.Menu):
@@ -26,55 +26,70 @@ class BEYOND_MOCAP_PT_presets(PresetPanel, bpy.types.Panel):
     preset_add_operator = "beyond_mocap.add_preset"
 
 
-class BEYOND_MOCAP_PT_synthesis(TabPanel, bpy.types.Panel):
-    """Synthesize button, progress and settings."""
+class BEYOND_MOCAP_MT_queue(bpy.types.Menu):
+    """The players that wait for their turn; one that is chosen waits no longer."""
 
-    bl_label = "3  Synthesize"
-    bl_order = 3
-
-    def draw_header_preset(self, _context):
-        BEYOND_MOCAP_PT_presets.draw_panel_header(self.layout)
+    bl_label = "Waiting Players"
 
     def draw(self, context):
-        layout, settings = self.layout, context.scene.beyond_mocap
+        """Draw a line for each waiting player."""
+        for name in context.window_manager.beyond_mocap_work.waiting.splitlines():
+            self.layout.operator("beyond_mocap.cancel", text=f"Cancel {name}", icon="X").player = name
+
+
+class BEYOND_MOCAP_PT_synthesis(StepPanel, bpy.types.Panel):
+    """Step 3: Synthesize, its progress and its settings."""
+
+    bl_label = "3  Synthesize"
+    task = "PLAYER"
+    bl_order = 3
+
+    def find_state(self, context):
+        """Return whether there is a player to synthesize."""
+        return ("next" if context.scene.beyond_mocap.players else "later"), ""
+
+    def draw_step(self, layout, context):
+        """Draw the buttons, the line of the progress, and the settings."""
+        settings = context.scene.beyond_mocap
         row = layout.row(align=True)
         row.scale_y = 1.3
         row.operator("beyond_mocap.synthesize", icon="ARMATURE_DATA")
         row.operator("beyond_mocap.update", icon="FILE_REFRESH")
-        row.prop(settings, "live", text="", icon="UV_SYNC_SELECT")
-        self.draw_queue(context)
+        draw_queue(layout, context.window_manager.beyond_mocap_work, settings)
         if body := draw_header(layout, "synthesis_more", "Settings"):
-            body.use_property_split, body.use_property_decorate = True, False
-            body.prop(settings, "method")
-            if settings.method == "distance":
-                body.prop(settings, "catch_up")
-            for name in ("solve_touches", "mirror", "nearest", "rate"):
-                body.prop(settings, name)
-            self.draw_fine_tuning(body, settings)
+            draw_settings(body, settings)
 
-    def draw_queue(self, context):
-        """Draw the running job, its progress, and the waiting players."""
-        running = context.window_manager.beyond_mocap_work
+
+def draw_queue(layout, running, settings) -> None:
+    """Draw two lines below the buttons: the work and how to end it, or what stands in their place meanwhile."""
+    first, second = layout.row(align=True), layout.row(align=True)
+    if running.kind != "synthesis":
         if running.trouble:
-            self.layout.label(text=running.trouble, icon="ERROR")
-        if running.kind != "synthesis":
-            return
-        box = self.layout.box().column(align=True)
-        box.progress(factor=running.fraction, text=running.text)
-        row = box.row(align=True)
-        early = row.row(align=True)
-        early.enabled = not running.ending
-        early.operator("beyond_mocap.cancel", text="Finish Early", icon="CHECKMARK").keep = True
-        row.operator("beyond_mocap.cancel", text="Cancel", icon="X")
-        for name in running.waiting.splitlines():
-            row = box.row(align=True)
-            row.label(text=f"{name} (waiting)", icon="TIME")
-            row.operator("beyond_mocap.cancel", text="", icon="X", emboss=False).player = name
+            first.label(text=running.trouble, icon="ERROR")
+        else:
+            first.prop(settings, "live", text="Update Automatically")
+        second.menu("BEYOND_MOCAP_MT_presets", text="Presets")
+        second.popover("BEYOND_MOCAP_PT_presets", text="", icon="PRESET_NEW")
+        return
+    first.progress(factor=running.fraction, text=running.text)
+    early = second.row(align=True)
+    early.enabled = not running.ending
+    early.operator("beyond_mocap.cancel", text="Finish Early", icon="CHECKMARK").keep = True
+    second.operator("beyond_mocap.cancel", text="Cancel", icon="X")
+    if waiting := running.waiting.splitlines():
+        more = second.row(align=True)
+        more.ui_units_x = 2.5
+        more.menu("BEYOND_MOCAP_MT_queue", text=f"+{len(waiting)}")
 
-    def draw_fine_tuning(self, layout, settings):
-        """Draw the settings that seldom need another value, closed at first."""
-        body = draw_header(layout, "synthesis_tuning", "Fine-Tuning")
-        if not body:
-            return
+
+def draw_settings(layout, settings) -> None:
+    """Draw the settings of the search."""
+    layout.use_property_split, layout.use_property_decorate = True, False
+    layout.prop(settings, "method")
+    if settings.method == "distance":
+        layout.prop(settings, "catch_up")
+    for name in ("solve_touches", "mirror", "nearest", "rate"):
+        layout.prop(settings, name)
+    if body := draw_header(layout, "synthesis_tuning", "Fine-Tuning"):
         for name in settings.list_tuning():
             body.prop(settings, name, slider=name in ("alpha", "watch"))

@@ -85,17 +85,86 @@ def create_value_column(layout):
     return column
 
 
+def with_progress(layout, context, kind: str, draw) -> None:
+    """Draw a step's main buttons, or in their place, as high as they are, a bar and Cancel while such work runs.
+
+    Args:
+        layout: the layout to draw into.
+        context: Blender's context.
+        kind: of the work.
+        draw: function that draws the buttons into a row.
+    """
+    row = layout.row(align=True)
+    row.scale_y = 1.3
+    running = context.window_manager.beyond_mocap_work
+    if running.kind == kind:
+        draw_bar(row, running)
+    else:
+        draw(row)
+
+
+def draw_bar(row, running) -> None:
+    """Draw a bar with the present step and the time that is left, and Cancel."""
+    row.progress(factor=running.fraction, text=running.text)
+    row.operator("beyond_mocap.cancel", text="", icon="X")
+
+
 class TabPanel:
-    """A collapsible panel in the 3D view's sidebar; the panels are ordered by `bl_order`."""
+    """A collapsible panel in the 3D view's sidebar; the panels are ordered by `bl_order`.
+
+    Attributes:
+        task: the task that shows the panel, see `TASKS`; "" for every task.
+    """
 
     bl_space_type = "VIEW_3D"
     bl_region_type = "UI"
     bl_category = "Beyond Mocap"
+    task = ""
+
+    @classmethod
+    def poll(cls, context):
+        """Return whether the panel belongs to the task that is chosen at the top of the tab."""
+        return cls.task in ("", context.scene.beyond_mocap.task)
 
     def draw_progress(self, context, kind: str) -> None:
         """Draw a progress bar and a Cancel button while work of this kind runs in the background."""
         running = context.window_manager.beyond_mocap_work
         if running.kind == kind:
-            row = self.layout.row(align=True)
-            row.progress(factor=running.fraction, text=running.text)
-            row.operator("beyond_mocap.cancel", text="", icon="X")
+            draw_bar(self.layout.row(align=True), running)
+
+
+class StepPanel(TabPanel):
+    """A step of a task: one line once it is done, open while it is next, closed while something before it is missing.
+
+    The line opens what is behind it; Blender remembers that for each of the three states.
+    """
+
+    bl_options = {"HIDE_HEADER"}
+
+    def draw(self, context):
+        """Draw the step's line, and its content while it is open."""
+        state, summary = self.find_state(context)
+        body = draw_step(self.layout, type(self).__name__, self.bl_label, state, summary)
+        if body:
+            self.draw_step(body, context)
+
+
+def draw_step(layout, name: str, title: str, state: str, summary: str = ""):
+    """Draw the line of a step, see StepPanel.
+
+    Args:
+        layout: the layout to draw into.
+        name: identifier, unique among all panels.
+        title: number and name of the step.
+        state: "done", "next" or "later".
+        summary: what the step has led to; shown where it is done.
+    Returns:
+        The layout of its body; None while it is closed.
+    """
+    header, body = layout.panel(f"beyond_mocap_{name}_{state}", default_closed=state != "next")
+    if state == "done":
+        number, _, plain = title.partition("  ")
+        header.label(text=f"{plain or number}: {summary}" if summary else plain or number, icon="CHECKMARK")
+    else:
+        header.label(text=title)
+    return body

@@ -12,6 +12,7 @@ class BEYOND_MOCAP_PT_throws(TabPanel, bpy.types.Panel):
     """Settings, preview and figures of a throw or kick."""
 
     bl_label = "Throws & Kicks"
+    task = "BALL"
     bl_order = 9
     bl_options = {"DEFAULT_CLOSED"}
 

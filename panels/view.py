@@ -16,7 +16,7 @@ class BEYOND_MOCAP_PT_view(TabPanel, bpy.types.Panel):
     """Overlays and error curves."""
 
     bl_label = "View"
-    bl_order = 12
+    bl_order = 14
     bl_options = {"DEFAULT_CLOSED"}
 
     def draw_header(self, context):

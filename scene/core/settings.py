@@ -7,7 +7,15 @@ Paths may be relative to the file. What is too large for a file's properties (a 
 from __future__ import annotations
 
 import bpy
-from bpy.props import BoolProperty, CollectionProperty, FloatProperty, IntProperty, PointerProperty, StringProperty
+from bpy.props import (
+    BoolProperty,
+    CollectionProperty,
+    EnumProperty,
+    FloatProperty,
+    IntProperty,
+    PointerProperty,
+    StringProperty,
+)
 
 from ...beyond_mocap.base.settings import list_settings
 from ..overlays.settings import BeyondMocapView
@@ -18,6 +26,14 @@ from ..rigs.rig import BeyondMocapRig
 from ..timeline.video import BeyondMocapVideo, tag_update
 from .properties import find_active_row, with_settings
 
+TASKS = (  # what the tab in the sidebar is for just now; items of an EnumProperty
+    ("PLAYER", "Player", "Animate players along their tracks: library, track, labels, take, rig", "ARMATURE_DATA", 0),
+    ("MATCH", "Match", "Animate a whole match from a provider's files", "COMMUNITY", 1),
+    ("PATH", "Path", "Lead an existing motion along a new path", "CURVE_PATH", 2),
+    ("BALL", "Ball", "Passing scenes, throws and kicks, a tracked, carried or aimed ball", "SPHERE", 3),
+    ("MARKERS", "Markers & Stream", "Optical markers, and motion received live", "POINTCLOUD_DATA", 4),
+    ("LIBRARY", "Library", "The clips: list, labels, import, assets", "ASSET_MANAGER", 5),
+)
 FILE = {"subtype": "FILE_PATH", "options": {"PATH_SUPPORTS_BLEND_RELATIVE"}}
 
 
@@ -94,6 +110,7 @@ class BeyondMocapSettings(bpy.types.PropertyGroup):
     attached_to = ("Scene.beyond_mocap",)
     version: IntProperty(name="Version", options={"HIDDEN"},
                          description="Version of these settings, see scene/core/migrate.py; 0: not saved yet")
+    task: EnumProperty(name="Task", items=TASKS, description="What the tab shows the panels of")
     rig: PointerProperty(type=BeyondMocapRig, description="Rig, bone map, baking and export")
     library_folder: StringProperty(
         name="Library", subtype="DIR_PATH", options={"PATH_SUPPORTS_BLEND_RELATIVE"},

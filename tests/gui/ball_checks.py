@@ -12,6 +12,7 @@ from tab import (
     copy_sample,
     get_settings,
     import_module,
+    open_task,
     output,
     read_printed_since,
     run_operator,
@@ -37,8 +38,9 @@ def find_object(name):
 def isolate_panel(part):
     """One part of the panel alone in a tab of its own, so that its buttons are found quickly; returns what puts it
     back. part: name of the function that draws it."""
-    kind = next(panel for panel in bpy.types.Panel.__subclasses__() if panel.__name__ == "BEYOND_MOCAP_PT_ball")
-    was, draw, drawn = (kind.bl_category, kind.bl_options), kind.draw, getattr(import_module("panels.ball"), part)
+    name = "stream" if part in ("draw_stream", "draw_play_live") else "ball"
+    kind, drawn = (getattr(import_module(f"panels.{name}"), one) for one in (f"BEYOND_MOCAP_PT_{name}", part))
+    was, draw = (kind.bl_category, kind.bl_options), kind.draw
     kind.draw = lambda self, context: drawn(
         *([self] if part in ("draw_passing_scene", "draw_tracked_ball", "draw_play_live") else []), self.layout, context
     )
@@ -52,6 +54,7 @@ def isolate_panel(part):
         kind.draw = draw
         place_panel(*was)
 
+    yield from open_task(kind.task)
     place_panel("Ball Check", set())
     yield from window.open_tab(window.find_area("VIEW_3D"), "Ball Check")
     return restore_panels

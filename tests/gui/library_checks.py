@@ -12,6 +12,7 @@ from tab import (
     get_settings,
     import_module,
     is_moving,
+    open_task,
     output,
     report_time,
     run_operator,
@@ -36,11 +37,12 @@ def open_sample(name="library"):
     shutil.copytree(copy_sample() / "library", folder, ignore=shutil.ignore_patterns(".beyond_mocap"))
     get_settings().library_folder = str(folder)
     yield from window.open_tab(window.find_area("VIEW_3D"), TAB)
+    yield from open_task("LIBRARY")
     return folder
 
 
 def unfold_step():
-    """Step 1 with all that it can unfold; returns what folds it again."""
+    """The panel Library with all that it can unfold; returns what folds it again."""
     fold = draw_unfolded(
         next(panel for panel in bpy.types.Panel.__subclasses__() if panel.__name__ == "BEYOND_MOCAP_PT_library")
     )

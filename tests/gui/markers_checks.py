@@ -11,6 +11,7 @@ from tab import (
     click_operator,
     copy_sample,
     import_module,
+    open_task,
     output,
     run_operator,
     wait_for_work,
@@ -32,6 +33,7 @@ def isolate_panel():
         kind.bl_category, kind.bl_options = category, options
         bpy.utils.register_class(kind)
 
+    yield from open_task("MARKERS")
     place_panel("Markers Check", set())
     yield from window.open_tab(window.find_area("VIEW_3D"), "Markers Check")
     return lambda: place_panel(*was)

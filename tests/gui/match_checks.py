@@ -12,6 +12,7 @@ from tab import (
     click_operator,
     copy_sample,
     import_module,
+    open_task,
     output,
     report_time,
     run_operator,
@@ -44,6 +45,7 @@ def open_empty_scene():
         bpy.utils.unregister_class(kind)
         kind.bl_category, kind.bl_options = "Match Check", set()
         bpy.utils.register_class(kind)
+    yield from open_task("MATCH")
     yield from window.open_tab(window.find_area("VIEW_3D"), "Match Check")
     yield 1
 

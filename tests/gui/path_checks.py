@@ -12,6 +12,7 @@ from tab import (
     copy_sample,
     get_settings,
     import_module,
+    open_task,
     output,
     report_time,
     run_operator,
@@ -171,6 +172,7 @@ def isolate_panel(area):
         kind.bl_category, kind.bl_options = category, options
         bpy.utils.register_class(kind)
 
+    yield from open_task("PATH")
     place_panel("Path Check", set())
     yield from window.open_tab(area, "Path Check")
     return lambda: place_panel(*was)

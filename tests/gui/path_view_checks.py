@@ -9,6 +9,7 @@ from tab import (
     TAB,
     copy_sample,
     import_module,
+    open_task,
     output,
     report_time,
     run_operator,
@@ -136,6 +137,7 @@ def check_the_panel_is_quick():
         "bl_options": set(), "bl_order": 0, "draw": timed})
     bpy.utils.register_class(opened)
     yield from window.open_tab(area, TAB)
+    yield from open_task("PATH")
     for _ in range(20):
         window.find_sidebar(area).tag_redraw()
         yield 0.06

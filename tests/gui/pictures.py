@@ -64,7 +64,8 @@ def look_at(body):
 
 
 def show_only(panel, kind):
-    """Only this panel is in the tab, it and what is within it open."""
+    """Only this panel is in the tab, it and what is within it open; its task is chosen."""
+    get_settings().task = getattr(panel[0], "task", "") or get_settings().task
     own = [cls for cls in bpy.types.Panel.__subclasses__() if cls.__module__.startswith(EXTENSION) and cls.is_registered
            and cls.bl_space_type == kind and getattr(cls, "bl_category", "") == TAB]
     for cls in sorted(own, key=lambda cls: not getattr(cls, "bl_parent_id", "")):  # those within others first

@@ -5,6 +5,7 @@ each file of checks, so that these need not import anything from here.
 """
 
 import importlib
+import inspect
 import pathlib
 import re
 import shutil
@@ -117,18 +118,62 @@ def wait_until_settled(limit=300.0):
     yield from wait_until(is_settled, limit)
 
 
+def list_tasks():
+    """The tasks between which the switch at the top of the tab chooses."""
+    return [row[0] for row in import_module("scene.core.settings").TASKS]
+
+
+def find_tasks(text):
+    """The tasks that have a panel whose code names this operator or property; empty where every task has one, and
+    where none has."""
+    found = []
+    for panel in bpy.types.Panel.__subclasses__():
+        if not panel.__module__.startswith(EXTENSION) or not panel.is_registered or not hasattr(panel, "task"):
+            continue
+        if re.search(rf"\b{re.escape(text)}\b", inspect.getsource(sys.modules[panel.__module__])):
+            found.append(panel.task)
+    return [] if "" in found else found
+
+
+def open_task(task):
+    """Choose a task at the top of the tab; without an undo step, so that what is undone is what a check did."""
+    if get_settings().task != task:
+        get_settings().task = task
+        for area in window.window.screen.areas:
+            area.tag_redraw()
+        yield 0.3
+
+
+def open_task_of(text):
+    """Choose a task that has this operator or property, where the one that is chosen has not."""
+    found = find_tasks(text)
+    if found and get_settings().task not in found:
+        yield from open_task(found[0])
+
+
 def press_all_buttons(operators=None):
-    """Press each button of the tab (or only the wanted operators'), page by page; return the calls that were pressed.
-    Whatever began is ended by Escape."""
+    """Press each button of the tab (or only the wanted operators'), task by task and page by page; return the calls
+    that were pressed. Whatever began is ended by Escape."""
+    yield from window.open_tab(window.find_area("VIEW_3D"), TAB)
+    wanted = {task for operator in operators or () for task in find_tasks(operator)}
+    pressed = []
+    for task in list_tasks():
+        if operators is None or task in (wanted or {get_settings().task}):
+            yield from open_task(task)
+            pressed += yield from press_buttons_of_task(operators, pressed)
+    return pressed
+
+
+def press_buttons_of_task(operators, known):
+    """Press each button of the task in front that is not among the `known` calls; return the calls."""
     area = window.find_area("VIEW_3D")
-    yield from window.open_tab(area, TAB)
     region = window.find_sidebar(area)
     yield from window.scroll_to_top(area, region)
     pressed, usable, more = [], {}, True
 
     def is_new(call):
         usable[call] = can_run(call)
-        return call not in pressed and (operators is None or parse_operator(call) in operators)
+        return call not in (*known, *pressed) and (operators is None or parse_operator(call) in operators)
 
     while more:
         _, call = yield from window.scan_region(area, region, window.command_under_pointer, is_new)
@@ -154,8 +199,11 @@ def click_operator(operator, *words, editor="VIEW_3D", limit=120.0):
 
 
 def press_button(operator, editor="VIEW_3D"):
-    """Find the operator's button in our tab and click it; `operator` may go on with its first arguments."""
+    """Find the operator's button in our tab, in whichever task it is, and click it; `operator` may go on with its first
+    arguments."""
     yield from window.open_tab(window.find_area(editor), TAB)
+    if editor == "VIEW_3D":
+        yield from open_task_of(operator.partition("(")[0])
     yield from click_operator(operator, editor=editor)
 
 
@@ -163,6 +211,8 @@ def fill_in(path, text, editor="VIEW_3D"):
     """Find the field of a property in our tab by the end of its data path, and type into it."""
     area = window.find_area(editor)
     yield from window.open_tab(area, TAB)
+    if editor == "VIEW_3D":
+        yield from open_task_of(path.rpartition(".")[2])
     yield from window.click_first(
         area, window.find_sidebar(area), lambda found: found.endswith(path), window.field_under_pointer
     )

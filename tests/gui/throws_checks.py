@@ -11,6 +11,7 @@ from tab import (
     assert_no_errors_since,
     click_operator,
     copy_sample,
+    open_task,
     output,
     report_time,
     wait_until,
@@ -45,6 +46,7 @@ def create_scene():
         bpy.utils.unregister_class(kind)
         kind.bl_category, kind.bl_options = "Throw Check", set()
         bpy.utils.register_class(kind)
+    yield from open_task("BALL")
     yield from window.open_tab(window.find_area("VIEW_3D"), "Throw Check")
     yield 1
 
