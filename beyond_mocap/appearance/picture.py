@@ -1,4 +1,4 @@
-"""A small picture of one pose: the low-poly body on a transparent background, drawn with numpy alone.
+"""A small picture of one pose: the light body on a transparent background, drawn with numpy alone.
 
 Faces are filled from far to near at twice the size and averaged down. This needs no graphics card and gives the same
 pixels on every machine. Also pictures in a grid, and PNG files.
@@ -19,7 +19,8 @@ from .mesh import MATERIALS, deform_body
 
 COLOURS = {
     "skin": (0.75, 0.55, 0.43), "shirt": (0.78, 0.16, 0.14), "shorts": (0.92, 0.92, 0.90), "socks": (0.16, 0.24, 0.59),
-    "boots": (0.12, 0.12, 0.13), "hair": (0.16, 0.11, 0.09),
+    "boots": (0.12, 0.12, 0.13), "hair": (0.16, 0.11, 0.09), "trim": (0.92, 0.92, 0.90), "soles": (0.45, 0.50, 0.15),
+    "eyes": (0.95, 0.95, 0.93), "pupils": (0.10, 0.07, 0.05), "gloves": (0.55, 0.60, 0.15),
 }
 _SUN = np.array([0.35, -0.45, 0.82])
 _AZIMUTH, _TILT = np.radians(-50.0), np.radians(12.0)  # angle from the body's front to the camera; downward tilt
@@ -42,7 +43,7 @@ def render_pose(motion: Motion, frame: int, size: int = 256) -> np.ndarray:
     pose = motion.frames(frame, frame + 1)
     pose = place_motion(pose, -float(compute_heading_from_positions(motion.skeleton, forward_kinematics(pose)[0])[0]))
     positions, rotations = forward_kinematics(pose)
-    body = build_body(motion.skeleton, example=motion)
+    body = build_body(motion.skeleton, example=motion, light=True)
     skin = deform_body(body, motion.skeleton, positions, rotations)[0]
     across, up, to_camera = _build_camera()
     # The shadow: each vertex projected along the sun's direction to the height of the lowest one.

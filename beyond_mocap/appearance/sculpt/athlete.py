@@ -15,11 +15,12 @@ from .stitching import Surface
 from .weights import compute_shares
 
 SIZES = {  # m, edges of the faces of each piece: of the full body and the light one
-    "head": (0.0052, 0.0150), "back": (0.0130, 0.0240), "shirt": (0.0220, 0.0520), "arm": (0.0160, 0.0330),
-    "hand": (0.0060, 0.0155), "shorts": (0.0200, 0.0500), "leg": (0.0170, 0.0380), "sock": (0.0170, 0.0400),
-    "boot": (0.0125, 0.0300), "hair": (0.0085, 0.0240), "brow": (0.0036, 0.0),
+    "head": (0.0056, 0.0120), "back": (0.0150, 0.0300), "shirt": (0.0230, 0.0540), "arm": (0.0170, 0.0360),
+    "hand": (0.0064, 0.0215), "shorts": (0.0230, 0.0550), "leg": (0.0180, 0.0420), "sock": (0.0190, 0.0450),
+    "boot": (0.0130, 0.0340), "hair": (0.0085, 0.0200), "brow": (0.0036, 0.0070),
 }
 SHIRT_HEM, SHORTS_HEM, SOCK_TOP, BOOT_TOP, SLEEVE_END, GLOVE_TOP = 0.885, 0.605, 0.462, 0.108, 0.185, 0.535
+BAND = 0.020  # m, width of the edges of sleeves, shorts and socks
 LIPS = {SHIRT: 0.003, SHORTS: 0.003, SOCKS: 0.003, BOOTS: 0.004}
 """Metres of thickness at hems."""
 
@@ -50,6 +51,10 @@ class _Maker:
     def size(self, name: str) -> float:
         """Return the edge of the faces of a piece, m."""
         return SIZES[name][self.light]
+
+    def tuck(self, depth: float) -> float:
+        """Return how deep cloth goes on inside a hem, m: not at all in the light body."""
+        return 0.0 if self.light else depth
 
     def make(self, name: str, solid: Field, axes, cuts, material: int) -> Piece:
         """Mesh a solid in a box, cut it where `cuts` are negative, and even it out.
@@ -84,10 +89,9 @@ class _Maker:
             self._add_leg(tops, sign)
         for sign in (1.0, -1.0):
             self.surface.add(_make_eye(sign, self.light))
-        if not self.light:
-            for sign in (1.0, -1.0):
-                low = HEAD + [0.05, 0.002 if sign > 0 else -0.068, 0.040]
-                self.surface.add(self._make_hair_piece("brow", head.build_brows(self.head), (low, low + 0.066)))
+        for sign in (1.0, -1.0):
+            low = HEAD + [0.05, 0.002 if sign > 0 else -0.068, 0.040]
+            self.surface.add(self._make_hair_piece("brow", head.build_brows(self.head), (low, low + 0.066)))
 
     def _add_head(self) -> list[int]:
         """Add head and neck, finest in the face; return the neck's border."""
@@ -108,8 +112,7 @@ class _Maker:
         box = np.array([-0.25, -0.46, 0.80]), np.array([0.25, 0.46, 1.62])
         piece = self.make("shirt", solid, box, cuts, SHIRT)
         for sign in (1.0, -1.0):
-            band = self.size("shirt") * 0.9
-            cut(piece, solid, lambda p, s=sign, b=band: _measure_sleeve(p, s, SLEEVE_END - b), (TRIM, -1))
+            cut(piece, solid, lambda p, s=sign: _measure_sleeve(p, s, SLEEVE_END - BAND), (TRIM, -1))
         borders = self.surface.add(piece)
         found = {name: min(borders, key=lambda border, at=at: float(np.linalg.norm(self.surface.middle(border) - at)))
                  for name, at in (("hem", (0, 0, 0.88)), ("neck", (0, 0, 1.53)), ("left", (0, 0.32, 1.34)),
@@ -132,7 +135,7 @@ class _Maker:
         """Add an arm with its hand, and the hem of its sleeve."""
         solid = limbs.build_bare_arm(self.light)
         box = np.array([-0.09, -0.09, -0.60]), np.array([0.09, 0.09, -0.08])
-        cuts = [lambda p: -p[:, 2] - SLEEVE_END + 0.045, lambda p: p[:, 2] + GLOVE_TOP - 0.008]
+        cuts = [lambda p: -p[:, 2] - SLEEVE_END + self.tuck(0.025) + 0.012, lambda p: p[:, 2] + GLOVE_TOP - 0.008]
         arm = self.surface.add(_raise(self.make("arm", solid, box, cuts, SKIN), sign))
         rim, wrist = sorted(arm, key=lambda border: -self.surface.middle(border)[2])
         box = np.array([-0.10, -0.11, -0.80]), np.array([0.10, 0.09, -0.49])
@@ -140,7 +143,7 @@ class _Maker:
         axis = limbs.ARM_TURN[:, 2] * [1.0, sign, 1.0]
         self.surface.bridge(self.surface.add(hand)[0], wrist, axis, SKIN)
         skin = _turn_arm(place(solid, SHOULDER, limbs.ARM_TURN), sign)
-        self._add_hem(shirt["left" if sign > 0 else "right"], rim, axis, skin, (0.020, SHIRT, TRIM))
+        self._add_hem(shirt["left" if sign > 0 else "right"], rim, axis, skin, (self.tuck(0.020), SHIRT, TRIM, SKIN))
 
     def _add_shorts(self, shirt: dict[str, list[int]]) -> dict[float, list[int]]:
         """Add the shorts and the hem of the shirt above them; return the borders of their legs by side."""
@@ -150,21 +153,20 @@ class _Maker:
         axes = (grade((-0.25, size), (0.25, size)), grade((-0.28, size), (-0.05, gap), (0.05, gap), (0.28, size)),
                 grade((0.54, size), (1.03, size)))
         piece = self.make("shorts", solid, axes, cuts, SHORTS)
-        cut(piece, solid, lambda p: p[:, 2] - SHORTS_HEM - 0.10 * (np.abs(p[:, 1]) - 0.1) - 0.9 * self.size("shorts"),
-            (TRIM, -1))
+        cut(piece, solid, lambda p: p[:, 2] - SHORTS_HEM - 0.10 * (np.abs(p[:, 1]) - 0.1) - BAND, (TRIM, -1))
         borders = sorted(self.surface.add(piece), key=lambda border: self.surface.middle(border)[2])
-        self._add_hem(shirt["hem"], borders[-1], (0.0, 0.0, 1.0), solid, (0.025, SHIRT, SHIRT))
+        self._add_hem(shirt["hem"], borders[-1], (0.0, 0.0, 1.0), solid, (self.tuck(0.025), SHIRT, SHIRT, SHORTS))
         return {float(np.sign(self.surface.middle(border)[1])): border for border in borders[:2]}
 
     def _add_leg(self, tops: dict[float, list[int]], sign: float) -> None:
         """Add thigh, knee, sock and boot, and the hem of the shorts."""
         leg, sock, boot = limbs.build_leg(), limbs.build_sock(), limbs.build_boot()
         low, high = np.array([-0.14, -0.04, 0.02]), np.array([0.14, 0.22, 0.75])
-        cuts = [lambda p: SHORTS_HEM + 0.045 - p[:, 2], lambda p: p[:, 2] - SOCK_TOP + 0.004]
+        cuts = [lambda p: SHORTS_HEM + self.tuck(0.030) + 0.012 - p[:, 2], lambda p: p[:, 2] - SOCK_TOP + 0.004]
         skin = _flip(self.make("leg", leg, (low + [0, 0, 0.35], high), cuts, SKIN), sign)
         tube = self.make("sock", sock, (low, high),
                          [lambda p: SOCK_TOP - p[:, 2], lambda p: p[:, 2] - BOOT_TOP + 0.006], SOCKS)
-        cut(tube, sock, lambda p: SOCK_TOP - 0.9 * self.size("sock") - p[:, 2], (TRIM, -1))
+        cut(tube, sock, lambda p: SOCK_TOP - 1.5 * BAND - p[:, 2], (TRIM, -1))
         shoe = self.make("boot", boot, (np.array([-0.12, 0.02, -0.03]), np.array([0.25, 0.17, 0.16])),
                          [_measure_boot_top], BOOTS)
         cut(shoe, boot, lambda p: p[:, 2] - 0.012 - 0.006 * (p[:, 0] > 0.14), (SOLES, -1))
@@ -172,9 +174,9 @@ class _Maker:
         stocking = sorted(self.surface.add(_flip(tube, sign)), key=lambda border: self.surface.middle(border)[2])
         collar = self.surface.add(_flip(shoe, sign))[0]
         up, side = np.array([0.0, 0.0, 1.0]), mirror if sign < 0 else (lambda field: field)
-        self._add_hem(tops[sign], thigh[-1], up, side(leg), (0.030, SHORTS, TRIM))
-        self._add_hem(stocking[-1], thigh[0], -up, side(leg), (0.0, SOCKS, TRIM))
-        self._add_hem(collar, stocking[0], -up, side(sock), (0.0, BOOTS, BOOTS))
+        self._add_hem(tops[sign], thigh[-1], up, side(leg), (self.tuck(0.030), SHORTS, TRIM, SKIN))
+        self._add_hem(stocking[-1], thigh[0], -up, side(leg), (0.0, SOCKS, TRIM, SKIN))
+        self._add_hem(collar, stocking[0], -up, side(sock), (0.0, BOOTS, BOOTS, SOCKS))
 
     def _add_hem(self, border: list[int], inner: list[int], axis, below: Field, form) -> None:
         """Fold a border inwards and stitch it to the border of what it covers.
@@ -183,18 +185,18 @@ class _Maker:
             border, inner: of the cloth, and of what is below it.
             axis: (3,) the direction into the cloth.
             below: the solid below the cloth.
-            form: depth in metres of the inner side (0: none), its material, material of the edge.
+            form: depth in metres of the inner side (0: none), its material, materials of the edge and of what is below.
         """
-        depth, material, edge = form
+        depth, material, edge, other = form
         points = np.array([self.surface.vertices[v] for v in border])
         slope = compute_gradient(below, points)
         move = np.clip(below(points) - 0.0008, 0.0005, LIPS[material])
         inward = points - move[:, None] * slope / np.linalg.norm(slope, axis=1, keepdims=True)
         lip = self.surface.extend(border, inward, edge)
-        if depth > 0.0 and not self.light:
+        if depth > 0.0:
             inside = _approach(inward + depth * np.asarray(axis), lambda p: below(p) - 0.004, 0.01)
             lip = self.surface.extend(lip, inside, material)
-        self.surface.bridge(lip, inner, axis, SKIN if material != SHIRT or edge == TRIM else SHORTS)
+        self.surface.bridge(lip, inner, axis, other)
 
     def make_hair(self, style: str) -> Piece:
         """Make a style of hair."""
@@ -271,7 +273,8 @@ def _make_eye(sign: float, light: bool) -> Piece:
                   for r in range(len(angles) - 1)]
         faces.append((last, int(number[-1, j]), int(number[-1, i])))
         materials += [PUPILS, PUPILS, *[EYES] * (len(angles) - 1)]
-    return Piece(np.concatenate(rows) + HEAD + head.EYE * [1.0, sign, 1.0], faces, materials)
+    shift = 0.0015 if light else 0.0  # the coarse lids lie further ahead
+    return Piece(np.concatenate(rows) + HEAD + head.EYE * [1.0, sign, 1.0] + [shift, 0.0, 0.0], faces, materials)
 
 
 def _finish(surface: Surface, parts: np.ndarray, count: int) -> Template:

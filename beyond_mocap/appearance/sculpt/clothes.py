@@ -14,8 +14,8 @@ _TRUNK = (  # height; middle, front, back, half widths
     (1.060, 0.000, 0.000, 0.121, 0.112, 0.164, 0.164), (1.120, 0.000, 0.000, 0.121, 0.110, 0.162, 0.162),
     (1.200, 0.000, 0.000, 0.126, 0.118, 0.170, 0.170), (1.280, -0.004, 0.000, 0.134, 0.124, 0.182, 0.182),
     (1.350, -0.008, 0.000, 0.131, 0.124, 0.186, 0.186), (1.410, -0.012, 0.000, 0.115, 0.118, 0.180, 0.180),
-    (1.460, -0.016, 0.000, 0.092, 0.104, 0.150, 0.150), (1.505, -0.018, 0.000, 0.070, 0.084, 0.100, 0.100),
-    (1.540, -0.018, 0.000, 0.062, 0.074, 0.072, 0.072), (1.580, -0.012, 0.000, 0.060, 0.070, 0.066, 0.066),
+    (1.460, -0.016, 0.000, 0.092, 0.104, 0.150, 0.150), (1.505, -0.018, 0.000, 0.076, 0.084, 0.100, 0.100),
+    (1.540, -0.018, 0.000, 0.068, 0.074, 0.072, 0.072), (1.580, -0.012, 0.000, 0.062, 0.070, 0.066, 0.066),
 )
 
 
@@ -55,9 +55,9 @@ def _measure_shirt_folds(points: np.ndarray) -> np.ndarray:
     x, y, z = points.T
     low = smoothstep(z, 1.26, 1.00)
     angle = np.arctan2(y, x)
-    drapes = 0.0042 * low * np.sin(9.0 * angle + 5.0 * np.sin(7.0 * z)) * (0.7 + 0.3 * np.sin(3.0 * angle + 1.0))
+    drapes = 0.0060 * low * np.sin(9.0 * angle + 5.0 * np.sin(7.0 * z)) * (0.7 + 0.3 * np.sin(3.0 * angle + 1.0))
     waist = np.exp(-(((z - 1.07) / 0.09) ** 2))
-    creases = 0.0035 * waist * np.sin(62.0 * z + 2.2 * np.sin(2.0 * angle + 0.6) + 1.5 * np.sin(angle))
+    creases = 0.0050 * waist * np.sin(62.0 * z + 2.2 * np.sin(2.0 * angle + 0.6) + 1.5 * np.sin(angle))
     hang = 0.006 * smoothstep(z, 1.06, 0.90)
     return drapes + creases + hang
 
@@ -85,7 +85,7 @@ def build_shorts() -> Field:
         side = np.where(points[:, 1] > 0.0, 1.0, -1.0)
         angle = np.arctan2(side * points[:, 1] - 0.098, points[:, 0])
         flare = smoothstep(points[:, 2], 0.88, 0.66)
-        folds = 0.0055 * flare * np.sin(7.0 * angle + 4.0 * np.sin(6.0 * points[:, 2]) + 0.7 * side)
+        folds = 0.0075 * flare * np.sin(7.0 * angle + 4.0 * np.sin(6.0 * points[:, 2]) + 0.7 * side)
         return solid(points) - folds * smoothstep(np.abs(points[:, 1]), 0.0, 0.03)
 
     return measure

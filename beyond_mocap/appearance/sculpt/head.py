@@ -23,8 +23,8 @@ _FACE = (
     (0.080, 0.032, 0.060, 0.060, 0.058, 0.058), (0.100, 0.020, 0.050, 0.060, 0.050, 0.050),
 )
 _NECK = (
-    (-0.190, -0.022, 0.070, 0.085, 0.100, 0.100), (-0.150, -0.016, 0.062, 0.074, 0.074, 0.074),
-    (-0.110, -0.008, 0.057, 0.066, 0.062, 0.062), (-0.070, 0.000, 0.054, 0.066, 0.058, 0.058),
+    (-0.190, -0.022, 0.054, 0.080, 0.090, 0.090), (-0.150, -0.016, 0.052, 0.072, 0.070, 0.070),
+    (-0.110, -0.008, 0.051, 0.066, 0.060, 0.060), (-0.070, 0.000, 0.051, 0.066, 0.057, 0.057),
     (-0.030, 0.004, 0.050, 0.070, 0.056, 0.056), (0.000, 0.004, 0.045, 0.070, 0.050, 0.050),
 )
 
@@ -32,11 +32,11 @@ _NECK = (
 def build_head() -> Field:
     """Build head and neck, without the eyeballs."""
     both = (1.0, -1.0)
-    jaw = [build_chain([(0.004, s * 0.052, 0.010, 0.013), (0.018, s * 0.044, -0.038, 0.013),
-                        (0.068, s * 0.016, -0.060, 0.014)]) for s in both]
+    jaw = [build_chain([(0.004, s * 0.052, 0.010, 0.013), (0.018, s * 0.041, -0.038, 0.012),
+                        (0.068, s * 0.016, -0.060, 0.013)]) for s in both]
     dome = build_ellipsoid((-0.004, 0.0, 0.067), (0.0985, 0.0755, 0.0885))
     solid = join(0.026, build_loft(_SKULL, 2.1), dome, build_loft(_FACE, 2.2), *jaw)
-    cheeks = [build_ellipsoid((0.063, s * 0.043, 0.008), (0.025, 0.021, 0.024)) for s in both]
+    cheeks = [build_ellipsoid((0.062, s * 0.043, 0.013), (0.024, 0.019, 0.020)) for s in both]
     brows = [build_chain([(0.089, s * 0.010, 0.055, 0.007), (0.085, s * 0.034, 0.060, 0.0075),
                           (0.068, s * 0.056, 0.054, 0.007)]) for s in both]
     solid = join(0.018, solid, *cheeks, build_ellipsoid((0.084, 0.0, -0.026), (0.016, 0.024, 0.020)),
@@ -48,7 +48,7 @@ def build_head() -> Field:
     ears = [place(_build_ear(), (-0.002, s * 0.074, 0.030), _turn_ear(s)) for s in both]
     solid = join(0.006, solid, *ears)
     muscles = [build_chain([(-0.020, s * 0.062, -0.010, 0.016), (0.026, s * 0.016, -0.150, 0.011)]) for s in both]
-    throat = build_ellipsoid((0.046, 0.0, -0.105), (0.012, 0.012, 0.018))
+    throat = build_ellipsoid((0.041, 0.0, -0.103), (0.012, 0.012, 0.018))
     neck = join(0.014, build_loft(_NECK, 2.1), *muscles, throat)
     return place(join(0.026, neck, solid), HEAD, np.eye(3))
 
@@ -72,14 +72,22 @@ def _add_nose_and_mouth(solid: Field) -> Field:
     solid = join(0.011, solid, *nose)
     nostrils = [build_ellipsoid((0.1005, s * 0.0065, -0.0075), (0.005, 0.003, 0.003)) for s in (1.0, -1.0)]
     solid = carve(0.004, solid, *nostrils)
-    upper = build_chain([(0.088, 0.021, -0.030, 0.002), (0.0990, 0.006, -0.0255, 0.0050),
-                         (0.0990, -0.006, -0.0255, 0.0050), (0.088, -0.021, -0.030, 0.002)])
-    lower = build_chain([(0.087, 0.018, -0.0325, 0.0025), (0.0975, 0.0, -0.0370, 0.0064),
-                         (0.087, -0.018, -0.0325, 0.0025)])
-    line = build_chain([(0.094, 0.025, -0.0305, 0.0012), (0.1050, 0.0, -0.0308, 0.0026),
-                        (0.094, -0.025, -0.0305, 0.0012)])
-    crease = build_chain([(0.099, 0.013, -0.047, 0.003), (0.101, 0.0, -0.047, 0.0035), (0.099, -0.013, -0.047, 0.003)])
-    return carve(0.006, carve(0.003, join(0.006, solid, upper, lower), line), crease)
+    upper = _lay(solid, ((0.023, -0.0305, 0.0015), (0.014, -0.0275, 0.0034), (0.005, -0.0255, 0.0044)))
+    lower = _lay(solid, ((0.021, -0.0325, 0.0015), (0.012, -0.0360, 0.0044), (0.004, -0.0375, 0.0056)))
+    solid = join(0.005, solid, upper, lower)
+    line = _lay(solid, ((0.0255, -0.0310, 0.0014), (0.013, -0.0312, 0.0020), (0.003, -0.0315, 0.0022)))
+    crease = _lay(solid, ((0.013, -0.0475, 0.0025), (0.004, -0.0480, 0.0030)))
+    return carve(0.006, carve(0.0028, solid, line), crease)
+
+
+def _lay(solid: Field, nodes) -> Field:
+    """Build capsules that lie on the front of a solid; nodes are rows (left, up, radius) m, mirrored to the right."""
+    left, up, radius = np.array(nodes, dtype=float).T
+    both = np.concatenate([left, -left[::-1]]), np.concatenate([up, up[::-1]])
+    points = np.stack([np.full(len(both[0]), 0.12), *both], axis=1)
+    for _ in range(40):
+        points[:, 0] -= 0.7 * solid(points)
+    return build_chain(np.column_stack([points, np.concatenate([radius, radius[::-1]])]))
 
 
 def _build_ear() -> Field:
@@ -102,10 +110,10 @@ def _turn_ear(side: float) -> np.ndarray:
 
 def build_brows(skin: Field) -> Field:
     """Build the hair of the eyebrows: thin strips that stand out of the skin."""
-    strips = [build_chain([(0.096, s * 0.0110, 0.0540, 0.0045), (0.094, s * 0.0280, 0.0600, 0.0055),
-                           (0.080, s * 0.0480, 0.0580, 0.0030)]) for s in (1.0, -1.0)]
+    strips = [build_chain([(0.096, s * 0.0120, 0.0560, 0.0034), (0.094, s * 0.0270, 0.0605, 0.0038),
+                           (0.080, s * 0.0490, 0.0575, 0.0020)]) for s in (1.0, -1.0)]
     near = place(lambda points: np.minimum(strips[0](points), strips[1](points)), HEAD, np.eye(3))
-    return lambda points: np.maximum(skin(points) - 0.0016, near(points) - 0.002)
+    return lambda points: np.maximum(skin(points) - 0.0024, near(points) - 0.002)
 
 
 # -- hair
@@ -145,7 +153,7 @@ def build_hair(style: str, head: Field) -> Field:
 _STYLES = {  # thickness at the sides and on top, roughness m, waves per metre times 2 pi
     "crop": (0.003, 0.005, 0.0003, 300.0),
     "short": (0.0045, 0.018, 0.0030, 175.0),
-    "curly": (0.018, 0.026, 0.0060, 250.0),
+    "curly": (0.017, 0.026, 0.0062, 190.0),
     "tied": (0.006, 0.009, 0.0010, 140.0),
 }
 

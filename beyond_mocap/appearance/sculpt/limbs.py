@@ -150,14 +150,19 @@ def build_boot() -> Field:
     tongue = build_cone((0.030, y, 0.105), (0.085, y, 0.062), 0.022, 0.018)
     solid = join(0.03, upper, ankle, tongue)
     floor = build_floor()
-    return lambda points: -blend_minimum(-solid(points), -floor(points), 0.008)
+    return lambda points: -blend_minimum(-solid(points), -floor(points), 0.004)
+
+
+_SOLE = ((-0.073, -0.068, -0.060, -0.045, -0.030, 0.133, 0.161, 0.188, 0.203, 0.210),
+         (0.030, 0.017, 0.005, 0.0012, 0.0, 0.0, 0.0010, 0.0024, 0.0056, 0.013))
+"""Metres ahead of the ankle, and height of the sole there: that of `appearance.boots`."""
 
 
 def build_floor() -> Field:
-    """Build the ground, rising a little below toes and heel."""
+    """Build what is below the sole, which rises at toes, heel and both edges."""
 
     def measure(points: np.ndarray) -> np.ndarray:
-        rise = 0.006 * np.clip((points[:, 0] - 0.140) / 0.066, 0.0, 1.0) ** 2
-        return rise - points[:, 2]
+        across = np.minimum(np.abs(points[:, 1] - HIP[1] - 0.004) / 0.045, 1.0)
+        return np.interp(points[:, 0], *_SOLE) + 0.005 * across**3 - points[:, 2]
 
     return measure

@@ -29,7 +29,7 @@ def _share_arm(shares, side: str, points: np.ndarray) -> np.ndarray:
     """Share points between the parts of an arm, and return what the arm has (N,)."""
     local = (points - SHOULDER) @ ARM_TURN
     down, aside = -local[:, 2], local[:, 1]
-    along = down + 1.1 * np.minimum(aside, 0.0) + 0.3 * np.maximum(aside, 0.0)
+    along = down + 1.35 * np.minimum(aside, 0.0) + 0.3 * np.maximum(aside, 0.0)
     arm = smoothstep(along, -0.045, 0.105) * smoothstep(points[:, 1], 0.09, 0.15)
     lower, hand = smoothstep(down, ELBOW - 0.055, ELBOW + 0.055), smoothstep(down, WRIST - 0.035, WRIST + 0.015)
     shares[f"upper_arm_{side}"] = arm * (1.0 - lower)
