@@ -8,7 +8,7 @@ import bpy
 
 LETTER_WIDTH = 5.7  # mean width of an interface letter in pixels, at a scale of 1
 MARKS = {"met": "CHECKMARK", "missed": "ERROR", "": "BLANK1"}
-NAME_SHARE = 0.7  # of the width that the name of a figure takes
+NAME_SHARE = 0.72  # of the width that the name of a figure takes
 LABEL_SHARE = 0.4  # of the width, where Blender splits names and values
 MARGIN = 70  # pixels of a sidebar without text: tabs, the box and its icon
 
@@ -48,7 +48,7 @@ def draw_figures(layout, text: str) -> None:
         row.label(text=name, icon=MARKS.get(status, "BLANK1"))
         row.label(text=value)
         if status == "missed":
-            row = column.split(factor=NAME_SHARE)
+            row = column.split(factor=LABEL_SHARE)
             row.active = False
             row.label(text="Target", icon="BLANK1")
             row.label(text=target)
@@ -184,27 +184,10 @@ class StepPanel(TabPanel):
     def draw(self, context):
         """Draw the step's line, and its content while it is open."""
         state, summary = self.find_state(context)
-        body = draw_step(self.layout, type(self).__name__, self.bl_label, state, summary)
+        header, body = self.layout.panel(f"beyond_mocap_step_{self.bl_order}_{state}", default_closed=state != "next")
+        if state == "done":
+            header.label(text=f"{self.bl_label.partition('  ')[2]}: {summary}", icon="CHECKMARK")
+        else:
+            header.label(text=self.bl_label)
         if body:
             self.draw_step(body, context)
-
-
-def draw_step(layout, name: str, title: str, state: str, summary: str = ""):
-    """Draw the line of a step, see StepPanel.
-
-    Args:
-        layout: the layout to draw into.
-        name: identifier, unique among all panels.
-        title: number and name of the step.
-        state: "done", "next" or "later".
-        summary: what the step has led to; shown where it is done.
-    Returns:
-        The layout of its body; None while it is closed.
-    """
-    header, body = layout.panel(f"beyond_mocap_{name}_{state}", default_closed=state != "next")
-    if state == "done":
-        number, _, plain = title.partition("  ")
-        header.label(text=f"{plain or number}: {summary}" if summary else plain or number, icon="CHECKMARK")
-    else:
-        header.label(text=title)
-    return body
