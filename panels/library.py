@@ -46,6 +46,7 @@ class BEYOND_MOCAP_PT_library_step(StepPanel, bpy.types.Panel):
 
     bl_label = "1  Library"
     task = "PLAYER"
+    also = ("MATCH", "BALL")
     bl_order = 1
 
     def find_state(self, context):

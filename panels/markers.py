@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import bpy
 
-from ..scene.markers.settings import find_active_label, find_target_cloud
+from ..scene.markers.settings import find_active_label, find_target_cloud, show_name
 from .tab import (
     TabPanel,
     create_value_column,
@@ -73,12 +73,6 @@ def draw_display(layout, settings, properties) -> None:
     column.prop(properties, "size")
 
 
-def show_name(identifier: str) -> str:
-    """Show an identifier in plain words: "left_temple" as "Left Temple"."""
-    plain = identifier.replace("_", " ")
-    return plain.title() if plain.islower() else plain
-
-
 def draw_labels(layout, properties) -> None:
     """Draw the list and the properties of the active marker."""
     chosen = f"Marker Set: {show_name(properties.set_name)}" if properties.set_name else "Marker Set"
@@ -92,7 +86,7 @@ def draw_labels(layout, properties) -> None:
     label = find_active_label(properties.id_data)
     if label is not None:
         column = create_value_column(layout)
-        for name in ("segment", "landmark", "role"):
+        for name in ("segment", "landmark_words", "role"):
             column.prop(label, name)
 
 

@@ -160,17 +160,20 @@ class TabPanel:
 
     Attributes:
         task: the task that shows the panel, see `TASKS`; "" for every task.
+        also: other tasks that show it.
     """
 
     bl_space_type = "VIEW_3D"
     bl_region_type = "UI"
     bl_category = "Beyond Mocap"
     task = ""
+    also: tuple[str, ...] = ()
 
     @classmethod
     def poll(cls, context):
         """Return whether the panel belongs to the task that is chosen at the top of the tab."""
-        return cls.task in ("", context.scene.beyond_mocap.task)
+        chosen = context.scene.beyond_mocap.task
+        return cls.task in ("", chosen) or chosen in cls.also
 
 
 class StepPanel(TabPanel):
@@ -185,9 +188,10 @@ class StepPanel(TabPanel):
         """Draw the step's line, and its content while it is open."""
         state, summary = self.find_state(context)
         header, body = self.layout.panel(f"beyond_mocap_step_{self.bl_order}_{state}", default_closed=state != "next")
+        plain = self.bl_label.partition("  ")[2]
         if state == "done":
-            header.label(text=f"{self.bl_label.partition('  ')[2]}: {summary}", icon="CHECKMARK")
-        else:
-            header.label(text=self.bl_label)
+            header.label(text=f"{plain}: {summary}", icon="CHECKMARK")
+        else:  # the number is that of its own task
+            header.label(text=self.bl_label if context.scene.beyond_mocap.task == self.task else plain)
         if body:
             self.draw_step(body, context)

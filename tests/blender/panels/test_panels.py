@@ -161,10 +161,12 @@ def test_progress_stands_where_the_button_was(context, kind, name, operator):
 def test_each_task_shows_its_own_panels(context):
     settings = bpy.context.scene.beyond_mocap
     assert settings.task == "PLAYER"
+    fill_scene(bpy.context.scene)
     for task in ("PLAYER", "MATCH", "PATH", "BALL", "MARKERS", "LIBRARY"):
         settings.task = task
-        shown = {cls.task for cls in list_panels() if cls.poll(context)}
-        assert shown == {"", task}
+        shown = {cls.__name__ for cls in list_panels() if cls.poll(context)}
+        assert shown == {cls.__name__ for cls in list_panels() if cls.task in ("", task) or task in cls.also}
+        assert {"BEYOND_MOCAP_PT_task", "BEYOND_MOCAP_PT_view"} < shown and len(shown) > 3
 
 
 def test_every_line_of_a_warning_can_be_pressed(context):
@@ -188,6 +190,16 @@ def test_zero_is_shown_as_automatic(context):
     assert ("name", "Height") in drawn and ("operator", "beyond_mocap.set_automatic:") in drawn
     assert bpy.ops.beyond_mocap.set_automatic(path=path) == {"FINISHED"}
     assert player.height == 0.0
+
+
+def test_landmarks_are_shown_in_plain_words(context):
+    bpy.ops.object.select_all(action="DESELECT")
+    cloud = bpy.data.objects.new("Cloud", bpy.data.meshes.new("Cloud"))
+    label = cloud.beyond_mocap_cloud.labels.add()
+    label.landmark = "left_temple, c7"
+    assert label.landmark_words == "Left Temple, C7"
+    label.landmark_words = "Right Temple"
+    assert label.landmark == "right_temple"
 
 
 def test_no_identifiers_are_shown(context):
