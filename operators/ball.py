@@ -302,7 +302,7 @@ class BEYOND_MOCAP_OT_accept_touches(BaseOperator, bpy.types.Operator):
 them"""
 
     bl_idname = "beyond_mocap.accept_touches"
-    bl_label = "Accept Touches"
+    bl_label = "Apply Touches"
     active: BoolProperty(name="Active Player", default=False, options={"SKIP_SAVE"},
                          description="Only touches of the active player")
     needs = "Press Solve Ball first", lambda context: len(context.scene.beyond_mocap_passes.touches) > 0

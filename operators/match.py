@@ -91,6 +91,7 @@ select the first minute"""
         asked, read = result
         match = scene.beyond_mocap_match
         order.update_match(match, asked, read)
+        scene.beyond_mocap.task = "MATCH"
         for line in match.report.splitlines()[:6]:
             self.report({"INFO"}, line)
         self.report({"INFO"}, f"{format_count(len(read.players), 'player')}, {match.length_s / 60.0:.1f} minutes, "

@@ -182,7 +182,7 @@ class BEYOND_MOCAP_OT_passes_clear(BaseOperator, bpy.types.Operator):
 again, and the lists stay"""
 
     bl_idname = "beyond_mocap.passes_clear"
-    bl_label = "Clear Scene"
+    bl_label = "Revert Scene"
     needs = "There is no scene to clear", lambda context: bool(context.scene.beyond_mocap_passes.made_of)
 
     def do(self, context):

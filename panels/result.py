@@ -73,7 +73,7 @@ def draw_state(layout, player, stale) -> None:
     if stale is None or not stale.lines:
         row.label(text=f"{player.name}: {text}", icon=icon)
         return
-    row.label(text=f"{player.name}: Out of Date", icon="ERROR")
+    row.label(text="Out of Date", icon="ERROR")
     if stale.mend in UPDATE_BUTTONS:
         text, icon = UPDATE_BUTTONS[stale.mend]
         button = row.operator(f"beyond_mocap.{stale.mend}", text=text, icon=icon)

@@ -491,6 +491,7 @@ ROWS = {
         "imported", lambda places: {"filepath": f"{places.out}/set.txt"}, a_cloud, changes=False
     ),
     "save_words": Row("clip", lambda places: {"overwrite": True}, changes=False),
+    "set_automatic": Row("imported", lambda places: {"path": "beyond_mocap.omega", "value": 3.0}),
     "set_static": Row("imported", prepare=two_clouds),
     "set_speed": Row("imported", lambda places: {"speed": 2.0}, draw),
     "show_match": Row("imported", prepare=a_made_match),
