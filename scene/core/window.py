@@ -10,6 +10,8 @@ from collections.abc import Callable
 import bpy
 import numpy as np
 
+from .measure import units_per_metre
+
 _draw_handlers: list[tuple[type, Callable, object]] = []  # type of space, function, Blender's handle
 _timers: list[bpy.types.Timer] = []
 
@@ -101,7 +103,7 @@ def look_through_camera(context: bpy.types.Context) -> None:
 FRAME_SHARE = 0.62  # of the 3D view's height or width that framed objects fill
 
 
-def frame_objects(context: bpy.types.Context, things: list[bpy.types.Object]) -> None:
+def frame_objects(context: bpy.types.Context, things: list[bpy.types.Object], least: float = 1.8) -> None:
     """Move the 3D view so that objects fill a good part of it; its direction stays.
 
     A view through a camera is left alone, and nothing happens without a window.
@@ -109,6 +111,7 @@ def frame_objects(context: bpy.types.Context, things: list[bpy.types.Object]) ->
     Args:
         context: the context.
         things: armatures, with the meshes that they move, and other objects, as they are on the current frame.
+        least: m, the smallest height that is shown, around a point for example.
     """
     area = find_view(context)
     corners = _list_corners(context, things) if area is not None else np.empty((0, 3))
@@ -118,8 +121,10 @@ def frame_objects(context: bpy.types.Context, things: list[bpy.types.Object]) ->
     region = next(region for region in area.regions if region.type == "WINDOW")
     left, bottom, right, top = find_free_region(area, region)
     share = FRAME_SHARE * np.array([(right - left) / region.width, (top - bottom) / region.height])
-    view.view_location = 0.5 * (corners.min(axis=0) + corners.max(axis=0))
-    seen = (corners - np.array(view.view_location)) @ np.array(view.view_rotation.to_matrix())
+    middle = 0.5 * (corners.min(axis=0) + corners.max(axis=0))
+    up = np.array([0.0, 0.0, 0.5 * least * units_per_metre(context.scene)])
+    view.view_location = middle
+    seen = np.vstack([corners - middle, up, -up]) @ np.array(view.view_rotation.to_matrix())
     scale = np.abs([view.window_matrix[0][0], view.window_matrix[1][1]])
     if view.view_perspective == "PERSP":  # a corner fits where its offset is less than its depth by the scale
         view.view_distance = float(np.max(np.abs(seen[:, :2]) * scale / share + seen[:, 2:]))
@@ -140,7 +145,7 @@ def _list_corners(context: bpy.types.Context, things: list[bpy.types.Object]) ->
 
 def find_middle(thing: bpy.types.Object) -> np.ndarray:
     """Find the middle (3,) of an evaluated object's box, in Blender units."""
-    return np.array(thing.matrix_world) @ np.append(np.mean(thing.bound_box, axis=0), 1.0)
+    return (np.array(thing.matrix_world) @ np.append(np.mean(thing.bound_box, axis=0), 1.0))[:3]
 
 
 def open_editor(context: bpy.types.Context, kind: str, direction: str, factor: float) -> bpy.types.Area | None:

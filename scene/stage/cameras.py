@@ -68,7 +68,7 @@ class Play:
 
 STATIONS = {"BROADCAST": Station(26.0, 17.0, 0.9, (15.0, 36.0)),
             "TACTICAL": Station(34.0, 23.0, 1.5, (30.0, 105.0), shows_all=True),
-            "GOAL": Station(9.0, 4.2, 0.7, (11.0, 34.0))}
+            "GOAL": Station(12.0, 6.0, 0.7, (11.0, 34.0))}
 
 
 def find_camera(scene: bpy.types.Scene, view: str) -> bpy.types.Object | None:
@@ -197,17 +197,21 @@ def _follow_play(scene: bpy.types.Scene, cast: Cast | None, smoothing: float, sh
     sigma = smoothing * frames_per_second(scene)
     ground = cast.places[:, :, :2]
     near_ball = len(cast.bodies) > CLOSE_UP and not shows_all
-    middle = _find_ball(cast) if near_ball else 0.5 * (ground.min(axis=0) + ground.max(axis=0))
-    middle = gaussian_smooth(middle, sigma)
-    away = np.linalg.norm(ground - middle, axis=-1)
+    followed = _find_ball(cast) if near_ball else 0.5 * (ground.min(axis=0) + ground.max(axis=0))
+    middle = gaussian_smooth(followed, sigma)
+    away = np.linalg.norm(np.concatenate([ground, followed[None]]) - middle, axis=-1)
     reach = np.where(away < PLAY_REACH, away, 0.0).max(axis=0) if near_ball else away.max(axis=0)
     return Play(cast.frames, middle, gaussian_smooth(reach[:, None], 2.0 * sigma)[:, 0])
 
 
 def _find_ball(cast: Cast) -> np.ndarray:
-    """Find where the ball is on the ground (F, 2) m; where it is unknown, the middle of most bodies."""
-    ground = np.median(cast.places[:, :, :2], axis=0)
-    return ground if cast.ball is None else np.where(np.isfinite(cast.ball[:, :2]), cast.ball[:, :2], ground)
+    """Find where the ball is on the ground (F, 2) m, between and beyond its keys too; without one, the bodies' middle.
+    """
+    if cast.ball is None:
+        return np.median(cast.places[:, :, :2], axis=0)
+    known = np.isfinite(cast.ball[:, 0])
+    columns = [np.interp(cast.frames, cast.frames[known], column[known]) for column in cast.ball[:, :2].T]
+    return np.stack(columns, axis=1)
 
 
 def _compute_place(view: str, size: tuple[float, float], middle: np.ndarray) -> np.ndarray:

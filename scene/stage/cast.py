@@ -44,7 +44,8 @@ def read_cast(scene: bpy.types.Scene) -> Cast | None:
     places = np.stack([_sample_path(path, frames) for path in paths.values()]) / units
     ball = find_ball(scene)
     flight = _read_keys(ball, "location", ball.location) if ball is not None else None
-    return Cast(frames, tuple(paths), places, None if flight is None else _sample_path(flight, frames, np.nan) / units)
+    path = _sample_path(flight, frames, np.nan) / units if flight is not None else np.full((1, 3), np.nan)
+    return Cast(frames, tuple(paths), places, path if np.isfinite(path).any() else None)
 
 
 def find_ball(scene: bpy.types.Scene) -> bpy.types.Object | None:

@@ -22,15 +22,26 @@ SUN_STRENGTH, SUN_ANGLE = 3.6, 0.035  # W/m2, rad: a little softer than the real
 MAST = (0.5, 14.0, 0.5, 12.0, 38.0)  # masts: half length + m, half width + m, as shares and metres; m of height
 LAMP_SIZE = (9.0, 5.0)  # metres of a mast's head
 LAMP_IRRADIANCE = 1.15  # W/m2 that each mast gives at the centre spot
-SKIES = {DAYLIGHT: (((0.085, 0.12, 0.055), (0.55, 0.66, 0.80), (0.13, 0.30, 0.66)), 0.85),
+SKIES = {DAYLIGHT: (((0.055, 0.115, 0.035), (0.50, 0.66, 0.86), (0.12, 0.30, 0.70)), 1.1),
          FLOODLIGHT: (((0.010, 0.014, 0.010), (0.020, 0.026, 0.045), (0.004, 0.006, 0.016)), 1.0)}
 """Colours (linear RGB) below the horizon, at it and above, and strength."""
 
 
 def create_lights(collection: bpy.types.Collection, units: float, size: tuple[float, float],
-                  kind: str) -> list[bpy.types.Object]:
-    """Create the lights of a kind, DAYLIGHT or FLOODLIGHT, over a pitch of `size` (length, width) metres."""
-    return [create_sun(collection)] if kind == DAYLIGHT else _create_floodlights(collection, units, size)
+                  kind: str, masts: bool) -> None:
+    """Create the lights over a pitch.
+
+    Args:
+        collection: for the lights.
+        units: Blender units in a metre.
+        size: length and width of the pitch, m.
+        kind: DAYLIGHT or FLOODLIGHT.
+        masts: whether floodlights have masts; with stands they are above the roof.
+    """
+    if kind == DAYLIGHT:
+        create_sun(collection)
+    else:
+        _create_floodlights(collection, units, size, masts)
 
 
 def create_sun(collection: bpy.types.Collection) -> bpy.types.Object:
@@ -103,7 +114,7 @@ def _paint_sky(world: bpy.types.World, colours, strength: float) -> None:
     elements = ramp.color_ramp.elements
     elements.new(0.5)
     elements.new(0.5)
-    for element, position, colour in zip(elements, (0.497, 0.505, 0.56, 0.85), (*colours[:2], colours[1], colours[2])):
+    for element, position, colour in zip(elements, (0.488, 0.506, 0.53, 0.75), (*colours[:2], colours[1], colours[2])):
         element.position, element.color = position, (*colour, 1.0)
     shader.inputs["Strength"].default_value = strength
     for start, end in ((place.outputs["Generated"], split.inputs[0]), (split.outputs["Z"], height.inputs["Value"]),
@@ -112,9 +123,9 @@ def _paint_sky(world: bpy.types.World, colours, strength: float) -> None:
         tree.links.new(start, end)
 
 
-def _create_floodlights(collection, units: float, size: tuple[float, float]) -> list[bpy.types.Object]:
-    """Create four masts at the corners, each with an area light towards the pitch."""
-    things, height = [], MAST[4]
+def _create_floodlights(collection, units: float, size: tuple[float, float], masts: bool) -> None:
+    """Create four area lights at the corners towards the pitch, each with its luminous head and a mast if wanted."""
+    height = MAST[4]
     for x, y in ((1, 1), (-1, 1), (-1, -1), (1, -1)):
         foot = np.array([x * (MAST[0] * size[0] + MAST[1]), y * (MAST[2] * size[1] + MAST[3]), 0.0])
         head = foot + [0.0, 0.0, height]
@@ -126,20 +137,23 @@ def _create_floodlights(collection, units: float, size: tuple[float, float]) -> 
         light.color = (1.0, 0.96, 0.90)
         lamp = create_object(collection, "Floodlight", light)
         lamp.rotation_mode, lamp.rotation_quaternion, lamp.location = "QUATERNION", turn, Vector(head * units)
-        things += [lamp, *_create_mast(collection, units, foot, head, turn)]
-    return things
+        _create_head(collection, units, head, turn)
+        if masts:
+            _create_mast(collection, units, foot, head)
 
 
-def _create_mast(collection, units: float, foot: np.ndarray, head: np.ndarray, turn) -> list[bpy.types.Object]:
-    """Create a mast and its luminous head behind the area light; neither throws a shadow."""
+def _create_mast(collection, units: float, foot: np.ndarray, head: np.ndarray) -> None:
+    """Create a mast, which throws no shadow."""
+    pole = create_tubes("Floodlight mast", [(foot * units, head * units)], 0.45 * units, 8)
+    pole.materials.append(get_material("Mast steel", (0.12, 0.125, 0.13), 0.5))
+    create_object(collection, "Floodlight mast", pole).visible_shadow = False
+
+
+def _create_head(collection, units: float, head: np.ndarray, turn) -> None:
+    """Create the luminous head behind an area light, which throws no shadow."""
     half = np.array(LAMP_SIZE) / 2.0
     corners = [turn @ Vector((x * half[0], y * half[1], 0.15)) + Vector(head)
                for x, y in ((-1, 1), (1, 1), (1, -1), (-1, -1))]
-    pole = create_tubes("Floodlight mast", [(foot * units, head * units)], 0.45 * units, 8)
-    pole.materials.append(get_material("Mast steel", (0.12, 0.125, 0.13), 0.5))
     lamps = create_mesh("Floodlight lamps", np.array(corners) * units, [(0, 1, 2, 3)])
     lamps.materials.append(surfaces.get_lamp_material())
-    things = [create_object(collection, mesh.name.split(".")[0], mesh) for mesh in (pole, lamps)]
-    for thing in things:
-        thing.visible_shadow = False
-    return things
+    create_object(collection, "Floodlight lamps", lamps).visible_shadow = False

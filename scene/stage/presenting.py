@@ -14,6 +14,7 @@ from .cast import find_ball
 from .stage_collection import STAGE_MARK
 
 MOST = 6  # bodies that are framed; of more, those nearest to the ball
+DOT_HEIGHT = 6.0  # m that are shown around dots, which have no size
 KINDS = {"ARMATURE", "EMPTY", "MESH"}
 
 
@@ -28,7 +29,8 @@ def present_new_objects(context: bpy.types.Context):
     yield
     cameras.update_cameras(scene)
     new = [thing for thing in scene.objects if thing.session_uid not in before]
-    window.frame_objects(bpy.context, choose_objects(scene, new))
+    chosen = choose_objects(scene, new)
+    window.frame_objects(bpy.context, chosen, DOT_HEIGHT if all(thing.type == "EMPTY" for thing in chosen) else 1.8)
 
 
 def choose_objects(scene: bpy.types.Scene, new: list[bpy.types.Object]) -> list[bpy.types.Object]:

@@ -28,5 +28,5 @@ class BeyondMocapStage(bpy.types.PropertyGroup):
     attached_to = ("Scene.beyond_mocap_stage",)
 
     light: EnumProperty(name="Light", items=LIGHTS, update=_update_stage, description="Light and sky of the stage")
-    stands: BoolProperty(name="Stands", default=True, update=_update_stage,
+    stands: BoolProperty(name="Stands", default=False, update=_update_stage,
                          description="Surround the pitch with stands and spectators")

@@ -28,17 +28,18 @@ def create_stage(scene: bpy.types.Scene, size: tuple[float, float] | None = None
         The collection.
     """
     size = tuple(size or find_pitch_size(scene))
-    is_new = find_stage(scene) is None
     stage = get_stage(scene)
+    is_new = PITCH_SIZE not in stage  # none, only cameras, or one of version 0.1
     _remove_objects([thing for thing in list_own_objects(stage) if not cameras.is_part_of_view(thing)])
     stage[STAGE_MARK], stage[PITCH_SIZE] = True, size
-    units = units_per_metre(scene)
+    units, before = units_per_metre(scene), set(stage.objects)
     create_pitch(stage, units, size)
     create_goals(stage, units, size[0])
     if scene.beyond_mocap_stage.stands:
         create_stands(stage, units, size)
-    lighting.create_lights(stage, units, size, scene.beyond_mocap_stage.light)
-    for thing in stage.objects:
+    settings = scene.beyond_mocap_stage
+    lighting.create_lights(stage, units, size, settings.light, masts=not settings.stands)
+    for thing in set(stage.objects) - before:
         thing[STAGE_MARK] = True
     lighting.set_sky(scene, scene.beyond_mocap_stage.light)
     if is_new:

@@ -10,7 +10,7 @@ from . import surfaces
 from .meshes import create_mesh, create_object
 
 NAME = "Stands"
-MARGIN = 7.0  # metres between the lines and the boards
+MARGIN = 5.9  # metres between the lines and the boards, which stand on the grass
 CORNER, STEPS = 12.0, 6  # metres of the bowl's inner radius at its corners, and edges of such a corner
 PARTS = {"boards": ((0.0, 0.0), (0.0, 0.95)),
          "concrete": ((0.0, 0.95), (0.25, 0.95), (0.25, 0.0), (2.2, 0.0), (2.2, 1.4)),

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import bpy
+import numpy as np
 
 from ..core.material import get_material
 
 STRIPES = {"Pitch grass": ((0.026, 0.086, 0.013), (0.062, 0.165, 0.027)),
            "Pitch grass mown": ((0.042, 0.122, 0.018), (0.095, 0.225, 0.038))}  # linear RGB, dark and light blades
-PAINT = "Pitch line"
+PAINT, WHITE = "Pitch line", ((0.42, 0.50, 0.38), (0.86, 0.86, 0.83))
 GRAIN = ((0.09, 0.32), (1.3, 0.23), (30.0, 0.45))  # per metre, weight: patches, tufts, blades
 CROWD, SEAT = "Stand crowd", (0.5, 0.8)  # metres of a seat, along the row and up the rows
 SHIRTS = ((0.015, 0.018, 0.03), (0.17, 0.025, 0.028), (0.30, 0.30, 0.29), (0.03, 0.045, 0.12), (0.06, 0.06, 0.07),
@@ -18,10 +19,10 @@ BOARDS = ((0.01, 0.03, 0.16), (0.62, 0.62, 0.60), (0.30, 0.01, 0.02), (0.01, 0.0
 
 def get_pitch_materials(units: float) -> list[bpy.types.Material]:
     """Return the materials of both stripes and of the lines; `units` are Blender units in a metre."""
-    return [*(_get_material(name, dark, lambda tree, pair=(dark, light): _paint_grass(tree, pair, units))
-              for name, (dark, light) in STRIPES.items()),
-            _get_material(PAINT, (0.80, 0.80, 0.78), lambda tree: _paint_grass(
-                tree, ((0.42, 0.50, 0.38), (0.86, 0.86, 0.83)), units))]
+    blades = {**STRIPES, PAINT: WHITE}
+    plain = {**{name: tuple(np.mean(pair, axis=0)) for name, pair in STRIPES.items()}, PAINT: WHITE[1]}
+    return [_get_material(name, plain[name], lambda tree, pair=pair: _paint_grass(tree, pair, units))
+            for name, pair in blades.items()]
 
 
 def get_crowd_material() -> bpy.types.Material:
@@ -75,6 +76,12 @@ class _Tree:
         for name, value in inputs.items():
             self.set(self.shader.inputs[name.replace("_", " ")], value)
 
+    def colour(self, output) -> None:
+        """Colour the shader by an output, written as a multiple of the plain colour: exporters keep that one."""
+        plain = tuple(self.shader.inputs["Base Color"].default_value[:3])
+        ratio = self.map_vector("DIVIDE", output, plain)
+        self.shade(Base_Color=_mix(self, 1.0, plain, ratio, "MULTIPLY"))
+
     def compute(self, operation: str, *inputs):
         """Add a math node; return its output."""
         return self.add("Math", *inputs, operation=operation).outputs[0]
@@ -105,8 +112,8 @@ def _paint_grass(tree: _Tree, colours, units: float) -> None:
     contrast = tree.add("MapRange", total, 0.34, 0.66).outputs[0]
     bump = tree.add("Bump", 0.55, 0.02 * units)
     tree.set(bump.inputs["Height"], grains[-1][0])
-    tree.shade(Base_Color=tree.pick_colour(contrast, colours), Normal=bump.outputs[0], Roughness=0.75)
-    tree.shade(Specular_IOR_Level=0.15)
+    tree.colour(tree.pick_colour(contrast, colours))
+    tree.shade(Normal=bump.outputs[0], Roughness=0.75, Specular_IOR_Level=0.15)
 
 
 def _paint_crowd(tree: _Tree) -> None:
@@ -125,7 +132,8 @@ def _paint_crowd(tree: _Tree) -> None:
     shirt = tree.pick_colour(chance.outputs["Value"], SHIRTS, "CONSTANT")
     skin = tree.pick_colour(person.outputs["Green"], ((0.05, 0.025, 0.015), (0.42, 0.24, 0.16)))
     seen = _mix(tree, chest, (0.012, 0.014, 0.02), shirt)
-    tree.shade(Base_Color=_mix(tree, head, seen, skin), Roughness=0.95, Specular_IOR_Level=0.05)
+    tree.colour(_mix(tree, head, seen, skin))
+    tree.shade(Roughness=0.95, Specular_IOR_Level=0.05)
 
 
 def _draw_ellipse(tree: _Tree, x, y, middle: float, width: float, height: float):
@@ -135,12 +143,12 @@ def _draw_ellipse(tree: _Tree, x, y, middle: float, width: float, height: float)
     return tree.compute("LESS_THAN", tree.compute("ADD", *squares), 1.0)
 
 
-def _mix(tree: _Tree, share, first, second):
+def _mix(tree: _Tree, share, first, second, blend: str = "MIX"):
     """Return a colour between two; each a linear RGB or an output."""
-    node = tree.add("Mix", data_type="RGBA")
+    node = tree.add("Mix", data_type="RGBA", blend_type=blend)
     sockets = [socket for socket in node.inputs if socket.enabled]
     for socket, value in zip(sockets, (share, first, second)):
-        tree.set(socket, value if isinstance(value, bpy.types.NodeSocket) else (*value, 1.0))
+        tree.set(socket, (*value, 1.0) if isinstance(value, tuple) else value)
     return next(socket for socket in node.outputs if socket.enabled)
 
 
@@ -150,7 +158,8 @@ def _paint_boards(tree: _Tree) -> None:
     field = tree.compute("FLOOR", tree.compute("DIVIDE", along, 6.0))
     chance = tree.add("TexWhiteNoise", field, noise_dimensions="1D").outputs["Value"]
     colour = tree.pick_colour(chance, BOARDS, "CONSTANT")
-    tree.shade(Base_Color=colour, Emission_Color=colour, Emission_Strength=0.35, Roughness=0.4)
+    tree.colour(colour)
+    tree.shade(Emission_Color=colour, Emission_Strength=0.35, Roughness=0.4)
 
 
 def _paint_lamps(tree: _Tree) -> None:

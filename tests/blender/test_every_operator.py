@@ -471,6 +471,7 @@ ROWS = {
     "stream_end": Row("imported", prepare=play_live, changes=False),
     "stream_keep": Row("imported", prepare=listen),
     "stream_play": Row("imported", prepare=fill_scene),
+    "stage_view": Row("accepted", lambda places: {"view": "BROADCAST"}),
     "stream_start": Row("imported", changes=False),
     "stream_stop": Row("imported", prepare=lambda: bpy.ops.beyond_mocap.stream_start(), changes=False),
     "stream_target": Row("imported", lambda places: {"number": 2}, play_live),

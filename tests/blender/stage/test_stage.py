@@ -1,5 +1,6 @@
 """The stage: lines that cannot flicker, cameras that follow whatever moves, light and sky that are its own."""
 
+import json
 from importlib import import_module
 
 import bpy
@@ -8,6 +9,7 @@ import pytest
 from bpy_extras.object_utils import world_to_camera_view
 from conftest import EXTENSION
 from mathutils import Vector
+from worlds import MARKERS, write_synthetic_markers
 
 FPS = 25
 
@@ -173,9 +175,9 @@ def test_light_and_stands_can_be_changed_and_nothing_is_left_twice(walker):
     scene.beyond_mocap_stage.light = "FLOODLIGHT"
     lamps = [thing for thing in scene.objects if thing.type == "LIGHT"]
     assert len(lamps) == 4 and {lamp.data.type for lamp in lamps} == {"AREA"}
-    scene.beyond_mocap_stage.stands = False
-    assert "Stands" not in scene.objects
-    scene.beyond_mocap_stage.light, scene.beyond_mocap_stage.stands = "DAYLIGHT", True
+    scene.beyond_mocap_stage.stands = True
+    assert "Stands" in scene.objects and not [thing for thing in scene.objects if "mast" in thing.name]
+    scene.beyond_mocap_stage.light, scene.beyond_mocap_stage.stands = "DAYLIGHT", False
     assert len(scene.objects) == before
     assert not [mesh for mesh in bpy.data.meshes if not mesh.users]
     assert not [light for light in bpy.data.lights if not light.users]
@@ -217,17 +219,60 @@ def test_a_fresh_scene_ends_where_its_import_ends_and_another_one_grows(core, tm
     assert scene.frame_end == long
 
 
-def test_what_is_framed_is_what_was_made(walker):
+def test_a_short_recording_of_markers_sets_the_end_of_a_fresh_scene():
+    write_synthetic_markers()
+    scene = bpy.context.scene
+    scene.render.fps = 24
+    bpy.ops.beyond_mocap.import_markers(filepath=str(MARKERS / "walk.trc"))
+    cloud = bpy.context.view_layer.objects.active
+    assert scene.frame_end == 1 + int(24 * room("markers.cloud").read_trial(cloud, scene).duration + 1e-4) < 60
+
+
+def test_a_ball_outside_the_bodies_time_leaves_the_cameras_with_the_bodies(walker):
+    scene, body = bpy.context.scene, walker(20.0, 8.0)
+    ball = room("stage.ball").create_ball(bpy.context, "Ball", scene.collection)
+    for frame in (300, 400):
+        ball.keyframe_insert("location", frame=frame)
+    bpy.ops.beyond_mocap.stage_view(view="BROADCAST")
+    assert np.all(np.abs(see(scene.camera, body, 30)[:2] - 0.5) < 0.3)
+
+
+def test_of_many_bodies_those_nearest_to_the_ball_are_framed(walker):
     presenting, scene = room("stage.presenting"), bpy.context.scene
     bpy.ops.beyond_mocap.add_stage()
     bodies = [walker(4.0 * i, 0.0, f"p{i}") for i in range(9)]
-    bpy.context.view_layer.update()
-    assert presenting.choose_objects(scene, [*scene.objects]) == [*bodies[4:5], *presenting.choose_objects(
-        scene, [*scene.objects])[1:]]
-    assert len(presenting.choose_objects(scene, [*scene.objects])) == presenting.MOST
-    assert presenting.choose_objects(scene, bodies[:2]) == bodies[:2]
     ball = room("stage.ball").create_ball(bpy.context, "Ball", scene.collection)
+    for frame in (1, 50):
+        ball.location.x = 31.0
+        ball.keyframe_insert("location", frame=frame)
     bpy.context.view_layer.update()
-    bodies[3].select_set(True)
-    assert presenting.choose_objects(scene, [ball]) == [ball, *[thing for thing in bpy.context.selected_objects
-                                                               if thing.type == "ARMATURE"]]
+    assert set(presenting.choose_objects(scene, [*scene.objects])) == set(bodies[3:])
+    assert presenting.choose_objects(scene, bodies[:2]) == bodies[:2]
+
+
+def test_a_new_ball_is_framed_with_who_throws_it(walker):
+    scene, thrower = bpy.context.scene, walker(0.0, 0.0)
+    for thing in bpy.context.selected_objects:
+        thing.select_set(False)
+    thrower.select_set(True)
+    ball = room("stage.ball").create_ball(bpy.context, "Ball", scene.collection)
+    assert room("stage.presenting").choose_objects(scene, [ball]) == [ball, thrower]
+
+
+@pytest.mark.parametrize("module, name", [
+    ("player", "import_tracking"), ("clips", "import_clips"), ("library", "import_clip"), ("markers", "import_markers"),
+    ("markers", "reconstruct_markers"), ("passes", "passes_make"), ("throws", "throw_at_target"),
+    ("throws", "kick_at_target"), ("library_labels", "annotate_clip"),
+])
+def test_what_makes_bodies_moves_the_view_to_them(module, name):
+    assert getattr(import_module(f"{EXTENSION}.operators.{module}"), f"BEYOND_MOCAP_OT_{name}").presents
+
+
+def test_exporters_read_the_grass_as_green(tmp_path):
+    bpy.ops.beyond_mocap.add_stage()
+    bpy.ops.export_scene.gltf(filepath=str(tmp_path / "stage.glb"))
+    raw = (tmp_path / "stage.glb").read_bytes()
+    found = json.loads(raw[20:20 + int.from_bytes(raw[12:16], "little")])["materials"]
+    red, green, blue, _ = next(one for one in found if one["name"] == "Pitch grass")["pbrMetallicRoughness"][
+        "baseColorFactor"]
+    assert green > 2 * red > blue
