@@ -6,11 +6,13 @@ import math
 from collections.abc import Callable
 from dataclasses import dataclass
 
+import bmesh
 import bpy
 from bpy.props import EnumProperty
 from mathutils import Euler
 
 from ..scene.core import sample, window
+from ..scene.core.material import get_material
 from ..scene.library import recordings
 from ..scene.result import queue
 from ..scene.stage.view_style import style_view
@@ -18,8 +20,9 @@ from .operator_base import BaseOperator
 
 FPS = 30  # frames per second of the sample's scene, those of its clips
 MATCH_SECONDS = (0.0, 8.0)  # s of the match that are shown
-WINDING = ((0.0, 0.0), (4.6, 0.0), (8.0, 2.4), (6.2, 5.8), (1.2, 4.6), (-2.4, 6.8), (-5.6, 5.2))  # m, of a path
-TARGET = (9.0, 2.0, 1.2)  # m, where the throw's target is
+WINDING = ((0.0, 0.0), (3.0, 0.0), (5.3, 1.6), (4.0, 3.9), (0.7, 3.0), (-1.6, 4.6), (-3.7, 3.4))  # m, of a path
+TARGET, TARGET_RADIUS = (9.0, 2.0, 1.2), 0.2  # m, of the throw's target
+TARGET_COLOUR = (0.9, 0.35, 0.02)  # linear RGB
 TILT = math.radians(70.0)  # of the free view, from straight down
 NLA_SHARE = 0.3  # of the 3D view's height, for the NLA editor
 
@@ -36,6 +39,7 @@ class Sample:
         find: finds in a scene what has been generated, to be shown (called with the scene); nothing if a step failed.
         next_step: what to try then.
         task: the task of the tab that it belongs to.
+        shows_empties: Blender's Empties are shown, since they are to be moved.
         heading: rad, direction of the free view; None looks through the scene's camera.
         seconds: length of the scene; what is longer extends it.
     """
@@ -47,6 +51,7 @@ class Sample:
     next_step: str
     task: str
     heading: float | None = None
+    shows_empties: bool = False
     seconds: float = 1.0
 
 
@@ -97,10 +102,21 @@ def make_passes(_context, how) -> None:
 def place_thrower(context, _how) -> None:
     """Show a standing player and add a target."""
     body = show_clip(context, "standing_2.bvh")
-    target = bpy.data.objects.new("Target", None)
-    target.empty_display_type, target.empty_display_size, target.location = "SPHERE", 0.3, TARGET
-    context.collection.objects.link(target)
+    target = create_target(context)
     body.beyond_mocap_throw.target = target
+
+
+def create_target(context) -> bpy.types.Object:
+    """Create the sphere that the ball is to hit."""
+    mesh, shape = bpy.data.meshes.new("Target"), bmesh.new()
+    bmesh.ops.create_icosphere(shape, subdivisions=3, radius=TARGET_RADIUS)
+    shape.to_mesh(mesh)
+    shape.free()
+    mesh.materials.append(get_material("Target", TARGET_COLOUR, 0.5))
+    target = bpy.data.objects.new("Target", mesh)
+    target.location = TARGET
+    context.collection.objects.link(target)
+    return target
 
 
 def throw_at_target(_context, how) -> None:
@@ -150,9 +166,10 @@ SAMPLES = {
                     find_bodies, "choose another time and press Make Match", task="MATCH"),
     "PATH": Sample("Path", "A recorded run that follows a winding path", (bend_path,), find_path,
                    "press Tab and move a point of the curve; the run follows", task="PATH", heading=math.radians(20.0),
-                   seconds=10.0),
+                   seconds=6.0),
     "PASSES": Sample("Passes", "Three players who pass a ball", (fill_passes, make_passes), find_bodies,
-                     "move a player's Empty; the passes follow", task="BALL", heading=math.radians(28.0)),
+                     "move a player's Empty; the passes follow", task="BALL", heading=math.radians(28.0),
+                     shows_empties=True),
     "THROW": Sample("Throw", "A player who throws a ball at a target", (place_thrower, throw_at_target), find_throw,
                     "move the target; the throw follows", task="BALL", heading=math.radians(-50.0), seconds=4.0),
     "MARKERS": Sample("Markers", "A walk recorded with optical markers", (import_markers, reconstruct_body),
@@ -242,7 +259,8 @@ def prepare_scene(context, wanted: Sample) -> None:
     scene.render.fps, scene.render.fps_base = FPS, 1.0
     scene.frame_start, scene.frame_end = 1, round(FPS * wanted.seconds)
     scene.beyond_mocap.library_folder, scene.beyond_mocap.task = str(library), wanted.task
-    if wanted.task != "MATCH":  # which adds the pitch of its own size
+    if wanted.task != "MATCH":  # which adds a pitch of its own size
+        scene.beyond_mocap_stage.stands = False  # which would hide the sky near a player
         bpy.ops.beyond_mocap.add_stage()
 
 
@@ -254,9 +272,6 @@ def is_free(scene: bpy.types.Scene) -> bool:
 
 def show_first(context, wanted: Sample) -> None:
     """Prepare the window while the motion is generated."""
-    if (area := window.find_view(context)) is None:
-        return
-    style_view(area.spaces.active, shows_helpers=wanted.heading is not None)
     if wanted.task == "PLAYER":
         window.open_editor(context, "NLA_EDITOR", "HORIZONTAL", NLA_SHARE)
 
@@ -266,6 +281,7 @@ def show_last(context, wanted: Sample) -> None:
     if (area := window.find_view(context)) is None:
         return
     scene = context.scene
+    style_view(area.spaces.active, wanted.shows_empties)
     if wanted.heading is None:
         window.look_through_camera(context)
     else:

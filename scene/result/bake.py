@@ -12,6 +12,7 @@ from ..core import action, channels, take_record
 from ..core.frame_range import extend_range
 from ..core.material import get_material
 from ..core.measure import frames_per_second, units_per_metre, whole_frames
+from ..core.names import find_named
 from ..core.session import StoredTake
 from ..core.settings import BeyondMocapPlayer, BeyondMocapSettings
 from ..rigs import armature
@@ -73,7 +74,7 @@ def write_ball(context: bpy.types.Context, path: BallPath) -> bpy.types.Object:
     """Write the ball's trajectory to the scene's ball."""
     scene = context.scene
     room = find_or_create_collection(scene)
-    target = room.objects.get(BALL) or ball.create_ball(context, BALL, room)
+    target = find_named(room.objects, BALL) or ball.create_ball(context, BALL, room)
     channels.remove_marked_action(target, MARK)
     ball.write_trajectory(target, path, scene, compute_frame(scene, float(path.times[0])))[MARK] = True
     return target
@@ -81,7 +82,7 @@ def write_ball(context: bpy.types.Context, path: BallPath) -> bpy.types.Object:
 
 def find_or_create_collection(scene: bpy.types.Scene) -> bpy.types.Collection:
     """Find or create the scene's collection for all baked objects."""
-    found = scene.collection.children.get(COLLECTION)
+    found = find_named(scene.collection.children, COLLECTION)
     if found is None:
         found = bpy.data.collections.new(COLLECTION)
         scene.collection.children.link(found)
@@ -118,7 +119,7 @@ def write_ribbon(context: bpy.types.Context, name: str, points: np.ndarray, rgb,
     line.points.foreach_set("co", placed.ravel())
     line.points.foreach_set("tilt", np.full(len(points), -np.pi / 2, np.float32))  # its upper side faces up
     data.materials.append(get_material(f"{name} colour", tuple(rgb), 0.9))
-    ribbon = collection.objects.get(name)
+    ribbon = find_named(collection.objects, name)
     if ribbon is None or ribbon.type != "CURVE":
         ribbon = bpy.data.objects.new(name, data)
         collection.objects.link(ribbon)

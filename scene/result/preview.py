@@ -14,6 +14,7 @@ from ...beyond_mocap.base.fixes import Fix
 from ..characters.player_character import update_character
 from ..core import channels, session
 from ..core.measure import build_scene_clock
+from ..core.names import find_named
 from ..core.saved_state import discard_saved_state, restore_nla, restore_playback, save_playback
 from ..core.settings import BeyondMocapPlayer
 from ..passes import possession
@@ -213,8 +214,8 @@ def _apply_shared(context: bpy.types.Context) -> None:
 
 def _with_free_ball(context: bpy.types.Context, change) -> None:
     """Call `change(context)` while no player holds the ball; possession is restored afterwards."""
-    room = context.scene.collection.children.get(bake.COLLECTION)
-    ball = room.objects.get(bake.BALL) if room is not None else None
+    room = find_named(context.scene.collection.children, bake.COLLECTION)
+    ball = find_named(room.objects, bake.BALL) if room is not None else None
     if ball is None or not len(ball.beyond_mocap_ball.holds):
         return change(context)
     possession.replace_own_action(context.scene, ball, lambda: change(context))
@@ -240,7 +241,7 @@ def _rename_datablocks(context: bpy.types.Context, player: BeyondMocapPlayer) ->
     if playing is not None and playing.get(MARK) and playing.library is None:
         playing.name = f"{player.name} take"
     room = bake.find_or_create_collection(context.scene)
-    ribbon, ball = room.objects.get(bake.build_track_name(player)), room.objects.get(bake.BALL)
+    ribbon, ball = find_named(room.objects, bake.build_track_name(player)), find_named(room.objects, bake.BALL)
     if ribbon is not None:
         ribbon.data.name = bake.build_track_name(player)
     path = channels.find_playing_action(ball)[0] if ball is not None else None
@@ -254,8 +255,8 @@ def _update_shared_objects(context: bpy.types.Context) -> None:
     shared = settings.shared
     takes = _list_takes(settings.players, "ACCEPTED", "PREVIEW")
     previews = any(player.result.state == "PREVIEW" for player in settings.players)
-    room = scene.collection.children.get(bake.COLLECTION)
-    ball = room.objects.get(bake.BALL) if room is not None else None
+    room = find_named(scene.collection.children, bake.COLLECTION)
+    ball = find_named(room.objects, bake.BALL) if room is not None else None
     if not previews:
         _restore_shared(scene, shared, ball)
         return
@@ -310,7 +311,7 @@ def _store_state(context: bpy.types.Context, player: BeyondMocapPlayer, new_take
         setattr(result, f"{name}_before", getattr(result, name))
     fits = body is not None and bake.is_matching(body, new_take.take, context.scene)
     result.mesh_made = not fits or not any(child.type == "MESH" for child in body.children)
-    ribbon = room.objects.get(bake.build_track_name(player))
+    ribbon = find_named(room.objects, bake.build_track_name(player))
     result.track_made = ribbon is None
     result.track = ribbon.data if ribbon is not None and ribbon.type == "CURVE" else None
     if fits:
@@ -336,7 +337,7 @@ def _remove_preview_objects(context: bpy.types.Context, player: BeyondMocapPlaye
     if result.mesh_made and body is not None:
         for child in [child for child in body.children if child.get(MARK)]:
             _remove_object(child)
-    ribbon = room.objects.get(bake.build_track_name(player))
+    ribbon = find_named(room.objects, bake.build_track_name(player))
     if ribbon is None:
         return
     if result.track_made:

@@ -210,7 +210,8 @@ def _find_ball(cast: Cast) -> np.ndarray:
     if cast.ball is None:
         return np.median(cast.places[:, :, :2], axis=0)
     known = np.isfinite(cast.ball[:, 0])
-    return np.stack([np.interp(cast.frames, cast.frames[known], column[known]) for column in cast.ball[:, :2].T], axis=1)
+    columns = [np.interp(cast.frames, cast.frames[known], column[known]) for column in cast.ball[:, :2].T]
+    return np.stack(columns, axis=1)
 
 
 def _compute_place(view: str, size: tuple[float, float], middle: np.ndarray) -> np.ndarray:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import bpy
 
+from ..core.names import find_named
 from .pitch import SIZE
 
 NAME = "Stage"
@@ -46,7 +47,7 @@ def list_own_objects(stage: bpy.types.Collection) -> list[bpy.types.Object]:
 def find_focus(scene: bpy.types.Scene) -> bpy.types.Object | None:
     """Find the empty that the following camera is attached to; None where there is no such camera."""
     stage = find_stage(scene)
-    return stage.objects.get(FOCUS) if stage is not None else None
+    return find_named(stage.objects, FOCUS) if stage is not None else None
 
 
 def find_pitch_size(scene: bpy.types.Scene) -> tuple[float, float]:

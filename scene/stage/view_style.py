@@ -8,12 +8,12 @@ SKY = (0.35, 0.50, 0.72)  # linear RGB behind the stage
 HELPER_LINES = ("floor", "axis_x", "axis_y", "cursor", "relationship_lines")
 
 
-def style_view(space: bpy.types.SpaceView3D, shows_helpers: bool) -> None:
+def style_view(space: bpy.types.SpaceView3D, shows_empties: bool) -> None:
     """Show materials' colours, shadows and a sky in a 3D view, without Blender's grid over the pitch.
 
     Args:
         space: the 3D view.
-        shows_helpers: whether empties, curves and cameras are shown.
+        shows_empties: whether Empties, lights and cameras are shown.
     """
     shading, overlay = space.shading, space.overlay
     shading.type, shading.light = "SOLID", "STUDIO"  # the light first: it decides which studio lights exist
@@ -23,4 +23,4 @@ def style_view(space: bpy.types.SpaceView3D, shows_helpers: bool) -> None:
     shading.background_type, shading.background_color = "VIEWPORT", SKY
     for name in HELPER_LINES:
         setattr(overlay, f"show_{name}", False)
-    overlay.show_extras, overlay.show_bones = shows_helpers, False
+    overlay.show_extras, overlay.show_bones = shows_empties, False

@@ -435,6 +435,7 @@ ROWS = {
     "load_bone_map": Row("rig", lambda places: {"filepath": f"{saved_map(places)}"}, unmapped),
     "load_marker_model": Row("imported", lambda places: {"filepath": f"{marker_model_file(places)}"}),
     "load_marker_set": Row("imported", lambda places: {"filepath": f"{marker_set_file(places)}"}),
+    "load_sample": Row("imported", lambda places: {"which": "PATH"}),
     "load_video": Row("imported", lambda places: {"filepath": f"{places.match}/{worlds.PICTURE}"}),
     "make_assets": Row("imported", prepare=list_clips),
     "make_match": Row("imported", prepare=a_match),
