@@ -1,5 +1,5 @@
-"""A character's armature, analysed once for all bodies that are copies of it: which bone moves which part, its skin, and
-its twist bones; and a motion on it, as curves of its bones.
+"""A character's armature, analysed once for all bodies that are copies of it: which bone moves which part, its skin,
+and its twist bones; and a motion on it, as curves of its bones.
 """
 
 from __future__ import annotations
@@ -12,7 +12,6 @@ import numpy as np
 
 from ...beyond_mocap.motion import quaternion
 from ...beyond_mocap.motion.motion import Motion
-from ...beyond_mocap.motion.skeleton import Skeleton
 from ..rigs import bone_maps
 from ..rigs.bone_curves import build_bone_curves, compute_bone_poses
 from ..rigs.driven import DrivenRig
