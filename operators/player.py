@@ -11,6 +11,7 @@ from ..beyond_mocap.annotation.label_candidates import find_label_candidates
 from ..beyond_mocap.base.errors import InputError
 from ..beyond_mocap.base.fixes import Fix
 from ..beyond_mocap.files.tracking.providers import PROVIDERS
+from ..scene.characters import player_character
 from ..scene.core import frame_range, notices
 from ..scene.core.settings import find_active_player, to_absolute_path, to_setting_path
 from ..scene.player import dots, pins, tracks
@@ -264,3 +265,23 @@ a preview is applied"""
         dots.remove_dot(context.scene, player)
         settings.players.remove(settings.active_player)
         settings.active_player = max(0, min(settings.active_player, len(settings.players) - 1))
+
+
+def has_character(context) -> bool:
+    """Whether the active player has a character and a motion."""
+    player = find_active_player(context.scene.beyond_mocap)
+    return player is not None and player.character is not None and player.body is not None
+
+
+class BEYOND_MOCAP_OT_update_character(BaseOperator, bpy.types.Operator):
+    """Give the active player's character the present motion of their body, such as after editing its keys"""
+
+    bl_idname = "beyond_mocap.update_character"
+    bl_label = "Update Body"
+    needs = "Synthesize, then choose a character for the active player", has_character
+
+    def do(self, context):
+        player = find_active_player(context.scene.beyond_mocap)
+        lines = player_character.show_character(context, player)
+        player.character_note = "\n".join(lines)
+        self.report({"INFO"}, f"{player.character.name} plays the motion of {player.name}")

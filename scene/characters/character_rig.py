@@ -1,5 +1,5 @@
-"""A character's armature, analysed once for all bodies that are copies of it: which bone moves which part, its skin, and
-its twist bones; and a motion on it, as curves of its bones.
+"""A character's armature, analysed once for all bodies that are copies of it: which bone moves which part, its skin,
+and its twist bones; and a motion on it, as curves of its bones.
 """
 
 from __future__ import annotations

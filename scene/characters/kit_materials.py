@@ -23,8 +23,8 @@ WORN = "beyond_mocap_worn"
 """Custom property of a character's copy: the name of the kit that it wears, and part -> colour, linear RGB."""
 
 _TINT = "Kit Colour"  # name of the node that colours a texture
-_NAMES = {"shirt": re.compile(r"(?i)shirt|jersey|top|torso|tunic|kit$"), "shorts": re.compile(r"(?i)short|pants|trouser"),
-          "socks": re.compile(r"(?i)sock|stocking")}
+_NAMES = {"shirt": re.compile(r"(?i)shirt|jersey|top|torso|tunic|kit$"),
+          "shorts": re.compile(r"(?i)short|pants|trouser"), "socks": re.compile(r"(?i)sock|stocking")}
 
 
 def find_kit_materials(original: bpy.types.Object) -> dict[str, bpy.types.Material]:

@@ -12,7 +12,7 @@ from ..rigs.driven import DrivenRig
 TOUCHING_PARTS = ("foot", "toe", "hand", "head", "upper_leg")
 _SOLE_DEPTH = 0.03  # m above the lowest point of a foot up to which its points belong to the sole
 _SOLE_CELL, _SKIN_CELL = 0.012, 0.008  # m: one point is kept in each cell
-_SAMPLE_DISTANCE, _MAX_CUTS = 0.012, 8  # m between points on large faces, and into how many parts an edge is cut at most
+_SAMPLE_DISTANCE, _MAX_CUTS = 0.012, 8  # m between points on large faces; parts into which an edge is cut at most
 
 
 def read_skin(driven: DrivenRig, meshes: list[bpy.types.Object]) -> dict[str, np.ndarray]:

@@ -12,7 +12,6 @@ from ..rigs.fit import SourceMotion
 from . import copies
 from .ball_touches import list_ball_touches
 from .character_rig import CharacterRig
-from .kit_materials import dress
 
 
 class TeamCharacters:
@@ -83,10 +82,6 @@ class TeamCharacters:
             self._add_message(str(error))
             return False
         return True
-
-    def dress(self, body: bpy.types.Object, kit) -> None:
-        """Dress a body in a kit of the match."""
-        dress(body, kit.name, {part: getattr(kit, part) for part in ("shirt", "shorts", "socks")})
 
     def build_keys(self, body: bpy.types.Object, motion: Motion, start: float, take=None):
         """Build the keys of a stretch on a body.

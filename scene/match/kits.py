@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import bpy
 import numpy as np
 
+from ..characters.kit_materials import WORN, dress
 from ..core.material import create_material
 from ..stage.body import CLOTH
 from . import match_objects as ours
@@ -110,6 +111,14 @@ def update_materials(scene: bpy.types.Scene, colours: dict[str, str]) -> None:
             for part, rgb in _build_part_colours(kit).items():
                 for material in used & set(_find_materials(kit, part)):
                     _set_colour(material, rgb)
+            for body in ours.find_armatures(scene):
+                if body.get(WORN, {}).get("kit") == kit.name:
+                    dress_in_kit(body, kit)
+
+
+def dress_in_kit(body: bpy.types.Object, kit: Kit) -> None:
+    """Dress a copy of a character of the file in a kit."""
+    dress(body, kit.name, {"shirt": kit.shirt, "shorts": kit.shorts, "socks": kit.socks})
 
 
 def create_kit_material(kit: Kit, part: str) -> bpy.types.Material:

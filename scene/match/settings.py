@@ -112,6 +112,7 @@ class BeyondMocapMatch(bpy.types.PropertyGroup):
     shown_first: IntProperty(options={"HIDDEN"}, description="First displayed frame")
     shown_rate: FloatProperty(options={"HIDDEN"}, description="Frame rate of the keys; 0: the scene's")
     shown: StringProperty(options={"HIDDEN"}, description="Displayed folder; empty if there is none")
+    shown_section: StringProperty(options={"HIDDEN"}, description="Name of what is displayed in this session")
 
     def list_characters(self) -> dict[str, bpy.types.Object | None]:
         """List the teams' own characters by group."""

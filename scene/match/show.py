@@ -14,16 +14,15 @@ import numpy as np
 from ...beyond_mocap.motion.track.ball_path import BallPath
 from ..characters import copies
 from ..characters.team_characters import TeamCharacters
-from ..core import action, channels, frame_range
+from ..core import action, channels, frame_range, session
 from ..core.measure import frames_per_second, units_per_metre
 from ..stage import ball, cameras, stage
 from . import match_objects as ours
 from .characters import CharacterBuilder, build_label
-from .kits import choose_kit
+from .kits import choose_kit, dress_in_kit
 from .load import Character, MatchSection
 
 VISIBILITY_GROUP = "Shown"  # group of curves
-_shown: dict[str, tuple[MatchSection, int]] = {}  # scene -> what was shown last in this session
 
 
 def show_match(context: bpy.types.Context, section: MatchSection, first: int) -> dict[str, float]:
@@ -37,7 +36,7 @@ def show_match(context: bpy.types.Context, section: MatchSection, first: int) ->
         Seconds that pitch, bodies, keys and cameras took.
     """
     scene, durations = context.scene, {}
-    _shown[scene.name] = section, first
+    scene.beyond_mocap_match.shown_section = session.store_section(section, first)
     ours.clear_match(scene)
     ours.include_collections(context.view_layer)
     last = int(np.floor(compute_frame(scene, section.start, first, section.end) + 1e-4))
@@ -64,7 +63,7 @@ def show_match(context: bpy.types.Context, section: MatchSection, first: int) ->
 
 def show_again(context: bpy.types.Context) -> bool:
     """Show what this session showed last in the scene, with other bodies; False where there is nothing."""
-    known = _shown.get(context.scene.name)
+    known = session.find_section(context.scene.beyond_mocap_match.shown_section)
     if known is None or ours.find_root(context.scene) is None:
         return False
     show_match(context, *known)
@@ -158,7 +157,7 @@ def _create_characters(context: bpy.types.Context, section: MatchSection, own: T
         home = ours.create_collection(context.scene, person.team)
         worn = own.create_body(person.team, person.keeper, build_label(person), home)
         if worn is not None:
-            own.dress(worn[0], choose_kit(person, section.colours))
+            dress_in_kit(worn[0], choose_kit(person, section.colours))
             worn[0][ours.PLAYER_PROPERTY] = person.id
         found.append((person, [ours.mark_object(one) for one in worn] if worn is not None
                       else wardrobe.create_character(person, home)))

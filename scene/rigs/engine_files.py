@@ -1,7 +1,7 @@
 """Files for game engines and other programs by presets: one file for each player, or one of the whole scene.
 
-A player's file has objects without rotation and scale, and a root bone that follows on the ground, as engines expect. The
-scene's file has everything as Blender shows it, with meshes that move point by point (Alembic) or by bones (USD).
+A player's file has objects without rotation and scale, and a root bone that follows on the ground, as engines expect.
+The scene's file has everything as Blender shows it, with meshes that move point by point (Alembic) or by bones (USD).
 """
 
 from __future__ import annotations
@@ -13,6 +13,9 @@ from pathlib import Path
 import bpy
 
 from ...beyond_mocap.base.errors import InputError, format_count
+from ..characters.player_character import find_shown_body
+from ..core.settings import find_active_player
+from ..match import match_objects
 from . import export
 from .rig import ROOTS
 
@@ -51,6 +54,27 @@ PRESET_ITEMS = (
 )
 ROOT_ITEMS = tuple(item for item in ROOTS if item[0] != "STRAIGHT")
 SCENE_FORMATS = ("USD", "ABC", "GLB")
+DELIVERED_ITEMS = (("ACTIVE", "Active Player", "The active player; without players the active armature"),
+       ("PLAYERS", "Selected Players", "Every selected player of the list, one file for each"),
+       ("MATCH", "Match", "Every player of the displayed match, one file for each"),
+       ("SCENE", "Whole Scene", "Everything visible, in one file of USD, Alembic or glTF"))
+
+
+def list_delivered_rigs(context: bpy.types.Context, who: str) -> list[bpy.types.Object]:
+    """List the armatures to deliver, "ACTIVE", "PLAYERS" or "MATCH"; InputError where no match is shown."""
+    settings = context.scene.beyond_mocap
+    if who == "MATCH":
+        found = match_objects.find_armatures(context.scene)
+        if not found:
+            raise InputError("export", "no match is shown", "a displayed match", "press Show Match first")
+        return [body for body in found if body.name in context.view_layer.objects]
+    if who == "PLAYERS":
+        return [body for player in settings.players if player.use and (body := find_shown_body(player)) is not None]
+    player = find_active_player(settings)
+    if player is not None and find_shown_body(player) is not None:
+        return [find_shown_body(player)]
+    active = context.object
+    return [active] if active is not None and active.type == "ARMATURE" else []
 
 
 def deliver_players(

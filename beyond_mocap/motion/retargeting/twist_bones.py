@@ -1,7 +1,7 @@
 """Twist bones: bones along a limb that share its roll, so that skin does not wring at a wrist or a shoulder.
 
-A forearm's twist bone at a share s of its length rolls with s of the hand's roll about the forearm. An upper arm's, or a
-thigh's, gives back the part of the limb's own roll that its place does not have: -(1 - s) of it.
+A forearm's twist bone at a share s of its length rolls with s of the hand's roll about the forearm. An upper arm's, or
+a thigh's, gives back the part of the limb's own roll that its place does not have: -(1 - s) of it.
 """
 
 from __future__ import annotations

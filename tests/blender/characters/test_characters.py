@@ -155,7 +155,8 @@ def start_player(room, core, clip):
     player.name = "Ada"
     body = room("rigs.armature").create_armature(bpy.context, clip.skeleton, "Ada")
     room("core.action").write_motion(body, clip, scene, 1)
-    room("stage.body").create_character(body, "Ada", (0.5, 0, 0), collection=scene.collection, scene=scene, example=clip)
+    room("stage.body").create_character(body, "Ada", (0.5, 0, 0), collection=scene.collection, scene=scene,
+                                        example=clip)
     player.body = body
     return player
 
