@@ -147,6 +147,7 @@ class _ContactMatcher:
         self.limbs: tuple[Limb, Limb] = (body.left, body.right)
         self.touches, self.soles = touches, soles
         self.spread = max(1, round(_SPREAD_SECONDS * motion.fps))
+        self._raise_body()
         self._move_body_to_ball()
         self.places, self.world = compute_pose(self.skeleton, self.root, self.rotations)
         self.rotations_out, self.drop = self.rotations, np.zeros(len(self.root))
@@ -227,6 +228,15 @@ class _ContactMatcher:
     def _compute_touch_shift(self, touch: PartTouch, shift: np.ndarray) -> np.ndarray:
         """Compute the further shift (T, 3) m of a part that brings its skin to the ball at the touch's frames."""
         return _fade_around(touch.frames, self._solve_shift(touch, shift), len(shift), TOUCH_SECONDS * self.fps)
+
+    def _raise_body(self) -> None:
+        """Raise the whole body by what its soles need in the median, so that knees are bent as the source's."""
+        places, world = compute_pose(self.skeleton, self.root, self.rotations)
+        needed = self.source.heights - np.stack([measure_sole_heights(sole, places, world) for sole in self.soles],
+                                                axis=1)
+        is_stance = self.source.contacts.any(axis=2)
+        if is_stance.any():
+            self.root = self.root + [0.0, 0.0, float(np.median(needed[is_stance]))]
 
     def _move_body_to_ball(self) -> None:
         """Move the whole body at touches of parts that no limb moves, such as the head."""
