@@ -162,16 +162,7 @@ the body in the view"""
         if context.view_layer.objects.active is None or context.mode == "OBJECT":
             window.select_only(context, body)
         if self.frame_view and not bpy.app.background:
-            _frame_selection(context)
-
-
-def _frame_selection(context) -> None:
-    """Frame the selection in every 3D view."""
-    for area in context.screen.areas:
-        if area.type == "VIEW_3D":
-            region = next(region for region in area.regions if region.type == "WINDOW")
-            with context.temp_override(area=area, region=region):
-                bpy.ops.view3d.view_selected(use_all_regions=False)
+            window.frame_objects(context, [body])
 
 
 class BEYOND_MOCAP_OT_go_to_moment(TimelineVerb, bpy.types.Operator):

@@ -18,7 +18,7 @@ from mathutils import Matrix, Vector
 from ..core import window
 from ..core.live import Watcher
 from ..core.settings import find_active_player
-from . import ball_paths, colours, momentum, path_overlays, shapes, store
+from . import ball_paths, colours, contact_handles, momentum, path_overlays, shapes, store
 from .prepare import Mesh, PreparedTake
 from .text_places import Box, find_free_box
 
@@ -142,7 +142,7 @@ def _list_path_items(context) -> list[path_overlays.DrawItem]:
     items = []
     if context.space_data.overlay.show_overlays and getattr(context.scene, "beyond_mocap", None) is not None:
         items = [*path_overlays.list_items(context.scene), *ball_paths.list_items(context.scene),
-                 *momentum.list_items(context.scene)]
+                 *momentum.list_items(context.scene), *contact_handles.list_items(context.scene)]
     now = {item.key for item in items}
     for key in [key for key in _batches if not isinstance(key[0], str) and key not in now]:
         del _batches[key]
