@@ -140,7 +140,7 @@ class Construction:
     def _edit_contacts(self, planted: PlantResult, steps_taken: Steps) -> tuple[PlantResult, Steps]:
         """Apply the plan's contact edits."""
         size = self.plan.size
-        edits = [edit if size == 1.0 else replace(edit, offset=tuple(value / size for value in edit.offset))
+        edits = [edit if size == 1.0 else replace(edit, offset=(edit.offset[0] / size, edit.offset[1] / size))
                  for edit in self.plan.requested.contact_edits]
         return apply_contact_edits(self.library.skeleton, planted, steps_taken, edits, self.plan.fps,
                                    start=float(self.track.times[0]))
