@@ -14,16 +14,16 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ...base.easing import smoothstep
-from ...base.time_series import find_runs, hann_smooth, interpolate_columns
-from ...motion import quaternion
-from ...motion.foot_plant import MAX_DROP, Foot, PlantResult, build_foot, compute_pelvis_drop, limit_to_reach
-from ...motion.humanoid import Limb, identify_joints
-from ...motion.limb import solve_two_bone
-from ...motion.motion import compute_pose
-from ...motion.skeleton import Skeleton
-from ..contact_edit import ADDED_SECONDS, FEET, ContactEdit
-from .extra_steps import Steps
+from ..base.easing import smoothstep
+from ..base.time_series import find_runs, hann_smooth, interpolate_columns
+from ..motion import quaternion
+from ..motion.foot_plant import MAX_DROP, Foot, PlantResult, build_foot, compute_pelvis_drop, limit_to_reach
+from ..motion.humanoid import Limb, identify_joints
+from ..motion.limb import solve_two_bone
+from ..motion.motion import compute_pose
+from ..motion.skeleton import Skeleton
+from .construct.extra_steps import Steps
+from .contact_edit import ADDED_SECONDS, FEET, ContactEdit
 
 MIN_SWING, MIN_STANCE = 0.1, 0.07  # s that a swing and a contact last at least
 REACH_SECONDS = 0.1  # s beside a contact within which an edit still finds it
