@@ -1,4 +1,4 @@
-"""Operators of Synthesize: new takes, updates, other solutions, contacts that the user edits (Fix Foot), and presets."""
+"""Operators of Synthesize: new takes, updates, other solutions, contacts that the user edits, and presets."""
 
 from __future__ import annotations
 
