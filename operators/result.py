@@ -6,6 +6,7 @@ import bpy
 from bpy.props import BoolProperty, EnumProperty, FloatProperty, IntProperty, StringProperty
 
 from ..beyond_mocap.base.errors import InputError
+from ..beyond_mocap.base.fixes import Fix
 from ..beyond_mocap.base.settings.synthesis import FORMS
 from ..scene.core import channels, session
 from ..scene.core.measure import frames_per_second
@@ -51,7 +52,8 @@ applied result to the other form"""
         lost = [player.name for player in not_shown if session.find_take(player.take) is None]
         if lost or not players:
             found = f"no take of {', '.join(lost) or 'any player'} in this session"
-            raise InputError("apply", found, "a take", "synthesize again")
+            raise InputError("apply", found, "a take", "synthesize again",
+                             fixes=(Fix("press", "beyond_mocap.synthesize"),))
         for line in (line for player in players for line in preview.revert_path_edit(player)):
             self.report({"INFO"}, line)
         for player in not_shown:
@@ -162,13 +164,15 @@ corrections, jerk, speed, cuts"""
     def do(self, context):
         player = find_active_player(context.scene.beyond_mocap)
         if player is None or player.body is None:
-            raise InputError("error curves", "the active player has no body", "a body", "synthesize first")
+            raise InputError("error curves", "the active player has no body", "a body", "synthesize first",
+                             fixes=(Fix("press", "beyond_mocap.synthesize"),))
         if player.body.library is not None or player.body.data.library is not None:
             raise InputError(f"body {player.body.name}", "is linked from another file", "an armature of this file")
         if self.remove:
             quality.remove_error_curves(player.body)
         elif session.find_take(player.take) is None:
-            raise InputError(f"player {player.name}", "has no take in this session", "a take", "synthesize again")
+            raise InputError(f"player {player.name}", "has no take in this session", "a take", "synthesize again",
+                             fixes=(Fix("press", "beyond_mocap.synthesize"),))
         else:
             quality.write_error_curves(context.scene, player)
 

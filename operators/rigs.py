@@ -10,9 +10,10 @@ from bpy_extras.io_utils import ExportHelper, ImportHelper
 
 from ..beyond_mocap.base.errors import InputError
 from ..beyond_mocap.files.bvh import bvh
+from ..scene.characters.player_character import find_shown_body
 from ..scene.core import action, channels, take_record, window
 from ..scene.core.settings import find_active_player
-from ..scene.rigs import armature, bone_maps, export, rig, rig_bake
+from ..scene.rigs import armature, bone_maps, engine_files, export, rig, rig_bake
 from ..scene.rigs.driven import DrivenRig, check_rig
 from ..scene.rigs.fit import BakeOptions, read_source
 from .operator_base import BaseOperator, ExportOperator
@@ -247,7 +248,7 @@ stays unchanged"""
 
     bl_idname = "beyond_mocap.export_motion"
     bl_label = "Export Motion"
-    filter_glob: StringProperty(default="*.fbx;*.glb;*.usdc;*.bvh", options={"HIDDEN"})
+    filter_glob: StringProperty(default="*.fbx;*.glb;*.usdc;*.abc;*.bvh", options={"HIDDEN"})
     format: EnumProperty(name="Format", items=rig.FORMATS, default="FBX", description="Format of the file")
     engine: EnumProperty(name="For", items=rig.ENGINES, default="BLENDER", description="Program to export for")
     who: EnumProperty(name="Export", items=rig.EXPORT_CHOICES, default="ACTIVE", description="Armatures to export")
@@ -281,13 +282,13 @@ stays unchanged"""
         if self.who == "SELECTED":
             return [one for one in context.selected_objects if one.type == "ARMATURE"]
         if self.who == "PLAYERS":
-            chosen = [player.rig or player.body for player in settings.players if player.use]
+            chosen = [find_shown_body(player) for player in settings.players if player.use]
             return [one for one in chosen if one is not None]
         player = find_active_player(settings)
         if settings.rig.target is not None and (settings.rig.source or player is None or player.rig is None):
             return [settings.rig.target]
-        if player is not None and (player.rig or player.body) is not None:
-            return [player.rig or player.body]
+        if player is not None and find_shown_body(player) is not None:
+            return [find_shown_body(player)]
         active = context.object
         return [active] if active is not None and active.type == "ARMATURE" else []
 
@@ -301,6 +302,56 @@ stays unchanged"""
             self.report({"WARNING"}, "The take's rate is not known; exported at the scene's frame rate. "
                                      "Press Synthesize and Apply to store it")
         return rate
+
+
+class BEYOND_MOCAP_OT_deliver(BaseOperator, bpy.types.Operator):
+    """Write files for an engine or another program into a folder, one for each player or one of the whole scene; the
+scene stays unchanged"""
+
+    bl_idname = "beyond_mocap.deliver"
+    bl_label = "Deliver"
+    bl_options = {"REGISTER", "PRESET"}
+    directory: StringProperty(name="Folder", subtype="DIR_PATH", options={"SKIP_SAVE"},
+                              description="Folder for the files; those of the same names are replaced")
+    filter_folder: BoolProperty(default=True, options={"HIDDEN", "SKIP_SAVE"})
+    preset: EnumProperty(name="For", items=engine_files.PRESET_ITEMS, default="UNREAL",
+                         description="Program to deliver to")
+    who: EnumProperty(name="Deliver", items=engine_files.DELIVERED_ITEMS, default="ACTIVE",
+                      description="What is delivered")
+    root: EnumProperty(name="Root Motion", items=engine_files.ROOT_ITEMS, default="SMOOTH",
+                       description="Motion of the root bone")
+    meshes: BoolProperty(name="Meshes", default=True, description="Also deliver the meshes that armatures move")
+
+    def invoke(self, context, _event):
+        """Choose the folder."""
+        context.window_manager.fileselect_add(self)
+        return {"RUNNING_MODAL"}
+
+    def draw(self, _context):
+        """Draw the settings beside the file browser."""
+        layout = self.layout
+        layout.use_property_split, layout.use_property_decorate = True, False
+        layout.prop(self, "preset")
+        layout.prop(self, "who")
+        column = layout.column()
+        column.active = self.who != "SCENE"
+        column.prop(self, "root")
+        column.prop(self, "meshes")
+
+    def do(self, context):
+        """Write the files and report them."""
+        if not self.directory:
+            raise InputError("export", "no folder given", "a folder to write to", "choose a folder")
+        folder = Path(bpy.path.abspath(self.directory))
+        if self.who == "SCENE":
+            suffix = export.SUFFIXES[engine_files.PRESETS[self.preset].format]
+            name = Path(bpy.data.filepath).stem or "scene"
+            lines = engine_files.deliver_scene(context, folder / f"{name}{suffix}", self.preset)
+        else:
+            lines = engine_files.deliver_players(context, engine_files.list_delivered_rigs(context, self.who), folder,
+                                                 self.preset, self.root, meshes=self.meshes)
+        for line in lines:
+            self.report({"INFO"}, line)
 
 
 class BEYOND_MOCAP_OT_export_bvh(BaseOperator, bpy.types.Operator, ExportHelper):

@@ -70,6 +70,7 @@ class BEYOND_MOCAP_OT_update_live(TakeOperator, bpy.types.Operator):
     bl_idname = "beyond_mocap.update_live"
     bl_label = "Live Update"
     bl_options = {"UNDO", "INTERNAL"}
+    pops_up = False
     player: bpy.props.StringProperty(name="Player", description="Name of the player in the list", options={"SKIP_SAVE"})
     kind: bpy.props.EnumProperty(name="Kind", items=(("quick", "Quick", "With a narrow search"),
                                                      ("whole", "Full", "In full quality, with figures")),
@@ -236,7 +237,7 @@ class BEYOND_MOCAP_OT_fix_foot(TakeOperator, bpy.types.Operator):
             return {"CANCELLED"}
         self.view, self.region = context.area, next(one for one in context.area.regions if one.type == "WINDOW")
         context.window_manager.modal_handler_add(self)
-        context.workspace.status_text_set(STATUS)
+        window.show_status(STATUS)
         return {"RUNNING_MODAL"}
 
     def show_contacts(self, context):
@@ -290,12 +291,12 @@ class BEYOND_MOCAP_OT_fix_foot(TakeOperator, bpy.types.Operator):
             self.handles.offset = np.zeros(2)
             by = self.measure_time_drag(event)
             contact = self.handles.contacts[self.handles.chosen]
-            context.workspace.status_text_set(f"{contact.foot} foot: {contact.start + by:.2f} to "
-                                              f"{contact.end + by:.2f} s ({by:+.2f} s)")
+            window.show_status(f"{contact.foot} foot: {contact.start + by:.2f} to "
+                               f"{contact.end + by:.2f} s ({by:+.2f} s)")
         elif place is not None:
             self.handles.offset = place - start
             length = 100.0 * float(np.linalg.norm(self.handles.offset))
-            context.workspace.status_text_set(f"{length:.0f} cm   Esc: cancel   {STATUS}")
+            window.show_status(f"{length:.0f} cm   Esc: cancel   {STATUS}")
         self.view.tag_redraw()
         return {"RUNNING_MODAL"}
 
@@ -319,7 +320,7 @@ class BEYOND_MOCAP_OT_fix_foot(TakeOperator, bpy.types.Operator):
         else:
             self.handles.offset = np.zeros(2)
         self.drag = None
-        context.workspace.status_text_set(STATUS)
+        window.show_status(STATUS)
         return {"RUNNING_MODAL"}
 
     def handle_key(self, context, event):

@@ -413,7 +413,15 @@ def measure_shortfall(foot: Foot, goal: np.ndarray, drop: np.ndarray) -> np.ndar
 
 
 def limit_to_reach(foot: Foot, goal: np.ndarray, drop: np.ndarray) -> np.ndarray:
-    """Limit the goals (T, 3) of feet in the air to the leg's length, or to its length in the recording."""
+    """Limit the goals of feet in the air to the leg's length, or to its length in the recording.
+
+    Args:
+        foot: the foot.
+        goal: (T, 3) m, world.
+        drop: (T,) m by which the pelvis is lowered.
+    Returns:
+        (T, 3) m, world.
+    """
     hip = foot.hip - drop[:, None] * [0.0, 0.0, 1.0]
     reach = goal - hip
     far = np.linalg.norm(reach, axis=1)

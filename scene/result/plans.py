@@ -7,6 +7,7 @@ import numpy as np
 
 from ...beyond_mocap.annotation import Timeline
 from ...beyond_mocap.base.errors import InputError
+from ...beyond_mocap.base.fixes import Fix
 from ...beyond_mocap.base.time_series import interpolate_columns
 from ...beyond_mocap.motion.track import Track, clean_track
 from ...beyond_mocap.synthesis.heading_plan import HeadingKey
@@ -27,7 +28,8 @@ def list_selected_players(settings: BeyondMocapSettings) -> list[BeyondMocapPlay
     """List the players that are switched on. Raises InputError if there is none."""
     players = [player for player in settings.players if player.use]
     if not players:
-        raise InputError("players", "no players are selected", "at least one", "import tracking in step 2")
+        raise InputError("players", "no players are selected", "at least one", "import tracking in step 2",
+                         fixes=(Fix("use_all_players"), Fix("add_track")))
     return players
 
 

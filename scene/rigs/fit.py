@@ -68,7 +68,7 @@ class FittedMotion:
         if options.exact:
             self.scale, self.slides, self.motion, self.messages = 1.0, 3 * (Slide(0.0, 0.0),), source.motion, []
             return
-        motion, skeleton = source.motion, _add_head_tip(driven.skeleton, source.motion.skeleton)
+        motion, skeleton = source.motion, add_head_tip(driven.skeleton, source.motion.skeleton)
         heel_toe_contacts = contacts.detect_heel_toe_contacts(motion)
         if source.foot_contacts is not None:
             heel_toe_contacts = heel_toe_contacts | source.foot_contacts[:, :, None]
@@ -112,7 +112,7 @@ class FittedMotion:
         return lines
 
 
-def _add_head_tip(skeleton: Skeleton, source: Skeleton) -> Skeleton:
+def add_head_tip(skeleton: Skeleton, source: Skeleton) -> Skeleton:
     """Add a tip to the driven skeleton's head, as far off the vertical as the source's in its rest pose.
 
     Heads that look straight ahead at rest then match. Unchanged where the source's rest pose shows nothing.

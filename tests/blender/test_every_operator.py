@@ -19,6 +19,7 @@ import bpy
 import cached_work
 import numpy as np
 import pytest
+import sample_characters as characters
 import sample_rigs as rigs
 import worlds
 from conftest import EXTENSION, find_free_port
@@ -256,6 +257,15 @@ def bake_it():
     bpy.ops.beyond_mocap.bake_to_rig()
 
 
+def a_still_character():
+    """The first player's body is a character that has lost its keys."""
+    rig, player = rigs.create_mixamo(), bpy.context.scene.beyond_mocap.players[0]
+    characters.add_mesh(rig, EXTENSION)
+    player.character = rig
+    player.character_body.animation_data.action = None
+    worlds.select_objects(player.body)
+
+
 def a_target(act="throw"):
     """Something far away to aim at: the 3D cursor; and a model that is quickly read."""
     bpy.context.scene.cursor.location = (20.0, 1.0, 1.0)
@@ -393,6 +403,7 @@ ROWS = {
     "draw_track": Row("imported"),
     "edit_path": Row("accepted"),
     "edit_words": Row("imported", lambda places: {"words": "header"}, pick_a_moment),
+    "deliver": Row("accepted", lambda places: {"directory": f"{places.out}/", "preset": "GODOT"}, changes=False),
     "error_curves": Row("synthesized"),
     "export_bvh": Row("accepted", lambda places: {"filepath": f"{places.out}/out.bvh"}, changes=False),
     "export_motion": Row(
@@ -424,6 +435,7 @@ ROWS = {
     "load_bone_map": Row("rig", lambda places: {"filepath": f"{saved_map(places)}"}, unmapped),
     "load_marker_model": Row("imported", lambda places: {"filepath": f"{marker_model_file(places)}"}),
     "load_marker_set": Row("imported", lambda places: {"filepath": f"{marker_set_file(places)}"}),
+    "load_sample": Row("imported", lambda places: {"which": "PATH"}),
     "load_video": Row("imported", lambda places: {"filepath": f"{places.match}/{worlds.PICTURE}"}),
     "make_assets": Row("imported", prepare=list_clips),
     "make_match": Row("imported", prepare=a_match),
@@ -451,6 +463,7 @@ ROWS = {
     "path_camera": Row("imported", lambda places: {"which": "SIDE"}, lay_cameras),
     "path_cameras": Row("accepted", prepare=ride),
     "path_curve": Row("accepted", lambda places: {"count": 7}, ride),
+    "hover_timeline": Row("imported", changes=False, window=True),
     "pick_moment": Row("imported", changes=False, window=True),
     "place_players": Row("imported", prepare=forget_dots),
     "player_from_dot": Row("imported", prepare=lose_a_player),
@@ -479,6 +492,7 @@ ROWS = {
         "imported", lambda places: {"filepath": f"{places.out}/set.txt"}, a_cloud, changes=False
     ),
     "save_words": Row("clip", lambda places: {"overwrite": True}, changes=False),
+    "set_automatic": Row("imported", lambda places: {"path": "beyond_mocap.omega", "value": 3.0}),
     "set_static": Row("imported", prepare=two_clouds),
     "set_speed": Row("imported", lambda places: {"speed": 2.0}, draw),
     "show_match": Row("imported", prepare=a_made_match),
@@ -491,6 +505,7 @@ ROWS = {
     "stream_end": Row("imported", prepare=play_live, changes=False),
     "stream_keep": Row("imported", prepare=listen),
     "stream_play": Row("imported", prepare=fill_scene),
+    "stage_view": Row("accepted", lambda places: {"view": "BROADCAST"}),
     "stream_start": Row("imported", changes=False),
     "stream_stop": Row("imported", prepare=lambda: bpy.ops.beyond_mocap.stream_start(), changes=False),
     "stream_target": Row("imported", lambda places: {"number": 2}, play_live),
@@ -505,6 +520,7 @@ ROWS = {
     "update_path": Row("accepted", prepare=ride_elsewhere),
     "update_live": Row("synthesized", lambda places: {"player": "player1", "kind": "quick"}),
     "use_marker_set": Row("imported", lambda places: {"which": "plug_in_gait_legs"}, a_cloud),
+    "update_character": Row("accepted", prepare=a_still_character),
     "use_selected_rig": Row("rig", prepare=another_rig),
     "variants": Row("synthesized", lambda places: {"count": 2}),
     "words_to_text": Row("imported"),

@@ -1,4 +1,4 @@
-"""Own keys as a layer: exactly the take at influence 0, exactly the keyed pose at 1; kept by updates, and removed."""
+"""Own keys as a layer: exactly the take at influence 0, the keyed pose at 1; kept by updates, and taken away."""
 
 import importlib
 
