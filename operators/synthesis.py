@@ -232,7 +232,8 @@ class BEYOND_MOCAP_OT_fix_foot(TakeOperator, bpy.types.Operator):
         """Show the footprints and wait for the pointer."""
         if bpy.app.background or context.area is None or context.area.type != "VIEW_3D":
             return self.execute(context)
-        self.player, self.handles, self.drag, self.is_changed = "", None, None, False
+        self.player, self.handles, self.drag = "", None, None
+        self.is_changed = self.is_updating = False
         if self.attempt(lambda: self.show_contacts(context)) != {"FINISHED"}:
             return {"CANCELLED"}
         self.view, self.region = context.area, next(one for one in context.area.regions if one.type == "WINDOW")
@@ -280,6 +281,9 @@ class BEYOND_MOCAP_OT_fix_foot(TakeOperator, bpy.types.Operator):
     def handle_motion(self, context, event):
         """Highlight the footprint under the pointer, or drag the chosen one."""
         place = self.find_ground_place(event)
+        if self.is_updating and not context.window_manager.beyond_mocap_work.kind:
+            self.is_updating = False
+            window.show_status(STATUS)  # the update has shown its progress there
         if self.drag is None:
             found = None if place is None else self.handles.find_nearest(place, find_current_second(context.scene))
             if found is not None and found != self.handles.chosen:
@@ -351,7 +355,7 @@ class BEYOND_MOCAP_OT_fix_foot(TakeOperator, bpy.types.Operator):
 
     def update(self, context, message: str):
         """Update the take quickly; its figures follow when the operator stops."""
-        self.is_changed = True
+        self.is_changed = self.is_updating = True
         bpy.ops.ed.undo_push(message=message[:60])
         bpy.ops.beyond_mocap.update_live("INVOKE_DEFAULT", player=self.player, kind="quick")
         self.view.tag_redraw()
