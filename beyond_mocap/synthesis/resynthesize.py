@@ -27,9 +27,9 @@ from ..motion.track import SampledTrack
 from ..motion.track.ball_path import BallPath
 from .body_size import to_library_size
 from .construct.construction import Construction, build_key_results, find_touches
-from .construct.contact_edits import find_edited_frames
 from .construct.edit_blending import OldMotion, blend_with_old, compute_old_share
 from .construct.transitions import compute_spread_reaches
+from .edited_contacts import find_edited_frames
 from .plan import Plan, ResolvedPlan
 from .provenance import list_labels_shown, list_sources
 from .resolve_plan import resolve_plan

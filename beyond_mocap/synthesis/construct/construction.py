@@ -29,6 +29,7 @@ from ...motion.motion import Motion
 from ...motion.toe_roll import roll_toes
 from ...motion.track import SampledTrack
 from ..body_size import scale_ball
+from ..edited_contacts import apply_contact_edits
 from ..exertion import compute_exertion
 from ..plan import ResolvedPlan
 from ..search.edit_list import EditList
@@ -37,7 +38,6 @@ from ..search.source_frames import SourceFrames, SourceMotion, fetch_overlap
 from ..take import KeyResult
 from .ball_touch.touch_frames import Touch
 from .breathing import breathe, compute_breath_depth
-from .contact_edits import apply_contact_edits
 from .edit_blending import OldMotion
 from .extra_steps import Steps, add_steps
 from .gaze import compute_release, estimate_look, hide_lost_ball, watch_ball
@@ -140,7 +140,7 @@ class Construction:
     def _edit_contacts(self, planted: PlantResult, steps_taken: Steps) -> tuple[PlantResult, Steps]:
         """Apply the plan's contact edits."""
         size = self.plan.size
-        edits = [edit if size == 1.0 else replace(edit, offset=tuple(value / size for value in edit.offset))
+        edits = [edit if size == 1.0 else replace(edit, offset=(edit.offset[0] / size, edit.offset[1] / size))
                  for edit in self.plan.requested.contact_edits]
         return apply_contact_edits(self.library.skeleton, planted, steps_taken, edits, self.plan.fps,
                                    start=float(self.track.times[0]))

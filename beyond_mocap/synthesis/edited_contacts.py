@@ -14,16 +14,16 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ...base.easing import smoothstep
-from ...base.time_series import find_runs, hann_smooth, interpolate_columns
-from ...motion import quaternion
-from ...motion.foot_plant import MAX_DROP, Foot, PlantResult, build_foot, compute_pelvis_drop, limit_to_reach
-from ...motion.humanoid import Limb, identify_joints
-from ...motion.limb import solve_two_bone
-from ...motion.motion import compute_pose
-from ...motion.skeleton import Skeleton
-from ..contact_edit import ADDED_SECONDS, FEET, ContactEdit
-from .extra_steps import Steps
+from ..base.easing import smoothstep
+from ..base.time_series import find_runs, hann_smooth, interpolate_columns
+from ..motion import quaternion
+from ..motion.foot_plant import MAX_DROP, Foot, PlantResult, build_foot, compute_pelvis_drop, limit_to_reach
+from ..motion.humanoid import Limb, identify_joints
+from ..motion.limb import solve_two_bone
+from ..motion.motion import compute_pose
+from ..motion.skeleton import Skeleton
+from .construct.extra_steps import Steps
+from .contact_edit import ADDED_SECONDS, FEET, ContactEdit
 
 MIN_SWING, MIN_STANCE = 0.1, 0.07  # s that a swing and a contact last at least
 REACH_SECONDS = 0.1  # s beside a contact within which an edit still finds it
@@ -283,7 +283,7 @@ def _map_contacts(stances: list[_Stance], source: np.ndarray, contacts: np.ndarr
 
 def _compute_sway(paths: list[_FootPath], fps: float) -> np.ndarray:
     """Compute how far the pelvis goes with moved feet, (T, 3) m."""
-    wanted = PELVIS_SHARE * sum(path.offset for path in paths)
+    wanted = PELVIS_SHARE * np.sum([path.offset for path in paths], axis=0)
     reach = int(round(FADE * fps))
     smooth = np.column_stack([hann_smooth(column, reach) for column in wanted.T])
     return np.column_stack([smooth, np.zeros(len(smooth))])
@@ -326,5 +326,5 @@ def _follow_paths(skeleton: Skeleton, planted: PlantResult, pose, *, paths: list
 
 def _build_moved_foot(pose, limb: Limb, path: _FootPath, sway: np.ndarray, affected: np.ndarray) -> Foot:
     """Build a foot under the moved pelvis; in affected frames it counts as firmly in contact from touchdown on."""
-    foot = build_foot(*pose, limb, path.contacts)
+    foot = build_foot(pose[0], pose[1], limb, path.contacts)
     return replace(foot, hip=foot.hip + sway, weight=(affected[:, None] & (foot.weight > 0.0)).astype(float))
