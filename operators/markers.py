@@ -47,6 +47,7 @@ class BEYOND_MOCAP_OT_import_markers(ImportOperator, bpy.types.Operator):
 
     bl_idname = "beyond_mocap.import_markers"
     bl_label = "Import Markers"
+    presents = True
     filename_ext = ".c3d"
     filter_glob: StringProperty(default="*.c3d;*.trc", options={"HIDDEN"})
     unit: FloatProperty(
@@ -72,6 +73,7 @@ class BEYOND_MOCAP_OT_import_markers(ImportOperator, bpy.types.Operator):
             bpy.ops.object.mode_set(mode="OBJECT")
         clouds_added = [self.add_cloud(context, path, trial) for path, trial in trials]
         window.select_only(context, *clouds_added)
+        context.scene.beyond_mocap.task = "MARKERS"
 
     def add_cloud(self, context, path: Path, trial) -> bpy.types.Object:
         """Create one cloud, and report messages on it."""
@@ -299,6 +301,7 @@ class BEYOND_MOCAP_OT_reconstruct_markers(MarkersVerb, BackgroundOperator, bpy.t
 
     bl_idname = "beyond_mocap.reconstruct_markers"
     bl_label = "Reconstruct"
+    presents = True
     kind = "reconstruct markers"
 
     def order(self, context):

@@ -6,7 +6,7 @@ import bpy
 
 from ..scene.core.settings import find_active_player
 from .characters import draw_player_character
-from .tab import StepPanel, TabPanel, create_value_column, draw_header, draw_paragraph, draw_section
+from .tab import StepPanel, TabPanel, create_value_column, draw_header, draw_paragraph, draw_section, draw_values
 
 
 class BEYOND_MOCAP_UL_players(bpy.types.UIList):
@@ -27,6 +27,7 @@ class BEYOND_MOCAP_PT_players(StepPanel, bpy.types.Panel):
 
     bl_label = "2  Track & Labels"
     task = "PLAYER"
+    rooms = ("player", "track", "timeline", "timeline_labels", "annotate")
     bl_order = 2
 
     def find_state(self, context):
@@ -128,8 +129,8 @@ def draw_curve_settings(column, player) -> None:
 def draw_player_settings(layout, player) -> None:
     """Draw the settings of this player: body, height, foot, style."""
     column = create_value_column(layout)
-    for name in ("body", "height", "strong_foot", "style", "style_weight", "strength", "masses", "fatigue"):
-        column.prop(player, name)
+    names = ("body", "height", "strong_foot", "style", "style_weight", "strength", "masses", "fatigue")
+    draw_values(column, player, names, {"height": 1.8})
 
 
 def draw_pins(layout, player) -> None:

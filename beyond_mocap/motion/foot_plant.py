@@ -413,7 +413,7 @@ def measure_shortfall(foot: Foot, goal: np.ndarray, drop: np.ndarray) -> np.ndar
 
 
 def limit_to_reach(foot: Foot, goal: np.ndarray, drop: np.ndarray) -> np.ndarray:
-    """Limit an ankle's goals in the air to the leg's length, or to its length in the recording.
+    """Limit the goals of feet in the air to the leg's length, or to its length in the recording.
 
     Args:
         foot: the foot.

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ...beyond_mocap.base.errors import InputError, UserCancelledError, format_seconds
+from ...beyond_mocap.base.fixes import Fix
 from ...beyond_mocap.motion.motion import Motion
 from ...beyond_mocap.motion.track.ball_path import BallPath
 
@@ -149,7 +150,8 @@ def _resolve_span(request: DisplayRequest, state: dict) -> tuple[float, float]:
     if end - start < 0.2:
         found = f"{format_seconds(request.start)} to {format_seconds(request.end)} s"
         expected = f"a time within {format_seconds(first)} to {format_seconds(last)} s"
-        raise InputError(request.folder, found, expected, "press Make Match for another time")
+        raise InputError(request.folder, found, expected, "press Make Match for another time",
+                         fixes=(Fix("press", "beyond_mocap.make_match"),))
     return start, end
 
 

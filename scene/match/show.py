@@ -11,15 +11,12 @@ from time import perf_counter
 import bpy
 import numpy as np
 
-from ...beyond_mocap.base.time_series import interpolate_columns
 from ...beyond_mocap.motion.track.ball_path import BallPath
 from ..characters import copies
 from ..characters.team_characters import TeamCharacters
-from ..core import action, channels, session
+from ..core import action, channels, frame_range, session
 from ..core.measure import frames_per_second, units_per_metre
-from ..result import bake
-from ..stage import ball, stage
-from . import cameras
+from ..stage import ball, cameras, stage
 from . import match_objects as ours
 from .characters import CharacterBuilder, build_label
 from .kits import choose_kit, dress_in_kit
@@ -44,7 +41,7 @@ def show_match(context: bpy.types.Context, section: MatchSection, first: int) ->
     ours.include_collections(context.view_layer)
     last = int(np.floor(compute_frame(scene, section.start, first, section.end) + 1e-4))
     with _measure_seconds(durations, "pitch"):
-        _create_pitch(scene, section)
+        stage.create_stage(scene, (section.length, section.width))
     with _measure_seconds(durations, "bodies"):
         own = TeamCharacters(context, scene.beyond_mocap_match.list_characters())
         characters = _create_characters(context, section, own)
@@ -57,12 +54,10 @@ def show_match(context: bpy.types.Context, section: MatchSection, first: int) ->
         if section.ball is not None:
             bake_ball(context, section.ball, section.start, first)
     with _measure_seconds(durations, "cameras"):
-        frames, size = np.arange(first, last + 1), (section.length, section.width)
-        camera = cameras.create_broadcast_camera(scene, size, frames, _compute_camera_targets(scene, section, frames,
-                first))
-    if scene.camera is None:  # none, or one that has just been removed
+        camera = cameras.get_camera(scene, "BROADCAST")
+    if scene.camera is None or cameras.is_own(scene, scene.camera):
         scene.camera = camera
-    bake.extend_scene(scene, last)
+    frame_range.extend_range(scene, last)
     return durations
 
 
@@ -155,17 +150,6 @@ def _measure_seconds(durations: dict[str, float], name: str):
     durations[name] = perf_counter() - began
 
 
-def _create_pitch(scene: bpy.types.Scene, section: MatchSection) -> None:
-    """Create grass, lines, goals and daylight; the "Stage" of single players is removed while a match is displayed."""
-    stage.remove_stage(scene)
-    home, units, size = ours.create_collection(scene, "pitch"), units_per_metre(scene), (section.length, section.width)
-    surface = stage.create_grass(home, units, size), stage.create_lines(home, units, size)
-    for thing in (*surface, *stage.create_goals(home, units, size[0]), stage.create_sun(home)):
-        ours.mark_object(thing)
-    if scene.world is None:
-        scene.world = stage.create_sky()
-
-
 def _create_characters(context: bpy.types.Context, section: MatchSection, own: TeamCharacters):
     """Create all characters with their objects: copies of the team's own character, or built-in bodies."""
     wardrobe, found = CharacterBuilder(context, section.colours), []
@@ -178,24 +162,6 @@ def _create_characters(context: bpy.types.Context, section: MatchSection, own: T
         found.append((person, [ours.mark_object(one) for one in worn] if worn is not None
                       else wardrobe.create_character(person, home)))
     return found
-
-
-def _compute_camera_targets(scene: bpy.types.Scene, section: MatchSection, frames: np.ndarray,
-                            first: int) -> np.ndarray:
-    """Compute what the stand's camera follows, (F, 2) m: the ball, or the mean position of all players."""
-    seconds = section.start + (frames - first) / frames_per_second(scene)
-    if section.ball is not None:
-        path = section.ball
-        return interpolate_columns(seconds, path.times, path.positions[:, :2])
-    total, count = np.zeros((len(frames), 2)), np.zeros(len(frames))
-    for person in section.characters:
-        for begins, motion in person.motions:
-            times = begins + np.arange(len(motion)) / motion.fps
-            is_present = (seconds >= times[0]) & (seconds <= times[-1])
-            for axis in range(2):
-                total[is_present, axis] += np.interp(seconds[is_present], times, motion.root_positions[:, axis])
-            count += is_present
-    return total / np.maximum(count, 1.0)[:, None]
 
 
 def _create_trajectory_curve(scene: bpy.types.Scene, path: BallPath) -> bpy.types.Object:

@@ -137,7 +137,7 @@ def export_sampled(
     """Export the sampled motion of armatures (`sample_rigs`) and of other objects to one file; returns messages."""
     scene, rate = context.scene, options.rate or frames_per_second(context.scene)
     count = len(sampled[rigs[0].name].object_matrices)
-    meshes_by_rig = {rig.name: _list_meshes(scene, rig)
+    meshes_by_rig = {rig.name: list_meshes(scene, rig)
                      for rig in rigs} if options.meshes and options.format != "BVH" else {}
     lies = {mesh: _find_rest_placement(rig, mesh) for rig in rigs for mesh in meshes_by_rig.get(rig.name, ())}
     messages = []
@@ -375,7 +375,7 @@ def _compute_channels(matrices: np.ndarray) -> dict[str, np.ndarray]:
     return found | ({"scale": size} if np.abs(size - 1.0).max() > _SCALE_TOLERANCE else {})
 
 
-def _list_meshes(scene: bpy.types.Scene, rig: bpy.types.Object) -> list[bpy.types.Object]:
+def list_meshes(scene: bpy.types.Scene, rig: bpy.types.Object) -> list[bpy.types.Object]:
     """List the meshes that an armature moves, visible now or at some other time by their keys."""
     moved = [thing for thing in scene.objects if thing.type == "MESH" and (
         thing.parent == rig or any(m.type == "ARMATURE" and m.object == rig for m in thing.modifiers))]

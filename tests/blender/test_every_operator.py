@@ -92,6 +92,23 @@ def two_variants():
     bpy.ops.beyond_mocap.variants(count=2)
 
 
+def move_a_contact():
+    edit = bpy.context.scene.beyond_mocap.players[0].contact_edits.add()
+    edit.time, edit.offset = 3.0, (0.1, 0.0)
+
+
+def key_a_pose():
+    body = bpy.context.scene.beyond_mocap.players[0].body
+    bpy.context.scene.frame_set(20)
+    body.pose.bones[0].location.z += 0.1
+    body.pose.bones[0].keyframe_insert("location")
+
+
+def keep_a_layer():
+    key_a_pose()
+    bpy.ops.beyond_mocap.keep_as_layer()
+
+
 def pin_a_hand():
     bpy.ops.beyond_mocap.add_pin(part="right_hand")
 
@@ -393,6 +410,7 @@ ROWS = {
         "accepted", lambda places: {"filepath": f"{places.out}/out.glb", "format": "GLB"}, changes=False
     ),
     "export_words": Row("imported", lambda places: {"filepath": f"{places.out}/out.txt"}, changes=False),
+    "fix_foot": Row("synthesized", lambda places: {"time": 3.0, "offset": (0.05, 0.0)}),
     "find_release": Row("imported", prepare=a_body_of_markers),
     "free_ball": Row("accepted", prepare=carry),
     "go_to_strike": Row("accepted", lambda places: {"frame": 7}, analyse),
@@ -417,6 +435,7 @@ ROWS = {
     "load_bone_map": Row("rig", lambda places: {"filepath": f"{saved_map(places)}"}, unmapped),
     "load_marker_model": Row("imported", lambda places: {"filepath": f"{marker_model_file(places)}"}),
     "load_marker_set": Row("imported", lambda places: {"filepath": f"{marker_set_file(places)}"}),
+    "load_sample": Row("imported", lambda places: {"which": "PATH"}),
     "load_video": Row("imported", lambda places: {"filepath": f"{places.match}/{worlds.PICTURE}"}),
     "make_assets": Row("imported", prepare=list_clips),
     "make_match": Row("imported", prepare=a_match),
@@ -444,6 +463,7 @@ ROWS = {
     "path_camera": Row("imported", lambda places: {"which": "SIDE"}, lay_cameras),
     "path_cameras": Row("accepted", prepare=ride),
     "path_curve": Row("accepted", lambda places: {"count": 7}, ride),
+    "hover_timeline": Row("imported", changes=False, window=True),
     "pick_moment": Row("imported", changes=False, window=True),
     "place_players": Row("imported", prepare=forget_dots),
     "player_from_dot": Row("imported", prepare=lose_a_player),
@@ -456,6 +476,9 @@ ROWS = {
     "relink_library": Row("imported", lambda places: {"directory": f"{moved(places.clips)}/"}),
     "remove_clip": Row("clip"),
     "remove_heading_key": Row("imported", prepare=face_ball),
+    "keep_as_layer": Row("accepted", prepare=key_a_pose),
+    "remove_layer": Row("accepted", prepare=keep_a_layer),
+    "remove_contact_edit": Row("synthesized", prepare=move_a_contact),
     "remove_pin": Row("synthesized", prepare=pin_a_hand),
     "remove_player": Row("imported"),
     "remove_video": Row("video"),
@@ -469,6 +492,7 @@ ROWS = {
         "imported", lambda places: {"filepath": f"{places.out}/set.txt"}, a_cloud, changes=False
     ),
     "save_words": Row("clip", lambda places: {"overwrite": True}, changes=False),
+    "set_automatic": Row("imported", lambda places: {"path": "beyond_mocap.omega", "value": 3.0}),
     "set_static": Row("imported", prepare=two_clouds),
     "set_speed": Row("imported", lambda places: {"speed": 2.0}, draw),
     "show_match": Row("imported", prepare=a_made_match),
@@ -481,6 +505,7 @@ ROWS = {
     "stream_end": Row("imported", prepare=play_live, changes=False),
     "stream_keep": Row("imported", prepare=listen),
     "stream_play": Row("imported", prepare=fill_scene),
+    "stage_view": Row("accepted", lambda places: {"view": "BROADCAST"}),
     "stream_start": Row("imported", changes=False),
     "stream_stop": Row("imported", prepare=lambda: bpy.ops.beyond_mocap.stream_start(), changes=False),
     "stream_target": Row("imported", lambda places: {"number": 2}, play_live),
