@@ -11,7 +11,7 @@ from mathutils import Matrix
 from ...beyond_mocap.base.errors import InputError
 from ..rigs import armature
 
-COPY_OF = "beyond_mocap_character"
+COPY_OF = "beyond_mocap_copy_of"
 """Custom property of a copy: the original."""
 
 SHOWN = "beyond_mocap_shown"

@@ -108,23 +108,13 @@ def read_player_motion(scene: bpy.types.Scene, player) -> tuple[SourceMotion, tu
     Raises:
         InputError: if it plays nothing.
     """
+    source = read_source(player.body, scene)
     stored = session.find_take(player.take) if player.take else None
     if stored is None or player.body.beyond_mocap_ride.on:
-        return read_source(player.body, scene), ()
-    take = stored.take
-
-    def to_seconds(frames: np.ndarray) -> np.ndarray:
-        settings = scene.beyond_mocap
-        return settings.start_time + (frames - settings.start_frame) / frames_per_second(scene)
-
-    def find_contacts(frames: np.ndarray) -> np.ndarray:
-        at = np.round((to_seconds(frames) - take.start_time) * take.motion.fps).astype(int)
-        inside = (at >= 0) & (at < len(take.contacts))
-        return take.contacts[np.clip(at, 0, len(take.contacts) - 1)] & inside[:, None]
-
-    source = read_source(player.body, scene, find_contacts)
-    seconds = to_seconds(source.start + np.arange(len(source.motion)))
-    return source, list_ball_touches(take, source.motion, seconds)
+        return source, ()
+    settings, frames = scene.beyond_mocap, source.start + np.arange(len(source.motion))
+    seconds = settings.start_time + (frames - settings.start_frame) / frames_per_second(scene)
+    return source, list_ball_touches(stored.take, source.motion, seconds)
 
 
 def _show_builtin(player, is_shown: bool) -> None:

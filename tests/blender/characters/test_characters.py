@@ -184,7 +184,7 @@ def test_a_player_gets_a_character_and_the_built_in_body_again(room, core, clip)
     player.character = None
     assert player.character_body is None and not other.hide_render
     assert not any(one.hide_render for one in player.body.children)
-    assert not [thing for thing in bpy.data.objects if "beyond_mocap_character" in thing]
+    assert not [thing for thing in bpy.data.objects if "beyond_mocap_copy_of" in thing]
 
 
 def test_a_textured_shirt_keeps_its_light_and_dark(room, core, clip):
