@@ -42,6 +42,7 @@ class BEYOND_MOCAP_OT_apply_fix(NoticeOperator, bpy.types.Operator):
 
     bl_idname = "beyond_mocap.apply_fix"
     bl_label = "Apply Fix"
+    bl_options = {"UNDO", "INTERNAL"}
     index: IntProperty(name="Fix", min=0, options={"SKIP_SAVE"}, description="Number of the fix among the notice's own")
 
     @classmethod
@@ -71,6 +72,7 @@ class BEYOND_MOCAP_OT_try_again(NoticeOperator, bpy.types.Operator):
 
     bl_idname = "beyond_mocap.try_again"
     bl_label = "Try Again"
+    bl_options = {"UNDO", "INTERNAL"}
 
     def do(self, context):
         """Run the operator of the notice."""

@@ -113,6 +113,26 @@ def pin_a_hand():
     bpy.ops.beyond_mocap.add_pin(part="right_hand")
 
 
+def lack_a_label():
+    """The library lacks a label, and Synthesize has told so."""
+    bpy.context.scene.frame_set(30)
+    bpy.ops.beyond_mocap.add_moment(words="scissors left back")
+    with pytest.raises(RuntimeError, match="the library has no clip"):
+        bpy.ops.beyond_mocap.synthesize()
+
+
+def allow_nearest_labels():
+    """What has failed would work now."""
+    lack_a_label()
+    bpy.context.scene.beyond_mocap.nearest = True
+
+
+def two_frames_of_the_stage():
+    bpy.ops.beyond_mocap.add_stage()
+    scene = bpy.context.scene
+    scene.use_preview_range, scene.frame_preview_start, scene.frame_preview_end = True, 5, 6
+
+
 def select_ball():
     """The ball's dot, active."""
     worlds.select_objects(bpy.data.objects["Ball dot"])
@@ -421,6 +441,13 @@ ROWS = {
     "import_markers": Row("imported", lambda places: {"filepath": f"{places.match}/walk.trc"}),
     "import_tracking": Row("imported", lambda places: {"filepath": f"{places.match}/player1.csv"}),
     "import_words": Row("imported", lambda places: {"filepath": f"{places.match}/player1.txt"}),
+    "apply_fix": Row("imported", prepare=lack_a_label),
+    "contact_sheet": Row("synthesized", lambda places: {"filepath": f"{places.out}/sheet.png", "height": 16, "count": 1,
+                                                        "samples": 1}, two_frames_of_the_stage, changes=False),
+    "dismiss_notice": Row("imported", prepare=lack_a_label, changes=False),
+    "preview_movie": Row("synthesized", lambda places: {"filepath": f"{places.out}/film.mp4", "height": 16,
+                                                        "samples": 1}, two_frames_of_the_stage, changes=False),
+    "try_again": Row("imported", prepare=allow_nearest_labels),
     "judge_proposal": Row("clip", prepare=list_proposals),
     "join_spans": Row("imported", prepare=two_spans),
     "jump_to": Row("synthesized", lambda places: {"seconds": 2.0}),
