@@ -1,4 +1,4 @@
-"""Operators of Synthesize: new takes, updates, other solutions, and the presets of its settings."""
+"""Operators of Synthesize: new takes, updates, other solutions, presets of its settings, and automatic values."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from ..scene.core import background, session
 from ..scene.core.settings import find_active_player
 from ..scene.result import freshness, plans, queue
 from ..scene.result import synthesis_request as orders
-from .operator_base import NEEDS_LIBRARY
+from .operator_base import NEEDS_LIBRARY, BaseOperator
 from .take_queue import TakeOperator
 
 
@@ -152,3 +152,31 @@ class BEYOND_MOCAP_OT_add_preset(AddPresetBase, bpy.types.Operator):
     preset_subdir = "beyond_mocap/synthesis"
     preset_defines = ["settings = bpy.context.scene.beyond_mocap"]
     preset_values = [f"settings.{row.identifier}" for row in list_settings("synthesis") if row.in_preset]
+
+
+class BEYOND_MOCAP_OT_set_automatic(BaseOperator, bpy.types.Operator):
+    """Set a value of your own, or let it be chosen automatically"""
+
+    bl_idname = "beyond_mocap.set_automatic"
+    bl_label = "Automatic"
+    bl_options = {"UNDO", "INTERNAL"}
+    object: StringProperty(name="Object", options={"SKIP_SAVE"}, description="Object that has the value; empty: the "
+                           "scene")
+    path: StringProperty(name="Path", options={"SKIP_SAVE"}, description="Data path of the value")
+    value: FloatProperty(name="Value", options={"SKIP_SAVE"}, description="Value to set; 0 chooses it automatically")
+
+    @classmethod
+    def description(cls, _context, properties):
+        return ("Set a value of your own instead of the automatic one" if properties.value
+                else "Choose the value automatically again")
+
+    def do(self, context):
+        """Set the value."""
+        thing = bpy.data.objects.get(self.object) if self.object else context.scene
+        place, _, name = self.path.rpartition(".")
+        try:
+            owner = thing.path_resolve(place)
+            value = type(getattr(owner, name))(self.value)
+        except (AttributeError, ValueError, TypeError):
+            raise InputError("automatic value", self.path or "no path", "the path of a number") from None
+        setattr(owner, name, value)
