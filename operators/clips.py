@@ -16,7 +16,7 @@ from ..beyond_mocap.motion import humanoid
 from ..beyond_mocap.motion.mirror import mirror
 from ..beyond_mocap.motion.motion import Motion, place_motion
 from ..beyond_mocap.motion.quaternion import from_up_angle, rotate
-from ..scene.core import action, channels, window
+from ..scene.core import action, channels, frame_range, window
 from ..scene.library import assets, clips, foreign, recordings
 from ..scene.rigs import armature, export
 from .operator_base import BackgroundOperator, BaseOperator, ImportOperator
@@ -28,6 +28,7 @@ motion, from the hips up and in metres"""
 
     bl_idname = "beyond_mocap.import_clips"
     bl_label = "Import Motion Clips"
+    presents = True
     filename_ext = ".bvh"
     filter_glob: StringProperty(default=";".join(f"*{ending}" for ending in (".bvh", *FOREIGN)), options={"HIDDEN"})
     unit: FloatProperty(name="Metres per Unit", default=0.0, min=0.0, precision=5,
@@ -59,6 +60,8 @@ motion, from the hips up and in metres"""
             bodies.append(body)
             for note in clip.notes:
                 self.report({"INFO"}, f"{name}: {note}")
+        ends = [channels.find_playing_action(body)[0].frame_range[1] for body in bodies]
+        frame_range.fit_range(context.scene, max(ends), bodies)
         window.select_only(context, bodies[-1], *bodies)
         self.report({"INFO"}, f"Clips imported at the scene's frame rate: {len(bodies)}")
 

@@ -47,6 +47,7 @@ class BEYOND_MOCAP_OT_import_markers(ImportOperator, bpy.types.Operator):
 
     bl_idname = "beyond_mocap.import_markers"
     bl_label = "Import Markers"
+    presents = True
     filename_ext = ".c3d"
     filter_glob: StringProperty(default="*.c3d;*.trc", options={"HIDDEN"})
     unit: FloatProperty(
@@ -300,6 +301,7 @@ class BEYOND_MOCAP_OT_reconstruct_markers(MarkersVerb, BackgroundOperator, bpy.t
 
     bl_idname = "beyond_mocap.reconstruct_markers"
     bl_label = "Reconstruct"
+    presents = True
     kind = "reconstruct markers"
 
     def order(self, context):

@@ -8,15 +8,17 @@ import bpy
 from bpy.props import BoolProperty, CollectionProperty, EnumProperty, FloatProperty, StringProperty
 
 from ..beyond_mocap.base.errors import InputError, format_count
+from ..beyond_mocap.base.fixes import Fix
 from ..scene.core import channels, session, window
 from ..scene.core.measure import frames_per_second
 from ..scene.core.settings import to_setting_path
-from ..scene.match import cameras, load, show
 from ..scene.match import command_process as child
+from ..scene.match import load, show
 from ..scene.match import match_objects as ours
 from ..scene.match import request as order
 from ..scene.match.settings import find_active_player, format_float
 from ..scene.rigs import export, rig
+from ..scene.stage import cameras, eyes, stage
 from .operator_base import NEEDS_LIBRARY, BackgroundOperator, BaseOperator, ExportOperator, ViewDropHandler
 
 SYNTHESIS_SHARE = 0.85
@@ -27,6 +29,11 @@ class MatchVerb(BackgroundOperator):
     """An operator that ends with a stretch of a match in the scene."""
 
     bl_options = {"REGISTER", "UNDO"}
+
+    @property
+    def presents(self):
+        """The first stretch that is shown is framed; one in place of another is not."""
+        return not ours.find_armatures(bpy.context.scene)
 
     def find_library(self, wanted: load.DisplayRequest):
         """Find the library if this session has it."""
@@ -199,7 +206,8 @@ page"""
             end = shown.shown_start + (last - shown.shown_first) / rate
             expected = f"{format_float(shown.shown_start)} to {format_float(end)} s"
             raise InputError("match", f"{format_float(self.seconds)} s is not shown", expected,
-                             "choose From and To around it and press Show Match")
+                             "choose From and To around it and press Show Match",
+                             fixes=(Fix("press", "beyond_mocap.show_match"),))
         body = _find_body(scene, self.player) if self.player else None
         scene.frame_set(frame)
         if body is not None and body.name in context.view_layer.objects and context.mode == "OBJECT":
@@ -211,7 +219,7 @@ def _find_body(scene: bpy.types.Scene, player: str) -> bpy.types.Object:
     known = {thing.get(ours.PLAYER_PROPERTY): thing for thing in ours.find_armatures(scene)}
     if player not in known:
         raise InputError("match", f"{player} is not shown", f"one of {', '.join(map(str, known))}",
-                         "select the player and press Show Match")
+                         "select the player and press Show Match", fixes=(Fix("press", "beyond_mocap.show_match"),))
     return known[player]
 
 
@@ -244,15 +252,11 @@ class BEYOND_MOCAP_OT_match_camera(ShownMatchVerb, bpy.types.Operator):
         """Make it the scene's camera, and look through it in the 3D view."""
         scene = context.scene
         if self.which == "EYES":
-            camera = cameras.create_eyes_camera(scene, self.find_body(context), show.find_ball(scene))
+            camera = eyes.create_eyes_camera(scene, self.find_body(context), show.find_ball(scene))
         else:
-            camera = cameras.find_broadcast_camera(scene)
-        if camera is None:
-            raise InputError("match", "no camera in the stand", "the match's camera", "press Show Match again")
+            camera = cameras.get_camera(scene, "BROADCAST")
         scene.camera = camera
-        area = None if bpy.app.background else window.find_largest_editor(context.window.screen, "VIEW_3D")
-        if area is not None:
-            _look_through(context, area)
+        window.look_through_camera(context)
 
     def find_body(self, context) -> bpy.types.Object:
         """Find the armature that is named, selected, or active in the list."""
@@ -266,14 +270,6 @@ class BEYOND_MOCAP_OT_match_camera(ShownMatchVerb, bpy.types.Operator):
                           or (chosen.feed_id if chosen else shown[0].get(ours.PLAYER_PROPERTY)))
 
 
-def _look_through(context, area: bpy.types.Area) -> None:
-    """Show the scene's camera in the 3D view, with its whole frame."""
-    area.spaces.active.region_3d.view_perspective = "CAMERA"
-    region = next(region for region in area.regions if region.type == "WINDOW")
-    with context.temp_override(area=area, region=region):
-        bpy.ops.view3d.view_center_camera()
-
-
 FORMATS = [one for one in rig.FORMATS if one[0] != "BVH"]
 
 
@@ -283,7 +279,7 @@ scene is not changed"""
 
     bl_idname = "beyond_mocap.match_export"
     bl_label = "Export Match"
-    filter_glob: StringProperty(default="*.fbx;*.glb;*.usdc", options={"HIDDEN"})
+    filter_glob: StringProperty(default="*.fbx;*.glb;*.usdc;*.abc", options={"HIDDEN"})
     format: EnumProperty(name="Format", items=FORMATS, default="GLB", description="File format")
     engine: EnumProperty(name="For", items=rig.ENGINES, default="BLENDER", description="Target program")
     root: EnumProperty(name="Root Motion", items=rig.ROOTS, default="KEEP", description="Motion of the root bone")
@@ -299,7 +295,7 @@ scene is not changed"""
             count = format_count(len(armatures) - len(bodies), "player")
             self.report({"WARNING"}, f"{count} left out: in an excluded collection")
         wanted = export.ExportOptions(path, self.format, self.engine, None, self.root)
-        things = ours.find_meshes(scene, "ball") + (ours.find_meshes(scene, "pitch") if self.pitch else [])
+        things = ours.find_meshes(scene, "ball") + (stage.find_pitch(scene) if self.pitch else [])
         for line in export.export_motion(context, bodies, wanted, things):
             self.report({"INFO"}, line)
         self.report({"INFO"}, f"Written: {path}")

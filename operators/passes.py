@@ -18,7 +18,7 @@ from ..scene.passes import generate as make
 from ..scene.passes import hit_analysis as hits_shown
 from ..scene.passes import scene_lists as order
 from ..scene.passes.settings import SAMPLES
-from .operator_base import BackgroundOperator, BaseOperator, ImportOperator
+from .operator_base import BackgroundOperator, BaseOperator, ImportOperator, describe_error
 
 ROWS = (("players", "Players", "Players of the scene"), ("passes", "Passes", "Passes in their order"))
 WHAT = (("ADD", "Add", "Add a row at the end"), ("REMOVE", "Remove", "Remove the active row"),
@@ -137,6 +137,7 @@ leads from one player's strike to the next"""
 
     bl_idname = "beyond_mocap.passes_make"
     bl_label = "Make Scene"
+    presents = True
     kind = "passes"
     live: BoolProperty(name="Live", options={"HIDDEN", "SKIP_SAVE"},
                        description="Start as an update after an edit, with errors shown in the panel")
@@ -168,11 +169,11 @@ leads from one player's strike to the next"""
             return {"CANCELLED"}
         return super().modal(context, event)
 
-    def report_failure(self, message):
+    def report_failure(self, error):
         """Show the error of an update in the panel; the scene that is shown stays."""
         if not self.live:
-            return super().report_failure(message)
-        bpy.context.scene.beyond_mocap_passes.messages = message
+            return super().report_failure(error)
+        bpy.context.scene.beyond_mocap_passes.messages = str(describe_error(error))
         return {"CANCELLED"}
 
 

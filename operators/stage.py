@@ -7,21 +7,65 @@ from bpy.props import BoolProperty, EnumProperty
 
 from ..beyond_mocap.base.errors import InputError
 from ..scene.core import window
+from ..scene.core.settings import find_active_player
 from ..scene.path_editing.settings import list_edited_bodies, list_target_bodies
-from ..scene.stage import path_cameras, stage
+from ..scene.stage import cameras, eyes, lighting, path_cameras, stage
+from ..scene.stage.cast import find_ball, read_cast
+from ..scene.stage.settings import VIEWS
 from .operator_base import NEEDS_NO_EDITING, BaseOperator
 
 
 class BEYOND_MOCAP_OT_add_stage(BaseOperator, bpy.types.Operator):
-    """Add a pitch with its lines, a sun and a camera that follows the players"""
+    """Add a pitch with goals, stands, light, sky and a camera that follows the players, or renew the ones there are"""
 
     bl_idname = "beyond_mocap.add_stage"
     bl_label = "Add Pitch, Light and Camera"
     camera: BoolProperty(name="Camera", default=True, description="Add a camera and use it for rendering")
 
     def do(self, context):
-        """Create the stage."""
-        stage.create_stage(context, self.camera)
+        """Create the stage, and let its cameras follow the bodies that the scene has."""
+        scene = context.scene
+        stage.create_stage(scene)
+        cameras.update_cameras(scene)
+        if self.camera and (scene.camera is None or not cameras.is_own(scene, scene.camera)):
+            scene.camera = cameras.get_camera(scene, "FOLLOW")
+        if not lighting.has_own_sky(scene):
+            self.report({"INFO"}, f"the world {scene.world.name!r} is yours and stays as it is")
+
+
+class BEYOND_MOCAP_OT_stage_view(BaseOperator, bpy.types.Operator):
+    """Look through one of the stage's cameras, and render with it"""
+
+    bl_idname = "beyond_mocap.stage_view"
+    bl_label = "Stage View"
+    view: EnumProperty(name="View", items=VIEWS, default="BROADCAST", description="The camera to look through")
+
+    @classmethod
+    def description(cls, _context, properties):
+        """Return what this button shows."""
+        return next(item[2] for item in VIEWS if item[0] == properties.view)
+
+    def do(self, context):
+        """Create the camera where it is missing, make it the scene's, and look through it in the 3D view."""
+        scene = context.scene
+        if self.view == "EYES":
+            body = find_viewer(context)
+            camera = eyes.create_eyes_camera(scene, body, find_ball(scene))
+        else:
+            camera = cameras.get_camera(scene, self.view)
+        scene.camera = camera
+        window.look_through_camera(context)
+
+
+def find_viewer(context) -> bpy.types.Object:
+    """Find the moving body that is selected, else the active player's, else the first; InputError without any."""
+    cast, active = read_cast(context.scene), context.view_layer.objects.active
+    if cast is None:
+        raise InputError("Player's Eye", "no body moves in this scene", "a body with a motion", "synthesize one first")
+    active = active.parent if active is not None and active.type == "MESH" else active
+    player = find_active_player(context.scene.beyond_mocap)
+    wanted = (active if active is not None and active.select_get() else None, player.body if player else None)
+    return next((body for body in wanted if body in cast.bodies), cast.bodies[0])
 
 
 class BEYOND_MOCAP_OT_path_cameras(BaseOperator, bpy.types.Operator):
@@ -68,7 +112,7 @@ class BEYOND_MOCAP_OT_path_camera(BaseOperator, bpy.types.Operator):
 
     def do(self, context):
         """Make it the scene's camera, and look through it in the 3D view."""
-        scene, area = context.scene, _find_view(context)
+        scene, area = context.scene, window.find_view(context)
         kind = self.which if self.which != "NEXT" else _find_next_kind(scene, area)
         if kind == "FREE":
             if area is not None and scene.camera is not None and scene.camera.get(path_cameras.MARK):
@@ -86,15 +130,6 @@ class BEYOND_MOCAP_OT_path_camera(BaseOperator, bpy.types.Operator):
         if area is not None:
             _look_through(area, scene.camera, camera)
         path_cameras.activate_camera(scene, camera)
-
-
-def _find_view(context) -> bpy.types.Area | None:
-    """Return the 3D view in which the key or button was pressed, or the largest; None without a window."""
-    if bpy.app.background or context.window is None:
-        return None
-    if context.area is not None and context.area.type == "VIEW_3D":
-        return context.area
-    return window.find_largest_editor(context.window.screen, "VIEW_3D")
 
 
 def _find_next_kind(scene: bpy.types.Scene, area: bpy.types.Area | None) -> str:

@@ -16,6 +16,7 @@ class TargetOperator(BackgroundOperator):
     """Base of throwing and kicking."""
 
     act = ""
+    presents = True
     needs = "Select the armature that throws or kicks", lambda context: find_thrower(context) is not None
 
     def order(self, context):

@@ -17,8 +17,8 @@ import wheels
 TOP = bundle.HERE.parent
 OUT = TOP / "build" / "extension"
 PARTS = ("__init__.py", "batch.py", "LICENSE", "README.md", "CHANGELOG.md", "beyond_mocap", "scene", "operators",
-         "panels")
-IGNORE = shutil.ignore_patterns("__pycache__", "*.pyc")
+         "panels", *(f"sample_blend/{part}" for part in ("library", "match", "passes", "markers")))
+IGNORE = shutil.ignore_patterns("__pycache__", "*.pyc", ".beyond_mocap")
 
 
 def main(argv=None):

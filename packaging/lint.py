@@ -11,6 +11,10 @@ from bundle import normalize_name, parse_wheel_name
 
 BLENDER_PLATFORMS = {f"{system}-{processor}" for system in ("linux", "windows", "macos")
                      for processor in ("x64", "arm64")}
+SAMPLE = "sample_blend/"
+SAMPLE_FILES = ("library/walking_1_2.bvh", "match/player1.csv", "match/player1.txt", "match/small/small.dat",
+                "match/small/small_meta.xml", "passes/library/ready_1.bvh", "markers/walk.trc")
+MAX_SAMPLE_BYTES = 3_500_000  # of the sample in the zip, compressed
 FORBIDDEN = ("tests/", "benchmarks/", "docs/", "packaging/", "build/", "training/", ".git", ".venv", "shared/")
 
 
@@ -68,12 +72,13 @@ def lint_zip(path, platform):
     """
     with zipfile.ZipFile(path) as archive:
         names = archive.namelist()
+        sample_size = sum(one.compress_size for one in archive.infolist() if one.filename.startswith(SAMPLE))
     wheels = [name.removeprefix("wheels/") for name in names if name.startswith("wheels/") and name.endswith(".whl")]
     return [
         *(
             f"{path.name}: {name} does not belong in it"
             for name in names
-            if name.startswith(FORBIDDEN) or "__pycache__" in name
+            if name.startswith(FORBIDDEN) or "__pycache__" in name or is_sample_generator(name)
         ),
         *(
             f"{path.name}: {name} is for another platform"
@@ -82,7 +87,14 @@ def lint_zip(path, platform):
         ),
         *(
             f"{path.name}: {name} is missing"
-            for name in ("__init__.py", "LICENSE", "blender_manifest.toml")
+            for name in ("__init__.py", "LICENSE", "blender_manifest.toml", *(SAMPLE + name for name in SAMPLE_FILES))
             if name not in names
         ),
+        *([f"{path.name}: the sample has {sample_size} bytes, at most {MAX_SAMPLE_BYTES} are expected"]
+          if sample_size > MAX_SAMPLE_BYTES else []),
     ]
+
+
+def is_sample_generator(name):
+    """Return whether a file is beside the sample's data: what generates it, or a file of Blender."""
+    return name.startswith(SAMPLE) and name.count("/") == 1 and not name.endswith("/")

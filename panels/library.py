@@ -46,6 +46,7 @@ class BEYOND_MOCAP_PT_library_step(StepPanel, bpy.types.Panel):
 
     bl_label = "1  Library"
     task = "PLAYER"
+    rooms = ("library",)
     also = ("MATCH", "BALL")
     bl_order = 1
 
@@ -89,7 +90,7 @@ class BEYOND_MOCAP_PT_library(TabPanel, bpy.types.Panel):
             for line in lines:
                 draw_paragraph(body, line, "DOT")
         if body := draw_header(layout, "library_clips", f"Clips ({listing.total})" if current and listing.total
-                               else "Clips"):
+                               else "Clips", closed=False):
             draw_clips(body, settings, listing, current)
         if context.object is not None and "beyond_mocap_clip" in context.object:
             draw_open_clip(layout, context, settings)

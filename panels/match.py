@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import bpy
 
+from .characters import draw_team_characters
 from .tab import TabPanel, create_value_column, draw_paragraph, draw_section, draw_values, with_progress
 
 MAX_LINES = 12  # lines of a report shown in the panel
@@ -44,6 +45,7 @@ class BEYOND_MOCAP_PT_match(TabPanel, bpy.types.Panel):
             draw_players(layout, match)
         if match.report:
             draw_section(layout, "match_data", "Data", lambda opened: draw_messages(opened, match.report))
+        draw_team_characters(layout, match)
         draw_values(create_value_column(layout), match, ("start", "end", "folder"), {"end": match.start + 30.0})
         with_progress(layout, context, ("match",), draw_buttons)
         draw_section(layout, "match_work", "Processing", lambda opened: draw_processing(opened, context.scene))
@@ -106,5 +108,6 @@ def draw_display(layout, match) -> None:
     row.operator("beyond_mocap.match_camera", text="Broadcast", icon="VIEW_CAMERA").which = "STAND"
     row.operator("beyond_mocap.match_camera", text="Eyes", icon="HIDE_OFF").which = "EYES"
     layout.operator("beyond_mocap.match_export", icon="EXPORT")
+    layout.operator("beyond_mocap.deliver", text="Deliver a File per Player", icon="FILE_FOLDER").who = "MATCH"
     for line in match.messages.splitlines()[:MAX_LINES]:
         draw_paragraph(layout, line, "INFO")

@@ -6,16 +6,9 @@ import bpy
 
 from ..scene.core.settings import find_active_player
 from ..scene.result.verdict import judge_take
-from .tab import (
-    StepPanel,
-    TabPanel,
-    create_value_column,
-    draw_figures,
-    draw_header,
-    draw_paragraph,
-    draw_section,
-    wrap_text,
-)
+from .edits import draw_edits
+from .tab import StepPanel, TabPanel, create_value_column, draw_figures, draw_header, draw_paragraph, draw_section
+from .wrapping import wrap_text
 
 VERDICT_ICONS = {"Good": "CHECKMARK", "Fair": "INFO", "Poor": "ERROR"}
 STATES = {"NONE": ("Not Shown", "BLANK1"),
@@ -32,6 +25,7 @@ class BEYOND_MOCAP_PT_result(StepPanel, bpy.types.Panel):
 
     bl_label = "4  Result"
     task = "PLAYER"
+    rooms = ("result",)
     bl_order = 4
 
     def find_state(self, context):
@@ -52,6 +46,7 @@ class BEYOND_MOCAP_PT_result(StepPanel, bpy.types.Panel):
         row.operator("beyond_mocap.discard", icon="X")
         column.row(align=True).prop(settings, "accept_as", expand=True)
         draw_section(layout, "result_others", "Alternatives", lambda opened: draw_alternatives(opened, player))
+        draw_section(layout, "result_edits", "Edits", lambda opened: draw_edits(opened, player))
         draw_section(layout, "result_more", "Options", lambda opened: draw_options(opened, settings))
         if stale is not None:
             draw_section(layout, "result_stale", "What Has Changed", lambda opened: draw_changes(opened, stale))

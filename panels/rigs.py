@@ -24,6 +24,7 @@ class BEYOND_MOCAP_PT_rig(StepPanel, bpy.types.Panel):
 
     bl_label = "5  Rig & Export"
     task = "PLAYER"
+    rooms = ("rigs",)
     bl_order = 6
 
     def find_state(self, context):
@@ -86,3 +87,4 @@ def draw_export(layout, rig) -> None:
     row = layout.row()
     row.scale_y = 1.3
     row.operator("beyond_mocap.export_motion", icon="EXPORT")
+    row.operator("beyond_mocap.deliver", text="Deliver to Engine", icon="FILE_FOLDER")

@@ -4,7 +4,10 @@ from __future__ import annotations
 
 import bpy
 
+from ..scene.stage.settings import VIEWS
 from .tab import TabPanel
+
+MARK = "beyond_mocap_view"  # custom property of the stage's cameras: their view
 
 
 class BEYOND_MOCAP_PT_stage(TabPanel, bpy.types.Panel):
@@ -15,5 +18,16 @@ class BEYOND_MOCAP_PT_stage(TabPanel, bpy.types.Panel):
     bl_options = {"DEFAULT_CLOSED"}
 
     def draw(self, context):
-        """Draw the button that adds the stage."""
-        self.layout.operator("beyond_mocap.add_stage", icon="VIEW_CAMERA")
+        """Draw the button that adds the stage, its light, a button for each view, and those that render pictures."""
+        layout, settings, scene = self.layout, context.scene.beyond_mocap_stage, context.scene
+        layout.operator("beyond_mocap.add_stage", icon="VIEW_CAMERA")
+        layout.row().prop(settings, "light", expand=True)
+        layout.prop(settings, "stands")
+        shown = scene.camera.get(MARK) if scene.camera is not None else None
+        grid = layout.grid_flow(columns=2, even_columns=True, align=True)
+        for view, name, _, icon, _ in VIEWS:
+            grid.operator("beyond_mocap.stage_view", text=name, icon=icon, depress=view == shown).view = view
+        row = layout.row(align=True)
+        row.operator("beyond_mocap.preview_movie", icon="FILE_MOVIE")
+        row.operator("beyond_mocap.contact_sheet", icon="IMGDISPLAY")
+        self.draw_progress(context, "pictures")

@@ -42,6 +42,7 @@ class BEYOND_MOCAP_PT_synthesis(StepPanel, bpy.types.Panel):
 
     bl_label = "3  Synthesize"
     task = "PLAYER"
+    rooms = ("synthesis",)
     bl_order = 3
 
     def find_state(self, context):

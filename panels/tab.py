@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-import textwrap
-
 import bpy
 
-LETTER_WIDTH = 5.7  # mean width of an interface letter in pixels, at a scale of 1
+from .notices import draw_notices
+from .wrapping import wrap_text
+
 MARKS = {"met": "CHECKMARK", "missed": "ERROR", "": "BLANK1"}
 NAME_SHARE = 0.72  # of the width that the name of a figure takes
 LABEL_SHARE = 0.4  # of the width, where Blender splits names and values
-MARGIN = 70  # pixels of a sidebar without text: tabs, the box and its icon
 
 
 def draw_table(layout, lines) -> None:
@@ -52,12 +51,6 @@ def draw_figures(layout, text: str) -> None:
             row.active = False
             row.label(text="Target", icon="BLANK1")
             row.label(text=target)
-
-
-def wrap_text(text: str) -> list[str]:
-    """Wrap text to the sidebar's width."""
-    width = bpy.context.region.width / bpy.context.preferences.system.ui_scale
-    return textwrap.wrap(text, max(16, int((width - MARGIN) / LETTER_WIDTH)))
 
 
 def draw_header(layout, name: str, title: str, closed: bool = True, icon: str = "NONE"):
@@ -160,6 +153,7 @@ class TabPanel:
 
     Attributes:
         task: the task that shows the panel, see `TASKS`; "" for every task.
+        rooms: names of the operators' modules whose notices the panel shows.
         also: other tasks that show it.
     """
 
@@ -167,6 +161,7 @@ class TabPanel:
     bl_region_type = "UI"
     bl_category = "Beyond Mocap"
     task = ""
+    rooms: tuple[str, ...] = ()
     also: tuple[str, ...] = ()
 
     @classmethod
@@ -195,3 +190,4 @@ class StepPanel(TabPanel):
             header.label(text=self.bl_label if context.scene.beyond_mocap.task == self.task else plain)
         if body:
             self.draw_step(body, context)
+        draw_notices(self.layout, context, self.rooms)

@@ -13,7 +13,7 @@ from . import channels
 from .live import Watcher
 from .settings import BeyondMocapSettings
 
-VERSION = 1  # 0: before the editor, without a number; also a scene that has not been saved
+VERSION = 2  # 1: tracks were rendered; 0: before the editor, without a number; also a scene that has not been saved
 
 
 def migrate_scene(scene: bpy.types.Scene) -> None:
@@ -21,6 +21,8 @@ def migrate_scene(scene: bpy.types.Scene) -> None:
     settings = scene.beyond_mocap
     if settings.version < 1:
         _mark_accepted_bodies(settings)
+    if settings.version < 2:
+        _hide_tracks(scene)
     settings.version = max(settings.version, VERSION)
 
 
@@ -32,6 +34,15 @@ def _mark_accepted_bodies(settings: BeyondMocapSettings) -> None:
         action, _ = channels.find_playing_action(player.body)
         if action is not None and action.get(bake.MARK):
             player.result.state = "ACCEPTED"
+
+
+def _hide_tracks(scene: bpy.types.Scene) -> None:
+    """From version 1: the coloured tracks on the ground are for the views alone."""
+    names = {bake.build_track_name(player) for player in scene.beyond_mocap.players}
+    room = scene.collection.children.get(bake.COLLECTION)
+    for thing in room.objects if room is not None else ():
+        if thing.name in names and thing.type == "CURVE" and thing.library is None:
+            thing.hide_render = True
 
 
 def on_load() -> None:

@@ -10,6 +10,7 @@ from pathlib import Path
 
 import bpy
 
+from . import sample
 from .properties import with_settings
 
 EXTENSION = __package__.removesuffix(".scene.core")
@@ -33,13 +34,15 @@ def count_threads() -> int:
 
 
 def find_cache_folder(library_folder: str) -> str | None:
-    """Return where the library of a folder is cached; None for beside its recordings."""
+    """Return where the library of a folder is cached; None for beside its recordings, where the sample's never is."""
     from ...beyond_mocap.library import cache  # slow to import, and enabling the extension must be quick
 
     chosen = find_preferences()
-    if not chosen or not chosen.cache_folder:
-        return None
-    return str(cache.find_own_folder(Path(bpy.path.abspath(chosen.cache_folder)), Path(library_folder)))
+    if chosen and chosen.cache_folder:
+        return str(cache.find_own_folder(Path(bpy.path.abspath(chosen.cache_folder)), Path(library_folder)))
+    if sample.is_in_sample(library_folder):
+        return str(cache.find_own_folder(sample.find_cache_base(), Path(library_folder)))
+    return None
 
 
 def build_library_options(library_folder: str) -> dict:

@@ -8,9 +8,13 @@ from __future__ import annotations
 from collections.abc import Callable
 
 import bpy
+import numpy as np
+
+from .measure import units_per_metre
 
 _draw_handlers: list[tuple[type, Callable, object]] = []  # type of space, function, Blender's handle
 _timers: list[bpy.types.Timer] = []
+_status: list[str] = []  # our line in the status bar
 
 
 def add_overlay(space: type, function: Callable[[], None], when: str = "POST_PIXEL") -> None:
@@ -52,10 +56,20 @@ def stop_timer(context: bpy.types.Context, timer: bpy.types.Timer) -> None:
     clear_status()
 
 
+def show_status(text: str) -> None:
+    """Show a line in the status bar of all windows.
+
+    Blender's own text belongs to the workspace of the present window, and is out of reach from another window or
+    workspace; a function that draws the line belongs to none.
+    """
+    _status[:] = [text]
+    _set_status(_draw_status)
+
+
 def clear_status() -> None:
-    """Clear our line from the status bar of every workspace: the user may have changed the workspace meanwhile."""
-    for workspace in bpy.data.workspaces:
-        workspace.status_text_set(None)
+    """Clear our line from the status bar of all windows."""
+    _status.clear()
+    _set_status(None)
 
 
 def clear_windows() -> None:
@@ -65,6 +79,35 @@ def clear_windows() -> None:
     for _, function, _ in list(_draw_handlers):
         remove_overlay(function)
     clear_status()
+    for shown in bpy.context.window_manager.windows:
+        shown.cursor_modal_restore()  # the end of a progress restores only that of the window in front
+
+
+def _set_status(text: Callable | None) -> None:
+    """Set what draws the status bar, and redraw it in each window; None for Blender's own."""
+    for shown in bpy.context.window_manager.windows:
+        with bpy.context.temp_override(window=shown):
+            shown.workspace.status_text_set(text)
+
+
+def _draw_status(header, _context) -> None:
+    """Draw our line, then the reports and figures that Blender's own status bar has."""
+    layout = header.layout
+    layout.label(text="".join(_status))
+    layout.separator_spacer()
+    layout.template_reports_banner()
+    layout.template_running_jobs()
+    layout.separator_spacer()
+    layout.template_status_info()
+
+
+def show_bones() -> None:
+    """Show bones in all 3D views of the open windows."""
+    for window in bpy.context.window_manager.windows:
+        for area in window.screen.areas:
+            for space in area.spaces:
+                if space.type == "VIEW_3D":
+                    space.overlay.show_bones = True
 
 
 def select_only(context: bpy.types.Context, *things: bpy.types.Object) -> None:
@@ -74,6 +117,75 @@ def select_only(context: bpy.types.Context, *things: bpy.types.Object) -> None:
     for thing in things:
         thing.select_set(True)
     context.view_layer.objects.active = things[0]
+
+
+def find_view(context: bpy.types.Context) -> bpy.types.Area | None:
+    """Return the 3D view in which a key or button was pressed, or the largest; None without a window."""
+    window = context.window or next(iter(context.window_manager.windows), None)
+    if bpy.app.background or window is None:
+        return None
+    if context.area is not None and context.area.type == "VIEW_3D":
+        return context.area
+    return find_largest_editor(window.screen, "VIEW_3D")
+
+
+def look_through_camera(context: bpy.types.Context) -> None:
+    """Look through the scene's camera in the 3D view, with its whole frame; nothing happens without a window."""
+    area = find_view(context)
+    if area is None:
+        return
+    area.spaces.active.region_3d.view_perspective = "CAMERA"
+    region = next(region for region in area.regions if region.type == "WINDOW")
+    with context.temp_override(area=area, region=region):
+        bpy.ops.view3d.view_center_camera()
+
+
+FRAME_SHARE = 0.62  # of the 3D view's height or width that framed objects fill
+
+
+def frame_objects(context: bpy.types.Context, things: list[bpy.types.Object], least: float = 1.8) -> None:
+    """Move the 3D view so that objects fill a good part of it; its direction stays.
+
+    A view through a camera is left alone, and nothing happens without a window.
+
+    Args:
+        context: the context.
+        things: armatures, with the meshes that they move, and other objects, as they are on the current frame.
+        least: m, the smallest height that is shown, around a point for example.
+    """
+    area = find_view(context)
+    corners = _list_corners(context, things) if area is not None else np.empty((0, 3))
+    if not len(corners) or area.spaces.active.region_3d.view_perspective == "CAMERA":
+        return
+    view = area.spaces.active.region_3d
+    region = next(region for region in area.regions if region.type == "WINDOW")
+    left, bottom, right, top = find_free_region(area, region)
+    share = FRAME_SHARE * np.array([(right - left) / region.width, (top - bottom) / region.height])
+    middle = 0.5 * (corners.min(axis=0) + corners.max(axis=0))
+    up = np.array([0.0, 0.0, 0.5 * least * units_per_metre(context.scene)])
+    view.view_location = middle
+    seen = np.vstack([corners - middle, up, -up]) @ np.array(view.view_rotation.to_matrix())
+    scale = np.abs([view.window_matrix[0][0], view.window_matrix[1][1]])
+    if view.view_perspective == "PERSP":  # a corner fits where its offset is less than its depth by the scale
+        view.view_distance = float(np.max(np.abs(seen[:, :2]) * scale / share + seen[:, 2:]))
+    else:
+        view.view_distance *= float(np.max(np.abs(seen[:, :2]) * scale / share))
+
+
+def _list_corners(context: bpy.types.Context, things: list[bpy.types.Object]) -> np.ndarray:
+    """List the corners (N, 3) of the boxes around evaluated objects and what they carry; of an empty its place."""
+    depsgraph = context.evaluated_depsgraph_get()
+    parts = {part for thing in things for part in (thing, *thing.children)}
+    shown = [part.evaluated_get(depsgraph) for part in parts if part.name in context.view_layer.objects
+             and part.visible_get()]
+    boxes = [np.array(part.matrix_world) @ np.column_stack([np.array(part.bound_box), np.ones(8)]).T for part in shown
+             if part.type != "ARMATURE" or len(part.data.bones)]
+    return np.concatenate([box[:3].T for box in boxes]) if boxes else np.empty((0, 3))
+
+
+def find_middle(thing: bpy.types.Object) -> np.ndarray:
+    """Find the middle (3,) of an evaluated object's box, in Blender units."""
+    return (np.array(thing.matrix_world) @ np.append(np.mean(thing.bound_box, axis=0), 1.0))[:3]
 
 
 def open_editor(context: bpy.types.Context, kind: str, direction: str, factor: float) -> bpy.types.Area | None:

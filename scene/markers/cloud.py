@@ -17,9 +17,9 @@ from mathutils import Vector
 
 from ...beyond_mocap.base.errors import InputError
 from ..core import channels
+from ..core.frame_range import fit_range
 from ..core.live import Watcher
 from ..core.measure import frames_per_second, units_per_metre
-from ..result import bake
 from . import nodes
 from .settings import is_cloud
 
@@ -66,7 +66,7 @@ def create_cloud(
     nodes.add_modifier(cloud, {"Start": start})
     properties.size = RADIUS * units
     write_trial(cloud, trial, scene)
-    bake.extend_scene(scene, start + trial.duration * frames_per_second(scene))
+    fit_range(scene, start + trial.duration * frames_per_second(scene), [cloud])
     return cloud
 
 

@@ -18,12 +18,12 @@ import numpy as np
 from mathutils import Matrix
 
 from ...beyond_mocap.base.errors import InputError
+from ...beyond_mocap.base.fixes import Fix
 from ...beyond_mocap.motion import quaternion
-from ..core import action, channels
+from ..core import action, channels, frame_range, sample
 from ..core.measure import frames_per_second, units_per_metre
 from ..core.properties import read_property_values
 from ..core.settings import to_absolute_path
-from ..result import bake
 from ..rigs import armature
 from ..stage import ball as balls
 from ..stage import body
@@ -118,7 +118,9 @@ def find_clip_path(scene: bpy.types.Scene, name: str) -> Path:
 
     folder = scene.beyond_mocap.library_folder
     if not folder:
-        raise InputError("library", "no folder", "a library folder", "choose one in step 1")
+        raise InputError("library", "no folder", "a library folder", "choose one in step 1",
+                         fixes=(Fix("choose_library"),))
+    sample.check_not_sample(to_absolute_path(folder))
     return find_free_file(Path(to_absolute_path(folder)), bpy.path.clean_name(name))
 
 
@@ -144,7 +146,7 @@ def show_reconstruction(context: bpy.types.Context, cloud: bpy.types.Object,
     action.write_motion(thing, played, scene, clouds.find_start_frame(cloud), cloud.name,
                         generated=True)[RECONSTRUCTED] = True
     thing.matrix_world = cloud.matrix_world
-    bake.extend_scene(scene, clouds.find_start_frame(cloud) + played.duration * frames_per_second(scene))
+    frame_range.extend_range(scene, clouds.find_start_frame(cloud) + played.duration * frames_per_second(scene))
     properties.made, properties.figures, properties.messages = store_reconstruction(reconstruction), "\n".join(
         list_figures(reconstruction)), "\n".join(reconstruction.warnings)
     store_model(cloud, reconstruction.model)
@@ -223,7 +225,8 @@ def build_release_request(
     properties, scene_settings = cloud.beyond_mocap_cloud, scene.beyond_mocap_markers
     reconstruction = find_reconstruction(properties.made)
     if reconstruction is None:
-        raise InputError(cloud.name, "not reconstructed in this session", "a body", "press Reconstruct first")
+        raise InputError(cloud.name, "not reconstructed in this session", "a body", "press Reconstruct first",
+                         fixes=(Fix("press", "beyond_mocap.reconstruct_markers"),))
     ball_labels = [row.name for row in properties.labels if row.role == "BALL"
                    and row.name in reconstruction.raw.labels]
     hand = None if scene_settings.hand == "AUTO" else scene_settings.hand

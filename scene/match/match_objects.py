@@ -7,6 +7,7 @@ from __future__ import annotations
 import bpy
 
 from ...beyond_mocap.base.errors import InputError
+from ..stage import cameras
 from .load import TEAMS
 
 MARK = "beyond_mocap_match"
@@ -16,6 +17,7 @@ PLAYER_PROPERTY = "beyond_mocap_match_player"
 ROOT = "Match"
 COLLECTION_NAMES = {"home": "Match Home", "away": "Match Away", "referee": "Match Referees", "ball": "Match Ball",
                     "pitch": "Match Pitch", "cameras": "Match Cameras"}
+"""The last two are of version 0.1: now the scene's stage has pitch and cameras."""
 
 
 def mark_object(thing):
@@ -113,6 +115,7 @@ def clear_match(scene: bpy.types.Scene) -> None:
     for one in [*root_collection.children, root_collection]:
         if not one.all_objects and not one.children:
             bpy.data.collections.remove(one)
+    cameras.update_cameras(scene)
 
 
 def _find_other_scenes(scene: bpy.types.Scene) -> list[bpy.types.Scene]:

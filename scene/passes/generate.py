@@ -15,8 +15,9 @@ import numpy as np
 from ...beyond_mocap.ball.contact import Tool
 from ...beyond_mocap.base.digest import byte_digest
 from ...beyond_mocap.base.errors import InputError
+from ...beyond_mocap.base.fixes import Fix
 from ...beyond_mocap.passes.pass_scene import Net, PassScene
-from ..core import action, channels, preferences, session
+from ..core import action, channels, frame_range, preferences, session
 from ..core.measure import frames_per_second, units_per_metre
 from ..core.saved_state import discard_saved_state, restore_playback, save_playback
 from ..core.settings import to_absolute_path
@@ -120,7 +121,7 @@ def build_order(scene: bpy.types.Scene) -> Order:
     if not folder:
         raise InputError("library", "no folder chosen",
                          "a folder of clips with strikes, such as sample_blend/passes/library",
-                         "choose one under Choices, or in step 1")
+                         "choose one under Choices, or in step 1", fixes=(Fix("choose_library"),))
     for row in settings.players:
         if row.body is not None:
             channels.check_local(row.body)
@@ -170,7 +171,7 @@ def apply_result(scene: bpy.types.Scene, result: Result) -> None:
         _update_tool(scene, rows[one.name].body, played_scene.plan.list_orders(one.name))
     apply_ball(scene, played_scene, start)
     _update_net(scene, result.order.scene.net)
-    bake.extend_scene(scene, start + played_scene.plan.seconds * frames_per_second(scene))
+    frame_range.extend_range(scene, start + played_scene.plan.seconds * frames_per_second(scene))
     settings.made_of = result.order.digest
     store_trajectories(result.order.digest, result.trajectories)
     settings.strikes = "\n".join(describe_strikes(scene, played_scene, start))

@@ -11,6 +11,7 @@ import numpy as np
 from ...beyond_mocap.motion.track import Track
 from ..core import channels
 from ..core.measure import Clock, build_scene_clock, units_per_metre
+from ..core.names import find_named
 from ..core.settings import BeyondMocapPlayer, BeyondMocapSettings, to_absolute_path, to_setting_path
 from ..result import bake
 from .tracks import read_track
@@ -50,7 +51,7 @@ def ensure_dot(context: bpy.types.Context, player: BeyondMocapPlayer) -> bpy.typ
     clock = build_scene_clock(context.scene)
     seconds, places = _select_measured(track.times, track.positions)
     _animate_dot(context.scene, dot, seconds, np.pad(places, ((0, 0), (0, 1))), clock)
-    if BALL not in collection.objects:
+    if find_named(collection.objects, BALL) is None:
         _create_ball_dot(context.scene, track, collection, clock)
     return dot
 
@@ -85,7 +86,7 @@ def remove_dot(scene: bpy.types.Scene, player: BeyondMocapPlayer) -> None:
     if dot is not None:
         _delete_dot(dot)
     if not any(other.dot for other in scene.beyond_mocap.players):
-        ball = bake.find_or_create_collection(scene).objects.get(BALL)
+        ball = find_named(bake.find_or_create_collection(scene).objects, BALL)
         if ball is not None:
             _delete_dot(ball)
 
@@ -106,6 +107,12 @@ def add_player_for_dot(settings: BeyondMocapSettings, dot: bpy.types.Object, nam
     player.name = name
     settings.active_player = len(settings.players) - 1
     return player
+
+
+def list_dots(scene: bpy.types.Scene) -> list[bpy.types.Object]:
+    """List the dots of a scene, the ball's too, that move as their tracks say."""
+    playing = ((thing, channels.find_playing_action(thing)[0]) for thing in scene.objects)
+    return [thing for thing, action in playing if action is not None and action.get(MARK)]
 
 
 def find_first_second(dot: bpy.types.Object) -> float:
@@ -150,7 +157,6 @@ def _create_ball_dot(scene: bpy.types.Scene, track: Track, collection: bpy.types
 def _create_empty(scene: bpy.types.Scene, name: str, size: float, collection: bpy.types.Collection) -> bpy.types.Object:
     dot = bpy.data.objects.new(name, None)
     dot.empty_display_type, dot.empty_display_size = "SPHERE", size * units_per_metre(scene)
-    dot.show_name = True
     collection.objects.link(dot)
     return dot
 

@@ -1,27 +1,28 @@
-"""Writing a take to the scene: armature, action, body, ball, the track on the ground, and the camera's motion."""
+"""Writing a take to the scene: armature, action, body, ball, and the track on the ground."""
 
 from __future__ import annotations
 
 import bpy
 import numpy as np
 
-from ...beyond_mocap.base.time_series import interpolate_columns
 from ...beyond_mocap.motion.track import sample_track
 from ...beyond_mocap.motion.track.ball_path import BallPath
 from ...beyond_mocap.synthesis.take import Take
-from ..core import action, channels
+from ..core import action, channels, take_record
+from ..core.frame_range import extend_range
 from ..core.material import get_material
 from ..core.measure import frames_per_second, units_per_metre, whole_frames
+from ..core.names import find_named
 from ..core.session import StoredTake
 from ..core.settings import BeyondMocapPlayer, BeyondMocapSettings
 from ..rigs import armature
-from ..stage import ball, body, stage
+from ..stage import ball, body
 
 COLLECTION = "Beyond Mocap"
 BALL = "Ball"
 MARK = "beyond_mocap_take"  # on datablocks created for a take, which the next one may replace or remove
 
-RIBBON_HEIGHT, RIBBON_WIDTH = 0.015, 0.03  # metres above the ground, half the ribbon's width
+RIBBON_HEIGHT, RIBBON_WIDTH = 0.03, 0.03  # metres above the ground, half the ribbon's width
 
 
 def compute_frame(scene: bpy.types.Scene, seconds: float) -> float:
@@ -56,36 +57,32 @@ def write_take(context: bpy.types.Context, owner: BeyondMocapPlayer, result: Sto
     if settings.make_paths:
         ground = sample_track(result.plan.track, result.plan.fps).positions
         write_ribbon(context, build_track_name(owner), ground, tuple(owner.shirt), room)
-    extend_scene(scene, start + take.motion.duration * frames_per_second(scene))
+    extend_range(scene, start + take.motion.duration * frames_per_second(scene))
     return target
+
+
+def store_record(written: bpy.types.Action, take: Take, scene: bpy.types.Scene) -> None:
+    """Store on a take's action what a bake and an export need of the take."""
+    fps, start = frames_per_second(scene), compute_frame(scene, take.start_time)
+    frames = whole_frames(start, take.motion.duration, fps)
+    at = np.round((frames - start) * take.motion.fps / fps).astype(int)
+    take_record.store_contacts(written, frames, take.contacts[np.clip(at, 0, len(take.contacts) - 1)])
+    written[take_record.RATE] = float(take.motion.fps)
 
 
 def write_ball(context: bpy.types.Context, path: BallPath) -> bpy.types.Object:
     """Write the ball's trajectory to the scene's ball."""
     scene = context.scene
     room = find_or_create_collection(scene)
-    target = room.objects.get(BALL) or ball.create_ball(context, BALL, room)
+    target = find_named(room.objects, BALL) or ball.create_ball(context, BALL, room)
     channels.remove_marked_action(target, MARK)
     ball.write_trajectory(target, path, scene, compute_frame(scene, float(path.times[0])))[MARK] = True
     return target
 
 
-def write_camera(scene: bpy.types.Scene, takes: list[Take]) -> None:
-    """Let the stage's camera follow the middle of all players smoothly, with all of them in view."""
-    start = min(take.start_time for take in takes)
-    end = max(take.start_time + take.motion.duration for take in takes)
-    fps = frames_per_second(scene)
-    frames = whole_frames(compute_frame(scene, start), end - start, fps)
-    seconds = start + (frames - compute_frame(scene, start)) / fps
-    places = np.array([_sample_places(take, seconds) for take in takes])
-    middle = _smooth_places(0.5 * (places.min(axis=0) + places.max(axis=0)), fps)
-    reach = np.linalg.norm(places - middle, axis=-1).max(axis=0)
-    stage.animate_camera(scene, frames, middle, _smooth_places(reach[:, None], fps)[:, 0])
-
-
 def find_or_create_collection(scene: bpy.types.Scene) -> bpy.types.Collection:
     """Find or create the scene's collection for all baked objects."""
-    found = scene.collection.children.get(COLLECTION)
+    found = find_named(scene.collection.children, COLLECTION)
     if found is None:
         found = bpy.data.collections.new(COLLECTION)
         scene.collection.children.link(found)
@@ -109,25 +106,6 @@ def is_matching(target: bpy.types.Object, take: Take, scene: bpy.types.Scene) ->
     return armature.build_skeleton(target, scene).has_same_bones(take.motion.skeleton)
 
 
-def extend_scene(scene: bpy.types.Scene, last: float) -> None:
-    """Extend the scene's frame range to `last`."""
-    scene.frame_end = max(scene.frame_end, int(np.floor(last + 1e-4)))
-
-
-def _sample_places(take: Take, seconds: np.ndarray) -> np.ndarray:
-    """Interpolate the player's places on the ground at times on the track's clock: (N, 2) metres."""
-    times = take.start_time + np.arange(len(take.motion)) / take.motion.fps
-    return interpolate_columns(seconds, times, take.motion.root_positions[:, :2])
-
-
-def _smooth_places(places: np.ndarray, fps: float) -> np.ndarray:
-    """Compute the running mean of (F, n) over two seconds, for a smooth camera."""
-    half = max(1, int(fps))
-    padded = np.concatenate([places[:1].repeat(half, axis=0), places, places[-1:].repeat(half, axis=0)])
-    total = np.concatenate([np.zeros((1, places.shape[1])), np.cumsum(padded, axis=0)])
-    return (total[2 * half + 1 :] - total[: -2 * half - 1]) / (2 * half + 1)
-
-
 def write_ribbon(context: bpy.types.Context, name: str, points: np.ndarray, rgb, collection) -> bpy.types.Object:
     """Create a ribbon along points (N, 2) metres, or replace that of the same name in the collection."""
     units = units_per_metre(context.scene)
@@ -141,7 +119,7 @@ def write_ribbon(context: bpy.types.Context, name: str, points: np.ndarray, rgb,
     line.points.foreach_set("co", placed.ravel())
     line.points.foreach_set("tilt", np.full(len(points), -np.pi / 2, np.float32))  # its upper side faces up
     data.materials.append(get_material(f"{name} colour", tuple(rgb), 0.9))
-    ribbon = collection.objects.get(name)
+    ribbon = find_named(collection.objects, name)
     if ribbon is None or ribbon.type != "CURVE":
         ribbon = bpy.data.objects.new(name, data)
         collection.objects.link(ribbon)
@@ -150,5 +128,5 @@ def write_ribbon(context: bpy.types.Context, name: str, points: np.ndarray, rgb,
         if not old.users:  # a preview may have stored it
             bpy.data.curves.remove(old)
             data.name = name
-    ribbon.hide_select = True
+    ribbon.hide_select = ribbon.hide_render = True
     return ribbon

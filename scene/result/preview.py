@@ -10,14 +10,18 @@ import bpy
 import numpy as np
 
 from ...beyond_mocap.base.errors import InputError
+from ...beyond_mocap.base.fixes import Fix
+from ..characters.player_character import update_character
 from ..core import channels, session
 from ..core.measure import build_scene_clock
+from ..core.names import find_named
 from ..core.saved_state import discard_saved_state, restore_nla, restore_playback, save_playback
 from ..core.settings import BeyondMocapPlayer
 from ..passes import possession
 from ..path_editing import edited_bodies
-from ..stage import stage
-from . import bake, blocks, quality
+from ..stage import cameras
+from ..stage.stage_collection import find_focus
+from . import bake, blocks, key_layers, quality
 from . import manual_keys as hand_keys
 from .bake import MARK
 
@@ -59,6 +63,7 @@ def show_preview(context: bpy.types.Context, player: BeyondMocapPlayer, take: st
     result_take, result = session.find_take(take), player.result
     check_body(player)
     reverted = revert_path_edit(player)
+    key_layers.unstack_layers(player.body, uses_nla=result.state != "PREVIEW")
     if result.state != "NONE" and not is_shown(context.scene, player):
         drop_preview(player)
     recorded_keys, clock = hand_keys.ManualKeys(), ""
@@ -75,12 +80,15 @@ def show_preview(context: bpy.types.Context, player: BeyondMocapPlayer, take: st
         body = bake.write_take(context, player, result_take)
     action, slot = channels.find_playing_action(body)
     blocks.store_blocks(action, result_take.take, context.scene)
+    bake.store_record(action, result_take.take, context.scene)
     hand_keys.store_generated(action, slot, build_scene_clock(context.scene))
     shift = hand_keys.compute_shift(clock, build_scene_clock(context.scene))
     result.hand_keys = hand_keys.write_manual_keys(action, slot, recorded_keys, shift) if shift is not None else 0
     result.state = "PREVIEW"
+    key_layers.stack_layers(body)
     quality.update_error_curves(context.scene, player)
     update_shared(context)
+    update_character(player, context)
     return body
 
 
@@ -91,6 +99,7 @@ def apply_preview(context: bpy.types.Context, player: BeyondMocapPlayer, form: s
     """
     result, body = player.result, player.body
     revert_path_edit(player)
+    key_layers.unstack_layers(body)
     if result.motion.kept and body.animation_data is not None:
         restore_nla(result.motion, body.animation_data)
     if form == "STRIPS":
@@ -101,6 +110,7 @@ def apply_preview(context: bpy.types.Context, player: BeyondMocapPlayer, form: s
     result.state = "ACCEPTED"
     _apply_shared(context)
     _rename_datablocks(context, player)
+    key_layers.stack_layers(body)
     return body
 
 
@@ -108,10 +118,12 @@ def revert_preview(context: bpy.types.Context, player: BeyondMocapPlayer) -> Non
     """Revert the preview of a player: the previous state is restored, bit for bit."""
     result, body = player.result, player.body
     revert_path_edit(player)
+    key_layers.unstack_layers(body, uses_nla=False)
     accepted = result.was_accepted
     if body is not None and body == result.body and result.motion.kept:
         _remove_preview_objects(context, player)
         restore_playback(result.motion, body, MARK)
+        key_layers.stack_layers(body)
     else:
         _remove_preview_objects(context, player)
         if body is not None:
@@ -126,6 +138,7 @@ def revert_preview(context: bpy.types.Context, player: BeyondMocapPlayer) -> Non
     result.state = "ACCEPTED" if accepted else "NONE"
     quality.update_error_curves(context.scene, player)
     update_shared(context)
+    update_character(player, context)
 
 
 def is_shown(scene: bpy.types.Scene, player: BeyondMocapPlayer) -> bool:
@@ -185,11 +198,13 @@ def show_variant(context: bpy.types.Context, player: BeyondMocapPlayer, number: 
     """Preview variant `number`, from 0. Raises InputError if the session does not have it."""
     variants = player.result.variants
     if not 0 <= number < len(variants):
-        raise InputError("variant", f"number {number + 1}", f"1 to {len(variants)}", "press Variants first")
+        raise InputError("variant", f"number {number + 1}", f"1 to {len(variants)}", "press Variants first",
+                         fixes=(Fix("press", "beyond_mocap.variants"),))
     variant = variants[number]
     if session.find_take(variant.name) is None:
         found = "is not in this session: it is from before the file was opened"
-        raise InputError("variant", found, "variants of this session", "press Variants again")
+        raise InputError("variant", found, "variants of this session", "press Variants again",
+                         fixes=(Fix("press", "beyond_mocap.variants"),))
     show_preview(context, player, variant.name, {line: getattr(variant, line) for line in VARIANT_LINES})
 
 
@@ -199,8 +214,8 @@ def _apply_shared(context: bpy.types.Context) -> None:
 
 def _with_free_ball(context: bpy.types.Context, change) -> None:
     """Call `change(context)` while no player holds the ball; possession is restored afterwards."""
-    room = context.scene.collection.children.get(bake.COLLECTION)
-    ball = room.objects.get(bake.BALL) if room is not None else None
+    room = find_named(context.scene.collection.children, bake.COLLECTION)
+    ball = find_named(room.objects, bake.BALL) if room is not None else None
     if ball is None or not len(ball.beyond_mocap_ball.holds):
         return change(context)
     possession.replace_own_action(context.scene, ball, lambda: change(context))
@@ -213,7 +228,7 @@ def _apply_shared_objects(context: bpy.types.Context) -> None:
             "ACCEPTED")
     if not has_other_previews or bake.find_ball(takes, context.scene.beyond_mocap) is not None:
         discard_saved_state(shared.ball, MARK)
-    discard_saved_state(shared.camera, stage.MARK)
+    discard_saved_state(shared.camera, cameras.MARK)
     shared.end_set = 0
     if has_other_previews:
         _update_followers(context, takes)
@@ -226,7 +241,7 @@ def _rename_datablocks(context: bpy.types.Context, player: BeyondMocapPlayer) ->
     if playing is not None and playing.get(MARK) and playing.library is None:
         playing.name = f"{player.name} take"
     room = bake.find_or_create_collection(context.scene)
-    ribbon, ball = room.objects.get(bake.build_track_name(player)), room.objects.get(bake.BALL)
+    ribbon, ball = find_named(room.objects, bake.build_track_name(player)), find_named(room.objects, bake.BALL)
     if ribbon is not None:
         ribbon.data.name = bake.build_track_name(player)
     path = channels.find_playing_action(ball)[0] if ball is not None else None
@@ -240,17 +255,14 @@ def _update_shared_objects(context: bpy.types.Context) -> None:
     shared = settings.shared
     takes = _list_takes(settings.players, "ACCEPTED", "PREVIEW")
     previews = any(player.result.state == "PREVIEW" for player in settings.players)
-    room = scene.collection.children.get(bake.COLLECTION)
-    ball = room.objects.get(bake.BALL) if room is not None else None
-    focus = stage.find_focus(scene)
+    room = find_named(scene.collection.children, bake.COLLECTION)
+    ball = find_named(room.objects, bake.BALL) if room is not None else None
     if not previews:
-        _restore_shared(scene, shared, ball, focus)
+        _restore_shared(scene, shared, ball)
         return
     is_new, wanted = ball is None, bake.find_ball(takes, settings) is not None
     if wanted and not is_new and not shared.ball.kept:
         save_playback(shared.ball, ball)
-    if takes and focus is not None and not shared.camera.kept:
-        save_playback(shared.camera, focus)
     _update_followers(context, takes)
     if wanted and is_new:
         shared.ball.kept = shared.ball.made = True
@@ -267,24 +279,25 @@ def _update_followers(context: bpy.types.Context, takes: list) -> None:
     path = bake.find_ball(takes, context.scene.beyond_mocap)
     if path is not None:
         bake.write_ball(context, path)
-    if takes and stage.find_focus(context.scene) is not None:
-        bake.write_camera(context.scene, takes)
+    cameras.update_cameras(context.scene)
 
 
-def _restore_shared(scene: bpy.types.Scene, shared, ball, focus) -> None:
-    """Restore ball, camera and scene length to their state before any preview."""
+def _restore_shared(scene: bpy.types.Scene, shared, ball) -> None:
+    """Restore ball and scene length to their state before any preview; the cameras follow the bodies that are left."""
     if shared.ball.kept and ball is not None:
         if shared.ball.made:
             _remove_object(ball)
         else:
             restore_playback(shared.ball, ball, MARK)
-    if shared.camera.kept and focus is not None:
-        restore_playback(shared.camera, focus, stage.MARK)
+    focus = find_focus(scene)
+    if shared.camera.kept and focus is not None:  # by version 0.1
+        restore_playback(shared.camera, focus, cameras.MARK)
     discard_saved_state(shared.ball, MARK)
-    discard_saved_state(shared.camera, stage.MARK)
+    discard_saved_state(shared.camera, cameras.MARK)
     if shared.end_set and scene.frame_end == shared.end_set:
         scene.frame_end = shared.end_before
     shared.end_set = 0
+    cameras.update_cameras(scene)
 
 
 def _store_state(context: bpy.types.Context, player: BeyondMocapPlayer, new_take: session.StoredTake) -> None:
@@ -298,7 +311,7 @@ def _store_state(context: bpy.types.Context, player: BeyondMocapPlayer, new_take
         setattr(result, f"{name}_before", getattr(result, name))
     fits = body is not None and bake.is_matching(body, new_take.take, context.scene)
     result.mesh_made = not fits or not any(child.type == "MESH" for child in body.children)
-    ribbon = room.objects.get(bake.build_track_name(player))
+    ribbon = find_named(room.objects, bake.build_track_name(player))
     result.track_made = ribbon is None
     result.track = ribbon.data if ribbon is not None and ribbon.type == "CURVE" else None
     if fits:
@@ -324,7 +337,7 @@ def _remove_preview_objects(context: bpy.types.Context, player: BeyondMocapPlaye
     if result.mesh_made and body is not None:
         for child in [child for child in body.children if child.get(MARK)]:
             _remove_object(child)
-    ribbon = room.objects.get(bake.build_track_name(player))
+    ribbon = find_named(room.objects, bake.build_track_name(player))
     if ribbon is None:
         return
     if result.track_made:

@@ -14,6 +14,7 @@ from ..core.material import get_material
 from ..core.measure import frames_per_second, units_per_metre, whole_frames
 
 RADIUS = 0.11  # metres, Laws of the Game: circumference 0.68 to 0.70 m
+MATERIAL = "Ball white"
 ROLLING_BELOW = 0.16  # metres, height of the centre up to which the ball rolls on the ground
 
 
@@ -28,12 +29,18 @@ def create_ball(context: bpy.types.Context, name: str, collection, radius: float
         face.material_index = int(np.max(patches @ np.array(face.normal)) > 0.94)
     shape.to_mesh(mesh)
     shape.free()
-    mesh.materials.append(get_material("Ball white", (0.9, 0.9, 0.9), 0.4))
+    mesh.materials.append(get_material(MATERIAL, (0.9, 0.9, 0.9), 0.4))
     mesh.materials.append(get_material("Ball black", (0.01, 0.01, 0.012), 0.4))
     ball = bpy.data.objects.new(name, mesh)
     ball.rotation_mode = "QUATERNION"
     collection.objects.link(ball)
     return ball
+
+
+def is_ball(thing: bpy.types.Object) -> bool:
+    """Return whether an object is a ball of `create_ball`, of this or an earlier version."""
+    materials = thing.data.materials if thing.type == "MESH" else ()
+    return any(material is not None and material.name.startswith(MATERIAL) for material in materials)
 
 
 def write_trajectory(ball: bpy.types.Object, path: BallPath, scene: bpy.types.Scene, start: float) -> bpy.types.Action:

@@ -13,13 +13,13 @@ from typing import TYPE_CHECKING
 import bpy
 
 from ...beyond_mocap.base.errors import BeyondMocapError, InputError
+from ...beyond_mocap.base.fixes import Fix
 from ...beyond_mocap.passes.hits import HitMotion
-from ..core import action, background, channels
+from ..core import action, background, channels, frame_range
 from ..core.live import Watcher
 from ..core.measure import frames_per_second
 from ..passes import generate as make
 from ..passes.settings import PLAYED
-from ..result import bake
 from . import follow
 
 if TYPE_CHECKING:
@@ -149,7 +149,8 @@ def update_rally(scene: bpy.types.Scene) -> None:
 def answer_now(scene: bpy.types.Scene, hit: HitMotion) -> LivePass:
     """Answer a strike at once, for scripts: the pass is computed and inserted before this returns."""
     if get_current_rally() is None:
-        raise InputError("play live", "no rally is being played", "a rally", "press Play Live")
+        raise InputError("play live", "no rally is being played", "a rally", "press Play Live",
+                         fixes=(Fix("press", "beyond_mocap.stream_play"),))
     piece = _build_answer(*_collect_request(scene, hit), None, None)
     _apply_pass(scene, piece)
     return piece
@@ -204,7 +205,7 @@ def _apply_players(scene, one: Rally, names: list[str]) -> None:
         played = one.players[name]
         make.apply_motion(scene, rows[name], SimpleNamespace(motion=played.motion, start_time=played.start), start)
     make.apply_ball(scene, SimpleNamespace(ball=one.ball, kind=build_ball(one.scene)), start)
-    bake.extend_scene(scene, start + float(one.ball.times[-1]) * frames_per_second(scene))
+    frame_range.extend_range(scene, start + float(one.ball.times[-1]) * frames_per_second(scene))
 
 
 def _update_target(scene) -> None:

@@ -13,11 +13,10 @@ from typing import TYPE_CHECKING
 import bpy
 import numpy as np
 
-from ..core import action, background, channels, session
+from ..core import action, background, channels, frame_range, session
 from ..core.live import Watcher, call_or_describe
 from ..core.measure import frames_per_second
 from ..core.saved_state import discard_saved_state, restore_playback, save_playback
-from ..result import bake
 from ..rigs.rig_bake import KEYS, PREVIOUS_STATE
 from ..rigs.rig_bake import MARK as BAKE_MARK
 from . import ball_motion as flown
@@ -60,7 +59,7 @@ def show_throw(scene: bpy.types.Scene, body: bpy.types.Object, result: "ThrowPre
         action.write_motion(body, joined.motion, scene, start, name, generated=True)[MARK] = True
     messages = [*messages, *flown.show_ball(scene, body, result)]
     last = joined.start + (len(joined.motion) - 1) / fps
-    bake.extend_scene(scene, fps * max(joined.release + result.seconds, last))
+    frame_range.extend_range(scene, fps * max(joined.release + result.seconds, last))
     settings.made, settings.release = result.order.action, joined.release * fps
     settings.made_of, settings.asked = result.order.digest, round(result.order.at * fps)
     settings.figures = "\n".join(list_figures(result))

@@ -72,13 +72,20 @@ def test_the_lint_sees(tmp_path, change, complaint):
 def test_the_lint_sees_what_does_not_belong_in_a_zip(tmp_path):
     path = tmp_path / "x.zip"
     with zipfile.ZipFile(path, "w") as archive:
-        for name in ("__init__.py", "blender_manifest.toml", "tests/core/test_x.py",
-                     "wheels/x-1-py3-none-win_amd64.whl"):
+        for name in ("__init__.py", "blender_manifest.toml", "tests/core/test_x.py", "sample_blend/make_match.py",
+                     "wheels/x-1-py3-none-win_amd64.whl", *(lint.SAMPLE + name for name in lint.SAMPLE_FILES[1:])):
             archive.writestr(name, "")
     lines = lint.lint_zip(path, LINUX)
     assert [line.split(": ")[1] for line in lines] == [
-        "tests/core/test_x.py does not belong in it", "x-1-py3-none-win_amd64.whl is for another platform",
-        "LICENSE is missing"]
+        "tests/core/test_x.py does not belong in it", "sample_blend/make_match.py does not belong in it",
+        "x-1-py3-none-win_amd64.whl is for another platform", "LICENSE is missing",
+        f"{lint.SAMPLE}{lint.SAMPLE_FILES[0]} is missing"]
+
+
+def test_the_zip_has_the_sample_without_what_generates_it(tmp_path):
+    build.copy_parts(build.TOP, tmp_path)
+    assert not [name for name in lint.SAMPLE_FILES if not (tmp_path / lint.SAMPLE / name).is_file()]
+    assert not [path.name for path in (tmp_path / lint.SAMPLE).iterdir() if path.is_file()]
 
 
 def test_slimming_keeps_licence_and_metadata_and_rebuilds_the_record(tmp_path):

@@ -265,7 +265,8 @@ def test_cameras_by_their_buttons(place, made):
     head = next(bone for bone in seven.pose.bones if bone.name.lower() == "head")
     assert (eyes.matrix_world.translation - seven.matrix_world @ head.head).length < 0.25
     assert press_operator(bpy.ops.beyond_mocap.match_camera, which="STAND") == {"FINISHED"}
-    assert scene.camera == room("cameras").find_broadcast_camera(scene) != eyes
+    stand = importlib.import_module(f"{EXTENSION}.scene.stage.cameras").find_camera(scene, "BROADCAST")
+    assert scene.camera == stand != eyes
     with pytest.raises(RuntimeError, match="away_1 is not shown"):
         bpy.ops.beyond_mocap.match_camera(which="EYES", player="away_1")
 

@@ -12,7 +12,7 @@ START, FPS = 100.0, 30
 
 @pytest.fixture
 def room():
-    return lambda name: importlib.import_module(f"{EXTENSION}.scene.match.{name}")
+    return lambda name, package="scene.match": importlib.import_module(f"{EXTENSION}.{package}.{name}")
 
 
 @pytest.fixture(scope="module")
@@ -297,18 +297,23 @@ def test_a_match_linked_from_another_file_is_left_alone(room, scenery, tmp_path)
     assert all(cloth.library is None for cloth in worn)  # a linked one would not take a new colour
 
 
-def test_the_stage_stands_aside_and_the_users_things_on_it_stay(room, scenery):
-    stage = importlib.import_module(f"{EXTENSION}.scene.stage.stage")
+def test_a_match_and_single_players_share_one_stage(room, scenery):
+    """Before or after: one pitch, of the match's size; what the user put on the stage stays."""
+    stage = room("stage.stage", "scene")
     scene = bpy.context.scene
-    stage.create_stage(bpy.context)
+    stage.create_stage(scene)
     own = bpy.data.objects.new("Mine", None)
     scene.collection.children["Stage"].objects.link(own)
     shown(room, scenery)
-    assert scene.camera == room("cameras").find_broadcast_camera(scene) is not None
+    assert scene.camera == room("stage.cameras", "scene").find_camera(scene, "BROADCAST") is not None
+    bpy.ops.beyond_mocap.add_stage()
+    grass = [thing for thing in scene.objects if thing.name.startswith("Grass")]
+    assert [round(side) for side in grass[0].dimensions[:2]] == [112, 76] and len(grass) == 1
+    assert scene.camera.name == "Broadcast" and own.name in scene.collection.children["Stage"].objects
+    stage.remove_stage(scene)
     assert scene.collection.children["Stage"].objects[:] == [own]
     bpy.data.objects.remove(own)
     stage.remove_stage(scene)
-    assert "Stage" not in scene.collection.children
 
 
 def test_a_stage_of_the_users_own_stays(room, scenery):
@@ -324,7 +329,7 @@ def test_the_stands_camera_keeps_the_ball_in_its_picture(room, scenery):
     from bpy_extras.object_utils import world_to_camera_view
 
     scene = shown(room, scenery)
-    camera, ball = room("cameras").find_broadcast_camera(scene), room("show").find_ball(scene)
+    camera, ball = room("stage.cameras", "scene").find_camera(scene, "BROADCAST"), room("show").find_ball(scene)
     assert scene.camera == camera
     places = []
     for frame in range(11, 11 + 121, 10):
@@ -339,7 +344,7 @@ def test_eyes_see_what_the_player_sees_but_not_his_own_head(room, scenery):
     scene = shown(room, scenery)
     ten = next(thing for thing in room("match_objects").find_armatures(scene)
                if thing[room("match_objects").PLAYER_PROPERTY] == "h10")
-    camera = room("cameras").create_eyes_camera(scene, ten, None)
+    camera = room("stage.eyes", "scene").create_eyes_camera(scene, ten, None)
     for frame in (20, 60, 120):
         scene.frame_set(frame)
         depsgraph = bpy.context.evaluated_depsgraph_get()
@@ -350,7 +355,7 @@ def test_eyes_see_what_the_player_sees_but_not_his_own_head(room, scenery):
         up = camera.matrix_world.to_quaternion() @ _ahead((0.0, 1.0, 0.0))
         assert up.z > 0.9
     actions = len(bpy.data.actions)
-    assert room("cameras").create_eyes_camera(scene, ten, room("show").find_ball(scene)) == camera
+    assert room("stage.eyes", "scene").create_eyes_camera(scene, ten, room("show").find_ball(scene)) == camera
     assert len(bpy.data.actions) == actions
 
 
@@ -369,32 +374,16 @@ def _hit(body, eye, ahead, near):
 def test_a_gaze_turns_to_the_ball_as_far_as_eyes_turn(room, walk):
     motion = walk(0.0, 0.0)
     middle = len(motion) // 2
-    place, plain = room("cameras").compute_eye_view(motion, None)
+    place, plain = room("stage.eyes", "scene").compute_eye_view(motion, None)
     ball = place + [3.0, 1.0, -1.5]
-    _, turned = room("cameras").compute_eye_view(motion, ball)
+    _, turned = room("stage.eyes", "scene").compute_eye_view(motion, ball)
     quaternion = importlib.import_module(f"{EXTENSION}.beyond_mocap.motion.quaternion")
     gaze = quaternion.rotate(turned, np.array([0.0, 0.0, -1.0]))[middle]
     wanted = (ball - place)[middle] / np.linalg.norm((ball - place)[middle])
     assert gaze @ wanted > np.cos(np.radians(4.0))
     behind = place + [-5.0, 0.0, 0.0]
-    _, same = room("cameras").compute_eye_view(motion, behind)
+    _, same = room("stage.eyes", "scene").compute_eye_view(motion, behind)
     assert quaternion.rotate(same, np.array([0.0, 0.0, -1.0]))[middle, 0] > 0.9
-
-
-@pytest.mark.parametrize("size", [(105.0, 68.0), (90.0, 45.0)])
-def test_lines_and_goals_fit_the_pitch(size):
-    pitch = importlib.import_module(f"{EXTENSION}.scene.stage.stage")
-    home = bpy.context.scene.collection
-    lines = pitch.create_lines(home, 1.0, size)
-    far = np.array([vertex.co for vertex in lines.data.vertices])
-    assert np.allclose(np.abs(far[:, :2]).max(axis=0), np.array(size) / 2.0 + 0.06, atol=0.011)
-    made = pitch.create_goals(home, 1.0, size[0])
-    bpy.context.view_layer.update()
-    for goal in made:
-        corners = np.array([goal.matrix_world @ vertex.co for vertex in goal.data.vertices])
-        assert np.all(np.isfinite(corners))
-        assert np.all(np.abs(corners[:, 0]) > size[0] / 2.0 - 0.07)  # behind the line
-        assert 2.4 < corners[:, 2].max() < 2.6 and 7.3 < np.ptp(corners[:, 1]) < 7.7
 
 
 def test_kits_tell_teams_and_keepers_apart(room):

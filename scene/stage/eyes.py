@@ -1,8 +1,5 @@
-"""Cameras of a match: one in the stand that follows the ball, and one in the head of any player.
-
-The stand's camera tracks a target that follows the ball smoothly, and zooms so that it always shows about the same
-width of pitch. The player's camera is at their eyes and looks where they look: in the direction of the face, and from
-there towards the ball within the range of the eyes.
+"""The camera in a player's head: it looks where they look, in the direction of the face, and from there towards the
+ball within the range of the eyes.
 """
 
 from __future__ import annotations
@@ -17,13 +14,12 @@ from ...beyond_mocap.motion import quaternion
 from ...beyond_mocap.motion.humanoid import identify_joints
 from ...beyond_mocap.motion.motion import Motion, forward_kinematics
 from ..core import action, channels
-from ..core.measure import frames_per_second, units_per_metre
-from . import match_objects as ours
+from ..core.measure import units_per_metre
+from .meshes import create_object
+from .stage_collection import STAGE_MARK, find_stage, get_stage, list_own_objects
 
-STAND, EYES = "Match Broadcast", "Match Eyes"
-STAND_POSITION = (0.0, 26.0, 17.0)  # m: along the pitch, behind the touch line, above the ground
-VIEW_WIDTH, MIN_DISTANCE = 33.0, 55.0  # m: width shown by the stand's camera; least distance to the ball used for zoom
-AIM_SMOOTHING = 0.9  # s, Gaussian smoothing of its target
+VIEW_MARK, EYES, NAME = "beyond_mocap_view", "EYES", "Player's Eye"
+OWNER = "beyond_mocap_eyes_of"
 SENSOR = 36.0  # mm
 EYE_OFFSET = (0.115, 0.04)  # m from the head joint to the middle of the eyes, ahead and up, for 1.80 m
 CLIP_START = 0.1  # m from the eyes that are clipped: brows and nose
@@ -33,45 +29,6 @@ GAZE_SMOOTHING = 0.12  # s, Gaussian smoothing of the gaze
 MAX_GAZE_SLOPE = np.tan(
     np.radians(18.0))  # steepest rise of a gaze: higher objects are in the upper half of the picture
 REST_ANGLE = np.radians(12.0)  # rad, how far a gaze without a ball points below the face's axis
-
-
-def create_broadcast_camera(scene: bpy.types.Scene, size: tuple[float, float], frames: np.ndarray, targets: np.ndarray):
-    """Create the camera in the stand.
-
-    Args:
-        scene: the scene.
-        size: length and width of the pitch, m.
-        frames: (F,) scene frames.
-        targets: (F, 2) m, what it follows.
-    Returns:
-        The camera.
-    """
-    units, collection = units_per_metre(scene), ours.create_collection(scene, "cameras")
-    aim = ours.mark_object(bpy.data.objects.new("Match Broadcast aim", None))
-    aim.empty_display_size = 0.5 * units
-    collection.objects.link(aim)
-    camera = bpy.data.objects.new(STAND, bpy.data.cameras.new(STAND))
-    camera[ours.MARK] = STAND
-    collection.objects.link(camera)
-    stand = np.array([STAND_POSITION[0], -size[1] / 2.0 - STAND_POSITION[1], STAND_POSITION[2]])
-    camera.location = stand * units
-    camera.data.clip_start, camera.data.clip_end, camera.data.sensor_width = units, 400.0 * units, SENSOR
-    look = camera.constraints.new("TRACK_TO")
-    look.target, look.track_axis, look.up_axis = aim, "TRACK_NEGATIVE_Z", "UP_Y"
-    middle = gaussian_smooth(targets, AIM_SMOOTHING * frames_per_second(scene))
-    middle = np.clip(middle, *(np.outer([-1.0, 1.0], np.array(size) / 2.0 - [14.0, 14.0])))
-    places = np.column_stack([middle, np.full(len(middle), 0.6)])
-    distance = np.linalg.norm(places - stand, axis=1)
-    lens = (SENSOR * np.maximum(distance, MIN_DISTANCE) / VIEW_WIDTH)[:, None]
-    group = "Object Transforms"
-    ours.mark_object(channels.create_action(aim, aim.name, frames, {"location": (group, places * units)}))
-    ours.mark_object(channels.create_action(camera.data, f"{STAND} lens", frames, {"lens": ("Lens", lens)}))
-    return camera
-
-
-def find_broadcast_camera(scene: bpy.types.Scene) -> bpy.types.Object | None:
-    """Find the camera in the stand; None if there is none."""
-    return next((thing for thing in ours.find_objects(scene, "cameras") if thing.get(ours.MARK) == STAND), None)
 
 
 def create_eyes_camera(scene: bpy.types.Scene, body: bpy.types.Object, ball: bpy.types.Object
@@ -89,17 +46,17 @@ def create_eyes_camera(scene: bpy.types.Scene, body: bpy.types.Object, ball: bpy
     """
     first = action.find_first_frame(body)
     if first is None:
-        raise InputError(body.name, "it plays no action", "a player of a shown match", "press Show Match")
+        raise InputError(body.name, "it plays no action", "a body with a motion", "synthesize it first")
     motion = action.read_motion(body, scene)
     frames = first + np.arange(len(motion))
     target = _sample_ball_keys(scene, ball, frames)
     place, turn = compute_eye_view(motion, target)
-    units, camera = units_per_metre(scene), _find_eyes_camera(scene)
-    channels.remove_marked_action(camera, ours.MARK)
+    units, camera = units_per_metre(scene), _get_eyes_camera(scene)
+    channels.remove_marked_action(camera, STAGE_MARK)
     group = "Object Transforms"
     curves = {"location": (group, place * units), "rotation_quaternion": (group, turn)}
-    ours.mark_object(channels.create_action(camera, f"{EYES} of {body.name}", frames, curves))
-    camera["beyond_mocap_eyes_of"] = body
+    channels.create_action(camera, f"{NAME} of {body.name}", frames, curves)[STAGE_MARK] = True
+    camera[OWNER] = body
     return camera
 
 
@@ -168,16 +125,21 @@ def _sample_ball_keys(scene: bpy.types.Scene, ball: bpy.types.Object | None, fra
     return np.stack(places, axis=1) / units_per_metre(scene)
 
 
-def _find_eyes_camera(scene: bpy.types.Scene) -> bpy.types.Object:
-    """Find the camera in the player's head, or create it."""
-    home = ours.create_collection(scene, "cameras")
-    found = next((thing for thing in ours.find_objects(scene, "cameras") if thing.get(ours.MARK) == EYES), None)
-    if found is None:
-        found = bpy.data.objects.new(EYES, bpy.data.cameras.new(EYES))
-        found[ours.MARK] = EYES
-        found.rotation_mode = "QUATERNION"
-        home.objects.link(found)
+def _get_eyes_camera(scene: bpy.types.Scene) -> bpy.types.Object:
+    """Find the camera in a player's head, or create it."""
+    camera = find_eyes_camera(scene)
+    if camera is None:
+        camera = create_object(get_stage(scene), NAME, bpy.data.cameras.new(NAME))
+        camera[VIEW_MARK], camera[STAGE_MARK] = EYES, True
+        camera.rotation_mode = "QUATERNION"
         units = units_per_metre(scene)
-        found.data.lens, found.data.sensor_width = EYES_LENS, SENSOR
-        found.data.clip_start, found.data.clip_end = CLIP_START * units, 400.0 * units
-    return found
+        camera.data.lens, camera.data.sensor_width = EYES_LENS, SENSOR
+        camera.data.clip_start, camera.data.clip_end = CLIP_START * units, 400.0 * units
+    return camera
+
+
+def find_eyes_camera(scene: bpy.types.Scene) -> bpy.types.Object | None:
+    """Find the camera in a player's head; None if there is none."""
+    stage = find_stage(scene)
+    own = list_own_objects(stage) if stage is not None else []
+    return next((thing for thing in own if thing.get(VIEW_MARK) == EYES), None)
