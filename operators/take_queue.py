@@ -21,7 +21,7 @@ from ..scene.player import dots
 from ..scene.result import freshness, plans, preview, quality, queue
 from ..scene.result import synthesis_request as orders
 from ..scene.timeline import strips
-from .library import describe_gaps, describe_library
+from .library.library import describe_gaps, describe_library
 from .operator_base import NEEDS_LIBRARY, BaseOperator, describe_error
 
 

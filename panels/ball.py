@@ -4,9 +4,15 @@ from __future__ import annotations
 
 import bpy
 
-from ..beyond_mocap.annotation.labels import find_label
 from ..scene.ball.settings import find_aimed_ball
-from ..scene.passes.settings import find_active_row, find_armature, find_ball, find_picture_icon, parse_lines
+from ..scene.passes.settings import (
+    find_active_row,
+    find_armature,
+    find_ball,
+    find_picture_icon,
+    parse_lines,
+    show_label,
+)
 from .tab import (
     TabPanel,
     create_value_column,
@@ -34,7 +40,7 @@ class BEYOND_MOCAP_UL_touches(bpy.types.UIList):
         row.prop(item, "use", text="")
         named = row.split(factor=0.62)
         named.label(text=f"{item.time:.2f}  {item.name or '?'}")
-        named.label(text=find_label(item.kind).title)
+        named.label(text=show_label(item.kind))
 
 
 class BEYOND_MOCAP_PT_ball(TabPanel, bpy.types.Panel):
@@ -66,7 +72,7 @@ def draw_tracked_ball(layout, context) -> None:
     layout.template_list("BEYOND_MOCAP_UL_touches", "", settings, "touches", settings, active_propname="active_touch",
                          rows=5)
     if touch := find_active_row(settings.touches, settings.active_touch):
-        kind, part = (find_label(word).title for word in (touch.kind, touch.part))
+        kind, part = (show_label(word) for word in (touch.kind, touch.part))
         layout.label(text=f"{kind}, {part}: confidence {touch.confidence:.0%}")
         create_value_column(layout).prop(touch, "words")
         layout.operator("beyond_mocap.jump_to", text="Go to Touch", icon="PLAY").seconds = touch.time

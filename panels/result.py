@@ -5,9 +5,9 @@ from __future__ import annotations
 import bpy
 
 from ..scene.core.settings import find_active_player
-from ..scene.result.verdict import judge_take
 from .edits import draw_edits
 from .tab import StepPanel, TabPanel, create_value_column, draw_figures, draw_header, draw_paragraph, draw_section
+from .verdict import judge_take
 from .wrapping import wrap_text
 
 VERDICT_ICONS = {"Good": "CHECKMARK", "Fair": "INFO", "Poor": "ERROR"}

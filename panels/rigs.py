@@ -28,15 +28,18 @@ class BEYOND_MOCAP_PT_rig(StepPanel, bpy.types.Panel):
     bl_order = 6
 
     def find_state(self, context):
-        """Return whether there is a result to bring to a rig."""
-        player = find_active_player(context.scene.beyond_mocap)
-        return ("next" if player is not None and player.result.state == "ACCEPTED" else "later"), ""
+        """Return whether there is a result to bring to a rig, or a rig is chosen."""
+        settings = context.scene.beyond_mocap
+        player = find_active_player(settings)
+        is_accepted = player is not None and player.result.state == "ACCEPTED"
+        return ("next" if is_accepted or settings.rig.target is not None else "later"), ""
 
     def draw_step(self, layout, context):
         """Draw rig and buttons, and below them what depends on the rig."""
         rig = context.scene.beyond_mocap.rig
         column = create_value_column(layout)
         column.prop(rig, "target")
+        column.operator("beyond_mocap.use_selected_rig", icon="ARMATURE_DATA")
         column.prop(rig, "source", placeholder="Active Player")
         row = layout.row(align=True)
         row.scale_y = 1.3
@@ -54,7 +57,6 @@ class BEYOND_MOCAP_PT_rig(StepPanel, bpy.types.Panel):
 
 def draw_bake_settings(layout, rig) -> None:
     """Draw how a motion is baked, and the button that simplifies keys."""
-    layout.operator("beyond_mocap.use_selected_rig", text="Use the Selected Rig", icon="EYEDROPPER")
     column = create_value_column(layout)
     for name in ("root", "steps", "ik", "plants", "reduces"):
         column.prop(rig, name)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import bpy
 
 from ..scene.stage.settings import VIEWS
-from .tab import TabPanel
+from .tab import TabPanel, with_progress
 
 MARK = "beyond_mocap_view"  # custom property of the stage's cameras: their view
 
@@ -27,7 +27,10 @@ class BEYOND_MOCAP_PT_stage(TabPanel, bpy.types.Panel):
         grid = layout.grid_flow(columns=2, even_columns=True, align=True)
         for view, name, _, icon, _ in VIEWS:
             grid.operator("beyond_mocap.stage_view", text=name, icon=icon, depress=view == shown).view = view
-        row = layout.row(align=True)
-        row.operator("beyond_mocap.preview_movie", icon="FILE_MOVIE")
-        row.operator("beyond_mocap.contact_sheet", icon="IMGDISPLAY")
-        self.draw_progress(context, "pictures")
+        with_progress(layout, context, ("pictures",), draw_pictures)
+
+
+def draw_pictures(row) -> None:
+    """Draw the buttons that render pictures."""
+    row.operator("beyond_mocap.preview_movie", icon="FILE_MOVIE")
+    row.operator("beyond_mocap.contact_sheet", icon="IMGDISPLAY")

@@ -5,6 +5,7 @@ from __future__ import annotations
 import bpy
 
 from .notices import draw_task_notices
+from .sample import draw_samples
 from .tab import TabPanel
 
 ROWS = (("PLAYER", "MATCH", "PATH", "BALL"), ("MARKERS", "LIBRARY"))
@@ -26,3 +27,4 @@ class BEYOND_MOCAP_PT_task(TabPanel, bpy.types.Panel):
             for task in tasks:
                 row.prop_enum(settings, "task", task)
         draw_task_notices(self.layout, context)
+        draw_samples(self.layout, context)

@@ -107,8 +107,8 @@ def synthesize_players(load, settings, steps) -> list[dict]:
     clips = load("beyond_mocap.library.build").build_library(settings.library_folder, progress=steps.show_progress)
     library_seconds = time.perf_counter() - started
     session.store_library(clips, None)
-    settings.library_holds = load("operators.library").describe_library(clips)
-    settings.library_gaps = load("operators.library").describe_gaps(clips)
+    settings.library_holds = load("operators.library.library").describe_library(clips)
+    settings.library_gaps = load("operators.library.library").describe_gaps(clips)
     reports = []
     for player in settings.players:
         steps.enter_part(player.name)

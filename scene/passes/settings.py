@@ -211,6 +211,13 @@ def name_picture(hits: BeyondMocapHits) -> str:
     return byte_digest(hits.found, size=8).hex()
 
 
+def show_label(name: str) -> str:
+    """Return a label's title, such as "Receive"."""
+    from ...beyond_mocap.annotation.labels import find_label
+
+    return find_label(name).title
+
+
 def find_picture_icon(hits: BeyondMocapHits) -> int:
     """Find the picture's icon number for a layout; 0 until it is painted."""
     previews, name = pictures.get("graphs"), name_picture(hits)

@@ -24,6 +24,7 @@ if TYPE_CHECKING:  # imported by the work itself: scipy and scikit-learn take a 
     from ...beyond_mocap.library.library import Library
 
 SAME_RANGE = 0.05  # seconds: ranges whose ends differ by less are the same
+SEARCH_SHARE = 0.6  # of the time of a take; the rest measures its quality
 
 
 @dataclass(frozen=True)
@@ -168,7 +169,11 @@ def _synthesize_single(request: Request, clips, progress, cancelled, hurry) -> T
     from ...beyond_mocap.synthesis.resynthesize import VariantStretch, list_shown_stretches, resynthesize
     from ...beyond_mocap.synthesis.synthesize import synthesize
 
-    start, plan, mode = perf_counter(), request.plan, request.mode
+    start, plan, mode, told = perf_counter(), request.plan, request.mode, progress
+
+    def progress(share, text):
+        told((1.0 if mode.kind == "quick" else SEARCH_SHARE) * share, text)
+
     stamp = freshness.compute_fingerprint(plan)
     is_same_plan, steps = request.recipe.get("plan") == stamp, request.recipe.get("steps")
     callbacks = progress, cancelled, hurry
@@ -190,6 +195,7 @@ def _synthesize_single(request: Request, clips, progress, cancelled, hurry) -> T
     if mode.kind == "quick":  # its figures come with the full take that follows
         seconds = {**take.seconds, "total": perf_counter() - start}
         return TakeResult(plan, take, {"fps": plan.fps, "seconds": seconds, "warnings": list(take.warnings)}, recipe)
+    progress(1.0, "Measuring")
     return _evaluate_take(clips, plan, take, recipe, perf_counter() - start)
 
 
@@ -208,7 +214,7 @@ def _synthesize_variants(request: Request, clips, progress, cancelled, hurry) ->
     found, used, count = [], (), request.mode.count
     for number in range(count):
         def report_progress(fraction, text, number=number):
-            progress((number + fraction) / count, f"variant {number + 1} of {count}: {text}")
+            progress((number + SEARCH_SHARE * fraction) / count, f"Variant {number + 1} of {count}: {text}")
 
         start = perf_counter()
         plan = replace(request.plan, seed=request.plan.seed + (0 if request.plan.method == "path" else number))
@@ -221,6 +227,7 @@ def _synthesize_variants(request: Request, clips, progress, cancelled, hurry) ->
                 raise
             break
         recipe = {"plan": freshness.compute_fingerprint(plan), "steps": [{"used": [asdict(piece) for piece in used]}]}
+        report_progress(1.0, "Measuring")
         found.append(_evaluate_take(clips, plan, take, recipe, perf_counter() - start))
         used = (*used, *list_shown_stretches(clips, take, take.start_time, take.start_time + take.motion.duration))
     return tuple(found)

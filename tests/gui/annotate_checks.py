@@ -137,7 +137,7 @@ def check_the_menu_is_drawn_clicked_and_greyed():
     yield 1.0
     yield from set_time(4.0)
     yield from type_keys("2")
-    annotate = importlib.import_module(f"{EXTENSION}.operators.annotate")
+    annotate = importlib.import_module(f"{EXTENSION}.operators.timeline.annotate")
     yield from wait_until(lambda: "box" in annotate._menu, 60.0, "the menu")
     yield 0.5
     window.save_picture(PICTURES / "annotate.png")
@@ -156,7 +156,7 @@ def check_the_menu_is_drawn_clicked_and_greyed():
 
 def check_the_menu_stays_within_every_editor():
     yield from open_annotating(editor="VIEW_3D")
-    annotate = importlib.import_module(f"{EXTENSION}.operators.annotate")
+    annotate = importlib.import_module(f"{EXTENSION}.operators.timeline.annotate")
     for area in [a for a in window.window.screen.areas if a.type in annotate.SPACES]:
         region = next(r for r in area.regions if r.type == "WINDOW")
         for x, y in ((0.03, 0.06), (0.97, 0.06), (0.97, 0.94), (0.5, 0.5)):

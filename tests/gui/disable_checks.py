@@ -103,7 +103,7 @@ def check_disabled_with_overlays():
 
 def check_disabled_during_annotation():
     yield from disable_while(lambda: run_operator("beyond_mocap.annotate"),
-                             lambda: import_module("operators.annotate")._running)
+                             lambda: import_module("operators.timeline.annotate")._running)
 
 
 def check_disabled_while_pictures_are_rendered():

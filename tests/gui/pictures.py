@@ -164,7 +164,7 @@ def check_momentum():
 
 def check_menu_of_labels():
     """The menu after `=` and `2` (catchb), in which neither recordings nor synthetic actions have everything."""
-    area, annotate = window.find_area("VIEW_3D"), import_module("operators.annotate")
+    area, annotate = window.find_area("VIEW_3D"), import_module("operators.timeline.annotate")
     region = next(region for region in area.regions if region.type == "WINDOW")
     yield from window.move_pointer(area.x + area.width // 3, area.y + area.height // 2)
     for key in ("J", "EQUAL", "TWO"):

@@ -165,7 +165,7 @@ def test_every_kind_of_fix_has_a_button_a_tooltip_and_an_action():
     import importlib
 
     kinds = importlib.import_module(f"{EXTENSION}.beyond_mocap.base.fixes").KINDS
-    actions = importlib.import_module(f"{EXTENSION}.operators.notices.fixes")
+    actions = importlib.import_module(f"{EXTENSION}.operators.fixes")
     buttons = importlib.import_module(f"{EXTENSION}.scene.core.notices").BUTTONS
     assert set(buttons) == set(actions.APPLY) == kinds == {*actions.TOOLTIPS, "press"}
 

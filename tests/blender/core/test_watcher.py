@@ -340,7 +340,7 @@ def a_live_update(room, _context):
 
 def a_menu_of_words(room, _context):
     """Annotate by Keys draws over every editor of time and space."""
-    room("operators.annotate")._start_drawing()
+    room("operators.timeline.annotate")._start_drawing()
 
 
 STARTS = (a_background_job, a_match_child, a_stream, a_live_update, a_menu_of_words)

@@ -9,7 +9,7 @@ MET = "\n".join(f"Figure {number}: 1.0 cm\t≤ 2.0\tmet" for number in range(20)
 
 @pytest.fixture
 def judge(extension):
-    return importlib.import_module(f"{extension.__name__}.scene.result.verdict").judge_take
+    return importlib.import_module(f"{extension.__name__}.panels.verdict").judge_take
 
 
 @pytest.mark.parametrize("more, word", [

@@ -8,17 +8,17 @@ import bpy
 from bpy.props import FloatProperty, StringProperty
 from bpy_extras.io_utils import ExportHelper
 
-from ..beyond_mocap.annotation import format_timeline, read_timeline, swap_sides
-from ..beyond_mocap.base.errors import InputError, format_count
-from ..scene.core.settings import find_active_player, to_setting_path
-from ..scene.library import recordings
-from ..scene.player import tracks
-from ..scene.timeline import label_tracks as lanes
-from ..scene.timeline import strip_writing as lay_strips
-from ..scene.timeline import strips
-from ..scene.timeline.strip_lines import format_labels, parse_labels
-from ..scene.timeline.strips import describe_target, ensure_target, find_active_clip, find_target, find_target_clock
-from .operator_base import BaseOperator, ImportOperator
+from ...beyond_mocap.annotation import format_timeline, read_timeline, swap_sides
+from ...beyond_mocap.base.errors import InputError, format_count
+from ...scene.core.settings import find_active_player, to_setting_path
+from ...scene.library import recordings
+from ...scene.player import tracks
+from ...scene.timeline import label_tracks as lanes
+from ...scene.timeline import strip_writing as lay_strips
+from ...scene.timeline import strips
+from ...scene.timeline.strip_lines import format_labels, parse_labels
+from ...scene.timeline.strips import describe_target, ensure_target, find_active_clip, find_target, find_target_clock
+from ..operator_base import BaseOperator, ImportOperator
 from .timeline import TimelineVerb, TimelineWritingVerb, compute_playhead, draw_problems, list_selected_spans
 
 

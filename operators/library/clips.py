@@ -9,17 +9,17 @@ import bpy
 import numpy as np
 from bpy.props import BoolProperty, EnumProperty, FloatProperty, StringProperty
 
-from ..beyond_mocap.base.errors import InputError, UserCancelledError, format_count
-from ..beyond_mocap.files.bvh import bvh
-from ..beyond_mocap.library.scan import FOREIGN, find_recordings, is_foreign
-from ..beyond_mocap.motion import humanoid
-from ..beyond_mocap.motion.mirror import mirror
-from ..beyond_mocap.motion.motion import Motion, place_motion
-from ..beyond_mocap.motion.quaternion import from_up_angle, rotate
-from ..scene.core import action, channels, frame_range, window
-from ..scene.library import assets, clips, foreign, recordings
-from ..scene.rigs import armature, export
-from .operator_base import BackgroundOperator, BaseOperator, ImportOperator
+from ...beyond_mocap.base.errors import InputError, UserCancelledError, format_count
+from ...beyond_mocap.files.bvh import bvh
+from ...beyond_mocap.library.scan import FOREIGN, find_recordings, is_foreign
+from ...beyond_mocap.motion import humanoid
+from ...beyond_mocap.motion.mirror import mirror
+from ...beyond_mocap.motion.motion import Motion, place_motion
+from ...beyond_mocap.motion.quaternion import from_up_angle, rotate
+from ...scene.core import action, channels, frame_range, window
+from ...scene.library import assets, clips, foreign, recordings
+from ...scene.rigs import armature, export
+from ..operator_base import BackgroundOperator, BaseOperator, ImportOperator
 
 
 class BEYOND_MOCAP_OT_import_clips(ImportOperator, bpy.types.Operator):
@@ -222,8 +222,8 @@ kind, in this file or as a .blend for a folder of asset libraries"""
     @staticmethod
     def run_job(order, progress, cancelled, _hurry):
         """Read the motions and render the pictures."""
-        from ..beyond_mocap.files.bvh import bvh
-        from ..beyond_mocap.library.label_files import read_labels
+        from ...beyond_mocap.files.bvh import bvh
+        from ...beyond_mocap.library.label_files import read_labels
 
         drafts, pictures, total = [], [], len(order.files) + len(order.drafts)
         for number, (path, file, unit, figures) in enumerate(order.files):

@@ -8,17 +8,17 @@ from pathlib import Path
 import bpy
 from bpy.props import BoolProperty, EnumProperty, FloatProperty, IntProperty, StringProperty
 
-from ..beyond_mocap.base.errors import BeyondMocapError, InputError, format_count
-from ..beyond_mocap.base.fixes import Fix
-from ..scene.core import preferences, sample, session
-from ..scene.core.settings import to_absolute_path
-from ..scene.core.window import clear_status, show_status
-from ..scene.library import clips, recordings
-from ..scene.timeline import label_tracks as lanes
-from ..scene.timeline import proposals
-from .annotate import SPACES
+from ...beyond_mocap.base.errors import BeyondMocapError, InputError, format_count
+from ...beyond_mocap.base.fixes import Fix
+from ...scene.core import preferences, sample, session
+from ...scene.core.settings import to_absolute_path
+from ...scene.core.window import clear_status, show_status
+from ...scene.library import clips, recordings
+from ...scene.timeline import label_tracks as lanes
+from ...scene.timeline import proposals
+from ..operator_base import BaseOperator
+from ..timeline.annotate import SPACES
 from .library import ClipOperator, FolderOperator
-from .operator_base import BaseOperator
 
 
 class OpenClipOperator(BaseOperator):
@@ -38,7 +38,7 @@ the NLA editor; Save Labels writes them to the library"""
 
     def do(self, context):
         """Read clip and labels, then create armature and strips."""
-        from ..beyond_mocap.library.label_files import read_labels, read_sources, to_timeline
+        from ...beyond_mocap.library.label_files import read_labels, read_sources, to_timeline
 
         settings, path = context.scene.beyond_mocap, self.find_clip(context)
         motion, _ = recordings.read_recording(settings, path)
@@ -71,10 +71,10 @@ headers, turns, getting up, and acts learned from annotated clips"""
 
     def do(self, context):
         """Read the recording, then write the strips."""
-        from ..beyond_mocap.annotation import Timeline
-        from ..beyond_mocap.library.classify import classifier
-        from ..beyond_mocap.library.label_files import to_timeline
-        from ..beyond_mocap.library.proposals import GAITS, list_gaits, propose_labels
+        from ...beyond_mocap.annotation import Timeline
+        from ...beyond_mocap.library.classify import classifier
+        from ...beyond_mocap.library.label_files import to_timeline
+        from ...beyond_mocap.library.proposals import GAITS, list_gaits, propose_labels
 
         settings, rig = context.scene.beyond_mocap, context.object
         motion, _ = recordings.read_recording(settings, recordings.find_shown_clip(rig), rig[recordings.FOLDER])
@@ -106,7 +106,7 @@ headers, turns, getting up, and acts learned from annotated clips"""
 
     def list_new_proposals(self, rig, scene, motion, found):
         """List the proposals that are not among the clip's labels already."""
-        from ..beyond_mocap.annotation import Timeline
+        from ...beyond_mocap.annotation import Timeline
 
         if not lanes.has_label_tracks(rig):
             recordings.write_labels(rig, scene, motion, Timeline())
@@ -264,8 +264,8 @@ table; existing labels are replaced only after you confirm"""
 
     def invoke(self, context, event):
         """Ask before existing labels are replaced."""
-        from ..beyond_mocap.base.errors import InputError
-        from ..beyond_mocap.library.label_files import find_label_file, has_labels
+        from ...beyond_mocap.base.errors import InputError
+        from ...beyond_mocap.library.label_files import find_label_file, has_labels
 
         rig = context.object
         clip, folder = recordings.find_source_file(rig)
@@ -284,7 +284,7 @@ table; existing labels are replaced only after you confirm"""
 
     def do(self, context):
         """Read the strips, write the file, and update the list."""
-        from ..beyond_mocap.library.label_files import write_labels
+        from ...beyond_mocap.library.label_files import write_labels
 
         rig = context.object
         rows = recordings.read_labels(rig)
@@ -337,10 +337,10 @@ others; the result is a file that works with any library"""
     @staticmethod
     def run_job(order, progress, cancelled, _hurry):
         """Read the clips, train and write the classifier; returns the file and lines about what was learned."""
-        from ..beyond_mocap.library import cache
-        from ..beyond_mocap.library.classify import classifier
-        from ..beyond_mocap.library.classify.examples import read_examples
-        from ..beyond_mocap.library.classify.train import train_classifier
+        from ...beyond_mocap.library import cache
+        from ...beyond_mocap.library.classify import classifier
+        from ...beyond_mocap.library.classify.examples import read_examples
+        from ...beyond_mocap.library.classify.train import train_classifier
 
         out = Path(order.out) if order.out else cache.find_cache_folder(Path(order.folder),
                                                                         order.cache)[0] / classifier.FILE_NAME

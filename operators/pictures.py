@@ -8,11 +8,11 @@ import bpy
 from bpy.props import BoolProperty, EnumProperty, IntProperty, StringProperty
 from bpy_extras.io_utils import ExportHelper
 
-from ...beyond_mocap.base.errors import InputError
-from ...scene.core import notices
-from ...scene.stage import pictures
-from ...scene.study import find_engine
-from ..operator_base import BackgroundOperator
+from ..beyond_mocap.base.errors import InputError
+from ..scene.core import notices
+from ..scene.stage import pictures
+from ..scene.study import find_engine
+from .operator_base import BackgroundOperator
 
 ENGINES = (("AUTO", "Automatic", "EEVEE, or Cycles where Blender has no window"),
            ("EEVEE", "EEVEE", "Quick with a graphics card"),

@@ -1,4 +1,4 @@
-"""One line about a take's quality, from the lines of figures, key moments and warnings that `quality` describes.
+"""One line about a take's quality, from the lines of figures, key moments and warnings that the player keeps.
 
 The rule, which docs/reference/panel-guide.md tells in full:
 

@@ -10,16 +10,16 @@ from typing import TYPE_CHECKING
 import bpy
 from bpy.props import BoolProperty, IntProperty, StringProperty
 
-from ..beyond_mocap.annotation.labels import find_label
-from ..beyond_mocap.base.errors import InputError, format_count
-from ..beyond_mocap.base.fixes import Fix
-from ..scene.core import preferences, session, window
-from ..scene.core.settings import to_absolute_path, to_setting_path
-from ..scene.library import clips, foreign, recordings
-from .operator_base import BackgroundOperator, BaseOperator
+from ...beyond_mocap.annotation.labels import find_label
+from ...beyond_mocap.base.errors import InputError, format_count
+from ...beyond_mocap.base.fixes import Fix
+from ...scene.core import preferences, session, window
+from ...scene.core.settings import to_absolute_path, to_setting_path
+from ...scene.library import clips, foreign, recordings
+from ..operator_base import BackgroundOperator, BaseOperator
 
 if TYPE_CHECKING:
-    from ..beyond_mocap.library.library import Library
+    from ...beyond_mocap.library.library import Library
 
 
 MAX_LEFT_OUT = 12  # stretches left out of locomotion that the panel lists
@@ -169,8 +169,8 @@ glTF and USD clips are converted first, and the result is cached"""
         """Build the library and list its clips; a library that cannot be built is listed too, so that it can be
         labelled.
         """
-        from ..beyond_mocap.library.build import build_library
-        from ..beyond_mocap.library.listing import list_clips, scan_clips
+        from ...beyond_mocap.library.build import build_library
+        from ...beyond_mocap.library.listing import list_clips, scan_clips
 
         files = clips.list_files(order.folder) or {}
         options = {"rebuild": order.rebuild, "unit": order.unit, **order.preferences}
@@ -214,7 +214,7 @@ def describe_gaps(library: "Library") -> str:
     """Describe for the panel, one line each, what is proposed, missing and left out of locomotion; the first line sums
     it up; "" where there is nothing to say.
     """
-    from ..beyond_mocap.library.left_out import describe_left_out
+    from ...beyond_mocap.library.left_out import describe_left_out
 
     missing, left_out = list(library.coverage.lines.values()), describe_left_out(library, MAX_LEFT_OUT)
     parts = ["Proposed labels"] if library.proposal_notes else []
@@ -252,7 +252,7 @@ quality"""
     @staticmethod
     def run_job(order, progress, _cancelled, _hurry):
         """List from the built library where there is one, else from the folder."""
-        from ..beyond_mocap.library.listing import list_clips, scan_clips
+        from ...beyond_mocap.library.listing import list_clips, scan_clips
 
         progress(0.0, "Listing clips")
         files = clips.list_files(order.folder)

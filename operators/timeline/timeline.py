@@ -7,18 +7,18 @@ from dataclasses import replace
 import bpy
 from bpy.props import BoolProperty, FloatProperty, IntProperty, StringProperty
 
-from ..beyond_mocap.base.errors import InputError
-from ..scene.core import window
-from ..scene.core.live import call_soon
-from ..scene.core.settings import find_active_player
-from ..scene.result import bake
-from ..scene.timeline import label_checks as word_checks
-from ..scene.timeline import label_tracks as lanes
-from ..scene.timeline import moment_names, strip_layout, strip_overlay
-from ..scene.timeline import strip_writing as lay_strips
-from ..scene.timeline.strip_lines import parse_labels
-from ..scene.timeline.strips import can_have_timeline, describe_target, ensure_target, find_target, find_target_clock
-from .operator_base import BaseOperator
+from ...beyond_mocap.base.errors import InputError
+from ...scene.core import window
+from ...scene.core.live import call_soon
+from ...scene.core.settings import find_active_player
+from ...scene.result import bake
+from ...scene.timeline import label_checks as word_checks
+from ...scene.timeline import label_tracks as lanes
+from ...scene.timeline import moment_names, strip_layout, strip_overlay
+from ...scene.timeline import strip_writing as lay_strips
+from ...scene.timeline.strip_lines import parse_labels
+from ...scene.timeline.strips import can_have_timeline, describe_target, ensure_target, find_target, find_target_clock
+from ..operator_base import BaseOperator
 
 
 class TimelineVerb(BaseOperator):

@@ -7,11 +7,11 @@ from pathlib import Path
 import bpy
 from bpy.props import IntProperty
 
-from ...beyond_mocap.base.errors import BeyondMocapError, InputError
-from ...scene.core import notices
-from ...scene.result import bake
-from ...scene.timeline import strips
-from ..operator_base import BaseOperator
+from ..beyond_mocap.base.errors import BeyondMocapError, InputError
+from ..scene.core import notices
+from ..scene.result import bake
+from ..scene.timeline import strips
+from .operator_base import BaseOperator
 
 
 class NoticeOperator(BaseOperator):

@@ -8,14 +8,14 @@ import bpy
 from bpy.props import BoolProperty, FloatProperty, IntProperty, StringProperty
 from bpy_extras.io_utils import ImportHelper
 
-from ..beyond_mocap.annotation import key_commands as annotating
-from ..beyond_mocap.annotation.key_commands import StopAnnotating
-from ..beyond_mocap.base.errors import BeyondMocapError, InputError
-from ..scene.core import popup, window
-from ..scene.timeline import video
-from ..scene.timeline.key_annotation import compute_now, describe_subject, find_combinations, run_command, type_keys
-from ..scene.timeline.video import add_driver
-from .operator_base import BaseOperator
+from ...beyond_mocap.annotation import key_commands as annotating
+from ...beyond_mocap.annotation.key_commands import StopAnnotating
+from ...beyond_mocap.base.errors import BeyondMocapError, InputError
+from ...scene.core import popup, window
+from ...scene.timeline import video
+from ...scene.timeline.key_annotation import compute_now, describe_subject, find_combinations, run_command, type_keys
+from ...scene.timeline.video import add_driver
+from ..operator_base import BaseOperator
 
 SPACES = {"VIEW_3D": bpy.types.SpaceView3D, "NLA_EDITOR": bpy.types.SpaceNLA, "CLIP_EDITOR": bpy.types.SpaceClipEditor,
           "DOPESHEET_EDITOR": bpy.types.SpaceDopeSheetEditor, "SEQUENCE_EDITOR": bpy.types.SpaceSequenceEditor}

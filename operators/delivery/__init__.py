@@ -1,1 +1,0 @@
-"""Operators that deliver what was made, as pictures."""

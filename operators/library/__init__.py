@@ -1,0 +1,1 @@
+"""Operators of the library: its folder, its clips, and their labels."""

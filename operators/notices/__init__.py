@@ -1,1 +1,0 @@
-"""Operators of notices about what failed."""

@@ -1,0 +1,1 @@
+"""Operators of the timeline: its editor, the labels of players, and annotating with keys."""
