@@ -4,7 +4,7 @@
 
 This is what `synthesize` and `resynthesize` do with a solved ball (`solve_ball`): before the search, key moments move
 to solved touches; when the body is done, the ball passes through the places where it was met, as solved in between, and
-in dribbles step by step from foot to foot (`synthesis.construct.dribble`).
+in dribbles step by step from foot to foot (`synthesis.construct.ball_touch.dribble`).
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ from .construct.ball_detour import find_free_contact, lead_ball_around_body
 from .construct.ball_touch.touch_frames import compute_contact_frames, find_nearest_frame
 from .construct.ball_touch.touch_problem import BALL_NOISE
 from .construct.contact_geometry import BALL_SECONDS, add_flight_arc, lead_ball_through
-from .construct.dribble import plan_dribbles
+from .construct.ball_touch.dribble import plan_dribbles
 from .construct.give import give_with_ball
 from .construct.held_ball import HandTouch, carry_in_hands, hold_in_spans
 from .construct.near_miss import miss_ball

@@ -14,11 +14,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ...annotation.body_solid import BodySolid, build_leg_surfaces
-from ...base.time_series import find_runs
-from ...motion.motion import compute_pose
-from ...motion.skeleton import Skeleton
-from .contact_geometry import move_ball_at
+from ....annotation.body_solid import BodySolid, build_leg_surfaces
+from ....base.time_series import find_runs
+from ....motion.motion import compute_pose
+from ....motion.skeleton import Skeleton
+from ..contact_geometry import move_ball_at
 from .dribble_search import SOONEST, DribblePart, DribbleSearch, Push
 
 KEY_SECONDS = 0.5  # s from either end of a stretch within which a key moment begins or ends the dribble

@@ -9,15 +9,15 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ...annotation.body_solid import BodySolid, build_leg_surfaces
-from ...annotation.striking import Surface, build_part_surfaces, find_nearest_point
-from ...ball.roll import compute_roll_speeds, simulate_rolls
-from ...base.time_series import find_runs
-from ...motion.humanoid import compute_heading_from_positions, identify_joints
-from ...motion.motion import compute_pose
-from ...motion.skeleton import Skeleton
-from ...motion.track import BALL_RADIUS, smooth_zero_phase_hann
-from .contact_geometry import find_touching_places
+from ....annotation.body_solid import BodySolid, build_leg_surfaces
+from ....annotation.striking import Surface, build_part_surfaces, find_nearest_point
+from ....ball.roll import compute_roll_speeds, simulate_rolls
+from ....base.time_series import find_runs
+from ....motion.humanoid import compute_heading_from_positions, identify_joints
+from ....motion.motion import compute_pose
+from ....motion.skeleton import Skeleton
+from ....motion.track import BALL_RADIUS, smooth_zero_phase_hann
+from ..contact_geometry import find_touching_places
 
 SOONEST, _LATEST = 0.2, 0.6  # s, shortest roll from one touch to the next, and longest beyond the `_LONG` below
 _ANGLES = np.radians([0.0, 35.0, -35.0, 65.0, -65.0])  # sides of the ball that are tried, from straight ahead
