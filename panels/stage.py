@@ -15,5 +15,6 @@ class BEYOND_MOCAP_PT_stage(TabPanel, bpy.types.Panel):
     bl_options = {"DEFAULT_CLOSED"}
 
     def draw(self, context):
-        """Draw the button that adds the stage."""
+        """Draw the buttons of stage and characters."""
         self.layout.operator("beyond_mocap.add_stage", icon="VIEW_CAMERA")
+        self.layout.operator("beyond_mocap.change_look", icon="MOD_CLOTH")

@@ -1,7 +1,7 @@
 """How deep the skin of a body's boots goes below the ground (`../shared/metrics.md`).
 
-The boots have the soles of the drawn character (`appearance.boots`), so what is measured is what is seen. A take stands on
-the ground at height 0, a recording as it is used.
+The boots have the soles of the drawn character (`appearance.boots`), so what is measured is what is seen. A take stands
+on the ground at height 0, a recording as it is used.
 """
 
 from __future__ import annotations
