@@ -29,9 +29,9 @@ from beyond_mocap.motion.motion import Motion, compute_pose, place_motion, sampl
 from beyond_mocap.motion.quaternion import rotate_about_up  # noqa: E402
 
 COLOURS = {"skin": (0.60, 0.36, 0.24), "shirt": (0.72, 0.06, 0.05), "shorts": (0.86, 0.86, 0.84),
-           "socks": (0.72, 0.06, 0.05), "boots": (0.03, 0.03, 0.035), "hair": (0.045, 0.028, 0.02), "trim": (0.86, 0.86, 0.84),
-           "soles": (0.35, 0.42, 0.03), "eyes": (0.72, 0.72, 0.70), "pupils": (0.02, 0.011, 0.007),
-           "gloves": (0.62, 0.66, 0.10)}
+           "socks": (0.72, 0.06, 0.05), "boots": (0.03, 0.03, 0.035), "hair": (0.045, 0.028, 0.02),
+           "trim": (0.86, 0.86, 0.84), "soles": (0.35, 0.42, 0.03), "eyes": (0.72, 0.72, 0.70),
+           "pupils": (0.02, 0.011, 0.007), "gloves": (0.62, 0.66, 0.10)}
 BALL_RADIUS = 0.11  # m
 
 

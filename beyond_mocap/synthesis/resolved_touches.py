@@ -27,10 +27,10 @@ from ..motion.motion import compute_pose
 from ..motion.track import BALL_RADIUS, Track
 from ..motion.track.ball_path import BallPath
 from .construct.ball_detour import find_free_contact, lead_ball_around_body
+from .construct.ball_touch.dribble import plan_dribbles
 from .construct.ball_touch.touch_frames import compute_contact_frames, find_nearest_frame
 from .construct.ball_touch.touch_problem import BALL_NOISE
 from .construct.contact_geometry import BALL_SECONDS, add_flight_arc, lead_ball_through
-from .construct.ball_touch.dribble import plan_dribbles
 from .construct.give import give_with_ball
 from .construct.held_ball import HandTouch, carry_in_hands, hold_in_spans
 from .construct.near_miss import miss_ball

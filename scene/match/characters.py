@@ -68,6 +68,7 @@ class CharacterBuilder:
         kit, look = choose_kit(person, self.colours), choose_look(person.id, gloves=person.keeper)
         mesh_objects = [self._add_mesh_object(armature_object, "body", self._create_body(example, kit, look),
                                               collection)]
+        mesh_objects[0][stage_body.CHARACTER_MARK] = True
         _colour_skin(mesh_objects[0], look)
         if person.number >= 0:
             mesh_objects.append(self._add_mesh_object(armature_object, "number",

@@ -10,6 +10,8 @@ from typing import TYPE_CHECKING
 import bpy
 import numpy as np
 
+from ..core import channels
+from ..core.action import read_motion
 from ..core.material import get_material
 from ..rigs import armature
 
@@ -31,6 +33,8 @@ ROUGHNESS = {"skin": 0.5, "hair": 0.6, "boots": 0.35, "eyes": 0.15, "pupils": 0.
 """Roughness of parts that are not cloth."""
 
 CLOTH = 0.85  # roughness
+CHARACTER_MARK = "beyond_mocap_character"
+"""Custom property of the mesh objects made here."""
 
 
 def create_character(player, name: str, shirt, collection, scene: bpy.types.Scene, example) -> bpy.types.Object:
@@ -62,8 +66,51 @@ def create_character(player, name: str, shirt, collection, scene: bpy.types.Scen
     character = bpy.data.objects.new(f"{name} body", mesh)
     collection.objects.link(character)
     attach(character, player)
+    character[CHARACTER_MARK] = True
     write_weights(character, skeleton.names, body.joints, body.weights)
     return character
+
+
+def list_characters(context: bpy.types.Context) -> list[bpy.types.Object]:
+    """List the characters that are selected, themselves or their armatures, and can be changed."""
+    found = [thing for picked in context.selected_objects for thing in (picked, *picked.children)]
+    return [thing for thing in dict.fromkeys(found)
+            if thing.get(CHARACTER_MARK) and thing.parent is not None and thing.library is None
+            and thing.override_library is None]
+
+
+def change_look(character: bpy.types.Object, scene: bpy.types.Scene, look: Look, light: bool) -> None:
+    """Give a character another look; its kit's materials stay.
+
+    Args:
+        character: one of `list_characters`.
+        scene: says the unit scale.
+        look: the new look.
+        light: whether it gets the light body.
+    """
+    from ...beyond_mocap.appearance.body import build_body
+    from ...beyond_mocap.appearance.mesh import MATERIALS
+
+    player, before = character.parent, character.data
+    skeleton = armature.build_skeleton(player, scene)
+    has_action = channels.find_playing_action(player)[0] is not None
+    body = build_body(skeleton, example=read_motion(player, scene) if has_action else None, look=look, light=light)
+    root = np.array(player.data.bones[skeleton.names[0]].head_local)
+    kit = dict(zip(MATERIALS, before.materials))
+
+    def find_material(part: str) -> bpy.types.Material:
+        kept = None if part in ("skin", "hair") else kit.get(part)
+        return kept or get_part_material(part, look)
+
+    vertices = body.vertices / armature.find_placement(player, scene).scale + root
+    mesh = create_body_mesh(before.name, body, vertices, find_material)
+    character.vertex_groups.clear()
+    character.data = mesh
+    for slot in character.material_slots:
+        slot.link = "DATA"
+    write_weights(character, skeleton.names, body.joints, body.weights)
+    if not before.users:
+        bpy.data.meshes.remove(before)
 
 
 def get_part_material(part: str, look: Look) -> bpy.types.Material:

@@ -70,6 +70,12 @@ def forget_dots():
     bpy.context.view_layer.update()
 
 
+def select_character():
+    character = next(thing for thing in bpy.context.scene.objects if thing.get("beyond_mocap_character"))
+    character.select_set(True)
+    bpy.context.view_layer.objects.active = character
+
+
 def pick_a_moment():
     bpy.ops.beyond_mocap.go_to_moment(strip="Moments", index=0)
 
@@ -415,6 +421,7 @@ ROWS = {
     "ball_to_physics": Row("accepted", lambda places: {"frame": 15}, aim_a_ball),
     "build_library": Row("imported", lambda places: {"rebuild": True}),
     "cancel": Row("imported", changes=False),
+    "change_look": Row("accepted", lambda places: {"hair": "bald"}, select_character),
     "choose_player": Row("imported", lambda places: {"player": "player2"}),
     "clean_markers": Row("imported", prepare=a_cloud),
     "clear_hits": Row("accepted", prepare=analyse),

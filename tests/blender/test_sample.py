@@ -41,8 +41,10 @@ def test_each_sample_moves_on_a_lit_pitch(which):
     scene.frame_set(scene.frame_start)
     poses = [[tuple(bone.matrix.translation) for bone in body.pose.bones] for body in bodies]
     scene.frame_set((scene.frame_start + scene.frame_end) // 2)
-    assert all(pose != [tuple(bone.matrix.translation) for bone in body.pose.bones] for pose, body in zip(poses, bodies))
-    assert any(thing.type == "LIGHT" for thing in scene.objects) and any("Grass" in thing.name for thing in scene.objects)
+    now = [[tuple(bone.matrix.translation) for bone in body.pose.bones] for body in bodies]
+    assert all(pose != later for pose, later in zip(poses, now))
+    assert any(thing.type == "LIGHT" for thing in scene.objects)
+    assert any("Grass" in thing.name for thing in scene.objects)
     assert scene.camera is not None and scene.world is not None
     assert scene != start and sorted(thing.name for thing in start.objects) == names
     last = max(body.animation_data.action.frame_range[1] for body in bodies)

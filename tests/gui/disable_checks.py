@@ -110,8 +110,8 @@ def check_disabled_while_pictures_are_rendered():
     def start():
         bpy.ops.beyond_mocap.list_clips()
         bpy.ops.beyond_mocap.import_clip(path="walking_1_2.bvh")
-        run_operator("beyond_mocap.preview_movie", filepath=str((PICTURES / "left-behind.mp4").resolve()), is_chosen=True,
-                     engine="CYCLES", samples=500)
+        run_operator("beyond_mocap.preview_movie", filepath=str((PICTURES / "left-behind.mp4").resolve()),
+                     is_chosen=True, engine="CYCLES", samples=500)
 
     yield from disable_while(start, lambda: import_module("scene.match.command_process")._running)
     assert not list(PICTURES.glob("*left-behind*"))

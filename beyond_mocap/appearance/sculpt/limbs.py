@@ -154,8 +154,10 @@ def build_boot() -> Field:
 
 
 _SOLE = ((-0.073, -0.068, -0.060, -0.045, -0.030, 0.133, 0.161, 0.188, 0.203, 0.210),
-         (0.030, 0.017, 0.005, 0.0012, 0.0, 0.0, 0.0010, 0.0024, 0.0056, 0.013))
+         (0.030, 0.017, 0.005, 0.0012, 0.0, 0.0, 0.0014, 0.0028, 0.0058, 0.013))
 """Metres ahead of the ankle, and height of the sole there: that of `appearance.boots`."""
+
+_CHORD = 0.0004  # m by which the middles of the sole's faces lie above its curve
 
 
 def build_floor() -> Field:
@@ -163,6 +165,6 @@ def build_floor() -> Field:
 
     def measure(points: np.ndarray) -> np.ndarray:
         across = np.minimum(np.abs(points[:, 1] - HIP[1] - 0.004) / 0.045, 1.0)
-        return np.interp(points[:, 0], *_SOLE) + 0.005 * across**3 - points[:, 2]
+        return np.interp(points[:, 0], *_SOLE) - _CHORD + 0.007 * across**3 - points[:, 2]
 
     return measure

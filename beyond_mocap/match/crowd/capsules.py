@@ -2,8 +2,8 @@
 
 A capsule is everything within its radius of a straight line. The overlap of two bodies is the largest value, over all
 pairs of a capsule of each, of the sum of both radii minus the distance of the two lines; negative if they are apart.
-The radii are those of the low-poly body (`appearance.body`); the wide trunk has three lines (across the hips, up the
-spine, across the shoulders).
+The radii are those of a slim adult; the wide trunk has three lines (across the hips, up the spine, across the
+shoulders).
 """
 
 from __future__ import annotations

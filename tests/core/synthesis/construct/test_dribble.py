@@ -15,8 +15,8 @@ from beyond_mocap.motion.humanoid import identify_joints
 from beyond_mocap.motion.motion import compute_pose
 from beyond_mocap.motion.track import BALL_RADIUS
 from beyond_mocap.synthesis.construct.ball_detour import lead_ball_around_body
-from beyond_mocap.synthesis.construct.contact_geometry import lead_ball_through, move_ball_at
 from beyond_mocap.synthesis.construct.ball_touch.dribble import plan_dribbles
+from beyond_mocap.synthesis.construct.contact_geometry import lead_ball_through, move_ball_at
 from beyond_mocap.synthetic.gait import build_gait
 
 FPS = 30.0

@@ -1,0 +1,60 @@
+"""Characters in the file: the mesh bends as in the core, keeps its volume, and changes its look but not its kit."""
+
+import importlib
+
+import bpy
+import numpy as np
+import pytest
+import synthetic_motion
+
+
+@pytest.fixture
+def character(extension, core):
+    """A character on an armature that plays a known motion, and that motion."""
+    rooms = {name: importlib.import_module(f"{extension.__name__}.scene.{name}")
+             for name in ("rigs.armature", "core.action", "stage.body")}
+    motion, scene = synthetic_motion.build_motion(core, 31, 30.0), bpy.context.scene
+    scene.render.fps = 30
+    rig = rooms["rigs.armature"].create_armature(bpy.context, motion.skeleton, "Somebody")
+    rooms["core.action"].write_motion(rig, motion, scene, 1.0)
+    body = rooms["stage.body"]
+    return body.create_character(rig, "Somebody", (1, 0, 0), scene.collection, scene, motion), motion, body
+
+
+def read_places(thing):
+    """The vertices (V, 3) of an object as displayed."""
+    shown = thing.evaluated_get(bpy.context.evaluated_depsgraph_get())
+    mesh, flat = shown.to_mesh(), np.empty(3 * len(thing.data.vertices), np.float32)
+    mesh.vertices.foreach_get("co", flat)
+    shown.to_mesh_clear()
+    matrix = np.array(thing.matrix_world)
+    return flat.reshape(-1, 3) @ matrix[:3, :3].T + matrix[:3, 3]
+
+
+def test_blender_bends_it_as_the_core_does(core, character):
+    thing, motion, _ = character
+    look = core("appearance.look").choose_look("Somebody")
+    body = core("appearance.body").build_body(motion.skeleton, example=motion, look=look)
+    places, world = core("motion.motion").forward_kinematics(motion)
+    for frame in (0, 17, 30):
+        bpy.context.scene.frame_set(1 + frame)
+        expected = core("appearance.mesh").deform_body(body, motion.skeleton, places[frame], world[frame])
+        assert np.abs(read_places(thing) - expected).max() < 0.002
+    assert thing.modifiers["Armature"].use_deform_preserve_volume
+
+
+def test_edges_between_parts_are_sharp_and_only_those(character):
+    thing = character[0]
+    sharp = np.empty(len(thing.data.edges), bool)
+    thing.data.edges.foreach_get("use_edge_sharp", sharp)
+    assert 0.005 < sharp.mean() < 0.15
+
+
+def test_another_look_keeps_the_kit(core, character):
+    thing, _, body = character
+    kit, faces = thing.data.materials[1], len(thing.data.polygons)
+    look = core("appearance.look").Look(hair="bald", skin=4, gloves=True)
+    body.change_look(thing, bpy.context.scene, look, True)
+    assert thing.data.materials[1] == kit and len(thing.data.polygons) < 0.4 * faces
+    assert thing.material_slots[0].material.name == "Skin 5" and len(thing.vertex_groups) > 10
+    assert np.ptp(read_places(thing)[:, 2]) > 1.2
