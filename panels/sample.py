@@ -7,7 +7,6 @@ import bpy
 from ..scene.markers.settings import list_clouds
 from .tab import TabPanel, draw_paragraph
 
-
 SAMPLES = {"PLAYER": ("PLAYER",), "MATCH": ("MATCH",), "PATH": ("PATH",), "BALL": ("PASSES", "THROW"),
            "MARKERS": ("MARKERS",)}
 """The samples of each task."""
