@@ -39,6 +39,7 @@ SECTIONS = {  # name -> heading, (subheading, module, function) of each part
                             ("Real trials", "markers_real", "trial_table"),
                             ("Releases of synthetic throws", "markers_real", "planted_table"),
                             ("Pitches against the radar", "markers_real", "radar_table"))),
+    "playback": ("Playback in Blender", (("", "playback", "section"),)),
     "throws": ("Throws and kicks", (("", "throws", "section"),)),
 }  # fmt: skip
 LIMIT = 900.0

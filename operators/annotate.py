@@ -73,11 +73,11 @@ class BEYOND_MOCAP_OT_annotate(BaseOperator, bpy.types.Operator):
             self.player_name = describe_subject(context)
             compute_now(context)
         except BeyondMocapError as error:
-            return self.report_failure(str(error))
+            return self.report_failure(error)
         self.pointer, self.is_folded = None, False
         _start_drawing()
         context.window_manager.modal_handler_add(self)
-        context.workspace.status_text_set(STATUS)
+        window.show_status(STATUS)
         self.update_menu(context, event)
         return {"RUNNING_MODAL"}
 

@@ -10,6 +10,7 @@ import bpy
 from bpy.props import BoolProperty, EnumProperty, FloatProperty, IntProperty, StringProperty
 
 from ..beyond_mocap.base.errors import InputError, format_count
+from ..beyond_mocap.base.fixes import Fix
 from ..beyond_mocap.base.settings.aim import TIMES, WAYS
 from ..beyond_mocap.base.settings.setting import BALLS, HOLDS, PARTS, SIDES
 from ..scene.ball import handover, shots
@@ -221,7 +222,8 @@ class BEYOND_MOCAP_OT_clear_hits(HitVerb, bpy.types.Operator):
         body = find_armature(context)
         channels.check_local(body)
         if not parse_hits(body.beyond_mocap_hits):
-            raise InputError(f"armature {body.name}", "no hit analysis", "a hit analysis", "press Hit Analysis")
+            raise InputError(f"armature {body.name}", "no hit analysis", "a hit analysis", "press Hit Analysis",
+                             fixes=(Fix("press", "beyond_mocap.hit_analysis"),))
         played = channels.find_playing_action(body)[0]
         if played is not None and played.library is None:
             hits_shown.remove_markers(played)
@@ -300,7 +302,7 @@ class BEYOND_MOCAP_OT_accept_touches(BaseOperator, bpy.types.Operator):
 them"""
 
     bl_idname = "beyond_mocap.accept_touches"
-    bl_label = "Accept Touches"
+    bl_label = "Apply Touches"
     active: BoolProperty(name="Active Player", default=False, options={"SKIP_SAVE"},
                          description="Only touches of the active player")
     needs = "Press Solve Ball first", lambda context: len(context.scene.beyond_mocap_passes.touches) > 0
@@ -308,7 +310,8 @@ them"""
     def do(self, context):
         player = find_active_player(context.scene.beyond_mocap)
         if self.active and player is None:
-            raise InputError("player", "none in the list", "a player", "import tracking in step 2")
+            raise InputError("player", "none in the list", "a player", "import tracking in step 2",
+                             fixes=(Fix("add_track"),))
         count, messages = tracked.accept_touches(context, player.name if self.active else "")
         if not count and not messages:
             raise InputError("touches", "none selected with labels and a player of the list", "at least one",

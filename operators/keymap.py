@@ -27,6 +27,7 @@ class Entry(NamedTuple):
         modifiers: of "shift", "ctrl", "alt", "oskey".
         properties: of the operator.
         repeat: whether the key repeats while it is held.
+        value: event value.
     """
 
     keymap: str
@@ -36,6 +37,7 @@ class Entry(NamedTuple):
     modifiers: tuple[str, ...] = ()
     properties: Mapping[str, object] = {}
     repeat: bool = False
+    value: str = "PRESS"
 
 
 ENTRIES: tuple[Entry, ...] = (
@@ -46,6 +48,8 @@ ENTRIES: tuple[Entry, ...] = (
     Entry("Clip Editor", "CLIP_EDITOR", "beyond_mocap.annotate", "J"),
     Entry("NLA Editor", "NLA_EDITOR", "beyond_mocap.pick_moment", "LEFTMOUSE"),
     Entry("Dopesheet", "DOPESHEET_EDITOR", "beyond_mocap.pick_moment", "LEFTMOUSE"),
+    Entry("NLA Editor", "NLA_EDITOR", "beyond_mocap.hover_timeline", "MOUSEMOVE", value="ANY"),
+    Entry("Dopesheet", "DOPESHEET_EDITOR", "beyond_mocap.hover_timeline", "MOUSEMOVE", value="ANY"),
     Entry("3D View", "VIEW_3D", "beyond_mocap.path_camera", "NUMPAD_0", ("shift",)),
     Entry("3D View", "VIEW_3D", "beyond_mocap.path_camera", "J", ("shift",)),
     *(Entry("Object Mode", "EMPTY", "beyond_mocap.stream_target", key, properties={"number": number})
@@ -64,7 +68,7 @@ def register():
     for entry in ENTRIES:
         keymap = configuration.keymaps.new(name=entry.keymap, space_type=entry.space)
         modifiers = {modifier: True for modifier in entry.modifiers}
-        item = keymap.keymap_items.new(entry.operator, entry.key, "PRESS", repeat=entry.repeat, **modifiers)
+        item = keymap.keymap_items.new(entry.operator, entry.key, entry.value, repeat=entry.repeat, **modifiers)
         for name, value in entry.properties.items():
             setattr(item.properties, name, value)
 

@@ -8,10 +8,11 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import bpy
-from bpy.props import BoolProperty, StringProperty
+from bpy.props import BoolProperty, IntProperty, StringProperty
 
 from ..beyond_mocap.annotation.labels import find_label
 from ..beyond_mocap.base.errors import InputError, format_count
+from ..beyond_mocap.base.fixes import Fix
 from ..scene.core import preferences, session, window
 from ..scene.core.settings import to_absolute_path, to_setting_path
 from ..scene.library import clips, foreign, recordings
@@ -97,7 +98,8 @@ glTF and USD clips are converted first, and the result is cached"""
     def order(self, context):
         settings = context.scene.beyond_mocap
         if not settings.library_folder:
-            raise InputError("library", "no folder chosen", "a folder of BVH clips", "choose one in step 1")
+            raise InputError("library", "no folder chosen", "a folder of BVH clips", "choose one in step 1",
+                             fixes=(Fix("choose_library"),))
         folder = to_absolute_path(settings.library_folder)
         unit = settings.library_unit or None
         queue = self.queue or self.create_queue(context)
@@ -151,8 +153,9 @@ glTF and USD clips are converted first, and the result is cached"""
         running, queue = context.window_manager.beyond_mocap_work, self.queue
         done = queue.total - len(queue.remaining)
         text = f"Converting {queue.remaining[0].name}" if queue.remaining else "Converted"
+        text += f" {done} of {queue.total}"
         running.kind, running.fraction, running.text = self.kind, done / max(queue.total, 1), text
-        context.workspace.status_text_set(f"{text}   {done} of {queue.total}   ESC: cancel")
+        window.show_status(f"{text}   ESC: cancel")
         window.redraw_editors()
 
     def cancel(self, context):
@@ -254,7 +257,8 @@ quality"""
         progress(0.0, "Listing clips")
         files = clips.list_files(order.folder)
         if files is None:
-            raise InputError(order.folder, "no such folder", "the library's folder", "press Relink Library")
+            raise InputError(order.folder, "no such folder", "the library's folder", "press Relink Library",
+                             fixes=(Fix("relink_library"),))
         found = list_clips(order.library) if order.library is not None else scan_clips(order.folder, order.cache_dir)
         return order.setting, found, files
 
@@ -271,8 +275,7 @@ class BEYOND_MOCAP_OT_relink_library(BaseOperator, bpy.types.Operator):
     bl_label = "Relink Library"
     directory: StringProperty(subtype="DIR_PATH", options={"SKIP_SAVE", "HIDDEN"})
     filter_folder: bpy.props.BoolProperty(default=True, options={"HIDDEN"})
-    needs = ("Choose the library folder in the field above",
-             lambda context: bool(context.scene.beyond_mocap.library_folder))
+    resumes: IntProperty(options={"SKIP_SAVE", "HIDDEN"}, description="Number of the notice that it fixes")
 
     def invoke(self, context, _event):
         """Search beside the file first; open the file browser where nothing is found."""
@@ -289,7 +292,7 @@ class BEYOND_MOCAP_OT_relink_library(BaseOperator, bpy.types.Operator):
         if chosen:
             settings.library_folder = to_setting_path(chosen)
         elif not os.path.isdir(to_absolute_path(settings.library_folder)) and not clips.relink_library(context.scene):
-            raise InputError(to_absolute_path(settings.library_folder),
+            raise InputError(to_absolute_path(settings.library_folder) or "library",
                              "no such folder, and no similar one beside this file", "the library's folder",
                              "choose it in Relink Library")
         clips.check_folder(context.scene)

@@ -9,9 +9,10 @@ import bpy
 from bpy.props import BoolProperty, EnumProperty, FloatProperty, IntProperty, StringProperty
 
 from ..beyond_mocap.base.errors import BeyondMocapError, InputError, format_count
+from ..beyond_mocap.base.fixes import Fix
 from ..scene.core import preferences, sample, session
 from ..scene.core.settings import to_absolute_path
-from ..scene.core.window import clear_status
+from ..scene.core.window import clear_status, show_status
 from ..scene.library import clips, recordings
 from ..scene.timeline import label_tracks as lanes
 from ..scene.timeline import proposals
@@ -202,7 +203,7 @@ and Down step, Esc finishes"""
         """Show the last result, the current proposal and the keys in the status bar."""
         one = proposals.find_active(context.object)
         now = f"{one.name}, confidence {one.confidence:.0%}" if one is not None else ""
-        context.workspace.status_text_set("   |   ".join(part for part in (message, now, STATUS_TEXT) if part))
+        show_status("   |   ".join(part for part in (message, now, STATUS_TEXT) if part))
         for area in context.window.screen.areas:
             area.tag_redraw()
 
@@ -327,7 +328,8 @@ others; the result is a file that works with any library"""
         """Collect folder, unit and target file."""
         settings = context.scene.beyond_mocap
         if not settings.library_folder:
-            raise InputError("library", "no folder chosen", "a folder of BVH clips", "choose one in step 1")
+            raise InputError("library", "no folder chosen", "a folder of BVH clips", "choose one in step 1",
+                             fixes=(Fix("choose_library"),))
         folder = to_absolute_path(settings.library_folder)
         return LearnOrder(folder, settings.library_unit or None, preferences.find_cache_folder(folder),
                           to_absolute_path(self.out))

@@ -73,6 +73,7 @@ class BEYOND_MOCAP_OT_import_markers(ImportOperator, bpy.types.Operator):
             bpy.ops.object.mode_set(mode="OBJECT")
         clouds_added = [self.add_cloud(context, path, trial) for path, trial in trials]
         window.select_only(context, *clouds_added)
+        context.scene.beyond_mocap.task = "MARKERS"
 
     def add_cloud(self, context, path: Path, trial) -> bpy.types.Object:
         """Create one cloud, and report messages on it."""

@@ -8,6 +8,7 @@ import bpy
 from bpy.props import BoolProperty, CollectionProperty, EnumProperty, FloatProperty, StringProperty
 
 from ..beyond_mocap.base.errors import InputError, format_count
+from ..beyond_mocap.base.fixes import Fix
 from ..scene.core import channels, session, window
 from ..scene.core.measure import frames_per_second
 from ..scene.core.settings import to_setting_path
@@ -90,6 +91,7 @@ select the first minute"""
         asked, read = result
         match = scene.beyond_mocap_match
         order.update_match(match, asked, read)
+        scene.beyond_mocap.task = "MATCH"
         for line in match.report.splitlines()[:6]:
             self.report({"INFO"}, line)
         self.report({"INFO"}, f"{format_count(len(read.players), 'player')}, {match.length_s / 60.0:.1f} minutes, "
@@ -204,7 +206,8 @@ page"""
             end = shown.shown_start + (last - shown.shown_first) / rate
             expected = f"{format_float(shown.shown_start)} to {format_float(end)} s"
             raise InputError("match", f"{format_float(self.seconds)} s is not shown", expected,
-                             "choose From and To around it and press Show Match")
+                             "choose From and To around it and press Show Match",
+                             fixes=(Fix("press", "beyond_mocap.show_match"),))
         body = _find_body(scene, self.player) if self.player else None
         scene.frame_set(frame)
         if body is not None and body.name in context.view_layer.objects and context.mode == "OBJECT":
@@ -216,7 +219,7 @@ def _find_body(scene: bpy.types.Scene, player: str) -> bpy.types.Object:
     known = {thing.get(ours.PLAYER_PROPERTY): thing for thing in ours.find_armatures(scene)}
     if player not in known:
         raise InputError("match", f"{player} is not shown", f"one of {', '.join(map(str, known))}",
-                         "select the player and press Show Match")
+                         "select the player and press Show Match", fixes=(Fix("press", "beyond_mocap.show_match"),))
     return known[player]
 
 
@@ -276,7 +279,7 @@ scene is not changed"""
 
     bl_idname = "beyond_mocap.match_export"
     bl_label = "Export Match"
-    filter_glob: StringProperty(default="*.fbx;*.glb;*.usdc", options={"HIDDEN"})
+    filter_glob: StringProperty(default="*.fbx;*.glb;*.usdc;*.abc", options={"HIDDEN"})
     format: EnumProperty(name="Format", items=FORMATS, default="GLB", description="File format")
     engine: EnumProperty(name="For", items=rig.ENGINES, default="BLENDER", description="Target program")
     root: EnumProperty(name="Root Motion", items=rig.ROOTS, default="KEEP", description="Motion of the root bone")

@@ -7,11 +7,11 @@ from contextlib import nullcontext
 from pathlib import Path
 
 import bpy
-from bpy.props import CollectionProperty, StringProperty
+from bpy.props import CollectionProperty, IntProperty, StringProperty
 from bpy_extras.io_utils import ExportHelper, ImportHelper
 
 from ..beyond_mocap.base.errors import BeyondMocapError, InputError
-from ..scene.core import background, window
+from ..scene.core import background, notices, window
 from ..scene.rigs import export
 from ..scene.stage.presenting import present_new_objects
 
@@ -29,11 +29,15 @@ class BaseOperator:
         needs: pairs of a message for the user while the operator is disabled, and a function of the context that
             returns whether it is enabled; they are checked in order.
         presents: whether the 3D view moves to the objects that it adds, and the stage's cameras follow them.
+        pops_up: whether a pop-up shows a failure, beside the panel.
+        resumes: number of the notice that it fixes, 0 for none.
     """
 
     bl_options = {"REGISTER", "UNDO"}
     needs = ()
     presents = False
+    pops_up = True
+    resumes = 0
 
     @classmethod
     def poll(cls, context):
@@ -45,25 +49,83 @@ class BaseOperator:
         return True
 
     def execute(self, context):
-        """Run the operator now."""
-        return self.attempt(lambda: self.do(context))
+        """Run the operator now; where it repairs what a notice is about, run what failed again."""
+        result = self.attempt(lambda: self.do(context))
+        if result == {"FINISHED"} and self.resumes:
+            try:
+                notices.run_again(context.scene, self.resumes)
+            except RuntimeError as error:  # what ran again has failed; this has not
+                self.report({"WARNING"}, str(error).strip().removeprefix("Error: "))
+        return result
 
     def attempt(self, action):
         """Run `action`: FINISHED if it succeeds, else a report and CANCELLED."""
         try:
             with present_new_objects(bpy.context) if self.presents else nullcontext():
                 action()
-        except BeyondMocapError as error:
-            return self.report_failure(str(error))
-        except OSError as error:
-            found = f"{error.filename or 'file'}: {error.strerror or error}"
-            return self.report_failure(f"{found}; check the path and its permissions")
+        except (BeyondMocapError, OSError) as error:
+            return self.report_failure(error)
+        notices.clear_notices(bpy.context.scene, type(self).bl_idname)
         return {"FINISHED"}
 
-    def report_failure(self, message: str):
-        """Report an error."""
-        self.report({"ERROR"}, message)
+    def report_failure(self, error: BeyondMocapError | OSError):
+        """Report an error: to a script as one line, after a button in a pop-up with the error's fixes; both leave a
+        notice.
+        """
+        number = self.post_failure(error)
+        if self.is_pressed():
+            self.report({"WARNING"}, str(describe_error(error)))  # Blender's own pop-up of errors has no buttons
+            if self.pops_up:
+                notices.show_notices(number)
+        else:
+            self.report({"ERROR"}, str(describe_error(error)))
         return {"CANCELLED"}
+
+    def post_failure(self, error: BeyondMocapError | OSError, topic: str = "", player: str = "") -> int:
+        """Post a notice of an error.
+
+        Args:
+            error: the error.
+            topic: that a newer notice replaces; "" for the operator itself.
+            player: name of the player that it is about.
+        Returns:
+            The notice's number.
+        """
+        subject = notices.Subject(topic=topic or type(self).bl_idname, room=self.find_room(), title=self.bl_label,
+                                  player=player, operator=type(self).bl_idname, arguments=self.read_arguments())
+        return notices.post_notice(bpy.context.scene, subject, describe_error(error))
+
+    @classmethod
+    def find_room(cls) -> str:
+        """Return the feature whose panel shows this operator's notices."""
+        return cls.__module__.rpartition(".")[2]
+
+    def read_arguments(self) -> dict:
+        """Read the arguments that this operator was called with."""
+        found = {}
+        for name in self.properties.bl_rna.properties.keys():
+            if name != "rna_type" and self.properties.is_property_set(name):
+                found[name] = _read_argument(getattr(self.properties, name))
+        return found
+
+    def is_pressed(self) -> bool:
+        """Return whether a button or key in a window has called the operator, not a script."""
+        return not bpy.app.background and self.options.is_invoke
+
+
+def describe_error(error: BeyondMocapError | OSError) -> BeyondMocapError:
+    """Describe an error of the system as one of ours; one of ours stays as it is."""
+    if isinstance(error, BeyondMocapError):
+        return error
+    return InputError(error.filename or "file", str(error.strerror or error), "",
+                      "check the path and its permissions")
+
+
+def _read_argument(value):
+    """Read the value of an operator's property in a form that JSON can write."""
+    if isinstance(value, bpy.types.bpy_prop_collection):
+        return [{"name": row.name} for row in value]
+    return value if isinstance(value, (str, int, float, bool)) else list(value)
 
 
 class ImportOperator(BaseOperator, ImportHelper):
@@ -72,6 +134,7 @@ class ImportOperator(BaseOperator, ImportHelper):
     bl_options = {"REGISTER", "UNDO", "PRESET"}
     directory: StringProperty(subtype="DIR_PATH", options={"SKIP_SAVE", "HIDDEN"})
     files: CollectionProperty(type=bpy.types.OperatorFileListElement, options={"SKIP_SAVE", "HIDDEN"})
+    resumes: IntProperty(options={"SKIP_SAVE", "HIDDEN"}, description="Number of the notice that it fixes")
 
     def invoke(self, context, event):
         """Import dropped files at once; otherwise open the file browser."""
@@ -209,10 +272,10 @@ class BackgroundOperator(BaseOperator):
     def show(self, context):
         """Show the progress in the status bar, at the pointer and in the panel."""
         running = context.window_manager.beyond_mocap_work
-        text = self.job.text or f"{self.bl_label} ..."
+        text = self.job.describe_progress()
         running.kind, running.fraction, running.text = self.kind, self.job.fraction, text
         context.window_manager.progress_update(int(100 * self.job.fraction))
-        context.workspace.status_text_set(f"{text}   {self.job.fraction:.0%}   ESC: cancel")
+        window.show_status(f"{text}   ESC: cancel")
         window.redraw_editors()
 
     def stop_polling(self, context):

@@ -18,7 +18,7 @@ from ..scene.passes import generate as make
 from ..scene.passes import hit_analysis as hits_shown
 from ..scene.passes import scene_lists as order
 from ..scene.passes.settings import SAMPLES
-from .operator_base import BackgroundOperator, BaseOperator, ImportOperator
+from .operator_base import BackgroundOperator, BaseOperator, ImportOperator, describe_error
 
 ROWS = (("players", "Players", "Players of the scene"), ("passes", "Passes", "Passes in their order"))
 WHAT = (("ADD", "Add", "Add a row at the end"), ("REMOVE", "Remove", "Remove the active row"),
@@ -169,11 +169,11 @@ leads from one player's strike to the next"""
             return {"CANCELLED"}
         return super().modal(context, event)
 
-    def report_failure(self, message):
+    def report_failure(self, error):
         """Show the error of an update in the panel; the scene that is shown stays."""
         if not self.live:
-            return super().report_failure(message)
-        bpy.context.scene.beyond_mocap_passes.messages = message
+            return super().report_failure(error)
+        bpy.context.scene.beyond_mocap_passes.messages = str(describe_error(error))
         return {"CANCELLED"}
 
 
@@ -182,7 +182,7 @@ class BEYOND_MOCAP_OT_passes_clear(BaseOperator, bpy.types.Operator):
 again, and the lists stay"""
 
     bl_idname = "beyond_mocap.passes_clear"
-    bl_label = "Clear Scene"
+    bl_label = "Revert Scene"
     needs = "There is no scene to clear", lambda context: bool(context.scene.beyond_mocap_passes.made_of)
 
     def do(self, context):

@@ -7,10 +7,13 @@ from pathlib import Path
 import bpy
 from bpy.props import EnumProperty, StringProperty
 
+from ..beyond_mocap.annotation.label_candidates import find_label_candidates
 from ..beyond_mocap.base.errors import InputError
+from ..beyond_mocap.base.fixes import Fix
 from ..beyond_mocap.files.tracking.providers import PROVIDERS
-from ..scene.core import frame_range
-from ..scene.core.settings import find_active_player, to_setting_path
+from ..scene.characters import player_character
+from ..scene.core import frame_range, notices
+from ..scene.core.settings import find_active_player, to_absolute_path, to_setting_path
 from ..scene.player import dots, pins, tracks
 from ..scene.result import preview
 from ..scene.timeline import label_checks as word_checks
@@ -19,6 +22,7 @@ from ..scene.timeline.strips import show_player
 from .operator_base import BaseOperator, ImportOperator, ViewDropHandler
 
 SHIRTS = {"home": ((0.75, 0.05, 0.06), (0.80, 0.30, 0.04)), "away": ((0.04, 0.14, 0.70), (0.02, 0.45, 0.60))}
+MOST_OFFERED = 3  # text files that are offered as a player's labels
 SECTION_SECONDS = 60.0  # seconds of a whole match that are selected at first
 
 
@@ -50,6 +54,7 @@ SkillCorner, Sportec, Second Spectrum, Stats Perform); a text file with the name
 
     def do(self, context):
         """Read all files, then add the players."""
+        self.offers = []
         settings = context.scene.beyond_mocap
         provider = "" if self.provider == "AUTO" else self.provider
         read = [(path, *tracks.list_players(path, self.metadata, provider)) for path in self.list_paths()]
@@ -64,6 +69,8 @@ SkillCorner, Sportec, Second Spectrum, Stats Perform); a text file with the name
         for player in list(settings.players)[settings.active_player :]:
             self.create_dot(context, player)
         self.extend_scene(context.scene, list(settings.players)[settings.active_player :])
+        if self.offers and self.is_pressed():
+            notices.show_notices(min(self.offers))
         self.report({"INFO"}, f"Players in the list: {len(settings.players)}")
 
     @staticmethod
@@ -88,8 +95,24 @@ SkillCorner, Sportec, Second Spectrum, Stats Perform); a text file with the name
                 self.report_labels(context.scene, player, words)
             elif not player.feed_id:
                 self.report({"INFO"}, f"{player.name}: no label file beside the track; gaits follow its speed")
+                self.offer_labels(context, player)
         except InputError as error:
             self.report({"WARNING"}, str(error))
+
+    def offer_labels(self, context, player):
+        """Offer text files beside the track that may have the player's labels under another name."""
+        path = to_absolute_path(player.tracking_file)
+        found = find_label_candidates(path)
+        if not found:
+            return
+        names = " or ".join(file.name for file in found[:MOST_OFFERED])
+        fixes = *(Fix("use_labels", str(file)) for file in found[:MOST_OFFERED]), Fix("choose_labels")
+        error = InputError(player.name, f"no file {Path(path).with_suffix('.txt').name} beside the track",
+                           "", f"the file {names} may have its labels", fixes=fixes)
+        subject = notices.Subject(topic=f"labels {player.name}", room=self.find_room(), title=self.bl_label,
+                                  player=player.name)
+        self.offers.append(notices.post_notice(context.scene, subject, error, is_error=False))
+        self.report({"INFO"}, str(error))
 
     def report_labels(self, scene, player, words):
         """Report the labels of the timeline and their problems."""
@@ -242,3 +265,23 @@ a preview is applied"""
         dots.remove_dot(context.scene, player)
         settings.players.remove(settings.active_player)
         settings.active_player = max(0, min(settings.active_player, len(settings.players) - 1))
+
+
+def has_character(context) -> bool:
+    """Whether the active player has a character and a motion."""
+    player = find_active_player(context.scene.beyond_mocap)
+    return player is not None and player.character is not None and player.body is not None
+
+
+class BEYOND_MOCAP_OT_update_character(BaseOperator, bpy.types.Operator):
+    """Give the active player's character the present motion of their body, such as after editing its keys"""
+
+    bl_idname = "beyond_mocap.update_character"
+    bl_label = "Update Body"
+    needs = "Synthesize, then choose a character for the active player", has_character
+
+    def do(self, context):
+        player = find_active_player(context.scene.beyond_mocap)
+        lines = player_character.show_character(context, player)
+        player.character_note = "\n".join(lines)
+        self.report({"INFO"}, f"{player.character.name} plays the motion of {player.name}")

@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 import bpy
-from bpy.props import BoolProperty, EnumProperty, IntProperty, StringProperty
+from bpy.props import BoolProperty, EnumProperty, FloatProperty, IntProperty, StringProperty
 
 from ..beyond_mocap.base.errors import InputError
+from ..beyond_mocap.base.fixes import Fix
 from ..beyond_mocap.base.settings.synthesis import FORMS
 from ..scene.core import channels, session
+from ..scene.core.measure import frames_per_second
 from ..scene.core.settings import find_active_player
 from ..scene.overlays import momentum_traces
-from ..scene.result import preview, quality
+from ..scene.result import key_layers, preview, quality
 from .operator_base import NEEDS_NO_EDITING, BaseOperator
 from .take_queue import update_automatic_strips
 
@@ -50,7 +52,8 @@ applied result to the other form"""
         lost = [player.name for player in not_shown if session.find_take(player.take) is None]
         if lost or not players:
             found = f"no take of {', '.join(lost) or 'any player'} in this session"
-            raise InputError("apply", found, "a take", "synthesize again")
+            raise InputError("apply", found, "a take", "synthesize again",
+                             fixes=(Fix("press", "beyond_mocap.synthesize"),))
         for line in (line for player in players for line in preview.revert_path_edit(player)):
             self.report({"INFO"}, line)
         for player in not_shown:
@@ -102,6 +105,46 @@ class BEYOND_MOCAP_OT_preview(ResultVerb, bpy.types.Operator):
         update_automatic_strips(context, player)
 
 
+class BEYOND_MOCAP_OT_keep_as_layer(BaseOperator, bpy.types.Operator):
+    """Move your own keys on the active player's take to a layer with an influence; the take below gets its own keys
+back, and updates keep the layer"""
+
+    bl_idname = "beyond_mocap.keep_as_layer"
+    bl_label = "Keep as Layer"
+    fade: FloatProperty(name="Fade", default=key_layers.FADE_SECONDS, min=0.0, soft_max=2.0, unit="TIME_ABSOLUTE",
+                        description="Seconds beside your keys over which their difference from the take fades")
+    needs = (*NEEDS_NO_EDITING, "Key a pose of the active player's body first",
+             lambda context: (player := find_active_player(context.scene.beyond_mocap)) is not None
+             and preview.is_shown(context.scene, player))
+
+    def do(self, context):
+        """Keep the keys, and report which bones they are on."""
+        body = find_active_player(context.scene.beyond_mocap).body
+        layer = key_layers.keep_as_layer(body, frames_per_second(context.scene), self.fade)
+        self.report({"INFO"}, f"{body.name}: own keys kept as the layer {layer.name}")
+
+
+class BEYOND_MOCAP_OT_remove_layer(BaseOperator, bpy.types.Operator):
+    """Remove this layer of your own keys"""
+
+    bl_idname = "beyond_mocap.remove_layer"
+    bl_label = "Remove Layer"
+    number: IntProperty(name="Layer", default=1, min=1, options={"SKIP_SAVE"},
+                        description="Number of the layer, from 1")
+    needs = ("The active player's body has no layers of own keys",
+             lambda context: bool((player := find_active_player(context.scene.beyond_mocap)) is not None
+                                  and key_layers.list_layers(player.body)))
+
+    def do(self, context):
+        body = find_active_player(context.scene.beyond_mocap).body
+        channels.check_local(body)
+        channels.check_editable(body)
+        count = len(key_layers.list_layers(body))
+        if self.number > count:
+            raise InputError("layer", f"number {self.number}", f"1 to {count}", "choose one of them")
+        key_layers.remove_layer(body, self.number - 1)
+
+
 class BEYOND_MOCAP_OT_error_curves(BaseOperator, bpy.types.Operator):
     """Show the active player's errors over time as curves in the Graph Editor: root error, foot slide, foot
 corrections, jerk, speed, cuts"""
@@ -121,13 +164,15 @@ corrections, jerk, speed, cuts"""
     def do(self, context):
         player = find_active_player(context.scene.beyond_mocap)
         if player is None or player.body is None:
-            raise InputError("error curves", "the active player has no body", "a body", "synthesize first")
+            raise InputError("error curves", "the active player has no body", "a body", "synthesize first",
+                             fixes=(Fix("press", "beyond_mocap.synthesize"),))
         if player.body.library is not None or player.body.data.library is not None:
             raise InputError(f"body {player.body.name}", "is linked from another file", "an armature of this file")
         if self.remove:
             quality.remove_error_curves(player.body)
         elif session.find_take(player.take) is None:
-            raise InputError(f"player {player.name}", "has no take in this session", "a take", "synthesize again")
+            raise InputError(f"player {player.name}", "has no take in this session", "a take", "synthesize again",
+                             fixes=(Fix("press", "beyond_mocap.synthesize"),))
         else:
             quality.write_error_curves(context.scene, player)
 

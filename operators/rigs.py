@@ -5,18 +5,15 @@ from __future__ import annotations
 from pathlib import Path
 
 import bpy
-import numpy as np
 from bpy.props import BoolProperty, EnumProperty, StringProperty
 from bpy_extras.io_utils import ExportHelper, ImportHelper
 
 from ..beyond_mocap.base.errors import InputError
 from ..beyond_mocap.files.bvh import bvh
-from ..scene.core import action, channels, session
-from ..scene.core.measure import frames_per_second
+from ..scene.characters.player_character import find_shown_body
+from ..scene.core import action, channels, take_record, window
 from ..scene.core.settings import find_active_player
-from ..scene.path_editing import edited_bodies
-from ..scene.result import bake
-from ..scene.rigs import armature, bone_maps, export, rig, rig_bake
+from ..scene.rigs import armature, bone_maps, engine_files, export, rig, rig_bake
 from ..scene.rigs.driven import DrivenRig, check_rig
 from ..scene.rigs.fit import BakeOptions, read_source
 from .operator_base import BaseOperator, ExportOperator
@@ -132,8 +129,8 @@ planted; the rig's previous action is kept"""
         """Prepare all bakes before the first rig is changed."""
         scene, settings = context.scene, context.scene.beyond_mocap
         options, work = build_bake_options(settings.rig), []
-        for body, player, target, table in self.list_bakes(context):
-            source = read_source(body, scene, build_contact_lookup(scene, player))
+        for body, target, table in self.list_bakes(context):
+            source = read_source(body, scene)
             work.append((rig_bake.prepare_bake(target, table, source, scene, options), target, table))
         lines = []
         for prepared, target, table in work:
@@ -141,28 +138,30 @@ planted; the rig's previous action is kept"""
             if settings.rig.reduces:
                 baked.messages.append(reduce_rig_keys(target, table, settings.rig))
             lines += [f"{prepared.name} on {target.name}: {len(baked.frames)} frames", *baked.messages]
+        if not all(export.list_meshes(scene, target) for _, target, _ in work):
+            window.show_bones()  # without a mesh, bones are all there is to see
         settings.rig.messages = "\n".join(lines)
         for line in lines[:1] if len(work) == 1 else lines:
             self.report({"INFO"}, line)
 
     def list_bakes(self, context) -> list:
-        """List (source body, its player or None, rig, map) of all bakes."""
+        """List (source body, rig, map) of all bakes."""
         settings = context.scene.beyond_mocap
         chosen = settings.rig
         if self.targets == "PLAYERS":
             return self.list_player_bakes(context)
-        body, player = find_source_body(settings), find_active_player(settings) if chosen.source is None else None
+        body = find_source_body(settings)
         if self.targets == "CHOSEN":
             check_rig(chosen.target, body)
             if not chosen.bones:
                 rig.fill_bone_map(chosen)
-            return [(body, player, chosen.target, rig.read_bone_list(chosen))]
+            return [(body, chosen.target, rig.read_bone_list(chosen))]
         rigs = [one for one in context.selected_objects if one.type == "ARMATURE" and one != body]
         if not rigs:
             raise InputError("bake to rig", "no armature besides the source is selected", "rigs", "select them")
         for one in rigs:
             check_rig(one, body)
-        return [(body, player, one, find_bone_map(chosen, one)) for one in rigs]
+        return [(body, one, find_bone_map(chosen, one)) for one in rigs]
 
     def list_player_bakes(self, context) -> list:
         """List the bakes of all selected players; missing rigs are copied."""
@@ -183,7 +182,7 @@ planted; the rig's previous action is kept"""
             player.rig = free or armature.copy_rig(settings.rig.target, f"{player.name} rig")
             free = None
         context.view_layer.update()
-        return [(player.body, player, player.rig, find_bone_map(settings.rig, player.rig)) for player in players]
+        return [(player.body, player.rig, find_bone_map(settings.rig, player.rig)) for player in players]
 
 
 class BEYOND_MOCAP_OT_unbake(BaseOperator, bpy.types.Operator):
@@ -220,24 +219,6 @@ def find_source_body(settings) -> bpy.types.Object | None:
     return settings.rig.source or (player.body if player is not None else None)
 
 
-def build_contact_lookup(scene: bpy.types.Scene, player):
-    """Build a function from scene frames (F,) to foot contacts (F, 2) of the player's take or path edit; None without.
-    """
-    if player is not None and player.body is not None and player.body.beyond_mocap_ride.on:
-        return edited_bodies.build_contact_lookup(player.body)
-    stored = session.find_take(player.take) if player is not None and player.take else None
-    if stored is None:
-        return None
-    take, fps = stored.take, frames_per_second(scene)
-
-    def find_contacts(frames: np.ndarray) -> np.ndarray:
-        at = np.round((frames - bake.compute_frame(scene, take.start_time)) * take.motion.fps / fps).astype(int)
-        inside = (at >= 0) & (at < len(take.contacts))
-        return take.contacts[np.clip(at, 0, len(take.contacts) - 1)] & inside[:, None]
-
-    return find_contacts
-
-
 def build_bake_options(settings) -> BakeOptions:
     """Build the bake options from the panel's settings."""
     keeps = {"AUTO": None, "KEEP": True, "SCALE": False}[settings.steps]
@@ -267,7 +248,7 @@ stays unchanged"""
 
     bl_idname = "beyond_mocap.export_motion"
     bl_label = "Export Motion"
-    filter_glob: StringProperty(default="*.fbx;*.glb;*.usdc;*.bvh", options={"HIDDEN"})
+    filter_glob: StringProperty(default="*.fbx;*.glb;*.usdc;*.abc;*.bvh", options={"HIDDEN"})
     format: EnumProperty(name="Format", items=rig.FORMATS, default="FBX", description="Format of the file")
     engine: EnumProperty(name="For", items=rig.ENGINES, default="BLENDER", description="Program to export for")
     who: EnumProperty(name="Export", items=rig.EXPORT_CHOICES, default="ACTIVE", description="Armatures to export")
@@ -301,13 +282,13 @@ stays unchanged"""
         if self.who == "SELECTED":
             return [one for one in context.selected_objects if one.type == "ARMATURE"]
         if self.who == "PLAYERS":
-            chosen = [player.rig or player.body for player in settings.players if player.use]
+            chosen = [find_shown_body(player) for player in settings.players if player.use]
             return [one for one in chosen if one is not None]
         player = find_active_player(settings)
         if settings.rig.target is not None and (settings.rig.source or player is None or player.rig is None):
             return [settings.rig.target]
-        if player is not None and (player.rig or player.body) is not None:
-            return [player.rig or player.body]
+        if player is not None and find_shown_body(player) is not None:
+            return [find_shown_body(player)]
         active = context.object
         return [active] if active is not None and active.type == "ARMATURE" else []
 
@@ -316,8 +297,61 @@ stays unchanged"""
         if not self.own_rate:
             return None
         player = find_active_player(context.scene.beyond_mocap)
-        stored = session.find_take(player.take) if player is not None and player.take else None
-        return stored.take.motion.fps if stored is not None else None
+        rate = take_record.read_rate(player.body) if player is not None and player.body is not None else None
+        if rate is None:
+            self.report({"WARNING"}, "The take's rate is not known; exported at the scene's frame rate. "
+                                     "Press Synthesize and Apply to store it")
+        return rate
+
+
+class BEYOND_MOCAP_OT_deliver(BaseOperator, bpy.types.Operator):
+    """Write files for an engine or another program into a folder, one for each player or one of the whole scene; the
+scene stays unchanged"""
+
+    bl_idname = "beyond_mocap.deliver"
+    bl_label = "Deliver"
+    bl_options = {"REGISTER", "PRESET"}
+    directory: StringProperty(name="Folder", subtype="DIR_PATH", options={"SKIP_SAVE"},
+                              description="Folder for the files; those of the same names are replaced")
+    filter_folder: BoolProperty(default=True, options={"HIDDEN", "SKIP_SAVE"})
+    preset: EnumProperty(name="For", items=engine_files.PRESET_ITEMS, default="UNREAL",
+                         description="Program to deliver to")
+    who: EnumProperty(name="Deliver", items=engine_files.DELIVERED_ITEMS, default="ACTIVE",
+                      description="What is delivered")
+    root: EnumProperty(name="Root Motion", items=engine_files.ROOT_ITEMS, default="SMOOTH",
+                       description="Motion of the root bone")
+    meshes: BoolProperty(name="Meshes", default=True, description="Also deliver the meshes that armatures move")
+
+    def invoke(self, context, _event):
+        """Choose the folder."""
+        context.window_manager.fileselect_add(self)
+        return {"RUNNING_MODAL"}
+
+    def draw(self, _context):
+        """Draw the settings beside the file browser."""
+        layout = self.layout
+        layout.use_property_split, layout.use_property_decorate = True, False
+        layout.prop(self, "preset")
+        layout.prop(self, "who")
+        column = layout.column()
+        column.active = self.who != "SCENE"
+        column.prop(self, "root")
+        column.prop(self, "meshes")
+
+    def do(self, context):
+        """Write the files and report them."""
+        if not self.directory:
+            raise InputError("export", "no folder given", "a folder to write to", "choose a folder")
+        folder = Path(bpy.path.abspath(self.directory))
+        if self.who == "SCENE":
+            suffix = export.SUFFIXES[engine_files.PRESETS[self.preset].format]
+            name = Path(bpy.data.filepath).stem or "scene"
+            lines = engine_files.deliver_scene(context, folder / f"{name}{suffix}", self.preset)
+        else:
+            lines = engine_files.deliver_players(context, engine_files.list_delivered_rigs(context, self.who), folder,
+                                                 self.preset, self.root, meshes=self.meshes)
+        for line in lines:
+            self.report({"INFO"}, line)
 
 
 class BEYOND_MOCAP_OT_export_bvh(BaseOperator, bpy.types.Operator, ExportHelper):

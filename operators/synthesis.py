@@ -52,6 +52,7 @@ class BEYOND_MOCAP_OT_update_live(TakeOperator, bpy.types.Operator):
     bl_idname = "beyond_mocap.update_live"
     bl_label = "Live Update"
     bl_options = {"UNDO", "INTERNAL"}
+    pops_up = False
     player: bpy.props.StringProperty(name="Player", description="Name of the player in the list", options={"SKIP_SAVE"})
     kind: bpy.props.EnumProperty(name="Kind", items=(("quick", "Quick", "With a narrow search"),
                                                      ("whole", "Full", "In full quality, with figures")),

@@ -15,21 +15,28 @@ from bpy.props import StringProperty
 
 from ..beyond_mocap.annotation import Timeline
 from ..beyond_mocap.base.errors import BeyondMocapError, InputError, format_count
-from ..scene.core import background, session
-from ..scene.core.window import start_timer, stop_timer
+from ..scene.core import background, notices, session
+from ..scene.core.window import show_status, start_timer, stop_timer
 from ..scene.player import dots
 from ..scene.result import freshness, plans, preview, quality, queue
 from ..scene.result import synthesis_request as orders
 from ..scene.timeline import strips
 from .library import describe_gaps, describe_library
-from .operator_base import NEEDS_LIBRARY, BaseOperator
+from .operator_base import NEEDS_LIBRARY, BaseOperator, describe_error
+
+
+def show_library(scene, order) -> None:
+    """Show what the library of an order holds, if it was built."""
+    library = session.find_library(order.folder, order.unit)
+    if library is not None:
+        scene.beyond_mocap.library_holds = describe_library(library)
+        scene.beyond_mocap.library_gaps = describe_gaps(library)
 
 
 def store_result(context, player, order, result) -> None:
     """Store the takes of a result in the session, show the first of them, and update what depends on it."""
     session.store_library(result.library, order.unit)
-    context.scene.beyond_mocap.library_holds = describe_library(result.library)
-    context.scene.beyond_mocap.library_gaps = describe_gaps(result.library)
+    show_library(context.scene, order)
     stored = []
     for one in result.takes:
         lines = {"quality": quality.describe_quality(one.report),
@@ -91,18 +98,34 @@ class TakeOperator(BaseOperator):
         settings = context.scene.beyond_mocap
         found = []
         for player, how in self.list_requests(context):
+            self.current = player.name
             order = orders.build_request(settings, player, how)
             found.append(queue.QueueEntry(context.scene.session_uid, player.name, how, order, order.fingerprint))
         return found
 
     def do(self, context):
         """Process all players at once: generate everything first, then store everything."""
-        window = context.window_manager
+        entries = self.build_entries(context)
+        try:
+            results = self.process_entries(context.window_manager, entries)
+        except BeyondMocapError:
+            show_library(context.scene, entries[0].request)
+            raise
+        for entry, result in zip(entries, results):
+            store_result(context, context.scene.beyond_mocap.players[entry.player], entry.request, result)
+        self.clear_failures(context.scene, *(entry.player for entry in entries))
+        players = [context.scene.beyond_mocap.players[entry.player] for entry in entries]
+        names = ", ".join(player.name for player in players)
+        self.report({"INFO"}, f"Generated: {names}{_describe_kept_keys(players)}; press Apply or Revert")
+
+    def process_entries(self, window, entries) -> list[orders.RequestResult]:
+        """Generate the takes of all entries, with the progress at the pointer."""
+        results: list[orders.RequestResult] = []
         window.progress_begin(0, 100)
         try:
-            entries = self.build_entries(context)
-            results = []
             for number, entry in enumerate(entries):
+                self.current = entry.player
+
                 def on_progress(done, text, number=number):
                     window.progress_update(int(100 * (number + done) / len(entries)))
 
@@ -111,11 +134,7 @@ class TakeOperator(BaseOperator):
                                                       lambda: False))
         finally:
             window.progress_end()
-        for entry, result in zip(entries, results):
-            store_result(context, context.scene.beyond_mocap.players[entry.player], entry.request, result)
-        players = [context.scene.beyond_mocap.players[entry.player] for entry in entries]
-        names = ", ".join(player.name for player in players)
-        self.report({"INFO"}, f"Generated: {names}{_describe_kept_keys(players)}; press Apply or Revert")
+        return results
 
     def invoke(self, context, event):
         """Queue the players, and process the queue if no other operator does."""
@@ -124,7 +143,8 @@ class TakeOperator(BaseOperator):
         try:
             entries = self.build_entries(context)
         except (BeyondMocapError, OSError) as error:
-            return self.report_failure(str(error))
+            return self.report_failure(error)
+        self.clear_failures(context.scene, *(entry.player for entry in entries))
         for entry in entries:
             queue.add_entry(entry)
         running = context.window_manager.beyond_mocap_work
@@ -133,7 +153,8 @@ class TakeOperator(BaseOperator):
             self.report({"INFO"}, f"Waiting: {', '.join(queue.list_players())}")
             return {"CANCELLED"}  # nothing has changed yet, so no undo step
         queue.set_busy(True)
-        self.entry, self.job, self.messages, self.stored_count = None, None, [], 0
+        self.entry, self.job, self.stored_count = None, None, 0
+        self.messages, self.failed = [], []
         self.seen, self.drawn = None, 0.0
         self.clock = start_timer(context)
         context.window_manager.modal_handler_add(self)
@@ -157,7 +178,7 @@ class TakeOperator(BaseOperator):
         elif event.type != "TIMER":
             return {"PASS_THROUGH"}
         if self.job is not None and not self.job.poll() and not self.job.is_ended and not self.job.is_stale:
-            self.show(context, self.job.text)
+            self.show(context, self.job.describe_progress())
             return {"RUNNING_MODAL"}
         if self.job is not None and not self.store_arrived(context):
             return {"RUNNING_MODAL"}
@@ -179,7 +200,7 @@ class TakeOperator(BaseOperator):
             try:
                 entry.request = orders.build_request(scene.beyond_mocap, player, entry.mode)
             except (BeyondMocapError, OSError) as error:
-                self.add_message(f"{entry.player}: {error}", "ERROR")
+                self.add_failure(entry, error)
                 continue
             entry.player, entry.fingerprint = player.name, entry.request.fingerprint
             self.entry, order, library = entry, entry.request, _find_library(entry)
@@ -196,7 +217,9 @@ class TakeOperator(BaseOperator):
         if job.error is not None:
             if not isinstance(job.error, (BeyondMocapError, OSError)):
                 raise job.error
-            self.add_message(str(job.error), "ERROR")
+            self.add_failure(entry, job.error)
+            if (scene := _find_scene(entry)) is not None:
+                show_library(scene, entry.request)
             return True
         scene = _find_scene(entry)
         if scene is None:
@@ -222,6 +245,7 @@ class TakeOperator(BaseOperator):
             self.add_message(f"{player.name}: generated{_describe_kept_keys([player])}; press Apply or Revert")
         return True
 
+    current = ""  # the player whose request is built or processed
     last = False  # whether the newest result was stored and has no undo step yet
 
     def requeue(self, scene):
@@ -243,9 +267,31 @@ class TakeOperator(BaseOperator):
         self.close_progress(context)
         for kind, text in self.messages:
             self.report({kind}, text)
+        if self.failed and self.pops_up:
+            notices.show_notices(min(self.failed))
         if self.stored_count > 1:
             self.report({"INFO"}, f"Players generated: {self.stored_count}; press Apply or Revert")
         return {"FINISHED"} if self.last else {"CANCELLED"}
+
+    @classmethod
+    def find_room(cls) -> str:
+        """Return the feature whose panel shows these operators' notices."""
+        return "synthesis"
+
+    def post_failure(self, error, topic: str = "", player: str = "") -> int:
+        """Post a notice about the player whose take failed, which the player's next take replaces."""
+        player = player or self.current
+        return super().post_failure(error, topic or (_name_topic(player) if player else ""), player)
+
+    def add_failure(self, entry: queue.QueueEntry, error):
+        """Post a notice of a failed entry, and store its line for the end."""
+        self.failed.append(self.post_failure(error, player=entry.player))
+        line = str(describe_error(error))
+        self.add_message(line if entry.player in line else f"{entry.player}: {line}", "WARNING")
+
+    def clear_failures(self, scene, *players: str):
+        """Clear the notices about earlier failures of these players."""
+        notices.clear_notices(scene, type(self).bl_idname, *map(_name_topic, players))
 
     def add_message(self, text, kind="INFO"):
         """Store a message for the end: Blender shows a modal operator's reports only then."""
@@ -271,8 +317,7 @@ class TakeOperator(BaseOperator):
         self.seen, self.drawn = seen, perf_counter()
         context.window_manager.progress_update(int(100 * fraction))
         waiting = f"   then {', '.join(queue.list_players())}" if queue.list_players() else ""
-        if context.workspace is not None:
-            context.workspace.status_text_set(f"{running.text}   {fraction:.0%}{waiting}   ESC: cancel")
+        show_status(f"{running.text}{waiting}   ESC: cancel")
         _redraw_sidebars(context)
 
     def close_progress(self, context):
@@ -282,6 +327,11 @@ class TakeOperator(BaseOperator):
         running.kind = running.waiting = ""
         stop_timer(context, self.clock)
         _redraw_sidebars(context)
+
+
+def _name_topic(player: str) -> str:
+    """Name the topic of notices about a player's take."""
+    return f"take {player}"
 
 
 def _describe_kept_keys(players) -> str:

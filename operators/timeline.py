@@ -14,7 +14,7 @@ from ..scene.core.settings import find_active_player
 from ..scene.result import bake
 from ..scene.timeline import label_checks as word_checks
 from ..scene.timeline import label_tracks as lanes
-from ..scene.timeline import moment_names
+from ..scene.timeline import moment_names, strip_layout, strip_overlay
 from ..scene.timeline import strip_writing as lay_strips
 from ..scene.timeline.strip_lines import parse_labels
 from ..scene.timeline.strips import can_have_timeline, describe_target, ensure_target, find_target, find_target_clock
@@ -205,7 +205,7 @@ class BEYOND_MOCAP_OT_pick_moment(BaseOperator, bpy.types.Operator):
         region = context.region
         if region is None or region.type != "WINDOW":
             return {"PASS_THROUGH"}
-        name = moment_names.find_name_at(context, region, event.mouse_region_x, event.mouse_region_y)
+        name = strip_layout.find_name_at(context, region, event.mouse_region_x, event.mouse_region_y)
         if name is None or name.target not in context.scene.objects:
             return {"PASS_THROUGH"}
         target = context.scene.objects[name.target]
@@ -249,7 +249,9 @@ class BEYOND_MOCAP_OT_pick_moment(BaseOperator, bpy.types.Operator):
         is_unmoved = frame == self.frame
         self.write_key(context, self.before.key if is_unmoved
                        else replace(self.before.key, time=clock.to_seconds(frame)))
-        context.area.header_text_set(f"Frame {frame} ({frame - self.frame:+d})    Esc: Cancel")
+        moved = clock.to_seconds(frame) - clock.to_seconds(self.frame)
+        context.area.header_text_set(f"{clock.to_seconds(frame):.2f} s ({moved:+.2f})    Frame {frame} "
+                                     f"({frame - self.frame:+d})    Esc: Cancel")
 
     def write_key(self, context, key):
         """Write the key moment and redraw it."""
@@ -260,6 +262,25 @@ class BEYOND_MOCAP_OT_pick_moment(BaseOperator, bpy.types.Operator):
         if key == self.before.key:
             context.area.header_text_set(None)
         moment_names.redraw_editors()
+
+
+class BEYOND_MOCAP_OT_hover_timeline(BaseOperator, bpy.types.Operator):
+    """Show what is under the pointer in the NLA editor or the dope sheet"""
+
+    bl_idname = "beyond_mocap.hover_timeline"
+    bl_label = "Show Label Under Pointer"
+    bl_options = {"INTERNAL"}
+
+    def execute(self, context):
+        """Fail without a pointer."""
+        return self.report_failure("Show Label Under Pointer needs the pointer in the NLA editor; read the list in its "
+                                   "sidebar instead")
+
+    def invoke(self, context, event):
+        """Take note of the pointer, and pass the event on."""
+        if context.region is not None and context.region.type == "WINDOW":
+            strip_overlay.move_pointer(context, event.mouse_region_x, event.mouse_region_y)
+        return {"PASS_THROUGH"}
 
 
 class BEYOND_MOCAP_OT_add_moment(TimelineWritingVerb, bpy.types.Operator):

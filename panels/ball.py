@@ -4,9 +4,19 @@ from __future__ import annotations
 
 import bpy
 
+from ..beyond_mocap.annotation.labels import find_label
 from ..scene.ball.settings import find_aimed_ball
 from ..scene.passes.settings import find_active_row, find_armature, find_ball, find_picture_icon, parse_lines
-from .tab import TabPanel, create_value_column, draw_paragraph, draw_section, draw_table
+from .tab import (
+    TabPanel,
+    create_value_column,
+    draw_automatic,
+    draw_paragraph,
+    draw_section,
+    draw_table,
+    draw_values,
+    with_progress,
+)
 
 LINE = 20.0  # pixels of a line of the interface, at a scale of 1
 
@@ -24,7 +34,7 @@ class BEYOND_MOCAP_UL_touches(bpy.types.UIList):
         row.prop(item, "use", text="")
         named = row.split(factor=0.62)
         named.label(text=f"{item.time:.2f}  {item.name or '?'}")
-        named.label(text=item.kind)
+        named.label(text=find_label(item.kind).title)
 
 
 class BEYOND_MOCAP_PT_ball(TabPanel, bpy.types.Panel):
@@ -37,20 +47,18 @@ class BEYOND_MOCAP_PT_ball(TabPanel, bpy.types.Panel):
     def draw(self, context):
         """Draw the sections; most are closed at first."""
         layout = self.layout
-        draw_section(layout, "ball_scene", "Passing Scene", lambda opened: draw_passing_scene(self, opened, context),
+        draw_section(layout, "ball_scene", "Passing Scene", lambda opened: draw_passing_scene(opened, context),
                      closed=False)
-        draw_section(layout, "ball_tracked", "Ball from Tracking", lambda opened: draw_tracked_ball(self, opened,
-                context))
+        draw_section(layout, "ball_tracked", "Ball from Tracking", lambda opened: draw_tracked_ball(opened, context))
         draw_section(layout, "ball_hits", "Hit Analysis", lambda opened: draw_hit_analysis(opened, context))
         draw_section(layout, "ball_hold", "Carried Ball", lambda opened: draw_carried_ball(opened, context))
         draw_section(layout, "ball_aim", "Aim Ball", lambda opened: draw_aim(opened, context))
 
 
-def draw_tracked_ball(panel, layout, context) -> None:
+def draw_tracked_ball(layout, context) -> None:
     """Draw the button, figures of the solved ball, and its touches."""
     settings = context.scene.beyond_mocap_passes
-    layout.operator("beyond_mocap.solve_ball", icon="SPHERE")
-    panel.draw_progress(context, "ball")
+    with_progress(layout, context, ("ball",), lambda row: row.operator("beyond_mocap.solve_ball", icon="SPHERE"))
     if settings.solved:
         draw_table(layout, settings.solved.splitlines())
     if not len(settings.touches):
@@ -58,12 +66,12 @@ def draw_tracked_ball(panel, layout, context) -> None:
     layout.template_list("BEYOND_MOCAP_UL_touches", "", settings, "touches", settings, active_propname="active_touch",
                          rows=5)
     if touch := find_active_row(settings.touches, settings.active_touch):
-        layout.label(text=f"{touch.kind} by the {touch.part}, confidence {touch.confidence:.0%}")
-        row = layout.row(align=True)
-        row.prop(touch, "words", text="")
-        row.operator("beyond_mocap.jump_to", text="", icon="PLAY").seconds = touch.time
+        kind, part = (find_label(word).title for word in (touch.kind, touch.part))
+        layout.label(text=f"{kind}, {part}: confidence {touch.confidence:.0%}")
+        create_value_column(layout).prop(touch, "words")
+        layout.operator("beyond_mocap.jump_to", text="Go to Touch", icon="PLAY").seconds = touch.time
     row = layout.row(align=True)
-    row.operator("beyond_mocap.accept_touches", icon="CHECKMARK")
+    row.operator("beyond_mocap.accept_touches", text="Apply All", icon="CHECKMARK")
     row.operator("beyond_mocap.accept_touches", text="Active Player").active = True
 
 
@@ -75,17 +83,16 @@ def draw_hit_analysis(layout, context) -> None:
         return
     found = body.beyond_mocap_hits
     layout.label(text=body.name, icon="ARMATURE_DATA")
-    row = layout.row(align=True)
-    row.prop(found, "part", text="")
-    row.prop(found, "side", text="")
     column = create_value_column(layout)
+    column.prop(found, "part")
+    column.prop(found, "side")
     column.prop_search(found, "bone", body.data, "bones")
-    column.prop(found, "threshold")
+    draw_automatic(column, found, "threshold", 0.2)
     row = layout.row(align=True)
     row.operator("beyond_mocap.hit_analysis", icon="GRAPH")
     if not found.found:
         return
-    row.operator("beyond_mocap.clear_hits", text="", icon="X")
+    row.operator("beyond_mocap.clear_hits", text="Clear", icon="X")
     if icon := find_picture_icon(found):
         width = context.region.width / context.preferences.system.ui_scale - 2.5 * LINE
         layout.template_icon(icon, scale=max(6.0, min(width / LINE, 16.0)))
@@ -102,13 +109,9 @@ def draw_carried_ball(layout, context) -> None:
                  icon="SPHERE" if ball is not None else "INFO")
     layout.label(text=body.name if body is not None else "No armature: select one",
                  icon="ARMATURE_DATA" if body is not None else "INFO")
-    row = layout.row(align=True)
-    row.prop(settings, "hold_part", text="")
-    row.prop(settings, "hold_side", text="")
-    row = layout.row(align=True)
-    row.prop(settings, "hold_first")
-    row.prop(settings, "hold_last")
-    layout.row().prop(settings, "hold_how", expand=True)
+    column = create_value_column(layout)
+    for name in ("hold_part", "hold_side", "hold_first", "hold_last", "hold_how"):
+        column.prop(settings, name)
     take = layout.operator("beyond_mocap.take_ball", icon="CON_CHILDOF")
     take.part, take.side, take.how = settings.hold_part, settings.hold_side, settings.hold_how
     take.first, take.last = settings.hold_first, settings.hold_last
@@ -134,12 +137,12 @@ def draw_aimed_ball(layout, ball) -> None:
     settings = ball.beyond_mocap_aim
     row = layout.row(align=True)
     row.label(text=ball.name, icon="SPHERE")
-    row.prop(settings, "live", text="", icon="LINKED" if settings.live else "UNLINKED")
-    row.operator("beyond_mocap.leave_aim", text="", icon="X")
+    row.operator("beyond_mocap.leave_aim", text="Revert", icon="X")
+    layout.prop(settings, "live", text="Update Automatically")
     column = create_value_column(layout)
     column.enabled = not settings.handed
     column.prop(settings, "target")
-    column.row().prop(settings, "way", expand=True)
+    column.prop(settings, "way")
     if settings.way == "AIR":
         column.prop(settings, "bounces")
     column.prop(settings, "timing")
@@ -212,31 +215,35 @@ def draw_list(layout, kind: str, settings, rows: str, active: str, operator: str
         button.rows, button.what = rows, action
 
 
-def draw_passing_scene(panel, layout, context) -> None:
+def draw_passing_scene(layout, context) -> None:
     """Draw players, passes, ball, and the result of the scene."""
     settings = context.scene.beyond_mocap_passes
+    layout.operator_menu_enum("beyond_mocap.passes_sample", "sample", icon="PRESET")
     row = layout.row(align=True)
-    row.operator_menu_enum("beyond_mocap.passes_sample", "sample", icon="PRESET")
-    row.operator("beyond_mocap.passes_from_json", text="", icon="IMPORT")
-    row.operator("beyond_mocap.passes_to_json", text="", icon="EXPORT")
+    row.operator("beyond_mocap.passes_from_json", text="From File", icon="IMPORT")
+    row.operator("beyond_mocap.passes_to_json", text="To File", icon="EXPORT")
+    with_progress(layout, context, ("passes",), draw_make_buttons)
+    layout.prop(settings, "live", text="Update Automatically")
+    layout.label(text="Players")
     draw_list(layout, "passers", settings, rows="players", active="active_player", operator="passes_list")
     if player := find_active_row(settings.players, settings.active_player):
-        draw_player(layout, player)
+        draw_section(layout, "ball_player", player.name, lambda opened: draw_player(opened, player))
+    layout.label(text="Passes")
     draw_list(layout, "passes", settings, rows="passes", active="active_pass", operator="passes_list")
     if one := find_active_row(settings.passes, settings.active_pass):
-        draw_pass(layout, settings, one)
-    row = layout.row(align=True)
-    row.scale_y = 1.3
-    row.operator("beyond_mocap.passes_make", icon="PLAY")
-    row.prop(settings, "live", text="", icon="UV_SYNC_SELECT")
-    row.operator("beyond_mocap.passes_clear", text="", icon="X")
-    panel.draw_progress(context, "passes")
+        draw_section(layout, "ball_pass", f"{one.who} to {one.to}", lambda opened: draw_pass(opened, settings, one))
     for line in settings.messages.splitlines():
         draw_paragraph(layout, line, "INFO")
     if settings.strikes:
         draw_section(layout, "ball_strikes", "Strikes", lambda opened: draw_strikes(opened, settings))
     draw_section(layout, "ball_choices", "Options", lambda opened: draw_choices(opened, settings))
     draw_section(layout, "ball_ball", "Ball & Air", lambda opened: draw_ball(opened, settings))
+
+
+def draw_make_buttons(row) -> None:
+    """Draw the buttons that make a passing scene and take it away."""
+    row.operator("beyond_mocap.passes_make", icon="PLAY")
+    row.operator("beyond_mocap.passes_clear", text="Revert", icon="X")
 
 
 def draw_strikes(layout, settings) -> None:
@@ -258,7 +265,7 @@ def draw_player(layout, player) -> None:
         for name in ("tool_length", "tool_reach", "tool_radius"):
             column.prop(player, name)
     column.prop(player, "bone")
-    column.prop(player, "height")
+    draw_automatic(column, player, "height", 1.8)
 
 
 def draw_pass(layout, settings, one) -> None:
@@ -266,9 +273,7 @@ def draw_pass(layout, settings, one) -> None:
     column = create_value_column(layout)
     column.prop_search(one, "who", settings, "players")
     column.prop_search(one, "to", settings, "players")
-    column.row().prop(one, "kind", expand=True)
-    for name in ("bounces", "seconds", "at", "part", "side", "error", "actor"):
-        column.prop(one, name)
+    draw_values(column, one, ("kind", "bounces", "seconds", "at", "part", "side", "error", "actor"), {"seconds": 0.8})
     if one.actor is not None:
         for name in ("actor_cut", *(("actor_first", "actor_last") if one.actor_cut else ())):
             column.prop(one, name)
@@ -283,8 +288,8 @@ def draw_pass(layout, settings, one) -> None:
 def draw_choices(layout, settings) -> None:
     """Draw the settings of all passes."""
     column = create_value_column(layout)
-    for name in ("library_folder", "repeat", "rate", "start_frame", "lead_in", "lead_out", "serve_from"):
-        column.prop(settings, name)
+    draw_values(column, settings, ("library_folder", "repeat", "rate", "start_frame", "lead_in", "lead_out",
+                                   "serve_from"), {"rate": 30.0})
     if settings.serve_from == "PLAYER":
         column.prop_search(settings, "serve", settings, "players")
     if settings.serve_from == "PLACE":

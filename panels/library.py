@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import bpy
 
-from .tab import StepPanel, TabPanel, draw_header, draw_paragraph, draw_table, with_progress
+from .tab import StepPanel, TabPanel, draw_automatic, draw_header, draw_paragraph, draw_table, with_progress
 
 QUALITY_ICONS = ("STRIP_COLOR_04", "STRIP_COLOR_02", "STRIP_COLOR_01", "BLANK1")  # green, orange, red, not measured
 STATE_ICONS = {"OPEN": "RADIOBUT_OFF", "ACCEPTED": "CHECKMARK", "REFUSED": "X"}
@@ -46,6 +46,8 @@ class BEYOND_MOCAP_PT_library_step(StepPanel, bpy.types.Panel):
 
     bl_label = "1  Library"
     task = "PLAYER"
+    rooms = ("library",)
+    also = ("MATCH", "BALL")
     bl_order = 1
 
     def find_state(self, context):
@@ -83,16 +85,15 @@ class BEYOND_MOCAP_PT_library(TabPanel, bpy.types.Panel):
         if content:
             if body := draw_header(layout, "library_holds", first):
                 draw_table(body, content)
-        first, *lines = settings.library_gaps.splitlines() or ("",)
-        if first and (body := draw_header(layout, "library_gaps", first, icon="INFO")):
+        _, *lines = settings.library_gaps.splitlines() or ("",)
+        if lines and (body := draw_header(layout, "library_gaps", "Missing and Left Out", icon="INFO")):
             for line in lines:
                 draw_paragraph(body, line, "DOT")
         if body := draw_header(layout, "library_clips", f"Clips ({listing.total})" if current and listing.total
-                               else "Clips"):
+                               else "Clips", closed=False):
             draw_clips(body, settings, listing, current)
         if context.object is not None and "beyond_mocap_clip" in context.object:
-            draw_open_clip(layout, context.object, settings)
-        self.draw_progress(context, "learning")
+            draw_open_clip(layout, context, settings)
         if body := draw_header(layout, "library_more", "Tools"):
             draw_tools(body, settings)
 
@@ -103,7 +104,7 @@ def draw_folder(layout, context) -> None:
     column = layout.column()
     column.label(text="Folder of Clips")
     column.prop(settings, "library_folder", text="")
-    with_progress(layout, context, "library", lambda row: row.operator("beyond_mocap.build_library",
+    with_progress(layout, context, ("library",), lambda row: row.operator("beyond_mocap.build_library",
                   icon="ASSET_MANAGER"))
     if context.window_manager.beyond_mocap_clips.missing:
         draw_paragraph(layout, "This folder does not exist", "ERROR")
@@ -146,17 +147,19 @@ def draw_assets(layout, listing) -> None:
     column.operator("beyond_mocap.make_assets", text="Selected Armatures", icon="ARMATURE_DATA").which = "SELECTED"
 
 
-def draw_open_clip(layout, thing, settings) -> None:
+def draw_open_clip(layout, context, settings) -> None:
     """Draw the operators for a clip that is in the scene."""
+    thing = context.object
     box = layout.box()
     box.label(text=thing.name, icon="ARMATURE_DATA")
     column = box.column(align=True)
     row = column.row(align=True)
     row.operator("beyond_mocap.propose_words", icon="LIGHT")
     row.operator("beyond_mocap.propose_words", text="Review", icon="VIEWZOOM").review = True
-    row = column.row(align=True)
-    row.prop(settings, "words_model", text="")
-    row.operator("beyond_mocap.learn_words", text="Learn", icon="OUTLINER_OB_LIGHTPROBE")
+    column.label(text="Learned Labels")
+    column.prop(settings, "words_model", text="")
+    with_progress(box, context, ("learning",), lambda row: row.operator("beyond_mocap.learn_words",
+                  text="Learn from the Library", icon="OUTLINER_OB_LIGHTPROBE"))
     if thing.beyond_mocap_proposals.listed:
         draw_proposals(box, thing.beyond_mocap_proposals)
     column = box.column(align=True)
@@ -181,7 +184,7 @@ def draw_proposals(layout, group) -> None:
 def draw_tools(body, settings) -> None:
     """Draw rarely needed settings and operators."""
     body.use_property_split, body.use_property_decorate = True, False
-    body.prop(settings, "library_unit")
+    draw_automatic(body, settings, "library_unit", 0.01)
     body.prop(settings, "library_watch")
     body.operator("beyond_mocap.build_library", text="Build from Scratch", icon="FILE_REFRESH").rebuild = True
     body.operator("beyond_mocap.relink_library", icon="FILE_FOLDER")

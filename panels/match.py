@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import bpy
 
-from .tab import TabPanel, create_value_column, draw_paragraph, draw_section
+from .characters import draw_team_characters
+from .tab import TabPanel, create_value_column, draw_paragraph, draw_section, draw_values, with_progress
 
 MAX_LINES = 12  # lines of a report shown in the panel
 TEAM_ICONS = {"home": "EVENT_H", "away": "EVENT_A", "referee": "EVENT_R"}
@@ -36,23 +37,18 @@ class BEYOND_MOCAP_PT_match(TabPanel, bpy.types.Panel):
         column = create_value_column(layout)
         column.prop(match, "tracking_file")
         draw_section(layout, "match_files", "More Files", lambda opened: draw_more_files(opened, match))
-        layout.operator("beyond_mocap.read_match", icon="FILE_REFRESH")
-        self.draw_progress(context, "match file")
+        with_progress(layout, context, ("match file",), lambda row: row.operator("beyond_mocap.read_match",
+                      icon="FILE_REFRESH"))
         if not match.tracking_file:
             draw_paragraph(layout, "Choose a provider's tracking file, or drop it into the view", "INFO")
         if match.players:
             draw_players(layout, match)
         if match.report:
             draw_section(layout, "match_data", "Data", lambda opened: draw_messages(opened, match.report))
-        column = create_value_column(layout)
-        for name in ("start", "end", "folder"):
-            column.prop(match, name)
+        draw_team_characters(layout, match)
+        draw_values(create_value_column(layout), match, ("start", "end", "folder"), {"end": match.start + 30.0})
+        with_progress(layout, context, ("match",), draw_buttons)
         draw_section(layout, "match_work", "Processing", lambda opened: draw_processing(opened, context.scene))
-        row = layout.row(align=True)
-        row.scale_y = 1.3
-        row.operator("beyond_mocap.make_match", icon="PLAY")
-        row.operator("beyond_mocap.show_match", icon="HIDE_OFF")
-        self.draw_progress(context, "match")
         if match.shown:
             draw_display(layout, match)
 
@@ -70,12 +66,21 @@ def draw_more_files(layout, match) -> None:
 def draw_players(layout, match) -> None:
     """Draw the list, buttons to select many players, and the teams' colours."""
     layout.template_list("BEYOND_MOCAP_UL_match", "", match, "players", match, active_propname="active", rows=5)
-    row = layout.row(align=True)
-    for whom, text in (("ALL", "All"), ("NONE", "None"), ("home", "Home"), ("away", "Away"), ("ONE", "Active")):
-        row.operator("beyond_mocap.tick_match", text=text).whom = whom
-    row = layout.row(align=True)
+    layout.operator_menu_enum("beyond_mocap.tick_match", "whom", icon="CHECKBOX_HLT")
+    draw_section(layout, "match_colours", "Colours", lambda opened: draw_colours(opened, match))
+
+
+def draw_colours(layout, match) -> None:
+    """Draw the colours of the teams' shirts."""
+    column = create_value_column(layout)
     for team in ("home", "away", "referee"):
-        row.prop(match, f"{team}_colour", text="")
+        column.prop(match, f"{team}_colour")
+
+
+def draw_buttons(row) -> None:
+    """Draw the buttons that make and show a match."""
+    row.operator("beyond_mocap.make_match", icon="PLAY")
+    row.operator("beyond_mocap.show_match", icon="HIDE_OFF")
 
 
 def draw_messages(layout, lines: str) -> None:
@@ -91,8 +96,8 @@ def draw_processing(layout, scene) -> None:
     """Draw how the work is done."""
     match = scene.beyond_mocap_match
     column = create_value_column(layout)
-    for name in ("solve_touches", "strength", "masses", "fatigue", "workers", "scheduler", "first_frame"):
-        column.prop(match, name)
+    draw_values(column, match, ("solve_touches", "strength", "masses", "fatigue", "workers", "scheduler",
+                                "first_frame"), {"workers": 2})
     column.prop(scene.beyond_mocap, "rate")
     column.prop(scene.beyond_mocap, "watch", slider=True)
 
@@ -103,5 +108,6 @@ def draw_display(layout, match) -> None:
     row.operator("beyond_mocap.match_camera", text="Broadcast", icon="VIEW_CAMERA").which = "STAND"
     row.operator("beyond_mocap.match_camera", text="Eyes", icon="HIDE_OFF").which = "EYES"
     layout.operator("beyond_mocap.match_export", icon="EXPORT")
+    layout.operator("beyond_mocap.deliver", text="Deliver a File per Player", icon="FILE_FOLDER").who = "MATCH"
     for line in match.messages.splitlines()[:MAX_LINES]:
         draw_paragraph(layout, line, "INFO")

@@ -11,7 +11,7 @@ import bpy
 
 from ..scene.core.settings import find_active_player
 from ..scene.path_editing.settings import list_target_bodies
-from .tab import TabPanel, create_value_column, draw_figures, draw_paragraph, draw_section
+from .tab import TabPanel, create_value_column, draw_figures, draw_paragraph, draw_section, draw_values
 
 OVERLAYS = {"path_source": "CURVE_PATH", "path_new": "CURVE_NCURVE", "path_trackers": "EMPTY_SINGLE_ARROW",
             "path_residuals": "TRACKING_REFINE_BACKWARDS", "path_ghost": "GHOST_ENABLED"}
@@ -65,6 +65,8 @@ class BEYOND_MOCAP_PT_path(TabPanel, bpy.types.Panel):
                 draw_section(layout, "path_body", "Body", lambda opened: draw_body(opened, edit))
                 if figure_text := describe_figures(edit.figures):
                     draw_section(layout, "path_figures", "Figures", lambda opened: draw_figures(opened, figure_text))
+                for line in edit.messages.splitlines():
+                    draw_paragraph(layout, line, "INFO")
         draw_section(layout, "path_cameras", "Cameras & Nudging", lambda opened: draw_cameras(opened, context),
                      closed=False)
         draw_section(layout, "path_overlays", "Overlays",
@@ -86,7 +88,7 @@ def find_subject(context) -> bpy.types.Object | None:
 def draw_armature(layout, body, edit) -> None:
     """Draw the armature, its curve and the buttons to start, apply and revert."""
     layout.label(text=f"{body.name} on Path" if edit.on else body.name, icon="ARMATURE_DATA")
-    layout.prop(edit, "curve", text="", placeholder="Curve fitted to its motion")
+    create_value_column(layout).prop(edit, "curve", placeholder="Fitted")
     row = layout.row(align=True)
     row.scale_y = 1.3
     if not edit.on:
@@ -95,19 +97,17 @@ def draw_armature(layout, body, edit) -> None:
         row.operator("beyond_mocap.bake_path", text="Apply", icon="CHECKMARK")
         row.operator("beyond_mocap.leave_path", text="Revert", icon="X")
         row = layout.row(align=True)
-        row.prop(edit, "live", toggle=True, icon="PLAY")
+        row.prop(edit, "live", text="Update Automatically")
         row.operator("beyond_mocap.update_path", text="Update", icon="FILE_REFRESH")
-    for line in edit.messages.splitlines():
-        draw_paragraph(layout, line, "INFO")
 
 
 def draw_new_curve(layout, settings) -> None:
     """Draw the settings and buttons of a new curve."""
     column = create_value_column(layout)
-    for name in ("curve_kind", "curve_points", "curve_degree"):
-        if name != "curve_degree" or settings.curve_kind == "NURBS":
-            column.prop(settings, name)
-    row = layout.row(align=True)
+    draw_values(column, settings, ("curve_kind", "curve_points"), {"curve_points": 6})
+    if settings.curve_kind == "NURBS":
+        column.prop(settings, "curve_degree")
+    row = layout.column(align=True)
     for shape, text in (("FITTED", "Original"), ("STRAIGHT", "Straight"), ("PRESENT", "As It Is")):
         button = row.operator("beyond_mocap.path_curve", text=text)
         button.shape, button.kind = shape, settings.curve_kind
@@ -124,7 +124,7 @@ def draw_following(layout, edit) -> None:
         column.prop(edit, name)
     row = layout.row(align=True)
     row.operator("beyond_mocap.path_apart", icon="MOD_PHYSICS")
-    row.operator("beyond_mocap.path_apart", text="", icon="X").clear = True
+    row.operator("beyond_mocap.path_apart", text="Clear", icon="X").clear = True
 
 
 def draw_body(layout, edit) -> None:
@@ -145,12 +145,12 @@ def draw_cameras(layout, context) -> None:
     """Draw the four cameras, and the step and directions of nudging."""
     column = layout.column(align=True)
     column.operator("beyond_mocap.path_cameras", icon="VIEW_CAMERA")
-    row, camera = column.row(align=True), context.scene.camera
+    row, camera = column.grid_flow(columns=2, even_columns=True, align=True), context.scene.camera
     active_camera = camera.get(CAMERA_MARK) if camera is not None else ""
     for kind, text in CAMERAS:
         row.operator("beyond_mocap.path_camera", text=text, depress=kind == active_camera).which = kind
+    create_value_column(layout).prop(context.scene.beyond_mocap, "nudge_step", text="Nudge")
     row = layout.row(align=True)
-    row.prop(context.scene.beyond_mocap, "nudge_step", text="Nudge")
     for direction, icon in NUDGES:
         row.operator("beyond_mocap.nudge_points", text="", icon=icon).direction = direction
 

@@ -5,7 +5,8 @@ from __future__ import annotations
 import bpy
 
 from ..scene.core.settings import find_active_player
-from .tab import StepPanel, TabPanel, create_value_column, draw_header, draw_paragraph, draw_section
+from .characters import draw_player_character
+from .tab import StepPanel, TabPanel, create_value_column, draw_header, draw_paragraph, draw_section, draw_values
 
 
 class BEYOND_MOCAP_UL_players(bpy.types.UIList):
@@ -26,6 +27,7 @@ class BEYOND_MOCAP_PT_players(StepPanel, bpy.types.Panel):
 
     bl_label = "2  Track & Labels"
     task = "PLAYER"
+    rooms = ("player", "track", "timeline", "timeline_labels", "annotate")
     bl_order = 2
 
     def find_state(self, context):
@@ -68,6 +70,7 @@ def draw_player(layout, settings, player) -> None:
     layout.label(text=player.name, icon="USER")
     draw_section(layout, "player_files", "Track", lambda opened: draw_files(opened, settings, player), closed=False)
     draw_section(layout, "player_own", "Body & Style", lambda opened: draw_player_settings(opened, player))
+    draw_player_character(layout, player)
     draw_pins(layout, player)
     draw_heading_keys(layout, player)
 
@@ -126,8 +129,8 @@ def draw_curve_settings(column, player) -> None:
 def draw_player_settings(layout, player) -> None:
     """Draw the settings of this player: body, height, foot, style."""
     column = create_value_column(layout)
-    for name in ("body", "height", "strong_foot", "style", "style_weight", "strength", "masses", "fatigue"):
-        column.prop(player, name)
+    names = ("body", "height", "strong_foot", "style", "style_weight", "strength", "masses", "fatigue")
+    draw_values(column, player, names, {"height": 1.8})
 
 
 def draw_pins(layout, player) -> None:

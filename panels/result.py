@@ -5,17 +5,12 @@ from __future__ import annotations
 import bpy
 
 from ..scene.core.settings import find_active_player
-from .tab import (
-    StepPanel,
-    TabPanel,
-    create_value_column,
-    draw_figures,
-    draw_header,
-    draw_paragraph,
-    draw_section,
-    wrap_text,
-)
+from ..scene.result.verdict import judge_take
+from .edits import draw_edits
+from .tab import StepPanel, TabPanel, create_value_column, draw_figures, draw_header, draw_paragraph, draw_section
+from .wrapping import wrap_text
 
+VERDICT_ICONS = {"Good": "CHECKMARK", "Fair": "INFO", "Poor": "ERROR"}
 STATES = {"NONE": ("Not Shown", "BLANK1"),
           "PREVIEW": ("Preview", "HIDE_OFF"),
           "ACCEPTED": ("Applied", "CHECKMARK")}
@@ -30,6 +25,7 @@ class BEYOND_MOCAP_PT_result(StepPanel, bpy.types.Panel):
 
     bl_label = "4  Result"
     task = "PLAYER"
+    rooms = ("result",)
     bl_order = 4
 
     def find_state(self, context):
@@ -50,6 +46,7 @@ class BEYOND_MOCAP_PT_result(StepPanel, bpy.types.Panel):
         row.operator("beyond_mocap.discard", icon="X")
         column.row(align=True).prop(settings, "accept_as", expand=True)
         draw_section(layout, "result_others", "Alternatives", lambda opened: draw_alternatives(opened, player))
+        draw_section(layout, "result_edits", "Edits", lambda opened: draw_edits(opened, player))
         draw_section(layout, "result_more", "Options", lambda opened: draw_options(opened, settings))
         if stale is not None:
             draw_section(layout, "result_stale", "What Has Changed", lambda opened: draw_changes(opened, stale))
@@ -76,7 +73,7 @@ def draw_state(layout, player, stale) -> None:
     if stale is None or not stale.lines:
         row.label(text=f"{player.name}: {text}", icon=icon)
         return
-    row.label(text=f"{player.name}: Out of Date", icon="ERROR")
+    row.label(text="Out of Date", icon="ERROR")
     if stale.mend in UPDATE_BUTTONS:
         text, icon = UPDATE_BUTTONS[stale.mend]
         button = row.operator(f"beyond_mocap.{stale.mend}", text=text, icon=icon)
@@ -122,59 +119,65 @@ def draw_alternatives(layout, player) -> None:
 
 
 class BEYOND_MOCAP_PT_quality(TabPanel, bpy.types.Panel):
-    """Figures, key moments and warnings of the active player's take; a line with a time goes there."""
+    """One line that judges the active player's take; behind it places to look at, key moments and figures."""
 
     bl_label = "Quality"
     task = "PLAYER"
     bl_order = 5
-    bl_options = {"DEFAULT_CLOSED"}
-
-    @classmethod
-    def poll(cls, context):
-        """Return whether the active player has figures."""
-        if not super().poll(context):
-            return False
-        player = find_active_player(context.scene.beyond_mocap)
-        return player is not None and bool(player.quality)
+    bl_options = {"HIDE_HEADER"}
 
     def draw(self, context):
-        """Draw the stored figures, key moments and warnings."""
-        layout, player = self.layout, find_active_player(context.scene.beyond_mocap)
-        layout.label(text=player.name, icon="ARMATURE_DATA")
-        lines = player.warnings.splitlines()
-        title, icon = (f"Warnings: {len(lines)}", "ERROR") if lines else ("No Warnings", "CHECKMARK")
-        if body := draw_header(layout, "quality_warnings", title, closed=False, icon=icon):
-            for line in lines:
-                text, _, seconds = line.partition("\t")
-                self.draw_line(body, player, text, seconds, "ERROR")
-        if body := draw_header(layout, "quality_moments", "Key Moments", closed=False):
-            for line in player.moments.splitlines():
-                text, second, status = (*line.split("\t"), "", "")[:3]
-                self.draw_line(body, player, text, second,
-                               "KEYTYPE_EXTREME_VEC" if status == "missed" else "KEYTYPE_KEYFRAME_VEC")
-        if body := draw_header(layout, "quality_why", "Why This Clip", closed=False):
-            self.draw_reasons(body, context.window_manager.beyond_mocap_playhead.why)
-        if body := draw_header(layout, "quality_figures", "Figures", closed=False):
-            draw_figures(body, player.quality)
-
-    def draw_line(self, layout, player, text: str, seconds: str, icon: str) -> None:
-        """Draw a line over several rows; the first row is a button if the line has times."""
-        if not seconds:
-            draw_paragraph(layout, text, icon)
+        """Draw the verdict, and while it is open what it is made of."""
+        player = find_active_player(context.scene.beyond_mocap)
+        found = judge_take(player.quality, player.moments, player.warnings) if player is not None else None
+        title, icon = (found.line, VERDICT_ICONS[found.word]) if found is not None and found.word else ("", "NONE")
+        body = draw_header(self.layout, "quality", f"Quality: {title}" if title else "Quality", icon=icon)
+        if not body:
             return
-        column = layout.column(align=True)
-        column.scale_y = 0.9
-        first, *rest = wrap_text(text)
+        if not title:
+            draw_paragraph(body, "Figures of the active player's take, once it is synthesized", "INFO")
+            return
+        draw_places(body, player, found)
+        draw_section(body, "quality_moments", "Key Moments", lambda opened: draw_moments(opened, player))
+        draw_section(body, "quality_figures", f"Figures: {found.met} of {found.judged} Targets Met",
+                     lambda opened: draw_figures(opened, player.quality))
+        draw_section(body, "quality_why", "Details", lambda opened: draw_reasons(
+            opened, context.window_manager.beyond_mocap_playhead.why))
+
+
+def draw_places(layout, player, found) -> None:
+    """Draw the places to look at, and the warnings that have no time."""
+    for text, seconds, is_moment in found.places:
+        draw_line(layout, player, text, seconds, "KEYTYPE_EXTREME_VEC" if is_moment else "ERROR")
+    for line in player.warnings.splitlines():
+        text, _, seconds = line.partition("\t")
+        if not seconds:
+            draw_paragraph(layout, text, "INFO")
+
+
+def draw_moments(layout, player) -> None:
+    """Draw the key moments."""
+    for line in player.moments.splitlines():
+        text, second, status = (*line.split("\t"), "", "")[:3]
+        icon = "KEYTYPE_EXTREME_VEC" if status == "missed" else "KEYTYPE_KEYFRAME_VEC"
+        draw_line(layout, player, text, second, icon)
+
+
+def draw_line(layout, player, text: str, seconds: str, icon: str) -> None:
+    """Draw a text that goes to its times, over as many rows as it needs; each of them can be pressed."""
+    column = layout.column(align=True)
+    column.scale_y = 0.9
+    for number, line in enumerate(wrap_text(text)):
         row = column.row(align=True)
         row.alignment = "LEFT"
-        button = row.operator("beyond_mocap.jump_to", text=first, icon=icon, emboss=False)
+        button = row.operator("beyond_mocap.jump_to", text=line, icon="BLANK1" if number else icon, emboss=False)
         button.stops, button.player = seconds, player.name
-        for line in rest:
-            column.label(text=line, icon="BLANK1")
 
-    def draw_reasons(self, layout, text: str) -> None:
-        """Draw the reasons for the piece at the playhead."""
-        column = layout.column(align=True)
-        column.scale_y = 0.85
-        for number, line in enumerate(text.splitlines() or ("No take in this session",)):
-            column.label(text=line, icon="SEQUENCE" if number == 0 and text else "BLANK1")
+
+def draw_reasons(layout, text: str) -> None:
+    """Draw why the piece at the playhead was chosen, with its costs."""
+    column = layout.column(align=True)
+    column.scale_y = 0.85
+    column.label(text="Why This Clip")
+    for line in text.splitlines() or ("No take in this session",):
+        draw_paragraph(column, line, "BLANK1")

@@ -24,6 +24,7 @@ class BEYOND_MOCAP_PT_rig(StepPanel, bpy.types.Panel):
 
     bl_label = "5  Rig & Export"
     task = "PLAYER"
+    rooms = ("rigs",)
     bl_order = 6
 
     def find_state(self, context):
@@ -36,7 +37,7 @@ class BEYOND_MOCAP_PT_rig(StepPanel, bpy.types.Panel):
         rig = context.scene.beyond_mocap.rig
         column = create_value_column(layout)
         column.prop(rig, "target")
-        column.prop(rig, "source", placeholder="Active Player's Body")
+        column.prop(rig, "source", placeholder="Active Player")
         row = layout.row(align=True)
         row.scale_y = 1.3
         row.operator("beyond_mocap.bake_to_rig", icon="ARMATURE_DATA").targets = "CHOSEN"
@@ -84,3 +85,4 @@ def draw_export(layout, rig) -> None:
     row = layout.row()
     row.scale_y = 1.3
     row.operator("beyond_mocap.export_motion", icon="EXPORT")
+    row.operator("beyond_mocap.deliver", text="Deliver to Engine", icon="FILE_FOLDER")

@@ -18,7 +18,7 @@ class BEYOND_MOCAP_PT_stage(TabPanel, bpy.types.Panel):
     bl_options = {"DEFAULT_CLOSED"}
 
     def draw(self, context):
-        """Draw the button that adds the stage, its light, and a button for each view."""
+        """Draw the button that adds the stage, its light, a button for each view, and those that render pictures."""
         layout, settings, scene = self.layout, context.scene.beyond_mocap_stage, context.scene
         layout.operator("beyond_mocap.add_stage", icon="VIEW_CAMERA")
         layout.row().prop(settings, "light", expand=True)
@@ -27,3 +27,7 @@ class BEYOND_MOCAP_PT_stage(TabPanel, bpy.types.Panel):
         grid = layout.grid_flow(columns=2, even_columns=True, align=True)
         for view, name, _, icon, _ in VIEWS:
             grid.operator("beyond_mocap.stage_view", text=name, icon=icon, depress=view == shown).view = view
+        row = layout.row(align=True)
+        row.operator("beyond_mocap.preview_movie", icon="FILE_MOVIE")
+        row.operator("beyond_mocap.contact_sheet", icon="IMGDISPLAY")
+        self.draw_progress(context, "pictures")

@@ -5,7 +5,7 @@ from __future__ import annotations
 import bpy
 from bl_ui.utils import PresetPanel
 
-from .tab import StepPanel, draw_header
+from .tab import StepPanel, draw_automatic, draw_header
 
 
 class BEYOND_MOCAP_MT_presets(bpy.types.Menu):
@@ -42,6 +42,7 @@ class BEYOND_MOCAP_PT_synthesis(StepPanel, bpy.types.Panel):
 
     bl_label = "3  Synthesize"
     task = "PLAYER"
+    rooms = ("synthesis",)
     bl_order = 3
 
     def find_state(self, context):
@@ -92,4 +93,7 @@ def draw_settings(layout, settings) -> None:
         layout.prop(settings, name)
     if body := draw_header(layout, "synthesis_tuning", "Fine-Tuning"):
         for name in settings.list_tuning():
-            body.prop(settings, name, slider=name in ("alpha", "watch"))
+            if name == "omega":
+                draw_automatic(body, settings, name, 4.0)
+            else:
+                body.prop(settings, name, slider=name in ("alpha", "watch"))

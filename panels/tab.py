@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-import textwrap
-
 import bpy
 
-LETTER_WIDTH = 5.7  # mean width of an interface letter in pixels, at a scale of 1
+from .notices import draw_notices
+from .wrapping import wrap_text
+
 MARKS = {"met": "CHECKMARK", "missed": "ERROR", "": "BLANK1"}
-MARGIN = 70  # pixels of a sidebar without text: tabs, the box and its icon
+NAME_SHARE = 0.72  # of the width that the name of a figure takes
+LABEL_SHARE = 0.4  # of the width, where Blender splits names and values
 
 
 def draw_table(layout, lines) -> None:
@@ -34,25 +35,22 @@ def draw_paragraph(layout, text: str, icon: str) -> None:
 
 
 def draw_figures(layout, text: str) -> None:
-    """Draw lines "name: value" with target and status separated by tabs; an icon shows whether the target is met."""
+    """Draw lines "name: value" with target and status separated by tabs: an icon shows whether the target is met, and
+    below what misses it stands the target.
+    """
     column = layout.column(align=True)
     column.scale_y = 0.85
     for line in text.splitlines():
         name_and_value, target, status = (*line.split("\t"), "", "")[:3]
         name, _, value = name_and_value.partition(": ")
-        row = column.split(factor=0.54)
+        row = column.split(factor=NAME_SHARE)
         row.label(text=name, icon=MARKS.get(status, "BLANK1"))
-        right = row.split(factor=0.54)
-        right.label(text=value)
-        target_row = right.row()
-        target_row.active = False
-        target_row.label(text=target)
-
-
-def wrap_text(text: str) -> list[str]:
-    """Wrap text to the sidebar's width."""
-    width = bpy.context.region.width / bpy.context.preferences.system.ui_scale
-    return textwrap.wrap(text, max(16, int((width - MARGIN) / LETTER_WIDTH)))
+        row.label(text=value)
+        if status == "missed":
+            row = column.split(factor=LABEL_SHARE)
+            row.active = False
+            row.label(text="Target", icon="BLANK1")
+            row.label(text=target)
 
 
 def draw_header(layout, name: str, title: str, closed: bool = True, icon: str = "NONE"):
@@ -85,19 +83,60 @@ def create_value_column(layout):
     return column
 
 
-def with_progress(layout, context, kind: str, draw) -> None:
+def draw_automatic(column, owner, name: str, start: float) -> None:
+    """Draw a value whose 0 means that it is chosen automatically: as "Automatic", or as a field with a button back.
+
+    Args:
+        column: a column of named values.
+        owner: the property group.
+        name: of its property.
+        start: the value with which one of the user's own begins.
+    """
+    value = getattr(owner, name)
+    if value:
+        row = column.row(align=True)
+        row.prop(owner, name)
+        button = row.operator("beyond_mocap.set_automatic", text="", icon="X")
+    else:
+        row = column.split(factor=LABEL_SHARE)
+        label = row.row()
+        label.alignment = "RIGHT"
+        label.label(text=owner.bl_rna.properties[name].name)
+        button = row.operator("beyond_mocap.set_automatic", text="Automatic")
+        button.value = start
+    button.object = owner.id_data.name if isinstance(owner.id_data, bpy.types.Object) else ""
+    button.path = owner.path_from_id(name)
+
+
+def draw_values(column, owner, names, automatic=None) -> None:
+    """Draw values below each other.
+
+    Args:
+        column: a column of named values.
+        owner: the property group.
+        names: of its properties.
+        automatic: name -> value to start with, of those whose 0 means automatic.
+    """
+    for name in names:
+        if automatic and name in automatic:
+            draw_automatic(column, owner, name, automatic[name])
+        else:
+            column.prop(owner, name)
+
+
+def with_progress(layout, context, kinds, draw) -> None:
     """Draw a step's main buttons, or in their place, as high as they are, a bar and Cancel while such work runs.
 
     Args:
         layout: the layout to draw into.
         context: Blender's context.
-        kind: of the work.
+        kinds: of the work.
         draw: function that draws the buttons into a row.
     """
     row = layout.row(align=True)
     row.scale_y = 1.3
     running = context.window_manager.beyond_mocap_work
-    if running.kind == kind:
+    if running.kind in kinds:
         draw_bar(row, running)
     else:
         draw(row)
@@ -114,23 +153,22 @@ class TabPanel:
 
     Attributes:
         task: the task that shows the panel, see `TASKS`; "" for every task.
+        rooms: names of the operators' modules whose notices the panel shows.
+        also: other tasks that show it.
     """
 
     bl_space_type = "VIEW_3D"
     bl_region_type = "UI"
     bl_category = "Beyond Mocap"
     task = ""
+    rooms: tuple[str, ...] = ()
+    also: tuple[str, ...] = ()
 
     @classmethod
     def poll(cls, context):
         """Return whether the panel belongs to the task that is chosen at the top of the tab."""
-        return cls.task in ("", context.scene.beyond_mocap.task)
-
-    def draw_progress(self, context, kind: str) -> None:
-        """Draw a progress bar and a Cancel button while work of this kind runs in the background."""
-        running = context.window_manager.beyond_mocap_work
-        if running.kind == kind:
-            draw_bar(self.layout.row(align=True), running)
+        chosen = context.scene.beyond_mocap.task
+        return cls.task in ("", chosen) or chosen in cls.also
 
 
 class StepPanel(TabPanel):
@@ -144,27 +182,12 @@ class StepPanel(TabPanel):
     def draw(self, context):
         """Draw the step's line, and its content while it is open."""
         state, summary = self.find_state(context)
-        body = draw_step(self.layout, type(self).__name__, self.bl_label, state, summary)
+        header, body = self.layout.panel(f"beyond_mocap_step_{self.bl_order}_{state}", default_closed=state != "next")
+        plain = self.bl_label.partition("  ")[2]
+        if state == "done":
+            header.label(text=f"{plain}: {summary}", icon="CHECKMARK")
+        else:  # the number is that of its own task
+            header.label(text=self.bl_label if context.scene.beyond_mocap.task == self.task else plain)
         if body:
             self.draw_step(body, context)
-
-
-def draw_step(layout, name: str, title: str, state: str, summary: str = ""):
-    """Draw the line of a step, see StepPanel.
-
-    Args:
-        layout: the layout to draw into.
-        name: identifier, unique among all panels.
-        title: number and name of the step.
-        state: "done", "next" or "later".
-        summary: what the step has led to; shown where it is done.
-    Returns:
-        The layout of its body; None while it is closed.
-    """
-    header, body = layout.panel(f"beyond_mocap_{name}_{state}", default_closed=state != "next")
-    if state == "done":
-        number, _, plain = title.partition("  ")
-        header.label(text=f"{plain or number}: {summary}" if summary else plain or number, icon="CHECKMARK")
-    else:
-        header.label(text=title)
-    return body
+        draw_notices(self.layout, context, self.rooms)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import bpy
 
+from .notices import draw_task_notices
 from .tab import TabPanel
 
 ROWS = (("PLAYER", "MATCH", "PATH", "BALL"), ("MARKERS", "LIBRARY"))
@@ -24,3 +25,4 @@ class BEYOND_MOCAP_PT_task(TabPanel, bpy.types.Panel):
         for row, tasks in ((column.row(align=True), first), (column.split(factor=WIDE, align=True), second)):
             for task in tasks:
                 row.prop_enum(settings, "task", task)
+        draw_task_notices(self.layout, context)

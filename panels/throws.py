@@ -5,7 +5,7 @@ from __future__ import annotations
 import bpy
 
 from ..scene.throws.settings import find_thrower
-from .tab import TabPanel, create_value_column, draw_paragraph, draw_section, draw_table
+from .tab import TabPanel, create_value_column, draw_paragraph, draw_section, draw_table, draw_values, with_progress
 
 
 class BEYOND_MOCAP_PT_throws(TabPanel, bpy.types.Panel):
@@ -26,31 +26,33 @@ class BEYOND_MOCAP_PT_throws(TabPanel, bpy.types.Panel):
         layout.label(text=body.name, icon="ARMATURE_DATA")
         layout.row().prop(settings, "side", expand=True)
         column = create_value_column(layout)
-        for name in ("target", "frame", "speed", "ball", "kind", "library"):
-            column.prop(settings, name)
+        draw_values(column, settings, ("target", "frame", "speed", "ball", "kind", "library"),
+                    {"frame": context.scene.frame_current, "speed": 15.0})
         if settings.target is None:
             draw_paragraph(layout, "Without a target the 3D cursor is used", "CURSOR")
-        row = layout.row(align=True)
-        row.scale_y = 1.3
-        row.operator("beyond_mocap.throw_at_target", text="Throw", icon="VIEW_PAN")
-        row.operator("beyond_mocap.kick_at_target", text="Kick", icon="MOD_DYNAMICPAINT")
-        for kind in ("throw", "kick"):
-            self.draw_progress(context, kind)
+        with_progress(layout, context, ("throw", "kick"), draw_buttons)
         draw_preview(layout, settings)
         draw_section(layout, "throw_models", "Models", lambda opened: draw_models(opened, settings))
 
 
+def draw_buttons(row) -> None:
+    """Draw the two main buttons."""
+    row.operator("beyond_mocap.throw_at_target", text="Throw", icon="VIEW_PAN")
+    row.operator("beyond_mocap.kick_at_target", text="Kick", icon="MOD_DYNAMICPAINT")
+
+
 def draw_preview(layout, settings) -> None:
-    """Draw the figures of the preview, and the buttons to apply or revert it."""
+    """Draw the buttons to apply or revert the preview, and its figures."""
     if not settings.made:
         return
+    row = layout.row(align=True)
+    row.scale_y = 1.3
+    row.operator("beyond_mocap.keep_throw", text="Apply", icon="CHECKMARK")
+    row.operator("beyond_mocap.leave_throw", text="Revert", icon="X")
+    layout.prop(settings, "live")
     draw_table(layout, settings.figures.splitlines())
     for line in settings.messages.splitlines():
         draw_paragraph(layout, line, "INFO")
-    layout.prop(settings, "live")
-    row = layout.row(align=True)
-    row.operator("beyond_mocap.keep_throw", text="Apply", icon="CHECKMARK")
-    row.operator("beyond_mocap.leave_throw", text="Revert", icon="X")
 
 
 def draw_models(layout, settings) -> None:

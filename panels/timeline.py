@@ -5,6 +5,7 @@ from __future__ import annotations
 import bpy
 
 from ..scene.core.settings import find_active_player
+from .notices import draw_notices
 from .tab import draw_header, draw_paragraph
 
 MOST = 60  # key moments that the list shows
@@ -44,6 +45,7 @@ class TimelineTab:
             self.draw_moments(layout, target)
             self.draw_problems(layout, context, target)
         self.draw_tools(layout)
+        draw_notices(layout, context, ("timeline", "timeline_labels", "annotate"))
 
     def draw_moments(self, layout, target):
         """Draw the key moments by frame; a click goes there and selects the moment."""

@@ -20,14 +20,18 @@ HERE = Path(__file__).resolve().parent
 if __name__ == "__main__":
     sys.path.insert(0, str(HERE.parent))
 
-from beyond_mocap.appearance.body import MATERIALS, BodyMesh, build_body, deform_body  # noqa: E402
+from beyond_mocap.appearance.body import build_body  # noqa: E402
+from beyond_mocap.appearance.mesh import MATERIALS, BodyMesh, deform_body  # noqa: E402
+from beyond_mocap.appearance.picture import encode_png  # noqa: E402
 from beyond_mocap.files.bvh import bvh  # noqa: E402
 from beyond_mocap.motion.humanoid import compute_heading  # noqa: E402
 from beyond_mocap.motion.motion import Motion, compute_pose, place_motion, sample_frames  # noqa: E402
 from beyond_mocap.motion.quaternion import rotate_about_up  # noqa: E402
 
 COLOURS = {"skin": (0.60, 0.36, 0.24), "shirt": (0.72, 0.06, 0.05), "shorts": (0.86, 0.86, 0.84),
-           "socks": (0.72, 0.06, 0.05), "boots": (0.03, 0.03, 0.035), "hair": (0.045, 0.028, 0.02)}
+           "socks": (0.72, 0.06, 0.05), "boots": (0.03, 0.03, 0.035), "hair": (0.045, 0.028, 0.02), "trim": (0.86, 0.86, 0.84),
+           "soles": (0.35, 0.42, 0.03), "eyes": (0.72, 0.72, 0.70), "pupils": (0.02, 0.011, 0.007),
+           "gloves": (0.62, 0.66, 0.10)}
 BALL_RADIUS = 0.11  # m
 
 
@@ -165,29 +169,8 @@ def render(scene: bpy.types.Scene, path: Path) -> np.ndarray:
 
 
 def save_picture(picture: np.ndarray, path: Path) -> None:
-    """Save a picture (H, W, 4) as PNG."""
-    height, width = picture.shape[:2]
-    image = bpy.data.images.new("sheet", width, height)
-    image.pixels.foreach_set(np.ascontiguousarray(picture[::-1], np.float32).ravel())
-    image.filepath_raw, image.file_format = str(path), "PNG"
-    image.save()
-
-
-def _add_side_camera(scene, centres: np.ndarray) -> None:
-    """Add a camera beside a place (1, 3) m."""
-    middle = centres[0] * [1, 1, 0] + [0, 0, 0.85]
-    add_camera(scene, middle + np.array([2.2, -6.0, 1.9]), middle, lens=45.0)
-
-
-def _arrange_grid(tiles: list[np.ndarray], columns: int) -> np.ndarray:
-    """Arrange pictures of one size in a grid."""
-    height, width = tiles[0].shape[:2]
-    rows = -(-len(tiles) // columns)
-    sheet = np.ones((rows * height, columns * width, 4), np.float32)
-    for i, tile in enumerate(tiles):
-        row, column = divmod(i, columns)
-        sheet[row * height : (row + 1) * height, column * width : (column + 1) * width] = tile
-    return sheet
+    """Save a picture (H, W, 4), 0 to 1, as PNG."""
+    path.write_bytes(encode_png(np.rint(255.0 * np.clip(picture, 0.0, 1.0)).astype(np.uint8)))
 
 
 def render_strip(motion: Motion, frames: np.ndarray, out_png, *, ball=None, spacing: float = 1.15, samples: int = 12,

@@ -18,7 +18,9 @@ from pathlib import Path
 import numpy as np
 
 sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
-from beyond_mocap.appearance.body import build_body, deform_body  # noqa: E402
+from beyond_mocap.appearance.body import build_body  # noqa: E402
+from beyond_mocap.appearance.mesh import MATERIALS, deform_body  # noqa: E402
+from beyond_mocap.appearance.picture import COLOURS as PART_COLOURS  # noqa: E402
 from beyond_mocap.base.errors import InputError  # noqa: E402
 from beyond_mocap.base.vectors import unit_vectors  # noqa: E402
 from beyond_mocap.files.bvh import bvh  # noqa: E402
@@ -26,7 +28,7 @@ from beyond_mocap.files.tables import read_ball  # noqa: E402
 from beyond_mocap.motion.motion import Motion, compute_pose, sample_frames  # noqa: E402
 from beyond_mocap.synthesis.provenance import read_provenance  # noqa: E402
 
-COLOURS = np.array([(190, 140, 110), (200, 40, 35), (235, 235, 230), (40, 60, 150), (30, 30, 34), (40, 28, 22)], float)
+COLOURS = 255.0 * np.array([PART_COLOURS[part] for part in MATERIALS])
 GRASS, LINE, SHADOW, SKY, BALL = (96, 140, 84), (134, 178, 118), (60, 92, 52), (200, 216, 232), (250, 250, 245)
 BELOW = (255, 0, 255)
 SUN = np.array([0.35, -0.45, 0.82])
@@ -158,7 +160,7 @@ def write_sheet(motion: Motion, frames, out, *, camera="follow", side=-90.0, bal
     from PIL import Image, ImageDraw
 
     frames = np.asarray(frames, dtype=float)
-    body = build_body(motion.skeleton, example=motion)
+    body = build_body(motion.skeleton, example=motion, light=True)
     root, local = sample_frames(motion, frames)
     skins = deform_body(body, motion.skeleton, *compute_pose(motion.skeleton, root, local))
     balls = np.full((len(frames), 3), np.nan) if ball is None else np.asarray(ball, dtype=float)

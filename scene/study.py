@@ -21,6 +21,7 @@ from .core.measure import frames_per_second, whole_frames
 from .core.saved_state import use_temporary_scene
 from .rigs import armature
 from .stage import ball, body
+from .stage.render_child import MOVIE_OUTPUT, PICTURE_OUTPUT, apply_settings
 
 SHIRT = (0.30, 0.32, 0.35)  # linear RGB, a neutral grey
 CAMERA_FROM = (-1.1, -5.2, 0.75)  # metres from the middle of the body
@@ -105,13 +106,8 @@ def _apply_settings(scene: bpy.types.Scene, look: RenderLook) -> None:
         scene.eevee.taa_render_samples = look.samples
     else:
         scene.display.shading.show_shadows = True
-    settings = render.image_settings
-    if hasattr(settings, "media_type"):
-        settings.media_type = "VIDEO" if look.movie else "IMAGE"
-    settings.file_format = "FFMPEG" if look.movie else "PNG"
-    if look.movie:
-        render.ffmpeg.format, render.ffmpeg.codec, render.ffmpeg.constant_rate_factor = "MPEG4", "H264", "HIGH"
-    render.use_stamp, render.use_file_extension = False, not look.movie  # stamps would reveal files and times
+    apply_settings(scene, MOVIE_OUTPUT if look.movie else PICTURE_OUTPUT)
+    render.use_stamp = False  # stamps would reveal files and times
 
 
 def _create_player(scene: bpy.types.Scene, motion: Motion) -> None:

@@ -10,6 +10,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from ..base.errors import InputError, format_seconds
+from ..base.fixes import Fix
 from .labels import avoids_ball, read_labels
 from .vocabulary import (
     CONTINUOUS,
@@ -259,7 +260,9 @@ def find_problems(
     items: list[Span | KeyMoment] = [*timeline.spans, *timeline.keys]
     for item in sorted(items, key=lambda item: item.start if isinstance(item, Span) else item.time):
         place = where if item.line is None else f"{where}:{item.line}"
-        found += [*_find_label_problems(item, known, place), *_find_time_problems(item, start, end, place)]
+        at = Fix("show_label", repr(item.start if isinstance(item, Span) else item.time))
+        problems = [*_find_label_problems(item, known, place), *_find_time_problems(item, start, end, place)]
+        found += [problem.offer(at) for problem in problems]
     return found + _find_overlaps(timeline, where)
 
 
@@ -370,6 +373,7 @@ def _find_overlaps(timeline: Timeline, where: str) -> list[InputError]:
         InputError(
             where if b.line is None else f"{where}:{b.line}", f"{_describe_item(a)} and {_describe_item(b)} {relation}",
             "one action at a time", "shorten one of them, or put all labels on one line",
+            fixes=(Fix("show_label", repr(b.start if isinstance(b, Span) else b.time)),),
         )
         for a, b, relation in pairs
     ]

@@ -1,21 +1,26 @@
-"""A small picture of one pose: the low-poly body on a transparent background, drawn with numpy alone.
+"""A small picture of one pose: the light body on a transparent background, drawn with numpy alone.
 
 Faces are filled from far to near at twice the size and averaged down. This needs no graphics card and gives the same
-pixels on every machine.
+pixels on every machine. Also pictures in a grid, and PNG files.
 """
 
 from __future__ import annotations
+
+import struct
+import zlib
 
 import numpy as np
 
 from ..base.vectors import unit_vectors
 from ..motion.humanoid import compute_heading_from_positions
 from ..motion.motion import Motion, forward_kinematics, place_motion
-from .body import MATERIALS, build_body, deform_body
+from .body import build_body
+from .mesh import MATERIALS, deform_body
 
 COLOURS = {
     "skin": (0.75, 0.55, 0.43), "shirt": (0.78, 0.16, 0.14), "shorts": (0.92, 0.92, 0.90), "socks": (0.16, 0.24, 0.59),
-    "boots": (0.12, 0.12, 0.13), "hair": (0.16, 0.11, 0.09),
+    "boots": (0.12, 0.12, 0.13), "hair": (0.16, 0.11, 0.09), "trim": (0.92, 0.92, 0.90), "soles": (0.45, 0.50, 0.15),
+    "eyes": (0.95, 0.95, 0.93), "pupils": (0.10, 0.07, 0.05), "gloves": (0.55, 0.60, 0.15),
 }
 _SUN = np.array([0.35, -0.45, 0.82])
 _AZIMUTH, _TILT = np.radians(-50.0), np.radians(12.0)  # angle from the body's front to the camera; downward tilt
@@ -38,7 +43,7 @@ def render_pose(motion: Motion, frame: int, size: int = 256) -> np.ndarray:
     pose = motion.frames(frame, frame + 1)
     pose = place_motion(pose, -float(compute_heading_from_positions(motion.skeleton, forward_kinematics(pose)[0])[0]))
     positions, rotations = forward_kinematics(pose)
-    body = build_body(motion.skeleton, example=motion)
+    body = build_body(motion.skeleton, example=motion, light=True)
     skin = deform_body(body, motion.skeleton, positions, rotations)[0]
     across, up, to_camera = _build_camera()
     # The shadow: each vertex projected along the sun's direction to the height of the lowest one.
@@ -53,6 +58,42 @@ def render_pose(motion: Motion, frame: int, size: int = 256) -> np.ndarray:
     canvas = np.zeros((canvas_size, canvas_size, 4))
     _draw_faces(canvas, skin, pixels, quads=quads, material=np.asarray(body.material), to_camera=to_camera)
     return _downsample(canvas, size)
+
+
+def arrange_grid(pictures: list[np.ndarray], columns: int) -> np.ndarray:
+    """Arrange pictures side by side, row below row, on white.
+
+    Args:
+        pictures: N of (H, W, C), of one size and type, the upper row first.
+        columns: pictures in a row.
+    Returns:
+        (rows * H, columns * W, C).
+    """
+    height, width, channels = pictures[0].shape
+    columns = min(columns, len(pictures))
+    white = 255 if pictures[0].dtype == np.uint8 else 1
+    sheet = np.full((-(-len(pictures) // columns) * height, columns * width, channels), white, pictures[0].dtype)
+    for number, picture in enumerate(pictures):
+        row, column = divmod(number, columns)
+        sheet[row * height : (row + 1) * height, column * width : (column + 1) * width] = picture
+    return sheet
+
+
+def encode_png(pixels: np.ndarray) -> bytes:
+    """Encode a picture as a PNG (ISO/IEC 15948): one chunk of rows without filter.
+
+    Args:
+        pixels: (H, W, 3) or (H, W, 4) uint8, the upper row first.
+    Returns:
+        The file's bytes.
+    """
+    high, wide, channels = pixels.shape
+    head = struct.pack(">IIBBBBB", wide, high, 8, 2 if channels == 3 else 6, 0, 0, 0)
+    rows = np.concatenate([np.zeros((high, 1), np.uint8), np.ascontiguousarray(pixels).reshape(high, -1)], axis=1)
+    chunks = ((b"IHDR", head), (b"IDAT", zlib.compress(rows.tobytes(), 9)), (b"IEND", b""))
+    return b"\x89PNG\r\n\x1a\n" + b"".join(
+        struct.pack(">I", len(data)) + kind + data + struct.pack(">I", zlib.crc32(kind + data)) for kind, data in chunks
+    )
 
 
 def _build_camera() -> tuple[np.ndarray, np.ndarray, np.ndarray]:

@@ -11,7 +11,7 @@ from ..base.vectors import cross_on_ground
 from ..motion.motion import Motion
 from ..motion.retargeting.neutral import build_neutral_stance
 from ..motion.skeleton import Skeleton, freeze_array
-from .body import SHIRT, BodyMesh, deform_body
+from .mesh import SHIRT, BodyMesh, deform_body
 
 _ABOVE = 0.004  # metres of the drawing above the cloth: more than coarse rings dip while they bend
 _MIDDLE = {"back": 0.70, "chest": 0.74}  # height of the drawing's middle as a share of the shirt's height from its hem

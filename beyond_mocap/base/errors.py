@@ -7,6 +7,12 @@ stderr, an operator puts it into Blender's report; no caller formats it again.
 from __future__ import annotations
 
 import os
+from typing import TYPE_CHECKING
+
+from .fixes import Fix
+
+if TYPE_CHECKING:
+    from typing import Self
 
 
 class BeyondMocapError(Exception):
@@ -14,9 +20,27 @@ class BeyondMocapError(Exception):
 
     Attributes:
         exit_status: exit status of the command.
+        fixes: steps that repair it and that an interface can offer.
+        parts: what is wrong and where, then what to do about it, which may be "".
     """
 
     exit_status = 2
+    fixes: tuple[Fix, ...] = ()
+
+    @property
+    def parts(self) -> tuple[str, str]:
+        return str(self), ""
+
+    def offer(self, *fixes: Fix) -> Self:
+        """Add steps that repair it.
+
+        Args:
+            fixes: after those that it has.
+        Returns:
+            The error itself.
+        """
+        self.fixes = (*self.fixes, *fixes)
+        return self
 
 
 class InputError(BeyondMocapError):
@@ -26,7 +50,8 @@ class InputError(BeyondMocapError):
         where: file, file:line or option, as text.
     """
 
-    def __init__(self, where: object, found: str, expected: str = "", next_step: str = ""):
+    def __init__(self, where: object, found: str, expected: str = "", next_step: str = "", *,
+                 fixes: tuple[Fix, ...] = ()):
         """Build the one-line message.
 
         Args:
@@ -34,14 +59,21 @@ class InputError(BeyondMocapError):
             found: what was found there.
             expected: what was expected; "" for nothing to say.
             next_step: what to do next; "" for nothing to say. All three are short phrases without a full stop.
+            fixes: steps that repair it and that an interface can offer.
         """
         parts = [f"{where}: {found}"]
         if expected:
             parts.append(f"expected {expected}")
         if next_step:
             parts.append(next_step)
-        super().__init__("; ".join(" ".join(part.split()) for part in parts))
-        self.where = str(where)
+        parts = [" ".join(part.split()) for part in parts]
+        super().__init__("; ".join(parts))
+        self.where, self.fixes = str(where), tuple(fixes)
+        self._parts = parts[0], "; ".join(parts[1:])
+
+    @property
+    def parts(self) -> tuple[str, str]:
+        return self._parts
 
 
 class NotInLibraryError(BeyondMocapError):
@@ -54,17 +86,24 @@ class NotInLibraryError(BeyondMocapError):
 
     exit_status = 3
 
-    def __init__(self, message: str, nearest: tuple[str, ...] = (), line: int | None = None):
+    def __init__(self, message: str, nearest: tuple[str, ...] = (), line: int | None = None,
+                 fixes: tuple[Fix, ...] = ()):
         """Build the one-line message.
 
         Args:
-            message: one line.
+            message: one line; what to do is after its last semicolon.
             nearest: the nearest label combinations that the library has.
             line: line of the annotations, None if unknown.
+            fixes: steps that repair it and that an interface can offer.
         """
         super().__init__(" ".join(message.split()))
         self.nearest = tuple(nearest)
-        self.line = line
+        self.line, self.fixes = line, tuple(fixes)
+
+    @property
+    def parts(self) -> tuple[str, str]:
+        found, _, step = str(self).rpartition("; ")
+        return (found, step) if found else (step, "")
 
     def locate(self, where: object) -> NotInLibraryError:
         """Build the same error with its place in front.
@@ -75,7 +114,7 @@ class NotInLibraryError(BeyondMocapError):
             The error.
         """
         place = where if self.line is None else f"{where}:{self.line}"
-        return NotInLibraryError(f"{place}: {self}", self.nearest, self.line)
+        return NotInLibraryError(f"{place}: {self}", self.nearest, self.line, self.fixes)
 
 
 class UserCancelledError(BeyondMocapError):

@@ -55,6 +55,7 @@ def run_synthesize(options, reporter: ProgressReporter, writers: Mapping[str, Wr
         writers: further output formats, by file suffix (Blender's).
     """
     from ..annotation import Timeline, check_timeline, read_timeline
+    from ..annotation.label_candidates import find_label_candidates
     from ..files.tables import write_ball, write_report
     from ..files.tracking.tracking import read_track_csv
     from ..motion.track import clean_track
@@ -87,7 +88,7 @@ def run_synthesize(options, reporter: ProgressReporter, writers: Mapping[str, Wr
         take = synthesize(library, plan, reporter.show_progress, reporter.is_cancelled)
     except NotInLibraryError as error:
         message = str(error.locate(annotations)).replace(USE_NEAREST, "add --nearest")
-        raise NotInLibraryError(message, error.nearest, error.line) from None
+        raise NotInLibraryError(message, error.nearest, error.line, error.fixes) from None
     take.seconds.update(load=loaded - started, library=ready - loaded, total=time.perf_counter() - started)
     if options.report:
         from ..evaluation.report import evaluate
@@ -105,6 +106,8 @@ def run_synthesize(options, reporter: ProgressReporter, writers: Mapping[str, Wr
     reporter.finish()
     if annotations and not options.annotations:
         reporter.show_note(f"{options.track}: with the labels of {annotations}")
+    if candidates := find_label_candidates(options.track) if not annotations else ():
+        reporter.show_note(f"{options.track}: no labels; {candidates[0]} may have them, name it with --annotations")
     if library.notes:
         notes = f"{format_count(len(library.notes), 'note')} on how its recordings were read and repaired"
         reporter.show_note(f"{options.library}: {notes}; the command 'library' prints all")

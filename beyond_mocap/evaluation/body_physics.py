@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..appearance.body import BodyMesh
+from ..appearance.mesh import BodyMesh
 from ..motion.motion import Motion
 from .boots import DEEP, measure_boot_heights
 from .naturalness import SLOW_SPEED, BodyCourse

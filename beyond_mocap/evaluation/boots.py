@@ -1,14 +1,14 @@
 """How deep the skin of a body's boots goes below the ground (`../shared/metrics.md`).
 
-The boots are those of the drawn character (`appearance.body`), so what is measured is what is seen. A take stands on
-the ground at height 0, a recording as it is used.
+The boots have the soles of the drawn character (`appearance.boots`), so what is measured is what is seen. A take stands
+on the ground at height 0, a recording as it is used.
 """
 
 from __future__ import annotations
 
 import numpy as np
 
-from ..appearance.body import BodyMesh
+from ..appearance.mesh import BodyMesh
 from ..motion import quaternion
 from ..motion.motion import Motion
 from .naturalness import FPS
@@ -20,7 +20,7 @@ def measure_boot_heights(boots: BodyMesh, motion: Motion, positions: np.ndarray,
     """Measure the height of the lowest point of both boots, at 30 frames per second: the nearest frames count.
 
     Args:
-        boots: of a body with the motion's skeleton (`appearance.body.build_boots`).
+        boots: of a body with the motion's skeleton (`appearance.boots.build_boots`).
         motion: N frames on a skeleton of J joints.
         positions: (N, J, 3) m, its joints, world.
         rotations: (N, J, 4), the same.
@@ -33,7 +33,7 @@ def measure_boot_heights(boots: BodyMesh, motion: Motion, positions: np.ndarray,
 
 
 def measure_lowest_point(skin: BodyMesh, rest: np.ndarray, positions: np.ndarray, rotations: np.ndarray) -> np.ndarray:
-    """Measure the height of the lowest vertex of a skin, deformed as in `appearance.body.deform_body`.
+    """Measure the height of the lowest vertex of a skin, deformed as in `appearance.mesh.deform_body`.
 
     Only heights are computed, joint by joint, with the third row of its rotation matrix.
 

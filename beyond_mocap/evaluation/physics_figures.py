@@ -7,7 +7,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from ..appearance.body import BodyMesh, build_boots
+from ..appearance.boots import build_boots
+from ..appearance.mesh import BodyMesh
 from ..base.errors import TimedMessage
 from ..base.time_series import time_derivative
 from ..motion.track import smooth_zero_phase_hann

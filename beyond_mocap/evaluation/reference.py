@@ -19,7 +19,8 @@ import numpy as np
 
 from ..annotation import Timeline
 from ..annotation.gaits import STANDING
-from ..appearance.body import BodyMesh, build_boots
+from ..appearance.boots import build_boots
+from ..appearance.mesh import BodyMesh
 from ..base.errors import InputError
 from ..library.clip import Clip
 from ..library.keys import collect_keys

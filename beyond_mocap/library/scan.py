@@ -15,6 +15,7 @@ from pathlib import Path
 
 from ..annotation import ClipAnnotation, read_annotation_csv, read_clip_annotations
 from ..base.errors import InputError, format_count
+from ..base.fixes import Fix
 from ..files.atomic import atomic_write
 
 CACHE_FOLDER = ".beyond_mocap"
@@ -46,7 +47,8 @@ def find_recordings(folder: str | Path, endings: tuple[str, ...] = (".bvh", *FOR
     folder = Path(folder)
     if not folder.is_dir():
         what = "a file, not a folder" if folder.is_file() else "no such folder"
-        raise InputError(folder, what, "a folder with BVH files", "choose the folder of your library")
+        raise InputError(folder, what, "a folder with BVH files", "choose the folder of your library",
+                         fixes=(Fix("relink_library"),))
     found: list[Path] = []
     seen: set[tuple[int, int]] = set()
     for parent, folders, files in os.walk(folder, followlinks=True):

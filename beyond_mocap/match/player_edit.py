@@ -63,7 +63,7 @@ _MAX_FRAMES, _MAX_RATE = 1e7, 100.0
 _MIN_WINDOW = 1.0  # s
 _DEFAULTS = {
     field.name: field.default for field in fields(Plan)
-    if field.name not in ("track", "timeline", "pins", "heading_keys", "solved", "heading_path")
+    if field.name not in ("track", "timeline", "pins", "heading_keys", "contact_edits", "solved", "heading_path")
 }  # fmt: skip
 _RUN_TYPES = {"clip": "<i2", "first": "<f8", "rate": "<f8", "length": "<i4", "cut": "|u1"}
 _UNKNOWN = -(2**31)

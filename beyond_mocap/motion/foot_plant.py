@@ -172,7 +172,7 @@ def plant_feet(
     correction, miss = np.zeros((len(root), 2)), np.zeros((len(root), 2))
     out = rotations
     for side, (foot, (target, foot_rotation)) in enumerate(zip(feet, goals)):
-        target = _limit_to_reach(foot, target, drop)
+        target = limit_to_reach(foot, target, drop)
         chain = (foot.limb.upper_leg, foot.limb.lower_leg, foot.limb.foot)
         reached = solve_two_bone(skeleton, root, out, chain, target, end_rotation=foot_rotation,
                                  soft=foot.ease_distance)
@@ -412,8 +412,16 @@ def measure_shortfall(foot: Foot, goal: np.ndarray, drop: np.ndarray) -> np.ndar
     return np.where(foot.contact_weight > 0, np.linalg.norm(reach, axis=1) - foot.max_reach, 0.0)
 
 
-def _limit_to_reach(foot: Foot, goal: np.ndarray, drop: np.ndarray) -> np.ndarray:
-    """Limit the goals (T, 3) of feet in the air to the leg's length, or to its length in the recording."""
+def limit_to_reach(foot: Foot, goal: np.ndarray, drop: np.ndarray) -> np.ndarray:
+    """Limit the goals of feet in the air to the leg's length, or to its length in the recording.
+
+    Args:
+        foot: the foot.
+        goal: (T, 3) m, world.
+        drop: (T,) m by which the pelvis is lowered.
+    Returns:
+        (T, 3) m, world.
+    """
     hip = foot.hip - drop[:, None] * [0.0, 0.0, 1.0]
     reach = goal - hip
     far = np.linalg.norm(reach, axis=1)

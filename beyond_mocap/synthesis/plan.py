@@ -20,6 +20,7 @@ from ..base.settings.setting import LATER, add_fields, check_limits
 from ..base.time_series import interpolate_columns
 from ..motion.skeleton import freeze_array
 from ..motion.track import SampledTrack, Track, sample_track
+from .contact_edit import ContactEdit
 from .heading_path import HeadingPath
 from .heading_plan import (
     FPS,
@@ -143,6 +144,7 @@ class Plan:
         library: folder of the library.
         pins: where hands, feet and gaze have to be, in order of time.
         heading_keys: where the body has to face, in order of time; the rest is planned (`heading_plan`).
+        contact_edits: contacts of the feet that are moved, longer, shorter, left out or added, in order of time.
         gaits: (gait label, clip) pairs; other gaits are found among all clips.
         height: m, of the player; 0 for the library's.
         strong_foot: one of FEET.
@@ -179,6 +181,7 @@ class Plan:
     gaits: tuple[tuple[str, str], ...] = ()
     pins: tuple[Pin, ...] = ()
     heading_keys: tuple[HeadingKey, ...] = field(default=(), metadata=LATER)
+    contact_edits: tuple[ContactEdit, ...] = field(default=(), metadata=LATER)
     height: float = 0.0
     strong_foot: str = ""
     style: tuple[str, ...] = ()
@@ -197,6 +200,8 @@ class Plan:
 
     def __post_init__(self):
         object.__setattr__(self, "pins", tuple(sorted(self.pins, key=lambda pin: (pin.time, pin.part))))
+        object.__setattr__(self, "contact_edits", tuple(sorted(self.contact_edits,
+                                                               key=lambda edit: (edit.time, edit.foot))))
         object.__setattr__(self, "heading_keys", tuple(sorted(self.heading_keys, key=lambda key: key.time)))
         object.__setattr__(self, "style", tuple(dict.fromkeys(self.style)))
         check_limits(self, (*list_settings("synthesis"), *list_settings("player")))

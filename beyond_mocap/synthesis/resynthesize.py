@@ -27,6 +27,7 @@ from ..motion.track import SampledTrack
 from ..motion.track.ball_path import BallPath
 from .body_size import to_library_size
 from .construct.construction import Construction, build_key_results, find_touches
+from .construct.contact_edits import find_edited_frames
 from .construct.edit_blending import OldMotion, blend_with_old, compute_old_share
 from .construct.transitions import compute_spread_reaches
 from .plan import Plan, ResolvedPlan
@@ -85,9 +86,9 @@ def resynthesize(
 ) -> Take:
     """Update a take after its plan has changed: search and construct only what the change affects.
 
-    Pins are applied again. It is a whole synthesis where the change is not one of labels, track, ball, pins or headings
-    (another method, frame rate, length or choice), where `before` was built from another library or by another method
-    than "path", or where all of it is affected. The same library, plan and take give the same bits.
+    Pins are applied again. It is a whole synthesis where the change is not one of labels, track, ball, pins, headings
+    or contacts (another method, frame rate, length or choice), where `before` was built from another library or by
+    another method than "path", or where all of it is affected. The same library, plan and take give the same bits.
 
     Args:
         library: the recordings.
@@ -136,12 +137,12 @@ def _check_stretch(plan: Plan, before: Take, variant: VariantStretch) -> None:
 
 
 def _is_comparable(plan: Plan, before: Take) -> bool:
-    """Return whether the plans differ only in track, timeline, library folder, pins and headings, at the same times."""
+    """Return whether the plans differ only in track, timeline, library, pins, headings and contacts, at one time."""
     old = before.plan
     if old is None or plan.method != "path":
         return False
     same_choices = replace(plan, track=old.track, timeline=old.timeline, library=old.library, pins=old.pins,
-                           heading_keys=old.heading_keys) == old
+                           heading_keys=old.heading_keys, contact_edits=old.contact_edits) == old
     return same_choices and np.array_equal(plan.track.times[[0, -1]], old.track.times[[0, -1]])
 
 
@@ -215,6 +216,7 @@ def _update_stretches(
     update = _TakeUpdate(library, plan, before, track=track, edit=edit, request=request)
     moved = np.interp(update.index, np.arange(len(request)),
                       find_moved_frames(old_request, request).astype(float)) > 0.0
+    moved |= find_edited_frames(track.times, old_plan.requested.contact_edits, plan.requested.contact_edits)
     for stretch in update.list_stretches(stretches_found, moved):
         update.construct_stretch(stretch)
     clock.append(time.perf_counter())

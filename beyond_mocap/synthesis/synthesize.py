@@ -31,6 +31,7 @@ from .construct.extra_steps import Steps
 from .construct.gaze import estimate_look
 from .construct.pins import apply_pins
 from .construct.thesis_methods import construct_blocks
+from .contact_edit import FEET
 from .plan import METHODS, Plan, ResolvedPlan
 from .provenance import build_provenance_fields
 from .quality.playback import playback_from_take
@@ -55,6 +56,9 @@ KEY_MARGIN = 1.5
 
 PIN_TOLERANCE, GAZE_TOLERANCE = 0.01, np.radians(5.0)
 """Metres, and radians of a gaze, by which a pin may be missed without a warning."""
+
+CONTACT_REACH = 0.2
+"""Seconds beside a contact edit within which its foot has to be in contact."""
 
 
 Progress = Callable[[float, str], None]
@@ -269,7 +273,8 @@ def add_warnings(
     if hurried_from is not None:
         since = take.start_time + hurried_from / recordings.fps
         messages.append(TimedMessage(f"{since:.1f} s: the search was cut short from here on", (since, since)))
-    messages += [*_report_avoided_labels(take), *_report_missed_pins(take), *_report_ignored_heading_keys(take.plan)]
+    messages += [*_report_avoided_labels(take), *_report_missed_pins(take), *_report_ignored_heading_keys(take.plan),
+                 *_report_ignored_contact_edits(take)]
     unmet = _report_unmet(recordings, take.plan, take) if report_unmet else ()
     return replace(take, is_cut_short=hurried_from is not None, warnings=(*messages, *unmet))
 
@@ -320,6 +325,19 @@ def _report_missed_pins(take: Take) -> list[str]:
             messages.append(TimedMessage(f"{pin} is {beyond:.0f} degrees beyond what the neck can turn", when))
         elif result.pin.part != "gaze" and result.miss > PIN_TOLERANCE:
             messages.append(TimedMessage(f"{pin} is out of reach by {100.0 * result.miss:.0f} cm", when))
+    return messages
+
+
+def _report_ignored_contact_edits(take: Take) -> list[TimedMessage]:
+    """Report the contact edits that found no contact of their foot, or no room for a new one."""
+    messages, times = [], take.start_time + np.arange(len(take.contacts)) / take.motion.fps
+    for edit in take.plan.contact_edits:
+        stands = times[take.contacts[:, FEET.index(edit.foot)]]
+        low, high = edit.time + min(edit.start, 0.0) - CONTACT_REACH, edit.time + max(edit.end, 0.0) + CONTACT_REACH
+        is_outside = not times[0] <= edit.time <= times[-1]
+        if is_outside or edit.kind != "delete" and not np.any((stands >= low) & (stands <= high)):
+            text = f"{format_seconds(edit.time)} s: the edited contact of the {edit.foot} foot is missing, the edit has"
+            messages.append(TimedMessage(f"{text} no effect", (edit.time, edit.time)))
     return messages
 
 

@@ -9,9 +9,11 @@ from __future__ import annotations
 import queue
 import sys
 import threading
+from time import perf_counter
 from typing import Any, Callable
 
 from ...beyond_mocap.base.errors import UserCancelledError
+from .time_left import TimeLeft
 
 Work = Callable[[Callable[[float, str], None], Callable[[], bool], Callable[[], bool]], Any]
 
@@ -41,6 +43,7 @@ class Job:
         cancel_jobs(kind)
         self.kind, self.can_end_early = kind, can_end_early
         self.fraction, self.text = 0.0, ""
+        self._time_left = TimeLeft(perf_counter())
         self.result, self.error, self._ended = None, None, False
         self._stop, self._end_requested, self._messages = threading.Event(), threading.Event(), queue.SimpleQueue()
         _newest[kind] = self
@@ -52,11 +55,18 @@ class Job:
             what, value = self._messages.get()
             if what == "progress":
                 self.fraction, self.text = value
+                self._time_left.add_share(self.fraction, perf_counter())
                 continue
             setattr(self, what, value)
             self._ended = True
             return True
         return False
+
+    def describe_progress(self) -> str:
+        """Describe what is done now, its share and the time left, such as "Searching 41 %, about 6 s left"."""
+        text = self.text[:1].upper() + self.text[1:] or "Starting"
+        left = self._time_left.describe(perf_counter())
+        return f"{text} {100.0 * self.fraction:.0f} %{', ' if left else ''}{left}"
 
     def cancel(self) -> None:
         """Ask the thread to stop; its result is dropped."""

@@ -16,15 +16,18 @@ if TYPE_CHECKING:  # the library's modules are slow to import, and enabling the 
     from ...beyond_mocap.library.library import Library
     from ...beyond_mocap.synthesis.plan import Plan
     from ...beyond_mocap.synthesis.take import Take
+    from ..match.load import MatchSection
 
 MAX_TAKES = 200
 MAX_LIBRARIES = 3
+MAX_SECTIONS = 2
 
 _numbers = itertools.count(1)
 # Part of every name, so that takes of another session are not confused with those of this one.
 _session = uuid.uuid4().hex[:8]
 _libraries: dict[tuple[str, float | None], "Library"] = {}
 _takes: dict[str, "StoredTake"] = {}
+_sections: dict[str, "tuple[MatchSection, int]"] = {}
 
 
 @dataclass(frozen=True, eq=False)
@@ -64,10 +67,23 @@ def find_take(name: str) -> StoredTake | None:
     return _takes.get(name)
 
 
+def store_section(section: "MatchSection", first: int) -> str:
+    """Store a section of a match that is shown from scene frame `first` on; return its name."""
+    name = f"section-{_session}-{next(_numbers)}"
+    _store_limited(_sections, name, (section, first), MAX_SECTIONS)
+    return name
+
+
+def find_section(name: str) -> "tuple[MatchSection, int] | None":
+    """Return the section of that name with its first frame; None if it is not of this session."""
+    return _sections.get(name)
+
+
 def clear_session() -> None:
     """Clear the store."""
     _libraries.clear()
     _takes.clear()
+    _sections.clear()
 
 
 def _store_limited(store: dict, name, value, limit: int) -> None:

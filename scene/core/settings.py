@@ -18,7 +18,10 @@ from bpy.props import (
 )
 
 from ...beyond_mocap.base.settings import list_settings
+from ..characters.player_character import update_character, update_kit
+from ..characters.settings import is_original
 from ..overlays.settings import BeyondMocapView
+from ..player.contact_edits import BeyondMocapContactEdit
 from ..player.heading_keys import BeyondMocapHeadingKey
 from ..player.pins import BeyondMocapPin
 from ..result.result import BeyondMocapResult, BeyondMocapShared
@@ -49,7 +52,8 @@ def is_track(_settings, candidate: bpy.types.Object) -> bool:
 
 
 def update_dot(player, _context) -> None:
-    """Apply a player's new name or colour to their dot."""
+    """Apply a player's new name or colour to their dot and their character."""
+    update_kit(player)
     if player.dot is not None:
         player.dot.name, player.dot.color = f"{player.name} dot", (*player.shirt, 1.0)
         player.dot.beyond_mocap_dot.player, player.dot.beyond_mocap_dot.shirt = player.name, player.shirt
@@ -75,6 +79,10 @@ class BeyondMocapPlayer(bpy.types.PropertyGroup):
     active_pin: IntProperty(name="Pin", min=0, description="The pin shown below the list")
     heading_keys: CollectionProperty(type=BeyondMocapHeadingKey,
                                      description="Directions and objects that the body faces, with their times")
+    contact_edits: CollectionProperty(type=BeyondMocapContactEdit,
+                                      description="Contacts of the feet that are moved, longer, shorter, left out or "
+                                      "added")
+    active_contact_edit: IntProperty(name="Contact", min=0, description="The edited contact chosen in the list")
     active_heading_key: IntProperty(name="Heading Key", min=0, description="The heading key chosen in the list")
     annotation_file: StringProperty(
         name="Labels", **FILE,
@@ -94,6 +102,13 @@ class BeyondMocapPlayer(bpy.types.PropertyGroup):
         description="This player's own rig for Bake to Rig with all players; empty uses a copy of the chosen "
         "rig",
     )
+    character: PointerProperty(
+        name="Character", type=bpy.types.Object, poll=is_original, update=update_character,
+        description="Armature of this file that is this player's body, with its meshes; empty: the built-in body",
+    )
+    character_body: PointerProperty(type=bpy.types.Object, options={"HIDDEN"},
+                                    description="Copy of the character that plays the player's motion")
+    character_note: StringProperty(options={"HIDDEN"}, description="Messages about the character")
     take: StringProperty(name="Take", options={"HIDDEN"}, description="Name of the newest take in this session")
     quality: StringProperty(name="Quality", options={"HIDDEN"}, description="Lines 'name: value' about the newest take")
     moments: StringProperty(name="Key Moments", options={"HIDDEN"},

@@ -14,6 +14,7 @@ from .measure import units_per_metre
 
 _draw_handlers: list[tuple[type, Callable, object]] = []  # type of space, function, Blender's handle
 _timers: list[bpy.types.Timer] = []
+_status: list[str] = []  # our line in the status bar
 
 
 def add_overlay(space: type, function: Callable[[], None], when: str = "POST_PIXEL") -> None:
@@ -55,10 +56,20 @@ def stop_timer(context: bpy.types.Context, timer: bpy.types.Timer) -> None:
     clear_status()
 
 
+def show_status(text: str) -> None:
+    """Show a line in the status bar of all windows.
+
+    Blender's own text belongs to the workspace of the present window, and is out of reach from another window or
+    workspace; a function that draws the line belongs to none.
+    """
+    _status[:] = [text]
+    _set_status(_draw_status)
+
+
 def clear_status() -> None:
-    """Clear our line from the status bar of every workspace: the user may have changed the workspace meanwhile."""
-    for workspace in bpy.data.workspaces:
-        workspace.status_text_set(None)
+    """Clear our line from the status bar of all windows."""
+    _status.clear()
+    _set_status(None)
 
 
 def clear_windows() -> None:
@@ -68,6 +79,35 @@ def clear_windows() -> None:
     for _, function, _ in list(_draw_handlers):
         remove_overlay(function)
     clear_status()
+    for shown in bpy.context.window_manager.windows:
+        shown.cursor_modal_restore()  # the end of a progress restores only that of the window in front
+
+
+def _set_status(text: Callable | None) -> None:
+    """Set what draws the status bar, and redraw it in each window; None for Blender's own."""
+    for shown in bpy.context.window_manager.windows:
+        with bpy.context.temp_override(window=shown):
+            shown.workspace.status_text_set(text)
+
+
+def _draw_status(header, _context) -> None:
+    """Draw our line, then the reports and figures that Blender's own status bar has."""
+    layout = header.layout
+    layout.label(text="".join(_status))
+    layout.separator_spacer()
+    layout.template_reports_banner()
+    layout.template_running_jobs()
+    layout.separator_spacer()
+    layout.template_status_info()
+
+
+def show_bones() -> None:
+    """Show bones in all 3D views of the open windows."""
+    for window in bpy.context.window_manager.windows:
+        for area in window.screen.areas:
+            for space in area.spaces:
+                if space.type == "VIEW_3D":
+                    space.overlay.show_bones = True
 
 
 def select_only(context: bpy.types.Context, *things: bpy.types.Object) -> None:

@@ -14,6 +14,7 @@ import bpy
 
 from ...beyond_mocap.annotation import ClipAnnotation, Timeline, build_clip_annotations
 from ...beyond_mocap.base.errors import InputError
+from ...beyond_mocap.base.fixes import Fix
 from ..core import action, preferences, window
 from ..core.measure import Clock, frames_per_second
 from ..core.settings import to_absolute_path
@@ -56,9 +57,11 @@ def find_clip_file(settings, path: str, folder: str = "") -> tuple[Path, float |
                               cache.find_cache_folder(library_folder,
                                                       preferences.find_cache_folder(str(library_folder)))[0])
     if not file.is_file():
-        raise InputError(file, "no such file", "a clip of the library", "press Build Library to update the list")
+        raise InputError(file, "no such file", "a clip of the library", "press Build Library to update the list",
+                         fixes=(Fix("press", "beyond_mocap.build_library"),))
     if not conversions.is_current(file):
-        raise InputError(file, "not converted yet", "a converted clip", "press Build Library")
+        raise InputError(file, "not converted yet", "a converted clip", "press Build Library",
+                         fixes=(Fix("press", "beyond_mocap.build_library"),))
     return conversions.find_readable_file(file), None if is_foreign(file) else settings.library_unit or None
 
 
@@ -115,7 +118,8 @@ def read_labels_at(rig: bpy.types.Object, fps: float, count: int) -> tuple[ClipA
     timeline = lanes.read_timeline(rig, f"strips of {rig.name}")
     rows = limit_rows(build_clip_annotations(timeline, fps), count) if timeline is not None else ()
     if not rows:
-        raise InputError(rig.name, "no labels in the strips", "at least one strip or marker", "press Propose Labels")
+        raise InputError(rig.name, "no labels in the strips", "at least one strip or marker", "press Propose Labels",
+                         fixes=(Fix("press", "beyond_mocap.propose_words"),))
     return rows
 
 

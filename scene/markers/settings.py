@@ -53,6 +53,27 @@ def search_landmarks(_label, _context, typed: str) -> list[str]:
     return [name for name in sorted(LANDMARKS) if typed.lower() in name]
 
 
+def show_name(identifier: str) -> str:
+    """Show an identifier in plain words: "left_temple" as "Left Temple"."""
+    plain = identifier.replace("_", " ")
+    return plain.title() if plain.islower() else plain
+
+
+def search_landmark_words(label, context, typed: str) -> list[str]:
+    """List the anatomical points in plain words."""
+    return [show_name(name) for name in search_landmarks(label, context, typed.replace(" ", "_"))]
+
+
+def get_landmark_words(label) -> str:
+    """Return a marker's landmarks in plain words."""
+    return ", ".join(show_name(name.strip()) for name in label.landmark.split(",") if name.strip())
+
+
+def set_landmark_words(label, words: str) -> None:
+    """Set a marker's landmarks from plain words."""
+    label.landmark = ", ".join("_".join(name.split()).lower() for name in words.split(",") if name.strip())
+
+
 class BeyondMocapMarker(bpy.types.PropertyGroup):
     """One marker of a cloud: its label, and what it lies on."""
 
@@ -61,6 +82,10 @@ class BeyondMocapMarker(bpy.types.PropertyGroup):
                             description="Body segment that the marker lies on")
     landmark: StringProperty(
         name="Landmark", search=search_landmarks,
+        description="Anatomical point that the marker lies on, used to place joints; separate several by commas",
+    )
+    landmark_words: StringProperty(
+        name="Landmark", search=search_landmark_words, get=get_landmark_words, set=set_landmark_words,
         description="Anatomical point that the marker lies on, used to place joints; separate several by commas",
     )
     role: EnumProperty(name="Role", items=ROLES, default="NEEDED", update=update_lines,

@@ -18,6 +18,7 @@ import numpy as np
 from mathutils import Matrix
 
 from ...beyond_mocap.base.errors import InputError
+from ...beyond_mocap.base.fixes import Fix
 from ...beyond_mocap.motion import quaternion
 from ..core import action, channels, frame_range, sample
 from ..core.measure import frames_per_second, units_per_metre
@@ -117,7 +118,8 @@ def find_clip_path(scene: bpy.types.Scene, name: str) -> Path:
 
     folder = scene.beyond_mocap.library_folder
     if not folder:
-        raise InputError("library", "no folder", "a library folder", "choose one in step 1")
+        raise InputError("library", "no folder", "a library folder", "choose one in step 1",
+                         fixes=(Fix("choose_library"),))
     sample.check_not_sample(to_absolute_path(folder))
     return find_free_file(Path(to_absolute_path(folder)), bpy.path.clean_name(name))
 
@@ -223,7 +225,8 @@ def build_release_request(
     properties, scene_settings = cloud.beyond_mocap_cloud, scene.beyond_mocap_markers
     reconstruction = find_reconstruction(properties.made)
     if reconstruction is None:
-        raise InputError(cloud.name, "not reconstructed in this session", "a body", "press Reconstruct first")
+        raise InputError(cloud.name, "not reconstructed in this session", "a body", "press Reconstruct first",
+                         fixes=(Fix("press", "beyond_mocap.reconstruct_markers"),))
     ball_labels = [row.name for row in properties.labels if row.role == "BALL"
                    and row.name in reconstruction.raw.labels]
     hand = None if scene_settings.hand == "AUTO" else scene_settings.hand

@@ -1,5 +1,5 @@
-"""Create the characters of a match: one armature, one mesh per kit and one per number, shared by all with the same
-bones.
+"""Create the characters of a match: one armature, one light body per kit and look, one number and name per player,
+shared by all with the same bones. Skin and hair have their colours on each player's own object.
 
 Numbers use Blender's own digits, subdivided finely enough to follow the shirt, large on the back and small in front.
 """
@@ -16,15 +16,18 @@ from ...beyond_mocap.motion.motion import Motion
 from ...beyond_mocap.motion.skeleton import Skeleton
 from ..core.measure import units_per_metre
 from ..rigs import armature
+from ..stage import body as stage_body
 from . import match_objects as ours
-from .kits import Kit, choose_kit, create_kit_material
+from .kits import KIT_PARTS, Kit, choose_kit, create_kit_material
 from .load import Character
 
 if TYPE_CHECKING:
-    from ...beyond_mocap.appearance.body import BodyMesh
+    from ...beyond_mocap.appearance.look import Look
+    from ...beyond_mocap.appearance.mesh import BodyMesh
 
 DIGIT_HEIGHTS = {"back": 0.235, "chest": 0.095}  # m, height of digits
 MAX_WIDTHS = {"back": 0.26, "chest": 0.13}  # m, largest width of a number
+NAME_HEIGHT, NAME_ABOVE = 0.048, 0.165  # m, height of the name, and how far above the middle of the number
 CUT_DISTANCE = 0.018  # m between cuts of the digits
 
 
@@ -56,17 +59,19 @@ class CharacterBuilder:
         Returns:
             The armature, then its meshes.
         """
+        from ...beyond_mocap.appearance.look import choose_look  # the core loads when it is first used
+
         example = person.motions[0][1]
         fit_key = _build_fit_key(example.skeleton)
         armature_object = ours.mark_object(self._create_armature(example, build_label(person), collection, fit_key))
         armature_object[ours.PLAYER_PROPERTY] = person.id
-        kit = choose_kit(person, self.colours)
-        mesh_objects = [self._add_mesh_object(armature_object, "body", self._create_body(example, fit_key, kit),
+        kit, look = choose_kit(person, self.colours), choose_look(person.id, gloves=person.keeper)
+        mesh_objects = [self._add_mesh_object(armature_object, "body", self._create_body(example, kit, look),
                                               collection)]
+        _colour_skin(mesh_objects[0], look)
         if person.number >= 0:
             mesh_objects.append(self._add_mesh_object(armature_object, "number",
-                                                      self._create_number(example, fit_key, kit, person.number),
-                                                      collection))
+                                                      self._create_number(example, kit, (person, look)), collection))
         return [armature_object, *mesh_objects]
 
     def _create_armature(self, example: Motion, name: str, collection, fits: tuple) -> bpy.types.Object:
@@ -83,76 +88,72 @@ class CharacterBuilder:
                          collection) -> bpy.types.Object:
         mesh_object = bpy.data.objects.new(f"{armature_object.name} {part}", mesh)
         collection.objects.link(mesh_object)
-        mesh_object.parent = armature_object
-        mesh_object.modifiers.new("Armature", "ARMATURE").object = armature_object
-        if not mesh_object.vertex_groups:
-            self._assign_weights(mesh_object, mesh, armature_object)
+        stage_body.attach(mesh_object, armature_object)
+        if not mesh_object.vertex_groups:  # the mesh keeps them for all its users
+            stage_body.write_weights(mesh_object, *self.shapes[mesh])
         return ours.mark_object(mesh_object)
 
-    def _build_body_shape(self, example: Motion, fits: tuple):
-        """Build the low-poly body for these bones."""
+    def _build_body_shape(self, example: Motion, look: Look) -> BodyMesh:
+        """Build the light body for these bones."""
         from ...beyond_mocap.appearance.body import build_body  # imports scipy, which is slow
 
-        if fits not in self.shapes:
-            self.shapes[fits] = build_body(example.skeleton, example=example)
-        return self.shapes[fits]
+        key = (_build_fit_key(example.skeleton), look.build, look.hair, look.gloves)
+        if key not in self.shapes:
+            self.shapes[key] = build_body(example.skeleton, example=example, look=look, light=True)
+        return self.shapes[key]
 
-    def _create_body(self, example: Motion, fits: tuple, kit: Kit) -> bpy.types.Mesh:
-        """Create the body mesh of a kit, or return the existing one."""
-        from ...beyond_mocap.appearance.body import MATERIALS
-
-        key = (fits, kit.name)
+    def _create_body(self, example: Motion, kit: Kit, look: Look) -> bpy.types.Mesh:
+        """Create the body mesh of a kit and look, or return the existing one."""
+        fits = _build_fit_key(example.skeleton)
+        key = (fits, kit.name, look.build, look.hair, look.gloves)
         if key not in self.meshes:
-            body = self._build_body_shape(example, fits)
-            mesh = self._create_mesh(f"Match {kit.name}", fits, body.vertices, body.faces)
-            mesh.polygons.foreach_set("material_index", np.asarray(body.material, np.int32))
-            mesh.polygons.foreach_set("use_smooth", np.ones(len(body.faces), bool))
-            for part in MATERIALS:
-                mesh.materials.append(self._find_material(kit, part))
+            body = self._build_body_shape(example, look)
+            mesh = stage_body.create_body_mesh(f"Match {kit.name}", body, self._place_vertices(fits, body.vertices),
+                                               lambda part: self._find_material(kit, part, look))
             self.shapes[mesh] = example.skeleton.names, body.joints, body.weights
             self.meshes[key] = mesh
         return self.meshes[key]
 
-    def _create_number(self, example: Motion, fits: tuple, kit: Kit, number: int) -> bpy.types.Mesh:
-        """Create the mesh of a shirt number in a kit's colours, or return the existing one."""
-        key = (fits, number, kit.name)
+    def _create_number(self, example: Motion, kit: Kit, player: tuple[Character, Look]) -> bpy.types.Mesh:
+        """Create the mesh of a shirt's number and name in a kit's colours, or return the existing one."""
+        person, look = player
+        fits, name = _build_fit_key(example.skeleton), build_shirt_name(person)
+        key = (fits, person.number, name, kit.name, look.build)
         if key not in self.meshes:
-            number_key = (fits, number)
-            if number_key not in self.shapes:
-                self.shapes[number_key] = build_number_shapes(number, self._build_body_shape(example, fits),
-                                                              example.skeleton, example)
-            vertices, faces, joints, weights = self.shapes[number_key]
-            mesh = self._create_mesh(f"Match {kit.name} {number}", fits, vertices, faces)
-            mesh.materials.append(self._find_material(kit, "number"))
+            body = self._build_body_shape(example, look)
+            shape_key = (fits, person.number, name, look.build)
+            if shape_key not in self.shapes:
+                self.shapes[shape_key] = build_number_shapes((person.number, name), body, example.skeleton, example)
+            vertices, faces, joints, weights = self.shapes[shape_key]
+            mesh = bpy.data.meshes.new(f"Match {kit.name} {person.number}")
+            mesh.from_pydata(self._place_vertices(fits, vertices).tolist(), [], faces)
+            mesh.materials.append(self._find_material(kit, "number", look))
             self.shapes[mesh] = example.skeleton.names, joints, weights
             self.meshes[key] = mesh
         return self.meshes[key]
 
-    def _find_material(self, kit: Kit, part: str) -> bpy.types.Material:
-        """Find or create the material that all of a kit share."""
+    def _find_material(self, kit: Kit, part: str, look: Look) -> bpy.types.Material:
+        """Find or create the material that all of a kit share, or all with a look."""
+        if part not in KIT_PARTS:
+            return stage_body.get_part_material(part, look)
         key = (kit.name, part)
         if key not in self.materials:
             self.materials[key] = create_kit_material(kit, part)
         return self.materials[key]
 
-    def _create_mesh(self, name: str, fits: tuple, vertices: np.ndarray, faces) -> bpy.types.Mesh:
-        """Create a mesh in the armature's own space from vertices (V, 3) m around the resting root."""
+    def _place_vertices(self, fits: tuple, vertices: np.ndarray) -> np.ndarray:
+        """Place vertices (V, 3) m around the resting root in the armature's own space."""
         root = np.array(self.bones[fits].bones[0].head_local)
-        mesh = bpy.data.meshes.new(name)
-        mesh.from_pydata((vertices * units_per_metre(self.context.scene) + root).tolist(), [], faces)
-        return mesh
+        return vertices * units_per_metre(self.context.scene) + root
 
-    def _assign_weights(self, thing: bpy.types.Object, mesh: bpy.types.Mesh, who: bpy.types.Object) -> None:
-        """Assign a vertex group per bone, in runs of equal weight; the mesh keeps them for all its users."""
-        names, joints, weights = self.shapes[mesh]
-        for joint, name in enumerate(names):
-            share = np.sum(np.where(joints == joint, weights, 0.0), axis=1)
-            if not np.any(share > 1e-6):
-                continue
-            group = thing.vertex_groups.new(name=name)
-            for weight in np.unique(share[share > 1e-6].round(4)):
-                near = np.abs(share - weight) < 5.1e-5
-                group.add(np.flatnonzero(near).tolist(), float(weight), "REPLACE")
+
+def _colour_skin(body: bpy.types.Object, look: Look) -> None:
+    """Give a body's object its own skin and hair; its mesh may be another's as well."""
+    from ...beyond_mocap.appearance.mesh import HAIR, MATERIALS, SKIN
+
+    for index in (SKIN, HAIR):
+        body.material_slots[index].link = "OBJECT"
+        body.material_slots[index].material = stage_body.get_part_material(MATERIALS[index], look)
 
 
 def build_label(person: Character) -> str:
@@ -162,25 +163,36 @@ def build_label(person: Character) -> str:
     return " ".join(part for part in (f"{person.team.capitalize()}{number}", known) if part)
 
 
-def build_number_shapes(number: int, body: "BodyMesh", skeleton: Skeleton,
+def build_shirt_name(person: Character) -> str:
+    """Build the name on a shirt: the last word of the player's name in capitals, "" where none is known."""
+    known = person.name if person.name and person.name != person.id else ""
+    return known.split()[-1].upper() if known.split() else ""
+
+
+def build_number_shapes(texts: tuple[int, str], body: BodyMesh, skeleton: Skeleton,
                         example: Motion) -> tuple[np.ndarray, list[tuple[int, ...]], np.ndarray, np.ndarray]:
-    """Build the shapes of a shirt number on back and chest.
+    """Build the shapes of a shirt number on back and chest, and of the name above the one on the back.
 
     Args:
-        number: of the shirt.
-        body: the body it lies on.
+        texts: number of the shirt, and the name, "" for none.
+        body: the body they lie on.
         skeleton: of the body.
         example: a motion of the player.
     Returns:
-        Vertices (V, 3) m in the rest pose, faces, joints (V, 6) and weights (V, 6).
+        Vertices (V, 3) m in the rest pose, faces, joints (V, K) and weights (V, K).
     """
     from ...beyond_mocap.appearance.shirt_number import place_on_shirt  # imports scipy, which is slow
 
     scale = float(np.ptp(body.vertices, axis=0).max()) / 1.8
+    number, name = texts
+    drawings = [("back", str(number), (0.0, DIGIT_HEIGHTS["back"], MAX_WIDTHS["back"])),
+                ("chest", str(number), (0.0, DIGIT_HEIGHTS["chest"], MAX_WIDTHS["chest"]))]
+    if name:
+        drawings.append(("back", name, (NAME_ABOVE, NAME_HEIGHT, MAX_WIDTHS["back"])))
     vertices, faces, joints, weights = [], [], [], []
-    for side in DIGIT_HEIGHTS:
-        points, polygons = _build_digits(str(number), DIGIT_HEIGHTS[side] * scale, MAX_WIDTHS[side] * scale)
-        placed = place_on_shirt(body, skeleton, points, side, example)
+    for side, text, (above, height, width) in drawings:
+        points, polygons = _build_digits(text, height * scale, width * scale)
+        placed = place_on_shirt(body, skeleton, points + [0.0, above * scale], side, example)
         first = sum(len(rows) for rows in vertices)
         vertices.append(placed.vertices)
         joints.append(placed.joints)
@@ -201,7 +213,10 @@ def _build_digits(text: str, height: float, max_width: float) -> tuple[np.ndarra
     shape.from_mesh(mesh)
     bpy.data.meshes.remove(mesh)
     bmesh.ops.remove_doubles(shape, verts=shape.verts, dist=1e-5)
-    points = np.array([vertex.co[:2] for vertex in shape.verts])
+    points = np.array([vertex.co[:2] for vertex in shape.verts]).reshape(-1, 2)
+    if not len(points):  # letters that Blender's font does not have
+        shape.free()
+        return points, []
     low, high = points.min(axis=0), points.max(axis=0)
     middle, scale = (low + high) / 2.0, height / (high[1] - low[1])
     scale = np.array([min(scale, max_width / (high[0] - low[0])), scale])

@@ -47,9 +47,28 @@ def run_command(arguments: list[str], progress: Callable[[float, str], None],
         if cancelled():
             raise UserCancelledError("cancelled")
         time.sleep(POLL_SECONDS)
-    process = subprocess.Popen([sys.executable, "-m", "beyond_mocap", *arguments, "--json"], stdin=subprocess.DEVNULL,
-                               stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True, encoding="utf-8",
-                               errors="replace", env=_build_environment(), **_build_group_options())
+    command = [sys.executable, "-m", "beyond_mocap", *arguments, "--json"]
+    return run_process(command, progress, cancelled, subject="the match process", environment=_build_environment())
+
+
+def run_process(command: list[str], progress: Callable[[float, str], None], cancelled: Callable[[], bool], *,
+                subject: str, environment: dict[str, str] | None = None) -> list[str]:
+    """Run a process that writes its progress as JSON lines to stderr, in any thread.
+
+    Args:
+        command: program and arguments.
+        progress: receives the share done and a text.
+        cancelled: called now and then; True cancels the work.
+        subject: what it is, for messages.
+        environment: its environment variables; None for those of this process.
+    Returns:
+        Its notes.
+    Raises:
+        UserCancelledError: if `cancelled` returned True and the process has ended.
+        BeyondMocapError: with its message, if it ended otherwise.
+    """
+    process = subprocess.Popen(command, stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE,
+                               text=True, encoding="utf-8", errors="replace", env=environment, **_build_group_options())
     _running.add(process)
     try:
         notes, last, is_stopped = _follow_process(process, progress, cancelled)
@@ -60,7 +79,7 @@ def run_command(arguments: list[str], progress: Callable[[float, str], None],
         return notes
     if is_stopped or process.returncode == UserCancelledError.exit_status:
         raise UserCancelledError("cancelled; finished work is kept, and the next run resumes there")
-    ended = f"the match process ended with status {process.returncode}"
+    ended = f"{subject} ended with status {process.returncode}"
     error = BeyondMocapError(last.removeprefix(ERROR_PREFIX) or ended)
     error.exit_status = process.returncode if process.returncode > 0 else error.exit_status
     raise error

@@ -8,8 +8,9 @@ from dataclasses import dataclass
 import bpy
 import numpy as np
 
-from ..core.material import create_material, get_material
-from ..stage.body import COLOURS
+from ..characters.kit_materials import WORN, dress
+from ..core.material import create_material
+from ..stage.body import CLOTH
 from . import match_objects as ours
 from .load import TEAMS, Character
 
@@ -20,7 +21,7 @@ KEEPER_COLOURS = ("#F2C200", "#1FA34A", "#F07A13", "#8A3FB5")
 """Possible shirts of keepers: yellow, green, orange, violet."""
 
 WHITE, DARK = (0.8, 0.8, 0.8), (0.012, 0.016, 0.03)
-KIT_PARTS = ("shirt", "shorts", "socks", "number")
+KIT_PARTS = ("shirt", "shorts", "socks", "trim", "number")
 """Parts that have the kit's colours."""
 
 BRIGHT_LUMINANCE = 0.35  # luminance from which a shirt gets a dark number and dark shorts
@@ -35,7 +36,7 @@ class Kit:
         shirt: colour.
         shorts: colour.
         socks: colour.
-        ink: colour of the number.
+        ink: colour of number, name, collar and edges.
     """
 
     name: str
@@ -110,14 +111,21 @@ def update_materials(scene: bpy.types.Scene, colours: dict[str, str]) -> None:
             for part, rgb in _build_part_colours(kit).items():
                 for material in used & set(_find_materials(kit, part)):
                     _set_colour(material, rgb)
+            for body in ours.find_armatures(scene):
+                if body.get(WORN, {}).get("kit") == kit.name:
+                    dress_in_kit(body, kit)
+
+
+def dress_in_kit(body: bpy.types.Object, kit: Kit) -> None:
+    """Dress a copy of a character of the file in a kit."""
+    dress(body, kit.name, {"shirt": kit.shirt, "shorts": kit.shorts, "socks": kit.socks})
 
 
 def create_kit_material(kit: Kit, part: str) -> bpy.types.Material:
-    """Create or reuse a material for a part of a kit ("shirt", "number", or one of the body's), in the kit's present
-    colour.
+    """Create or reuse a material for one of KIT_PARTS, in the kit's present colour.
 
-    A material used by another match or object is not reused: after the previous one is in use, each call for one of the
-    kit's own parts gives another material. Skin, hair and boots are shared by all.
+    A material used by another match or object is not reused: after the previous one is in use, each call gives another
+    material.
 
     Args:
         kit: the kit.
@@ -126,16 +134,14 @@ def create_kit_material(kit: Kit, part: str) -> bpy.types.Material:
         The material.
     """
     colours = _build_part_colours(kit)
-    if part not in colours:
-        return get_material(part.capitalize(), COLOURS[part])
     unused = (one for one in _find_materials(kit, part) if one.users == one.use_fake_user)
-    material = next(unused, None) or create_material(_build_material_name(kit, part), colours[part])
+    material = next(unused, None) or create_material(_build_material_name(kit, part), colours[part], CLOTH)
     _set_colour(material, colours[part])
     return material
 
 
 def _build_part_colours(kit: Kit) -> dict[str, tuple[float, float, float]]:
-    return dict(zip(KIT_PARTS, (kit.shirt, kit.shorts, kit.socks, kit.ink)))
+    return dict(zip(KIT_PARTS, (kit.shirt, kit.shorts, kit.socks, kit.ink, kit.ink)))
 
 
 def _build_material_name(kit: Kit, part: str) -> str:

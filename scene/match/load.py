@@ -10,11 +10,13 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ...beyond_mocap.base.errors import InputError, UserCancelledError, format_seconds
+from ...beyond_mocap.base.fixes import Fix
 from ...beyond_mocap.motion.motion import Motion
 from ...beyond_mocap.motion.track.ball_path import BallPath
 
 if TYPE_CHECKING:
     from ...beyond_mocap.library.library import Library
+    from ...beyond_mocap.synthesis.take import Take
 
 LIBRARY_SHARE = 0.1  # share of the progress bar
 TEAMS = ("home", "away", "referee")
@@ -31,6 +33,7 @@ class Character:
         team: one of TEAMS.
         keeper: True for a goalkeeper.
         motions: (s on the match's clock, motion) for every stretch on the pitch, in order.
+        takes: the takes of these stretches, with foot contacts and ball; none where they are not known.
     """
 
     id: str
@@ -39,6 +42,7 @@ class Character:
     team: str
     keeper: bool
     motions: tuple[tuple[float, Motion], ...]
+    takes: tuple["Take", ...] = ()
 
 
 @dataclass(frozen=True, eq=False)
@@ -146,7 +150,8 @@ def _resolve_span(request: DisplayRequest, state: dict) -> tuple[float, float]:
     if end - start < 0.2:
         found = f"{format_seconds(request.start)} to {format_seconds(request.end)} s"
         expected = f"a time within {format_seconds(first)} to {format_seconds(last)} s"
-        raise InputError(request.folder, found, expected, "press Make Match for another time")
+        raise InputError(request.folder, found, expected, "press Make Match for another time",
+                         fixes=(Fix("press", "beyond_mocap.make_match"),))
     return start, end
 
 
@@ -174,18 +179,19 @@ def _construct_characters(request, state, library, ball, span, progress, cancell
             lines.append(f"{player['id']} cannot be shown: {error}")
             continue
         if takes:
-            characters.append(_build_character(player, tuple((take.start_time, take.motion) for take in takes)))
+            characters.append(_build_character(player, takes))
     if last_error is not None and not characters:
         raise last_error
     return characters, lines
 
 
-def _build_character(player: dict, motions: tuple) -> Character:
+def _build_character(player: dict, takes: tuple["Take", ...]) -> Character:
     number = int(player.get("number", -1))
     team = player.get("team") if player.get("team") in TEAMS else "home"
     position = str(player.get("position") or "")
     keeper = "keeper" in position.lower() or (not position and number == 1)
-    return Character(player["id"], str(player.get("name") or ""), number, team=team, keeper=keeper, motions=motions)
+    return Character(player["id"], str(player.get("name") or ""), number, team=team, keeper=keeper,
+                     motions=tuple((take.start_time, take.motion) for take in takes), takes=tuple(takes))
 
 
 def _cut_ball(ball: "BallPath | None", start: float, end: float) -> "BallPath | None":

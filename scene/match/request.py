@@ -12,6 +12,7 @@ import bpy
 
 from ...beyond_mocap.base.digest import hex_digest
 from ...beyond_mocap.base.errors import InputError
+from ...beyond_mocap.base.fixes import Fix
 from ..core import preferences, sample
 from ..core.settings import to_absolute_path, to_setting_path
 from ..player import tracks
@@ -71,7 +72,8 @@ def choose_display_folder(scene: bpy.types.Scene) -> str:
     match = scene.beyond_mocap_match
     found = match.folder or match.made
     if not found:
-        raise InputError("match", "no folder", "the folder of a match", "press Make Match, or choose one")
+        raise InputError("match", "no folder", "the folder of a match", "press Make Match, or choose one",
+                         fixes=(Fix("press", "beyond_mocap.make_match"),))
     return to_absolute_path(found)
 
 
@@ -175,16 +177,18 @@ def _build_arguments(scene: bpy.types.Scene) -> list[str]:
 def _build_player_arguments(match: BeyondMocapMatch) -> list[str]:
     selected = [player.feed_id for player in match.players if player.use]
     if match.players and not selected:
-        raise InputError("match", "no players selected", "at least one", "select players in the list")
+        raise InputError("match", "no players selected", "at least one", "select players in the list",
+                         fixes=(Fix("use_all_players"),))
     if len(selected) == len(match.players):
         return []
     if to_absolute_path(match.read_of) != to_absolute_path(match.tracking_file):
         raise InputError("match", f"the list belongs to {Path(match.read_of).name}", "that of the tracking file",
-                         "press Read Match, then select players")
+                         "press Read Match, then select players", fixes=(Fix("press", "beyond_mocap.read_match"),))
     return ["--players", *selected]
 
 
 def _find_library_folder(settings) -> str:
     if not settings.library_folder:
-        raise InputError("library", "no folder chosen", "a folder of clips", "choose one in step 1")
+        raise InputError("library", "no folder chosen", "a folder of clips", "choose one in step 1",
+                         fixes=(Fix("choose_library"),))
     return to_absolute_path(settings.library_folder)

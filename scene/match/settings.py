@@ -6,10 +6,19 @@ from __future__ import annotations
 
 import bpy
 import numpy as np
-from bpy.props import CollectionProperty, EnumProperty, FloatProperty, FloatVectorProperty, IntProperty, StringProperty
+from bpy.props import (
+    CollectionProperty,
+    EnumProperty,
+    FloatProperty,
+    FloatVectorProperty,
+    IntProperty,
+    PointerProperty,
+    StringProperty,
+)
 
 from ...beyond_mocap.files.event_providers import EVENT_PROVIDERS
 from ...beyond_mocap.files.tracking.providers import PROVIDERS
+from ..characters.settings import is_original
 from ..core.properties import with_settings
 from .kits import DEFAULT_COLOURS, to_hex, to_linear, update_materials
 
@@ -20,6 +29,7 @@ PROVIDER_ITEMS = [DETECT_ITEM, *((one.name, one.title, one.files.replace("`", ""
 EVENT_PROVIDER_ITEMS = [DETECT_ITEM, *((one.name, one.title, one.files.replace("`", ""))
                                        for one in EVENT_PROVIDERS.values())]
 COLOUR = {"subtype": "COLOR", "size": 3, "min": 0.0, "max": 1.0}
+CHARACTER_GROUPS = ("home", "away", "referee", "keeper")
 TEAM_ITEMS = (("home", "Home", "The home team"), ("away", "Away", "The away team"), ("referee", "Referee", "Referees"))
 FIRST_SECONDS = 60.0
 """s that are selected after a match has been read."""
@@ -29,6 +39,17 @@ def update_colours(match, _context) -> None:
     """Update the displayed kits when a colour changes."""
     if match.shown:
         update_materials(match.id_data, collect_colours(match))
+
+
+def update_bodies(match, context) -> None:
+    """Show the displayed match again with other bodies."""
+    from . import show
+
+    if match.shown and not show.show_again(context):
+        match.character_note = "Press Show Match to change the bodies of a match from before the file was opened"
+
+
+CHARACTER = {"type": bpy.types.Object, "poll": is_original, "update": update_bodies}
 
 
 class BeyondMocapMatchPlayer(bpy.types.PropertyGroup):
@@ -71,6 +92,15 @@ class BeyondMocapMatch(bpy.types.PropertyGroup):
                                      update=update_colours, description="Colour of the away team's shirts", **COLOUR)
     referee_colour: FloatVectorProperty(name="Referees", default=to_linear(DEFAULT_COLOURS["referee"]),
                                         update=update_colours, description="Colour of the referees' shirts", **COLOUR)
+    home_character: PointerProperty(name="Home Body", **CHARACTER,
+                                    description="Armature of this file as the home team's body; empty: built-in")
+    away_character: PointerProperty(name="Away Body", **CHARACTER,
+                                    description="Armature of this file as the away team's body; empty: built-in")
+    referee_character: PointerProperty(name="Referees' Body", **CHARACTER,
+                                       description="Armature of this file as the referees' body; empty: built-in")
+    keeper_character: PointerProperty(name="Keepers' Body", **CHARACTER,
+                                      description="Armature of this file as the keepers' body; empty: their team's")
+    character_note: StringProperty(options={"HIDDEN"}, description="Messages about the teams' bodies")
     players: CollectionProperty(type=BeyondMocapMatchPlayer, description="Players of the match")
     active: IntProperty(name="Player", min=0, description="Active player in the list")
     read_of: StringProperty(options={"HIDDEN"}, description="Tracking file the list was read from")
@@ -82,6 +112,11 @@ class BeyondMocapMatch(bpy.types.PropertyGroup):
     shown_first: IntProperty(options={"HIDDEN"}, description="First displayed frame")
     shown_rate: FloatProperty(options={"HIDDEN"}, description="Frame rate of the keys; 0: the scene's")
     shown: StringProperty(options={"HIDDEN"}, description="Displayed folder; empty if there is none")
+    shown_section: StringProperty(options={"HIDDEN"}, description="Name of what is displayed in this session")
+
+    def list_characters(self) -> dict[str, bpy.types.Object | None]:
+        """List the teams' own characters by group."""
+        return {group: getattr(self, f"{group}_character") for group in CHARACTER_GROUPS}
 
 
 def format_float(value: float) -> str:

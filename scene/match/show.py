@@ -12,11 +12,14 @@ import bpy
 import numpy as np
 
 from ...beyond_mocap.motion.track.ball_path import BallPath
-from ..core import action, channels, frame_range
+from ..characters import copies
+from ..characters.team_characters import TeamCharacters
+from ..core import action, channels, frame_range, session
 from ..core.measure import frames_per_second, units_per_metre
 from ..stage import ball, cameras, stage
 from . import match_objects as ours
-from .characters import CharacterBuilder
+from .characters import CharacterBuilder, build_label
+from .kits import choose_kit, dress_in_kit
 from .load import Character, MatchSection
 
 VISIBILITY_GROUP = "Shown"  # group of curves
@@ -33,16 +36,21 @@ def show_match(context: bpy.types.Context, section: MatchSection, first: int) ->
         Seconds that pitch, bodies, keys and cameras took.
     """
     scene, durations = context.scene, {}
+    scene.beyond_mocap_match.shown_section = session.store_section(section, first)
     ours.clear_match(scene)
     ours.include_collections(context.view_layer)
     last = int(np.floor(compute_frame(scene, section.start, first, section.end) + 1e-4))
     with _measure_seconds(durations, "pitch"):
         stage.create_stage(scene, (section.length, section.width))
     with _measure_seconds(durations, "bodies"):
-        characters = _create_characters(context, section)
+        own = TeamCharacters(context, scene.beyond_mocap_match.list_characters())
+        characters = _create_characters(context, section, own)
     with _measure_seconds(durations, "keys"):
         for person, worn in characters:
-            bake_character(scene, person, worn, start=section.start, first=first, last=last)
+            keys = own.build_keys if copies.find_original(worn[0]) is not None else None
+            bake_character(scene, person, worn, start=section.start, first=first, last=last, build_keys=keys)
+        own.update_originals()
+        scene.beyond_mocap_match.character_note = "\n".join(own.messages)
         if section.ball is not None:
             bake_ball(context, section.ball, section.start, first)
     with _measure_seconds(durations, "cameras"):
@@ -51,6 +59,15 @@ def show_match(context: bpy.types.Context, section: MatchSection, first: int) ->
         scene.camera = camera
     frame_range.extend_range(scene, last)
     return durations
+
+
+def show_again(context: bpy.types.Context) -> bool:
+    """Show what this session showed last in the scene, with other bodies; False where there is nothing."""
+    known = session.find_section(context.scene.beyond_mocap_match.shown_section)
+    if known is None or ours.find_root(context.scene) is None:
+        return False
+    show_match(context, *known)
+    return True
 
 
 def find_ball(scene: bpy.types.Scene) -> bpy.types.Object | None:
@@ -64,7 +81,7 @@ def compute_frame(scene: bpy.types.Scene, start: float, first: int, seconds: flo
 
 
 def bake_character(scene: bpy.types.Scene, character: Character, objects: list[bpy.types.Object], start: float,
-                   first: int, last: int) -> None:
+                   first: int, last: int, build_keys=None) -> None:
     """Bake a character's motion to its armature, and hide its objects outside its stretches.
 
     Args:
@@ -74,10 +91,15 @@ def bake_character(scene: bpy.types.Scene, character: Character, objects: list[b
         start: s on the match's clock.
         first: scene frame of that time.
         last: last displayed frame.
+        build_keys: function (armature, motion, frame, take) -> frames and curves, for an own character; None for the
+            built-in body.
     """
     body = objects[0]
-    parts = [action.build_keys(body, motion, scene, compute_frame(scene, start, first, begins)) for begins,
-             motion in character.motions]
+    takes = character.takes or (None,) * len(character.motions)
+    places = [(motion, compute_frame(scene, start, first, begins), take)
+              for (begins, motion), take in zip(character.motions, takes)]
+    parts = [build_keys(body, *place) if build_keys is not None else action.build_keys(body, place[0], scene, place[1])
+             for place in places]
     frames = np.concatenate([frames for frames, _ in parts])
     is_new = np.concatenate([[True], np.diff(frames) > 0])  # consecutive stretches may share a frame
     curves = {path: (group, np.concatenate([curves[path][1] for _, curves in parts])[is_new]) for path,
@@ -128,11 +150,18 @@ def _measure_seconds(durations: dict[str, float], name: str):
     durations[name] = perf_counter() - began
 
 
-def _create_characters(context: bpy.types.Context, section: MatchSection):
-    """Create all characters with their objects."""
-    wardrobe = CharacterBuilder(context, section.colours)
-    return [(person, wardrobe.create_character(person, ours.create_collection(context.scene, person.team)))
-            for person in section.characters]
+def _create_characters(context: bpy.types.Context, section: MatchSection, own: TeamCharacters):
+    """Create all characters with their objects: copies of the team's own character, or built-in bodies."""
+    wardrobe, found = CharacterBuilder(context, section.colours), []
+    for person in section.characters:
+        home = ours.create_collection(context.scene, person.team)
+        worn = own.create_body(person.team, person.keeper, build_label(person), home)
+        if worn is not None:
+            dress_in_kit(worn[0], choose_kit(person, section.colours))
+            worn[0][ours.PLAYER_PROPERTY] = person.id
+        found.append((person, [ours.mark_object(one) for one in worn] if worn is not None
+                      else wardrobe.create_character(person, home)))
+    return found
 
 
 def _create_trajectory_curve(scene: bpy.types.Scene, path: BallPath) -> bpy.types.Object:

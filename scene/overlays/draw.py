@@ -18,8 +18,9 @@ from mathutils import Matrix, Vector
 from ..core import window
 from ..core.live import Watcher
 from ..core.settings import find_active_player
-from . import ball_paths, colours, momentum, path_overlays, shapes, store
+from . import ball_paths, colours, contact_handles, momentum, path_overlays, shapes, store
 from .prepare import Mesh, PreparedTake
+from .text_places import Box, find_free_box
 
 BIAS = 1e-5
 DISC, LIFT = 0.12, 0.034  # metres: radius of a contact's disc, its height above the ground
@@ -32,6 +33,7 @@ GROUND = (0.03, 0.03, 0.03, 0.72)  # background of texts
 _batches: dict[tuple, list] = {}
 _owners: dict[str, PreparedTake] = {}
 _square: list = []
+_taken: list[Box] = []  # places of the texts that this draw has drawn so far
 
 
 class DrawnTake(NamedTuple):
@@ -59,13 +61,23 @@ def clear_batches() -> None:
     _square.clear()
 
 
+def measure_lines(lines, scale: float) -> tuple[float, float]:
+    """Measure the background of lines of text: width and height in pixels."""
+    blf.size(FONT, SIZE * scale)
+    blf.enable(FONT, blf.WORD_WRAP)  # also breaks at line ends, so that one call measures and draws all lines
+    blf.word_wrap(FONT, 10000)
+    width, height = blf.dimensions(FONT, "\n".join(lines))
+    blf.disable(FONT, blf.WORD_WRAP)
+    return width + 2 * MARGIN * scale, height + 2.4 * MARGIN * scale
+
+
 def draw_lines(x: float, y: float, lines, scale: float, strength: float = 1.0) -> None:
     """Draw lines of text, the first on top, on a dark background whose lower left corner is at pixel x, y."""
     size, margin, text = SIZE * scale, MARGIN * scale, "\n".join(lines)
-    blf.size(FONT, size)
-    blf.enable(FONT, blf.WORD_WRAP)  # also breaks at line ends, so that one call draws all lines
+    width, height = measure_lines(lines, scale)
+    width, height = width - 2 * margin, height - 2.4 * margin
+    blf.enable(FONT, blf.WORD_WRAP)
     blf.word_wrap(FONT, 10000)
-    width, height = blf.dimensions(FONT, text)
     draw_box(x, y, width + 2 * margin, height + 2.4 * margin, (*GROUND[:3], GROUND[3] * strength))
     blf.color(FONT, 1.0, 1.0, 1.0, strength)
     blf.position(FONT, x + margin, y + margin + height - 0.78 * size, 0.0)
@@ -130,7 +142,7 @@ def _list_path_items(context) -> list[path_overlays.DrawItem]:
     items = []
     if context.space_data.overlay.show_overlays and getattr(context.scene, "beyond_mocap", None) is not None:
         items = [*path_overlays.list_items(context.scene), *ball_paths.list_items(context.scene),
-                 *momentum.list_items(context.scene)]
+                 *momentum.list_items(context.scene), *contact_handles.list_items(context.scene)]
     now = {item.key for item in items}
     for key in [key for key in _batches if not isinstance(key[0], str) and key not in now]:
         del _batches[key]
@@ -255,6 +267,7 @@ def _draw_texts():
     view = context.scene.beyond_mocap.view
     on = view.list_overlays()
     gpu.state.blend_set("ALPHA")
+    _taken.clear()
     try:
         for shown in found:
             if "moments" in on:
@@ -294,7 +307,12 @@ def _draw_text(context, where: Vector, lines, strength: float, shift: tuple[floa
     if at is None or not (-50 < at.x < region.width + 50 and -50 < at.y < region.height + 50):
         return
     scale = context.preferences.system.ui_scale
-    draw_lines(at.x + shift[0] * scale, at.y + shift[1] * scale, lines, scale, strength)
+    x, y = at.x + shift[0] * scale, at.y + shift[1] * scale
+    width, height = measure_lines(lines, scale)
+    box = find_free_box((x, y, x + width, y + height), _taken, 2 * scale)
+    if box is not None:
+        _taken.append(box)
+        draw_lines(box[0], box[1], lines, scale, strength)
 
 
 def _build_scale_row(title: str, stops, factor: float, unit: str):

@@ -15,6 +15,7 @@ import numpy as np
 from ...beyond_mocap.ball.contact import Tool
 from ...beyond_mocap.base.digest import byte_digest
 from ...beyond_mocap.base.errors import InputError
+from ...beyond_mocap.base.fixes import Fix
 from ...beyond_mocap.passes.pass_scene import Net, PassScene
 from ..core import action, channels, frame_range, preferences, session
 from ..core.measure import frames_per_second, units_per_metre
@@ -120,7 +121,7 @@ def build_order(scene: bpy.types.Scene) -> Order:
     if not folder:
         raise InputError("library", "no folder chosen",
                          "a folder of clips with strikes, such as sample_blend/passes/library",
-                         "choose one under Choices, or in step 1")
+                         "choose one under Choices, or in step 1", fixes=(Fix("choose_library"),))
     for row in settings.players:
         if row.body is not None:
             channels.check_local(row.body)

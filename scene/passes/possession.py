@@ -19,6 +19,7 @@ from mathutils import Matrix, Quaternion, Vector
 
 from ...beyond_mocap.base.easing import smoothstep
 from ...beyond_mocap.base.errors import InputError
+from ...beyond_mocap.base.fixes import Fix
 from ...beyond_mocap.motion.humanoid import identify_joints
 from ..core import channels
 from ..core.measure import frames_per_second, units_per_metre
@@ -205,9 +206,10 @@ def check_unaimed(ball: bpy.types.Object) -> None:
     aim = ball.beyond_mocap_aim
     if aim.handed:
         raise InputError(f"ball {ball.name}", "moved by Blender's physics", "a ball with keys",
-                         "press Ball from Physics first")
+                         "press Ball from Physics first", fixes=(Fix("press", "beyond_mocap.ball_from_physics"),))
     if aim.on:
-        raise InputError(f"ball {ball.name}", "it is aimed", "a ball that is not aimed", "press Revert Aim first")
+        raise InputError(f"ball {ball.name}", "it is aimed", "a ball that is not aimed", "press Revert Aim first",
+                         fixes=(Fix("press", "beyond_mocap.leave_aim"),))
 
 
 def _check_hold(ball, body, bone: str, first: int, last: int) -> None:

@@ -112,7 +112,7 @@ class BeyondMocapTouch(bpy.types.PropertyGroup):
     kind: StringProperty(name="Kind", description="Kind of touch")
     words: StringProperty(name="Labels", description="Labels of the key moment for this touch")
     confidence: FloatProperty(name="Confidence", min=0.0, max=1.0, description="Confidence of this touch, from 0 to 1")
-    use: BoolProperty(name="Use", default=True, description="Make a key moment of this touch with Accept Touches")
+    use: BoolProperty(name="Use", default=True, description="Make a key moment of this touch with Apply Touches")
 
 
 @with_settings("ball.held")

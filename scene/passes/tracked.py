@@ -11,6 +11,7 @@ import numpy as np
 
 from ...beyond_mocap.ball.tracked.kinds import TOUCH_KINDS
 from ...beyond_mocap.base.errors import InputError
+from ...beyond_mocap.base.fixes import Fix
 from ..core import channels
 from ..core.measure import build_scene_clock, frames_per_second
 from ..core.settings import BeyondMocapPlayer, find_active_player, to_absolute_path
@@ -65,7 +66,8 @@ def build_order(scene: bpy.types.Scene) -> Order:
     settings = scene.beyond_mocap
     player = find_active_player(settings)
     if player is None or not player.tracking_file:
-        raise InputError("tracking", "no file", "players with a tracking file", "import one in step 2")
+        raise InputError("tracking", "no file", "players with a tracking file", "import one in step 2",
+                         fixes=(Fix("add_track"),))
     if player.feed_id:
         end = settings.section_end if settings.section_end > settings.section_start else None
         path, metadata = to_absolute_path(player.tracking_file), to_absolute_path(player.metadata_file)

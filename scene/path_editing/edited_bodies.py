@@ -11,7 +11,7 @@ import numpy as np
 
 from ...beyond_mocap.base.digest import byte_digest
 from ...beyond_mocap.base.errors import BeyondMocapError, InputError
-from ..core import channels
+from ..core import channels, take_record
 from ..core.saved_state import discard_saved_state, restore_nla
 from . import curve, keys
 from .armature_adapter import MARK, clear_source_cache, invalidate_sources, read_source
@@ -122,6 +122,8 @@ def update_motion(scene: bpy.types.Scene, body: bpy.types.Object, force: bool = 
     edited = edit_path(known.core, path, settings, curve.load_ground(scene, edit.ground, ground))
     if force or not up_to_date:
         carrier.write_motion(scene, known.read, edited, digest)
+        frames = known.read.first + np.arange(len(edited.motion))
+        take_record.store_contacts(carrier.find_edit_action()[0], frames, edited.standing.any(axis=2))
     _counter += 1
     first, fps = known.read.first, known.read.motion.fps
     messages = "\n".join((*drawn.notes, *curve.list_ground_messages(edit.ground), *known.read.messages,
@@ -314,20 +316,6 @@ def revert_path_edits(*bodies: bpy.types.Object | None) -> list[str]:
     for body in edited:
         revert_path_edit(body)
     return [f"{body.name}: path edit reverted; its curve stays, press Edit Path to use it again" for body in edited]
-
-
-def build_contact_lookup(body: bpy.types.Object | None):
-    """Build a function from scene frames (F,) to foot contacts (F, 2) of an edited armature; None where unknown."""
-    now = find_computed_edit(body) if body is not None else None
-    if now is None:
-        return None
-    stands = now.edited.standing.any(axis=2)
-
-    def find_contacts(frames: np.ndarray) -> np.ndarray:
-        rows = np.round(frames).astype(int) - now.first
-        return stands[np.clip(rows, 0, len(stands) - 1)] & ((rows >= 0) & (rows < len(stands)))[:, None]
-
-    return find_contacts
 
 
 def select_again(context: bpy.types.Context, bodies: list[bpy.types.Object]) -> None:

@@ -157,7 +157,6 @@ def _create_ball_dot(scene: bpy.types.Scene, track: Track, collection: bpy.types
 def _create_empty(scene: bpy.types.Scene, name: str, size: float, collection: bpy.types.Collection) -> bpy.types.Object:
     dot = bpy.data.objects.new(name, None)
     dot.empty_display_type, dot.empty_display_size = "SPHERE", size * units_per_metre(scene)
-    dot.show_name = True
     collection.objects.link(dot)
     return dot
 

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
 from ...beyond_mocap.base.errors import InputError, build_read_error
+from ...beyond_mocap.base.fixes import Fix
 from ...beyond_mocap.files.tracking import tracking
 from ..core.settings import BeyondMocapPlayer, BeyondMocapSettings, to_absolute_path
 from . import drawn_track
@@ -51,7 +52,8 @@ def read_track(settings: BeyondMocapSettings, player: BeyondMocapPlayer, still: 
     path = to_absolute_path(player.tracking_file)
     if not path:
         step = "choose one in step 2 or draw a track"
-        raise InputError(f"player {player.name}", "no tracking file", "a file with positions", step)
+        raise InputError(f"player {player.name}", "no tracking file", "a file with positions", step,
+                         fixes=(Fix("add_track"),))
     if not player.feed_id:
         return _read_plain_track(path)
     match = read_match(path, to_absolute_path(player.metadata_file), player.provider)

@@ -8,10 +8,10 @@ import numpy as np
 from ...beyond_mocap.motion.track import sample_track
 from ...beyond_mocap.motion.track.ball_path import BallPath
 from ...beyond_mocap.synthesis.take import Take
-from ..core import action, channels
+from ..core import action, channels, take_record
 from ..core.frame_range import extend_range
 from ..core.material import get_material
-from ..core.measure import frames_per_second, units_per_metre
+from ..core.measure import frames_per_second, units_per_metre, whole_frames
 from ..core.names import find_named
 from ..core.session import StoredTake
 from ..core.settings import BeyondMocapPlayer, BeyondMocapSettings
@@ -59,6 +59,15 @@ def write_take(context: bpy.types.Context, owner: BeyondMocapPlayer, result: Sto
         write_ribbon(context, build_track_name(owner), ground, tuple(owner.shirt), room)
     extend_range(scene, start + take.motion.duration * frames_per_second(scene))
     return target
+
+
+def store_record(written: bpy.types.Action, take: Take, scene: bpy.types.Scene) -> None:
+    """Store on a take's action what a bake and an export need of the take."""
+    fps, start = frames_per_second(scene), compute_frame(scene, take.start_time)
+    frames = whole_frames(start, take.motion.duration, fps)
+    at = np.round((frames - start) * take.motion.fps / fps).astype(int)
+    take_record.store_contacts(written, frames, take.contacts[np.clip(at, 0, len(take.contacts) - 1)])
+    written[take_record.RATE] = float(take.motion.fps)
 
 
 def write_ball(context: bpy.types.Context, path: BallPath) -> bpy.types.Object:

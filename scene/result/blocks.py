@@ -15,7 +15,7 @@ import numpy as np
 
 from ...beyond_mocap.annotation import DISCRETE
 from ...beyond_mocap.synthesis.take import Take
-from ..core import channels
+from ..core import channels, take_record
 from ..core.action import PLACEMENT
 from ..core.measure import frames_per_second
 from ..core.saved_state import remove_unused_action
@@ -91,19 +91,26 @@ def convert_to_strips(body: bpy.types.Object) -> bpy.types.NlaTrack:
         if generated is not None:
             hand_keys.write_generated(action, generated.select_frames(block.start, block.end))
         action[MARK], action[BLOCKS] = True, json.dumps([[block.start, block.end, block.name]])
-        _copy_place(whole, action)
-        strip = track.strips.new(block.name, block.start, action)
-        strip.action_slot = part
-        strip.use_sync_length = False
-        strip.action_frame_start, strip.action_frame_end = block.start, block.end
-        strip.frame_start, strip.frame_end = block.start, block.end
-        strip.blend_type = "REPLACE"
+        _copy_record(whole, action)
+        strip = add_strip(track, action, part, block.start, last=block.end, name=block.name)
         strip.extrapolation = "HOLD" if number == 0 else "HOLD_FORWARD"
-        strip.name = block.name
     data.use_nla = True
     if not whole.users - whole.use_fake_user:
         remove_unused_action(whole, MARK)
     return track
+
+
+def add_strip(track: bpy.types.NlaTrack, action: bpy.types.Action, slot, first: int, last: int,
+              name: str) -> bpy.types.NlaStrip:
+    """Add a strip that plays the frames `first` to `last` of an action where they are."""
+    strip = track.strips.new(name, first, action)
+    strip.action_slot = slot
+    strip.use_sync_length = False
+    strip.action_frame_start, strip.action_frame_end = first, last
+    strip.frame_start, strip.frame_end = first, last
+    strip.blend_type = "REPLACE"
+    strip.name = name
+    return strip
 
 
 def convert_to_action(body: bpy.types.Object) -> bpy.types.Action | None:
@@ -122,17 +129,18 @@ def convert_to_action(body: bpy.types.Object) -> bpy.types.Action | None:
         if generated is not None:
             hand_keys.write_generated(whole, generated)
         whole[MARK] = True
-        _copy_place(parts[0][0], whole)
+        _copy_record(parts[0][0], whole)
         whole[BLOCKS] = json.dumps([[block.start, block.end, block.name] for _, _, block in parts])
     _clear_track(track)
     body.animation_data.nla_tracks.remove(track)
     return whole
 
 
-def _copy_place(source: bpy.types.Action, target: bpy.types.Action) -> None:
-    """Copy the stored place of the body to another action."""
+def _copy_record(source: bpy.types.Action, target: bpy.types.Action) -> None:
+    """Copy the stored place of the body, and what is stored of the take, to another action."""
     if PLACEMENT in source:
         target[PLACEMENT] = list(source[PLACEMENT])
+    take_record.copy_record(source, target)
 
 
 def find_track(body: bpy.types.Object) -> bpy.types.NlaTrack | None:

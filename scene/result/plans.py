@@ -7,6 +7,7 @@ import numpy as np
 
 from ...beyond_mocap.annotation import Timeline
 from ...beyond_mocap.base.errors import InputError
+from ...beyond_mocap.base.fixes import Fix
 from ...beyond_mocap.base.time_series import interpolate_columns
 from ...beyond_mocap.motion.track import Track, clean_track
 from ...beyond_mocap.synthesis.heading_plan import HeadingKey
@@ -14,7 +15,7 @@ from ...beyond_mocap.synthesis.plan import Plan
 from ..core.measure import build_scene_clock
 from ..core.properties import read_property_values
 from ..core.settings import BeyondMocapPlayer, BeyondMocapSettings, find_active_player, to_absolute_path
-from ..player import drawn_track, pins
+from ..player import contact_edits, drawn_track, pins
 from ..player.tracks import read_track
 from ..timeline import label_tracks as lanes
 from ..timeline import strips
@@ -27,7 +28,8 @@ def list_selected_players(settings: BeyondMocapSettings) -> list[BeyondMocapPlay
     """List the players that are switched on. Raises InputError if there is none."""
     players = [player for player in settings.players if player.use]
     if not players:
-        raise InputError("players", "no players are selected", "at least one", "import tracking in step 2")
+        raise InputError("players", "no players are selected", "at least one", "import tracking in step 2",
+                         fixes=(Fix("use_all_players"), Fix("add_track")))
     return players
 
 
@@ -46,6 +48,7 @@ def build_plan(settings: BeyondMocapSettings, player: BeyondMocapPlayer,
     plan = Plan(track=track, timeline=read_timeline(player, settings.rate, track),
                 library=to_absolute_path(settings.library_folder), pins=pins.read_pins(player.id_data, player),
                 heading_keys=read_heading_keys(settings, player, still),
+                contact_edits=contact_edits.read_contact_edits(player),
                 **read_property_values(Plan, settings, "synthesis"), **read_property_values(Plan, player, "player"))
     return plan, found.warnings
 

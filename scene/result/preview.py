@@ -10,6 +10,8 @@ import bpy
 import numpy as np
 
 from ...beyond_mocap.base.errors import InputError
+from ...beyond_mocap.base.fixes import Fix
+from ..characters.player_character import update_character
 from ..core import channels, session
 from ..core.measure import build_scene_clock
 from ..core.names import find_named
@@ -19,7 +21,7 @@ from ..passes import possession
 from ..path_editing import edited_bodies
 from ..stage import cameras
 from ..stage.stage_collection import find_focus
-from . import bake, blocks, quality
+from . import bake, blocks, key_layers, quality
 from . import manual_keys as hand_keys
 from .bake import MARK
 
@@ -61,6 +63,7 @@ def show_preview(context: bpy.types.Context, player: BeyondMocapPlayer, take: st
     result_take, result = session.find_take(take), player.result
     check_body(player)
     reverted = revert_path_edit(player)
+    key_layers.unstack_layers(player.body, uses_nla=result.state != "PREVIEW")
     if result.state != "NONE" and not is_shown(context.scene, player):
         drop_preview(player)
     recorded_keys, clock = hand_keys.ManualKeys(), ""
@@ -77,12 +80,15 @@ def show_preview(context: bpy.types.Context, player: BeyondMocapPlayer, take: st
         body = bake.write_take(context, player, result_take)
     action, slot = channels.find_playing_action(body)
     blocks.store_blocks(action, result_take.take, context.scene)
+    bake.store_record(action, result_take.take, context.scene)
     hand_keys.store_generated(action, slot, build_scene_clock(context.scene))
     shift = hand_keys.compute_shift(clock, build_scene_clock(context.scene))
     result.hand_keys = hand_keys.write_manual_keys(action, slot, recorded_keys, shift) if shift is not None else 0
     result.state = "PREVIEW"
+    key_layers.stack_layers(body)
     quality.update_error_curves(context.scene, player)
     update_shared(context)
+    update_character(player, context)
     return body
 
 
@@ -93,6 +99,7 @@ def apply_preview(context: bpy.types.Context, player: BeyondMocapPlayer, form: s
     """
     result, body = player.result, player.body
     revert_path_edit(player)
+    key_layers.unstack_layers(body)
     if result.motion.kept and body.animation_data is not None:
         restore_nla(result.motion, body.animation_data)
     if form == "STRIPS":
@@ -103,6 +110,7 @@ def apply_preview(context: bpy.types.Context, player: BeyondMocapPlayer, form: s
     result.state = "ACCEPTED"
     _apply_shared(context)
     _rename_datablocks(context, player)
+    key_layers.stack_layers(body)
     return body
 
 
@@ -110,10 +118,12 @@ def revert_preview(context: bpy.types.Context, player: BeyondMocapPlayer) -> Non
     """Revert the preview of a player: the previous state is restored, bit for bit."""
     result, body = player.result, player.body
     revert_path_edit(player)
+    key_layers.unstack_layers(body, uses_nla=False)
     accepted = result.was_accepted
     if body is not None and body == result.body and result.motion.kept:
         _remove_preview_objects(context, player)
         restore_playback(result.motion, body, MARK)
+        key_layers.stack_layers(body)
     else:
         _remove_preview_objects(context, player)
         if body is not None:
@@ -128,6 +138,7 @@ def revert_preview(context: bpy.types.Context, player: BeyondMocapPlayer) -> Non
     result.state = "ACCEPTED" if accepted else "NONE"
     quality.update_error_curves(context.scene, player)
     update_shared(context)
+    update_character(player, context)
 
 
 def is_shown(scene: bpy.types.Scene, player: BeyondMocapPlayer) -> bool:
@@ -187,11 +198,13 @@ def show_variant(context: bpy.types.Context, player: BeyondMocapPlayer, number: 
     """Preview variant `number`, from 0. Raises InputError if the session does not have it."""
     variants = player.result.variants
     if not 0 <= number < len(variants):
-        raise InputError("variant", f"number {number + 1}", f"1 to {len(variants)}", "press Variants first")
+        raise InputError("variant", f"number {number + 1}", f"1 to {len(variants)}", "press Variants first",
+                         fixes=(Fix("press", "beyond_mocap.variants"),))
     variant = variants[number]
     if session.find_take(variant.name) is None:
         found = "is not in this session: it is from before the file was opened"
-        raise InputError("variant", found, "variants of this session", "press Variants again")
+        raise InputError("variant", found, "variants of this session", "press Variants again",
+                         fixes=(Fix("press", "beyond_mocap.variants"),))
     show_preview(context, player, variant.name, {line: getattr(variant, line) for line in VARIANT_LINES})
 
 

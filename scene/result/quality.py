@@ -62,7 +62,7 @@ FIGURES = (  # name, key path in the report, factor (a negative one counts from 
     ("Touches that fit the ball", "touches.fit.fit_share", 100, "{:.0f}", " %"),
     ("Reachable balls met", "touches.contact.reachable_met_share", 100, "{:.0f}", " %"),
     ("Ball inside the body", "touches.ball_inside.inside_frames", 1, "{:.0f}", " frames"),
-    ("Other labels shown", "touches.substituted_count", 1, "{:.0f}", " key moments"),
+    ("Other labels shown", "touches.substituted_count", 1, "{:.0f}", ""),
     ("Computing time", "seconds.total", 1, "{:.1f}", " s"),
 )
 ERROR_GROUP, ERROR_MARK = "Beyond Mocap", "beyond_mocap_error_curves"

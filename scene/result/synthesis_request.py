@@ -13,6 +13,7 @@ import numpy as np
 
 from ...beyond_mocap.annotation import check_timeline
 from ...beyond_mocap.base.errors import InputError, NotInLibraryError
+from ...beyond_mocap.base.fixes import Fix
 from ...beyond_mocap.synthesis.plan import Plan
 from ...beyond_mocap.synthesis.take import Take
 from ..core import preferences, session
@@ -115,13 +116,15 @@ def build_request(settings: BeyondMocapSettings, player: BeyondMocapPlayer, mode
         InputError: if an input is missing.
     """
     if not settings.library_folder:
-        raise InputError("library", "no folder is chosen", "a folder of clips", "choose one in step 1")
+        raise InputError("library", "no folder is chosen", "a folder of clips", "choose one in step 1",
+                         fixes=(Fix("choose_library"),))
     preview.check_body(player)
     plan, warnings = plans.build_plan(settings, player, still)
     session_take = session.find_take(player.take)
     if mode.kind == "stretch" and session_take is None:
         found = f"no take of {player.name} in this session"
-        raise InputError("resynthesize", found, "a take", "press Update first to compute it again")
+        raise InputError("resynthesize", found, "a take", "press Update first to compute it again",
+                         fixes=(Fix("press", "beyond_mocap.update"),))
     folder, unit = to_absolute_path(settings.library_folder), settings.library_unit or None
     return Request(player.name, mode, plan, where=plans.describe_label_source(player), warnings=warnings,
                    begin=player.take, before=session_take.take if session_take else None,
@@ -130,7 +133,7 @@ def build_request(settings: BeyondMocapSettings, player: BeyondMocapPlayer, mode
 
 
 def process_request(request: Request, library: "Library | None", progress, cancelled, hurry) -> RequestResult:
-    """Process a request. Never accesses bpy.
+    """Process a request. Never accesses bpy. A library that it builds is stored at once, whatever comes after.
 
     Args:
         request: the request.
@@ -143,8 +146,11 @@ def process_request(request: Request, library: "Library | None", progress, cance
     """
     from ...beyond_mocap.library.build import build_library
 
-    clips = library or build_library(request.folder, unit=request.unit, **request.build, progress=progress,
-                                     cancelled=lambda: cancelled() or hurry())
+    clips = library
+    if clips is None:
+        clips = build_library(request.folder, unit=request.unit, **request.build, progress=progress,
+                              cancelled=lambda: cancelled() or hurry())
+        session.store_library(clips, request.unit)
     plan = request.plan
     check_timeline(plan.timeline, clips.labels, float(plan.track.times[0]), float(plan.track.times[-1]), request.where)
     callbacks = progress, cancelled, hurry

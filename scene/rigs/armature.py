@@ -16,11 +16,12 @@ from mathutils import Vector
 
 from ...beyond_mocap.base.errors import InputError
 from ...beyond_mocap.motion import quaternion
-from ...beyond_mocap.motion.humanoid import split_joint_name
+from ...beyond_mocap.motion.humanoid import identify_joints, split_joint_name
 from ...beyond_mocap.motion.skeleton import Skeleton
 from ..core.measure import units_per_metre
 
 SKELETON_PROPERTY = "beyond_mocap_skeleton"
+FINGERS = "Fingers"  # name of the bone collection with the bones beyond the wrists
 STUB_LENGTH = 0.04  # metres: length of a bone without children
 
 
@@ -48,7 +49,7 @@ class Placement:
 
 
 def create_armature(context: bpy.types.Context, skeleton: Skeleton, name: str, collection=None) -> bpy.types.Object:
-    """Create an armature object with one bone per joint, its lowest joint on the floor.
+    """Create an armature object with one bone per joint, its lowest joint on the floor; fingers are not displayed.
 
     The exact offsets in metres, the order of the joints and the tips are stored as a custom property of the armature.
 
@@ -78,6 +79,7 @@ def create_armature(context: bpy.types.Context, skeleton: Skeleton, name: str, c
                 bone.parent = data.edit_bones[skeleton.names[skeleton.parents[joint]]]
     for bone in body.pose.bones:
         bone.rotation_mode = "QUATERNION"
+    _hide_fingers(data, skeleton)
     data[SKELETON_PROPERTY] = json.dumps({
         "names": skeleton.names, "parents": skeleton.parents, "offsets": skeleton.offsets.tolist(),
         "end_parents": skeleton.end_parents, "end_offsets": skeleton.end_offsets.tolist(), "units_per_metre": units,
@@ -87,6 +89,26 @@ def create_armature(context: bpy.types.Context, skeleton: Skeleton, name: str, c
         scene.collection.objects.unlink(body)
     context.view_layer.update()
     return body
+
+
+def _hide_fingers(data: bpy.types.Armature, skeleton: Skeleton) -> None:
+    """Put the bones beyond the wrists into a bone collection that is not displayed: they would stick out of the body's
+    closed hands.
+    """
+    try:
+        humanoid = identify_joints(skeleton)
+    except InputError:
+        return
+    wrists = {humanoid.left.hand, humanoid.right.hand} - {None}
+    beyond: list[int] = []
+    for joint, parent in enumerate(skeleton.parents):
+        if parent in wrists or parent in beyond:
+            beyond.append(joint)
+    if beyond:
+        fingers = data.collections.new(FINGERS)
+        fingers.is_visible = False
+        for joint in beyond:
+            fingers.assign(data.bones[skeleton.names[joint]])
 
 
 def build_skeleton(body: bpy.types.Object, scene: bpy.types.Scene) -> Skeleton:
@@ -232,11 +254,25 @@ def copy_rig(rig: bpy.types.Object, name: str) -> bpy.types.Object:
     The copy is in the original's collections, or in the scene's own where these are linked. Pointers within the family
     point to the copies; the copy plays nothing.
     """
-    family = [rig, *rig.children_recursive]
+    return copy_objects([rig, *rig.children_recursive], name)[rig]
+
+
+def copy_objects(family: list[bpy.types.Object], name: str,
+                 home: bpy.types.Collection | None = None) -> dict[bpy.types.Object, bpy.types.Object]:
+    """Copy an armature object and others of its family, which share their data with the originals.
+
+    Args:
+        family: the armature, then the others.
+        name: of the armature's copy.
+        home: where the copies go; None for the originals' collections.
+    Returns:
+        Original -> copy. Pointers within the family point to the copies; the armature's copy plays nothing.
+    """
+    rig = family[0]
     copies = {original: original.copy() for original in family}
     for original, copied in copies.items():
         copied.name = name if original == rig else f"{name} {original.name}"
-        for collection in _list_editable_collections(original):
+        for collection in [home] if home is not None else _list_editable_collections(original):
             collection.objects.link(copied)
         if original.parent in copies:
             inverse = original.matrix_parent_inverse.copy()
@@ -247,7 +283,7 @@ def copy_rig(rig: bpy.types.Object, name: str) -> bpy.types.Object:
         data.action = None
         for track in list(data.nla_tracks):
             data.nla_tracks.remove(track)
-    return copies[rig]
+    return copies
 
 
 def _list_editable_collections(thing: bpy.types.Object) -> list[bpy.types.Collection]:

@@ -206,7 +206,8 @@ def compute_root_motion(rig: bpy.types.Object, sampled, options, messages: list[
     legs = world[:, :, :3, 3]
     across = legs[:, 0] - legs[:, 1]
     facing = np.unwrap(np.arctan2(-across[:, 0], across[:, 1]))
-    units, rate = units_per_metre(bpy.context.scene), options.rate or frames_per_second(bpy.context.scene)
+    scene = bpy.context.scene
+    units, rate = units_per_metre(scene) / options.units, options.rate or frames_per_second(scene)
     place, yaw = compute_root_path(legs.mean(axis=1)[:, :2] / units, facing, rate,
                                    "straight" if options.root == "STRAIGHT" else "smooth")
     path = np.tile(np.eye(4), (len(yaw), 1, 1))
@@ -219,7 +220,7 @@ def compute_root_motion(rig: bpy.types.Object, sampled, options, messages: list[
     if root_bone is not None:
         rest = np.array(rig.data.bones[root_bone].matrix_local)
         return table["hips"], root_bone, inward @ path @ _compute_upright_matrix(rig, table) @ rest, None
-    messages.append(f"{rig.name} has no root bone: the file contains an added one named {ROOT_BONE!r}")
+    messages.append(f"no root bone on the armature: the file has an added one named {ROOT_BONE!r}")
     return table["hips"], None, inward @ path @ _compute_upright_matrix(rig, table), None
 
 

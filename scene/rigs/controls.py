@@ -6,6 +6,7 @@ which each of its location channels moves it.
 
 from __future__ import annotations
 
+import json
 import re
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -15,6 +16,7 @@ import numpy as np
 
 from ...beyond_mocap.base.errors import InputError
 from ...beyond_mocap.motion import quaternion
+from ..core import channels
 from .control_study import (
     CARRIER_TOLERANCE,
     STATIC,
@@ -26,6 +28,8 @@ from .control_study import (
     split_poses,
 )
 
+PREVIOUS_STATE = "beyond_mocap_before"  # on a baked action: JSON with the rig's state before its first bake
+
 _TRIAL_ANGLE = 0.7
 _IK_TO_FK, _FK_TO_IK = re.compile(r"(?i)ik.*fk"), re.compile(r"(?i)fk.*ik")
 _FOLLOW = re.compile(r"(?i)follow")
@@ -33,7 +37,8 @@ _FOLLOW = re.compile(r"(?i)follow")
 
 @dataclass(frozen=True)
 class Switch:
-    """A number on a pose bone that has to be `value` for the controls to take effect."""
+    """A number on a pose bone that has to be `value` for the controls to take effect; it was `before` the first bake.
+    """
 
     bone: str
     name: str
@@ -195,14 +200,15 @@ class Controls:
         """Pose the rig without its animation, its switches on FK, overrides muted; all is restored afterwards."""
         bones = self.rig.pose.bones
         silent = [bones[one.bone].constraints[one.constraint] for one in self.overrides]
+        current = [bones[switch.bone][switch.name] for switch in self.switches]
         with PosedRig(self.rig, bpy.context.view_layer, self.bones, silent) as posed:
             try:
                 for switch in self.switches:
                     bones[switch.bone][switch.name] = switch.value
                 yield posed
             finally:
-                for switch in self.switches:
-                    bones[switch.bone][switch.name] = switch.before
+                for switch, value in zip(self.switches, current):
+                    bones[switch.bone][switch.name] = value
 
 
 def _find_nearest_rotation(matrix: np.ndarray) -> np.ndarray:
@@ -211,11 +217,21 @@ def _find_nearest_rotation(matrix: np.ndarray) -> np.ndarray:
     return u @ np.diag([1.0, 1.0, np.sign(np.linalg.det(u @ v))]) @ v
 
 
+def read_previous_state(rig: bpy.types.Object) -> dict:
+    """Read the rig's state before its first bake, while it plays a bake; else nothing."""
+    playing, _ = channels.find_playing_action(rig)
+    return json.loads(playing.get(PREVIOUS_STATE, "{}")) if playing is not None else {}
+
+
 def list_switches(rig: bpy.types.Object) -> list[Switch]:
-    """List the numbers on pose bones that choose between IK and FK, or let a bone follow partly."""
+    """List the numbers on pose bones that choose between IK and FK, or let a bone follow partly: as they were before
+    the first bake, which sets them.
+    """
     found = []
+    earlier = {(bone, name): value for bone, name, value in read_previous_state(rig).get("switches", ())}
     for bone in rig.pose.bones:
-        for name, value in bone.items():
+        for name, current in bone.items():
+            value = earlier.get((bone.name, name), current)
             if isinstance(value, bool) or not isinstance(value, (int, float)):
                 continue
             if _IK_TO_FK.search(name) or _FK_TO_IK.search(name):
@@ -229,11 +245,16 @@ def list_switches(rig: bpy.types.Object) -> list[Switch]:
 
 
 def list_overrides(rig: bpy.types.Object, bones: list[str]) -> list[Override]:
-    """List the constraints that override driven bones: those on them, and inverse kinematics further down the chain."""
+    """List the constraints that override driven bones: those on them, and inverse kinematics further down the chain.
+
+    Those that an earlier bake has switched off count as they were before it.
+    """
     driven, found = set(bones), []
+    earlier = {(bone, name): value for bone, name, value in read_previous_state(rig).get("constraints", ())}
     for bone in rig.pose.bones:
         for constraint in bone.constraints:
-            if constraint.mute or constraint.influence == 0.0:
+            influence = earlier.get((bone.name, constraint.name), constraint.influence)
+            if constraint.mute or influence == 0.0:
                 continue
             held = {bone.name}
             if constraint.type in {"IK", "SPLINE_IK"}:

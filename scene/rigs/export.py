@@ -14,6 +14,7 @@ from pathlib import Path
 
 import bpy
 import numpy as np
+from mathutils import Matrix
 
 from ...beyond_mocap.base.errors import InputError, format_count
 from ...beyond_mocap.files.atomic import atomic_path
@@ -24,8 +25,9 @@ from ..core.saved_state import use_temporary_scene
 from .bone_curves import ROOT_BONE, compute_root_motion
 from .fit import find_common_extent, sample_motion
 
-SUFFIXES = {"FBX": ".fbx", "GLB": ".glb", "USD": ".usdc", "BVH": ".bvh"}
-_OPERATORS = {"FBX": ("export_scene", "fbx"), "GLB": ("export_scene", "gltf"), "USD": ("wm", "usd_export")}
+SUFFIXES = {"FBX": ".fbx", "GLB": ".glb", "USD": ".usdc", "ABC": ".abc", "BVH": ".bvh"}
+_OPERATORS = {"FBX": ("export_scene", "fbx"), "GLB": ("export_scene", "gltf"), "USD": ("wm", "usd_export"),
+              "ABC": ("wm", "alembic_export")}
 _FBX_AXES = {"BLENDER": ("-Z", "Y"), "UNITY": ("-Z", "Y"), "GODOT": ("-Z", "Y"), "UNREAL": ("Y", "Z")}
 _USD_AXES = {"UNITY": ("NEGATIVE_Z", "Y"), "GODOT": ("NEGATIVE_Z", "Y")}
 _SCALE_TOLERANCE = 1e-4  # deviation of a scale from 1 that is ignored
@@ -44,6 +46,9 @@ class ExportOptions:
         root: one of `rig.ROOTS`.
         deform_only: leave out controls and helper bones.
         meshes: export meshes too.
+        applies_transforms: objects are at the origin, unscaled and not rotated; bones and meshes have it instead.
+        units: of the file for each of the scene's; needs applied transforms where it is not 1.
+        armature_name: of the armature in the file; None for its own.
     """
 
     path: Path
@@ -53,6 +58,9 @@ class ExportOptions:
     root: str = "KEEP"
     deform_only: bool = True
     meshes: bool = True
+    applies_transforms: bool = False
+    units: float = 1.0
+    armature_name: str | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -80,33 +88,72 @@ def export_motion(
     Raises:
         InputError: if an armature does not move or the file cannot be written.
     """
+    check_place(options, rigs)
+    things = [] if options.format == "BVH" else list(things)
+    sampled = sample_rigs(context.scene, rigs, options.rate, things)
+    return export_sampled(context, rigs, sampled, options, things)
+
+
+def check_place(options: ExportOptions, rigs: list[bpy.types.Object]) -> None:
+    """Check that there is an exporter, an armature and a writable folder (InputError)."""
     check_exporter(options.format)
     if not rigs:
         raise InputError("export", "no armature", "an armature that moves", "select one or choose players")
-    if not options.path.parent.is_dir() or not os.access(options.path.parent, os.W_OK):
-        raise InputError(options.path, "the folder cannot be written", "a folder that you can write to",
+    check_folder(options.path)
+
+
+def check_folder(path: Path) -> None:
+    """Check that a file's folder can be written (InputError)."""
+    if not path.parent.is_dir() or not os.access(path.parent, os.W_OK):
+        raise InputError(path, "the folder cannot be written", "a folder that you can write to",
                          "choose another folder")
-    scene = context.scene
+
+
+def sample_rigs(scene: bpy.types.Scene, rigs: list[bpy.types.Object], rate: float | None,
+                things: list[bpy.types.Object] = ()) -> dict[str, _SampledPoses]:
+    """Sample the displayed motion of armatures, and of objects without bones, from its first frame to its last.
+
+    Args:
+        scene: the scene.
+        rigs: armatures that move.
+        rate: frames per second, None for the scene's.
+        things: other objects.
+    Returns:
+        Name -> the sampled motion.
+    Raises:
+        InputError: if an armature does not move.
+    """
     first, last = find_common_extent(rigs)
-    rate = options.rate or frames_per_second(scene)
-    times = first + np.arange(int(np.floor((last - first) * rate / frames_per_second(scene) + 1e-6)) + 1) * (
-        frames_per_second(scene) / rate)
-    things = [] if options.format == "BVH" else list(things)
-    sampled = _sample_poses(scene, rigs, times, things)
-    meshes_by_rig = {rig.name: _list_meshes(scene, rig)
+    fps = frames_per_second(scene)
+    rate = rate or fps
+    times = first + np.arange(int(np.floor((last - first) * rate / fps + 1e-6)) + 1) * (fps / rate)
+    return _sample_poses(scene, rigs, times, list(things))
+
+
+def export_sampled(
+    context: bpy.types.Context, rigs: list[bpy.types.Object], sampled: dict[str, _SampledPoses],
+    options: ExportOptions, things: list[bpy.types.Object] = ()
+) -> list[str]:
+    """Export the sampled motion of armatures (`sample_rigs`) and of other objects to one file; returns messages."""
+    scene, rate = context.scene, options.rate or frames_per_second(context.scene)
+    count = len(sampled[rigs[0].name].object_matrices)
+    meshes_by_rig = {rig.name: list_meshes(scene, rig)
                      for rig in rigs} if options.meshes and options.format != "BVH" else {}
+    lies = {mesh: _find_rest_placement(rig, mesh) for rig in rigs for mesh in meshes_by_rig.get(rig.name, ())}
     messages = []
-    with _export_scene(context, rate, len(times)) as stage:
+    with _export_scene(context, rate, count, options.units) as stage:
         copies = [_copy_armature(stage, rig, sampled[rig.name], options, messages) for rig in rigs]
-        meshes = [_copy_mesh(stage, thing, rig, copy) for rig, copy in zip(rigs, copies)
-                  for thing in meshes_by_rig.get(rig.name, ())]
+        meshes = [_copy_mesh(stage, thing, rig, copy) if not options.applies_transforms
+                  else _copy_applied_mesh(stage, thing, rig, copy, Matrix.Scale(options.units, 4) @ lies[thing])
+                  for rig, copy in zip(rigs, copies) for thing in meshes_by_rig.get(rig.name, ())]
         free_meshes = [_copy_free_mesh(stage, thing, sampled[thing.name].object_matrices) for thing in things]
         if options.format == "GLB" and not meshes:
             messages.append("no mesh on the armature: glTF then stores its bones as plain nodes")
         dressed = [thing for rig in rigs for thing in meshes_by_rig.get(rig.name, ())]
-        with _original_names([*rigs, *dressed, *things], [*copies, *meshes, *free_meshes]):
+        named = [options.armature_name or rig.name for rig in rigs]
+        with _original_names([*rigs, *dressed, *things], [*copies, *meshes, *free_meshes], named):
             _save_file(stage, copies, options)
-    messages.insert(0, f"{len(times)} frames at {rate:g} per second, {format_count(len(rigs), 'armature')}, "
+    messages.insert(0, f"{count} frames at {rate:g} per second, {format_count(len(rigs), 'armature')}, "
                     f"{format_count(len(meshes), 'mesh', 'meshes')}"
                     + (f", {format_count(len(things), 'object')} beside them" if things else ""))
     return messages
@@ -148,14 +195,16 @@ def _sample_poses(
 
 
 @contextmanager
-def _export_scene(context: bpy.types.Context, rate: float, frames: int):
-    """Create a temporary scene at this rate; afterwards selection and mode are restored."""
+def _export_scene(context: bpy.types.Context, rate: float, frames: int, per_unit: float = 1.0):
+    """Create a temporary scene at this rate, `per_unit` of its units for each of the open scene's; afterwards selection
+    and mode are restored.
+    """
     units, chosen = context.scene.unit_settings, list(context.selected_objects)
     active = context.view_layer.objects.active
     mode = active.mode if active is not None else "OBJECT"
     try:
         with use_temporary_scene("Beyond Mocap export") as stage:
-            stage.unit_settings.system, stage.unit_settings.scale_length = units.system, units.scale_length
+            stage.unit_settings.system, stage.unit_settings.scale_length = units.system, units.scale_length / per_unit
             stage.render.fps = max(1, round(rate))
             stage.render.fps_base = stage.render.fps / rate
             stage.frame_start, stage.frame_end = 0, max(frames - 1, 0)
@@ -176,7 +225,10 @@ def _copy_armature(stage: bpy.types.Scene, rig: bpy.types.Object, shown: _Sample
     copy = bpy.data.objects.new(rig.name, data)
     stage.collection.objects.link(copy)
     data.pose_position = "POSE"
-    hips, root, line, in_place = compute_root_motion(rig, shown, wanted, messages)
+    if wanted.applies_transforms:
+        shown = _apply_transforms(copy, rig, shown)
+    hips, root, line, in_place = compute_root_motion(copy if wanted.applies_transforms else rig, shown, wanted,
+                                                     messages)
     bones = _select_bones(rig, wanted, root)
     poses = {name: shown.poses[:, number] for number, name in enumerate(shown.bones) if name in bones}
     if in_place is not None:
@@ -184,8 +236,36 @@ def _copy_armature(stage: bpy.types.Scene, rig: bpy.types.Object, shown: _Sample
     if line is not None:
         poses[root or ROOT_BONE] = line
     parents = _simplify_bones(stage, copy, rig, kept=bones, hips=hips if line is not None and root is None else None)
+    if wanted.units != 1.0:
+        copy.data.transform(Matrix.Scale(wanted.units, 4))
+        poses = {name: _scale_places(pose, wanted.units) for name, pose in poses.items()}
     _create_action(copy, poses, parents, shown.object_matrices)
     return copy
+
+
+def _apply_transforms(copy: bpy.types.Object, rig: bpy.types.Object, shown: _SampledPoses) -> _SampledPoses:
+    """Give a copy's bones the placement of its object, which stays at the origin; returns their poses in the world."""
+    copy.data.transform(_find_even_matrix(rig))
+    poses = shown.object_matrices[:, None] @ shown.poses
+    size = np.cbrt(np.abs(np.linalg.det(shown.object_matrices[:, :3, :3])))
+    poses[..., :3, :3] /= size[:, None, None, None]
+    return _SampledPoses(shown.bones, poses, np.tile(np.eye(4), (len(poses), 1, 1)))
+
+
+def _find_even_matrix(rig: bpy.types.Object) -> Matrix:
+    """Find an armature's placement in the world; InputError for a mirrored or uneven one, which bones cannot have."""
+    scale = rig.matrix_world.to_scale()
+    if rig.matrix_world.determinant() <= 0.0 or max(scale) > 1.001 * min(scale):
+        raise InputError(f"armature {rig.name}", f"is scaled {', '.join(f'{one:g}' for one in scale)}",
+                         "one positive scale", "apply it with Ctrl-A, Scale")
+    return rig.matrix_world.copy()
+
+
+def _scale_places(matrices: np.ndarray, factor: float) -> np.ndarray:
+    """Scale the places of matrices (F, 4, 4), not their axes."""
+    out = matrices.copy()
+    out[:, :3, 3] *= factor
+    return out
 
 
 def _select_bones(rig: bpy.types.Object, wanted: ExportOptions, root: str | None) -> set[str]:
@@ -295,7 +375,7 @@ def _compute_channels(matrices: np.ndarray) -> dict[str, np.ndarray]:
     return found | ({"scale": size} if np.abs(size - 1.0).max() > _SCALE_TOLERANCE else {})
 
 
-def _list_meshes(scene: bpy.types.Scene, rig: bpy.types.Object) -> list[bpy.types.Object]:
+def list_meshes(scene: bpy.types.Scene, rig: bpy.types.Object) -> list[bpy.types.Object]:
     """List the meshes that an armature moves, visible now or at some other time by their keys."""
     moved = [thing for thing in scene.objects if thing.type == "MESH" and (
         thing.parent == rig or any(m.type == "ARMATURE" and m.object == rig for m in thing.modifiers))]
@@ -327,12 +407,44 @@ def _copy_mesh(stage: bpy.types.Scene, thing: bpy.types.Object, rig: bpy.types.O
     return copied
 
 
+def _find_rest_placement(rig: bpy.types.Object, thing: bpy.types.Object) -> Matrix:
+    """Find where a mesh is in the world while its armature rests where it is; one on a bone moves with that bone."""
+    if thing.parent != rig or thing.parent_type != "BONE":
+        return thing.matrix_world.copy()
+    bone = rig.pose.bones[thing.parent_bone]
+    return rig.matrix_world @ bone.bone.matrix_local @ bone.matrix.inverted() @ rig.matrix_world.inverted() \
+        @ thing.matrix_world
+
+
+def _copy_applied_mesh(stage: bpy.types.Scene, thing: bpy.types.Object, rig: bpy.types.Object, copy: bpy.types.Object,
+                       placement: Matrix) -> bpy.types.Object:
+    """Copy a mesh with its placement (while the armature rests) applied to its vertices."""
+    copied = _copy_mesh(stage, thing, rig, copy)
+    copied.data = thing.data.copy()
+    copied.data.transform(placement, shape_keys=True)
+    if thing.parent == rig and thing.parent_type == "BONE":
+        copied.vertex_groups.clear()
+        copied.vertex_groups.new(name=thing.parent_bone).add(range(len(copied.data.vertices)), 1.0, "REPLACE")
+        copied.modifiers.new("Armature", "ARMATURE").object = copy
+    copied.parent, copied.parent_type = copy, "OBJECT"
+    copied.matrix_parent_inverse, copied.matrix_basis = Matrix.Identity(4), Matrix.Identity(4)
+    return copied
+
+
 @contextmanager
-def _original_names(rigs, copies):
-    """Give the copies the rigs' own names, and their bones' data too, while they are exported."""
-    local = [(rig, copy, rig.name) for rig, copy in zip(rigs, copies) if rig.library is None]
-    for rig, copy, name in local:
-        rig.name = f"{name} (original)"
+def _original_names(originals, copies, armature_names):
+    """Give the copies the originals' names, the armatures these names, and their bones' data too, while they are
+    exported.
+    """
+    wanted = [*armature_names, *(one.name for one in originals[len(armature_names):])]
+    local = [(one, copy, one.name) for one, copy in zip(originals, copies) if one.library is None]
+    others = [(one, one.name) for one in bpy.data.objects if one.name in wanted and one not in copies
+              and one not in originals and one.library is None]
+    for one, name in others:
+        one.name = f"{name} (other)"
+    for one, _, name in local:
+        one.name = f"{name} (original)"
+    for name, copy in zip(wanted, copies):
         copy.name = name
         if copy.type == "ARMATURE" and name not in bpy.data.armatures:  # USD's bones; many may share one
             copy.data.name = name
@@ -341,9 +453,10 @@ def _original_names(rigs, copies):
     try:
         yield
     finally:
-        for rig, copy, name in local:
-            copy.name = f"{name} (copy)"
-            rig.name = name
+        for copy in copies:
+            copy.name = f"{copy.name} (copy)"
+        for one, name in [*others, *((one, name) for one, _, name in local)]:
+            one.name = name
 
 
 def _save_file(stage, copies, wanted: ExportOptions) -> None:
@@ -414,5 +527,11 @@ def _export_usd(path: str, engine: str, selected: bool) -> None:
                           export_armatures=True, **turned)
 
 
-EXPORTERS = {"FBX": _export_fbx, "GLB": _export_glb, "USD": _export_usd}
+def _export_alembic(path: str, _engine: str, selected: bool) -> None:
+    scene = bpy.context.scene
+    bpy.ops.wm.alembic_export(filepath=path, check_existing=False, selected=selected, start=scene.frame_start,
+                              end=scene.frame_end, as_background_job=False)
+
+
+EXPORTERS = {"FBX": _export_fbx, "GLB": _export_glb, "USD": _export_usd, "ABC": _export_alembic}
 """Format -> function (path, engine, selected only) that exports the scene in the window."""

@@ -14,7 +14,7 @@ from ...beyond_mocap.base.vectors import find_nearest_axis
 from ...beyond_mocap.motion import quaternion
 from ...beyond_mocap.motion.motion import Motion, forward_kinematics
 from ...beyond_mocap.motion.skeleton import Skeleton
-from ..core import action, channels
+from ..core import action, channels, take_record
 from ..core.measure import frames_per_second, units_per_metre
 from . import armature
 from .driven import DrivenRig
@@ -68,7 +68,7 @@ class FittedMotion:
         if options.exact:
             self.scale, self.slides, self.motion, self.messages = 1.0, 3 * (Slide(0.0, 0.0),), source.motion, []
             return
-        motion, skeleton = source.motion, _add_head_tip(driven.skeleton, source.motion.skeleton)
+        motion, skeleton = source.motion, add_head_tip(driven.skeleton, source.motion.skeleton)
         heel_toe_contacts = contacts.detect_heel_toe_contacts(motion)
         if source.foot_contacts is not None:
             heel_toe_contacts = heel_toe_contacts | source.foot_contacts[:, :, None]
@@ -112,7 +112,7 @@ class FittedMotion:
         return lines
 
 
-def _add_head_tip(skeleton: Skeleton, source: Skeleton) -> Skeleton:
+def add_head_tip(skeleton: Skeleton, source: Skeleton) -> Skeleton:
     """Add a tip to the driven skeleton's head, as far off the vertical as the source's in its rest pose.
 
     Heads that look straight ahead at rest then match. Unchanged where the source's rest pose shows nothing.
@@ -181,13 +181,12 @@ class SourceMotion:
     foot_contacts: np.ndarray | None = None
 
 
-def read_source(body: bpy.types.Object | None, scene: bpy.types.Scene, find_contacts=None) -> SourceMotion:
-    """Read the motion that an armature plays: its action, or the result of its NLA strips.
+def read_source(body: bpy.types.Object | None, scene: bpy.types.Scene) -> SourceMotion:
+    """Read the motion that an armature plays, with the contacts stored on it: its action, or its NLA strips' result.
 
     Args:
         body: the armature.
         scene: of the armature.
-        find_contacts: function (frames) -> (F, 2) bool of a take; None where there is none.
     Returns:
         The motion.
     Raises:
@@ -196,9 +195,7 @@ def read_source(body: bpy.types.Object | None, scene: bpy.types.Scene, find_cont
     if body is None or body.type != "ARMATURE":
         raise InputError("bake to rig", "no motion", "a player with a result or an armature with an action",
                          "synthesize and press Apply first")
-    data = body.animation_data
-    strips = [strip for track in (data.nla_tracks if data and data.use_nla else ()) if not track.mute
-              for strip in track.strips if not strip.mute]
+    strips = take_record.list_strips(body)
     playing, _ = channels.find_playing_action(body)
     if playing is None and not strips:
         raise InputError(f"armature {body.name}", "plays no action", "an armature that moves",
@@ -209,7 +206,7 @@ def read_source(body: bpy.types.Object | None, scene: bpy.types.Scene, find_cont
     else:
         motion, start, name = action.read_motion(body, scene), action.find_first_frame(body), playing.name
     frames = start + np.arange(len(motion))
-    return SourceMotion(motion, start, name, None if find_contacts is None else find_contacts(frames))
+    return SourceMotion(motion, start, name, take_record.read_body_contacts(body, frames))
 
 
 def _find_extent(body: bpy.types.Object, strips) -> tuple[int, int]:

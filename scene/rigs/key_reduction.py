@@ -13,6 +13,7 @@ import bpy
 import numpy as np
 
 from ...beyond_mocap.base.errors import InputError
+from ...beyond_mocap.base.fixes import Fix
 from ...beyond_mocap.motion import quaternion
 from ..core import channels
 from ..path_editing.rig_sampling import find_rotation_channel, to_rotations
@@ -42,7 +43,8 @@ def reduce_keys(
     """
     playing, slot = channels.find_playing_action(rig)
     if playing is None:
-        raise InputError(f"rig {rig.name}", "plays no action", "a baked rig", "press Bake to Rig first")
+        raise InputError(f"rig {rig.name}", "plays no action", "a baked rig", "press Bake to Rig first",
+                         fixes=(Fix("press", "beyond_mocap.bake_to_rig"),))
     channels.check_editable(rig)
     curves = channels.collect_curves(playing, slot)
     ends = channels.find_key_range(curves)

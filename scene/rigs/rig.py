@@ -27,11 +27,13 @@ STEPS = (
     ("SCALE", "Proportion", "Scale steps and path with the legs: a child takes shorter steps and travels less"),
 )
 IK = (
-    ("MUTE", "Switch Off", "Switch off constraints on driven bones by a key (influence 0)"),
-    ("BAKE", "Bake Targets", "Bake IK targets and poles to follow hands, feet, knees and elbows; constraints stay on"),
+    ("MUTE", "Switch Off", "Switch off constraints on driven bones by a key (influence 0); IK targets stay at rest"),
+    ("BAKE", "Bake Targets", "Bake IK targets and poles to follow hands, feet, knees and elbows, so that IK and FK can "
+     "both be used; constraints stay on"),
 )
 FORMATS = (("FBX", "FBX", "Autodesk FBX (.fbx)"), ("GLB", "glTF", "glTF binary (.glb), always Y up"),
            ("USD", "USD", "Universal Scene Description (.usdc)"),
+           ("ABC", "Alembic", "Alembic (.abc): meshes that move point by point, without bones"),
            ("BVH", "BVH", "Biovision hierarchy (.bvh): the skeleton alone, centimetres, Y up"))
 ENGINES = (("BLENDER", "Blender", "Axes of Blender's exporters: Y up, -Z forward"),
            ("UNREAL", "Unreal", "For Unreal Engine: FBX in centimetres, X forward, Z up"),
@@ -107,7 +109,7 @@ class BeyondMocapRig(bpy.types.PropertyGroup):
     messages: StringProperty(options={"HIDDEN"}, description="Messages of the last step")
     root: EnumProperty(name="Root Motion", items=ROOTS, default="KEEP", description="Motion of the root bone")
     steps: EnumProperty(name="Steps", items=STEPS, default="AUTO", description="Steps of legs with a different length")
-    ik: EnumProperty(name="IK", items=IK, default="MUTE", description="Treatment of inverse kinematics on the rig")
+    ik: EnumProperty(name="IK", items=IK, default="BAKE", description="Treatment of inverse kinematics on the rig")
     plants: BoolProperty(name="Plant Feet", default=True,
                          description="Plant feet in contact on the ground with the rig's own legs")
     reduces: BoolProperty(name="Simplify Keys", default=False, description="Remove keys that the curves do not need")

@@ -20,12 +20,12 @@ from ..core import channels
 from ..path_editing import edited_bodies
 from .bone_curves import build_bone_curves, build_setting_curves, compute_bone_poses
 from .control_study import CHANNELS
+from .controls import PREVIOUS_STATE, read_previous_state
 from .driven import DrivenRig
 from .fit import BakeOptions, FittedMotion, Slide, SourceMotion
 
 _REPORTED_DISTANCE = 1e-3  # metres from which a deviation is reported
 MARK = "beyond_mocap_rig"
-PREVIOUS_STATE = "beyond_mocap_before"
 KEYS = "beyond_mocap_keys"  # digest of the baked keys: if it differs, the user has edited them
 
 
@@ -96,6 +96,7 @@ def apply_bake(prepared: PreparedBake) -> BakeResult:
     record_keys(rig)
     for switch in driven.controls.switches:
         rig.pose.bones[switch.bone][switch.name] = switch.value
+    _restore_influences(rig, previous_state)
     messages = [*reverted, *prepared.messages, *kept_messages, *_describe_deviation(driven, prepared.frames,
                                                                                     prepared.heads, driven.scene)]
     return BakeResult(action, prepared.frames, prepared.fit.scale, prepared.fit.slides, messages)
@@ -139,18 +140,23 @@ def _describe_deviation(driven: DrivenRig, frames: np.ndarray, heads: np.ndarray
 
 
 def record_previous_state(rig: bpy.types.Object, driven: DrivenRig) -> dict:
-    """Record the rig's state for `remove_bake`; while an earlier bake is still on, the state recorded with it."""
+    """Record the rig's state for `remove_bake`; what an earlier bake that is still on has recorded is kept."""
     playing, slot = channels.find_playing_action(rig)
-    if playing is not None and playing.get(MARK) and PREVIOUS_STATE in playing:
-        return json.loads(playing[PREVIOUS_STATE])
     bones = rig.pose.bones
-    return {
+    now = {
         "action": playing.name if playing else "", "slot": slot.identifier if slot else "",
         "bones": {name: {c: list(getattr(bones[name], c)) for c in CHANNELS} for name in driven.controls.bones},
         "switches": [[s.bone, s.name, s.before] for s in driven.controls.switches],
         "constraints": [[o.bone, o.constraint, bones[o.bone].constraints[o.constraint].influence]
                         for o in driven.overrides],
     }
+    earlier = read_previous_state(rig)
+    if not earlier:
+        return now
+    known = {(bone, name) for kind in ("switches", "constraints") for bone, name, _ in earlier[kind]}
+    return {**earlier, "bones": now["bones"] | earlier["bones"],
+            **{kind: earlier[kind] + [row for row in now[kind] if (row[0], row[1]) not in known]
+               for kind in ("switches", "constraints")}}
 
 
 def record_keys(rig: bpy.types.Object) -> None:
@@ -201,10 +207,15 @@ def remove_bake(rig: bpy.types.Object) -> None:
     for bone, name, value in before.get("switches", []):
         if bone in rig.pose.bones:
             rig.pose.bones[bone][name] = value
-    for bone, name, value in before.get("constraints", []):
-        if bone in rig.pose.bones and name in rig.pose.bones[bone].constraints:
-            rig.pose.bones[bone].constraints[name].influence = value
+    _restore_influences(rig, before)
     found = bpy.data.actions.get(before.get("action", ""))
     if found is not None:
         slot = next((slot for slot in found.slots if slot.identifier == before.get("slot")), None)
         channels.assign_action(rig, found, slot)
+
+
+def _restore_influences(rig: bpy.types.Object, state: dict) -> None:
+    """Restore the influences of constraints that a bake has switched off."""
+    for bone, name, value in state.get("constraints", []):
+        if bone in rig.pose.bones and name in rig.pose.bones[bone].constraints:
+            rig.pose.bones[bone].constraints[name].influence = value

@@ -1,6 +1,11 @@
-"""A low-poly character on an armature: one mesh, a vertex group for each bone, the shirt in the player's colour."""
+"""A character on an armature: the sculpted body as one mesh, a vertex group for each bone, the shirt in the player's
+colour, skin and hair by the player's look.
+"""
 
 from __future__ import annotations
+
+from collections.abc import Callable
+from typing import TYPE_CHECKING
 
 import bpy
 import numpy as np
@@ -8,13 +13,24 @@ import numpy as np
 from ..core.material import get_material
 from ..rigs import armature
 
+if TYPE_CHECKING:
+    from ...beyond_mocap.appearance.look import Look
+    from ...beyond_mocap.appearance.mesh import BodyMesh
+
 COLOURS = {  # linear RGB of the parts that all players share
-    "skin": (0.46, 0.24, 0.15),
-    "hair": (0.035, 0.02, 0.012),
     "shorts": (0.70, 0.70, 0.72),
     "socks": (0.70, 0.70, 0.72),
+    "trim": (0.70, 0.70, 0.72),
     "boots": (0.015, 0.015, 0.018),
+    "soles": (0.35, 0.42, 0.03),
+    "eyes": (0.72, 0.72, 0.70),
+    "pupils": (0.020, 0.011, 0.007),
+    "gloves": (0.62, 0.66, 0.10),
 }
+ROUGHNESS = {"skin": 0.5, "hair": 0.6, "boots": 0.35, "eyes": 0.15, "pupils": 0.1}
+"""Roughness of parts that are not cloth."""
+
+CLOTH = 0.85  # roughness
 
 
 def create_character(player, name: str, shirt, collection, scene: bpy.types.Scene, example) -> bpy.types.Object:
@@ -22,7 +38,7 @@ def create_character(player, name: str, shirt, collection, scene: bpy.types.Scen
 
     Args:
         player: the armature.
-        name: of the mesh.
+        name: of the mesh; the look is chosen by it.
         shirt: linear RGB.
         collection: for the mesh.
         scene: says the unit scale.
@@ -31,31 +47,94 @@ def create_character(player, name: str, shirt, collection, scene: bpy.types.Scen
     Returns:
         The mesh object.
     """
-    from ...beyond_mocap.appearance.body import MATERIALS, build_body  # imports scipy, which is slow
+    from ...beyond_mocap.appearance.body import build_body  # imports scipy, which is slow
+    from ...beyond_mocap.appearance.look import choose_look
 
-    skeleton = armature.build_skeleton(player, scene)
-    body = build_body(skeleton, example=example)
+    skeleton, look = armature.build_skeleton(player, scene), choose_look(name)
+    body = build_body(skeleton, example=example, look=look)
     scale = armature.find_placement(player, scene).scale
     root = np.array(player.data.bones[skeleton.names[0]].head_local)
-    mesh = bpy.data.meshes.new(f"{name} body")
-    mesh.from_pydata((body.vertices / scale + root).tolist(), [], body.faces)
-    mesh.polygons.foreach_set("material_index", np.asarray(body.material, np.int32))
-    mesh.polygons.foreach_set("use_smooth", np.ones(len(body.faces), bool))
-    for part in MATERIALS:
-        material = f"{name} {part}" if part == "shirt" else part.capitalize()
-        mesh.materials.append(get_material(material, COLOURS.get(part, shirt)))
+
+    def find_material(part: str) -> bpy.types.Material:
+        return get_material(f"{name} shirt", tuple(shirt), CLOTH) if part == "shirt" else get_part_material(part, look)
+
+    mesh = create_body_mesh(f"{name} body", body, body.vertices / scale + root, find_material)
     character = bpy.data.objects.new(f"{name} body", mesh)
     collection.objects.link(character)
-    character.parent = player
-    character.modifiers.new("Armature", "ARMATURE").object = player
-    _write_weights(character, skeleton.names, body)
+    attach(character, player)
+    write_weights(character, skeleton.names, body.joints, body.weights)
     return character
 
 
-def _write_weights(character: bpy.types.Object, names: tuple[str, ...], body) -> None:
-    """Write a vertex group for each bone, in runs of equal weight: few calls, and no operator."""
+def get_part_material(part: str, look: Look) -> bpy.types.Material:
+    """Return the material that all players with this look share for a part other than the kit's own."""
+    from ...beyond_mocap.appearance.look import HAIR_COLOURS, SKIN_TONES
+
+    tones = {"skin": (look.skin, SKIN_TONES), "hair": (look.colour, HAIR_COLOURS)}
+    roughness = ROUGHNESS.get(part, CLOTH)
+    if part not in tones:
+        return get_material(part.capitalize(), COLOURS[part], roughness)
+    index, table = tones[part]
+    return get_material(f"{part.capitalize()} {index + 1}", table[index], roughness)
+
+
+def create_body_mesh(name: str, body: BodyMesh, vertices: np.ndarray,
+                     find_material: Callable[[str], bpy.types.Material]) -> bpy.types.Mesh:
+    """Create the mesh of a body, smooth but for the edges between its parts.
+
+    Args:
+        name: of the mesh.
+        body: faces and materials.
+        vertices: (V, 3) in the armature's space.
+        find_material: gives the material of a part.
+    Returns:
+        The mesh.
+    """
+    from ...beyond_mocap.appearance.mesh import MATERIALS
+
+    mesh = bpy.data.meshes.new(name)
+    mesh.from_pydata(vertices.tolist(), [], body.faces)
+    mesh.polygons.foreach_set("material_index", np.asarray(body.material, np.int32))
+    mesh.polygons.foreach_set("use_smooth", np.ones(len(body.faces), bool))
+    _mark_edges(mesh, body)
+    for part in MATERIALS:
+        mesh.materials.append(find_material(part))
+    return mesh
+
+
+def _mark_edges(mesh: bpy.types.Mesh, body: BodyMesh) -> None:
+    """Mark the edges between materials as sharp."""
+    edge_of_corner = np.empty(len(mesh.loops), np.int32)
+    mesh.loops.foreach_get("edge_index", edge_of_corner)
+    material = np.repeat(body.material, [len(face) for face in body.faces])
+    low, high = np.full(len(mesh.edges), len(body.material)), np.full(len(mesh.edges), -1)
+    np.minimum.at(low, edge_of_corner, material)
+    np.maximum.at(high, edge_of_corner, material)
+    mesh.edges.foreach_set("use_edge_sharp", low != high)
+
+
+def attach(character: bpy.types.Object, player: bpy.types.Object) -> None:
+    """Make a mesh the child of an armature that bends it and keeps its volume."""
+    character.parent = player
+    modifier = character.modifiers.new("Armature", "ARMATURE")
+    modifier.object, modifier.use_deform_preserve_volume = player, True
+
+
+def write_weights(character: bpy.types.Object, names: tuple[str, ...], joints: np.ndarray,
+                  weights: np.ndarray) -> None:
+    """Write a vertex group for each bone that moves something, in runs of equal weight: few calls, and no operator.
+
+    Args:
+        character: the mesh object.
+        names: of the bones.
+        joints, weights: (V, K) as in `BodyMesh`.
+    """
     for joint, name in enumerate(names):
+        share = np.sum(np.where(joints == joint, weights, 0.0), axis=1).round(3)
+        used = np.flatnonzero(share)
+        if not len(used):
+            continue
         group = character.vertex_groups.new(name=name)
-        weights = np.sum(np.where(body.joints == joint, body.weights, 0.0), axis=1)
-        for weight in np.unique(weights[weights > 1e-6]):
-            group.add(np.flatnonzero(weights == weight).tolist(), float(weight), "REPLACE")
+        order = used[np.argsort(share[used], kind="stable")]
+        for run in np.split(order, np.flatnonzero(np.diff(share[order])) + 1):
+            group.add(run.tolist(), float(share[run[0]]), "REPLACE")

@@ -15,6 +15,7 @@ import bpy
 import numpy as np
 
 from ...beyond_mocap.base.errors import BeyondMocapError, InputError
+from ...beyond_mocap.base.fixes import Fix
 from ...beyond_mocap.motion import quaternion
 from ...beyond_mocap.motion.motion import Motion
 from ...beyond_mocap.motion.skeleton import Skeleton
@@ -196,7 +197,8 @@ def start_listening(settings) -> Listener:
     hierarchy = read_hierarchy(clip) if clip else None
     before = get_current_listener()
     if before is not None:
-        raise InputError(f"port {before.port}", "a stream is already received", "one at a time", "press Stop Stream")
+        raise InputError(f"port {before.port}", "a stream is already received", "one at a time", "press Stop Stream",
+                         fixes=(Fix("press", "beyond_mocap.stream_stop"),))
     one = Listener(settings.port, settings.protocol, hierarchy, settings.unit or None).start()
     _session["listener"] = one
     _session["hits"] = LiveHits(one, settings.part, "" if settings.side == "either" else settings.side,

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING
 import bpy
 
 from ...beyond_mocap.base.errors import BeyondMocapError, InputError
+from ...beyond_mocap.base.fixes import Fix
 from ...beyond_mocap.passes.hits import HitMotion
 from ..core import action, background, channels, frame_range
 from ..core.live import Watcher
@@ -148,7 +149,8 @@ def update_rally(scene: bpy.types.Scene) -> None:
 def answer_now(scene: bpy.types.Scene, hit: HitMotion) -> LivePass:
     """Answer a strike at once, for scripts: the pass is computed and inserted before this returns."""
     if get_current_rally() is None:
-        raise InputError("play live", "no rally is being played", "a rally", "press Play Live")
+        raise InputError("play live", "no rally is being played", "a rally", "press Play Live",
+                         fixes=(Fix("press", "beyond_mocap.stream_play"),))
     piece = _build_answer(*_collect_request(scene, hit), None, None)
     _apply_pass(scene, piece)
     return piece

@@ -25,6 +25,7 @@ from ...beyond_mocap.annotation.key_commands import (
     ShowMessage,
 )
 from ...beyond_mocap.base.errors import InputError
+from ...beyond_mocap.base.fixes import Fix
 from ..core import session
 from ..core.measure import Clock, build_scene_clock
 from ..core.settings import find_active_player, to_absolute_path
@@ -63,7 +64,8 @@ def compute_now(context: bpy.types.Context) -> Playhead:
     """Compute the playhead on the target's clock. Raises InputError without a target."""
     target = strips.find_target(context)
     if target is None and not strips.can_have_timeline(context):
-        raise InputError("annotate", "there is no player", "a player in the list", "import tracking in step 2 first")
+        raise InputError("annotate", "there is no player", "a player in the list", "import tracking in step 2 first",
+                         fixes=(Fix("add_track"),))
     clock = build_scene_clock(context.scene) if target is None else strips.find_target_clock(context, target)
     time = clock.to_seconds(context.scene.frame_current_final)
     ends = [placed.span.end for placed in _list_active_spans(target)] + [placed.time

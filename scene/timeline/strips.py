@@ -10,6 +10,7 @@ import bpy
 
 from ...beyond_mocap.annotation import Timeline, parse_timeline, read_timeline
 from ...beyond_mocap.base.errors import InputError, format_count
+from ...beyond_mocap.base.fixes import Fix
 from ...beyond_mocap.motion.track import Track
 from ..core.measure import Clock, build_scene_clock
 from ..core.settings import BeyondMocapPlayer, find_active_player, to_absolute_path
@@ -146,7 +147,10 @@ def read_written_labels(player: BeyondMocapPlayer, fps: float, track: Track) -> 
     if player.annotation_text is not None:
         return parse_timeline(player.annotation_text.as_string(), describe_label_source(player), fps, start)
     if player.annotation_file:
-        return read_timeline(describe_label_source(player), fps, start)
+        try:
+            return read_timeline(describe_label_source(player), fps, start)
+        except InputError as error:
+            raise error.offer(Fix("choose_labels")) from None
     return Timeline()
 
 

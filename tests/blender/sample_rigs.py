@@ -3,6 +3,8 @@
 The body stands 1.75 m tall, looks along -Y as Blender's characters do, its soles on the ground.
 """
 
+import importlib
+
 import bpy
 import numpy as np
 from mathutils import Euler, Matrix, Vector
@@ -174,3 +176,11 @@ def read_heads(rig, bones, frames):
         scene.frame_set(int(frame))
         found.append([np.array((rig.matrix_world @ rig.pose.bones[bone].matrix).translation) for bone in bones])
     return np.array(found)
+
+
+def read_all_keys(extension, rig):
+    """All keys of the action that a rig plays: by channel, frames and values as text of their bits."""
+    channels = importlib.import_module(f"{extension}.scene.core.channels")
+    curves = channels.collect_curves(*channels.find_playing_action(rig))
+    return {f"{path}[{index}]": channels.read_keys(curve)["co"].tobytes().hex()
+            for (path, index), curve in curves.items()}

@@ -19,6 +19,7 @@ import bpy
 import cached_work
 import numpy as np
 import pytest
+import sample_characters as characters
 import sample_rigs as rigs
 import worlds
 from conftest import EXTENSION, find_free_port
@@ -89,6 +90,23 @@ def lose_a_player():
 
 def two_variants():
     bpy.ops.beyond_mocap.variants(count=2)
+
+
+def move_a_contact():
+    edit = bpy.context.scene.beyond_mocap.players[0].contact_edits.add()
+    edit.time, edit.offset = 3.0, (0.1, 0.0)
+
+
+def key_a_pose():
+    body = bpy.context.scene.beyond_mocap.players[0].body
+    bpy.context.scene.frame_set(20)
+    body.pose.bones[0].location.z += 0.1
+    body.pose.bones[0].keyframe_insert("location")
+
+
+def keep_a_layer():
+    key_a_pose()
+    bpy.ops.beyond_mocap.keep_as_layer()
 
 
 def pin_a_hand():
@@ -239,6 +257,15 @@ def bake_it():
     bpy.ops.beyond_mocap.bake_to_rig()
 
 
+def a_still_character():
+    """The first player's body is a character that has lost its keys."""
+    rig, player = rigs.create_mixamo(), bpy.context.scene.beyond_mocap.players[0]
+    characters.add_mesh(rig, EXTENSION)
+    player.character = rig
+    player.character_body.animation_data.action = None
+    worlds.select_objects(player.body)
+
+
 def a_target(act="throw"):
     """Something far away to aim at: the 3D cursor; and a model that is quickly read."""
     bpy.context.scene.cursor.location = (20.0, 1.0, 1.0)
@@ -376,12 +403,14 @@ ROWS = {
     "draw_track": Row("imported"),
     "edit_path": Row("accepted"),
     "edit_words": Row("imported", lambda places: {"words": "header"}, pick_a_moment),
+    "deliver": Row("accepted", lambda places: {"directory": f"{places.out}/", "preset": "GODOT"}, changes=False),
     "error_curves": Row("synthesized"),
     "export_bvh": Row("accepted", lambda places: {"filepath": f"{places.out}/out.bvh"}, changes=False),
     "export_motion": Row(
         "accepted", lambda places: {"filepath": f"{places.out}/out.glb", "format": "GLB"}, changes=False
     ),
     "export_words": Row("imported", lambda places: {"filepath": f"{places.out}/out.txt"}, changes=False),
+    "fix_foot": Row("synthesized", lambda places: {"time": 3.0, "offset": (0.05, 0.0)}),
     "find_release": Row("imported", prepare=a_body_of_markers),
     "free_ball": Row("accepted", prepare=carry),
     "go_to_strike": Row("accepted", lambda places: {"frame": 7}, analyse),
@@ -434,6 +463,7 @@ ROWS = {
     "path_camera": Row("imported", lambda places: {"which": "SIDE"}, lay_cameras),
     "path_cameras": Row("accepted", prepare=ride),
     "path_curve": Row("accepted", lambda places: {"count": 7}, ride),
+    "hover_timeline": Row("imported", changes=False, window=True),
     "pick_moment": Row("imported", changes=False, window=True),
     "place_players": Row("imported", prepare=forget_dots),
     "player_from_dot": Row("imported", prepare=lose_a_player),
@@ -446,6 +476,9 @@ ROWS = {
     "relink_library": Row("imported", lambda places: {"directory": f"{moved(places.clips)}/"}),
     "remove_clip": Row("clip"),
     "remove_heading_key": Row("imported", prepare=face_ball),
+    "keep_as_layer": Row("accepted", prepare=key_a_pose),
+    "remove_layer": Row("accepted", prepare=keep_a_layer),
+    "remove_contact_edit": Row("synthesized", prepare=move_a_contact),
     "remove_pin": Row("synthesized", prepare=pin_a_hand),
     "remove_player": Row("imported"),
     "remove_video": Row("video"),
@@ -459,6 +492,7 @@ ROWS = {
         "imported", lambda places: {"filepath": f"{places.out}/set.txt"}, a_cloud, changes=False
     ),
     "save_words": Row("clip", lambda places: {"overwrite": True}, changes=False),
+    "set_automatic": Row("imported", lambda places: {"path": "beyond_mocap.omega", "value": 3.0}),
     "set_static": Row("imported", prepare=two_clouds),
     "set_speed": Row("imported", lambda places: {"speed": 2.0}, draw),
     "show_match": Row("imported", prepare=a_made_match),
@@ -486,6 +520,7 @@ ROWS = {
     "update_path": Row("accepted", prepare=ride_elsewhere),
     "update_live": Row("synthesized", lambda places: {"player": "player1", "kind": "quick"}),
     "use_marker_set": Row("imported", lambda places: {"which": "plug_in_gait_legs"}, a_cloud),
+    "update_character": Row("accepted", prepare=a_still_character),
     "use_selected_rig": Row("rig", prepare=another_rig),
     "variants": Row("synthesized", lambda places: {"count": 2}),
     "words_to_text": Row("imported"),

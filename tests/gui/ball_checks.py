@@ -41,9 +41,7 @@ def isolate_panel(part):
     name = "stream" if part in ("draw_stream", "draw_play_live") else "ball"
     kind, drawn = (getattr(import_module(f"panels.{name}"), one) for one in (f"BEYOND_MOCAP_PT_{name}", part))
     was, draw = (kind.bl_category, kind.bl_options), kind.draw
-    kind.draw = lambda self, context: drawn(
-        *([self] if part in ("draw_passing_scene", "draw_tracked_ball", "draw_play_live") else []), self.layout, context
-    )
+    kind.draw = lambda self, context: drawn(self.layout, context)
 
     def place_panel(category, options):
         bpy.utils.unregister_class(kind)

@@ -266,7 +266,7 @@ def check_a_passing_scene():
     area = window.find_area("VIEW_3D")
     show_only([panel], "VIEW_3D")
     draw, look = panel.draw, bpy.context.preferences.view
-    panel.draw = lambda self, context: import_module("panels.ball").draw_passing_scene(self, self.layout, context)
+    panel.draw = lambda self, context: import_module("panels.ball").draw_passing_scene(self.layout, context)
     draw_unfolded(panel)
     look.ui_scale = 0.75  # it is longer than the window
     yield from window.open_tab(area, TAB)

@@ -180,6 +180,7 @@ def press_buttons_of_task(operators, known):
         if call:
             pressed.append(call)
             reaction = yield from close_opened()
+            yield from window.escape_from(window.window)  # a dialog, of which nothing can be read
             output.write_line(f"     pressed {call}: {reaction if usable[call] else 'greyed out'}")
         more = call or (yield from window.scroll_region(area, region))
     return pressed

@@ -194,13 +194,17 @@ def check_another_frame_rate():
     assert format_strips() == before and is_in_order()
 
 
+def list_names(region):
+    """The key moments that are drawn, in the context of their editor."""
+    return import_module("scene.timeline.strip_layout").build_layout(bpy.context, region).names
+
+
 def find_name(text):
-    """The drawn name with this text, and its middle in pixels of the window."""
+    """The drawn key moment with this name, and its middle in pixels of the window."""
     area = find_nla()
     region = next(region for region in area.regions if region.type == "WINDOW")
     with override_nla():
-        found = next(one for one in import_module("scene.timeline.moment_names").list_names(bpy.context, region)
-                     if one.text == text)
+        found = next(one for one in list_names(region) if one.name == text)
     left, bottom, right, top = found.box
     return found, (int(region.x + (left + right) / 2), int(region.y + (bottom + top) / 2))
 
@@ -316,11 +320,12 @@ def check_many_names_do_not_overlap():
     yield 0.5
     region = next(region for region in find_nla().regions if region.type == "WINDOW")
     with override_nla():
-        boxes = [one.box for one in import_module("scene.timeline.moment_names").list_names(bpy.context, region)]
+        boxes = [one.box for one in list_names(region) if one.text]
+        diamonds = [one for one in list_names(region) if one.y is not None]
     window.save_picture(PICTURES / "timeline-many.png")
     bpy.context.preferences.view.ui_scale = 1.0
     yield 0.5
-    assert len(boxes) > 5
+    assert len(boxes) > 5 and len(diamonds) >= 80, "the row of key moments is not found under so many ticks"
     for number, a in enumerate(boxes):
         assert 0 <= a[0] and a[2] <= region.width and a[3] < region.height
         for b in boxes[:number]:
@@ -335,7 +340,7 @@ def check_names_in_the_dope_sheet():
     region = next(region for region in area.regions if region.type == "WINDOW")
     with bpy.context.temp_override(window=window.window, screen=window.window.screen, area=area, region=region):
         bpy.ops.action.view_all()
-        found = import_module("scene.timeline.moment_names").list_names(bpy.context, region)
+        found = list_names(region)
     yield 0.5
     window.save_picture(PICTURES / "timeline-dope-sheet.png")
     assert found, "no name is drawn"

@@ -13,6 +13,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from ...base.errors import InputError
+from ...base.fixes import Fix
 from ...base.vectors import unit_vectors
 
 NAMES = {"m": 1.0, "meter": 1.0, "meters": 1.0, "metre": 1.0, "metres": 1.0, "dm": 0.1, "decimeter": 0.1,
@@ -75,7 +76,7 @@ def check_given_unit(path: str | os.PathLike, unit: float | str, positions: np.n
     metres, span = parse_unit(unit), measure_span(positions)
     if span > 0 and not _GIVEN_RANGE[0] <= span * metres <= _GIVEN_RANGE[1]:
         found = f"makes {path} span {span * metres:.4g} m"
-        raise InputError(f"unit {str(unit)[:40]}", found, "a body", "check the unit")
+        raise InputError(f"unit {str(unit)[:40]}", found, "a body", "check the unit", fixes=(Fix("use_unit", "0"),))
     note = f"unit {metres:g} m, as given"
     usual = not span or _BODY_RANGE[0] <= span * metres <= _BODY_RANGE[1]
     return metres, note if usual else f"{note}: the markers then span {span * metres:.4g} m, unusual for a body"
@@ -100,18 +101,27 @@ def decide_unit(path: str | os.PathLike, header_unit: str, positions: np.ndarray
     if known is not None:
         if height > 0 and not _HEIGHT_RANGE[0] <= height * known <= _HEIGHT_RANGE[1]:
             raise InputError(path, f"a body of {height * known:.4g} m in the header's unit {header_unit.strip()!r}",
-                             "a body", _SET_UNIT)  # fmt: skip
+                             "a body", _SET_UNIT, fixes=_list_unit_fixes(span))  # fmt: skip
         if span > 0 and not _BODY_RANGE[0] <= span * known <= _BODY_RANGE[1]:
             raise InputError(
                 path, f"markers that span {span * known:.4g} m in the header's unit {header_unit.strip()!r}", "a body",
-                             _SET_UNIT)  # fmt: skip
+                             _SET_UNIT, fixes=_list_unit_fixes(span))  # fmt: skip
         return known, f"unit {header_unit.strip()}"
-    fitting = [name for name in _GUESSED_UNITS if _GUESS_RANGE[0] <= span * NAMES[name] <= _GUESS_RANGE[1]]
+    fitting = _list_fitting_units(span)
     found = f"unit {header_unit.strip()[:20]!r}" if header_unit.strip() else "no unit"
     if not fitting:
         raise InputError(path, f"{found}, and markers that span {span:.4g} of it", "mm, cm, m or in", _SET_UNIT)
     best = min(fitting, key=lambda name: abs(math.log(span * NAMES[name] / _USUAL_SPAN)))
     return NAMES[best], f"{found} in the header: taken as {best}, since the markers span {span:.4g}"
+
+
+def _list_fitting_units(span: float) -> list[str]:
+    """List the names of the units in which markers that span so much of the file's unit are a body's."""
+    return [name for name in _GUESSED_UNITS if _GUESS_RANGE[0] <= span * NAMES[name] <= _GUESS_RANGE[1]]
+
+
+def _list_unit_fixes(span: float) -> tuple[Fix, ...]:
+    return tuple(Fix("use_unit", f"{NAMES[name]:g}") for name in _list_fitting_units(span))
 
 
 def measure_span(positions: np.ndarray) -> float:

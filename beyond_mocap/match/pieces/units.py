@@ -125,8 +125,8 @@ def cut_plan(plan: Plan, start: float, end: float) -> Plan:
     """Cut a plan to a span within its track.
 
     The track's first sample is at `start` and its last at `end`, interpolated where the feed has none. Key moments,
-    pins and headings outside are left out, but for headings that fade in or out inside; spans that reach into the time
-    stay whole.
+    pins, contact edits and headings outside are left out, but for headings that fade in or out inside; spans that reach
+    into the time stay whole.
 
     Args:
         plan: the plan.
@@ -143,6 +143,7 @@ def cut_plan(plan: Plan, start: float, end: float) -> Plan:
         timeline=Timeline(tuple(spans), tuple(inside)),
         exertion=measure_exertion(plan.track, start, plan.exertion) if plan.fatigue else plan.exertion,
         pins=tuple(pin for pin in plan.pins if pin.time <= end and pin.end >= start),
+        contact_edits=tuple(edit for edit in plan.contact_edits if start <= edit.time <= end),
         heading_keys=tuple(key for key in plan.heading_keys if key.is_within(start - HOLD_FADE, end + HOLD_FADE)),
         heading_path=None if plan.heading_path is None else plan.heading_path.cut_span(start - HOLD_FADE,
                                                                                        end + HOLD_FADE),

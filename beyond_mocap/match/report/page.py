@@ -11,6 +11,7 @@ from pathlib import Path
 
 import numpy as np
 
+from ...appearance.picture import encode_png
 from ...base.errors import format_seconds
 from ...evaluation import naturalness_figures, physics_figures, touch_figures
 from ...evaluation.html_page import (
@@ -29,7 +30,7 @@ from ...evaluation.html_page import (
 from ...evaluation.report import flatten_report
 from ...evaluation.titles import Title
 from ...synthesis.quality.targets import find_target
-from .pictures import encode_png, render_heat_strip
+from .pictures import render_heat_strip
 from .results import (
     LIMITS,
     MAX_SECONDS,

@@ -4,14 +4,12 @@ second.
 
 from __future__ import annotations
 
-import struct
-import zlib
 from collections.abc import Callable, Mapping
 from pathlib import Path
 
 import numpy as np
 
-from ...appearance.picture import render_pose
+from ...appearance.picture import encode_png, render_pose
 from ...base.errors import BeyondMocapError
 from ...library.library import Library
 from ..displayed_motion import construct_displayed_player
@@ -83,20 +81,3 @@ def compute_colours(bad: np.ndarray) -> np.ndarray:
     above = _LIMIT + (_BAD - _LIMIT) * (known - 1.0) / (FULL_COLOUR - 1.0)
     out = np.where(np.isnan(bad)[..., None], _ABSENT, np.where(known <= 1.0, below, above))
     return np.rint(out).astype(np.uint8)
-
-
-def encode_png(pixels: np.ndarray) -> bytes:
-    """Encode a picture as a PNG (ISO/IEC 15948): one chunk of rows without filter.
-
-    Args:
-        pixels: (H, W, 3) or (H, W, 4) uint8, the upper row first.
-    Returns:
-        The file's bytes.
-    """
-    high, wide, channels = pixels.shape
-    head = struct.pack(">IIBBBBB", wide, high, 8, 2 if channels == 3 else 6, 0, 0, 0)
-    rows = np.concatenate([np.zeros((high, 1), np.uint8), np.ascontiguousarray(pixels).reshape(high, -1)], axis=1)
-    chunks = ((b"IHDR", head), (b"IDAT", zlib.compress(rows.tobytes(), 9)), (b"IEND", b""))
-    return b"\x89PNG\r\n\x1a\n" + b"".join(
-        struct.pack(">I", len(data)) + kind + data + struct.pack(">I", zlib.crc32(kind + data)) for kind, data in chunks
-    )

@@ -37,6 +37,7 @@ from ..search.source_frames import SourceFrames, SourceMotion, fetch_overlap
 from ..take import KeyResult
 from .ball_touch.touch_frames import Touch
 from .breathing import breathe, compute_breath_depth
+from .contact_edits import apply_contact_edits
 from .edit_blending import OldMotion
 from .extra_steps import Steps, add_steps
 from .gaze import compute_release, estimate_look, hide_lost_ball, watch_ball
@@ -133,7 +134,16 @@ class Construction:
             ground, pose = self._pull_to_track(ground), self._lean_into_curves(pose)
         planted, steps_taken = self._plant_feet(np.column_stack([ground, self.smooth_source.height]), pose)
         planted = self._obey_momentum(self._breathe(self._watch_ball(planted)))
+        planted, steps_taken = self._edit_contacts(planted, steps_taken)
         return replace(planted, rotations=self._roll_toes(planted.root, planted.rotations)), steps_taken
+
+    def _edit_contacts(self, planted: PlantResult, steps_taken: Steps) -> tuple[PlantResult, Steps]:
+        """Apply the plan's contact edits."""
+        size = self.plan.size
+        edits = [edit if size == 1.0 else replace(edit, offset=tuple(value / size for value in edit.offset))
+                 for edit in self.plan.requested.contact_edits]
+        return apply_contact_edits(self.library.skeleton, planted, steps_taken, edits, self.plan.fps,
+                                   start=float(self.track.times[0]))
 
     def _roll_toes(self, root: np.ndarray, rotations: np.ndarray) -> np.ndarray:
         """Bend the toes (T, J, 4) where their tips would be below the ground."""

@@ -27,6 +27,7 @@ from ...annotation.ball_contact import takes_with_foot
 from ...annotation.labels import list_gaits, read_labels
 from ...annotation.vocabulary import DIRECTIONS, SIDES, find_nearest_labels
 from ...base.errors import NotInLibraryError, TimedMessage, format_seconds
+from ...base.fixes import Fix
 from ...library.automatic_locomotion import build_automatic_labels
 from ...library.keys import Key, list_nearest_labels, select_keys, select_nearest_keys, select_substitutes
 from ...library.library import Library
@@ -249,7 +250,9 @@ def _build_nearest_key(moment: KeyMoment, frame: float, usable: tuple[Key, ...],
             f"{_describe_synthetic(moment.words) if has_synthetic else ''}")
     if not use_nearest:
         way_out = ("use one of these, " if nearest else "") + f"add such a clip, or {USE_NEAREST}"
-        raise NotInLibraryError(f"{text}; {way_out}", nearest, moment.line)
+        fixes = (Fix("use_nearest"), *([Fix("show_clips", nearest[0].split()[0])] if nearest else []),
+                 Fix("show_label", repr(moment.time)))
+        raise NotInLibraryError(f"{text}; {way_out}", nearest, moment.line, fixes)
     choices = select_nearest_keys(usable, moment.words)
     used = sort_labels(choices[0].labels) if choices else gait_words
     instead = " ".join(used) if choices else "locomotion continues there"

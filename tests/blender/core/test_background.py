@@ -31,6 +31,16 @@ def test_result_and_progress(background):
     assert job.result is True and (job.fraction, job.text) == (0.5, "half") and not job.is_stale
 
 
+def test_progress_always_has_a_text(background):
+    """Before the thread had said anything, the panel showed a player's name with nothing behind it."""
+    job = background.Job("test", lambda *asking: None)
+    assert job.describe_progress() == "Starting 0 %"
+    wait(job)
+    job = background.Job("test", lambda progress, *asking: progress(0.41, "searching"))
+    wait(job)
+    assert job.describe_progress() == "Searching 41 %"
+
+
 def test_errors_are_carried_over(background):
     def work(progress, cancelled, hurry):
         raise ValueError("planted")

@@ -82,3 +82,19 @@ def test_the_active_object_and_its_mode_stay(core, armature):
 def test_not_an_armature(core, armature):
     with pytest.raises(core("base.errors").InputError, match="select one"):
         armature.build_skeleton(None, bpy.context.scene)
+
+
+def test_fingers_are_kept_but_not_displayed(core, armature):
+    plain = synthetic_motion.build_skeleton(core)
+    left, count = plain.index("LeftForeArm"), len(plain)
+    skeleton = core("motion.skeleton").Skeleton(
+        (*plain.names, "LeftHand", "LeftThumb1"), (*plain.parents, left, count),
+        np.vstack([plain.offsets, [[0.0, 0.0, -0.25], [0.03, 0.0, -0.03]]]),
+        (*(parent for parent in plain.end_parents if parent != left), count + 1),
+        np.vstack([[offset for parent, offset in zip(plain.end_parents, plain.end_offsets) if parent != left],
+                   [[0.02, 0.0, -0.01]]]))
+    body = armature.create_armature(bpy.context, skeleton, "Body")
+    hidden = {bone.name for bone in body.data.bones if bone.collections
+              and not any(one.is_visible for one in bone.collections)}
+    assert hidden == {"LeftThumb1"}
+    assert_same(armature.build_skeleton(body, bpy.context.scene), skeleton, 0.0)

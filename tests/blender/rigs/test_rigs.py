@@ -26,8 +26,8 @@ FAMILIES = {"mixamo": rigs.create_mixamo, "unreal": rigs.create_unreal, "metahum
 @pytest.fixture
 def rooms(extension):
     return {name: importlib.import_module(f"{extension.__name__}.scene.{name}")
-            for name in ("rigs.armature", "core.action", "core.channels", "rigs.bone_maps", "rigs.rig_bake",
-                         "rigs.control_study", "rigs.fit", "rigs.key_reduction", "rigs.rig")}
+            for name in ("rigs.armature", "core.action", "core.channels", "core.take_record", "rigs.bone_maps",
+                         "rigs.rig_bake", "rigs.control_study", "rigs.fit", "rigs.key_reduction", "rigs.rig")}
 
 
 @pytest.fixture(scope="session")
@@ -268,10 +268,22 @@ def test_fewer_keys_stay_within_the_tolerance(rooms, body):
         )
 
 
-def test_what_is_carried_over_is_the_takes_own_contact(rooms, body):
-    scene = bpy.context.scene
-    source = rooms["rigs.fit"].read_source(body, scene, lambda frames: np.zeros((len(frames), 2), bool))
-    assert source.foot_contacts.shape == (60, 2) and source.start == START
+def test_contacts_stored_on_an_action_are_read_from_it_and_from_its_strips(rooms, body):
+    scene, record = bpy.context.scene, rooms["core.take_record"]
+    action, slot = rooms["core.channels"].find_playing_action(body)
+    assert rooms["rigs.fit"].read_source(body, scene).foot_contacts is None
+    frames, contacts = np.arange(START, START + 60), np.zeros((60, 2), bool)
+    contacts[10:20, 0] = contacts[50:, 1] = True
+    record.store_contacts(action, frames, contacts)
+    source = rooms["rigs.fit"].read_source(body, scene)
+    assert source.start == START
+    np.testing.assert_array_equal(source.foot_contacts, contacts)
+    body.animation_data.action = None
+    strip = body.animation_data.nla_tracks.new().strips.new("later", START + 100, action)
+    strip.action_slot = slot
+    np.testing.assert_array_equal(rooms["rigs.fit"].read_source(body, scene).foot_contacts, contacts)
+    strip.scale = 2.0
+    np.testing.assert_array_equal(rooms["rigs.fit"].read_source(body, scene).foot_contacts[:119:2], contacts)
 
 
 def test_nla_strips_are_baked_as_they_play(rooms, body):

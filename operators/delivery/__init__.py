@@ -1,0 +1,1 @@
+"""Operators that deliver what was made, as pictures."""

@@ -1,0 +1,1 @@
+"""Operators of notices about what failed."""

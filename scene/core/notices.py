@@ -1,0 +1,200 @@
+"""What went wrong, kept until it is fixed or dismissed: the line, its fixes as buttons, and the call that failed.
+
+The rows are on the window manager: neither saved with a file nor undone. Panels draw them, operators post and clear
+them.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+
+import bpy
+from bpy.props import BoolProperty, CollectionProperty, IntProperty, StringProperty
+
+from ...beyond_mocap.base.errors import BeyondMocapError
+from ...beyond_mocap.base.fixes import Fix
+from . import window
+from .live import Watcher
+
+
+class BeyondMocapFix(bpy.types.PropertyGroup):
+    """One way out of a notice; `name` is what its button says"""
+
+    kind: StringProperty(description="Kind of the fix")
+    value: StringProperty(description="What the fix needs")
+    icon: StringProperty(description="Icon of its button")
+
+
+class BeyondMocapNotice(bpy.types.PropertyGroup):
+    """One notice; `name` is what failed"""
+
+    number: IntProperty(description="Number of the notice in this session")
+    scene: StringProperty(description="The scene that it belongs to")
+    topic: StringProperty(description="What it is about; a newer notice about the same replaces it")
+    room: StringProperty(description="The feature whose panel shows it")
+    found: StringProperty(description="What is wrong and where")
+    step: StringProperty(description="What is expected, and what to do")
+    player: StringProperty(description="The player that it is about")
+    is_error: BoolProperty(description="Whether something failed")
+    operator: StringProperty(description="The operator that failed")
+    arguments: StringProperty(description="The arguments it was called with")
+    fixes: CollectionProperty(type=BeyondMocapFix, description="Ways out, the best first")
+
+
+class BeyondMocapNotices(bpy.types.PropertyGroup):
+    """All notices"""
+
+    attached_to = ("WindowManager.beyond_mocap_notices",)
+    rows: CollectionProperty(type=BeyondMocapNotice, description="The notices, the oldest first")
+    count: IntProperty(description="How many there were in this session")
+    shown: IntProperty(description="Number of the first notice that the pop-up shows")
+
+
+@dataclass(frozen=True, kw_only=True)
+class Subject:
+    """What a notice is about.
+
+    Attributes:
+        topic: a newer notice about the same topic replaces the older one.
+        room: the feature whose panel shows it.
+        title: what failed, as its button says it.
+        player: name of the player that it is about; "" for none.
+        operator: name of the operator that failed; "" for none.
+        arguments: it was called with.
+    """
+
+    topic: str
+    room: str
+    title: str
+    player: str = ""
+    operator: str = ""
+    arguments: dict = field(default_factory=dict)
+
+
+UNITS = {0.001: "Millimetres", 0.01: "Centimetres", 0.0254: "Inches", 1.0: "Metres"}
+
+
+def _name_file(path: str) -> str:
+    return bpy.path.basename(path)
+
+
+def _name_unit(metres: str) -> str:
+    return f"Read as {UNITS[float(metres)]}" if float(metres) else "Use the File's Unit"
+
+
+def _name_operator(name: str) -> str:
+    return find_operator(name).get_rna_type().name
+
+
+BUTTONS = {  # kind of a fix -> what its button says, from the fix's value, and its icon
+    "use_nearest": (lambda _: "Use Nearest Labels", "CHECKMARK"),
+    "show_clips": (lambda _: "Show Clips", "PRESET"),
+    "show_label": (lambda _: "Show the Label", "TIME"),
+    "choose_library": (lambda _: "Choose Library", "FILE_FOLDER"),
+    "relink_library": (lambda _: "Relink Library", "FILE_FOLDER"),
+    "choose_labels": (lambda _: "Choose Labels File", "FILEBROWSER"),
+    "use_labels": (lambda path: f"Use {_name_file(path)}", "IMPORT"),
+    "add_track": (lambda _: "Add a Track", "IMPORT"),
+    "use_all_players": (lambda _: "Use All Players", "CHECKBOX_HLT"),
+    "use_unit": (_name_unit, "DRIVER_DISTANCE"),
+    "press": (_name_operator, "PLAY"),
+}
+
+
+def post_notice(scene: bpy.types.Scene, subject: Subject, error: BeyondMocapError, is_error: bool = True) -> int:
+    """Post a notice; it replaces an older one about the same topic.
+
+    Args:
+        scene: that it belongs to.
+        subject: what it is about.
+        error: what went wrong.
+        is_error: whether something failed; otherwise it is an offer.
+    Returns:
+        Its number.
+    """
+    clear_notices(scene, subject.topic)
+    group = bpy.context.window_manager.beyond_mocap_notices
+    group.count += 1
+    row = group.rows.add()
+    row.number, row.scene, row.name, row.is_error = group.count, str(scene.session_uid), subject.title, is_error
+    row.topic, row.room, row.player, row.operator = subject.topic, subject.room, subject.player, subject.operator
+    row.arguments = json.dumps(subject.arguments)
+    row.found, row.step = error.parts
+    for fix in error.fixes:
+        _add_fix(row, fix)
+    window.redraw_editors("VIEW_3D", "NLA_EDITOR", "DOPESHEET_EDITOR")
+    return row.number
+
+
+def clear_notices(scene: bpy.types.Scene, *topics: str) -> None:
+    """Clear the notices of a scene about these topics."""
+    rows = bpy.context.window_manager.beyond_mocap_notices.rows
+    for index in reversed(range(len(rows))):
+        if rows[index].scene == str(scene.session_uid) and rows[index].topic in topics:
+            rows.remove(index)
+
+
+def dismiss_notice(number: int) -> None:
+    """Remove the notice of that number, if it is still there."""
+    rows = bpy.context.window_manager.beyond_mocap_notices.rows
+    for index in reversed(range(len(rows))):
+        if rows[index].number == number:
+            rows.remove(index)
+    window.redraw_editors("VIEW_3D", "NLA_EDITOR", "DOPESHEET_EDITOR")
+
+
+def find_notice(scene: bpy.types.Scene, number: int = 0) -> BeyondMocapNotice | None:
+    """Find the notice of that number, 0 for the newest one of a scene; None where there is none."""
+    found = [row for row in list_notices(scene) if number in (0, row.number)]
+    return found[-1] if found else None
+
+
+def list_notices(scene: bpy.types.Scene) -> Iterator[BeyondMocapNotice]:
+    """List the notices of a scene, the oldest first."""
+    return (row for row in bpy.context.window_manager.beyond_mocap_notices.rows if row.scene == str(scene.session_uid))
+
+
+def run_again(scene: bpy.types.Scene, number: int, **other) -> None:
+    """Dismiss a notice, and call the operator that failed as its button would: long work runs in the background.
+
+    Args:
+        scene: of the notice.
+        number: of the notice; nothing happens where it is gone.
+        other: arguments to call it with besides or instead of those that it had.
+    """
+    row = find_notice(scene, number)
+    if row is None:
+        return
+    name, arguments = row.operator, json.loads(row.arguments)
+    dismiss_notice(number)
+    if name and find_operator(name).poll():
+        find_operator(name)("INVOKE_DEFAULT", True, **arguments | other)
+
+
+def find_operator(name: str):
+    """Find the function that calls an operator, by the operator's name."""
+    group, verb = name.split(".")
+    return getattr(getattr(bpy.ops, group), verb)
+
+
+def show_notices(first: int) -> None:
+    """Show the notices from a number on in a pop-up at the pointer; nothing without a window."""
+    if bpy.app.background or bpy.context.window is None:
+        return
+    bpy.context.window_manager.beyond_mocap_notices.shown = first
+    bpy.ops.wm.call_panel("INVOKE_DEFAULT", name="BEYOND_MOCAP_PT_notices", keep_open=False)
+
+
+def _add_fix(row: BeyondMocapNotice, fix: Fix) -> None:
+    say, icon = BUTTONS[fix.kind]
+    added = row.fixes.add()
+    added.name, added.icon, added.kind, added.value = say(fix.value), icon, fix.kind, fix.value
+
+
+def _clear_all() -> None:
+    bpy.context.window_manager.beyond_mocap_notices.rows.clear()
+
+
+WATCHER = Watcher(name="notices", loaded=_clear_all)
