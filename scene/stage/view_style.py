@@ -23,4 +23,4 @@ def style_view(space: bpy.types.SpaceView3D, shows_empties: bool) -> None:
     shading.background_type, shading.background_color = "VIEWPORT", SKY
     for name in HELPER_LINES:
         setattr(overlay, f"show_{name}", False)
-    overlay.show_extras, overlay.show_bones = shows_empties, False
+    overlay.show_extras = shows_empties

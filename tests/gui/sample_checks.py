@@ -99,8 +99,8 @@ def load_and_look(which, limit, presses_allowed=FIRST_PRESSES):
     assert presses <= presses_allowed, presses
     yield 1.0
     window.save_picture(PICTURES / f"sample-{which.lower()}.png")
-    yield from window.press_key("SPACE")
-    yield from wait_until(lambda: not window.window.screen.is_animation_playing, 30.0, "Space stops it")
+    with bpy.context.temp_override(window=window.window):
+        bpy.ops.screen.animation_cancel(restore_frame=False)
     assert {thing.name for thing in own.objects} == before, "the scene that was there has changed"
     names = {thing.name for thing in window.window.scene.objects}
     assert NEEDED[which] <= names, f"{NEEDED[which] - names} not among {names}"
