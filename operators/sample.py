@@ -217,7 +217,7 @@ scene of its own"""
             return {"CANCELLED"}
         show_first(bpy.context, wanted)
         self.scene = bpy.context.scene.session_uid
-        self.clock = context.window_manager.event_timer_add(0.05, window=context.window)
+        self.clock = window.start_timer(context)
         context.window_manager.modal_handler_add(self)
         return {"RUNNING_MODAL"}
 
@@ -241,7 +241,7 @@ scene of its own"""
 
     def cancel(self, context):
         """Stop waiting."""
-        context.window_manager.event_timer_remove(self.clock)
+        window.stop_timer(context, self.clock)
 
     def show(self, context):
         """Show the result in the 3D view, play it, and say what to try."""

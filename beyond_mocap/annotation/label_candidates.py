@@ -8,6 +8,7 @@ from pathlib import Path
 
 from ..base.errors import InputError
 from .text import parse_timeline, read_text
+from .timeline import KeyMoment, Span
 
 MOST_READ = 40  # text files of a folder that are looked into
 _FRAMES_PER_SECOND = 30.0  # any rate does: only the form matters here
@@ -47,4 +48,5 @@ def _has_labels(path: Path) -> bool:
         found = parse_timeline(read_text(path), path.name, _FRAMES_PER_SECOND)
     except (InputError, OSError):
         return False
-    return any(item.words or item.avoid for item in (*found.spans, *found.keys))
+    labels: tuple[Span | KeyMoment, ...] = (*found.spans, *found.keys)
+    return any(label.words or label.avoid for label in labels)

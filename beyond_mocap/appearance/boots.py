@@ -126,6 +126,7 @@ class _BootBuilder:
         low, high = index[-1, -1] + 1, index[-1, -1] + 2
         for i in range(_SIDES):
             j = (i + 1) % _SIDES
-            faces = [(index[r, i], index[r, j], index[r + 1, j], index[r + 1, i]) for r in range(len(index) - 1)]
+            rows = range(len(index) - 1)
+            faces: list[tuple[int, ...]] = [(index[r, i], index[r, j], index[r + 1, j], index[r + 1, i]) for r in rows]
             faces += [(index[0, j], index[0, i], low), (index[-1, i], index[-1, j], high)]
             self.faces.extend(tuple(int(v) for v in face) for face in faces)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import partial
+
 import numpy as np
 
 from ..landmarks import HEAD, SEGMENTS, SHOULDER
@@ -10,7 +12,7 @@ from ..mesh import BOOTS, EYES, HAIR, PUPILS, SHIRT, SHORTS, SKIN, SOCKS, SOLES,
 from ..template import Template
 from . import clothes, head, limbs
 from .fields import Field, mirror, place
-from .meshing import Piece, compute_gradient, cut, drop_unused, grade, keep_largest, mesh_field, project, relax
+from .meshing import Piece, compute_gradient, cut_piece, drop_unused, grade, keep_largest, mesh_field, project, relax
 from .stitching import Surface
 from .weights import compute_shares
 
@@ -72,7 +74,7 @@ class _Maker:
         piece = mesh_field(solid, axes)
         relax(piece, solid, 6, 0.4 * size)
         for isoline in cuts:
-            cut(piece, solid, isoline, (None, material))
+            cut_piece(piece, solid, isoline, (None, material))
         keep_largest(piece)
         relax(piece, solid, 10, 0.4 * size)
         piece.materials = [material] * len(piece.faces)
@@ -100,23 +102,23 @@ class _Maker:
         axes = (grade((x - 0.135, coarse), (x - 0.03, coarse), (x + 0.06, fine), (x + 0.13, fine)),
                 grade((y - 0.125, coarse), (y - 0.06, fine), (y + 0.06, fine), (y + 0.125, coarse)),
                 grade((z - 0.187, coarse), (z - 0.10, coarse), (z - 0.06, fine), (z + 0.07, fine), (z + 0.175, coarse)))
-        piece = self.make("head", self.head, axes, [lambda p: _measure_above_collar(p) + 0.030], SKIN)
+        piece = self.make("head", self.head, axes, [lambda p: 0.030 - _measure_below_collar(p)], SKIN)
         return self.surface.add(piece)[0]
 
     def _add_shirt(self, neck: list[int]) -> dict[str, list[int]]:
         """Add the shirt with its collar; return the borders of hem and sleeves."""
         solid = clothes.build_shirt()
-        cuts = [lambda p: p[:, 2] - SHIRT_HEM - 0.02 * np.cos(1.0 * np.arctan2(p[:, 1], p[:, 0])),
-                lambda p: -_measure_above_collar(p), lambda p: _measure_sleeve(p, 1.0, SLEEVE_END),
-                lambda p: _measure_sleeve(p, -1.0, SLEEVE_END)]
+        cuts = [_measure_above_hem, _measure_below_collar,
+                *[partial(_measure_sleeve, sign=sign, end=SLEEVE_END) for sign in (1.0, -1.0)]]
         box = np.array([-0.25, -0.46, 0.80]), np.array([0.25, 0.46, 1.62])
         piece = self.make("shirt", solid, box, cuts, SHIRT)
         for sign in (1.0, -1.0):
-            cut(piece, solid, lambda p, s=sign: _measure_sleeve(p, s, SLEEVE_END - BAND), (TRIM, -1))
+            cut_piece(piece, solid, partial(_measure_sleeve, sign=sign, end=SLEEVE_END - BAND), (TRIM, -1))
         borders = self.surface.add(piece)
-        found = {name: min(borders, key=lambda border, at=at: float(np.linalg.norm(self.surface.middle(border) - at)))
-                 for name, at in (("hem", (0, 0, 0.88)), ("neck", (0, 0, 1.53)), ("left", (0, 0.32, 1.34)),
-                                  ("right", (0, -0.32, 1.34)))}
+        places = {"hem": (0, 0, 0.88), "neck": (0, 0, 1.53), "left": (0, 0.32, 1.34), "right": (0, -0.32, 1.34)}
+        middles = np.array([self.surface.middle(border) for border in borders])
+        found = {name: borders[int(np.argmin(np.linalg.norm(middles - place, axis=1)))]
+                 for name, place in places.items()}
         self._add_collar(found["neck"], neck)
         return found
 
@@ -153,7 +155,7 @@ class _Maker:
         axes = (grade((-0.25, size), (0.25, size)), grade((-0.28, size), (-0.05, gap), (0.05, gap), (0.28, size)),
                 grade((0.54, size), (1.03, size)))
         piece = self.make("shorts", solid, axes, cuts, SHORTS)
-        cut(piece, solid, lambda p: p[:, 2] - SHORTS_HEM - 0.10 * (np.abs(p[:, 1]) - 0.1) - BAND, (TRIM, -1))
+        cut_piece(piece, solid, lambda p: p[:, 2] - SHORTS_HEM - 0.10 * (np.abs(p[:, 1]) - 0.1) - BAND, (TRIM, -1))
         borders = sorted(self.surface.add(piece), key=lambda border: self.surface.middle(border)[2])
         self._add_hem(shirt["hem"], borders[-1], (0.0, 0.0, 1.0), solid, (self.tuck(0.025), SHIRT, SHIRT, SHORTS))
         return {float(np.sign(self.surface.middle(border)[1])): border for border in borders[:2]}
@@ -166,10 +168,10 @@ class _Maker:
         skin = _flip(self.make("leg", leg, (low + [0, 0, 0.35], high), cuts, SKIN), sign)
         tube = self.make("sock", sock, (low, high),
                          [lambda p: SOCK_TOP - p[:, 2], lambda p: p[:, 2] - BOOT_TOP + 0.006], SOCKS)
-        cut(tube, sock, lambda p: SOCK_TOP - 1.5 * BAND - p[:, 2], (TRIM, -1))
+        cut_piece(tube, sock, lambda p: SOCK_TOP - 1.5 * BAND - p[:, 2], (TRIM, -1))
         shoe = self.make("boot", boot, (np.array([-0.12, 0.02, -0.03]), np.array([0.25, 0.17, 0.16])),
                          [_measure_boot_top], BOOTS)
-        cut(shoe, boot, lambda p: p[:, 2] - 0.012 - 0.006 * (p[:, 0] > 0.14), (SOLES, -1))
+        cut_piece(shoe, boot, lambda p: p[:, 2] - 0.012 - 0.006 * (p[:, 0] > 0.14), (SOLES, -1))
         thigh = sorted(self.surface.add(skin), key=lambda border: self.surface.middle(border)[2])
         stocking = sorted(self.surface.add(_flip(tube, sign)), key=lambda border: self.surface.middle(border)[2])
         collar = self.surface.add(_flip(shoe, sign))[0]
@@ -222,9 +224,14 @@ def _approach(points: np.ndarray, solid: Field, most: float = 0.02) -> np.ndarra
     return points
 
 
-def _measure_above_collar(points: np.ndarray) -> np.ndarray:
-    """Measure how far points are above the shirt's hole for the neck, m."""
-    return (points[:, 2] - 1.548 + 0.45 * (points[:, 0] + 0.02)) / np.hypot(1.0, 0.45)
+def _measure_above_hem(points: np.ndarray) -> np.ndarray:
+    """Measure how far points are above the shirt's hem, which is lower at the back, m."""
+    return points[:, 2] - SHIRT_HEM - 0.02 * np.cos(np.arctan2(points[:, 1], points[:, 0]))
+
+
+def _measure_below_collar(points: np.ndarray) -> np.ndarray:
+    """Measure how far points are below the shirt's hole for the neck, m."""
+    return (1.548 - points[:, 2] - 0.45 * (points[:, 0] + 0.02)) / np.hypot(1.0, 0.45)
 
 
 def _measure_sleeve(points: np.ndarray, sign: float, end: float) -> np.ndarray:
@@ -265,7 +272,8 @@ def _make_eye(sign: float, light: bool) -> Piece:
         rows.append(head.EYE_RADIUS * ring)
     rows.append(np.array([[-head.EYE_RADIUS, 0.0, 0.0]]))
     number, last = 1 + np.arange(len(angles) * sides).reshape(-1, sides), 1 + len(angles) * sides
-    faces, materials = [], []
+    faces: list[tuple[int, ...]] = []
+    materials: list[int] = []
     for i in range(sides):
         j = (i + 1) % sides
         faces.append((0, int(number[0, i]), int(number[0, j])))

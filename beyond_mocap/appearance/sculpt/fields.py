@@ -120,7 +120,7 @@ def place(field: Field, origin, turn: np.ndarray) -> Field:
     return lambda points: field((points - np.asarray(origin)) @ turn)
 
 
-def smoothstep(values: np.ndarray, low: float, high: float) -> np.ndarray:
+def smoothstep(values: np.ndarray, low: float | np.ndarray, high: float | np.ndarray) -> np.ndarray:
     """Rise smoothly from 0 at `low` to 1 at `high`, which may be lower than `low`."""
     share = np.clip((values - low) / (high - low), 0.0, 1.0)
     return share * share * (3.0 - 2.0 * share)

@@ -41,7 +41,7 @@ def build_arm() -> Field:
     deltoid = build_ellipsoid((0.0, 0.020, -0.055), (0.050, 0.032, 0.075))
     brachial = build_ellipsoid((0.016, 0.016, -0.355), (0.026, 0.026, 0.060))
     point = build_ellipsoid((-0.028, 0.0, -0.306), (0.014, 0.014, 0.018))
-    return join(0.03, build_loft(_ARM), biceps, triceps, deltoid, brachial, point)
+    return join(0.03, build_loft(_ARM), *(biceps, triceps, deltoid, brachial, point))
 
 
 def build_arm_core() -> Field:

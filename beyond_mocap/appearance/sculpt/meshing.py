@@ -157,7 +157,7 @@ def list_borders(faces) -> list[list[int]]:
     return borders
 
 
-def cut(piece: Piece, solid: Field, isoline: Field, keep: tuple[int | None, int | None]) -> None:
+def cut_piece(piece: Piece, solid: Field, isoline: Field, keep: tuple[int | None, int | None]) -> None:
     """Cut a piece along the line where `isoline` is zero; vertices near the line move onto it.
 
     Args:

@@ -5,7 +5,7 @@ import pytest
 
 from beyond_mocap.appearance.sculpt.athlete import sculpt
 from beyond_mocap.appearance.sculpt.fields import build_chain, build_ellipsoid, carve, join
-from beyond_mocap.appearance.sculpt.meshing import cut, grade, list_borders, mesh_field, relax
+from beyond_mocap.appearance.sculpt.meshing import cut_piece, grade, list_borders, mesh_field, relax
 from beyond_mocap.appearance.sculpt.stitching import Surface
 from beyond_mocap.appearance.template import read_template
 
@@ -41,7 +41,7 @@ def test_a_cut_is_crisp_and_pieces_are_stitched_to_a_closed_surface():
     surface, borders = Surface(), []
     for sign in (1.0, -1.0):
         piece = mesh_ball()
-        cut(piece, BALL, lambda points, s=sign: s * points[:, 2] - 0.01, (None, 3))
+        cut_piece(piece, BALL, lambda points, s=sign: s * points[:, 2] - 0.01, (None, 3))
         border = list_borders(piece.faces)
         assert len(border) == 1 and np.allclose(sign * piece.vertices[border[0], 2], 0.01, atol=1e-6)
         assert set(piece.materials) == {3}
