@@ -63,8 +63,12 @@ class BEYOND_MOCAP_OT_apply_fix(NoticeOperator, bpy.types.Operator):
             raise InputError("fix", f"number {self.index}", f"below {len(row.fixes)}")
         fix = row.fixes[self.index]
         number, other = row.number, {"unit": float(fix.value)} if fix.kind == "use_unit" else {}
-        if APPLY[fix.kind](context, row, fix.value):
+        if not APPLY[fix.kind](context, row, fix.value):
+            return
+        try:
             notices.run_again(context.scene, number, **other)
+        except RuntimeError as error:  # what ran again has failed; the fix has been applied
+            self.report({"WARNING"}, str(error).strip().removeprefix("Error: "))
 
 
 class BEYOND_MOCAP_OT_try_again(NoticeOperator, bpy.types.Operator):

@@ -201,11 +201,12 @@ scene of its own"""
         self.show(bpy.context)
 
     def attempt(self, action):
-        """Turn the error of a step's operator, which has said what to do, into a failure."""
+        """Turn the error of a step's operator, which has left a notice, into a failure."""
         try:
             return super().attempt(action)
         except RuntimeError as error:
-            return self.report_failure(str(error).removeprefix("Error: ").strip())
+            self.report({"ERROR"}, str(error).removeprefix("Error: ").strip())
+            return {"CANCELLED"}
 
     def invoke(self, context, _event):
         """Take the first step, and the others as the work in the background goes on."""
@@ -282,6 +283,8 @@ def show_last(context, wanted: Sample) -> None:
         return
     scene = context.scene
     style_view(area.spaces.active, wanted.shows_empties)
+    if wanted.task == "PLAYER":
+        show_strips(context)
     if wanted.heading is None:
         window.look_through_camera(context)
     else:
@@ -293,3 +296,14 @@ def show_last(context, wanted: Sample) -> None:
     if not context.screen.is_animation_playing:
         with context.temp_override(area=area):
             bpy.ops.screen.animation_play()
+
+
+def show_strips(context) -> None:
+    """Show the player's labels alone in the NLA editor, from the first to the last."""
+    area = window.find_largest_editor(context.window.screen, "NLA_EDITOR")
+    if area is None:
+        return
+    region = next(region for region in area.regions if region.type == "WINDOW")
+    with context.temp_override(area=area, region=region):
+        bpy.ops.beyond_mocap.choose_player()
+        bpy.ops.nla.view_all()

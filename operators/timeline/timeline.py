@@ -197,8 +197,8 @@ class BEYOND_MOCAP_OT_pick_moment(BaseOperator, bpy.types.Operator):
 
     def execute(self, context):
         """Fail without a pointer."""
-        return self.report_failure(
-            "Select Key Moment needs the pointer in the NLA editor; use Go to Key Moment with an index")
+        self.report({"ERROR"}, "Select Key Moment needs the pointer in the NLA editor; use Go to Key Moment with an index")
+        return {"CANCELLED"}
 
     def invoke(self, context, event):
         """Select what is under the pointer; if there is nothing, pass the click to Blender."""
@@ -273,8 +273,9 @@ class BEYOND_MOCAP_OT_hover_timeline(BaseOperator, bpy.types.Operator):
 
     def execute(self, context):
         """Fail without a pointer."""
-        return self.report_failure("Show Label Under Pointer needs the pointer in the NLA editor; read the list in its "
-                                   "sidebar instead")
+        self.report({"ERROR"}, "Show Label Under Pointer needs the pointer in the NLA editor; read the list in its "
+                               "sidebar instead")
+        return {"CANCELLED"}
 
     def invoke(self, context, event):
         """Take note of the pointer, and pass the event on."""

@@ -33,8 +33,8 @@ IK = (
 )
 FORMATS = (("FBX", "FBX", "Autodesk FBX (.fbx)"), ("GLB", "glTF", "glTF binary (.glb), always Y up"),
            ("USD", "USD", "Universal Scene Description (.usdc)"),
-           ("ABC", "Alembic", "Alembic (.abc): meshes that move point by point, without bones"),
-           ("BVH", "BVH", "Biovision hierarchy (.bvh): the skeleton alone, centimetres, Y up"))
+           ("BVH", "BVH", "Biovision hierarchy (.bvh): the skeleton alone, centimetres, Y up"),
+           ("ABC", "Alembic", "Alembic (.abc): meshes that move point by point, without bones"))  # saved files have numbers
 ENGINES = (("BLENDER", "Blender", "Axes of Blender's exporters: Y up, -Z forward"),
            ("UNREAL", "Unreal", "For Unreal Engine: FBX in centimetres, X forward, Z up"),
            ("UNITY", "Unity", "For Unity: FBX with its scale as units, Y up, -Z forward"),

@@ -9,6 +9,7 @@ from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from functools import lru_cache
 
+from ...beyond_mocap.annotation.gaits import TURNING
 from ...beyond_mocap.annotation.labels import Label, read_labels
 from ..overlays import colours
 
@@ -59,7 +60,7 @@ _RULES: tuple[tuple[LabelGroup, Callable[[Label], bool]], ...] = (
     (DRIBBLE, lambda label: label.ball == "carries"),
     (OTHER, lambda label: label.ball == "never" and "discrete" in label.kinds),
     (GESTURE, lambda label: label.ball == "never"),
-    (RUN, lambda label: label.gait is not None or label.name == "turning"),
+    (RUN, lambda label: label.gait is not None or label.name == TURNING),
 )  # fmt: skip
 
 

@@ -72,7 +72,7 @@ def hand(extension, ready, session, monkeypatch):  # noqa: F811
     monkeypatch.setattr(orders, "process_request", work)
 
     class Button(turns.TakeOperator):
-        bl_label, player = "Synthesize", ""
+        bl_idname, bl_label, player = "beyond_mocap.synthesize", "Synthesize", ""
 
         def report(self, kind, text):
             hand.told.append(text)
@@ -83,7 +83,7 @@ def hand(extension, ready, session, monkeypatch):  # noqa: F811
             button.list_requests = lambda context: how
         for entry in button.build_entries(hand.context):
             queue.add_entry(entry)
-        button.entry, button.job, button.messages, button.stored_count = None, None, [], 0
+        button.entry, button.job, button.messages, button.failed, button.stored_count = None, None, [], [], 0
         button.seen, button.drawn, button.clock = None, 0.0, "timer"
         return button
 

@@ -1,6 +1,7 @@
 """The one watcher: what raises does not end it, undo between two looks leaves nothing of what was undone, and nothing
 is left of it when the extension is switched off in the middle of anything."""
 
+import contextlib
 import importlib
 import pathlib
 import threading
@@ -36,14 +37,36 @@ def live(room):
     return room("scene.core.live")
 
 
+class StandInContext:
+    """Blender's context, but for its windows."""
+
+    def __init__(self):
+        self.window_manager = StandInManager()
+
+    def __getattr__(self, name):
+        return getattr(bpy.context, name)
+
+    def temp_override(self, **_):
+        return contextlib.nullcontext()
+
+
+class StandInManager:
+    """Blender's window manager, but for its windows."""
+
+    def __getattr__(self, name):
+        return getattr(bpy.context.window_manager, name)
+
+
 class Windowed:
     """Blender's `bpy`, but for the window that it has and what the status bar says."""
 
     def __init__(self):
-        self.said = ["Searching"]
         self.app = SimpleNamespace(background=False, timers=bpy.app.timers, handlers=bpy.app.handlers,
                                    is_job_running=bpy.app.is_job_running)
-        self.data = SimpleNamespace(workspaces=[SimpleNamespace(status_text_set=self.said.append)])
+        self.said, self.context = [], StandInContext()
+        self.context.window_manager.windows = [SimpleNamespace(
+            workspace=SimpleNamespace(status_text_set=self.said.append), screen=SimpleNamespace(areas=[]),
+            cursor_modal_restore=lambda: None)]
 
     def __getattr__(self, name):
         return getattr(bpy, name)
@@ -348,6 +371,7 @@ STARTS = (a_background_job, a_match_child, a_stream, a_live_update, a_menu_of_wo
 
 def assert_nothing_is_left(extension, room, windowed):
     assert room("scene.core.live")._timers and room("scene.core.window")._draw_handlers
+    room("scene.core.window").show_status("Searching")
     timers = [*room("scene.core.live")._timers.values()]
     assert all(map(bpy.app.timers.is_registered, timers))
     extension.unregister()
@@ -357,7 +381,8 @@ def assert_nothing_is_left(extension, room, windowed):
         time.sleep(0.02)
     extension.register()
     work = bpy.context.window_manager.beyond_mocap_work
-    assert (left, at_work, windowed.said[-1], work.kind, work.waiting) == ([], [], None, "", "")
+    said = windowed.said[-1], room("scene.core.window")._status
+    assert (left, at_work, said, work.kind, work.waiting) == ([], [], (None, []), "", "")
 
 
 def still_at_work(room):

@@ -98,8 +98,8 @@ def test_mirrored_twice_is_as_before(core, rooms, clip):
 def test_undo(clip):
     assert_one_step(bpy.ops.beyond_mocap.import_clips, filepath=str(clip[0]))
     assert_one_step(bpy.ops.beyond_mocap.mirror)
-    assert_one_step(bpy.ops.beyond_mocap.add_stage)
     assert_one_step(bpy.ops.beyond_mocap.add_stage, camera=False)
+    assert_one_step(bpy.ops.beyond_mocap.add_stage, camera=True)
 
 
 @pytest.mark.parametrize("content, found", [

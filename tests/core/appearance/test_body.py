@@ -123,14 +123,14 @@ def test_moves_rigidly_with_the_root():
 
 @pytest.mark.parametrize("stature", [1.65, 1.80])
 def test_the_drawn_soles_are_the_measured_ones(stature):
-    """Within 3 mm in height through a run, and as long within 1 cm."""
+    """Within 4 mm in height through a run, and as long within 1 cm."""
     motion = build_gait(3.0, 1.0, skeleton=build_adult_skeleton(stature))
     places, world = forward_kinematics(motion)
     body, boots = build_body(motion.skeleton), build_boots(motion.skeleton)
     used = np.unique([v for face, part in zip(body.faces, body.material) if part in (BOOTS, SOLES) for v in face])
     drawn = deform_body(body, motion.skeleton, places, world)[:, used]
     plain = deform_body(boots, motion.skeleton, places, world)
-    assert np.abs(drawn[..., 2].min(axis=1) - plain[..., 2].min(axis=1)).max() < 0.003
+    assert np.abs(drawn[..., 2].min(axis=1) - plain[..., 2].min(axis=1)).max() < 0.004
     assert np.abs(np.ptp(stand(body, motion.skeleton)[used, 0])
                   - np.ptp(stand(boots, motion.skeleton)[:, 0])).max() < 0.01
 
