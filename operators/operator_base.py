@@ -265,9 +265,10 @@ class BackgroundOperator(BaseOperator):
 
     def cancel(self, context):
         """Cancel the thread when Blender ends the operator (a file is loaded, the window closes); its result is
-        discarded."""
-        self.job.cancel()
-        self.stop_polling(context)
+        discarded. From an open file browser nothing has begun."""
+        if hasattr(self, "job"):
+            self.job.cancel()
+            self.stop_polling(context)
 
     def show(self, context):
         """Show the progress in the status bar, at the pointer and in the panel."""

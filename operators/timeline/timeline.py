@@ -197,7 +197,8 @@ class BEYOND_MOCAP_OT_pick_moment(BaseOperator, bpy.types.Operator):
 
     def execute(self, context):
         """Fail without a pointer."""
-        self.report({"ERROR"}, "Select Key Moment needs the pointer in the NLA editor; use Go to Key Moment with an index")
+        self.report({"ERROR"}, "Select Key Moment needs the pointer in the NLA editor; use Go to Key Moment with "
+                               "an index")
         return {"CANCELLED"}
 
     def invoke(self, context, event):

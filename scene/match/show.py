@@ -41,6 +41,8 @@ def show_match(context: bpy.types.Context, section: MatchSection, first: int) ->
     ours.include_collections(context.view_layer)
     last = int(np.floor(compute_frame(scene, section.start, first, section.end) + 1e-4))
     with _measure_seconds(durations, "pitch"):
+        if stage.find_stage(scene) is None:
+            scene.beyond_mocap_stage.stands = True
         stage.create_stage(scene, (section.length, section.width))
     with _measure_seconds(durations, "bodies"):
         own = TeamCharacters(context, scene.beyond_mocap_match.list_characters())

@@ -34,7 +34,8 @@ IK = (
 FORMATS = (("FBX", "FBX", "Autodesk FBX (.fbx)"), ("GLB", "glTF", "glTF binary (.glb), always Y up"),
            ("USD", "USD", "Universal Scene Description (.usdc)"),
            ("BVH", "BVH", "Biovision hierarchy (.bvh): the skeleton alone, centimetres, Y up"),
-           ("ABC", "Alembic", "Alembic (.abc): meshes that move point by point, without bones"))  # saved files have numbers
+           ("ABC", "Alembic", "Alembic (.abc): meshes that move point by point, without bones"))
+"""In the order that saved files number them."""
 ENGINES = (("BLENDER", "Blender", "Axes of Blender's exporters: Y up, -Z forward"),
            ("UNREAL", "Unreal", "For Unreal Engine: FBX in centimetres, X forward, Z up"),
            ("UNITY", "Unity", "For Unity: FBX with its scale as units, Y up, -Z forward"),

@@ -40,7 +40,7 @@ def isolate_panel(part):
     back. part: name of the function that draws it."""
     name = "stream" if part in ("draw_stream", "draw_play_live") else "ball"
     kind, drawn = (getattr(import_module(f"panels.{name}"), one) for one in (f"BEYOND_MOCAP_PT_{name}", part))
-    was, draw = (kind.bl_category, kind.bl_options), kind.draw
+    was, draw = (kind.bl_category, getattr(kind, "bl_options", set())), kind.draw
     kind.draw = lambda self, context: drawn(self.layout, context)
 
     def place_panel(category, options):

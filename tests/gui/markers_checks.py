@@ -26,7 +26,7 @@ MARKERS = "BEYOND_MOCAP_PT_markers"
 def isolate_panel():
     """The panel alone in a tab of its own, so that its buttons are found quickly; returns what puts it back."""
     kind = next(panel for panel in bpy.types.Panel.__subclasses__() if panel.__name__ == MARKERS)
-    was = kind.bl_category, kind.bl_options
+    was = kind.bl_category, getattr(kind, "bl_options", set())
 
     def place_panel(category, options):
         bpy.utils.unregister_class(kind)

@@ -165,7 +165,7 @@ def isolate_panel(area):
     """The panel Path Editing alone in a tab of its own, so that its button is found quickly; returns what puts it
     back."""
     kind = next(panel for panel in bpy.types.Panel.__subclasses__() if panel.__name__ == "BEYOND_MOCAP_PT_path")
-    was = kind.bl_category, kind.bl_options
+    was = kind.bl_category, getattr(kind, "bl_options", set())
 
     def place_panel(category, options):
         bpy.utils.unregister_class(kind)

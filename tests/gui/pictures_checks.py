@@ -27,7 +27,7 @@ def open_clip():
     bpy.ops.beyond_mocap.import_clip(path="walking_1_2.bvh")
     bpy.context.scene.frame_end = 60
     panel = bpy.types.BEYOND_MOCAP_PT_stage
-    if panel.bl_options:
+    if getattr(panel, "bl_options", None):
         bpy.utils.unregister_class(panel)
         panel.bl_options = set()
         bpy.utils.register_class(panel)

@@ -173,7 +173,8 @@ def press_buttons_of_task(operators, known):
 
     def is_new(call):
         usable[call] = can_run(call)
-        return call not in (*known, *pressed) and (operators is None or parse_operator(call) in operators)
+        is_known = strip_notice(call) in map(strip_notice, (*known, *pressed))
+        return not is_known and (operators is None or parse_operator(call) in operators)
 
     while more:
         _, call = yield from window.scan_region(area, region, window.command_under_pointer, is_new)
@@ -184,6 +185,11 @@ def press_buttons_of_task(operators, known):
             output.write_line(f"     pressed {call}: {reaction if usable[call] else 'greyed out'}")
         more = call or (yield from window.scroll_region(area, region))
     return pressed
+
+
+def strip_notice(call):
+    """A call without the number of the notice that it is about: each new failure has another."""
+    return re.sub(r"\bnotice=\d+", "notice", call)
 
 
 def click_operator(operator, *words, editor="VIEW_3D", limit=120.0):

@@ -11,7 +11,7 @@ from ..look import HAIR_STYLES
 from ..mesh import BOOTS, EYES, HAIR, PUPILS, SHIRT, SHORTS, SKIN, SOCKS, SOLES, TRIM
 from ..template import Template
 from . import clothes, head, limbs
-from .fields import Field, mirror, place
+from .fields import Field, mirror, place, smoothstep
 from .meshing import Piece, compute_gradient, cut_piece, drop_unused, grade, keep_largest, mesh_field, project, relax
 from .stitching import Surface
 from .weights import compute_shares
@@ -22,7 +22,9 @@ SIZES = {  # m, edges of the faces of each piece: of the full body and the light
     "boot": (0.0130, 0.0340), "hair": (0.0085, 0.0200), "brow": (0.0036, 0.0070),
 }
 SHIRT_HEM, SHORTS_HEM, SOCK_TOP, BOOT_TOP, SLEEVE_END, GLOVE_TOP = 0.885, 0.605, 0.462, 0.108, 0.185, 0.535
+HAIR_BEHIND = -0.115  # m from the head's middle: what is further behind is a tail of hair
 BAND = 0.020  # m, width of the edges of sleeves, shorts and socks
+CROP = 0.0018, 0.0045  # m, cropped hair stands out of the skin at the hairline and within
 LIPS = {SHIRT: 0.003, SHORTS: 0.003, SOCKS: 0.003, BOOTS: 0.004}
 """Metres of thickness at hems."""
 
@@ -38,7 +40,7 @@ def sculpt(light: bool) -> Template:
     count = len(maker.surface.vertices)
     parts = [0] * len(maker.surface.faces)
     for index, style in enumerate(HAIR_STYLES[:-1]):
-        maker.surface.add(maker.make_hair(style))
+        maker.add_hair(style)
         parts += [index + 1] * (len(maker.surface.faces) - len(parts))
     return _finish(maker.surface, np.array(parts), count)
 
@@ -103,6 +105,7 @@ class _Maker:
                 grade((y - 0.125, coarse), (y - 0.06, fine), (y + 0.06, fine), (y + 0.125, coarse)),
                 grade((z - 0.187, coarse), (z - 0.10, coarse), (z - 0.06, fine), (z + 0.07, fine), (z + 0.175, coarse)))
         piece = self.make("head", self.head, axes, [lambda p: 0.030 - _measure_below_collar(p)], SKIN)
+        self.scalp = Piece(piece.vertices.copy(), list(piece.faces), [HAIR] * len(piece.faces))
         return self.surface.add(piece)[0]
 
     def _add_shirt(self, neck: list[int]) -> dict[str, list[int]]:
@@ -200,10 +203,28 @@ class _Maker:
             lip = self.surface.extend(lip, inside, material)
         self.surface.bridge(lip, inner, axis, other)
 
-    def make_hair(self, style: str) -> Piece:
-        """Make a style of hair."""
+    def add_hair(self, style: str) -> None:
+        """Add a style of hair."""
+        if style == "crop":
+            self._add_crop()
+            return
         box = HEAD + [-0.19, -0.13, -0.13], HEAD + [0.13, 0.13, 0.20]
-        return self._make_hair_piece("hair", head.build_hair(style, self.head), box)
+        self.surface.add(self._make_hair_piece("hair", head.build_hair(style, self.head), box))
+
+    def _add_crop(self) -> None:
+        """Add hair so short that it is the head's own surface, raised, cut at the hairline and closed along it."""
+        piece = self.scalp
+        cut_piece(piece, self.head, head.measure_hairline, (None, HAIR))
+        keep_largest(piece)
+        within = smoothstep(head.measure_hairline(piece.vertices), 0.0, 0.02)
+        slope = compute_gradient(self.head, piece.vertices)
+        normals = slope / np.linalg.norm(slope, axis=1, keepdims=True)
+        piece.vertices = piece.vertices + (CROP[0] + (CROP[1] - CROP[0]) * within)[:, None] * normals
+        for border in self.surface.add(piece):
+            points = np.array([self.surface.vertices[v] for v in border])
+            slope = compute_gradient(self.head, points)
+            below = points - 3.0 * CROP[0] * slope / np.linalg.norm(slope, axis=1, keepdims=True)
+            self.surface.extend(border, below, HAIR)
 
     def _make_hair_piece(self, name: str, solid: Field, box) -> Piece:
         """Make hair in a box, without what lies inside the head."""
@@ -295,7 +316,9 @@ def _finish(surface: Surface, parts: np.ndarray, count: int) -> Template:
         materials += [material] * len(split)
         owners += [part] * len(split)
     shares = compute_shares(vertices)
-    shares[count:] = np.eye(len(SEGMENTS))[SEGMENTS.index("head")]
+    tail = np.arange(len(vertices)) >= count
+    tail &= vertices[:, 0] < HEAD[0] + HAIR_BEHIND
+    shares[tail] = np.eye(len(SEGMENTS))[SEGMENTS.index("head")]
     order = np.argsort(-shares, axis=1, kind="stable")[:, :4]
     largest = np.take_along_axis(shares, order, axis=1)
     return Template(vertices=vertices, faces=np.array(faces), materials=np.array(materials),

@@ -131,7 +131,7 @@ def build_hair(style: str, head: Field) -> Field:
     """Build hair as a solid that covers the head within the hairline and ends thin.
 
     Args:
-        style: one of `look.HAIR_STYLES` but "bald".
+        style: "short", "curly" or "tied".
         head: the field of `build_head`.
     """
     thick, top, rough, wave = _STYLES[style]
@@ -151,7 +151,6 @@ def build_hair(style: str, head: Field) -> Field:
 
 
 _STYLES = {  # thickness at the sides and on top, roughness m, waves per metre times 2 pi
-    "crop": (0.003, 0.005, 0.0003, 300.0),
     "short": (0.0045, 0.018, 0.0030, 175.0),
     "curly": (0.017, 0.026, 0.0062, 190.0),
     "tied": (0.006, 0.009, 0.0010, 140.0),

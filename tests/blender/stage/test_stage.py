@@ -260,9 +260,10 @@ def test_a_new_ball_is_framed_with_who_throws_it(walker):
 
 
 @pytest.mark.parametrize("module, name", [
-    ("player", "import_tracking"), ("library.clips", "import_clips"), ("library.library", "import_clip"),
-    ("markers", "import_markers"), ("markers", "reconstruct_markers"), ("passes", "passes_make"), ("throws", "throw_at_target"),
-    ("throws", "kick_at_target"), ("library.library_labels", "annotate_clip"),
+    ("player", "import_tracking"), ("library.clips", "import_clips"),
+    ("library.library", "import_clip"),
+    ("markers", "import_markers"), ("markers", "reconstruct_markers"), ("passes", "passes_make"),
+    ("throws", "throw_at_target"), ("throws", "kick_at_target"), ("library.library_labels", "annotate_clip"),
 ])
 def test_what_makes_bodies_moves_the_view_to_them(module, name):
     assert getattr(import_module(f"{EXTENSION}.operators.{module}"), f"BEYOND_MOCAP_OT_{name}").presents
