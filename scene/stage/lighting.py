@@ -22,9 +22,10 @@ SUN_STRENGTH, SUN_ANGLE = 3.6, 0.035  # W/m2, rad: a little softer than the real
 MAST = (0.5, 14.0, 0.5, 12.0, 38.0)  # masts: half length + m, half width + m, as shares and metres; m of height
 LAMP_SIZE = (9.0, 5.0)  # metres of a mast's head
 LAMP_IRRADIANCE = 1.15  # W/m2 that each mast gives at the centre spot
-SKIES = {DAYLIGHT: (((0.055, 0.115, 0.035), (0.50, 0.66, 0.86), (0.12, 0.30, 0.70)), 1.1),
+SKIES = {DAYLIGHT: (((0.045, 0.130, 0.040), (0.50, 0.66, 0.86), (0.12, 0.30, 0.70)), 1.1),
          FLOODLIGHT: (((0.010, 0.014, 0.010), (0.020, 0.026, 0.045), (0.004, 0.006, 0.016)), 1.0)}
 """Colours (linear RGB) below the horizon, at it and above, and strength."""
+HAZE = 0.4  # share of the horizon's colour in that of the farthest ground
 
 
 def create_lights(collection: bpy.types.Collection, units: float, size: tuple[float, float],
@@ -114,7 +115,9 @@ def _paint_sky(world: bpy.types.World, colours, strength: float) -> None:
     elements = ramp.color_ramp.elements
     elements.new(0.5)
     elements.new(0.5)
-    for element, position, colour in zip(elements, (0.488, 0.506, 0.53, 0.75), (*colours[:2], colours[1], colours[2])):
+    ground, horizon, zenith = colours
+    haze = [HAZE * far + (1.0 - HAZE) * near for near, far in zip(ground, horizon)]
+    for element, position, colour in zip(elements, (0.44, 0.497, 0.512, 0.75), (ground, haze, horizon, zenith)):
         element.position, element.color = position, (*colour, 1.0)
     shader.inputs["Strength"].default_value = strength
     for start, end in ((place.outputs["Generated"], split.inputs[0]), (split.outputs["Z"], height.inputs["Value"]),
