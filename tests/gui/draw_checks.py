@@ -50,10 +50,10 @@ def draw_and_synthesize():
     assert run_operator("beyond_mocap.draw_track") == {"FINISHED"}
     area = window.find_area("VIEW_3D")
     yield from window.open_tab(area, TAB)
-    look_down(area)
     run_operator("beyond_mocap.synthesize")
     yield from wait_until_settled()
     yield from wait_until(lambda: get_player().take)
+    look_down(area)  # synthesis has moved the view to the body
 
 
 def check_the_preview_follows_a_dragged_point():

@@ -82,7 +82,7 @@ def check_match():
     yield from click_operator("match_camera", "EYES")
     yield 1
     window.save_picture(PICTURES / "match-eyes.png")
-    assert window.window.scene.camera.name == "Match Eyes"
+    assert window.window.scene.camera.name == "Player's Eye"
     for _ in range(3):
         bpy.ops.ed.undo()
         yield from wait_until_settled()

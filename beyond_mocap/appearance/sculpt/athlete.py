@@ -17,9 +17,9 @@ from .stitching import Surface
 from .weights import compute_shares
 
 SIZES = {  # m, edges of the faces of each piece: of the full body and the light one
-    "head": (0.0056, 0.0120), "back": (0.0150, 0.0300), "shirt": (0.0230, 0.0540), "arm": (0.0170, 0.0360),
-    "hand": (0.0064, 0.0215), "shorts": (0.0230, 0.0550), "leg": (0.0180, 0.0420), "sock": (0.0190, 0.0450),
-    "boot": (0.0130, 0.0340), "hair": (0.0085, 0.0200), "brow": (0.0036, 0.0070),
+    "head": (0.0066, 0.0150), "back": (0.0170, 0.0340), "shirt": (0.0270, 0.0640), "arm": (0.0200, 0.0430),
+    "hand": (0.0074, 0.0270), "shorts": (0.0270, 0.0640), "leg": (0.0210, 0.0500), "sock": (0.0220, 0.0540),
+    "boot": (0.0150, 0.0400), "hair": (0.0095, 0.0200), "brow": (0.0040, 0.0085),
 }
 SHIRT_HEM, SHORTS_HEM, SOCK_TOP, BOOT_TOP, SLEEVE_END, GLOVE_TOP = 0.885, 0.605, 0.462, 0.108, 0.185, 0.535
 HAIR_BEHIND = -0.115  # m from the head's middle: what is further behind is a tail of hair

@@ -106,7 +106,7 @@ def check_poses(clip, most_seen, most_turned):
     body = build_body(motion.skeleton, example=motion, look=Look(hair="bald"), light=True)
     stance = build_lifted_stance(motion.skeleton, motion)
     layers = Layers(body, deform_body(body, motion.skeleton, stance.positions, stance.rotations))
-    assert len(layers.hidden[0]) > 100
+    assert len(layers.hidden[0]) > 80
     places, world = forward_kinematics(motion)
     for frame in np.linspace(0, len(motion) - 1, POSES).astype(int):
         moved = deform_body(body, motion.skeleton, places[frame], world[frame])
@@ -117,7 +117,7 @@ def check_poses(clip, most_seen, most_turned):
 
 @pytest.mark.parametrize("clip", SAMPLE_CLIPS)
 def test_nothing_pokes_through_in_the_sample(clip):
-    check_poses(SAMPLE / f"{clip}.bvh", FOLDED if clip == "getting_up" else 0.05, 0.01)
+    check_poses(SAMPLE / f"{clip}.bvh", FOLDED if clip == "getting_up" else 0.05, 0.015)
 
 
 @pytest.mark.parametrize("clip", RECORDED)
