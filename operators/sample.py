@@ -266,9 +266,11 @@ def prepare_scene(context, wanted: Sample) -> None:
 
 
 def is_free(scene: bpy.types.Scene) -> bool:
-    """Return whether a scene has no content: no objects, players, or library other than the sample's."""
-    folder = scene.beyond_mocap.library_folder
-    return not scene.objects and not scene.beyond_mocap.players and (not folder or sample.is_in_sample(folder))
+    """Return whether a scene has no content: no objects, video, markers, players, or library but the sample's."""
+    folder, editor = scene.beyond_mocap.library_folder, scene.sequence_editor
+    has_video = editor is not None and len(editor.strips_all) > 0
+    return (not scene.objects and not has_video and not len(scene.timeline_markers)
+            and not scene.beyond_mocap.players and (not folder or sample.is_in_sample(folder)))
 
 
 def show_first(context, wanted: Sample) -> None:

@@ -55,6 +55,8 @@ def show_character(context: bpy.types.Context, player) -> list[str]:
     """
     copies.check_character(player.character)
     source, touches = read_player_motion(context.scene, player)
+    if player.character_body is not None and context.scene.objects.get(player.character_body.name) is None:
+        remove_character(player)  # the user has deleted its copy in a view
     body, is_new = player.character_body, player.character_body is None
     if is_new:
         home = player.body.users_collection[0]

@@ -46,11 +46,20 @@ def render_order(order: dict) -> None:
     bpy.ops.wm.open_mainfile(filepath=order["file"], load_ui=False, use_scripts=order["scripts"])
     scene = bpy.data.scenes[order["scene"]]
     apply_settings(scene, order["settings"])
+    _mute_file_outputs()
     if order["movie"]:
         _render_movie(scene, order["movie"])
     for number, tile in enumerate(order["tiles"]):
         _render_tile(scene, *tile)
         _write_progress((number + 1) / len(order["tiles"]), f"Picture {number + 1} of {len(order['tiles'])}")
+
+
+def _mute_file_outputs() -> None:
+    """Mute the compositor's nodes that write files: a preview must not replace what the user has rendered."""
+    trees = [*bpy.data.node_groups, *(getattr(scene, "node_tree", None) for scene in bpy.data.scenes)]
+    for node in [node for tree in trees if tree is not None for node in tree.nodes]:
+        if node.bl_idname == "CompositorNodeOutputFile":
+            node.mute = True
 
 
 def _render_movie(scene: bpy.types.Scene, path: str) -> None:
