@@ -81,8 +81,7 @@ def show_character(context: bpy.types.Context, player) -> list[str]:
     dress(body, player.name, {"shirt": tuple(player.shirt)})
     _show_builtin(player, False)
     copies.update_original(player.character)
-    loose = copies.list_loose_meshes(player.character)
-    return [f"{', '.join(loose[:3])}: no vertex group of a bone, does not follow the body"] if loose else []
+    return copies.describe_loose_meshes(player.character)
 
 
 def remove_character(player) -> None:

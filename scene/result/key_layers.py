@@ -26,9 +26,10 @@ STACKED = "beyond_mocap_stacked"  # on a take's action that plays as a strip bel
 NAME = "Own Keys"
 FADE_SECONDS = 0.3  # s beside keys over which their difference fades
 _ROTATION, _SCALE = "rotation_quaternion", "scale"
-_STRIP_SETTINGS = ("action_frame_start", "action_frame_end", "repeat", "scale", "frame_start", "frame_end", "blend_type",
-                   "extrapolation", "use_auto_blend", "blend_in", "blend_out", "use_reverse", "mute", "use_sync_length",
-                   "use_animated_influence", "use_animated_time", "use_animated_time_cyclic")
+_STRIP_SETTINGS = (
+    "action_frame_start", "action_frame_end", "repeat", "scale", "frame_start", "frame_end", "blend_type",
+    "extrapolation", "use_auto_blend", "blend_in", "blend_out", "use_reverse", "mute", "use_sync_length",
+    "use_animated_influence", "use_animated_time", "use_animated_time_cyclic")
 _DEFAULTS = {_ROTATION: (1.0, 0.0, 0.0, 0.0), _SCALE: (1.0, 1.0, 1.0)}
 
 Table = tuple[np.ndarray, np.ndarray]  # frames (F,) and values (F, N) of one property

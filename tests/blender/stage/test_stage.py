@@ -277,3 +277,16 @@ def test_exporters_read_the_grass_as_green(tmp_path):
     red, green, blue, _ = next(one for one in found if one["name"] == "Pitch grass")["pbrMetallicRoughness"][
         "baseColorFactor"]
     assert green > 2 * red > blue
+
+
+def test_a_zoom_of_ones_own_stays(extension):
+    bpy.ops.beyond_mocap.add_stage()
+    bpy.ops.beyond_mocap.stage_view(view="BROADCAST")
+    lens = bpy.context.scene.camera.data
+    lens.animation_data_clear()
+    for frame, length in ((1, 35.0), (40, 90.0)):
+        lens.lens = length
+        lens.keyframe_insert("lens", frame=frame)
+    mine = lens.animation_data.action
+    bpy.ops.beyond_mocap.add_stage()
+    assert lens.animation_data.action == mine
