@@ -290,3 +290,18 @@ def test_a_zoom_of_ones_own_stays(extension):
     mine = lens.animation_data.action
     bpy.ops.beyond_mocap.add_stage()
     assert lens.animation_data.action == mine
+
+
+def test_what_is_changed_of_the_sky_stays_until_the_light_changes(extension):
+    bpy.ops.beyond_mocap.add_stage()
+    scene = bpy.context.scene
+    shader = next(node for node in scene.world.node_tree.nodes if node.type == "BACKGROUND")
+    shader.inputs["Strength"].default_value = 7.0
+    scene.beyond_mocap_stage.stands = True
+    bpy.ops.beyond_mocap.add_stage()
+    strengths = [node.inputs["Strength"].default_value for node in scene.world.node_tree.nodes
+                 if node.type == "BACKGROUND"]
+    assert strengths == [7.0]
+    scene.beyond_mocap_stage.light = "FLOODLIGHT"
+    (shader,) = (node for node in scene.world.node_tree.nodes if node.type == "BACKGROUND")
+    assert shader.inputs["Strength"].default_value == 1.0
