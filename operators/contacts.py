@@ -120,7 +120,8 @@ class BEYOND_MOCAP_OT_fix_foot(TakeOperator, bpy.types.Operator):
     def modal(self, context, event):
         """Handle the pointer over the view, and the keys; pass on all other events."""
         player = find_active_player(context.scene.beyond_mocap)
-        if player is None or self.handles is None or context.scene.name != self.handles.scene:
+        areas = [area for shown in context.window_manager.windows for area in shown.screen.areas]
+        if player is None or self.handles is None or context.scene.name != self.handles.scene or self.view not in areas:
             return self.stop(context)
         if self.drag is None and (player.take, player.name) != (self.handles.take, self.player):
             if self.attempt(lambda: self.show_contacts(context)) != {"FINISHED"}:

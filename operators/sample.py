@@ -13,6 +13,7 @@ from mathutils import Euler
 
 from ..scene.core import sample, window
 from ..scene.core.material import get_material
+from ..scene.core.measure import units_per_metre
 from ..scene.library import recordings
 from ..scene.result import queue
 from ..scene.stage.view_style import style_view
@@ -81,10 +82,10 @@ def bend_path(context, _how) -> None:
     """Show a recorded run, and let it follow a winding path."""
     show_clip(context, "jogging_2_9.bvh")
     bpy.ops.beyond_mocap.edit_path(count=len(WINDING))
-    points = context.view_layer.objects.active.data.splines[0].bezier_points
+    points, units = context.view_layer.objects.active.data.splines[0].bezier_points, units_per_metre(context.scene)
     for point, place in zip(points, WINDING):
         point.handle_left_type = point.handle_right_type = "AUTO"
-        point.co.xy = place
+        point.co.xy = [units * metres for metres in place]
     bpy.ops.beyond_mocap.update_path()
 
 
@@ -108,13 +109,13 @@ def place_thrower(context, _how) -> None:
 
 def create_target(context) -> bpy.types.Object:
     """Create the sphere that the ball is to hit."""
-    mesh, shape = bpy.data.meshes.new("Target"), bmesh.new()
-    bmesh.ops.create_icosphere(shape, subdivisions=3, radius=TARGET_RADIUS)
+    mesh, shape, units = bpy.data.meshes.new("Target"), bmesh.new(), units_per_metre(context.scene)
+    bmesh.ops.create_icosphere(shape, subdivisions=3, radius=TARGET_RADIUS * units)
     shape.to_mesh(mesh)
     shape.free()
     mesh.materials.append(get_material("Target", TARGET_COLOUR, 0.5))
     target = bpy.data.objects.new("Target", mesh)
-    target.location = TARGET
+    target.location = [units * metres for metres in TARGET]
     context.collection.objects.link(target)
     return target
 
@@ -266,9 +267,11 @@ def prepare_scene(context, wanted: Sample) -> None:
 
 
 def is_free(scene: bpy.types.Scene) -> bool:
-    """Return whether a scene has no content: no objects, players, or library other than the sample's."""
-    folder = scene.beyond_mocap.library_folder
-    return not scene.objects and not scene.beyond_mocap.players and (not folder or sample.is_in_sample(folder))
+    """Return whether a scene has no content: no objects, video, markers, players, or library but the sample's."""
+    folder, editor = scene.beyond_mocap.library_folder, scene.sequence_editor
+    has_video = editor is not None and len(editor.strips_all) > 0
+    return (not scene.objects and not has_video and not len(scene.timeline_markers)
+            and not scene.beyond_mocap.players and (not folder or sample.is_in_sample(folder)))
 
 
 def show_first(context, wanted: Sample) -> None:

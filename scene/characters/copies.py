@@ -44,11 +44,12 @@ def list_meshes(original: bpy.types.Object) -> list[bpy.types.Object]:
     return sorted(moved, key=lambda thing: thing.name)
 
 
-def list_loose_meshes(original: bpy.types.Object) -> list[str]:
-    """List the names of meshes that do not follow any bone: no vertex group has a bone's name."""
+def describe_loose_meshes(original: bpy.types.Object) -> list[str]:
+    """Describe meshes that do not follow any bone, since no vertex group has a bone's name: one line, or none."""
     bones = set(original.data.bones.keys())
-    return [thing.name for thing in list_meshes(original)
-            if thing.parent_type != "BONE" and not bones.intersection(thing.vertex_groups.keys())]
+    loose = [thing.name for thing in list_meshes(original)
+             if thing.parent_type != "BONE" and not bones.intersection(thing.vertex_groups.keys())]
+    return [f"{', '.join(loose[:3])}: no vertex group of a bone, does not follow the body"] if loose else []
 
 
 def create_copy(original: bpy.types.Object, name: str, collection: bpy.types.Collection) -> list[bpy.types.Object]:

@@ -55,6 +55,8 @@ def show_character(context: bpy.types.Context, player) -> list[str]:
     """
     copies.check_character(player.character)
     source, touches = read_player_motion(context.scene, player)
+    if player.character_body is not None and context.scene.objects.get(player.character_body.name) is None:
+        remove_character(player)  # the user has deleted its copy in a view
     body, is_new = player.character_body, player.character_body is None
     if is_new:
         home = player.body.users_collection[0]
@@ -79,8 +81,7 @@ def show_character(context: bpy.types.Context, player) -> list[str]:
     dress(body, player.name, {"shirt": tuple(player.shirt)})
     _show_builtin(player, False)
     copies.update_original(player.character)
-    loose = copies.list_loose_meshes(player.character)
-    return [f"{', '.join(loose[:3])}: no vertex group of a bone, does not follow the body"] if loose else []
+    return copies.describe_loose_meshes(player.character)
 
 
 def remove_character(player) -> None:

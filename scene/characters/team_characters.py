@@ -40,9 +40,8 @@ class TeamCharacters:
         except BeyondMocapError as error:
             self._add_message(str(error))
             return False
-        loose = copies.list_loose_meshes(original)
-        if loose:
-            self._add_message(f"{', '.join(loose[:3])}: no vertex group of a bone, does not follow the body")
+        for line in copies.describe_loose_meshes(original):
+            self._add_message(line)
         return True
 
     def _add_message(self, text: str) -> None:

@@ -163,13 +163,17 @@ def run_again(scene: bpy.types.Scene, number: int, **other) -> None:
         scene: of the notice.
         number: of the notice; nothing happens where it is gone.
         other: arguments to call it with besides or instead of those that it had.
+    Raises:
+        RuntimeError: if it fails at once, or cannot run at present; in that case the notice stays.
     """
     row = find_notice(scene, number)
     if row is None:
         return
     name, arguments = row.operator, json.loads(row.arguments)
+    if name and not find_operator(name).poll():
+        raise RuntimeError(f"{row.name} cannot run at present; point at its button to see what it needs")
     dismiss_notice(number)
-    if name and find_operator(name).poll():
+    if name:
         find_operator(name)("INVOKE_DEFAULT", True, **arguments | other)
 
 

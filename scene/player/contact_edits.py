@@ -11,6 +11,7 @@ import numpy as np
 from bpy.props import EnumProperty, FloatProperty, FloatVectorProperty
 
 from ...beyond_mocap.base.errors import InputError
+from ...beyond_mocap.base.fixes import Fix
 from ...beyond_mocap.base.time_series import find_runs
 from ...beyond_mocap.synthesis.contact_edit import FEET as FEET_OF_CORE
 from ...beyond_mocap.synthesis.contact_edit import ContactEdit
@@ -80,7 +81,7 @@ def find_take(player):
     stored = session.find_take(player.take) if player is not None and player.take else None
     if stored is None:
         raise InputError("fix foot", "this session has no take of the player", "a take whose contacts are known",
-                         "press Update first")
+                         "press Update first", fixes=(Fix("press", "beyond_mocap.update"),))
     return stored.take
 
 

@@ -26,6 +26,10 @@ STACKED = "beyond_mocap_stacked"  # on a take's action that plays as a strip bel
 NAME = "Own Keys"
 FADE_SECONDS = 0.3  # s beside keys over which their difference fades
 _ROTATION, _SCALE = "rotation_quaternion", "scale"
+_STRIP_SETTINGS = (
+    "action_frame_start", "action_frame_end", "repeat", "scale", "frame_start", "frame_end", "blend_type",
+    "extrapolation", "use_auto_blend", "blend_in", "blend_out", "use_reverse", "mute", "use_sync_length",
+    "use_animated_influence", "use_animated_time", "use_animated_time_cyclic")
 _DEFAULTS = {_ROTATION: (1.0, 0.0, 0.0, 0.0), _SCALE: (1.0, 1.0, 1.0)}
 
 Table = tuple[np.ndarray, np.ndarray]  # frames (F,) and values (F, N) of one property
@@ -73,9 +77,9 @@ def keep_as_layer(body: bpy.types.Object, fps: float, fade: float = FADE_SECONDS
         _restore_generated(action, slot, generated)
     track = body.animation_data.nla_tracks.new()
     track.name = NAME
-    strip = _add_layer_strip(track, layer, part, 1.0)
+    _add_layer_strip(track, layer, part)
     stack_layers(body)
-    return list_layers(body)[-1] if strip is not None else strip
+    return list_layers(body)[-1]
 
 
 def remove_layer(body: bpy.types.Object, number: int) -> None:
@@ -182,8 +186,13 @@ def _reset_channels(body: bpy.types.Object, paths: set[str]) -> None:
     """Reset these properties to rest; those that something else still animates are evaluated again afterwards."""
     for path in sorted(paths):
         owner, _, name = path.rpartition(".")
-        thing = body.path_resolve(owner)
-        setattr(thing, name, _DEFAULTS.get(name, (0.0,) * len(getattr(thing, name))))
+        try:
+            thing = body.path_resolve(owner) if owner else body
+            value = getattr(thing, name)
+        except (AttributeError, ValueError):  # a custom property, or of a bone that is gone: its value stays
+            continue
+        if not isinstance(value, (bool, int, float, str)):
+            setattr(thing, name, _DEFAULTS.get(name, (0.0,) * len(value)))
     body.update_tag(refresh={"OBJECT", "DATA", "TIME"})
 
 
@@ -266,7 +275,7 @@ def _restore_generated(action: bpy.types.Action, slot, generated: hand_keys.Gene
         curve.update()
 
 
-def _add_layer_strip(track: bpy.types.NlaTrack, action: bpy.types.Action, slot, influence: float):
+def _add_layer_strip(track: bpy.types.NlaTrack, action: bpy.types.Action, slot) -> None:
     """Add the strip of a layer."""
     first, last = channels.find_key_range(channels.collect_curves(action, slot))
     strip = blocks.add_strip(track, action, slot, first, last=last, name=NAME)
@@ -274,8 +283,7 @@ def _add_layer_strip(track: bpy.types.NlaTrack, action: bpy.types.Action, slot, 
     strip.use_animated_influence = True  # else Blender takes the influence from the strip's blend in and out
     for curve in strip.fcurves:
         curve.keyframe_points.clear()  # a plain slider, until the user keys it
-    strip.influence = influence
-    return strip
+    strip.influence = 1.0
 
 
 def _raise_layers(body: bpy.types.Object) -> None:
@@ -284,14 +292,31 @@ def _raise_layers(body: bpy.types.Object) -> None:
     tracks = list(data.nla_tracks)
     takes = [number for number, track in enumerate(tracks)
              if any(strip.action is not None and strip.action.get(MARK) for strip in track.strips)]
-    names = [track.name for number, track in enumerate(tracks) if takes and number < takes[-1]
-             and any(strip.action is not None and strip.action.get(LAYER) for strip in track.strips)]
-    for name in names:
-        old = data.nla_tracks[name]
-        strip = old.strips[0]
-        action, slot, influence, is_muted = strip.action, strip.action_slot, strip.influence, old.mute or strip.mute
-        strip_name, new = strip.name, data.nla_tracks.new()
-        new.mute = is_muted
-        raised = _add_layer_strip(new, action, slot, influence)
-        data.nla_tracks.remove(old)
-        new.name, raised.name = name, strip_name
+    for track in tracks[:takes[-1]] if takes else ():
+        if any(strip.action is not None and strip.action.get(LAYER) for strip in track.strips):
+            _raise_track(data.nla_tracks, track)
+
+
+def _raise_track(tracks, old: bpy.types.NlaTrack) -> None:
+    """Put a copy of a track on top, with all that the user has set on its strips, in place of the track."""
+    new, name, strips = tracks.new(), old.name, [strip for strip in old.strips if strip.action is not None]
+    new.mute, new.lock = old.mute, old.lock
+    copies = [(_copy_strip(new, strip), strip.name) for strip in strips]
+    tracks.remove(old)
+    new.name = name
+    for copied, strip_name in copies:
+        copied.name = strip_name
+
+
+def _copy_strip(track: bpy.types.NlaTrack, strip: bpy.types.NlaStrip) -> bpy.types.NlaStrip:
+    """Copy a strip, with its place in time, its blending and the keys of its own properties, to another track."""
+    copied = blocks.add_strip(track, strip.action, strip.action_slot, int(np.floor(strip.frame_start)),
+                              last=int(np.ceil(strip.frame_end)), name=strip.name)
+    for name in _STRIP_SETTINGS:
+        setattr(copied, name, getattr(strip, name))
+    for curve in strip.fcurves:
+        target = copied.fcurves.find(curve.data_path)
+        target.keyframe_points.clear()
+        channels.write_keys(target, channels.read_keys(curve))
+    copied.influence = strip.influence
+    return copied

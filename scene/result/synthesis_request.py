@@ -169,10 +169,10 @@ def _synthesize_single(request: Request, clips, progress, cancelled, hurry) -> T
     from ...beyond_mocap.synthesis.resynthesize import VariantStretch, list_shown_stretches, resynthesize
     from ...beyond_mocap.synthesis.synthesize import synthesize
 
-    start, plan, mode, told = perf_counter(), request.plan, request.mode, progress
+    start, plan, mode, report_progress = perf_counter(), request.plan, request.mode, progress
 
     def progress(share, text):
-        told((1.0 if mode.kind == "quick" else SEARCH_SHARE) * share, text)
+        report_progress((1.0 if mode.kind == "quick" else SEARCH_SHARE) * share, text)
 
     stamp = freshness.compute_fingerprint(plan)
     is_same_plan, steps = request.recipe.get("plan") == stamp, request.recipe.get("steps")

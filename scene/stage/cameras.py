@@ -2,7 +2,7 @@
 
 All are ordinary cameras with keys. The first three stand still, look at an empty and zoom; the last is the child of an
 empty whose scale is its distance. An empty's path is smoothed by a Gaussian, forwards and backwards alike, so that a
-camera neither jerks nor lags. Empties that play an action of the user's are left alone.
+camera neither jerks nor lags. Empties and lenses that play an action of the user's are left alone.
 """
 
 from __future__ import annotations
@@ -150,10 +150,10 @@ def _find_empty(camera: bpy.types.Object | None) -> bpy.types.Object | None:
     return next((look.target for look in looks if look.type == "TRACK_TO" and look.target is not None), None)
 
 
-def _is_free(empty: bpy.types.Object) -> bool:
-    """Return whether an empty plays nothing, or what these cameras have written."""
-    action, _ = channels.find_playing_action(empty)
-    data = empty.animation_data
+def _is_free(thing: bpy.types.ID) -> bool:
+    """Return whether an empty or a camera's lens plays nothing, or what these cameras have written."""
+    action, _ = channels.find_playing_action(thing)
+    data = thing.animation_data
     return action.get(MARK, False) if action is not None else data is None or not len(data.nla_tracks)
 
 
@@ -168,7 +168,9 @@ def _animate_standing(scene: bpy.types.Scene, camera: bpy.types.Object, aim: bpy
     target = np.column_stack([play.middle, np.full(len(width), AIM_HEIGHT)])
     distance = np.linalg.norm(target - np.array(camera.location) / units, axis=1)
     _write_keys(aim, play.frames, "Object Transforms", {"location": target * units})
-    _write_keys(camera.data, play.frames, "Lens", {"lens": np.clip(SENSOR * distance / width, 15.0, 400.0)[:, None]})
+    if _is_free(camera.data):
+        lens = np.clip(SENSOR * distance / width, 15.0, 400.0)
+        _write_keys(camera.data, play.frames, "Lens", {"lens": lens[:, None]})
 
 
 def _animate_following(scene: bpy.types.Scene, _camera: bpy.types.Object, focus: bpy.types.Object,

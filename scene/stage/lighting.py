@@ -13,7 +13,7 @@ from ..core.material import get_material
 from . import surfaces
 from .meshes import create_mesh, create_object, create_tubes
 
-MARK = "beyond_mocap_sky"
+MARK = "beyond_mocap_sky"  # of a world: the kind of sky that it was painted as
 PREVIOUS = "beyond_mocap_world_before"
 WORLD = "Stage sky"
 DAYLIGHT, FLOODLIGHT = "DAYLIGHT", "FLOODLIGHT"
@@ -56,16 +56,20 @@ def create_sun(collection: bpy.types.Collection) -> bpy.types.Object:
 
 
 def set_sky(scene: bpy.types.Scene, kind: str) -> bool:
-    """Give the scene the sky of a kind; False, and nothing changes, where the world is one of the user's."""
+    """Give the scene the sky of a kind; False, and nothing changes, where the world is one of the user's.
+
+    A sky of that kind is not painted again, so that what the user has changed of it stays.
+    """
     world = scene.world
     if world is not None and not world.get(MARK) and not is_plain_world(world):
         return False
     if world is None or not world.get(MARK) or world.library is not None:
         scene.world = bpy.data.worlds.new(WORLD)
-        scene.world[MARK] = True
         if world is not None:
             scene.world[PREVIOUS] = world
-    _paint_sky(scene.world, *SKIES[kind])
+    if scene.world.get(MARK) != kind:
+        _paint_sky(scene.world, *SKIES[kind])
+        scene.world[MARK] = kind
     return True
 
 

@@ -159,7 +159,8 @@ def _list_settings(scene: bpy.types.Scene, look: PictureLook) -> list[tuple]:
     width = look.height * render.resolution_x * render.pixel_aspect_x / (render.resolution_y * render.pixel_aspect_y)
     sizes = [("render.resolution_x", 2 * round(width / 2)), ("render.resolution_y", 2 * round(look.height / 2)),
              ("render.resolution_percentage", 100), ("render.use_border", False), ("render.use_sequencer", False),
-             ("render.film_transparent", False), ("render.engine", look.engine)]
+             ("render.film_transparent", False), ("render.use_multiview", False), ("frame_step", 1),
+             ("render.engine", look.engine)]
     samples = {"CYCLES": [("cycles.samples", look.samples), ("cycles.use_denoising", False), ("cycles.max_bounces", 3)],
                "BLENDER_WORKBENCH": [("display.shading.light", "STUDIO"), ("display.shading.color_type", "MATERIAL"),
                                      ("display.shading.show_shadows", True)]}

@@ -9,6 +9,7 @@ Progress goes to stderr as JSON lines. This file imports nothing of the extensio
 from __future__ import annotations
 
 import json
+import os
 import signal
 import sys
 
@@ -46,11 +47,20 @@ def render_order(order: dict) -> None:
     bpy.ops.wm.open_mainfile(filepath=order["file"], load_ui=False, use_scripts=order["scripts"])
     scene = bpy.data.scenes[order["scene"]]
     apply_settings(scene, order["settings"])
+    _mute_file_outputs()
     if order["movie"]:
         _render_movie(scene, order["movie"])
     for number, tile in enumerate(order["tiles"]):
         _render_tile(scene, *tile)
         _write_progress((number + 1) / len(order["tiles"]), f"Picture {number + 1} of {len(order['tiles'])}")
+
+
+def _mute_file_outputs() -> None:
+    """Mute the compositor's nodes that write files: a preview must not replace what the user has rendered."""
+    trees = [*bpy.data.node_groups, *(getattr(scene, "node_tree", None) for scene in bpy.data.scenes)]
+    for node in [node for tree in trees if tree is not None for node in tree.nodes]:
+        if node.bl_idname == "CompositorNodeOutputFile":
+            node.mute = True
 
 
 def _render_movie(scene: bpy.types.Scene, path: str) -> None:
@@ -85,8 +95,8 @@ def _write_progress(fraction: float, text: str) -> None:
     print(json.dumps({"progress": fraction, "text": text}), file=sys.stderr, flush=True)
 
 
-def _run() -> None:
-    """Render the order on the command line; exit status 2 and a line where that fails."""
+def _run() -> int:
+    """Render the order on the command line; return the exit status, 2 with a line where that fails."""
     signal.signal(signal.SIGINT, signal.SIG_DFL)  # ends at once, also within a frame
     with open(sys.argv[sys.argv.index("--") + 1], encoding="utf-8") as file:
         order = json.load(file)
@@ -94,8 +104,9 @@ def _run() -> None:
         render_order(order)
     except Exception as error:
         print(f"{ERROR_PREFIX}{' '.join(str(error).split()).removeprefix('Error: ')}", file=sys.stderr, flush=True)
-        sys.exit(2)
+        return 2
+    return 0
 
 
 if __name__ == "__main__":
-    _run()
+    os._exit(_run())  # Blender 4.5 as a module may wait forever for its own threads when it is cleaned up

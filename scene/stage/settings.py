@@ -16,10 +16,10 @@ VIEWS = (("FOLLOW", "Following", "From near the ground, moving with the players"
          ("EYES", "Player's Eye", "Through the eyes of the selected player", "HIDE_OFF", 4))
 
 
-def _update_stage(_settings, context) -> None:
+def _update_stage(settings, _context) -> None:
     """Rebuild the stage in the new light; nothing happens where there is none."""
-    if stage.find_stage(context.scene) is not None:
-        stage.create_stage(context.scene)
+    if stage.find_stage(settings.id_data) is not None:
+        stage.create_stage(settings.id_data)
 
 
 class BeyondMocapStage(bpy.types.PropertyGroup):

@@ -137,8 +137,8 @@ def _find_own_rows(context, rows: dict[tuple[str, str], int], bands: list[int]) 
     bands = [row for row in bands if row not in rows.values()]
     if len(owners) != len(bands):
         return above
-    told = {(thing.name, OWN): row for thing, row in zip(owners, bands) if thing.beyond_mocap_dot.clock}
-    return told if above.items() <= told.items() else above
+    tinted = {(thing.name, OWN): row for thing, row in zip(owners, bands) if thing.beyond_mocap_dot.clock}
+    return tinted if above.items() <= tinted.items() else above
 
 
 def _list_targets(context: bpy.types.Context) -> list[bpy.types.Object]:

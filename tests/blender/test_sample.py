@@ -68,6 +68,22 @@ def test_an_empty_scene_is_filled_itself():
     assert scene.beyond_mocap.task == "PATH"
 
 
+def test_a_scene_with_video_alone_has_content():
+    bpy.ops.wm.read_homefile(use_empty=True)
+    scene = bpy.context.scene
+    length = {"length": 100} if bpy.app.version >= (5, 0, 0) else {"frame_end": 101}
+    scene.sequence_editor_create().strips.new_effect(name="Shot", type="COLOR", channel=1, frame_start=1, **length)
+    before = scene.render.fps, scene.frame_end
+    bpy.ops.beyond_mocap.load_sample(which="PATH")
+    assert bpy.context.scene != scene and (scene.render.fps, scene.frame_end) == before
+
+
+def test_it_has_its_size_in_a_scene_of_centimetres():
+    bpy.ops.wm.read_homefile(use_empty=True)
+    bpy.context.scene.unit_settings.scale_length = 0.01
+    assert bpy.ops.beyond_mocap.load_sample(which="PATH") == {"FINISHED"}
+
+
 def test_what_is_in_a_scene_stays():
     scene = bpy.context.scene
     scene.beyond_mocap.library_folder = "//mine"

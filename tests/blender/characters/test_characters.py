@@ -348,3 +348,19 @@ def test_a_character_is_found_again_in_a_saved_file(room, core, clip, tmp_path):
     second.name, second.body = "Eva", player.body
     second.character = player.character
     np.testing.assert_allclose(second.character_body.matrix_world.to_scale(), (0.01,) * 3, rtol=1e-5)
+
+
+def test_a_copy_that_was_deleted_in_a_view_is_made_again(room, core, clip):
+    player = start_player(room, core, clip)
+    rig = rigs.create_mixamo()
+    characters.add_mesh(rig, EXTENSION)
+    player.character = rig
+    copy = player.character_body
+    for thing in (copy, *copy.children):  # as Blender's Delete does; the player's pointer keeps the object in the file
+        for collection in list(thing.users_collection):
+            collection.objects.unlink(thing)
+    bpy.context.scene.beyond_mocap.active_player = 0
+    assert bpy.ops.beyond_mocap.update_character() == {"FINISHED"}
+    assert player.character_body.name in bpy.context.scene.objects and rig.hide_render
+    player.character = None
+    assert not rig.hide_render

@@ -157,3 +157,35 @@ def test_without_own_keys_there_is_no_layer(body, layers):
     with pytest.raises(RuntimeError, match="no keys of your own"):
         bpy.ops.beyond_mocap.keep_as_layer()
     assert not layers.list_layers(body) and body.animation_data.action is not None
+
+
+def test_time_and_keyed_influence_of_a_layer_are_kept_by_updates(body, layers, one):  # noqa: F811
+    key_poses(body)
+    bpy.ops.beyond_mocap.keep_as_layer()
+    (layer,) = layers.list_layers(body)
+    layer.scale, layer.blend_type, layer.frame_start_ui = 1.5, "ADD", layer.frame_start + 20.0
+    for influence, frame in ((0.25, 60), (0.75, 90)):
+        layer.influence = influence
+        layer.keyframe_insert("influence", frame=frame)
+
+    def read_layer():
+        (layer,) = layers.list_layers(body)
+        return (layer.frame_start, layer.frame_end, layer.scale, layer.blend_type,
+                [tuple(key.co) for curve in layer.fcurves for key in curve.keyframe_points])
+
+    before = read_layer()
+    assert len(before[-1]) == 2
+    for step in (lambda: bpy.ops.beyond_mocap.update(player=one.name), lambda: bpy.ops.beyond_mocap.accept()):
+        assert step() == {"FINISHED"}
+        assert read_layer() == before
+
+
+def test_a_layer_with_keys_of_the_object_and_of_a_custom_property_is_removed(body, layers):
+    bone = body.pose.bones["Spine"]
+    bone["stiffness"] = 0.5
+    bone.keyframe_insert('["stiffness"]', frame=50)
+    body.location.x += 1.0
+    body.keyframe_insert("location", frame=50)
+    bpy.ops.beyond_mocap.keep_as_layer()
+    assert bpy.ops.beyond_mocap.remove_layer(number=1) == {"FINISHED"}
+    assert not layers.list_layers(body)

@@ -94,3 +94,26 @@ def test_cancelled_or_failed_nothing_is_written(scene, tmp_path):
     with pytest.raises(errors.BeyondMocapError, match="gone"):
         pictures.render_pictures(order, lambda *told: None, lambda: False)
     assert list(tmp_path.iterdir()) == []
+
+
+def test_what_the_compositor_writes_to_files_is_left_alone(scene, tmp_path):
+    """A preview must not replace the passes of a final rendering."""
+    passes = tmp_path / "passes"
+    passes.mkdir()
+    if bpy.app.version >= (5, 0, 0):
+        tree = scene.compositing_node_group = bpy.data.node_groups.new("Passes", "CompositorNodeTree")
+    else:
+        scene.use_nodes = True
+        tree = scene.node_tree
+        tree.nodes.clear()
+    layers, file = tree.nodes.new("CompositorNodeRLayers"), tree.nodes.new("CompositorNodeOutputFile")
+    if bpy.app.version >= (5, 0, 0):
+        file.directory = str(passes)
+        file.file_output_items.new("RGBA", "Image")
+    else:
+        file.base_path = str(passes)
+    tree.links.new(layers.outputs["Image"], file.inputs[0])
+    out = tmp_path / "take.v2"
+    assert bpy.ops.beyond_mocap.contact_sheet(filepath=str(out), engine="CYCLES", samples=1, height=32, count=1,
+                                              columns=1) == {"FINISHED"}
+    assert (tmp_path / "take.v2.png").is_file() and not list(passes.iterdir())

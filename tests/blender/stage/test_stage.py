@@ -277,3 +277,31 @@ def test_exporters_read_the_grass_as_green(tmp_path):
     red, green, blue, _ = next(one for one in found if one["name"] == "Pitch grass")["pbrMetallicRoughness"][
         "baseColorFactor"]
     assert green > 2 * red > blue
+
+
+def test_a_zoom_of_ones_own_stays(extension):
+    bpy.ops.beyond_mocap.add_stage()
+    bpy.ops.beyond_mocap.stage_view(view="BROADCAST")
+    lens = bpy.context.scene.camera.data
+    lens.animation_data_clear()
+    for frame, length in ((1, 35.0), (40, 90.0)):
+        lens.lens = length
+        lens.keyframe_insert("lens", frame=frame)
+    mine = lens.animation_data.action
+    bpy.ops.beyond_mocap.add_stage()
+    assert lens.animation_data.action == mine
+
+
+def test_what_is_changed_of_the_sky_stays_until_the_light_changes(extension):
+    bpy.ops.beyond_mocap.add_stage()
+    scene = bpy.context.scene
+    shader = next(node for node in scene.world.node_tree.nodes if node.type == "BACKGROUND")
+    shader.inputs["Strength"].default_value = 7.0
+    scene.beyond_mocap_stage.stands = True
+    bpy.ops.beyond_mocap.add_stage()
+    strengths = [node.inputs["Strength"].default_value for node in scene.world.node_tree.nodes
+                 if node.type == "BACKGROUND"]
+    assert strengths == [7.0]
+    scene.beyond_mocap_stage.light = "FLOODLIGHT"
+    (shader,) = (node for node in scene.world.node_tree.nodes if node.type == "BACKGROUND")
+    assert shader.inputs["Strength"].default_value == 1.0
