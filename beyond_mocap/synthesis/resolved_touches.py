@@ -258,7 +258,7 @@ def apply_trajectory(take: Take, plan: ResolvedPlan) -> tuple[Take, list[str]]:
     held = [compute_contact_frames(key.frame, len(contact_ball)) for key in keys]
     course_changes = [(touch.time - take.start_time) * fps for touch in plan.trajectory.touches]
     trajectory, filled = plan.trajectory.interpolate(times)
-    path = np.where(np.isfinite(trajectory), trajectory, contact_ball)
+    path = plan.lead_ball(times, np.where(np.isfinite(trajectory), trajectory, contact_ball))
     known = np.interp(times, plan.track.times, plan.track.ball_height_known.astype(float)) > 0.5
     for number, pair in enumerate(held):
         path = add_flight_arc(path, float(np.mean(pair)), float(contact_ball[list(pair), 2].mean()), ~known, fps)

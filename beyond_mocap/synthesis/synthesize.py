@@ -25,14 +25,16 @@ from ..library.library import Library
 from ..motion.foot_plant import PlantResult
 from ..motion.motion import Motion
 from ..motion.track.ball_path import BallPath
+from .ball_pins import BALL, SAME_TOUCH, find_pinned_frame
 from .body_size import to_player_size
+from .construct.ball_touch.touch_frames import find_nearest_frame
 from .construct.construction import Construction, build_key_results, find_touches
 from .construct.extra_steps import Steps
 from .construct.gaze import estimate_look
 from .construct.pins import apply_pins
 from .construct.thesis_methods import construct_blocks
 from .contact_edit import FEET
-from .plan import METHODS, Plan, ResolvedPlan
+from .plan import METHODS, Pin, Plan, ResolvedPlan
 from .provenance import build_provenance_fields
 from .quality.playback import playback_from_take
 from .quality.unmet_constraints import report_unmet_constraints
@@ -236,13 +238,14 @@ def finish_take(
     take, detours = apply_trajectory(take, plan)
     if plan.trajectory is not None:
         take = replace(take, seconds={**take.seconds, "ball": time.perf_counter() - started})
+    take = measure_ball_pins(take, plan)
     return add_warnings(take, recordings, request, hurried_from, report_unmet=report_unmet,
                         more=[*report_missing_touches(take, plan), *detours])
 
 
 def add_pins(take: Take, recordings: Library) -> Take:
     """Bring the hands, feet and gaze of a take to the pins of its plan."""
-    pins = take.plan.pins
+    pins = [pin for pin in take.plan.pins if pin.part != BALL]
     if not pins:
         return take
     found = apply_pins(take.motion, take.contacts, pins, take.start_time, estimate_look(recordings))
@@ -250,6 +253,23 @@ def add_pins(take: Take, recordings: Library) -> Take:
     results = tuple(PinResult(pin, miss) for pin, miss in zip(pins, found.miss))
     unpinned = take.motion, take.contacts
     return replace(take, motion=motion, contacts=found.contacts, pins=results, unpinned=unpinned)
+
+
+def measure_ball_pins(take: Take, plan: ResolvedPlan) -> Take:
+    """Measure how far the ball of a take is from its pins, each at the frame at which its key moment is played."""
+    misses = [_measure_ball_miss(take, pin) for pin in plan.ball_pins]
+    results = [PinResult(pin, miss) for pin, miss in zip([pin for pin in take.plan.pins if pin.part == BALL], misses)]
+    return replace(take, pins=(*take.pins, *results)) if results else take
+
+
+def _measure_ball_miss(take: Take, pin: Pin) -> float:
+    """Measure how far, m, the ball is from a pin of `assign_ball_pins`; infinite outside the take and without a ball."""
+    frame = None if take.ball is None else find_pinned_frame(take.ball.times, pin)
+    if frame is None:
+        return np.inf
+    played = [find_nearest_frame(key.frame, len(take.motion)) for key in take.keys
+              if abs(key.requested.resolved_time - pin.time) <= SAME_TOUCH]
+    return float(np.linalg.norm(take.ball.positions[min(played, default=frame)] - pin.position))
 
 
 def add_warnings(
@@ -319,11 +339,14 @@ def _report_missed_pins(take: Take) -> list[str]:
         pin, when = f"{format_seconds(result.pin.time)} s: the pin of {result.pin.part}", (result.pin.time,
                 result.pin.end)
         if not np.isfinite(result.miss):
-            messages.append(f"{pin} is outside the track, or the skeleton has no such part; it is ignored")
+            missing = "track has no ball" if result.pin.part == BALL else "skeleton has no such part"
+            messages.append(f"{pin} is outside the track, or the {missing}; it is ignored")
         elif result.pin.part == "gaze" and result.miss > GAZE_TOLERANCE:
             beyond = np.degrees(result.miss)
             messages.append(TimedMessage(f"{pin} is {beyond:.0f} degrees beyond what the neck can turn", when))
-        elif result.pin.part != "gaze" and result.miss > PIN_TOLERANCE:
+        elif result.pin.part == BALL and result.miss > PIN_TOLERANCE:
+            messages.append(TimedMessage(f"{pin} is missed by {100.0 * result.miss:.0f} cm: the body is in the way", when))
+        elif result.pin.part not in ("gaze", BALL) and result.miss > PIN_TOLERANCE:
             messages.append(TimedMessage(f"{pin} is out of reach by {100.0 * result.miss:.0f} cm", when))
     return messages
 

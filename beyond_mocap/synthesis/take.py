@@ -49,7 +49,7 @@ class PinResult:
 
     Attributes:
         pin: the pin.
-        miss: m by which a hand or foot falls short of it, or rad that the gaze looks past it.
+        miss: m by which a hand, a foot or the ball falls short of it, or rad that the gaze looks past it.
     """
 
     pin: Pin
