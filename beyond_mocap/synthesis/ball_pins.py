@@ -1,11 +1,12 @@
 """Pins of the ball: its trajectory is moved so that it goes through a place at a key moment.
 
     pins = assign_ball_pins(plan.pins, timeline)
-    ball = lead_ball_to_pins(times, ball, pins, list_fixed_times(timeline, touches))
+    ball = lead_ball_to_pins(times, ball, pins.values(), list_fixed_times(timeline, touches))
 
-A pin belongs to the key moment nearest to it, and acts when that key moment is played. The ball is shifted by the same
-for a moment around it, and eased back to its own trajectory within FADE_SECONDS, or at the next touch if that is
-earlier.
+A pin belongs to the key moment nearest to it, within KEY_REACH, and acts when that is played; without one it has no
+effect. The ball is shifted by the same for a moment around it, and eased back to its own trajectory within
+FADE_SECONDS, or at the next touch if that is earlier. That is where the body looks for the ball and meets it; a solved
+ball is then led from touch to touch as ever (`resolved_touches.apply_trajectory`), so that it keeps rolling or flying.
 """
 
 from __future__ import annotations
@@ -45,38 +46,43 @@ def list_ball_keys(timeline: Timeline) -> list[KeyMoment]:
 
 
 def list_fixed_times(timeline: Timeline, touches: Iterable[PlayerTouch] = ()) -> list[float]:
-    """List the seconds at which a pin of another moment leaves the ball where it is: all its touches."""
+    """List the seconds of all touches, at which a pin of another one leaves the ball where it is."""
     return [*(key.resolved_time for key in list_ball_keys(timeline)), *(touch.time for touch in touches)]
 
 
-def assign_ball_pins(pins: Iterable[Pin], timeline: Timeline) -> tuple[Pin, ...]:
-    """Give each pin of the ball the time at which its key moment is played; one without a key moment keeps its own.
+def assign_ball_pins(pins: Iterable[Pin], timeline: Timeline) -> dict[Pin, Pin]:
+    """Assign each pin of the ball to the key moment nearest to it.
 
     Args:
-        pins: of all parts, in order of time.
+        pins: of all parts.
         timeline: the annotations, with key moments at the touches that they mean.
     Returns:
-        The pins of the ball, no two at one key moment and none in the ground.
+        The pins that have a key moment, no two the same one -> the pin when that is played, not in the ground.
     """
     ball_pins, keys = [pin for pin in pins if pin.part == BALL], list_ball_keys(timeline)
     pairs = [(min(abs(pin.time - key.time), abs(pin.time - key.resolved_time)), number, row)
              for number, pin in enumerate(ball_pins) for row, key in enumerate(keys)]
-    moments: dict[int, float] = {}
+    moments: dict[int, int] = {}
     for away, number, row in sorted(pairs):
-        if away <= KEY_REACH and number not in moments and keys[row].resolved_time not in moments.values():
-            moments[number] = keys[row].resolved_time
-    return tuple(replace(pin, time=moments.get(number, pin.time), position=np.maximum(pin.position, _LOWEST))
-                 for number, pin in enumerate(ball_pins))
+        if away <= KEY_REACH and number not in moments and row not in moments.values():
+            moments[number] = row
+    return {ball_pins[number]: _play_pin(ball_pins[number], keys[row]) for number, row in sorted(moments.items())}
 
 
-def lead_ball_to_pins(times: np.ndarray, ball: np.ndarray, pins: Sequence[Pin], fixed: Sequence[float]) -> np.ndarray:
+def _play_pin(pin: Pin, key: KeyMoment) -> Pin:
+    """Move a pin to the time at which its key moment is played, and out of the ground."""
+    x, y, z = pin.position
+    return replace(pin, time=key.resolved_time, position=(x, y, max(z, BALL_RADIUS)))
+
+
+def lead_ball_to_pins(times: np.ndarray, ball: np.ndarray, pins: Iterable[Pin], fixed: Sequence[float]) -> np.ndarray:
     """Lead the ball's trajectory through its pins, each at the frame nearest to it.
 
     Args:
         times: (T,) s, at an even rate.
         ball: (T, 3) m, NaN where it is unknown.
-        pins: of `assign_ball_pins`; those outside the times and where the ball is unknown have no effect.
-        fixed: s at which the ball stays where it is, except within SAME_TOUCH of a pin.
+        pins: when they are played; those outside the times and where the ball is unknown have no effect.
+        fixed: s of all touches; none but the pinned ones move.
     Returns:
         (T, 3) m; the same array without pins.
     """
@@ -85,8 +91,7 @@ def lead_ball_to_pins(times: np.ndarray, ball: np.ndarray, pins: Sequence[Pin], 
         frame = find_pinned_frame(times, pin)
         if frame is None or not np.isfinite(ball[frame]).all():
             continue
-        others = [other.time for other in pins if other is not pin]
-        stops = [*others, *(second for second in fixed if abs(second - pin.time) > SAME_TOUCH)]
+        stops = [second for second in fixed if abs(second - pin.time) > SAME_TOUCH]
         low = max([pin.time - FADE_SECONDS, *(second for second in stops if second < pin.time)])
         high = min([pin.time + FADE_SECONDS, *(second for second in stops if second > pin.time)])
         share = ease_around(times, low, max(pin.time - _WHOLE, low), min(pin.time + _WHOLE, high), high)

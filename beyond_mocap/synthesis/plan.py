@@ -385,8 +385,8 @@ class ResolvedPlan:
         return sampled if ball is sampled.ball else replace(sampled, ball=ball)
 
     @cached_property
-    def ball_pins(self) -> tuple[Pin, ...]:
-        """The pins of the ball, at the times of their key moments, in the player's size."""
+    def ball_pins(self) -> dict[Pin, Pin]:
+        """The requested pins of the ball -> the same when their key moments are played, in the player's size."""
         return assign_ball_pins(self.requested.pins, self.timeline)
 
     def lead_ball(self, times: np.ndarray, ball: np.ndarray, size: float = 1.0) -> np.ndarray:
@@ -399,6 +399,6 @@ class ResolvedPlan:
         Returns:
             (T, 3) m; the same array without pins.
         """
-        pins = [_scale_pin(pin, size) for pin in self.ball_pins]
+        pins = [_scale_pin(pin, size) for pin in self.ball_pins.values()]
         touches = () if self.trajectory is None else self.trajectory.touches
         return lead_ball_to_pins(times, ball, pins, list_fixed_times(self.timeline, touches))

@@ -25,7 +25,7 @@ from ..library.library import Library
 from ..motion.foot_plant import PlantResult
 from ..motion.motion import Motion
 from ..motion.track.ball_path import BallPath
-from .ball_pins import BALL, SAME_TOUCH, find_pinned_frame
+from .ball_pins import BALL, KEY_REACH, SAME_TOUCH, find_pinned_frame
 from .body_size import to_player_size
 from .construct.ball_touch.touch_frames import find_nearest_frame
 from .construct.construction import Construction, build_key_results, find_touches
@@ -58,6 +58,9 @@ KEY_MARGIN = 1.5
 
 PIN_TOLERANCE, GAZE_TOLERANCE = 0.01, np.radians(5.0)
 """Metres, and radians of a gaze, by which a pin may be missed without a warning."""
+
+_NO_EFFECT = ("is outside the track, or the skeleton has no such part",
+              f"has no key moment with the ball within {KEY_REACH:g} s, or the track has no ball")
 
 CONTACT_REACH = 0.2
 """Seconds beside a contact edit within which its foot has to be in contact."""
@@ -257,15 +260,15 @@ def add_pins(take: Take, recordings: Library) -> Take:
 
 def measure_ball_pins(take: Take, plan: ResolvedPlan) -> Take:
     """Measure how far the ball of a take is from its pins, each at the frame at which its key moment is played."""
-    misses = [_measure_ball_miss(take, pin) for pin in plan.ball_pins]
-    results = [PinResult(pin, miss) for pin, miss in zip([pin for pin in take.plan.pins if pin.part == BALL], misses)]
+    results = [PinResult(pin, _measure_ball_miss(take, plan.ball_pins.get(pin))) for pin in take.plan.pins
+               if pin.part == BALL]
     return replace(take, pins=(*take.pins, *results)) if results else take
 
 
-def _measure_ball_miss(take: Take, pin: Pin) -> float:
-    """Measure how far, m, the ball is from a pin of `assign_ball_pins`; infinite outside the take and without a ball."""
-    frame = None if take.ball is None else find_pinned_frame(take.ball.times, pin)
-    if frame is None:
+def _measure_ball_miss(take: Take, pin: Pin | None) -> float:
+    """Measure how far, m, the ball is from a pin when its key moment is played; infinite for a pin without effect."""
+    frame = None if pin is None or take.ball is None else find_pinned_frame(take.ball.times, pin)
+    if pin is None or take.ball is None or frame is None:
         return np.inf
     played = [find_nearest_frame(key.frame, len(take.motion)) for key in take.keys
               if abs(key.requested.resolved_time - pin.time) <= SAME_TOUCH]
@@ -339,13 +342,12 @@ def _report_missed_pins(take: Take) -> list[str]:
         pin, when = f"{format_seconds(result.pin.time)} s: the pin of {result.pin.part}", (result.pin.time,
                 result.pin.end)
         if not np.isfinite(result.miss):
-            missing = "track has no ball" if result.pin.part == BALL else "skeleton has no such part"
-            messages.append(f"{pin} is outside the track, or the {missing}; it is ignored")
+            messages.append(f"{pin} {_NO_EFFECT[result.pin.part == BALL]}; it is ignored")
         elif result.pin.part == "gaze" and result.miss > GAZE_TOLERANCE:
             beyond = np.degrees(result.miss)
             messages.append(TimedMessage(f"{pin} is {beyond:.0f} degrees beyond what the neck can turn", when))
         elif result.pin.part == BALL and result.miss > PIN_TOLERANCE:
-            messages.append(TimedMessage(f"{pin} is missed by {100.0 * result.miss:.0f} cm: the body is in the way", when))
+            messages.append(TimedMessage(f"{pin} is missed by {100.0 * result.miss:.0f} cm", when))
         elif result.pin.part not in ("gaze", BALL) and result.miss > PIN_TOLERANCE:
             messages.append(TimedMessage(f"{pin} is out of reach by {100.0 * result.miss:.0f} cm", when))
     return messages

@@ -246,7 +246,7 @@ class Construction:
     def _pin_touches(self) -> list[Touch]:
         """Give the touches at a pin of the ball its place, in the player's size."""
         seconds = [float(self.track.times[0]) + touch.frame / self.plan.fps for touch in self.touches]
-        pins = [next((pin for pin in self.plan.ball_pins if abs(pin.time - second) <= SAME_TOUCH), None)
+        pins = [next((pin for pin in self.plan.ball_pins.values() if abs(pin.time - second) <= SAME_TOUCH), None)
                 for second in seconds]
         return [touch if pin is None else replace(touch, place=pin.position) for touch, pin in zip(self.touches, pins)]
 

@@ -142,9 +142,9 @@ def build_problem(body: Body, moment: TouchFrames, origin: int, contacts, path, 
         path = add_flight_arc(path, moment.frame, float(height), ~height_known, fps)
     ahead = _choose_direction(body, parts[0], moment, at=at, path=path, fps=fps)
     avoid = _compute_other_leg_lines(body, parts[0], at) if parts[0].part == "foot" else []
-    is_held = not moment.is_fixed and comes_from_hands(moment.words) and _measure_distance(body, at, path[moment.frame]) < HELD_DISTANCE
+    is_held = comes_from_hands(moment.words) and _measure_distance(body, at, path[moment.frame]) < HELD_DISTANCE
     scene = TouchProblem(moment=moment, parts=parts, shares=shares, ball=path, measured=measured,
-                          is_held=is_held, aim=Aim(ahead), avoid=avoid, origin=origin, fps=fps)
+                          is_held=is_held and not moment.is_fixed, aim=Aim(ahead), avoid=avoid, origin=origin, fps=fps)
     if len(parts) == 2:
         return scene
     aim = choose_aim(line, radius, ahead, rise=_RISE[parts[0].part], ball=path[moment.frame],
