@@ -1,4 +1,4 @@
-"""Pins in the scene: an Empty for each place where a player's hand, foot, gaze or ball has to be, with time and hold."""
+"""Pins in the scene: an Empty for each place where a hand, a foot, the gaze or the ball has to be, with its time."""
 
 from __future__ import annotations
 
