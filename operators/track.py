@@ -7,7 +7,7 @@ import numpy as np
 
 from ..beyond_mocap.base.errors import InputError
 from ..beyond_mocap.motion.track.line_track import MAX_SPEED
-from ..beyond_mocap.synthesis.ball_pins import BALL
+from ..beyond_mocap.synthesis.pin import BALL
 from ..scene.core import channels, window
 from ..scene.core.measure import units_per_metre
 from ..scene.core.settings import find_active_player, is_track

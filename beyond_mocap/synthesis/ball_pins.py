@@ -1,7 +1,7 @@
 """Pins of the ball: its trajectory is moved so that it goes through a place at a key moment.
 
     pins = assign_ball_pins(plan.pins, timeline)
-    ball = lead_ball_to_pins(times, ball, pins.values(), list_fixed_times(timeline, touches))
+    ball = lead_ball_to_pins(times, ball, pins.values(), list_key_times(timeline))
 
 A pin belongs to the key moment nearest to it, within KEY_REACH, and acts when that is played; without one it has no
 effect. The ball is shifted by the same for a moment around it, and eased back to its own trajectory within
@@ -13,7 +13,6 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -21,11 +20,7 @@ from ..annotation import KeyMoment, Timeline
 from ..annotation.ball_contact import find_striking_part
 from ..motion.track import BALL_RADIUS
 from .construct.contact_geometry import ease_around
-
-if TYPE_CHECKING:
-    from .plan import Pin, PlayerTouch
-
-BALL = "ball"
+from .pin import BALL, Pin
 
 FADE_SECONDS = 0.6
 """Seconds before and after a pin within which the ball is back on its own trajectory."""
@@ -45,9 +40,9 @@ def list_ball_keys(timeline: Timeline) -> list[KeyMoment]:
     return [key for key in timeline.keys if find_striking_part(key.words) and not key.misses_ball]
 
 
-def list_fixed_times(timeline: Timeline, touches: Iterable[PlayerTouch] = ()) -> list[float]:
-    """List the seconds of all touches, at which a pin of another one leaves the ball where it is."""
-    return [*(key.resolved_time for key in list_ball_keys(timeline)), *(touch.time for touch in touches)]
+def list_key_times(timeline: Timeline) -> list[float]:
+    """List the seconds at which the key moments with the ball are played."""
+    return [key.resolved_time for key in list_ball_keys(timeline)]
 
 
 def assign_ball_pins(pins: Iterable[Pin], timeline: Timeline) -> dict[Pin, Pin]:

@@ -8,7 +8,7 @@ import os
 
 from ..annotation import read_text
 from ..base.errors import InputError
-from .plan import Pin
+from .pin import Pin
 
 COLUMNS = ("time_s", "part", "x_m", "y_m", "z_m", "hold_s")
 

@@ -6,7 +6,6 @@ and explanations work with.
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
@@ -20,7 +19,7 @@ from ..base.settings.setting import LATER, add_fields, check_limits
 from ..base.time_series import interpolate_columns
 from ..motion.skeleton import freeze_array
 from ..motion.track import SampledTrack, Track, sample_track
-from .ball_pins import BALL, assign_ball_pins, lead_ball_to_pins, list_fixed_times
+from .ball_pins import assign_ball_pins, lead_ball_to_pins, list_key_times
 from .contact_edit import ContactEdit
 from .heading_path import HeadingPath
 from .heading_plan import (
@@ -33,54 +32,14 @@ from .heading_plan import (
     sample_heading,
     update_heading_path,
 )
+from .pin import GAZE, PARTS, Pin
 
-GAZE = "gaze"
-PARTS = ("left_hand", "right_hand", "left_foot", "right_foot", GAZE, BALL)
 FEET = ("", "left", "right")
 METHODS = find_setting("synthesis", "method").choice_names
 MASSES = find_setting("player", "masses").choice_names
 _DEFAULTS = collect_defaults("synthesis", "player")
 _HEIGHT = find_setting("player", "height")
 _SAME = 1e-5  # s by which the end of a hold and the next key may differ where both are meant to be one time
-
-
-@dataclass(frozen=True)
-class Pin:
-    """A part of the body held at a place, or the ball led through it.
-
-    Attributes:
-        time: s on the track's clock from which on it holds.
-        part: one of PARTS; hands and feet are pinned by their joint (wrist, ankle), the gaze is turned to the place,
-            the ball's centre goes through it (`ball_pins`).
-        position: (x, y, z) m, world.
-        hold: s for which it holds, 0 for a moment; 0 for the ball.
-    Raises:
-        InputError: for an unknown part, for NaN or infinite values, and for a ball that holds.
-    """
-
-    time: float
-    part: str
-    position: tuple[float, float, float]
-    hold: float = 0.0
-
-    def __post_init__(self):
-        if self.part not in PARTS:
-            raise InputError("pin", f"part {self.part!r}", f"one of {', '.join(PARTS)}", "correct the part")
-        object.__setattr__(self, "time", float(self.time))
-        object.__setattr__(self, "hold", float(self.hold))
-        object.__setattr__(self, "position", tuple(float(value) for value in self.position))
-        if len(self.position) != 3 or not all(map(math.isfinite, (*self.position, self.time, self.hold))):
-            found = f"{self.time:g} s, {self.position}, {self.hold:g} s"
-            raise InputError("pin", found, "a finite time, position and hold", "correct the pin")
-        if self.hold < 0.0:
-            raise InputError("pin", f"a hold of {self.hold:g} s", "0 s or more", "correct the pin")
-        if self.part == BALL and self.hold:
-            raise InputError("pin", f"a hold of {self.hold:g} s", "0 s for the ball, which passes", "correct the pin")
-
-    @property
-    def end(self) -> float:
-        """Seconds at which the part is released."""
-        return self.time + self.hold
 
 
 @dataclass(frozen=True)
@@ -401,4 +360,5 @@ class ResolvedPlan:
         """
         pins = [_scale_pin(pin, size) for pin in self.ball_pins.values()]
         touches = () if self.trajectory is None else self.trajectory.touches
-        return lead_ball_to_pins(times, ball, pins, list_fixed_times(self.timeline, touches))
+        fixed = [*list_key_times(self.timeline), *(touch.time for touch in touches)]
+        return lead_ball_to_pins(times, ball, pins, fixed)

@@ -25,7 +25,7 @@ from ..library.library import Library
 from ..motion.foot_plant import PlantResult
 from ..motion.motion import Motion
 from ..motion.track.ball_path import BallPath
-from .ball_pins import BALL, KEY_REACH, SAME_TOUCH, find_pinned_frame
+from .ball_pins import KEY_REACH, SAME_TOUCH, find_pinned_frame
 from .body_size import to_player_size
 from .construct.ball_touch.touch_frames import find_nearest_frame
 from .construct.construction import Construction, build_key_results, find_touches
@@ -34,7 +34,8 @@ from .construct.gaze import estimate_look
 from .construct.pins import apply_pins
 from .construct.thesis_methods import construct_blocks
 from .contact_edit import FEET
-from .plan import METHODS, Pin, Plan, ResolvedPlan
+from .pin import BALL, Pin
+from .plan import METHODS, Plan, ResolvedPlan
 from .provenance import build_provenance_fields
 from .quality.playback import playback_from_take
 from .quality.unmet_constraints import report_unmet_constraints

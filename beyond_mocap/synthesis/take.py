@@ -11,7 +11,8 @@ from ..annotation.ball_contact import choose_contact_labels
 from ..motion.motion import Motion
 from ..motion.track.ball_path import BallPath
 from .heading_path import HeadingPath
-from .plan import Pin, Plan, SolvedTrajectory
+from .pin import Pin
+from .plan import Plan, SolvedTrajectory
 from .search.edit_list import EditList
 
 

@@ -8,8 +8,7 @@ from bpy.props import EnumProperty, FloatProperty, PointerProperty
 
 from ...beyond_mocap.base.errors import InputError
 from ...beyond_mocap.motion.humanoid import identify_joints
-from ...beyond_mocap.synthesis.ball_pins import BALL
-from ...beyond_mocap.synthesis.plan import Pin
+from ...beyond_mocap.synthesis.pin import BALL, Pin
 from ..core import window
 from ..core.measure import build_scene_clock, units_per_metre
 from ..rigs import armature
