@@ -348,8 +348,8 @@ def _report_missed_pins(take: Take) -> list[str]:
             beyond = np.degrees(result.miss)
             messages.append(TimedMessage(f"{pin} is {beyond:.0f} degrees beyond what the neck can turn", when))
         elif result.pin.part == BALL and result.miss > PIN_TOLERANCE:
-            centimetres = 100.0 * result.miss
-            messages.append(TimedMessage(f"{pin} is missed by {centimetres:.0f} cm: the ball goes round the body", when))
+            text = f"is missed by {100.0 * result.miss:.0f} cm: the ball goes round the body"
+            messages.append(TimedMessage(f"{pin} {text}", when))
         elif result.pin.part not in ("gaze", BALL) and result.miss > PIN_TOLERANCE:
             messages.append(TimedMessage(f"{pin} is out of reach by {100.0 * result.miss:.0f} cm", when))
     return messages
