@@ -32,7 +32,6 @@ SAME_TOUCH = 0.1
 """Seconds from a pin within which a touch is the pinned one."""
 
 _WHOLE = 0.05  # s before and after a pin in which the ball has its whole shift: the frames around the touch
-_LOWEST = (-np.inf, -np.inf, BALL_RADIUS)  # m
 
 
 def list_ball_keys(timeline: Timeline) -> list[KeyMoment]:
@@ -90,9 +89,10 @@ def lead_ball_to_pins(times: np.ndarray, ball: np.ndarray, pins: Iterable[Pin], 
         low = max([pin.time - FADE_SECONDS, *(second for second in stops if second < pin.time)])
         high = min([pin.time + FADE_SECONDS, *(second for second in stops if second > pin.time)])
         share = ease_around(times, low, max(pin.time - _WHOLE, low), min(pin.time + _WHOLE, high), high)
-        place = np.maximum(pin.position, _LOWEST)
-        out = np.maximum(out + share[:, None] * (place - ball[frame]), _LOWEST)
-        out[frame] = place
+        lowest = np.minimum(out[:, 2], pin.position[2])
+        out = out + share[:, None] * (np.asarray(pin.position) - ball[frame])
+        out[:, 2] = np.maximum(out[:, 2], lowest)
+        out[frame] = pin.position
     return out
 
 

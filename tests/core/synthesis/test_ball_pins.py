@@ -112,6 +112,14 @@ def test_the_shift_is_smooth_and_stays_between_the_touches_beside_it():
     assert lead_ball_to_pins(times, ball, [], [2.0]) is ball
 
 
+def test_a_ball_pinned_lower_stays_above_the_ground():
+    times = np.arange(0.0, 4.0, 1.0 / 60.0)
+    height = BALL_RADIUS + np.maximum(2.0 - 5.0 * np.abs(times - 2.0), 0.0)  # it rises and falls within 0.8 s
+    ball = np.column_stack([3.0 * times, np.zeros_like(times), height])
+    led = lead_ball_to_pins(times, ball, [Pin(2.0, "ball", (6.0, 0.0, 0.3))], [2.0])
+    assert led[:, 2].min() == BALL_RADIUS and led[:, 2].max() < ball[:, 2].max()
+
+
 def test_a_pin_belongs_to_the_nearest_key_moment_that_has_the_ball():
     keys = (KeyMoment(2.0, ("kick", "right"), solved=2.1), KeyMoment(2.5, ("celebration",)),
             KeyMoment(5.0, ("header",)))
