@@ -7,13 +7,17 @@ import numpy as np
 
 from ..beyond_mocap.base.errors import InputError
 from ..beyond_mocap.motion.track.line_track import MAX_SPEED
+from ..beyond_mocap.synthesis.pin import BALL
 from ..scene.core import channels, window
 from ..scene.core.measure import units_per_metre
 from ..scene.core.settings import find_active_player, is_track
 from ..scene.player import dots, drawn_track, heading_keys, pins
 from ..scene.result import bake
+from ..scene.result.ball_pins import find_ball_moment
 from .operator_base import BaseOperator
 from .player import choose_shirt, find_free_name
+
+SAME = 1e-4  # s by which two times may differ that mean one
 
 
 class BEYOND_MOCAP_OT_draw_track(BaseOperator, bpy.types.Operator):
@@ -112,8 +116,8 @@ def list_selected_points(drawn: bpy.types.Object) -> list:
 
 
 class BEYOND_MOCAP_OT_add_pin(BaseOperator, bpy.types.Operator):
-    """Add an Empty at which a hand, a foot or the gaze of the active player has to be on the current frame; move it
-with G, and set time and hold in the list of pins"""
+    """Add an Empty at which a hand, a foot or the gaze of the active player has to be on the current frame, or the ball
+at the nearest key moment; move it with G, and set time and hold in the list of pins"""
 
     bl_idname = "beyond_mocap.add_pin"
     bl_label = "Add Pin"
@@ -132,16 +136,21 @@ with G, and set time and hold in the list of pins"""
         """Find the position, check for another pin of the part at that time, add the pin."""
         scene, part = context.scene, self.part.replace("_", " ")
         channels.check_local(scene)
-        player, seconds = find_active_player(scene.beyond_mocap), pins.find_current_second(scene)
+        player, now, hold = find_active_player(scene.beyond_mocap), pins.find_current_second(scene), self.hold
+        moment = find_ball_moment(scene, player, now) if part == BALL else None
+        seconds, hold = (now, hold) if moment is None else (moment.time, 0.0)
         for other in player.pins:
-            if other.part == self.part and other.time <= seconds + self.hold and seconds <= other.time + other.hold:
+            first, last = other.time - SAME, other.time + other.hold + SAME
+            if other.part == self.part and first <= seconds + hold and seconds <= last:
                 found, step = f"a pin of {part} at {other.time:.2f} s", "go to another frame or move that pin"
                 raise InputError(f"player {player.name}", found, "one position at a time", step)
-        if self.at == "BODY":
-            place = pins.find_part_position(context, player, self.part)
-        else:
+        if self.at == "CURSOR":
             place = np.array(scene.cursor.location) / units_per_metre(scene)
-        pins.add_pin(context, player, self.part, seconds=seconds, hold=self.hold, place=place,
+        else:
+            place = pins.find_part_position(context, player, self.part) if moment is None else moment.place
+        if moment is not None:
+            scene.frame_set(round(bake.compute_frame(scene, moment.second)))
+        pins.add_pin(context, player, self.part, seconds=seconds, hold=hold, place=place,
                      collection=bake.find_or_create_collection(scene))
         self.report({"INFO"}, f"{player.name}: {part} pinned at {seconds:.2f} s; move it with G, then press Update")
 

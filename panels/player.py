@@ -101,7 +101,8 @@ class BEYOND_MOCAP_UL_pins(bpy.types.UIList):
             row.label(text="Missing Empty", icon="ERROR")
             return
         row.prop(item, "time", text="")
-        row.prop(item, "hold", text="")
+        if item.part != "ball":
+            row.prop(item, "hold", text="")
 
 
 class BEYOND_MOCAP_UL_heading_keys(bpy.types.UIList):
@@ -134,7 +135,7 @@ def draw_player_settings(layout, player) -> None:
 
 
 def draw_pins(layout, player) -> None:
-    """Draw the pins of hands, feet and gaze."""
+    """Draw the pins of hands, feet, gaze and ball."""
     if body := draw_header(layout, "player_pins", f"Pins: {len(player.pins)}" if player.pins else "Pins"):
         row = body.row()
         row.template_list("BEYOND_MOCAP_UL_pins", "", player, "pins", player, active_propname="active_pin", rows=2)
@@ -142,6 +143,8 @@ def draw_pins(layout, player) -> None:
         row = body.row(align=True)
         row.operator_menu_enum("beyond_mocap.add_pin", "part", text="Pin at Body", icon="PINNED").at = "BODY"
         row.operator_menu_enum("beyond_mocap.add_pin", "part", text="At Cursor", icon="PIVOT_CURSOR").at = "CURSOR"
+        ball = body.operator("beyond_mocap.add_pin", text="Pin Ball at Key Moment", icon="MESH_UVSPHERE")
+        ball.part, ball.at = "ball", "BODY"
 
 
 def draw_heading_keys(layout, player) -> None:

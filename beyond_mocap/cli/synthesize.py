@@ -38,7 +38,7 @@ def add_synthesize(verbs) -> argparse.ArgumentParser:
     verb.add_argument("--report", type=Path, metavar="R.json")
     add_options(verb, "synthesis")
     verb.add_argument("--solve-touches", action="store_true", default=True, help="the default; version 0.1 needed it")
-    verb.add_argument("--pins", type=Path, metavar="P.csv", help="targets of hands, feet and gaze with times")
+    verb.add_argument("--pins", type=Path, metavar="P.csv", help="targets of hands, feet, gaze and ball with times")
     verb.add_argument("--headings", type=Path, metavar="H.csv", help="where the body faces, with times")
     add_options(verb, "player")
     add_options(verb, "library")

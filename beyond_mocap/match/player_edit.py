@@ -35,7 +35,8 @@ from ..files.plain_npz import HEADER, read_plain_arrays, take_header_text
 from ..motion.track import Track
 from ..synthesis.heading_path import HeadingPath
 from ..synthesis.heading_plan import HeadingKey
-from ..synthesis.plan import METHODS, Pin, Plan, PlayerTouch, SolvedTrajectory
+from ..synthesis.pin import Pin
+from ..synthesis.plan import METHODS, Plan, PlayerTouch, SolvedTrajectory
 from ..synthesis.resolved_touches import resolve_touches
 from .crowd.correction import Correction
 from .pieces.named_edit import NamedEdit, NamedKey

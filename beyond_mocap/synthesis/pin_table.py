@@ -1,4 +1,4 @@
-"""Pins as a table `time_s,part,x_m,y_m,z_m,hold_s`: one line per place of a hand, a foot or the gaze."""
+"""Pins as a table `time_s,part,x_m,y_m,z_m,hold_s`: one line per place of a hand, a foot, the gaze or the ball."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ import os
 
 from ..annotation import read_text
 from ..base.errors import InputError
-from .plan import Pin
+from .pin import Pin
 
 COLUMNS = ("time_s", "part", "x_m", "y_m", "z_m", "hold_s")
 

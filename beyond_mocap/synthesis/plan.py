@@ -6,7 +6,6 @@ and explanations work with.
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
@@ -20,6 +19,7 @@ from ..base.settings.setting import LATER, add_fields, check_limits
 from ..base.time_series import interpolate_columns
 from ..motion.skeleton import freeze_array
 from ..motion.track import SampledTrack, Track, sample_track
+from .ball_pins import assign_ball_pins, lead_ball_to_pins, list_key_times
 from .contact_edit import ContactEdit
 from .heading_path import HeadingPath
 from .heading_plan import (
@@ -32,51 +32,14 @@ from .heading_plan import (
     sample_heading,
     update_heading_path,
 )
+from .pin import GAZE, PARTS, Pin
 
-GAZE = "gaze"
-PARTS = ("left_hand", "right_hand", "left_foot", "right_foot", GAZE)
 FEET = ("", "left", "right")
 METHODS = find_setting("synthesis", "method").choice_names
 MASSES = find_setting("player", "masses").choice_names
 _DEFAULTS = collect_defaults("synthesis", "player")
 _HEIGHT = find_setting("player", "height")
 _SAME = 1e-5  # s by which the end of a hold and the next key may differ where both are meant to be one time
-
-
-@dataclass(frozen=True)
-class Pin:
-    """A part of the body held at a place.
-
-    Attributes:
-        time: s on the track's clock from which on it holds.
-        part: one of PARTS; hands and feet are pinned by their joint (wrist, ankle), the gaze is turned to the place.
-        position: (x, y, z) m, world.
-        hold: s for which it holds, 0 for a moment.
-    Raises:
-        InputError: for an unknown part, and for NaN or infinite values.
-    """
-
-    time: float
-    part: str
-    position: tuple[float, float, float]
-    hold: float = 0.0
-
-    def __post_init__(self):
-        if self.part not in PARTS:
-            raise InputError("pin", f"part {self.part!r}", f"one of {', '.join(PARTS)}", "correct the part")
-        object.__setattr__(self, "time", float(self.time))
-        object.__setattr__(self, "hold", float(self.hold))
-        object.__setattr__(self, "position", tuple(float(value) for value in self.position))
-        if len(self.position) != 3 or not all(map(math.isfinite, (*self.position, self.time, self.hold))):
-            found = f"{self.time:g} s, {self.position}, {self.hold:g} s"
-            raise InputError("pin", found, "a finite time, position and hold", "correct the pin")
-        if self.hold < 0.0:
-            raise InputError("pin", f"a hold of {self.hold:g} s", "0 s or more", "correct the pin")
-
-    @property
-    def end(self) -> float:
-        """Seconds at which the part is released."""
-        return self.time + self.hold
 
 
 @dataclass(frozen=True)
@@ -142,7 +105,7 @@ class Plan:
         track: the player's samples, cleaned (`motion.track.clean_track`), with the ball where the feed has it.
         timeline: the requested annotations (`annotation.read_timeline`), not yet filled.
         library: folder of the library.
-        pins: where hands, feet and gaze have to be, in order of time.
+        pins: where hands, feet, gaze and ball have to be, in order of time.
         heading_keys: where the body has to face, in order of time; the rest is planned (`heading_plan`).
         contact_edits: contacts of the feet that are moved, longer, shorter, left out or added, in order of time.
         gaits: (gait label, clip) pairs; other gaits are found among all clips.
@@ -244,6 +207,12 @@ class Plan:
                                  "move one, or shorten the earlier hold")
 
 
+def _scale_pin(pin: Pin, size: float) -> Pin:
+    """Scale a pin to the library's size."""
+    x, y, z = pin.position
+    return replace(pin, position=(x / size, y / size, z / size))
+
+
 def sample_with_trajectory(track: Track, trajectory: SolvedTrajectory | None, fps: float,
                            window: float) -> SampledTrack:
     """Sample a track with its solved ball.
@@ -328,8 +297,7 @@ class ResolvedPlan:
     def _build_heading_request(self, play: Play | None) -> HeadingRequest:
         """Build what is asked of the heading, in the library's size."""
         size = self.size
-        gazes = [replace(pin, position=(pin.position[0] / size, pin.position[1] / size, pin.position[2] / size))
-                 for pin in self.requested.pins if pin.part == GAZE]
+        gazes = [_scale_pin(pin, size) for pin in self.requested.pins if pin.part == GAZE]
         keys = self._find_heading_keys()
         return HeadingRequest(keys=keys, gazes=tuple(gazes), spans=self.timeline.spans, play=play)
 
@@ -367,8 +335,30 @@ class ResolvedPlan:
         return self._rested[fps, rests]
 
     def _sample_ball_track(self, fps: float) -> SampledTrack:
-        """Sample the track, with the solved ball, in the library's size, as it was measured."""
+        """Sample the track, with the solved ball through its pins, in the library's size, as it was measured."""
         trajectory = self.trajectory
         if trajectory is not None and self.size != 1.0:
             trajectory = replace(trajectory, ball=trajectory.ball / self.size)
-        return sample_with_trajectory(self.track, trajectory, fps, self.requested.track_window)
+        sampled = sample_with_trajectory(self.track, trajectory, fps, self.requested.track_window)
+        ball = self.lead_ball(sampled.times, sampled.ball, self.size)
+        return sampled if ball is sampled.ball else replace(sampled, ball=ball)
+
+    @cached_property
+    def ball_pins(self) -> dict[Pin, Pin]:
+        """The requested pins of the ball -> the same when their key moments are played, in the player's size."""
+        return assign_ball_pins(self.requested.pins, self.timeline)
+
+    def lead_ball(self, times: np.ndarray, ball: np.ndarray, size: float = 1.0) -> np.ndarray:
+        """Lead the ball's trajectory through its pins (`ball_pins.lead_ball_to_pins`).
+
+        Args:
+            times: (T,) s, at an even rate.
+            ball: (T, 3) m.
+            size: times as tall as the library's skeleton that the player is, for a ball in the library's size.
+        Returns:
+            (T, 3) m; the same array without pins.
+        """
+        pins = [_scale_pin(pin, size) for pin in self.ball_pins.values()]
+        touches = () if self.trajectory is None else self.trajectory.touches
+        fixed = [*list_key_times(self.timeline), *(touch.time for touch in touches)]
+        return lead_ball_to_pins(times, ball, pins, fixed)

@@ -259,6 +259,8 @@ def apply_trajectory(take: Take, plan: ResolvedPlan) -> tuple[Take, list[str]]:
     course_changes = [(touch.time - take.start_time) * fps for touch in plan.trajectory.touches]
     trajectory, filled = plan.trajectory.interpolate(times)
     path = np.where(np.isfinite(trajectory), trajectory, contact_ball)
+    # the height of a pin; on the ground the touches lead the ball evenly, as they do below
+    path = np.column_stack([path[:, :2], plan.lead_ball(times, path)[:, 2]])
     known = np.interp(times, plan.track.times, plan.track.ball_height_known.astype(float)) > 0.5
     for number, pair in enumerate(held):
         path = add_flight_arc(path, float(np.mean(pair)), float(contact_ball[list(pair), 2].mean()), ~known, fps)

@@ -25,13 +25,16 @@ from ..library.library import Library
 from ..motion.foot_plant import PlantResult
 from ..motion.motion import Motion
 from ..motion.track.ball_path import BallPath
+from .ball_pins import KEY_REACH, SAME_TOUCH, find_pinned_frame
 from .body_size import to_player_size
+from .construct.ball_touch.touch_frames import find_nearest_frame
 from .construct.construction import Construction, build_key_results, find_touches
 from .construct.extra_steps import Steps
 from .construct.gaze import estimate_look
 from .construct.pins import apply_pins
 from .construct.thesis_methods import construct_blocks
 from .contact_edit import FEET
+from .pin import BALL, Pin
 from .plan import METHODS, Plan, ResolvedPlan
 from .provenance import build_provenance_fields
 from .quality.playback import playback_from_take
@@ -56,6 +59,9 @@ KEY_MARGIN = 1.5
 
 PIN_TOLERANCE, GAZE_TOLERANCE = 0.01, np.radians(5.0)
 """Metres, and radians of a gaze, by which a pin may be missed without a warning."""
+
+_NO_EFFECT = ("is outside the track, or the skeleton has no such part",
+              f"has no key moment with the ball within {KEY_REACH:g} s, or the track has no ball")
 
 CONTACT_REACH = 0.2
 """Seconds beside a contact edit within which its foot has to be in contact."""
@@ -236,13 +242,14 @@ def finish_take(
     take, detours = apply_trajectory(take, plan)
     if plan.trajectory is not None:
         take = replace(take, seconds={**take.seconds, "ball": time.perf_counter() - started})
+    take = measure_ball_pins(take, plan)
     return add_warnings(take, recordings, request, hurried_from, report_unmet=report_unmet,
                         more=[*report_missing_touches(take, plan), *detours])
 
 
 def add_pins(take: Take, recordings: Library) -> Take:
     """Bring the hands, feet and gaze of a take to the pins of its plan."""
-    pins = take.plan.pins
+    pins = [pin for pin in take.plan.pins if pin.part != BALL]
     if not pins:
         return take
     found = apply_pins(take.motion, take.contacts, pins, take.start_time, estimate_look(recordings))
@@ -250,6 +257,23 @@ def add_pins(take: Take, recordings: Library) -> Take:
     results = tuple(PinResult(pin, miss) for pin, miss in zip(pins, found.miss))
     unpinned = take.motion, take.contacts
     return replace(take, motion=motion, contacts=found.contacts, pins=results, unpinned=unpinned)
+
+
+def measure_ball_pins(take: Take, plan: ResolvedPlan) -> Take:
+    """Measure how far the ball of a take is from its pins, each at the frame at which its key moment is played."""
+    results = [PinResult(pin, _measure_ball_miss(take, plan.ball_pins.get(pin))) for pin in take.plan.pins
+               if pin.part == BALL]
+    return replace(take, pins=(*take.pins, *results)) if results else take
+
+
+def _measure_ball_miss(take: Take, pin: Pin | None) -> float:
+    """Measure how far, m, the ball is from a pin when its key moment is played; infinite for a pin without effect."""
+    frame = None if pin is None or take.ball is None else find_pinned_frame(take.ball.times, pin)
+    if pin is None or take.ball is None or frame is None:
+        return np.inf
+    played = [find_nearest_frame(key.frame, len(take.motion)) for key in take.keys
+              if abs(key.requested.resolved_time - pin.time) <= SAME_TOUCH]
+    return float(np.linalg.norm(take.ball.positions[min(played, default=frame)] - pin.position))
 
 
 def add_warnings(
@@ -319,11 +343,14 @@ def _report_missed_pins(take: Take) -> list[str]:
         pin, when = f"{format_seconds(result.pin.time)} s: the pin of {result.pin.part}", (result.pin.time,
                 result.pin.end)
         if not np.isfinite(result.miss):
-            messages.append(f"{pin} is outside the track, or the skeleton has no such part; it is ignored")
+            messages.append(f"{pin} {_NO_EFFECT[result.pin.part == BALL]}; it is ignored")
         elif result.pin.part == "gaze" and result.miss > GAZE_TOLERANCE:
             beyond = np.degrees(result.miss)
             messages.append(TimedMessage(f"{pin} is {beyond:.0f} degrees beyond what the neck can turn", when))
-        elif result.pin.part != "gaze" and result.miss > PIN_TOLERANCE:
+        elif result.pin.part == BALL and result.miss > PIN_TOLERANCE:
+            text = f"is missed by {100.0 * result.miss:.0f} cm: the ball goes round the body"
+            messages.append(TimedMessage(f"{pin} {text}", when))
+        elif result.pin.part not in ("gaze", BALL) and result.miss > PIN_TOLERANCE:
             messages.append(TimedMessage(f"{pin} is out of reach by {100.0 * result.miss:.0f} cm", when))
     return messages
 

@@ -11,7 +11,8 @@ from ..annotation.ball_contact import choose_contact_labels
 from ..motion.motion import Motion
 from ..motion.track.ball_path import BallPath
 from .heading_path import HeadingPath
-from .plan import Pin, Plan, SolvedTrajectory
+from .pin import Pin
+from .plan import Plan, SolvedTrajectory
 from .search.edit_list import EditList
 
 
@@ -49,7 +50,7 @@ class PinResult:
 
     Attributes:
         pin: the pin.
-        miss: m by which a hand or foot falls short of it, or rad that the gaze looks past it.
+        miss: m by which a hand, a foot or the ball falls short of it, or rad that the gaze looks past it.
     """
 
     pin: Pin

@@ -75,7 +75,7 @@ class BeyondMocapPlayer(bpy.types.PropertyGroup):
         name="Drawn Track", type=bpy.types.Object, poll=is_track,
         description="A curve with speeds at its points, or a moving object; it replaces the tracking file",
     )
-    pins: CollectionProperty(type=BeyondMocapPin, description="Targets for hands, feet and gaze, with their times")
+    pins: CollectionProperty(type=BeyondMocapPin, description="Targets for hands, feet, gaze and ball, with times")
     active_pin: IntProperty(name="Pin", min=0, description="The pin shown below the list")
     heading_keys: CollectionProperty(type=BeyondMocapHeadingKey,
                                      description="Directions and objects that the body faces, with their times")

@@ -1,4 +1,4 @@
-"""Pins in the scene: an Empty for each place where a player's hand, foot or gaze has to be, with its time and hold."""
+"""Pins in the scene: an Empty for each place where a hand, a foot, the gaze or the ball has to be, with its time."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from bpy.props import EnumProperty, FloatProperty, PointerProperty
 
 from ...beyond_mocap.base.errors import InputError
 from ...beyond_mocap.motion.humanoid import identify_joints
-from ...beyond_mocap.synthesis.plan import Pin
+from ...beyond_mocap.synthesis.pin import BALL, Pin
 from ..core import window
 from ..core.measure import build_scene_clock, units_per_metre
 from ..rigs import armature
@@ -17,8 +17,9 @@ PARTS = (("left_hand", "Left Hand", "Pin the wrist of the left hand", "VIEW_PAN"
          ("right_hand", "Right Hand", "Pin the wrist of the right hand", "VIEW_PAN", 1),
          ("left_foot", "Left Foot", "Pin the ankle of the left foot", "MOD_DYNAMICPAINT", 2),
          ("right_foot", "Right Foot", "Pin the ankle of the right foot", "MOD_DYNAMICPAINT", 3),
-         ("gaze", "Gaze", "Pin the point that the player looks at", "HIDE_OFF", 4))
-SIZE = 0.12  # metres
+         ("gaze", "Gaze", "Pin the point that the player looks at", "HIDE_OFF", 4),
+         (BALL, "Ball", "Pin the ball at the nearest key moment at which the player meets it", "MESH_UVSPHERE", 5))
+SIZE = 0.12  # metres, just larger than the ball
 GAZE_DISTANCE = 3.0  # metres in front of the head at which a new gaze pin is placed
 
 
@@ -31,7 +32,7 @@ class BeyondMocapPin(bpy.types.PropertyGroup):
     time: FloatProperty(name="Time", unit="TIME_ABSOLUTE", precision=2,
                         description="Time on the track's clock at which the part is there")
     hold: FloatProperty(name="Hold", min=0.0, soft_max=5.0, unit="TIME_ABSOLUTE", precision=2,
-                        description="Duration for which the part stays there; 0 for a moment")
+                        description="Duration for which the part stays there; 0 for a moment, as always for the ball")
 
 
 def read_pins(scene: bpy.types.Scene, player) -> tuple[Pin, ...]:
@@ -41,7 +42,8 @@ def read_pins(scene: bpy.types.Scene, player) -> tuple[Pin, ...]:
     for pin in player.pins:
         if pin.target is not None and pin.target.name in scene.objects:
             place = np.array(pin.target.matrix_world.translation, dtype=float) * metres
-            found.append(Pin(round(pin.time, 6), pin.part, tuple(np.round(place, 6)), round(pin.hold, 6)))
+            hold = 0.0 if pin.part == BALL else round(pin.hold, 6)
+            found.append(Pin(round(pin.time, 6), pin.part, tuple(np.round(place, 6)), hold))
     return tuple(found)
 
 

@@ -28,6 +28,7 @@ from ...motion.momentum_polish import obey_momentum
 from ...motion.motion import Motion
 from ...motion.toe_roll import roll_toes
 from ...motion.track import SampledTrack
+from ..ball_pins import SAME_TOUCH
 from ..body_size import scale_ball
 from ..edited_contacts import apply_contact_edits
 from ..exertion import compute_exertion
@@ -233,7 +234,7 @@ class Construction:
         if size != 1.0:  # solved in the player's size: the ball is the same for tall and short players
             skeleton, root, ball = skeleton.scale(size), root * size, scale_ball(ball, size)
         contacts, rotations = steps_taken.heel_toe_contacts.any(axis=2), planted.rotations
-        meet = partial(strike_ball, skeleton, root, contacts=contacts, ball=ball, touches=self.touches,
+        meet = partial(strike_ball, skeleton, root, contacts=contacts, ball=ball, touches=self._pin_touches(),
                        fps=self.plan.fps, measured=track.ball_measured, height_known=is_height_known)
         contact = meet(rotations)
         placed = place_plant_feet(skeleton, root, rotations, contact, contacts, touches=self.touches, fps=self.plan.fps)
@@ -241,6 +242,13 @@ class Construction:
             contact = meet(placed)
         root, ball = (contact.root, contact.ball) if size == 1.0 else (contact.root / size, contact.ball / size)
         return replace(planted, root=root, rotations=self._roll_toes(root, contact.rotations)), ball
+
+    def _pin_touches(self) -> list[Touch]:
+        """Give the touches at a pin of the ball its place, in the player's size."""
+        seconds = [float(self.track.times[0]) + touch.frame / self.plan.fps for touch in self.touches]
+        pins = [next((pin for pin in self.plan.ball_pins.values() if abs(pin.time - second) <= SAME_TOUCH), None)
+                for second in seconds]
+        return [touch if pin is None else replace(touch, place=pin.position) for touch, pin in zip(self.touches, pins)]
 
     def _solve_heading(self) -> np.ndarray:
         """Solve the heading (T,) rad from given values, track and source, turned to the ball at touches."""

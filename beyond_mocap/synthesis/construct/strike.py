@@ -78,6 +78,9 @@ def strike_ball(
     for number, moment in iter_touch_frames(skeleton, touches, count, fps):
         if not np.isfinite(samples[list(moment.held)]).all():
             continue
+        place = touches[number].place
+        if place is not None:
+            path = shift_ball_eased(path, (moment.frame, moment.frame), np.array([place, place]), moment.bounds, fps)
         span = slice(max(moment.low, 0), min(moment.high, count - 1) + 1)
         body = Body.from_pose(skeleton, root[span], rotations[span])
         scene = build_problem(body, moment, span.start, contacts=contacts[span], path=path, measured=measured,
@@ -98,6 +101,8 @@ def _move_to_contact(skeleton: Skeleton, root, rotations, feed, touch: Touch, fp
 
     Only where the labels allow for that and the ball is out of reach at the key moment itself.
     """
+    if touch.place is not None:
+        return touch
     latest = touch.frame + find_contact_window(touch.words) * fps
     first, last = (find_nearest_frame(frame, len(root)) for frame in (touch.frame, latest))
     if first == last or not np.isfinite(feed[first : last + 1]).all():

@@ -20,6 +20,7 @@ def test_a_table_is_read_as_it_is_meant(tmp_path):
 @pytest.mark.parametrize("row, part", [
     ("2.5,tail,1,2,3,0", "'tail'"), ("x,gaze,1,2,3,0", "time_s 'x'"), ("2,gaze,1,,3,0", "y_m ''"),
     ("2,gaze,1,nan,3,0", "a finite time, position and hold"), ("2,gaze,1,2,3,-1", "a hold of -1 s"),
+    ("2,ball,1,2,0.11,0.5", "a hold of 0.5 s; expected 0 s for the ball"),
 ])
 def test_mistakes_name_their_line(tmp_path, row, part):
     file = tmp_path / "pins.csv"

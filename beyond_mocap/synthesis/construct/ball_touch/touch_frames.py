@@ -26,6 +26,7 @@ class Touch:
         entry: frames before `frame` within which the body may be changed.
         leave: frames after it.
         misses: whether the body reaches for the ball and misses it by design (`near_miss`).
+        place: (3,) m of the ball that the body has to meet, None where the ball may move within its noise.
     """
 
     frame: float
@@ -33,6 +34,7 @@ class Touch:
     entry: float
     leave: float
     misses: bool = False
+    place: tuple[float, float, float] | None = None
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -46,6 +48,7 @@ class TouchFrames:
         low: frame before which the body does not change.
         high: frame after which it does not.
         bounds: held frames of the touches before and after.
+        is_fixed: whether the ball stays where it is at `frame`.
     """
 
     words: frozenset[str]
@@ -54,6 +57,7 @@ class TouchFrames:
     low: int
     high: int
     bounds: tuple[int, int]
+    is_fixed: bool = False
 
 
 def iter_touch_frames(skeleton: Skeleton, touches: Sequence[Touch], count: int, fps: float):
@@ -79,7 +83,8 @@ def iter_touch_frames(skeleton: Skeleton, touches: Sequence[Touch], count: int, 
         low = max(int(first - np.clip(touch.entry, shortest, longest)), before)
         high = min(int(np.ceil(last + np.clip(touch.leave, shortest, longest))), after)
         yield number, TouchFrames(words=frozenset(touch.words), frame=find_nearest_frame(frame, count),
-                                   held=held[place], low=low, high=high, bounds=(before, after))
+                                   held=held[place], low=low, high=high, bounds=(before, after),
+                                  is_fixed=touch.place is not None)
 
 
 def find_nearest_frame(frame: float, count: int) -> int:

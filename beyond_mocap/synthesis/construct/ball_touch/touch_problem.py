@@ -102,7 +102,9 @@ class TouchProblem:
     def compute_ball_range(self, frame: int) -> BallRange:
         """Return how far the ball may move; a ball on the ground stays there, and one just above it nearly so: a feed's
         heights are noisy, and a ball lifted to a foot would hop there by itself. A filled one may come down to the
-        ground. A ball that the hands have held is where they are, at any height."""
+        ground. A ball that the hands have held is where they are, at any height. A fixed one stays."""
+        if self.moment.is_fixed and frame == self.moment.frame:
+            return BallRange(0.0, 0.0)
         if self.is_held:
             return BallRange(np.inf, np.inf)
         whole, lowest = (BALL_NOISE, _IN_THE_AIR) if self.measured[frame] else (FILLED_NOISE, BALL_RADIUS)
@@ -136,12 +138,13 @@ def build_problem(body: Body, moment: TouchFrames, origin: int, contacts, path, 
     if parts[0].part != "foot" or _HIGH & moment.words:
         # without a measured height the ball flies through the part's height
         height = 0.5 * (line[0] + line[1])[2] + _RISE[parts[0].part] * (radius + BALL_RADIUS)
+        height = path[moment.frame, 2] if moment.is_fixed else height
         path = add_flight_arc(path, moment.frame, float(height), ~height_known, fps)
     ahead = _choose_direction(body, parts[0], moment, at=at, path=path, fps=fps)
     avoid = _compute_other_leg_lines(body, parts[0], at) if parts[0].part == "foot" else []
     is_held = comes_from_hands(moment.words) and _measure_distance(body, at, path[moment.frame]) < HELD_DISTANCE
     scene = TouchProblem(moment=moment, parts=parts, shares=shares, ball=path, measured=measured,
-                          is_held=is_held, aim=Aim(ahead), avoid=avoid, origin=origin, fps=fps)
+                          is_held=is_held and not moment.is_fixed, aim=Aim(ahead), avoid=avoid, origin=origin, fps=fps)
     if len(parts) == 2:
         return scene
     aim = choose_aim(line, radius, ahead, rise=_RISE[parts[0].part], ball=path[moment.frame],
