@@ -289,11 +289,9 @@ scene is not changed"""
     def do(self, context):
         path = self.output_path()
         scene = context.scene
-        armatures = ours.find_armatures(scene)
-        bodies = [body for body in armatures if body.name in context.view_layer.objects]
-        if len(bodies) < len(armatures):
-            count = format_count(len(armatures) - len(bodies), "player")
-            self.report({"WARNING"}, f"{count} left out: in an excluded collection")
+        bodies = [body for body in ours.find_armatures(scene) if body.name in context.view_layer.objects]
+        for line in ours.describe_left_out(scene, bodies):
+            self.report({"WARNING"}, line)
         wanted = export.ExportOptions(path, self.format, self.engine, None, self.root)
         things = ours.find_meshes(scene, "ball") + (stage.find_pitch(scene) if self.pitch else [])
         for line in export.export_motion(context, bodies, wanted, things):

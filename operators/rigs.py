@@ -13,6 +13,7 @@ from ..beyond_mocap.files.bvh import bvh
 from ..scene.characters.player_character import find_shown_body
 from ..scene.core import action, channels, take_record, window
 from ..scene.core.settings import find_active_player
+from ..scene.match import match_objects
 from ..scene.rigs import armature, bone_maps, engine_files, export, rig, rig_bake
 from ..scene.rigs.driven import DrivenRig, check_rig
 from ..scene.rigs.fit import BakeOptions, read_source
@@ -348,8 +349,11 @@ scene stays unchanged"""
             name = Path(bpy.data.filepath).stem or "scene"
             lines = engine_files.deliver_scene(context, folder / f"{name}{suffix}", self.preset)
         else:
-            lines = engine_files.deliver_players(context, engine_files.list_delivered_rigs(context, self.who), folder,
-                                                 self.preset, self.root, meshes=self.meshes)
+            rigs = engine_files.list_delivered_rigs(context, self.who)
+            if self.who == "MATCH":
+                for line in match_objects.describe_left_out(context.scene, rigs):
+                    self.report({"WARNING"}, line)
+            lines = engine_files.deliver_players(context, rigs, folder, self.preset, self.root, meshes=self.meshes)
         for line in lines:
             self.report({"INFO"}, line)
 

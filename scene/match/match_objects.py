@@ -6,7 +6,7 @@ from __future__ import annotations
 
 import bpy
 
-from ...beyond_mocap.base.errors import InputError
+from ...beyond_mocap.base.errors import InputError, format_count
 from ..stage import cameras
 from .load import TEAMS
 
@@ -62,6 +62,12 @@ def _include_children(layer: bpy.types.LayerCollection) -> None:
         if any(collection.get(MARK) and collection.library is None for collection in collections):
             one.exclude = False
             _include_children(one)
+
+
+def describe_left_out(scene: bpy.types.Scene, bodies: list[bpy.types.Object]) -> list[str]:
+    """Describe the players of the displayed match that are not among these armatures: one line, or none."""
+    count = len(find_armatures(scene)) - len(bodies)
+    return [f"{format_count(count, 'player')} left out: in an excluded collection"] if count else []
 
 
 def find_armatures(scene: bpy.types.Scene) -> list[bpy.types.Object]:
