@@ -21,8 +21,8 @@ from tab import (
 from window import draw_unfolded
 
 KEPT_PICTURES = pathlib.Path("docs/pictures")
-NAMES = {"players": "track", "synthesis": "synthesize"}  # panels whose page has another name
-NOT_SHOWN = ("throws", "ball")  # their pages show them at work
+NAMES = {"players": "track", "synthesis": "synthesize", "library_step": "library-step"}  # panels whose page has another name
+NOT_SHOWN = ("throws", "ball", "stream", "task")  # pages show them at work, or within others
 LONG = ("library", "quality")  # longer than the window
 TABS = 22  # pixels of a sidebar's right edge that are its tabs
 FRAME = 190
@@ -52,6 +52,13 @@ def open_moving_match():
     bpy.context.scene.frame_set(FRAME)
     look_at(bpy.context.scene.beyond_mocap.players[0].body)
     yield 1
+
+
+def open_empty_pitch():
+    """An empty file with a pitch, in the present window."""
+    bpy.ops.wm.read_homefile(use_empty=True, load_ui=False)
+    yield 1
+    bpy.ops.beyond_mocap.add_stage(camera=False)
 
 
 def look_at(body):
@@ -146,8 +153,7 @@ def check_overlays():
 
 def check_momentum():
     """A runner who pushes off, with the momentum of their body."""
-    bpy.ops.wm.read_homefile(use_empty=True, load_ui=False)
-    yield 1
+    yield from open_empty_pitch()
     bpy.context.scene.render.fps = 30
     bpy.ops.beyond_mocap.import_clips(filepath=str(copy_sample() / "library" / "running_4_2.bvh"))
     runner = create_person(bpy.context.object)
@@ -164,6 +170,7 @@ def check_momentum():
 
 def check_menu_of_labels():
     """The menu after `=` and `2` (catchb), in which neither recordings nor synthetic actions have everything."""
+    yield from open_moving_match()
     area, annotate = window.find_area("VIEW_3D"), import_module("operators.timeline.annotate")
     region = next(region for region in area.regions if region.type == "WINDOW")
     yield from window.move_pointer(area.x + area.width // 3, area.y + area.height // 2)
@@ -217,8 +224,7 @@ def check_assets():
 
 def check_a_throw():
     """A throw of a sample clip's body at an Empty, just after the release, with its panel."""
-    bpy.ops.wm.read_homefile(use_empty=True, load_ui=False)
-    yield 1
+    yield from open_empty_pitch()
     scene = bpy.context.scene
     scene.render.fps, get_settings().library_folder = 30, str(copy_sample() / "library")
     bpy.ops.beyond_mocap.import_clips(filepath=str(copy_sample() / "library" / "walking_1_2.bvh"))
@@ -247,8 +253,7 @@ def check_a_throw():
 
 
 def check_a_passing_scene():
-    bpy.ops.wm.read_homefile(use_empty=True, load_ui=False)
-    yield 1
+    yield from open_empty_pitch()
     scene = bpy.context.scene
     scene.render.fps = 30
     run_operator("beyond_mocap.passes_sample", "EXEC_DEFAULT", sample="three")
@@ -289,8 +294,7 @@ def create_person(armature):
 
 def create_walk_on_bend():
     """A walk of the sample with a low-poly body, on a curve with two bends; the curve's middle point is selected."""
-    bpy.ops.wm.read_homefile(use_empty=True, load_ui=False)
-    yield 1
+    yield from open_empty_pitch()
     scene = bpy.context.scene
     bpy.ops.beyond_mocap.import_clips(filepath=str(copy_sample() / "library" / "walk_jog_walk.bvh"))
     walker = bpy.context.object
@@ -355,8 +359,7 @@ def check_path_editing():
 
 
 def check_optical_markers():
-    bpy.ops.wm.read_homefile(use_empty=True, load_ui=False)
-    yield 1
+    yield from open_empty_pitch()
     scene = bpy.context.scene
     bpy.ops.beyond_mocap.import_markers(filepath=str(copy_sample() / "markers" / "throw.c3d"))
     cloud = bpy.context.object
