@@ -212,7 +212,10 @@ class BEYOND_MOCAP_OT_fix_foot(TakeOperator, bpy.types.Operator):
     def edit(self, context, action, contact, **how):
         """Edit a contact, with an undo step of its own, and update the take."""
         player = find_active_player(context.scene.beyond_mocap)
-        self.update(context, apply_edit(player, action, contact, **how))
+        if self.attempt(lambda: apply_edit(player, action, contact, **how)) == {"FINISHED"}:
+            self.update(context, f"{player.name}: {contact.foot} foot at {contact.middle:.2f} s")
+        else:
+            self.handles.offset = np.zeros(2)
 
     def update(self, context, message: str):
         """Update the take quickly; its figures follow when the operator stops."""

@@ -21,6 +21,7 @@ FEET = (("left", "Left", "Left foot"), ("right", "Right", "Right foot"))
 KINDS = (("change", "Changed", "The contact is moved, longer or shorter"),
          ("delete", "Left Out", "The foot does not touch the ground there"),
          ("add", "Added", "The foot touches the ground there"))
+MOST_OFFSET = 1.0  # m from its place that a contact may be moved: about what a leg reaches
 _NEAR = 0.1  # s by which an edit may lie beside the contact it belongs to: contacts begin and end on frames
 
 
@@ -120,8 +121,15 @@ def find_edit(player, contact: Contact):
 
 
 def change_contact(player, contact: Contact, offset=(0.0, 0.0), start: float = 0.0, end: float = 0.0):
-    """Move a contact by `offset` (2,) m, and let it begin and end later by seconds; returns its edit."""
+    """Move a contact by `offset` (2,) m, and let it begin and end later by seconds; returns its edit.
+
+    Raises InputError for a contact that is then farther than MOST_OFFSET from its place.
+    """
     edit = find_edit(player, contact)
+    length = float(np.hypot(*(np.array(offset, dtype=float) + (list(edit.offset) if edit is not None else 0.0))))
+    if length > MOST_OFFSET:
+        raise InputError("fix foot", f"a contact moved by {length:.2f} m", f"at most {MOST_OFFSET:g} m",
+                         "move it less, or bend the track")
     if edit is None:
         edit = _add_edit(player, contact.foot, "change", contact.middle)
     edit.offset = [float(before) + float(by) for before, by in zip(edit.offset, offset)]

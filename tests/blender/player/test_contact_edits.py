@@ -69,7 +69,9 @@ def test_edits_are_saved_with_the_file_and_are_part_of_the_plan(one, contacts_of
 
 
 def test_a_failed_edit_leaves_the_contacts_as_they_were(one, contacts_of, edits, session):  # noqa: F811
-    contacts_of()
+    chosen = contacts_of()[0]
+    with pytest.raises(RuntimeError, match="moved by 50.00 m; expected at most 1 m"):
+        bpy.ops.beyond_mocap.fix_foot(action="MOVE", foot=chosen.foot, time=chosen.middle, offset=(50.0, 0.0))
     with pytest.raises(RuntimeError, match="stands at|no contact"):
         bpy.ops.beyond_mocap.fix_foot(action="MOVE", foot="left", time=100.0)
     assert not one.contact_edits
