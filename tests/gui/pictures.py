@@ -21,7 +21,7 @@ from tab import (
 from window import draw_unfolded
 
 KEPT_PICTURES = pathlib.Path("docs/pictures")
-NAMES = {"players": "track", "synthesis": "synthesize", "library_step": "library-step"}  # panels whose page has another name
+NAMES = {"players": "track", "synthesis": "synthesize", "library_step": "library-step"}  # whose page has another name
 NOT_SHOWN = ("throws", "ball", "stream", "task")  # pages show them at work, or within others
 LONG = ("library", "quality")  # longer than the window
 TABS = 22  # pixels of a sidebar's right edge that are its tabs
