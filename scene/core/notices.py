@@ -104,7 +104,7 @@ BUTTONS = {  # kind of a fix -> what its button says, from the fix's value, and 
 
 
 def post_notice(scene: bpy.types.Scene, subject: Subject, error: BeyondMocapError, is_error: bool = True) -> int:
-    """Post a notice; it replaces an older one about the same topic.
+    """Post a notice; it replaces an older one about the same topic, and one of the same fault.
 
     Args:
         scene: that it belongs to.
@@ -116,6 +116,10 @@ def post_notice(scene: bpy.types.Scene, subject: Subject, error: BeyondMocapErro
     """
     clear_notices(scene, subject.topic)
     group = bpy.context.window_manager.beyond_mocap_notices
+    for index in reversed(range(len(group.rows))):
+        row = group.rows[index]
+        if (row.scene, row.player, row.found) == (str(scene.session_uid), subject.player, error.parts[0]):
+            group.rows.remove(index)
     group.count += 1
     row = group.rows.add()
     row.number, row.scene, row.name, row.is_error = group.count, str(scene.session_uid), subject.title, is_error

@@ -56,6 +56,16 @@ def test_a_script_gets_one_line_and_the_notice_has_the_same_in_two_parts(lacking
     assert (row.name, row.room, row.player) == ("Synthesize", "synthesis", "player2")
 
 
+def test_one_fault_is_shown_once_whatever_fails_by_it(places):
+    bpy.context.scene.beyond_mocap.library_folder = str(places.clips / "gone")
+    for operator in (bpy.ops.beyond_mocap.list_clips, bpy.ops.beyond_mocap.build_library):
+        with pytest.raises(RuntimeError, match="gone"):
+            operator()
+    assert [row.operator for row in list_notices()] == ["beyond_mocap.build_library"]
+    bpy.context.scene.beyond_mocap.library_folder = str(places.clips)
+    assert bpy.ops.beyond_mocap.build_library() == {"FINISHED"} and list_notices() == []
+
+
 def test_use_nearest_labels_synthesizes_again(lacking):
     player, _ = lacking
     assert apply_fix("use_nearest") == {"FINISHED"}
