@@ -158,6 +158,20 @@ def check_the_tour():
     output.write_line(f"     undone in {back} steps, redone in {forth}")
 
 
+def check_the_tour_in_large_letters():
+    """The same steps at a UI scale of 1.5, without the way back."""
+    bpy.context.preferences.view.ui_scale = 1.5
+    try:
+        bpy.ops.wm.read_homefile(use_empty=True, load_ui=True)
+        yield 1.5
+        for step in STEPS:
+            yield from step()
+            yield from wait_until_settled()
+        window.save_picture(PICTURES / "tour-large.png")
+    finally:
+        bpy.context.preferences.view.ui_scale = 1.0
+
+
 def step_through_states(key, expected, **held):
     """Press the key until all these states of the file have come, in their order; return how often."""
     yield from move_into_view()

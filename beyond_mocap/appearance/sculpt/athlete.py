@@ -19,7 +19,7 @@ from .weights import compute_shares
 SIZES = {  # m, edges of the faces of each piece: of the full body and the light one
     "head": (0.0066, 0.0150), "back": (0.0170, 0.0340), "shirt": (0.0270, 0.0640), "arm": (0.0200, 0.0430),
     "hand": (0.0074, 0.0270), "shorts": (0.0270, 0.0640), "leg": (0.0210, 0.0500), "sock": (0.0220, 0.0540),
-    "boot": (0.0150, 0.0400), "hair": (0.0095, 0.0200), "brow": (0.0040, 0.0085),
+    "boot": (0.0130, 0.0400), "hair": (0.0095, 0.0200), "brow": (0.0040, 0.0085),
 }
 SHIRT_HEM, SHORTS_HEM, SOCK_TOP, BOOT_TOP, SLEEVE_END, GLOVE_TOP = 0.885, 0.605, 0.462, 0.108, 0.185, 0.535
 HAIR_BEHIND = -0.115  # m from the head's middle: what is further behind is a tail of hair
