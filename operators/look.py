@@ -20,7 +20,7 @@ COLOUR_ITEMS = tuple((str(i), name, f"{name} hair") for i, name in enumerate(
 
 
 class BEYOND_MOCAP_OT_change_look(BaseOperator, bpy.types.Operator):
-    """Change build, hair, skin and gloves of the selected characters; kits and modifiers stay, edits of the mesh do not"""
+    """Change build, hair, skin and gloves of the selected characters; kits stay, edits of the mesh are replaced"""
 
     bl_idname = "beyond_mocap.change_look"
     bl_label = "Change Look"
