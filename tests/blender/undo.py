@@ -110,6 +110,11 @@ def assert_one_step(operator, **arguments):
     after = collect_state()
     assert after != before
     bpy.ops.ed.undo()
-    assert collect_state() == before
+    assert list_differences(collect_state(), before) == {}
     bpy.ops.ed.redo()
-    assert collect_state() == after
+    assert list_differences(collect_state(), after) == {}
+
+
+def list_differences(found, expected):
+    """What two states differ in, as (found, expected) by name."""
+    return {name: (found[name], value) for name, value in expected.items() if found[name] != value}
