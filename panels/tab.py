@@ -5,7 +5,7 @@ from __future__ import annotations
 import bpy
 
 from .notices import draw_notices
-from .wrapping import wrap_text
+from .wrapping import shorten_progress, wrap_text
 
 MARKS = {"met": "CHECKMARK", "missed": "ERROR", "": "BLANK1"}
 NAME_SHARE = 0.72  # of the width that the name of a figure takes
@@ -144,7 +144,7 @@ def with_progress(layout, context, kinds, draw) -> None:
 
 def draw_bar(row, running) -> None:
     """Draw a bar with the present step and the time that is left, and Cancel."""
-    row.progress(factor=running.fraction, text=running.text)
+    row.progress(factor=running.fraction, text=shorten_progress(running.text))
     row.operator("beyond_mocap.cancel", text="", icon="X")
 
 
