@@ -115,10 +115,12 @@ def draw_values(column, owner, names, automatic=None) -> None:
         column: a column of named values.
         owner: the property group.
         names: of its properties.
-        automatic: name -> value to start with, of those whose 0 means automatic.
+        automatic: name -> value to start with, of those whose 0 means automatic; of a text, what it is while empty.
     """
     for name in names:
-        if automatic and name in automatic:
+        if automatic and isinstance(automatic.get(name), str):
+            column.prop(owner, name, placeholder=automatic[name])
+        elif automatic and name in automatic:
             draw_automatic(column, owner, name, automatic[name])
         else:
             column.prop(owner, name)

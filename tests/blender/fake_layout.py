@@ -76,7 +76,7 @@ class FakeLayout:
         shown = "" if icon_only else text
         is_button = toggle or row.type == "BOOLEAN"
         if self.use_property_split and shown and not is_button:
-            self._add("name", shown, measure_text(shown) + PAD / 4)
+            self._add("name", shown, measure_text(shown) + PAD / 2)
             return
         field = 0.0 if is_button or icon_only or row.type == "ENUM" else FIELD
         extra = ICON * (icon != "NONE" or (row.type == "BOOLEAN" and not toggle))
@@ -207,6 +207,10 @@ def draw(cls, context):
 
 
 def list_cut_panels(context):
-    """List what is cut in the tab, a line each."""
-    return [f"{cls.__name__}: {text!r} has {room:.0f}, needs {needed:.0f}" for cls in list_panels()
-            for text, room, needed in list_cut(draw(cls, context))]
+    """List what is cut in the tab, a line each; a panel with a header of its own is in a box."""
+    found = []
+    for cls in list_panels():
+        is_boxed = "HIDE_HEADER" not in getattr(cls, "bl_options", ()) and not getattr(cls, "bl_parent_id", "")
+        cut = list_cut(draw(cls, context), SIDEBAR - TABS - EDGE - INDENT * is_boxed)
+        found += [f"{cls.__name__}: {text!r} has {room:.0f}, needs {needed:.0f}" for text, room, needed in cut]
+    return found
