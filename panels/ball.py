@@ -295,7 +295,7 @@ def draw_choices(layout, settings) -> None:
     """Draw the settings of all passes."""
     column = create_value_column(layout)
     draw_values(column, settings, ("library_folder", "repeat", "rate", "start_frame", "lead_in", "lead_out",
-                                   "serve_from"), {"rate": 30.0})
+                                   "serve_from"), {"rate": 30.0, "library_folder": "As in Step 1"})
     if settings.serve_from == "PLAYER":
         column.prop_search(settings, "serve", settings, "players")
     if settings.serve_from == "PLACE":

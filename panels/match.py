@@ -46,7 +46,8 @@ class BEYOND_MOCAP_PT_match(TabPanel, bpy.types.Panel):
         if match.report:
             draw_section(layout, "match_data", "Data", lambda opened: draw_messages(opened, match.report))
         draw_team_characters(layout, match)
-        draw_values(create_value_column(layout), match, ("start", "end", "folder"), {"end": match.start + 30.0})
+        draw_values(create_value_column(layout), match, ("start", "end", "folder"),
+                    {"end": match.start + 30.0, "folder": "Automatic"})
         with_progress(layout, context, ("match",), draw_buttons)
         draw_section(layout, "match_work", "Processing", lambda opened: draw_processing(opened, context.scene))
         if match.shown:
@@ -96,8 +97,10 @@ def draw_processing(layout, scene) -> None:
     """Draw how the work is done."""
     match = scene.beyond_mocap_match
     column = create_value_column(layout)
-    draw_values(column, match, ("solve_touches", "strength", "masses", "fatigue", "workers", "scheduler",
-                                "first_frame"), {"workers": 2})
+    draw_values(column, match, ("solve_touches", "strength"))
+    column.prop(match, "masses", text="Masses")
+    draw_values(column, match, ("fatigue", "workers", "scheduler", "first_frame"),
+                {"workers": 2, "scheduler": "This Computer"})
     column.prop(scene.beyond_mocap, "rate")
     column.prop(scene.beyond_mocap, "watch", slider=True)
 

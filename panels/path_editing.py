@@ -96,9 +96,8 @@ def draw_armature(layout, body, edit) -> None:
     else:
         row.operator("beyond_mocap.bake_path", text="Apply", icon="CHECKMARK")
         row.operator("beyond_mocap.leave_path", text="Revert", icon="X")
-        row = layout.row(align=True)
-        row.prop(edit, "live", text="Update Automatically")
-        row.operator("beyond_mocap.update_path", text="Update", icon="FILE_REFRESH")
+        layout.prop(edit, "live", text="Update Automatically")
+        layout.operator("beyond_mocap.update_path", text="Update", icon="FILE_REFRESH")
 
 
 def draw_new_curve(layout, settings) -> None:

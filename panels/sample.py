@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from ..scene.markers.settings import list_clouds
-from .tab import draw_paragraph
+from .tab import draw_paragraph, with_progress
 
 SAMPLES = {"PLAYER": ("PLAYER",), "MATCH": ("MATCH",), "PATH": ("PATH",), "BALL": ("PASSES", "THROW"),
            "MARKERS": ("MARKERS",)}
@@ -19,13 +19,23 @@ EMPTY = {"PLAYER": lambda scene: not scene.beyond_mocap.players,
 
 
 def draw_samples(layout, context) -> None:
-    """Draw a button for each sample of the chosen task, while the scene has nothing of it."""
+    """Draw a button for each sample of the chosen task while the scene has nothing of it, and its progress there."""
     task = context.scene.beyond_mocap.task
     if task not in EMPTY or not EMPTY[task](context.scene):
         return
     draw_paragraph(layout, "See it move first, or begin with your own data below", "INFO")
-    row = layout.row(align=True)
-    row.scale_y = 1.5
+    work = context.window_manager.beyond_mocap_work.kind
+    with_progress(layout, context, (work,) if work and is_loading(context) else (), lambda row: draw_buttons(row, task))
+
+
+def draw_buttons(row, task: str) -> None:
+    """Draw the buttons that load a task's samples."""
     for name in SAMPLES[task]:
         text = "Load Sample" if len(SAMPLES[task]) == 1 else f"{name.title()} Sample"
         row.operator("beyond_mocap.load_sample", text=text, icon="PLAY").which = name
+
+
+def is_loading(context) -> bool:
+    """Return whether a sample is being loaded."""
+    running = context.window.modal_operators if context.window is not None else ()
+    return any(one.bl_idname == "BEYOND_MOCAP_OT_load_sample" for one in running)

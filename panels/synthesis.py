@@ -6,6 +6,7 @@ import bpy
 from bl_ui.utils import PresetPanel
 
 from .tab import StepPanel, draw_automatic, draw_header
+from .wrapping import BARE_MARGIN, shorten_progress
 
 
 class BEYOND_MOCAP_MT_presets(bpy.types.Menu):
@@ -72,7 +73,7 @@ def draw_queue(layout, running, settings) -> None:
         second.menu("BEYOND_MOCAP_MT_presets", text="Presets")
         second.popover("BEYOND_MOCAP_PT_presets", text="", icon="PRESET_NEW")
         return
-    first.progress(factor=running.fraction, text=running.text)
+    first.progress(factor=running.fraction, text=shorten_progress(running.text, BARE_MARGIN))
     early = second.row(align=True)
     early.enabled = not running.ending
     early.operator("beyond_mocap.cancel", text="Finish Early", icon="CHECKMARK").keep = True

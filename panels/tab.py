@@ -5,7 +5,7 @@ from __future__ import annotations
 import bpy
 
 from .notices import draw_notices
-from .wrapping import wrap_text
+from .wrapping import shorten_progress, wrap_text
 
 MARKS = {"met": "CHECKMARK", "missed": "ERROR", "": "BLANK1"}
 NAME_SHARE = 0.72  # of the width that the name of a figure takes
@@ -115,10 +115,12 @@ def draw_values(column, owner, names, automatic=None) -> None:
         column: a column of named values.
         owner: the property group.
         names: of its properties.
-        automatic: name -> value to start with, of those whose 0 means automatic.
+        automatic: name -> value to start with, of those whose 0 means automatic; of a text, what it is while empty.
     """
     for name in names:
-        if automatic and name in automatic:
+        if automatic and isinstance(automatic.get(name), str):
+            column.prop(owner, name, placeholder=automatic[name])
+        elif automatic and name in automatic:
             draw_automatic(column, owner, name, automatic[name])
         else:
             column.prop(owner, name)
@@ -144,7 +146,7 @@ def with_progress(layout, context, kinds, draw) -> None:
 
 def draw_bar(row, running) -> None:
     """Draw a bar with the present step and the time that is left, and Cancel."""
-    row.progress(factor=running.fraction, text=running.text)
+    row.progress(factor=running.fraction, text=shorten_progress(running.text))
     row.operator("beyond_mocap.cancel", text="", icon="X")
 
 

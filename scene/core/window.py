@@ -178,9 +178,20 @@ def _list_corners(context: bpy.types.Context, things: list[bpy.types.Object]) ->
     parts = {part for thing in things for part in (thing, *thing.children)}
     shown = [part.evaluated_get(depsgraph) for part in parts if part.name in context.view_layer.objects
              and part.visible_get()]
-    boxes = [np.array(part.matrix_world) @ np.column_stack([np.array(part.bound_box), np.ones(8)]).T for part in shown
-             if part.type != "ARMATURE" or len(part.data.bones)]
-    return np.concatenate([box[:3].T for box in boxes]) if boxes else np.empty((0, 3))
+    found = [(np.array(part.matrix_world), _list_outer_points(part)) for part in shown]
+    return np.concatenate([points @ place[:3, :3].T + place[:3, 3] for place, points in found] or [np.empty((0, 3))])
+
+
+def _list_outer_points(part: bpy.types.Object) -> np.ndarray:
+    """List the points (N, 3) in whose midst an object lies, in its own space: Blender's box around a curve has room
+    for a radius that nothing shows.
+    """
+    if part.type == "ARMATURE" and not len(part.data.bones):
+        return np.empty((0, 3))
+    if part.type != "CURVE":
+        return np.array(part.bound_box)
+    points = [point.co[:3] for spline in part.data.splines for point in (*spline.bezier_points, *spline.points)]
+    return np.array(points).reshape(-1, 3)
 
 
 def find_middle(thing: bpy.types.Object) -> np.ndarray:

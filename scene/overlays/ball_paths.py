@@ -25,6 +25,7 @@ if TYPE_CHECKING:
     from ..ball.shots import SolvedShot
 
 MOST = 40  # candidates drawn, at most
+FAINT = 0.25  # their alpha: they are many, and lie over each other
 SPEED = 0.04  # metres of a line for each m/s of the striking part
 DOT, RING, CROSS, LIFT = 0.018, 0.14, 0.09, 0.012  # metres
 WIDE, THIN = 3.5, 1.5  # pixels
@@ -103,7 +104,7 @@ def build_flight_meshes(rally: make.Trajectories, now: int) -> list[Mesh]:
 
 def _build_candidates(few: np.ndarray) -> Mesh:
     """Build lines of candidate flights (N, P, 3) m."""
-    return build_segments_mesh(few[:, :-1], few[:, 1:], colours.BLACK, THIN, 0.75)
+    return build_segments_mesh(few[:, :-1], few[:, 1:], colours.BLACK, THIN, FAINT)
 
 
 def _build_bounces(places: np.ndarray) -> list[Mesh]:

@@ -33,6 +33,7 @@ ROUGHNESS = {"skin": 0.5, "hair": 0.6, "boots": 0.35, "eyes": 0.15, "pupils": 0.
 """Roughness of parts that are not cloth."""
 
 CLOTH = 0.85  # roughness
+TIP, TIP_SHARE = "Beyond Mocap Tip", 0.55  # the shape of bones at a limb's end, and how much of the bone it shows
 CHARACTER_MARK = "beyond_mocap_character"
 """Custom property of the mesh objects made here."""
 
@@ -66,6 +67,9 @@ def create_character(player, name: str, shirt, collection, scene: bpy.types.Scen
     character = bpy.data.objects.new(f"{name} body", mesh)
     collection.objects.link(character)
     attach(character, player)
+    for bone in player.pose.bones:
+        if not bone.children and bone.custom_shape is None:
+            bone.custom_shape = get_tip()
     character[CHARACTER_MARK] = True
     write_weights(character, skeleton.names, body.joints, body.weights)
     return character
@@ -165,6 +169,18 @@ def attach(character: bpy.types.Object, player: bpy.types.Object) -> None:
     character.parent = player
     modifier = character.modifiers.new("Armature", "ARMATURE")
     modifier.object, modifier.use_deform_preserve_volume = player, True
+
+
+def get_tip() -> bpy.types.Object:
+    """Return the shape of bones at a limb's end: a shorter line, since head and hands are shorter than the recorded
+    bones, which would stick out of them.
+    """
+    tip = bpy.data.objects.get(TIP)
+    if tip is None or tip.type != "MESH":
+        mesh = bpy.data.meshes.new(TIP)
+        mesh.from_pydata([(0.0, 0.0, 0.0), (0.0, TIP_SHARE, 0.0)], [(0, 1)], [])
+        tip = bpy.data.objects.new(TIP, mesh)
+    return tip
 
 
 def write_weights(character: bpy.types.Object, names: tuple[str, ...], joints: np.ndarray,

@@ -3,13 +3,18 @@
 Widths are pixels at an interface scale of 1; the sidebar is as wide as Blender makes it at first.
 """
 
+import importlib
+import inspect
 from types import SimpleNamespace
 
 import blf
+import bpy
+from conftest import EXTENSION
 
 SIDEBAR = 280.0  # a sidebar as Blender first opens it
 TABS, EDGE = 20.0, 16.0  # of its width: the tabs; a panel's two margins
 INDENT, ICON, PAD, FIELD = 8.0, 20.0, 8.0, 50.0  # a box's margins; an icon; around a text; a field without a name
+TEXT = 200.0  # what each thing with a text asks for, so that those of a row become equally wide
 SPLIT = 0.4  # of the width, that names of values take
 
 
@@ -71,7 +76,7 @@ class FakeLayout:
         shown = "" if icon_only else text
         is_button = toggle or row.type == "BOOLEAN"
         if self.use_property_split and shown and not is_button:
-            self._add("name", shown, measure_text(shown) + PAD / 4)
+            self._add("name", shown, measure_text(shown) + PAD / 2)
             return
         field = 0.0 if is_button or icon_only or row.type == "ENUM" else FIELD
         extra = ICON * (icon != "NONE" or (row.type == "BOOLEAN" and not toggle))
@@ -88,8 +93,6 @@ class FakeLayout:
         self._add("enum", title, measure_text(title) + ICON + PAD / 2)
 
     def operator(self, idname, text=None, icon="NONE", **_):
-        import bpy
-
         group, name = idname.split(".")
         title = getattr(getattr(bpy.ops, group), name).get_rna_type().name if text is None else text
         width = measure_text(title) + ICON * (icon != "NONE") + PAD * bool(title)
@@ -138,24 +141,76 @@ def list_cut(layout, width=SIDEBAR - TABS - EDGE):
     return found
 
 
-def compute_natural(layout):
-    """Compute the width that a thing asks for."""
+def compute_natural(layout, fits_text=False):
+    """Compute the width that a thing asks for: of a text the same whatever its length, unless the row is aligned."""
     if layout.ui_units_x:
-        return 20.0 * layout.ui_units_x
+        return ICON * layout.ui_units_x
     if not isinstance(layout, FakeLayout):
-        return layout.natural
-    widths = [compute_natural(child) for child in layout.children] or [0.0]
-    return sum(widths) if layout.kind == "row" else max(widths)
+        return layout.natural if fits_text else min(layout.natural, ICON) if is_bare(layout) else TEXT
+    fits_text = fits_text or layout.alignment != "EXPAND"
+    widths = [compute_natural(child, fits_text) for child in layout.children] or [0.0]
+    return sum(widths) if layout.kind in ("row", "header") else max(widths)
+
+
+def is_bare(thing):
+    """Whether a thing has no text that could be cut."""
+    return not thing.text.partition(":")[2] if thing.kind == "operator" else thing.natural <= ICON + PAD / 2
 
 
 def _list_cut_row(layout, width):
-    """A row shrinks all that is in it alike where there is too little room."""
-    if any(isinstance(child, FakeLayout) and child.children for child in layout.children):
-        natural = [compute_natural(child) for child in layout.children]
-        shares = [width * one / max(sum(natural), 1e-9) for one in natural]
-        return [cut for child, share in zip(layout.children, shares) for cut in list_cut(child, share)]
+    """A row gives what has a fixed width that, and the others shares of what is left by the widths they ask for."""
     if any(child.kind == "name" for child in layout.children):
         return [cut for child in layout.children for cut in list_cut(child, width)]
-    needed = sum(compute_natural(child) for child in layout.children)
-    texts = " | ".join(child.text for child in layout.children if child.text)
-    return [(texts, width, needed)] if needed > width + 0.5 else []
+    natural = [compute_natural(child, layout.alignment != "EXPAND") for child in layout.children]
+    is_fixed = [bool(child.ui_units_x) or (not isinstance(child, FakeLayout) and is_bare(child))
+                for child in layout.children]
+    taken = sum(one for one, fixed in zip(natural, is_fixed) if fixed)
+    wanted = sum(one for one, fixed in zip(natural, is_fixed) if not fixed)
+    share = (width - taken) / max(wanted, 1e-9)
+    return [cut for child, one, fixed in zip(layout.children, natural, is_fixed) if not fixed
+            for cut in list_cut(child, one * (min(share, 1.0) if layout.alignment != "EXPAND" else share))]
+
+
+class FakePanel:
+    """Stands in for a panel that is drawn into a layout."""
+
+    def __init__(self, cls, layout):
+        vars(self).update(_cls=cls, layout=layout)
+
+    def __getattr__(self, name):
+        found = inspect.getattr_static(self._cls, name)
+        return found.__get__(self) if inspect.isfunction(found) else getattr(self._cls, name)
+
+
+def create_context(monkeypatch):
+    """Blender's context with a sidebar at a scale of 1."""
+    scale = SimpleNamespace(system=SimpleNamespace(ui_scale=1.0))
+    own = SimpleNamespace(region=SimpleNamespace(width=SIDEBAR), preferences=scale, object=bpy.context.object,
+                          scene=bpy.context.scene, window_manager=bpy.context.window_manager, mode="OBJECT",
+                          view_layer=bpy.context.view_layer, selected_objects=[], space_data=None,
+                          window=SimpleNamespace(modal_operators=[]))
+    monkeypatch.setattr(importlib.import_module(f"{EXTENSION}.panels.wrapping"), "bpy", SimpleNamespace(context=own))
+    return own
+
+
+def list_panels():
+    """The panels of the 3D view's tab."""
+    return [cls for cls in bpy.types.Panel.__subclasses__() if cls.__module__.startswith(EXTENSION)
+            and cls.bl_space_type == "VIEW_3D" and cls.is_registered and hasattr(cls, "task")]
+
+
+def draw(cls, context):
+    """Draw a panel; return its layout."""
+    layout = FakeLayout()
+    cls.draw(FakePanel(cls, layout), context)
+    return layout
+
+
+def list_cut_panels(context):
+    """List what is cut in the tab, a line each; a panel with a header of its own is in a box."""
+    found = []
+    for cls in list_panels():
+        is_boxed = "HIDE_HEADER" not in getattr(cls, "bl_options", ()) and not getattr(cls, "bl_parent_id", "")
+        cut = list_cut(draw(cls, context), SIDEBAR - TABS - EDGE - INDENT * is_boxed)
+        found += [f"{cls.__name__}: {text!r} has {room:.0f}, needs {needed:.0f}" for text, room, needed in cut]
+    return found

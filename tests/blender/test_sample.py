@@ -7,6 +7,7 @@ import shutil
 import bpy
 import pytest
 from conftest import EXTENSION
+from fake_layout import create_context, list_cut_panels
 from undo import assert_one_step, collect_state
 
 QUICK = ("PATH", "MARKERS")
@@ -34,7 +35,7 @@ def list_files(folder):
 
 
 @pytest.mark.parametrize("which", MOVING)
-def test_each_sample_moves_on_a_lit_pitch(which):
+def test_each_sample_moves_on_a_lit_pitch(which, monkeypatch):
     sample = import_module("scene.core.sample")
     before, start = list_files(sample.FOLDER), bpy.context.scene
     names = sorted(thing.name for thing in start.objects)
@@ -53,6 +54,7 @@ def test_each_sample_moves_on_a_lit_pitch(which):
     last = max(body.animation_data.action.frame_range[1] for body in bodies)
     assert abs(scene.frame_end - last) < 130, "the scene goes on long after the motion"
     assert list_files(sample.FOLDER) == before, "something was written into the extension's folder"
+    assert not list_cut_panels(create_context(monkeypatch))
 
 
 @pytest.mark.parametrize("which", QUICK)

@@ -1,15 +1,12 @@
 """What the tab draws: nothing is cut at the width that Blender gives it at first, and main buttons stay in their place
 while work runs and after it. All panels are drawn into a layout that writes down what it is told, all sections open."""
 
-import importlib
-import inspect
 import re
 from types import SimpleNamespace
 
 import bpy
 import pytest
-from conftest import EXTENSION
-from fake_layout import FakeLayout, list_cut
+from fake_layout import FakeLayout, create_context, draw, list_cut, list_cut_panels, list_panels
 
 MAIN = {  # panel -> operators whose place is not to change
     "library_step": ("build_library",),
@@ -26,40 +23,10 @@ QUALITY = "\n".join(("Foot slide: 3.5 cm/s\t≤ 3.2\tmissed", "Lean at starts an
 WARNINGS = "15.3-15.5 s: hardly any steps sideways or diagonally at 0.5 to 1.5 m/s: add some\t15.267"
 
 
-class FakePanel:
-    """Stands in for a panel that is drawn into a layout."""
-
-    def __init__(self, cls, layout):
-        vars(self).update(_cls=cls, layout=layout)
-
-    def __getattr__(self, name):
-        found = inspect.getattr_static(self._cls, name)
-        return found.__get__(self) if inspect.isfunction(found) else getattr(self._cls, name)
-
-
 @pytest.fixture
 def context(extension, monkeypatch):
     """Blender's context with a sidebar at a scale of 1."""
-    scale = SimpleNamespace(system=SimpleNamespace(ui_scale=1.0))
-    own = SimpleNamespace(region=SimpleNamespace(width=280.0), preferences=scale, object=bpy.context.object,
-                          scene=bpy.context.scene, window_manager=bpy.context.window_manager, mode="OBJECT",
-                          view_layer=bpy.context.view_layer, selected_objects=[], space_data=None)
-    wrapping = importlib.import_module(f"{EXTENSION}.panels.wrapping")
-    monkeypatch.setattr(wrapping, "bpy", SimpleNamespace(context=own))
-    return own
-
-
-def list_panels():
-    """The panels of the 3D view's tab."""
-    return [cls for cls in bpy.types.Panel.__subclasses__() if cls.__module__.startswith(EXTENSION)
-            and cls.bl_space_type == "VIEW_3D" and cls.is_registered and hasattr(cls, "task")]
-
-
-def draw(cls, context):
-    """Draw a panel; return its layout."""
-    layout = FakeLayout()
-    cls.draw(FakePanel(cls, layout), context)
-    return layout
+    return create_context(monkeypatch)
 
 
 def find_panel(name):
@@ -80,22 +47,24 @@ def fill_scene(scene):
     body = bpy.data.objects.new("Body", bpy.data.armatures.new("Body"))
     scene.collection.objects.link(body)
     bpy.context.view_layer.objects.active = body
+    body.beyond_mocap_ride.on, body.beyond_mocap_throw.made = True, "take"
 
 
 @pytest.mark.parametrize("filled", [False, True])
 def test_nothing_is_cut(context, filled):
     if filled:
         fill_scene(bpy.context.scene)
-    cut = {cls.__name__: found for cls in list_panels() if (found := list_cut(draw(cls, context)))}
-    assert not cut, "\n".join(f"{name}: {text!r} has {room:.0f}, needs {needed:.0f}"
-                              for name, rows in cut.items() for text, room, needed in rows)
+    assert not list_cut_panels(context)
 
 
 def test_a_cut_text_would_be_found():
     layout = FakeLayout()
     layout.row().operator("beyond_mocap.cancel", text="a text that no sidebar has the room for, whoever looks at it")
     layout.split(factor=0.5).label(text="half of the width is too little")
-    assert len(list_cut(layout)) == 2
+    row = layout.row()
+    row.label(text="as wide as the short one")
+    row.label(text="short")
+    assert len(list_cut(layout)) == 3
 
 
 @pytest.mark.parametrize("name", MAIN)
@@ -156,6 +125,35 @@ def test_progress_stands_where_the_button_was(context, kind, name, operator):
         assert rows[place] == ["Working 41 %, about 6 s left", "beyond_mocap.cancel:"]
     finally:
         bpy.context.window_manager.beyond_mocap_work.kind = ""
+
+
+def test_progress_keeps_its_share_and_time_where_there_is_little_room(context):
+    fill_scene(bpy.context.scene)
+    running = bpy.context.window_manager.beyond_mocap_work
+    texts = {"passes": ("Clustering blocks of 32 frames", "Clustering…"), "library": ("Reading walk_1.bvh", "Reading…"),
+             "synthesis": ("player1: Searching", "player1: Searching")}
+    try:
+        for kind, (text, short) in texts.items():
+            running.kind, running.text = kind, f"{text} 80 %, about 10 s left"
+            drawn = [bar for cls in list_panels() for what, bar in draw(cls, context).drawn if what == "progress"]
+            assert f"{short} 80 %, about 10 s left" in drawn
+            assert not list_cut_panels(context)
+    finally:
+        running.kind = ""
+
+
+def test_a_sample_s_progress_stands_where_its_button_was(context):
+    running, task = bpy.context.window_manager.beyond_mocap_work, find_panel("task")
+    context.scene.beyond_mocap.task = "BALL"
+    rows = list(iter_rows(draw(task, context)))
+    place = next(number for number, texts in enumerate(rows) if any("load_sample" in text for text in texts))
+    try:
+        running.kind, running.text = "throw", "Generating 41 %"
+        assert list(iter_rows(draw(task, context)))[place] == rows[place]
+        context.window.modal_operators.append(SimpleNamespace(bl_idname="BEYOND_MOCAP_OT_load_sample"))
+        assert list(iter_rows(draw(task, context)))[place] == ["Generating 41 %", "beyond_mocap.cancel:"]
+    finally:
+        running.kind = ""
 
 
 def test_each_task_shows_its_own_panels(context):

@@ -43,6 +43,13 @@ def test_blender_bends_it_as_the_core_does(core, character):
     assert thing.modifiers["Armature"].use_deform_preserve_volume
 
 
+def test_bones_do_not_stick_out_of_head_and_hands(character):
+    thing, _, body = character
+    shown = {bone.name for bone in thing.parent.pose.bones if bone.custom_shape == body.get_tip()}
+    assert shown == {bone.name for bone in thing.parent.data.bones if not bone.children} != set()
+    assert max(corner.co.y for corner in body.get_tip().data.vertices) < 0.6 and not body.get_tip().users_collection
+
+
 def test_edges_between_parts_are_sharp_and_only_those(character):
     thing = character[0]
     sharp = np.empty(len(thing.data.edges), bool)
