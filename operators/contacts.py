@@ -80,9 +80,11 @@ class BEYOND_MOCAP_OT_fix_foot(TakeOperator, bpy.types.Operator):
 
     def edit_contact(self, context, player) -> str:
         """Edit the contact of the operator's properties; returns what has changed."""
-        contacts = contact_edits.list_contacts(contact_edits.find_take(player))
+        take = contact_edits.find_take(player)
+        contacts = contact_edits.list_contacts(take)
         seconds = find_current_second(context.scene) if self.time < 0.0 else self.time
         if self.action == "ADD":
+            contact_edits.check_time(take, seconds)
             contact_edits.add_contact(player, contacts, self.foot, seconds)
             return f"{player.name}: {self.foot} foot at {seconds:.2f} s"
         contact = contact_edits.find_contact(contacts, self.foot, seconds)
@@ -206,6 +208,7 @@ class BEYOND_MOCAP_OT_fix_foot(TakeOperator, bpy.types.Operator):
         """Add a contact of the chosen contact's foot on the current frame, of the other foot where this one stands."""
         player, seconds = find_active_player(context.scene.beyond_mocap), find_current_second(context.scene)
         foot = contact.foot if contact is not None else "left"
+        contact_edits.check_time(contact_edits.find_take(player), seconds)
         contact_edits.add_contact(player, self.handles.contacts, foot, seconds)
         self.update(context, f"{player.name}: {foot} foot added")
 

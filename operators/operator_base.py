@@ -12,7 +12,7 @@ from bpy_extras.io_utils import ExportHelper, ImportHelper
 
 from ..beyond_mocap.base.errors import BeyondMocapError, InputError
 from ..scene.core import background, notices, window
-from ..scene.rigs import export
+from ..scene.rigs import exporters
 from ..scene.stage.presenting import present_new_objects
 
 NEEDS_LIBRARY = ("Choose the library's folder first",
@@ -175,7 +175,7 @@ class ExportOperator(BaseOperator, ExportHelper):
 
     def invoke(self, context, event):
         """Open the file browser."""
-        self.filename_ext = export.SUFFIXES[self.format]
+        self.filename_ext = exporters.SUFFIXES[self.format]
         return ExportHelper.invoke(self, context, event)
 
     def check(self, _context):
@@ -183,14 +183,14 @@ class ExportOperator(BaseOperator, ExportHelper):
         path = Path(self.filepath)
         if not path.name:
             return False
-        previous, self.filepath = self.filepath, str(export.replace_ending(path, export.SUFFIXES[self.format]))
+        previous, self.filepath = self.filepath, str(exporters.replace_ending(path, exporters.SUFFIXES[self.format]))
         return self.filepath != previous
 
     def output_path(self) -> Path:
         """Return the file to write; InputError if none is chosen."""
         if not self.filepath:
             raise InputError("export", "no file given", "a file to write", "choose a file")
-        return export.replace_ending(Path(bpy.path.abspath(self.filepath)), export.SUFFIXES[self.format])
+        return exporters.replace_ending(Path(bpy.path.abspath(self.filepath)), exporters.SUFFIXES[self.format])
 
 
 class BackgroundOperator(BaseOperator):

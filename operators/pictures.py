@@ -50,7 +50,7 @@ class PictureOperator(BackgroundOperator, ExportHelper):
         """Return the file to write; InputError if none is chosen."""
         if not self.filepath:
             raise InputError(self.bl_label, "no file given", f"a {self.filename_ext} file", "choose where to write it")
-        return Path(bpy.path.ensure_ext(bpy.path.abspath(self.filepath), self.filename_ext))
+        return Path(bpy.path.ensure_ext(bpy.path.abspath(self.filepath), self.filename_ext)).absolute()
 
     def read_look(self) -> pictures.PictureLook:
         """Read how to render."""

@@ -80,6 +80,8 @@ removed"""
         if not players:
             raise InputError("revert", "no preview is shown", "a preview", "synthesize first")
         for player in players:
+            preview.check_body(player)
+        for player in players:
             for line in preview.revert_path_edit(player):
                 self.report({"INFO"}, line)
             preview.revert_preview(context, player)
@@ -111,7 +113,8 @@ back, and updates keep the layer"""
 
     bl_idname = "beyond_mocap.keep_as_layer"
     bl_label = "Keep as Layer"
-    fade: FloatProperty(name="Fade", default=key_layers.FADE_SECONDS, min=0.0, soft_max=2.0, unit="TIME_ABSOLUTE",
+    fade: FloatProperty(name="Fade", default=key_layers.FADE_SECONDS, min=0.0, max=60.0, soft_max=2.0,
+                        unit="TIME_ABSOLUTE",
                         description="Seconds beside your keys over which their difference from the take fades")
     needs = (*NEEDS_NO_EDITING, "Key a pose of the active player's body first",
              lambda context: (player := find_active_player(context.scene.beyond_mocap)) is not None

@@ -14,7 +14,7 @@ from ..scene.characters.player_character import find_shown_body
 from ..scene.core import action, channels, take_record, window
 from ..scene.core.settings import find_active_player
 from ..scene.match import match_objects
-from ..scene.rigs import armature, bone_maps, engine_files, export, rig, rig_bake
+from ..scene.rigs import armature, bone_maps, engine_files, export, exporters, rig, rig_bake
 from ..scene.rigs.driven import DrivenRig, check_rig
 from ..scene.rigs.fit import BakeOptions, read_source
 from .operator_base import BaseOperator, ExportOperator
@@ -345,7 +345,7 @@ scene stays unchanged"""
             raise InputError("export", "no folder given", "a folder to write to", "choose a folder")
         folder = Path(bpy.path.abspath(self.directory))
         if self.who == "SCENE":
-            suffix = export.SUFFIXES[engine_files.PRESETS[self.preset].format]
+            suffix = exporters.SUFFIXES[engine_files.PRESETS[self.preset].format]
             name = Path(bpy.data.filepath).stem or "scene"
             lines = engine_files.deliver_scene(context, folder / f"{name}{suffix}", self.preset)
         else:

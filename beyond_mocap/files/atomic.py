@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import errno
 import os
 import shutil
 import threading
@@ -10,6 +11,8 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from ..base.errors import InputError
+
+_LEAST_FREE = 65536  # bytes on a disk below which a file written by another program may be cut off
 
 
 @contextlib.contextmanager
@@ -37,6 +40,18 @@ def atomic_path(path: str | os.PathLike, ending: str = ".part") -> Iterator[Path
     finally:
         with contextlib.suppress(OSError):
             temporary.unlink()
+
+
+def check_disk(path: Path) -> None:
+    """Check after another program has written a file that its disk is not full: some leave a file cut off and succeed.
+
+    Args:
+        path: the file.
+    Raises:
+        OSError: if there is no space left.
+    """
+    if shutil.disk_usage(path.parent).free < _LEAST_FREE:
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
 
 
 @contextlib.contextmanager

@@ -18,7 +18,7 @@ from ...beyond_mocap.motion.motion import Motion, place_motion
 from ...beyond_mocap.motion.quaternion import from_up_angle, rotate
 from ...scene.core import action, channels, frame_range, window
 from ...scene.library import assets, clips, foreign, recordings
-from ...scene.rigs import armature, export
+from ...scene.rigs import armature, exporters
 from ..operator_base import BackgroundOperator, BaseOperator, ImportOperator
 
 
@@ -205,7 +205,7 @@ kind, in this file or as a .blend for a folder of asset libraries"""
 
     def find_target(self) -> Path:
         """Return the .blend to write."""
-        return export.replace_ending(Path(bpy.path.abspath(self.filepath)), ".blend")
+        return exporters.replace_ending(Path(bpy.path.abspath(self.filepath)), ".blend")
 
     def check_target(self):
         """Check that the file may be written (InputError)."""

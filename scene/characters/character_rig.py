@@ -47,7 +47,7 @@ class CharacterRig:
     """A character's rig, skin and twist bones."""
 
     def __init__(self, body: bpy.types.Object, meshes: list[bpy.types.Object], scene: bpy.types.Scene):
-        """Analyse a copy of the character that plays nothing.
+        """Analyse a copy of the character that plays nothing, and set it to follow its keys.
 
         Args:
             body: the armature.
@@ -58,6 +58,7 @@ class CharacterRig:
         """
         table = bone_maps.load_stored_map(body) or bone_maps.find_bone_map(body)
         self.driven = DrivenRig(body, table, scene)
+        self.set_switches(body)  # a constraint may hold the body elsewhere than its bones rest
         bpy.context.view_layer.update()
         self.skin = read_skin(self.driven, meshes)
         self.twist_bones = list_twist_bones(self.driven)

@@ -27,6 +27,13 @@ def check_character(original: bpy.types.Object | None) -> None:
         raise InputError(where, "its bones are being edited", "object or pose mode", "leave edit mode with Tab")
     if not len(original.data.bones):
         raise InputError(where, "has no bones", "a humanoid armature", "choose another armature")
+    if original.data.pose_position == "REST":
+        raise InputError(where, "its armature is set to its rest position, in which nothing moves", "pose position",
+                         "press Pose Position in the armature's properties")
+    owner = find_player(original)
+    if owner is not None:
+        raise InputError(where, f"shows the motion of {owner}", "an armature that no player has",
+                         "choose another armature")
     matrix = find_world_matrix(original)
     if matrix.determinant() <= 0.0 or max(matrix.to_scale()) > 1.001 * min(matrix.to_scale()):
         raise InputError(where, f"is scaled {', '.join(f'{one:g}' for one in matrix.to_scale())}",
@@ -34,6 +41,12 @@ def check_character(original: bpy.types.Object | None) -> None:
     if not list_meshes(original):
         raise InputError(where, "has no mesh", "meshes with an armature modifier, or parented to it",
                          "choose the armature that moves the character's mesh")
+
+
+def find_player(original: bpy.types.Object) -> str | None:
+    """Find the player whose body or rig an armature is; None where it is nobody's."""
+    players = (player for scene in bpy.data.scenes for player in scene.beyond_mocap.players)
+    return next((player.name for player in players if original in (player.body, player.rig)), None)
 
 
 def list_meshes(original: bpy.types.Object) -> list[bpy.types.Object]:
@@ -44,12 +57,41 @@ def list_meshes(original: bpy.types.Object) -> list[bpy.types.Object]:
     return sorted(moved, key=lambda thing: thing.name)
 
 
-def describe_loose_meshes(original: bpy.types.Object) -> list[str]:
-    """Describe meshes that do not follow any bone, since no vertex group has a bone's name: one line, or none."""
-    bones = set(original.data.bones.keys())
-    loose = [thing.name for thing in list_meshes(original)
-             if thing.parent_type != "BONE" and not bones.intersection(thing.vertex_groups.keys())]
-    return [f"{', '.join(loose[:3])}: no vertex group of a bone, does not follow the body"] if loose else []
+def describe_differences(original: bpy.types.Object) -> list[str]:
+    """Describe how copies of a character differ from it: a line for each kind of difference."""
+    lines, loose = [], [thing.name for thing in list_meshes(original) if not _follows_bones(thing, original)]
+    if loose:
+        lines.append(f"{', '.join(loose[:3])}: no vertex group of a bone, does not follow the body")
+    scaled = [bone.name for bone in original.pose.bones if max(abs(one - 1.0) for one in bone.scale) > 1e-3]
+    if scaled:
+        lines.append(f"{', '.join(scaled[:3])}: scaled in the pose, which the copies do not have; in pose mode, press "
+                     "Apply Pose as Rest Pose to keep it")
+    driven = [thing.name for thing in list_meshes(original) if thing.data.shape_keys is not None
+              and thing.data.shape_keys.animation_data is not None
+              and len(thing.data.shape_keys.animation_data.drivers)]
+    if driven:
+        lines.append(f"{', '.join(driven[:3])}: its shape keys follow the original, since all copies share them")
+    return lines
+
+
+def _follows_bones(thing: bpy.types.Object, original: bpy.types.Object) -> bool:
+    """Whether a mesh has a vertex group of a bone, or hangs on one, itself or by what it is parented to."""
+    if not set(original.data.bones.keys()).isdisjoint(thing.vertex_groups.keys()):
+        return True
+    above: bpy.types.Object | None = thing
+    while above is not None and above != original:
+        if above.parent == original and above.parent_type == "BONE":
+            return True
+        above = above.parent
+    return False
+
+
+def _list_family(original: bpy.types.Object) -> list[bpy.types.Object]:
+    """List an armature, the objects between it and its meshes, such as sockets on bones, and the meshes."""
+    meshes = list_meshes(original)
+    between = [thing for thing in original.children_recursive
+               if thing not in meshes and not set(meshes).isdisjoint(thing.children_recursive)]
+    return [original, *between, *meshes]
 
 
 def create_copy(original: bpy.types.Object, name: str, collection: bpy.types.Collection) -> list[bpy.types.Object]:
@@ -60,9 +102,9 @@ def create_copy(original: bpy.types.Object, name: str, collection: bpy.types.Col
         name: of the copy.
         collection: where the copies go.
     Returns:
-        The armature, then its meshes.
+        The armature, then its meshes and what these hang on.
     """
-    matrix, family = find_world_matrix(original), [original, *list_meshes(original)]
+    matrix, family = find_world_matrix(original), _list_family(original)
     lies = {thing: matrix.inverted() @ find_world_matrix(thing) for thing in family}
     copies = armature.copy_objects(family, name, collection)
     body = copies[original]

@@ -73,7 +73,6 @@ def show_character(context: bpy.types.Context, player) -> list[str]:
         elif played[0] is not None:
             channels.assign_action(body, *played)
         raise
-    rig.set_switches(body)
     player.character_body = body
     channels.create_action(body, f"{player.name} character", frames, curves)[MARK] = True
     if played[0] is not None and played[0].get(MARK) and not played[0].users:
@@ -81,7 +80,7 @@ def show_character(context: bpy.types.Context, player) -> list[str]:
     dress(body, player.name, {"shirt": tuple(player.shirt)})
     _show_builtin(player, False)
     copies.update_original(player.character)
-    return copies.describe_loose_meshes(player.character)
+    return copies.describe_differences(player.character)
 
 
 def remove_character(player) -> None:

@@ -7,10 +7,10 @@ from bpy.props import PointerProperty
 
 
 def is_original(_settings, candidate: bpy.types.Object) -> bool:
-    """Return whether an object may be picked as a character: an armature that is no copy of one."""
-    from .copies import COPY_OF
+    """Return whether an object may be picked as a character: an armature that is no copy of one, and no player's."""
+    from .copies import COPY_OF, find_player
 
-    return candidate.type == "ARMATURE" and candidate.get(COPY_OF) is None
+    return candidate.type == "ARMATURE" and candidate.get(COPY_OF) is None and find_player(candidate) is None
 
 
 def is_worn(character: "BeyondMocapCharacter", candidate: bpy.types.Material) -> bool:

@@ -40,7 +40,7 @@ class TeamCharacters:
         except BeyondMocapError as error:
             self._add_message(str(error))
             return False
-        for line in copies.describe_loose_meshes(original):
+        for line in copies.describe_differences(original):
             self._add_message(line)
         return True
 
@@ -58,7 +58,7 @@ class TeamCharacters:
             name: of the armature.
             collection: where it goes.
         Returns:
-            The armature, then its meshes; None where the player has the built-in body.
+            The armature, then its meshes and what these hang on; None where the player has the built-in body.
         """
         original = (self.chosen.get("keeper") if is_keeper else None) or self.chosen.get(team)
         if original is None:
@@ -76,7 +76,7 @@ class TeamCharacters:
         """Analyse the first copy of a character for all others; False where that is not possible."""
         self.context.view_layer.update()
         try:
-            self._rigs[original] = CharacterRig(things[0], things[1:], self.context.scene)
+            self._rigs[original] = CharacterRig(things[0], copies.list_meshes(things[0]), self.context.scene)
         except BeyondMocapError as error:
             self._add_message(str(error))
             return False

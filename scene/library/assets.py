@@ -19,7 +19,7 @@ from ...beyond_mocap.annotation import DISCRETE, LOCOMOTION
 from ...beyond_mocap.base.errors import InputError
 from ...beyond_mocap.files.atomic import atomic_write
 from ..core import action
-from ..rigs import armature, export
+from ..rigs import armature, exporters
 
 if TYPE_CHECKING:
     from ...beyond_mocap.motion.motion import Motion
@@ -162,5 +162,5 @@ def define_catalogs(folder: str | Path, catalogs: Iterable[str]) -> Path:
 
 def write_library(path: Path, actions: list[bpy.types.Action]) -> None:
     """Write actions to a .blend of their own, completely or not at all; InputError where that fails."""
-    export.write_whole_file(path, lambda part: bpy.data.libraries.write(part, set(actions), fake_user=True,
+    exporters.write_whole_file(path, lambda part: bpy.data.libraries.write(part, set(actions), fake_user=True,
                                                                         compress=True))

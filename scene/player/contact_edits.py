@@ -86,6 +86,14 @@ def find_take(player):
     return stored.take
 
 
+def check_time(take, seconds: float) -> None:
+    """Check that a time is within a take (InputError)."""
+    end = take.start_time + (len(take.motion) - 1) / take.motion.fps
+    if not take.start_time <= seconds <= end:
+        raise InputError("fix foot", f"{seconds:.2f} s", f"a time of the take, {take.start_time:.2f} to {end:.2f} s",
+                         "go to a frame of the take")
+
+
 def list_contacts(take) -> list[Contact]:
     """List the contacts of a take, of both feet."""
     from ...beyond_mocap.motion.humanoid import identify_joints
@@ -123,9 +131,12 @@ def find_edit(player, contact: Contact):
 def change_contact(player, contact: Contact, offset=(0.0, 0.0), start: float = 0.0, end: float = 0.0):
     """Move a contact by `offset` (2,) m, and let it begin and end later by seconds; returns its edit.
 
-    Raises InputError for a contact that is then farther than MOST_OFFSET from its place.
+    Raises InputError for a contact that is then farther than MOST_OFFSET from its place, or has no length.
     """
     edit = find_edit(player, contact)
+    if contact.end + end <= contact.start + start:
+        raise InputError("fix foot", f"a contact of {contact.end - contact.start:.2f} s made shorter by "
+                         f"{start - end:.2f} s", "some of it left", "delete the contact instead")
     length = float(np.hypot(*(np.array(offset, dtype=float) + (list(edit.offset) if edit is not None else 0.0))))
     if length > MOST_OFFSET:
         raise InputError("fix foot", f"a contact moved by {length:.2f} m", f"at most {MOST_OFFSET:g} m",

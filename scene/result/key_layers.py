@@ -59,7 +59,7 @@ def keep_as_layer(body: bpy.types.Object, fps: float, fade: float = FADE_SECONDS
     action, slot = channels.find_playing_action(body)
     generated = hand_keys.read_generated(action) if action is not None else None
     is_above = generated is None and action is not None and blocks.find_track(body) is not None
-    tables = _read_own_keys(action, slot, generated) if generated is not None or is_above else {}
+    tables = _read_own_keys(body, action, slot, generated) if generated is not None or is_above else {}
     if not tables:
         raise InputError(f"body {body.name}", "no keys of your own on its take", "keys that differ from the take's",
                          "key a pose first, then press Keep as Layer")
@@ -67,8 +67,9 @@ def keep_as_layer(body: bpy.types.Object, fps: float, fade: float = FADE_SECONDS
         else _sample_below(body, tables)
     groups = {path: (curve.group.name if curve.group else "") for (path, _), curve in
               channels.collect_curves(action, slot).items()}
-    layer, part = _build_layer(body, {path: (table[0], _subtract(path, table[1], bases[path]))
-                                      for path, table in tables.items()}, groups, max(1, round(fade * fps)))
+    differences = {path: (frames, _subtract(path, _fill_components(path, values, bases[path], is_above), bases[path]))
+                   for path, (frames, values) in tables.items()}
+    layer, part = _build_layer(body, differences, groups, max(1, round(fade * fps)))
     if is_above:
         body.animation_data.action = None
         if not action.users - action.use_fake_user:
@@ -141,8 +142,12 @@ def unstack_layers(body: bpy.types.Object | None, uses_nla: bool = True) -> None
     data.use_nla = uses_nla
 
 
-def _read_own_keys(action: bpy.types.Action, slot, generated: hand_keys.GeneratedKeys | None) -> dict[str, Table]:
-    """Read frames and values of the user's keys of an action: those that differ from the generated ones, or all."""
+def _read_own_keys(body: bpy.types.Object, action: bpy.types.Action, slot,
+                   generated: hand_keys.GeneratedKeys | None) -> dict[str, Table]:
+    """Read frames and values of the user's keys of an action: those that differ from the generated ones, or all.
+
+    Components of a property without keys are NaN; properties that the body does not have any more are left out.
+    """
     curves, frames = channels.collect_curves(action, slot), {}
     if generated is None:
         for (path, _), curve in curves.items():
@@ -156,16 +161,25 @@ def _read_own_keys(action: bpy.types.Action, slot, generated: hand_keys.Generate
     found = {}
     for path, given in frames.items():
         at = np.unique(np.round(np.array(given, float), 3))
-        indices = sorted(index for one, index in {*curves, *(generated.values if generated else ())} if one == path)
-        default = _DEFAULTS.get(path.rpartition(".")[2], (0.0,) * (indices[-1] + 1))
-        values = np.tile(np.array(default, float)[:max(len(default), indices[-1] + 1)], (len(at), 1))
+        values = np.full((len(at), _count_components(body, path)), np.nan)
         for index in range(values.shape[1]):
             if (path, index) in curves:
                 values[:, index] = [curves[path, index].evaluate(frame) for frame in at]
-            elif generated is not None and (path, index) in generated.values:
-                values[:, index] = _interpolate(generated, (path, index), at)
-        found[path] = at, values
+        if values.shape[1]:
+            found[path] = at, values
     return found
+
+
+def _count_components(body: bpy.types.Object, path: str) -> int:
+    """Count the numbers of a body's property, 0 where it is gone; InputError for one that is no number."""
+    try:
+        value = body.path_resolve(path)
+    except ValueError:
+        return 0
+    if isinstance(value, str):
+        raise InputError(f"body {body.name}", f"keys on {path}", "keys of numbers, which a layer can add",
+                         "remove these keys first")
+    return int(np.size(value))
 
 
 def _sample_generated(generated: hand_keys.GeneratedKeys, path: str, frames: np.ndarray,
@@ -214,6 +228,14 @@ def _sample_below(body: bpy.types.Object, tables: dict[str, Table]) -> dict[str,
         channels.assign_action(body, action, slot)
         scene.frame_set(now, subframe=subframe)
     return found
+
+
+def _fill_components(path: str, values: np.ndarray, base: np.ndarray, is_above: bool) -> np.ndarray:
+    """Fill the components without keys, NaN in `values` (F, N), as Blender does: from `base` (F, N) below, but in a
+    quaternion above strips, which it takes as a whole, with those of no rotation.
+    """
+    takes_whole = is_above and path.rpartition(".")[2] == _ROTATION
+    return np.where(np.isnan(values), np.array(_DEFAULTS[_ROTATION]) if takes_whole else base, values)
 
 
 def _subtract(path: str, values: np.ndarray, base: np.ndarray) -> np.ndarray:

@@ -41,6 +41,7 @@ def check_body(player: BeyondMocapPlayer) -> None:
     if override is not None and override.is_system_override:
         raise InputError(f"body {body.name}", "is an override that cannot be edited", "an editable override",
                          "make it editable: Outliner, Library Override, Make")
+    channels.check_editable(body)
 
 
 def revert_path_edit(player: BeyondMocapPlayer) -> list[str]:

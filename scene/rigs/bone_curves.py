@@ -17,7 +17,7 @@ from ..path_editing.rig_sampling import find_rotation_channel
 from . import armature, bone_maps
 from .driven import DrivenRig, compute_upright_axes
 
-ROOT_BONE = "root"  # name in a copy whose rig has none
+ROOT_BONE = "root"
 
 
 def compute_bone_poses(driven: DrivenRig, motion: Motion, frames: np.ndarray, root: str):
@@ -135,6 +135,11 @@ def is_carried(rig: bpy.types.Object) -> bool:
     return False
 
 
+def name_root_bone(rig: bpy.types.Object) -> str:
+    """Name the root bone that a copy of an armature gets: none of its own bones has this name."""
+    return ROOT_BONE if ROOT_BONE not in rig.data.bones else f"{ROOT_BONE}_motion"
+
+
 def build_bone_curves(rig: bpy.types.Object, basis: dict) -> dict[str, tuple[str, np.ndarray]]:
     """Build curves for the driven bones' channels, each bone in its own rotation mode."""
     found = {}
@@ -220,7 +225,7 @@ def compute_root_motion(rig: bpy.types.Object, sampled, options, messages: list[
     if root_bone is not None:
         rest = np.array(rig.data.bones[root_bone].matrix_local)
         return table["hips"], root_bone, inward @ path @ _compute_upright_matrix(rig, table) @ rest, None
-    messages.append(f"no root bone on the armature: the file has an added one named {ROOT_BONE!r}")
+    messages.append(f"no root bone on the armature: the file has an added one named {name_root_bone(rig)!r}")
     return table["hips"], None, inward @ path @ _compute_upright_matrix(rig, table), None
 
 

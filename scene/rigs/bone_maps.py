@@ -97,9 +97,7 @@ def _build_named_tree(rig: bpy.types.Object) -> tuple[Skeleton, list[str]]:
     for name, parent in above.items():
         if parent is not None:
             below[parent].append(name)
-    order = [max(roots, key=lambda name: _count_tree(below, name))]
-    for name in order:  # grows during the loop
-        order.extend(below[name])
+    order = max((_list_tree(below, root) for root in roots), key=len)
     parents = [-1] + [order.index(above[name]) for name in order[1:]]
     heads = np.array([rig.data.bones[name].head_local for name in order])
     tails = np.array([rig.data.bones[name].tail_local for name in order])
@@ -126,8 +124,12 @@ def _find_parent_among(bone: bpy.types.Bone, among) -> str | None:
     return None
 
 
-def _count_tree(below: dict[str, list[str]], name: str) -> int:
-    return 1 + sum(_count_tree(below, child) for child in below[name])
+def _list_tree(below: dict[str, list[str]], root: str) -> list[str]:
+    """List a bone and all below it, parents first."""
+    found = [root]
+    for name in found:  # grows during the loop
+        found.extend(below[name])
+    return found
 
 
 def _make_unique(names: list[str]) -> tuple[str, ...]:

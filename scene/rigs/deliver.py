@@ -17,7 +17,7 @@ from ..core import action
 from ..match import load, show
 from ..result import bake
 from ..stage import ball, body
-from . import armature, export
+from . import armature, exporters
 
 if TYPE_CHECKING:
     from ...beyond_mocap.match.synthesize_match import MatchResult
@@ -35,7 +35,7 @@ def write_result(result: "Take | MatchResult", out: Path) -> tuple[str, ...]:
     from ...beyond_mocap.match.synthesize_match import MatchResult  # imports scipy, which is slow
 
     lines = create_match_scene(result) if isinstance(result, MatchResult) else create_take_scene(result)
-    export.write_whole_file(out, EXPORTERS[out.suffix.lower()])
+    exporters.write_whole_file(out, EXPORTERS[out.suffix.lower()])
     return lines
 
 
@@ -83,7 +83,7 @@ def _write_blend(path: str) -> None:
 
 def _build_exporter(format: str):
     """Build the exporter of a format for everything in the file, axes as in Blender's exporters."""
-    return lambda path: export.EXPORTERS[format](path, "BLENDER", False)
+    return lambda path: exporters.EXPORTERS[format](path, "BLENDER", "ALL")
 
 
 EXPORTERS = {".blend": _write_blend, ".fbx": _build_exporter("FBX"), ".glb": _build_exporter("GLB"),

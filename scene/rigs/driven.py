@@ -48,6 +48,9 @@ def check_rig(rig: bpy.types.Object | None, source: bpy.types.Object | None = No
     if rig.name not in bpy.context.view_layer.objects or not rig.visible_get():
         raise InputError(where, "is hidden or excluded", "a visible rig, which Blender poses",
                          "show it in the outliner")
+    if rig.data.pose_position == "REST":
+        raise InputError(where, "is set to its rest position, in which nothing moves", "pose position",
+                         "press Pose Position in the armature's properties")
     if rig.mode == "EDIT":
         raise InputError(where, "its bones are being edited", "object or pose mode", "leave edit mode with Tab")
     channels.check_editable(rig)

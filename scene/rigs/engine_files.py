@@ -16,7 +16,7 @@ from ...beyond_mocap.base.errors import InputError, format_count
 from ..characters.player_character import find_shown_body
 from ..core.settings import find_active_player
 from ..match import match_objects
-from . import export
+from . import export, exporters
 from .rig import ROOTS
 
 
@@ -25,7 +25,7 @@ class EnginePreset:
     """What a program expects.
 
     Attributes:
-        format: of `export.SUFFIXES`.
+        format: of `exporters.SUFFIXES`.
         engine: of `rig.ENGINES`.
         units: of the file for each metre.
         armature_name: of the armature object; None for the player's own.
@@ -95,7 +95,7 @@ def deliver_players(
         InputError: if an armature does not move or a file cannot be written; none of the files is then half written.
     """
     wanted = PRESETS[preset]
-    paths = [folder / f"{name}{export.SUFFIXES[wanted.format]}" for name in name_files([rig.name for rig in rigs])]
+    paths = [folder / f"{name}{exporters.SUFFIXES[wanted.format]}" for name in name_files([rig.name for rig in rigs])]
     options = [export.ExportOptions(path, wanted.format, wanted.engine, root=root, meshes=meshes,
                                     applies_transforms=True, units=wanted.units, armature_name=wanted.armature_name)
                for path in paths]
@@ -130,12 +130,19 @@ def deliver_scene(context: bpy.types.Context, path: Path, preset: str) -> list[s
     if wanted.format not in SCENE_FORMATS:
         raise InputError("export", f"{preset.capitalize()} has a file for each player", "USD, Alembic or Godot",
                          "choose one of these, or players")
-    export.check_exporter(wanted.format)
-    export.check_folder(path)
+    exporters.check_exporter(wanted.format)
+    exporters.check_folder(path)
     if path.is_dir():
         raise InputError(path, "is a folder", "a name that is free", "choose another folder")
-    export.write_whole_file(path, lambda part: export.EXPORTERS[wanted.format](part, wanted.engine, False))
-    return [f"{scene.frame_end - scene.frame_start + 1} frames of the whole scene", f"Written: {path}"]
+    shown = [thing for thing in scene.objects if thing.type in {"MESH", "ARMATURE"} and thing.visible_get()]
+    if not any(thing.type == "MESH" or wanted.format != "ABC" for thing in shown):
+        raise InputError("export", "nothing to deliver is visible", "visible meshes", "synthesize, or show some")
+    with export.keep_mode(context):
+        exporters.write_whole_file(path, lambda part: exporters.EXPORTERS[wanted.format](part, wanted.engine,
+                                                                                         "VISIBLE"))
+    hidden = export.list_hidden_now(scene)
+    return [f"{scene.frame_end - scene.frame_start + 1} frames of the whole scene", f"Written: {path}",
+            *([f"{format_count(len(hidden), 'mesh', 'meshes')} left out: hidden at this frame"] if hidden else [])]
 
 
 def name_files(names: list[str]) -> list[str]:

@@ -7,7 +7,6 @@ drivers or NLA strips that an exporter could evaluate differently from Blender.
 
 from __future__ import annotations
 
-import os
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
@@ -17,19 +16,14 @@ import numpy as np
 from mathutils import Matrix
 
 from ...beyond_mocap.base.errors import InputError, format_count
-from ...beyond_mocap.files.atomic import atomic_path
 from ...beyond_mocap.motion import quaternion
 from ..core import channels
 from ..core.measure import frames_per_second
 from ..core.saved_state import use_temporary_scene
-from .bone_curves import ROOT_BONE, compute_root_motion
+from . import exporters
+from .bone_curves import ROOT_BONE, compute_root_motion, name_root_bone
 from .fit import find_common_extent, sample_motion
 
-SUFFIXES = {"FBX": ".fbx", "GLB": ".glb", "USD": ".usdc", "ABC": ".abc", "BVH": ".bvh"}
-_OPERATORS = {"FBX": ("export_scene", "fbx"), "GLB": ("export_scene", "gltf"), "USD": ("wm", "usd_export"),
-              "ABC": ("wm", "alembic_export")}
-_FBX_AXES = {"BLENDER": ("-Z", "Y"), "UNITY": ("-Z", "Y"), "GODOT": ("-Z", "Y"), "UNREAL": ("Y", "Z")}
-_USD_AXES = {"UNITY": ("NEGATIVE_Z", "Y"), "GODOT": ("NEGATIVE_Z", "Y")}
 _SCALE_TOLERANCE = 1e-4  # deviation of a scale from 1 that is ignored
 VISIBILITY_CHANNELS = {
     "hide_viewport", "hide_render"}  # keyed channels of a mesh that is visible for a part of the time only
@@ -96,17 +90,10 @@ def export_motion(
 
 def check_place(options: ExportOptions, rigs: list[bpy.types.Object]) -> None:
     """Check that there is an exporter, an armature and a writable folder (InputError)."""
-    check_exporter(options.format)
+    exporters.check_exporter(options.format)
     if not rigs:
         raise InputError("export", "no armature", "an armature that moves", "select one or choose players")
-    check_folder(options.path)
-
-
-def check_folder(path: Path) -> None:
-    """Check that a file's folder can be written (InputError)."""
-    if not path.parent.is_dir() or not os.access(path.parent, os.W_OK):
-        raise InputError(path, "the folder cannot be written", "a folder that you can write to",
-                         "choose another folder")
+    exporters.check_folder(options.path)
 
 
 def sample_rigs(scene: bpy.types.Scene, rigs: list[bpy.types.Object], rate: float | None,
@@ -140,6 +127,9 @@ def export_sampled(
     meshes_by_rig = {rig.name: list_meshes(scene, rig)
                      for rig in rigs} if options.meshes and options.format != "BVH" else {}
     lies = {mesh: _find_rest_placement(rig, mesh) for rig in rigs for mesh in meshes_by_rig.get(rig.name, ())}
+    if options.format == "ABC" and not (things or any(meshes_by_rig.values())):
+        raise InputError("export", "no visible mesh", "a mesh, which is all that Alembic stores",
+                         "show the meshes, or choose another format")
     messages = []
     with _export_scene(context, rate, count, options.units) as stage:
         copies = [_copy_armature(stage, rig, sampled[rig.name], options, messages) for rig in rigs]
@@ -157,19 +147,6 @@ def export_sampled(
                     f"{format_count(len(meshes), 'mesh', 'meshes')}"
                     + (f", {format_count(len(things), 'object')} beside them" if things else ""))
     return messages
-
-
-def check_exporter(format: str) -> None:
-    """Check that this Blender has the exporter (InputError)."""
-    if format not in _OPERATORS:
-        return
-    group, name = _OPERATORS[format]
-    try:
-        getattr(getattr(bpy.ops, group), name).get_rna_type()
-    except (AttributeError, KeyError):
-        others = ", ".join(f for f in SUFFIXES if f != format)
-        raise InputError("export", f"this Blender has no {format} exporter", f"an available format ({others})",
-                         "choose another format or enable the exporter's add-on") from None
 
 
 def _sample_poses(
@@ -199,16 +176,22 @@ def _export_scene(context: bpy.types.Context, rate: float, frames: int, per_unit
     """Create a temporary scene at this rate, `per_unit` of its units for each of the open scene's; afterwards selection
     and mode are restored.
     """
-    units, chosen = context.scene.unit_settings, list(context.selected_objects)
-    active = context.view_layer.objects.active
+    units = context.scene.unit_settings
+    with keep_mode(context), use_temporary_scene("Beyond Mocap export") as stage:
+        stage.unit_settings.system, stage.unit_settings.scale_length = units.system, units.scale_length / per_unit
+        stage.render.fps = max(1, round(rate))
+        stage.render.fps_base = stage.render.fps / rate
+        stage.frame_start, stage.frame_end = 0, max(frames - 1, 0)
+        yield stage
+
+
+@contextmanager
+def keep_mode(context: bpy.types.Context):
+    """Restore selection, active object and its mode at the end of a `with`: exporters may change them."""
+    chosen, active = list(context.selected_objects), context.view_layer.objects.active
     mode = active.mode if active is not None else "OBJECT"
     try:
-        with use_temporary_scene("Beyond Mocap export") as stage:
-            stage.unit_settings.system, stage.unit_settings.scale_length = units.system, units.scale_length / per_unit
-            stage.render.fps = max(1, round(rate))
-            stage.render.fps_base = stage.render.fps / rate
-            stage.frame_start, stage.frame_end = 0, max(frames - 1, 0)
-            yield stage
+        yield
     finally:
         for one in context.view_layer.objects:
             if one.select_get() != (one in chosen):
@@ -234,7 +217,7 @@ def _copy_armature(stage: bpy.types.Scene, rig: bpy.types.Object, shown: _Sample
     if in_place is not None:
         poses = {name: in_place @ pose for name, pose in poses.items()}
     if line is not None:
-        poses[root or ROOT_BONE] = line
+        poses[root or name_root_bone(rig)] = line
     parents = _simplify_bones(stage, copy, rig, kept=bones, hips=hips if line is not None and root is None else None)
     if wanted.units != 1.0:
         copy.data.transform(Matrix.Scale(wanted.units, 4))
@@ -301,12 +284,13 @@ def _simplify_bones(stage, copy, rig, kept: set[str], hips: str | None) -> dict[
             else:
                 bone.use_inherit_rotation, bone.use_local_location, bone.inherit_scale = True, True, "FULL"
         if hips is not None:
-            root = bones.new(ROOT_BONE)
+            name_of_root = name_root_bone(rig)
+            root = bones.new(name_of_root)
             root.head, root.tail = (0, 0, 0), (0, bones[hips].length or 1.0, 0)
             for name, parent in parents.items():
                 if parent is None:
-                    bones[name].parent, parents[name] = root, ROOT_BONE
-            parents[ROOT_BONE] = None
+                    bones[name].parent, parents[name] = root, name_of_root
+            parents[name_of_root] = None
         bpy.ops.object.mode_set(mode="OBJECT")
     return parents
 
@@ -382,6 +366,12 @@ def list_meshes(scene: bpy.types.Scene, rig: bpy.types.Object) -> list[bpy.types
     return [thing for thing in moved if thing.visible_get() or _has_only_keys_on(thing, VISIBILITY_CHANNELS)]
 
 
+def list_hidden_now(scene: bpy.types.Scene) -> list[bpy.types.Object]:
+    """List the meshes that are hidden at the current frame and visible at another one by their keys."""
+    return [thing for thing in scene.objects if thing.type == "MESH" and not thing.visible_get()
+            and _has_only_keys_on(thing, VISIBILITY_CHANNELS)]
+
+
 def _has_only_keys_on(thing: bpy.types.Object, paths: set[str]) -> bool:
     """Whether an object has keys on all of these properties and on no other."""
     playing, slot = channels.find_playing_action(thing)
@@ -422,6 +412,8 @@ def _copy_applied_mesh(stage: bpy.types.Scene, thing: bpy.types.Object, rig: bpy
     copied = _copy_mesh(stage, thing, rig, copy)
     copied.data = thing.data.copy()
     copied.data.transform(placement, shape_keys=True)
+    if placement.determinant() < 0.0:  # a mirrored mesh would be inside out
+        copied.data.flip_normals()
     if thing.parent == rig and thing.parent_type == "BONE":
         copied.vertex_groups.clear()
         copied.vertex_groups.new(name=thing.parent_bone).add(range(len(copied.data.vertices)), 1.0, "REPLACE")
@@ -469,26 +461,8 @@ def _save_file(stage, copies, wanted: ExportOptions) -> None:
     if wanted.format == "BVH":
         _write_bvh(stage, copies, wanted.path)
         return
-    write_whole_file(wanted.path, lambda path: EXPORTERS[wanted.format](path, wanted.engine, True))
-
-
-def replace_ending(path: Path, ending: str) -> Path:
-    """Return a path with this ending: replacing another format's, else appended ("walk.v2" keeps its ".v2")."""
-    if path.suffix.lower() in {ending, *SUFFIXES.values()}:
-        return path.with_suffix(ending)
-    return path.with_name(path.name + ending)
-
-
-def write_whole_file(out: Path, write_to) -> None:
-    """Let `write_to(path)` write a temporary file, then rename it to `out`; InputError for exporters' exceptions."""
-    try:
-        with atomic_path(out, out.suffix) as part:
-            write_to(str(part))
-            if not part.is_file():
-                raise RuntimeError("nothing was written")
-    except (RuntimeError, AttributeError) as error:  # what operators raise: errors while writing; a disabled exporter
-        found, expected = f"Blender could not write it ({error})", "an available exporter and a writable folder"
-        raise InputError(out, found, expected, "choose another format or folder") from None
+    write = exporters.EXPORTERS[wanted.format]
+    exporters.write_whole_file(wanted.path, lambda path: write(path, wanted.engine, "SELECTED"))
 
 
 def _write_bvh(stage: bpy.types.Scene, copies, path: Path) -> None:
@@ -498,40 +472,3 @@ def _write_bvh(stage: bpy.types.Scene, copies, path: Path) -> None:
     for copy in copies:
         own = path if len(copies) == 1 else path.with_name(f"{path.stem} {copy.name}{path.suffix}")
         bvh.write_bvh(own, sample_motion(copy, stage, frames))
-
-
-def _export_fbx(path: str, engine: str, selected: bool) -> None:
-    forward, up = _FBX_AXES[engine]
-    bpy.ops.export_scene.fbx(filepath=path, check_existing=False, use_selection=selected,
-                             object_types={"ARMATURE", "MESH", "EMPTY"}, axis_forward=forward, axis_up=up,
-                             apply_scale_options="FBX_SCALE_UNITS" if engine == "UNITY" else "FBX_SCALE_NONE",
-                             add_leaf_bones=False, bake_anim=True, bake_anim_use_all_bones=True,
-                             bake_anim_use_nla_strips=False, bake_anim_use_all_actions=False,
-                             bake_anim_force_startend_keying=True, bake_anim_simplify_factor=0.0)
-
-
-def _export_glb(path: str, _engine: str, selected: bool) -> None:
-    bpy.ops.export_scene.gltf(filepath=path, check_existing=False, export_format="GLB", use_selection=selected,
-                              use_active_scene=True, export_yup=True, export_animations=True,
-                              export_animation_mode="ACTIVE_ACTIONS", export_frame_range=True,
-                              export_force_sampling=True, export_optimize_animation_size=False)
-
-
-def _export_usd(path: str, engine: str, selected: bool) -> None:
-    turned = {}
-    if engine in _USD_AXES:
-        forward, up = _USD_AXES[engine]
-        turned = {"convert_orientation": True, "export_global_forward_selection": forward,
-                  "export_global_up_selection": up}
-    bpy.ops.wm.usd_export(filepath=path, check_existing=False, selected_objects_only=selected, export_animation=True,
-                          export_armatures=True, **turned)
-
-
-def _export_alembic(path: str, _engine: str, selected: bool) -> None:
-    scene = bpy.context.scene
-    bpy.ops.wm.alembic_export(filepath=path, check_existing=False, selected=selected, start=scene.frame_start,
-                              end=scene.frame_end, as_background_job=False)
-
-
-EXPORTERS = {"FBX": _export_fbx, "GLB": _export_glb, "USD": _export_usd, "ABC": _export_alembic}
-"""Format -> function (path, engine, selected only) that exports the scene in the window."""

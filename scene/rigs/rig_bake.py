@@ -114,6 +114,9 @@ def _describe_rig(driven: DrivenRig, options: BakeOptions) -> list[str]:
     if driven.followers:
         lines.append(f"IK targets baked too: {', '.join(driven.followers)}")
     bones = driven.rig.pose.bones
+    scaled = [bone for bone in driven.table.values() if max(abs(one - 1.0) for one in bones[bone].scale) > 1e-3]
+    if scaled:
+        lines.append(f"{', '.join(scaled[:4])}: scaled in the pose, so the rig misses its computed positions")
     locked = [bone for part, bone in driven.table.items()
               if any(bones[bone].lock_rotation) or part in ("hips", "root") and any(bones[bone].lock_location)]
     if locked:

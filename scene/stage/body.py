@@ -108,13 +108,14 @@ def change_look(character: bpy.types.Object, scene: bpy.types.Scene, look: Look,
 
     vertices = body.vertices / armature.find_placement(player, scene).scale + root
     mesh = create_body_mesh(before.name, body, vertices, find_material)
-    character.vertex_groups.clear()
-    character.data = mesh
+    character.data = mesh  # whose groups are its own: others may share the mesh before, with its groups
     for slot in character.material_slots:
         slot.link = "DATA"
     write_weights(character, skeleton.names, body.joints, body.weights)
     if not before.users:
+        name = before.name
         bpy.data.meshes.remove(before)
+        mesh.name = name
 
 
 def get_part_material(part: str, look: Look) -> bpy.types.Material:

@@ -17,13 +17,15 @@ import numpy as np
 from ...beyond_mocap.appearance.picture import arrange_grid, encode_png
 from ...beyond_mocap.base.errors import BeyondMocapError, InputError
 from ...beyond_mocap.base.fixes import Fix
-from ...beyond_mocap.files.atomic import atomic_path
+from ...beyond_mocap.files.atomic import atomic_path, check_disk
 from ..core import channels
 from ..core.measure import build_scene_clock
 from ..match.command_process import run_process
+from ..rigs.exporters import describe_failure
 from . import render_child
 
 SUBJECT = "the picture process"
+_WIDTHS = 16, 16384  # pixels, least and most
 STAMPS = ("date", "time", "render_time", "frame", "frame_range", "memory", "hostname", "camera", "lens", "scene",
           "marker", "filename", "sequencer_strip", "labels")
 
@@ -126,6 +128,7 @@ def render_pictures(order: PictureOrder, progress: Callable[[float, str], None],
                 temporary.write_bytes(encode_png(arrange_grid(tiles, order.columns)))
             elif not temporary.is_file():
                 raise BeyondMocapError(f"{order.out}: no movie was written; this Blender may have no FFmpeg")
+            check_disk(temporary)
     finally:
         shutil.rmtree(order.folder, ignore_errors=True)
     return order.out
@@ -157,6 +160,9 @@ def _list_settings(scene: bpy.types.Scene, look: PictureLook) -> list[tuple]:
     """List the settings of size and engine."""
     render = scene.render
     width = look.height * render.resolution_x * render.pixel_aspect_x / (render.resolution_y * render.pixel_aspect_y)
+    if not _WIDTHS[0] <= width <= _WIDTHS[1]:
+        raise InputError(f"scene {scene.name}", f"pictures {width:.0f} pixels wide and {look.height} high",
+                         f"a width of {_WIDTHS[0]} to {_WIDTHS[1]}", "change the height, or the scene's resolution")
     sizes = [("render.resolution_x", 2 * round(width / 2)), ("render.resolution_y", 2 * round(look.height / 2)),
              ("render.resolution_percentage", 100), ("render.use_border", False), ("render.use_sequencer", False),
              ("render.film_transparent", False), ("render.use_multiview", False), ("frame_step", 1),
@@ -174,11 +180,21 @@ def _build_order(scene: bpy.types.Scene, out: Path, settings: list[tuple], colum
         raise InputError(out, "cannot be written", "a file in a folder that you can write to", "choose another place")
     folder = Path(tempfile.mkdtemp(prefix="beyond-mocap-"))
     copy = folder / "scene.blend"
-    bpy.ops.wm.save_as_mainfile(filepath=str(copy), copy=True, compress=False)
+    _save_copy(copy)
     order = {"file": str(copy), "scene": scene.name, "settings": settings, "movie": "", "tiles": [],
              "scripts": bpy.context.preferences.filepaths.use_scripts_auto_execute}
     return PictureOrder(out=out, folder=folder, columns=columns, order=order,
                         command=(*_find_program(), "--", str(folder / "order.json")))
+
+
+def _save_copy(path: Path) -> None:
+    """Save a copy of the file to its temporary folder, which is removed where that fails (InputError)."""
+    try:
+        bpy.ops.wm.save_as_mainfile(filepath=str(path), copy=True, compress=False)
+    except RuntimeError as error:
+        shutil.rmtree(path.parent, ignore_errors=True)
+        raise InputError(path.parent.parent, f"a copy of the file cannot be written ({describe_failure(error)})",
+                         "space in the folder for temporary files", "free some space") from None
 
 
 def _find_program() -> tuple[str, ...]:

@@ -229,8 +229,17 @@ def edit(rig, mesh):
     bpy.ops.object.mode_set(mode="EDIT")
 
 
+def rest(rig, mesh):
+    rig.data.pose_position = "REST"
+
+
+def give_to_another_player(rig, mesh):
+    bpy.context.scene.beyond_mocap.players.add().rig = rig
+
+
 @pytest.mark.parametrize("wrong, words", [(lose_meshes, "no mesh"), (mirror, "scale"), (stretch, "scale"),
-                                          (lose_legs, "legs"), (edit, "being edited")])
+                                          (lose_legs, "legs"), (edit, "being edited"), (rest, "rest position"),
+                                          (give_to_another_player, "shows the motion")])
 def test_a_character_that_cannot_be_a_body_is_told_in_one_line(room, core, clip, wrong, words):
     player = start_player(room, core, clip)
     rig = rigs.create_mixamo()
@@ -270,7 +279,24 @@ def add_a_twin(rig, mesh):
     characters.add_mesh(rigs.create_mixamo(), EXTENSION, name="Twin")
 
 
-@pytest.mark.parametrize("unusual", [add_bones, lose_fingers, turn, add_a_twin])
+def hold_elsewhere(rig, mesh):
+    """A constraint holds the hips at the origin while the bones rest a metre above it."""
+    target = bpy.data.objects.new("Target", None)
+    bpy.context.scene.collection.objects.link(target)
+    rig.pose.bones["mixamorig:Hips"].constraints.new("COPY_LOCATION").target = target
+
+
+def flip_bones(rig, mesh):
+    """Bones that point the other way, rolled, as some exporters leave them."""
+    bpy.context.view_layer.objects.active = rig
+    bpy.ops.object.mode_set(mode="EDIT")
+    for bone in rig.data.edit_bones:
+        bone.use_connect, bone.tail = False, 2.0 * bone.head - bone.tail
+        bone.roll += 3.0
+    bpy.ops.object.mode_set(mode="OBJECT")
+
+
+@pytest.mark.parametrize("unusual", [add_bones, lose_fingers, turn, add_a_twin, hold_elsewhere, flip_bones])
 def test_unusual_characters_work(room, core, clip, unusual):
     player = start_player(room, core, clip)
     rig = rigs.create_mixamo()
@@ -283,7 +309,7 @@ def test_unusual_characters_work(room, core, clip, unusual):
     body = room("rigs.bone_maps").find_bone_map(player.body)
     table = room("rigs.bone_maps").find_bone_map(copy)
     for part in ("left toe", "right toe"):
-        shown = [rigs.read_heads(one, [names[part]], (20, 50))[:, 0, :2]
+        shown = [rigs.read_heads(one, [names[part]], (20, 50))[:, 0]
                  for one, names in ((copy, table), (player.body, body))]
         assert np.abs(shown[0] - shown[1]).max() < 0.08
 
@@ -297,6 +323,39 @@ def test_a_mesh_without_vertex_groups_is_named(room, core, clip):
     loose.modifiers.new("Armature", "ARMATURE").object = rig
     player.character = rig
     assert player.character_note.startswith("Hat:") and player.character_body is not None
+
+
+def test_what_copies_do_not_have_is_named(room, core, clip):
+    player = start_player(room, core, clip)
+    rig = rigs.create_mixamo()
+    mesh = characters.add_mesh(rig, EXTENSION)
+    rig.pose.bones["mixamorig:Head"].scale = (2.0, 2.0, 2.0)
+    mesh.shape_key_add(name="Basis")
+    mesh.shape_key_add(name="Fist").driver_add("value")
+    player.character = rig
+    head, shapes = player.character_note.splitlines()
+    assert head.startswith("mixamorig:Head: scaled") and shapes.startswith("Mesh: its shape keys")
+
+
+def test_a_thing_on_a_socket_follows_its_bone(room, core, clip):
+    """An Empty on the head carries a hat, as game engines have it: both are copied."""
+    player = start_player(room, core, clip)
+    rig = rigs.create_mixamo()
+    characters.add_mesh(rig, EXTENSION)
+    socket = bpy.data.objects.new("Socket", None)
+    hat = bpy.data.objects.new("Hat", bpy.data.meshes.new("Hat"))
+    for thing, parent in ((socket, rig), (hat, socket)):
+        bpy.context.scene.collection.objects.link(thing)
+        thing.parent = parent
+    socket.parent_type, socket.parent_bone = "BONE", "mixamorig:Head"
+    player.character = rig
+    worn = next(one for one in room("characters.copies").list_meshes(player.character_body) if one.data == hat.data)
+    for frame in (20, 50):
+        bpy.context.scene.frame_set(frame)
+        head = player.character_body.matrix_world @ player.character_body.pose.bones["mixamorig:Head"].tail
+        assert (worn.matrix_world.translation - head).length < 1e-3
+    player.character = None
+    assert not [thing for thing in bpy.data.objects if "beyond_mocap_copy_of" in thing]
 
 
 def test_a_deleted_character_leaves_its_copies(room, core, clip):

@@ -74,6 +74,10 @@ def test_a_failed_edit_leaves_the_contacts_as_they_were(one, contacts_of, edits,
         bpy.ops.beyond_mocap.fix_foot(action="MOVE", foot=chosen.foot, time=chosen.middle, offset=(50.0, 0.0))
     with pytest.raises(RuntimeError, match="stands at|no contact"):
         bpy.ops.beyond_mocap.fix_foot(action="MOVE", foot="left", time=100.0)
+    with pytest.raises(RuntimeError, match="a time of the take"):
+        bpy.ops.beyond_mocap.fix_foot(action="ADD", foot="left", time=100.0)
+    with pytest.raises(RuntimeError, match="delete the contact instead"):
+        bpy.ops.beyond_mocap.fix_foot(action="SHORTER", foot=chosen.foot, time=chosen.middle, seconds=100.0)
     assert not one.contact_edits
     session.clear_session()
     with pytest.raises(RuntimeError, match="press Update first"):

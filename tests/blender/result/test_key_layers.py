@@ -189,3 +189,30 @@ def test_a_layer_with_keys_of_the_object_and_of_a_custom_property_is_removed(bod
     bpy.ops.beyond_mocap.keep_as_layer()
     assert bpy.ops.beyond_mocap.remove_layer(number=1) == {"FINISHED"}
     assert not layers.list_layers(body)
+
+
+def test_keys_of_one_axis_above_a_layer_leave_the_others(body, layers):
+    key_poses(body)
+    bpy.ops.beyond_mocap.keep_as_layer()
+    before = read_poses(body, FRAMES)
+    bpy.context.scene.frame_set(52)
+    body.pose.bones["Hips"].location.y += 0.3
+    body.pose.bones["Hips"].keyframe_insert("location", index=1, frame=52)
+    assert bpy.ops.beyond_mocap.keep_as_layer() == {"FINISHED"}
+    after = read_poses(body, FRAMES)
+    np.testing.assert_allclose(after[2, 2, 4:] - before[2, 2, 4:], (0.0, 0.3, 0.0), atol=2e-6)
+    away = [FRAMES.index(frame) for frame in (20, 90)]
+    np.testing.assert_allclose(after[away], before[away], atol=2e-6)
+
+
+def test_a_strip_in_tweak_mode_stops_updates_before_they_change_anything(body, layers, one):  # noqa: F811
+    key_poses(body)
+    bpy.ops.beyond_mocap.keep_as_layer()
+    data = body.animation_data
+    track = data.nla_tracks[-1]
+    track.select, data.nla_tracks.active = True, track
+    data.use_tweak_mode, take = True, one.take
+    for step in (lambda: bpy.ops.beyond_mocap.update(player=one.name), bpy.ops.beyond_mocap.accept):
+        with pytest.raises(RuntimeError, match="leave tweak mode"):
+            step()
+    assert one.take == take

@@ -1,14 +1,19 @@
 """Files for engines, read back: joints, meshes, root bone, scale and rate are what the program expects."""
 
 import importlib
+import json
 import pathlib
+import shutil
+from types import SimpleNamespace
 
+import bmesh
 import bpy
 import numpy as np
 import pytest
 import sample_characters as characters
 import sample_rigs as rigs
 from conftest import EXTENSION
+from mathutils import Matrix
 
 SAMPLE = pathlib.Path(__file__).resolve().parents[3] / "sample_blend" / "library"
 RATE, FRAMES = 30, 50
@@ -161,3 +166,65 @@ def test_what_cannot_be_delivered_is_told_and_leaves_nothing(player, tmp_path):
     assert "does not move" in complain(directory=f"{tmp_path}/", who="ACTIVE")
     assert not list(tmp_path.iterdir())
     assert len(bpy.data.scenes) == 1
+
+
+@pytest.mark.parametrize("preset", ["UNREAL", "GODOT"])
+def test_a_mirrored_mesh_is_not_inside_out(player, tmp_path, preset):
+    mesh = player.character_body.children[0]
+    mesh.data.transform(Matrix.Scale(-1.0, 4, (1.0, 0.0, 0.0)))
+    mesh.data.flip_normals()
+    mesh.scale.x = -1.0
+    bpy.context.view_layer.update()
+    (path,) = deliver(tmp_path, preset=preset, who="ACTIVE")
+    _, found = read_back(path)
+    shape = bmesh.new()
+    shape.from_mesh(found.data)
+    assert shape.calc_volume(signed=True) * found.matrix_world.determinant() > 0.0
+    shape.free()
+
+
+def test_the_added_root_bone_takes_no_other_bones_name(player, tmp_path):
+    rig = player.character_body
+    rig.data.bones["mixamorig:LeftHandMiddle1"].name = "root"
+    (path,) = deliver(tmp_path, preset="GODOT", who="ACTIVE")
+    armature, _ = read_back(path)
+    (root,) = [bone.name for bone in armature.data.bones if bone.parent is None]
+    ground = rigs.read_heads(armature, [root], (0, FRAMES - 1))[:, 0]
+    assert root != "root" and np.linalg.norm(ground[1] - ground[0]) > 2.0
+
+
+def test_the_whole_scene_is_what_is_visible(player, tmp_path):
+    """The hidden original of the character is not in the file; a scene in which nothing is visible has none."""
+    bpy.context.view_layer.objects.active = player.character_body
+    bpy.ops.object.mode_set(mode="EDIT")
+    (path,) = deliver(tmp_path, preset="GODOT", who="SCENE")
+    assert bpy.context.mode == "EDIT_ARMATURE"
+    content = path.read_bytes()
+    nodes = json.loads(content[20:20 + int.from_bytes(content[12:16], "little")])["nodes"]
+    assert {"Ada", "Ada Mixamo"} <= {node["name"] for node in nodes} and "Mixamo" not in {one["name"] for one in nodes}
+    bpy.ops.object.mode_set(mode="OBJECT")
+    path.unlink()
+    for thing in bpy.context.scene.objects:
+        thing.hide_viewport = True
+    with pytest.raises(RuntimeError, match="nothing to deliver is visible"):
+        deliver(tmp_path, preset="ALEMBIC", who="SCENE")
+    with pytest.raises(RuntimeError, match="no visible mesh"):
+        deliver(tmp_path, preset="ALEMBIC", who="ACTIVE", meshes=False)
+    assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize("preset", ["USD", "ALEMBIC"])
+def test_on_a_full_disk_nothing_is_written(player, tmp_path, monkeypatch, preset):
+    """USD's exporter leaves a file cut off and succeeds, Alembic's ends Blender."""
+    monkeypatch.setattr(shutil, "disk_usage", lambda folder: SimpleNamespace(free=0))
+    with pytest.raises(RuntimeError, match="No space left|MB needed"):
+        deliver(tmp_path, preset=preset, who="ACTIVE")
+    assert not list(tmp_path.iterdir())
+
+
+def test_what_an_exporter_raises_is_one_line():
+    describe = importlib.import_module(f"{EXTENSION}.scene.rigs.exporters").describe_failure
+    raised = RuntimeError('Error: Python: Traceback (most recent call last):\n  File "x.py", line 1, in write\n'
+                          "OSError: [Errno 28] No space left on device\nLocation: ops.py:109\n")
+    assert describe(raised) == "No space left on device"
+    assert describe(RuntimeError("Error: Cannot open file\n")) == "Cannot open file"

@@ -26,7 +26,7 @@ SUFFIXES = {"FBX": ".fbx", "GLB": ".glb", "USD": ".usdc", "BVH": ".bvh"}
 def rooms(extension):
     return {name: importlib.import_module(f"{extension.__name__}.scene.{name}")
             for name in ("rigs.armature", "core.action", "core.channels", "rigs.bone_maps", "rigs.rig_bake",
-                         "rigs.fit", "rigs.export", "rigs.deliver")}
+                         "rigs.fit", "rigs.export", "rigs.exporters", "rigs.deliver")}
 
 
 @pytest.fixture(scope="session")
@@ -247,9 +247,9 @@ def test_bad_places_and_choices_are_told(rooms, body, tmp_path, core, monkeypatc
     select(still)
     assert "does not move" in complaint(path=tmp_path / "out.fbx", format="FBX")
     bpy.ops.object.select_all(action="DESELECT")
-    monkeypatch.setitem(rooms["rigs.export"]._OPERATORS, "USD", ("wm", "no_such_exporter"))
+    monkeypatch.setitem(rooms["rigs.exporters"]._OPERATORS, "USD", ("wm", "no_such_exporter"))
     with pytest.raises(core("base.errors").InputError, match="no USD exporter"):
-        rooms["rigs.export"].check_exporter("USD")
+        rooms["rigs.exporters"].check_exporter("USD")
 
 
 @pytest.mark.parametrize("suffix", (".fbx", ".glb", ".usdc"))

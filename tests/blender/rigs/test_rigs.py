@@ -492,6 +492,9 @@ def test_wrong_choices_are_told_in_one_line(rooms, body, tmp_path):
     rig.scale = (1, 2, 1)
     assert "Ctrl-A" in complaint(bake_to_rig)
     rig.scale = (0.01,) * 3
+    rig.data.pose_position = "REST"
+    assert "rest position" in complaint(bake_to_rig)
+    rig.data.pose_position = "POSE"
     load, save = bpy.ops.beyond_mocap.load_bone_map, bpy.ops.beyond_mocap.save_bone_map
     assert "no such file" in complaint(load, filepath=str(tmp_path / "none.json"))
     for text, said in (("{", "not JSON"), ("[]", "no object"), ('{"bones": {"tail": "x"}}', "unknown part 'tail'"),
@@ -502,6 +505,20 @@ def test_wrong_choices_are_told_in_one_line(rooms, body, tmp_path):
     bpy.ops.object.select_all(action="DESELECT")
     assert "selected" in complaint(bake_to_rig, targets="SELECTED")
     assert "no selected player" in complaint(bake_to_rig, targets="PLAYERS")
+
+
+def test_long_chains_of_bones_are_mapped(rooms):
+    """Braids and ropes: more bones below each other than Python's functions may call each other."""
+    rig = rigs.create_mixamo()
+    bpy.context.view_layer.objects.active = rig
+    bpy.ops.object.mode_set(mode="EDIT")
+    above = rig.data.edit_bones["mixamorig:Head"]
+    for number in range(1100):
+        bone = rig.data.edit_bones.new(f"braid_{number}")
+        bone.head, bone.tail, bone.parent = above.tail, above.tail + above.vector.normalized(), above
+        above = bone
+    bpy.ops.object.mode_set(mode="OBJECT")
+    assert rooms["rigs.bone_maps"].find_bone_map(rig)["head"] == "mixamorig:Head"
 
 
 def test_a_rig_without_legs_is_told(body):

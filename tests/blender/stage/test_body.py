@@ -65,3 +65,14 @@ def test_another_look_keeps_the_kit(core, character):
     assert thing.data.materials[1] == kit and len(thing.data.polygons) < 0.4 * faces
     assert thing.material_slots[0].material.name == "Skin 5" and len(thing.vertex_groups) > 10
     assert np.ptp(read_places(thing)[:, 2]) > 1.2
+
+
+def test_another_look_leaves_those_who_share_the_mesh_alone(core, character):
+    """A team of a match shares one mesh, and with it the vertex groups."""
+    thing, _, body = character
+    other = thing.copy()
+    bpy.context.scene.collection.objects.link(other)
+    before = read_places(other)
+    body.change_look(thing, bpy.context.scene, core("appearance.look").Look(hair="bald"), True)
+    assert other.data != thing.data and len(thing.vertex_groups) == len(other.vertex_groups)
+    np.testing.assert_array_equal(read_places(other), before)
