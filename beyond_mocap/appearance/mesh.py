@@ -25,6 +25,8 @@ class BodyMesh:
         joints: (V, K) int, the joints that a vertex follows, the one with the largest weight first.
         weights: (V, K) their weights, which sum to 1; those after the first may be 0.
         material: (F,) int, index into MATERIALS per face.
+        sculpted: (V, 3) m, where each vertex is on the sculpted athlete, by which materials are painted; None for the
+            measured boots.
     """
 
     vertices: np.ndarray
@@ -32,6 +34,7 @@ class BodyMesh:
     joints: np.ndarray
     weights: np.ndarray
     material: np.ndarray
+    sculpted: np.ndarray | None = None
 
 
 def deform_body(body: BodyMesh, skeleton: Skeleton, positions: np.ndarray, rotations: np.ndarray) -> np.ndarray:

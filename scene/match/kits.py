@@ -11,6 +11,7 @@ import numpy as np
 from ..characters.kit_materials import WORN, dress
 from ..core.material import create_material
 from ..stage.body import CLOTH
+from ..stage.body_surfaces import paint_part
 from . import match_objects as ours
 from .load import TEAMS, Character
 
@@ -135,7 +136,8 @@ def create_kit_material(kit: Kit, part: str) -> bpy.types.Material:
     """
     colours = _build_part_colours(kit)
     unused = (one for one in _find_materials(kit, part) if one.users == one.use_fake_user)
-    material = next(unused, None) or create_material(_build_material_name(kit, part), colours[part], CLOTH)
+    material = next(unused, None) or paint_part(create_material(_build_material_name(kit, part), colours[part], CLOTH),
+                                                part)
     _set_colour(material, colours[part])
     return material
 

@@ -12,8 +12,9 @@ import numpy as np
 
 from ..core import channels
 from ..core.action import read_motion
-from ..core.material import get_material
+from ..core.material import create_material
 from ..rigs import armature
+from .body_surfaces import ATTRIBUTE, paint_part
 
 if TYPE_CHECKING:
     from ...beyond_mocap.appearance.look import Look
@@ -61,7 +62,8 @@ def create_character(player, name: str, shirt, collection, scene: bpy.types.Scen
     root = np.array(player.data.bones[skeleton.names[0]].head_local)
 
     def find_material(part: str) -> bpy.types.Material:
-        return get_material(f"{name} shirt", tuple(shirt), CLOTH) if part == "shirt" else get_part_material(part, look)
+        return (_get_painted(f"{name} shirt", part, tuple(shirt)) if part == "shirt"
+                else get_part_material(part, look))
 
     mesh = create_body_mesh(f"{name} body", body, body.vertices / scale + root, find_material)
     character = bpy.data.objects.new(f"{name} body", mesh)
@@ -123,11 +125,16 @@ def get_part_material(part: str, look: Look) -> bpy.types.Material:
     from ...beyond_mocap.appearance.look import HAIR_COLOURS, SKIN_TONES
 
     tones = {"skin": (look.skin, SKIN_TONES), "hair": (look.colour, HAIR_COLOURS)}
-    roughness = ROUGHNESS.get(part, CLOTH)
     if part not in tones:
-        return get_material(part.capitalize(), COLOURS[part], roughness)
+        return _get_painted(part.capitalize(), part, COLOURS[part])
     index, table = tones[part]
-    return get_material(f"{part.capitalize()} {index + 1}", table[index], roughness)
+    return _get_painted(f"{part.capitalize()} {index + 1}", part, table[index])
+
+
+def _get_painted(name: str, part: str, rgb: tuple[float, float, float]) -> bpy.types.Material:
+    """Return the material of a name; create and paint it if the file has none of its own."""
+    found = bpy.data.materials.get((name, None))
+    return found or paint_part(create_material(name, rgb, ROUGHNESS.get(part, CLOTH)), part)
 
 
 def create_body_mesh(name: str, body: BodyMesh, vertices: np.ndarray,
@@ -148,6 +155,8 @@ def create_body_mesh(name: str, body: BodyMesh, vertices: np.ndarray,
     mesh.from_pydata(vertices.tolist(), [], body.faces)
     mesh.polygons.foreach_set("material_index", np.asarray(body.material, np.int32))
     mesh.polygons.foreach_set("use_smooth", np.ones(len(body.faces), bool))
+    painted = mesh.attributes.new(ATTRIBUTE, "FLOAT_VECTOR", "POINT")
+    painted.data.foreach_set("vector", np.asarray(body.sculpted, np.float32).ravel())
     _mark_edges(mesh, body)
     for part in MATERIALS:
         mesh.materials.append(find_material(part))

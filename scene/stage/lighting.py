@@ -141,7 +141,7 @@ def _create_floodlights(collection, units: float, size: tuple[float, float], mas
         light = bpy.data.lights.new("Floodlight", "AREA")
         light.shape, (light.size, light.size_y) = "RECTANGLE", (side * units for side in LAMP_SIZE)
         light.energy = LAMP_IRRADIANCE * np.pi * float(np.sum(head**2)) * units**2
-        light.color = (1.0, 0.96, 0.90)
+        light.color = (0.93, 0.97, 1.0)  # as the lamps of today's stadiums
         lamp = create_object(collection, "Floodlight", light)
         lamp.rotation_mode, lamp.rotation_quaternion, lamp.location = "QUATERNION", turn, Vector(head * units)
         _create_head(collection, units, head, turn)

@@ -174,7 +174,7 @@ class _Maker:
         cut_piece(tube, sock, lambda p: SOCK_TOP - 1.5 * BAND - p[:, 2], (TRIM, -1))
         shoe = self.make("boot", boot, (np.array([-0.12, 0.02, -0.03]), np.array([0.25, 0.17, 0.16])),
                          [_measure_boot_top], BOOTS)
-        cut_piece(shoe, boot, lambda p: p[:, 2] - 0.012 - 0.006 * (p[:, 0] > 0.14), (SOLES, -1))
+        cut_piece(shoe, boot, lambda p: p[:, 2] - 0.012 - 0.006 * smoothstep(p[:, 0], 0.10, 0.17), (SOLES, -1))
         thigh = sorted(self.surface.add(skin), key=lambda border: self.surface.middle(border)[2])
         stocking = sorted(self.surface.add(_flip(tube, sign)), key=lambda border: self.surface.middle(border)[2])
         collar = self.surface.add(_flip(shoe, sign))[0]
@@ -286,12 +286,13 @@ def _make_eye(sign: float, light: bool) -> Piece:
     """Make an eyeball with a dark pupil that looks ahead."""
     sides, angles = (8, (16, 33, 60, 110)) if light else (16, (16, 33, 60, 95, 140))
     around = 2.0 * np.pi * np.arange(sides) / sides
-    rows = [np.array([[head.EYE_RADIUS, 0.0, 0.0]])]
+    radius = head.EYE_RADIUS - (0.0 if light else 0.0008)  # so that no vertex shows through the thin lids
+    rows = [np.array([[radius, 0.0, 0.0]])]
     for angle in np.radians(angles):
         ring = np.stack([np.full(sides, np.cos(angle)), np.sin(angle) * np.cos(around),
                          np.sin(angle) * np.sin(around)], axis=1)
-        rows.append(head.EYE_RADIUS * ring)
-    rows.append(np.array([[-head.EYE_RADIUS, 0.0, 0.0]]))
+        rows.append(radius * ring)
+    rows.append(np.array([[-radius, 0.0, 0.0]]))
     number, last = 1 + np.arange(len(angles) * sides).reshape(-1, sides), 1 + len(angles) * sides
     faces: list[tuple[int, ...]] = []
     materials: list[int] = []

@@ -57,6 +57,24 @@ def test_edges_between_parts_are_sharp_and_only_those(character):
     assert 0.005 < sharp.mean() < 0.15
 
 
+def test_paint_follows_the_sculpted_athlete_and_keeps_plain_colours(core, character):
+    """Exporters write the plain colours; the shader finds mouth, eyes and cloth by the mesh's attribute."""
+    thing, motion, rooms = character
+    look, stored = core("appearance.look").choose_look("Somebody"), thing.data.attributes["sculpted"].data
+    places = np.empty(3 * len(stored), np.float32)
+    stored.foreach_get("vector", places)
+    body = core("appearance.body").build_body(motion.skeleton, example=motion, look=look)
+    assert np.allclose(places.reshape(-1, 3), body.sculpted, atol=1e-6)
+    for part, material in zip(core("appearance.mesh").MATERIALS, thing.data.materials):
+        nodes = {node.type: node for node in material.node_tree.nodes}
+        inputs = nodes["BSDF_PRINCIPLED"].inputs
+        is_painted = any(inputs[name].is_linked for name in ("Base Color", "Normal"))
+        assert is_painted == (part not in ("eyes", "soles")), part
+        assert not is_painted or nodes["ATTRIBUTE"].attribute_name == "sculpted"
+    skin = core("appearance.look").SKIN_TONES[look.skin]
+    assert np.allclose(thing.data.materials[0].node_tree.nodes["Principled BSDF"].inputs[0].default_value[:3], skin)
+
+
 def test_another_look_keeps_the_kit(core, character):
     thing, _, body = character
     kit, faces = thing.data.materials[1], len(thing.data.polygons)
