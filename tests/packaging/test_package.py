@@ -138,7 +138,7 @@ def test_the_tutorial_runs_in_a_fresh_environment(package, fresh):
      "learn"),
     ("match --tracking sample_blend/match/small/small.dat --library sample_blend/library --out match", "match"),
     ("reconstruct throw.c3d --out x.bvh", "markers"),
-    ("evaluate sample_blend/library/walking_1_2.bvh --html x.html", "plots"),
+    ("evaluate sample_blend/library/walking_1_2.bvh --report x.json --html x.html", "plots"),
     ("throw train . --out x.npz", "training"),
 ])
 def test_a_missing_extra_is_one_line(package, fresh, arguments, extra):
@@ -147,11 +147,11 @@ def test_a_missing_extra_is_one_line(package, fresh, arguments, extra):
     done = run([fresh / "beyond-mocap", *arguments.split()], package.source)
     assert done.returncode == 2 and "Traceback" not in done.stderr
     assert f"pip install '.[{extra}]'" in done.stderr.splitlines()[-1], done.stderr
-    assert not {path.name for path in set(package.source.iterdir()) - before} & {"x.bvh", "x.html", "x.npz"}
+    assert not {path.name for path in set(package.source.iterdir()) - before} & {"x.bvh", "x.html", "x.json", "x.npz"}
 
 
 @pytest.mark.parametrize("arguments", [
-    "mirror sample_blend/library/walking_1_2.bvh --out mirrored.bvh",
+    "mirror sample_blend/library/walking_1_2.bvh mirrored.bvh",
     "retarget sample_blend/library/walking_1_2.bvh --to sample_blend/library/jogging_2_4.bvh --out other.bvh",
     "path sample_blend/library/walking_1_2.bvh --path sample_blend/match/player1.csv --out bent.bvh",
     "evaluate sample_blend/library/walking_1_2.bvh --report report.json",
