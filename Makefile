@@ -8,7 +8,7 @@ REAL_BLENDER ?= ../shared/tools/real-blender
 
 .DEFAULT_GOAL := help
 .NOTPARALLEL:
-.PHONY: help venv venv-oldest training lint quick test test-core test-blender test-oldest test-training demo bench weights tables docs extension extension-all window-test window-bench \
+.PHONY: help venv venv-oldest training lint quick test test-core test-blender test-oldest test-training demo bench weights tables docs package extension extension-all window-test window-bench \
   pictures clean
 
 help:
@@ -22,6 +22,7 @@ help:
 	@echo 'make weights        train the shipped networks again on synthetic throws and kicks; some minutes'
 	@echo 'make tables         the pages of docs/ that come from the code: settings, providers'
 	@echo 'make docs           the documents as a site, into build/docs; broken links are errors'
+	@echo 'make package        the Python package, wheel and source archive, into build/package'
 	@echo 'make extension      the zip for Blender, into build/extension; PLATFORMS="linux-x64 windows-x64" for others'
 	@echo 'make extension-all  one zip for each platform: linux-x64 windows-x64 macos-arm64 macos-x64'
 	@echo 'make window-test    install the zip in a real Blender and press its buttons; skipped where none can be had'
@@ -105,6 +106,11 @@ docs: venv
 	.venv-docs/bin/mkdocs build --quiet --strict
 	@echo 'the documents stand in build/docs/index.html'
 
+package:
+	@packaging/venv.sh package
+	rm -rf build/package
+	.venv-package/bin/python -m build --no-isolation --outdir build/package .
+
 extension: venv
 	.venv/bin/python packaging/build.py --platforms $(PLATFORMS)
 
@@ -121,4 +127,4 @@ pictures: extension
 	@tests/gui/run $(REAL_BLENDER) tests/gui/pictures.py
 
 clean:
-	rm -rf build .venv .venv-4.5 .venv-training .venv-lint .venv-docs
+	rm -rf build .venv .venv-4.5 .venv-training .venv-lint .venv-docs .venv-package

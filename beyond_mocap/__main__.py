@@ -2,7 +2,7 @@
 
 import sys
 
-_CORE_PACKAGES = ("numpy", "scipy", "sklearn")
+_CORE_PACKAGES = ("numpy", "scipy", "threadpoolctl")
 
 
 def _run() -> int:

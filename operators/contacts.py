@@ -205,7 +205,7 @@ class BEYOND_MOCAP_OT_fix_foot(TakeOperator, bpy.types.Operator):
         return {"RUNNING_MODAL"}
 
     def add(self, context, contact):
-        """Add a contact of the chosen contact's foot on the current frame, of the other foot where this one stands."""
+        """Add a contact on the current frame, of the chosen contact's foot, or of the left one without a choice."""
         player, seconds = find_active_player(context.scene.beyond_mocap), find_current_second(context.scene)
         foot = contact.foot if contact is not None else "left"
         contact_edits.check_time(contact_edits.find_take(player), seconds)

@@ -25,7 +25,7 @@ class NoticeOperator(BaseOperator):
         try:
             action()
         except (BeyondMocapError, RuntimeError) as error:
-            self.report({"ERROR"}, str(error).strip().removeprefix("Error: "))
+            self.report({"ERROR"}, notices.read_failure(error))
             return {"CANCELLED"}
         return {"FINISHED"}
 
@@ -68,7 +68,7 @@ class BEYOND_MOCAP_OT_apply_fix(NoticeOperator, bpy.types.Operator):
         try:
             notices.run_again(context.scene, number, **other)
         except RuntimeError as error:  # what ran again has failed; the fix has been applied
-            self.report({"WARNING"}, str(error).strip().removeprefix("Error: "))
+            self.report({"WARNING"}, notices.read_failure(error))
 
 
 class BEYOND_MOCAP_OT_try_again(NoticeOperator, bpy.types.Operator):

@@ -55,7 +55,7 @@ class BaseOperator:
             try:
                 notices.run_again(context.scene, self.resumes)
             except RuntimeError as error:  # what ran again has failed; this has not
-                self.report({"WARNING"}, str(error).strip().removeprefix("Error: "))
+                self.report({"WARNING"}, notices.read_failure(error))
         return result
 
     def attempt(self, action):

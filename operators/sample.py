@@ -11,7 +11,7 @@ import bpy
 from bpy.props import EnumProperty
 from mathutils import Euler
 
-from ..scene.core import sample, window
+from ..scene.core import notices, sample, window
 from ..scene.core.material import get_material
 from ..scene.core.measure import units_per_metre
 from ..scene.library import recordings
@@ -206,7 +206,7 @@ scene of its own"""
         try:
             return super().attempt(action)
         except RuntimeError as error:
-            self.report({"ERROR"}, str(error).removeprefix("Error: ").strip())
+            self.report({"ERROR"}, notices.read_failure(error))
             return {"CANCELLED"}
 
     def invoke(self, context, _event):

@@ -6,6 +6,7 @@
 #   packaging/venv.sh training  .venv-training  jax and optax on Python 3.11, 3.12 or 3.13, without bpy
 #   packaging/venv.sh lint      .venv-lint      ruff and mypy
 #   packaging/venv.sh docs      .venv-docs      mkdocs
+#   packaging/venv.sh package   .venv-package   build and hatchling
 #
 # The environments live outside the clone, in a cache named by their requirements, so that a second
 # clone (or a clean one) gets them in a second; the clone holds links. PYTHON=... chooses an interpreter.
@@ -65,7 +66,8 @@ case ${1:-} in
     python=$(find_python 3.11 3.12 3.13) || fail "training needs Python 3.11, 3.12 or 3.13 (PYTHON=... names one)" ;;
   lint) link=$clone/.venv-lint; python=$(find_python 3.11 3.12 3.13) || fail "needs Python 3.11 or later (PYTHON=... names one)" ;;
   docs) link=$clone/.venv-docs; python=$(find_python 3.11 3.12 3.13) || fail "needs Python 3.11 or later (PYTHON=... names one)" ;;
-  *) sed -n '2,12s/^# \{0,1\}//p' "$0"; exit 2 ;;
+  package) link=$clone/.venv-package; python=$(find_python 3.11 3.12 3.13) || fail "needs Python 3.11 or later (PYTHON=... names one)" ;;
+  *) sed -n '2,13s/^# \{0,1\}//p' "$0"; exit 2 ;;
 esac
 modules="bpy numpy scipy sklearn joblib distributed kloppy c3d pytest xdist hypothesis matplotlib"  # the first is imported, to see it works
 download="Blender as a module, about 350 MB"
@@ -75,6 +77,7 @@ case $1-$(version_of "$python") in
   oldest-3.11) kind=blender-4.5 ;;
   lint-*) kind=lint; modules="mypy ruff"; download="ruff and mypy, about 20 MB" ;;
   docs-*) kind=docs; modules="mkdocs material latex2mathml"; download="mkdocs, about 20 MB" ;;
+  package-*) kind=package; modules="build hatchling"; download="build and hatchling, about 2 MB" ;;
   training-*) kind=training; modules="jax numpy scipy sklearn optax c3d pytest hypothesis"; download="jax, about 150 MB" ;;
 esac
 requirements=$here/requirements/$kind.txt

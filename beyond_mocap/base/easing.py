@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 
-def smoothstep(x: np.ndarray, start: float = 0.0, end: float = 1.0) -> np.ndarray:
+def smoothstep(x: np.ndarray, start: float | np.ndarray = 0.0, end: float | np.ndarray = 1.0) -> np.ndarray:
     """Ease from 0 at `start` to 1 at `end` with a cubic whose slope is zero at both ends.
 
     Args:

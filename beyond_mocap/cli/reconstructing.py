@@ -17,6 +17,7 @@ import numpy as np
 
 from .. import __version__
 from ..base.errors import InputError, format_count
+from ..base.optional_packages import import_optional
 from ..base.settings.options import add_options, option_values
 from .outputs import ProgressReporter, Writer, build_take, check_outputs, choose_writer
 
@@ -194,14 +195,13 @@ def _write_result(result, options) -> dict:
 
 def _write_overview(rows, options, reporter: ProgressReporter) -> None:
     """Write trials.json, and report.html if matplotlib is installed."""
-    from ..evaluation.plots import require_matplotlib
     from ..files.atomic import atomic_write
     from ..files.tables import write_report
     from ..markers.trials_page import build_trials_report
 
     write_report(options.out / "trials.json", {"trials": rows})
     try:
-        require_matplotlib()
+        import_optional("matplotlib", "HTML report")
     except InputError as error:
         reporter.show_note(f"{options.out / 'report.html'} was not written: {error}")
         return

@@ -11,6 +11,7 @@ from pathlib import Path
 import numpy as np
 
 from ..base.errors import InputError, NotInLibraryError, format_count
+from ..base.optional_packages import import_optional
 from ..base.settings.options import add_options, option_values
 from .comparing import run_comparison
 from .library import open_library
@@ -175,7 +176,6 @@ def _evaluate_motion(options, reporter: ProgressReporter) -> None:
 
     from ..annotation import check_timeline, read_timeline
     from ..evaluation.html import build_html_report
-    from ..evaluation.plots import require_matplotlib
     from ..evaluation.report import describe_figures, evaluate_played
     from ..files.atomic import atomic_write
     from ..files.bvh import bvh
@@ -188,7 +188,7 @@ def _evaluate_motion(options, reporter: ProgressReporter) -> None:
     inputs = (options.motion, options.track, options.annotations, options.provenance, options.ball)
     check_outputs(options.report, options.html, reserved=inputs)
     if options.html:
-        require_matplotlib()
+        import_optional("matplotlib", "HTML report")
     motion = bvh.read_bvh(options.motion, None if options.library else options.unit).motion
     track = clean_track(read_track_csv(options.track))[0] if options.track else None
     start = float(track.times[0]) if track else 0.0

@@ -73,7 +73,7 @@ def _require_training() -> None:
         raise InputError(
             "throw train", "this Python cannot train", "jax, optax and the project's folder",
             "in the project's folder run 'make training', then .venv-training/bin/python -m beyond_mocap throw train "
-            "...",
+            "...; or pip install '.[training]'",
         ) from None
 
 

@@ -23,6 +23,7 @@ import numpy as np
 from ..annotation import LOCOMOTION
 from ..annotation.vocabulary import DIRECTIONS
 from ..base.errors import InputError, format_count
+from ..base.optional_packages import import_optional
 from ..library.landings import LANDING_FOLDER
 from ..library.library import Library
 from ..motion.motion import Motion, resample, sample_frames
@@ -81,10 +82,11 @@ def compare_with_recordings(takes: Mapping[str, Playback], library: Library) -> 
     Returns:
         The report, NaN for figures with too few windows; the same input gives the same bits.
     Raises:
-        InputError: without takes, their sources, recordings, or windows enough.
+        InputError: without takes, their sources, recordings, or windows enough, or without scikit-learn.
     """
     from threadpoolctl import threadpool_limits
 
+    import_optional("sklearn", "comparison with recordings")
     all_recorded = collect_recorded_windows(library)
     all_synthesized, features = collect_take_windows(takes, library)
     synthesized, recorded = match_windows(all_synthesized, all_recorded)

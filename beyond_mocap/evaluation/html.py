@@ -14,6 +14,7 @@ from collections.abc import Mapping
 import numpy as np
 
 from ..annotation import Timeline
+from ..base.optional_packages import import_optional
 from ..library.library import Library
 from ..motion.track import Track
 from ..synthesis.quality import movement
@@ -68,7 +69,7 @@ def build_html_report(
     Raises:
         InputError: if matplotlib is not installed, or the library has another skeleton than the motion.
     """
-    plots.require_matplotlib()
+    import_optional("matplotlib", "HTML report")
     view = View(played, track, timeline, library)
     over_time = build_image(plots.draw_curves(view), "distance from the track, toe heights, speed, smoothness")
     return build_page(

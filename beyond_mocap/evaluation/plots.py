@@ -10,7 +10,6 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from ..base.errors import InputError
 from ..base.time_series import find_runs
 from ..motion.contacts import measure_floor_height
 from ..motion.humanoid import compute_heading_from_positions, split_joint_name
@@ -27,21 +26,6 @@ LEFT, RIGHT, MIDDLE, BALL = "#2563a8", "#c0392b", "#333333", "#e08a00"
 _SIDES = {"left": LEFT, "right": RIGHT}
 _MAX_ROWS = 30
 _SPACING = 1.3  # metres between two figures of a strip
-
-
-def require_matplotlib() -> None:
-    """Check that matplotlib is installed.
-
-    Raises:
-        InputError: with the next step, if it is not.
-    """
-    try:
-        import matplotlib  # noqa: F401
-    except ImportError:
-        raise InputError(
-            "HTML report", "matplotlib is not installed", "matplotlib for the plots",
-            "run python -m pip install 'matplotlib>=3.8', or write no HTML report",
-        ) from None  # fmt: skip
 
 
 def draw_curves(view: View) -> bytes:

@@ -21,7 +21,6 @@ from . import common_skeleton as one_skeleton
 from .cache import write_synthetic_clips
 from .classify.classifier import FILE_NAME, Classifier, read_classifier
 from .clip import Clip
-from .clusters import BLOCK_LENGTHS, cluster_blocks
 from .features import FPS, build_frames
 from .library import Library, Progress
 from .proposals import propose_labels
@@ -65,14 +64,14 @@ def build_library(
     skeleton_file = Path(skeleton) if skeleton else None
     model = _find_model(place, annotations, paths)
     sources = [*annotations.list_sources(paths), *([model] if model else [])]
-    key = cache.compute_fingerprint(folder, files, sources, skeleton_file, unit=unit, seed=seed)
+    key = cache.compute_fingerprint(folder, files, sources, skeleton_file, unit=unit)
     if not rebuild:
         report(0.0, "Reading the cache")
         found = cache.load_library(place, key)
         if found is not None:
             write_synthetic_clips(place, _list_completed(found["clips"]), missing_only=True)
             found["notes"] += tuple(waiting)
-            return Library(folder=str(folder), cache_location=(place, key), **found)
+            return Library(folder=str(folder), cache_location=(place, key), seed=seed, **found)
     notes: list[str] = [*([cache_note] if cache_note else []), *annotations.describe_unknown_files(folder)]
     clips = _read_clips(folder, paths, files, annotations=annotations, chosen=skeleton_file, unit=unit, threads=threads,
                         notes=notes, report=report, cancelled=cancelled,
@@ -209,17 +208,11 @@ def _collect_unit_notes(read) -> list[str]:
 
 
 def _index_clips(folder: str, clips, notes, seed, report, cancelled) -> Library:
-    """Index the clips: features, labels and clusters."""
+    """Index the clips: features and labels."""
     _check_cancelled(cancelled)
     report(0.7, "Describing frames")
-    frames = build_frames(clips)
-    clusters = {}
-    for number, length in enumerate(BLOCK_LENGTHS):
-        _check_cancelled(cancelled)
-        report(0.8 + 0.06 * number, f"Clustering blocks of {length} frames")
-        clusters[length] = cluster_blocks(frames, length, seed)
-    return Library(folder=folder, skeleton=clips[0].motion.skeleton, clips=clips, frames=frames, clusters=clusters,
-                   fps=FPS, notes=notes)
+    return Library(folder=folder, skeleton=clips[0].motion.skeleton, clips=clips, frames=build_frames(clips), fps=FPS,
+                   notes=notes, seed=seed)
 
 
 def _check_cancelled(cancelled) -> None:

@@ -25,13 +25,12 @@ from ..files.bvh import bvh
 from ..motion.motion import Motion
 from ..motion.skeleton import Skeleton
 from .clip import Clip
-from .clusters import Clusters
 from .features import Frames
 from .repair import RepairFigures
 from .scan import CACHE_FOLDER
 
 # raised whenever what is computed or stored changes, so that old caches are not used
-VERSION = 39
+VERSION = 40
 _FRAME_ARRAYS = tuple(field.name for field in fields(Frames) if field.name != "vocabulary")
 
 
@@ -78,9 +77,6 @@ def find_own_folder(base: Path, folder: Path) -> Path:
 def save_library(place: Path, key: str, library, name: str = "library") -> bool:
     """Save `library` as `place`/`name`.npz; returns False if the folder cannot be written."""
     arrays = {f"frames.{part}": getattr(library.frames, part) for part in _FRAME_ARRAYS}
-    for length, clusters in library.clusters.items():
-        for part in ("start", "label", "medoid"):
-            arrays[f"clusters.{length}.{part}"] = getattr(clusters, part)
     arrays["root"] = np.concatenate([clip.motion.root_positions for clip in library.clips])
     arrays["rotations"] = np.concatenate([clip.motion.rotations for clip in library.clips])
     arrays["standing"] = np.concatenate([clip.heel_toe_contacts for clip in library.clips])
@@ -102,7 +98,6 @@ def _build_header(key: str, library) -> dict:
     return {
         "key": key, "names": skeleton.names, "parents": skeleton.parents, "end_parents": skeleton.end_parents,
         "vocabulary": library.frames.vocabulary, "fps": library.fps, "notes": library.notes,
-        "lengths": list(library.clusters),
         "clips": [[clip.path, clip.mirrored, clip.motion.fps, len(clip.motion),
                    [asdict(row) for row in clip.annotations], clip.recorded_count, asdict(clip.repair_figures)
                    if clip.repair_figures else None, clip.has_proposed_labels] for clip in library.clips],
@@ -146,12 +141,8 @@ def _restore_fields(header: dict, arrays: dict) -> dict:
     frames = Frames(
         vocabulary=tuple(header["vocabulary"]), **{name: arrays[f"frames.{name}"] for name in _FRAME_ARRAYS}
     )
-    clusters = {
-        length: Clusters(length, *(arrays[f"clusters.{length}.{name}"] for name in ("start", "label", "medoid")))
-        for length in header["lengths"]
-    }
     return {
-        "skeleton": skeleton, "clips": tuple(clips), "frames": frames, "clusters": clusters, "fps": header["fps"],
+        "skeleton": skeleton, "clips": tuple(clips), "frames": frames, "fps": header["fps"],
         "notes": tuple(header["notes"]),
     }  # fmt: skip
 

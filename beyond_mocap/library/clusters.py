@@ -16,6 +16,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ..base.optional_packages import import_optional
 from .features import Frames, compute_principal_components
 
 BLOCK_LENGTHS = (32, 16, 8)
@@ -61,8 +62,11 @@ def cluster_blocks(frames: Frames, length: int, seed: int = 0) -> Clusters:
         seed: of k-means.
     Returns:
         100 clusters (fewer of fewer blocks); empty where no block fits.
+    Raises:
+        InputError: if scikit-learn cannot be imported.
     Source: Faustino 2016, section 3.2.
     """
+    import_optional("sklearn.cluster", "block search")
     start = find_block_starts(frames, length)
     if not len(start):
         nothing = np.zeros(0, int)

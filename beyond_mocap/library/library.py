@@ -1,4 +1,4 @@
-"""A library: the clips of a folder, a mirrored twin of each, their labels, features, clusters and key moments.
+"""A library: the clips of a folder, a mirrored twin of each, their labels, features and key moments.
 
 `build_library` reads a folder once and saves the results in a cache (`library.cache`); the next call is quick.
 """
@@ -23,7 +23,7 @@ from ..motion.skeleton import Skeleton
 from . import cache
 from .cache import write_synthetic_clips
 from .clip import Clip
-from .clusters import Clusters
+from .clusters import BLOCK_LENGTHS, Clusters, cluster_blocks
 from .coverage import BACK_SPEEDS, TURNS, Coverage, measure_coverage
 from .features import FPS, Frames, build_frames, join_frames
 from .keys import Key, collect_keys
@@ -63,9 +63,9 @@ class Library:
         skeleton: of all clips.
         clips: recordings and their twins.
         frames: all clips at `fps`.
-        clusters: by block length.
         fps: 30.
         notes: decisions made while building, for people.
+        seed: of the clustering.
         cache_location: the cache's folder and key, for results that are computed later.
         chosen_gaits: (gait label, clip path) pairs: the clip that defines a gait (`library.automatic_locomotion`).
     """
@@ -74,9 +74,9 @@ class Library:
     skeleton: Skeleton
     clips: tuple[Clip, ...]
     frames: Frames
-    clusters: dict[int, Clusters]
     fps: float = FPS
     notes: tuple[str, ...] = ()
+    seed: int = 0
     cache_location: tuple[Path, str] | None = None
     chosen_gaits: tuple[tuple[str, str], ...] = ()
 
@@ -84,6 +84,11 @@ class Library:
     def keys(self) -> tuple[Key, ...]:
         """Key moments of all clips."""
         return collect_keys(self.clips)
+
+    @cached_property
+    def clusters(self) -> dict[int, Clusters]:
+        """Clusters of blocks by block length, which only the block search needs."""
+        return {length: cluster_blocks(self.frames, length, self.seed) for length in BLOCK_LENGTHS}
 
     @cached_property
     def cut_receptions(self) -> tuple[Key, ...]:
@@ -169,7 +174,7 @@ class Library:
         """The recordings followed by the synthetic clips of `library.synthetic_clips`.
 
         These add the speeds between and above the recordings, and kicks on the run. They are generated on first use and
-        cached. The result has no clusters. InputError where no recording shows locomotion.
+        cached. InputError where no recording shows locomotion.
         """
         measure_gaits(self)  # a library without locomotion raises InputError
         cached = cache.load_library(*self.cache_location, "made") if self.cache_location else None
@@ -191,9 +196,9 @@ class Library:
         Args:
             clips: on the library's skeleton.
         Returns:
-            The library with them; it has no clusters. They define no gait.
+            The library with them. They define no gait.
         """
-        added = replace(self, clips=tuple(clips), frames=build_frames(clips, self.frames), clusters={})
+        added = replace(self, clips=tuple(clips), frames=build_frames(clips, self.frames))
         joined = self._join(added)
         known = {name: getattr(self, name) for name in ("normal_postures", "cut_receptions", "gaits", "neutral_stance")}
         known |= {name: np.concatenate([getattr(self, name), getattr(added, name)])
@@ -202,9 +207,9 @@ class Library:
         return joined
 
     def _join(self, other: "Library") -> "Library":
-        """Return the library followed by the clips of another one; without clusters."""
+        """Return the library followed by the clips of another one."""
         frames = join_frames(self.frames, other.frames)
-        return replace(self, clips=(*self.clips, *other.clips), frames=frames, clusters={})
+        return replace(self, clips=(*self.clips, *other.clips), frames=frames)
 
     def needs_synthetic_clips(self, speed: np.ndarray, offset: np.ndarray, heading: np.ndarray,
                               kick_speeds: np.ndarray) -> bool:
@@ -262,7 +267,7 @@ def _build_synthetic_library(library: Library) -> Library:
     if not clips:
         return replace(library, clips=())
     frames = build_frames(clips, library.frames)
-    return replace(library, clips=tuple(clips), frames=frames, clusters={}, notes=())
+    return replace(library, clips=tuple(clips), frames=frames, notes=())
 
 
 def _measure_stance_seconds(clip: Clip, source: np.ndarray) -> np.ndarray:

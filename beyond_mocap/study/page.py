@@ -13,6 +13,7 @@ from typing import Any
 
 import numpy as np
 
+from ..base.optional_packages import import_optional
 from ..evaluation.html_page import (
     Html,
     build_element,
@@ -25,7 +26,7 @@ from ..evaluation.html_page import (
     build_title,
     join_html,
 )
-from ..evaluation.plots import create_canvas, render_png, require_matplotlib
+from ..evaluation.plots import create_canvas, render_png
 from ..evaluation.report import round_values
 from .analysis import ALPHA, Analysis, Finding, Shares
 from .form import BACKGROUND, SCALE
@@ -71,7 +72,7 @@ def build_study_page(analysis: Analysis) -> str:
     Raises:
         InputError: if matplotlib is not installed.
     """
-    require_matplotlib()
+    import_optional("matplotlib", "HTML report")
     unit = "choices: 1 is always the first, -1 always the second" if analysis.study.pairs else "points of the scale"
     picture = draw_differences(analysis.findings, f"each rater's mean difference, {unit}")
     return build_page(

@@ -274,10 +274,9 @@ def apply_trajectory(take: Take, plan: ResolvedPlan) -> tuple[Take, list[str]]:
     dribbled = plan_dribbles(take.motion.skeleton, take.motion.root_positions, take.motion.rotations,
                              foot_contacts=foot_contacts, ball=path, stretches=stretches, held=held, fps=fps,
                              measured=take.ball.measured & ~filled, course_changes=course_changes)
-    pushes = tuple(DribbleTouch(push.first, push.last, push.side) for push in dribbled.pushes)
-    pushed = [(push.first, push.last) for push in pushes]
+    pushed = [(push.first, push.last) for push in dribbled.pushes]
     take = _miss_ball(take, replace(take.ball, positions=dribbled.ball))
-    free, met = _free_met_ball(take, dribbled.ball, pushes)
+    free, met = _free_met_ball(take, dribbled.ball, dribbled.pushes)
     touches = [_build_hand_touch(take, key) for key in keys]
     free, carried = carry_in_hands(take.motion, free, touches)
     free, holds = hold_in_spans(take.motion, free, _find_shown(take, _HOLDING),
@@ -289,7 +288,8 @@ def apply_trajectory(take: Take, plan: ResolvedPlan) -> tuple[Take, list[str]]:
     for first, last in carried:
         far[first : last + 1] = 0.0
     messages = _report_detours(times, np.where(take.ball.measured & ~filled, far, 0.0))
-    return replace(take, ball=ball, solved=plan.trajectory, contact_ball=take.ball, dribble_touches=pushes), messages
+    return replace(take, ball=ball, solved=plan.trajectory, contact_ball=take.ball,
+                   dribble_touches=dribbled.pushes), messages
 
 
 def _miss_ball(take: Take, ball: BallPath | None) -> Take:

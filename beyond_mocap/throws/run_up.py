@@ -195,7 +195,7 @@ def add_throw_clip(library: Library, motion: Motion, release: float, action: str
     clip = Clip(path=_CLIP, mirrored=False, motion=motion, annotations=(row,),
                 heel_toe_contacts=contacts.detect_heel_toe_contacts(motion))
     frames = joined_frames(library.frames, build_frames([clip], library.frames))
-    return replace(library, clips=(*library.clips, clip), frames=frames, clusters={}, cache_location=None)
+    return replace(library, clips=(*library.clips, clip), frames=frames, cache_location=None)
 
 
 def _insert_in_plan(plan: Plan, throw: Motion, release: float, at: float, action: str) -> tuple[Plan, list[str]]:

@@ -7,7 +7,7 @@ them.
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 
 import bpy
@@ -115,11 +115,9 @@ def post_notice(scene: bpy.types.Scene, subject: Subject, error: BeyondMocapErro
         Its number.
     """
     clear_notices(scene, subject.topic)
+    fault = str(scene.session_uid), subject.player, error.parts[0]
+    _remove_rows(lambda row: (row.scene, row.player, row.found) == fault)
     group = bpy.context.window_manager.beyond_mocap_notices
-    for index in reversed(range(len(group.rows))):
-        row = group.rows[index]
-        if (row.scene, row.player, row.found) == (str(scene.session_uid), subject.player, error.parts[0]):
-            group.rows.remove(index)
     group.count += 1
     row = group.rows.add()
     row.number, row.scene, row.name, row.is_error = group.count, str(scene.session_uid), subject.title, is_error
@@ -134,18 +132,12 @@ def post_notice(scene: bpy.types.Scene, subject: Subject, error: BeyondMocapErro
 
 def clear_notices(scene: bpy.types.Scene, *topics: str) -> None:
     """Clear the notices of a scene about these topics."""
-    rows = bpy.context.window_manager.beyond_mocap_notices.rows
-    for index in reversed(range(len(rows))):
-        if rows[index].scene == str(scene.session_uid) and rows[index].topic in topics:
-            rows.remove(index)
+    _remove_rows(lambda row: row.scene == str(scene.session_uid) and row.topic in topics)
 
 
 def dismiss_notice(number: int) -> None:
     """Remove the notice of that number, if it is still there."""
-    rows = bpy.context.window_manager.beyond_mocap_notices.rows
-    for index in reversed(range(len(rows))):
-        if rows[index].number == number:
-            rows.remove(index)
+    _remove_rows(lambda row: row.number == number)
     window.redraw_editors("VIEW_3D", "NLA_EDITOR", "DOPESHEET_EDITOR")
 
 
@@ -181,6 +173,11 @@ def run_again(scene: bpy.types.Scene, number: int, **other) -> None:
         find_operator(name)("INVOKE_DEFAULT", True, **arguments | other)
 
 
+def read_failure(error: RuntimeError) -> str:
+    """Read the line that an operator has reported as its failure."""
+    return str(error).strip().removeprefix("Error: ")
+
+
 def find_operator(name: str):
     """Find the function that calls an operator, by the operator's name."""
     group, verb = name.split(".")
@@ -193,6 +190,13 @@ def show_notices(first: int) -> None:
         return
     bpy.context.window_manager.beyond_mocap_notices.shown = first
     bpy.ops.wm.call_panel("INVOKE_DEFAULT", name="BEYOND_MOCAP_PT_notices", keep_open=False)
+
+
+def _remove_rows(is_meant: Callable[[BeyondMocapNotice], bool]) -> None:
+    rows = bpy.context.window_manager.beyond_mocap_notices.rows
+    for index in reversed(range(len(rows))):
+        if is_meant(rows[index]):
+            rows.remove(index)
 
 
 def _add_fix(row: BeyondMocapNotice, fix: Fix) -> None:

@@ -6,12 +6,13 @@ from functools import partial
 
 import numpy as np
 
+from ...base.easing import smoothstep
 from ..landmarks import HEAD, SEGMENTS, SHOULDER
 from ..look import HAIR_STYLES
 from ..mesh import BOOTS, EYES, HAIR, PUPILS, SHIRT, SHORTS, SKIN, SOCKS, SOLES, TRIM
 from ..template import Template
 from . import clothes, head, limbs
-from .fields import Field, mirror, place, smoothstep
+from .fields import Field, mirror, place
 from .meshing import Piece, compute_gradient, cut_piece, drop_unused, grade, keep_largest, mesh_field, project, relax
 from .stitching import Surface
 from .weights import compute_shares

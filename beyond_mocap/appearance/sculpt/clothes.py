@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
+from ...base.easing import smoothstep
 from ..landmarks import SHOULDER
-from .fields import Field, build_chain, build_ellipsoid, build_loft, join, mirror, place, smoothstep
+from .fields import Field, build_chain, build_ellipsoid, build_loft, join, mirror, place
 from .limbs import ARM_TURN, build_arm_core
 
 _TRUNK = (  # height; middle, front, back, half widths

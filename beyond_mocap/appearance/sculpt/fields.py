@@ -118,9 +118,3 @@ def place(field: Field, origin, turn: np.ndarray) -> Field:
     """Place a solid given in a frame of its own: `turn` (3, 3) rotates that frame's axes, `origin` (3,) m is moved
     to."""
     return lambda points: field((points - np.asarray(origin)) @ turn)
-
-
-def smoothstep(values: np.ndarray, low: float | np.ndarray, high: float | np.ndarray) -> np.ndarray:
-    """Rise smoothly from 0 at `low` to 1 at `high`, which may be lower than `low`."""
-    share = np.clip((values - low) / (high - low), 0.0, 1.0)
-    return share * share * (3.0 - 2.0 * share)

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
+from ...base.easing import smoothstep
 from ..landmarks import HEAD
-from .fields import Field, build_chain, build_ellipsoid, build_loft, carve, join, place, smoothstep
+from .fields import Field, build_chain, build_ellipsoid, build_loft, carve, join, place
 
 EYE, EYE_RADIUS = np.array([0.0790, 0.0315, 0.040]), 0.0128
 """Middle of the left eyeball from HEAD, and its radius."""

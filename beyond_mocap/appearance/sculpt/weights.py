@@ -7,8 +7,8 @@ from __future__ import annotations
 
 import numpy as np
 
+from ...base.easing import smoothstep
 from ..landmarks import ANKLE, ELBOW, KNEE, SEGMENTS, SHOULDER, WRIST
-from .fields import smoothstep
 from .limbs import ARM_TURN
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import importlib
 import logging
 import re
 import warnings
@@ -12,6 +11,7 @@ from pathlib import Path
 from typing import TypeVar
 
 from ...base.errors import InputError
+from ...base.optional_packages import import_optional
 
 _HEAD_BYTES = 8192  # bytes that identify a format
 _LINE_SUFFIXES = {".dat", ".csv", ".txt", ".jsonl"}  # suffixes of files that are read line by line
@@ -147,12 +147,7 @@ def load_with_kloppy(path: Path, provider: str, loader: str, arguments: Mapping,
     Raises:
         InputError: if kloppy is not installed or cannot read the files.
     """
-    try:
-        module = importlib.import_module(f"kloppy.{provider}")
-    except ImportError as error:
-        raise InputError(
-            path, f"kloppy cannot be imported ({error})", "kloppy 3.19 or newer", "pip install 'beyond-mocap[tracking]'"
-        ) from None
+    module = import_optional(f"kloppy.{provider}", path)
     logging.getLogger("kloppy").addHandler(logging.NullHandler())  # its output is covered by our own messages
     try:
         with warnings.catch_warnings():

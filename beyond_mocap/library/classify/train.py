@@ -14,6 +14,7 @@ import numpy as np
 from ...annotation import swap_sides
 from ...annotation.labels import find_label
 from ...base.errors import InputError, format_count
+from ...base.optional_packages import import_optional
 from ..label_sources import Proposal
 from .classifier import (
     Act,
@@ -73,13 +74,14 @@ def train_classifier(examples: Sequence[Example], progress=None, cancelled=None)
     Returns:
         The classifier.
     Raises:
-        InputError: if no act has enough examples.
+        InputError: if no act has enough examples, or scikit-learn cannot be imported.
         UserCancelledError: if `cancelled` returns True.
     """
     from threadpoolctl import threadpool_limits
 
     from ...base.errors import UserCancelledError
 
+    import_optional("sklearn", "learning labels")
     acts_to_learn = _count_acts(examples)
     if not acts_to_learn:
         found = f"{format_count(len(examples), 'clip')} with too few key moments"

@@ -18,6 +18,7 @@ import numpy as np
 
 from ...base.content import open_file
 from ...base.errors import InputError
+from ...base.optional_packages import import_optional
 from ..trial import MAX_FPS, MIN_FPS, MarkerTrial
 from .raw_markers import RawMarkers, build_trial
 
@@ -147,11 +148,8 @@ def _read_parameters(path: Path, handle, size: int) -> _Parameters:
 
 def _parse_parameters(path: Path, section: bytes):
     """Parse header and parameters with the package, without the data, so that wrong sizes cannot lead into it."""
-    try:
-        import c3d
-    except ImportError as error:
-        found = f"the package c3d cannot be imported ({error})"
-        raise InputError(path, found, "c3d 0.6 or newer", "pip install 'beyond-mocap[markers]'") from None
+    import_optional("c3d", path)
+    import c3d
 
     class Reader(c3d.Reader):
         def _check_metadata(self):  # the package asserts that header and parameters agree; `_find_layout` handles it

@@ -23,6 +23,7 @@ from dataclasses import dataclass
 from typing import NoReturn
 
 from ...base.errors import BeyondMocapError, InputError, UserCancelledError
+from ...base.optional_packages import import_optional
 
 PIECES_PER_WORKER = 2
 """Pieces that each worker runs or has waiting: enough that none is idle, few enough to save memory."""
@@ -259,9 +260,8 @@ class _Processes:
         BrokenExecutor if one of them has ended.
         """
         if self._executor is None:
-            from joblib.externals.loky import get_reusable_executor
-
-            self._executor = get_reusable_executor(
+            loky = import_optional("joblib.externals.loky", "workers")
+            self._executor = loky.get_reusable_executor(
                 self._workers, timeout=_IDLE_SECONDS, reuse=True, initializer=_start_worker, initargs=(os.getpid(),),
                 env={name: "1" for name in _THREADS},
             )  # fmt: skip
@@ -355,15 +355,11 @@ class _Cluster:
 @contextlib.contextmanager
 def _connect_cluster(address: str) -> Iterator[object]:
     """Connect to the scheduler at `address`; InputError if it does not answer, or Dask is not installed."""
-    try:
-        from distributed import Client
-    except ImportError as error:
-        raise InputError("scheduler", f"Dask cannot be imported ({error})", "dask and distributed",
-                         "pip install 'beyond-mocap[cluster]'") from None  # fmt: skip
+    distributed = import_optional("distributed", "scheduler")
     for name in [one for one in logging.root.manager.loggerDict if one.split(".")[0] == "distributed"]:
         logging.getLogger(name).setLevel(logging.CRITICAL + 1)  # errors are reported here, in one line
     try:
-        client = Client(address, timeout=_ANSWER_TIMEOUT, set_as_default=False)
+        client = distributed.Client(address, timeout=_ANSWER_TIMEOUT, set_as_default=False)
     except (OSError, ValueError, TypeError) as error:
         found = f"{address} does not answer ({' '.join(str(error).split())[:120]})"
         expected = "the address of a Dask scheduler, such as tcp://127.0.0.1:8786"

@@ -72,6 +72,7 @@ def test_the_polygon_lies_under_the_standing_foot_and_the_arrow_begins_in_it(run
     bpy.ops.beyond_mocap.show_momentum()
     shown, momentum = traces.find_momentum(runner), room("overlays.momentum")
     standing = np.flatnonzero(shown.trace.is_down.any(axis=(1, 2)))[::9]
+    assert len(standing) > 3
     for row in standing:
         meshes = momentum.build_frame(shown.trace, int(row))
         fill = next(mesh for mesh in meshes if mesh.kind == "TRIS")

@@ -178,7 +178,7 @@ def test_half_a_frame_is_the_target_of_a_key_s_time():
 def test_without_matplotlib_one_line_says_what_to_do(take, monkeypatch):
     monkeypatch.setitem(sys.modules, "matplotlib", None)
     played = playback_from_take(take)
-    with pytest.raises(InputError, match="matplotlib is not installed.*pip install") as told:
+    with pytest.raises(InputError, match="matplotlib cannot be imported.*extra 'plots'") as told:
         build_html_report(played, {"keys": []})
     assert "\n" not in str(told.value)
 

@@ -250,7 +250,7 @@ def test_without_kloppy_the_way_to_it_is_named(tmp_path, monkeypatch):
     file, _ = made_tracab(tmp_path)
     monkeypatch.setitem(sys.modules, "kloppy", None)
     monkeypatch.delitem(sys.modules, "kloppy.tracab", raising=False)
-    with pytest.raises(InputError, match="pip install"):
+    with pytest.raises(InputError, match="extra 'match'"):
         read_match(file, cache_dir=tmp_path / "cache")
 
 

@@ -47,8 +47,6 @@ def arrays_of(library: Library) -> dict[str, np.ndarray]:
     found = {"offsets": library.skeleton.offsets, "end_offsets": library.skeleton.end_offsets}
     for name in cache._FRAME_ARRAYS:
         found[f"frames.{name}"] = getattr(library.frames, name)
-    for length, clusters in library.clusters.items():
-        found.update({f"{length}.{name}": getattr(clusters, name) for name in ("start", "label", "medoid")})
     for number, clip in enumerate(library.clips):
         found[f"{number}.root"], found[f"{number}.rotations"] = clip.motion.root_positions, clip.motion.rotations
         found[f"{number}.standing"] = clip.heel_toe_contacts
@@ -59,7 +57,7 @@ def the_rest(library: Library):
     clips = [(c.path, c.mirrored, c.motion.fps, c.annotations) for c in library.clips]
     skeleton = (library.skeleton.names, library.skeleton.parents, library.skeleton.end_parents)
     words = (library.frames.vocabulary, library.labels, library.keys)
-    return (clips, skeleton, words, library.fps, library.notes, list(library.clusters), library.folder,
+    return (clips, skeleton, words, library.fps, library.notes, library.folder,
             library.gaits, library.minutes)  # fmt: skip
 
 

@@ -18,8 +18,9 @@ from ....annotation.body_solid import BodySolid, build_leg_surfaces
 from ....base.time_series import find_runs
 from ....motion.motion import compute_pose
 from ....motion.skeleton import Skeleton
+from ...take import DribbleTouch
 from ..contact_geometry import move_ball_at
-from .dribble_search import SOONEST, DribblePart, DribbleSearch, Push
+from .dribble_search import SOONEST, DribblePart, DribbleSearch
 
 KEY_SECONDS = 0.5  # s from either end of a stretch within which a key moment begins or ends the dribble
 OUT_OF_REACH = 1.1
@@ -40,7 +41,7 @@ class DribbleResult:
     """
 
     ball: np.ndarray
-    pushes: tuple[Push, ...]
+    pushes: tuple[DribbleTouch, ...]
 
 
 def plan_dribbles(
@@ -82,7 +83,7 @@ def plan_dribbles(
             before, after, part_path = found
             # found: frames counted from the part's first one
             path[part.low + before : part.low + after + 1] = part_path
-            pushes += [Push(p.first + part.low, p.last + part.low, p.side) for p in search.pushes]
+            pushes += [DribbleTouch(p.first + part.low, p.last + part.low, p.side) for p in search.pushes]
             touched = [*held, *((push.first, push.last) for push in pushes)]
             others = [*course_changes, *(edge for pair in touched for edge in pair)]
             path = _lead_open_ends(path, ball, part, first=before, last=after, others=others, fps=fps)

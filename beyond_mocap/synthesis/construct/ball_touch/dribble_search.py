@@ -17,6 +17,7 @@ from ....motion.humanoid import compute_heading_from_positions, identify_joints
 from ....motion.motion import compute_pose
 from ....motion.skeleton import Skeleton
 from ....motion.track import BALL_RADIUS, smooth_zero_phase_hann
+from ...take import DribbleTouch
 from ..contact_geometry import find_touching_places
 
 SOONEST, _LATEST = 0.2, 0.6  # s, shortest roll from one touch to the next, and longest beyond the `_LONG` below
@@ -51,21 +52,6 @@ _KEPT = 6  # pushes of one swing from which the ball may roll on
 _START = -1  # node number of the part's beginning
 
 SLOW = 0.6  # m/s below which the facing counts as the body's direction, not the velocity
-
-
-@dataclass(frozen=True)
-class Push:
-    """One touch of a dribble.
-
-    Attributes:
-        first: first output frame in which the ball is at the foot.
-        last: last one.
-        side: "left" or "right".
-    """
-
-    first: int
-    last: int
-    side: str
 
 
 @dataclass(frozen=True)
@@ -156,7 +142,7 @@ class DribbleSearch:
         self.part, self.fps, self.count = part, fps, part.high - part.low + 1
         self.body = Legs(skeleton, root[span], rotations[span], fps)
         self.foot_contacts, self.feed, self.measured = foot_contacts[span], path[span], measured[span]
-        self.pushes: list[Push] = []
+        self.pushes: list[DribbleTouch] = []
         self.haste = np.maximum(self.body.speed - _FAST, 0.0)  # (W,) m/s
         self._build_nodes()
 
@@ -449,7 +435,7 @@ class DribbleSearch:
             first = int(self.frame[entered])
             held = np.flatnonzero(self._is_same_touch(node) & (self.frame >= first) & (self.frame <= frame))
             path[self.frame[held]] = self.place[held]
-            self.pushes.insert(0, Push(first, frame, ("left", "right")[self.side[node]]))
+            self.pushes.insert(0, DribbleTouch(first, frame, ("left", "right")[self.side[node]]))
             to, there = first, self.place[entered]
             node = int(self.roll_source[entered])
             if node == _START and not self.part.is_met_at_start:

@@ -333,5 +333,5 @@ def test_any_damage_is_read_or_reported(body, read, changes, kind):
 
 def test_without_the_package_one_line_is_said(body, read, monkeypatch):
     monkeypatch.setitem(sys.modules, "c3d", None)
-    with pytest.raises(InputError, match="c3d cannot be imported.*pip install"):
+    with pytest.raises(InputError, match="c3d cannot be imported.*extra 'markers'"):
         read(body.c3d(body.positions, body.labels))
