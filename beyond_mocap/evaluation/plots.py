@@ -40,7 +40,7 @@ def require_matplotlib() -> None:
     except ImportError:
         raise InputError(
             "HTML report", "matplotlib is not installed", "matplotlib for the plots",
-            "run python -m pip install 'matplotlib>=3.8', or write no HTML report",
+            "run pip install '.[plot]' in the project's folder, or write no HTML report",
         ) from None  # fmt: skip
 
 

@@ -151,7 +151,8 @@ def _parse_parameters(path: Path, section: bytes):
         import c3d
     except ImportError as error:
         found = f"the package c3d cannot be imported ({error})"
-        raise InputError(path, found, "c3d 0.6 or newer", "pip install 'beyond-mocap[markers]'") from None
+        raise InputError(path, found, "c3d 0.6 or newer",
+                         "run pip install '.[markers]' in the project's folder") from None
 
     class Reader(c3d.Reader):
         def _check_metadata(self):  # the package asserts that header and parameters agree; `_find_layout` handles it

@@ -359,7 +359,7 @@ def _connect_cluster(address: str) -> Iterator[object]:
         from distributed import Client
     except ImportError as error:
         raise InputError("scheduler", f"Dask cannot be imported ({error})", "dask and distributed",
-                         "pip install 'beyond-mocap[cluster]'") from None  # fmt: skip
+                         "run pip install '.[cluster]' in the project's folder") from None  # fmt: skip
     for name in [one for one in logging.root.manager.loggerDict if one.split(".")[0] == "distributed"]:
         logging.getLogger(name).setLevel(logging.CRITICAL + 1)  # errors are reported here, in one line
     try:
