@@ -125,7 +125,7 @@ def _run_command(argv: list[str] | None, writers: Mapping[str, Writer], prog: st
         reporter = ProgressReporter(options.json)
         with _InterruptHandler(reporter):
             options.run(options, reporter, writers)
-        _flush_output()
+        print(end="", flush=True)
         return 0
     except BeyondMocapError as error:
         status, text = error.exit_status, str(error)
@@ -134,7 +134,7 @@ def _run_command(argv: list[str] | None, writers: Mapping[str, Writer], prog: st
     except BrokenPipeError:
         raise
     except OSError as error:
-        path = error.filename or "a temporary file or standard output"
+        path = error.filename or "standard output or a temporary file"
         status, text = 2, f"{path}: {error.strerror or error}; check that the file can be read and its folder written"
     except MemoryError:
         status, text = 2, "not enough memory; close other programs, or take a smaller file, library or time span"
@@ -144,17 +144,6 @@ def _run_command(argv: list[str] | None, writers: Mapping[str, Writer], prog: st
         reporter.finish()
     print(text if text.startswith(prog) else f"{prog}: {text}", file=sys.stderr)
     return status
-
-
-def _flush_output() -> None:
-    """Flush standard output; InputError where it cannot be written, as on a full disk."""
-    try:
-        print(end="", flush=True)
-    except BrokenPipeError:
-        raise
-    except OSError as error:
-        raise InputError("standard output", f"cannot be written ({error.strerror or error})", "room for the output",
-                         "the files of the command are complete") from None
 
 
 def _discard_unwritable() -> None:

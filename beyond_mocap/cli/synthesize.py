@@ -198,7 +198,8 @@ def _evaluate_motion(options, reporter: ProgressReporter) -> None:
     timeline = read_timeline(options.annotations, motion.fps, start) if options.annotations else None
     provenance = read_provenance(options.provenance) if options.provenance else None
     ball = read_ball(options.ball) if options.ball else None
-    played = playback_from_tables(motion, provenance, ball, start, str(options.provenance))
+    with locate_errors(options.motion):
+        played = playback_from_tables(motion, provenance, ball, start, str(options.provenance))
     library = open_library(options, reporter) if options.library else None
     if timeline is not None and track is not None and library is not None:  # otherwise some labels or times are unknown
         check_timeline(timeline, library.labels, start, float(track.times[-1]), str(options.annotations))

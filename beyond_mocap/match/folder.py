@@ -270,10 +270,19 @@ def _hold_lock(lock: Path, folder: Path) -> Iterator[None]:
             process = file.read(20).decode("ascii", "replace").strip()
             found = f"another run (process {process}) uses it" if process else "another run uses it"
             raise InputError(folder, found, "one run at a time", "wait for it, or choose another folder") from None
+        _write_owner(file, lock)
+        yield
+
+
+def _write_owner(file, lock: Path) -> None:
+    """Write this process's number into the lock; InputError where the disk is full."""
+    try:
         file.truncate(0)
         file.write(str(os.getpid()).encode())
         file.flush()
-        yield
+    except OSError as error:
+        found = f"cannot be written ({error.strerror or error})"
+        raise InputError(lock, found, "a writable folder", "choose another folder") from None
 
 
 def _acquire_lock(file) -> None:
