@@ -55,9 +55,15 @@ def prepare(folder: Path) -> tuple[dict[str, Path], dict[str, Path]]:
         (folder / "clips").mkdir(exist_ok=True)
         shutil.copy(folder / f"long_{name}.bvh", folder / "clips" / f"{name}.bvh")
         (folder / "clips" / f"{name}.txt").write_text(f"0 1.9 {'walking' if name == 'walk' else 'standing'}\n")
-    files = {"walk": folder / "walk.bvh", "curve": folder / "curve.csv", "track": folder / "track.csv",
-             "library": folder / "clips", "cache": folder / "cache", "strikes": SAMPLE / "passes" / "library",
-             "strikes_cache": folder / "strikes_cache"}  # fmt: skip
+    files = {
+        "walk": folder / "walk.bvh",
+        "curve": folder / "curve.csv",
+        "track": folder / "track.csv",
+        "library": folder / "clips",
+        "cache": folder / "cache",
+        "strikes": SAMPLE / "passes" / "library",
+        "strikes_cache": folder / "strikes_cache",
+    }
     return {**seeds, **_build_derived_seeds(folder)}, files
 
 
@@ -69,8 +75,13 @@ def _build_derived_seeds(folder: Path) -> dict[str, Path]:
     from beyond_mocap.markers.files.marker_set_text import SHIPPED
     from beyond_mocap.match.piece_file import write_piece_file
 
-    made = {"piece.npz": folder / "piece.npz", "match.json": folder / "match.json", "mesh.obj": folder / "mesh.obj",
-            "clips.csv": folder / "clips.csv", "set.txt": sorted(SHIPPED.glob("*.txt"))[0]}
+    made = {
+        "piece.npz": folder / "piece.npz",
+        "match.json": folder / "match.json",
+        "mesh.obj": folder / "mesh.obj",
+        "clips.csv": folder / "clips.csv",
+        "set.txt": sorted(SHIPPED.glob("*.txt"))[0],
+    }
     write_piece_file(made["piece.npz"], {"number": 1}, {"clip": np.arange(4), "rate": np.ones(4)})
     state = {"version": 1, "digest": "0" * 16, "players": [{"id": "home_7", "status": "done"}], "notes": []}
     made["match.json"].write_text(json.dumps(state, indent=1))
@@ -170,7 +181,9 @@ def work(job) -> tuple[int, list[tuple[str, int, str]], dict[str, float]]:
     """Run inputs until the end of the time: their number, the faults, and seconds by target."""
     worker, options, folder, seeds, files = job
     resource.setrlimit(resource.RLIMIT_AS, (_MEMORY, _MEMORY))
-    targets = [one for one in list_targets(files) if any(fnmatch(seed, pattern) for seed in seeds for pattern in one.seeds)]
+    targets = [
+        one for one in list_targets(files) if any(fnmatch(seed, pattern) for seed in seeds for pattern in one.seeds)
+    ]
     by_name = {one.name: one for one in targets}
     chosen = [one for one in targets if not options.target or one.name in options.target]
     weights, faults, seconds, count = [one.weight for one in chosen], [], {}, 0
@@ -227,8 +240,10 @@ def main() -> int:
         for name, value in seconds.items():
             totals[name] = totals.get(name, 0.0) + value
     slow = ", ".join(f"{name} {totals[name]:.0f} s" for name in sorted(totals, key=totals.get, reverse=True)[:6])
-    print(f"{count} inputs from number {options.start} in {took:.0f} s ({60 * count / took:.0f} a minute), "
-          f"{len(faults)} faults; most time: {slow}")
+    print(
+        f"{count} inputs from number {options.start} in {took:.0f} s ({60 * count / took:.0f} a minute), "
+        f"{len(faults)} faults; most time: {slow}"
+    )
     return 1 if faults else 0
 
 

@@ -8,10 +8,63 @@ from random import Random
 
 import numpy as np
 
-NUMBERS = ("nan", "inf", "-inf", "1e308", "-1e308", "1e-320", "0", "-0", "-1", "1e9", "-1e9", "1e6", "99999999999999999999",
-           "0x10", "1_0", "1,5", "", "x", "½", "1e", "--1", "2147483648", "0.0000001")  # fmt: skip
-WORDS = ("", " ", "\0", "\ufeff", "é", "\u202e", "con", "../../x", "/", "-", "#", '"', "'", ";", ",", "\t", "{", "}", "[", "]",
-         "kick", "-kick", "transition", "unit frames", "null", "true", "<!DOCTYPE x>", "A" * 5000, "\r", "\n")  # fmt: skip
+NUMBERS = (
+    "nan",
+    "inf",
+    "-inf",
+    "1e308",
+    "-1e308",
+    "1e-320",
+    "0",
+    "-0",
+    "-1",
+    "1e9",
+    "-1e9",
+    "1e6",
+    "0x10",
+    "1_0",
+    "1,5",
+    "99999999999999999999",
+    "",
+    "x",
+    "½",
+    "1e",
+    "--1",
+    "2147483648",
+    "0.0000001",
+)
+WORDS = (
+    "",
+    " ",
+    "\0",
+    "\ufeff",
+    "é",
+    "\u202e",
+    "con",
+    "../../x",
+    "/",
+    "-",
+    "#",
+    '"',
+    "'",
+    ";",
+    ",",
+    "\t",
+    "{",
+    "}",
+    "[",
+    "]",
+    "kick",
+    "-kick",
+    "transition",
+    "unit frames",
+    "null",
+    "true",
+    "<!DOCTYPE x>",
+    "A" * 5000,
+    "\r",
+    "\n",
+)
 VALUES = (None, True, False, 0, -1, 1e308, 10**400, 0.5, "", "x", "nan", [], {}, [[]], [None], {"": None}, [0] * 1000)
 _NUMBER = re.compile(r"-?\d+\.?\d*(?:[eE][-+]?\d+)?")
 
@@ -36,20 +89,30 @@ def _mutate_bytes(data: bytes, rng: Random) -> bytes:
     """Cut, flip, repeat, remove or insert bytes, or encode the text in another way."""
     at, size = rng.randrange(len(data) + 1), rng.choice((1, 1, 4, 40, 400))
     block = data[at : at + size]
-    return rng.choice((
-        lambda: data[:at], lambda: data[:at] + bytes(byte ^ (1 << rng.randrange(8)) for byte in block) + data[at + size :],
-        lambda: data[:at] + rng.randbytes(size) + data[at + size :], lambda: data[:at] + data[at + size :],
-        lambda: data[:at] + block * rng.choice((2, 3, 50)) + data[at + size :], lambda: b"\xef\xbb\xbf" + data,
-        lambda: data.decode("latin-1").encode("utf-16"), lambda: data.replace(b"\n", b"\r\n"), lambda: b"",
-        lambda: data.replace(b"\n", b"\r"), lambda: data + b"\0" * size, lambda: data.replace(b",", b";"),
-    ))()  # fmt: skip
+    return rng.choice(
+        (
+            lambda: data[:at],
+            lambda: data[:at] + bytes(byte ^ (1 << rng.randrange(8)) for byte in block) + data[at + size :],
+            lambda: data[:at] + rng.randbytes(size) + data[at + size :],
+            lambda: data[:at] + data[at + size :],
+            lambda: data[:at] + block * rng.choice((2, 3, 50)) + data[at + size :],
+            lambda: b"\xef\xbb\xbf" + data,
+            lambda: data.decode("latin-1").encode("utf-16"),
+            lambda: data.replace(b"\n", b"\r\n"),
+            lambda: b"",
+            lambda: data.replace(b"\n", b"\r"),
+            lambda: data + b"\0" * size,
+            lambda: data.replace(b",", b";"),
+        )
+    )()
 
 
 def _mutate_text(data: bytes, rng: Random) -> bytes:
     """Change numbers, words, cells and lines."""
     text = data.decode("utf-8", "replace")
     return rng.choice((_change_number, _change_number, _change_number, _change_word, _change_lines, _swap_words))(
-        text, rng).encode("utf-8", "surrogatepass")
+        text, rng
+    ).encode("utf-8", "surrogatepass")
 
 
 def _change_number(text: str, rng: Random) -> str:
@@ -163,7 +226,9 @@ def _change_array(arrays: dict, name: str, rng: Random) -> None:
         values = values.reshape(-1)
     elif values.size and values.dtype.kind in "fi":
         at = rng.randrange(values.size)
-        extremes = (np.nan, np.inf, 1e300, -1.0, 0.0) if values.dtype.kind == "f" else (-1, 0, 127, np.iinfo(values.dtype).max)
+        extremes = (
+            (np.nan, np.inf, 1e300, -1.0, 0.0) if values.dtype.kind == "f" else (-1, 0, 127, np.iinfo(values.dtype).max)
+        )
         values.flat[at] = values.dtype.type(rng.choice(extremes))
     arrays[name] = values
 
@@ -180,7 +245,10 @@ def _mutate_zip_names(data: bytes, rng: Random) -> bytes:
 
 
 _KINDS = {
-    "npz": (_mutate_arrays, _mutate_arrays, _mutate_zip_names), "c3d": (_mutate_bytes,),
-    "json": (_mutate_json, _mutate_json, _mutate_text), "jsonl": (_mutate_json, _mutate_text),
-    "centroids": (_mutate_json, _mutate_text), "ball": (_mutate_json, _mutate_text),
+    "npz": (_mutate_arrays, _mutate_arrays, _mutate_zip_names),
+    "c3d": (_mutate_bytes,),
+    "json": (_mutate_json, _mutate_json, _mutate_text),
+    "jsonl": (_mutate_json, _mutate_text),
+    "centroids": (_mutate_json, _mutate_text),
+    "ball": (_mutate_json, _mutate_text),
 }

@@ -11,7 +11,8 @@ SAMPLE, SHARED = TOP / "sample_blend", TOP.parent / "shared" / "data"
 
 TEXTS = {
     "words.txt": "# a comment\n0 6 walking\n1.5 2.5 dribble right\n3 kick right low\n4f 20f standing\n",
-    "annotations.csv": "file,start_frame,end_frame,key_frame,labels\nwalk.bvh,0,20,,walking\nwalk.bvh,3,9,6,kick right\n",
+    "annotations.csv": "file,start_frame,end_frame,key_frame,labels\nwalk.bvh,0,20,,walking\n"
+    "walk.bvh,3,9,6,kick right\n",
     "pins.csv": "time_s,part,x_m,y_m,z_m,hold_s\n2,gaze,30,0,1.5,0.5\n2.5,left_hand,0,0,1,\n3,ball,1,1,0.2,\n",
     "headings.csv": "time_s,heading_deg,hold_s,x_m,y_m\n2,120,1,,\n3,,0.5,10,4\n",
     "ball.csv": "time_s,x_m,y_m,z_m,measured\n" + "".join(f"{t / 10},{t / 9:.3f},0,0.11,1\n" for t in range(40)),
@@ -23,16 +24,21 @@ TEXTS = {
 """Name -> content of the seeds that are written here."""
 
 SHARED_GROUPS = {
-    "tracab": ("tracab_raw.dat", "tracab_meta.xml"), "tracab_json": ("tracab_raw.json", "tracab_meta.json"),
+    "tracab": ("tracab_raw.dat", "tracab_meta.xml"),
+    "tracab_json": ("tracab_raw.json", "tracab_meta.json"),
     "metrica": ("epts_metrica_tracking.txt", "epts_metrica_metadata.xml"),
     "skillcorner": ("skillcorner_tracking.jsonl", "skillcorner_meta.json"),
     "sportec": ("sportec_positional_w_referee.xml", "sportec_meta.xml"),
     "secondspectrum": ("secondspectrum_tracking_anon.jsonl", "secondspectrum_meta_anon.json"),
     "statsperform": ("statsperform_tracking_ma25.txt", "statsperform_tracking_ma1.json"),
     "pff": ("pff_3812.jsonl", "pff_metadata_3812.json", "pff_rosters_3812.json"),
-    "signality": ("signality_p1_raw_data_subset.json", "signality_meta_data.json", "signality_venue_information.json",
-                  "signality_p2_raw_data_subset.json"),
-}  # fmt: skip
+    "signality": (
+        "signality_p1_raw_data_subset.json",
+        "signality_meta_data.json",
+        "signality_venue_information.json",
+        "signality_p2_raw_data_subset.json",
+    ),
+}
 """Provider -> its files in ../shared/data/tracking/other, the tracking file first, then the metadata."""
 _LINES = 120  # of large line-based files that are kept
 
@@ -68,8 +74,11 @@ def _build_shared_seeds(folder: Path) -> dict[str, Path]:
     for name, files in SHARED_GROUPS.items():
         if all((other / file).is_file() for file in files):
             seeds[f"match_{name}"] = _copy_group(folder / f"match_{name}", [other / file for file in files])
-    for path in (SHARED / "mocap" / "getup" / "humanoid3d_run.bvh", SHARED / "mocap" / "bandai" / "dataset-1_run_normal_001.bvh",
-                 SHARED / "mocap" / "cmu10" / "10_01.bvh"):
+    for path in (
+        SHARED / "mocap" / "getup" / "humanoid3d_run.bvh",
+        SHARED / "mocap" / "bandai" / "dataset-1_run_normal_001.bvh",
+        SHARED / "mocap" / "cmu10" / "10_01.bvh",
+    ):
         if path.is_file():
             seeds[path.name] = shorten_bvh(path, folder / path.name, 24)
     if len(seeds) < len(SHARED_GROUPS) + 3:

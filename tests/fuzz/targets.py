@@ -58,7 +58,9 @@ def _read(name: str, seeds: str, function: Callable, weight: int = 4) -> Target:
     return Target(name, tuple(seeds.split()), weight, read)
 
 
-def _verb(name: str, seeds: str, command: str, files: dict[str, Path], weight: int = 1, seconds: float = 60.0) -> Target:
+def _verb(
+    name: str, seeds: str, command: str, files: dict[str, Path], weight: int = 1, seconds: float = 60.0
+) -> Target:
     """A verb; in its command {bad} is the damaged file, {out} the empty folder, other names are valid files."""
 
     def run(path: Path, out: Path) -> int:
@@ -95,21 +97,32 @@ def list_targets(files: dict[str, Path]) -> list[Target]:
         The targets.
     """
     read = [
-        _read("bvh", "*.bvh", read_bvh, 20), _read("timeline", "words.txt", read_timeline, 10),
+        _read("bvh", "*.bvh", read_bvh, 20),
+        _read("timeline", "words.txt", read_timeline, 10),
         _read("clip words", "words.txt", lambda path: read_clip_annotations(path, 30.0)),
-        _read("table of words", "annotations.csv", read_annotation_csv, 8), _read("pins", "pins.csv", read_pins, 8),
-        _read("headings", "headings.csv", read_heading_keys, 8), _read("ball", "ball.csv", read_ball),
-        _read("curve", "curve.csv", read_curve), _read("provenance", "provenance.csv", read_provenance),
+        _read("table of words", "annotations.csv", read_annotation_csv, 8),
+        _read("pins", "pins.csv", read_pins, 8),
+        _read("headings", "headings.csv", read_heading_keys, 8),
+        _read("ball", "ball.csv", read_ball),
+        _read("curve", "curve.csv", read_curve),
+        _read("provenance", "provenance.csv", read_provenance),
         _read("track", "track.csv", lambda path: clean_track(read_track_csv(path)), 16),
-        _read("scene", "*scene.json", read_scene, 12), _read("events", "events.csv", read_events, 8),
-        _read("event labels", "event_labels.csv", read_event_labels), _read("bone map", "map.json", read_bone_map),
-        _read("mesh", "mesh.obj", read_mesh), _read("clips of a study", "clips.csv", read_clips),
-        _read("trc", "*.trc", read_markers, 16), _read("c3d", "*.c3d", read_markers, 10),
-        _read("marker set", "set.txt", read_marker_set), _read("marker model", "model.json", read_model),
-        _read("weights", "weights.npz", read_weights, 6), _read("classifier", "classifier.npz", read_classifier),
-        _read("edit list", "player.npz", read_player, 8), _read("piece", "piece.npz", read_piece_file),
+        _read("scene", "*scene.json", read_scene, 12),
+        _read("events", "events.csv", read_events, 8),
+        _read("event labels", "event_labels.csv", read_event_labels),
+        _read("bone map", "map.json", read_bone_map),
+        _read("mesh", "mesh.obj", read_mesh),
+        _read("clips of a study", "clips.csv", read_clips),
+        _read("trc", "*.trc", read_markers, 16),
+        _read("c3d", "*.c3d", read_markers, 10),
+        _read("marker set", "set.txt", read_marker_set),
+        _read("marker model", "model.json", read_model),
+        _read("weights", "weights.npz", read_weights, 6),
+        _read("classifier", "classifier.npz", read_classifier),
+        _read("edit list", "player.npz", read_player, 8),
+        _read("piece", "piece.npz", read_piece_file),
         _read("state of a match", "match.json", lambda path: read_state(path.parent)),
-    ]  # fmt: skip
+    ]
     matches = Target("match", ("match_*",), 16, _read_match_folder, 30.0)
     verbs = [
         _verb("mirror", "*.bvh", "mirror {bad} {out}/o.bvh", files, 10),
@@ -120,20 +133,57 @@ def list_targets(files: dict[str, Path]) -> list[Target]:
         _verb("path along", "curve.csv", "path {walk} --path {bad} --out {out}/o.bvh --report {out}/r.json", files, 4),
         _verb("evaluate", "*.bvh", "evaluate {bad} --report {out}/r.json", files, 4),
         _verb("evaluate by track", "track.csv", "evaluate {walk} --track {bad} --report {out}/r.json", files, 2),
-        _verb("evaluate by tables", "provenance.csv", "evaluate {walk} --provenance {bad} --report {out}/r.json", files, 3),
+        _verb(
+            "evaluate by tables", "provenance.csv", "evaluate {walk} --provenance {bad} --report {out}/r.json", files, 3
+        ),
         _verb("touches", "track.csv", "touches {bad} --out {out}/t.csv --report {out}/r.json", files, 4),
-        _verb("synthesize", "track.csv", "synthesize --library {library} --cache {cache} --track {bad} --out {out}/o.bvh "
-              "--ball {out}/b.csv --report {out}/r.json --nearest", files, 1, 120.0),
-        _verb("synthesize words", "words.txt", "synthesize --library {library} --cache {cache} --track {track} "
-              "--annotations {bad} --out {out}/o.bvh --nearest", files, 1, 120.0),
-        _verb("synthesize pins", "pins.csv", "synthesize --library {library} --cache {cache} --track {track} --pins {bad} "
-              "--out {out}/o.bvh", files, 1, 120.0),
-        _verb("synthesize headings", "headings.csv", "synthesize --library {library} --cache {cache} --track {track} "
-              "--headings {bad} --out {out}/o.bvh", files, 1, 120.0),
-        _verb("throw", "weights.npz", "throw synthesize --model {bad} --target 8,1,1 --out {out}/o.bvh", files, 2, 120.0),
+        _verb(
+            "synthesize",
+            "track.csv",
+            "synthesize --library {library} --cache {cache} --track {bad} "
+            "--out {out}/o.bvh "
+            "--ball {out}/b.csv --report {out}/r.json --nearest",
+            files,
+            1,
+            120.0,
+        ),
+        _verb(
+            "synthesize words",
+            "words.txt",
+            "synthesize --library {library} --cache {cache} --track {track} "
+            "--annotations {bad} --out {out}/o.bvh --nearest",
+            files,
+            1,
+            120.0,
+        ),
+        _verb(
+            "synthesize pins",
+            "pins.csv",
+            "synthesize --library {library} --cache {cache} --track {track} --pins {bad} --out {out}/o.bvh",
+            files,
+            1,
+            120.0,
+        ),
+        _verb(
+            "synthesize headings",
+            "headings.csv",
+            "synthesize --library {library} --cache {cache} --track {track} --headings {bad} --out {out}/o.bvh",
+            files,
+            1,
+            120.0,
+        ),
+        _verb(
+            "throw", "weights.npz", "throw synthesize --model {bad} --target 8,1,1 --out {out}/o.bvh", files, 2, 120.0
+        ),
         _verb("reconstruct", "walk.trc", "reconstruct {bad} --out {out}/o.bvh --report {out}/r.json", files, 1, 120.0),
-        _verb("passes", "*scene.json", "passes {bad} --library {strikes} --cache {strikes_cache} --out {out}/f", files, 1,
-              120.0),
+        _verb(
+            "passes",
+            "*scene.json",
+            "passes {bad} --library {strikes} --cache {strikes_cache} --out {out}/f",
+            files,
+            1,
+            120.0,
+        ),
         Target("library", ("*.bvh", "words.txt", "annotations.csv"), 3, _build_library, 60.0),
-    ]  # fmt: skip
+    ]
     return [*read, matches, *verbs]
