@@ -114,7 +114,9 @@ def check(target: Target, number: int, seeds: dict[str, Path], base: Path) -> st
     out.mkdir()
     for path in base.glob("long_*.bvh"):
         shutil.copy(path, place.parent)
-    path = damage(target, number, seeds, place)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        path = damage(target, number, seeds, place)
     said = io.StringIO()
     signal.signal(signal.SIGALRM, _end_of_time)
     signal.setitimer(signal.ITIMER_REAL, 6.0 * target.seconds)
@@ -122,6 +124,7 @@ def check(target: Target, number: int, seeds: dict[str, Path], base: Path) -> st
     try:
         with contextlib.redirect_stderr(said), contextlib.redirect_stdout(io.StringIO()), warnings.catch_warnings():
             warnings.simplefilter("always")
+            warnings.simplefilter("ignore", ResourceWarning)  # of kloppy; Python shows none
             try:
                 status = target.read(path, out)
             except BeyondMocapError as error:

@@ -197,7 +197,7 @@ def _mutate_arrays(data: bytes, rng: Random) -> bytes:
     """Change the arrays or the text of an .npz and pack them with valid checksums again."""
     try:
         with np.load(io.BytesIO(data), allow_pickle=False) as stored:
-            arrays = {name: stored[name] for name in stored.files}
+            arrays = {name: stored[name] for name in stored.files if isinstance(stored[name], np.ndarray)}
     except Exception:  # damaged by an earlier step
         return _mutate_bytes(data, rng)
     if not arrays:

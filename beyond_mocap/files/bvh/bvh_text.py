@@ -116,12 +116,11 @@ def read_content(path: Path) -> bytes:
         InputError: if it cannot be read or is not BVH.
     """
     data = read_bytes(path, "a BVH file", MAX_BYTES)
+    data = data.removeprefix(b"\xef\xbb\xbf")
     if not data or data.isspace():
         raise InputError(path, "the file is empty", "a BVH file", _EXPORT_AGAIN)
-    if data.startswith(b"\xef\xbb\xbf"):
-        data = data[3:]
     if b"\0" in data or not re.match(rb"\s*HIERARCHY\b", data, re.I):
-        first = "binary content" if b"\0" in data else f"starts with {_decode(data[:12].split()[0])!r}"
+        first = "binary content" if b"\0" in data else f"starts with {_decode(data.lstrip()[:12].split()[0])!r}"
         raise InputError(f"{path}:1", first, "HIERARCHY at the start", "choose a BVH file")
     return data.replace(b"\r\n", b"\n").replace(b"\r", b"\n") if b"\r" in data else data
 

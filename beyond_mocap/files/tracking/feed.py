@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import importlib
 import json
 import logging
@@ -155,9 +156,8 @@ def load_with_kloppy(path: Path, provider: str, loader: str, arguments: Mapping,
     except ImportError as error:
         raise InputError(path, f"kloppy cannot be imported ({error})", "kloppy 3.19 or newer",
                          "run pip install '.[tracking]' in the project's folder") from None
-    logging.getLogger("kloppy").addHandler(logging.NullHandler())  # its output is covered by our own messages
     try:
-        with warnings.catch_warnings():
+        with warnings.catch_warnings(), _silence_logging():
             warnings.simplefilter("ignore")
             return getattr(module, loader)(**arguments)
     except Exception as error:  # kloppy's parsers raise many kinds of errors
@@ -165,6 +165,17 @@ def load_with_kloppy(path: Path, provider: str, loader: str, arguments: Mapping,
         reason = _find_syntax_error(arguments.values()) or (str(error)[:120] if is_plain else "")
         found = f"not readable as {expected}" + (f" ({reason})" if reason else "")
         raise InputError(path, found, f"{expected}{others}", "check the files, and the provider") from None
+
+
+@contextlib.contextmanager
+def _silence_logging() -> Iterator[None]:
+    """Context manager: nothing is logged, also not by the root logger; our own messages cover what kloppy logs."""
+    before = logging.root.manager.disable
+    logging.disable(logging.CRITICAL)
+    try:
+        yield
+    finally:
+        logging.disable(before)
 
 
 def _find_syntax_error(files: Iterable) -> str:

@@ -387,6 +387,8 @@ BAD = {
     "zero frame time": (GOOD.replace(b"Time: 0.01", b"Time: 0"), "seconds, above 0"),
     "no frame time": (GOOD.replace(b"Frame Time: 0.01\n", b""), "expected Frame Time"),
     "huge position": (GOOD.replace(ROW, b"1e30 " + ROW.split(b" ", 1)[1]), "beyond 1000 km"),
+    "only a byte order mark": (b"\xef\xbb\xbf\n", "the file is empty"),
+    "blank lines first": (b"\n" * 20 + b"what", "starts with 'what'"),
     "huge offset": (re.sub(rb"OFFSET \S+", b"OFFSET -1e308", GOOD, count=2), "OFFSET and three numbers of normal size"),
     "huge angle": (GOOD.replace(FIRST, b"1e30"), "expected an angle"),
     "bracket missing": (GOOD.replace(b"}", b"", 1), "bracket"),
