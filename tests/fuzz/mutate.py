@@ -81,7 +81,10 @@ def mutate(data: bytes, name: str, rng: Random) -> bytes:
     """
     kinds = _KINDS.get(name.rpartition(".")[2].lower(), (_mutate_text, _mutate_bytes))
     for _ in range(rng.choice((1, 1, 1, 2, 2, 4, 8))):
-        data = rng.choice((*kinds, *kinds, *kinds, _mutate_bytes))(data, rng)
+        try:
+            data = rng.choice((*kinds, *kinds, *kinds, _mutate_bytes))(data, rng)
+        except Exception:  # what an earlier step damaged can no longer be unpacked
+            data = _mutate_bytes(data, rng)
     return data
 
 
