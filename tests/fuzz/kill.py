@@ -24,7 +24,7 @@ TOP = Path(__file__).resolve().parents[2]
 SAMPLE = TOP / "sample_blend"
 KILLS_IN_A_ROW = 4
 _CLIPS = ("walking_1_2", "jogging_2_9", "standing_1", "kick_low_inside", "running_4_2")
-_MATCH = ("--from", "0", "--to", "6", "--workers", "2", "--players", "home_10", "home_4", "--no-figures")
+_MATCH = ("--from", "0", "--to", "4", "--workers", "2", "--players", "home_10", "--no-figures")
 _TIMED = ("match.json", "report.json", "report.html", "lock")  # files with times of the run
 
 
@@ -70,7 +70,7 @@ def list_jobs(base: Path) -> list[Job]:
     if not trainer.exists():
         print("kill-test: no .venv-training; training is skipped (make training)")
         return jobs
-    run(trainer, ["throw", "examples", "--out", base / "examples", "--subjects", "1", "--seed", "0"])
+    run(trainer, ["throw", "examples", "--out", base / "examples", "--subjects", "1", "--throws", "4", "--seed", "0"])
     return [*jobs, Job("training", trainer, lambda out: _build_training(base / "examples", out / "w.npz"))]
 
 
