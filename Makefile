@@ -8,7 +8,7 @@ REAL_BLENDER ?= ../shared/tools/real-blender
 
 .DEFAULT_GOAL := help
 .NOTPARALLEL:
-.PHONY: help venv venv-oldest training lint quick test test-core test-blender test-oldest test-training demo bench weights tables docs package extension extension-all window-test window-bench \
+.PHONY: help venv venv-oldest training lint quick test test-core test-blender test-oldest test-training demo bench weights tables docs package extension extension-all window-test window-bench fuzz kill-test \
   pictures clean
 
 help:
@@ -17,6 +17,8 @@ help:
 	@echo 'make quick ROOM=... the tests of one package (ROOM=path_editing), in about a minute'
 	@echo 'make lint           ruff over all source, mypy over the core'
 	@echo 'make test           all tests but the window ones: the core, training, then Blender 5.0 (or 5.2) and Blender 4.5'
+	@echo 'make fuzz           damaged files for every reader and verb, for 10 minutes on two cores (SECONDS_OF_FUZZ=600)'
+	@echo 'make kill-test      library builds, matches and trainings killed at 100 random moments, and resumed'
 	@echo 'make demo           the sample match, synthesized and rendered into build/demo'
 	@echo 'make bench          time and quality on recordings'
 	@echo 'make weights        train the shipped networks again on synthetic throws and kicks; some minutes'
@@ -81,6 +83,17 @@ test-blender: venv
 
 test-oldest: venv-oldest
 	@if [ -e .venv-4.5 ]; then set -x; .venv-4.5/bin/python $(PYTEST) tests/blender; fi
+
+# Not parts of `make test`: they last, and take other inputs each time. What they find is told with the number that makes it again.
+SECONDS_OF_FUZZ ?= 600
+fuzz kill-test: export OPENBLAS_NUM_THREADS = 1
+fuzz kill-test: export OMP_NUM_THREADS = 1
+fuzz: venv
+	.venv/bin/python $(PYTEST) -q tests/fuzz
+	.venv/bin/python -P tests/fuzz/fuzz.py --seconds $(SECONDS_OF_FUZZ)
+
+kill-test: venv training
+	.venv/bin/python -P tests/fuzz/kill.py
 
 demo: venv
 	.venv/bin/python sample_blend/demo.py --out build/demo

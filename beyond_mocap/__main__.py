@@ -1,17 +1,21 @@
 """Run the command line: `python -m beyond_mocap VERB ...`, see `cli.main`."""
 
+import os
+import signal
 import sys
 
 _CORE_PACKAGES = ("numpy", "scipy", "threadpoolctl")
 
 
-def _run() -> int:
+def run() -> int:
     """Run the command line; a missing package of the core is one line, as a fresh clone has no installed packages, and
     so is Ctrl-C while the packages are loaded.
     """
+    signal.signal(signal.SIGINT, _end_at_once)
     try:
         from .cli.main import main
 
+        signal.signal(signal.SIGINT, signal.default_int_handler)
         return main()
     except ModuleNotFoundError as error:
         package = (error.name or "").partition(".")[0]
@@ -25,5 +29,11 @@ def _run() -> int:
         return 130
 
 
+def _end_at_once(*_) -> None:
+    """End the program on Ctrl-C while packages are loaded: some turn an interrupt into errors of their own."""
+    print("beyond-mocap: cancelled", file=sys.stderr, flush=True)
+    os._exit(130)
+
+
 if __name__ == "__main__":
-    sys.exit(_run())
+    sys.exit(run())

@@ -4,20 +4,27 @@ written raise the same InputErrors.
 
 from __future__ import annotations
 
+import contextlib
 import io
 import os
 import select
 import stat
+import threading
+from collections.abc import Iterator
 from typing import BinaryIO
 
 from .errors import InputError, build_read_error
 
+MAX_STREAM_BYTES = 1_000_000_000
+"""Largest content of a pipe or a device, which does not say its size and may have no end."""
+_BLOCK = 1 << 20
 PIPE_SECONDS = 5.0
 """Seconds until a pipe that no program writes to is refused; opening it like a file would wait for ever."""
+_waiting = threading.Event()
 
 
 def open_file(path: str | os.PathLike, kind: str, max_bytes: int | None = None) -> BinaryIO:
-    """Open a file for reading bytes; of a pipe, such as `<(...)` in a shell, the whole content.
+    """Open a file for reading bytes; of a pipe, such as `<(...)` in a shell, or a device the whole content.
 
     Args:
         path: the file.
@@ -30,8 +37,12 @@ def open_file(path: str | os.PathLike, kind: str, max_bytes: int | None = None) 
     """
     handle: BinaryIO
     try:
-        if stat.S_ISFIFO(os.stat(path).st_mode):
-            content = _read_pipe(path, kind)
+        mode = os.stat(path).st_mode
+        if stat.S_ISFIFO(mode) or stat.S_ISCHR(mode):
+            most = min(max_bytes or MAX_STREAM_BYTES, MAX_STREAM_BYTES)
+            content = (_read_pipe if stat.S_ISFIFO(mode) else _read_device)(path, kind, most + 1)
+            if len(content) > most:
+                raise InputError(path, f"has no end within {most} bytes", f"{kind}, which is shorter", "name a file")
             handle, size = io.BytesIO(content), len(content)
         else:
             handle = open(path, "rb")
@@ -44,12 +55,18 @@ def open_file(path: str | os.PathLike, kind: str, max_bytes: int | None = None) 
     return handle
 
 
-def _read_pipe(path: str | os.PathLike, kind: str) -> bytes:
-    """Read a pipe until its writer closes it; InputError if none opens it within PIPE_SECONDS.
+def _read_device(path: str | os.PathLike, kind: str, most: int) -> bytes:
+    """Read a device such as /dev/null up to `most` bytes."""
+    with open(path, "rb") as device:
+        return device.read(most)
+
+
+def _read_pipe(path: str | os.PathLike, kind: str, most: int) -> bytes:
+    """Read a pipe until its writer closes it, up to `most` bytes; InputError if none opens it within PIPE_SECONDS.
 
     Opened without waiting, a pipe gives None while its writer has written nothing yet, and nothing without a writer.
     """
-    with open(os.open(path, os.O_RDONLY | os.O_NONBLOCK), "rb", buffering=0) as pipe:
+    with _wait_for_pipe(), open(os.open(path, os.O_RDONLY | os.O_NONBLOCK), "rb", buffering=0) as pipe:
         poller = select.poll()
         poller.register(pipe, select.POLLIN)
         has_writer = bool(poller.poll(1000.0 * PIPE_SECONDS))
@@ -58,7 +75,30 @@ def _read_pipe(path: str | os.PathLike, kind: str) -> bytes:
             raise InputError(path, "is not a regular file but a pipe, into which no program writes", kind,
                              "name a file, or start the program that writes")
         os.set_blocking(pipe.fileno(), True)
-        return (begin or b"") + pipe.read()
+        return _read_blocks(pipe, begin or b"", most)
+
+
+@contextlib.contextmanager
+def _wait_for_pipe() -> Iterator[None]:
+    """Context manager: `is_waiting_for_pipe` is true in it."""
+    _waiting.set()
+    try:
+        yield
+    finally:
+        _waiting.clear()
+
+
+def is_waiting_for_pipe() -> bool:
+    """Say whether a pipe is being read: its writer may never write, and nothing asks for cancellation meanwhile."""
+    return _waiting.is_set()
+
+
+def _read_blocks(pipe: BinaryIO, begin: bytes, most: int) -> bytes:
+    """Read what follows `begin`, up to `most` bytes in all."""
+    content = bytearray(begin)
+    while len(content) < most and (block := pipe.read(min(_BLOCK, most - len(content)))):
+        content += block
+    return bytes(content)
 
 
 def read_bytes(path: str | os.PathLike, kind: str, max_bytes: int | None = None) -> bytes:

@@ -4,10 +4,9 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Mapping
-from pathlib import Path
 
 from ..base.errors import InputError
-from ..base.settings.options import add_options
+from ..base.settings.options import add_options, parse_path
 from .outputs import ProgressReporter, Writer, check_outputs, choose_writer, locate_errors
 
 
@@ -20,8 +19,8 @@ def add_mirror(verbs) -> argparse.ArgumentParser:
         The parser of this verb.
     """
     verb = verbs.add_parser("mirror", help="exchange left and right of a motion")
-    verb.add_argument("input", type=Path, metavar="IN.bvh")
-    verb.add_argument("output", type=Path, metavar="OUT.bvh")
+    verb.add_argument("input", type=parse_path, metavar="IN.bvh", help="the motion")
+    verb.add_argument("output", type=parse_path, metavar="OUT.bvh", help="the mirrored motion")
     add_options(verb, "mirror")
     verb.set_defaults(run=run_mirror)
     return verb
@@ -36,10 +35,13 @@ def add_retarget(verbs) -> argparse.ArgumentParser:
         The parser of this verb.
     """
     verb = verbs.add_parser("retarget", help="move a motion to another skeleton")
-    verb.add_argument("input", type=Path, metavar="IN.bvh")
-    verb.add_argument("--to", type=Path, required=True, metavar="SKELETON.bvh", help="a BVH file with the new skeleton")
-    verb.add_argument("--out", type=Path, required=True, metavar="OUT.bvh")
-    verb.add_argument("--map", type=Path, metavar="M.json", help="a JSON object, joint of IN -> joint of SKELETON")
+    verb.add_argument("input", type=parse_path, metavar="IN.bvh", help="the motion")
+    verb.add_argument("--to", type=parse_path, required=True, metavar="SKELETON.bvh",
+                      help="a BVH file with the new skeleton")
+    verb.add_argument("--out", type=parse_path, required=True, metavar="OUT.bvh",
+                      help="the motion on it, in centimetres")
+    verb.add_argument("--map", type=parse_path, metavar="M.json",
+                      help="a JSON object, joint of IN -> joint of SKELETON")
     add_options(verb, "retarget")
     verb.set_defaults(run=run_retarget)
     return verb
@@ -103,7 +105,7 @@ def add_stream(verbs):
         The parser of this verb.
     """
     verb = verbs.add_parser("stream", help="send a recording like a mocap suit, on this machine only")
-    verb.add_argument("clip", type=Path, metavar="CLIP.bvh")
+    verb.add_argument("clip", type=parse_path, metavar="CLIP.bvh", help="the recording to send")
     add_options(verb, "stream")
     add_options(verb.add_mutually_exclusive_group(), "stream.way")
     add_options(verb, "stream.send")

@@ -11,7 +11,7 @@ from pathlib import Path
 
 from .. import __version__
 from ..base.errors import InputError, format_count
-from ..base.settings.options import add_options
+from ..base.settings.options import add_options, parse_path
 from .outputs import ProgressReporter, Writer, check_outputs
 
 # Header of the table of proposed labels.
@@ -28,10 +28,10 @@ def add_library(verbs) -> argparse.ArgumentParser:
         The parser of this verb.
     """
     verb = verbs.add_parser("library", help="read a folder of BVH clips and annotations and describe it")
-    verb.add_argument("library", type=Path, metavar="LIBRARY")
+    verb.add_argument("library", type=parse_path, metavar="LIBRARY", help="a folder with BVH files and annotations")
     add_options(verb, "library.build")
     add_options(verb, "library")
-    verb.add_argument("--report", type=Path, metavar="R.json")
+    verb.add_argument("--report", type=parse_path, metavar="R.json", help="write what is printed, and more, as JSON")
     add_learning_options(verb)
     verb.set_defaults(run=run_library)
     return verb
@@ -80,7 +80,7 @@ def summarize_library(library) -> dict:
         "labels: " + " ".join(labels),
         "gaits: " + ", ".join(f"{g['word']} {g['speed_m_s']:.1f} m/s" for g in gaits),
         f"fastest: {library.max_speed:.1f} m/s",
-        "key moments: " + (", ".join(keys) if keys else "none"),
+        "key moments: " + ("" if keys else "none"), *(f"  {key}" for key in keys),
         *library.proposal_notes,
         *library.coverage.lines.values(),
         *describe_left_out(library, MAX_LEFT_OUT),
@@ -125,9 +125,9 @@ def add_learning_options(verb) -> None:
     Args:
         verb: the parser to add them to.
     """
-    verb.add_argument("--learn", type=Path, metavar="MODEL.npz", help="learn from the clips that have labels")
-    verb.add_argument("--propose", type=Path, metavar="OUT.csv", help="propose labels for the clips without any")
-    verb.add_argument("--learned", type=Path, metavar="MODEL.npz", help="a learned model; without it rules alone")
+    verb.add_argument("--learn", type=parse_path, metavar="MODEL.npz", help="learn from the clips that have labels")
+    verb.add_argument("--propose", type=parse_path, metavar="OUT.csv", help="propose labels for the clips without any")
+    verb.add_argument("--learned", type=parse_path, metavar="MODEL.npz", help="a learned model; without it rules alone")
     add_options(verb, "library.learn")
 
 

@@ -16,6 +16,7 @@ import threading
 from collections.abc import Callable, Mapping
 
 from .. import __version__
+from ..base.content import is_waiting_for_pipe
 from ..base.errors import BeyondMocapError, InputError, UserCancelledError
 from .convert import add_mirror, add_retarget, add_stream
 from .library import add_library
@@ -33,6 +34,7 @@ VERBS = (add_library, add_synthesize, add_path, add_touches, add_stream, add_pas
 """Functions that add a verb, in the order of `--help`; each takes the sub-parsers and returns its parser."""
 IsolatedRunner = Callable[[list[str], Callable[[float, str], None], Callable[[], bool]], object]
 """Runs a command line in another process: (arguments, progress callback, cancellation callback)."""
+_DOCUMENTS = "documents: the folder docs beside the source, docs/reference/commands.md for all commands"
 _UNREAD = 141  # exit status that shells give to a program that SIGPIPE ended
 
 
@@ -78,11 +80,14 @@ def build_parser(prog: str = "beyond-mocap") -> argparse.ArgumentParser:
     Returns:
         The parser; its result has the verb in `verb` and the function to run in `run`.
     """
-    top = OneLineParser(prog=prog, description="Full-body animation from tracking data, labels and motion capture.")
+    top = OneLineParser(prog=prog, description="Full-body animation from tracking data, labels and motion capture.",
+                        epilog=_DOCUMENTS)
     top.add_argument("--version", action="version", version=f"beyond-mocap {__version__}")
     verbs = top.add_subparsers(dest="verb", required=True, metavar="VERB", parser_class=OneLineParser)
     for add in VERBS:
-        add(verbs).add_argument("--json", action="store_true", help="progress as JSON lines on stderr")
+        verb = add(verbs)
+        verb.epilog = _DOCUMENTS
+        verb.add_argument("--json", action="store_true", help="progress as JSON lines on stderr")
     return top
 
 
@@ -129,8 +134,10 @@ def _run_command(argv: list[str] | None, writers: Mapping[str, Writer], prog: st
     except BrokenPipeError:
         raise
     except OSError as error:
-        path = error.filename or prog
+        path = error.filename or "standard output or a temporary file"
         status, text = 2, f"{path}: {error.strerror or error}; check that the file can be read and its folder written"
+    except MemoryError:
+        status, text = 2, "not enough memory; close other programs, or take a smaller file, library or time span"
     except SystemExit as done:  # --help and --version
         return int(done.code or 0)
     if reporter is not None:
@@ -175,3 +182,5 @@ class _InterruptHandler:
 
     def _handle_signal(self, *_):
         self._reporter.cancel()
+        if is_waiting_for_pipe():
+            raise KeyboardInterrupt

@@ -13,8 +13,8 @@ import numpy as np
 
 from .. import __version__
 from ..base.errors import BeyondMocapError, InputError, format_count, format_seconds
-from ..base.settings.options import add_options, option_values
-from .outputs import ProgressReporter, Writer, check_outputs, parse_folder
+from ..base.settings.options import add_options, option_values, parse_path
+from .outputs import ProgressReporter, Writer, check_outputs
 
 
 def add_match(verbs):
@@ -29,16 +29,17 @@ def add_match(verbs):
     from ..files.tracking.providers import PROVIDERS
 
     verb = verbs.add_parser("match", help="all players' motion and the ball of a tracked match, resumable")
-    verb.add_argument("--tracking", type=Path, required=True, metavar="FILE", help="a provider's tracking data")
-    verb.add_argument("--meta", type=Path, metavar="FILE", help="the provider's metadata; default: beside FILE")
-    verb.add_argument("--events", type=Path, metavar="FILE", help="event data, from a provider or as CSV")
-    verb.add_argument("--events-meta", type=Path, metavar="FILE", help="metadata of the events; default: beside them")
+    verb.add_argument("--tracking", type=parse_path, required=True, metavar="FILE", help="a provider's tracking data")
+    verb.add_argument("--meta", type=parse_path, metavar="FILE", help="the provider's metadata; default: beside FILE")
+    verb.add_argument("--events", type=parse_path, metavar="FILE", help="event data, from a provider or as CSV")
+    verb.add_argument("--events-meta", type=parse_path, metavar="FILE",
+                      help="metadata of the events; default: beside them")
     verb.add_argument("--events-provider", metavar="NAME", default="",
                       help=f"format of the events: {', '.join(EVENT_PROVIDERS)}; default: detected")
     verb.add_argument("--provider", metavar="NAME", default="",
                       help=f"format of FILE: {', '.join(PROVIDERS)}; default: detected")
-    verb.add_argument("--library", type=Path, required=True)
-    verb.add_argument("--out", type=parse_folder, required=True, metavar="FOLDER",
+    verb.add_argument("--library", type=parse_path, required=True, help="a folder with BVH files and annotations")
+    verb.add_argument("--out", type=parse_path, required=True, metavar="FOLDER",
                       help="output folder; an unfinished run continues there")
     add_options(verb, "match.section")
     add_options(verb.add_mutually_exclusive_group(), "match.work")
@@ -139,14 +140,15 @@ def add_touches(verbs):
     from ..files.tracking.providers import PROVIDERS
 
     verb = verbs.add_parser("touches", help="who touches the ball and when, from tracking data")
-    verb.add_argument("input", type=Path, metavar="FILE", help="a provider's tracking data, or a player's track as CSV")
-    verb.add_argument("--meta", type=Path, metavar="FILE", help="the provider's metadata; default: beside FILE")
+    verb.add_argument("input", type=parse_path, metavar="FILE",
+                      help="a provider's tracking data, or a player's track as CSV")
+    verb.add_argument("--meta", type=parse_path, metavar="FILE", help="the provider's metadata; default: beside FILE")
     verb.add_argument("--provider", metavar="NAME",
                       help=f"format of FILE: {', '.join(PROVIDERS)}; default: detected from its content")
     add_options(verb, "touches")
-    verb.add_argument("--out", type=Path, required=True, metavar="TOUCHES.csv")
-    verb.add_argument("--ball", type=Path, metavar="BALL.csv", help="the solved trajectory at the samples' times")
-    verb.add_argument("--report", type=Path, metavar="R.json")
+    verb.add_argument("--out", type=parse_path, required=True, metavar="TOUCHES.csv", help="a table of the touches")
+    verb.add_argument("--ball", type=parse_path, metavar="BALL.csv", help="the solved trajectory at the samples' times")
+    verb.add_argument("--report", type=parse_path, metavar="R.json", help="write all figures to this file")
     verb.set_defaults(run=run_touches)
     return verb
 

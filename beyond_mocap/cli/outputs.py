@@ -12,6 +12,7 @@ from contextlib import contextmanager
 from pathlib import Path
 
 from ..base.errors import InputError, UserCancelledError
+from ..base.settings.options import parse_path
 
 Writer = Callable[[object, Path], Sequence[str] | None]
 """Writes a take, or the result of the verb `match`, to a file; returns lines for the user, if any."""
@@ -182,29 +183,14 @@ def check_outputs(*paths: Path | None, reserved: tuple[Path | None, ...] = ()) -
         used.add(path.resolve())
 
 
-def parse_folder(text: str) -> Path:
-    """Parse an option that names a folder; an empty one would mean the current folder.
-
-    Args:
-        text: the option's text.
-    Returns:
-        The folder.
-    Raises:
-        ArgumentTypeError: if the text is empty.
-    """
-    if not text.strip():
-        raise argparse.ArgumentTypeError("no folder is named")
-    return Path(text)
-
-
 def add_take_files(verb) -> None:
     """Add the options for the files beside a motion: provenance and ball.
 
     Args:
         verb: the parser to add them to.
     """
-    verb.add_argument("--provenance", type=Path, metavar="P.csv")
-    verb.add_argument("--ball", type=Path, metavar="B.csv")
+    verb.add_argument("--provenance", type=parse_path, metavar="P.csv", help="which clip each frame is from")
+    verb.add_argument("--ball", type=parse_path, metavar="B.csv", help="the ball as it is shown")
 
 
 def add_subverbs(verb, dest: str, *adders: Callable):

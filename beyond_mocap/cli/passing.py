@@ -11,8 +11,9 @@ import numpy as np
 
 from .. import __version__
 from ..base.errors import InputError, format_count
-from ..base.settings.options import add_options
-from .outputs import ProgressReporter, Writer, locate_errors, parse_folder
+from ..base.settings.options import add_options, parse_path
+from ..files.file_names import avoid_reserved_name
+from .outputs import ProgressReporter, Writer, locate_errors
 
 
 def add_passes(verbs):
@@ -24,10 +25,10 @@ def add_passes(verbs):
         The parser of this verb.
     """
     verb = verbs.add_parser("passes", help="several players pass a ball to each other")
-    verb.add_argument("scene", type=Path, metavar="SCENE.json",
+    verb.add_argument("scene", type=parse_path, metavar="SCENE.json",
                       help="who passes to whom; see docs/reference/scene-json.md")
-    verb.add_argument("--library", type=Path, required=True, help="a folder of clips with ball strikes")
-    verb.add_argument("--out", type=parse_folder, required=True, metavar="FOLDER", help="created if missing")
+    verb.add_argument("--library", type=parse_path, required=True, help="a folder of clips with ball strikes")
+    verb.add_argument("--out", type=parse_path, required=True, metavar="FOLDER", help="created if missing")
     add_options(verb, "library")
     verb.set_defaults(run=run_passes)
     return verb
@@ -64,7 +65,7 @@ def run_passes(options, reporter: ProgressReporter, writers: Mapping[str, Writer
     report = {**_build_report(result, table), "seconds": {"load": loaded - started, "play": done - loaded}}
     _write_results(options.out, result, table, report)
     reporter.finish(f"{options.scene}: {line}" for line in result.warnings)
-    names = {player.name for player in result.players}
+    names = {avoid_reserved_name(player.name) for player in result.players}
     others = sorted(path.stem for path in options.out.glob("*.bvh") if path.stem not in names)
     if others:
         reporter.show_note(f"{options.out}: files of another scene: {', '.join(others)}")
@@ -140,8 +141,9 @@ def _write_results(folder: Path, played, table: list[dict], report: dict) -> Non
 
     folder.mkdir(exist_ok=True)
     for player in played.players:
-        bvh.write_bvh(folder / f"{player.name}.bvh", player.take.motion)
-        write_provenance(folder / f"{player.name}.provenance.csv", player.take)
+        name = avoid_reserved_name(player.name)
+        bvh.write_bvh(folder / f"{name}.bvh", player.take.motion)
+        write_provenance(folder / f"{name}.provenance.csv", player.take)
     write_ball(folder / "ball.csv", played.ball)
     write_strikes(folder / "strikes.csv", table)
     write_report(folder / "scene.report.json", report)

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..base.errors import InputError
-from ..base.settings.options import add_options, option_values
+from ..base.settings.options import add_options, option_values, parse_path
 from .outputs import ProgressReporter, Writer, build_take, check_outputs, choose_writer, locate_errors
 
 if TYPE_CHECKING:
@@ -35,9 +35,9 @@ def add_path(verbs):
         The parser of this verb.
     """
     verb = verbs.add_parser("path", help="move a recording onto another path")
-    verb.add_argument("input", type=Path, metavar="IN.bvh")
-    verb.add_argument("--path", type=Path, required=True, metavar="CURVE.csv", help="x_m,y_m[,z_m]: the new path")
-    verb.add_argument("--out", type=Path, required=True, metavar="OUT.bvh")
+    verb.add_argument("input", type=parse_path, metavar="IN.bvh", help="the motion")
+    verb.add_argument("--path", type=parse_path, required=True, metavar="CURVE.csv", help="x_m,y_m[,z_m]: the new path")
+    verb.add_argument("--out", type=parse_path, required=True, metavar="OUT.bvh", help="the motion on the path")
     # Blender's Cycles add-on reads the arguments after `--` (batch.py) and quits over `--cycle`: hence the alias --loop
     add_options(verb, "path_editing")
     verb.set_defaults(run=run_path)

@@ -18,7 +18,7 @@ import numpy as np
 from .. import __version__
 from ..base.errors import InputError, format_count
 from ..base.optional_packages import import_optional
-from ..base.settings.options import add_options, option_values
+from ..base.settings.options import add_options, option_values, parse_path
 from .outputs import ProgressReporter, Writer, build_take, check_outputs, choose_writer
 
 _MAX_LINES = 12  # notes that the command prints; the report has all
@@ -33,12 +33,13 @@ def add_reconstruct(verbs):
         The parser of this verb.
     """
     verb = verbs.add_parser("reconstruct", help="solve a moving skeleton from optical markers (.c3d, .trc)")
-    verb.add_argument("trial", type=Path, metavar="TRIAL", help="a marker recording, or a folder of them")
-    verb.add_argument("--static", type=Path, metavar="STATIC", help="the same markers on the same body, standing")
-    verb.add_argument("--model", type=Path, metavar="MODEL.json", help="a saved model, instead of --static")
-    verb.add_argument("--out", type=Path, required=True, metavar="OUT.bvh", help="a folder for a folder of trials")
-    verb.add_argument("--report", type=Path, metavar="R.json")
-    verb.add_argument("--save-model", type=Path, metavar="MODEL.json")
+    verb.add_argument("trial", type=parse_path, metavar="TRIAL", help="a marker recording, or a folder of them")
+    verb.add_argument("--static", type=parse_path, metavar="STATIC", help="the same markers on the same body, standing")
+    verb.add_argument("--model", type=parse_path, metavar="MODEL.json", help="a saved model, instead of --static")
+    verb.add_argument("--out", type=parse_path, required=True, metavar="OUT.bvh",
+                      help="a folder for a folder of trials")
+    verb.add_argument("--report", type=parse_path, metavar="R.json", help="write all figures to this file")
+    verb.add_argument("--save-model", type=parse_path, metavar="MODEL.json", help="keep the model for other trials")
     add_options(verb, "markers")
     verb.set_defaults(run=run_reconstruct)
     return verb
@@ -317,9 +318,10 @@ def add_release(verbs):
         The parser of this verb.
     """
     verb = verbs.add_parser("release", help="when and how a ball leaves the hand in a recorded throw")
-    verb.add_argument("trial", type=Path, metavar="TRIAL", help="markers, .c3d or .trc")
-    verb.add_argument("--motion", type=Path, required=True, metavar="M.bvh", help="the motion of this trial")
-    verb.add_argument("--report", type=Path, required=True, metavar="R.json")
+    verb.add_argument("trial", type=parse_path, metavar="TRIAL", help="markers, .c3d or .trc")
+    verb.add_argument("--motion", type=parse_path, required=True, metavar="M.bvh", help="the motion of this trial")
+    verb.add_argument("--report", type=parse_path, required=True, metavar="R.json",
+                      help="the release and how sure it is")
     add_options(verb, "release")
     verb.set_defaults(run=run_release)
     return verb

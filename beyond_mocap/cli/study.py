@@ -10,7 +10,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from ..base.errors import InputError, format_count
-from ..base.settings.options import add_options
+from ..base.settings.options import add_options, parse_path
 from .outputs import ProgressReporter, Writer, add_subverbs, check_outputs
 
 CLIPS, FORMS, ANSWERS = "clips", "forms", "answers"
@@ -33,7 +33,7 @@ def add_study(verbs):
 
 def _add_order(verbs):
     verb = verbs.add_parser("order", help="give clips neutral names and each rater an order")
-    verb.add_argument("clips", type=Path, metavar="CLIPS.csv", help="file,system,scenario; two are 'training'")
+    verb.add_argument("clips", type=parse_path, metavar="CLIPS.csv", help="file,system,scenario; two are 'training'")
     add_options(verb, "study.order")
     verb.set_defaults(run=run_order)
     return verb
@@ -41,7 +41,7 @@ def _add_order(verbs):
 
 def _add_form(verbs):
     verb = verbs.add_parser("form", help="write a page and a table for each rater")
-    verb.add_argument("study", type=Path, metavar="FOLDER", help="folder written by study order")
+    verb.add_argument("study", type=parse_path, metavar="FOLDER", help="folder written by study order")
     add_options(verb, "study.form")
     verb.set_defaults(run=run_form)
     return verb
@@ -49,11 +49,12 @@ def _add_form(verbs):
 
 def _add_analyse(verbs):
     verb = verbs.add_parser("analyse", help="test the answers: one-sided tests, effect sizes")
-    verb.add_argument("study", type=Path, metavar="FOLDER")
-    verb.add_argument("--answers", type=Path, nargs="+", metavar="FILE", help="files or folders; else FOLDER/answers")
+    verb.add_argument("study", type=parse_path, metavar="FOLDER", help="the folder of the study")
+    verb.add_argument("--answers", type=parse_path, nargs="+", metavar="FILE",
+                      help="files or folders; else FOLDER/answers")
     add_options(verb, "study.analyse")
-    verb.add_argument("--report", type=Path, required=True, metavar="R.json")
-    verb.add_argument("--html", type=Path, metavar="R.html", help="a page with plots; needs matplotlib")
+    verb.add_argument("--report", type=parse_path, required=True, metavar="R.json", help="the tests and effect sizes")
+    verb.add_argument("--html", type=parse_path, metavar="R.html", help="a page with plots; needs matplotlib")
     verb.set_defaults(run=run_analyse)
     return verb
 

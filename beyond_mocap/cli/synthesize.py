@@ -12,10 +12,10 @@ import numpy as np
 
 from ..base.errors import InputError, NotInLibraryError, format_count
 from ..base.optional_packages import import_optional
-from ..base.settings.options import add_options, option_values
+from ..base.settings.options import add_options, option_values, parse_path
 from .comparing import run_comparison
 from .library import open_library
-from .outputs import ProgressReporter, Writer, add_take_files, check_outputs, choose_writer
+from .outputs import ProgressReporter, Writer, add_take_files, check_outputs, choose_writer, locate_errors
 
 _MAX_REPORT_BYTES = 100_000_000  # no report is as large
 _OTHER_LENGTH, _OTHER_PLACE = 1.0, 2.0  # s and m by which a motion differs from its track at most
@@ -30,17 +30,19 @@ def add_synthesize(verbs) -> argparse.ArgumentParser:
         The parser of this verb.
     """
     verb = verbs.add_parser("synthesize", help="synthesize a player's motion from track, annotations and library")
-    verb.add_argument("--library", type=Path, required=True)
-    verb.add_argument("--track", type=Path, required=True, metavar="T.csv")
-    verb.add_argument("--annotations", type=Path, metavar="A.txt",
+    verb.add_argument("--library", type=parse_path, required=True, help="a folder with BVH files and annotations")
+    verb.add_argument("--track", type=parse_path, required=True, metavar="T.csv",
+                      help="the player's track, and the ball")
+    verb.add_argument("--annotations", type=parse_path, metavar="A.txt",
                       help="the labels; default: the text T.txt beside the track, else all automatic")
-    verb.add_argument("--out", type=Path, required=True, metavar="OUT.bvh")
+    verb.add_argument("--out", type=parse_path, required=True, metavar="OUT.bvh", help="the motion")
     add_take_files(verb)
-    verb.add_argument("--report", type=Path, metavar="R.json")
+    verb.add_argument("--report", type=parse_path, metavar="R.json", help="write all figures to this file")
     add_options(verb, "synthesis")
     verb.add_argument("--solve-touches", action="store_true", default=True, help="the default; version 0.1 needed it")
-    verb.add_argument("--pins", type=Path, metavar="P.csv", help="targets of hands, feet, gaze and ball with times")
-    verb.add_argument("--headings", type=Path, metavar="H.csv", help="where the body faces, with times")
+    verb.add_argument("--pins", type=parse_path, metavar="P.csv",
+                      help="targets of hands, feet, gaze and ball with times")
+    verb.add_argument("--headings", type=parse_path, metavar="H.csv", help="where the body faces, with times")
     add_options(verb, "player")
     add_options(verb, "library")
     verb.set_defaults(run=run_synthesize)
@@ -135,17 +137,18 @@ def add_evaluate(verbs) -> argparse.ArgumentParser:
         The parser of this verb.
     """
     verb = verbs.add_parser("evaluate", help="measure a motion, or compare takes with recordings")
-    verb.add_argument("motion", type=Path, nargs="+", metavar="M.bvh",
+    verb.add_argument("motion", type=parse_path, nargs="+", metavar="M.bvh",
                       help="the motion; with --against one or more takes, or folders of takes")
-    verb.add_argument("--track", type=Path, metavar="T.csv")
-    verb.add_argument("--annotations", type=Path, metavar="A.txt")
+    verb.add_argument("--track", type=parse_path, metavar="T.csv", help="the track that the motion follows")
+    verb.add_argument("--annotations", type=parse_path, metavar="A.txt", help="the labels that it was made from")
     add_take_files(verb)
-    verb.add_argument("--library", type=Path)
-    verb.add_argument("--against", type=Path, metavar="LIBRARY",
+    verb.add_argument("--library", type=parse_path, help="the clips that it was made from, to compare with")
+    verb.add_argument("--against", type=parse_path, metavar="LIBRARY",
                       help="measure whether classifiers can distinguish the takes from this library's recordings")
     add_options(verb, "library")
-    verb.add_argument("--report", type=Path, required=True, metavar="R.json")
-    verb.add_argument("--html", type=Path, metavar="R.html", help="a page with plots; needs matplotlib")
+    verb.add_argument("--report", type=parse_path, required=True, metavar="R.json",
+                      help="write all figures to this file")
+    verb.add_argument("--html", type=parse_path, metavar="R.html", help="a page with plots; needs matplotlib")
     verb.set_defaults(run=run_evaluate)
     return verb
 
@@ -195,11 +198,13 @@ def _evaluate_motion(options, reporter: ProgressReporter) -> None:
     timeline = read_timeline(options.annotations, motion.fps, start) if options.annotations else None
     provenance = read_provenance(options.provenance) if options.provenance else None
     ball = read_ball(options.ball) if options.ball else None
-    played = playback_from_tables(motion, provenance, ball, start, str(options.provenance))
+    with locate_errors(options.motion):
+        played = playback_from_tables(motion, provenance, ball, start, str(options.provenance))
     library = open_library(options, reporter) if options.library else None
     if timeline is not None and track is not None and library is not None:  # otherwise some labels or times are unknown
         check_timeline(timeline, library.labels, start, float(track.times[-1]), str(options.annotations))
-    report = evaluate_played(played, track=track, timeline=timeline, library=library)
+    with locate_errors(options.motion):
+        report = evaluate_played(played, track=track, timeline=timeline, library=library)
     notes = [*report["warnings"], *report["notes"], *_describe_fit(report, motion, track, options)]
     if provenance is None and report["keys"]:
         notes.append("the clips that played are unknown; name them with --provenance")

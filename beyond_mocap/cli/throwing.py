@@ -13,7 +13,7 @@ import numpy as np
 
 from .. import __version__
 from ..base.errors import InputError, format_seconds
-from ..base.settings.options import add_options
+from ..base.settings.options import add_options, parse_path
 from .outputs import ProgressReporter, Writer, add_subverbs, build_take, check_outputs, choose_writer, locate_errors
 
 if TYPE_CHECKING:
@@ -35,8 +35,9 @@ def add_throw(verbs):
 
 def _add_train(verbs):
     verb = verbs.add_parser("train", help="train networks on a folder of BVH and annotations (see make training)")
-    verb.add_argument("folder", type=Path, metavar="FOLDER", help="recordings, annotations and optionally throws.csv")
-    verb.add_argument("--out", type=Path, required=True, metavar="W.npz", help="the trained model")
+    verb.add_argument("folder", type=parse_path, metavar="FOLDER",
+                      help="recordings, annotations and optionally throws.csv")
+    verb.add_argument("--out", type=parse_path, required=True, metavar="W.npz", help="the trained model")
     add_options(verb, "throw.train")
     verb.set_defaults(run=run_train)
     return verb
@@ -80,8 +81,9 @@ def _require_training() -> None:
 def _add_synthesize(verbs):
     verb = verbs.add_parser("synthesize", help="a throw or kick that hits a target")
     verb.add_argument("--target", type=_parse_point, required=True, metavar="X,Y,Z", help="metres, Z up")
-    verb.add_argument("--out", type=Path, required=True, metavar="OUT.bvh")
-    verb.add_argument("--model", type=Path, metavar="W.npz", help="default: the weights supplied with the project")
+    verb.add_argument("--out", type=parse_path, required=True, metavar="OUT.bvh", help="the motion")
+    verb.add_argument("--model", type=parse_path, metavar="W.npz",
+                      help="default: the weights supplied with the project")
     add_options(verb, "throw")
     place = verb.add_mutually_exclusive_group()
     place.add_argument("--start", type=_parse_ground_point, metavar="X,Y", help="hips in the first frame; default 0,0")
@@ -89,9 +91,10 @@ def _add_synthesize(verbs):
     place.add_argument("--ball-place", type=_parse_ground_point, metavar="X,Y",
                        help="position of the ball that is kicked")
     add_options(verb, "throw.ball")
-    verb.add_argument("--library", type=Path, metavar="L", help="with --track: source of run-up and recovery")
-    verb.add_argument("--track", type=Path, metavar="T.csv", help="the player's track; the throw is on it at --time")
-    verb.add_argument("--annotations", type=Path, metavar="A.txt", help="the player's other actions on the track")
+    verb.add_argument("--library", type=parse_path, metavar="L", help="with --track: source of run-up and recovery")
+    verb.add_argument("--track", type=parse_path, metavar="T.csv",
+                      help="the player's track; the throw is on it at --time")
+    verb.add_argument("--annotations", type=parse_path, metavar="A.txt", help="the player's other actions on the track")
     add_options(verb, "library", "cache", "unit")
     verb.set_defaults(run=run_synthesize)
     return verb
@@ -268,8 +271,9 @@ class _Player:
 
 def _add_evaluate(verbs):
     verb = verbs.add_parser("evaluate", help="measure trained networks on recorded throws or kicks")
-    verb.add_argument("--model", type=Path, required=True, metavar="W.npz", help="the trained model")
-    verb.add_argument("--examples", type=Path, required=True, metavar="FOLDER", help="recordings with annotations")
+    verb.add_argument("--model", type=parse_path, required=True, metavar="W.npz", help="the trained model")
+    verb.add_argument("--examples", type=parse_path, required=True, metavar="FOLDER",
+                      help="recordings with annotations")
     add_options(verb, "throw.evaluate")
     verb.set_defaults(run=run_evaluate)
     return verb
@@ -342,7 +346,7 @@ def _choose_subjects(examples, subjects: list[str], folder: Path):
 
 def _add_examples(verbs):
     verb = verbs.add_parser("examples", help="write synthetic throws or kicks with known targets to train and test")
-    verb.add_argument("--out", type=Path, required=True, metavar="FOLDER", help="a new or empty folder")
+    verb.add_argument("--out", type=parse_path, required=True, metavar="FOLDER", help="a new or empty folder")
     add_options(verb, "throw.examples")
     verb.set_defaults(run=run_examples)
     return verb

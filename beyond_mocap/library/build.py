@@ -72,7 +72,8 @@ def build_library(
             write_synthetic_clips(place, _list_completed(found["clips"]), missing_only=True)
             found["notes"] += tuple(waiting)
             return Library(folder=str(folder), cache_location=(place, key), seed=seed, **found)
-    notes: list[str] = [*([cache_note] if cache_note else []), *annotations.describe_unknown_files(folder)]
+    notes: list[str] = [*([cache_note] if cache_note else []), *annotations.describe_unknown_files(folder),
+                        *annotations.describe_lone_texts(folder)]
     clips = _read_clips(folder, paths, files, annotations=annotations, chosen=skeleton_file, unit=unit, threads=threads,
                         notes=notes, report=report, cancelled=cancelled,
                         classifier=read_classifier(model) if model else None)

@@ -20,6 +20,7 @@ from ..annotation import ClipAnnotation
 from ..base.content import read_bytes
 from ..base.digest import byte_digest
 from ..base.errors import InputError
+from ..base.user_folders import find_user_cache
 from ..files.atomic import atomic_write
 from ..files.bvh import bvh
 from ..motion.motion import Motion
@@ -64,8 +65,10 @@ def find_cache_folder(folder: Path, cache_dir: str | Path | None) -> tuple[Path,
     beside = folder / CACHE_FOLDER
     if os.access(beside if beside.is_dir() else folder, os.W_OK):
         return beside, ""
-    base = os.environ.get("LOCALAPPDATA") or os.environ.get("XDG_CACHE_HOME") or os.path.expanduser("~/.cache")
-    elsewhere = find_own_folder(Path(base) / "beyond_mocap", folder)
+    base = find_user_cache()
+    if base is None:
+        return beside, ""
+    elsewhere = find_own_folder(base, folder)
     return elsewhere, f"{folder} cannot be written: its cache is in {elsewhere}"
 
 

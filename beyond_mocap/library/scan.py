@@ -157,10 +157,26 @@ class Annotations:
         rows = "1 row names a file that is" if count == 1 else f"{count} rows name files that are"
         return [f"{TABLE_NAME}: {rows} not in the library, such as {unknown[0][1]}"]
 
+    def describe_lone_texts(self, folder: Path) -> list[str]:
+        """Describe in a line the texts with labels that lie beside no recording of their name."""
+        known = {path.with_suffix("") for path in list_own_recordings(folder)}
+        texts = [path for path in find_recordings(folder, (".txt",)) if path.with_suffix("") not in known]
+        lone = [path.relative_to(folder).as_posix() for path in texts if _has_labels(path)]
+        found = format_count(len(lone), "text with labels", "texts with labels")
+        return [f"{found} beside no recording of the name, such as {lone[0]}"] if lone else []
+
     def list_sources(self, clips: list[Path]) -> list[Path]:
         """List every file that was or would be read for annotations; the cache depends on them."""
         texts = [clip.with_suffix(".txt") for clip in clips]
         return [path for path in texts if path.is_file()] + [place / TABLE_NAME for place in sorted(self.tables)]
+
+
+def _has_labels(path: Path) -> bool:
+    """Say whether a text has labels of a clip, as a README or a licence has not."""
+    try:
+        return bool(read_clip_annotations(path, 30.0))
+    except InputError:
+        return False
 
 
 def is_foreign(path: Path) -> bool:

@@ -22,6 +22,7 @@ from pathlib import Path
 from ..base.content import read_bytes
 from ..base.errors import InputError
 from ..files.atomic import atomic_write
+from ..files.file_names import avoid_reserved_name
 from ..files.tables import to_plain
 from .request import compute_digest
 
@@ -33,7 +34,6 @@ _MAX_NAME = 100  # characters of a file name
 _PART = re.compile(r"\..+\.\d+\.\d+\.part")  # temporary files of `files.atomic`
 _HEAD_BYTES, _DIGEST = 1000, re.compile(
     rb'"digest": *"([0-9a-f]+)"')  # first bytes of match.json, which contain its digest
-_RESERVED = re.compile(r"(con|prn|aux|nul|com\d|lpt\d)(\.|$)", re.IGNORECASE)  # names reserved by Windows
 
 
 @dataclass(eq=False)
@@ -213,7 +213,7 @@ def build_file_names(ids: Iterable[str]) -> dict[str, str]:
     used: set[str] = set()
     for player in ids:
         base = re.sub(r"[^\w.-]", "_", player, flags=re.ASCII).strip(".")[:_MAX_NAME] or "player"
-        base = f"_{base}" if _RESERVED.match(base) else base
+        base = avoid_reserved_name(base)
         name, number = base, 2
         while name.lower() in used:
             name, number = f"{base}-{number}", number + 1
@@ -270,10 +270,19 @@ def _hold_lock(lock: Path, folder: Path) -> Iterator[None]:
             process = file.read(20).decode("ascii", "replace").strip()
             found = f"another run (process {process}) uses it" if process else "another run uses it"
             raise InputError(folder, found, "one run at a time", "wait for it, or choose another folder") from None
+        _write_owner(file, lock)
+        yield
+
+
+def _write_owner(file, lock: Path) -> None:
+    """Write this process's number into the lock; InputError where the disk is full."""
+    try:
         file.truncate(0)
         file.write(str(os.getpid()).encode())
         file.flush()
-        yield
+    except OSError as error:
+        found = f"cannot be written ({error.strerror or error})"
+        raise InputError(lock, found, "a writable folder", "choose another folder") from None
 
 
 def _acquire_lock(file) -> None:

@@ -149,7 +149,7 @@ def identify_posed_joints(motion: Motion) -> Humanoid:
     skeleton = motion.skeleton
     parts = [split_joint_name(name) for name in skeleton.names]
     roles = _find_named_roles(parts)
-    if not _has_legs(roles):
+    if not _has_legs(skeleton.parents, roles):
         frames = np.unique(np.linspace(0, len(motion) - 1, 64).astype(int))
         roles = _choose_roles(_find_structural_roles(skeleton, motion.root_positions[frames], motion.rotations[frames]),
                               roles)
@@ -160,7 +160,7 @@ def identify_posed_joints(motion: Motion) -> Humanoid:
 def _identify_from_arrays(names: tuple[str, ...], parents: tuple[int, ...], offsets: bytes, tips: tuple) -> Humanoid:
     """Identify joints from hashable parts of a skeleton, so that results can be cached."""
     roles = _find_named_roles([split_joint_name(name) for name in names])
-    if not _has_legs(roles):
+    if not _has_legs(parents, roles):
         ends = np.frombuffer(tips[1]).reshape(-1, 3)
         skeleton = Skeleton(names, parents, np.frombuffer(offsets).reshape(-1, 3), tips[0], ends)
         roles = _choose_roles(_find_structural_roles(skeleton, np.zeros((1, 3)), quaternion.identity(1, len(names))),
@@ -195,15 +195,17 @@ def build_humanoid(names: tuple[str, ...], parents: tuple[int, ...], roles: Mapp
     Returns:
         The joints by meaning.
     Raises:
-        InputError: if a leg's joint is missing.
+        InputError: if a leg's joint is missing, or a joint of a limb does not hang below the one before.
     """
     roles = dict(roles)
-    if not _has_legs(roles):
-        missing = [part for part in _LEG_ROLES if part not in roles]
+    if missing := [part for part in _LEG_ROLES if part not in roles]:
         raise InputError(
             "skeleton", f"no joint found for {', '.join(missing)}",
             "legs named as in common rigs, or two legs alike below the hips", "give a bone map",
         )
+    for high, low in _find_broken_chains(parents, roles, _CHAINS):
+        found = f"{names[roles[low]]} ({low}) does not hang below {names[roles[high]]} ({high})"
+        raise InputError("skeleton", found, "limbs that are chains", "correct the names or the bone map")
     legs = [roles["left upper_leg"], roles["right upper_leg"]]
     arms = [roles[part] for part in ("left upper_arm", "right upper_arm") if part in roles]
     crossing = structure.find_common_ancestor(parents, legs)
@@ -233,11 +235,24 @@ def list_roles(body: Humanoid) -> dict[str, int]:
     return {role: joint for role, joint in found.items() if joint is not None}
 
 
-_LEG_ROLES = tuple(f"{side} {part}" for side in ("left", "right") for part in ("upper_leg", "lower_leg", "foot"))
+_SIDES = ("left", "right")
+_LEG_CHAINS = tuple((f"{side} {high}", f"{side} {low}") for side in _SIDES
+                    for high, low in (("upper_leg", "lower_leg"), ("lower_leg", "foot")))
+_CHAINS = (*_LEG_CHAINS, *((f"{side} {high}", f"{side} {low}") for side in _SIDES
+                           for high, low in (("foot", "toe"), ("upper_arm", "lower_arm"), ("lower_arm", "hand"))))
+_LEG_ROLES = tuple(f"{side} {part}" for side in _SIDES for part in ("upper_leg", "lower_leg", "foot"))
 
 
-def _has_legs(roles: Mapping[str, int]) -> bool:
-    return all(role in roles for role in _LEG_ROLES)
+def _has_legs(parents: tuple[int, ...], roles: Mapping[str, int]) -> bool:
+    """Say whether both legs are there, each joint below the one before."""
+    return all(role in roles for role in _LEG_ROLES) and not _find_broken_chains(parents, roles, _LEG_CHAINS)
+
+
+def _find_broken_chains(parents: tuple[int, ...], roles: Mapping[str, int], chains) -> list[tuple[str, str]]:
+    """Find the pairs of roles whose second joint does not hang below the first, among the roles that there are."""
+    pairs = [(high, low) for high, low in chains if high in roles and low in roles]
+    return [(high, low) for high, low in pairs
+            if roles[high] == roles[low] or roles[high] not in structure.list_ancestors(parents, roles[low])]
 
 
 def _find_named_roles(parts) -> dict[str, int]:

@@ -6,12 +6,14 @@ alone.
 
 from __future__ import annotations
 
-import os
-import tempfile
+import contextlib
+import io
 from pathlib import Path
 
 import numpy as np
 
+from ..base.errors import InputError
+from ..files.atomic import atomic_write
 from ..library.library import Library
 
 # raised whenever the analysis or the stored arrays change
@@ -49,18 +51,11 @@ def save_arrays(library: Library, name: str, arrays: dict[str, np.ndarray]) -> N
     if library.cache_location is None:
         return
     folder, key = library.cache_location
-    try:
+    content = io.BytesIO()
+    np.savez(content, of=np.frombuffer(_encode_key(key), np.uint8), **arrays)
+    with contextlib.suppress(OSError, InputError):
         Path(folder).mkdir(parents=True, exist_ok=True)
-        # write to a temporary file in the same folder, then rename: readers never see half a file
-        handle, temporary = tempfile.mkstemp(suffix=".part", dir=folder)
-    except OSError:
-        return
-    try:
-        with os.fdopen(handle, "wb") as file:
-            np.savez(file, of=np.frombuffer(_encode_key(key), np.uint8), **arrays)
-        os.replace(temporary, Path(folder) / f"{name}.npz")
-    except OSError:
-        Path(temporary).unlink(missing_ok=True)
+        atomic_write(Path(folder) / f"{name}.npz", content.getvalue())
 
 
 def _encode_key(key: str) -> bytes:

@@ -22,7 +22,7 @@ TABLES = {
     "library.learn": (Setting(name="least", default=0.5, least=0.0, most=1.0, expected="a number from {least} to "
                               "{most}", option="--least",
                               help="lowest confidence of a proposal (default %(default)g)"),),
-    "mirror": (Setting(name="unit", kind=float, option="--unit", **POSITIVE),),
+    "mirror": (Setting(name="unit", kind=float, option="--unit", help="metres per unit of IN.bvh", **POSITIVE),),
     "retarget": (
         Setting(name="unit", kind=float, option="--unit", help="metres per unit of IN.bvh", **POSITIVE),
         Setting(name="to_unit", kind=float, option="--to-unit", help="metres per unit of SKELETON.bvh", **POSITIVE),

@@ -49,7 +49,7 @@ TABLES = {
         Setting(name="radius", kind=float, least=0.005, most=0.5, unit="metres", option="--ball-radius",
                 help="of a ball with a marker", tooltip="Radius of the ball; 0 fits it to a marker on the ball, or "
                 "uses that of the ball's kind", precision=4, panel_more=dict(default=0.0, min=0.0)),
-        Setting(name="ball", default="baseball", choices=BALL_CHOICES, option="--ball-kind"),
+        Setting(name="ball", default="baseball", choices=BALL_CHOICES, option="--ball-kind", help="the ball"),
         Setting(name="hold_ball", default=False, option="--hold-ball", help="use the ball's marker for the pose until "
                 "the release"),
         Setting(name="release", default="auto", choices=("auto", "yes", "no"), option="--release",

@@ -34,8 +34,9 @@ TABLES = {
         Setting(name="scene", kind=Path, option="--scene", metavar="FILE", help="write players, ball and pitch to one "
                 "file; inside Blender: .blend, .fbx, .glb, .usdc"),
         Setting(name="figures", default=True, option="--no-figures", help="write no reports, provenance and page"),
-        Setting(name="fps", default=30.0, least=1.0, most=480.0, unit="frames per second", option="--fps"),
-        Setting(name="seed", default=0, least=0, most=2**31 - 1, option="--seed"),
+        Setting(name="fps", default=30.0, least=1.0, most=480.0, unit="frames per second", option="--fps",
+                help="frames per second of the motion; default 30"),
+        Setting(name="seed", default=0, least=0, most=2**31 - 1, option="--seed", help="seed of the players' habits"),
         Setting(name="nearest", default=True, option="--exact", help="a player fails if the library lacks labels, "
                 "instead of using the nearest ones"),
         Setting(name="watch", default=1.0, least=0.0, most=1.0, expected=BETWEEN, option="--watch", metavar="SHARE",

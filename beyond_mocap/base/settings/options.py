@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 import contextlib
 from functools import partial
+from pathlib import Path
 from typing import Any
 
 from . import list_settings
@@ -41,7 +42,8 @@ def option_values(record: type, options: argparse.Namespace, *groups: str) -> di
 def _build_arguments(row: Setting) -> dict:
     """Build the arguments of `add_argument` for a setting."""
     more = {name: value for name, value in row.option_more.items() if name not in ("least", "most")}
-    out = {"dest": row.name, "help": row.help, "default": [] if row.kind is tuple else row.default}
+    tooltip = row.tooltip[:1].lower() + row.tooltip[1:].replace("%", "%%")
+    out = {"dest": row.name, "help": row.help or tooltip or None, "default": [] if row.kind is tuple else row.default}
     if row.kind is bool:
         return {**out, "action": "store_false" if row.default else "store_true", **more}
     if row.choices:
@@ -52,8 +54,25 @@ def _build_arguments(row: Setting) -> dict:
     return {**out, "metavar": row.metavar or unit, **more}
 
 
+def parse_path(text: str) -> Path:
+    """Parse an option that names a file or a folder; an empty one would mean the current folder.
+
+    Args:
+        text: the option's text.
+    Returns:
+        The path.
+    Raises:
+        ArgumentTypeError: if the text is empty.
+    """
+    if not text.strip():
+        raise argparse.ArgumentTypeError("no file or folder is named")
+    return Path(text)
+
+
 def _build_value_parser(row: Setting):
     """Build the function that parses an option's text into the setting's value."""
+    if row.kind is Path:
+        return parse_path
     least, most = (row.option_more.get(name, getattr(row, name)) for name in ("least", "most"))
     return row.kind if least is None else partial(parse_number, row=row, least=least, most=most)
 

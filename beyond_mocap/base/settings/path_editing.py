@@ -72,8 +72,9 @@ TABLES = {
         Setting(name="ground", kind=Path, option="--ground", metavar="HILL.obj", help="a mesh as ground for the "
                 "feet: metres, Y up"),
         Setting(name="live", default=True, tooltip="Update the motion while the curve and these settings are edited"),
-        Setting(name="report", kind=Path, option="--report", metavar="R.json"),
-        Setting(name="provenance", kind=Path, option="--provenance", metavar="P.csv"),
+        Setting(name="report", kind=Path, option="--report", metavar="R.json", help="write all figures to this file"),
+        Setting(name="provenance", kind=Path, option="--provenance", metavar="P.csv",
+                help="which frame each frame is from"),
         Setting(name="unit", kind=float, option="--unit", help="metres per unit of IN.bvh", **POSITIVE),
     ),
     "path.new_curve": (

@@ -8,10 +8,11 @@ from .setting import Setting
 TABLES = {
     "study.order": (
         Setting(name="raters", kind=int, least=1, most=1000, option="--raters", metavar="N",
-                option_more=dict(required=True)),
+                help="how many people rate", option_more=dict(required=True)),
         Setting(name="out", kind=Path, option="--out", metavar="FOLDER", help="a new or empty folder",
                 option_more=dict(required=True)),
-        Setting(name="seed", default=0, least=0, most=2**31 - 1, option="--seed"),
+        Setting(name="seed", default=0, least=0, most=2**31 - 1, option="--seed",
+                help="seed of the order of the clips"),
         Setting(name="pairs", default=False, option="--pairs", help="compare two clips at a time instead of rating "
                 "each"),
         Setting(name="copy", default=False, option="--copy", help="copy movies under their neutral names"),

@@ -30,7 +30,7 @@ TABLES = {
                 "handball, volleyball, football, paper", tooltip="Kind of ball, which determines its flight",
                 option_more=dict(choices=None), panel_more=dict(default="usual")),
         Setting(name="ball", kind=Path, option="--ball", metavar="B.csv", help="file for the ball's trajectory"),
-        Setting(name="report", kind=Path, option="--report", metavar="R.json"),
+        Setting(name="report", kind=Path, option="--report", metavar="R.json", help="write all figures to this file"),
         Setting(name="seed", default=0, least=0, most=2**31 - 1, option="--seed", help="selects another motion with "
                 "the same target; default %(default)s", tooltip="Choose another motion with the same target by another "
                 "number", panel_more=dict(max=None)),
@@ -44,7 +44,8 @@ TABLES = {
                 "or these settings change, until it is applied"),
     ),
     "throw.train": (
-        Setting(name="action", default="throw", choices=("throw", "kick"), option="--action"),
+        Setting(name="action", default="throw", choices=("throw", "kick"), option="--action",
+                help="what the networks learn"),
         Setting(name="config", kind=Path, option="--config", metavar="C.json", help="sizes and rates of the training; "
                 "default: those of the weights that are included"),
         Setting(name="subject", default=(), option="--subject", metavar="S", help="train on this subject only; "
@@ -63,7 +64,8 @@ TABLES = {
     "throw.evaluate": (
         Setting(name="subject", default=(), option="--subject", metavar="S", help="evaluate this subject only; "
                 "repeatable", option_more=dict(action="append")),
-        Setting(name="report", kind=Path, option="--report", metavar="R.json", option_more=dict(required=True)),
+        Setting(name="report", kind=Path, option="--report", metavar="R.json",
+                help="write all figures to this file", option_more=dict(required=True)),
         Setting(name="html", kind=Path, option="--html", metavar="R.html", help="file for the report as an HTML page"),
         Setting(name="raw", default=False, option="--raw", help="networks alone: no pose iterations, no inverse "
                 "kinematics"),
@@ -72,7 +74,8 @@ TABLES = {
                 help="maximum number for each subject, evenly selected"),
     ),
     "throw.examples": (
-        Setting(name="action", default="throw", choices=("throw", "kick"), option="--action"),
+        Setting(name="action", default="throw", choices=("throw", "kick"), option="--action",
+                help="what the networks learn"),
         Setting(name="subjects", default=4, least=1, most=1000, expected="{least} to {most} subjects",
                 option="--subjects", metavar="N", help="number of subjects; default %(default)s"),
         Setting(name="throws", default=40, least=1, most=10000, expected="{least} to {most} for each subject",

@@ -22,6 +22,10 @@ POSITIONS = ("Xposition", "Yposition", "Zposition")
 ROTATIONS = ("Xrotation", "Yrotation", "Zrotation")
 _CHANNELS = {name.lower(): name for name in POSITIONS + ROTATIONS}
 _LARGEST_ANGLE = 1e7  # degrees; larger values are damaged
+_LARGEST_POSITION = 1e9  # 1000 km in millimetres
+_MOST_JOINTS = 2000  # bodies with fingers and faces have some hundreds
+MAX_BYTES = 2_000_000_000
+"""Largest BVH file: 90 minutes of a body with fingers at 240 frames per second are about 1 GB."""
 _EXPORT_AGAIN = "export the file again"
 _DAMAGED = f"the file is truncated or damaged; {_EXPORT_AGAIN}"
 
@@ -68,7 +72,7 @@ def read_bvh_text(path) -> BvhText:
         InputError: with the line, if it is missing, truncated, damaged or not BVH.
     """
     path = Path(path)
-    return parse_bvh_text(path, _read_content(path))
+    return parse_bvh_text(path, read_content(path))
 
 
 def parse_bvh_text(path: Path, data: bytes) -> BvhText:
@@ -97,19 +101,26 @@ def parse_bvh_text(path: Path, data: bytes) -> BvhText:
             f"{path}:{line}", f"{format_count(len(values), 'row')} of motion", f"{frames}, the number after Frames:",
             f"the file is {'truncated' if len(values) < frames else 'damaged'}; {_EXPORT_AGAIN}",
         )
-    _check_angles(path, joints, values, line)
+    _check_sizes(path, joints, values, line)
     return joints.build_text(frame_time, values, line)
 
 
-def _read_content(path: Path) -> bytes:
-    """Read the file's bytes with unified line ends; InputError if it cannot be read or is not BVH."""
-    data = read_bytes(path, "a BVH file")
+def read_content(path: Path) -> bytes:
+    """Read the bytes of a BVH file.
+
+    Args:
+        path: the file.
+    Returns:
+        The bytes with unified line ends.
+    Raises:
+        InputError: if it cannot be read or is not BVH.
+    """
+    data = read_bytes(path, "a BVH file", MAX_BYTES)
+    data = data.removeprefix(b"\xef\xbb\xbf")
     if not data or data.isspace():
         raise InputError(path, "the file is empty", "a BVH file", _EXPORT_AGAIN)
-    if data.startswith(b"\xef\xbb\xbf"):
-        data = data[3:]
     if b"\0" in data or not re.match(rb"\s*HIERARCHY\b", data, re.I):
-        first = "binary content" if b"\0" in data else f"starts with {_decode(data[:12].split()[0])!r}"
+        first = "binary content" if b"\0" in data else f"starts with {_decode(data.lstrip()[:12].split()[0])!r}"
         raise InputError(f"{path}:1", first, "HIERARCHY at the start", "choose a BVH file")
     return data.replace(b"\r\n", b"\n").replace(b"\r", b"\n") if b"\r" in data else data
 
@@ -200,6 +211,8 @@ class _HierarchyParser:
             return words[stop:]
         if not name:
             raise self._build_error(f"{keyword} without a name", f"{keyword} and a name")
+        if len(self.names) == _MOST_JOINTS:
+            raise self._build_error(f"more than {_MOST_JOINTS} joints", "the skeleton of a body")
         self.stack.append(len(self.names))
         self.names.append(self._make_unique(name))
         self.parents.append(parent)
@@ -217,8 +230,8 @@ class _HierarchyParser:
 
     def _parse_offset(self, words: list[str]) -> list[str]:
         numbers = [_parse_number(word) for word in words[1:4]]
-        if len(numbers) < 3 or None in numbers:
-            raise self._build_error(f"{' '.join(words)[:60]!r}", "OFFSET and three numbers")
+        if len(numbers) < 3 or any(number is None or abs(number) > _LARGEST_POSITION for number in numbers):
+            raise self._build_error(f"{' '.join(words)[:60]!r}", "OFFSET and three numbers of normal size")
         if not self.stack:
             raise self._build_error("OFFSET outside of a joint", "ROOT first")
         if self.stack[-1] is None:
@@ -301,7 +314,7 @@ def _parse_rows(path: Path, text: bytes, columns: int, line: int) -> np.ndarray:
     raise _build_row_error(path, text, columns, line)
 
 
-def _check_angles(path: Path, joints: _HierarchyParser, values: np.ndarray, line: int) -> None:
+def _check_sizes(path: Path, joints: _HierarchyParser, values: np.ndarray, line: int) -> None:
     if max(values.max(), -values.min()) <= _LARGEST_ANGLE:
         return
     names = [f"{name} {c}" for name, channels in zip(joints.names, joints.channels) for c in channels]
@@ -309,6 +322,9 @@ def _check_angles(path: Path, joints: _HierarchyParser, values: np.ndarray, line
         if names[column].endswith("rotation"):
             found = f"{values[row, column]:.3g} degrees in {names[column]}, frame {row}"
             raise InputError(f"{path}:{line + row}", found, "an angle", _EXPORT_AGAIN)
+        if abs(values[row, column]) > _LARGEST_POSITION:
+            found = f"a position beyond 1000 km in {names[column]}, frame {row}"
+            raise InputError(f"{path}:{line + row}", found, "a person's motion", _EXPORT_AGAIN)
 
 
 def _build_row_error(path: Path, text: bytes, columns: int, line: int) -> InputError:

@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+import contextlib
+import json
 import logging
+import os
 import re
 import warnings
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TypeVar
+from xml.parsers import expat
 
 from ...base.errors import InputError
 from ...base.optional_packages import import_optional
@@ -148,12 +152,48 @@ def load_with_kloppy(path: Path, provider: str, loader: str, arguments: Mapping,
         InputError: if kloppy is not installed or cannot read the files.
     """
     module = import_optional(f"kloppy.{provider}", path)
-    logging.getLogger("kloppy").addHandler(logging.NullHandler())  # its output is covered by our own messages
     try:
-        with warnings.catch_warnings():
+        with warnings.catch_warnings(), _silence_logging():
             warnings.simplefilter("ignore")
             return getattr(module, loader)(**arguments)
     except Exception as error:  # kloppy's parsers raise many kinds of errors
         is_plain = type(error).__module__.startswith("kloppy")  # others are of use to kloppy's developers only
-        found = f"not readable as {expected}" + f" ({str(error)[:120]})" * is_plain
+        reason = _find_syntax_error(arguments.values()) or (str(error)[:120] if is_plain else "")
+        found = f"not readable as {expected}" + (f" ({reason})" if reason else "")
         raise InputError(path, found, f"{expected}{others}", "check the files, and the provider") from None
+
+
+@contextlib.contextmanager
+def _silence_logging() -> Iterator[None]:
+    """Context manager: nothing is logged, also not by the root logger; our own messages cover what kloppy logs."""
+    before = logging.root.manager.disable
+    logging.disable(logging.CRITICAL)
+    try:
+        yield
+    finally:
+        logging.disable(before)
+
+
+def _find_syntax_error(files: Iterable) -> str:
+    """Find the first of some JSON and XML files that is damaged: its name, the line and what is wrong there; "" if all
+    are well-formed.
+    """
+    for path in (Path(file) for file in files if isinstance(file, (str, os.PathLike)) and Path(file).is_file()):
+        try:
+            if path.suffix.lower() == ".json":
+                json.loads(path.read_bytes())
+            elif path.suffix.lower() == ".xml":
+                _check_xml(path)
+        except json.JSONDecodeError as error:
+            return f"{path}:{error.lineno}: {error.msg.lower()} at column {error.colno}"
+        except expat.ExpatError as error:
+            return f"{path}:{error.lineno}: {expat.ErrorString(error.code)} at column {error.offset + 1}"
+        except (ValueError, OSError, RecursionError):
+            return f"{path}: damaged"
+    return ""
+
+
+def _check_xml(path: Path) -> None:
+    """Parse an XML file without building anything; ExpatError where it is not well-formed."""
+    with open(path, "rb") as file:
+        expat.ParserCreate().ParseFile(file)

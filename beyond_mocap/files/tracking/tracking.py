@@ -5,15 +5,18 @@ In the core: metres from the pitch's centre, x along its length, y to the left o
 
 from __future__ import annotations
 
+import contextlib
 import hashlib
 import io
 import os
+import re
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 
 from ...base.errors import InputError, format_count
+from ...base.user_folders import find_user_cache
 from ...motion.skeleton import freeze_array
 from ...motion.track import Track
 from ...motion.track.match_data import REFEREE, Match, MatchPlayer, Team, describe_presence
@@ -40,6 +43,8 @@ RATES = (5.0, 100.0)
 
 _BALL = ("ball_x_m", "ball_y_m", "ball_z_m")
 _CACHE_VERSION = 3
+_CACHE_BYTES = 4_000_000_000  # of all matches in the cache, some 40
+_CACHE_NAME = re.compile(r"[0-9a-f]{40}\.npz")
 _ARRAY_NAMES = ("times", "positions", "ball", "players", "pitch", "periods", "teams", "lines")
 
 
@@ -114,11 +119,13 @@ def read_match(
         InputError: if files are missing, invalid or not of one match, or without kloppy.
     """
     feed, notes = find_feed(path, meta, provider)
-    cache = _choose_cache_folder(cache_dir) / f"{_compute_key(feed, pitch)}.npz"
-    arrays = _load_cache(cache)
+    folder = Path(cache_dir) if cache_dir is not None else _find_cache_folder()
+    cache = folder / f"{_compute_key(feed, pitch)}.npz" if folder else None
+    arrays = _load_cache(cache) if cache else None
     if arrays is None:
         arrays = _read_arrays(feed, pitch)
-        _save_cache(cache, arrays, notes)
+        if cache:
+            _save_cache(cache, arrays, notes)
     return _build_match(arrays, feed, notes)
 
 
@@ -196,11 +203,10 @@ def _build_match(arrays: dict[str, np.ndarray], feed: Feed, notes: list[str]) ->
     return replace(match, report=(*notes, *arrays["lines"].tolist(), *describe_presence(match)))
 
 
-def _choose_cache_folder(folder: str | os.PathLike | None) -> Path:
-    if folder is not None:
-        return Path(folder)
-    home = os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache"
-    return Path(home) / "beyond_mocap" / "tracking"
+def _find_cache_folder() -> Path | None:
+    """Find the user's cache of tracking data; None for a user without a home."""
+    base = find_user_cache()
+    return base and base / "tracking"
 
 
 def _compute_key(feed: Feed, pitch: tuple[float, float] | None) -> str:
@@ -217,6 +223,8 @@ def _load_cache(cache: Path) -> dict[str, np.ndarray] | None:
     try:
         with np.load(cache, allow_pickle=False) as stored:
             arrays = {name: stored[name] for name in _ARRAY_NAMES}
+        with contextlib.suppress(OSError):
+            os.utime(cache)  # matches in use stay the longest
     except Exception:  # zipfile, zlib and numpy raise many kinds of errors for damaged files
         return None
     count, player_count = arrays["times"].size, arrays["players"].size // 5
@@ -233,5 +241,16 @@ def _save_cache(cache: Path, arrays: dict[str, np.ndarray], notes: list[str]) ->
     try:
         cache.parent.mkdir(parents=True, exist_ok=True)
         atomic_write(cache, content.getvalue())
+        _prune_cache(cache)
     except (OSError, InputError):
         notes.append(f"{cache.parent} is not writable, so nothing is cached for the next time")
+
+
+def _prune_cache(newest: Path) -> None:
+    """Remove the matches that were not read for the longest time, until the others have _CACHE_BYTES at most."""
+    found = [(path.stat(), path) for path in newest.parent.iterdir() if _CACHE_NAME.fullmatch(path.name)]
+    size = 0
+    for status, path in sorted(found, key=lambda one: (one[1] != newest, -one[0].st_mtime_ns, one[1].name)):
+        size += status.st_size
+        if size > _CACHE_BYTES and path != newest:
+            path.unlink(missing_ok=True)

@@ -4,8 +4,6 @@ of a window is saved in a file (never pickled).
 
 from __future__ import annotations
 
-import io
-import json
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -13,12 +11,12 @@ from pathlib import Path
 import numpy as np
 
 from ...annotation.ball_contact import build_surfaces
-from ...files.atomic import atomic_write
 from ...library.features import FPS
 from ...library.library import Library
 from ...motion.motion import Motion
 from ...synthesis.take import Take
 from ..match_ball import apply_led_ball, find_led_ball, lead_ball_between_players, restore_ball_contact, sample_ball
+from ..piece_file import read_piece_file, write_piece_file
 from ..pieces.named_edit import cut_named_edit
 from ..pieces.units import cut_plan
 from ..player_edit import PlayerEdit, Stretch
@@ -151,24 +149,21 @@ def save_parts(path: Path, parts: Sequence[PlayerCorrection]) -> None:
         arrays |= {f"{number}.{name}": getattr(part, name) for name in _ARRAYS}
         arrays |= {f"{number}.knots": part.correction.knots, f"{number}.values": part.correction.values}
     header = [[part.correction.fps, part.correction.step, part.before] for part in parts]
-    out = io.BytesIO()
-    np.savez_compressed(out, header=np.frombuffer(json.dumps(header).encode(), np.uint8), **arrays)
-    atomic_write(path, out.getvalue())
+    write_piece_file(path, header, arrays)
 
 
 def load_parts(path: Path) -> tuple[PlayerCorrection, ...] | None:
     """Load the results that `save_parts` wrote; None if there is no complete file."""
-    try:
-        with np.load(path, allow_pickle=False) as arrays:
-            header = json.loads(arrays["header"].tobytes())
-            return tuple(
-                PlayerCorrection(
-                    correction=Correction(arrays[f"{number}.knots"], arrays[f"{number}.values"], fps, step),
-                    before=before, **{name: arrays[f"{number}.{name}"] for name in _ARRAYS},
-                ) for number, (fps, step, before) in enumerate(header)
-            )  # fmt: skip
-    except Exception:  # a damaged file can raise any error of zipfile, zlib, numpy or this package
+    found = read_piece_file(path)
+    if found is None:
         return None
+    header, arrays = found
+    return tuple(
+        PlayerCorrection(
+            correction=Correction(arrays[f"{number}.knots"], arrays[f"{number}.values"], fps, step),
+            before=before, **{name: arrays[f"{number}.{name}"] for name in _ARRAYS},
+        ) for number, (fps, step, before) in enumerate(header)
+    )  # fmt: skip
 
 
 def _compute_firmness(take: Take) -> np.ndarray:

@@ -7,8 +7,6 @@ at the transition with the lowest cost in the overlap.
 
 from __future__ import annotations
 
-import io
-import json
 import time
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import asdict, dataclass, replace
@@ -17,7 +15,6 @@ from pathlib import Path
 import numpy as np
 
 from ...base.errors import InputError, TimedMessage, line_spans
-from ...files.atomic import atomic_write
 from ...library.automatic_locomotion import apply_chosen_gaits
 from ...library.features import FPS
 from ...library.library import Library
@@ -30,6 +27,7 @@ from ...synthesis.search.path_search import PathSearch
 from ...synthesis.search.request import build_request
 from ...synthesis.search.slots import MIN_KEY_MARGIN
 from ...synthesis.search_library import find_plan_actions
+from ..piece_file import read_piece_file, write_piece_file
 from ..player_edit import WINDOW_SECONDS, PlayerEdit, Stretch, to_stored_plan
 from .named_edit import (
     CONTINUITY_TOLERANCE,
@@ -130,25 +128,20 @@ def save_piece(path: Path, piece: Piece) -> None:
     header = {name: getattr(piece, name) for name in _PLAIN}
     header |= {"hurried": piece.hurried_from, "warnings": [[str(line), line_spans(line)] for line in piece.warnings]}
     header |= {"clips": piece.edit.clips, "keys": [asdict(key) for key in piece.edit.keys]}
-    out = io.BytesIO()
-    arrays = {name: getattr(piece.edit, name) for name in _ARRAYS}
-    np.savez_compressed(out, header=np.frombuffer(json.dumps(header).encode(), np.uint8), **arrays)
-    atomic_write(path, out.getvalue())
+    write_piece_file(path, header, {name: getattr(piece.edit, name) for name in _ARRAYS})
 
 
 def load_piece(path: Path) -> Piece | None:
     """Load the piece that `save_piece` wrote; None if there is no complete file."""
-    try:
-        with np.load(path, allow_pickle=False) as file:
-            header = json.loads(file["header"].tobytes())
-            arrays = {name: file[name] for name in _ARRAYS}
-        keys = tuple(NamedKey(**{**key, "words": tuple(key["words"])}) for key in header.pop("keys"))
-        clips = tuple((path, mirrored) for path, mirrored in header.pop("clips"))
-        warnings = tuple(TimedMessage(text, *spans) for text, spans in header["warnings"])
-        header |= {"own": tuple(header["own"]), "warnings": warnings, "hurried_from": header.pop("hurried")}
-        return Piece(edit=NamedEdit(clips=clips, **arrays, keys=keys), **header)
-    except Exception:  # a damaged file can raise any error of zipfile, zlib, numpy or this package
+    found = read_piece_file(path)
+    if found is None:
         return None
+    header, arrays = found
+    keys = tuple(NamedKey(**{**key, "words": tuple(key["words"])}) for key in header.pop("keys"))
+    clips = tuple((path, mirrored) for path, mirrored in header.pop("clips"))
+    warnings = tuple(TimedMessage(text, *spans) for text, spans in header["warnings"])
+    header |= {"own": tuple(header["own"]), "warnings": warnings, "hurried_from": header.pop("hurried")}
+    return Piece(edit=NamedEdit(clips=clips, **arrays, keys=keys), **header)
 
 
 @dataclass(frozen=True)

@@ -196,9 +196,9 @@ def read_hierarchy(path) -> str:
     """
     from ...files.bvh import bvh_text
 
-    bvh_text.read_bvh_text(path)
-    text = Path(path).read_text("utf-8", "replace").replace("\r\n", "\n").replace("\r", "\n")
-    return re.split(r"(?im)^[ \t]*MOTION\b", text.removeprefix("\ufeff"))[0].strip()
+    data = bvh_text.read_content(Path(path))
+    bvh_text.parse_bvh_text(Path(path), data)
+    return re.split(r"(?im)^[ \t]*MOTION\b", data.decode("utf-8", "replace"))[0].strip()
 
 
 def _parse_hierarchy(text: str, values: np.ndarray | None) -> BvhText:

@@ -1,5 +1,6 @@
 """Tracking in: the contract's CSV, and providers' files through kloppy and their cache."""
 
+import os
 import pathlib
 import sys
 import types
@@ -11,7 +12,7 @@ from hypothesis import strategies as st
 
 from beyond_mocap.base.errors import InputError
 from beyond_mocap.cli.main import main
-from beyond_mocap.files.tracking import tracking
+from beyond_mocap.files.tracking import feed, tracking
 from beyond_mocap.files.tracking.feed import TrackingProvider
 from beyond_mocap.files.tracking.providers import PROVIDERS
 from beyond_mocap.files.tracking.tracking import read_match, read_track_csv
@@ -328,3 +329,22 @@ def test_a_real_match_is_the_same_in_two_layouts(tmp_path):
     np.testing.assert_allclose(tracab.positions, metrica.positions, atol=0.01)
     np.testing.assert_allclose(tracab.ball[:, :2], metrica.ball[:, :2], atol=0.01)
     np.testing.assert_allclose(tracab.times, metrica.times, atol=1e-6)
+
+
+def test_the_cache_keeps_what_was_read_last(tmp_path, monkeypatch):
+    monkeypatch.setattr(tracking, "_CACHE_BYTES", 250)
+    for age, name in enumerate(("a", "b", "c")):
+        (tmp_path / f"{name * 40}.npz").write_bytes(b"x" * 100)
+        os.utime(tmp_path / f"{name * 40}.npz", (1000 - age, 1000 - age))
+    (tmp_path / "mine.npz").write_bytes(b"x" * 1000)
+    tracking._prune_cache(tmp_path / f"{'c' * 40}.npz")  # the newest stays, though its time is the oldest
+    assert sorted(path.name[0] for path in tmp_path.iterdir()) == ["a", "c", "m"]
+
+
+def test_a_damaged_xml_or_json_is_told_with_its_line(tmp_path):
+    (tmp_path / "meta.xml").write_text("<match>\n<a></b>\n</match>")
+    (tmp_path / "meta.json").write_text('{"a": 1,\n "b": }')
+    assert "meta.xml:2: mismatched tag at column" in feed._find_syntax_error([str(tmp_path / "meta.xml")])
+    assert "meta.json:2: expecting value at column 7" in feed._find_syntax_error([None, str(tmp_path / "meta.json")])
+    (tmp_path / "meta.json").write_text("{}")
+    assert feed._find_syntax_error([str(tmp_path / "meta.json"), "x", 3]) == ""

@@ -1,0 +1,164 @@
+"""Inputs, disks and machines that are not as they should be: one line, the contract's status, no traceback."""
+
+import argparse
+import os
+import shutil
+import signal
+import subprocess
+import sys
+import threading
+from pathlib import Path
+
+import pytest
+
+from beyond_mocap.base import content, user_folders
+from beyond_mocap.cli.main import build_parser, main
+from beyond_mocap.files.bvh import bvh
+from beyond_mocap.files.file_names import avoid_reserved_name
+
+TOP = Path(__file__).resolve().parents[3]
+WALK = TOP / "sample_blend" / "library" / "walking_1_2.bvh"
+POSIX = pytest.mark.skipif(os.name == "nt", reason="Windows has no such pipes, devices and signals")
+
+
+@pytest.fixture
+def told(capfd):
+    """told(*arguments) -> status and the one line on standard error."""
+
+    def call(*arguments):
+        capfd.readouterr()
+        status = main([str(argument) for argument in arguments])
+        lines = capfd.readouterr().err.splitlines()
+        assert len(lines) == 1 and "Traceback" not in lines[0], lines
+        return status, lines[0]
+
+    return call
+
+
+def run_python(code: str, **more):
+    return subprocess.run([sys.executable, "-c", code], cwd=TOP, capture_output=True, text=True, timeout=120, **more)
+
+
+def swap_names(path: Path, one: str, other: str) -> Path:
+    """A walk in which two joints have exchanged names."""
+    text = WALK.read_text().replace(f"JOINT {one}\n", "JOINT -\n").replace(f"JOINT {other}\n", f"JOINT {one}\n")
+    path.write_text(text.replace("JOINT -\n", f"JOINT {other}\n"))
+    return path
+
+
+@pytest.mark.parametrize("verb", ["evaluate", "mirror"])
+def test_a_knee_that_is_not_below_its_thigh_is_told_with_the_file(told, tmp_path, verb):
+    bad = swap_names(tmp_path / "bad.bvh", "LeftLeg", "LeftArm")
+    more = ["--report", tmp_path / "r.json"] if verb == "evaluate" else [tmp_path / "out.bvh"]
+    status, line = told(verb, bad, *more)
+    assert status == 2 and "bad.bvh" in line and "LeftLeg (left lower_leg) does not hang below LeftUpLeg" in line
+
+
+def test_exchanged_names_of_legs_do_not_count_against_their_structure(tmp_path):
+    crossed = bvh.read_bvh(swap_names(tmp_path / "crossed.bvh", "LeftLeg", "RightLeg")).motion
+    assert estimate_legs(crossed) == estimate_legs(bvh.read_bvh(WALK).motion)
+
+
+def estimate_legs(motion):
+    from beyond_mocap.motion.humanoid import identify_joints
+
+    body = identify_joints(motion.skeleton)
+    return [(limb.upper_leg, limb.lower_leg, limb.foot) for limb in (body.left, body.right)]
+
+
+@POSIX
+def test_a_device_without_an_end_is_refused(told, tmp_path, monkeypatch):
+    monkeypatch.setattr(content, "MAX_STREAM_BYTES", 1 << 16)
+    status, line = told("mirror", "/dev/zero", tmp_path / "out.bvh")
+    assert status == 2 and "/dev/zero: has no end within" in line
+
+
+def test_too_little_memory_is_one_line(told, tmp_path, monkeypatch):
+    def fail(*_):
+        raise MemoryError
+
+    monkeypatch.setattr(bvh, "read_bvh", fail)
+    status, line = told("mirror", WALK, tmp_path / "out.bvh")
+    assert status == 2 and "not enough memory" in line
+
+
+@POSIX
+def test_a_program_that_opens_a_pipe_and_stays_silent_can_be_left(told, tmp_path):
+    os.mkfifo(tmp_path / "pipe.bvh")
+    writer = os.open(tmp_path / "pipe.bvh", os.O_RDWR)
+    threading.Timer(1.0, os.kill, [os.getpid(), signal.SIGTERM]).start()
+    status, line = told("mirror", tmp_path / "pipe.bvh", tmp_path / "out.bvh")
+    os.close(writer)
+    assert status == 130 and "cancelled" in line
+
+
+@POSIX
+def test_ctrl_c_while_packages_are_loaded_is_one_line():
+    code = """
+import runpy, signal, sys
+class Interrupt:
+    def find_spec(self, name, *_):
+        if name == "beyond_mocap.cli.main":
+            signal.raise_signal(signal.SIGINT)
+sys.meta_path.insert(0, Interrupt())
+runpy.run_module("beyond_mocap", run_name="__main__")
+"""
+    done = run_python(code)
+    assert (done.returncode, done.stderr) == (130, "beyond-mocap: cancelled\n")
+
+
+@pytest.mark.skipif(not os.path.exists("/dev/full"), reason="this system has no full device")
+def test_a_full_disk_below_standard_output_is_named(tmp_path):
+    command = [sys.executable, "-m", "beyond_mocap", "mirror", str(WALK), str(tmp_path / "out.bvh")]
+    with open("/dev/full", "w") as full:
+        done = subprocess.run(command, cwd=TOP, stdout=full, stderr=-1, text=True, timeout=120)
+    lines = [line for line in done.stderr.splitlines() if not line.startswith("note: ")]
+    assert done.returncode == 2 and len(lines) == 1 and "standard output" in lines[0] and "No space" in lines[0]
+
+
+def test_a_user_without_a_home_has_no_cache_folder(monkeypatch):
+    for name in ("LOCALAPPDATA", "XDG_CACHE_HOME"):
+        monkeypatch.delenv(name, raising=False)
+    monkeypatch.setattr(os.path, "expanduser", lambda path: path)  # as of a number without an entry in passwd
+    assert user_folders.find_user_cache() is None
+    monkeypatch.setenv("XDG_CACHE_HOME", "/somewhere")
+    assert user_folders.find_user_cache() == Path("/somewhere/beyond_mocap")
+
+
+@pytest.mark.parametrize("name", ["CON", "aux", "lpt3"])
+def test_names_that_windows_keeps_are_changed(name):
+    assert avoid_reserved_name(name) == f"_{name}" and avoid_reserved_name(f"{name}x") == f"{name}x"
+
+
+@pytest.mark.parametrize("arguments", [("mirror", "", "o.bvh"), ("mirror", WALK, ""), ("library", "x", "--cache", "")])
+def test_an_empty_name_is_told_as_one(told, arguments):
+    status, line = told(*arguments)
+    assert status == 2 and "no file or folder is named" in line
+
+
+def iter_options(parser):
+    for action in parser._actions:
+        if isinstance(action, argparse._SubParsersAction):
+            for verb in action.choices.values():
+                yield from iter_options(verb)
+        else:
+            yield parser, action
+
+
+def test_every_option_has_a_help_text_and_every_page_names_the_documents():
+    options = list(iter_options(build_parser()))
+    assert [f"{parser.prog} {action.dest}" for parser, action in options if not action.help] == []
+    assert "docs/reference/commands.md" in build_parser().format_help()
+
+
+def test_texts_with_labels_beside_no_recording_are_told(tmp_path, capfd):
+    shutil.copy(WALK, tmp_path / "walk.bvh")
+    (tmp_path / "wlak.txt").write_text("0 2 walking\n")
+    (tmp_path / "README.txt").write_text("These recordings are ours.\n")
+    assert main(["library", str(tmp_path)]) == 0
+    assert "1 text with labels beside no recording of the name, such as wlak.txt" in capfd.readouterr().out
+
+
+def test_no_package_is_advised_that_no_index_has():
+    advice, sources = "install 'beyond-mocap", (TOP / "beyond_mocap").rglob("*.py")
+    assert [path for path in sources if advice in path.read_text("utf-8")] == []

@@ -1,0 +1,197 @@
+"""Kill library builds, matches and trainings at random moments and resume them: `make kill-test`.
+
+After a SIGKILL no file with a final name is half-written. After some kills the command runs to its end: what was left
+must not stop it, no temporary file may remain, and the bits are those of a run that nothing interrupted.
+"""
+
+import argparse
+import hashlib
+import json
+import os
+import random
+import shutil
+import signal
+import subprocess
+import sys
+import tempfile
+import time
+import zipfile
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+TOP = Path(__file__).resolve().parents[2]
+SAMPLE = TOP / "sample_blend"
+KILLS_IN_A_ROW = 4
+_CLIPS = ("walking_1_2", "jogging_2_9", "standing_1", "kick_low_inside", "running_4_2")
+_MATCH = ("--from", "0", "--to", "4", "--workers", "2", "--players", "home_10", "--no-figures")
+_TIMED = ("match.json", "report.json", "report.html", "lock")  # files with times of the run
+
+
+@dataclass(frozen=True)
+class Job:
+    """A command that can be killed. build: folder for its outputs -> the command line."""
+
+    name: str
+    python: Path
+    build: Callable[[Path], list]
+
+
+def list_jobs(base: Path) -> list[Job]:
+    """List the jobs, with their inputs below `base`; a line says what cannot run here."""
+    clips = base / "clips"
+    clips.mkdir()
+    for name in _CLIPS:
+        for ending in (".bvh", ".txt"):
+            shutil.copy(SAMPLE / "library" / (name + ending), clips)
+    small, main = SAMPLE / "match" / "small", Path(sys.executable)
+    jobs = [
+        Job("library", main, lambda out: ["library", clips, "--cache", out]),
+        Job(
+            "match",
+            main,
+            lambda out: [
+                "match",
+                "--tracking",
+                small / "small.dat",
+                "--meta",
+                small / "small_meta.xml",
+                "--library",
+                clips,
+                "--cache",
+                base / "cache",
+                "--out",
+                out,
+                *_MATCH,
+            ],
+        ),
+    ]
+    trainer = TOP / ".venv-training" / "bin" / "python"
+    if not trainer.exists():
+        print("kill-test: no .venv-training; training is skipped (make training)")
+        return jobs
+    run(trainer, ["throw", "examples", "--out", base / "examples", "--subjects", "1", "--throws", "4", "--seed", "0"])
+    return [*jobs, Job("training", trainer, lambda out: _build_training(base / "examples", out / "w.npz"))]
+
+
+def _build_training(examples: Path, weights: Path) -> list:
+    """Build the command of a training, which continues where there is a checkpoint."""
+    kept = weights.with_suffix(".checkpoint.npz")
+    command = ["throw", "train", examples, "--epochs", "40", "--out", weights]
+    return [*command, "--resume"] if kept.exists() else command
+
+
+def start(python: Path, command: list) -> subprocess.Popen:
+    """Start a command in a session of its own."""
+    environment = {**os.environ, "OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1"}
+    return subprocess.Popen(
+        [python, "-m", "beyond_mocap", *map(str, command)],
+        cwd=TOP,
+        env=environment,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.STDOUT,
+        text=True,
+        start_new_session=True,
+    )
+
+
+def run(python: Path, command: list) -> None:
+    """Run a command to its end; SystemExit with its words where it fails."""
+    process = start(python, command)
+    said = process.communicate()[0]
+    if process.returncode:
+        sys.exit(f"kill-test: {' '.join(map(str, command))}: status {process.returncode}: {said}")
+
+
+def run_whole(job: Job, out: Path) -> tuple[dict[str, str], float]:
+    """Run a job that nothing interrupts: digests of its files, and its seconds."""
+    out.mkdir()
+    began = time.time()
+    run(job.python, job.build(out))
+    return read_digests(out), time.time() - began
+
+
+def kill_once(job: Job, out: Path, moment: float) -> None:
+    """Kill a job with all its processes after `moment` seconds, and check what it leaves."""
+    process = start(job.python, job.build(out))
+    try:
+        process.wait(moment)
+    except subprocess.TimeoutExpired:
+        pass
+    try:
+        os.killpg(process.pid, signal.SIGKILL)
+    except ProcessLookupError:
+        pass
+    process.communicate()
+    for path in list_files(out):
+        check_whole(path)
+
+
+def list_files(out: Path) -> list[Path]:
+    """List the files with final names."""
+    return [path for path in sorted(out.rglob("*")) if path.is_file() and not path.name.endswith(".part")]
+
+
+def check_whole(path: Path) -> None:
+    """Check that a file is whole; SystemExit where it is not."""
+    try:
+        if path.suffix == ".npz":
+            with zipfile.ZipFile(path) as archive:
+                assert archive.testzip() is None
+        elif path.suffix == ".json":
+            json.loads(path.read_text())
+        elif path.suffix in (".csv", ".bvh"):
+            assert path.read_bytes().endswith(b"\n")
+    except (AssertionError, ValueError, zipfile.BadZipFile) as error:
+        sys.exit(f"kill-test: {path} is half-written ({error})")
+
+
+def read_digests(out: Path) -> dict[str, str]:
+    """Read the digests of all results by name, without those that contain times of the run."""
+    results = [path for path in list_files(out) if not path.name.endswith(_TIMED) and ".work" not in path.parts]
+    return {str(path.relative_to(out)): hashlib.sha256(path.read_bytes()).hexdigest() for path in results}
+
+
+def test_job(job: Job, base: Path, kills: int, rng: random.Random) -> int:
+    """Kill a job at random moments, and resume it after some kills in a row; return the number of kills."""
+    expected, seconds = run_whole(job, base / f"{job.name}_whole")
+    done = 0
+    while done < kills:
+        out = base / f"{job.name}_{done}"
+        out.mkdir()
+        for _ in range(min(KILLS_IN_A_ROW, kills - done)):
+            kill_once(job, out, rng.uniform(0.0, seconds))
+            done += 1
+        run(job.python, job.build(out))
+        left = [path.name for path in out.rglob("*.part")]
+        if left and job.name == "match":
+            sys.exit(f"kill-test: {job.name}: {left[0]} is left in {out}")
+        if read_digests(out) != expected:
+            keep = TOP / "build" / "killed"
+            shutil.rmtree(keep, ignore_errors=True)
+            shutil.copytree(out, keep)
+            differ = sorted(
+                name for name in {**expected, **read_digests(out)} if expected.get(name) != read_digests(out).get(name)
+            )
+            sys.exit(f"kill-test: {job.name}: {', '.join(differ)[:300]} differ from a run without kills; see {keep}")
+        shutil.rmtree(out)
+        print(f"kill-test: {job.name}: {done} of {kills} kills, same bits", flush=True)
+    return done
+
+
+def main() -> None:
+    """Kill all jobs and say how often."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--kills", type=int, default=100, help="of all jobs together; default 100")
+    parser.add_argument("--seed", type=int, default=int(time.time()), help="of the moments; default: the time")
+    parser.add_argument("--job", action="append", help="only this job: library, match or training")
+    options = parser.parse_args()
+    rng = random.Random(options.seed)
+    with tempfile.TemporaryDirectory(prefix="beyond-mocap-kill-") as folder:
+        jobs = [job for job in list_jobs(Path(folder)) if not options.job or job.name in options.job]
+        counts = [test_job(job, Path(folder), -(-options.kills // len(jobs)), rng) for job in jobs]
+    print(f"kill-test: {sum(counts)} kills of {', '.join(job.name for job in jobs)}, seed {options.seed}: no fault")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,112 @@
+"""Valid files to damage: small ones made from the sample, and those of ../shared where they are."""
+
+import json
+import shutil
+from pathlib import Path
+
+import numpy as np
+
+TOP = Path(__file__).resolve().parents[2]
+SAMPLE, SHARED = TOP / "sample_blend", TOP.parent / "shared" / "data"
+
+TEXTS = {
+    "words.txt": "# a comment\n0 6 walking\n1.5 2.5 dribble right\n3 kick right low\n4f 20f standing\n",
+    "annotations.csv": "file,start_frame,end_frame,key_frame,labels\nwalk.bvh,0,20,,walking\n"
+    "walk.bvh,3,9,6,kick right\n",
+    "pins.csv": "time_s,part,x_m,y_m,z_m,hold_s\n2,gaze,30,0,1.5,0.5\n2.5,left_hand,0,0,1,\n3,ball,1,1,0.2,\n",
+    "headings.csv": "time_s,heading_deg,hold_s,x_m,y_m\n2,120,1,,\n3,,0.5,10,4\n",
+    "ball.csv": "time_s,x_m,y_m,z_m,measured\n" + "".join(f"{t / 10},{t / 9:.3f},0,0.11,1\n" for t in range(40)),
+    "curve.csv": "x_m,y_m\n" + "".join(f"{0.4 * t},{np.sin(t / 4):.3f}\n" for t in range(24)),
+    "provenance.csv": "frame,time_s,clip,clip_frame,mirrored,labels,contact_left,contact_right\n"
+    + "".join(f"{f},{f / 30:.4f},walk.bvh,{f},0,walking,1,0\n" for f in range(24)),
+    "map.json": json.dumps({"Hips": "Hips", "LeftUpLeg": "LeftUpLeg", "Head": "Head"}),
+}
+"""Name -> content of the seeds that are written here."""
+
+SHARED_GROUPS = {
+    "tracab": ("tracab_raw.dat", "tracab_meta.xml"),
+    "tracab_json": ("tracab_raw.json", "tracab_meta.json"),
+    "metrica": ("epts_metrica_tracking.txt", "epts_metrica_metadata.xml"),
+    "skillcorner": ("skillcorner_tracking.jsonl", "skillcorner_meta.json"),
+    "sportec": ("sportec_positional_w_referee.xml", "sportec_meta.xml"),
+    "secondspectrum": ("secondspectrum_tracking_anon.jsonl", "secondspectrum_meta_anon.json"),
+    "statsperform": ("statsperform_tracking_ma25.txt", "statsperform_tracking_ma1.json"),
+    "pff": ("pff_3812.jsonl", "pff_metadata_3812.json", "pff_rosters_3812.json"),
+    "signality": (
+        "signality_p1_raw_data_subset.json",
+        "signality_meta_data.json",
+        "signality_venue_information.json",
+        "signality_p2_raw_data_subset.json",
+    ),
+}
+"""Provider -> its files in ../shared/data/tracking/other, the tracking file first, then the metadata."""
+_LINES = 120  # of large line-based files that are kept
+
+
+def build_seeds(folder: Path) -> dict[str, Path]:
+    """Write the seeds into a folder.
+
+    Args:
+        folder: an empty folder.
+    Returns:
+        Name -> file, or folder of the files of one match, whose first name is the tracking file.
+    """
+    seeds = {}
+    for name, text in TEXTS.items():
+        (folder / name).write_text(text)
+        seeds[name] = folder / name
+    for number, path in enumerate(sorted((SAMPLE / "passes").glob("*.json"))):
+        seeds[f"{number}_scene.json"] = path
+    seeds["events.csv"] = SAMPLE / "match" / "small" / "small_events.csv"
+    seeds["track.csv"] = _cut(SAMPLE / "match" / "player1.csv", folder / "track.csv", 120)
+    seeds["walk.trc"] = _cut(SAMPLE / "markers" / "walk.trc", folder / "walk.trc", 60)
+    seeds["throw.c3d"] = SAMPLE / "markers" / "throw.c3d"
+    seeds["weights.npz"] = TOP / "beyond_mocap" / "throws" / "networks" / "weights" / "throw.npz"
+    seeds["walk.bvh"] = shorten_bvh(SAMPLE / "library" / "walking_1_2.bvh", folder / "walk.bvh", 24)
+    small = SAMPLE / "match" / "small"
+    seeds["match_small"] = _copy_group(folder / "match_small", [small / "small.dat", small / "small_meta.xml"])
+    return {**seeds, **_build_shared_seeds(folder)}
+
+
+def _build_shared_seeds(folder: Path) -> dict[str, Path]:
+    """Write the seeds from ../shared; a line says what is missing."""
+    other, seeds = SHARED / "tracking" / "other", {}
+    for name, files in SHARED_GROUPS.items():
+        if all((other / file).is_file() for file in files):
+            seeds[f"match_{name}"] = _copy_group(folder / f"match_{name}", [other / file for file in files])
+    for path in (
+        SHARED / "mocap" / "getup" / "humanoid3d_run.bvh",
+        SHARED / "mocap" / "bandai" / "dataset-1_run_normal_001.bvh",
+        SHARED / "mocap" / "cmu10" / "10_01.bvh",
+    ):
+        if path.is_file():
+            seeds[path.name] = shorten_bvh(path, folder / path.name, 24)
+    if len(seeds) < len(SHARED_GROUPS) + 3:
+        print(f"fuzz: {len(seeds)} of {len(SHARED_GROUPS) + 3} seeds of {SHARED} are there; the others are skipped")
+    return seeds
+
+
+def _copy_group(folder: Path, files: list[Path]) -> Path:
+    """Copy the files of one match; long line-based ones are cut."""
+    folder.mkdir()
+    for number, path in enumerate(files):
+        target = folder / f"{number}_{path.name}"
+        if path.suffix in (".dat", ".txt", ".jsonl") and number == 0:
+            _cut(path, target, _LINES)
+        else:
+            shutil.copy(path, target)
+    return folder
+
+
+def _cut(path: Path, target: Path, lines: int) -> Path:
+    target.write_bytes(b"".join(path.read_bytes().splitlines(keepends=True)[:lines]))
+    return target
+
+
+def shorten_bvh(path: Path, target: Path, frames: int) -> Path:
+    """Write the first frames of a BVH file."""
+    lines = path.read_text().splitlines()
+    at = next(number for number, line in enumerate(lines) if line.strip().startswith("Frames:"))
+    lines[at] = f"Frames: {frames}"
+    target.write_text("\n".join(lines[: at + 2 + frames]) + "\n")
+    return target
