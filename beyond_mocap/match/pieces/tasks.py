@@ -1,4 +1,4 @@
-"""The three kinds of work of a match, as functions for any process.
+"""The four kinds of work of a match, as functions for any process.
 
 Each takes everything it needs except the library, which a worker reads by itself, once, and which is the same
 everywhere. The last kind writes a player's files: with the figures of every report over all stretches, and second by
@@ -27,9 +27,10 @@ from ...synthesis.provenance import Provenance, build_provenance, write_provenan
 from ...synthesis.quality import movement
 from ...synthesis.quality.playback import Playback, playback_from_take
 from ...synthesis.take import Take
+from ..crowd.correction import Correction
 from ..crowd.window import PlayerCorrection, resolve_window
-from ..displayed_motion import construct_displayed_player
-from ..player_edit import PlayerEdit
+from ..displayed_motion import display_take
+from .motion_parts import MotionBlock, MotionSpan
 from .units import Unit
 from .windows import Piece, search_window
 
@@ -111,7 +112,8 @@ class FinishRequest:
     """What is needed to finish a player.
 
     Attributes:
-        edit: the edit list, with its correction.
+        motion: constructed, one span per stretch.
+        correction: collision avoidance.
         measured: tracks, one per stretch.
         ball: the match's ball.
         frames: (K,) frames of the match's clock at which the player overlaps another one.
@@ -120,7 +122,8 @@ class FinishRequest:
         bvh: write BVH.
     """
 
-    edit: PlayerEdit
+    motion: tuple[MotionSpan, ...]
+    correction: Correction
     measured: tuple[Track, ...]
     ball: BallPath
     frames: np.ndarray
@@ -134,14 +137,21 @@ def search_unit(source: LibrarySource, unit: Unit) -> Piece:
     return search_window(load_library(source), unit)
 
 
-def resolve_collision_window(source: LibrarySource, edits: Sequence[PlayerEdit], start: float,
+def construct_block(source: LibrarySource, block: MotionBlock) -> tuple[bytes, ...]:
+    """Construct some windows of one player (`MotionBlock.construct`)."""
+    return block.construct(load_library(source))
+
+
+def resolve_collision_window(source: LibrarySource, players: Sequence[Sequence[MotionSpan]], start: float,
                              end: float) -> tuple[PlayerCorrection, ...]:
     """Resolve the collisions of all players in one window (`crowd.window.resolve_window`)."""
-    return resolve_window(load_library(source), edits, start, end)
+    skeleton = load_library(source).skeleton
+    takes = [[span.load_take(skeleton) for span in spans] for spans in players]
+    return resolve_window(takes, start, end)
 
 
 def finish_player(source: LibrarySource, request: FinishRequest) -> PlayerFiles:
-    """Construct a player's whole motion, its figures and its files.
+    """Build a player's figures and files.
 
     Args:
         source: where the library is.
@@ -153,9 +163,8 @@ def finish_player(source: LibrarySource, request: FinishRequest) -> PlayerFiles:
 
     library = load_library(source)
     with threadpool_limits(limits=1):
-        plans = [stretch.plan for stretch in request.edit.stretches]
-        span = float(plans[0].track.times[0]), float(plans[-1].track.times[-1])
-        takes = construct_displayed_player(library, request.edit, request.ball, *span)
+        takes = [display_take(span.load_take(library.skeleton), request.correction, request.ball)
+                 for span in request.motion]
         files, report = {}, None
         if request.figures:
             overlap = [_build_overlap(take, request) for take in takes]
