@@ -4,8 +4,8 @@
     end=60.0))
 
 Read -> find who is present when -> solve the ball -> labels -> separate tracks -> workers search windows of all players
--> join them into edit lists -> resolve collisions -> place the ball where it is touched -> reports. However a run ends,
-the same request resumes where it was, with the same bits.
+-> join them into edit lists -> construct -> resolve collisions -> place the ball where it is touched -> reports.
+However a run ends, the same request resumes where it was, with the same bits.
 """
 
 from __future__ import annotations
@@ -248,8 +248,10 @@ def _finish_match(job: Job, crowd) -> None:
     if job.request.figures:
         from .report.page import build_match_page
 
-        path = job.folder.path
+        path, clock = job.folder.path, read_clocks()
         atomic_write(path / "report.html", build_match_page(path, build_thumbnail_renderer(job.library, path)))
+        state.record_stage("page", clock)
+        state.write_state()
 
 
 def read_result(request: MatchRequest) -> MatchResult:

@@ -4,10 +4,12 @@ needed.
 
 from __future__ import annotations
 
+import shutil
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, replace
 from pathlib import Path
 
+from ...base.errors import InputError
 from ...files.atomic import atomic_write
 from ..crowd.window import cut_edit
 from ..player_edit import PlayerEdit
@@ -19,6 +21,8 @@ from .tasks import construct_block
 
 MOTION = "motion"
 """The kind of these pieces."""
+
+_OTHER_NUMBERS = 25  # that are stored of a frame beside the rotations
 
 Times = tuple[float, float]
 
@@ -64,11 +68,14 @@ class ConstructedMotion:
             players: ids; None: all.
         Returns:
             Whether all of it is constructed; if not, the players that failed are no longer in `edits`.
+        Raises:
+            InputError: if the folder has no room for it.
         """
         job, spans = self._job, list(times)
         missing = [(player, one) for player in (list(self.edits) if players is None else players)
                    for one in self._blocks[player] if any(one.start < end and one.end > start for start, end in spans)
                    and not all(map(self._is_stored, one.files))]  # fmt: skip
+        self._check_room(sum(one.end - one.start for _, one in missing))
         tasks = (((player, one.files), (job.source, one.block)) for player, one in missing if player in self.edits)
         has_failed = False
         for done, ((player, files), result) in enumerate(run_stage(job, tasks, construct_block, MOTION), 1):
@@ -92,6 +99,14 @@ class ConstructedMotion:
     def remove(self) -> None:
         """Remove the stored motion."""
         self._job.folder.remove_pieces(MOTION, ())
+
+    def _check_room(self, seconds: float) -> None:
+        """Check that the folder has room for so many seconds of motion; InputError otherwise."""
+        job = self._job
+        needed = seconds * job.request.fps * 8 * (4 * len(job.library.skeleton) + _OTHER_NUMBERS)
+        if (free := shutil.disk_usage(job.folder.path).free) < needed:
+            raise InputError(job.folder.path, f"{free / 1e9:.1f} GB free", f"{needed / 1e9:.1f} GB while it is made",
+                             "make room, or choose another folder")
 
     def _iter_parts(self, grid: StretchWindows, files: list[Path], low: int, high: int) -> Iterator[tuple[Content, int,
             int]]:
