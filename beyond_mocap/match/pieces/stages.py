@@ -136,6 +136,8 @@ def resolve_player_collisions(job: Job, motion: ConstructedMotion, span: tuple[f
         found = _load_windows(job, names, len(players))
         if motion.construct(_widen(*window) for number, window in enumerate(windows) if number not in found):
             break
+    if not players:
+        return {}
     tasks = ((number, (job.source, [motion.find_spans(player, *_widen(*window)) for player in players], *window))
              for number, window in enumerate(windows) if number not in found)
     for number, result in run_stage(job, tasks, resolve_collision_window, CROWD):
