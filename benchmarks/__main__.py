@@ -27,6 +27,7 @@ SECTIONS = {  # name -> heading, (subheading, module, function) of each part
     "scenarios": ("Synthesis", (("", "scenarios", "section"),)),
     "against": ("Takes against recordings", (("", "against_recordings", "section"),)),
     "match": ("Players of a match", (("", "match", "speed_section"),)),
+    "stages": ("Stages of a match", (("", "match", "stages_section"),)),
     "crowd": ("All players of a match", (("", "match", "crowd_section"),)),
     "paths": ("Path editing", (("", "path_editing", "section"),)),
     "ball": ("The tracked ball", (("", "ball_touches", "section"),)),

@@ -1,26 +1,29 @@
 """Cost of the players of a match, and how they get on together.
 
 `speed_section`: processor seconds of search, construction and polishing per 20 s of motion, and of reading and cleaning
-a whole half. `crowd_section`: overlaps between players, the cost of collision avoidance, and players in step; overlaps,
-skate and jerk without and with the corrections. The share in step refers to the time of all players.
+a whole half. `stages_section`: what each stage of a match costs. `crowd_section`: overlaps between players, the cost of
+collision avoidance, and players in step; overlaps, skate and jerk without and with the corrections. The share in step
+refers to the time of all players.
 """
 
 from __future__ import annotations
 
 import sys
 import tempfile
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 
 from benchmarks.effort import format_head, format_row, measure_seconds
-from benchmarks.places import CMU_UNIT, DATA
+from benchmarks.places import CMU_UNIT, DATA, library_folder
 from beyond_mocap.files.tracking.tracking import Match, read_match
 from beyond_mocap.library.build import build_library
 from beyond_mocap.library.library import Library
 from beyond_mocap.match.crowd.collision_avoidance import measure_overlap_depths, resolve_collisions
 from beyond_mocap.match.crowd.correction import ARMS, ROOT, Correction, apply_correction
 from beyond_mocap.match.crowd.variety import measure_share_in_step
+from beyond_mocap.match.folder import read_state
 from beyond_mocap.match.player_edit import read_player
 from beyond_mocap.match.player_motion import construct_player
 from beyond_mocap.match.request import MatchRequest
@@ -43,6 +46,9 @@ WINDOW = 60.0  # s that are measured of a player
 STARTS = (60.0, 600.0, 1200.0, 1800.0, 2400.0)  # s at which windows begin
 EVERY = 4
 """Every fourth player is measured, each in the next window."""
+STAGE_SECONDS, STAGE_PLAYERS = (300.0, 600.0), 6
+"""Stretch of the recorded half whose stages are measured, and how many of its players."""
+HALF_MINUTES, HALF_PLAYERS, CORES = 46.0, 22, 2  # what is extrapolated
 
 
 def measure_step_share(library: Library, takes: list[Take], firsts: list[int]) -> float:
@@ -152,6 +158,44 @@ def build_half_row(match: Match) -> str:
     sampled, _ = measure_seconds(lambda: sample_track(known, 30.0))
     minutes = (track.times[-1] - track.times[0]) / 60
     return format_row([match.players[0].id, f"{minutes:.1f}", f"{cleaned:.3f}", f"{sampled:.3f}"])
+
+
+def stages_section() -> list[str]:
+    """Build the lines for results.md: the stages of STAGE_PLAYERS players, library mixed, in this process."""
+    with tempfile.TemporaryDirectory() as place:
+        folder, recordings, cache = Path(place) / "match", library_folder("mixed", Path(place)), Path(place) / "cache"
+        feed = DATA / "tracking" / "match" / "nl2019_half1.dat"
+        players = read_match(feed, cache_dir=cache).players
+        chosen = tuple(player.id for player in players[1 :: len(players) // STAGE_PLAYERS][:STAGE_PLAYERS])
+        warm_up = MatchRequest(feed, recordings, Path(place) / "first", cache=cache, start=STAGE_SECONDS[0],
+                               end=STAGE_SECONDS[0] + 10.0, players=chosen[:1])
+        synthesize_match(warm_up)  # what is computed once for each process and library
+        synthesize_match(replace(warm_up, out=folder, end=STAGE_SECONDS[1], players=chosen))
+        state = read_state(folder)
+    minutes = sum(end - start for row in state["players"] for start, end in row["stretches_s"]) / 60.0
+    return [*build_stage_rows(state, minutes), "", report_peak_memory()]
+
+
+def build_stage_rows(state: dict, minutes: float) -> list[str]:
+    """Build a table of the stages of a match's state with so many minutes of players: processor seconds per minute of a
+    player, and minutes of clock time of a whole half.
+    """
+    main, shared, match_minutes = state["main_cpu_s"], state["worker_cpu_s"], (state["to_s"] - state["from_s"]) / 60.0
+    scale = HALF_MINUTES * HALF_PLAYERS / minutes
+    # seconds, and seconds of a half: the ball is one for all players, the page has a fixed number of pictures
+    stages = {"ball": (main["ball"], main["ball"] / match_minutes * HALF_MINUTES),
+              "words": (main["words"], main["words"] * scale),
+              **{name: (seconds, seconds * scale / CORES) for name, seconds in shared.items()},
+              "page": (main["page"], main["page"])}
+    whole = sum(seconds for seconds, _ in stages.values())
+    lines = format_head(("stage", "s per player-minute", "share", "a half, min"))
+    lines += [format_row([name, f"{seconds / minutes:.3f}", f"{100 * seconds / whole:.0f}%", f"{half / 60:.1f}"])
+              for name, (seconds, half) in stages.items()]
+    lists = sum(stages[name][1] for name in ("ball", "words", "search")) / 60.0
+    everything = sum(half for _, half in stages.values()) / 60.0
+    return [*lines, "", f"a half of {HALF_MINUTES:g} min, {HALF_PLAYERS} players, {CORES} cores, extrapolated from "
+            f"{minutes:.0f} minutes of players: edit lists {lists:.1f} min (target 4), everything {everything:.1f} min "
+            "(target 7)"]
 
 
 def report_peak_memory() -> str:

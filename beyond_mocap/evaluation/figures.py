@@ -260,7 +260,8 @@ def _measure_pose_realism(view: View, features: np.ndarray) -> dict:
     if not np.isfinite(reference.pose_p95).any():
         unreal = np.full(view.count, np.nan)
     else:
-        distance = realism.measure_nearest_distance(features / view.scale, reference.poses)
+        limit = np.nan_to_num(reference.pose_p95[classes], nan=np.inf)
+        distance = realism.bound_nearest_distance(features / view.scale, reference.poses, limit)
         unreal = realism.find_unreal_frames(distance, view.speed, reference.pose_p95)
     by_speed = {
         name: {"share": _finite_mean(unreal[classes == k]), "frames": int(np.sum(classes == k)),

@@ -20,6 +20,7 @@ VELOCITY_SECONDS = 0.12  # weight of m/s against metres, like `library.features.
 FEWEST_RECORDINGS = 3
 """Recordings that a speed class needs, so that with one's own left out two others show how far apart people are."""
 _ROWS_AT_ONCE = 512  # rows of distances at once, to limit memory
+_PARTS, _ROUNDING = 16, 2e-3  # of a library that are searched in turn; m that a distance in float32 may be off
 
 
 def compute_local_positions(skeleton: Skeleton, positions: np.ndarray, hips: int) -> np.ndarray:
@@ -112,11 +113,35 @@ def measure_nearest_distance(
     out = np.empty(len(features))
     for start in range(0, len(features), _ROWS_AT_ONCE):
         rows = features[start : start + _ROWS_AT_ONCE]
-        squared_distance = squares - 2.0 * (rows @ library.T)
+        squared_distance = rows @ library.T
+        squared_distance *= -2.0
+        squared_distance += squares
         if left_out is not None:
             squared_distance[left_out[start : start + _ROWS_AT_ONCE, None] == owner] = np.inf
         out[start : start + len(rows)] = squared_distance.min(axis=1) + np.einsum("td,td->t", rows, rows)
     return np.sqrt(np.maximum(out, 0.0))
+
+
+def bound_nearest_distance(features: np.ndarray, library: np.ndarray, enough: np.ndarray) -> np.ndarray:
+    """Measure the distance from each row of features to the nearest row of a library, as far as it matters.
+
+    The library is searched in parts, each with every _PARTS-th pose of it. A row that is near enough to one of them is
+    not compared with the others.
+
+    Args:
+        features: (T, D) m.
+        library: (N, D) m.
+        enough: (T,) m, a distance of which nothing is known but that the nearest row is no farther.
+    Returns:
+        (T,) m, that of `measure_nearest_distance` or less than `enough`.
+    """
+    out, left = np.full(len(features), np.inf), np.arange(len(features))
+    for part in range(_PARTS):
+        left = left[out[left] >= enough[left] - _ROUNDING]
+        if len(left) and part < len(library):
+            found = measure_nearest_distance(features[left], np.ascontiguousarray(library[part::_PARTS]))
+            out[left] = np.minimum(out[left], found)
+    return out
 
 
 def compute_class_p95(values: np.ndarray, speed: np.ndarray) -> np.ndarray:

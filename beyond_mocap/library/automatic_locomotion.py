@@ -38,12 +38,13 @@ def build_automatic_labels(library: Library, gait: np.ndarray, track: SampledTra
         T tuples of labels.
     """
     recorded = {row.words for clip in library.clips for row in clip.annotations}
-    words: list[tuple[str, ...]] = []
-    for number, direction in zip(gait, choose_directions(compute_heading_offset(track), track.fps)):
+    pairs = list(zip(gait, choose_directions(compute_heading_offset(track), track.fps)))
+    words: dict[tuple[int, str], tuple[str, ...]] = {}
+    for number, direction in set(pairs):
         own = library.gaits[number].labels
         in_direction = tuple(direction if word == DIRECTIONS[0] else word for word in own)
-        words.append(in_direction if in_direction in recorded else own)
-    return words
+        words[number, direction] = in_direction if in_direction in recorded else own
+    return [words[pair] for pair in pairs]
 
 
 def apply_chosen_gaits(library: Library, chosen: Mapping[str, str]) -> Library:

@@ -43,8 +43,7 @@ def construct_displayed_player(
     if not end > start:
         raise InputError("times", f"{start:g} to {end:g} s", "an end after the start")
     takes = construct_player(library, edit, start - MARGIN_SECONDS, end + MARGIN_SECONDS, progress)
-    finished = (_finish_take(take, edit.correction, ball) for take in takes)
-    inside = (_cut_take(take, start, end) for take in finished)
+    inside = (_cut_take(display_take(take, edit.correction, ball), start, end) for take in takes)
     return tuple(take for take in inside if take is not None)
 
 
@@ -60,8 +59,16 @@ def _cut_take(take: Take, start: float, end: float) -> Take | None:
     return replace(cut_take(take, first, last + 1), plan=take.plan)
 
 
-def _finish_take(take: Take, correction: Correction | None, ball: BallPath | None) -> Take:
-    """Apply collision avoidance and ball contact to a take."""
+def display_take(take: Take, correction: Correction | None, ball: BallPath | None) -> Take:
+    """Apply collision avoidance and ball contact to a take.
+
+    Args:
+        take: from `construct_player`.
+        correction: of the player, None if not known.
+        ball: as for `construct_displayed_player`.
+    Returns:
+        The take as displayed.
+    """
     first = round(take.start_time * take.motion.fps)
     if correction is not None and len(correction.knots):
         take = replace(take, motion=apply_correction(take.motion, correction, first))

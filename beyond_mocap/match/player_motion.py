@@ -76,10 +76,49 @@ def construct_player(
         def report_stretch(fraction: float, number=number):
             report((number + fraction) / len(edit.stretches), "Constructing")
 
-        take = _StretchConstructor(library, edit.window, stretch).construct_take(start, end, report_stretch)
-        takes += [] if take is None else [take]
+        grid = StretchWindows(stretch, edit.window)
+        if (frames := grid.find_frames(start, end)) is not None:
+            parts = StretchConstructor(library, grid).iter_parts(*frames, report_stretch)
+            takes.append(join_takes(list(parts), grid.cut_plan(*frames)))
     report(1.0, "Done")
     return tuple(takes)
+
+
+class StretchWindows:
+    """A stretch and the grid of windows in which it is constructed.
+
+    Attributes:
+        plan: of the stretch.
+        edit: its edit list.
+        fps: frames per second of the output.
+        begin: s of its first frame.
+        count: its number of frames.
+        edges: frames between which its windows lie.
+    """
+
+    def __init__(self, stretch: Stretch, window: float):
+        self.plan, self.edit = stretch.plan, stretch.edit
+        self.fps, self.begin = self.plan.fps, float(self.plan.track.times[0])
+        self.count = count_frames(self.plan, self.fps)
+        self.edges = build_window_edges(self.begin, self.count, window, self.fps, step=1)
+
+    def find_frames(self, start: float, end: float) -> tuple[int, int] | None:
+        """Find the (first, end) frames from `start` to `end` s; None if there are fewer than two."""
+        low = int(max(0, np.ceil((start - self.begin) * self.fps - 1e-6)))
+        high = int(min(self.count, np.floor((end - self.begin) * self.fps + 1e-6) + 1))
+        return None if high - low < 2 else (low, high)
+
+    def list_windows(self, low: int, high: int) -> list[int]:
+        """List the windows with frames of low .. high."""
+        return [n for n, (a, b) in enumerate(zip(self.edges, self.edges[1:])) if a < high and b > low]
+
+    def cut_plan(self, low: int, high: int) -> Plan:
+        """Cut the plan of frames low .. high."""
+        return cut_plan(self.plan, self.compute_time(low), self.compute_time(high - 1))
+
+    def compute_time(self, frame: int) -> float:
+        """Compute the second of a frame on the match's clock."""
+        return self.begin + frame / self.fps
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -101,33 +140,31 @@ class _Window:
     foot_contacts: np.ndarray
 
 
-class _StretchConstructor:
-    """A stretch and the grid of windows in which it is constructed."""
+class StretchConstructor:
+    """What constructs a stretch, window by window."""
 
-    def __init__(self, library: Library, window: float, stretch: Stretch):
-        self.plan, self.edit = stretch.plan, stretch.edit
-        paths = [path for path, _ in self.edit.clips]
+    def __init__(self, library: Library, grid: StretchWindows):
+        """Prepare the library of the stretch.
+
+        Args:
+            library: the clips.
+            grid: the stretch.
+        """
+        paths = [path for path, _ in grid.edit.clips]
         if any(path.startswith(SYNTHETIC_FOLDER) for path in paths):
             library = add_actions(library.with_synthetic_clips, paths)
-        self.library = apply_chosen_gaits(library, dict(self.plan.gaits))
-        self.fps, self.begin = self.plan.fps, float(self.plan.track.times[0])
-        self.count = count_frames(self.plan, self.fps)
-        self.edges = build_window_edges(self.begin, self.count, window, self.fps, step=1)
+        self.library, self.grid = apply_chosen_gaits(library, dict(grid.plan.gaits)), grid
 
-    def construct_take(self, start: float, end: float, report_progress: Callable[[float], None]) -> Take | None:
-        """Construct the frames from `start` to `end` s; None if there are fewer than two."""
-        low = max(0, int(np.ceil((start - self.begin) * self.fps - 1e-6)))
-        high = min(self.count, int(np.floor((end - self.begin) * self.fps + 1e-6)) + 1)
-        if high - low < 2:
-            return None
-        parts = list(self._iter_parts(low, high, report_progress))
-        return join_takes(parts, cut_plan(self.plan, self._compute_time(low), self._compute_time(high - 1)))
+    def iter_parts(self, low: int, high: int, report_progress: Callable[[float], None]) -> Iterator[Take]:
+        """Construct the frames low .. high: iterate over one take for each window.
 
-    def _iter_parts(self, low: int, high: int, report_progress: Callable[[float], None]) -> Iterator[Take]:
-        """Iterate over the frames low .. high, window by window."""
-        settle_frames = int(round(SETTLE_SECONDS * self.fps))
-        numbers = [n for n, (a, b) in enumerate(zip(self.edges, self.edges[1:])) if a < high and b > low]
-        before = None
+        Args:
+            low: first frame of the stretch.
+            high: end frame.
+            report_progress: receives the share done.
+        """
+        settle_frames = int(round(SETTLE_SECONDS * self.grid.fps))
+        numbers, before = self.grid.list_windows(low, high), None
         for done, number in enumerate(numbers):
             report_progress(done / len(numbers))
             window, blended = self._construct_window(number), None
@@ -139,11 +176,12 @@ class _StretchConstructor:
 
     def _construct_window(self, number: int) -> _Window:
         """Construct a window with its margins; only key moments within its plan count."""
-        low, high = self.edges[number : number + 2]
-        around = int(round(MARGIN_SECONDS * self.fps))
-        first, end = max(0, low - around), min(self.count, high + around)
-        plan = cut_plan(self.plan, self._compute_time(first), self._compute_time(end - 1))
-        shown_here = self._select_edit(plan, first * FPS / self.fps)
+        grid = self.grid
+        low, high = grid.edges[number : number + 2]
+        around = int(round(MARGIN_SECONDS * grid.fps))
+        first, end = max(0, low - around), min(grid.count, high + around)
+        plan = grid.cut_plan(first, end)
+        shown_here = self._select_edit(plan, first * FPS / grid.fps)
         resolved = resolve_plan(plan, self.library, are_touches_resolved=True)
         take = construct_take(self.library, resolved, shown_here)
         return _Window(low=low, high=high, first=first, take=take, foot_contacts=self._find_foot_contacts(shown_here,
@@ -154,21 +192,18 @@ class _StretchConstructor:
         rate.
         """
         count, whole = count_frames(plan), int(at)
-        edit = cut_named_edit(self.edit, whole, min(whole + count + 1, len(self.edit)))
+        edit = cut_named_edit(self.grid.edit, whole, min(whole + count + 1, len(self.grid.edit)))
         edit = to_library_edit(self.library, edit, plan.timeline.keys)
         clip, frame, piece = sample_edit(edit, np.minimum(np.arange(count) + (at - whole), len(edit) - 1))
         return EditList(clip, frame, np.flatnonzero(np.diff(piece)) + 1, edit.keys)
 
     def _find_foot_contacts(self, edit: EditList, take: Take) -> np.ndarray:
         """Find the feet (T, 2) bool whose heel or toe is in contact."""
-        index = np.minimum(np.arange(len(take.motion)) * (FPS / self.fps), len(edit) - 1)
+        index = np.minimum(np.arange(len(take.motion)) * (FPS / self.grid.fps), len(edit) - 1)
         what = look_up_frames(self.library, edit, index)
         frame, clips = np.round(what.clip_frame).astype(int), self.library.clips
         stands = np.array([clips[clip].heel_toe_contacts[at].any(axis=1) for clip, at in zip(what.clip, frame)])
         return stands & ~take.stepped
-
-    def _compute_time(self, frame: int) -> float:
-        return self.begin + frame / self.fps
 
 
 def _blend_window_start(before: _Window, window: _Window, settle_frames: int) -> Take:

@@ -4,8 +4,8 @@
     end=60.0))
 
 Read -> find who is present when -> solve the ball -> labels -> separate tracks -> workers search windows of all players
--> join them into edit lists -> resolve collisions -> place the ball where it is touched -> reports. However a run ends,
-the same request resumes where it was, with the same bits.
+-> join them into edit lists -> construct -> resolve collisions -> place the ball where it is touched -> reports.
+However a run ends, the same request resumes where it was, with the same bits.
 """
 
 from __future__ import annotations
@@ -31,6 +31,8 @@ from .goalkeeping.positions import fill_keepers
 from .labels import MatchLabels, label_match
 from .match_ball import apply_led_ball, build_ball_plan, sample_ball
 from .pieces import stages
+from .pieces.constructed_motion import ConstructedMotion
+from .pieces.job import Job
 from .pieces.pool import WorkerConfig, check_workers, stop_workers
 from .pieces.tasks import LibrarySource, set_library
 from .play import build_plays, find_kept_lines
@@ -43,7 +45,8 @@ from .state import build_player_row, build_state, read_clocks
 BALL_MARGIN = 5.0
 """s before and after the span in which the ball is solved too."""
 
-_STAGE_ENDS = {"read": 0.02, "library": 0.07, "ball": 0.12, "search": 0.7, "crowd": 0.8, "figures": 0.98, "page": 1.0}
+_STAGE_ENDS = {"read": 0.02, "library": 0.07, "ball": 0.12, "search": 0.55, "motion": 0.8, "crowd": 0.85,
+               "figures": 0.98, "page": 1.0}
 """Progress at the end of each stage."""
 
 Progress = Callable[[float, str], None]
@@ -120,7 +123,7 @@ def synthesize_match(
         state.report["notes"] += folder.notes
         state.seconds["read"] = round(read[0] - clock[0], 3)
         state.record_stage("library", read)
-        job = stages.Job(request=request, folder=folder, state=state, source=source, library=library, workers=place,
+        job = Job(request=request, folder=folder, state=state, source=source, library=library, workers=place,
                          report=report, cancelled=cancelled)
         try:
             with threadpool_limits(limits=1):  # more threads would change the order of sums
@@ -150,7 +153,7 @@ def _build_library(request: MatchRequest, report: Progress, cancelled) -> tuple[
 
 
 def _run_stages(
-    job: stages.Job, match: Match, events: MatchEvents | None, span: tuple[float, float], report: Progress
+    job: Job, match: Match, events: MatchEvents | None, span: tuple[float, float], report: Progress
 ) -> None:
     """Run all stages after reading."""
     state, begin = job.state, read_clocks()
@@ -180,18 +183,19 @@ def _run_stages(
     edits = stages.search_players(replace(job, report=_scale_progress(report, "search")), parts)
     state.record_stage("search", clock)
     clock = read_clocks()
-    crowd = stages.resolve_player_collisions(replace(job, report=_scale_progress(report, "crowd")), edits,
+    motion = ConstructedMotion(replace(job, report=_scale_progress(report, "motion")), edits)
+    crowd = stages.resolve_player_collisions(replace(job, report=_scale_progress(report, "crowd")), motion,
                                              span) if edits else {}
     ball = _write_match_ball(job, match, solved, span, crowd)
     state.record_stage("crowd", clock)
     clock = read_clocks()
-    stages.finish_players(replace(job, report=_scale_progress(report, "figures")), parts, edits, crowd, ball)
+    stages.finish_players(replace(job, report=_scale_progress(report, "figures")), parts, motion, crowd, ball)
     state.record_stage("figures", clock)
     state.record_stage("total", begin)
     _finish_match(job, crowd)
 
 
-def _solve_ball(job: stages.Job, match: Match, span: tuple[float, float], report: Progress) -> SolvedBall | None:
+def _solve_ball(job: Job, match: Match, span: tuple[float, float], report: Progress) -> SolvedBall | None:
     """Solve the ball around the span; None if it is not requested or not possible."""
     if not job.request.solve_touches:
         return None
@@ -202,7 +206,7 @@ def _solve_ball(job: stages.Job, match: Match, span: tuple[float, float], report
         return None
 
 
-def _label_players(job: stages.Job, match: Match, events: MatchEvents | None, solved: SolvedBall | None) -> MatchLabels:
+def _label_players(job: Job, match: Match, events: MatchEvents | None, solved: SolvedBall | None) -> MatchLabels:
     """Label all players from touches and, if there are any, events."""
     report = job.state.report
     if events is not None and solved is None:
@@ -213,7 +217,7 @@ def _label_players(job: stages.Job, match: Match, events: MatchEvents | None, so
     return labels
 
 
-def _write_match_ball(job: stages.Job, match: Match, solved: SolvedBall | None, span, crowd) -> BallPath:
+def _write_match_ball(job: Job, match: Match, solved: SolvedBall | None, span, crowd) -> BallPath:
     """Write the match's ball over the span, if it is known at all, and return it."""
     fps = job.request.fps
     first, last = int(np.ceil(span[0] * fps - 1e-6)), int(np.floor(span[1] * fps + 1e-6))
@@ -231,7 +235,7 @@ def _write_match_ball(job: stages.Job, match: Match, solved: SolvedBall | None, 
     return ball
 
 
-def _finish_match(job: stages.Job, crowd) -> None:
+def _finish_match(job: Job, crowd) -> None:
     """Write the final state and the page."""
     state = job.state
     state.report["crowd"] = {
@@ -244,8 +248,10 @@ def _finish_match(job: stages.Job, crowd) -> None:
     if job.request.figures:
         from .report.page import build_match_page
 
-        path = job.folder.path
+        path, clock = job.folder.path, read_clocks()
         atomic_write(path / "report.html", build_match_page(path, build_thumbnail_renderer(job.library, path)))
+        state.record_stage("page", clock)
+        state.write_state()
 
 
 def read_result(request: MatchRequest) -> MatchResult:

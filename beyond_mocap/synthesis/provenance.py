@@ -144,5 +144,16 @@ def list_sources(library: Library, frames_shown: SourceFrames) -> tuple[str, ...
 
 def list_labels_shown(library: Library, frames_shown: SourceFrames) -> tuple[tuple[str, ...], ...]:
     """List the labels that every shown frame's clip carries there."""
-    frames = zip(frames_shown.clip, np.round(frames_shown.clip_frame, 6))
-    return tuple(sort_labels(library.clips[clip].labels_at(frame)) for clip, frame in frames)
+    labels: list[tuple[str, ...]] = [()] * len(frames_shown.clip)
+    clip, frame = frames_shown.clip, np.round(frames_shown.clip_frame, 6)
+    for number in np.unique(clip):
+        rows, at = library.clips[number].annotations, np.flatnonzero(clip == number)
+        edges = np.unique([edge for row in rows for edge in (row.start, row.end)])
+        # the labels change at and behind the edges of rows only: each place is an edge, or lies between two
+        place = np.searchsorted(edges, frame[at]) + np.searchsorted(edges, frame[at], side="right")
+        for one in np.unique(place):
+            there = at[place == one]
+            words = sort_labels(library.clips[number].labels_at(frame[there[0]]))
+            for index in there:
+                labels[index] = words
+    return tuple(labels)

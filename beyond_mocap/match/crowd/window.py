@@ -12,7 +12,6 @@ import numpy as np
 
 from ...annotation.ball_contact import build_surfaces
 from ...library.features import FPS
-from ...library.library import Library
 from ...motion.motion import Motion
 from ...synthesis.take import Take
 from ..match_ball import apply_led_ball, find_led_ball, lead_ball_between_players, restore_ball_contact, sample_ball
@@ -20,7 +19,6 @@ from ..piece_file import read_piece_file, write_piece_file
 from ..pieces.named_edit import cut_named_edit
 from ..pieces.units import cut_plan
 from ..player_edit import PlayerEdit, Stretch
-from ..player_motion import construct_player
 from .collision_avoidance import measure_overlap_depths, resolve_collisions
 from .correction import CURVES, Correction, apply_correction, join_corrections
 from .spacing import compute_firmness
@@ -84,13 +82,11 @@ def _cut_stretch(stretch: Stretch, start: float, end: float) -> Stretch | None:
     return replace(stretch, plan=plan, edit=cut_named_edit(stretch.edit, first, last))
 
 
-def resolve_window(library: Library, edits: Sequence[PlayerEdit], start: float, end: float) -> tuple[PlayerCorrection,
-        ...]:
+def resolve_window(takes: Sequence[Sequence[Take]], start: float, end: float) -> tuple[PlayerCorrection, ...]:
     """Resolve the collisions of a window. The same input gives the same bits.
 
     Args:
-        library: the clips.
-        edits: one per player, cut to the window and MARGIN_SECONDS on either side (`cut_edit`).
+        takes: of each player, as constructed, in the window and MARGIN_SECONDS on either side.
         start: s of the window.
         end: s of the window.
     Returns:
@@ -99,8 +95,6 @@ def resolve_window(library: Library, edits: Sequence[PlayerEdit], start: float, 
     from threadpoolctl import threadpool_limits
 
     with threadpool_limits(limits=1):
-        takes = [construct_player(library, edit, start - MARGIN_SECONDS, end + MARGIN_SECONDS) if edit.stretches else ()
-                 for edit in edits]
         flat = [take for player_takes in takes for take in player_takes]
         fps = flat[0].motion.fps if flat else 1.0
         firsts = [round(take.start_time * fps) for take in flat]

@@ -7,8 +7,8 @@ edit only affected pieces are computed again.
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -16,57 +16,21 @@ from ...annotation import Timeline
 from ...base.errors import BeyondMocapError, format_seconds
 from ...files.atomic import atomic_write
 from ...files.tables import to_plain
-from ...library.library import Library
 from ...motion.track.ball_path import BallPath
 from ..crowd.window import MARGIN_SECONDS, MAX_SECONDS, PlayerCorrection, cut_edit, join_windows, load_parts, save_parts
-from ..folder import MatchFolder
 from ..player_edit import PlayerEdit, write_player
 from ..player_plans import PlayerPlans
-from ..request import FORM, MatchRequest, compute_digest
-from ..state import MatchState
-from .pool import TaskFailure, WorkerConfig, run_tasks
-from .tasks import FinishRequest, LibrarySource, finish_player, resolve_collision_window, search_unit
+from .constructed_motion import ConstructedMotion
+from .job import Job, remove_library_paths, run_stage
+from .pool import TaskFailure
+from .tasks import FinishRequest, finish_player, resolve_collision_window, search_unit
 from .units import build_units
 from .windows import Piece, join_pieces, load_piece, save_piece
 
 SEARCH, CROWD = "search", "crowd"
-"""The kinds of pieces that are stored."""
+"""The kinds of pieces that are stored, beside the constructed motion."""
 
-Report = Callable[[float, str], None]
-
-
-@dataclass(frozen=True, eq=False, kw_only=True)
-class Job:
-    """What all stages share.
-
-    Attributes:
-        request: the match's request.
-        folder: its folder.
-        state: its state.
-        source: the library as workers read it.
-        library: the library in this process.
-        workers: where work runs.
-        report: receives the share of the stage done and a text.
-        cancelled: called now and then; True cancels the work.
-    """
-
-    request: MatchRequest
-    folder: MatchFolder
-    state: MatchState
-    source: LibrarySource
-    library: Library
-    workers: WorkerConfig
-    report: Report
-    cancelled: Callable[[], bool] | None = None
-
-    def build_name(self, *values: object) -> str:
-        """Build the name of a piece of work that depends on the library and on `values`."""
-        return compute_digest(FORM, self.source.key, *values)
-
-
-def _run_stage(job: Job, tasks, work, stage: str) -> Iterator[tuple]:
-    """Run a stage's tasks; (key, result) as of `pool.run_tasks`."""
-    return run_tasks(tasks, work, job.workers, job.cancelled, job.state.build_result_counter(stage))
+_ALWAYS = -np.inf, np.inf
 
 
 def search_players(job: Job, parts: Sequence[PlayerPlans]) -> dict[str, PlayerEdit]:
@@ -100,7 +64,7 @@ class _PlayerSearch:
     def search_missing(self) -> dict[str, PlayerEdit]:
         """Search what is missing, then return the edit lists by id."""
         job = self._job
-        for (player, name), result in _run_stage(job, self._iter_missing(), search_unit, SEARCH):
+        for (player, name), result in run_stage(job, self._iter_missing(), search_unit, SEARCH):
             if isinstance(result, TaskFailure):
                 self._mark_failed(player, result.reason)
                 continue
@@ -155,32 +119,28 @@ class _PlayerSearch:
         return self._job.state.players[player]["status"] == "failed"
 
 
-def resolve_player_collisions(job: Job, edits: dict[str, PlayerEdit], span: tuple[float, float]) -> dict[str,
+def resolve_player_collisions(job: Job, motion: ConstructedMotion, span: tuple[float, float]) -> dict[str,
         PlayerCorrection]:
     """Resolve the collisions of the whole span, in windows of all players on the match's clock.
 
     Args:
         job: what all stages share.
-        edits: edit list by player id.
+        motion: of all players; what is needed of it is constructed.
         span: (start, end) s.
     Returns:
         Correction by player id.
     """
-    players, names = list(edits), {}
     windows = _build_windows(span, min(job.request.window, MAX_SECONDS), job.request.fps)
-    found: dict[int, tuple[PlayerCorrection, ...]] = {}
-
-    def iter_missing():
-        for number, (start, end) in enumerate(windows):
-            cut = tuple(cut_edit(edits[player], start - MARGIN_SECONDS, end + MARGIN_SECONDS) for player in players)
-            names[number] = job.build_name(start, end, _remove_library_paths(cut))
-            kept = load_parts(job.folder.piece_path(CROWD, names[number]))
-            if kept is not None and len(kept) == len(players):
-                found[number] = kept
-            else:
-                yield number, (job.source, cut, start, end)
-
-    for number, result in _run_stage(job, iter_missing(), resolve_collision_window, CROWD):
+    while True:
+        players, names = list(motion.edits), [_name_window(job, motion.edits, *window) for window in windows]
+        found = _load_windows(job, names, len(players))
+        if motion.construct(_widen(*window) for number, window in enumerate(windows) if number not in found):
+            break
+    if not players:
+        return {}
+    tasks = ((number, (job.source, [motion.find_spans(player, *_widen(*window)) for player in players], *window))
+             for number, window in enumerate(windows) if number not in found)
+    for number, result in run_stage(job, tasks, resolve_collision_window, CROWD):
         if isinstance(result, TaskFailure):
             start, end = windows[number]
             when = f"{format_seconds(start)}-{format_seconds(end)} s"
@@ -189,10 +149,26 @@ def resolve_player_collisions(job: Job, edits: dict[str, PlayerEdit], span: tupl
         save_parts(job.folder.piece_path(CROWD, names[number]), result)
         found[number] = result
         job.report(len(found) / len(windows), f"Resolving collisions: {len(found)} of {len(windows)} windows")
-    job.folder.remove_pieces(CROWD, names.values())
+    job.folder.remove_pieces(CROWD, names)
     rows = [(found[number], windows[number]) for number in sorted(found)]
     return {player: join_windows([(parts[place], window) for parts, window in rows], job.request.fps)
             for place, player in enumerate(players)}  # fmt: skip
+
+
+def _widen(start: float, end: float) -> tuple[float, float]:
+    return start - MARGIN_SECONDS, end + MARGIN_SECONDS
+
+
+def _name_window(job: Job, edits: dict[str, PlayerEdit], start: float, end: float) -> str:
+    """Name a window by all that its result depends on."""
+    cut = tuple(cut_edit(edit, *_widen(start, end)) for edit in edits.values())
+    return job.build_name(start, end, remove_library_paths(cut))
+
+
+def _load_windows(job: Job, names: Sequence[str], count: int) -> dict[int, tuple[PlayerCorrection, ...]]:
+    """Load the results of the windows that are stored, by number; count: of players."""
+    loaded = ((number, load_parts(job.folder.piece_path(CROWD, name))) for number, name in enumerate(names))
+    return {number: parts for number, parts in loaded if parts is not None and len(parts) == count}
 
 
 def _build_windows(span: tuple[float, float], window: float, fps: float) -> list[tuple[float, float]]:
@@ -202,46 +178,35 @@ def _build_windows(span: tuple[float, float], window: float, fps: float) -> list
     return list(zip(edges, edges[1:]))
 
 
-def _remove_library_paths(edits: Sequence[PlayerEdit]) -> tuple:
-    """Remove the library's path from edit lists, because their motion does not depend on it."""
-    stretches_of_edits = [[replace(one, plan=replace(one.plan, library="")) for one in edit.stretches]
-                          for edit in edits]
-    return tuple(replace(edit, stretches=tuple(stretches)) for edit, stretches in zip(edits, stretches_of_edits))
-
-
 def finish_players(
-    job: Job, parts: Sequence[PlayerPlans], edits: dict[str, PlayerEdit], crowd: dict[str, PlayerCorrection],
+    job: Job, parts: Sequence[PlayerPlans], motion: ConstructedMotion, crowd: dict[str, PlayerCorrection],
     ball: BallPath
 ) -> None:
-    """Write all players' files: the corrected edit list and, where requested, report, provenance and BVH.
+    """Write all players' files: the corrected edit list and, where requested, report, provenance and BVH. Then remove
+    the stored motion.
 
     Args:
         job: what all stages share.
         parts: the players' plans.
-        edits: edit list by player id.
+        motion: of all players; what is needed of it is constructed.
         crowd: correction by player id.
         ball: the match's ball.
     """
-    parts_by_id = {part.role.player.id: part for part in parts if part.role.player.id in edits}
+    parts_by_id = {part.role.player.id: part for part in parts if part.role.player.id in motion.edits}
     names: dict[str, str] = {}
-    done = 0
-
-    def iter_missing():
-        nonlocal done
-        for player, part in parts_by_id.items():
-            edit = replace(edits[player], correction=crowd[player].correction)
-            write_player(job.folder.player_path(part.file, "take.npz"), edit)
-            order = FinishRequest(edit=edit, measured=part.role.measured, ball=ball, frames=crowd[player].frames,
-                                  depth=crowd[player].depth, figures=job.request.figures,
-                                  bvh=job.request.bvh)  # fmt: skip
-            names[player] = job.build_name(replace(order, edit=_remove_library_paths([edit])[0]), part.role.player,
-                                           part.role.notes)
-            if _is_finished(job, part, names[player]):
-                done += 1
-            else:
-                yield player, (job.source, order)
-
-    for player, result in _run_stage(job, iter_missing(), finish_player, "figures"):
+    for player, part in parts_by_id.items():
+        edit = replace(motion.edits[player], correction=crowd[player].correction)
+        write_player(job.folder.player_path(part.file, "take.npz"), edit)
+        found, order = crowd[player], job.request
+        names[player] = job.build_name(remove_library_paths([edit])[0], part.role.measured, ball, found.frames,
+                                       found.depth, order.figures, order.bvh, part.role.player, part.role.notes)
+    missing = [player for player, part in parts_by_id.items() if not _is_finished(job, part, names[player])]
+    if job.request.figures or job.request.bvh:
+        motion.construct([_ALWAYS], missing)
+    tasks = ((player, (job.source, _build_finish_request(job, parts_by_id[player], motion, crowd[player], ball)))
+             for player in missing if player in motion.edits)
+    done = len(parts_by_id) - len(missing)
+    for player, result in run_stage(job, tasks, finish_player, "figures"):
         if isinstance(result, TaskFailure):
             job.state.update_player(player, status="failed", reason=result.reason)
             continue
@@ -249,6 +214,14 @@ def finish_players(
         done += 1
         job.report(done / len(parts_by_id), f"Figures: {done} of {len(parts_by_id)} players")
         job.state.update_player(player, status="done", **files)
+    motion.remove()
+
+
+def _build_finish_request(job: Job, part: PlayerPlans, motion: ConstructedMotion, found: PlayerCorrection,
+                          ball: BallPath) -> FinishRequest:
+    spans = motion.find_spans(part.role.player.id, *_ALWAYS) if job.request.figures or job.request.bvh else ()
+    return FinishRequest(motion=spans, correction=found.correction, measured=part.role.measured, ball=ball,
+                         frames=found.frames, depth=found.depth, figures=job.request.figures, bvh=job.request.bvh)
 
 
 def _is_finished(job: Job, part: PlayerPlans, name: str) -> bool:

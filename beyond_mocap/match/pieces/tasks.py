@@ -1,4 +1,4 @@
-"""The three kinds of work of a match, as functions for any process.
+"""The four kinds of work of a match, as functions for any process.
 
 Each takes everything it needs except the library, which a worker reads by itself, once, and which is the same
 everywhere. The last kind writes a player's files: with the figures of every report over all stretches, and second by
@@ -27,9 +27,10 @@ from ...synthesis.provenance import Provenance, build_provenance, write_provenan
 from ...synthesis.quality import movement
 from ...synthesis.quality.playback import Playback, playback_from_take
 from ...synthesis.take import Take
+from ..crowd.correction import Correction
 from ..crowd.window import PlayerCorrection, resolve_window
-from ..displayed_motion import construct_displayed_player
-from ..player_edit import PlayerEdit
+from ..displayed_motion import display_take
+from .motion_parts import MotionBlock, MotionSpan
 from .units import Unit
 from .windows import Piece, search_window
 
@@ -111,7 +112,8 @@ class FinishRequest:
     """What is needed to finish a player.
 
     Attributes:
-        edit: the edit list, with its correction.
+        motion: constructed, one span per stretch.
+        correction: collision avoidance.
         measured: tracks, one per stretch.
         ball: the match's ball.
         frames: (K,) frames of the match's clock at which the player overlaps another one.
@@ -120,7 +122,8 @@ class FinishRequest:
         bvh: write BVH.
     """
 
-    edit: PlayerEdit
+    motion: tuple[MotionSpan, ...]
+    correction: Correction
     measured: tuple[Track, ...]
     ball: BallPath
     frames: np.ndarray
@@ -134,14 +137,21 @@ def search_unit(source: LibrarySource, unit: Unit) -> Piece:
     return search_window(load_library(source), unit)
 
 
-def resolve_collision_window(source: LibrarySource, edits: Sequence[PlayerEdit], start: float,
+def construct_block(source: LibrarySource, block: MotionBlock) -> tuple[bytes, ...]:
+    """Construct some windows of one player (`MotionBlock.construct`)."""
+    return block.construct(load_library(source))
+
+
+def resolve_collision_window(source: LibrarySource, players: Sequence[Sequence[MotionSpan]], start: float,
                              end: float) -> tuple[PlayerCorrection, ...]:
     """Resolve the collisions of all players in one window (`crowd.window.resolve_window`)."""
-    return resolve_window(load_library(source), edits, start, end)
+    skeleton = load_library(source).skeleton
+    takes = [[span.load_take(skeleton) for span in spans] for spans in players]
+    return resolve_window(takes, start, end)
 
 
 def finish_player(source: LibrarySource, request: FinishRequest) -> PlayerFiles:
-    """Construct a player's whole motion, its figures and its files.
+    """Build a player's figures and files.
 
     Args:
         source: where the library is.
@@ -152,44 +162,68 @@ def finish_player(source: LibrarySource, request: FinishRequest) -> PlayerFiles:
     from threadpoolctl import threadpool_limits
 
     library = load_library(source)
+    files: dict[str, bytes] = {}
+    stretches, tables = [], []
     with threadpool_limits(limits=1):
-        plans = [stretch.plan for stretch in request.edit.stretches]
-        span = float(plans[0].track.times[0]), float(plans[-1].track.times[-1])
-        takes = construct_displayed_player(library, request.edit, request.ball, *span)
-        files, report = {}, None
-        if request.figures:
-            overlap = [_build_overlap(take, request) for take in takes]
-            report = build_player_report(library, takes, request.measured, overlap, request.ball)
-            table = _join_provenance([build_provenance(take) for take in takes])
-            files["provenance.csv"] = _write_to_bytes(lambda path: write_provenance(path, table))
-        if request.bvh:
-            for number, take in enumerate(takes, 1):
+        for number, (span, track) in enumerate(zip(request.motion, request.measured), 1):  # one is in memory at a time
+            take = display_take(span.load_take(library.skeleton), request.correction, request.ball)
+            if request.figures:
+                stretches.append(measure_stretch(library, take, track, _build_overlap(take, request), request.ball))
+                tables.append(build_provenance(take))
+            if request.bvh:
                 ending = "bvh" if number == 1 else f"{number}.bvh"
                 files[ending] = _write_to_bytes(lambda path, take=take: bvh.write_bvh(path, take.motion))
-    return PlayerFiles(report, files)
+        if request.figures:
+            table = _join_provenance(tables)
+            files["provenance.csv"] = _write_to_bytes(lambda path: write_provenance(path, table))
+    return PlayerFiles(build_player_report(stretches) if request.figures else None, files)
 
 
-def build_player_report(
-    library: Library, takes: Sequence[Take], tracks: Sequence[Track], overlap: Sequence[np.ndarray], ball: BallPath
-) -> dict:
+@dataclass(frozen=True, eq=False)
+class StretchFigures:
+    """The figures of one stretch.
+
+    Attributes:
+        report: from `evaluate`.
+        frames: of its take.
+        per_second: from `measure_per_second`.
+    """
+
+    report: dict
+    frames: int
+    per_second: dict
+
+
+def measure_stretch(library: Library, take: Take, track: Track, overlap: np.ndarray, ball: BallPath) -> StretchFigures:
+    """Measure a stretch.
+
+    Args:
+        library: the clips.
+        take: of the stretch, T frames.
+        track: measured.
+        overlap: (T,) m of overlap with other bodies.
+        ball: the match's ball, as written.
+    Returns:
+        The figures.
+    Raises:
+        InputError: if the take has another skeleton than the library.
+    """
+    return StretchFigures(evaluate(take, track, library), len(take.motion),
+                          measure_per_second(playback_from_take(take), track, overlap, ball))
+
+
+def build_player_report(stretches: Sequence[StretchFigures]) -> dict:
     """Build a player's report over all stretches, in the form of the contract's Report JSON with `time_lost_s` and
     `per_second` added.
 
     Args:
-        library: the clips.
-        takes: one per stretch.
-        tracks: measured, one per stretch.
-        overlap: (T,) m of overlap with other bodies, one per stretch.
-        ball: the match's ball, as written.
+        stretches: in order of time.
     Returns:
         The report.
-    Raises:
-        InputError: if a take has another skeleton than the library.
     """
-    reports = [evaluate(take, track, library) for take, track in zip(takes, tracks)]
-    out = merge_reports(reports, [len(take.motion) for take in takes])
+    out = merge_reports([one.report for one in stretches], [one.frames for one in stretches])
     out["time_lost_s"] = measure_time_lost(out["warning_seconds"])
-    out["per_second"] = measure_per_second([playback_from_take(take) for take in takes], tracks, overlap, ball)
+    out["per_second"] = join_seconds([one.per_second for one in stretches])
     return round_values(out)
 
 
@@ -224,32 +258,36 @@ def measure_time_lost(warning_seconds: Sequence[Sequence[Sequence[float]]]) -> f
     return lost
 
 
-def measure_per_second(
-    played: Sequence[Playback], tracks: Sequence[Track], overlap: Sequence[np.ndarray], ball: BallPath
-) -> dict:
+def measure_per_second(played: Playback, track: Track, overlap: np.ndarray, ball: BallPath) -> dict:
     """Measure figures for whole seconds of the match's clock.
 
     Args:
-        played: one per stretch.
-        tracks: one per stretch.
-        overlap: (T,) m, one per stretch.
+        played: a stretch, T frames.
+        track: measured.
+        overlap: (T,) m.
         ball: the match's ball.
     Returns:
-        `start_s`, and lists with None where the player is absent: `root_error_m` (mean), `skate_cm_s` (mean over feet
-        in contact), `overlap_m` (deepest), `ball_m` (least horizontal distance of the hips from the ball).
+        `start_s`, and lists with None where nothing is known: `root_error_m` (mean), `skate_cm_s` (mean over feet in
+        contact), `overlap_m` (deepest), `ball_m` (least horizontal distance of the hips from the ball).
     """
-    start = int(np.floor(min(one.start_time for one in played) + 1e-6))
-    end = int(np.floor(max(one.times[-1] for one in played) + 1e-6)) + 1
-    names = ("root_error_m", "skate_cm_s", "overlap_m", "ball_m")
-    rows: dict[str, list] = {name: [None] * (end - start) for name in names}
-    for one, track, deep in zip(played, tracks, overlap):
-        second = np.floor(one.times + 1e-6).astype(int) - start
-        for name, values, over in _compute_curves(one, track, deep, ball):
-            for number in np.unique(second):
-                found = values[second == number]
-                found = found[np.isfinite(found)]
-                rows[name][number] = float(over(found)) if len(found) else None
-    return {"start_s": start, **rows}
+    second = np.floor(played.times + 1e-6).astype(int)
+    edges = np.searchsorted(second, np.arange(second[0], second[-1] + 2))
+    rows: dict[str, list] = {}
+    for name, values, over in _compute_curves(played, track, overlap, ball):
+        known = (values[low:high][np.isfinite(values[low:high])] for low, high in zip(edges, edges[1:]))
+        rows[name] = [float(over(found)) if len(found) else None for found in known]
+    return {"start_s": int(second[0]), **rows}
+
+
+def join_seconds(stretches: Sequence[dict]) -> dict:
+    """Join what `measure_per_second` found for several stretches in order of time; None where the player is absent."""
+    start = stretches[0]["start_s"]
+    out: dict[str, list] = {name: [] for name in stretches[0] if name != "start_s"}
+    for one in stretches:
+        for name, values in out.items():
+            first = one["start_s"] - start
+            out[name] = [*values, *[None] * (first - len(values))][:first] + one[name]
+    return {"start_s": start, **out}
 
 
 def _build_overlap(take: Take, request: FinishRequest) -> np.ndarray:

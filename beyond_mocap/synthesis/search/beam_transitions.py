@@ -7,7 +7,7 @@ pairs that may still be kept. The result is the same as if every pair were evalu
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -34,7 +34,7 @@ class SlotCandidates:
 
     def select(self, which: np.ndarray) -> "SlotCandidates":
         """Select candidates by index."""
-        return SlotCandidates(*(getattr(self, field.name)[which] for field in fields(self)))
+        return SlotCandidates(*(values[which] for values in vars(self).values()))
 
 
 class BeamTransitions:
@@ -133,14 +133,14 @@ class BeamTransitions:
         """
         costs, weights = self.costs, self.costs.weights
         candidate, state = np.divmod(pairs, lower_bound.shape[1])
-        start, end = to.start[candidate], self.end[state]
-        frame = costs.round_frame(start)
-        cut = np.float32(weights.feet) * costs.measure_foot_jump(costs.round_frame(end), frame)
-        cut += costs.compute_recording_change(costs.round_frame(end), frame)
+        frame, left = costs.round_frame(to.start)[candidate], costs.round_frame(self.end)[state]
+        cut = np.float32(weights.feet) * costs.measure_foot_jump(left, frame)
+        cut += costs.compute_recording_change(left, frame)
         # a stand may be shown again: nothing in it is recognized
         shown = self.seen[state, costs.index.bucket[frame]]
         cut += np.float32(weights.replay) * shown * np.maximum(costs.index.lifted[frame], np.float32(0.1))
-        cut[_is_same_frame(start, end) & (to.clip[candidate] == self.clip[state])] = 0.0
+        is_same = _is_same_frame(to.start[candidate], self.end[state])
+        cut[is_same & (to.clip[candidate] == self.clip[state])] = 0.0
         rate = np.float32(weights.rate_change) * np.abs(to.rate.astype(np.float32)[candidate] - self.rate[state])
         return lower_bound.ravel()[pairs] + cut + rate
 

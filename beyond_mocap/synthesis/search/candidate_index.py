@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import weakref
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 
 import numpy as np
 from scipy.ndimage import maximum_filter1d, uniform_filter1d
@@ -59,9 +59,9 @@ class RatePairs:
     lifted: np.ndarray
     lean: np.ndarray
 
-    def slice_pairs(self, which: slice) -> "RatePairs":
-        """Select a slice of the pairs."""
-        return RatePairs(*(getattr(self, field.name)[which] for field in fields(self)))
+    def select_pairs(self, which: slice | np.ndarray) -> "RatePairs":
+        """Select a slice of the pairs, or pairs by index."""
+        return RatePairs(*(values[which] for values in vars(self).values()))
 
 
 class CandidateIndex:

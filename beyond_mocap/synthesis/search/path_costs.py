@@ -6,7 +6,7 @@ how far two poses are apart. Costs are per slot, about 1 per metre per second of
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -24,13 +24,14 @@ from .request import SearchRequest
 # Finding the cheapest of many pairs of a playback rate and a library frame without evaluating all.
 #
 # Pairs are in order of their speeds, and each costs at least the speed that it misses. The costs of every eighth pair
-# give an upper bound for the cheapest ones, and so a limit of how far from the requested speed they can lie.
+# give an upper bound for the cheapest ones, and so a limit of how far from the requested speed they can lie. Of these,
+# the terms that cost little to compute leave a quarter, of which all terms are computed.
 
 
 _SAMPLED = 8  # every eighth pair is sampled
 # safety factor on the rank in the sample: so many pairs very likely lie below the cost found there
 _ABOVE = 1.25
-_ROUNDING = 1e-3  # m/s, for float32 speeds
+_ROUNDING = 1e-3  # m/s or a share of a cost, for float32
 
 _CONTINUITY = ("switch", "other", "young", "pose", "rate_change")
 FREE_SPEED, FREE_TURN, FREE_ASIDE = (0.05, 0.06), np.radians(5.0), np.float32(np.radians(12.0))
@@ -41,12 +42,14 @@ YOUNG_SLOTS = 7  # slots after a cut before which another one costs more: 1.9 s,
 
 
 def find_cheapest(
-    cost_of: Callable[[slice], np.ndarray], speeds: np.ndarray, speed: float, weight: float, considered: int, count: int
+    cost_of: Callable[[slice | np.ndarray], np.ndarray], bound_of: Callable[[slice], np.ndarray], speeds: np.ndarray,
+    speed: float, weight: float, considered: int, count: int,
 ) -> tuple[np.ndarray, np.ndarray]:
     """Find the `count` cheapest of the `considered` pairs nearest to a speed.
 
     Args:
-        cost_of: returns the costs (n,) of a slice of the pairs.
+        cost_of: returns the costs (n,) of a slice of the pairs, or of their numbers (n,).
+        bound_of: returns what each pair of a slice costs at least (n,), up to rounding.
         speeds: (K,) m/s of the pairs, ascending.
         speed: m/s that is requested.
         weight: least cost of a metre per second of missed speed.
@@ -56,20 +59,26 @@ def find_cheapest(
         Their numbers (k,), ascending, and costs (k,).
     """
     near = _nearest_slice(speeds, speed, considered)
-    part, cost = _find_promising(cost_of, speeds, speed, weight=weight, near=near, count=count)
+    numbers, cost = _find_promising(cost_of, bound_of, speeds, speed, weight=weight, near=near, count=count)
     best = np.sort(np.argpartition(cost, count)[:count]) if len(cost) > count else np.arange(len(cost))
-    return part.start + best, cost[best]
+    return numbers[best], cost[best]
 
 
 def _nearest_slice(speeds: np.ndarray, speed: float, count: int) -> slice:
     """Return the slice of the `count` speeds nearest to `speed`, by rank."""
-    middle = int(np.searchsorted(speeds, speed))
+    middle = int(_locate_speeds(speeds, [speed])[0])
     low = int(np.clip(middle - count // 2, 0, max(0, len(speeds) - count)))
     return slice(low, min(low + count, len(speeds)))
 
 
-def _find_promising(cost_of, speeds: np.ndarray, speed: float, weight: float, near: slice, count: int):
-    """Return the part of `near` that holds the `count` cheapest pairs, and their costs.
+def _locate_speeds(speeds: np.ndarray, values: Sequence[float]) -> np.ndarray:
+    """Find where values (n,) lie in speeds, as np.searchsorted, which would convert float32 speeds to float64."""
+    at = np.asarray(values, speeds.dtype)
+    return np.searchsorted(speeds, np.where(at < values, np.nextafter(at, speeds.dtype.type(np.inf)), at))
+
+
+def _find_promising(cost_of, bound_of, speeds: np.ndarray, speed: float, weight: float, near: slice, count: int):
+    """Return numbers of pairs in `near`, the `count` cheapest ones among them, and their costs.
 
     All of `near` where it is small, or where the sample gave too low a bound.
     """
@@ -78,12 +87,14 @@ def _find_promising(cost_of, speeds: np.ndarray, speed: float, weight: float, ne
         # cost / weight bounds the missed speed, so the cheapest pairs lie within `reach` of the requested speed
         upper_bound = np.partition(cost_of(slice(near.start, near.stop, _SAMPLED)), rank)[rank]
         reach = float(upper_bound) / weight + FREE_SPEED[0] + FREE_SPEED[1] * speed + _ROUNDING
-        low, high = np.searchsorted(speeds, [speed - reach, speed + reach])
+        low, high = _locate_speeds(speeds, [speed - reach, speed + reach])
         part = slice(max(int(low), near.start), min(int(high), near.stop))
-        cost = cost_of(part)
-        if np.count_nonzero(cost <= upper_bound) >= count:
-            return part, cost
-    return near, cost_of(near)
+        numbers = part.start + np.flatnonzero(bound_of(part) <= upper_bound + _ROUNDING * max(1.0, float(upper_bound)))
+        cost = cost_of(numbers)
+        below = np.flatnonzero(cost <= upper_bound)
+        if len(below) >= count:
+            return numbers[below], cost[below]
+    return np.arange(near.start, near.stop), cost_of(near)
 
 
 TERMS = {
@@ -224,10 +235,11 @@ class PathCosts:
         self._key_weights = replace(weights, turn=KEY_TURN * weights.turn, facing=KEY_TURN * weights.facing,
                                     slide=KEY_SLIDE * weights.slide)
         self._cached_motion: dict[tuple[int, int], tuple[float, float]] = {}
+        self._cached_lean: dict[tuple[int, int], np.ndarray] = {}
 
     def round_frame(self, frame: np.ndarray) -> np.ndarray:
         """Round to the nearest whole library frames."""
-        return np.clip(np.round(frame).astype(int), 0, len(self.frames) - 1)
+        return np.minimum(np.maximum(np.rint(frame).astype(int), 0), len(self.frames) - 1)
 
     def requested_motion(self, first: int, end: int) -> tuple[float, float]:
         """Return the track's mean speed, m/s, and change of direction, rad, from frame first to end; cached."""
@@ -279,12 +291,15 @@ class PathCosts:
         pairs, fixed_cost, (speed, _) = self.index.pairs_by_speed(avoid), self._fixed_costs(words,
                 is_asked, avoid), self.requested_motion(first, end)
 
-        def cost_of(part: slice) -> np.ndarray:
-            part_pairs = pairs.slice_pairs(part)
+        def cost_of(part: slice | np.ndarray) -> np.ndarray:
+            part_pairs = pairs.select_pairs(part)
             return _sum_terms(self._iter_motion_costs(first, end, part_pairs)) + fixed_cost[part_pairs.frame]
 
-        best, cost = find_cheapest(cost_of, pairs.speed, speed, weight=self.weights.speed, considered=considered,
-                                   count=count)
+        def bound_of(part: slice) -> np.ndarray:
+            return self._bound_motion_costs(first, end, pairs.select_pairs(part), fixed_cost)
+
+        best, cost = find_cheapest(cost_of, bound_of, pairs.speed, speed, weight=self.weights.speed,
+                                   considered=considered, count=count)
         return pairs.number[best], pairs.frame[best], cost
 
     def list_asked_labels(self, first: int, end: int) -> frozenset[str]:
@@ -299,17 +314,42 @@ class PathCosts:
 
     def _iter_motion_costs(self, first: int, end: int, pairs: RatePairs) -> Iterator[Term]:
         """Generate the terms that depend on the track: motion of pairs (K,), playback rate, and the player's lag."""
+        yield from self._iter_pair_terms(first, end, pairs)
+        middle = (first + end) // 2
+        if self.lean_counts[middle] > 0.0:
+            weight = np.float32(self.weights.lean * self.lean_counts[middle])
+            yield "lean", weight * compute_lean_cost(pairs.lean, self._find_wanted_lean(first, end))
+        yield from self._iter_rate_terms(first, pairs)
+
+    def _bound_motion_costs(self, first: int, end: int, pairs: RatePairs, fixed_cost: np.ndarray) -> np.ndarray:
+        """Compute what pairs (K,) cost at least: the terms that cost little to compute; fixed_cost: (N,) of frames."""
+        total = fixed_cost[pairs.frame]
+        for name, values in self._iter_pair_terms(first, end, pairs):
+            total += values
+            if name == "turn":  # the terms behind it take longest, and are not computed
+                break
+        for _, values in self._iter_rate_terms(first, pairs):
+            total += values
+        return total
+
+    def _iter_pair_terms(self, first: int, end: int, pairs: RatePairs) -> Iterator[Term]:
+        """Generate the terms of speed, turning and facing of pairs (K,)."""
         # pairs hold the turn over SLOT frames, this slot may be longer or shorter
         turn = pairs.turn * np.float32((end - first) / SLOT)
         yield from self._iter_motion_terms(first, end, pairs.speed, turn=turn, offset=pairs.offset,
                                            long_stance=pairs.long_stance, lifted=pairs.lifted)
-        middle = (first + end) // 2
-        if self.lean_counts[middle] > 0.0:
-            weight = np.float32(self.weights.lean * self.lean_counts[middle])
-            yield "lean", weight * compute_lean_cost(pairs.lean, self.wanted_lean[first : end + 1].mean(axis=0))
+
+    def _iter_rate_terms(self, first: int, pairs: RatePairs) -> Iterator[Term]:
+        """Generate the terms of the playback rate and the player's lag of pairs (K,)."""
         yield "rate", self._rate_cost[pairs.number]
         if self.request.lag_preference is not None:
             yield "variety", self.request.lag_preference.compute_cost(first, pairs.frame)
+
+    def _find_wanted_lean(self, first: int, end: int) -> np.ndarray:
+        """Find the mean lean (2,) of the track from frame first to end; cached."""
+        if (first, end) not in self._cached_lean:
+            self._cached_lean[first, end] = self.wanted_lean[first : end + 1].mean(axis=0)
+        return self._cached_lean[first, end]
 
     def _fixed_costs(self, words: frozenset[str], is_asked: bool, avoid: frozenset[str]) -> np.ndarray:
         """Return the cost (N,) of the library's frames wherever these labels are requested and avoided; cached."""
@@ -484,10 +524,11 @@ class PathCosts:
             m, summed over both feet.
         """
         feet, in_contact = self.frames.feet, self.index.is_in_contact
-        apart = np.zeros(np.broadcast_shapes(ends.shape, start.shape), np.float32)
+        moved, stay = feet[ends] - feet[start], in_contact[ends] & in_contact[start]
+        moved *= moved
+        apart = np.zeros(moved.shape[:-1], np.float32)
         for foot in (0, 1):
-            x, y = (feet[ends, axis] - feet[start, axis] for axis in (2 * foot, 2 * foot + 1))
-            apart += np.sqrt(x * x + y * y) * (in_contact[ends, foot] & in_contact[start, foot])
+            apart += np.sqrt(moved[..., 2 * foot] + moved[..., 2 * foot + 1]) * stay[..., foot]
         return apart
 
 

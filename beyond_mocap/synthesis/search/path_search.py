@@ -11,7 +11,7 @@ has to pass through one of these clips at exactly the requested time, and begins
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -95,7 +95,7 @@ class BeamStates:
 
     def select(self, which: np.ndarray) -> "BeamStates":
         """Select states by index."""
-        return BeamStates(*(getattr(self, field.name)[which] for field in fields(self)))
+        return BeamStates(*(values[which] for values in vars(self).values()))
 
 
 class PathSearch:
@@ -281,7 +281,8 @@ class PathSearch:
         width, order = self.width.beam_width, np.argsort(states.cost, kind="stable")
         free, acts = states.piece[order] < 0, self._shows_requested_action(slot, states.start[order])
         kept = (order[free][:width], order[~free][:width])
-        acting = np.setdiff1d(order[free & acts][: self._acting_width], kept[0])
+        acting = order[free & acts][: self._acting_width]
+        acting = np.setdiff1d(acting, kept[0]) if len(acting) else acting
         best = states.select(np.concatenate([*kept, acting]))
         best.recent[:, -1] = self.index.bucket[self.costs.round_frame(best.start)]
         return best

@@ -142,7 +142,8 @@ def build_request(library: Library, plan: ResolvedPlan) -> SearchRequest:
     avoided = avoided_labels_per_frame(plan.timeline, track.times)
     gait = _replace_avoided_gaits(library, gait, track.speed, avoided)
     automatic = build_automatic_labels(library, gait, track)
-    automatic = [tuple(word for word in words if word not in avoid) for words, avoid in zip(automatic, avoided)]
+    if any(avoided):
+        automatic = [tuple(word for word in words if word not in avoid) for words, avoid in zip(automatic, avoided)]
     timeline = fill_timeline(plan.timeline, track.times, automatic)
     allowed = np.array([settings.mirror or not clip.mirrored for clip in library.clips])
     warnings: list[str] = []

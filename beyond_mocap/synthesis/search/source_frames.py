@@ -187,9 +187,11 @@ def _compute_overlap(library: Library, source: SourceMotion, edges: np.ndarray, 
 
 def _to_clip_frames(library: Library, clip: np.ndarray, frame: np.ndarray) -> np.ndarray:
     """Convert library frames to fractional frames in the clips' own rates, held at the clips' ends."""
-    rates = np.array([c.motion.fps for c in library.clips]) / library.fps
-    lengths = np.array([len(c.motion) for c in library.clips])
-    return np.clip((frame - library.frames.first[clip]) * rates[clip], 0, lengths[clip] - 1)
+    shown, place = np.unique(clip, return_inverse=True)
+    motions = [library.clips[number].motion for number in shown]
+    rates = np.array([motion.fps for motion in motions]) / library.fps
+    lengths = np.array([len(motion) for motion in motions])
+    return np.clip((frame - library.frames.first[clip]) * rates[place], 0, lengths[place] - 1)
 
 
 def _fetch_poses(library: Library, clip: np.ndarray, frame: np.ndarray):

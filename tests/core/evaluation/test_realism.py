@@ -59,7 +59,11 @@ def test_nearest_distance_is_the_smallest_of_all(seed):
     owner = random.integers(0, 3, 30)
     mine = random.integers(0, 3, 7)
     every = np.linalg.norm(a[:, None] - b, axis=-1)
-    np.testing.assert_allclose(realism.measure_nearest_distance(a, b), every.min(axis=1), atol=1e-3)
+    nearest, enough = every.min(axis=1), random.uniform(1.0, 5.0, 7)
+    np.testing.assert_allclose(realism.measure_nearest_distance(a, b), nearest, atol=1e-3)
+    bound = realism.bound_nearest_distance(a, b, enough)
+    np.testing.assert_array_equal(bound > enough, nearest > enough)
+    np.testing.assert_allclose(bound[nearest > enough], nearest[nearest > enough], atol=1e-3)
     every[mine[:, None] == owner] = np.inf
     np.testing.assert_allclose(realism.measure_nearest_distance(a, b, mine, owner), every.min(axis=1), atol=1e-3)
 

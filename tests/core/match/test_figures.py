@@ -4,7 +4,14 @@ import numpy as np
 import pytest
 
 from beyond_mocap.evaluation.report import evaluate
-from beyond_mocap.match.pieces.tasks import build_player_report, measure_per_second, measure_time_lost, merge_reports
+from beyond_mocap.match.pieces.tasks import (
+    build_player_report,
+    join_seconds,
+    measure_per_second,
+    measure_stretch,
+    measure_time_lost,
+    merge_reports,
+)
 from beyond_mocap.motion.track.ball_path import BallPath
 from beyond_mocap.synthesis.quality.playback import playback_from_take
 
@@ -76,7 +83,8 @@ def test_every_second_has_its_own_figures(take, library):
     ball[30:60] += [30.0, 0.0, 0.0]
     overlap = np.zeros(count)
     overlap[45] = 0.25
-    report = build_player_report(library, [take], [track], [overlap], BallPath(times, ball, np.ones(count, bool)))
+    figures = measure_stretch(library, take, track, overlap, BallPath(times, ball, np.ones(count, bool)))
+    report = build_player_report([figures])
     alone = evaluate(take, track, library)
     assert {name: report[name] for name in alone} == alone
     rows = report["per_second"]
@@ -93,9 +101,9 @@ def test_seconds_between_stretches_are_empty(take):
     later = replace(take, start_time=take.start_time + 40.0)
     count = len(take.motion)
     ball = BallPath(np.arange(2.0), np.full((2, 3), np.nan), np.zeros(2, bool))
-    rows = measure_per_second(
-        [playback_from_take(take), playback_from_take(later)], [take.plan.track] * 2, [np.zeros(count)] * 2, ball
-    )
+    rows = join_seconds([
+        measure_per_second(playback_from_take(one), take.plan.track, np.zeros(count), ball) for one in (take, later)
+    ])  # fmt: skip
     there = [value is not None for value in rows["overlap_m"]]
     assert there[0] and there[40] and not there[30]
     assert rows["ball_m"] == [None] * len(there)

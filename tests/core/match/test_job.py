@@ -19,6 +19,7 @@ from beyond_mocap.files.tracking.tracking import read_match
 from beyond_mocap.library.build import build_library
 from beyond_mocap.match.displayed_motion import construct_displayed_player
 from beyond_mocap.match.folder import read_state
+from beyond_mocap.match.pieces.constructed_motion import MOTION
 from beyond_mocap.match.player_edit import read_player
 from beyond_mocap.match.synthesize_match import synthesize_match
 from beyond_mocap.motion.track.ball_path import BallPath
@@ -128,7 +129,7 @@ if __name__ == "__main__":
 """]  # fmt: skip
 
 
-@pytest.mark.parametrize("kind", ["search", "crowd"])
+@pytest.mark.parametrize("kind", ["search", MOTION, "crowd"])
 def test_a_run_that_was_killed_is_gone_on_with_to_the_same_bits(made, order_to, tmp_path, kind):
     order = order_to(tmp_path / "killed", workers=2)
     process = subprocess.Popen(command(order), start_new_session=True)
@@ -139,10 +140,12 @@ def test_a_run_that_was_killed_is_gone_on_with_to_the_same_bits(made, order_to, 
     os.kill(process.pid, signal.SIGKILL)
     process.wait()
     assert read_state(order.out)["status"] == "running"
-    kept = {path: path.stat().st_mtime_ns for path in (order.out / ".work").rglob("*.npz")}
+    kept = {path: path.stat().st_mtime_ns for path in (order.out / ".work").rglob("*.npz")
+            if path.parent.name != MOTION}  # fmt: skip
     synthesize_match(replace(order, workers=1))
     assert read_reproducible_files(order.out) == read_reproducible_files(made[0])
     assert kept and all(path.stat().st_mtime_ns == when for path, when in kept.items())
+    assert not list((order.out / ".work" / MOTION).iterdir())  # it is stored only while it is needed
 
 
 def test_what_is_cancelled_is_told_and_gone_on_with(made, order_to, tmp_path):

@@ -7,7 +7,8 @@ import numpy as np
 import pytest
 
 from beyond_mocap.base.errors import InputError
-from beyond_mocap.match.player_motion import construct_player
+from beyond_mocap.match.pieces import motion_parts
+from beyond_mocap.match.player_motion import StretchWindows, construct_player
 from beyond_mocap.motion import quaternion
 from beyond_mocap.motion.humanoid import identify_joints
 from beyond_mocap.motion.motion import forward_kinematics
@@ -51,6 +52,23 @@ def test_any_span_shows_the_same_frames(library, weaving_player, fps):
         assert same_frames(whole, part)
         assert len(part.keys) == (start <= KICK_TIME <= end)
         assert part.timeline.spans[0].start == pytest.approx(part.start_time)
+
+
+def test_stored_windows_show_what_is_constructed(library, weaving_player, monkeypatch):
+    monkeypatch.setattr(motion_parts, "BLOCK_WINDOWS", 2)
+    (stretch,), window = weaving_player.stretches, weaving_player.window
+    blocks = motion_parts.list_blocks(weaving_player)
+    contents = [content for _, block in blocks for content in block.construct(library)]
+    grid = StretchWindows(stretch, window)
+    assert len(contents) == len(grid.edges) - 1 > 2
+    parts = tuple((content, 0, end - first) for content, first, end in zip(contents, grid.edges, grid.edges[1:]))
+    stored = motion_parts.MotionSpan(grid.cut_plan(0, grid.count), parts).load_take(library.skeleton)
+    (whole,) = construct_player(library, weaving_player, 0.0, 100.0)
+    assert same_frames(whole, stored)
+    for name in ("start_time", "words", "timeline", "keys", "warnings", "dribble_touches", "method", "seed"):
+        assert getattr(stored, name) == getattr(whole, name), name
+    for name in ("seams", "correction", "ik_miss", "stepped", "planned_heading"):
+        np.testing.assert_array_equal(getattr(stored, name), getattr(whole, name))
 
 
 def test_he_shows_the_whole_of_his_edit_list_on_his_track(library, weaving_player):

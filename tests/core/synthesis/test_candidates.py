@@ -18,19 +18,24 @@ def costs_of(missed, seed=1):
     return cost_of, missed + more, weighed
 
 
+def bound_nothing(part):
+    return np.zeros(part.stop - part.start)
+
+
 @pytest.mark.parametrize("speed", [-1.0, 0.0, 1.3, 9.0])
 def test_they_are_the_cheapest_and_few_are_weighed(speed):
     speeds = np.sort(np.random.default_rng(2).uniform(0.0, 6.0, 40000))
     cost_of, every, weighed = costs_of(np.abs(speeds - speed))
-    number, cost = find_cheapest(cost_of, speeds, speed, 1.0, len(speeds), 300)
+    missed = np.abs(speeds - speed)
+    number, cost = find_cheapest(cost_of, lambda part: missed[part], speeds, speed, 1.0, len(speeds), 300)
     assert set(number) == set(np.argsort(every)[:300]) and np.all(np.diff(number) > 0)
     np.testing.assert_array_equal(cost, every[number])
-    assert sum(weighed) < 0.5 * len(speeds)
+    assert sum(weighed) < 0.3 * len(speeds)
 
 
 def test_only_the_nearest_in_speed_are_looked_at():
     speeds = np.linspace(0.0, 6.0, 5000)
-    number, _ = find_cheapest(costs_of(np.zeros(5000))[0], speeds, 3.0, 0.0, 1000, 200)
+    number, _ = find_cheapest(costs_of(np.zeros(5000))[0], bound_nothing, speeds, 3.0, 0.0, 1000, 200)
     assert len(number) == 200 and np.all(np.abs(speeds[number] - 3.0) < 0.61)
 
 
@@ -38,5 +43,5 @@ def test_a_sample_that_deceives_costs_time_only():
     """Every eighth pair is cheap, and no other near it in cost."""
     speeds = np.linspace(2.0, 2.001, 40000)
     every = np.where(np.arange(40000) % 8, 1.0, 0.5) + speeds
-    number, cost = find_cheapest(lambda part: every[part], speeds, 2.0, 1.0, 40000, 6000)
+    number, cost = find_cheapest(lambda part: every[part], bound_nothing, speeds, 2.0, 1.0, 40000, 6000)
     assert len(set(number)) == 6000 and np.array_equal(np.sort(cost), np.sort(every)[:6000])
