@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
@@ -178,7 +179,7 @@ class Library:
             synthetic = _build_synthetic_library(self)
             if self.cache_location:
                 write_synthetic_clips(self.cache_location[0], synthetic.clips)
-                cache.save_library(*self.cache_location, synthetic, "made")
+                _save_synthetic_library(*self.cache_location, synthetic)
         else:
             write_synthetic_clips(self.cache_location[0], synthetic.clips, missing_only=True)
         return self._join(synthetic) if synthetic.clips else self
@@ -263,6 +264,12 @@ def _build_synthetic_library(library: Library) -> Library:
         return replace(library, clips=())
     frames = build_frames(clips, library.frames)
     return replace(library, clips=tuple(clips), frames=frames, clusters={}, notes=())
+
+
+def _save_synthetic_library(place: Path, key: str, synthetic: Library) -> None:
+    """Save the synthetic clips beside the cache of the recordings; a folder that cannot be written is left alone."""
+    with suppress(OSError), cache.create_arrays_folder(place, "made") as arrays:
+        cache.save_library(place, key, synthetic, arrays=arrays, name="made")
 
 
 def _measure_stance_seconds(clip: Clip, source: np.ndarray) -> np.ndarray:
