@@ -8,8 +8,6 @@ import time
 from collections.abc import Mapping
 from pathlib import Path
 
-import numpy as np
-
 from ..base.errors import InputError, NotInLibraryError, format_count
 from ..base.settings.options import add_options, option_values
 from .comparing import run_comparison
@@ -168,6 +166,8 @@ def run_evaluate(options, reporter: ProgressReporter, writers: Mapping[str, Writ
 
 def _evaluate_motion(options, reporter: ProgressReporter) -> None:
     """Report on a motion that was written before."""
+    import numpy as np
+
     if len(options.motion) > 1:
         raise InputError("evaluate", f"{len(options.motion)} motions", "one motion, or --against LIBRARY",
                          "evaluate them one after the other")

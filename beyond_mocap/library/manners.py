@@ -56,7 +56,6 @@ def measure_manners(paths: list[str], frames, is_calm: np.ndarray, fps: float) -
         is_calm: (N,) bool, frames of recordings that belong to locomotion.
         fps: frames per second.
     """
-
     from scipy.spatial.distance import cdist
 
     seen = is_calm & (frames.speed >= WALKING_SPEEDS[0]) & (frames.speed <= WALKING_SPEEDS[1])

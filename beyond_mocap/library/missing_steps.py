@@ -157,7 +157,6 @@ def _turn_ahead(motion: Motion) -> np.ndarray:
 
 def _average_stride(walk: Strides) -> np.ndarray:
     """Average the strides of a walk: (N, J, 4) world rotations relative to the heading at even phases."""
-
     from scipy.interpolate import PchipInterpolator
 
     landings = walk.landings[walk.first_side :]

@@ -163,7 +163,6 @@ def _propose_locomotion(seen: _RecordingSignals, gaits) -> list[Proposal]:
 
 def _propose_kicks(seen: _RecordingSignals) -> list[Proposal]:
     """Propose kicks: feet that swing faster than a stride; of two within half a second the faster."""
-
     from scipy.signal import find_peaks
 
     fps, found = seen.motion.fps, []

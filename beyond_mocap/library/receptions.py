@@ -52,7 +52,6 @@ def find_cut_receptions(clips: Sequence, frames: Frames, feet_in_contact: np.nda
 
 def _find_gives(frames: Frames, dribbles: np.ndarray, is_in_contact: np.ndarray, side: int) -> list[tuple[float, int]]:
     """Find the frames in which one foot begins to give, with its largest speed in m/s around them."""
-
     from scipy.signal import find_peaks
 
     toe = frames.feet[:, 2 * side : 2 * side + 2]

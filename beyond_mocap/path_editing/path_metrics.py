@@ -73,7 +73,6 @@ def measure_path_distance(pelvis: np.ndarray, origin: np.ndarray, path, fps: flo
     Returns:
         (T,) metres.
     """
-
     from scipy.spatial import cKDTree
 
     low, high = path.domain

@@ -21,11 +21,15 @@ Angles in degrees here, radians outside. Speeds in m/s.
 from __future__ import annotations
 
 from functools import lru_cache
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from ..base.easing import quintic_step
 from ..motion.retargeting import adult
+
+if TYPE_CHECKING:
+    from scipy.interpolate import CubicSpline, PchipInterpolator
 
 LEG = adult.ADULT_LEG
 GRAVITY = 9.81  # m/s^2

@@ -12,6 +12,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import lru_cache
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -29,6 +30,9 @@ from .footsteps import Footsteps, compute_ground_lift
 from .gait import build_posture, plan_footsteps
 from .gait_legs import limit_leg_reach, measure_leg, plant_feet
 from .gait_plan import GaitPlan, GaitStyle, plan_gait
+
+if TYPE_CHECKING:
+    from scipy.interpolate import PchipInterpolator
 
 LEFT, RIGHT = 0, 1
 
@@ -211,7 +215,6 @@ def _blend_strike(posture: Posture, gait_plan: GaitPlan, steps, key: float, reci
 def _guide_foot(posture: Posture, gait_plan: GaitPlan, steps: Footsteps, key: float, rows,
                 neutral: NeutralStance) -> Posture:
     """Guide the right foot's swing around `key` seconds through the rows of a Strike; its ends stay as they were."""
-
     from scipy.interpolate import CubicSpline
 
     swing = _find_swing(steps, key)
@@ -361,7 +364,6 @@ def choose_style(
 @lru_cache(maxsize=256)
 def _build_curve(rows: tuple) -> tuple[float, float, PchipInterpolator]:
     """Build the first time, last time and curve of a table; cached, because a synthetic move is planned many times."""
-
     from scipy.interpolate import PchipInterpolator
 
     table = np.array(rows, dtype=float)

@@ -110,7 +110,6 @@ def _compute_jump(times, air: float, standing: np.ndarray, *, neutral: NeutralSt
     """Compute the height of the hips (N,) m, free fall in the air, and how far (N,) the ankles are drawn up and back
     there; `longer`: s that the tables' rows on the ground are further from the contact.
     """
-
     from scipy.interpolate import CubicSpline
 
     scale = neutral.leg / tables.LEG

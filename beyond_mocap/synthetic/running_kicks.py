@@ -162,7 +162,6 @@ def _select_frames(gait_plan: GaitPlan) -> slice:
 
 def _time_steps(gait_plan: GaitPlan, speed: float) -> tuple[GaitPlan, np.ndarray]:
     """Time the steps of a run for a kick: also s from the contact at which right, plant and right foot land."""
-
     from scipy.interpolate import PchipInterpolator
 
     share = np.clip((speed - _SLOWEST) / (_FASTEST - _SLOWEST), 0.0, 1.0)

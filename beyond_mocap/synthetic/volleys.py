@@ -331,7 +331,6 @@ def _blend_recipe(posture: Posture, recipe: Volley, times, ease, neutral: Neutra
 def _guide_foot(posture: Posture, rows: tuple, times: np.ndarray, neutral: NeutralStance) -> Posture:
     """Guide the right foot from its place through `rows` and back, never through the ground nor beyond the leg's reach.
     """
-
     from scipy.interpolate import CubicSpline
 
     scale, table = neutral.leg / tables.LEG, np.array(rows, dtype=float)

@@ -58,7 +58,6 @@ def build_loft(table, roundness: float = 2.0) -> Field:
             be left out, then it is 0.
         roundness: exponent of the sections: 2 is an ellipse, more is boxier.
     """
-
     from scipy.interpolate import PchipInterpolator
 
     rows = np.array(sorted(map(tuple, table)), dtype=float)

@@ -94,7 +94,6 @@ def find_candidates(kernel: Kernel, rows: np.ndarray, seconds: np.ndarray, ruled
     Returns:
         Samples (C,) and their scores (C,).
     """
-
     from scipy.signal import find_peaks
 
     score = smooth_score(kernel.compute_scores(rows))

@@ -50,7 +50,6 @@ def fit_smoothing_spline(
         Knots (P + 4,) and coefficients (P, K).
     Source: Eilers and Marx 1996; O'Sullivan 1986.
     """
-
     from scipy.linalg import solveh_banded
 
     low, high = domain or (float(at[0]), float(at[-1]))
@@ -216,7 +215,6 @@ def _build_right_side(rows: np.ndarray, left: np.ndarray, weights: np.ndarray, v
 
 def _solve_pinned(band: np.ndarray, right: np.ndarray, ends: np.ndarray) -> np.ndarray:
     """Solve the coefficients (P, K) of which the first and the last are `ends` (2, K)."""
-
     from scipy.linalg import solveh_banded
 
     last = len(right) - 1
@@ -229,7 +227,6 @@ def _solve_pinned(band: np.ndarray, right: np.ndarray, ends: np.ndarray) -> np.n
 def _solve_cyclic(band: np.ndarray, right: np.ndarray) -> np.ndarray:
     """Solve the coefficients (P, K) of a closed curve: the last three are solved after all others (Schur complement).
     """
-
     from scipy.linalg import solveh_banded
 
     count = len(right)

@@ -56,7 +56,6 @@ def calm_foot(body: Body, foot: Surface, held: tuple[int, int], is_in_contact: n
 def _delay(away: np.ndarray, lag: np.ndarray) -> np.ndarray:
     """Compute the moves (W, 3) m of a point that passes its path (W, 3) m `lag` (W,) frames late; 0 where it does not.
     """
-
     from scipy.interpolate import CubicSpline
 
     frames = np.arange(len(away))

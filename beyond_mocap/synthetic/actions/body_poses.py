@@ -192,7 +192,6 @@ def compute_flight(times: np.ndarray, height: np.ndarray, take_off: float, landi
     Returns:
         (T,) m.
     """
-
     from scipy.interpolate import CubicSpline
 
     low, high = np.interp([take_off, landing], times, height)
