@@ -17,6 +17,7 @@ import numpy as np
 
 from ..annotation import ClipAnnotation
 from ..base.errors import InputError, UserCancelledError
+from ..base.memory import check_memory
 from ..base.settings import find_setting
 from ..files.bvh import bvh
 from ..motion.motion import Motion
@@ -31,7 +32,9 @@ from .features import FPS, build_frames
 from .library import Library, Progress
 from .motion_file import MappedMotions, MotionWriter
 from .proposals import propose_labels
-from .scan import Annotations, find_readable_clips
+from .scan import Annotations, find_readable_clips, read_stamp
+
+_BASE_BYTES, _BYTES_PER_BYTE = 3e8, 2.0  # of memory that a build needs, and what it needs for a byte of its BVH files
 
 
 def build_library(
@@ -80,7 +83,9 @@ def build_library(
             write_synthetic_clips(place, _list_completed(found["clips"]), missing_only=True)
             digests.save()
             found["notes"] += tuple(waiting)
-            return Library(folder=str(folder), cache_location=(place, key), **found)
+            return _remember(Library(folder=str(folder), cache_location=(place, key), **found))
+    text_bytes = sum(read_stamp(file)[0] for file in files)
+    check_memory(folder, _BASE_BYTES + _BYTES_PER_BYTE * text_bytes, "use fewer or shorter clips")
     told = [*waiting, *cache.describe_outdated_cache(place)]
     sources_read = _Recordings(
         folder=folder, paths=paths, files=files, annotations=annotations, unit=unit, threads=threads,
@@ -90,7 +95,16 @@ def build_library(
     library = _build_cached(sources_read, place, key, seed, report, cancelled)
     digests.save()
     report(1.0, "Library ready")
-    return replace(library, cache_location=(place, key), notes=(*library.notes, *told))
+    return _remember(replace(library, cache_location=(place, key), notes=(*library.notes, *told)))
+
+
+def _remember(library: Library) -> Library:
+    """Give a library what the cache knows of it: what its recordings lack, and where its index is."""
+    coverage = cache.load_coverage(*library.cache_location)
+    vars(library)["index_place"] = (*library.cache_location, "index")
+    if coverage is not None:
+        vars(library)["coverage"] = coverage  # where a cached property keeps its value
+    return library
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -120,6 +134,7 @@ def _build_cached(recordings: _Recordings, place: Path, key: str, seed: int, rep
             library = _index_clips(recordings, arrays, seed, report, cancelled)
             write_synthetic_clips(place, _list_completed(library.clips))
             cache.save_library(place, key, library, arrays=arrays)
+            cache.save_coverage(place, key, library.coverage)
             return library
     except OSError:
         library = _index_clips(recordings, None, seed, report, cancelled)

@@ -32,6 +32,7 @@ from ..files.bvh import bvh
 from ..motion.skeleton import Skeleton
 from .clip import Clip
 from .clusters import Clusters
+from .coverage import Coverage
 from .features import Frames
 from .motion_file import MappedMotions, MotionWriter, map_array
 from .repair import RepairFigures
@@ -41,8 +42,9 @@ from .scan import CACHE_FOLDER, read_stamp
 VERSION = 40
 MOTIONS = "motions.npy"
 """Name of the file with the motions of all clips (`motion_file`)."""
-_DIGESTS = "digests.json"
+_DIGESTS, _COVERAGE = "digests.json", "coverage"
 _SETTLED = 2_000_000_000  # ns since a file's last change from which on its time tells the next one
+_TOKEN_BYTES = 6  # of the part of a folder's name that makes it unique
 _ABANDONED = 3600.0  # s after which an array folder that no header names is used by no process
 _FRAME_ARRAYS = tuple(field.name for field in fields(Frames) if field.name != "vocabulary")
 
@@ -142,7 +144,7 @@ def create_arrays_folder(place: Path, name: str = "library") -> Iterator[Path]:
         OSError: if it cannot be created.
     """
     is_new = not place.exists()
-    folder = place / f"{name}-{secrets.token_hex(6)}"
+    folder = place / f"{name}-{secrets.token_hex(_TOKEN_BYTES)}"
     folder.mkdir(parents=True)
     try:
         yield folder
@@ -173,11 +175,60 @@ def save_library(place: Path, key: str, library, *, arrays: Path, name: str = "l
         writer.finish()
     for part, values in _list_arrays(library).items():
         np.save(arrays / f"{part}.npy", values, allow_pickle=False)
+    _publish(place, name, arrays, _build_header(key, library))
+
+
+def _publish(place: Path, name: str, arrays: Path, header: dict) -> None:
+    """Write the header that names a folder of complete arrays."""
     stamps = {file.name: [*read_stamp(file), _digest_file(file)] for file in sorted(arrays.iterdir())}
     with suppress(OSError, KeyError, TypeError):
         os.utime(place / _read_header(place, name)["folder"])  # from now on it is abandoned
-    _write_header(place, name, {**_build_header(key, library), "folder": arrays.name, "files": stamps})
+    _write_header(place, name, {**header, "version": VERSION, "folder": arrays.name, "files": stamps})
     _remove_old_folders(place, name, arrays.name)
+
+
+def save_arrays(place: Path, key: str, name: str, arrays: dict[str, np.ndarray]) -> None:
+    """Save arrays that were computed from a cached library beside it; a folder that cannot be written is left alone.
+
+    Args:
+        place: the cache's folder.
+        key: fingerprint of the library.
+        name: of the arrays.
+        arrays: by name.
+    """
+    with suppress(OSError), create_arrays_folder(place, name) as folder:
+        for part, values in arrays.items():
+            np.save(folder / f"{part}.npy", values, allow_pickle=False)
+        _publish(place, name, folder, {"key": key})
+
+
+def load_arrays(place: Path, key: str, name: str) -> dict[str, np.ndarray] | None:
+    """Load what `save_arrays` saved, mapped into memory; None where it is missing, damaged or of another library."""
+    header = _read_header(place, name)
+    if header.get("key") != key or header.get("version") != VERSION:
+        return None
+    try:
+        return {file.stem: map_array(file) for file in _list_sound_files(place, name, header)}
+    except Exception:  # as for `load_library`
+        return None
+
+
+def save_coverage(place: Path, key: str, coverage: Coverage) -> None:
+    """Save what the recordings lack, which takes as long to find as a take; a place that cannot be written is left
+    alone.
+    """
+    with suppress(OSError):
+        _write_header(place, _COVERAGE, {"key": key, "coverage": asdict(coverage)})
+
+
+def load_coverage(place: Path, key: str) -> Coverage | None:
+    """Load what `save_coverage` saved; None where it is missing, damaged or of another library."""
+    header = _read_header(place, _COVERAGE)
+    if header.get("key") != key:
+        return None
+    rows = {name: value if isinstance(value, bool) else tuple(tuple(row) if isinstance(row, list) else row for row in
+                                                              value) for name, value in header["coverage"].items()}
+    return Coverage(**rows)
 
 
 def _list_arrays(library) -> dict[str, np.ndarray]:
@@ -221,7 +272,7 @@ def _remove_old_folders(place: Path, name: str, current: str) -> None:
     Until then other processes, on other machines too, may have them mapped.
     """
     outdated = time.time() - _ABANDONED
-    for folder in place.glob(f"{name}-*"):
+    for folder in place.glob(f"{name}-{'[0-9a-f]' * 2 * _TOKEN_BYTES}"):
         with suppress(OSError):  # on Windows, one that is still mapped stays until the next build
             if folder.name != current and folder.stat().st_mtime < outdated:
                 shutil.rmtree(folder)
@@ -240,7 +291,7 @@ def _build_header(key: str, library) -> dict:
     """Build the header: everything that is not an array."""
     skeleton = library.skeleton
     return {
-        "version": VERSION, "key": key, "names": skeleton.names, "parents": skeleton.parents,
+        "key": key, "names": skeleton.names, "parents": skeleton.parents,
         "end_parents": skeleton.end_parents,
         "vocabulary": library.frames.vocabulary, "fps": library.fps, "notes": library.notes,
         "lengths": list(library.clusters),

@@ -144,6 +144,15 @@ class Library:
         return measure_coverage(self.clips, self.frames, self.fps, self.strangeness)
 
     @cached_property
+    def index_place(self) -> tuple[Path, str, str] | None:
+        """Where what is computed from exactly these clips is cached: folder, key and name.
+
+        None for a library that was changed after it was built or completed: `build_library` and `with_synthetic_clips`
+        set it, and a changed copy does not have it.
+        """
+        return None
+
+    @cached_property
     def manners(self) -> Manners:
         """How the people of this library move."""
         is_calm = self._is_recorded & (self.strangeness <= 1.0)
@@ -182,7 +191,12 @@ class Library:
                 _save_synthetic_library(*self.cache_location, synthetic)
         else:
             write_synthetic_clips(self.cache_location[0], synthetic.clips, missing_only=True)
-        return self._join(synthetic) if synthetic.clips else self
+        if not synthetic.clips:
+            return self
+        joined = self._join(synthetic)
+        if self.index_place is not None:
+            vars(joined)["index_place"] = (*self.cache_location, "made-index")
+        return joined
 
     def append_synthetic_clips(self, clips: Sequence[Clip]) -> "Library":
         """Append synthetic clips, described like its own.

@@ -23,7 +23,7 @@ from ...library.build import build_library
 from ...library.library import Library
 from ...motion.track import Track
 from ...motion.track.ball_path import BallPath
-from ...synthesis.provenance import Provenance, build_provenance, write_provenance
+from ...synthesis.provenance import build_provenance, join_provenance, write_provenance
 from ...synthesis.quality import movement
 from ...synthesis.quality.playback import Playback, playback_from_take
 from ...synthesis.take import Take
@@ -160,7 +160,7 @@ def finish_player(source: LibrarySource, request: FinishRequest) -> PlayerFiles:
         if request.figures:
             overlap = [_build_overlap(take, request) for take in takes]
             report = build_player_report(library, takes, request.measured, overlap, request.ball)
-            table = _join_provenance([build_provenance(take) for take in takes])
+            table = join_provenance([build_provenance(take) for take in takes])
             files["provenance.csv"] = _write_to_bytes(lambda path: write_provenance(path, table))
         if request.bvh:
             for number, take in enumerate(takes, 1):
@@ -259,16 +259,6 @@ def _build_overlap(take: Take, request: FinishRequest) -> np.ndarray:
     inside = (at >= 0) & (at < len(out))
     out[at[inside]] = request.depth[inside]
     return out
-
-
-def _join_provenance(tables: Sequence[Provenance]) -> Provenance:
-    """Join the provenance of several stretches."""
-    names = ["times", "clip_frame", "mirrored", "contacts"]
-    if all(one.planned_heading is not None for one in tables):
-        names.append("planned_heading")
-    arrays = {name: np.concatenate([getattr(one, name) for one in tables]) for name in names}
-    return Provenance(clip=tuple(clip for one in tables for clip in one.clip),
-                      words=tuple(words for one in tables for words in one.words), **arrays)
 
 
 def _write_to_bytes(write) -> bytes:
