@@ -20,6 +20,7 @@ from ..base.errors import InputError, UserCancelledError
 from ..base.memory import check_memory
 from ..base.settings import find_setting
 from ..files.bvh import bvh
+from ..files.motion_file import MappedMotions, MotionWriter
 from ..motion.motion import Motion
 from ..synthetic.landing import ends_in_flight
 from . import cache, landings, repair
@@ -30,7 +31,6 @@ from .clip import Clip
 from .clusters import BLOCK_LENGTHS, cluster_blocks
 from .features import FPS, build_frames
 from .library import Library, Progress
-from .motion_file import MappedMotions, MotionWriter
 from .proposals import propose_labels
 from .scan import Annotations, find_readable_clips, read_stamp
 

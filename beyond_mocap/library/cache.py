@@ -29,19 +29,19 @@ from ..base.digest import byte_digest
 from ..base.errors import InputError
 from ..files.atomic import atomic_write
 from ..files.bvh import bvh
+from ..files.motion_file import MappedMotions, MotionWriter, map_array
 from ..motion.skeleton import Skeleton
 from .clip import Clip
 from .clusters import Clusters
 from .coverage import Coverage
 from .features import Frames
-from .motion_file import MappedMotions, MotionWriter, map_array
 from .repair import RepairFigures
 from .scan import CACHE_FOLDER, read_stamp
 
 # raised whenever what is computed or stored changes, so that old caches are not used
 VERSION = 40
 MOTIONS = "motions.npy"
-"""Name of the file with the motions of all clips (`motion_file`)."""
+"""Name of the file with the motions of all clips (`files.motion_file`)."""
 _DIGESTS, _COVERAGE = "digests.json", "coverage"
 _SETTLED = 2_000_000_000  # ns since a file's last change from which on its time tells the next one
 _TOKEN_BYTES = 6  # of the part of a folder's name that makes it unique

@@ -13,7 +13,8 @@ import numpy as np
 import pytest
 
 from beyond_mocap.base.errors import InputError
-from beyond_mocap.library import cache, motion_file
+from beyond_mocap.files import motion_file
+from beyond_mocap.library import cache
 from beyond_mocap.library.build import build_library
 from beyond_mocap.library.library import Library
 from beyond_mocap.library.scan import CACHE_FOLDER
