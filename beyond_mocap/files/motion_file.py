@@ -75,21 +75,8 @@ class MappedMotions(Sequence):
     """
 
     def __init__(self, numbers: np.ndarray, shapes: Iterable[Shape]):
-        """Divide the numbers (N,) of a mapped file into motions.
-
-        Raises:
-            ValueError: if they are more or fewer than the shapes say.
-        """
-        self._numbers, self._motions, start = numbers, [], 0  # type: ignore[var-annotated]
-        for skeleton, count, fps in shapes:
-            middle = start + 3 * count
-            end = middle + 4 * count * len(skeleton)
-            root, rotations = numbers[start:middle], numbers[middle:end]
-            self._motions.append(Motion.from_stored(skeleton, root.reshape(count, 3),
-                                                    rotations.reshape(count, len(skeleton), 4), fps))
-            start = end
-        if start != len(numbers):
-            raise ValueError(f"{len(numbers)} numbers, {start} expected")
+        """Divide the numbers (N,) of a mapped file into motions, see `divide_into_motions`."""
+        self._numbers, self._motions = numbers, divide_into_motions(numbers, shapes)
 
     def __len__(self) -> int:
         return len(self._motions)
@@ -105,6 +92,25 @@ class MappedMotions(Sequence):
             mapped = mapped.base
         if isinstance(mapped, mmap.mmap) and hasattr(mmap, "MADV_DONTNEED"):
             mapped.madvise(mmap.MADV_DONTNEED)
+
+
+def divide_into_motions(numbers: np.ndarray, shapes: Iterable[Shape]) -> list[Motion]:
+    """Divide the numbers (N,) of a file into its motions, without looking at them.
+
+    Raises:
+        ValueError: if they are more or fewer than the shapes say.
+    """
+    motions, start = [], 0
+    for skeleton, count, fps in shapes:
+        middle = start + 3 * count
+        end = middle + 4 * count * len(skeleton)
+        root, rotations = numbers[start:middle], numbers[middle:end]
+        motions.append(Motion.from_stored(skeleton, root.reshape(count, 3),
+                                          rotations.reshape(count, len(skeleton), 4), fps))
+        start = end
+    if start != len(numbers):
+        raise ValueError(f"{len(numbers)} numbers, {start} expected")
+    return motions
 
 
 def map_array(path: Path) -> np.ndarray:

@@ -29,7 +29,7 @@ from ..base.digest import byte_digest
 from ..base.errors import InputError
 from ..files.atomic import atomic_write
 from ..files.bvh import bvh
-from ..files.motion_file import MappedMotions, MotionWriter, map_array
+from ..files.motion_file import MotionWriter, divide_into_motions, map_array
 from ..motion.skeleton import Skeleton
 from .clip import Clip
 from .clusters import Clusters
@@ -344,7 +344,8 @@ def _restore_fields(header: dict, arrays: dict) -> dict:
     """Restore the fields of a library but its folder."""
     names, parents, ends = (header[part] for part in ("names", "parents", "end_parents"))
     skeleton = Skeleton(names, parents, arrays["offsets"], ends, arrays["end_offsets"])
-    motions = MappedMotions(arrays[Path(MOTIONS).stem], ((skeleton, row[3], row[2]) for row in header["clips"]))
+    shapes = ((skeleton, row[3], row[2]) for row in header["clips"])
+    motions = divide_into_motions(arrays[Path(MOTIONS).stem], shapes)
     clips, start = [], 0
     for motion, (path, mirrored, _, count, rows, recorded, mended, is_proposed) in zip(motions, header["clips"]):
         annotations = tuple(ClipAnnotation(first, end, key, tuple(words)) for first, end, key, words in rows)
