@@ -30,7 +30,7 @@ from .classify.classifier import FILE_NAME, Classifier, read_classifier
 from .clip import Clip
 from .clusters import BLOCK_LENGTHS, cluster_blocks
 from .features import FPS, build_frames
-from .library import Library, Progress
+from .library import RECORDED_INDEX, Library, Progress
 from .proposals import propose_labels
 from .scan import Annotations, find_readable_clips, read_stamp
 
@@ -101,7 +101,7 @@ def build_library(
 def _remember(library: Library) -> Library:
     """Give a library what the cache knows of it: what its recordings lack, and where its index is."""
     coverage = cache.load_coverage(*library.cache_location)
-    vars(library)["index_place"] = (*library.cache_location, "index")
+    vars(library)["index_place"] = (*library.cache_location, RECORDED_INDEX)
     if coverage is not None:
         vars(library)["coverage"] = coverage  # where a cached property keeps its value
     return library

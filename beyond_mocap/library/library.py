@@ -37,6 +37,8 @@ from .synthetic_clips import KICK_STEP, iter_synthetic_clips, measure_kick_speed
 
 MIN_RUN_SECONDS = 2.0  # of a track's runs from which on long runs are needed
 RESTING_SPEED = 0.1  # m/s of a track below which a player stands
+RECORDED_INDEX = "index"
+"""Name under which what is computed from the recordings alone is cached."""
 Progress = Callable[[float, str], None]
 
 
@@ -194,8 +196,8 @@ class Library:
         if not synthetic.clips:
             return self
         joined = self._join(synthetic)
-        if self.index_place is not None:
-            vars(joined)["index_place"] = (*self.cache_location, "made-index")
+        if self.index_place is not None and self.index_place[-1] == RECORDED_INDEX:
+            vars(joined)["index_place"] = (*self.cache_location, f"made-{RECORDED_INDEX}")
         return joined
 
     def append_synthetic_clips(self, clips: Sequence[Clip]) -> "Library":

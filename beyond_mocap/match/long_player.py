@@ -25,7 +25,7 @@ from ..synthesis.resolve_plan import resolve_plan
 from ..synthesis.take import Take
 from .pieces.tasks import merge_reports
 from .pieces.units import build_units, count_frames, cut_track
-from .pieces.windows import build_search_library, join_pieces, search_window
+from .pieces.windows import join_pieces, search_window
 from .player_edit import PlayerEdit, to_stored_plan
 from .player_motion import construct_player
 
@@ -59,7 +59,7 @@ def search_long_player(library: Library, plan: Plan, window: float, progress: Pr
     for unit in units:
         progress(0.6 * unit.number / len(units), "Searching")
         pieces.append(search_window(library, unit, cancelled))
-    return join_pieces(build_search_library(library, plan), [plan], pieces, CONSTRUCTION_WINDOW)[0]
+    return join_pieces(library, [plan], pieces, CONSTRUCTION_WINDOW)[0]
 
 
 def iter_parts(library: Library, edit: PlayerEdit, progress: Progress,

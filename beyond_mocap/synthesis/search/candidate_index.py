@@ -111,7 +111,7 @@ class CandidateIndex:
         self._showing: dict[frozenset[str], np.ndarray] = {}
         place = library.index_place if allowed.all() else None
         known = cache.load_arrays(*place) if place else None
-        if known is None or set(known) != {*_STORED, *_list_pair_names()}:
+        if known is None or set(known) != {*_STORED, *_list_pair_names()} or len(known["strange"]) != len(self.frames):
             self._compute(library, allowed)
             if place:
                 cache.save_arrays(*place, self._list_arrays())
