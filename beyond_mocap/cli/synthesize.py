@@ -89,9 +89,11 @@ def run_synthesize(options, reporter: ProgressReporter, writers: Mapping[str, Wr
     seconds = {"load": loaded - started, "library": ready - loaded}
     try:
         if window:
-            frames, ball, warnings = _synthesize_in_windows(options, reporter, library, plan, window, seconds, data)
+            frames, ball, warnings = _synthesize_in_windows(options, reporter, library, plan, window=window,
+                                                            seconds=seconds, lines=data.lines)
         else:
-            frames, ball, warnings = _synthesize_whole(options, reporter, library, plan, write, seconds, data)
+            frames, ball, warnings = _synthesize_whole(options, reporter, library, plan, write=write, seconds=seconds,
+                                                       lines=data.lines)
     except NotInLibraryError as error:
         message = str(error.locate(annotations)).replace(USE_NEAREST, "add --nearest")
         raise NotInLibraryError(message, error.nearest, error.line, error.fixes) from None
@@ -131,7 +133,8 @@ def _choose_window(options, track) -> float:
     return window
 
 
-def _synthesize_whole(options, reporter: ProgressReporter, library, plan, write: Writer, seconds: dict, data):
+def _synthesize_whole(options, reporter: ProgressReporter, library, plan, *, write: Writer, seconds: dict,
+                      lines):
     """Synthesize a track at once and write its files; returns the number of frames, the ball and warnings."""
     from ..files.tables import write_ball, write_report
     from ..synthesis.provenance import write_provenance
@@ -145,7 +148,7 @@ def _synthesize_whole(options, reporter: ProgressReporter, library, plan, write:
 
         with reporter.stop_at_once():
             report = evaluate(take, plan.track, library)
-        report["warnings"] = [*report.get("warnings", []), *data.lines]
+        report["warnings"] = [*report.get("warnings", []), *lines]
     write(take, options.out)
     if options.provenance:
         write_provenance(options.provenance, take)
@@ -156,7 +159,8 @@ def _synthesize_whole(options, reporter: ProgressReporter, library, plan, write:
     return len(take.motion), take.ball, take.warnings
 
 
-def _synthesize_in_windows(options, reporter: ProgressReporter, library, plan, window: float, seconds: dict, data):
+def _synthesize_in_windows(options, reporter: ProgressReporter, library, plan, *, window: float, seconds: dict,
+                           lines):
     """Synthesize a track in windows and write its files; returns the number of frames, the ball and warnings."""
     from ..files.tables import write_report
     from ..match.long_player import LongTakeFiles, iter_parts, search_long_player
@@ -171,7 +175,7 @@ def _synthesize_in_windows(options, reporter: ProgressReporter, library, plan, w
     warnings = (*edit.stretches[0].warnings, *files.warnings)
     if options.report:
         merged = files.build_report()
-        merged["warnings"] = [*merged.get("warnings", []), *data.lines]
+        merged["warnings"] = [*merged.get("warnings", []), *lines]
         merged["seconds"] = {**merged["seconds"], **seconds, "total": sum(seconds.values())}
         write_report(options.report, merged)
     return files.frames, files.ball, warnings

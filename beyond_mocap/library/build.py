@@ -92,7 +92,7 @@ def build_library(
         skeleton=skeleton_file, classifier=read_classifier(model) if model else None,
         notes=(*([cache_note] if cache_note else []), *annotations.describe_unknown_files(folder)),
     )
-    library = _build_cached(sources_read, place, key, seed, report, cancelled)
+    library = _build_cached(sources_read, place, key, seed, report=report, cancelled=cancelled)
     digests.save()
     report(1.0, "Library ready")
     return _remember(replace(library, cache_location=(place, key), notes=(*library.notes, *told)))
@@ -173,8 +173,8 @@ def _read_clips(recordings: _Recordings, arrays: Path | None, notes: list[str], 
     rows = _read_rows(recordings, motions)
     is_proposed = not any(rows)
     repaired = MotionWriter(arrays and arrays / "repaired.npy")
-    repairs, contacts = _repair_clips(recordings, motions, [drift for _, drift in changes], repaired, notes, report,
-                                      cancelled)
+    repairs, contacts = _repair_clips(recordings, motions, [drift for _, drift in changes], repaired, notes=notes,
+                                      report=report, cancelled=cancelled)
     levelled.discard()
     motions = repaired.finish()
     if is_proposed:
