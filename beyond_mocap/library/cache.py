@@ -20,6 +20,7 @@ from collections.abc import Iterable, Iterator
 from contextlib import contextmanager, suppress
 from dataclasses import asdict, fields
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -226,8 +227,10 @@ def load_coverage(place: Path, key: str) -> Coverage | None:
     header = _read_header(place, _COVERAGE)
     if header.get("key") != key:
         return None
-    rows = {name: value if isinstance(value, bool) else tuple(tuple(row) if isinstance(row, list) else row for row in
-                                                              value) for name, value in header["coverage"].items()}
+    rows: dict[str, Any] = {}
+    for name, value in header["coverage"].items():
+        is_list = isinstance(value, list)
+        rows[name] = tuple(tuple(row) if isinstance(row, list) else row for row in value) if is_list else value
     return Coverage(**rows)
 
 

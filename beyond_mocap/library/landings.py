@@ -87,7 +87,7 @@ def _build_getting_up(motions: Sequence[Motion], rows: Sequence[tuple[ClipAnnota
 
     Its upright stance is that of the longest stretch of slow locomotion: waiting goalkeepers, like runners, lean.
     """
-    upright = (motion.frames(row.start, row.end + 1) for motion, own in zip(motions, rows) for row in own
+    upright = (motion.frames(int(row.start), int(row.end) + 1) for motion, own in zip(motions, rows) for row in own
                if row.key is None and _UPRIGHT & set(row.words))
     example = max(upright, key=lambda motion: motion.duration, default=motions[0])
     gesture = build_get_up(example.skeleton, _MADE_FPS, example=example).motion
