@@ -41,6 +41,7 @@ SECTIONS = {  # name -> heading, (subheading, module, function) of each part
                             ("Releases of synthetic throws", "markers_real", "planted_table"),
                             ("Pitches against the radar", "markers_real", "radar_table"))),
     "playback": ("Playback in Blender", (("", "playback", "section"),)),
+    "scale": ("Large libraries and long tracks", (("", "scale", "section"),)),
     "throws": ("Throws and kicks", (("", "throws", "section"),)),
 }  # fmt: skip
 LIMIT = 900.0

@@ -2,19 +2,43 @@
 
 from __future__ import annotations
 
+import argparse
 import os
 import time
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
-
-import numpy as np
+from typing import TYPE_CHECKING
 
 from .. import __version__
 from ..base.errors import BeyondMocapError, InputError, format_count, format_seconds
 from ..base.settings.options import add_options, option_values, parse_path
 from .outputs import ProgressReporter, Writer, check_outputs
+
+if TYPE_CHECKING:
+    import numpy as np
+
+
+class _ProviderOption(argparse.Action):
+    """An option whose help names all providers; they are imported only where it is shown, so that the program starts
+    quickly.
+    """
+
+    @property
+    def help(self) -> str:
+        """The help with the providers' names."""
+        from ..files.event_providers import EVENT_PROVIDERS
+        from ..files.tracking.providers import PROVIDERS
+
+        return self._text.format(", ".join(EVENT_PROVIDERS if self.dest == "events_provider" else PROVIDERS))
+
+    @help.setter
+    def help(self, text: str) -> None:
+        self._text = text
+
+    def __call__(self, parser, namespace, values, option_string=None):
+        setattr(namespace, self.dest, values)
 
 
 def add_match(verbs):
@@ -25,19 +49,16 @@ def add_match(verbs):
     Returns:
         The parser of this verb.
     """
-    from ..files.event_providers import EVENT_PROVIDERS
-    from ..files.tracking.providers import PROVIDERS
-
     verb = verbs.add_parser("match", help="all players' motion and the ball of a tracked match, resumable")
     verb.add_argument("--tracking", type=parse_path, required=True, metavar="FILE", help="a provider's tracking data")
     verb.add_argument("--meta", type=parse_path, metavar="FILE", help="the provider's metadata; default: beside FILE")
     verb.add_argument("--events", type=parse_path, metavar="FILE", help="event data, from a provider or as CSV")
     verb.add_argument("--events-meta", type=parse_path, metavar="FILE",
                       help="metadata of the events; default: beside them")
-    verb.add_argument("--events-provider", metavar="NAME", default="",
-                      help=f"format of the events: {', '.join(EVENT_PROVIDERS)}; default: detected")
-    verb.add_argument("--provider", metavar="NAME", default="",
-                      help=f"format of FILE: {', '.join(PROVIDERS)}; default: detected")
+    verb.add_argument("--events-provider", metavar="NAME", default="", action=_ProviderOption,
+                      help="format of the events: {}; default: detected")
+    verb.add_argument("--provider", metavar="NAME", default="", action=_ProviderOption,
+                      help="format of FILE: {}; default: detected")
     verb.add_argument("--library", type=parse_path, required=True, help="a folder with BVH files and annotations")
     verb.add_argument("--out", type=parse_path, required=True, metavar="FOLDER",
                       help="output folder; an unfinished run continues there")
@@ -137,14 +158,12 @@ def add_touches(verbs):
     Returns:
         The parser of this verb.
     """
-    from ..files.tracking.providers import PROVIDERS
-
     verb = verbs.add_parser("touches", help="who touches the ball and when, from tracking data")
     verb.add_argument("input", type=parse_path, metavar="FILE",
                       help="a provider's tracking data, or a player's track as CSV")
     verb.add_argument("--meta", type=parse_path, metavar="FILE", help="the provider's metadata; default: beside FILE")
-    verb.add_argument("--provider", metavar="NAME",
-                      help=f"format of FILE: {', '.join(PROVIDERS)}; default: detected from its content")
+    verb.add_argument("--provider", metavar="NAME", action=_ProviderOption,
+                      help="format of FILE: {}; default: detected from its content")
     add_options(verb, "touches")
     verb.add_argument("--out", type=parse_path, required=True, metavar="TOUCHES.csv", help="a table of the touches")
     verb.add_argument("--ball", type=parse_path, metavar="BALL.csv", help="the solved trajectory at the samples' times")
@@ -201,6 +220,8 @@ def _read_tracking(options):
 
 def _build_touch_report(solved) -> dict:
     """Build the report of a `SolvedBall`, for JSON."""
+    import numpy as np
+
     residuals = solved.residuals[solved.measured & np.isfinite(solved.residuals)]
     spread = [touch.uncertainty for touch in solved.touches]
     return {
@@ -219,6 +240,8 @@ def _build_touch_report(solved) -> dict:
 
 def _compute_percentiles(values: np.ndarray) -> dict | None:
     """Compute median, 95th percentile and maximum; None without values."""
+    import numpy as np
+
     if not len(values):
         return None
     return {"median": np.median(values), "p95": np.percentile(values, 95), "max": values.max()}

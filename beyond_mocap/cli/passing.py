@@ -7,8 +7,6 @@ import time
 from collections.abc import Mapping
 from pathlib import Path
 
-import numpy as np
-
 from .. import __version__
 from ..base.errors import InputError, format_count
 from ..base.settings.options import add_options, parse_path
@@ -94,6 +92,8 @@ def list_strikes(library, played) -> list[dict]:
     Returns:
         Column name -> value for each strike, in the plan's order.
     """
+    import numpy as np
+
     out = []
     for number, strike in enumerate(played.plan.strikes):
         order, clip = strike.order, library.clips[strike.order.clip]

@@ -11,8 +11,6 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-import numpy as np
-
 from ..base.errors import InputError
 from ..base.settings.options import add_options, option_values, parse_path
 from .outputs import ProgressReporter, Writer, build_take, check_outputs, choose_writer, locate_errors
@@ -52,6 +50,8 @@ def run_path(options, reporter: ProgressReporter, writers: Mapping[str, Writer])
         reporter: progress, notes and cancellation.
         writers: further output formats, by file suffix (Blender's).
     """
+    import numpy as np
+
     from ..files.bvh import bvh
 
     started = time.perf_counter()
@@ -103,6 +103,8 @@ def _describe_remaining_path(source, edited, path, options) -> list[str]:
 
 def _describe_unit(clip, options) -> str:
     """Describe the output's unit where it differs from the input's."""
+    import numpy as np
+
     same = options.out.suffix.lower() != ".bvh" or np.isclose(clip.form.unit, 0.01)
     return "" if same else "; positions in centimetres (--unit 0.01)"
 
@@ -164,6 +166,8 @@ def _avoid_others(source, path, settings, ground, options):
 
 def _edit_motion(source, path, settings, ground, options):
     """Move the motion onto the path; return the result and the same as a take."""
+    import numpy as np
+
     from ..path_editing.path_edit import edit_path
     from ..path_editing.path_metrics import carry_contacts
 
@@ -196,6 +200,8 @@ def _build_report(source, edited, take, path, ground) -> dict:
 
 def _read_others(paths: Sequence[Path]) -> list[Follower]:
     """Read the other recordings as fixed bodies; second 0 is their first frame."""
+    import numpy as np
+
     from ..files.bvh import bvh
     from ..path_editing.detour import Follower
 
@@ -243,6 +249,8 @@ def _avoid_collisions(
 
 
 def _build_follower(name: str, edited: EditedMotion) -> Follower:
+    import numpy as np
+
     from ..path_editing.detour import Follower
 
     times = np.arange(len(edited.motion)) / edited.motion.fps
@@ -252,12 +260,16 @@ def _build_follower(name: str, edited: EditedMotion) -> Follower:
 
 def _apply_change(settings: PathEditSettings, change: PathChange, fps: float) -> PathEditSettings:
     """Apply a change to the settings; bodies wait for whole frames."""
+    import numpy as np
+
     delay = float(np.ceil(round(change.delay * fps, 3)) / fps)
     return replace(settings, delay=settings.delay + delay, detours=change.detours)
 
 
 def _find_collisions(followers: list[Follower], distance: float) -> list:
     """Find the collisions of the first body with the others."""
+    import numpy as np
+
     from ..path_editing.collisions import find_collisions
 
     times = np.unique(np.concatenate([follower.times for follower in followers]))

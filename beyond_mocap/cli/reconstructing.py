@@ -13,8 +13,6 @@ from dataclasses import replace
 from functools import partial
 from pathlib import Path
 
-import numpy as np
-
 from .. import __version__
 from ..base.errors import InputError, format_count
 from ..base.optional_packages import import_optional
@@ -282,6 +280,8 @@ def describe_result(result) -> str:
     Returns:
         Frames, duration, markers and their mean distance.
     """
+    import numpy as np
+
     residual = result.solved.residual[np.isfinite(result.solved.residual)]
     distance = f", markers {1000.0 * np.mean(residual):.1f} mm off" if len(residual) else ""
     return f"{len(result.motion)} frames, {result.motion.duration:.1f} s, {len(result.model.markers)} markers{distance}"

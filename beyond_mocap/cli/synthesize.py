@@ -8,15 +8,17 @@ import time
 from collections.abc import Mapping
 from pathlib import Path
 
-import numpy as np
-
 from ..base.errors import InputError, NotInLibraryError, format_count
+from ..base.memory import check_memory
 from ..base.optional_packages import import_optional
 from ..base.settings.options import add_options, option_values, parse_path
 from .comparing import run_comparison
 from .library import open_library
 from .outputs import ProgressReporter, Writer, add_take_files, check_outputs, choose_writer, locate_errors
 
+LONG_TRACK, WINDOW = 1200.0, 300.0  # s of a track from which on it is done in windows, and of these
+_FRAME_BYTES = 16e3  # of memory that a frame of a track takes that is not done in windows
+_BASE_BYTES = 4e8  # of memory that any take needs
 _MAX_REPORT_BYTES = 100_000_000  # no report is as large
 _OTHER_LENGTH, _OTHER_PLACE = 1.0, 2.0  # s and m by which a motion differs from its track at most
 
@@ -39,6 +41,9 @@ def add_synthesize(verbs) -> argparse.ArgumentParser:
     add_take_files(verb)
     verb.add_argument("--report", type=parse_path, metavar="R.json", help="write all figures to this file")
     add_options(verb, "synthesis")
+    verb.add_argument("--window", type=float, metavar="SECONDS",
+                      help="search and construct the track in windows of so many seconds, which takes less memory; "
+                           f"default: {WINDOW:g} for tracks above {LONG_TRACK / 60.0:g} minutes; 0: never")
     verb.add_argument("--solve-touches", action="store_true", default=True, help="the default; version 0.1 needed it")
     verb.add_argument("--pins", type=parse_path, metavar="P.csv",
                       help="targets of hands, feet, gaze and ball with times")
@@ -59,15 +64,12 @@ def run_synthesize(options, reporter: ProgressReporter, writers: Mapping[str, Wr
     """
     from ..annotation import Timeline, check_timeline, read_timeline
     from ..annotation.label_candidates import find_label_candidates
-    from ..files.tables import write_ball, write_report
     from ..files.tracking.tracking import read_track_csv
     from ..motion.track import clean_track
     from ..synthesis.heading_table import read_heading_keys
     from ..synthesis.pin_table import read_pins
     from ..synthesis.plan import Plan
-    from ..synthesis.provenance import write_provenance
     from ..synthesis.search.request import USE_NEAREST
-    from ..synthesis.synthesize import synthesize
 
     started = time.perf_counter()
     outputs = (options.out, options.provenance, options.ball, options.report)
@@ -77,7 +79,7 @@ def run_synthesize(options, reporter: ProgressReporter, writers: Mapping[str, Wr
     write = choose_writer(options.out, writers)
     track, data = clean_track(read_track_csv(options.track))
     timeline = read_timeline(annotations, options.fps, float(track.times[0])) if annotations else Timeline()
-    loaded = time.perf_counter()
+    window, loaded = _choose_window(options, track), time.perf_counter()
     library = open_library(options, reporter, seed=options.seed)
     check_timeline(timeline, library.labels, float(track.times[0]), float(track.times[-1]), str(annotations))
     ready = time.perf_counter()
@@ -87,25 +89,17 @@ def run_synthesize(options, reporter: ProgressReporter, writers: Mapping[str, Wr
         heading_keys=read_heading_keys(options.headings) if options.headings else (),
         **option_values(Plan, options, "synthesis", "player"),
     )
+    seconds = {"load": loaded - started, "library": ready - loaded}
     try:
-        take = synthesize(library, plan, reporter.show_progress, reporter.is_cancelled)
+        if window:
+            frames, ball, warnings = _synthesize_in_windows(options, reporter, library, plan, window=window,
+                                                            seconds=seconds, lines=data.lines)
+        else:
+            frames, ball, warnings = _synthesize_whole(options, reporter, library, plan, write=write, seconds=seconds,
+                                                       lines=data.lines)
     except NotInLibraryError as error:
         message = str(error.locate(annotations)).replace(USE_NEAREST, "add --nearest")
         raise NotInLibraryError(message, error.nearest, error.line, error.fixes) from None
-    take.seconds.update(load=loaded - started, library=ready - loaded, total=time.perf_counter() - started)
-    if options.report:
-        from ..evaluation.report import evaluate
-
-        with reporter.stop_at_once():
-            report = evaluate(take, track, library)
-        report["warnings"] = [*report.get("warnings", []), *data.lines]
-    write(take, options.out)
-    if options.provenance:
-        write_provenance(options.provenance, take)
-    if options.ball and take.ball is not None:
-        write_ball(options.ball, take.ball)
-    if options.report:
-        write_report(options.report, report)
     reporter.finish()
     if annotations and not options.annotations:
         reporter.show_note(f"{options.track}: with the labels of {annotations}")
@@ -114,12 +108,80 @@ def run_synthesize(options, reporter: ProgressReporter, writers: Mapping[str, Wr
     if library.notes:
         notes = f"{format_count(len(library.notes), 'note')} on how its recordings were read and repaired"
         reporter.show_note(f"{options.library}: {notes}; the command 'library' prints all")
-    take_warnings = [line for line in take.warnings if line not in library.notes]
+    take_warnings = [line for line in warnings if line not in library.notes]
     for line in (*take_warnings, *(f"{options.track}: {line}" for line in data.lines)):
         reporter.show_note(line)
-    if options.ball and take.ball is None:
+    if options.ball and ball is None:
         reporter.show_note(f"{options.track} has no ball, so {options.ball} is not written")
-    print(f"{options.out}: {len(take.motion)} frames, {take.motion.duration:.1f} s")
+    print(f"{options.out}: {frames} frames, {(frames - 1) / options.fps:.1f} s")
+
+
+def _choose_window(options, track) -> float:
+    """Choose the seconds of the windows, 0 for the whole track at once.
+
+    Raises:
+        InputError: where windows are asked for that this take cannot have, or a whole take needs more memory than is
+            free.
+    """
+    seconds, window = float(track.times[-1] - track.times[0]), options.window
+    can_be_cut = options.method == "path" and options.out.suffix.lower() == ".bvh"
+    if window and not can_be_cut:
+        raise InputError("--window", f"method {options.method} to {options.out.suffix}", "method path to .bvh",
+                         "leave it out")
+    if window is None:
+        window = WINDOW if can_be_cut and seconds > LONG_TRACK else 0.0
+    if not window:
+        next_step = "use --window" if can_be_cut else "use a shorter track"
+        check_memory(options.track, _BASE_BYTES + _FRAME_BYTES * seconds * options.fps, next_step)
+    return window
+
+
+def _synthesize_whole(options, reporter: ProgressReporter, library, plan, *, write: Writer, seconds: dict,
+                      lines):
+    """Synthesize a track at once and write its files; returns the number of frames, the ball and warnings."""
+    from ..files.tables import write_ball, write_report
+    from ..synthesis.provenance import write_provenance
+    from ..synthesis.synthesize import synthesize
+
+    started = time.perf_counter()
+    take = synthesize(library, plan, reporter.show_progress, reporter.is_cancelled)
+    take.seconds.update(**seconds, total=sum(seconds.values()) + time.perf_counter() - started)
+    if options.report:
+        from ..evaluation.report import evaluate
+
+        with reporter.stop_at_once():
+            report = evaluate(take, plan.track, library)
+        report["warnings"] = [*report.get("warnings", []), *lines]
+    write(take, options.out)
+    if options.provenance:
+        write_provenance(options.provenance, take)
+    if options.ball and take.ball is not None:
+        write_ball(options.ball, take.ball)
+    if options.report:
+        write_report(options.report, report)
+    return len(take.motion), take.ball, take.warnings
+
+
+def _synthesize_in_windows(options, reporter: ProgressReporter, library, plan, *, window: float, seconds: dict,
+                           lines):
+    """Synthesize a track in windows and write its files; returns the number of frames, the ball and warnings."""
+    from ..files.tables import write_report
+    from ..match.long_player import LongTakeFiles, iter_parts, search_long_player
+    from ..match.pieces.units import count_frames
+
+    started, report = time.perf_counter(), (reporter.show_progress, reporter.is_cancelled)
+    edit = search_long_player(library, plan, window, *report)
+    seconds["search"], plan = time.perf_counter() - started, edit.stretches[0].plan
+    files = LongTakeFiles(library, plan.track, bool(options.report))
+    files.write_motion(options.out, iter_parts(library, edit, *report), count_frames(plan, plan.fps))
+    files.write_tables(options.provenance, options.ball)
+    warnings = (*edit.stretches[0].warnings, *files.warnings)
+    if options.report:
+        merged = files.build_report()
+        merged["warnings"] = [*merged.get("warnings", []), *lines]
+        merged["seconds"] = {**merged["seconds"], **seconds, "total": sum(seconds.values())}
+        write_report(options.report, merged)
+    return files.frames, files.ball, warnings
 
 
 def _find_annotations(track: Path) -> Path | None:
@@ -172,6 +234,8 @@ def run_evaluate(options, reporter: ProgressReporter, writers: Mapping[str, Writ
 
 def _evaluate_motion(options, reporter: ProgressReporter) -> None:
     """Report on a motion that was written before."""
+    import numpy as np
+
     if len(options.motion) > 1:
         raise InputError("evaluate", f"{len(options.motion)} motions", "one motion, or --against LIBRARY",
                          "evaluate them one after the other")

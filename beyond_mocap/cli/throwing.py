@@ -9,8 +9,6 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-import numpy as np
-
 from .. import __version__
 from ..base.errors import InputError, format_seconds
 from ..base.settings.options import add_options, parse_path
@@ -108,6 +106,8 @@ def run_synthesize(options, reporter: ProgressReporter, writers: Mapping[str, Wr
         reporter: progress, notes and cancellation.
         writers: further output formats, by file suffix (Blender's).
     """
+    import numpy as np
+
     from ..files.tables import write_ball, write_report
     from ..throws.throw import throw_at
 
@@ -249,6 +249,8 @@ class _Player:
 
     def find_position(self, time: float) -> tuple[float, ...]:
         """Find the track's position (2,) m at a time."""
+        import numpy as np
+
         track = self.plan.sample_track(self.plan.fps)
         return tuple(float(np.interp(time, track.times, column)) for column in track.positions.T)
 

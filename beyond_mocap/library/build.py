@@ -6,15 +6,22 @@ In a folder without any annotation, labels are proposed (`library.proposals`), u
 from __future__ import annotations
 
 import re
+from collections import deque
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import replace
+from dataclasses import dataclass, replace
+from itertools import islice
 from pathlib import Path
-from typing import Callable, Iterable
+
+import numpy as np
 
 from ..annotation import ClipAnnotation
 from ..base.errors import InputError, UserCancelledError
+from ..base.memory import check_memory
 from ..base.settings import find_setting
 from ..files.bvh import bvh
+from ..files.motion_file import MappedMotions, MotionWriter
+from ..motion.motion import Motion
 from ..synthetic.landing import ends_in_flight
 from . import cache, landings, repair
 from . import common_skeleton as one_skeleton
@@ -22,9 +29,11 @@ from .cache import write_synthetic_clips
 from .classify.classifier import FILE_NAME, Classifier, read_classifier
 from .clip import Clip
 from .features import FPS, build_frames
-from .library import Library, Progress
+from .library import RECORDED_INDEX, Library, Progress
 from .proposals import propose_labels
-from .scan import Annotations, find_readable_clips
+from .scan import Annotations, find_readable_clips, read_stamp
+
+_BASE_BYTES, _BYTES_PER_BYTE = 3e8, 2.0  # of memory that a build needs, and what it needs for a byte of its BVH files
 
 
 def build_library(
@@ -64,29 +73,73 @@ def build_library(
     skeleton_file = Path(skeleton) if skeleton else None
     model = _find_model(place, annotations, paths)
     sources = [*annotations.list_sources(paths), *([model] if model else [])]
-    key = cache.compute_fingerprint(folder, files, sources, skeleton_file, unit=unit)
+    digests = cache.SourceDigests(place)
+    key = cache.compute_fingerprint(folder, files, sources, skeleton_file, digests, unit=unit)
     if not rebuild:
         report(0.0, "Reading the cache")
         found = cache.load_library(place, key)
         if found is not None:
             write_synthetic_clips(place, _list_completed(found["clips"]), missing_only=True)
+            digests.save()
             found["notes"] += tuple(waiting)
-            return Library(folder=str(folder), cache_location=(place, key), seed=seed, **found)
-    notes: list[str] = [*([cache_note] if cache_note else []), *annotations.describe_unknown_files(folder),
-                        *annotations.describe_lone_texts(folder)]
-    clips = _read_clips(folder, paths, files, annotations=annotations, chosen=skeleton_file, unit=unit, threads=threads,
-                        notes=notes, report=report, cancelled=cancelled,
-                        classifier=read_classifier(model) if model else None)
-    library = _index_clips(str(folder), clips, tuple(notes), seed=seed, report=report, cancelled=cancelled)
-    write_synthetic_clips(place, _list_completed(library.clips))
-    if not cache.save_library(place, key, library):
-        note = (
-            f"{place} cannot be written: the library is rebuilt each time; "
-            "choose a cache folder that you can write to"
-        )
-        library = replace(library, notes=(*library.notes, note))
+            return _remember(Library(folder=str(folder), cache_location=(place, key), seed=seed, **found))
+    text_bytes = sum(read_stamp(file)[0] for file in files)
+    check_memory(folder, _BASE_BYTES + _BYTES_PER_BYTE * text_bytes, "use fewer or shorter clips")
+    told = [*waiting, *cache.describe_outdated_cache(place)]
+    sources_read = _Recordings(
+        folder=folder, paths=paths, files=files, annotations=annotations, unit=unit, threads=threads,
+        skeleton=skeleton_file, classifier=read_classifier(model) if model else None,
+        notes=(*([cache_note] if cache_note else []), *annotations.describe_unknown_files(folder),
+               *annotations.describe_lone_texts(folder)),
+    )
+    library = _build_cached(sources_read, place, key, seed, report=report, cancelled=cancelled)
+    digests.save()
     report(1.0, "Library ready")
-    return replace(library, cache_location=(place, key), notes=(*library.notes, *waiting))
+    return _remember(replace(library, cache_location=(place, key), notes=(*library.notes, *told)))
+
+
+def _remember(library: Library) -> Library:
+    """Give a library what the cache knows of it: what its recordings lack, and where its index is."""
+    coverage = cache.load_coverage(*library.cache_location)
+    vars(library)["index_place"] = (*library.cache_location, RECORDED_INDEX)
+    if coverage is not None:
+        vars(library)["coverage"] = coverage  # where a cached property keeps its value
+    return library
+
+
+@dataclass(frozen=True, kw_only=True)
+class _Recordings:
+    """The recordings of a library and how they are read; see `build_library`.
+
+    Attributes:
+        files: what to read for each of `paths` (`scan.Conversions`).
+        notes: for the user, so far.
+    """
+
+    folder: Path
+    paths: list[Path]
+    files: list[Path]
+    annotations: Annotations
+    unit: float | None
+    threads: int
+    skeleton: Path | None
+    classifier: Classifier | None
+    notes: tuple[str, ...]
+
+
+def _build_cached(recordings: _Recordings, place: Path, key: str, seed: int, report: Progress, cancelled) -> Library:
+    """Build the library in files of its cache; in memory, with a note, where that cannot be written."""
+    try:
+        with cache.create_arrays_folder(place) as arrays:
+            library = _index_clips(recordings, arrays, seed, report, cancelled)
+            write_synthetic_clips(place, _list_completed(library.clips))
+            cache.save_library(place, key, library, arrays=arrays)
+            cache.save_coverage(place, key, library.coverage)
+            return library
+    except OSError:
+        library = _index_clips(recordings, None, seed, report, cancelled)
+    note = f"{place} cannot be written: the library is rebuilt each time; choose a cache folder that you can write to"
+    return replace(library, notes=(*library.notes, note))
 
 
 def _list_completed(clips: Iterable[Clip]) -> list[Clip]:
@@ -100,90 +153,132 @@ def _find_model(place: Path, annotations: Annotations, paths: list[Path]) -> Pat
     return model if model.is_file() and not any(annotations.read_rows(path, FPS) for path in paths) else None
 
 
-def _read_clips(folder, paths, files, annotations, chosen, unit, threads, notes, report, cancelled,
-                classifier) -> tuple[Clip, ...]:
-    """Read all recordings, repair them, bring them to one skeleton, put each on the floor, and add the twins."""
-    read, without_pops, levelled = zip(*_read_files(paths, files, unit, threads=threads, report=report,
-                                                    cancelled=cancelled))
-    notes += _collect_unit_notes(read)
-    example = bvh.read_bvh(chosen, unit).motion if chosen is not None else None
-    unified = one_skeleton.unify_skeletons(paths, [motion for motion, _ in levelled], example, notes)
-    repaired, rows = [], []
-    for number, (path, (motion, standing, was_retargeted)) in enumerate(zip(paths, unified)):
-        _check_cancelled(cancelled)
-        report(0.4 + 0.3 * number / len(paths), f"Repairing and mirroring {path.name}")
-        one = repair.repair_floor_and_feet(motion, standing, was_retargeted)
-        repaired.append(replace(one, drift=one.drift + levelled[number][1]))
-        rows.append(_limit_rows(path, annotations.read_rows(path, motion.fps), len(motion)))
+def _read_clips(recordings: _Recordings, arrays: Path | None, notes: list[str], report: Progress,
+                cancelled) -> tuple[list[Clip], Sequence[Motion]]:
+    """Read all recordings, repair them, bring them to one skeleton, put each on the floor, and add the twins.
+
+    One motion is in memory at a time; the others wait in files of the folder `arrays` (None: in memory).
+
+    Returns:
+        The clips, and their motions, which let go of memory where they lie in a file.
+    """
+    levelled, changes = MotionWriter(arrays and arrays / "levelled.npy"), []
+    units: list[str] = []
+    for source_notes, motion, pops, drift in _iter_levelled(recordings, report, cancelled):
+        units += source_notes
+        levelled.append(motion)
+        changes.append((pops, drift))
+    notes += _collect_unit_notes(units)
+    motions = levelled.finish()
+    rows = _read_rows(recordings, motions)
     is_proposed = not any(rows)
+    repaired = MotionWriter(arrays and arrays / "repaired.npy")
+    repairs, contacts = _repair_clips(recordings, motions, [drift for _, drift in changes], repaired, notes=notes,
+                                      report=report, cancelled=cancelled)
+    levelled.discard()
+    motions = repaired.finish()
     if is_proposed:
-        rows = _propose_rows(folder, repaired, classifier, report, cancelled)
-    notes += repair.describe_repairs([(one, pops) for one, (_, pops) in zip(repaired, without_pops)])
-    originals = _complete_landings([path.relative_to(folder).as_posix() for path in paths], repaired, rows, notes)
-    figures = [repair.RepairFigures(pops, one.drift, *one.slide) for one, (_, pops) in zip(repaired, without_pops)]
-    originals = [replace(clip, repair_figures=what, has_proposed_labels=is_proposed)
-                 for clip, what in zip(originals, figures)]
-    return tuple(clip for original in originals for clip in (original, original.build_twin()))
+        rows = _propose_rows(recordings, motions, report, cancelled)
+    notes += repair.describe_repairs([(one, pops) for one, (pops, _) in zip(repairs, changes)])
+    figures = [repair.RepairFigures(pops, one.drift, *one.slide) for one, (pops, _) in zip(repairs, changes)]
+    complete = MotionWriter(arrays and arrays / cache.MOTIONS)
+    known: list[dict] = []  # all of a clip but its motion
+    for original, what in zip(_iter_completed(recordings, motions, rows, contacts, notes), figures):
+        _check_cancelled(cancelled)
+        original = replace(original, repair_figures=what, has_proposed_labels=is_proposed)
+        for clip in (original, original.build_twin()):
+            complete.append(clip.motion)
+            known.append({name: value for name, value in vars(clip).items() if name != "motion"})
+    repaired.discard()
+    finished = complete.finish()
+    return [Clip(motion=motion, **rest) for motion, rest in zip(finished, known)], finished
 
 
-def _propose_rows(folder: Path, repaired: list[repair.RepairedClip], classifier: Classifier | None,
-                  report: Progress, cancelled) -> list[tuple[ClipAnnotation, ...]]:
+def _repair_clips(recordings: _Recordings, motions: Sequence[Motion], drifts: Sequence[float], repaired: MotionWriter,
+                  notes: list[str], report: Progress, cancelled) -> tuple[list[repair.Repair], list[np.ndarray]]:
+    """Bring motions to one skeleton and repair them into `repaired`; returns what was changed, and their contacts."""
+    chosen, paths = recordings.skeleton, recordings.paths
+    example = bvh.read_bvh(chosen, recordings.unit).motion if chosen is not None else None
+    repairs, contacts = [], []
+    for number, unified in enumerate(one_skeleton.unify_skeletons(paths, motions, example, notes)):
+        _check_cancelled(cancelled)
+        report(0.4 + 0.3 * number / len(paths), f"Repairing and mirroring {paths[number].name}")
+        one = repair.repair_floor_and_feet(*unified)
+        repaired.append(one.motion)
+        contacts.append(one.heel_toe_contacts)
+        repairs.append(repair.Repair(drift=one.drift + drifts[number], travel=one.travel, slide=one.slide,
+                                     was_sliding=one.was_sliding))
+    return repairs, contacts
+
+
+def _read_rows(recordings: _Recordings, motions: Sequence[Motion]) -> list[tuple[ClipAnnotation, ...]]:
+    """Read the annotations of all clips."""
+    read = recordings.annotations.read_rows
+    return [_limit_rows(path, read(path, motion.fps), len(motion)) for path, motion in zip(recordings.paths, motions)]
+
+
+def _propose_rows(recordings: _Recordings, motions: Sequence[Motion], report: Progress,
+                  cancelled) -> list[tuple[ClipAnnotation, ...]]:
     """Propose the annotations of all clips; InputError where nothing is proposed."""
     rows, least = [], find_setting("library.learn", "least").default
-    for number, one in enumerate(repaired):
+    for number, motion in enumerate(motions):
         _check_cancelled(cancelled)
-        report(0.68 + 0.02 * number / len(repaired), "Proposing labels")
-        proposals = propose_labels(one.motion, classifier=classifier)
+        report(0.68 + 0.02 * number / len(motions), "Proposing labels")
+        proposals = propose_labels(motion, classifier=recordings.classifier)
         rows.append(tuple(one.annotation for one in proposals if one.confidence >= least))
     if not any(rows):
         raise InputError(
-            folder, "no annotation for any clip, and no label to propose",
+            recordings.folder, "no annotation for any clip, and no label to propose",
             "NAME.txt beside NAME.bvh or an annotations.csv",
             "label frames as standing, walking, jogging, running, kick ...",
         )
     return rows
 
 
-def _read_files(paths, files, unit, threads, report, cancelled) -> list[tuple]:
-    """Read files, several at once: each as read, without pops (and their number), and without drift (and its metres).
+def _iter_levelled(recordings: _Recordings, report: Progress,
+                   cancelled) -> Iterator[tuple[tuple[str, ...], Motion, int, float]]:
+    """Read files, a few at once: the reader's notes, and the motion without pops and drift, with the number of pops and
+    metres of drift.
 
-    files: what to read for each of `paths` (`scan.Conversions`); the unit applies to the user's own files only.
+    The unit applies to the user's own files only.
     """
+    paths, ahead = recordings.paths, 2 * max(1, recordings.threads)
 
     def read_one(path: Path, file: Path):
-        source = bvh.read_bvh(file, unit if file == path else None)
-        unpopped = repair.remove_pops(source.motion)
-        return source, unpopped, repair.remove_drift(unpopped[0])
+        source = bvh.read_bvh(file, recordings.unit if file == path else None)
+        motion, pops = repair.remove_pops(source.motion)
+        motion, drift = repair.remove_drift(motion)
+        return source.notes, motion, pops, drift
 
-    read = []
-    with ThreadPoolExecutor(max(1, threads)) as pool:
-        waiting = [pool.submit(read_one, *both) for both in zip(paths, files)]
+    both, waiting = zip(paths, recordings.files), deque()
+    with ThreadPoolExecutor(max(1, recordings.threads)) as pool:
         try:
-            for number, (path, one) in enumerate(zip(paths, waiting)):
+            waiting.extend(pool.submit(read_one, *one) for one in islice(both, ahead))
+            for number, path in enumerate(paths):
                 _check_cancelled(cancelled)
                 report(0.4 * number / len(paths), f"Reading {path.name}")
-                read.append(one.result())
+                yield waiting.popleft().result()
+                waiting.extend(pool.submit(read_one, *one) for one in islice(both, 1))
         finally:
             pool.shutdown(wait=True, cancel_futures=True)
-    return read
 
 
-def _complete_landings(names: list[str], repaired: list[repair.RepairedClip], rows, notes: list[str]) -> list[Clip]:
-    """Build the clips; those that end in flight get a landing and getting up."""
-    flying = [ends_in_flight(one.motion) for one in repaired]
-    getting_ups = landings.collect_getting_ups([(one.motion, own, one.heel_toe_contacts) for one,
-                                                own in zip(repaired, rows)]) if any(flying) else []
-    clips, ends = [], []
-    for name, one, own, flies in zip(names, repaired, rows, flying):
-        if flies:
-            ends.append(landings.complete_clip(one.motion, own, one.heel_toe_contacts, getting_ups))
-            clips.append(Clip(path=name, mirrored=False, motion=ends[-1].motion, annotations=ends[-1].rows,
-                              heel_toe_contacts=ends[-1].heel_toe_contacts, recorded_count=ends[-1].recorded_count))
-        else:
-            clips.append(Clip(path=name, mirrored=False, motion=one.motion, annotations=own,
-                              heel_toe_contacts=one.heel_toe_contacts))
-    notes += landings.describe_landings(ends, getting_ups)
-    return clips
+def _iter_completed(recordings: _Recordings, motions: Sequence[Motion], rows: Sequence[tuple[ClipAnnotation, ...]],
+                    contacts: Sequence[np.ndarray], notes: list[str]) -> Iterator[Clip]:
+    """Iterate over the clips; those that end in flight get a landing and getting up, and notes a line about them."""
+    flying = [ends_in_flight(motion) for motion in motions]
+    getting_ups = landings.collect_getting_ups(motions, rows, contacts) if any(flying) else []
+    seconds = []
+    for number, path in enumerate(recordings.paths):
+        name, own = path.relative_to(recordings.folder).as_posix(), (motions[number], rows[number], contacts[number])
+        clip: dict = dict(zip(("motion", "annotations", "heel_toe_contacts"), own))
+        if flying[number]:
+            end = landings.complete_clip(*own, getting_ups)
+            seconds.append(end.seconds)
+            clip = {"motion": end.motion, "annotations": end.rows, "heel_toe_contacts": end.heel_toe_contacts,
+                    "recorded_count": end.recorded_count}
+        yield Clip(path=name, mirrored=False, **clip)
+    notes += landings.describe_landings(seconds, getting_ups)
 
 
 def _limit_rows(path: Path, rows: tuple[ClipAnnotation, ...], count: int) -> tuple[ClipAnnotation, ...]:
@@ -197,23 +292,30 @@ def _limit_rows(path: Path, rows: tuple[ClipAnnotation, ...], count: int) -> tup
     return tuple(replace(row, end=min(row.end, count - 1)) for row in rows)
 
 
-def _collect_unit_notes(read) -> list[str]:
+def _collect_unit_notes(read: Sequence[str]) -> list[str]:
     """Collect the reader's notes: each kind of sentence once (numbers aside), with the number of clips that it applies
     to.
     """
     kinds: dict[str, list[str]] = {}
-    for source in read:
-        for note in source.notes:
-            kinds.setdefault(re.sub(r"(?<=hips )[\d.]+", "", note), []).append(note)
+    for note in read:
+        kinds.setdefault(re.sub(r"(?<=hips )[\d.]+", "", note), []).append(note)
     return [f"{notes[0]} (similar in {len(notes)} clips)" if len(notes) > 1 else notes[0] for notes in kinds.values()]
 
 
-def _index_clips(folder: str, clips, notes, seed, report, cancelled) -> Library:
-    """Index the clips: features and labels."""
-    _check_cancelled(cancelled)
-    report(0.7, "Describing frames")
-    return Library(folder=folder, skeleton=clips[0].motion.skeleton, clips=clips, frames=build_frames(clips), fps=FPS,
-                   notes=notes, seed=seed)
+def _index_clips(recordings: _Recordings, arrays: Path | None, seed: int, report: Progress, cancelled) -> Library:
+    """Read and index the clips: features and labels."""
+    notes = list(recordings.notes)
+    clips, motions = _read_clips(recordings, arrays, notes, report, cancelled)
+
+    def report_clip(number: int) -> None:
+        _check_cancelled(cancelled)
+        report(0.7 + 0.25 * number / len(clips), "Describing frames")
+        if isinstance(motions, MappedMotions):
+            motions.release()
+
+    frames = build_frames(clips, on_clip=report_clip)
+    return Library(folder=str(recordings.folder), skeleton=clips[0].motion.skeleton, clips=tuple(clips), frames=frames,
+                   fps=FPS, notes=tuple(notes), seed=seed)
 
 
 def _check_cancelled(cancelled) -> None:

@@ -17,7 +17,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..base.optional_packages import import_optional
-from .features import Frames, compute_principal_components
+from .features import Frames, reduce_to_principal_components
 
 BLOCK_LENGTHS = (32, 16, 8)
 CLUSTERS = 100
@@ -74,8 +74,9 @@ def cluster_blocks(frames: Frames, length: int, seed: int = 0) -> Clusters:
     step = max(1, length // SAMPLES_PER_BLOCK)
     offsets = np.arange(0, length, step)
     blocks = frames.features[start[:, None] + offsets].reshape(len(start), -1)
-    mean, basis = compute_principal_components(blocks)
-    label, medoid = _run_kmeans(np.ascontiguousarray((blocks - mean) @ basis), min(CLUSTERS, len(start)), seed)
+    points = reduce_to_principal_components(blocks)[2]
+    del blocks  # the largest array of a build
+    label, medoid = _run_kmeans(points, min(CLUSTERS, len(start)), seed)
     return Clusters(length, start, label, medoid)
 
 
@@ -107,7 +108,9 @@ def _run_kmeans(points: np.ndarray, count: int, seed: int) -> tuple[np.ndarray, 
         fit = KMeans(min(count, len(points[::step])), n_init=1, max_iter=60, tol=1e-3, random_state=seed)
         fit.fit(points[::step])
         label = fit.labels_ if step == 1 else fit.predict(points)
-    distance = np.sum((points - fit.cluster_centers_[label]) ** 2, axis=1)
+    parts = (slice(low, low + MAX_FITTED) for low in range(0, len(points), MAX_FITTED))
+    distance = np.concatenate([np.sum((points[part] - fit.cluster_centers_[label[part]]) ** 2, axis=1)
+                               for part in parts])
     # sorted by label, then distance: the first of each label is its medoid
     order = np.lexsort((distance, label))
     used, first = np.unique(label[order], return_index=True)

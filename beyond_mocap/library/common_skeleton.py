@@ -34,7 +34,7 @@ def unify_skeletons(
 
     Args:
         paths: the files.
-        motions: as read, in the order of `paths`.
+        motions: as read, in the order of `paths`; taken one at a time, since they may lie in a file.
         skeleton_example: a recording with the library's skeleton (default: the skeleton with most frames, the first
             path's among equals).
         notes: gets one line about retargeted clips.
@@ -48,13 +48,12 @@ def unify_skeletons(
     groups = _group_by_skeleton(motions)
     skeleton = skeleton_example.skeleton if skeleton_example is not None else _find_commonest_skeleton(motions, groups)
     own_clips = [i for i, motion in enumerate(motions) if motion.skeleton.has_same_bones(skeleton, BONE_TOLERANCE)]
-    example, example_contacts = _sample_frames([motions[i] for i in own_clips],
-                                               [contact_mask[i]
-                                                for i in own_clips]) if own_clips else (skeleton_example, None)
+    example, example_contacts = (_sample_frames(motions, own_clips, contact_mask) if own_clips
+                                 else (skeleton_example, None))
     rigs = {}
     for group in groups:
         if group[0] not in own_clips:
-            sample, sample_contacts = _sample_frames([motions[i] for i in group], [contact_mask[i] for i in group])
+            sample, sample_contacts = _sample_frames(motions, group, contact_mask)
             known: dict[str, Any] = {"example": example, "standing": sample_contacts,
                                      "example_standing": example_contacts}
             rig = _run_for_file(paths[group[0]], lambda: Retargeter(sample, skeleton, **known))
@@ -143,17 +142,22 @@ def _find_commonest_skeleton(motions: Sequence[Motion], groups: list[list[int]])
     return motions[best[0]].skeleton
 
 
-def _sample_frames(motions: Sequence[Motion], contact_mask: Sequence[np.ndarray]) -> tuple[Motion, np.ndarray]:
+def _sample_frames(motions: Sequence[Motion], group: Sequence[int],
+                   contact_mask: Sequence[np.ndarray]) -> tuple[Motion, np.ndarray]:
     """Sample frames of all clips of one rig above one floor, and which feet (T, 2) are flat on the ground in them.
+
+    group: the rig's clips among `motions`, which may lie in a file: they are taken one after the other.
     """
-    ends = np.cumsum([len(motion) for motion in motions])
+    ends = np.cumsum([len(motions[i]) for i in group])
     frames = np.unique(np.linspace(0, ends[-1] - 1, _SAMPLE_COUNT).astype(int))
     roots, rotations, foot_contacts = [], [], []
-    for motion, points, end in zip(motions, contact_mask, ends):
+    for i, end in zip(group, ends):
+        motion = motions[i]
         here = frames[(frames >= end - len(motion)) & (frames < end)] - (end - len(motion))
         if len(here):
             roots.append(motion.root_positions[here] - [0.0, 0.0, contacts.measure_ground_height(motion)])
             rotations.append(motion.rotations[here])
-            foot_contacts.append(points.all(axis=2)[here])
-    sample = Motion(motions[0].skeleton, np.concatenate(roots), np.concatenate(rotations), motions[0].fps)
+            foot_contacts.append(contact_mask[i].all(axis=2)[here])
+    first = motions[group[0]]
+    sample = Motion(first.skeleton, np.concatenate(roots), np.concatenate(rotations), first.fps)
     return sample, np.concatenate(foot_contacts)

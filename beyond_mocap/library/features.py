@@ -9,6 +9,7 @@ second later. Faustino drops each motion's first two frames, which lack derivati
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -124,70 +125,84 @@ def compute_raw_features(positions: np.ndarray, heading: np.ndarray, fps: float)
     return flat[:, 2:] / np.sqrt(positions.shape[1])
 
 
-def compute_principal_components(values: np.ndarray, energy: float = ENERGY) -> tuple[np.ndarray, np.ndarray]:
-    """Compute the fewest principal components that hold a share of the variance.
+def reduce_to_principal_components(
+    values: np.ndarray, energy: float = ENERGY
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Reduce values to the fewest principal components that hold a share of the variance.
+
+    The largest arrays of a library go through here, so `values` are overwritten: a copy would double the memory.
 
     Args:
-        values: (N, K).
+        values: (N, K); their mean is subtracted in place.
         energy: the share.
     Returns:
-        Mean (K,) and basis (K, D).
+        Mean (K,), basis (K, D), and the reduced values (N, D).
     """
     mean = values.mean(axis=0)
-    centred = values - mean
-    covariance = centred.T @ centred
+    values -= mean
+    covariance = values.T @ values
     variance, vectors = np.linalg.eigh(covariance.astype(float))
     variance, vectors = np.maximum(variance[::-1], 0.0), vectors[:, ::-1]
     count = int(np.searchsorted(np.cumsum(variance), energy * variance.sum())) + 1
-    return mean, vectors[:, :count].astype(values.dtype)
+    basis = vectors[:, :count].astype(values.dtype)
+    return mean, basis, values @ basis
 
 
-def build_frames(clips, reference: Frames | None = None) -> Frames:
+def build_frames(clips, reference: Frames | None = None, on_clip: Callable[[int], None] | None = None) -> Frames:
     """Build the frames of clips at FPS with all labels that they carry.
 
     Args:
         clips: of one skeleton (`library.clip`).
         reference: frames whose components are used, so that features of both can be compared; None uses the clips' own.
+        on_clip: called with the index of each clip before its frames are built.
     Returns:
         The frames.
     """
     from threadpoolctl import threadpool_limits
 
     with threadpool_limits(limits=1):  # with more threads, sums of products have another order and other bits
-        return _build_frames(clips, reference)
+        return _build_frames(clips, reference, on_clip or (lambda index: None))
 
 
-def _build_frames(clips, reference: Frames | None) -> Frames:
-    """Build the columns of all clips and reduce their features."""
+def _build_frames(clips, reference: Frames | None, on_clip: Callable[[int], None]) -> Frames:
+    """Build the columns of all clips, each in one array from the start, and reduce their features."""
     skeleton = clips[0].motion.skeleton
     vocabulary = tuple(sorted({word for clip in clips for row in clip.annotations for word in row.words}))
     joints, body = select_feature_joints(skeleton), identify_joints(skeleton)
-    toes = [body.left.toe_or_foot, body.right.toe_or_foot]
-    parts: dict[str, list[np.ndarray]] = {name: [] for name in _COLUMNS}
-    counts = []
+    count = np.array([count_frames(clip.motion, FPS) for clip in clips])
+    first = np.cumsum(count) - count
+    merged: dict[str, np.ndarray] = {}
     for index, clip in enumerate(clips):
-        source, positions = sample_positions(clip.motion, FPS)
-        facing = np.unwrap(compute_heading_from_positions(skeleton, positions))
-        path = smooth_zero_phase_hann(positions[:, 0, :2], FPS, SMOOTH_SECONDS)
-        counts.append(len(source))
-        columns = (
-            np.full(len(source), index), source, positions[:, 0], facing, path,
-            quaternion.rotate_level(time_derivative(path, FPS), -facing),
-            _compute_feet(positions, toes, path, facing),
-            compute_max_jerk(positions, FPS),
-            compute_lean_slopes(skeleton, positions, FPS).astype(np.float32),
-            compute_raw_features(positions[:, joints], facing, FPS).astype(np.float32),
-            compute_postures(positions, facing, FPS, body),
-            build_label_matrix(clip, source, vocabulary),
-        )  # fmt: skip
-        for name, column in zip(_COLUMNS, columns):
-            parts[name].append(column)
-    merged = {name: np.concatenate(columns) for name, columns in parts.items()}
-    mean, basis = (reference.mean, reference.basis) if reference is not None else compute_principal_components(
-        merged["features"])
-    merged["features"] = (merged["features"] - mean) @ basis
-    count = np.array(counts)
-    return Frames(first=np.cumsum(count) - count, count=count, mean=mean, basis=basis, vocabulary=vocabulary, **merged)
+        on_clip(index)
+        rows = slice(first[index], first[index] + count[index])
+        for name, column in zip(_COLUMNS, _build_columns(index, clip, joints, body, vocabulary)):
+            if not index:
+                merged[name] = np.empty((count.sum(), *column.shape[1:]), column.dtype)
+            merged[name][rows] = column
+    if reference is not None:
+        mean, basis = reference.mean, reference.basis
+        merged["features"] = (merged["features"] - mean) @ basis
+    else:
+        mean, basis, merged["features"] = reduce_to_principal_components(merged["features"])
+    return Frames(first=first, count=count, mean=mean, basis=basis, vocabulary=vocabulary, **merged)
+
+
+def _build_columns(index: int, clip, joints: np.ndarray, body, vocabulary: tuple[str, ...]) -> tuple[np.ndarray, ...]:
+    """Build the columns of one clip, in the order of `_COLUMNS`, with features before PCA."""
+    skeleton, toes = clip.motion.skeleton, [body.left.toe_or_foot, body.right.toe_or_foot]
+    source, positions = sample_positions(clip.motion, FPS)
+    facing = np.unwrap(compute_heading_from_positions(skeleton, positions))
+    path = smooth_zero_phase_hann(positions[:, 0, :2], FPS, SMOOTH_SECONDS)
+    return (
+        np.full(len(source), index), source, positions[:, 0], facing, path,
+        quaternion.rotate_level(time_derivative(path, FPS), -facing),
+        _compute_feet(positions, toes, path, facing),
+        compute_max_jerk(positions, FPS),
+        compute_lean_slopes(skeleton, positions, FPS).astype(np.float32),
+        compute_raw_features(positions[:, joints], facing, FPS).astype(np.float32),
+        compute_postures(positions, facing, FPS, body),
+        build_label_matrix(clip, source, vocabulary),
+    )  # fmt: skip
 
 
 def build_label_matrix(clip, source: np.ndarray, vocabulary: tuple[str, ...]) -> np.ndarray:
@@ -244,9 +259,13 @@ def compute_max_jerk(positions: np.ndarray, fps: float) -> np.ndarray:
     return np.pad(np.sqrt((third**2).sum(axis=-1).max(axis=-1)) * fps**3, (1, 2), mode="edge")
 
 
+def count_frames(motion, fps: float) -> int:
+    """Count the frames of a motion at `fps`."""
+    return int(np.floor(motion.duration * fps + 1e-6)) + 1
+
+
 def sample_positions(motion, fps: float) -> tuple[np.ndarray, np.ndarray]:
     """Sample a motion at `fps`: fractional frames (T,) of its own rate, and joint positions (T, J, 3) m, world."""
-    count = int(np.floor(motion.duration * fps + 1e-6)) + 1
-    source = np.arange(count) * (motion.fps / fps)
+    source = np.arange(count_frames(motion, fps)) * (motion.fps / fps)
     root, rotations = sample_frames(motion, source)
     return source, compute_pose(motion.skeleton, root, rotations)[0]

@@ -57,28 +57,39 @@ class CompletedClip:
     heel_toe_contacts: np.ndarray
     recorded_count: int
 
+    @property
+    def seconds(self) -> float:
+        """Duration of the synthetic end."""
+        return (len(self.motion) - self.recorded_count) / self.motion.fps
 
-def collect_getting_ups(clips: Sequence[tuple[Motion, tuple[ClipAnnotation, ...], np.ndarray]]) -> list[GettingUp]:
-    """Collect every movement of getting up among clips (motion, rows, contacts) of one skeleton.
 
-    A synthetic one is returned where they show none.
+def collect_getting_ups(motions: Sequence[Motion], rows: Sequence[tuple[ClipAnnotation, ...]],
+                        contacts: Sequence[np.ndarray]) -> list[GettingUp]:
+    """Collect every movement of getting up among clips of one skeleton.
+
+    Args:
+        motions: taken one at a time, since they may lie in a file.
+        rows: annotations of each.
+        contacts: of each, (T, 2, 2) bool.
+    Returns:
+        The movements; a synthetic one where the clips show none.
     """
     found = [
         GettingUp(motion.frames(int(row.start), int(row.end) + 1), standing[int(row.start) : int(row.end) + 1],
-                  row.words) for motion, rows, standing in clips for row in rows if "getting_up" in row.words
-        and row.end - row.start > motion.fps and not ends_in_flight(motion)
+                  row.words) for motion, own, standing in zip(motions, rows, contacts) for row in own
+        if "getting_up" in row.words and row.end - row.start > motion.fps and not ends_in_flight(motion)
     ]
-    return found or [_build_getting_up([(motion, rows) for motion, rows, _ in clips])]
+    return found or [_build_getting_up(motions, rows)]
 
 
-def _build_getting_up(clips) -> GettingUp:
-    """Build a synthetic getting up for the skeleton of clips (motion, rows).
+def _build_getting_up(motions: Sequence[Motion], rows: Sequence[tuple[ClipAnnotation, ...]]) -> GettingUp:
+    """Build a synthetic getting up for the skeleton of clips.
 
     Its upright stance is that of the longest stretch of slow locomotion: waiting goalkeepers, like runners, lean.
     """
-    upright = [motion.frames(row.start, row.end + 1) for motion, rows in clips for row in rows
-               if row.key is None and _UPRIGHT & set(row.words)]  # fmt: skip
-    example = max(upright, key=lambda motion: motion.duration, default=clips[0][0])
+    upright = (motion.frames(int(row.start), int(row.end) + 1) for motion, own in zip(motions, rows) for row in own
+               if row.key is None and _UPRIGHT & set(row.words))
+    example = max(upright, key=lambda motion: motion.duration, default=motions[0])
     gesture = build_get_up(example.skeleton, _MADE_FPS, example=example).motion
     return GettingUp(gesture, np.zeros((len(gesture), 2, 2), bool), ("getting_up", "back"), is_synthetic=True)
 
@@ -120,11 +131,10 @@ def _extend_row(row: ClipAnnotation, recorded: int, last: int) -> ClipAnnotation
     return replace(row, end=recorded - 1 if key is None else last, key=key)
 
 
-def describe_landings(completed_clips: Sequence[CompletedClip], getting_ups: Sequence[GettingUp]) -> list[str]:
-    """Describe the completed clips in one line; no line where there are none."""
-    if not completed_clips:
+def describe_landings(seconds: Sequence[float], getting_ups: Sequence[GettingUp]) -> list[str]:
+    """Describe the completed clips in one line; no line where there are none. seconds: of each synthetic end."""
+    if not seconds:
         return []
-    seconds = np.median([(len(one.motion) - one.recorded_count) / one.motion.fps for one in completed_clips])
     by = "synthetic, since no clip shows it" if getting_ups[0].is_synthetic else "from the library's own clips"
-    what = f"landing and getting up ({by}) added, {seconds:.1f} s each"
-    return [f"{format_count(len(completed_clips), 'clip')} ending in flight: {what}"]
+    what = f"landing and getting up ({by}) added, {np.median(seconds):.1f} s each"
+    return [f"{format_count(len(seconds), 'clip')} ending in flight: {what}"]

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
@@ -36,6 +37,8 @@ from .synthetic_clips import KICK_STEP, iter_synthetic_clips, measure_kick_speed
 
 MIN_RUN_SECONDS = 2.0  # of a track's runs from which on long runs are needed
 RESTING_SPEED = 0.1  # m/s of a track below which a player stands
+RECORDED_INDEX = "index"
+"""Name under which what is computed from the recordings alone is cached."""
 Progress = Callable[[float, str], None]
 
 
@@ -148,6 +151,15 @@ class Library:
         return measure_coverage(self.clips, self.frames, self.fps, self.strangeness)
 
     @cached_property
+    def index_place(self) -> tuple[Path, str, str] | None:
+        """Where what is computed from exactly these clips is cached: folder, key and name.
+
+        None for a library that was changed after it was built or completed: `build_library` and `with_synthetic_clips`
+        set it, and a changed copy does not have it.
+        """
+        return None
+
+    @cached_property
     def manners(self) -> Manners:
         """How the people of this library move."""
         is_calm = self._is_recorded & (self.strangeness <= 1.0)
@@ -183,10 +195,15 @@ class Library:
             synthetic = _build_synthetic_library(self)
             if self.cache_location:
                 write_synthetic_clips(self.cache_location[0], synthetic.clips)
-                cache.save_library(*self.cache_location, synthetic, "made")
+                _save_synthetic_library(*self.cache_location, synthetic)
         else:
             write_synthetic_clips(self.cache_location[0], synthetic.clips, missing_only=True)
-        return self._join(synthetic) if synthetic.clips else self
+        if not synthetic.clips:
+            return self
+        joined = self._join(synthetic)
+        if self.index_place is not None and self.index_place[-1] == RECORDED_INDEX:
+            vars(joined)["index_place"] = (*self.cache_location, f"made-{RECORDED_INDEX}")
+        return joined
 
     def append_synthetic_clips(self, clips: Sequence[Clip]) -> "Library":
         """Append synthetic clips, described like its own.
@@ -268,6 +285,12 @@ def _build_synthetic_library(library: Library) -> Library:
         return replace(library, clips=())
     frames = build_frames(clips, library.frames)
     return replace(library, clips=tuple(clips), frames=frames, notes=())
+
+
+def _save_synthetic_library(place: Path, key: str, synthetic: Library) -> None:
+    """Save the synthetic clips beside the cache of the recordings; a folder that cannot be written is left alone."""
+    with suppress(OSError), cache.create_arrays_folder(place, "made") as arrays:
+        cache.save_library(place, key, synthetic, arrays=arrays, name="made")
 
 
 def _measure_stance_seconds(clip: Clip, source: np.ndarray) -> np.ndarray:

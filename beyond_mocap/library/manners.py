@@ -10,7 +10,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.spatial.distance import cdist
 
 WALKING_SPEEDS = (0.5, 2.2)  # m/s at which a manner is seen; runs and stands follow the walk of their own clip
 LEAST_SECONDS = 3.0  # of calm walking in a recording whose manner players can follow
@@ -57,6 +56,8 @@ def measure_manners(paths: list[str], frames, is_calm: np.ndarray, fps: float) -
         is_calm: (N,) bool, frames of recordings that belong to locomotion.
         fps: frames per second.
     """
+    from scipy.spatial.distance import cdist
+
     seen = is_calm & (frames.speed >= WALKING_SPEEDS[0]) & (frames.speed <= WALKING_SPEEDS[1])
     recording = np.unique(paths, return_inverse=True)[1]
     count = np.bincount(recording[frames.clip[seen]], minlength=recording.max(initial=-1) + 1)

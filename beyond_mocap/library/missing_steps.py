@@ -15,7 +15,6 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.interpolate import CubicSpline, PchipInterpolator
 
 from ..base.easing import smoothstep
 from ..motion import quaternion
@@ -79,6 +78,8 @@ class Carriage:
         return None if self.stand is None else self.stand[np.arange(count) % len(self.stand)]
 
     def _sample_stride(self, phase: np.ndarray) -> np.ndarray:
+        from scipy.interpolate import CubicSpline
+
         grid = np.linspace(0.0, 1.0, len(self.stride) + 1)
         closed = quaternion.unify_signs(np.concatenate([self.stride, self.stride[:1]]))
         closed[-1] = self.stride[0]
@@ -156,6 +157,8 @@ def _turn_ahead(motion: Motion) -> np.ndarray:
 
 def _average_stride(walk: Strides) -> np.ndarray:
     """Average the strides of a walk: (N, J, 4) world rotations relative to the heading at even phases."""
+    from scipy.interpolate import PchipInterpolator
+
     landings = walk.landings[walk.first_side :]
     phase = np.arange(0, len(landings) - 2, 2)[:, None] + 2.0 * np.arange(_PHASES) / _PHASES
     turned = _turn_ahead(walk.motion)

@@ -18,7 +18,6 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy.ndimage import gaussian_filter1d
-from scipy.signal import find_peaks
 
 from ..annotation import LOCOMOTION, ClipAnnotation, choose_gaits
 from ..annotation.gaits import STANDING, remove_short_runs
@@ -164,6 +163,8 @@ def _propose_locomotion(seen: _RecordingSignals, gaits) -> list[Proposal]:
 
 def _propose_kicks(seen: _RecordingSignals) -> list[Proposal]:
     """Propose kicks: feet that swing faster than a stride; of two within half a second the faster."""
+    from scipy.signal import find_peaks
+
     fps, found = seen.motion.fps, []
     for side, limb in (("left", seen.body.left), ("right", seen.body.right)):
         toe = seen.places[:, limb.toe_or_foot]

@@ -10,7 +10,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from scipy.signal import find_peaks
 
 from ..annotation.ball_contact import shows_foot_on_ball
 from ..annotation.labels import list_labels
@@ -53,6 +52,8 @@ def find_cut_receptions(clips: Sequence, frames: Frames, feet_in_contact: np.nda
 
 def _find_gives(frames: Frames, dribbles: np.ndarray, is_in_contact: np.ndarray, side: int) -> list[tuple[float, int]]:
     """Find the frames in which one foot begins to give, with its largest speed in m/s around them."""
+    from scipy.signal import find_peaks
+
     toe = frames.feet[:, 2 * side : 2 * side + 2]
     speed = np.linalg.norm(np.gradient(toe, axis=0), axis=1) * FPS
     around, back, free = (int(np.ceil(seconds * FPS)) for seconds in (_AROUND_SECONDS, _GIVE_SECONDS, _FREE_SECONDS))

@@ -48,24 +48,33 @@ _BALL_SHARE = 0.7  # share of the distance from ankle to the foot's tip
 
 
 @dataclass(frozen=True, kw_only=True)
-class RepairedClip:
-    """A repaired clip and what was changed.
+class Repair:
+    """What a repair changed.
 
     Attributes:
-        motion: the repaired motion.
-        heel_toe_contacts: (T, 2, 2) bool, left and right, heel and toe, on the ground.
         drift: metres between the lowest and the highest floor.
         travel: metres by which the last frame was moved relative to the first.
         slide: m/s before and after, mean over heels and toes in contact.
         was_sliding: whether the clip was sliding, so that travel and feet were corrected.
     """
 
-    motion: Motion
-    heel_toe_contacts: np.ndarray
     drift: float
     travel: float
     slide: tuple[float, float]
     was_sliding: bool
+
+
+@dataclass(frozen=True, kw_only=True)
+class RepairedClip(Repair):
+    """A repaired clip and what was changed.
+
+    Attributes:
+        motion: the repaired motion.
+        heel_toe_contacts: (T, 2, 2) bool, left and right, heel and toe, on the ground.
+    """
+
+    motion: Motion
+    heel_toe_contacts: np.ndarray
 
 
 @dataclass(frozen=True)
@@ -298,7 +307,7 @@ def _fit_smooth_curve(weighted_values: np.ndarray, weight: np.ndarray, seconds: 
     return squares.solve()[:, 0]
 
 
-def describe_repairs(repaired: Sequence[tuple[RepairedClip, int]]) -> list[str]:
+def describe_repairs(repaired: Sequence[tuple[Repair, int]]) -> list[str]:
     """Describe the repairs of a library's clips, one line per kind. repaired: each clip's repair and its number of
     pops.
     """

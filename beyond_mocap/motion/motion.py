@@ -47,6 +47,23 @@ class Motion:
         object.__setattr__(self, "rotations", rotations)
         object.__setattr__(self, "fps", float(self.fps))
 
+    @classmethod
+    def from_stored(cls, skeleton: Skeleton, root_positions: np.ndarray, rotations: np.ndarray, fps: float) -> "Motion":
+        """Build a motion of the arrays that a motion had before, without looking at them or copying them.
+
+        So a motion can lie in a file that is mapped into memory, and only the frames that are used are read.
+
+        Args:
+            skeleton: J joints.
+            root_positions: (T, 3), read-only.
+            rotations: (T, J, 4), read-only.
+            fps: frames per second.
+        """
+        motion = object.__new__(cls)
+        fields = {"skeleton": skeleton, "root_positions": root_positions, "rotations": rotations, "fps": float(fps)}
+        vars(motion).update(fields)
+        return motion
+
     def __len__(self) -> int:
         return len(self.root_positions)
 

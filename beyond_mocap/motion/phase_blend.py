@@ -12,7 +12,6 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.interpolate import PchipInterpolator
 
 from ..base.easing import smoothstep
 from ..base.vectors import arctan2, distances_along
@@ -126,6 +125,8 @@ def blend_strides(slow: Strides, fast: Strides, speed: float, fps: float) -> tup
         The motion, and the contacts (T, 2, 2) bool of left and right, heel and toe.
     Source: Faustino 2016, section 6.2; Park, Shin and Shin 2002.
     """
+    from scipy.interpolate import PchipInterpolator
+
     slow, fast = _align_first_foot(slow, fast)
     steps = min(slow.steps, fast.steps)
     weight = _solve_blend_weight(slow, fast, steps, speed)
@@ -208,6 +209,8 @@ def _sample_at_phase(strides: Strides, phase: np.ndarray, steps: int) -> dict[st
         pose (T, J, 4) relative to the heading, height (T,) metres, sway (T, 2) metres in the heading frame, turn (T,)
         radians and way (T, 2) metres per step, and inside (T, 2, 2): steps from each point's nearest stance boundary.
     """
+    from scipy.interpolate import PchipInterpolator
+
     curve = PchipInterpolator(np.arange(steps + 1.0), strides.landings[: steps + 1])
     frames, pace = curve(phase), curve.derivative()(phase)
     root, pose = sample_frames(strides.motion, frames)

@@ -7,7 +7,6 @@
 from __future__ import annotations
 
 import numpy as np
-from scipy.spatial import cKDTree
 
 from ..base.time_series import time_derivative
 from ..motion import contacts as foot_contacts
@@ -74,6 +73,8 @@ def measure_path_distance(pelvis: np.ndarray, origin: np.ndarray, path, fps: flo
     Returns:
         (T,) metres.
     """
+    from scipy.spatial import cKDTree
+
     low, high = path.domain
     line = path.at(np.linspace(low, high, 4001))[:, :2]
     both_lines = np.concatenate([smooth_zero_phase_hann(origin, fps, movement.ROOT_WINDOW), line])

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -67,6 +68,16 @@ def build_provenance(take: Take) -> Provenance:
         contacts=take.contacts,
         planned_heading=take.planned_heading,
     )
+
+
+def join_provenance(tables: Sequence[Provenance]) -> Provenance:
+    """Join the provenance of takes that follow each other."""
+    names = ["times", "clip_frame", "mirrored", "contacts"]
+    if all(one.planned_heading is not None for one in tables):
+        names.append("planned_heading")
+    arrays = {name: np.concatenate([getattr(one, name) for one in tables]) for name in names}
+    return Provenance(clip=tuple(clip for one in tables for clip in one.clip),
+                      words=tuple(words for one in tables for words in one.words), **arrays)
 
 
 def write_provenance(path: str | os.PathLike, take: Take | Provenance) -> None:

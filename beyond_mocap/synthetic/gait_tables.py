@@ -21,12 +21,15 @@ Angles in degrees here, radians outside. Speeds in m/s.
 from __future__ import annotations
 
 from functools import lru_cache
+from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.interpolate import CubicSpline, PchipInterpolator
 
 from ..base.easing import quintic_step
 from ..motion.retargeting import adult
+
+if TYPE_CHECKING:
+    from scipy.interpolate import CubicSpline, PchipInterpolator
 
 LEG = adult.ADULT_LEG
 GRAVITY = 9.81  # m/s^2
@@ -113,12 +116,16 @@ ELBOW_RANGE = (40.0, 135.0)
 
 @lru_cache(maxsize=None)
 def _build_curve(name: str) -> PchipInterpolator:
+    from scipy.interpolate import PchipInterpolator
+
     x, y = zip(*_SPEEDS[name])
     return PchipInterpolator(x, y, extrapolate=False)
 
 
 @lru_cache(maxsize=None)
 def _build_sprint_curve(name: str) -> PchipInterpolator:
+    from scipy.interpolate import PchipInterpolator
+
     x, y = zip(*_SPRINT_SPEEDS[name])
     return PchipInterpolator(x, y, extrapolate=False)
 
@@ -209,6 +216,8 @@ _SPRINT_SWING = {
 
 @lru_cache(maxsize=None)
 def _build_swing_curves(sprints: bool) -> tuple[np.ndarray, CubicSpline]:
+    from scipy.interpolate import CubicSpline
+
     rows = _SPRINT_SWING if sprints else _SWING
     table = np.array([rows[v] for v in sorted(rows)], dtype=float)
     return np.array(sorted(rows)), CubicSpline(_SWING_AT, table.transpose(2, 0, 1), axis=0)
@@ -250,6 +259,8 @@ _STANCE = {
 
 @lru_cache(maxsize=None)
 def _build_stance_curves() -> tuple[np.ndarray, PchipInterpolator]:
+    from scipy.interpolate import PchipInterpolator
+
     table = np.array([_STANCE[v] for v in sorted(_STANCE)], dtype=float)
     return np.array(sorted(_STANCE)), PchipInterpolator(_STANCE_AT, table.T, axis=0)
 

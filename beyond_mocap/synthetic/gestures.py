@@ -12,9 +12,9 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import lru_cache
+from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.interpolate import CubicSpline, PchipInterpolator
 
 from ..base.easing import quintic_step
 from ..base.errors import InputError
@@ -30,6 +30,9 @@ from .footsteps import Footsteps, compute_ground_lift
 from .gait import build_posture, plan_footsteps
 from .gait_legs import limit_leg_reach, measure_leg, plant_feet
 from .gait_plan import GaitPlan, GaitStyle, plan_gait
+
+if TYPE_CHECKING:
+    from scipy.interpolate import PchipInterpolator
 
 LEFT, RIGHT = 0, 1
 
@@ -212,6 +215,8 @@ def _blend_strike(posture: Posture, gait_plan: GaitPlan, steps, key: float, reci
 def _guide_foot(posture: Posture, gait_plan: GaitPlan, steps: Footsteps, key: float, rows,
                 neutral: NeutralStance) -> Posture:
     """Guide the right foot's swing around `key` seconds through the rows of a Strike; its ends stay as they were."""
+    from scipy.interpolate import CubicSpline
+
     swing = _find_swing(steps, key)
     scale = neutral.leg / tables.LEG
     inside = (gait_plan.times > swing[0]) & (gait_plan.times < swing[1])
@@ -359,6 +364,8 @@ def choose_style(
 @lru_cache(maxsize=256)
 def _build_curve(rows: tuple) -> tuple[float, float, PchipInterpolator]:
     """Build the first time, last time and curve of a table; cached, because a synthetic move is planned many times."""
+    from scipy.interpolate import PchipInterpolator
+
     table = np.array(rows, dtype=float)
     return table[0, 0], table[-1, 0], PchipInterpolator(table[:, 0], table[:, 1:], axis=0)
 

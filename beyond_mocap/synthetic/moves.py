@@ -6,7 +6,6 @@ Key poses over seconds from the key moment are blended over standing (the celebr
 from __future__ import annotations
 
 import numpy as np
-from scipy.interpolate import CubicSpline
 
 from ..base.easing import quintic_step
 from ..motion.motion import Motion
@@ -111,6 +110,8 @@ def _compute_jump(times, air: float, standing: np.ndarray, *, neutral: NeutralSt
     """Compute the height of the hips (N,) m, free fall in the air, and how far (N,) the ankles are drawn up and back
     there; `longer`: s that the tables' rows on the ground are further from the contact.
     """
+    from scipy.interpolate import CubicSpline
+
     scale = neutral.leg / tables.LEG
     take_off = np.mean(standing) + (_TOES if longer == 0.0 else _SOFT_TOES) * scale
     speed = tables.GRAVITY * air

@@ -15,7 +15,6 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.interpolate import PchipInterpolator
 
 from ..motion import quaternion
 from ..motion.foot_plant import plant_feet as lift_feet
@@ -163,6 +162,8 @@ def _select_frames(gait_plan: GaitPlan) -> slice:
 
 def _time_steps(gait_plan: GaitPlan, speed: float) -> tuple[GaitPlan, np.ndarray]:
     """Time the steps of a run for a kick: also s from the contact at which right, plant and right foot land."""
+    from scipy.interpolate import PchipInterpolator
+
     share = np.clip((speed - _SLOWEST) / (_FASTEST - _SLOWEST), 0.0, 1.0)
     plant, back = (a + share * (b - a) for a, b in (_PLANT_SECONDS, _RETURN_SECONDS))
     rate = np.gradient(gait_plan.phase, gait_plan.times)

@@ -9,7 +9,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.interpolate import CubicSpline
 
 from ..motion.motion import Motion
 from ..motion.retargeting.adult import build_adult_skeleton
@@ -332,6 +331,8 @@ def _blend_recipe(posture: Posture, recipe: Volley, times, ease, neutral: Neutra
 def _guide_foot(posture: Posture, rows: tuple, times: np.ndarray, neutral: NeutralStance) -> Posture:
     """Guide the right foot from its place through `rows` and back, never through the ground nor beyond the leg's reach.
     """
+    from scipy.interpolate import CubicSpline
+
     scale, table = neutral.leg / tables.LEG, np.array(rows, dtype=float)
     begin, land = table[0, 0] - 0.16, table[-1, 0] + 0.14
     inside = (times > begin) & (times < land)

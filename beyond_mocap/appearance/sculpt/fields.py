@@ -9,7 +9,6 @@ from __future__ import annotations
 from collections.abc import Callable
 
 import numpy as np
-from scipy.interpolate import PchipInterpolator
 
 Field = Callable[[np.ndarray], np.ndarray]
 
@@ -59,6 +58,8 @@ def build_loft(table, roundness: float = 2.0) -> Field:
             be left out, then it is 0.
         roundness: exponent of the sections: 2 is an ellipse, more is boxier.
     """
+    from scipy.interpolate import PchipInterpolator
+
     rows = np.array(sorted(map(tuple, table)), dtype=float)
     if rows.shape[1] == 6:
         rows = np.insert(rows, 2, 0.0, axis=1)

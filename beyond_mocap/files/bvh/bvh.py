@@ -12,6 +12,7 @@ stay unrotated. The format does not define the up axis and the unit; they are es
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -27,7 +28,7 @@ from ...motion.skeleton import Skeleton
 from ..atomic import atomic_path
 from . import bvh_text
 from .bvh_text import POSITIONS, ROTATIONS, BvhText
-from .bvh_write import BvhForm, JointAboveHips, format_bvh
+from .bvh_write import BvhForm, JointAboveHips, format_bvh, iter_parts_text
 
 _STILL_METRES = 1e-3  # smaller motion counts as none
 _STILL_ROTATION = np.cos(np.radians(0.1) / 2)  # w of a rotation by a tenth of a degree
@@ -114,6 +115,20 @@ def write_bvh(path, motion: Motion, form: BvhForm | None = None) -> tuple[str, .
     with atomic_path(target) as temporary, open(temporary, "w", encoding="utf-8", newline="\n") as file:
         file.writelines(pieces)
     return notes
+
+
+def write_bvh_parts(path, parts: Iterable[Motion], count: int) -> None:
+    """Write a motion that comes in parts as BVH, as `write_bvh` writes the whole.
+
+    Args:
+        path: the file.
+        parts: of one skeleton and rate, in order.
+        count: frames of all parts.
+    Raises:
+        InputError: if the folder is not writable.
+    """
+    with atomic_path(path) as temporary, open(temporary, "w", encoding="utf-8", newline="\n") as file:
+        file.writelines(iter_parts_text(parts, count))
 
 
 class BvhRows:

@@ -5,8 +5,9 @@ Hierarchy in file order, Euler angles, centimetres, Y up.
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
-from typing import Iterator, Mapping
+from itertools import chain
 
 import numpy as np
 
@@ -95,6 +96,22 @@ def format_bvh(motion: Motion, form: BvhForm) -> tuple[Iterator[str], tuple[str,
     Returns:
         The file's text in pieces, and a note for each joint that needs more channels than `form` gives it.
     """
+    joints = _build_joints(motion, form)
+    notes = tuple(f"{j.name}: {', '.join(j.added)} added, because the motion needs it" for j in joints if j.added)
+    return chain(_iter_head(joints, len(motion), motion.fps), _iter_rows(joints)), notes
+
+
+def iter_parts_text(parts: Iterable[Motion], count: int) -> Iterator[str]:
+    """Format a motion that comes in parts, of `count` frames in all, as BVH: the text in pieces."""
+    for number, part in enumerate(parts):
+        joints = _build_joints(part, BvhForm())
+        if not number:
+            yield from _iter_head(joints, count, part.fps)
+        yield from _iter_rows(joints)
+
+
+def _build_joints(motion: Motion, form: BvhForm) -> list[_Joint]:
+    """Build the joints in the file's order."""
     joints = _build_joints_above(motion, form.above)
     root, rotation = _compute_hips(motion, form.above)
     for i, depth in _iter_depth_first(motion.skeleton):
@@ -105,8 +122,7 @@ def format_bvh(motion: Motion, form: BvhForm) -> tuple[Iterator[str], tuple[str,
         local_rotation = rotation if i == 0 else motion.rotations[:, i]
         joints.append(_build_joint(name, len(form.above) + depth, declared, place=position, turn=local_rotation,
                                    ends=ends))
-    notes = tuple(f"{j.name}: {', '.join(j.added)} added, because the motion needs it" for j in joints if j.added)
-    return _iter_text(joints, motion.fps), notes
+    return joints
 
 
 def compute_euler_degrees(rotations: np.ndarray, letters: str) -> np.ndarray:
@@ -216,15 +232,19 @@ def _compute_hips(motion: Motion, above: tuple[JointAboveHips, ...]) -> tuple[np
     return _to_parent_frame(hips, _compute_chain(motion, above)[-1]) if above else hips
 
 
-def _iter_text(joints: list[_Joint], fps: float) -> Iterator[str]:
-    """Iterate over the pieces of the file."""
+def _iter_head(joints: list[_Joint], count: int, fps: float) -> Iterator[str]:
+    """Iterate over the pieces of the file before its rows."""
     yield "HIERARCHY\n"
     for joint, depth_after in zip(joints, [j.depth for j in joints[1:]] + [0]):
         yield from _iter_joint_text(joint)
         for depth in range(joint.depth, depth_after - 1, -1):
             yield "\t" * depth + "}\n"
+    yield f"MOTION\nFrames: {count}\nFrame Time: {1.0 / fps:.10g}\n"
+
+
+def _iter_rows(joints: list[_Joint]) -> Iterator[str]:
+    """Iterate over the rows of the file."""
     values = np.concatenate([joint.columns for joint in joints], axis=1)
-    yield f"MOTION\nFrames: {len(values)}\nFrame Time: {1.0 / fps:.10g}\n"
     row = " ".join(["%.6f"] * values.shape[1]) + "\n"
     # adding 0 turns the -0.0 that rounding leaves into 0.0
     yield from (row % tuple(frame) for frame in (np.round(values, 6) + 0.0).tolist())

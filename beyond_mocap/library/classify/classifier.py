@@ -13,7 +13,6 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.ndimage import uniform_filter1d
-from scipy.signal import find_peaks
 
 from ...annotation import LOCOMOTION, ClipAnnotation, swap_sides
 from ...base.content import read_bytes
@@ -95,6 +94,8 @@ def find_candidates(kernel: Kernel, rows: np.ndarray, seconds: np.ndarray, ruled
     Returns:
         Samples (C,) and their scores (C,).
     """
+    from scipy.signal import find_peaks
+
     score = smooth_score(kernel.compute_scores(rows))
     at = find_peaks(np.pad(score, 1, constant_values=-9.0), distance=_CANDIDATES_APART)[0] - 1
     for time in list_rule_moments(ruled, word):

@@ -23,7 +23,7 @@ from ...library.build import build_library
 from ...library.library import Library
 from ...motion.track import Track
 from ...motion.track.ball_path import BallPath
-from ...synthesis.provenance import Provenance, build_provenance, write_provenance
+from ...synthesis.provenance import build_provenance, join_provenance, write_provenance
 from ...synthesis.quality import movement
 from ...synthesis.quality.playback import Playback, playback_from_take
 from ...synthesis.take import Take
@@ -174,7 +174,7 @@ def finish_player(source: LibrarySource, request: FinishRequest) -> PlayerFiles:
                 ending = "bvh" if number == 1 else f"{number}.bvh"
                 files[ending] = _write_to_bytes(lambda path, take=take: bvh.write_bvh(path, take.motion))
         if request.figures:
-            table = _join_provenance(tables)
+            table = join_provenance(tables)
             files["provenance.csv"] = _write_to_bytes(lambda path: write_provenance(path, table))
     return PlayerFiles(build_player_report(stretches) if request.figures else None, files)
 
@@ -297,16 +297,6 @@ def _build_overlap(take: Take, request: FinishRequest) -> np.ndarray:
     inside = (at >= 0) & (at < len(out))
     out[at[inside]] = request.depth[inside]
     return out
-
-
-def _join_provenance(tables: Sequence[Provenance]) -> Provenance:
-    """Join the provenance of several stretches."""
-    names = ["times", "clip_frame", "mirrored", "contacts"]
-    if all(one.planned_heading is not None for one in tables):
-        names.append("planned_heading")
-    arrays = {name: np.concatenate([getattr(one, name) for one in tables]) for name in names}
-    return Provenance(clip=tuple(clip for one in tables for clip in one.clip),
-                      words=tuple(words for one in tables for words in one.words), **arrays)
 
 
 def _write_to_bytes(write) -> bytes:

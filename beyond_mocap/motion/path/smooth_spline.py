@@ -11,7 +11,6 @@ one banded system. A body's path is the curve of least acceleration that stays n
 from __future__ import annotations
 
 import numpy as np
-from scipy.linalg import solveh_banded
 from scipy.ndimage import maximum_filter1d, uniform_filter1d
 
 DEGREE = 3
@@ -51,6 +50,8 @@ def fit_smoothing_spline(
         Knots (P + 4,) and coefficients (P, K).
     Source: Eilers and Marx 1996; O'Sullivan 1986.
     """
+    from scipy.linalg import solveh_banded
+
     low, high = domain or (float(at[0]), float(at[-1]))
     knots = _build_knots(low, high, pieces, closed)
     values = np.asarray(values, dtype=float)
@@ -214,6 +215,8 @@ def _build_right_side(rows: np.ndarray, left: np.ndarray, weights: np.ndarray, v
 
 def _solve_pinned(band: np.ndarray, right: np.ndarray, ends: np.ndarray) -> np.ndarray:
     """Solve the coefficients (P, K) of which the first and the last are `ends` (2, K)."""
+    from scipy.linalg import solveh_banded
+
     last = len(right) - 1
     for below in range(1, _WIDTH):  # move the known coefficients' terms to the right side
         right[below] -= band[below, 0] * ends[0]
@@ -224,6 +227,8 @@ def _solve_pinned(band: np.ndarray, right: np.ndarray, ends: np.ndarray) -> np.n
 def _solve_cyclic(band: np.ndarray, right: np.ndarray) -> np.ndarray:
     """Solve the coefficients (P, K) of a closed curve: the last three are solved after all others (Schur complement).
     """
+    from scipy.linalg import solveh_banded
+
     count = len(right)
     inner = count - DEGREE
     beside, corner = np.zeros((inner, DEGREE)), np.zeros((DEGREE, DEGREE))

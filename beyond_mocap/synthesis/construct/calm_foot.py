@@ -8,7 +8,6 @@ as far as the swing lasts.
 from __future__ import annotations
 
 import numpy as np
-from scipy.interpolate import CubicSpline
 
 from ...annotation.striking import Surface
 from ...base.easing import smoothstep
@@ -57,6 +56,8 @@ def calm_foot(body: Body, foot: Surface, held: tuple[int, int], is_in_contact: n
 def _delay(away: np.ndarray, lag: np.ndarray) -> np.ndarray:
     """Compute the moves (W, 3) m of a point that passes its path (W, 3) m `lag` (W,) frames late; 0 where it does not.
     """
+    from scipy.interpolate import CubicSpline
+
     frames = np.arange(len(away))
     return np.where(lag[:, None] != 0.0, CubicSpline(frames, away)(frames - lag) - away, 0.0)
 

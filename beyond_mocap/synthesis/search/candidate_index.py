@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import weakref
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 
 import numpy as np
 from scipy.ndimage import maximum_filter1d, uniform_filter1d
@@ -12,6 +12,7 @@ from ...annotation import CONTINUOUS, DISCRETE
 from ...annotation.gaits import TURNING
 from ...annotation.labels import list_gaits, list_labels
 from ...base.vectors import arctan2
+from ...library import cache
 from ...library.library import Library
 from .block_costs import AnnotationCost
 
@@ -31,6 +32,11 @@ where it is requested (recordings of it are judged by their posture)."""
 STRIKES, STRIKE_COST = frozenset(list_labels(ball="sends")), 4.0
 """Labels of a ball that is struck, and how many times as much they cost as other actions that are not requested: a kick
 without a ball is the last thing to fill a run with."""
+
+_STORED = ("is_synthetic", "strange", "recording", "is_made_travel", "speed", "turn", "valid", "by_speed", "offset",
+           "long_stance", "is_in_contact", "lifted", "lean", "wild_before", "wild_after")  # fmt: skip
+"""Arrays of an index that are stored beside the library's cache."""
+_PAIR = "pair_"
 
 _SHOWN = 14  # library frames that a long slot shows at the fastest playback rate
 
@@ -94,9 +100,33 @@ class CandidateIndex:
         return cached[allowed.tobytes()]
 
     def __init__(self, library: Library, allowed: np.ndarray):
-        """Build the index; `for_library` does so only once."""
+        """Build the index, or map the one that an earlier run left beside the library's cache; `for_library` does so
+        only once.
+        """
         self.frames = library.frames
         self.annotation = AnnotationCost(library.frames)
+        self.bucket = (np.arange(len(library.frames)) // BUCKET).astype(int)
+        self._by_words: dict[frozenset[str], tuple[np.ndarray, np.ndarray]] = {}
+        self._sorted: dict[frozenset[str], RatePairs] = {}
+        self._showing: dict[frozenset[str], np.ndarray] = {}
+        place = library.index_place if allowed.all() else None
+        known = cache.load_arrays(*place) if place else None
+        if known is None or set(known) != {*_STORED, *_list_pair_names()} or len(known["strange"]) != len(self.frames):
+            self._compute(library, allowed)
+            if place:
+                cache.save_arrays(*place, self._list_arrays())
+        else:
+            vars(self).update({name: known[name] for name in _STORED})
+            self._sorted[frozenset()] = RatePairs(*(known[name] for name in _list_pair_names()))
+
+    def _list_arrays(self) -> dict[str, np.ndarray]:
+        """List the arrays that are stored, with all pairs in order of their speeds."""
+        pairs = self.pairs_by_speed()
+        stored = {name: getattr(self, name) for name in _STORED}
+        return {**stored, **{name: getattr(pairs, name.removeprefix(_PAIR)) for name in _list_pair_names()}}
+
+    def _compute(self, library: Library, allowed: np.ndarray) -> None:
+        """Compute what depends on the clips."""
         self.is_synthetic = np.array([clip.is_synthetic for clip in library.clips])[library.frames.clip]
         strange = maximum_filter1d(library.strangeness, SLOT, origin=-(SLOT // 2), mode="nearest")
         self.strange = np.clip(strange - 1.0, 0.0, MOST_STRANGE)
@@ -106,7 +136,6 @@ class CandidateIndex:
         np.maximum.at(fastest, library.frames.clip, library.frames.speed)
         # a recorded stand that is played forward and backward costs nothing; the ends of a synthetic turn are no stand
         self.is_made_travel = self.is_synthetic & (fastest[library.frames.clip] > STAND_SPEED)
-        self.bucket = (np.arange(len(library.frames)) // BUCKET).astype(int)
         speed, turn, lasts = map(np.stack, zip(*(compute_speed_and_turn(library, rate) for rate in PLAYBACK_RATES)))
         self.speed, self.turn = speed.astype(np.float32), turn.astype(np.float32)
         self.valid = lasts & allowed[library.frames.clip]
@@ -119,9 +148,6 @@ class CandidateIndex:
         self.lifted = uniform_filter1d(lifted, SLOT, origin=-(SLOT // 2), mode="nearest")
         self.lean = uniform_filter1d(library.frames.lean, SLOT, axis=0, origin=-(SLOT // 2), mode="nearest")
         self.wild_before, self.wild_after = measure_wildness(library)
-        self._by_words: dict[frozenset[str], tuple[np.ndarray, np.ndarray]] = {}
-        self._sorted: dict[frozenset[str], RatePairs] = {}
-        self._showing: dict[frozenset[str], np.ndarray] = {}
 
     def build_pairs(self, number: np.ndarray, frame: np.ndarray) -> RatePairs:
         """Build the pairs of PLAYBACK_RATES[number (K,)] and library frame (K,)."""
@@ -170,6 +196,11 @@ class CandidateIndex:
                                  ~frames.words.any(axis=1))
             self._by_words[words] = missing.astype(np.float32), lacking.astype(np.float32)
         return self._by_words[words]
+
+
+def _list_pair_names() -> list[str]:
+    """List the names under which the pairs in order of their speeds are stored."""
+    return [_PAIR + field.name for field in fields(RatePairs)]
 
 
 def measure_wildness(library: Library) -> tuple[np.ndarray, np.ndarray]:

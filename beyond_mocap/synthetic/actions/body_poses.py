@@ -11,7 +11,6 @@ from dataclasses import dataclass, replace
 from functools import lru_cache
 
 import numpy as np
-from scipy.interpolate import CubicSpline
 
 from ...motion import quaternion
 from ...motion.motion import Motion
@@ -193,6 +192,8 @@ def compute_flight(times: np.ndarray, height: np.ndarray, take_off: float, landi
     Returns:
         (T,) m.
     """
+    from scipy.interpolate import CubicSpline
+
     low, high = np.interp([take_off, landing], times, height)
     length = landing - take_off
     rise = (high - low) / length + 0.5 * tables.GRAVITY * length

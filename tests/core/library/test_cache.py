@@ -5,6 +5,7 @@ import os
 import shutil
 import subprocess
 import sys
+from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -12,6 +13,7 @@ import numpy as np
 import pytest
 
 from beyond_mocap.base.errors import InputError
+from beyond_mocap.files import motion_file
 from beyond_mocap.library import cache
 from beyond_mocap.library.build import build_library
 from beyond_mocap.library.library import Library
@@ -128,11 +130,19 @@ DAMAGE = {
 }
 
 
+def cache_files(folder: Path) -> dict[str, Path]:
+    """The header and the motions of a library's cache."""
+    place = folder / CACHE_FOLDER
+    (motions,) = place.glob("library-*/motions.npy")
+    return {"header": place / "library.json", "motions": motions}
+
+
+@pytest.mark.parametrize("name", ["header", "motions"])
 @pytest.mark.parametrize("damage", DAMAGE.values(), ids=DAMAGE)
-def test_a_damaged_cache_is_written_anew(folder, damage):
-    library, worked = built(folder)
-    assert not worked
-    file = folder / ".beyond_mocap" / "library.npz"
+def test_a_damaged_cache_is_written_anew(folder, small, name, damage):
+    library = replace(build_library(small), folder=str(folder))
+    assert not built(folder)[1]
+    file = cache_files(folder)[name]
     file.write_bytes(damage(file.read_bytes()))
     again, worked = built(folder)
     assert worked
@@ -140,56 +150,102 @@ def test_a_damaged_cache_is_written_anew(folder, damage):
     assert not built(folder)[1]
 
 
-def test_no_single_wrong_byte_does_harm(small, tmp_path):
-    """Flipped bytes all over the file, its directory above all: the cache is not used, or says the same."""
-    content = (small / ".beyond_mocap" / "library.npz").read_bytes()
-    library = build_library(small)
-    key = _header(small)["key"]
+def test_no_single_wrong_byte_does_harm(folder, small):
+    """A flipped byte anywhere in the files: the cache is not used."""
+    library, place = build_library(small), folder / CACHE_FOLDER
+    key = library.cache_location[1]
     random = np.random.default_rng(3)
-    places = [*random.integers(0, len(content), 40), *range(len(content) - 2500, len(content), 7)]
-    for place in places:
-        (tmp_path / "library.npz").write_bytes(
-            content[:place] + bytes([content[place] ^ (1 << place % 8)]) + content[place + 1 :]
-        )
-        found = cache.load_library(tmp_path, key)
-        if found is not None:
-            left, right = arrays_of(library), arrays_of(Library(folder=str(small), **found))
-            assert all(np.array_equal(left[name], right[name]) for name in left), place
+    files = [*(place / "library.json",) * 60, *sorted(place.glob("library-*/*.npy"))]
+    for file in files:
+        content = file.read_bytes()
+        at = int(random.integers(len(content)))
+        file.write_bytes(content[:at] + bytes([content[at] ^ (1 << at % 8)]) + content[at + 1 :])
+        assert cache.load_library(place, key) is None, (file, at)
+        file.write_bytes(content)
+    left, right = arrays_of(library), arrays_of(Library(folder=str(folder), **cache.load_library(place, key)))
+    assert all(np.array_equal(left[name], right[name]) for name in left)
 
 
-def _header(folder):
-    import json
+def test_a_copied_cache_is_checked_once_and_used(folder):
+    for file in (folder / CACHE_FOLDER).rglob("*.npy"):
+        os.utime(file, (1e9, 1e9))
+    before = cache_files(folder)["header"].read_bytes()
+    assert not built(folder)[1]
+    assert cache_files(folder)["header"].read_bytes() != before  # now with the files' new times
+    assert not built(folder)[1]
 
-    with np.load(folder / ".beyond_mocap" / "library.npz") as arrays:
-        return json.loads(arrays["header"].tobytes())
 
-
-@pytest.mark.parametrize("change", ["nothing", "a list", "no clips", "another skeleton", "short arrays", "objects"])
+@pytest.mark.parametrize("change", ["nothing", "a list", "no clips", "another skeleton", "a file less", "elsewhere"])
 def test_a_cache_of_another_form_is_not_used(folder, change):
-    import json
-
-    file = folder / ".beyond_mocap" / "library.npz"
-    header = _header(folder)
-    with np.load(file) as arrays:
-        content = {name: arrays[name] for name in arrays.files}
+    place = folder / CACHE_FOLDER
+    header = cache._read_header(place, "library")
+    key = header["key"]
     if change == "nothing":
-        content = {"something": np.zeros(3)}
+        header = {"key": key}
     elif change == "a list":
-        header = [header["key"]]
+        header = [key]
     elif change == "no clips":
         header["clips"] = None
     elif change == "another skeleton":
         header["parents"] = header["parents"][::-1]
-    elif change == "short arrays":
-        content["rotations"] = content["rotations"][:-1]
-    elif change == "objects":
-        content["root"] = np.array([{"a": 1}], dtype=object)
-    if change != "nothing":
-        content["header"] = np.frombuffer(json.dumps(header).encode(), np.uint8)
-    np.savez(file, **content)
+    elif change == "a file less":
+        header["files"].pop("contacts.npy")
+    elif change == "elsewhere":
+        header["folder"] = "../" + header["folder"] + "/.."
+    cache._write_header(place, "library", header)
     library, worked = built(folder)
     assert worked and len(library.clips) == 4
     assert not built(folder)[1]
+
+
+def test_a_cache_of_an_earlier_version_is_told_and_replaced(folder):
+    shutil.rmtree(folder / CACHE_FOLDER)
+    (folder / CACHE_FOLDER).mkdir()
+    (folder / CACHE_FOLDER / "library.npz").write_bytes(b"of version 0.1")
+    first, worked = built(folder)
+    assert worked and any("another version" in note for note in first.notes)
+    again, worked = built(folder)
+    assert not worked and not any("another version" in note for note in again.notes)
+    assert not list((folder / CACHE_FOLDER).glob("*.npz"))
+
+
+def test_what_a_build_replaces_stays_for_an_hour_and_all_of_it_others_may_read(folder):
+    place = folder / CACHE_FOLDER
+    build_library(folder, rebuild=True)
+    assert len(list(place.glob("library-*"))) == 2  # another machine may have the old one open
+    for path in place.glob("library-*"):
+        os.utime(path, (1e9, 1e9))
+    (place / "library-gait").mkdir()
+    os.utime(place / "library-gait", (1e9, 1e9))
+    build_library(folder, rebuild=True)
+    assert len(list(place.glob("library-*"))) == 3  # and what only looks alike
+    mask = os.umask(0)
+    os.umask(mask)
+    for path in (place, *place.rglob("*")):
+        wanted = (0o777 if path.is_dir() else 0o666) & ~mask
+        assert path.stat().st_mode & 0o777 == wanted, path
+
+
+def test_a_file_that_changes_within_its_clock_tick_is_read_again(folder):
+    """Only the digest of a file that has been quiet for a while is taken from the last time."""
+    os.utime(folder / "walk.bvh", (1e9, 1e9))
+    digests = cache.SourceDigests(folder / CACHE_FOLDER)
+    fresh = digests.digest("walk.bvh", folder / "walk.bvh")
+    digests.save()
+    (folder / "walk.bvh").write_bytes((folder / "walk.bvh").read_bytes().replace(b"0", b"1", 1))
+    os.utime(folder / "walk.bvh", (1e9, 1e9))  # size and time of content are as before
+    assert cache.SourceDigests(folder / CACHE_FOLDER).digest("walk.bvh", folder / "walk.bvh") != fresh
+
+
+def test_built_in_files_or_in_memory_gives_the_same_bits(folder, monkeypatch):
+    def refuse(place, name="library"):
+        raise OSError("no place")
+
+    library, _ = built(folder)
+    monkeypatch.setattr(cache, "create_arrays_folder", refuse)
+    again, worked = built(folder, rebuild=True)
+    assert worked and any("cannot be written" in note for note in again.notes)
+    assert_same(library, replace(again, notes=library.notes))
 
 
 def test_the_cache_may_lie_elsewhere(folder, tmp_path):
@@ -236,10 +292,10 @@ def test_a_file_in_the_cache_s_place_does_no_harm(folder):
 
 
 def test_a_folder_in_the_cache_file_s_place_does_no_harm(folder):
-    (folder / ".beyond_mocap" / "library.npz").unlink()
-    (folder / ".beyond_mocap" / "library.npz").mkdir()
+    (folder / CACHE_FOLDER / "library.json").unlink()
+    (folder / CACHE_FOLDER / "library.json").mkdir()
     assert built(folder)[1]
-    assert not list((folder / ".beyond_mocap").rglob("*.part"))
+    assert not list((folder / CACHE_FOLDER).rglob("*.part"))
 
 
 def test_two_processes_that_build_at_once_both_succeed(folder):
@@ -277,17 +333,17 @@ def test_a_cache_that_cannot_be_written_is_told(folder, tmp_path):
 
 @pytest.mark.skipif(not Path("/dev/full").exists(), reason="needs a disk that is always full")
 def test_a_full_disk_is_told_once_and_leaves_no_half_of_a_cache(folder, monkeypatch):
-    write_bytes = Path.write_bytes
-    monkeypatch.setattr(
-        Path, "write_bytes",
-        lambda path, content: write_bytes(Path("/dev/full") if path.suffix == ".part" else path, content),
-    )  # fmt: skip
+    def open_full(path, mode="r", *more):
+        return open("/dev/full" if mode == "wb" else path, mode, *more)
+
+    monkeypatch.setattr(motion_file, "open", open_full, raising=False)
     ignored = []
     monkeypatch.setattr(sys, "unraisablehook", ignored.append)
+    before = {path.name for path in (folder / CACHE_FOLDER).iterdir()}
     library = build_library(folder, rebuild=True)
     gc.collect()
     assert ignored == [] and sum("cannot be written" in note for note in library.notes) == 1
-    assert not list((folder / ".beyond_mocap").rglob("*.part"))
+    assert {path.name for path in (folder / CACHE_FOLDER).iterdir()} - before <= {"digests.json"}
 
 
 def test_a_synthetic_clip_that_cannot_be_written_does_no_harm(small, tmp_path):

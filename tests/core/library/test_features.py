@@ -9,8 +9,8 @@ from beyond_mocap.library.clip import Clip
 from beyond_mocap.library.features import (
     HORIZON,
     build_frames,
-    compute_principal_components,
     compute_raw_features,
+    reduce_to_principal_components,
     sample_positions,
     select_feature_joints,
 )
@@ -87,15 +87,16 @@ def test_short_clips_have_features():
 def test_the_fewest_components_that_hold_the_energy(seed, rows, columns, energy):
     random = np.random.default_rng(seed)
     values = random.normal(size=(rows, columns)) * random.uniform(0.01, 3.0, columns)
-    mean, basis = compute_principal_components(values, energy)
+    mean, basis, reduced = reduce_to_principal_components(values.copy(), energy)
     centred = values - mean
+    assert np.array_equal(reduced, centred @ basis)
     held = [np.sum((centred @ basis[:, :kept]) ** 2) / np.sum(centred**2) for kept in range(basis.shape[1] + 1)]
     assert np.allclose(basis.T @ basis, np.eye(basis.shape[1]), atol=1e-9)
     assert held[-1] >= energy - 1e-9 and held[-2] < energy + 1e-9
 
 
 def test_values_without_variance_keep_one_component():
-    mean, basis = compute_principal_components(np.ones((5, 3)))
+    mean, basis, _ = reduce_to_principal_components(np.ones((5, 3)))
     assert basis.shape == (3, 1) and np.allclose(mean, 1.0)
 
 
