@@ -48,7 +48,7 @@ def check_enabling_is_light():
         assert addon_utils.enable(EXTENSION) is not None
         seconds.append(time.process_time() - start)
         yield 0.1
-    report_time("enabling, s", min(seconds), 0.3)
+    report_time("enabling, s", min(seconds), 0.1)
 
 
 def check_packages_come_from_our_wheels():
