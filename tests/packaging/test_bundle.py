@@ -32,7 +32,7 @@ def make_wheel(name, licence="LICENSE.txt"):
     """The bytes of a wheel with a licence."""
     out = io.BytesIO()
     with zipfile.ZipFile(out, "w") as archive:
-        archive.writestr(f"{name.split('-')[0]}-1.dist-info/{licence}", name)
+        archive.writestr(zipfile.ZipInfo(f"{name.split('-')[0]}-1.dist-info/{licence}"), name)
     return out.getvalue()
 
 
