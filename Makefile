@@ -1,6 +1,5 @@
 # Everything runs in virtual environments that packaging/venv.sh makes on demand; nothing to prepare but
 # make and Python 3.11 (or 3.13). `make help` lists what there is.
-PLATFORMS ?= linux-x64
 PYTEST = -P -m pytest
 TRAINED = .venv-training/bin/python -m beyond_mocap
 WEIGHTS = beyond_mocap/throws/networks/weights
@@ -8,14 +7,14 @@ REAL_BLENDER ?= ../shared/tools/real-blender
 
 .DEFAULT_GOAL := help
 .NOTPARALLEL:
-.PHONY: help venv venv-oldest training lint quick test test-core test-blender test-oldest test-training demo bench weights tables docs package extension extension-all window-test window-bench fuzz kill-test \
-  pictures clean
+.PHONY: help venv venv-oldest training lint quick test test-core test-blender test-oldest test-training demo bench weights tables docs package extension extension-all repository \
+  repository-test pins window-test window-bench fuzz kill-test pictures clean
 
 help:
 	@echo 'make venv           .venv with Blender as a Python module and all that the tests need'
 	@echo 'make training       .venv-training with what trains the networks of throws and kicks (jax, no Blender)'
 	@echo 'make quick ROOM=... the tests of one package (ROOM=path_editing), in about a minute'
-	@echo 'make lint           ruff over all source, mypy over the core'
+	@echo 'make lint           ruff over all source, mypy over the core, the workflow by its schema'
 	@echo 'make test           all tests but the window ones: the core, training, then Blender 5.0 (or 5.2) and Blender 4.5'
 	@echo 'make fuzz           damaged files for every reader and verb, for 10 minutes on two cores (SECONDS_OF_FUZZ=600)'
 	@echo 'make kill-test      library builds, matches and trainings killed at 100 random moments, and resumed'
@@ -25,8 +24,12 @@ help:
 	@echo 'make tables         the pages of docs/ that come from the code: settings, providers'
 	@echo 'make docs           the documents as a site, into build/docs; broken links are errors'
 	@echo 'make package        the Python package, wheel and source archive, into build/package'
-	@echo 'make extension      the zip for Blender, into build/extension; PLATFORMS="linux-x64 windows-x64" for others'
-	@echo 'make extension-all  one zip for each platform: linux-x64 windows-x64 macos-arm64 macos-x64'
+	@echo 'make extension      the zips for Blender, one for each of its Pythons, into build/extension;'
+	@echo '                    PLATFORMS="windows-x64 macos-arm64" for others, MAINTAINER="Name <mail>" to publish them'
+	@echo 'make extension-all  the zips of all platforms: linux-x64 windows-x64 macos-arm64 macos-x64'
+	@echo 'make repository     a static extension repository of the zips that stand in build/extension, into build/repository'
+	@echo 'make repository-test  a repository over http on this machine: Blenders install 0.1.0 from it and update'
+	@echo 'make pins           resolve and pin the wheels of the zips again, with their hashes'
 	@echo 'make window-test    install the zip in a real Blender and press its buttons; skipped where none can be had'
 	@echo 'make window-bench   the same, and times in the window that are above their targets are failures'
 	@echo 'make pictures       the pictures of docs/, taken in a real Blender of our own sample'
@@ -57,6 +60,7 @@ lint: venv
 	@packaging/venv.sh lint
 	.venv-lint/bin/ruff check .
 	.venv-lint/bin/mypy --python-executable .venv/bin/python
+	.venv-lint/bin/check-jsonschema --builtin-schema vendor.github-workflows .github/workflows/*.yml
 
 # One room's folders, tests/core/ROOM and tests/blender/ROOM, and files, test_ROOM*.py; the second has settings of its own.
 ROOM_OF = $(wildcard tests/$(1)/$(ROOM) tests/$(1)/*/$(ROOM) tests/$(1)/test_$(ROOM).py tests/$(1)/test_$(ROOM)_*.py)
@@ -125,10 +129,26 @@ package:
 	.venv-package/bin/python -m build --no-isolation --outdir build/package .
 
 extension: venv
-	.venv/bin/python packaging/build.py --platforms $(PLATFORMS)
+	@packaging/venv.sh pack
+	.venv/bin/python packaging/build.py $(if $(PLATFORMS),--platforms $(PLATFORMS)) $(if $(MAINTAINER),--maintainer "$(MAINTAINER)")
 
 extension-all: PLATFORMS = linux-x64 windows-x64 macos-arm64 macos-x64
 extension-all: extension
+
+repository:
+	@ls build/extension/*.zip >/dev/null 2>&1 || $(MAKE) -s extension
+	.venv/bin/python packaging/repository.py
+
+# What `make extension` has built is what is installed.
+repository-test: venv-oldest
+	@ls build/extension/*.zip >/dev/null 2>&1 || $(MAKE) -s extension
+	REAL_BLENDER=$(REAL_BLENDER) .venv/bin/python $(PYTEST) tests/repository
+
+# Older versions than these are kept where they still fit; `make pins UPGRADE=--upgrade` takes the newest.
+pins:
+	@packaging/venv.sh pack
+	cd packaging/requirements && ../../.venv-pack/bin/uv pip compile --python-version 3.11 --python-platform linux --generate-hashes \
+	  --only-binary :all: --no-emit-package numpy --no-annotate --no-header --quiet $(UPGRADE) bundle.in -o bundle.txt
 
 window-test: extension
 	@tests/gui/run $(REAL_BLENDER)
@@ -140,4 +160,4 @@ pictures: extension
 	@tests/gui/run $(REAL_BLENDER) tests/gui/pictures.py
 
 clean:
-	rm -rf build .venv .venv-4.5 .venv-training .venv-lint .venv-docs .venv-package
+	rm -rf build .venv .venv-4.5 .venv-training .venv-lint .venv-docs .venv-package .venv-pack

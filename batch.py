@@ -6,34 +6,31 @@ It takes the verbs of `python -m beyond_mocap` and exits with their status. It u
 otherwise the code beside this file, so that nothing has to be installed.
 """
 
-import importlib
 import importlib.util
 import pathlib
 import sys
 
-LOCAL_PACKAGE = "beyond_mocap_batch"
+REPOSITORY = "beyond_mocap_batch"
 
 
 def find_extension():
-    """Find the package of the enabled extension; without one, load the folder of this file.
+    """Find the package of the enabled extension; without one, that of this file's folder.
+
+    Blender itself makes the folder importable: it becomes an extension repository of this session.
 
     Returns:
         The package's name.
     """
     import bpy
 
-    enabled = [name for name in bpy.context.preferences.addons.keys() if name.startswith("bl_ext.")]
-    for name in enabled:
-        if name.endswith(".beyond_mocap") and name in sys.modules:
+    preferences = bpy.context.preferences
+    for name in preferences.addons.keys():
+        if name.startswith("bl_ext.") and name.endswith(".beyond_mocap") and importlib.util.find_spec(name):
             return name
-    folder = pathlib.Path(__file__).resolve().parent
-    spec = importlib.util.spec_from_file_location(
-        LOCAL_PACKAGE, folder / "__init__.py", submodule_search_locations=[str(folder)]
-    )
-    package = importlib.util.module_from_spec(spec)
-    sys.modules[LOCAL_PACKAGE] = package
-    spec.loader.exec_module(package)
-    return LOCAL_PACKAGE
+    folder, saved = pathlib.Path(__file__).resolve().parent, preferences.is_dirty
+    preferences.extensions.repos.new(name=REPOSITORY, module=REPOSITORY, custom_directory=str(folder))
+    preferences.is_dirty = saved  # nothing to save: the repository is gone when Blender ends
+    return f"bl_ext.{REPOSITORY}"
 
 
 def main():

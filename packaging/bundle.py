@@ -1,4 +1,4 @@
-"""The contents of the zip, read from bundle.toml, and the parts of a wheel's file name."""
+"""The contents of the zips, read from bundle.toml and the pinned requirements, and the parts of a wheel's file name."""
 
 import pathlib
 import re
@@ -6,6 +6,7 @@ import tomllib
 from typing import NamedTuple
 
 HERE = pathlib.Path(__file__).resolve().parent
+PINS = HERE / "requirements" / "bundle.txt"
 
 
 class Package(NamedTuple):
@@ -15,33 +16,37 @@ class Package(NamedTuple):
         name, version: as released.
         copyright: the copyright holder.
         license: SPDX name.
-        slimmed: whether the zip's wheel is reduced.
+        hashes: SHA-256 of its released wheels.
     """
 
     name: str
     version: str
     copyright: str
     license: str
-    slimmed: bool = False
-
-    @property
-    def bundled_version(self):
-        """The version of the zip's wheel, marked if the wheel is reduced."""
-        return self.version + ("+slim" if self.slimmed else "")
+    hashes: frozenset[str] = frozenset()
 
 
-class Platform(NamedTuple):
-    """One of Blender's platforms.
+class Target(NamedTuple):
+    """What one zip is for.
 
     Attributes:
-        name: Blender's name.
-        pythons: the Python versions to support.
+        platform: Blender's name of the platform.
+        python: the Python version, such as "311".
         tags: the wheel tags that fit, the best first.
+        blender_min: the first Blender of this Python.
+        blender_max: the first Blender after it that runs another; "" if there is none yet.
     """
 
-    name: str
-    pythons: list[str]
+    platform: str
+    python: str
     tags: list[str]
+    blender_min: str
+    blender_max: str = ""
+
+    @property
+    def name(self):
+        """Platform and Python."""
+        return f"{self.platform}-cp{self.python}"
 
 
 class Wheel(NamedTuple):
@@ -53,16 +58,11 @@ class Wheel(NamedTuple):
     abis: frozenset[str]
     platforms: frozenset[str]
 
-    def is_compatible(self, platform, python):
-        """Return whether Blender unpacks this wheel on a platform under a Python version.
-
-        Args:
-            platform: the platform.
-            python: the version, such as "311".
-        """
-        fits_python = f"cp{python}" in self.pythons or "py3" in self.pythons or (
-            "abi3" in self.abis and any(_is_older(tag, python) for tag in self.pythons))
-        return fits_python and ("any" in self.platforms or bool(self.platforms & set(platform.tags)))
+    def is_compatible(self, target):
+        """Return whether Blender unpacks this wheel there."""
+        fits_python = f"cp{target.python}" in self.pythons or "py3" in self.pythons or (
+            "abi3" in self.abis and any(_is_older(tag, target.python) for tag in self.pythons))
+        return fits_python and ("any" in self.platforms or bool(self.platforms & set(target.tags)))
 
 
 def _is_older(tag, python):
@@ -72,7 +72,7 @@ def _is_older(tag, python):
 def parse_wheel_name(filename):
     """Split a wheel's file name into its parts.
 
-    >>> wheel("lxml-6.1.3-cp311-cp311-win_amd64.whl").platforms
+    >>> parse_wheel_name("lxml-6.1.3-cp311-cp311-win_amd64.whl").platforms
     frozenset({'win_amd64'})
     """
     name, version, *_, python, abi, platform = filename.removesuffix(".whl").split("-")
@@ -85,17 +85,35 @@ def normalize_name(name):
 
 
 def list_packages():
-    """List all bundled packages, in the file's order."""
-    return [Package(**row) for row in _read_table()["package"]]
+    """List all bundled packages, in the file's order; exit where bundle.toml and the pins name different ones."""
+    rows, pins = _read_table()["package"], read_pins()
+    if different := pins.keys() ^ {row["name"] for row in rows}:
+        raise SystemExit(f"bundle.toml and {PINS.name} differ: {', '.join(sorted(different))}")
+    return [Package(**row, **pins[row["name"]]) for row in rows]
 
 
-def read_platforms():
-    """Read the platforms that a zip can be built for.
+def read_pins():
+    """Read the pinned requirements.
 
     Returns:
-        Name -> platform.
+        Name -> version and hashes.
     """
-    return {name: Platform(name, **row) for name, row in _read_table()["platform"].items()}
+    pins = re.findall(r"^([a-z0-9-]+)==(\S+)((?:\s*\\\n\s+--hash=sha256:\w+)+)", PINS.read_text("utf-8"), re.MULTILINE)
+    return {name: {"version": version, "hashes": frozenset(re.findall(r"sha256:(\w+)", hashes))}
+            for name, version, hashes in pins}
+
+
+def list_targets(*platforms):
+    """List what zips can be built for.
+
+    Args:
+        platforms: Blender's names; none for all.
+    Returns:
+        One target for each Python of each platform.
+    """
+    table = _read_table()
+    return [Target(name, python, table["platform"][name]["tags"], **table["python"][python])
+            for name in platforms or table["platform"] for python in table["platform"][name]["pythons"]]
 
 
 def _read_table():

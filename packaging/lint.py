@@ -1,30 +1,33 @@
 """Checks of the extension that Blender's `validate` does not make.
 
-A platform with a typo, a missing wheel, a Python version without its wheel, a bundled package that the copyright does
-not name, a file that must not be in the zip.
+A platform with a typo, a missing or altered wheel, one without its licence, a bundled package that the copyright does
+not name, a maintainer without an address, a file that must not be in the zip, a zip that is too big.
 """
 
+import re
 import tomllib
 import zipfile
 
 from bundle import normalize_name, parse_wheel_name
+from wheels import list_pinned
 
 BLENDER_PLATFORMS = {f"{system}-{processor}" for system in ("linux", "windows", "macos")
                      for processor in ("x64", "arm64")}
 SAMPLE = "sample_blend/"
 SAMPLE_FILES = ("library/walking_1_2.bvh", "match/player1.csv", "match/player1.txt", "match/small/small.dat",
                 "match/small/small_meta.xml", "passes/library/ready_1.bvh", "markers/walk.trc")
+MAX_ZIP_BYTES = 100_000_000
 MAX_SAMPLE_BYTES = 3_500_000  # of the sample in the zip, compressed
 FORBIDDEN = ("tests/", "benchmarks/", "docs/", "packaging/", "build/", "training/", ".git", ".venv", "shared/")
 
 
-def lint_stage(folder, packages, platform):
-    """Check the folder staged for one platform.
+def lint_stage(folder, packages, target):
+    """Check the folder staged for one zip.
 
     Args:
         folder: the staging folder.
         packages: the bundled packages.
-        platform: the platform.
+        target: what the zip is for.
     Returns:
         Complaints, one line each.
     """
@@ -36,40 +39,57 @@ def lint_stage(folder, packages, platform):
                                                    if name not in existing),
             *(f"wheel {name} exists but is not listed" for name in sorted(existing) if name not in listed),
             *(f"licence {name!r} has no SPDX name" for name in manifest["license"] if not name.startswith("SPDX:")),
-            *_check_copyright(manifest, packages), *_check_coverage(listed, packages, platform)]
+            *check_maintainer(manifest["maintainer"]), *_check_copyright(manifest, packages),
+            *_check_coverage(listed, packages, target), *_check_wheels(folder / "wheels", packages)]
+
+
+def check_maintainer(text):
+    """Check that a maintainer is a name and an address; return complaints."""
+    fits = re.fullmatch(r"[^<>]*\w[^<>]* <[^<>@\s]+@[^<>@\s]+\.\w+>", text)
+    return [] if fits else [f"maintainer {text!r}: expected a name and an address, 'Name <name@host>'"]
 
 
 def _check_copyright(manifest, packages):
     for package in packages:
-        credit = f"({package.name} {package.bundled_version}, {package.license})"
+        credit = f"({package.name} {package.version}, {package.license})"
         if not any(line.endswith(credit) for line in manifest["copyright"]):
-            yield f"the copyright does not name {package.name} {package.bundled_version}"
+            yield f"the copyright does not name {package.name} {package.version}"
 
 
-def _check_coverage(listed, packages, platform):
-    """Check that each Python version gets exactly one wheel of each package, and that each wheel is used."""
+def _check_coverage(listed, packages, target):
+    """Check that there is exactly one wheel of each package that Blender unpacks there, and no other."""
     wheels = {name: parse_wheel_name(name) for name in listed}
     unused = set(listed)
-    for python in platform.pythons:
-        for package in packages:
-            matching = {name for name, w in wheels.items() if w.is_compatible(platform, python)
-                        and (w.name, w.version) == (normalize_name(package.name), package.bundled_version)}
-            unused -= matching
-            if len(matching) != 1:
-                found = f"{len(matching)} wheels of {package.name}"
-                yield f"{found} for {platform.name}, Python {python}: {sorted(matching)}"
-    yield from (f"wheel {name} fits no Python version of {platform.name}" for name in sorted(unused))
+    for package in packages:
+        matching = {name for name, wheel in wheels.items() if wheel.is_compatible(target)
+                    and (wheel.name, wheel.version) == (normalize_name(package.name), package.version)}
+        unused -= matching
+        if len(matching) != 1:
+            yield f"{len(matching)} wheels of {package.name} for {target.name}: {sorted(matching)}"
+    yield from (f"wheel {name} is not for {target.name}" for name in sorted(unused))
 
 
-def lint_zip(path, platform):
-    """Check a finished zip for one platform.
+def _check_wheels(folder, packages):
+    """Check that all wheels are as released, and bring their licences."""
+    pinned = list_pinned(packages, folder)
+    altered = sorted(set(folder.iterdir()) - set(pinned))
+    yield from (f"wheel {path.name} is not the released file" for path in altered)
+    for path in pinned:
+        with zipfile.ZipFile(path) as archive:
+            if not any(re.search(r"\.dist-info/.*(LICEN[CS]E|COPYING)", name, re.I) for name in archive.namelist()):
+                yield f"wheel {path.name} has no licence in it"
+
+
+def lint_zip(path, target):
+    """Check a finished zip.
 
     Args:
         path: the zip.
-        platform: the platform.
+        target: what it is for.
     Returns:
         Complaints, one line each.
     """
+    size = path.stat().st_size
     with zipfile.ZipFile(path) as archive:
         names = archive.namelist()
         sample_size = sum(one.compress_size for one in archive.infolist() if one.filename.startswith(SAMPLE))
@@ -83,15 +103,17 @@ def lint_zip(path, platform):
         *(
             f"{path.name}: {name} is for another platform"
             for name in wheels
-            if not any(parse_wheel_name(name).is_compatible(platform, python) for python in platform.pythons)
+            if not parse_wheel_name(name).is_compatible(target)
         ),
         *(
             f"{path.name}: {name} is missing"
-            for name in ("__init__.py", "LICENSE", "blender_manifest.toml", *(SAMPLE + name for name in SAMPLE_FILES))
+            for name in ("__init__.py", "LICENSE", "SECURITY.md", "blender_manifest.toml", "sbom.cdx.json",
+                         *(SAMPLE + name for name in SAMPLE_FILES))
             if name not in names
         ),
         *([f"{path.name}: the sample has {sample_size} bytes, at most {MAX_SAMPLE_BYTES} are expected"]
           if sample_size > MAX_SAMPLE_BYTES else []),
+        *([f"{path.name}: {size} bytes, at most {MAX_ZIP_BYTES} are allowed"] if size > MAX_ZIP_BYTES else []),
     ]
 
 

@@ -4,9 +4,10 @@
 #   packaging/venv.sh main      .venv           bpy 5.0.1 on Python 3.11, bpy 5.2.2 on Python 3.13
 #   packaging/venv.sh oldest    .venv-4.5       bpy 4.5.15 on Python 3.11; says so and makes none without that Python
 #   packaging/venv.sh training  .venv-training  jax and optax on Python 3.11, 3.12 or 3.13, without bpy
-#   packaging/venv.sh lint      .venv-lint      ruff and mypy
+#   packaging/venv.sh lint      .venv-lint      ruff, mypy and check-jsonschema
 #   packaging/venv.sh docs      .venv-docs      mkdocs
 #   packaging/venv.sh package   .venv-package   build and hatchling
+#   packaging/venv.sh pack      .venv-pack      what pins and describes the wheels of the zips
 #
 # The environments live outside the clone, in a cache named by their requirements, so that a second
 # clone (or a clean one) gets them in a second; the clone holds links. PYTHON=... chooses an interpreter.
@@ -67,7 +68,8 @@ case ${1:-} in
   lint) link=$clone/.venv-lint; python=$(find_python 3.11 3.12 3.13) || fail "needs Python 3.11 or later (PYTHON=... names one)" ;;
   docs) link=$clone/.venv-docs; python=$(find_python 3.11 3.12 3.13) || fail "needs Python 3.11 or later (PYTHON=... names one)" ;;
   package) link=$clone/.venv-package; python=$(find_python 3.11 3.12 3.13) || fail "needs Python 3.11 or later (PYTHON=... names one)" ;;
-  *) sed -n '2,13s/^# \{0,1\}//p' "$0"; exit 2 ;;
+  pack) link=$clone/.venv-pack; python=$(find_python 3.11 3.12 3.13) || fail "needs Python 3.11 or later (PYTHON=... names one)" ;;
+  *) sed -n '2,14s/^# \{0,1\}//p' "$0"; exit 2 ;;
 esac
 modules="bpy numpy scipy sklearn joblib distributed kloppy c3d pytest xdist hypothesis matplotlib"  # the first is imported, to see it works
 download="Blender as a module, about 350 MB"
@@ -75,9 +77,10 @@ case $1-$(version_of "$python") in
   main-3.11) kind=blender-5.0 ;;
   main-3.13) kind=blender-5.2 ;;
   oldest-3.11) kind=blender-4.5 ;;
-  lint-*) kind=lint; modules="mypy ruff"; download="ruff and mypy, about 20 MB" ;;
+  lint-*) kind=lint; modules="mypy ruff check_jsonschema"; download="ruff and mypy, about 20 MB" ;;
   docs-*) kind=docs; modules="mkdocs material latex2mathml"; download="mkdocs, about 20 MB" ;;
   package-*) kind=package; modules="build hatchling"; download="build and hatchling, about 2 MB" ;;
+  pack-*) kind=pack; modules="cyclonedx uv"; download="uv and cyclonedx, about 30 MB" ;;
   training-*) kind=training; modules="jax numpy scipy sklearn optax c3d pytest hypothesis"; download="jax, about 150 MB" ;;
 esac
 requirements=$here/requirements/$kind.txt

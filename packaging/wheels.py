@@ -1,126 +1,67 @@
-"""Fetch the bundle's wheels, once per platform and Python version, into a cache outside the clone, and reduce kloppy's.
+"""Fetch the bundle's wheels, once for each platform and Python, into a cache outside the clone.
 
-kloppy is bundled without its 213 MB of test recordings and without the HTTP client that only its downloads need; the
-extension reads local files. The rest is kloppy's code as released, its licence and its metadata. The metadata no longer
-requires `fsspec[http]` (the aiohttp family), the version shows that the wheel is reduced, and RECORD lists its actual
-files.
+pip takes only files whose hash is pinned in requirements/bundle.txt. A file of the cache is hashed again each time.
 """
 
-import base64
-import csv
 import hashlib
-import io
 import os
 import pathlib
 import shutil
 import subprocess
 import sys
 import tempfile
-import zipfile
-from concurrent.futures import ThreadPoolExecutor
 
-from bundle import normalize_name, parse_wheel_name
+from bundle import PINS, normalize_name, parse_wheel_name
 
 CACHE = pathlib.Path(os.environ.get("XDG_CACHE_HOME") or pathlib.Path.home() / ".cache") / "beyond-mocap" / "wheels"
-EXCLUDED = ("kloppy/tests/",)
-STAMP = (2020, 1, 1, 0, 0, 0)  # fixed, so that the wheel is reproducible bit for bit
 
 
-def copy_wheels(packages, platform, folder):
-    """Copy every wheel that a platform needs into a folder.
+def copy_wheels(packages, target, folder):
+    """Copy every wheel that a zip needs into a folder.
 
     Args:
         packages: the bundled packages.
-        platform: the platform.
+        target: what the zip is for.
         folder: a new folder.
     Returns:
         The file names, sorted.
     """
     folder.mkdir(parents=True)
-    with ThreadPoolExecutor(2) as pool:
-        fetched = list(pool.map(lambda python: _fetch_wheels(packages, platform, python), platform.pythons))
-    for source in sorted({path.name: path for paths in fetched for path in paths}.values()):
-        package = next(p for p in packages if normalize_name(p.name) == parse_wheel_name(source.name).name)
-        if package.slimmed:
-            reduce_wheel(source, folder, package)
-        else:
-            shutil.copyfile(source, folder / source.name)
+    for source in _fetch_wheels(packages, target):
+        shutil.copyfile(source, folder / source.name)
     return sorted(path.name for path in folder.iterdir())
 
 
-def _fetch_wheels(packages, platform, python):
-    """Return the cached wheels for one platform and Python version; download them if the cache is incomplete."""
-    pins = [f"{package.name}=={package.version}" for package in packages]
-    folder = CACHE / f"{platform.name}-cp{python}"
-    if not _is_complete(folder, packages):
-        _download_wheels(pins, platform, python, folder)
-    required = {(normalize_name(package.name), package.version) for package in packages}
-    return [path for path in folder.glob("*.whl") if parse_wheel_name(path.name)[:2] in required]
+def _fetch_wheels(packages, target):
+    """Return the cached wheels of one platform and Python; download them if any is missing or is not the pinned one."""
+    folder = CACHE / target.name
+    if len(list_pinned(packages, folder)) < len(packages):
+        _download_wheels(target, folder)
+    return list_pinned(packages, folder)
 
 
-def _is_complete(folder, packages):
-    cached = {parse_wheel_name(path.name)[:2] for path in folder.glob("*.whl")}
-    return all((normalize_name(package.name), package.version) in cached for package in packages)
+def list_pinned(packages, folder):
+    """List the wheels in a folder whose name, version and hash are pinned."""
+    hashes = {(normalize_name(package.name), package.version): package.hashes for package in packages}
+    return [path for path in sorted(folder.glob("*.whl"))
+            if compute_hash(path) in hashes.get(parse_wheel_name(path.name)[:2], ())]
 
 
-def _download_wheels(pins, platform, python, folder):
+def compute_hash(path):
+    """Compute the SHA-256 of a file."""
+    with path.open("rb") as stream:
+        return hashlib.file_digest(stream, "sha256").hexdigest()
+
+
+def _download_wheels(target, folder):
     """Download to a temporary folder and move complete files, so that simultaneous builds do not interfere."""
-    print(f"wheels: fetching {len(pins)} packages for {platform.name}, Python {python[0]}.{python[1:]}", flush=True)
+    print(f"wheels: fetching the bundle for {target.name}", flush=True)
     folder.mkdir(parents=True, exist_ok=True)
     with tempfile.TemporaryDirectory(dir=CACHE) as fresh:
         command = [sys.executable, "-m", "pip", "download", "--quiet", "--disable-pip-version-check", "--no-deps",
-                   "--only-binary=:all:", "--implementation", "cp", "--python-version", python,
-                   "--abi", f"cp{python}", "--abi", "abi3", "--abi", "none", "--dest", fresh]
-        command += [part for tag in platform.tags for part in ("--platform", tag)]
-        subprocess.run([*command, *pins], check=True)
+                   "--only-binary=:all:", "--implementation", "cp", "--python-version", target.python,
+                   "--abi", f"cp{target.python}", "--abi", "abi3", "--abi", "none", "--dest", fresh]
+        command += [part for tag in target.tags for part in ("--platform", tag)]
+        subprocess.run([*command, "--require-hashes", "--requirement", PINS], check=True)
         for path in pathlib.Path(fresh).glob("*.whl"):
             path.replace(folder / path.name)
-
-
-def reduce_wheel(source, folder, package):
-    """Write the reduced wheel of a package.
-
-    Args:
-        source: the released wheel.
-        folder: the folder to write to.
-        package: the package.
-    Returns:
-        The new wheel's path.
-    """
-    old, new = (f"{package.name}-{version}" for version in (package.version, package.bundled_version))
-    target = folder / source.name.replace(old, new)
-    files = {name.replace(f"{old}.dist-info/", f"{new}.dist-info/"): text for name, text in _iter_kept_files(source)}
-    metadata = f"{new}.dist-info/METADATA"
-    files[metadata] = _reduce_metadata(files[metadata].decode("utf-8"), package).encode("utf-8")
-    record = f"{new}.dist-info/RECORD"
-    files[record] = _build_record(files, record)
-    with zipfile.ZipFile(target, "w", zipfile.ZIP_DEFLATED) as archive:
-        for name, data in files.items():
-            archive.writestr(zipfile.ZipInfo(name, STAMP), data, zipfile.ZIP_DEFLATED)
-    return target
-
-
-def _iter_kept_files(source):
-    with zipfile.ZipFile(source) as archive:
-        for name in archive.namelist():
-            if not name.startswith(EXCLUDED):
-                yield name, archive.read(name)
-
-
-def _reduce_metadata(text, package):
-    """Return the metadata with the marked version and with fsspec without its "http" extra."""
-    head, gap, description = text.partition("\n\n")
-    lines = [line.replace("fsspec[http]", "fsspec") for line in head.splitlines()]
-    lines[lines.index(f"Version: {package.version}")] = f"Version: {package.bundled_version}"
-    return "\n".join(lines) + gap + description
-
-
-def _build_record(files, record):
-    out = io.StringIO()
-    rows = csv.writer(out, lineterminator="\n")
-    for name, data in files.items():
-        if name != record:
-            digest = base64.urlsafe_b64encode(hashlib.sha256(data).digest()).rstrip(b"=").decode("ascii")
-            rows.writerow([name, f"sha256={digest}", len(data)])
-    rows.writerow([record, "", ""])
-    return out.getvalue().encode("utf-8")

@@ -10,9 +10,9 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Iterator
 from functools import partial
 from importlib import import_module
+from inspect import get_annotations
 from pkgutil import iter_modules
 from types import ModuleType
-from typing import get_type_hints
 
 import bpy
 
@@ -54,10 +54,11 @@ def sort_classes(classes: Iterable[type]) -> list[type]:
         The classes in the order of registration.
     """
     classes = sorted(classes, key=lambda cls: next(n for n, kind in enumerate(KINDS) if issubclass(cls, kind)))
+    by_name = {cls.__name__: cls for cls in classes}
     ordered: dict[type, None] = {}
 
     def add_class(cls: type) -> None:
-        for needed in _list_requirements(cls, classes):
+        for needed in _list_requirements(cls, by_name):
             add_class(needed)
         ordered.setdefault(cls)
 
@@ -99,12 +100,21 @@ def _list_classes(module: ModuleType) -> list[type]:
     return [cls for cls in defined if cls.__module__ == module.__name__ and issubclass(cls, KINDS)]
 
 
-def _list_requirements(cls: type, classes: list[type]) -> list[type]:
+def _list_requirements(cls: type, by_name: dict[str, type]) -> list[type]:
     """List the classes that must be registered before this one: targets of its properties, or a panel's parent."""
     if issubclass(cls, bpy.types.PropertyGroup):
-        pointed = [getattr(hint, "keywords", {}).get("type") for hint in get_type_hints(cls).values()]
-        return [other for other in classes if other in pointed]
-    return [other for other in classes if other.__name__ == getattr(cls, "bl_parent_id", None)]
+        targets = (getattr(hint, "keywords", {}).get("type") for hint in _evaluate_annotations(cls).values())
+        return [target for target in targets if target in by_name.values()]
+    parent = by_name.get(getattr(cls, "bl_parent_id", None))
+    return [parent] if parent is not None else []
+
+
+def _evaluate_annotations(cls: type) -> dict[str, object]:
+    """Evaluate a class's annotations in place, once: Blender evaluates texts among them again and again."""
+    own = get_annotations(cls)
+    if any(isinstance(value, str) for value in own.values()):
+        cls.__annotations__ = own = get_annotations(cls, eval_str=True)
+    return own
 
 
 def _attach_property(owner: type, name: str, cls: type) -> None:

@@ -17,6 +17,8 @@ import time
 from collections.abc import Callable
 from pathlib import Path
 
+import bpy
+
 from ...beyond_mocap.base.errors import BeyondMocapError, UserCancelledError
 
 POLL_SECONDS = 0.1  # s between two checks for a cancellation
@@ -149,7 +151,9 @@ def _build_environment() -> dict[str, str]:
     """Build the environment in which a plain Python finds the core and its dependencies where Blender found them."""
     core = Path(__file__).resolve().parents[2]
     paths = [str(core), *(path for path in sys.path if path and os.path.isdir(path))]
-    added = {"PYTHONPATH": os.pathsep.join(dict.fromkeys(paths)), "PYTHONSAFEPATH": "1", "PYTHONDONTWRITEBYTECODE": "1"}
+    allowed = bpy.app.online_access  # the user's choice in the preferences; a constant that any thread may read
+    added = {"PYTHONPATH": os.pathsep.join(dict.fromkeys(paths)), "PYTHONSAFEPATH": "1", "PYTHONDONTWRITEBYTECODE": "1",
+             "BEYOND_MOCAP_OFFLINE": "" if allowed else "1"}
     return os.environ | added
 
 

@@ -12,6 +12,7 @@ from __future__ import annotations
 import contextlib
 import logging
 import os
+import re
 import signal
 import sys
 import threading
@@ -33,6 +34,9 @@ POLL_SECONDS = 0.2
 
 MAX_WAIT = 60.0
 """s without any worker after which a cluster is given up."""
+
+OFFLINE = "BEYOND_MOCAP_OFFLINE"
+"""Environment variable by which a host, such as Blender, says that no other machine may be reached."""
 
 _ANSWER_TIMEOUT = "10s"  # the longest a scheduler may take to answer
 _IDLE_SECONDS = 60  # s after which a local worker without work ends
@@ -352,9 +356,19 @@ class _Cluster:
         return 0
 
 
+def _is_loopback(address: str) -> bool:
+    """Return whether a scheduler's address is on this machine."""
+    return bool(re.fullmatch(r"(\w+://)?(localhost|127(\.\d{1,3}){3}|\[::1\])(:\d+)?/?", address))
+
+
 @contextlib.contextmanager
 def _connect_cluster(address: str) -> Iterator[object]:
-    """Connect to the scheduler at `address`; InputError if it does not answer, or Dask is not installed."""
+    """Connect to the scheduler at `address`; InputError if it does not answer, if Dask is not installed, or if it is on
+    another machine and the host does not allow online access.
+    """
+    if os.environ.get(OFFLINE) and not _is_loopback(address):
+        raise InputError("scheduler", f"{address} is on another machine, and Blender is offline", "online access",
+                         "set Allow Online Access in Preferences > System, or start blender with --online-mode")
     distributed = import_optional("distributed", "scheduler")
     for name in [one for one in logging.root.manager.loggerDict if one.split(".")[0] == "distributed"]:
         logging.getLogger(name).setLevel(logging.CRITICAL + 1)  # errors are reported here, in one line

@@ -6,6 +6,7 @@ import subprocess
 import sys
 import time
 
+import bpy
 import pytest
 from conftest import EXTENSION
 
@@ -46,6 +47,19 @@ def test_cancelled_it_ends_soon(child, errors, tmp_path):
     with pytest.raises(errors.UserCancelledError):
         run(child, "library", SAMPLE, "--cache", tmp_path, cancelled=lambda: time.monotonic() - start > 0.5)
     assert time.monotonic() - start < 30.0 and not child._running
+
+
+@pytest.mark.parametrize("online", [False, True])
+def test_blenders_online_access_holds_for_a_scheduler_elsewhere(child, errors, tmp_path, online):
+    """A name of .invalid never exists (RFC 2606): online, it is asked for and does not answer."""
+    system, match = bpy.context.preferences.system, SAMPLE.parent / "match" / "small"
+    system.use_online_access = online
+    assert bpy.app.online_access is online
+    words = ("match", "--tracking", match / "small.dat", "--library", SAMPLE, "--out", tmp_path / "out",
+             "--scheduler", "tcp://cluster.invalid:8786")
+    with pytest.raises(errors.BeyondMocapError, match="does not answer" if online else "Blender is offline"):
+        run(child, *words)
+    system.use_online_access = False
 
 
 def heard(child, script, cancelled=lambda: False):

@@ -134,7 +134,7 @@ def test_the_cache_can_be_put_elsewhere_and_made_anew(run, tmp_path, clip_file):
     clip_file(tmp_path / "clips" / "walk.bvh", 1.4, 1.5)
     for more in ((), ("--rebuild",)):
         assert run("library", tmp_path / "clips", "--cache", tmp_path / "kept", *more)[0] == 0
-    assert (tmp_path / "kept" / "library.npz").is_file() and not (tmp_path / "clips" / ".beyond_mocap").exists()
+    assert (tmp_path / "kept" / "library.json").is_file() and not (tmp_path / "clips" / ".beyond_mocap").exists()
 
 
 @pytest.mark.parametrize("method", ["path", "distance", "blocks"])
@@ -676,7 +676,7 @@ def test_headings_of_a_method_that_plans_none_are_told(synthesize, tmp_path, met
 
 
 def test_a_missing_package_of_the_core_is_told_in_one_line():
-    code = "import sys, runpy; sys.modules['numpy'] = None; runpy.run_module('beyond_mocap', run_name='__main__')"
+    code = "import sys, runpy; sys.modules['numpy'] = None; sys.argv[1:] = ['mirror', 'a.bvh', 'b.bvh']; runpy.run_module('beyond_mocap', run_name='__main__')"
     done = subprocess.run([sys.executable, "-c", code], cwd=TOP, capture_output=True, text=True)
     expected = "beyond-mocap: numpy is missing; install the core: pip install . in the project's folder"
     assert (done.returncode, done.stderr.strip()) == (2, expected)

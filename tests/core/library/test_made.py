@@ -83,7 +83,7 @@ def test_the_recordings_come_first_and_unchanged(library, more):
 
 def test_kept_beside_the_cache_and_read_back_the_same(library, more):
     place = library.cache_location[0]
-    assert (place / "made.npz").is_file() and list((place / "made-gait").glob("*.bvh"))
+    assert (place / "made.json").is_file() and list((place / "made-gait").glob("*.bvh"))
     again = build_library(library.folder, cache_dir=place).with_synthetic_clips
     assert np.array_equal(again.frames.features, more.frames.features)
     assert all(np.array_equal(a.heel_toe_contacts, b.heel_toe_contacts) for a, b in zip(again.clips, more.clips))

@@ -154,7 +154,7 @@ def test_an_option_is_taken_out_however_it_is_written(written):
     ({"scheduler": "tcp://127.0.0.1:9"}, 2, "not allowed with argument --workers"),
     ({"scheduler": "tcp://127.0.0.1:9", "workers": None}, 2, "scheduler: tcp://127.0.0.1:9 does not answer"),
     ({"fps": 0}, 2, "1 to 480 frames per second"),
-    ({"out": ""}, 2, "no folder is named"),
+    ({"out": ""}, 2, "no file or folder is named"),
     ({"from": "nan"}, 2, "start time: not a number"),
     ({"seed": -5}, 2, "'-5' is not 0 to 2147483647"),
     ({"annotations": "nowhere"}, 2, "nowhere: no such folder"),

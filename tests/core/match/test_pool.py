@@ -21,6 +21,20 @@ def test_everything_is_done_once(chores, workers):
     assert sorted(run_tasks(numbers(9), chores.square, WorkerConfig(workers))) == [(n, n * n) for n in range(9)]
 
 
+@pytest.mark.parametrize("address, local", [
+    ("tcp://127.0.0.1:8786", True), ("localhost:8786", True), ("tls://[::1]:1", True), ("tcp://10.0.0.5:8786", False),
+    ("tcp://127.0.0.1.evil.org:8786", False), ("tcp://[bad", False), ("http://localhost@evil.org:1", False),
+])
+def test_offline_only_this_machine_is_asked(monkeypatch, address, local):
+    """Blender says whether it is online; a scheduler elsewhere is not even looked up then."""
+    monkeypatch.setenv(pool.OFFLINE, "1")
+    monkeypatch.setattr("socket.getaddrinfo", lambda *_, **__: pytest.fail("looked up"))
+    assert pool._is_loopback(address) is local
+    if not local:
+        with pytest.raises(InputError, match="another machine, and Blender is offline.*Allow Online Access"):
+            pool.check_workers(WorkerConfig(1, address))
+
+
 @pytest.mark.parametrize("workers", [1, 2])
 def test_what_fails_fails_alone_and_says_why(chores, workers):
     found = dict(run_tasks(numbers(5), chores.odd, WorkerConfig(workers)))

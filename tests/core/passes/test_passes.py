@@ -190,7 +190,7 @@ def test_players_of_another_scene_are_named_and_stay(run, tmp_path):
 def test_a_folder_without_a_name_is_none(capfd, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     assert main(["passes", "scene.json", "--library", ".", "--out", ""]) == 2
-    assert "no folder is named" in capfd.readouterr().err and not list(tmp_path.iterdir())
+    assert "no file or folder is named" in capfd.readouterr().err and not list(tmp_path.iterdir())
 
 
 def test_other_fouls(run, tmp_path, clips_folder, monkeypatch):
