@@ -134,7 +134,9 @@ def change_contact(player, contact: Contact, offset=(0.0, 0.0), start: float = 0
     Raises InputError for a contact that is then farther than MOST_OFFSET from its place, or has no length.
     """
     edit = find_edit(player, contact)
-    if contact.end + end <= contact.start + start:
+    lasts = contact.end + end > contact.start + start
+    is_undone = edit is not None and edit.start + start <= 0.0 <= edit.end + end  # at least as long as it was found
+    if not (lasts or is_undone):
         raise InputError("fix foot", f"a contact of {contact.end - contact.start:.2f} s made shorter by "
                          f"{start - end:.2f} s", "some of it left", "delete the contact instead")
     length = float(np.hypot(*(np.array(offset, dtype=float) + (list(edit.offset) if edit is not None else 0.0))))

@@ -8,6 +8,7 @@ import numpy as np
 
 KINDS = ("objects", "armatures", "actions", "meshes", "curves", "materials", "cameras", "lights", "collections",
          "worlds", "texts")
+SHARED = {"Beyond Mocap Tip"}  # the shape of bones of all characters: in no scene, and not saved without characters
 # every group of properties that the extension hangs on Blender's data has a name that begins so
 PROPERTY_PREFIX = "beyond_mocap"
 
@@ -16,7 +17,7 @@ def collect_state():
     """All names of data, our properties everywhere, animation and what is chosen, as plain values."""
     scene, layer = bpy.context.scene, bpy.context.view_layer
     return {
-        **{kind: sorted(item.name for item in getattr(bpy.data, kind)) for kind in KINDS},
+        **{kind: sorted({item.name for item in getattr(bpy.data, kind)} - SHARED) for kind in KINDS},
         "animated": sorted((o.name, o.animation_data.action.name) for o in bpy.data.objects if o.animation_data
                            and o.animation_data.action),
         "strips": sorted(strip for thing in bpy.data.objects for strip in iter_strips(thing)),

@@ -676,7 +676,8 @@ def test_headings_of_a_method_that_plans_none_are_told(synthesize, tmp_path, met
 
 
 def test_a_missing_package_of_the_core_is_told_in_one_line():
-    code = "import sys, runpy; sys.modules['numpy'] = None; sys.argv[1:] = ['mirror', 'a.bvh', 'b.bvh']; runpy.run_module('beyond_mocap', run_name='__main__')"
+    code = ("import sys, runpy; sys.modules['numpy'] = None; sys.argv[1:] = ['mirror', 'a.bvh', 'b.bvh']; "
+            "runpy.run_module('beyond_mocap', run_name='__main__')")
     done = subprocess.run([sys.executable, "-c", code], cwd=TOP, capture_output=True, text=True)
     expected = "beyond-mocap: numpy is missing; install the core: pip install . in the project's folder"
     assert (done.returncode, done.stderr.strip()) == (2, expected)
