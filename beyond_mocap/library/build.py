@@ -85,7 +85,7 @@ def build_library(
             return _remember(Library(folder=str(folder), cache_location=(place, key), seed=seed, **found))
     text_bytes = sum(read_stamp(file)[0] for file in files)
     check_memory(folder, _BASE_BYTES + _BYTES_PER_BYTE * text_bytes, "use fewer or shorter clips")
-    told = [*waiting, *cache.describe_outdated_cache(place)]
+    messages = [*waiting, *cache.describe_outdated_cache(place)]
     sources_read = _Recordings(
         folder=folder, paths=paths, files=files, annotations=annotations, unit=unit, threads=threads,
         skeleton=skeleton_file, classifier=read_classifier(model) if model else None,
@@ -95,7 +95,7 @@ def build_library(
     library = _build_cached(sources_read, place, key, seed, report=report, cancelled=cancelled)
     digests.save()
     report(1.0, "Library ready")
-    return _remember(replace(library, cache_location=(place, key), notes=(*library.notes, *told)))
+    return _remember(replace(library, cache_location=(place, key), notes=(*library.notes, *messages)))
 
 
 def _remember(library: Library) -> Library:

@@ -44,7 +44,7 @@ def check_character(original: bpy.types.Object | None) -> None:
 
 
 def find_player(original: bpy.types.Object) -> str | None:
-    """Find the player whose body or rig an armature is; None where it is nobody's."""
+    """Find the player whose body or rig an armature is; None where no player has it."""
     players = (player for scene in bpy.data.scenes for player in scene.beyond_mocap.players)
     return next((player.name for player in players if original in (player.body, player.rig)), None)
 

@@ -16,26 +16,26 @@ LIBRARY = TOP / "sample_blend" / "library"
 WATCHED = """
 import json, os, sys
 
-told = {"network": [], "processes": [], "pickles": [], "written": []}
+events = {"network": [], "processes": [], "pickles": [], "written": []}
 CHANGES = {"os.mkdir", "os.remove", "os.rename", "os.rmdir", "os.symlink", "os.link", "os.truncate", "os.chmod"}
 
 def watch(event, arguments):
     if event in ("socket.connect", "socket.bind", "socket.sendto", "socket.getaddrinfo", "socket.gethostbyname"):
-        told["network"].append(f"{event} {arguments[1:]}")
+        events["network"].append(f"{event} {arguments[1:]}")
     elif event in ("subprocess.Popen", "os.system", "os.exec", "os.posix_spawn"):
-        told["processes"].append(str(arguments[1]))
+        events["processes"].append(str(arguments[1]))
     elif event == "pickle.find_class":
-        told["pickles"].append(str(arguments))
+        events["pickles"].append(str(arguments))
     elif event in CHANGES:
-        told["written"] += [os.path.abspath(part) for part in arguments if isinstance(part, (str, bytes, os.PathLike))]
+        events["written"] += [os.path.abspath(part) for part in arguments if isinstance(part, (str, bytes, os.PathLike))]
     elif event == "open" and isinstance(arguments[0], (str, os.PathLike)) and (
             arguments[2] & (os.O_WRONLY | os.O_RDWR | os.O_CREAT)):
-        told["written"].append(os.path.abspath(arguments[0]))
+        events["written"].append(os.path.abspath(arguments[0]))
 
 from beyond_mocap.cli.main import main
 sys.addaudithook(watch)
 status = [main(words) for words in json.loads(sys.argv[1])]
-print("TOLD", json.dumps({"status": status, **told}))
+print("EVENTS", json.dumps({"status": status, **events}))
 """
 
 
@@ -49,9 +49,9 @@ def watched(tmp_path):
         words = json.dumps([list(map(str, command)) for command in commands])
         done = subprocess.run([sys.executable, "-c", WATCHED, words], cwd=tmp_path, env=environment,
                               capture_output=True, text=True, timeout=300)
-        line = next((line for line in done.stdout.splitlines() if line.startswith("TOLD ")), None)
+        line = next((line for line in done.stdout.splitlines() if line.startswith("EVENTS ")), None)
         assert line, done.stdout + done.stderr
-        return json.loads(line.removeprefix("TOLD ")) | {"stderr": done.stderr}
+        return json.loads(line.removeprefix("EVENTS ")) | {"stderr": done.stderr}
 
     return run
 
@@ -64,26 +64,26 @@ def test_commands_reach_no_network_and_write_only_into_folders_that_they_are_giv
         shutil.copy(path, clips)
     (tmp_path / "labels.txt").touch()
     (tmp_path / "track.csv").write_text("time_s,x_m,y_m\n" + "".join(f"{t / 10},{0.13 * t:.2f},0\n" for t in range(60)))
-    told = watched(
+    events = watched(
         ["synthesize", "--library", clips, "--cache", cache, "--track", "track.csv", "--annotations", "labels.txt",
          "--out", out / "take.bvh", "--report", out / "take.json", "--json"],
         ["evaluate", out / "take.bvh", "--track", "track.csv", "--report", out / "again.json"],
         ["mirror", LIBRARY / "walking_1_2.bvh", out / "mirrored.bvh"],
     )  # fmt: skip
-    assert told["status"] == [0, 0, 0], told["stderr"]
-    assert (told["network"], told["pickles"]) == ([], [])
+    assert events["status"] == [0, 0, 0], events["stderr"]
+    assert (events["network"], events["pickles"]) == ([], [])
     counters = ("['lscpu'", "['sysctl'", "['powershell.exe'")  # joblib counts the cores with what the system has
-    assert [command for command in told["processes"] if not command.startswith(counters)] == []
+    assert [command for command in events["processes"] if not command.startswith(counters)] == []
     allowed = (str(out), str(cache), os.devnull)
-    strangers = sorted({path for path in told["written"] if not path.startswith(allowed)})
-    assert told["written"] and strangers == []
+    outsiders = sorted({path for path in events["written"] if not path.startswith(allowed)})
+    assert events["written"] and outsiders == []
 
 
 @pytest.mark.parametrize("address", ["https://example.org/match.dat", "s3://bucket/match.dat", "file:///etc/passwd"])
 def test_an_address_in_place_of_a_file_is_not_fetched(watched, tmp_path, address):
     """kloppy can read addresses; nothing but paths of this machine ever reaches it."""
-    told = watched(["match", "--tracking", address, "--library", LIBRARY, "--out", tmp_path / "out"])
-    assert told["status"] == [2] and told["network"] == [] and "Traceback" not in told["stderr"]
+    events = watched(["match", "--tracking", address, "--library", LIBRARY, "--out", tmp_path / "out"])
+    assert events["status"] == [2] and events["network"] == [] and "Traceback" not in events["stderr"]
 
 
 def test_the_extension_leaves_pythons_modules_and_search_path_alone():

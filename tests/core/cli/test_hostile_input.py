@@ -22,8 +22,8 @@ POSIX = pytest.mark.skipif(os.name == "nt", reason="Windows has no such pipes, d
 
 
 @pytest.fixture
-def told(capfd):
-    """told(*arguments) -> status and the one line on standard error."""
+def run_line(capfd):
+    """run_line(*arguments) -> status and the one line on standard error."""
 
     def call(*arguments):
         capfd.readouterr()
@@ -47,10 +47,10 @@ def swap_names(path: Path, one: str, other: str) -> Path:
 
 
 @pytest.mark.parametrize("verb", ["evaluate", "mirror"])
-def test_a_knee_that_is_not_below_its_thigh_is_told_with_the_file(told, tmp_path, verb):
+def test_a_knee_that_is_not_below_its_thigh_is_reported_with_the_file(run_line, tmp_path, verb):
     bad = swap_names(tmp_path / "bad.bvh", "LeftLeg", "LeftArm")
     more = ["--report", tmp_path / "r.json"] if verb == "evaluate" else [tmp_path / "out.bvh"]
-    status, line = told(verb, bad, *more)
+    status, line = run_line(verb, bad, *more)
     assert status == 2 and "bad.bvh" in line and "LeftLeg (left lower_leg) does not hang below LeftUpLeg" in line
 
 
@@ -67,27 +67,27 @@ def estimate_legs(motion):
 
 
 @POSIX
-def test_a_device_without_an_end_is_refused(told, tmp_path, monkeypatch):
+def test_a_device_without_an_end_is_refused(run_line, tmp_path, monkeypatch):
     monkeypatch.setattr(content, "MAX_STREAM_BYTES", 1 << 16)
-    status, line = told("mirror", "/dev/zero", tmp_path / "out.bvh")
+    status, line = run_line("mirror", "/dev/zero", tmp_path / "out.bvh")
     assert status == 2 and "/dev/zero: has no end within" in line
 
 
-def test_too_little_memory_is_one_line(told, tmp_path, monkeypatch):
+def test_too_little_memory_is_one_line(run_line, tmp_path, monkeypatch):
     def fail(*_):
         raise MemoryError
 
     monkeypatch.setattr(bvh, "read_bvh", fail)
-    status, line = told("mirror", WALK, tmp_path / "out.bvh")
+    status, line = run_line("mirror", WALK, tmp_path / "out.bvh")
     assert status == 2 and "not enough memory" in line
 
 
 @POSIX
-def test_a_program_that_opens_a_pipe_and_stays_silent_can_be_left(told, tmp_path):
+def test_a_program_that_opens_a_pipe_and_stays_silent_can_be_left(run_line, tmp_path):
     os.mkfifo(tmp_path / "pipe.bvh")
     writer = os.open(tmp_path / "pipe.bvh", os.O_RDWR)
     threading.Timer(1.0, os.kill, [os.getpid(), signal.SIGTERM]).start()
-    status, line = told("mirror", tmp_path / "pipe.bvh", tmp_path / "out.bvh")
+    status, line = run_line("mirror", tmp_path / "pipe.bvh", tmp_path / "out.bvh")
     os.close(writer)
     assert status == 130 and "cancelled" in line
 
@@ -131,8 +131,8 @@ def test_names_that_windows_keeps_are_changed(name):
 
 
 @pytest.mark.parametrize("arguments", [("mirror", "", "o.bvh"), ("mirror", WALK, ""), ("library", "x", "--cache", "")])
-def test_an_empty_name_is_told_as_one(told, arguments):
-    status, line = told(*arguments)
+def test_an_empty_name_is_reported_as_one(run_line, arguments):
+    status, line = run_line(*arguments)
     assert status == 2 and "no file or folder is named" in line
 
 
