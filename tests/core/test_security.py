@@ -27,7 +27,8 @@ def watch(event, arguments):
     elif event == "pickle.find_class":
         events["pickles"].append(str(arguments))
     elif event in CHANGES:
-        events["written"] += [os.path.abspath(part) for part in arguments if isinstance(part, (str, bytes, os.PathLike))]
+        paths = [part for part in arguments if isinstance(part, (str, bytes, os.PathLike))]
+        events["written"] += [os.path.abspath(path) for path in paths]
     elif event == "open" and isinstance(arguments[0], (str, os.PathLike)) and (
             arguments[2] & (os.O_WRONLY | os.O_RDWR | os.O_CREAT)):
         events["written"].append(os.path.abspath(arguments[0]))
