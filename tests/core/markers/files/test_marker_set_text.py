@@ -1,7 +1,5 @@
 """Marker sets as text: ours are read, what is written is read again, and what is wrong is told with its line."""
 
-import tomllib
-from pathlib import Path
 
 import pytest
 from hypothesis import given, settings
@@ -51,12 +49,6 @@ def test_ours_come_back_as_they_are(tmp_path):
     for one in sets:
         (tmp_path / "one.txt").write_text(format_marker_set(one), encoding="utf-8")
         assert read_marker_set(tmp_path / "one.txt") == one
-
-
-def test_ours_go_into_the_wheel():
-    top = Path(__file__).resolve().parents[4]
-    data = tomllib.loads((top / "pyproject.toml").read_text("utf-8"))["tool"]["setuptools"]["package-data"]
-    assert any("sets/*.txt" in pattern for patterns in data.values() for pattern in patterns)
 
 
 def test_a_set_is_chosen_by_name_or_file(tmp_path):
