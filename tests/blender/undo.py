@@ -111,9 +111,9 @@ def assert_one_step(operator, **arguments):
     after = collect_state()
     assert after != before
     bpy.ops.ed.undo()
-    assert list_differences(collect_state(), before) == {}
+    assert not (found := list_differences(collect_state(), before)), found
     bpy.ops.ed.redo()
-    assert list_differences(collect_state(), after) == {}
+    assert not (found := list_differences(collect_state(), after)), found
 
 
 def list_differences(found, expected):
