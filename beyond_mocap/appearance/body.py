@@ -60,7 +60,7 @@ def build_body(skeleton: Skeleton, height: float | None = None, example: Motion 
     rest = _move_to_rest(stance, vertices, joints, weights)
     corners = tuple(tuple(row[:3] if row[3] < 0 else row) for row in faces.tolist())
     return BodyMesh(freeze_array(rest), corners, freeze_array(joints, int), freeze_array(weights),
-                    freeze_array(materials, int), freeze_array(template.vertices[used]))
+                    material=freeze_array(materials, int), sculpted=freeze_array(template.vertices[used]))
 
 
 def _put_gloves_on(vertices: np.ndarray, faces: np.ndarray, thickness: np.ndarray) -> np.ndarray:

@@ -31,6 +31,7 @@ LACES = ((0.088, 0.090, 0.075), (0.040, 0.013, 0.060), 0.2), 0.013  # as in FACE
 STRANDS = 34.0, 26.0  # of hair: waves per radian around the head, and per metre down
 CLOTHS = ("shirt", "shorts", "socks", "trim", "gloves")
 FOLDS, WEAVE = (11.0, 11.0, 6.0), 800.0  # waves per metre of cloth
+FOLD_NOISE = (1.0, 2.5, 0.5, None, 1.1)  # scale, detail, roughness, lacunarity (as it is), distortion
 
 
 def paint_part(material: bpy.types.Material, part: str) -> bpy.types.Material:
@@ -85,7 +86,7 @@ def _paint_boots(tree: ShaderTree, place, _units: float) -> None:
 
 def _paint_cloth(tree: ShaderTree, place, units: float) -> None:
     """Raise folds that fall downwards, and the weave."""
-    folds = tree.add("TexNoise", tree.map_vector("MULTIPLY", place, FOLDS), 1.0, 2.5, 0.5, None, 1.1).outputs[0]
+    folds = tree.add("TexNoise", tree.map_vector("MULTIPLY", place, FOLDS), *FOLD_NOISE).outputs[0]
     weave = tree.add("TexNoise", place, WEAVE, 1.0).outputs[0]
     tree.bump(tree.compute("MULTIPLY_ADD", weave, 0.03, folds), 0.7, 0.028 * units)
     tree.shade(Sheen_Weight=0.12)

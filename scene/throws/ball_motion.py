@@ -99,7 +99,7 @@ def restore_ball(scene: bpy.types.Scene, body: bpy.types.Object) -> None:
     settings = body.beyond_mocap_throw
     ball, path = settings.flown, settings.curve
     if ball is None or not find_other_thrower(ball, body):
-        if path is not None:
+        if path is not None and path.type == "CURVE":  # after an undo, Blender 4.5 may have another object here
             remove_curve(path)
         if ball is not None:
             _restore_or_remove(scene, ball, settings)

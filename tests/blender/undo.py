@@ -92,10 +92,17 @@ def choose_converter(known):
     if known.type == "COLLECTION":
         return lambda value: [to_plain(item) for item in value]
     if known.type == "POINTER":
-        return lambda value: value and (to_plain(value) if isinstance(value, bpy.types.PropertyGroup) else value.name)
+        return lambda value: value and (to_plain if isinstance(value, bpy.types.PropertyGroup) else name_data)(value)
     if getattr(known, "is_array", False):
         return tuple
     return sorted if known.type == "ENUM" and known.is_enum_flag else lambda value: value
+
+
+def name_data(data):
+    """The name of data that a property points to; in Blender 4.5 only that it points to some, since an undo there can
+    let it point to other data that has come to lie at the same place in memory.
+    """
+    return data.name if bpy.app.version >= (5, 0) else True
 
 
 def press_operator(operator, **arguments):

@@ -198,8 +198,9 @@ def finish_players(
         edit = replace(motion.edits[player], correction=crowd[player].correction)
         write_player(job.folder.player_path(part.file, "take.npz"), edit)
         found, order = crowd[player], job.request
-        names[player] = job.build_name(remove_library_paths([edit])[0], part.role.measured, ball, found.frames,
-                                       found.depth, order.figures, order.bvh, part.role.player, part.role.notes)
+        depends_on = (remove_library_paths([edit])[0], part.role.measured, ball, found.frames, found.depth,
+                      order.figures, order.bvh, part.role.player, part.role.notes)
+        names[player] = job.build_name(*depends_on)
     missing = [player for player, part in parts_by_id.items() if not _is_finished(job, part, names[player])]
     if job.request.figures or job.request.bvh:
         motion.construct([_ALWAYS], missing)
