@@ -41,12 +41,12 @@ def test_a_library_is_kept_where_the_preferences_say(rooms, clips, tmp_path):
     assert bpy.ops.beyond_mocap.build_library() == {"FINISHED"}
     assert not (clips / ".beyond_mocap").exists()
     own, = place.iterdir()
-    assert (own / "library.npz").is_file() and preferences.find_cache_folder(str(clips)) == str(own)
+    assert (own / "library.json").is_file() and preferences.find_cache_folder(str(clips)) == str(own)
     assert preferences.find_cache_folder(str(tmp_path)) != str(own)
     session.clear_session()
     chosen.cache_folder = ""
     assert bpy.ops.beyond_mocap.build_library() == {"FINISHED"}
-    assert (clips / ".beyond_mocap" / "library.npz").is_file()
+    assert (clips / ".beyond_mocap" / "library.json").is_file()
 
 
 def test_threads_change_no_bit(rooms, clips):
