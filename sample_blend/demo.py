@@ -36,7 +36,7 @@ def load_extension():
     import batch
 
     name = batch.find_extension()
-    extension = importlib.import_module(name)
+    extension = importlib.import_module(f"{name}.__init__")  # Blender makes a folder a package without running this
     extension.register()
     return lambda module: importlib.import_module(f"{name}.{module}"), extension.unregister
 
