@@ -207,8 +207,8 @@ def describe_strikes(scene: bpy.types.Scene, played_scene: "PlayedScene", start:
         gap, speed = played_scene.find_gap(number), np.linalg.norm(one.velocity_out)
         near = "" if np.isnan(gap) else f", {1000 * gap:.0f} mm"
         side = f"{one.order.side} " if one.order.side else ""
-        outcome = "" if one.outcome == "struck" else f", {one.outcome}"
-        found.append(f"{frame}\t{one.player}: {side}{one.order.part}{outcome}, {speed:.1f} m/s{near}")
+        result = f"{speed:.1f} m/s" if one.outcome == "struck" else one.outcome
+        found.append(f"{frame}\t{one.player}: {side}{one.order.part}, {result}{near}")
     return found
 
 
