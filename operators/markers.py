@@ -97,7 +97,7 @@ class BEYOND_MOCAP_FH_markers(ViewDropHandler, bpy.types.FileHandler):
     """Recordings of optical markers dropped into the 3D view"""
 
     bl_idname = "BEYOND_MOCAP_FH_markers"
-    bl_label = "Optical markers"
+    bl_label = "Optical Markers"
     bl_import_operator = "beyond_mocap.import_markers"
     bl_file_extensions = ".c3d;.trc"
 

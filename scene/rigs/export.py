@@ -157,14 +157,16 @@ def _sample_poses(
     names = {rig.name: [bone.name for bone in rig.data.bones] for rig in rigs}
     poses = {rig.name: np.empty((len(times), len(names[rig.name]), 4, 4), np.float32) for rig in rigs}
     lies = {one.name: np.empty((len(times), 4, 4)) for one in (*rigs, *things)}
-    for number, time in enumerate(times):
-        whole = int(np.floor(time + 1e-6))
-        scene.frame_set(whole, subframe=float(np.clip(time - whole, 0.0, 0.999999)))
-        for rig in rigs:
-            poses[rig.name][number] = [bone.matrix for bone in rig.pose.bones]
-        for one in (*rigs, *things):
-            lies[one.name][number] = one.matrix_world
-    scene.frame_set(now, subframe=subframe)
+    try:
+        for number, time in enumerate(times):
+            whole = int(np.floor(time + 1e-6))
+            scene.frame_set(whole, subframe=float(np.clip(time - whole, 0.0, 0.999999)))
+            for rig in rigs:
+                poses[rig.name][number] = [bone.matrix for bone in rig.pose.bones]
+            for one in (*rigs, *things):
+                lies[one.name][number] = one.matrix_world
+    finally:
+        scene.frame_set(now, subframe=subframe)
     ordered = {rig.name: [bone.name for bone in rig.pose.bones] for rig in rigs}
     none = np.empty((len(times), 0, 4, 4), np.float32)
     return {name: _SampledPoses(ordered.get(name, []), poses.get(name, none).astype(float), lies[name])

@@ -1,6 +1,6 @@
 """Daylight or floodlight for the stage, each with a sky of its own; exposure stays 0, since the lights are measured.
 
-A world that the user has made is left alone. Blender's plain grey one is replaced, and comes back with `restore_world`.
+A world that the user has made is left alone. Blender's plain grey one is replaced.
 """
 
 from __future__ import annotations
@@ -14,7 +14,6 @@ from . import surfaces
 from .meshes import create_mesh, create_object, create_tubes
 
 MARK = "beyond_mocap_sky"  # of a world: the kind of sky that it was painted as
-PREVIOUS = "beyond_mocap_world_before"
 WORLD = "Stage sky"
 DAYLIGHT, FLOODLIGHT = "DAYLIGHT", "FLOODLIGHT"
 
@@ -65,8 +64,6 @@ def set_sky(scene: bpy.types.Scene, kind: str) -> bool:
         return False
     if world is None or not world.get(MARK) or world.library is not None:
         scene.world = bpy.data.worlds.new(WORLD)
-        if world is not None:
-            scene.world[PREVIOUS] = world
     if scene.world.get(MARK) != kind:
         _paint_sky(scene.world, *SKIES[kind])
         scene.world[MARK] = kind
@@ -76,15 +73,6 @@ def set_sky(scene: bpy.types.Scene, kind: str) -> bool:
 def has_own_sky(scene: bpy.types.Scene) -> bool:
     """Return whether the scene's world is the stage's."""
     return scene.world is not None and bool(scene.world.get(MARK))
-
-
-def restore_world(scene: bpy.types.Scene) -> None:
-    """Give the scene back the world that `set_sky` replaced."""
-    sky = scene.world
-    if sky is not None and sky.get(MARK):
-        scene.world = sky.get(PREVIOUS)
-        if not sky.users:
-            bpy.data.worlds.remove(sky)
 
 
 def is_plain_world(world: bpy.types.World) -> bool:

@@ -48,20 +48,6 @@ def create_stage(scene: bpy.types.Scene, size: tuple[float, float] | None = None
     return stage
 
 
-def remove_stage(scene: bpy.types.Scene) -> None:
-    """Remove the stage with the data that only it used, and give the scene back its plain world.
-
-    Objects that the user added to its collection stay, and so does another collection of that name.
-    """
-    stage = find_stage(scene)
-    if stage is None:
-        return
-    _remove_objects(list_own_objects(stage))
-    if not stage.objects and not stage.children:
-        bpy.data.collections.remove(stage)
-    lighting.restore_world(scene)
-
-
 def find_pitch(scene: bpy.types.Scene) -> list[bpy.types.Object]:
     """Find grass, lines and goals of the scene's stage."""
     stage = find_stage(scene)

@@ -88,21 +88,18 @@ def list_fields(kind):
 
 
 def choose_converter(known):
-    """What makes a plain value of a property's value."""
+    """What makes a plain value of a property's value; of the throw's trajectory in Blender 4.5 only whether it is set,
+    since an undo there can let it point to other data that has come to lie at the same place in memory.
+    """
+    if known.identifier == "curve" and bpy.app.version < (5, 0):
+        return bool
     if known.type == "COLLECTION":
         return lambda value: [to_plain(item) for item in value]
     if known.type == "POINTER":
-        return lambda value: value and (to_plain if isinstance(value, bpy.types.PropertyGroup) else name_data)(value)
+        return lambda value: value and (to_plain(value) if isinstance(value, bpy.types.PropertyGroup) else value.name)
     if getattr(known, "is_array", False):
         return tuple
     return sorted if known.type == "ENUM" and known.is_enum_flag else lambda value: value
-
-
-def name_data(data):
-    """The name of data that a property points to; in Blender 4.5 only that it points to some, since an undo there can
-    let it point to other data that has come to lie at the same place in memory.
-    """
-    return data.name if bpy.app.version >= (5, 0) else True
 
 
 def press_operator(operator, **arguments):

@@ -310,10 +310,6 @@ def test_a_match_and_single_players_share_one_stage(room, scenery):
     grass = [thing for thing in scene.objects if thing.name.startswith("Grass")]
     assert [round(side) for side in grass[0].dimensions[:2]] == [112, 76] and len(grass) == 1
     assert scene.camera.name == "Broadcast" and own.name in scene.collection.children["Stage"].objects
-    stage.remove_stage(scene)
-    assert scene.collection.children["Stage"].objects[:] == [own]
-    bpy.data.objects.remove(own)
-    stage.remove_stage(scene)
 
 
 def test_a_stage_of_the_users_own_stays(room, scenery):

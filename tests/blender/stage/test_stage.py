@@ -152,12 +152,11 @@ def grey_world():
     return world
 
 
-def test_the_plain_world_gives_way_to_a_sky_and_comes_back():
-    scene, plain = bpy.context.scene, grey_world()
+def test_the_plain_world_gives_way_to_a_sky():
+    scene = bpy.context.scene
+    grey_world()
     bpy.ops.beyond_mocap.add_stage()
     assert scene.world.name.startswith("Stage sky") and scene.view_settings.view_transform == "AgX"
-    room("stage.stage").remove_stage(scene)
-    assert scene.world == plain
 
 
 def test_a_world_of_the_users_stays():
