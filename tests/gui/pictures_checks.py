@@ -38,19 +38,19 @@ def get_work():
     return bpy.context.window_manager.beyond_mocap_work
 
 
-def press_contact_sheet(samples):
-    """Press the button, set the samples in the browser, and choose the file."""
+def press_contact_sheet(samples, count):
+    """Press the button, set samples and number of pictures in the browser, and choose the file."""
     yield from click_operator("contact_sheet")
     yield 1.0
     operator = next(shown.screen.areas[0].spaces.active.active_operator for shown in bpy.context.window_manager.windows
                     if shown.screen.areas[0].type == "FILE_BROWSER")
-    operator.engine, operator.samples, operator.height, operator.count = "CYCLES", samples, 90, 4
+    operator.engine, operator.samples, operator.height, operator.count = "CYCLES", samples, 90, count
     yield from choose_file(SHEET)
 
 
 def check_it_is_written_while_the_window_is_alive():
     yield from open_clip()
-    yield from press_contact_sheet(1)
+    yield from press_contact_sheet(1, 4)
     yield from wait_until(lambda: get_work().kind == "pictures", 30.0, "it is at work")
     longest, before = 0.0, time.monotonic()
     while get_work().kind == "pictures":
@@ -64,7 +64,7 @@ def check_it_is_written_while_the_window_is_alive():
 def check_escape_cancels():
     yield from open_clip()
     SHEET.unlink(missing_ok=True)
-    yield from press_contact_sheet(4000)
+    yield from press_contact_sheet(4000, 100)  # minutes, on the quickest machine too
     yield from wait_until(lambda: get_work().kind == "pictures", 30.0, "it is at work")
     yield 3.0
     window.save_picture(PICTURES / "pictures-progress.png")
