@@ -2,6 +2,7 @@
 
 import json
 import shutil
+from importlib.util import find_spec
 from pathlib import Path
 
 import numpy as np
@@ -40,7 +41,22 @@ SHARED_GROUPS = {
     ),
 }
 """Provider -> its files in ../shared/data/tracking/other, the tracking file first, then the metadata."""
+EVENT_GROUPS = {
+    "opta": ("opta_f24.xml", "opta_f7.xml"),
+    "sportec": ("sportec_events.xml", "sportec_meta.xml"),
+    "statsbomb": ("statsbomb_event.json", "statsbomb_lineup.json"),
+    "metrica": ("metrica_events.json", "epts_metrica_metadata.xml"),
+    "wyscout2": ("wyscout_events_v2.json",),
+    "wyscout3": ("wyscout_events_v3.json",),
+    "datafactory": ("datafactory_events.json",),
+    "statsperform": ("statsperform_event_ma3.json", "statsperform_event_ma1.json"),
+    "impect": ("impect_events.json", "impect_lineups.json"),
+}
+"""Provider -> its files of events among kloppy's own test files, the events first, then the second file."""
+HAWKEYE = ("hawkeye_2_46.football.samples.centroids", "hawkeye_2_46.football.samples.ball")
 _LINES = 120  # of large line-based files that are kept
+_LARGE = 200_000  # bytes from which on JSON is shortened
+_ENTRIES = 60  # of long lists in JSON that are kept
 
 
 def build_seeds(folder: Path) -> dict[str, Path]:
@@ -65,7 +81,7 @@ def build_seeds(folder: Path) -> dict[str, Path]:
     seeds["walk.bvh"] = shorten_bvh(SAMPLE / "library" / "walking_1_2.bvh", folder / "walk.bvh", 24)
     small = SAMPLE / "match" / "small"
     seeds["match_small"] = _copy_group(folder / "match_small", [small / "small.dat", small / "small_meta.xml"])
-    return {**seeds, **_build_shared_seeds(folder)}
+    return {**seeds, **_build_shared_seeds(folder), **_build_kloppy_seeds(folder)}
 
 
 def _build_shared_seeds(folder: Path) -> dict[str, Path]:
@@ -86,6 +102,19 @@ def _build_shared_seeds(folder: Path) -> dict[str, Path]:
     return seeds
 
 
+def _build_kloppy_seeds(folder: Path) -> dict[str, Path]:
+    """Write the seeds from kloppy's own test files; a line says where it comes without them."""
+    source = Path(find_spec("kloppy").submodule_search_locations[0]) / "tests" / "files"
+    if not (source / HAWKEYE[0]).is_file():
+        print("fuzz: this kloppy comes without its own test files; events of providers and Hawk-Eye are skipped")
+        return {}
+    groups = {f"events_{name}": files for name, files in EVENT_GROUPS.items()}
+    return {
+        name: _copy_group(folder / name, [source / file for file in files])
+        for name, files in {**groups, "hawkeye": HAWKEYE}.items()
+    }
+
+
 def _copy_group(folder: Path, files: list[Path]) -> Path:
     """Copy the files of one match; long line-based ones are cut."""
     folder.mkdir()
@@ -93,9 +122,18 @@ def _copy_group(folder: Path, files: list[Path]) -> Path:
         target = folder / f"{number}_{path.name}"
         if path.suffix in (".dat", ".txt", ".jsonl") and number == 0:
             _cut(path, target, _LINES)
+        elif path.suffix in (".json", ".centroids", ".ball") and path.stat().st_size > _LARGE:
+            target.write_text(json.dumps(_shorten(json.loads(path.read_text())), indent=1))
         else:
             shutil.copy(path, target)
     return folder
+
+
+def _shorten(value):
+    """Shorten the lists in a JSON value."""
+    if isinstance(value, dict):
+        return {name: _shorten(one) for name, one in value.items()}
+    return [_shorten(one) for one in value[:_ENTRIES]] if isinstance(value, list) else value
 
 
 def _cut(path: Path, target: Path, lines: int) -> Path:
