@@ -34,7 +34,7 @@ from .library import RECORDED_INDEX, Library, Progress
 from .proposals import propose_labels
 from .scan import Annotations, find_readable_clips, read_stamp
 
-_BASE_BYTES, _BYTES_PER_BYTE = 3e8, 2.0  # of memory that a build needs, and what it needs for a byte of its BVH files
+_BASE_BYTES, _BYTES_PER_BYTE = 1e8, 4.0  # of memory that a build needs, and what it needs for a byte of its BVH files
 
 
 def build_library(

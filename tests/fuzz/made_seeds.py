@@ -27,7 +27,7 @@ def build_made_seeds(folder: Path) -> dict[str, Path]:
     state = {"version": 1, "digest": "0" * 16, "players": [{"id": "home_7", "status": "done"}], "notes": []}
     seeds["match.json"].write_text(json.dumps(state, indent=1))
     seeds["mesh.obj"].write_text("v 0 0 0\nv 1 0 0\nv 0 1 0\nvn 0 0 1\nf 1//1 2//1 3//1\n")
-    seeds["clips.csv"].write_text("clip,system,scenario\na.mp4,ours,1\nb.mp4,theirs,1\n")
+    seeds["clips.csv"].write_text("file,system,scenario\na.mp4,ours,1\nb.mp4,theirs,1\n")
     write_model(small_model(), seeds["model.json"])
     write_player(seeds["player.npz"], made_player())
     seeds["set.txt"] = sorted(SHIPPED.glob("*.txt"))[0]

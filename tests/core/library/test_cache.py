@@ -15,6 +15,7 @@ import pytest
 from beyond_mocap.base.errors import InputError
 from beyond_mocap.files import motion_file
 from beyond_mocap.library import cache
+from beyond_mocap.library import library as library_module
 from beyond_mocap.library.build import build_library
 from beyond_mocap.library.library import Library
 from beyond_mocap.library.scan import CACHE_FOLDER
@@ -75,6 +76,13 @@ def test_from_the_cache_come_the_same_bits(clips_folder, library):
     again, worked = built(clips_folder)
     assert not worked
     assert_same(library, again)
+
+
+def test_the_stance_of_all_recordings_is_measured_once(folder, monkeypatch):
+    first = build_library(folder).neutral_stance
+    monkeypatch.setattr(library_module, "sample_upright_example", None)
+    again = build_library(folder).neutral_stance
+    assert all(np.array_equal(getattr(first, name), getattr(again, name)) for name in library_module._STANCE_NUMBERS)
 
 
 def test_built_twice_gives_the_same_bits(clips_folder, library, tmp_path):
