@@ -40,16 +40,21 @@ def build_comparison_page(comparison: MethodComparison) -> str:
         "Methods compared", build_element("h1", "Methods compared"),
         build_element("p", f"{comparison.library}: {comparison.clips} clips, {comparison.minutes:.1f} minutes"),
         *map(_build_section, build_tables(comparison)),
-        build_section("How they differ", build_list(describe_differences(comparison))),
-        build_section("What handicaps whom", build_list(describe_handicaps(comparison))),
+        build_section("How they differ", build_list(map(_remove_ticks, describe_differences(comparison)))),
+        build_section("What handicaps whom", build_list(map(_remove_ticks, describe_handicaps(comparison)))),
         build_section("Curves of Appendix D", build_element("p", "Distance of the features of consecutive frames, cm; "
                       "all curves of a scenario have one scale. Dotted: key moments. Only the peaks count."), *curves),
     )  # fmt: skip
 
 
+def _remove_ticks(line: str) -> str:
+    """Remove the marks of Markdown around names."""
+    return line.replace("`", "")
+
+
 def _build_section(table: ComparisonTable) -> Html:
     """Build a table with its title and note."""
-    return build_section(table.title, build_element("p", table.note),
+    return build_section(table.title, build_element("p", _remove_ticks(table.note)),
                          build_table(table.head, [build_row(*row) for row in table.rows]))
 
 
@@ -65,13 +70,14 @@ def draw_smoothness(comparison: MethodComparison, scenario: Scenario) -> bytes:
     """
     methods = comparison.methods
     canvas, axes = create_canvas(_ROW * len(methods) + 0.4, len(methods), sharex=True, sharey=True)
-    for ax, method in zip(axes, methods):
-        result = comparison.results[scenario.name, method]
+    results = [comparison.results[scenario.name, method] for method in methods]
+    top = max(float(result.smoothness.max(initial=0.01)) for result in results)
+    for ax, method, result in zip(axes, methods, results):
         ax.plot(result.times, 100.0 * result.smoothness, color=MIDDLE, lw=0.9)
         for key in result.take.keys:
             ax.axvline(key.requested.resolved_time, color=RIGHT, lw=0.9, ls=":", zorder=0)
         ax.set_title(method, loc="left", fontsize=9)
-        ax.set_ylim(bottom=0.0)
+        ax.set_ylim(0.0, 105.0 * top)
     axes[-1].set_xlabel("seconds on the track's clock", fontsize=8)
     return render_png(canvas)
 
