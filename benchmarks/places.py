@@ -13,6 +13,8 @@ ROOT = Path(__file__).resolve().parent.parent
 DATA = ROOT.parent / "shared" / "data"
 CMU_UNIT = 0.05644  # m per unit of the CMU recordings
 MIXED = ("cmu10", "lmd/Player1", "lafan1", "runs15", "sprinter")
+SAMPLE = ROOT / "sample_blend"
+"""The shipped sample: `library` has its clips, `match` two players with labels."""
 LIBRARIES = {"cmu10": CMU_UNIT, "mixed": None}
 """Name -> metres per unit of its clips, None where each is estimated."""
 

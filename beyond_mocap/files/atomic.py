@@ -7,11 +7,14 @@ import errno
 import os
 import shutil
 import threading
+import time
 from collections.abc import Iterator
 from pathlib import Path
 
 from ..base.errors import InputError
 
+ABANDONED_SECONDS = 3600.0
+"""Age, in seconds, from which on no running process writes what is temporary."""
 _LEAST_FREE = 65536  # bytes on a disk below which a file written by another program may be cut off
 
 
@@ -40,6 +43,20 @@ def atomic_path(path: str | os.PathLike, ending: str = ".part") -> Iterator[Path
     finally:
         with contextlib.suppress(OSError):
             temporary.unlink()
+
+
+def remove_abandoned(folder: Path) -> None:
+    """Remove temporary files that killed processes left in a folder, or in one below it, an hour ago or more.
+
+    Args:
+        folder: where `atomic_path` wrote.
+    """
+    outdated = time.time() - ABANDONED_SECONDS
+    for pattern in (".*.[0-9]*.[0-9]*.part", "*/.*.[0-9]*.[0-9]*.part"):
+        for path in folder.glob(pattern):
+            with contextlib.suppress(OSError):
+                if path.is_file() and path.stat().st_mtime < outdated:
+                    path.unlink()
 
 
 def check_disk(path: Path) -> None:

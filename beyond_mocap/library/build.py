@@ -9,6 +9,7 @@ import re
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
+from contextlib import ExitStack
 from dataclasses import dataclass, replace
 from itertools import islice
 from pathlib import Path
@@ -33,7 +34,7 @@ from .library import RECORDED_INDEX, Library, Progress
 from .proposals import propose_labels
 from .scan import Annotations, find_readable_clips, read_stamp
 
-_BASE_BYTES, _BYTES_PER_BYTE = 3e8, 2.0  # of memory that a build needs, and what it needs for a byte of its BVH files
+_BASE_BYTES, _BYTES_PER_BYTE = 1e8, 4.0  # of memory that a build needs, and what it needs for a byte of its BVH files
 
 
 def build_library(
@@ -128,18 +129,28 @@ class _Recordings:
 
 
 def _build_cached(recordings: _Recordings, place: Path, key: str, seed: int, report: Progress, cancelled) -> Library:
-    """Build the library in files of its cache; in memory, with a note, where that cannot be written."""
-    try:
-        with cache.create_arrays_folder(place) as arrays:
+    """Build the library in files of its cache; in memory, with a note, where the cache's folder cannot be made.
+
+    Raises:
+        InputError: if the disk gets full, where memory would too.
+    """
+    with ExitStack() as stack:
+        try:
+            arrays = stack.enter_context(cache.create_arrays_folder(place))
+        except OSError:
+            library = _index_clips(recordings, None, seed, report, cancelled)
+            note = (f"{place} cannot be written: the library is rebuilt each time; choose a cache folder that you can "
+                    "write to")
+            return replace(library, notes=(*library.notes, note))
+        try:
             library = _index_clips(recordings, arrays, seed, report, cancelled)
             write_synthetic_clips(place, _list_completed(library.clips))
             cache.save_library(place, key, library, arrays=arrays)
-            cache.save_coverage(place, key, library.coverage)
-            return library
-    except OSError:
-        library = _index_clips(recordings, None, seed, report, cancelled)
-    note = f"{place} cannot be written: the library is rebuilt each time; choose a cache folder that you can write to"
-    return replace(library, notes=(*library.notes, note))
+        except OSError as error:
+            raise InputError(place, f"the library's cache cannot be written ({error.strerror or error})", "",
+                             "free space on its disk, or choose another cache folder") from None
+        cache.save_coverage(place, key, library.coverage)
+        return library
 
 
 def _list_completed(clips: Iterable[Clip]) -> list[Clip]:

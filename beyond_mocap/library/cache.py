@@ -29,7 +29,7 @@ from ..base.content import read_bytes
 from ..base.digest import byte_digest
 from ..base.errors import InputError
 from ..base.user_folders import find_user_cache
-from ..files.atomic import atomic_write
+from ..files.atomic import ABANDONED_SECONDS, atomic_write, remove_abandoned
 from ..files.bvh import bvh
 from ..files.motion_file import MotionWriter, divide_into_motions, map_array
 from ..motion.skeleton import Skeleton
@@ -46,7 +46,6 @@ MOTIONS = "motions.npy"
 _DIGESTS, _COVERAGE = "digests.json", "coverage"
 _SETTLED = 2_000_000_000  # ns since a file's last change from which on its time tells the next one
 _TOKEN_BYTES = 6  # of the part of a folder's name that makes it unique
-_ABANDONED = 3600.0  # s after which an array folder that no header names is used by no process
 _FRAME_ARRAYS = tuple(field.name for field in fields(Frames) if field.name != "vocabulary")
 
 
@@ -144,9 +143,11 @@ def create_arrays_folder(place: Path, name: str = "library") -> Iterator[Path]:
     """Context manager: a new folder in `place` for the arrays of a library; removed if the block fails.
 
     Raises:
-        OSError: if it cannot be created.
+        OSError: if it cannot be created, or something else has the place of the header.
     """
     is_new = not place.exists()
+    if (place / f"{name}.json").is_dir():
+        raise IsADirectoryError(f"{name}.json is a folder")
     folder = place / f"{name}-{secrets.token_hex(_TOKEN_BYTES)}"
     folder.mkdir(parents=True)
     try:
@@ -269,11 +270,12 @@ def _read_header(place: Path, name: str) -> dict:
 
 
 def _remove_old_folders(place: Path, name: str, current: str) -> None:
-    """Remove array folders that were replaced, or left by killed builds, an hour ago or more, and files of version 0.1.
+    """Remove what was replaced, or left by killed builds, an hour ago or more, and files of version 0.1.
 
     Until then other processes, on other machines too, may have them mapped.
     """
-    outdated = time.time() - _ABANDONED
+    remove_abandoned(place)
+    outdated = time.time() - ABANDONED_SECONDS
     for folder in place.glob(f"{name}-{'[0-9a-f]' * 2 * _TOKEN_BYTES}"):
         with suppress(OSError):  # on Windows, one that is still mapped stays until the next build
             if folder.name != current and folder.stat().st_mtime < outdated:

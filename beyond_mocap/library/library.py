@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Sequence
 from contextlib import suppress
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 from functools import cached_property
 from pathlib import Path
 from typing import Any, Callable
@@ -38,6 +38,7 @@ from .synthetic_clips import KICK_STEP, iter_synthetic_clips, measure_kick_speed
 MIN_RUN_SECONDS = 2.0  # of a track's runs from which on long runs are needed
 RESTING_SPEED = 0.1  # m/s of a track below which a player stands
 RECORDED_INDEX = "index"
+_STANCE_NUMBERS = tuple(field.name for field in fields(NeutralStance) if field.name != "skeleton")
 """Name under which what is computed from the recordings alone is cached."""
 Progress = Callable[[float, str], None]
 
@@ -141,9 +142,17 @@ class Library:
 
     @cached_property
     def neutral_stance(self) -> NeutralStance:
-        """How people of this library stand."""
+        """How people of this library stand; cached, because it is measured on all recordings."""
+        place = self.index_place and (*self.index_place[:2], "stance")
+        stored = cache.load_arrays(*place) if place else None
+        if stored is not None and set(stored) == set(_STANCE_NUMBERS):
+            known = {name: values if values.ndim else float(values) for name, values in stored.items()}
+            return NeutralStance(skeleton=self.skeleton, **known)
         recordings = [clip for clip in self.clips if not clip.is_synthetic] or self.clips
-        return build_neutral_stance(self.skeleton, sample_upright_example(recordings))
+        stance = build_neutral_stance(self.skeleton, sample_upright_example(recordings))
+        if place:
+            cache.save_arrays(*place, {name: np.asarray(getattr(stance, name)) for name in _STANCE_NUMBERS})
+        return stance
 
     @cached_property
     def coverage(self) -> Coverage:

@@ -59,10 +59,11 @@ def find_recordings(folder: str | Path, endings: tuple[str, ...] = (".bvh", *FOR
         seen.add((status.st_dev, status.st_ino))
         folders[:] = sorted(name for name in folders if name != CACHE_FOLDER)
         found += [Path(parent) / name for name in files if name.lower().endswith(endings)]
-    for path in found:
-        if str(path.relative_to(folder)).encode("utf-8", "replace").decode() != str(path.relative_to(folder)):
+    names = {path: path.relative_to(folder).as_posix() for path in found}
+    for path, name in names.items():
+        if name.encode("utf-8", "replace").decode() != name:
             raise InputError(ascii(str(path)), "a name that is not UTF-8", "a name in UTF-8", "rename the file")
-    return sorted(found, key=lambda path: path.relative_to(folder).as_posix())
+    return sorted(found, key=names.__getitem__)
 
 
 def list_own_recordings(folder: str | Path) -> list[Path]:
@@ -70,6 +71,8 @@ def list_own_recordings(folder: str | Path) -> list[Path]:
     former.
     """
     found = find_recordings(folder)
+    if not any(map(is_foreign, found)):
+        return found
     plain = {path.with_suffix("") for path in found if not is_foreign(path)}
     return [path for path in found if not is_foreign(path) or path.with_suffix("") not in plain]
 

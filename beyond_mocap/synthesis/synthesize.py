@@ -41,11 +41,13 @@ from .quality.playback import playback_from_take
 from .quality.unmet_constraints import report_unmet_constraints
 from .resolve_plan import resolve_plan
 from .resolved_touches import apply_trajectory, report_missing_touches
+from .search.block_costs import rescale_alpha
 from .search.blocks import BlockSearch
 from .search.distance import align_keys, build_straight_edit, build_warped_edit
 from .search.edit_list import EditList
 from .search.foot_drag import report_left_out
-from .search.locomotion import match_distance
+from .search.gait_loops import build_gait_loops
+from .search.locomotion import compute_travelled_distance, match_distance
 from .search.path_costs import balance_weights
 from .search.path_search import PathSearch
 from .search.preferences import UsedStretch
@@ -78,11 +80,13 @@ class SearchResult:
         edit: the edit list, at the library's rate.
         travelled: (T,) m travelled where the method decides it, else None.
         hurried_from: frame from which on it was searched in a hurry, None if it was not.
+        notes: what was left out of the search, one line each.
     """
 
     edit: EditList
     travelled: np.ndarray | None = None
     hurried_from: int | None = None
+    notes: Sequence[str] = ()
 
     def interpolate_travelled(self, index: np.ndarray) -> np.ndarray | None:
         """Interpolate the distance (N,) m travelled at fractional frames `index` (N,) of the edit list."""
@@ -139,7 +143,7 @@ def _synthesize_plan(library: Library, requested: Plan, report: Progress, **opti
     seconds = {"search": time.perf_counter() - started}
     take, construct_seconds = _construct_motion(library, plan, request, found, report)
     take = replace(take, seconds={**seconds, **construct_seconds, **solving})
-    return finish_take(take, plan, recordings, request, hurried_from=found.hurried_from)
+    return finish_take(take, plan, recordings, request, hurried_from=found.hurried_from, notes=found.notes)
 
 
 def construct_take(library: Library, plan: ResolvedPlan, edit: EditList, progress: Progress | None = None) -> Take:
@@ -201,12 +205,15 @@ def _search(
         search = PathSearch(library, request, balance_weights(plan.requested.alpha), report, cancelled, **more)
         return SearchResult(search.run(), hurried_from=search.hurried_from)
     stops = [stop for stop in (cancelled, hurry) if stop]
-    search = BlockSearch(library, request, plan.requested.alpha, report, lambda: any(stop() for stop in stops))
+    if plan.method == "baseline":
+        return SearchResult(build_gait_loops(library, request))
+    alpha = rescale_alpha(plan.requested.alpha)
+    search = BlockSearch(library, request, alpha, report, lambda: any(stop() for stop in stops))
     blocks = search.run()
-    if plan.method == "blocks":
-        return SearchResult(build_straight_edit(search, blocks))
-    return SearchResult(*build_warped_edit(search, match_distance(search, blocks, plan.requested.delta),
-                                           plan.requested.catch_up))
+    if plan.method != "distance":
+        return SearchResult(build_straight_edit(search, blocks), notes=search.notes)
+    sections = match_distance(search, blocks, plan.requested.delta)
+    return SearchResult(*build_warped_edit(search, sections, plan.requested.catch_up), notes=search.notes)
 
 
 def _construct_body(construction: Construction, travelled: np.ndarray | None) -> tuple[PlantResult, Steps,
@@ -217,14 +224,15 @@ def _construct_body(construction: Construction, travelled: np.ndarray | None) ->
         planted, steps = construction.construct_body()
         planted, ball = construction.solve_ball_contact(planted, steps)
     else:
-        planted, steps = construct_blocks(construction, travelled)
+        is_on_track = construction.plan.method in ("fs", "baseline")
+        planted, steps = construct_blocks(construction, compute_travelled_distance(track) if is_on_track else travelled)
     known = np.any(np.isfinite(ball[:, :2]))
     return planted, steps, BallPath(track.times, ball, track.ball_measured) if known else None
 
 
 def finish_take(
     take: Take, plan: ResolvedPlan, recordings: Library, request: SearchRequest, *, hurried_from: int | None = None,
-    before: Take | None = None, report_unmet: bool = True,
+    before: Take | None = None, report_unmet: bool = True, notes: Sequence[str] = (),
 ) -> Take:
     """Finish a take: scale it to the player's size, apply pins and the ball's trajectory, and add its warnings.
 
@@ -236,6 +244,7 @@ def finish_take(
         hurried_from: frame at the library's rate from which on the search was cut short, None if it was not.
         before: the finished take that it is an edit of.
         report_unmet: whether unmet constraints are reported.
+        notes: what was left out of the search, one line each.
     """
     take = add_pins(to_player_size(take, plan.size, plan.requested, before), recordings)
     started = time.perf_counter()
@@ -244,7 +253,7 @@ def finish_take(
         take = replace(take, seconds={**take.seconds, "ball": time.perf_counter() - started})
     take = measure_ball_pins(take, plan)
     return add_warnings(take, recordings, request, hurried_from, report_unmet=report_unmet,
-                        more=[*report_missing_touches(take, plan), *detours])
+                        more=[*notes, *report_missing_touches(take, plan), *detours])
 
 
 def add_pins(take: Take, recordings: Library) -> Take:

@@ -150,7 +150,8 @@ class BeyondMocapSettings(bpy.types.PropertyGroup):
 
     def list_tuning(self) -> list[str]:
         """List the names of the settings under Fine Tuning."""
-        return [row.identifier for row in list_settings("synthesis") if row.tuning in ("any", self.method)]
+        return [row.identifier for row in list_settings("synthesis")
+                if row.tuning == "any" or self.method in row.tuning.split()]
 
 
 class BeyondMocapWork(bpy.types.PropertyGroup):

@@ -27,6 +27,7 @@ from random import Random
 HERE = Path(__file__).resolve().parent
 sys.path[:0] = [str(HERE), str(HERE.parents[1])]
 
+from made_seeds import build_made_seeds  # noqa: E402
 from mutate import mutate  # noqa: E402
 from seeds import SAMPLE, build_seeds, shorten_bvh  # noqa: E402
 from targets import Target, list_targets  # noqa: E402
@@ -59,36 +60,13 @@ def prepare(folder: Path) -> tuple[dict[str, Path], dict[str, Path]]:
         "walk": folder / "walk.bvh",
         "curve": folder / "curve.csv",
         "track": folder / "track.csv",
+        "trc": folder / "walk.trc",
         "library": folder / "clips",
         "cache": folder / "cache",
         "strikes": SAMPLE / "passes" / "library",
         "strikes_cache": folder / "strikes_cache",
     }
-    return {**seeds, **_build_derived_seeds(folder)}, files
-
-
-def _build_derived_seeds(folder: Path) -> dict[str, Path]:
-    """Write the seeds that the program itself writes: tables, pieces and an edit list."""
-    import numpy as np
-
-    from beyond_mocap.annotation import event_labels
-    from beyond_mocap.markers.files.marker_set_text import SHIPPED
-    from beyond_mocap.match.piece_file import write_piece_file
-
-    made = {
-        "piece.npz": folder / "piece.npz",
-        "match.json": folder / "match.json",
-        "mesh.obj": folder / "mesh.obj",
-        "clips.csv": folder / "clips.csv",
-        "set.txt": sorted(SHIPPED.glob("*.txt"))[0],
-    }
-    write_piece_file(made["piece.npz"], {"number": 1}, {"clip": np.arange(4), "rate": np.ones(4)})
-    state = {"version": 1, "digest": "0" * 16, "players": [{"id": "home_7", "status": "done"}], "notes": []}
-    made["match.json"].write_text(json.dumps(state, indent=1))
-    made["mesh.obj"].write_text("v 0 0 0\nv 1 0 0\nv 0 1 0\nvn 0 0 1\nf 1//1 2//1 3//1\n")
-    made["clips.csv"].write_text("clip,system,scenario\na.mp4,ours,1\nb.mp4,theirs,1\n")
-    table = Path(event_labels.__file__).parent / "event_words.csv"
-    return {**made, **({"event_labels.csv": table} if table.is_file() else {})}
+    return {**seeds, **build_made_seeds(folder)}, files
 
 
 def damage(target: Target, number: int, seeds: dict[str, Path], place: Path) -> Path:

@@ -1,7 +1,9 @@
 """Valid files to damage: small ones made from the sample, and those of ../shared where they are."""
 
 import json
+import re
 import shutil
+from importlib.util import find_spec
 from pathlib import Path
 
 import numpy as np
@@ -10,7 +12,7 @@ TOP = Path(__file__).resolve().parents[2]
 SAMPLE, SHARED = TOP / "sample_blend", TOP.parent / "shared" / "data"
 
 TEXTS = {
-    "words.txt": "# a comment\n0 6 walking\n1.5 2.5 dribble right\n3 kick right low\n4f 20f standing\n",
+    "words.txt": "# a comment\n0 6 walking\n1.5 2.5 dribble right\n3 kick right low\n7 8 standing\n",
     "annotations.csv": "file,start_frame,end_frame,key_frame,labels\nwalk.bvh,0,20,,walking\n"
     "walk.bvh,3,9,6,kick right\n",
     "pins.csv": "time_s,part,x_m,y_m,z_m,hold_s\n2,gaze,30,0,1.5,0.5\n2.5,left_hand,0,0,1,\n3,ball,1,1,0.2,\n",
@@ -27,7 +29,6 @@ SHARED_GROUPS = {
     "tracab": ("tracab_raw.dat", "tracab_meta.xml"),
     "tracab_json": ("tracab_raw.json", "tracab_meta.json"),
     "metrica": ("epts_metrica_tracking.txt", "epts_metrica_metadata.xml"),
-    "skillcorner": ("skillcorner_tracking.jsonl", "skillcorner_meta.json"),
     "sportec": ("sportec_positional_w_referee.xml", "sportec_meta.xml"),
     "secondspectrum": ("secondspectrum_tracking_anon.jsonl", "secondspectrum_meta_anon.json"),
     "statsperform": ("statsperform_tracking_ma25.txt", "statsperform_tracking_ma1.json"),
@@ -40,7 +41,24 @@ SHARED_GROUPS = {
     ),
 }
 """Provider -> its files in ../shared/data/tracking/other, the tracking file first, then the metadata."""
+KLOPPY_GROUPS = {
+    "match_skillcorner": ("skillcorner_v3_raw_data.jsonl", "skillcorner_meta_data.json"),
+    "hawkeye": ("hawkeye_2_46.football.samples.centroids", "hawkeye_2_46.football.samples.ball"),
+    "events_opta": ("opta_f24.xml", "opta_f7.xml"),
+    "events_sportec": ("sportec_events.xml", "sportec_meta.xml"),
+    "events_statsbomb": ("statsbomb_event.json", "statsbomb_lineup.json"),
+    "events_metrica": ("metrica_events.json", "epts_metrica_metadata.xml"),
+    "events_wyscout2": ("wyscout_events_v2.json",),
+    "events_wyscout3": ("wyscout_events_v3.json",),
+    "events_datafactory": ("datafactory_events.json",),
+    "events_statsperform": ("statsperform_event_ma3.json", "statsperform_event_ma1.json"),
+    "events_impect": ("impect_events.json", "impect_lineups.json"),
+}
+"""Seed -> its files among kloppy's own test files: tracking or events first, then the second file."""
 _LINES = 120  # of large line-based files that are kept
+_LARGE = 200_000  # bytes from which on JSON is shortened
+_PERIOD = re.compile("Half Start|Half End|KICK_OFF|FINAL_WHISTLE")
+_ENTRIES = 60  # of long lists in JSON that are kept
 
 
 def build_seeds(folder: Path) -> dict[str, Path]:
@@ -65,7 +83,7 @@ def build_seeds(folder: Path) -> dict[str, Path]:
     seeds["walk.bvh"] = shorten_bvh(SAMPLE / "library" / "walking_1_2.bvh", folder / "walk.bvh", 24)
     small = SAMPLE / "match" / "small"
     seeds["match_small"] = _copy_group(folder / "match_small", [small / "small.dat", small / "small_meta.xml"])
-    return {**seeds, **_build_shared_seeds(folder)}
+    return {**seeds, **_build_shared_seeds(folder), **_build_kloppy_seeds(folder)}
 
 
 def _build_shared_seeds(folder: Path) -> dict[str, Path]:
@@ -86,16 +104,40 @@ def _build_shared_seeds(folder: Path) -> dict[str, Path]:
     return seeds
 
 
-def _copy_group(folder: Path, files: list[Path]) -> Path:
-    """Copy the files of one match; long line-based ones are cut."""
+def _build_kloppy_seeds(folder: Path) -> dict[str, Path]:
+    """Write the seeds from kloppy's own test files; a line says where it comes without them."""
+    source = Path(find_spec("kloppy").submodule_search_locations[0]) / "tests" / "files"
+    if not source.is_dir():
+        print("fuzz: this kloppy comes without its own test files; events of providers and HawkEye are skipped")
+        return {}
+    return {
+        name: _copy_group(folder / name, [source / file for file in files], has_numbers=name != "hawkeye")
+        for name, files in KLOPPY_GROUPS.items()
+    }
+
+
+def _copy_group(folder: Path, files: list[Path], has_numbers: bool = True) -> Path:
+    """Copy the files of one match, with numbers before their names to keep the order; long ones are cut."""
     folder.mkdir()
     for number, path in enumerate(files):
-        target = folder / f"{number}_{path.name}"
+        target = folder / (f"{number}_{path.name}" if has_numbers else path.name)
         if path.suffix in (".dat", ".txt", ".jsonl") and number == 0:
             _cut(path, target, _LINES)
+        elif path.suffix in (".json", ".centroids", ".ball") and path.stat().st_size > _LARGE:
+            target.write_text(json.dumps(_shorten(json.loads(path.read_text())), indent=1))
         else:
             shutil.copy(path, target)
     return folder
+
+
+def _shorten(value):
+    """Shorten the lists in a JSON value; the periods' first and last events stay."""
+    if isinstance(value, dict):
+        return {name: _shorten(one) for name, one in value.items()}
+    if not isinstance(value, list):
+        return value
+    rows = [one for number, one in enumerate(value) if number < _ENTRIES or _PERIOD.search(json.dumps(one)[:2000])]
+    return [_shorten(one) for one in rows]
 
 
 def _cut(path: Path, target: Path, lines: int) -> Path:

@@ -75,6 +75,17 @@ def _read_match_folder(path: Path, out: Path) -> None:
     read_match(tracking, others[0] if others else None, cache_dir=out.parent / "cache")
 
 
+def _read_hawkeye_folder(path: Path, out: Path) -> None:
+    """Read a match of HawkEye, whose second file is found by its name."""
+    read_match(min(path.glob("*.centroids")), cache_dir=out.parent / "cache")
+
+
+def _read_event_folder(path: Path, out: Path) -> None:
+    """Read events from a folder of their files: the events, then the second file."""
+    events, *others = sorted(path.iterdir())
+    read_events(events, others[0] if others else None)
+
+
 def _build_library(path: Path, out: Path) -> int:
     """Build a library of a valid and a damaged clip, or with a damaged text or table."""
     folder = out.parent / "library"
@@ -123,7 +134,11 @@ def list_targets(files: dict[str, Path]) -> list[Target]:
         _read("piece", "piece.npz", read_piece_file),
         _read("state of a match", "match.json", lambda path: read_state(path.parent)),
     ]
-    matches = Target("match", ("match_*",), 16, _read_match_folder, 30.0)
+    matches = [
+        Target("match", ("match_*",), 16, _read_match_folder, 30.0),
+        Target("match of hawkeye", ("hawkeye",), 4, _read_hawkeye_folder, 30.0),
+        Target("events of providers", ("events_*",), 12, _read_event_folder, 30.0),
+    ]
     verbs = [
         _verb("mirror", "*.bvh", "mirror {bad} {out}/o.bvh", files, 10),
         _verb("retarget from", "*.bvh", "retarget {bad} --to {walk} --out {out}/o.bvh", files, 6),
@@ -184,6 +199,15 @@ def list_targets(files: dict[str, Path]) -> list[Target]:
             1,
             120.0,
         ),
+        _verb("reconstruct by model", "model.json", "reconstruct {trc} --model {bad} --out {out}/o.bvh", files, 1, 99.0),
+        _verb(
+            "propose",
+            "classifier.npz",
+            "library {library} --cache {cache} --learned {bad} --propose {out}/w.csv",
+            files,
+            2,
+            60.0,
+        ),
         Target("library", ("*.bvh", "words.txt", "annotations.csv"), 3, _build_library, 60.0),
     ]
-    return [*read, matches, *verbs]
+    return [*read, *matches, *verbs]

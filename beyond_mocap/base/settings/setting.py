@@ -57,7 +57,7 @@ class Setting:
         precision: decimals in a panel.
         panel_more: further arguments of the bpy property, and `default`, `min`, `max` where they differ there.
         in_preset: whether presets store it.
-        tuning: the method under whose Fine Tuning the panel lists it; "any": under each; "" for none.
+        tuning: the methods under whose Fine Tuning the panel lists it, with blanks; "any": under each; "" for none.
         blank: the choice that is "" in code.
         convert: converts the user's value to the value that code reads.
         feature: set by the table.

@@ -10,6 +10,8 @@ METHODS = (
     ("path", "Path Following", "Place the body on the track and keep the sway of the clips"),
     ("distance", "Distance", "Match the travelled distance by adding or removing steps, then by warping time"),
     ("blocks", "Blocks", "Find the smoothest sequence of clips for the labels, without following the track"),
+    ("fs", "Sliding Blocks", "Put the clips of Blocks on the track: the distance is not matched, and feet slide"),
+    ("baseline", "Gait Loops", "Loop the recording of each gait that is nearest in speed on the track; no actions"),
 )
 FEET = (
     ("any", "Any", "No preferred foot"), ("left", "Left", "Key moments without a side prefer clips of the left foot"),
@@ -83,6 +85,15 @@ TABLES = {
                 title="Distance Tolerance", tooltip="For Distance: error of a stretch's travelled distance up to which "
                 "no steps are added or removed", in_preset=True, tuning="distance",
                 panel_more=dict(unit="LENGTH", subtype="DISTANCE")),
+        Setting(name="catch_up_window", default=2.0, least=0.1, most=60.0, unit="seconds", expected=BETWEEN,
+                option="--catch-up-window", help="time within which locomotion regains lost distance ('distance'); "
+                "default %(default)g", tooltip="For Distance: time within which locomotion regains the distance that "
+                "an action has lost", in_preset=True, tuning="distance"),
+        Setting(name="max_blocks", default=500, least=50, most=20000, expected=BETWEEN, option="--max-blocks",
+                metavar="NUMBER", help="blocks that are compared for a section ('distance') or slot; time grows with "
+                "the square; default %(default)d", title="Most Blocks", tooltip="For Distance and Blocks: blocks that "
+                "are compared for a section or slot; the time grows with the square of their number", in_preset=True,
+                tuning="distance blocks fs"),
         Setting(name="omega", default=0.0, least=0.0, most=100.0, expected=BETWEEN, option="--omega", metavar="NUMBER",
                 help="the faster of two gaits begins at 1/omega of the range between their speeds; 0: as the "
                 "recordings are labelled ('path'), else 4; default %(default)g", title="Gait Threshold",

@@ -20,7 +20,7 @@ from ...base.user_folders import find_user_cache
 from ...motion.skeleton import freeze_array
 from ...motion.track import Track
 from ...motion.track.match_data import REFEREE, Match, MatchPlayer, Team, describe_presence
-from ..atomic import atomic_write
+from ..atomic import atomic_write, remove_abandoned
 from ..tables import parse_number, read_rows
 from . import match_arrays
 from .feed import Feed
@@ -242,6 +242,7 @@ def _save_cache(cache: Path, arrays: dict[str, np.ndarray], notes: list[str]) ->
         cache.parent.mkdir(parents=True, exist_ok=True)
         atomic_write(cache, content.getvalue())
         _prune_cache(cache)
+        remove_abandoned(cache.parent)
     except (OSError, InputError):
         notes.append(f"{cache.parent} is not writable, so nothing is cached for the next time")
 

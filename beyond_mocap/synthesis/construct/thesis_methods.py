@@ -1,5 +1,5 @@
-"""Root motion of Faustino's block searches: the track's place by travelled distance, or the clips' own paths chained
-one after the other (§3.2.6).
+"""Root motion of Faustino's block searches and of the plain baseline: the track's place by travelled distance, the
+track's own place while the feet slide, or the clips' own paths chained one after the other (§3.2.6).
 """
 
 from __future__ import annotations
@@ -32,12 +32,13 @@ def construct_blocks(construction: Construction, travelled: np.ndarray | None) -
 
     Args:
         construction: the source frames and the track.
-        travelled: (T,) m by method "distance", None by "blocks".
+        travelled: (T,) m by method "distance", the track's own by "fs" and "baseline", None by "blocks".
     """
     track, source = construction.track, construction.source
-    smooth = _spread_transitions(construction.plan, source)
+    smooth = _spread_transitions(construction.plan, replace(source, turn=_turn_torsos(construction.library, source)))
     if travelled is None:
-        heading, ground = integrate_root(construction.library, source, smooth, track)
+        heading = integrate_heading(float(track.direction[0]), smooth.turn)
+        ground = integrate_path(track.positions[0], smooth.velocity, smooth.sway, heading, track.fps)
     else:
         heading, ground = place_root_at_distance(track, smooth, travelled)
     pose, none = apply_heading(smooth.pose, heading), np.zeros((len(ground), 2))
@@ -97,24 +98,12 @@ def find_places_along(track: SampledTrack, travelled: np.ndarray) -> tuple[np.nd
     return place + beyond * np.stack([np.cos(direction), np.sin(direction)], axis=1), direction
 
 
-def integrate_root(
-    library: Library, source: SourceMotion, smooth_source: SourceMotion, track: SampledTrack
-) -> tuple[np.ndarray, np.ndarray]:
-    """Integrate the root from the track's first place and direction on, wherever the clips lead.
-
-    Args:
-        library: the clips.
-        source: T source frames.
-        smooth_source: the same without jumps.
-        track: T frames.
-    Returns:
-        Heading (T,) rad and root (T, 2) m, world.
-    """
+def _turn_torsos(library: Library, source: SourceMotion) -> np.ndarray:
+    """Compute the turning (T,) rad of source frames, with the corrections for torsos that are not upright."""
     turn = source.turn.copy()
     torso, expected = _torso_vectors(library, source.pose), _torso_vectors(library, source.ahead_pose)
     turn[source.transitions] += compute_torso_corrections(torso, source.transitions, expected)
-    heading = integrate_heading(float(track.direction[0]), turn)
-    return heading, integrate_path(track.positions[0], smooth_source.velocity, smooth_source.sway, heading, track.fps)
+    return turn
 
 
 def _torso_vectors(library: Library, pose: np.ndarray) -> np.ndarray:

@@ -7,8 +7,12 @@ from collections.abc import Sequence
 import numpy as np
 
 from ...library.features import Frames
+from ..plan import Plan
 
 Labels = frozenset[str] | None
+
+FITTED_ALPHA = 0.6
+"""Weight of labels against continuity in units of the typical distance, fitted by `python -m benchmarks alpha`."""
 
 
 class AnnotationCost:
@@ -57,6 +61,16 @@ class AnnotationCost:
             either += (self._present[b] - self._present[a]) + len(words) * (high - low) - inside
         # both - only one = both - (either - both)
         return np.where(either > 0, -(2.0 * common - either) / np.maximum(either, 1.0), 0.0)
+
+    def count_labels(self, frame: np.ndarray, requested: frozenset[str]) -> tuple[np.ndarray, np.ndarray]:
+        """Count the labels that library frames have in common with the requested ones, and those that either has.
+
+        Args:
+            frame: library frames, of any shape.
+            requested: requested labels.
+        """
+        shared = np.diff(self._shared_count(requested))[frame]
+        return shared, np.diff(self._present)[frame] + len(requested) - shared
 
     def find_frames_with(self, words: frozenset[str]) -> np.ndarray:
         """Return (N,) bool: frames that carry any of the labels."""
@@ -123,6 +137,23 @@ def measure_typical_distance(frames: Frames) -> float:
     """Compute the root mean square distance of two frames drawn at random.
 
     This length makes continuity costs about one for unrelated poses, in any library. Eq. 13 weighs continuity against
-    annotation, which lies within +-1; without a common scale alpha = 0.2 would mean something else in every library.
+    annotation, which lies within +-1; without a common scale alpha would mean something else in every library.
     """
     return float(np.sqrt(2.0 * frames.features.var(axis=0, dtype=float).sum())) or 1.0
+
+
+def rescale_alpha(alpha: float, fitted: float = FITTED_ALPHA) -> float:
+    """Convert the setting alpha to the weight of labels against continuity in units of the typical distance.
+
+    The thesis found 0.2 for its own C, whose unit is that of its features. Divided by the typical distance, C is
+    smaller, and the weight that plays the part of 0.2 is `fitted`. The ratio of both weights keeps its meaning: 0 and 1
+    stay what they are, and twice the ratio is twice the ratio.
+
+    Args:
+        alpha: the setting, 0 to 1; its default is the thesis' 0.2.
+        fitted: what the default becomes.
+    Source: Faustino 2016, eq. 13.
+    """
+    default = Plan.alpha
+    ratio = fitted / (1.0 - fitted) * (1.0 - default) / default
+    return ratio * alpha / (ratio * alpha + 1.0 - alpha)

@@ -22,18 +22,19 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ...base.errors import UserCancelledError
+from ...base.errors import TimedMessage, UserCancelledError
 from ...library.clusters import BLOCK_LENGTHS
 from ...library.keys import Key
 from ...library.library import Library
+from .block_choice import rank_varied
 from .block_costs import AnnotationCost, collect_windows, compute_distances, measure_typical_distance
 from .preferences import compute_weak_foot_cost
 from .request import SearchRequest, compute_needed_frames, library_frame
 
-MAX_CANDIDATES = 600  # blocks per slot, besides those next to key moments
 AVOIDED_COST = 1000.0
 """Cost of a block that shows an avoided label: more than a whole track of anything else."""
 FINEST_LENGTH = BLOCK_LENGTHS[-1]  # frames
+SEARCH_MORE = "a higher Most Blocks compares more and takes longer"
 
 
 # The sequence through slots with the lowest cost, by dynamic programming (Faustino eq. 14, 15), on costs alone.
@@ -98,6 +99,7 @@ class BlockSearch:
         alpha: weight of labels against continuity, eq. 13.
         scale: length that makes continuity costs comparable.
         key_in_slot: slot -> (number of the key moment, library key) that its block shows, after `run`.
+        thinned_slots: frames of a block -> number of candidates of each slot that had more than were compared.
     """
 
     def __init__(
@@ -124,6 +126,8 @@ class BlockSearch:
         self._report = progress or (lambda fraction, text: None)
         self._cancelled = cancelled or (lambda: False)
         self.key_in_slot: dict[int, tuple[int, Key]] = {}
+        self.thinned_slots: dict[int, list[int]] = {length: [] for length in BLOCK_LENGTHS}
+        self._notes: list[TimedMessage] = []
 
     def run(self) -> BlockCandidates:
         """Run the search.
@@ -139,6 +143,33 @@ class BlockSearch:
             self._report_step(0.4 + 0.3 * number, f"Blocks of {length} frames")
             blocks = self._choose_blocks(length, self._split_blocks(blocks, length))
         return blocks
+
+    @property
+    def notes(self) -> list[str]:
+        """What was left out of the search, one line each."""
+        return [*self._describe_thinned_slots(), *self._notes]
+
+    def _describe_thinned_slots(self) -> list[str]:
+        """Describe the slots whose candidates were thinned."""
+        found = [f"{len(counts)} of {self.count_slots(length)} with {length} frames (up to {max(counts):,} candidates)"
+                 for length, counts in self.thinned_slots.items() if counts]
+        limit = self.request.plan.max_blocks
+        text = f"slots for which not all blocks were compared: {', '.join(found)}; the {limit} nearest in labels were"
+        return [f"{text}; {SEARCH_MORE}"] if found else []
+
+    def note_thinning(self, first: int, end: int, count: int, clips: int, clips_left: int) -> None:
+        """Note that not all locomotion blocks of a section were compared.
+
+        Args:
+            first, end: the section's frames.
+            count: blocks that could be shown.
+            clips: number of their clips.
+            clips_left: clips of those that were compared.
+        """
+        low, high = (float(self.request.track.times[0]) + frame / self.library.fps for frame in (first, end))
+        text = (f"{low:.1f} to {high:.1f} s: {count:,} blocks of {clips} clips fit; compared "
+                f"were {self.request.plan.max_blocks} of {clips_left} clips, the nearest in labels and speed")
+        self._notes.append(TimedMessage(f"{text}; {SEARCH_MORE}", (low, high)))
 
     def count_slots(self, length: int) -> int:
         """Return the number of slots of `length` frames; all levels cover a whole number of the longest."""
@@ -283,12 +314,16 @@ class BlockSearch:
         return BlockCandidates(np.concatenate([p.clip for p in picked]), np.concatenate([p.start for p in picked]))
 
     def _thin_candidates(self, slot: int, length: int, candidates: BlockCandidates) -> BlockCandidates:
-        """Select at most MAX_CANDIDATES blocks, those with the best labels first, plus the ones beside key moments."""
-        if len(candidates) > MAX_CANDIDATES:
+        """Select at most `Plan.max_blocks` blocks, those with the best labels first and from many clips, plus the ones
+        beside key moments.
+        """
+        limit = self.request.plan.max_blocks
+        if len(candidates) > limit:
             cost = self.annotation.compute_block_costs(candidates.start, self.list_requested_labels(slot, length))
             cost += AVOIDED_COST * self._shows_avoided(candidates.start, slot,
                                                        length) + self._compute_style_cost(candidates.start)
-            candidates = candidates.select(np.sort(np.argsort(cost, kind="stable")[:MAX_CANDIDATES]))
+            self.thinned_slots[length].append(len(candidates))
+            candidates = candidates.select(np.sort(rank_varied(cost, candidates.clip)[:limit]))
         beside = self._blocks_beside_keys(slot, length)
         return BlockCandidates(np.append(candidates.clip, beside.clip), np.append(candidates.start, beside.start))
 

@@ -10,9 +10,6 @@ from .edit_list import EditList, PlacedKey, find_transitions
 from .locomotion import Section, compute_travelled_distance
 from .request import library_frame
 
-CATCH_UP_FRAMES = 60  # output frames over which a distance error is regained
-
-
 # The boundary between two blocks moves by a few frames to where the two clips agree best.
 #
 # Faustino §3.2.5 shifts the exit and the entry frame separately by gradient descent; the motion then changes its
@@ -147,8 +144,7 @@ def build_straight_edit(search: BlockSearch, blocks: BlockCandidates) -> EditLis
     return build_edit_list(search.library, clip[:count], frame[:count], list_placed_keys(search), fixed)
 
 
-def build_warped_edit(search: BlockSearch, sections: list[Section], regains_distance: bool) -> tuple[EditList,
-        np.ndarray]:
+def build_warped_edit(search: BlockSearch, sections: list[Section], catch_up: bool) -> tuple[EditList, np.ndarray]:
     """Play the sections so that locomotion follows the track's speed.
 
     Other sections are played as recorded and travel what the recording did; what they lose or gain against the track is
@@ -157,7 +153,7 @@ def build_warped_edit(search: BlockSearch, sections: list[Section], regains_dist
     Args:
         search: the block search.
         sections: its blocks, with cycles added or removed.
-        regains_distance: whether lost distance is regained.
+        catch_up: whether lost distance is regained, within the plan's `catch_up_window`.
     Returns:
         The edit list, and (T,) m travelled by each output frame.
     """
@@ -168,6 +164,7 @@ def build_warped_edit(search: BlockSearch, sections: list[Section], regains_dist
     piece = np.cumsum(piece)
     track_distance, clip_distance = compute_travelled_distance(search.request.track), _compute_clip_distance(
         search.library, source)
+    catch_up_frames = max(1, round(search.request.plan.catch_up_window * search.library.fps)) if catch_up else 0
     places, travelled, low = [], [], 0
     for section in sections:
         # low .. high: the section among the joined source frames; `out`: the section among the output frames
@@ -175,7 +172,7 @@ def build_warped_edit(search: BlockSearch, sections: list[Section], regains_dist
         out = _section_frames(section, len(track_distance))
         so_far = travelled[-1][-1] if travelled else 0.0
         at, metres = _warp_section(section, clip_distance[low:high] - clip_distance[low], track_distance[out], so_far,
-                                   regains_distance)
+                                   catch_up_frames)
         places.append(low + at)
         travelled.append(so_far + metres)
         low = high
@@ -220,7 +217,7 @@ def _compute_clip_distance(library: Library, source: EditList) -> np.ndarray:
 
 
 def _warp_section(section: Section, clip_distance: np.ndarray, track_distance: np.ndarray, so_far: float,
-                  regains_distance: bool):
+                  catch_up_frames: int):
     """Compute the source frames (F,) of a section and the distance (F,) m from its start, for its F output frames."""
     count = len(track_distance)
     if not count:
@@ -228,8 +225,8 @@ def _warp_section(section: Section, clip_distance: np.ndarray, track_distance: n
     if not section.is_locomotion:
         return np.arange(count, dtype=float), clip_distance[:count]
     goal = track_distance - track_distance[0]
-    if regains_distance:
-        goal = goal + distribute_error(float(track_distance[0]) - so_far, count, CATCH_UP_FRAMES)
+    if catch_up_frames:
+        goal = goal + distribute_error(float(track_distance[0]) - so_far, count, catch_up_frames)
     goal = np.maximum.accumulate(goal - goal[0])
     return warp_time(clip_distance, goal), goal
 

@@ -18,7 +18,7 @@ from ...library.library import Library
 from ..plan import ResolvedPlan
 from ..search_library import extend_library
 from .beam_transitions import SAME_FRAME, SlotCandidates
-from .block_costs import AnnotationCost, collect_windows, compute_distances, measure_typical_distance
+from .block_costs import AnnotationCost, collect_windows, compute_distances, measure_typical_distance, rescale_alpha
 from .candidate_index import PLAYBACK_RATES, SLOT
 from .edit_list import EditList
 from .path_costs import YOUNG_SLOTS, Term, Weights, balance_weights
@@ -93,7 +93,9 @@ def explain_choices(library: Library, plan: ResolvedPlan, edit: EditList) -> lis
     request = build_request(library, plan)
     if plan.method == "path":
         return explain_path_choices(library, request, edit, balance_weights(plan.requested.alpha))
-    return explain_block_choices(library, request, edit, plan.requested.alpha)
+    if plan.method == "baseline":
+        return explain_gait_loops(library, request, edit)
+    return explain_block_choices(library, request, edit, rescale_alpha(plan.requested.alpha))
 
 
 def explain_path_choices(library: Library, request: SearchRequest, edit: EditList, weights: Weights,
@@ -152,6 +154,15 @@ def explain_block_choices(library: Library, request: SearchRequest, edit: EditLi
         found.append(_build_reason(library, edit, first, end=end, costs={"words": alpha * float(np.sum(blocks))},
                                    cut_costs=cut_costs))
     return found
+
+
+def explain_gait_loops(library: Library, request: SearchRequest, edit: EditList) -> list[ChoiceReason]:
+    """Explain the choices of `baseline`: the speed, m/s, by which each piece differs from the track."""
+    speed = library.frames.speed[np.clip(np.rint(edit.frame).astype(int), 0, len(library.frames) - 1)]
+    missed = [abs(float(np.mean(speed[low:high]) - np.mean(request.track.speed[low:high])))
+              for low, high in edit.pieces]
+    return [_build_reason(library, edit, low, end=high, costs={"speed": off}, cut_costs={})
+            for (low, high), off in zip(edit.pieces, missed)]
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)

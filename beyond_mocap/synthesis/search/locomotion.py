@@ -22,12 +22,12 @@ from ...annotation import LOCOMOTION_LABELS
 from ...base.vectors import distances_along
 from ...library.library import Library
 from ...motion.track import SampledTrack
+from .block_choice import STRETCH, choose_stretches, count_demands
 from .block_costs import collect_windows, compute_distances
 from .blocks import FINEST_LENGTH, BlockCandidates, BlockSearch
 from .request import SearchRequest
 
 DISTANCE_TOLERANCE = 0.1  # m from the requested distance within which a sequence fits
-MAX_BLOCKS = 500  # candidates of a section
 
 
 @dataclass(frozen=True, eq=False)
@@ -131,16 +131,22 @@ def _select_locomotion_blocks(search: BlockSearch, section: Section) -> BlockCan
         free = fits & (running_count[start + FINEST_LENGTH] == running_count[start])
         fits = free if free.any() else fits
     start = start[fits]
-    if len(start) > MAX_BLOCKS:
-        start = _thin_evenly(start, frames.clip[start])
-    return BlockCandidates(frames.clip[start], start)
+    found = BlockCandidates(frames.clip[start], start)
+    return found if len(found) <= search.request.plan.max_blocks else _thin_blocks(search, section, found)
 
 
-def _thin_evenly(start: np.ndarray, clip: np.ndarray) -> np.ndarray:
-    """Select at most about MAX_BLOCKS blocks, whole clips at a time, clips spread evenly."""
-    clips = np.unique(clip)
-    share = max(1, int(np.ceil(len(start) / MAX_BLOCKS)))
-    return start[np.isin(clip, clips[::share])]
+def _thin_blocks(search: BlockSearch, section: Section, blocks: BlockCandidates) -> BlockCandidates:
+    """Select as many blocks as the plan allows, by labels, speed and variety, and note that it was necessary."""
+    request, frames = search.request, search.frames
+    low, high = section.first * FINEST_LENGTH, min(section.end * FINEST_LENGTH, len(request))
+    demands = count_demands(list(request.requested_labels[low:high]), request.track.speed[low:high])
+    label_cost = {labels: search.annotation.compute_block_costs(blocks.start, [labels] * FINEST_LENGTH)
+                  for labels, _ in demands}
+    speed = compute_block_distances(search.library, blocks) * search.library.fps / FINEST_LENGTH
+    stretch = (blocks.start - frames.first[blocks.clip]) // STRETCH + frames.first[blocks.clip]
+    chosen = blocks.select(choose_stretches(demands, label_cost, speed, blocks.clip, stretch, request.plan.max_blocks))
+    search.note_thinning(low, high, len(blocks), len(np.unique(blocks.clip)), len(np.unique(chosen.clip)))
+    return chosen
 
 
 def _find_cheapest_chain(search: BlockSearch, section: Section, blocks: BlockCandidates, goal: float) -> np.ndarray:
@@ -158,9 +164,9 @@ def _find_cheapest_chain(search: BlockSearch, section: Section, blocks: BlockCan
                                    before)[0]
     to_exit = weight * compute_distances(after, collect_windows(search.frames, last.clip, last.start, size))[:, 0]
     between = weight * compute_distances(after, before)
-    words = _build_label_cost(search, section, blocks)
+    label_cost = _build_label_cost(search, section, blocks)
     # layer n: lowest cost of a chain of n + 1 blocks that ends with each block, and the distance it travels
-    total = weight * from_entry + alpha * words(np.zeros(len(blocks)), np.arange(len(blocks)))
+    total = weight * from_entry + alpha * label_cost(np.zeros(len(blocks)))
     travelled, back, layers = step.copy(), [], []
     for layer in range(4 * (section.end - section.first) + 8):
         # distance error, and cost per block with the exit, if the chain ends here
@@ -170,31 +176,38 @@ def _find_cheapest_chain(search: BlockSearch, section: Section, blocks: BlockCan
         # through[i, j]: the best chain to block i, then block j
         through = total[:, None] + between
         source = np.argmin(through, axis=0)
-        total = through[source, np.arange(len(source))] + alpha * words(travelled[source], np.arange(len(source)))
+        total = through[source, np.arange(len(source))] + alpha * label_cost(travelled[source])
         travelled = travelled[source] + step
         back.append(source)
     return _read_chain(layers, back)
 
 
 def _build_label_cost(search: BlockSearch, section: Section, blocks: BlockCandidates):
-    """Build a function for D of a block after `travelled` metres of the section.
+    """Build a function for D of each block after `travelled` (B,) metres of the section.
 
-    It compares with the labels requested where the track has travelled as far (the paper's AA_d over travelled
-    distance).
+    Each frame of a block is compared with the labels requested where the track has travelled as far as the body then
+    has (the paper's AA_d over travelled distance).
+
+    Source: Faustino 2016, §3.2.4.
     """
     track_distance = compute_travelled_distance(search.request.track)
     low, high = section.first * FINEST_LENGTH, min(section.end * FINEST_LENGTH, len(track_distance))
-    kinds = sorted({w for w in search.request.requested_labels[low:high] if w is not None}, key=sorted)
-    # table[kind, block]: D for each distinct set of requested labels
-    table = np.stack([search.annotation.compute_block_costs(blocks.start, [kind] * FINEST_LENGTH) for kind in kinds])
-    number = np.array([kinds.index(w) if w is not None else 0 for w in search.request.requested_labels[low:high]])
+    requested = search.request.requested_labels[low:high]
+    kinds = sorted(set(requested), key=sorted)
+    number = np.array([kinds.index(labels) for labels in requested])
     along = track_distance[low:high] - track_distance[low]
+    running, steps = distances_along(search.frames.path), np.arange(FINEST_LENGTH)
+    frame = blocks.start[:, None] + steps
+    inside = running[frame] - running[blocks.start][:, None]
+    # counts[kind]: labels in common and in either, of each block's frames
+    counts = np.array([search.annotation.count_labels(frame, kind) for kind in kinds])
 
-    def label_cost(travelled: np.ndarray, block: np.ndarray) -> np.ndarray:
-        place = np.minimum(np.searchsorted(along, travelled), len(along) - 1)
-        return table[number[place], block]
+    def compute_label_cost(travelled: np.ndarray) -> np.ndarray:
+        place = np.minimum(np.searchsorted(along, travelled[:, None] + inside), len(along) - 1)
+        common, either = counts[number[place], :, np.arange(len(blocks))[:, None], steps].sum(axis=1).T
+        return (either - 2.0 * common) / np.maximum(either, 1.0)
 
-    return label_cost
+    return compute_label_cost
 
 
 def _read_chain(layers, back) -> np.ndarray:

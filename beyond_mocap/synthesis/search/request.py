@@ -26,7 +26,7 @@ from ...annotation import (
 from ...annotation.ball_contact import takes_with_foot
 from ...annotation.labels import list_gaits, read_labels
 from ...annotation.vocabulary import DIRECTIONS, SIDES, find_nearest_labels
-from ...base.errors import NotInLibraryError, TimedMessage, format_seconds
+from ...base.errors import NotInLibraryError, TimedMessage, format_count, format_seconds
 from ...base.fixes import Fix
 from ...library.automatic_locomotion import build_automatic_labels
 from ...library.keys import Key, list_nearest_labels, select_keys, select_nearest_keys, select_substitutes
@@ -148,7 +148,7 @@ def build_request(library: Library, plan: ResolvedPlan) -> SearchRequest:
     allowed = np.array([settings.mirror or not clip.mirrored for clip in library.clips])
     warnings: list[str] = []
     actions = [read_moment_action(moment, plan.track, track) for moment in timeline.keys]
-    keys = tuple(_build_key(
+    keys = _ignore_keys(library, timeline, track, gait, warnings) if plan.method == "baseline" else tuple(_build_key(
         library, moment, track, asked=asked, gait=gait, allowed=allowed, use_nearest=settings.nearest,
         has_synthetic=plan.method == "path" and settings.made, warnings=warnings,
     ) for moment, asked in zip(timeline.keys, actions))
@@ -200,7 +200,7 @@ def _build_key(library, moment: KeyMoment, track, asked: ActionMoment, gait, all
     dribbles, swings of the library's own kicker, synthetic actions; then the nearest labels.
     """
     warnings += _report_no_action(moment)
-    frame = float(np.clip((moment.resolved_time - track.times[0]) * library.fps, 0, len(track.times) - 1))
+    frame = _find_key_frame(library, moment, track)
     may_show = [key for key in library.keys if allowed[key.clip]]
     usable = tuple(key for key in may_show if not library.clips[key.clip].is_synthetic)
     actions = _select_action_keys(library, may_show, asked)
@@ -218,6 +218,22 @@ def _build_key(library, moment: KeyMoment, track, asked: ActionMoment, gait, all
     gait_words = library.gaits[int(gait[int(round(frame))])].labels
     return _build_nearest_key(moment, frame, usable, synthetic, gait_words=gait_words, use_nearest=use_nearest,
                               has_synthetic=has_synthetic, warnings=warnings)
+
+
+def _find_key_frame(library: Library, moment: KeyMoment, track: SampledTrack) -> float:
+    """Find the fractional frame of a key moment at the library's rate."""
+    return float(np.clip((moment.resolved_time - track.times[0]) * library.fps, 0, len(track.times) - 1))
+
+
+def _ignore_keys(library: Library, timeline: Timeline, track: SampledTrack, gait: np.ndarray,
+                 warnings: list[str]) -> tuple[RequestedKey, ...]:
+    """Build the key moments of a method that shows no actions: the gait continues there, which a warning says."""
+    frames = [_find_key_frame(library, moment, track) for moment in timeline.keys]
+    if frames:
+        warnings.append(f"{format_count(len(frames), 'key moment')} ignored: this method shows gaits and no actions")
+    return tuple(RequestedKey(requested=moment, frame=frame, choices=(),
+                              used_instead=library.gaits[int(gait[int(round(frame))])].labels)
+                 for moment, frame in zip(timeline.keys, frames))
 
 
 def _choose_recorded(moment: KeyMoment, asked: ActionMoment, usable: tuple[Key, ...], synthetic: tuple[Key, ...],

@@ -681,3 +681,23 @@ def test_a_missing_package_of_the_core_is_told_in_one_line():
     done = subprocess.run([sys.executable, "-c", code], cwd=TOP, capture_output=True, text=True)
     expected = "beyond-mocap: numpy is missing; install the core: pip install . in the project's folder"
     assert (done.returncode, done.stderr.strip()) == (2, expected)
+
+
+def test_methods_are_compared_and_their_takes_are_a_study(run, clips_folder, library, match, tmp_path):
+    scenarios = tmp_path / "scenarios"
+    scenarios.mkdir()
+    (scenarios / "one.csv").write_bytes((match / "track_only.csv").read_bytes())
+    common = ("compare", "--library", clips_folder, "--scenarios", scenarios, "--methods", "fs,baseline")
+    status, out, error = run(*common, "--out", tmp_path / "r.md", "--takes", tmp_path / "takes")
+    assert status == 0 and "1 scenario, 2 methods" in out and any("no labels" in line for line in error)
+    assert "| baseline |" in (tmp_path / "r.md").read_text()
+    rows = (tmp_path / "takes" / "clips.csv").read_text().splitlines()
+    assert rows[0] == "file,system,scenario" and all((tmp_path / "takes" / row.split(",")[0]).is_file()
+                                                     for row in rows[1:])
+    assert_told(run(*common, "--out", tmp_path / "r.txt"), 2, ".html, .md, .json")
+    assert_told(run(*common, "--out", tmp_path / "r.md", "--takes", tmp_path / "takes"), 2, "a new or empty folder")
+    (tmp_path / "none").mkdir()
+    empty = (*common[:4], tmp_path / "none", "--out", tmp_path / "e.md")
+    assert_told(run(*empty), 2, "no .csv file in it")
+    assert_told(run(*empty[:4], scenarios, "--methods", "magic", *empty[5:]), 2, "'magic'")
+    assert not (tmp_path / "e.md").exists()

@@ -1,5 +1,7 @@
 """Block search: words followed, key moments at exactly their frame, and strange orders served."""
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 
@@ -7,10 +9,12 @@ from beyond_mocap.base.errors import UserCancelledError
 from beyond_mocap.library.build import build_library
 from beyond_mocap.synthesis.plan import Plan
 from beyond_mocap.synthesis.resolve_plan import resolve_plan
-from beyond_mocap.synthesis.search.block_costs import AnnotationCost
+from beyond_mocap.synthesis.search.block_costs import FITTED_ALPHA, AnnotationCost, rescale_alpha
 from beyond_mocap.synthesis.search.blocks import FINEST_LENGTH, BlockSearch
 from beyond_mocap.synthesis.search.distance import build_straight_edit, list_block_frames
 from beyond_mocap.synthesis.search.request import build_request, library_frame
+
+DATA = Path(__file__).resolve().parents[5] / "shared" / "data" / "mocap"
 
 
 def shown(library, order, alpha=0.2):
@@ -70,6 +74,33 @@ def test_words_change_when_they_are_asked_to(library, order):
     carried = words_shown(library, clip, frame)
     assert np.mean(["jogging" in w for w in carried[:110]]) > 0.9
     assert np.mean(["walking" in w for w in carried[130:]]) > 0.9
+
+
+def test_the_setting_alpha_becomes_the_fitted_weight():
+    settings = np.linspace(0.0, 1.0, 21)
+    weights = [rescale_alpha(setting) for setting in settings]
+    assert weights[0] == 0.0 and weights[-1] == 1.0 and np.all(np.diff(weights) > 0.0)
+    assert rescale_alpha(Plan.alpha) == pytest.approx(FITTED_ALPHA)
+    assert rescale_alpha(0.4, Plan.alpha) == pytest.approx(0.4)  # where the thesis' own weight fits
+
+
+@pytest.mark.skipif(not DATA.is_dir(), reason="needs recordings of walking and jogging")
+def test_a_walker_jogs_where_the_track_does(tmp_path, track_of):
+    """Recordings of CMU: the weight 0.2 on the rescaled cost walks on."""
+    files = [DATA / f"cmu10/train_{gait}_{number}.bvh" for gait in ("walking", "running") for number in (1, 2, 3)]
+    for path in files:
+        (tmp_path / path.name).symlink_to(path)
+    rows = (DATA / "annotations.csv").read_text().splitlines()
+    rows = [rows[0], *(row.removeprefix("cmu10/") for row in rows if row.startswith("cmu10/train_"))]
+    (tmp_path / "annotations.csv").write_text("\n".join(rows))
+    library = build_library(tmp_path, unit=0.05644)
+    plan = Plan(track=track_of(lambda t: np.where((t > 5.0) & (t < 10.0), 2.8, 1.2), 15.0), method="blocks")
+    asked = build_request(library, resolve_plan(plan, library))
+    jogs = []
+    for alpha in (rescale_alpha(Plan.alpha), Plan.alpha):
+        carried = words_shown(library, *shown(library, asked, alpha))
+        jogs.append(np.mean(["jogging" in words for words in carried[170:290]]))
+    assert jogs[0] > 0.9 > 0.5 > jogs[1]
 
 
 def test_alpha_weighs_words_against_continuity(library, order):

@@ -1,0 +1,145 @@
+"""Synthesize scenarios by several methods and measure every take alike."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from ...base.errors import InputError, UserCancelledError
+from ...library.library import Library
+from ...synthesis.plan import METHODS, Plan
+from ...synthesis.quality.playback import playback_from_take
+from ...synthesis.synthesize import synthesize
+from ...synthesis.take import Take
+from .. import figures
+from ..realism import measure_smoothness
+from ..reference import View
+from .scenarios import Scenario
+
+NO_CATCH_UP = "distance-no-catch-up"
+"""Method "distance" as in the thesis' chapter 5, which leaves out the catch-up of 3.3.2."""
+METHOD_OPTIONS: dict[str, dict] = {
+    **{name: {"method": name} for name in METHODS}, NO_CATCH_UP: {"method": "distance", "catch_up": False},
+}  # fmt: skip
+"""Name in a comparison -> settings of the plan."""
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class MethodResult:
+    """What a method made of a scenario.
+
+    Attributes:
+        take: the take.
+        figures: groups of the report that the tables show (`measure_take`).
+        times: (T-1,) s on the track's clock.
+        smoothness: (T-1,) m, distance of features from the frame before (Faustino App. D).
+        seconds: processor time of the synthesis.
+    """
+
+    take: Take
+    figures: Mapping
+    times: np.ndarray
+    smoothness: np.ndarray
+    seconds: float
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class MethodComparison:
+    """Methods side by side.
+
+    Attributes:
+        library: folder of the clips.
+        clips: number of recordings, without mirrored ones.
+        minutes: of recordings.
+        scenarios: in the order of their names.
+        methods: in the order in which they were asked for.
+        results: (scenario's name, method) -> what came out.
+    """
+
+    library: str
+    clips: int
+    minutes: float
+    scenarios: Sequence[Scenario]
+    methods: Sequence[str]
+    results: Mapping[tuple[str, str], MethodResult]
+
+    def collect(self, method: str, read: Callable[[MethodResult], float | None]) -> np.ndarray:
+        """Collect a figure of a method for each scenario, NaN where it is unknown."""
+        values = [read(self.results[scenario.name, method]) for scenario in self.scenarios]
+        return np.array([np.nan if value is None else value for value in values], dtype=float)
+
+
+def choose_methods(text: str) -> tuple[str, ...]:
+    """Choose methods by a list of names.
+
+    Args:
+        text: names with commas between them.
+    Raises:
+        InputError: for no name, an unknown one, and one that comes twice.
+    """
+    names = [name.strip() for name in text.split(",") if name.strip()]
+    expected = f"some of {', '.join(METHOD_OPTIONS)}"
+    if not names:
+        raise InputError("--methods", "no method", expected)
+    for place, name in enumerate(names):
+        if name not in METHOD_OPTIONS:
+            raise InputError("--methods", repr(name), expected)
+        if name in names[:place]:
+            raise InputError("--methods", f"{name} twice", "each method once", "remove one of them")
+    return tuple(names)
+
+
+def compare_methods(
+    library: Library, scenarios: Sequence[Scenario], methods: Sequence[str], fps: float, seed: int = 0,
+    progress: Callable[[float, str], None] | None = None, cancelled: Callable[[], bool] | None = None,
+) -> MethodComparison:
+    """Synthesize every scenario by every method and measure the takes.
+
+    Labels that the library lacks are replaced by the nearest ones, for all methods alike.
+
+    Args:
+        library: the clips.
+        scenarios: tracks with labels.
+        methods: names of METHOD_OPTIONS.
+        fps: frames per second of the takes.
+        seed: of every plan.
+        progress: called as progress(fraction, text).
+        cancelled: returns whether to stop.
+    Raises:
+        UserCancelledError: when `cancelled` returns true.
+    """
+    results, pairs = {}, [(scenario, method) for scenario in scenarios for method in methods]
+    for number, (scenario, method) in enumerate(pairs):
+        if cancelled is not None and cancelled():
+            raise UserCancelledError("compare: cancelled")
+        if progress is not None:
+            progress(number / len(pairs), f"{scenario.name}, {method}")
+        plan = Plan(track=scenario.track, timeline=scenario.timeline, library=library.folder, fps=fps, seed=seed,
+                    nearest=True, **METHOD_OPTIONS[method])
+        if scenario is scenarios[0]:  # what is computed once for the library is no part of the seconds
+            synthesize(library, plan, cancelled=cancelled)
+        started = time.process_time()
+        take = synthesize(library, plan, cancelled=cancelled)
+        results[scenario.name, method] = measure_take(take, library, time.process_time() - started)
+    recorded = [clip for clip in library.clips if not clip.mirrored]
+    return MethodComparison(library=library.folder, clips=len(recorded), minutes=library.minutes, scenarios=scenarios,
+                            methods=methods, results=results)
+
+
+def measure_take(take: Take, library: Library, seconds: float) -> MethodResult:
+    """Measure a take.
+
+    Args:
+        take: the take.
+        library: its clips.
+        seconds: processor time of its synthesis.
+    """
+    played = playback_from_take(take)
+    view = View(played, take.plan.track, take.timeline, library)
+    groups = {**figures.measure_path_errors(view), **figures.measure_feet(view), **figures.measure_transitions(view),
+              "annotation_similarity": figures.measure_annotation_similarity(view)}
+    curve = measure_smoothness(played.motion.skeleton, played.positions, view.fps)
+    return MethodResult(take=take, figures=groups, times=played.times[1:], smoothness=curve, seconds=seconds)

@@ -1,0 +1,89 @@
+"""Methods side by side: what the tables say is what the takes are, and what is said of them follows from figures."""
+
+import numpy as np
+import pytest
+
+from beyond_mocap.base.errors import InputError
+from beyond_mocap.evaluation.methods.comparison import choose_methods, compare_methods
+from beyond_mocap.evaluation.methods.report import build_comparison_page, build_comparison_report
+from beyond_mocap.evaluation.methods.scenarios import read_scenarios
+from beyond_mocap.evaluation.methods.tables import build_tables, describe_differences, format_markdown
+from beyond_mocap.evaluation.methods.thesis import THESIS
+from beyond_mocap.evaluation.report import evaluate
+from beyond_mocap.library.build import build_library
+from beyond_mocap.motion.track import sample_track
+
+METHODS = ("blocks", "fs", "baseline")
+
+
+def write_track(path, speed, turn_rate=0.0):
+    """Four seconds at a speed, m/s, turning by rad/s."""
+    times = np.arange(0.0, 4.001, 0.04)
+    steps = speed * 0.04 * np.stack([np.cos(turn_rate * times), np.sin(turn_rate * times)], axis=1)
+    rows = np.column_stack([times, np.cumsum(steps, axis=0)])
+    path.write_text("time_s,x_m,y_m\n" + "\n".join(",".join(f"{v:.4f}" for v in row) for row in rows) + "\n")
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    place = tmp_path_factory.mktemp("scenarios")
+    write_track(place / "scenario1_track.csv", 1.4)
+    (place / "scenario1_annotations.txt").write_text("2 kick right\n")
+    write_track(place / "turn.csv", 2.6, 0.3)
+    (place / "events.csv").write_text("time,event\n1,kick\n")
+    return place
+
+
+@pytest.fixture(scope="module")
+def comparison(folder, clips_folder, tmp_path_factory):
+    library = build_library(clips_folder, cache_dir=tmp_path_factory.mktemp("cache"))
+    return library, compare_methods(library, read_scenarios(folder, 30.0)[0], METHODS, 30.0)
+
+
+def test_scenarios_are_tracks_with_their_labels(folder):
+    scenarios, notes = read_scenarios(folder, 30.0)
+    assert [scenario.name for scenario in scenarios] == ["scenario1", "turn"]
+    assert len(scenarios[0].timeline.keys) == 1 and not scenarios[1].timeline.keys
+    assert [line.rpartition("/")[2].split(":")[0] for line in notes] == ["events.csv", "turn.csv"]
+
+
+def test_a_name_alone_makes_no_scenario_of_the_thesis(folder):
+    assert not any(scenario.thesis for scenario in read_scenarios(folder, 30.0)[0]) and len(THESIS) == 5
+
+
+def test_the_tables_have_the_figures_of_the_reports(comparison):
+    library, found = comparison
+    distance, similarity, *_ = build_tables(found)
+    for row, method in zip(distance.rows, METHODS):
+        reports = [evaluate(found.results[s.name, method].take, s.track, library) for s in found.scenarios]
+        off = [report["pelvis_error_m"]["mean"] for report in reports]
+        assert row[0] == method and [cell.split(" / ")[0] for cell in row[1:]] == [
+            f"{value:.2f}" for value in (*off, np.mean(off))]  # fmt: skip
+    assert all(row[2].split(" / ")[1].startswith("–") for row in similarity.rows)  # no key moment in "turn"
+
+
+def test_what_is_said_follows_from_the_figures(comparison):
+    _, found = comparison
+    first = describe_differences(found)[0]
+    assert first.startswith("Distance from the track, least first: ") and first.index("fs") < first.index("blocks")
+    off = np.linalg.norm(found.results["turn", "fs"].take.motion.root_positions[:, :2]
+                         - sample_track(found.scenarios[1].track, 30.0).positions, axis=1)
+    assert off.mean() < 0.1
+    text = "\n".join(format_markdown(found))
+    assert all(f"| {method} |" in text for method in METHODS) and "Faustino's thesis" not in text
+
+
+def test_the_page_has_a_curve_of_every_scenario_and_the_report_every_figure(comparison):
+    pytest.importorskip("matplotlib")
+    _, found = comparison
+    assert build_comparison_page(found).count("data:image/png") == len(found.scenarios)
+    report = build_comparison_report(found)
+    take = report["takes"]["scenario1"]["fs"]
+    assert len(take["smoothness_m"]) == len(found.results["scenario1", "fs"].take.motion) - 1
+    assert any("key moment" in line for line in report["takes"]["scenario1"]["baseline"]["warnings"])
+
+
+@pytest.mark.parametrize("text, found", [("", "no method"), ("path,magic", "'magic'"), ("fs, path,fs", "fs twice")])
+def test_methods_that_nobody_has_are_refused(text, found):
+    with pytest.raises(InputError, match=found):
+        choose_methods(text)

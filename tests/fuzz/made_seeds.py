@@ -1,0 +1,46 @@
+"""Valid files to damage that the program itself writes: tables, pieces, a model of markers, a classifier, a player."""
+
+import json
+import shutil
+from pathlib import Path
+
+import numpy as np
+from seeds import SAMPLE
+
+from beyond_mocap.annotation import event_labels
+from beyond_mocap.cli.main import main
+from beyond_mocap.markers.files.marker_set_text import SHIPPED
+from beyond_mocap.markers.files.model_json import write_model
+from beyond_mocap.match.piece_file import write_piece_file
+from beyond_mocap.match.player_edit import write_player
+from tests.core.markers.files.small_model import small_model
+from tests.core.match.made_player import made_player
+
+_LEARNED = ("kick_low_inside", "kick_low_top", "jogging_2_9")  # clips of the sample from which the classifier learns
+
+
+def build_made_seeds(folder: Path) -> dict[str, Path]:
+    """Write the seeds into a folder; name -> file."""
+    names = ("piece.npz", "match.json", "mesh.obj", "clips.csv", "model.json", "player.npz")
+    seeds = {name: folder / name for name in names}
+    write_piece_file(seeds["piece.npz"], {"number": 1}, {"clip": np.arange(4), "rate": np.ones(4)})
+    state = {"version": 1, "digest": "0" * 16, "players": [{"id": "home_7", "status": "done"}], "notes": []}
+    seeds["match.json"].write_text(json.dumps(state, indent=1))
+    seeds["mesh.obj"].write_text("v 0 0 0\nv 1 0 0\nv 0 1 0\nvn 0 0 1\nf 1//1 2//1 3//1\n")
+    seeds["clips.csv"].write_text("file,system,scenario\na.mp4,ours,1\nb.mp4,theirs,1\n")
+    write_model(small_model(), seeds["model.json"])
+    write_player(seeds["player.npz"], made_player())
+    seeds["set.txt"] = sorted(SHIPPED.glob("*.txt"))[0]
+    seeds["event_labels.csv"] = Path(event_labels.__file__).parent / "event_words.csv"
+    return {**seeds, "classifier.npz": _learn(folder / "learned", folder / "classifier.npz")}
+
+
+def _learn(clips: Path, out: Path) -> Path:
+    """Learn a classifier from clips of the sample; SystemExit where that fails."""
+    clips.mkdir()
+    for name in _LEARNED:
+        for ending in (".bvh", ".txt"):
+            shutil.copy(SAMPLE / "library" / (name + ending), clips)
+    if main(["library", str(clips), "--cache", str(clips), "--learn", str(out)]):
+        raise SystemExit("fuzz: no classifier can be learned, so that a seed is missing")
+    return out
