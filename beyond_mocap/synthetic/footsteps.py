@@ -172,41 +172,43 @@ def compute_foot_path(
 def _compute_swing(steps, which, times, air, hip, heading, neutral: NeutralStance, thigh_shank) -> FootPath:
     """Compute the foot in the air at `times[air]`, after stances `which`."""
     scale = neutral.leg / tables.LEG
-    begin, end = steps.off[which], steps.on[which + 1]
+    # all frames of a swing have the same two ends: these are computed once a swing
+    swings, of = np.unique(which, return_inverse=True)
+    begin, end = steps.off[swings], steps.on[swings + 1]
     length = end - begin
-    share = (times[air] - begin) / length
-    leave, land = (compute_stance(steps, w, np.full(len(w), u), neutral) for w, u in ((which, 1.0), (which + 1, 0.0)))
-    leave_speed, land_speed = _compute_edge_speeds(steps, which, neutral)
-    speed = 0.5 * (steps.speed[which] + steps.speed[which + 1])
-    direction = steps.direction[which + 1]
+    share = (times[air] - begin[of]) / length[of]
+    leave, land = (compute_stance(steps, w, np.full(len(w), u), neutral) for w, u in ((swings, 1.0), (swings + 1, 0.0)))
+    leave_speed, land_speed = _compute_edge_speeds(steps, swings, neutral)
+    speed = 0.5 * (steps.speed[swings] + steps.speed[swings + 1])
+    direction = steps.direction[swings + 1]
 
-    def published_swing(at, share_at):
-        """Ankle (N, 3) and pitch (N,) of the published swing, hung on the hip at seconds `at`."""
+    def published_swing(at, share_at, rows=slice(None)):
+        """Ankle (N, 3) and pitch (N,) of the published swing of `rows`, hung on the hip at seconds `at`."""
         hip_at = interpolate_columns(at, times, hip)
         heading_at = np.interp(at, times, heading)
-        forward, up, pitch = _compute_leg_swing(share_at, speed, direction, thigh_shank)
+        forward, up, pitch = _compute_leg_swing(share_at, speed[rows], direction[rows], thigh_shank)
         across = np.stack([forward * np.cos(heading_at), forward * np.sin(heading_at), up], axis=-1)
         return np.concatenate([hip_at + across, pitch[:, None]], axis=-1)
 
-    now = published_swing(times[air], share)
+    now = published_swing(times[air], share, of)
     step = 0.01
-    at_leave, at_land = published_swing(begin, np.zeros_like(share)), published_swing(end, np.ones_like(share))
+    at_leave, at_land = published_swing(begin, np.zeros_like(length)), published_swing(end, np.ones_like(length))
     # velocities of the published swing at its ends, by one-sided differences
-    free_leave = (published_swing(begin + step * length, np.full_like(share, step)) - at_leave) / (step * length)[:,
+    free_leave = (published_swing(begin + step * length, np.full_like(length, step)) - at_leave) / (step * length)[:,
             None]
-    free_land = (at_land - published_swing(end - step * length, np.full_like(share, 1 - step))) / (step * length)[:,
+    free_land = (at_land - published_swing(end - step * length, np.full_like(length, 1 - step))) / (step * length)[:,
             None]
     wanted_leave = np.concatenate([leave.ankle, leave.pitch[:, None]], axis=-1)
     wanted_land = np.concatenate([land.ankle, land.pitch[:, None]], axis=-1)
-    full = now + _bridge_ends(share, length, wanted_leave - at_leave, offset1=wanted_land - at_land,
-                              speed0=leave_speed - free_leave, speed1=land_speed - free_land)
+    full = now + _bridge_ends(share, length[of], (wanted_leave - at_leave)[of], offset1=(wanted_land - at_land)[of],
+                              speed0=(leave_speed - free_leave)[of], speed1=(land_speed - free_land)[of])
     size = steps.compute_step_size(scale)[which]
-    small = _compute_small_step(share, wanted_leave, wanted_land, size * 0.05 * scale)
+    small = _compute_small_step(share, wanted_leave[of], wanted_land[of], size * 0.05 * scale)
     mixed = full * size[:, None] + small * (1.0 - size[:, None])
-    yaw = leave.yaw + (land.yaw - leave.yaw) * quintic_step(share)
+    yaw = leave.yaw[of] + (land.yaw - leave.yaw)[of] * quintic_step(share)
     ankle = mixed[:, :3].copy()
     ankle[:, 2] += _compute_clearance(ankle[:, 2], mixed[:, 3], share, size, neutral)
-    return FootPath(ankle, mixed[:, 3], yaw, leave.bend * (1.0 - quintic_step(share / 0.3)))
+    return FootPath(ankle, mixed[:, 3], yaw, leave.bend[of] * (1.0 - quintic_step(share / 0.3)))
 
 
 def _compute_edge_speeds(steps: Footsteps, which: np.ndarray, neutral: NeutralStance) -> tuple[np.ndarray, np.ndarray]:
