@@ -583,10 +583,11 @@ def work_once(extension):
 
 
 @pytest.fixture(scope="module")
-def stages(extension, session, work_once, tmp_path_factory):
+def stages(session, work_once, library_folder, tmp_path_factory):
     """The folders, and a file for each stage."""
     top = tmp_path_factory.mktemp("worlds")
     places = worlds.make_places(top)
+    shutil.copytree(library_folder / ".beyond_mocap", places.clips / ".beyond_mocap")
     bpy.ops.wm.read_homefile(use_empty=True)
     for name, go_on in worlds.STAGES.items():
         go_on(places)
