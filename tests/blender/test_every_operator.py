@@ -273,7 +273,7 @@ def listen():
         for piece in (text.split("MOTION")[0], *text.strip().split("\n")[-40:]):
             out.sendto(piece.encode(), ("127.0.0.1", listener.port))
             time.sleep(0.01)
-    end = time.monotonic() + 20.0
+    end = time.monotonic() + 120.0
     while listener.measure_status().frames < 20:
         assert time.monotonic() < end, f"{listener.measure_status()}"
         time.sleep(0.01)
