@@ -138,75 +138,98 @@ def roll_foot(pitch: np.ndarray, tip_pitch: np.ndarray, neutral: NeutralStance, 
     return np.where(pitch >= 0.0, ahead, heel_ahead), np.where(pitch >= 0.0, up, heel_up)
 
 
-def compute_foot_path(
-    steps: Footsteps, times: np.ndarray, hip: np.ndarray, heading: np.ndarray, neutral: NeutralStance,
-    thigh_shank: tuple[float, float],
-) -> FootPath:
-    """Compute the whole movement of one foot.
+class FootMovement:
+    """The movement of one foot at T moments: all of it that does not hang on the hips, computed once.
 
     Args:
         steps: the stances.
         times: (T,) s, evenly spaced.
-        hip: (T, 3) m, hip joint, world frame.
         heading: (T,) rad of the body.
         neutral: neutral stance of the body.
         thigh_shank: bone lengths, m.
-    Returns:
-        The foot at these T moments.
     """
-    which = steps.find_stance(times)
-    share = np.clip((times - steps.on[which]) / (steps.off[which] - steps.on[which]), 0.0, 1.0)
-    stance = compute_stance(steps, which, share, neutral)
-    is_in_air = times > steps.off[which]
-    if not np.any(is_in_air):
-        return stance
-    swing = _compute_swing(steps, which[is_in_air], times, air=is_in_air, hip=hip, heading=heading, neutral=neutral,
-                           thigh_shank=thigh_shank)
-    out = {}
-    for name in ("ankle", "pitch", "yaw", "bend"):
-        out[name] = getattr(stance, name).copy()
-        out[name][is_in_air] = getattr(swing, name)
-    return FootPath(**out)
+
+    def __init__(self, steps: Footsteps, times: np.ndarray, heading: np.ndarray, neutral: NeutralStance,
+                 thigh_shank: tuple[float, float]):
+        self.times = times
+        which = steps.find_stance(times)
+        share = np.clip((times - steps.on[which]) / (steps.off[which] - steps.on[which]), 0.0, 1.0)
+        self.stance = compute_stance(steps, which, share, neutral)
+        self.is_in_air = times > steps.off[which]
+        self.swings = None
+        if np.any(self.is_in_air):
+            self.swings = _Swings(steps, which[self.is_in_air], times, air=self.is_in_air, heading=heading,
+                                  neutral=neutral, thigh_shank=thigh_shank)
+
+    def compute_path(self, hip: np.ndarray) -> FootPath:
+        """Compute the foot at these T moments for a hip joint at `hip`, (T, 3) m, world frame."""
+        if self.swings is None:
+            return self.stance
+        swing, out = self.swings.compute_path(self.times, hip), {}
+        for name in ("ankle", "pitch", "yaw", "bend"):
+            out[name] = getattr(self.stance, name).copy()
+            out[name][self.is_in_air] = getattr(swing, name)
+        return FootPath(**out)
 
 
-def _compute_swing(steps, which, times, air, hip, heading, neutral: NeutralStance, thigh_shank) -> FootPath:
-    """Compute the foot in the air at `times[air]`, after stances `which`."""
-    scale = neutral.leg / tables.LEG
-    begin, end = steps.off[which], steps.on[which + 1]
-    length = end - begin
-    share = (times[air] - begin) / length
-    leave, land = (compute_stance(steps, w, np.full(len(w), u), neutral) for w, u in ((which, 1.0), (which + 1, 0.0)))
-    leave_speed, land_speed = _compute_edge_speeds(steps, which, neutral)
-    speed = 0.5 * (steps.speed[which] + steps.speed[which + 1])
-    direction = steps.direction[which + 1]
+class _Swings:
+    """The foot in the air at N moments `times[air]`, after stances `which`. All frames of a swing have the same two
+    ends, which are computed once a swing.
+    """
 
-    def published_swing(at, share_at):
-        """Ankle (N, 3) and pitch (N,) of the published swing, hung on the hip at seconds `at`."""
-        hip_at = interpolate_columns(at, times, hip)
-        heading_at = np.interp(at, times, heading)
-        forward, up, pitch = _compute_leg_swing(share_at, speed, direction, thigh_shank)
-        across = np.stack([forward * np.cos(heading_at), forward * np.sin(heading_at), up], axis=-1)
-        return np.concatenate([hip_at + across, pitch[:, None]], axis=-1)
+    def __init__(self, steps: Footsteps, which, times, air, heading, neutral: NeutralStance, thigh_shank):
+        scale = neutral.leg / tables.LEG
+        swings, of = np.unique(which, return_inverse=True)
+        begin, end = steps.off[swings], steps.on[swings + 1]
+        length = end - begin
+        self.neutral, self.of, self.length = neutral, of, length
+        self.share = (times[air] - begin[of]) / length[of]
+        self.leave, self.land = (
+            compute_stance(steps, w, np.full(len(w), u), neutral) for w, u in ((swings, 1.0), (swings + 1, 0.0))
+        )
+        self.leave_speed, self.land_speed = _compute_edge_speeds(steps, swings, neutral)
+        self.size = steps.compute_step_size(scale)[which]
+        wanted = [np.concatenate([foot.ankle, foot.pitch[:, None]], axis=-1) for foot in (self.leave, self.land)]
+        self.wanted_leave, self.wanted_land = wanted
+        self.small = _compute_small_step(self.share, self.wanted_leave[of], self.wanted_land[of],
+                                         self.size * 0.05 * scale)
+        speed = 0.5 * (steps.speed[swings] + steps.speed[swings + 1])
+        direction = steps.direction[swings + 1]
+        step = self.step = 0.01
 
-    now = published_swing(times[air], share)
-    step = 0.01
-    at_leave, at_land = published_swing(begin, np.zeros_like(share)), published_swing(end, np.ones_like(share))
-    # velocities of the published swing at its ends, by one-sided differences
-    free_leave = (published_swing(begin + step * length, np.full_like(share, step)) - at_leave) / (step * length)[:,
-            None]
-    free_land = (at_land - published_swing(end - step * length, np.full_like(share, 1 - step))) / (step * length)[:,
-            None]
-    wanted_leave = np.concatenate([leave.ankle, leave.pitch[:, None]], axis=-1)
-    wanted_land = np.concatenate([land.ankle, land.pitch[:, None]], axis=-1)
-    full = now + _bridge_ends(share, length, wanted_leave - at_leave, offset1=wanted_land - at_land,
-                              speed0=leave_speed - free_leave, speed1=land_speed - free_land)
-    size = steps.compute_step_size(scale)[which]
-    small = _compute_small_step(share, wanted_leave, wanted_land, size * 0.05 * scale)
-    mixed = full * size[:, None] + small * (1.0 - size[:, None])
-    yaw = leave.yaw + (land.yaw - leave.yaw) * quintic_step(share)
-    ankle = mixed[:, :3].copy()
-    ankle[:, 2] += _compute_clearance(ankle[:, 2], mixed[:, 3], share, size, neutral)
-    return FootPath(ankle, mixed[:, 3], yaw, leave.bend * (1.0 - quintic_step(share / 0.3)))
+        def publish(at, share_at, rows=slice(None)):
+            """Seconds `at`, and ankle (N, 3) from the hip and pitch (N, 1) of the published swings of `rows`."""
+            heading_at = np.interp(at, times, heading)
+            forward, up, pitch = _compute_leg_swing(share_at, speed[rows], direction[rows], thigh_shank)
+            return at, np.stack([forward * np.cos(heading_at), forward * np.sin(heading_at), up], axis=-1), pitch[:,
+                    None]
+
+        self.now = publish(times[air], self.share, of)
+        self.at_leave, self.at_land = publish(begin, np.zeros_like(length)), publish(end, np.ones_like(length))
+        self.after_leave = publish(begin + step * length, np.full_like(length, step))
+        self.before_land = publish(end - step * length, np.full_like(length, 1 - step))
+
+    def compute_path(self, times: np.ndarray, hip: np.ndarray) -> FootPath:
+        """Compute the foot in the air, hung on the hip joint, (T, 3) m at `times` (T,)."""
+
+        def hang(published):
+            at, from_hip, pitch = published
+            return np.concatenate([interpolate_columns(at, times, hip) + from_hip, pitch], axis=-1)
+
+        of, share, span = self.of, self.share, (self.step * self.length)[:, None]
+        at_leave, at_land = hang(self.at_leave), hang(self.at_land)
+        # velocities of the published swing at its ends, by one-sided differences
+        free_leave = (hang(self.after_leave) - at_leave) / span
+        free_land = (at_land - hang(self.before_land)) / span
+        full = hang(self.now) + _bridge_ends(
+            share, self.length[of], (self.wanted_leave - at_leave)[of], offset1=(self.wanted_land - at_land)[of],
+            speed0=(self.leave_speed - free_leave)[of], speed1=(self.land_speed - free_land)[of])
+        size, neutral = self.size, self.neutral
+        mixed = full * size[:, None] + self.small * (1.0 - size[:, None])
+        yaw = self.leave.yaw[of] + (self.land.yaw - self.leave.yaw)[of] * quintic_step(share)
+        ankle = mixed[:, :3].copy()
+        ankle[:, 2] += _compute_clearance(ankle[:, 2], mixed[:, 3], share, size, neutral)
+        return FootPath(ankle, mixed[:, 3], yaw, self.leave.bend[of] * (1.0 - quintic_step(share / 0.3)))
 
 
 def _compute_edge_speeds(steps: Footsteps, which: np.ndarray, neutral: NeutralStance) -> tuple[np.ndarray, np.ndarray]:

@@ -9,7 +9,7 @@ from ..motion.humanoid import identify_joints
 from ..motion.retargeting.neutral import NeutralStance
 from ..motion.retargeting.posture import Posture, compute_hip_positions
 from . import gait_tables as tables
-from .footsteps import TOE_LIFT_PITCH, Footsteps, compute_foot_path, roll_foot
+from .footsteps import TOE_LIFT_PITCH, FootMovement, Footsteps, roll_foot
 
 # longest reach of a leg, walking and running, share of its length: runners' knees stay bent by about 20
 # degrees (V, and recordings), and a knee that snaps straight is the most visible error
@@ -20,6 +20,51 @@ _SPRINT_HEIGHT = 0.94
 _CLOSEST = (0.317, 0.259)
 # share of the leg's length below that limit from which a swinging leg eases toward it
 _EASE_SHARE = 0.03
+
+
+class Legs:
+    """Both legs at T moments on given stances, for one or several paths of the hips.
+
+    Args:
+        times: (T,) s.
+        steps: stances of the left and the right foot.
+        heading: (T,) rad of the body.
+        neutral: neutral stance of the body.
+    """
+
+    def __init__(self, times: np.ndarray, steps: tuple[Footsteps, ...], heading: np.ndarray, neutral: NeutralStance):
+        self.times, self.steps, self.neutral = times, steps, neutral
+        self.feet = tuple(FootMovement(steps[s], times, heading=heading, neutral=neutral,
+                                       thigh_shank=measure_leg(neutral, s)) for s in (0, 1))
+
+    def plant_feet(self, posture: Posture) -> Posture:
+        """Set the feet of a posture; the hips are lowered where a leg would not reach."""
+        times, steps, neutral = self.times, self.steps, self.neutral
+        hips = posture.hips.copy()
+        hips[:, 2] -= self.compute_hip_drop(posture)
+        posture = posture.replace_arrays(hips=hips)
+        tops = compute_hip_positions(posture, neutral)
+        paths = [self.feet[s].compute_path(tops[:, s]) for s in (0, 1)]
+        ankles = [limit_leg_reach(paths[s].ankle, tops[:, s], times, steps[s], sum(measure_leg(neutral, s)))
+                  for s in (0, 1)]
+        feet = np.stack([np.stack([np.zeros_like(p.pitch), p.pitch, p.yaw], axis=-1) for p in paths], axis=1)
+        return posture.replace_arrays(ankles=np.stack(ankles, axis=1), feet=feet,
+                                      toes=np.stack([p.bend for p in paths], axis=1))
+
+    def compute_hip_drop(self, posture: Posture) -> np.ndarray:
+        """Compute how far (T,) m to lower the hips so that feet in contact are in reach, smooth in time."""
+        times, tops = self.times, compute_hip_positions(posture, self.neutral)
+        drop = np.zeros(len(times))
+        for side, steps in enumerate(self.steps):
+            ankle = self.feet[side].compute_path(tops[:, side]).ankle
+            longest = _compute_longest_reach(steps, times) * sum(measure_leg(self.neutral, side))
+            flat = np.sum((tops[:, side, :2] - ankle[:, :2]) ** 2, axis=-1)
+            highest = ankle[:, 2] + np.sqrt(np.maximum(longest**2 - flat, 0.0))
+            drop = np.maximum(drop, np.where(steps.is_in_contact(times), tops[:, side, 2] - highest, 0.0))
+        width = max(int(0.06 / (times[1] - times[0])), 1)
+        # the greatest need around each frame, then smoothed: never less than needed
+        around = np.lib.stride_tricks.sliding_window_view(np.pad(drop, width, mode="edge"), 2 * width + 1)
+        return hann_smooth(np.max(around, axis=-1), width)
 
 
 def plant_feet(posture: Posture, times: np.ndarray, steps: tuple[Footsteps, ...], neutral: NeutralStance) -> Posture:
@@ -33,17 +78,7 @@ def plant_feet(posture: Posture, times: np.ndarray, steps: tuple[Footsteps, ...]
     Returns:
         The posture with feet.
     """
-    hips = posture.hips.copy()
-    hips[:, 2] -= compute_hip_drop(posture, times, steps, neutral)
-    posture = posture.replace_arrays(hips=hips)
-    tops = compute_hip_positions(posture, neutral)
-    paths = [compute_foot_path(steps[s], times, tops[:, s], heading=posture.heading, neutral=neutral,
-                               thigh_shank=measure_leg(neutral, s)) for s in (0, 1)]
-    ankles = [limit_leg_reach(paths[s].ankle, tops[:, s], times, steps[s], sum(measure_leg(neutral, s)))
-              for s in (0, 1)]
-    feet = np.stack([np.stack([np.zeros_like(p.pitch), p.pitch, p.yaw], axis=-1) for p in paths], axis=1)
-    return posture.replace_arrays(ankles=np.stack(ankles, axis=1), feet=feet,
-                                  toes=np.stack([p.bend for p in paths], axis=1))
+    return Legs(times, steps, posture.heading, neutral).plant_feet(posture)
 
 
 def _compute_longest_reach(steps: Footsteps, times: np.ndarray) -> np.ndarray:
@@ -111,20 +146,3 @@ def measure_push_off(neutral: NeutralStance) -> float:
     ahead, up = roll_foot(pitch, pitch - TOE_LIFT_PITCH, neutral, 0)
     below = _SPRINT_HEIGHT * (neutral.leg + neutral.ankle_height) - up
     return float(ahead[0] + np.sqrt(max((_SPRINT_REACH * neutral.leg) ** 2 - below[0] ** 2, 0.0))) / neutral.leg
-
-
-def compute_hip_drop(posture: Posture, times: np.ndarray, steps, neutral: NeutralStance) -> np.ndarray:
-    """Compute how far (T,) m to lower the hips so that feet in contact are in reach, smooth in time."""
-    tops = compute_hip_positions(posture, neutral)
-    drop = np.zeros(len(times))
-    for side in (0, 1):
-        path = compute_foot_path(steps[side], times, tops[:, side], heading=posture.heading, neutral=neutral,
-                                 thigh_shank=measure_leg(neutral, side))
-        longest = _compute_longest_reach(steps[side], times) * sum(measure_leg(neutral, side))
-        flat = np.sum((tops[:, side, :2] - path.ankle[:, :2]) ** 2, axis=-1)
-        highest = path.ankle[:, 2] + np.sqrt(np.maximum(longest**2 - flat, 0.0))
-        drop = np.maximum(drop, np.where(steps[side].is_in_contact(times), tops[:, side, 2] - highest, 0.0))
-    width = max(int(0.06 / (times[1] - times[0])), 1)
-    # the greatest need around each frame, then smoothed: never less than needed
-    around = np.lib.stride_tricks.sliding_window_view(np.pad(drop, width, mode="edge"), 2 * width + 1)
-    return hann_smooth(np.max(around, axis=-1), width)

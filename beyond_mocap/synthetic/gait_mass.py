@@ -21,7 +21,7 @@ from ..motion.retargeting.neutral import NeutralStance
 from ..motion.retargeting.posture import Posture, to_motion
 from . import gait_tables as tables
 from .footsteps import Footsteps
-from .gait_legs import compute_hip_drop, plant_feet
+from .gait_legs import Legs
 from .gait_plan import GaitPlan
 
 # m/s by which a runner slows down on landing and speeds up until the foot leaves (V)
@@ -81,16 +81,17 @@ def follow_mass(posture: Posture, plan: GaitPlan, steps: tuple[Footsteps, ...], 
     rate = 1.0 / (plan.times[1] - plan.times[0])
     share = hann_smooth(tables.compute_flight_share(plan.adult_speed), int(_ONSET * rate))
     share = share * ((plan.times > flights.middle[_EDGE]) & (plan.times < flights.middle[-1 - _EDGE]))
-    posture = plant_feet(posture, plan.times, steps, neutral)
+    legs = Legs(plan.times, steps, posture.heading, neutral)
+    posture = legs.plant_feet(posture)
     base = _compute_base(measure_mass(posture, neutral), plan, flights)
     for reach in _PASSES:
         wanted = plan_mass_path(plan, flights, base)
         hips = posture.hips + _GAIN * share[:, None] * (wanted - measure_mass(posture, neutral))
         posture = posture.replace_arrays(hips=hips)
         if reach:
-            drop = compute_hip_drop(posture, plan.times, steps, neutral) * share
+            drop = legs.compute_hip_drop(posture) * share
             base = base - _spread_drop(drop, plan, flights)[:, None] * [0.0, 0.0, 1.0]
-        posture = plant_feet(posture, plan.times, steps, neutral)
+        posture = legs.plant_feet(posture)
     return posture
 
 

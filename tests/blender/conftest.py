@@ -63,6 +63,30 @@ def empty_scene(extension):
 
 
 @pytest.fixture(scope="session")
+def library_folder(core, tmp_path_factory):
+    """A few clips of the sample, their library built and its synthetic clips made: seconds of work, done once.
+
+    Here, because a fixture that test files import from each other is set up again in each of them."""
+    import worlds
+
+    folder = tmp_path_factory.mktemp("library")
+    for name in worlds.CLIPS:
+        for suffix in (".bvh", ".txt"):
+            (folder / f"{name}{suffix}").symlink_to(worlds.SAMPLE / f"{name}{suffix}")
+    assert core("library.build").build_library(folder).with_synthetic_clips.clips
+    return folder
+
+
+@pytest.fixture(scope="session")
+def sample_cache(core, tmp_path_factory):
+    """The cache of the sample's whole library, with its synthetic clips."""
+    folder = tmp_path_factory.mktemp("sample_cache")
+    assert core("library.build").build_library(SOURCE / "sample_blend" / "library",
+                                               cache_dir=folder).with_synthetic_clips.clips
+    return folder
+
+
+@pytest.fixture(scope="session")
 def core(extension):
     """Import a core module by its dotted name below the core: `core("motion.quaternion")`; `core()` is the core."""
     def module(name=""):

@@ -273,7 +273,7 @@ def listen():
         for piece in (text.split("MOTION")[0], *text.strip().split("\n")[-40:]):
             out.sendto(piece.encode(), ("127.0.0.1", listener.port))
             time.sleep(0.01)
-    end = time.monotonic() + 20.0
+    end = time.monotonic() + 120.0
     while listener.measure_status().frames < 20:
         assert time.monotonic() < end, f"{listener.measure_status()}"
         time.sleep(0.01)
@@ -583,10 +583,11 @@ def work_once(extension):
 
 
 @pytest.fixture(scope="module")
-def stages(extension, session, work_once, tmp_path_factory):
+def stages(session, work_once, library_folder, tmp_path_factory):
     """The folders, and a file for each stage."""
     top = tmp_path_factory.mktemp("worlds")
     places = worlds.make_places(top)
+    shutil.copytree(library_folder / ".beyond_mocap", places.clips / ".beyond_mocap")
     bpy.ops.wm.read_homefile(use_empty=True)
     for name, go_on in worlds.STAGES.items():
         go_on(places)

@@ -10,9 +10,10 @@ import bpy
 SAMPLE = pathlib.Path(__file__).resolve().parents[2] / "sample_blend"
 
 
-def test_three_buttons(extension, tmp_path):
+def test_three_buttons(extension, sample_cache, tmp_path):
     for folder in ("library", "match"):
         shutil.copytree(SAMPLE / folder, tmp_path / folder, ignore=shutil.ignore_patterns(".beyond_mocap"))
+    shutil.copytree(sample_cache, tmp_path / "library" / ".beyond_mocap")
     shutil.copy(SAMPLE / "quickstart.blend", tmp_path)
     assert (tmp_path / "quickstart.blend").stat().st_size < 1e6
     bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "quickstart.blend"))

@@ -1,5 +1,6 @@
 """A small made library with planted truths (speeds, a kick's moment), and made tracks, for the core's tests."""
 
+import gc
 import os
 from pathlib import Path
 from typing import NamedTuple
@@ -38,6 +39,13 @@ def pytest_collection_modifyitems(items):
     for item in items:
         room = item.path.relative_to(HERE).parts[0] if item.path.is_relative_to(HERE) else item.path.name
         item.add_marker(pytest.mark.xdist_group(room))
+
+
+def pytest_sessionfinish():
+    """Collect garbage before a worker says that it is done. Pytest does it five times more, and execnet interrupts
+    a worker that then takes longer than five seconds; what is left now is not looked at again."""
+    gc.collect()
+    gc.freeze()
 
 
 @pytest.fixture(scope="session")

@@ -27,6 +27,8 @@ LONG = ("library", "quality")  # longer than the window
 TABS = 22  # pixels of a sidebar's right edge that are its tabs
 FRAME = 190
 
+bpy.context.preferences.system.viewport_aa = "8"  # which checks do without
+
 
 @cache
 def list_panels(kind, parent=""):

@@ -10,21 +10,16 @@ import pytest
 
 TOP = pathlib.Path(__file__).resolve().parents[3]
 SAMPLE = TOP / "sample_blend"
-CLIPS = ("standing_1", "walking_1_2", "walk_jog_walk", "jogging_2_9", "running_4_2")
 
 
 @pytest.fixture(scope="module")
-def order(tmp_path_factory):
+def order(library_folder, tmp_path_factory):
     """Arguments of a short synthesis."""
     folder = tmp_path_factory.mktemp("order")
-    (folder / "library").mkdir()
-    for name in CLIPS:
-        for suffix in (".bvh", ".txt"):
-            (folder / "library" / f"{name}{suffix}").symlink_to(SAMPLE / "library" / f"{name}{suffix}")
     rows = "\n".join(f"{t / 10},{t / 5},0,{t / 5 + 1},0,0.11" for t in range(40))
     (folder / "track.csv").write_text(f"time_s,x_m,y_m,ball_x_m,ball_y_m,ball_z_m\n{rows}\n")
     (folder / "words.txt").write_text("")
-    return ["synthesize", "--library", str(folder / "library"), "--track", str(folder / "track.csv"),
+    return ["synthesize", "--library", str(library_folder), "--track", str(folder / "track.csv"),
             "--annotations", str(folder / "words.txt")]
 
 

@@ -6,7 +6,7 @@ from types import SimpleNamespace
 
 import bpy
 import pytest
-from test_players import library_folder, match, ready, session  # noqa: F401  (fixtures)
+from test_players import match, ready, session  # noqa: F401  (fixtures)
 
 TIMER, ESC, MOVE = (SimpleNamespace(type=t, value="PRESS") for t in ("TIMER", "ESC", "MOUSEMOVE"))
 

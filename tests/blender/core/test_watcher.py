@@ -11,7 +11,7 @@ from types import SimpleNamespace
 import bpy
 import pytest
 from conftest import EXTENSION, find_free_port
-from test_players import library_folder, match, ready, session  # noqa: F401  (fixtures)
+from test_players import match, ready, session  # noqa: F401  (fixtures)
 from test_turns import Context, Windows, hand  # noqa: F401
 from undo import collect_state
 

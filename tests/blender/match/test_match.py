@@ -16,10 +16,11 @@ TRACKING = SAMPLE / "match" / "small" / "small.dat"
 
 
 @pytest.fixture(scope="module")
-def place(tmp_path_factory):
-    """The sample's library, where a cache may be written beside it, and a folder for matches."""
+def place(sample_cache, tmp_path_factory):
+    """The sample's library with its cache beside it, and a folder for matches."""
     top = tmp_path_factory.mktemp("match")
     shutil.copytree(SAMPLE / "library", top / "library", ignore=shutil.ignore_patterns(".beyond_mocap"))
+    shutil.copytree(sample_cache, top / "library" / ".beyond_mocap")
     return top
 
 

@@ -15,12 +15,11 @@ def run(extension):
 
 
 @pytest.fixture(scope="module")
-def order(tmp_path_factory):
+def order(sample_cache):
     """Arguments of two seconds of the small match."""
-    small, cache = SAMPLE / "match" / "small", tmp_path_factory.mktemp("cache")
+    small = SAMPLE / "match" / "small"
     return ["match", "--tracking", str(small / "small.dat"), "--library", str(SAMPLE / "library"),
-            "--cache", str(cache),
-            "--from", "2", "--to", "4", "--workers", "2", "--no-figures"]
+            "--cache", str(sample_cache), "--from", "2", "--to", "4", "--workers", "2", "--no-figures"]
 
 
 def test_everybody_comes_out_as_one_file(run, order, tmp_path, capfd):

@@ -3,7 +3,6 @@
 import bpy
 import numpy as np
 import pytest
-import sample_rigs as rigs
 from test_match_scene import FPS, START, room, scenery, shown, walk  # noqa: F401  (fixtures)
 
 READERS = {
@@ -17,23 +16,20 @@ LAST = 5.5  # seconds of the match that are written: the latest player's end
 
 def places_of(scene, bone):
     """Name -> (F, 3) of a bone of every armature and of the ball, over the match's frames."""
-    found = {}
-    frames = range(scene.frame_start, scene.frame_start + round(LAST * FPS) + 1)
-    for thing in [one for one in scene.objects if one.type == "ARMATURE"]:
-        found[plain(thing)] = rigs.read_heads(thing, [bone], frames)[:, 0]
+    armatures = [one for one in scene.objects if one.type == "ARMATURE"]
     ball = next(one for one in scene.objects if one.type != "CURVE" and plain(one).startswith("Match ball"))
-    found["ball"] = np.array([_at(scene, ball, frame) for frame in frames])
-    return found
+    found = {name: [] for name in ("ball", *map(plain, armatures))}
+    for frame in range(scene.frame_start, scene.frame_start + round(LAST * FPS) + 1):
+        scene.frame_set(frame)
+        found["ball"].append(np.array(ball.matrix_world.translation))
+        for thing in armatures:
+            found[plain(thing)].append(np.array((thing.matrix_world @ thing.pose.bones[bone].matrix).translation))
+    return {name: np.array(places) for name, places in found.items()}
 
 
 def plain(thing):
     """Its name as Blender had it: USD knows no spaces, and the importer adds numbers."""
     return thing.name.replace("_", " ").split(".")[0]
-
-
-def _at(scene, thing, frame):
-    scene.frame_set(frame)
-    return np.array(thing.matrix_world.translation)
 
 
 @pytest.mark.parametrize("format", FORMATS)

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 import sample_rigs as rigs
 from test_path_edit import choose, walker
-from test_players import library_folder, match, ready, refused, session  # noqa: F401  (fixtures)
+from test_players import match, ready, refused, session  # noqa: F401  (fixtures)
 from test_result import look, one, poses  # noqa: F401
 from undo import assert_one_step
 

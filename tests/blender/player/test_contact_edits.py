@@ -5,7 +5,7 @@ import importlib
 import bpy
 import numpy as np
 import pytest
-from test_players import library_folder, match, ready, session  # noqa: F401  (fixtures)
+from test_players import match, ready, session  # noqa: F401  (fixtures)
 from test_result import one  # noqa: F401  (fixture)
 
 

@@ -8,21 +8,10 @@ import bpy
 import numpy as np
 import pytest
 from undo import assert_one_step, collect_state, press_operator
+from worlds import CLIPS
 
 SAMPLE = pathlib.Path(__file__).resolve().parents[3] / "sample_blend"
-CLIPS = ("standing_1", "walking_1_2", "walk_jog_walk", "jogging_2_9", "jogging_turn_left", "running_4_2",
-         "kick_low_inside", "receive_foot", "dribble_jogging")
 WORDS = "6.0 kick right running low inside\n"
-
-
-@pytest.fixture(scope="session")
-def library_folder(tmp_path_factory):
-    """A few clips of the sample, so that building takes a second; built once by whoever comes first."""
-    folder = tmp_path_factory.mktemp("library")
-    for name in CLIPS:
-        for suffix in (".bvh", ".txt"):
-            (folder / f"{name}{suffix}").symlink_to(SAMPLE / "library" / f"{name}{suffix}")
-    return folder
 
 
 @pytest.fixture
@@ -41,7 +30,7 @@ def match(tmp_path):
 
 @pytest.fixture
 def ready(match, library_folder):
-    """Settings as an animator fills them in; nothing built yet."""
+    """Settings as an animator fills them in; no library read yet."""
     settings = bpy.context.scene.beyond_mocap
     settings.library_folder = str(library_folder)
     bpy.ops.beyond_mocap.import_tracking(directory=str(match), files=[{"name": "player1.csv"}, {"name": "player2.csv"}])
@@ -328,7 +317,7 @@ def test_a_take_of_another_session(ready, session):
     refused(bpy.ops.beyond_mocap.accept, "synthesize again")
 
 
-def test_a_library_that_cannot_be_written(ready, library_folder, tmp_path):
+def test_a_library_that_cannot_be_written(ready, tmp_path):
     locked = tmp_path / "locked"
     locked.mkdir()
     for name in CLIPS[:4]:

@@ -6,7 +6,7 @@ import os
 import bpy
 import numpy as np
 import pytest
-from test_players import library_folder, match, ready, refused, session  # noqa: F401  (fixtures)
+from test_players import match, ready, refused, session  # noqa: F401  (fixtures)
 from test_result import one  # noqa: F401  (fixture)
 
 

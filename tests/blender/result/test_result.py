@@ -6,7 +6,7 @@ from types import SimpleNamespace
 import bpy
 import numpy as np
 import pytest
-from test_players import library_folder, match, ready, refused, session  # noqa: F401  (fixtures)
+from test_players import match, ready, refused, session  # noqa: F401  (fixtures)
 from undo import assert_one_step, collect_state, press_operator
 
 

@@ -12,7 +12,7 @@ import pytest
 import sample_rigs as rigs
 from conftest import EXTENSION
 from sample_rigs import read_all_keys
-from test_players import library_folder, match, ready, session  # noqa: F401  (fixtures)
+from test_players import match, ready, session  # noqa: F401  (fixtures)
 from test_result import one  # noqa: F401  (fixture)
 from test_rigs import body, choose, clip, rigify, rooms  # noqa: F401  (fixtures and a function)
 

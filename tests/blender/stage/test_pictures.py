@@ -84,11 +84,11 @@ def test_cancelled_or_failed_nothing_is_written(scene, tmp_path):
     look = pictures.PictureLook(engine="CYCLES", height=400, samples=4000)
     order = pictures.order_movie(scene, tmp_path / "out.mp4", look)
     stop, seen = threading.Event(), []
-    threading.Timer(6.0, stop.set).start()
+    threading.Timer(3.0, stop.set).start()
     started = time.monotonic()
     with pytest.raises(errors.UserCancelledError):
         pictures.render_pictures(order, lambda *told: seen.append(told), stop.is_set)
-    assert time.monotonic() - started < 20.0 and list(tmp_path.iterdir()) == [] and not order.folder.exists()
+    assert time.monotonic() - started < 60.0 and list(tmp_path.iterdir()) == [] and not order.folder.exists()
     order = pictures.order_movie(scene, tmp_path / "out.mp4", look)
     order.order["scene"] = "gone"
     with pytest.raises(errors.BeyondMocapError, match="gone"):

@@ -173,7 +173,7 @@ def test_what_was_written_can_be_evaluated(synthesize, run, match, clips_folder,
     assert synthesize(provenance=tmp_path / "p.csv", ball=tmp_path / "b.csv", report=tmp_path / "r.json")[0] == 0
     status, out, error = run(
         "evaluate", tmp_path / "out.bvh", "--track", match / "track.csv", "--annotations", match / "words.txt",
-        "--provenance", tmp_path / "p.csv", "--ball", tmp_path / "b.csv", "--library", clips_folder, "--unit", 0.01,
+        "--provenance", tmp_path / "p.csv", "--ball", tmp_path / "b.csv", "--library", clips_folder,
         "--report", tmp_path / "e.json",
     )  # fmt: skip
     mine, again = (json.loads((tmp_path / name).read_text()) for name in ("r.json", "e.json"))
@@ -191,7 +191,7 @@ def test_what_was_written_can_be_evaluated(synthesize, run, match, clips_folder,
     head = "head_off_ball_deg_median"
     assert again["naturalness"][head] == pytest.approx(mine["naturalness"][head], abs=0.1)
     without = run("evaluate", tmp_path / "out.bvh", "--track", match / "track.csv", "--provenance", tmp_path / "p.csv",
-                  "--library", clips_folder, "--unit", 0.01, "--report", tmp_path / "n.json")
+                  "--library", clips_folder, "--report", tmp_path / "n.json")
     assert sum("no angle between head and ball; name it with --ball" in line for line in without[2]) == 1
     assert head not in json.loads((tmp_path / "n.json").read_text())["naturalness"]
 
@@ -213,7 +213,8 @@ def test_evaluate_says_what_it_cannot_know_and_what_it_replaces(synthesize, run,
     pytest.importorskip("matplotlib")
     assert synthesize(report=tmp_path / "r.json")[0] == 0
     (tmp_path / "far.csv").write_text("time_s,x_m,y_m\n" + "".join(f"{t / 10},{t / 5 + 50},0\n" for t in range(200)))
-    command = ("evaluate", tmp_path / "out.bvh", "--annotations", match / "words.txt", "--report", tmp_path / "r.json")
+    command = ("evaluate", tmp_path / "out.bvh", "--unit", 0.01, "--annotations", match / "words.txt",
+               "--report", tmp_path / "r.json")
     status, _, error = run(*command, "--track", tmp_path / "far.csv", "--html", tmp_path / "r.html")
     assert status == 0 and "played: unknown" in (tmp_path / "r.html").read_text()
     for part in ("far.csv 19.9 s; check", "m from .*far.csv on average", "clips that played are unknown",

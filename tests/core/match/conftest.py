@@ -102,7 +102,7 @@ def cluster(chores, tmp_path):
     command = [sys.executable, "-m", "distributed.cli.dask_worker", "--scheduler-file", str(where), "--nthreads", "1",
                "--no-dashboard", "--no-nanny"]  # fmt: skip
     processes += [subprocess.Popen(command, **quiet) for _ in range(2)]
-    deadline = time.monotonic() + 60.0
+    deadline = time.monotonic() + 300.0
     while not (where.is_file() and where.stat().st_size):
         assert time.monotonic() < deadline, "no scheduler came up"
         time.sleep(0.05)

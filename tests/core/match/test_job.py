@@ -133,7 +133,7 @@ if __name__ == "__main__":
 def test_a_run_that_was_killed_is_gone_on_with_to_the_same_bits(made, order_to, tmp_path, kind):
     order = order_to(tmp_path / "killed", workers=2)
     process = subprocess.Popen(command(order), start_new_session=True)
-    deadline = time.monotonic() + 120.0
+    deadline = time.monotonic() + 600.0
     while not list((order.out / ".work" / kind).glob("*.npz")):
         assert process.poll() is None and time.monotonic() < deadline
         time.sleep(0.01)

