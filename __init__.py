@@ -3,18 +3,32 @@
 This file only registers and unregisters the extension. Its packages are registered in the order of ROOMS and
 unregistered in reverse order; each does the same with its own modules. `bpy` is first imported when `register()` runs,
 so this folder can be read as a plain Python package (by a test collector) without Blender.
+
+Enabling must be quick. While it runs, a module that is imported as a whole from `scene` or the core
+(`from ..scene.rigs import fit`) is loaded only when it is first used (`fit.read_source`); a name that is imported from
+a module loads it at once.
 """
 
+from contextlib import contextmanager
+from importlib import import_module
+from pathlib import Path
+from pkgutil import iter_modules
+from types import ModuleType
+
 PACKAGES = ("scene", "operators", "panels")
+LAZY = ("beyond_mocap", "scene")
+FULL = {"annotation"}
+"""Packages that import their own modules."""
 
 
 def register():
     """Register all packages; if one fails, unregister those before it and raise its error."""
     registered = []
     try:
-        for package in _iter_packages():
-            package.register()
-            registered.append(package)
+        with _import_lazily():
+            for package in _iter_packages():
+                package.register()
+                registered.append(package)
     except BaseException:
         for package in reversed(registered):
             package.unregister()
@@ -28,6 +42,49 @@ def unregister():
 
 
 def _iter_packages():
-    from importlib import import_module
-
     return (import_module(f".{name}", __package__) for name in PACKAGES)
+
+
+class _WaitingModule(ModuleType):
+    """Stands for a module until one of its names is used; then Python imports the module, as always."""
+
+    def __getattr__(self, name):
+        return getattr(import_module(self.__name__), name)
+
+    def __setattr__(self, name, value):
+        setattr(import_module(self.__name__), name, value)
+
+    def __delattr__(self, name):
+        delattr(import_module(self.__name__), name)
+
+
+@contextmanager
+def _import_lazily():
+    """Let the packages of LAZY give a waiting module for each that is not loaded, until the block ends."""
+    packages = [found for name in LAZY for found in _iter_lazy_packages(f"{__package__}.{name}")]
+    for package in packages:
+        package.__getattr__ = _build_getter(package)
+    try:
+        yield
+    finally:
+        for package in packages:
+            del package.__getattr__
+
+
+def _iter_lazy_packages(name):
+    package = import_module(name)
+    yield package
+    for found in iter_modules(package.__path__):
+        if found.ispkg and found.name not in FULL:
+            yield from _iter_lazy_packages(f"{name}.{found.name}")
+
+
+def _build_getter(package):
+    folder = Path(package.__path__[0])
+
+    def find_module(name):
+        if (folder / f"{name}.py").is_file() or (folder / name / "__init__.py").is_file():
+            return _WaitingModule(f"{package.__name__}.{name}")
+        raise AttributeError(f"module {package.__name__!r} has no attribute {name!r}")
+
+    return find_module

@@ -288,7 +288,10 @@ and its touches are proposals for key moments"""
         """Build the request."""
         return tracked.build_order(context.scene)
 
-    run_job = staticmethod(tracked.run_order)
+    @staticmethod
+    def run_job(order, progress, cancelled, hurry):
+        """Solve it."""
+        return tracked.run_order(order, progress, cancelled, hurry)
 
     def apply(self, scene, solved):
         """Create the ball and the list of touches."""

@@ -10,7 +10,7 @@ from bpy.props import EnumProperty, FloatProperty, StringProperty
 from bpy_extras.io_utils import ExportHelper
 
 from ..beyond_mocap.base.errors import InputError
-from ..beyond_mocap.files.atomic import atomic_write
+from ..beyond_mocap.files import atomic
 from ..scene.core import channels, window
 from ..scene.core.settings import to_setting_path
 from ..scene.markers import cloud, sets, solve
@@ -199,7 +199,7 @@ class BEYOND_MOCAP_OT_save_marker_set(MarkersVerb, BaseOperator, bpy.types.Opera
 
         path = Path(bpy.path.abspath(self.filepath))
         name = "_".join(path.stem.split()) or sets.OWN
-        atomic_write(path, format_marker_set(sets.build_marker_set(find_target_cloud(context), name)))
+        atomic.atomic_write(path, format_marker_set(sets.build_marker_set(find_target_cloud(context), name)))
         self.report({"INFO"}, f"written to {path}")
 
 

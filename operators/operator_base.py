@@ -13,7 +13,7 @@ from bpy_extras.io_utils import ExportHelper, ImportHelper
 from ..beyond_mocap.base.errors import BeyondMocapError, InputError
 from ..scene.core import background, notices, window
 from ..scene.rigs import exporters
-from ..scene.stage.presenting import present_new_objects
+from ..scene.stage import presenting
 
 NEEDS_LIBRARY = ("Choose the library's folder first",
                  lambda context: bool(context.scene.beyond_mocap.library_folder))
@@ -61,7 +61,7 @@ class BaseOperator:
     def attempt(self, action):
         """Run `action`: FINISHED if it succeeds, else a report and CANCELLED."""
         try:
-            with present_new_objects(bpy.context) if self.presents else nullcontext():
+            with presenting.present_new_objects(bpy.context) if self.presents else nullcontext():
                 action()
         except (BeyondMocapError, OSError) as error:
             return self.report_failure(error)

@@ -9,9 +9,8 @@ from bpy.props import BoolProperty, EnumProperty, StringProperty
 from bpy_extras.io_utils import ExportHelper
 
 from ..beyond_mocap.base.errors import InputError, format_count
-from ..beyond_mocap.files.atomic import atomic_write
+from ..beyond_mocap.files import atomic
 from ..beyond_mocap.passes import scene_json
-from ..beyond_mocap.passes.scene_json import SAMPLES as SCENES
 from ..scene.core.measure import units_per_metre
 from ..scene.passes import characters as shown
 from ..scene.passes import generate as make
@@ -151,7 +150,10 @@ leads from one player's strike to the next"""
             order.clear_examples()
         return make.build_order(context.scene)
 
-    run_job = staticmethod(make.run_order)
+    @staticmethod
+    def run_job(asked, progress, cancelled, hurry):
+        """Generate the passing scene."""
+        return make.run_order(asked, progress, cancelled, hurry)
 
     def apply(self, scene, result):
         """Apply the result to characters and ball."""
@@ -198,7 +200,7 @@ class BEYOND_MOCAP_OT_passes_sample(BaseOperator, bpy.types.Operator):
 
     def do(self, context):
         """Parse the sample and set the lists."""
-        order.fill_lists(context, scene_json.parse_scene(SCENES[self.sample], self.sample))
+        order.fill_lists(context, scene_json.parse_scene(scene_json.SAMPLES[self.sample], self.sample))
         self.report({"INFO"}, "Move the players' Empties, edit the passes, then press Make Scene")
 
 
@@ -228,7 +230,7 @@ class BEYOND_MOCAP_OT_passes_to_json(BaseOperator, bpy.types.Operator, ExportHel
     def do(self, context):
         """Build the scene and write it."""
         text = scene_json.format_scene(order.build_scene(context.scene))
-        atomic_write(bpy.path.abspath(self.filepath), text)
+        atomic.atomic_write(bpy.path.abspath(self.filepath), text)
         missing = order.list_lost_examples(context.scene.beyond_mocap_passes)
         self.report({"WARNING" if missing else "INFO"},
                     ", ".join(filter(None, (f"Written to {self.filepath}", missing))))

@@ -9,9 +9,9 @@ from bpy.props import BoolProperty, EnumProperty, IntProperty, StringProperty
 from bpy_extras.io_utils import ExportHelper
 
 from ..beyond_mocap.base.errors import InputError
+from ..scene import study as filming
 from ..scene.core import notices
 from ..scene.stage import pictures
-from ..scene.study import find_engine
 from .operator_base import BackgroundOperator
 
 ENGINES = (("AUTO", "Automatic", "EEVEE, or Cycles where Blender has no window"),
@@ -54,7 +54,7 @@ class PictureOperator(BackgroundOperator, ExportHelper):
 
     def read_look(self) -> pictures.PictureLook:
         """Read how to render."""
-        return pictures.PictureLook(engine=find_engine(self.engine), height=self.height, samples=self.samples)
+        return pictures.PictureLook(engine=filming.find_engine(self.engine), height=self.height, samples=self.samples)
 
     @staticmethod
     def run_job(order, progress, cancelled, _hurry):

@@ -7,7 +7,6 @@ from pathlib import Path
 import bpy
 from bpy.props import EnumProperty, StringProperty
 
-from ..beyond_mocap.annotation.label_candidates import find_label_candidates
 from ..beyond_mocap.base.errors import InputError
 from ..beyond_mocap.base.fixes import Fix
 from ..beyond_mocap.files.tracking.providers import PROVIDERS
@@ -18,7 +17,6 @@ from ..scene.player import dots, pins, tracks
 from ..scene.result import preview
 from ..scene.timeline import label_checks as word_checks
 from ..scene.timeline import strip_events, strips
-from ..scene.timeline.strips import show_player
 from .operator_base import BaseOperator, ImportOperator, ViewDropHandler
 
 SHIRTS = {"home": ((0.75, 0.05, 0.06), (0.80, 0.30, 0.04)), "away": ((0.04, 0.14, 0.70), (0.02, 0.45, 0.60))}
@@ -101,6 +99,8 @@ SkillCorner, Sportec, Second Spectrum, Stats Perform); a text file with the name
 
     def offer_labels(self, context, player):
         """Offer text files beside the track that may have the player's labels under another name."""
+        from ..beyond_mocap.annotation.label_candidates import find_label_candidates
+
         path = to_absolute_path(player.tracking_file)
         found = find_label_candidates(path)
         if not found:
@@ -186,7 +186,7 @@ class BEYOND_MOCAP_OT_choose_player(BaseOperator, bpy.types.Operator):
         player = settings.players.get(self.player) if self.player else active
         if player is None:
             raise InputError("player", f"{self.player!r} is not in the list", "a player in the list")
-        show_player(context, player)
+        strips.show_player(context, player)
         if context.area is not None and context.area.type == "NLA_EDITOR":
             context.space_data.dopesheet.show_only_selected = True
 

@@ -10,13 +10,11 @@ from bpy_extras.io_utils import ExportHelper, ImportHelper
 
 from ..beyond_mocap.base.errors import InputError
 from ..beyond_mocap.files.bvh import bvh
-from ..scene.characters.player_character import find_shown_body
+from ..scene.characters import player_character
 from ..scene.core import action, channels, take_record, window
 from ..scene.core.settings import find_active_player
 from ..scene.match import match_objects
-from ..scene.rigs import armature, bone_maps, engine_files, export, exporters, rig, rig_bake
-from ..scene.rigs.driven import DrivenRig, check_rig
-from ..scene.rigs.fit import BakeOptions, read_source
+from ..scene.rigs import armature, bone_maps, driven, engine_files, export, exporters, fit, rig, rig_bake
 from .operator_base import BaseOperator, ExportOperator
 
 
@@ -97,7 +95,7 @@ class BEYOND_MOCAP_OT_use_selected_rig(BaseOperator, bpy.types.Operator):
 
     def do(self, context):
         """Choose the rig; its bones are mapped at once."""
-        check_rig(context.object)
+        driven.check_rig(context.object)
         context.scene.beyond_mocap.rig.target = context.object
 
 
@@ -131,7 +129,7 @@ planted; the rig's previous action is kept"""
         scene, settings = context.scene, context.scene.beyond_mocap
         options, work = build_bake_options(settings.rig), []
         for body, target, table in self.list_bakes(context):
-            source = read_source(body, scene)
+            source = fit.read_source(body, scene)
             work.append((rig_bake.prepare_bake(target, table, source, scene, options), target, table))
         lines = []
         for prepared, target, table in work:
@@ -153,7 +151,7 @@ planted; the rig's previous action is kept"""
             return self.list_player_bakes(context)
         body = find_source_body(settings)
         if self.targets == "CHOSEN":
-            check_rig(chosen.target, body)
+            driven.check_rig(chosen.target, body)
             if not chosen.bones:
                 rig.fill_bone_map(chosen)
             return [(body, chosen.target, rig.read_bone_list(chosen))]
@@ -161,7 +159,7 @@ planted; the rig's previous action is kept"""
         if not rigs:
             raise InputError("bake to rig", "no armature besides the source is selected", "rigs", "select them")
         for one in rigs:
-            check_rig(one, body)
+            driven.check_rig(one, body)
         return [(body, one, find_bone_map(chosen, one)) for one in rigs]
 
     def list_player_bakes(self, context) -> list:
@@ -172,12 +170,12 @@ planted; the rig's previous action is kept"""
             raise InputError("bake to rig", "no selected player has a body", "a result", "synthesize first")
         players_without_rig = [player for player in players if player.rig is None]
         if players_without_rig:
-            check_rig(settings.rig.target)
+            driven.check_rig(settings.rig.target)
         for player in players:
-            check_rig(player.rig or settings.rig.target, player.body)
-            read_source(player.body, context.scene)
+            driven.check_rig(player.rig or settings.rig.target, player.body)
+            fit.read_source(player.body, context.scene)
         for target in {player.rig or settings.rig.target for player in players} if players_without_rig else ():
-            DrivenRig(target, find_bone_map(settings.rig, target), context.scene)  # before anything is copied
+            driven.DrivenRig(target, find_bone_map(settings.rig, target), context.scene)  # before anything is copied
         free = settings.rig.target if all(player.rig != settings.rig.target for player in players) else None
         for player in players_without_rig:
             player.rig = free or armature.copy_rig(settings.rig.target, f"{player.name} rig")
@@ -220,10 +218,10 @@ def find_source_body(settings) -> bpy.types.Object | None:
     return settings.rig.source or (player.body if player is not None else None)
 
 
-def build_bake_options(settings) -> BakeOptions:
+def build_bake_options(settings) -> fit.BakeOptions:
     """Build the bake options from the panel's settings."""
     keeps = {"AUTO": None, "KEEP": True, "SCALE": False}[settings.steps]
-    return BakeOptions(settings.root, keeps, settings.ik == "BAKE", settings.plants)
+    return fit.BakeOptions(settings.root, keeps, settings.ik == "BAKE", settings.plants)
 
 
 def find_bone_map(settings, target: bpy.types.Object) -> dict[str, str]:
@@ -283,13 +281,13 @@ stays unchanged"""
         if self.who == "SELECTED":
             return [one for one in context.selected_objects if one.type == "ARMATURE"]
         if self.who == "PLAYERS":
-            chosen = [find_shown_body(player) for player in settings.players if player.use]
+            chosen = [player_character.find_shown_body(player) for player in settings.players if player.use]
             return [one for one in chosen if one is not None]
         player = find_active_player(settings)
         if settings.rig.target is not None and (settings.rig.source or player is None or player.rig is None):
             return [settings.rig.target]
-        if player is not None and find_shown_body(player) is not None:
-            return [find_shown_body(player)]
+        if player is not None and player_character.find_shown_body(player) is not None:
+            return [player_character.find_shown_body(player)]
         active = context.object
         return [active] if active is not None and active.type == "ARMATURE" else []
 

@@ -11,12 +11,11 @@ import bpy
 from bpy.props import EnumProperty
 from mathutils import Euler
 
-from ..scene.core import notices, sample, window
-from ..scene.core.material import get_material
+from ..scene.core import material, notices, sample, window
 from ..scene.core.measure import units_per_metre
 from ..scene.library import recordings
 from ..scene.result import queue
-from ..scene.stage.view_style import style_view
+from ..scene.stage import view_style
 from .operator_base import BaseOperator
 
 FPS = 30  # frames per second of the sample's scene, those of its clips
@@ -113,7 +112,7 @@ def create_target(context) -> bpy.types.Object:
     bmesh.ops.create_icosphere(shape, subdivisions=3, radius=TARGET_RADIUS * units)
     shape.to_mesh(mesh)
     shape.free()
-    mesh.materials.append(get_material("Target", TARGET_COLOUR, 0.5))
+    mesh.materials.append(material.get_material("Target", TARGET_COLOUR, 0.5))
     target = bpy.data.objects.new("Target", mesh)
     target.location = [units * metres for metres in TARGET]
     context.collection.objects.link(target)
@@ -285,7 +284,7 @@ def show_last(context, wanted: Sample) -> None:
     if (area := window.find_view(context)) is None:
         return
     scene = context.scene
-    style_view(area.spaces.active, wanted.shows_empties)
+    view_style.style_view(area.spaces.active, wanted.shows_empties)
     if wanted.task == "PLAYER":
         show_strips(context)
     if wanted.heading is None:

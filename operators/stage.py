@@ -10,7 +10,7 @@ from ..scene.core import window
 from ..scene.core.settings import find_active_player
 from ..scene.path_editing.settings import list_edited_bodies, list_target_bodies
 from ..scene.stage import cameras, eyes, lighting, path_cameras, stage
-from ..scene.stage.cast import find_ball, read_cast
+from ..scene.stage import cast as casting
 from ..scene.stage.settings import VIEWS
 from .operator_base import NEEDS_NO_EDITING, BaseOperator
 
@@ -50,7 +50,7 @@ class BEYOND_MOCAP_OT_stage_view(BaseOperator, bpy.types.Operator):
         scene = context.scene
         if self.view == "EYES":
             body = find_viewer(context)
-            camera = eyes.create_eyes_camera(scene, body, find_ball(scene))
+            camera = eyes.create_eyes_camera(scene, body, casting.find_ball(scene))
         else:
             camera = cameras.get_camera(scene, self.view)
         scene.camera = camera
@@ -59,7 +59,7 @@ class BEYOND_MOCAP_OT_stage_view(BaseOperator, bpy.types.Operator):
 
 def find_viewer(context) -> bpy.types.Object:
     """Find the moving body that is selected, else the active player's, else the first; InputError without any."""
-    cast, active = read_cast(context.scene), context.view_layer.objects.active
+    cast, active = casting.read_cast(context.scene), context.view_layer.objects.active
     if cast is None:
         raise InputError("Player's Eye", "no body moves in this scene", "a body with a motion", "synthesize one first")
     active = active.parent if active is not None and active.type == "MESH" else active

@@ -6,7 +6,7 @@ import bpy
 from bpy.props import FloatProperty, IntProperty, StringProperty
 
 from ..beyond_mocap.base.errors import InputError
-from ..beyond_mocap.passes.stream.live_hits import build_recording
+from ..beyond_mocap.passes.stream import live_hits
 from ..scene.passes import generate as make
 from ..scene.passes.settings import find_armature
 from ..scene.stream import follow, play
@@ -77,7 +77,7 @@ class BEYOND_MOCAP_OT_stream_keep(ListeningVerb, bpy.types.Operator):
 
     def do(self, context):
         """Build a motion from the ring buffer and write it to an action."""
-        motion = build_recording(follow.get_current_listener(), self.seconds)
+        motion = live_hits.build_recording(follow.get_current_listener(), self.seconds)
         if motion is None:
             raise InputError("stream", "nothing has arrived yet", "frames", "start the sender")
         follow.keep_recording(context, motion)

@@ -9,11 +9,9 @@ import bpy
 from bpy.props import BoolProperty, EnumProperty, IntProperty, StringProperty
 
 from ..beyond_mocap.base.errors import InputError, format_count
-from ..beyond_mocap.files.atomic import atomic_path
+from ..beyond_mocap.files import atomic, tables
 from ..beyond_mocap.files.bvh import bvh
-from ..beyond_mocap.files.tables import read_ball
-from ..beyond_mocap.study.form import MOVIES, find_movie
-from ..beyond_mocap.study.order import read_study
+from ..beyond_mocap.study import form, order
 from ..scene import study as filming
 from .operator_base import BaseOperator
 
@@ -49,7 +47,7 @@ class BEYOND_MOCAP_OT_study_render(BaseOperator, bpy.types.Operator):
         if not self.directory:
             raise InputError("study", "no folder given", "the folder with study.json", "choose the folder")
         folder = Path(bpy.path.abspath(self.directory))
-        study = read_study(folder)
+        study = order.read_study(folder)
         out = folder / CLIPS
         missing = [clip for clip in study.clips if self.again or not _is_rendered(out, clip.name)]
         sources = [(clip, _read_clip(folder, clip)) for clip in missing]
@@ -72,7 +70,7 @@ class BEYOND_MOCAP_OT_study_render(BaseOperator, bpy.types.Operator):
     def render_clip(self, out: Path, clip, source, look) -> None:
         """Render or copy one clip."""
         if isinstance(source, Path):
-            with atomic_path(out / f"{clip.name}{source.suffix.lower()}") as temporary:
+            with atomic.atomic_path(out / f"{clip.name}{source.suffix.lower()}") as temporary:
                 shutil.copyfile(source, temporary)
             return
         target = out / (f"{clip.name}.mp4" if look.movie else clip.name)
@@ -88,18 +86,18 @@ class BEYOND_MOCAP_OT_study_render(BaseOperator, bpy.types.Operator):
 
 def _is_rendered(out: Path, name: str) -> bool:
     """Return whether a clip is rendered, as a movie or as pictures."""
-    return find_movie(out, name) is not None or any((out / name).glob("*.png"))
+    return form.find_movie(out, name) is not None or any((out / name).glob("*.png"))
 
 
 def _read_clip(folder: Path, clip):
     """Read a clip: a movie's path, or motion and ball; InputError for other files."""
     path = folder / clip.file
-    if path.suffix.lower() in MOVIES:
+    if path.suffix.lower() in form.MOVIES:
         if not path.is_file():
             raise InputError(path, "no such file", "a movie", "correct the table and create the study again")
         return path
     if path.suffix.lower() != ".bvh":
-        raise InputError(path, f"file type {path.suffix}", f"a .bvh file or a movie ({', '.join(MOVIES)})",
+        raise InputError(path, f"file type {path.suffix}", f"a .bvh file or a movie ({', '.join(form.MOVIES)})",
                          "convert it, or render it yourself")  # fmt: skip
     ball_file = path.with_suffix(".ball.csv")
-    return bvh.read_bvh(path).motion, read_ball(ball_file) if ball_file.is_file() else None
+    return bvh.read_bvh(path).motion, tables.read_ball(ball_file) if ball_file.is_file() else None

@@ -13,7 +13,7 @@ from time import perf_counter
 import bpy
 from bpy.props import StringProperty
 
-from ..beyond_mocap.annotation import Timeline
+from ..beyond_mocap import annotation
 from ..beyond_mocap.base.errors import BeyondMocapError, InputError, format_count
 from ..scene.core import background, notices, session
 from ..scene.core.window import show_status, start_timer, stop_timer
@@ -60,7 +60,8 @@ def update_automatic_strips(context, player) -> None:
     """
     stored = session.find_take(player.take)
     if strips.read_player_timeline(player, context.scene) is not None and (stored is not None or not player.take):
-        strips.show_automatic_spans(context, player, stored.take.timeline if stored is not None else Timeline())
+        timeline = stored.take.timeline if stored is not None else annotation.Timeline()
+        strips.show_automatic_spans(context, player, timeline)
 
 
 KIND = "synthesis"

@@ -23,7 +23,10 @@ class TargetOperator(BackgroundOperator):
         """Build the request from the scene."""
         return order.build_request(context.scene, find_thrower(context), self.act)
 
-    run_job = staticmethod(made.generate_throw)
+    @staticmethod
+    def run_job(asked, progress, cancelled, hurry):
+        """Generate the throw or kick."""
+        return made.generate_throw(asked, progress, cancelled, hurry)
 
     def apply(self, scene, result):
         body = scene.objects.get(result.order.body)

@@ -6,14 +6,13 @@ import bpy
 import numpy as np
 
 from ..beyond_mocap.base.errors import InputError
-from ..beyond_mocap.motion.track.line_track import MAX_SPEED
+from ..beyond_mocap.motion.track import line_track
 from ..beyond_mocap.synthesis.pin import BALL
 from ..scene.core import channels, window
 from ..scene.core.measure import units_per_metre
 from ..scene.core.settings import find_active_player, is_track
 from ..scene.player import dots, drawn_track, heading_keys, pins
-from ..scene.result import bake
-from ..scene.result.ball_pins import find_ball_moment
+from ..scene.result import bake, ball_pins
 from .operator_base import BaseOperator
 from .player import choose_shirt, find_free_name
 
@@ -84,7 +83,7 @@ Mode; the player waits at points of speed 0"""
 
     bl_idname = "beyond_mocap.set_speed"
     bl_label = "Set Speed"
-    speed: bpy.props.FloatProperty(name="Speed", default=3.0, min=0.0, max=MAX_SPEED, precision=2,
+    speed: bpy.props.FloatProperty(name="Speed", default=3.0, min=0.0, max=line_track.MAX_SPEED, precision=2,
                                    description="Metres per second; 0 for a stop")
     wait: bpy.props.FloatProperty(name="Wait", default=1.0, min=0.01, max=60.0, precision=2, unit="TIME_ABSOLUTE",
                                   description="Seconds of waiting at a stop")
@@ -93,7 +92,7 @@ Mode; the player waits at points of speed 0"""
     def invoke(self, context, _event):
         points = list_selected_points(context.object)
         if points:
-            self.speed, self.wait = min(points[0].radius, MAX_SPEED), points[0].weight_softbody
+            self.speed, self.wait = min(points[0].radius, line_track.MAX_SPEED), points[0].weight_softbody
         return context.window_manager.invoke_props_dialog(self)
 
     def do(self, context):
@@ -137,7 +136,7 @@ at the nearest key moment; move it with G, and set time and hold in the list of 
         scene, part = context.scene, self.part.replace("_", " ")
         channels.check_local(scene)
         player, now, hold = find_active_player(scene.beyond_mocap), pins.find_current_second(scene), self.hold
-        moment = find_ball_moment(scene, player, now) if part == BALL else None
+        moment = ball_pins.find_ball_moment(scene, player, now) if part == BALL else None
         seconds, hold = (now, hold) if moment is None else (moment.time, 0.0)
         for other in player.pins:
             first, last = other.time - SAME, other.time + other.hold + SAME

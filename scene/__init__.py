@@ -4,17 +4,16 @@ There is one package for each feature, described in its own docstring; docs/expl
 All use `core`: channels, clock, background work, settings, registration, and the one live watcher.
 """
 
-from .core import registration, session
-from .core.live import start_watching, stop_watching
-from .markers import solve
-from .match import command_process as child
+REGISTERED = ()
 
 
 def register():
     """Register the data classes, attach them to Blender's own data, and start watching; undo it all if a step fails."""
+    from .core import live, registration
+
     registration.register_package(__name__)
     try:
-        start_watching()
+        live.start_watching()
     except BaseException:
         unregister()
         raise
@@ -22,7 +21,11 @@ def register():
 
 def unregister():
     """Stop what runs, undo the registration, and clear what is stored in memory."""
-    stop_watching()
+    from .core import live, registration, session
+    from .markers import solve
+    from .match import command_process as child
+
+    live.stop_watching()
     child.stop_all()
     registration.unregister_package(__name__)
     session.clear_session()

@@ -11,15 +11,15 @@ import re
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
+from typing import TYPE_CHECKING
 
-from ..annotation.event_labels import KINDS
-from ..annotation.striking import BODY_PARTS
 from ..base.errors import InputError, build_read_error
-from ..motion.track.match_data import Match
-from .event_data import EventPlayer, MatchEvent
-from .tables import parse_number, read_rows
+from . import event_data, tables
+from .tracking import match_arrays
 from .tracking.feed import Provider, find_provider, load_with_kloppy, read_head
-from .tracking.match_arrays import USUAL_PITCH
+
+if TYPE_CHECKING:
+    from ..motion.track.match_data import Match
 
 _TABLE_KINDS = {  # event types of plain tables -> kind
     "miss": "shot", "goal": "shot", "post": "shot", "saved shot": "shot", "cross": "pass", "blocked pass": "deflection",
@@ -131,7 +131,7 @@ def find_pitch_size(match: Match | None) -> tuple[float, float]:
     Returns:
         Length and width, m.
     """
-    return (match.length, match.width) if match else USUAL_PITCH
+    return (match.length, match.width) if match else match_arrays.USUAL_PITCH
 
 
 def read_plain_events(path: Path, match: Match | None):
@@ -147,11 +147,14 @@ def read_plain_events(path: Path, match: Match | None):
     Raises:
         InputError: with the line, if a cell is invalid.
     """
+    from ..annotation.event_labels import KINDS
+    from ..annotation.striking import BODY_PARTS
+
     rows = []
-    for place, row in read_rows(path, ("time_s", "type", "player")):
-        time, period = parse_number(row["time_s"], "time_s", place), 1
+    for place, row in tables.read_rows(path, ("time_s", "type", "player")):
+        time, period = tables.parse_number(row["time_s"], "time_s", place), 1
         if row.get("period"):
-            period = int(parse_number(row["period"], "period", place))
+            period = int(tables.parse_number(row["period"], "period", place))
         elif match is not None:
             half = max((half for half in match.halves if time >= half.start - 5.0), key=lambda half: half.start,
                        default=match.halves[0])  # fmt: skip
@@ -165,11 +168,12 @@ def read_plain_events(path: Path, match: Match | None):
         sides = f"{row.get('side', '')} {words}".split() if part == "foot" else ()
         side = next((one for one in ("left", "right") if one in sides), "")
         details = ("throw-in",) if "throw in" in f"{event_type} {words}".replace("-", " ") else ()
-        xy = tuple(parse_number(row.get(name, ""), name, place, blank=True) for name in ("x", "y"))
+        xy = tuple(tables.parse_number(row.get(name, ""), name, place, blank=True) for name in ("x", "y"))
         success = {"true": True, "1": True, "false": False, "0": False}.get(row.get("success", "").lower())
-        event = MatchEvent(time=time, period=period, player="", team="", kind=kind, part="hand" if details else part,
-                           side=side, details=details, original_text=event_type, success=success, place=xy)
-        rows.append((event, EventPlayer.from_text(row["player"]) if row["player"] else None))
+        event = event_data.MatchEvent(time=time, period=period, player="", team="", kind=kind, side=side,
+                                      part="hand" if details else part, details=details, original_text=event_type,
+                                      success=success, place=xy)
+        rows.append((event, event_data.EventPlayer.from_text(row["player"]) if row["player"] else None))
     return rows
 
 
@@ -191,13 +195,15 @@ def read_metrica_events(path: Path, match: Match | None):
     Raises:
         InputError: with the line, if a cell is invalid.
     """
+    from ..annotation.event_labels import KINDS
+
     rows = []
     needed = ("Team", "Type", "Subtype", "Period", "Start Time [s]", "From", "Start X", "Start Y")
     length, width = find_pitch_size(match)
     period_starts: dict[int, float] = {}
-    for place, row in read_rows(path, needed):
-        period = int(parse_number(row["Period"], "Period", place))
-        time = parse_number(row["Start Time [s]"], "Start Time [s]", place)
+    for place, row in tables.read_rows(path, needed):
+        period = int(tables.parse_number(row["Period"], "Period", place))
+        time = tables.parse_number(row["Start Time [s]"], "Start Time [s]", place)
         time -= period_starts.setdefault(period, 0.0 if period == 1 else time)
         event_type = f"{row['Type']} {row['Subtype']}".strip().lower()
         type_name = (row["Type"].lower(), "other")[row["Type"].lower() not in (*KINDS, *_TABLE_KINDS)]
@@ -205,12 +211,12 @@ def read_metrica_events(path: Path, match: Match | None):
                     _TABLE_KINDS.get(type_name, type_name))
         part = "head" if "head" in event_type else "hand" if "throw in" in event_type else ""
         details = ("throw-in",) * (part == "hand") + ("lost",) * (kind == "aerial" and "lost" in event_type)
-        x, y = (parse_number(row[name], name, place, blank=True) for name in ("Start X", "Start Y"))
+        x, y = (tables.parse_number(row[name], name, place, blank=True) for name in ("Start X", "Start Y"))
         team = row["Team"].lower() if row["Team"].lower() in ("home", "away") else ""
-        event = MatchEvent(time=time, period=period, player="", team=team, kind=kind, part=part, side="",
+        event = event_data.MatchEvent(time=time, period=period, player="", team=team, kind=kind, part=part, side="",
                            details=details, original_text=event_type, success=None,
                            place=((x - 0.5) * length, (0.5 - y) * width))
-        rows.append((event, EventPlayer.from_text(row["From"], team) if row["From"] else None))
+        rows.append((event, event_data.EventPlayer.from_text(row["From"], team) if row["From"] else None))
     return rows
 
 

@@ -13,7 +13,7 @@ import os
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 
-from ..annotation import ClipAnnotation, read_annotation_csv, read_clip_annotations
+from .. import annotation
 from ..base.errors import InputError, format_count
 from ..base.fixes import Fix
 from ..files.atomic import atomic_write
@@ -128,15 +128,15 @@ class Annotations:
         for a broken one.
         """
         tables = find_tables(folder, clips)
-        self.tables = {_to_absolute(table.parent): read_annotation_csv(table, skips) for table in tables}
+        self.tables = {_to_absolute(table.parent): annotation.read_annotation_csv(table, skips) for table in tables}
 
-    def read_rows(self, clip: Path, fps: float) -> tuple[ClipAnnotation, ...]:
+    def read_rows(self, clip: Path, fps: float) -> tuple[annotation.ClipAnnotation, ...]:
         """Read the rows of one clip: NAME.txt beside it, else the nearest table from its folder upward that has rows
         for it.
         """
         beside = clip.with_suffix(".txt")
         if beside.is_file():
-            return tuple(read_clip_annotations(beside, fps))
+            return tuple(annotation.read_clip_annotations(beside, fps))
         clip = _to_absolute(clip)
         for place in clip.parents:
             if place in self.tables:
@@ -177,7 +177,7 @@ class Annotations:
 def _has_labels(path: Path) -> bool:
     """Say whether a text has labels of a clip, as a README or a licence has not."""
     try:
-        return bool(read_clip_annotations(path, 30.0))
+        return bool(annotation.read_clip_annotations(path, 30.0))
     except InputError:
         return False
 

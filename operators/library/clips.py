@@ -12,10 +12,9 @@ from bpy.props import BoolProperty, EnumProperty, FloatProperty, StringProperty
 from ...beyond_mocap.base.errors import InputError, UserCancelledError, format_count
 from ...beyond_mocap.files.bvh import bvh
 from ...beyond_mocap.library.scan import FOREIGN, find_recordings, is_foreign
-from ...beyond_mocap.motion import humanoid
-from ...beyond_mocap.motion.mirror import mirror
-from ...beyond_mocap.motion.motion import Motion, place_motion
-from ...beyond_mocap.motion.quaternion import from_up_angle, rotate
+from ...beyond_mocap.motion import humanoid, quaternion
+from ...beyond_mocap.motion import mirror as mirroring
+from ...beyond_mocap.motion import motion as motions
 from ...scene.core import action, channels, frame_range, window
 from ...scene.library import assets, clips, foreign, recordings
 from ...scene.rigs import armature, exporters
@@ -133,13 +132,13 @@ kicks to the other side; the previous motion stays as an action"""
         action.write_motion(body, mirror_in_place(motion), context.scene, start, f"{name} mirrored")
 
 
-def mirror_in_place(motion: Motion) -> Motion:
+def mirror_in_place(motion: motions.Motion) -> motions.Motion:
     """Mirror a motion and place it where the original started, with the same heading."""
-    mirrored = mirror(motion)
+    mirrored = mirroring.mirror(motion)
     angle = humanoid.compute_heading(motion)[0] - humanoid.compute_heading(mirrored)[0]
-    start = rotate(from_up_angle(angle), mirrored.root_positions[0])
+    start = quaternion.rotate(quaternion.from_up_angle(angle), mirrored.root_positions[0])
     offset = np.append((motion.root_positions[0] - start)[:2], 0.0)
-    return place_motion(mirrored, angle, offset)
+    return motions.place_motion(mirrored, angle, offset)
 
 
 CLIP_CHOICES = (("CHOSEN", "Chosen Clip", "The clip chosen in the library's list"),

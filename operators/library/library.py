@@ -10,7 +10,6 @@ from typing import TYPE_CHECKING
 import bpy
 from bpy.props import BoolProperty, IntProperty, StringProperty
 
-from ...beyond_mocap.annotation.labels import find_label
 from ...beyond_mocap.base.errors import InputError, format_count
 from ...beyond_mocap.base.fixes import Fix
 from ...scene.core import preferences, session, window
@@ -201,6 +200,8 @@ def describe_library(library: "Library") -> str:
     """Describe a library for the panel: clips and minutes, then each gait with its speed, then key moments with their
     number.
     """
+    from ...beyond_mocap.annotation.labels import find_label
+
     originals = [clip for clip in library.clips if not clip.mirrored]
     keys = Counter(row.words[0] for clip in originals for row in clip.annotations if row.key is not None and row.words)
     lines = [f"{format_count(len(originals), 'clip')}, {library.minutes:.1f} minutes, {len(library.skeleton)} joints"]

@@ -8,12 +8,9 @@ import bpy
 from bpy.props import BoolProperty, FloatProperty, IntProperty, StringProperty
 from bpy_extras.io_utils import ImportHelper
 
-from ...beyond_mocap.annotation import key_commands as annotating
-from ...beyond_mocap.annotation.key_commands import StopAnnotating
 from ...beyond_mocap.base.errors import BeyondMocapError, InputError
 from ...scene.core import popup, window
-from ...scene.timeline import video
-from ...scene.timeline.key_annotation import compute_now, describe_subject, find_combinations, run_command, type_keys
+from ...scene.timeline import key_annotation, video
 from ...scene.timeline.video import add_driver
 from ..operator_base import BaseOperator
 
@@ -46,10 +43,12 @@ class BEYOND_MOCAP_OT_annotate(BaseOperator, bpy.types.Operator):
     keys: StringProperty(name="Keys", options={"SKIP_SAVE"},
                          description="Keys to press at the playhead, separated by spaces, for scripts: '2 2 3 5 ENTER'")
     needs = ("Import tracking data and choose a player in the list first, or open a clip's labels",
-             lambda context: bool(describe_subject(context)))
+             lambda context: bool(key_annotation.describe_subject(context)))
 
     def do(self, context):
         """Press the keys of a script."""
+        from ...beyond_mocap.annotation import key_commands as annotating
+
         keys = self.keys.upper().split()
         names = sorted(key for key in annotating.KEYS if not key[0].isdigit())
         known = {*names, *"0123456789"}
@@ -58,20 +57,22 @@ class BEYOND_MOCAP_OT_annotate(BaseOperator, bpy.types.Operator):
             found = f"the key {unknown}" if unknown else "no keys"
             raise InputError("annotate", found, f"keys of {', '.join(['0 to 9', *names])}",
                              "for example '2 2 3 5 ENTER'")
-        lines = type_keys(context, keys)
+        lines = key_annotation.type_keys(context, keys)
         self.report({"INFO"}, "; ".join(lines) or "Nothing to do")
 
     def invoke(self, context, event):
         """Start, or stop if it runs already."""
+        from ...beyond_mocap.annotation import key_commands as annotating
+
         if bpy.app.background or self.keys:
             return self.execute(context)
         if _running:
             stop_drawing()  # the running operator detects this and ends
             return {"CANCELLED"}
         try:
-            self.state, self.message = annotating.AnnotationState(find_combinations(context.scene)), ""
-            self.player_name = describe_subject(context)
-            compute_now(context)
+            self.state, self.message = annotating.AnnotationState(key_annotation.find_combinations(context.scene)), ""
+            self.player_name = key_annotation.describe_subject(context)
+            key_annotation.compute_now(context)
         except BeyondMocapError as error:
             return self.report_failure(error)
         self.pointer, self.is_folded = None, False
@@ -83,6 +84,8 @@ class BEYOND_MOCAP_OT_annotate(BaseOperator, bpy.types.Operator):
 
     def modal(self, context, event):
         """Handle the table's keys if an editor of `SPACES` is under the pointer; pass on all other events."""
+        from ...beyond_mocap.annotation import key_commands as annotating
+
         if not _running:
             return self.stop(context)
         area, region = _find_editor(context, event)
@@ -108,9 +111,9 @@ class BEYOND_MOCAP_OT_annotate(BaseOperator, bpy.types.Operator):
             handle: from the state and the playhead to the next state and its commands.
         """
         try:
-            self.player_name = describe_subject(context)
-            before = replace(self.state, available=find_combinations(context.scene))
-            self.state, commands = handle(before, compute_now(context))
+            self.player_name = key_annotation.describe_subject(context)
+            before = replace(self.state, available=key_annotation.find_combinations(context.scene))
+            self.state, commands = handle(before, key_annotation.compute_now(context))
             self.message = "" if commands else self.message
             if self.state.trail and not before.trail:
                 self.pointer = (event.mouse_x, event.mouse_y)
@@ -123,16 +126,20 @@ class BEYOND_MOCAP_OT_annotate(BaseOperator, bpy.types.Operator):
 
     def run_command(self, context, command):
         """Run one command; add an undo step if it changes labels."""
-        if isinstance(command, StopAnnotating):
+        from ...beyond_mocap.annotation import key_commands as annotating
+
+        if isinstance(command, annotating.StopAnnotating):
             self.state = None
             return
-        result = run_command(context, command)
-        self.message, self.player_name = result.line, describe_subject(context)
+        result = key_annotation.run_command(context, command)
+        self.message, self.player_name = result.line, key_annotation.describe_subject(context)
         if result.changed_labels:
             bpy.ops.ed.undo_push(message=f"Annotate: {self.message}"[:60])
 
     def handle_mouse(self, context, event, area, region):
         """Highlight the row under the mouse; a click chooses it. Events outside the menu are passed on."""
+        from ...beyond_mocap.annotation import key_commands as annotating
+
         word = None
         if _menu.get("region") == region.as_pointer():
             word = _menu["box"].word_at(event.mouse_x - region.x, event.mouse_y - region.y)

@@ -14,10 +14,9 @@ from ...scene.core.settings import find_active_player
 from ...scene.result import bake
 from ...scene.timeline import label_checks as word_checks
 from ...scene.timeline import label_tracks as lanes
-from ...scene.timeline import moment_names, strip_layout, strip_overlay
+from ...scene.timeline import moment_names, strip_layout, strip_overlay, strips
 from ...scene.timeline import strip_writing as lay_strips
 from ...scene.timeline.strip_lines import parse_labels
-from ...scene.timeline.strips import can_have_timeline, describe_target, ensure_target, find_target, find_target_clock
 from ..operator_base import BaseOperator
 
 
@@ -25,7 +24,7 @@ class TimelineVerb(BaseOperator):
     """A verb for the active player's timeline, or for that of a library clip that is being annotated."""
 
     needs = ("Import tracking in step 2 first, and place its players in the timeline",
-             lambda context: find_target(context) is not None)
+             lambda context: strips.find_target(context) is not None)
 
     def attempt(self, action):
         """Run the action, then update the problems of labels."""
@@ -37,14 +36,14 @@ class TimelineVerb(BaseOperator):
 class TimelineWritingVerb(TimelineVerb):
     """A verb that creates the timeline if there is none yet."""
 
-    needs = "Import tracking in step 2 first", lambda context: can_have_timeline(context)
+    needs = "Import tracking in step 2 first", lambda context: strips.can_have_timeline(context)
 
 
 class MomentVerb(TimelineVerb):
     """A verb for the selected key moment."""
 
     needs = (*TimelineVerb.needs, "Select a key moment first: click its name in the NLA editor or in the list",
-             lambda context: has_selected_moment(find_target(context)))
+             lambda context: has_selected_moment(strips.find_target(context)))
 
 
 def has_selected_moment(target: bpy.types.Object) -> bool:
@@ -56,7 +55,7 @@ def find_selected_moment(target: bpy.types.Object) -> lanes.PlacedMoment:
     """Find the selected key moment. Raises InputError if there is none."""
     found = next((moment for moment in lanes.list_moments(target) if moment.is_selected), None)
     if found is None:
-        raise InputError(describe_target(target), "no key moment is selected", "a key moment",
+        raise InputError(strips.describe_target(target), "no key moment is selected", "a key moment",
                          "click its name in the NLA editor")
     return found
 
@@ -78,7 +77,7 @@ def draw_problems(layout, context: bpy.types.Context, item) -> None:
 
 def compute_playhead(context: bpy.types.Context, target: bpy.types.Object) -> float:
     """Compute the playhead in seconds on the clock of the object's strips."""
-    return find_target_clock(context, target).to_seconds(context.scene.frame_current_final)
+    return strips.find_target_clock(context, target).to_seconds(context.scene.frame_current_final)
 
 
 class BEYOND_MOCAP_OT_show_timeline(BaseOperator, bpy.types.Operator):
@@ -175,12 +174,12 @@ class BEYOND_MOCAP_OT_go_to_moment(TimelineVerb, bpy.types.Operator):
 
     def do(self, context):
         """Select the moment and set the frame."""
-        target = find_target(context)
+        target = strips.find_target(context)
         strip = lanes.find_strip(target, self.strip or lanes.MOMENTS)
         markers = strip.action.pose_markers
         if not 0 <= self.index < len(markers):
             found = f"key moment {self.index} of strip {strip.name!r}"
-            raise InputError(describe_target(target), found, "one of this strip", f"it has {len(markers)}")
+            raise InputError(strips.describe_target(target), found, "one of this strip", f"it has {len(markers)}")
         lay_strips.select_moment(target, strip.name, self.index)
         context.scene.frame_set(lanes.compute_marker_frame(strip, markers[self.index]))
 
@@ -302,9 +301,9 @@ class BEYOND_MOCAP_OT_add_moment(TimelineWritingVerb, bpy.types.Operator):
 
     def do(self, context):
         parse_labels(self.words, 0.0)
-        target = ensure_target(context)
+        target = strips.ensure_target(context)
         lay_strips.add_moment(target, parse_labels(self.words, compute_playhead(context, target)),
-                              find_target_clock(context, target))
+                              strips.find_target_clock(context, target))
 
 
 class BEYOND_MOCAP_OT_move_moment(MomentVerb, bpy.types.Operator):
@@ -315,7 +314,7 @@ class BEYOND_MOCAP_OT_move_moment(MomentVerb, bpy.types.Operator):
     frames: IntProperty(name="Frames", options={"SKIP_SAVE"}, description="Frames to move by; 0: move to the playhead")
 
     def do(self, context):
-        target = find_target(context)
+        target = strips.find_target(context)
         moment, clock = find_selected_moment(target), lanes.read_clock(target)
         time = clock.to_seconds(moment.frame + self.frames) if self.frames else compute_playhead(context, target)
         lay_strips.change_moment(target, moment.strip, moment.index, replace(moment.key, time=time))
@@ -328,6 +327,6 @@ class BEYOND_MOCAP_OT_delete_moment(MomentVerb, bpy.types.Operator):
     bl_label = "Delete Key Moment"
 
     def do(self, context):
-        target = find_target(context)
+        target = strips.find_target(context)
         moment = find_selected_moment(target)
         lay_strips.remove_moment(target, moment.strip, moment.index)

@@ -8,7 +8,7 @@ import bpy
 from bpy.props import FloatProperty, StringProperty
 from bpy_extras.io_utils import ExportHelper
 
-from ...beyond_mocap.annotation import format_timeline, read_timeline, swap_sides
+from ...beyond_mocap import annotation
 from ...beyond_mocap.base.errors import InputError, format_count
 from ...scene.core.settings import find_active_player, to_setting_path
 from ...scene.library import recordings
@@ -17,7 +17,6 @@ from ...scene.timeline import label_tracks as lanes
 from ...scene.timeline import strip_writing as lay_strips
 from ...scene.timeline import strips
 from ...scene.timeline.strip_lines import format_labels, parse_labels
-from ...scene.timeline.strips import describe_target, ensure_target, find_active_clip, find_target, find_target_clock
 from ..operator_base import BaseOperator, ImportOperator
 from .timeline import TimelineVerb, TimelineWritingVerb, compute_playhead, draw_problems, list_selected_spans
 
@@ -49,14 +48,14 @@ class BEYOND_MOCAP_OT_add_span(TimelineWritingVerb, bpy.types.Operator):
         if end <= start:
             raise InputError("span", f"the end {end:g} s is not after the start {start:g} s", "an end after the start")
         span = parse_labels(self.words, start, end)
-        target = ensure_target(context)
-        lay_strips.add_span(target, span, find_target_clock(context, target))
+        target = strips.ensure_target(context)
+        lay_strips.add_span(target, span, strips.find_target_clock(context, target))
 
     @staticmethod
     def compute_range(context) -> tuple[float, float]:
         """Compute the preview range, or a second from the playhead on."""
-        scene, target = context.scene, find_target(context) or ensure_target(context)
-        clock = find_target_clock(context, target)
+        scene, target = context.scene, strips.find_target(context) or strips.ensure_target(context)
+        clock = strips.find_target_clock(context, target)
         if scene.use_preview_range:
             return clock.to_seconds(scene.frame_preview_start), clock.to_seconds(scene.frame_preview_end)
         return clock.to_seconds(scene.frame_current), clock.to_seconds(scene.frame_current) + 1.0
@@ -69,14 +68,14 @@ class BEYOND_MOCAP_OT_split_span(TimelineVerb, bpy.types.Operator):
     bl_label = "Split Span at Playhead"
 
     def do(self, context):
-        target = find_target(context)
+        target = strips.find_target(context)
         time, clock = compute_playhead(context, target), lanes.read_clock(target)
         frame = clock.to_whole_frame(time)
         there = [span for span in lanes.list_spans(target) if span.first < frame < span.last and not span.is_automatic]
         there = [span for span in there if span.is_selected] or there
         if not there:
             found = "no span is under the playhead"
-            raise InputError(describe_target(target), found, "a span", "move the playhead into a strip")
+            raise InputError(strips.describe_target(target), found, "a span", "move the playhead into a strip")
         for placed in there:
             lay_strips.change_span(target, placed.strip, replace(placed.span, end=time))
             lay_strips.add_span(target, replace(placed.span, start=time), clock)
@@ -93,16 +92,16 @@ class BEYOND_MOCAP_OT_join_spans(TimelineVerb, bpy.types.Operator):
         if not super().poll(context):
             return False
         cls.poll_message_set("Select two or more strips of one player first")
-        chosen = [strip for _, strip in lanes.iter_strips(find_target(context)) if strip.select]
+        chosen = [strip for _, strip in lanes.iter_strips(strips.find_target(context)) if strip.select]
         return sum(strip.action.beyond_mocap.kind != "moments" for strip in chosen) > 1
 
     def do(self, context):
         """Extend the first span and remove the others; their key moments stay."""
-        target = find_target(context)
+        target = strips.find_target(context)
         chosen = list_selected_spans(target)
         if len(chosen) < 2:
             found = "fewer than two spans are selected"
-            raise InputError(describe_target(target), found, "two spans or more", "select their strips")
+            raise InputError(strips.describe_target(target), found, "two spans or more", "select their strips")
         inner = [moment.key for moment in lanes.list_moments(target)
                  if moment.strip in {span.strip for span in chosen[1:]}]
         for placed in chosen[1:]:
@@ -124,13 +123,13 @@ class BEYOND_MOCAP_OT_mirror_side(TimelineVerb, bpy.types.Operator):
 
     def do(self, context):
         """Change all items whose labels have a side."""
-        target = find_target(context)
+        target = strips.find_target(context)
         moments = [moment for moment in lanes.list_moments(target) if moment.is_selected]
         moments_with_side = [placed for placed in moments if _mirror_labels(placed.key) != placed.key]
         spans = [placed for placed in list_selected_spans(target) if _mirror_labels(placed.span) != placed.span]
         if not (moments_with_side or spans):
             found = "nothing with left or right is selected"
-            raise InputError(describe_target(target), found, "a span or key moment with a side", "select one")
+            raise InputError(strips.describe_target(target), found, "a span or key moment with a side", "select one")
         for placed in moments_with_side:
             lay_strips.change_moment(target, placed.strip, placed.index, _mirror_labels(placed.key))
         for placed in spans:
@@ -139,7 +138,7 @@ class BEYOND_MOCAP_OT_mirror_side(TimelineVerb, bpy.types.Operator):
 
 def _mirror_labels(item):
     """Mirror the labels of a span or key moment."""
-    return replace(item, words=swap_sides(item.words), avoid=swap_sides(item.avoid))
+    return replace(item, words=annotation.swap_sides(item.words), avoid=annotation.swap_sides(item.avoid))
 
 
 class BEYOND_MOCAP_OT_edit_words(TimelineVerb, bpy.types.Operator):
@@ -157,16 +156,17 @@ class BEYOND_MOCAP_OT_edit_words(TimelineVerb, bpy.types.Operator):
 
     def load_labels(self, context):
         """Load the present labels."""
-        placed = find_selected_item(find_target(context))
+        placed = find_selected_item(strips.find_target(context))
         self.words = format_labels(placed.key if isinstance(placed, lanes.PlacedMoment) else placed.span)
 
     def draw(self, context):
         """Draw the labels and what is wrong with them."""
         self.layout.prop(self, "words", text="")
-        draw_problems(self.layout, context, lambda: _parse_item(self.words, find_selected_item(find_target(context))))
+        draw_problems(self.layout, context,
+                      lambda: _parse_item(self.words, find_selected_item(strips.find_target(context))))
 
     def do(self, context):
-        target = find_target(context)
+        target = strips.find_target(context)
         placed = find_selected_item(target)
         item = _parse_item(self.words, placed)
         if isinstance(placed, lanes.PlacedMoment):
@@ -183,7 +183,7 @@ def find_selected_item(target: bpy.types.Object):
         return moments[0]
     if len(spans) != 1:
         found = f"{len(spans)} spans are selected" if spans else "nothing is selected"
-        raise InputError(describe_target(target), found, "one span or key moment",
+        raise InputError(strips.describe_target(target), found, "one span or key moment",
                          "click the name of a key moment, or one strip")
     return spans[0]
 
@@ -221,12 +221,12 @@ class BEYOND_MOCAP_OT_words_to_text(TimelineVerb, bpy.types.Operator):
 
     def do(self, context):
         """Write to the player's text, or to a new one."""
-        target = find_target(context)
-        words = format_timeline(lanes.read_timeline(target, describe_target(target)))
-        player = None if find_active_clip(context) else find_active_player(context.scene.beyond_mocap)
+        target = strips.find_target(context)
+        words = annotation.format_timeline(lanes.read_timeline(target, strips.describe_target(target)))
+        player = None if strips.find_active_clip(context) else find_active_player(context.scene.beyond_mocap)
         text = player.annotation_text if player else None
         if text is None or text.library is not None:
-            text = bpy.data.texts.new(f"{describe_target(target)} labels")
+            text = bpy.data.texts.new(f"{strips.describe_target(target)} labels")
         text.clear()
         text.write(words)
         if player:
@@ -246,8 +246,8 @@ class BEYOND_MOCAP_OT_export_words(TimelineVerb, ExportHelper, bpy.types.Operato
     def do(self, context):
         if not self.filepath:
             raise InputError("export", "no file is chosen", "a file to write", "choose one")
-        target = find_target(context)
-        words = format_timeline(lanes.read_timeline(target, describe_target(target)))
+        target = strips.find_target(context)
+        words = annotation.format_timeline(lanes.read_timeline(target, strips.describe_target(target)))
         with open(bpy.path.abspath(self.filepath), "w", encoding="utf-8", newline="\n") as file:
             file.write(words)
         self.report({"INFO"}, f"{format_count(words.count(chr(10)), 'line')} in {self.filepath}")
@@ -272,12 +272,12 @@ of the library clip whose armature is active"""
         settings, rig = context.scene.beyond_mocap, context.object
         if recordings.find_shown_clip(rig):
             motion, _ = recordings.read_recording(settings, recordings.find_shown_clip(rig), rig[recordings.FOLDER])
-            timeline, owner = read_timeline(path, motion.fps), rig.name
+            timeline, owner = annotation.read_timeline(path, motion.fps), rig.name
             recordings.write_labels(rig, context.scene, motion, timeline)
         else:
             player = find_active_player(settings)
             start = float(tracks.read_track(settings, player).times[0])
-            timeline, owner = read_timeline(path, settings.rate, start), player.name
+            timeline, owner = annotation.read_timeline(path, settings.rate, start), player.name
             strips.write_player_timeline(context, player, timeline)
             player.annotation_file = to_setting_path(str(path))
         self.report({"INFO"}, f"{owner}: {strips.describe_counts(timeline)}")

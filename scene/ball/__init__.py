@@ -6,3 +6,5 @@ dragged.
 - `live`       detects changes of target, settings or body, and updates the ball
 - `handover`   lets Blender's rigid bodies move the ball from a frame on, and reverts that
 """
+
+REGISTERED = ("live", "settings")

@@ -72,5 +72,6 @@ def detect_changes(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> No
             WATCHER.mark_dirty()
 
 
-WATCHER = Watcher(name="Aimed balls", changed=detect_changes, follow=update_balls, restored=shots.clear_strikes,
-                  loaded=shots.clear_all, ends=shots.clear_all)
+WATCHER = Watcher(name="Aimed balls", changed=detect_changes, follow=update_balls,
+                  restored=lambda: shots.clear_strikes(), loaded=lambda: shots.clear_all(),
+                  ends=lambda: shots.clear_all())

@@ -1,5 +1,8 @@
 """Register everything that the modules of a package define: there is no list of classes to maintain.
 
+Enabling is quick because it loads only the modules that have something to register. A package of `scene`, most of whose
+modules have nothing, names those that do in `REGISTERED`; a test finds what is missing there.
+
 A class is registered because it is a Blender class that a module defines; one that is attached to Blender's own data
 says so in `attached_to` ("Scene.beyond_mocap"). A module that needs more has a function `register()`, `unregister()` or
 both. A package with `register()` in its `__init__` handles its own modules.
@@ -86,8 +89,12 @@ def _iter_steps(package: str) -> Iterator[tuple[Callable[[], None], Callable[[],
 
 
 def _iter_modules(package: ModuleType) -> Iterator[ModuleType]:
-    """Iterate over the modules below a package by name; of a package that registers itself, only that package."""
+    """Iterate over the modules below a package by name: all, or those in its `REGISTERED`, and its packages; of a
+    package that registers itself, only that package.
+    """
     for found in sorted(iter_modules(package.__path__), key=lambda found: found.name):
+        if not found.ispkg and found.name not in getattr(package, "REGISTERED", (found.name,)):
+            continue
         module = import_module(f"{package.__name__}.{found.name}")
         yield module
         if found.ispkg and not hasattr(module, "register"):

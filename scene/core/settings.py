@@ -18,7 +18,7 @@ from bpy.props import (
 )
 
 from ...beyond_mocap.base.settings import list_settings
-from ..characters.player_character import update_character, update_kit
+from ..characters import player_character
 from ..characters.settings import is_original
 from ..overlays.settings import BeyondMocapView
 from ..player.contact_edits import BeyondMocapContactEdit
@@ -51,9 +51,14 @@ def is_track(_settings, candidate: bpy.types.Object) -> bool:
     return candidate.type in {"CURVE", "EMPTY", "MESH", "ARMATURE"}
 
 
+def update_character(player, context) -> None:
+    """Let the chosen character play the player's motion."""
+    player_character.update_character(player, context)
+
+
 def update_dot(player, _context) -> None:
     """Apply a player's new name or colour to their dot and their character."""
-    update_kit(player)
+    player_character.update_kit(player)
     if player.dot is not None:
         player.dot.name, player.dot.color = f"{player.name} dot", (*player.shirt, 1.0)
         player.dot.beyond_mocap_dot.player, player.dot.beyond_mocap_dot.shirt = player.name, player.shirt

@@ -1,1 +1,3 @@
 """The library's clips in the scene."""
+
+REGISTERED = ("clips",)

@@ -20,7 +20,6 @@ from typing import TYPE_CHECKING
 import bpy
 from bpy.props import BoolProperty, CollectionProperty, EnumProperty, FloatProperty, IntProperty, StringProperty
 
-from ...beyond_mocap.annotation.labels import find_label
 from ...beyond_mocap.base.errors import format_count
 from ..core import window
 from ..core.live import Watcher
@@ -123,6 +122,8 @@ def update_list(manager: bpy.types.WindowManager) -> None:
     before = find_active_clip(manager)
     path = before.path if before is not None else ""
     listing.shown.clear()
+    from ...beyond_mocap.annotation.labels import find_label
+
     listing.total = len(_listing.clips)
     search_terms = listing.find.lower().split()
     chosen = [clip for clip in _listing.clips if all(_matches(clip, word) for word in search_terms)]

@@ -6,3 +6,5 @@ trajectories; edges and colours by segment - `cloud`      a trial as objects, an
 `sets`       the labels as a marker set, and a marker set applied to the labels - `solve`      the request of a
 reconstruction, and its result: body, model and the thrown ball
 """
+
+REGISTERED = ("cloud", "settings")

@@ -16,8 +16,7 @@ from bpy_extras.view3d_utils import location_3d_to_region_2d
 from mathutils import Vector
 
 from ...beyond_mocap.base.errors import InputError
-from ..core import channels
-from ..core.frame_range import fit_range
+from ..core import channels, frame_range
 from ..core.live import Watcher
 from ..core.measure import frames_per_second, units_per_metre
 from . import nodes
@@ -66,7 +65,7 @@ def create_cloud(
     nodes.add_modifier(cloud, {"Start": start})
     properties.size = RADIUS * units
     write_trial(cloud, trial, scene)
-    fit_range(scene, start + trial.duration * frames_per_second(scene), [cloud])
+    frame_range.fit_range(scene, start + trial.duration * frames_per_second(scene), [cloud])
     return cloud
 
 

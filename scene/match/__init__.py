@@ -1,1 +1,3 @@
 """Matches in the scene: players in kits, pitch, ball and cameras."""
+
+REGISTERED = ("settings",)

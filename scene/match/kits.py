@@ -8,12 +8,12 @@ from dataclasses import dataclass
 import bpy
 import numpy as np
 
-from ..characters.kit_materials import WORN, dress
+from ..characters import kit_materials
 from ..core.material import create_material
-from ..stage.body import CLOTH
-from ..stage.body_surfaces import paint_part
+from ..stage import body as bodies
+from ..stage import body_surfaces
+from . import load
 from . import match_objects as ours
-from .load import TEAMS, Character
 
 DEFAULT_COLOURS = {"home": "#C8102E", "away": "#1D4ED8", "referee": "#15171A"}
 """Shirts of teams without a colour in the feed."""
@@ -47,7 +47,7 @@ class Kit:
     ink: tuple[float, float, float]
 
 
-def choose_kit(person: Character, colours: dict[str, str]) -> Kit:
+def choose_kit(person: load.Character, colours: dict[str, str]) -> Kit:
     """Choose a person's kit.
 
     Args:
@@ -105,21 +105,21 @@ def update_materials(scene: bpy.types.Scene, colours: dict[str, str]) -> None:
         scene: the scene.
         colours: "#RRGGBB" by team.
     """
-    used = {cloth for team in TEAMS for thing in ours.find_meshes(scene, team) for cloth in thing.data.materials}
+    used = {cloth for team in load.TEAMS for thing in ours.find_meshes(scene, team) for cloth in thing.data.materials}
     for team in DEFAULT_COLOURS:
         for keeper in (False, True):
-            kit = choose_kit(Character("", "", -1, team=team, keeper=keeper, motions=()), colours)
+            kit = choose_kit(load.Character("", "", -1, team=team, keeper=keeper, motions=()), colours)
             for part, rgb in _build_part_colours(kit).items():
                 for material in used & set(_find_materials(kit, part)):
                     _set_colour(material, rgb)
             for body in ours.find_armatures(scene):
-                if body.get(WORN, {}).get("kit") == kit.name:
+                if body.get(kit_materials.WORN, {}).get("kit") == kit.name:
                     dress_in_kit(body, kit)
 
 
 def dress_in_kit(body: bpy.types.Object, kit: Kit) -> None:
     """Dress a copy of a character of the file in a kit."""
-    dress(body, kit.name, {"shirt": kit.shirt, "shorts": kit.shorts, "socks": kit.socks})
+    kit_materials.dress(body, kit.name, {"shirt": kit.shirt, "shorts": kit.shorts, "socks": kit.socks})
 
 
 def create_kit_material(kit: Kit, part: str) -> bpy.types.Material:
@@ -136,8 +136,8 @@ def create_kit_material(kit: Kit, part: str) -> bpy.types.Material:
     """
     colours = _build_part_colours(kit)
     unused = (one for one in _find_materials(kit, part) if one.users == one.use_fake_user)
-    material = next(unused, None) or paint_part(create_material(_build_material_name(kit, part), colours[part], CLOTH),
-                                                part)
+    material = next(unused, None) or body_surfaces.paint_part(
+        create_material(_build_material_name(kit, part), colours[part], bodies.CLOTH), part)
     _set_colour(material, colours[part])
     return material
 

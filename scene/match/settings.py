@@ -20,7 +20,7 @@ from ...beyond_mocap.files.event_providers import EVENT_PROVIDERS
 from ...beyond_mocap.files.tracking.providers import PROVIDERS
 from ..characters.settings import is_original
 from ..core.properties import with_settings
-from .kits import DEFAULT_COLOURS, to_hex, to_linear, update_materials
+from . import kits
 
 FILE = {"subtype": "FILE_PATH", "options": {"PATH_SUPPORTS_BLEND_RELATIVE"}}
 AUTO = "AUTO"
@@ -38,7 +38,7 @@ FIRST_SECONDS = 60.0
 def update_colours(match, _context) -> None:
     """Update the displayed kits when a colour changes."""
     if match.shown:
-        update_materials(match.id_data, collect_colours(match))
+        kits.update_materials(match.id_data, collect_colours(match))
 
 
 def update_bodies(match, context) -> None:
@@ -86,11 +86,11 @@ class BeyondMocapMatch(bpy.types.PropertyGroup):
         description="Where results are stored, some megabytes per match; empty: a folder per selection "
         "beside the saved file or the tracking file",
     )
-    home_colour: FloatVectorProperty(name="Home Shirts", default=to_linear(DEFAULT_COLOURS["home"]),
+    home_colour: FloatVectorProperty(name="Home Shirts", default=kits.to_linear(kits.DEFAULT_COLOURS["home"]),
                                      update=update_colours, description="Colour of the home team's shirts", **COLOUR)
-    away_colour: FloatVectorProperty(name="Away Shirts", default=to_linear(DEFAULT_COLOURS["away"]),
+    away_colour: FloatVectorProperty(name="Away Shirts", default=kits.to_linear(kits.DEFAULT_COLOURS["away"]),
                                      update=update_colours, description="Colour of the away team's shirts", **COLOUR)
-    referee_colour: FloatVectorProperty(name="Referees", default=to_linear(DEFAULT_COLOURS["referee"]),
+    referee_colour: FloatVectorProperty(name="Referees", default=kits.to_linear(kits.DEFAULT_COLOURS["referee"]),
                                         update=update_colours, description="Colour of the referees' shirts", **COLOUR)
     home_character: PointerProperty(name="Home Body", **CHARACTER,
                                     description="Armature of this file as the home team's body; empty: built-in")
@@ -126,7 +126,7 @@ def format_float(value: float) -> str:
 
 def collect_colours(match: BeyondMocapMatch) -> dict[str, str]:
     """Collect "#RRGGBB" of shirts by team."""
-    return {team: to_hex(getattr(match, f"{team}_colour")) for team in DEFAULT_COLOURS}
+    return {team: kits.to_hex(getattr(match, f"{team}_colour")) for team in kits.DEFAULT_COLOURS}
 
 
 def find_active_player(match: BeyondMocapMatch) -> BeyondMocapMatchPlayer | None:

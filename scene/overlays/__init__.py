@@ -11,3 +11,5 @@
 - `momentum`       centre of mass, flights, support polygon and ground force at the current frame
 - `draw`           the handlers of the view, which only look up; the legend
 """
+
+REGISTERED = ("draw", "momentum_traces", "player_names", "settings", "store")

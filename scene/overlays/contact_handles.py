@@ -10,7 +10,8 @@ import bpy
 import numpy as np
 from mathutils import Matrix
 
-from ..player.contact_edits import FEET_OF_CORE, Contact
+from ...beyond_mocap.synthesis import contact_edit
+from ..player.contact_edits import Contact
 from . import colours, shapes
 from .path_overlays import DrawItem
 from .prepare import SOLE, SOLE_EDGE, Mesh
@@ -78,7 +79,7 @@ def list_items(scene: bpy.types.Scene) -> list[DrawItem]:
 def _build_all(handles: Handles) -> list[Mesh]:
     """Build all footprints, coloured by foot; edited ones have a yellow edge."""
     fill, edge = _build_soles(handles.contacts, np.zeros(2), 0.0)
-    side = [FEET_OF_CORE.index(contact.foot) for contact in handles.contacts]
+    side = [contact_edit.FEET.index(contact.foot) for contact in handles.contacts]
     colour = np.array([(*colours.LEFT, 0.55), (*colours.RIGHT, 0.55)], np.float32)[side]
     edges = np.array([(*colours.YELLOW, 1.0) if edited else (*colours.BLACK, 0.8) for edited in handles.edited],
                      np.float32)
@@ -102,7 +103,7 @@ def _build_chosen(handles: Handles) -> list[Mesh]:
 def _build_soles(contacts: list[Contact], offset: np.ndarray, lift: float) -> tuple[np.ndarray, np.ndarray]:
     heel, toe = (np.array([getattr(contact, name) for contact in contacts]) + offset for name in ("heel", "toe"))
     along = toe - heel
-    side = np.array([FEET_OF_CORE.index(contact.foot) for contact in contacts])
+    side = np.array([contact_edit.FEET.index(contact.foot) for contact in contacts])
     fill, edge = shapes.build_soles(heel, toe, np.arctan2(along[:, 1], along[:, 0]), side, SOLE + lift)
     edge[:, 2] = SOLE_EDGE + lift
     return fill, edge

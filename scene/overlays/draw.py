@@ -18,8 +18,7 @@ from mathutils import Matrix, Vector
 from ..core import window
 from ..core.live import Watcher
 from ..core.settings import find_active_player
-from . import ball_paths, colours, contact_handles, momentum, path_overlays, shapes, store
-from .prepare import Mesh, PreparedTake
+from . import ball_paths, colours, contact_handles, momentum, path_overlays, prepare, shapes, store
 from .text_places import Box, find_free_box
 
 BIAS = 1e-5
@@ -31,7 +30,7 @@ FONT = 0
 GROUND = (0.03, 0.03, 0.03, 0.72)  # background of texts
 
 _batches: dict[tuple, list] = {}
-_owners: dict[str, PreparedTake] = {}
+_owners: dict[str, prepare.PreparedTake] = {}
 _square: list = []
 _taken: list[Box] = []  # places of the texts that this draw has drawn so far
 
@@ -48,7 +47,7 @@ class DrawnTake(NamedTuple):
     """
 
     take: str
-    prepared: PreparedTake
+    prepared: prepare.PreparedTake
     world: Matrix
     seconds: float
     active: bool
@@ -127,7 +126,7 @@ def _list_takes(context) -> list[DrawnTake]:
     return found
 
 
-def _free_unused(now: dict[str, PreparedTake]) -> None:
+def _free_unused(now: dict[str, prepare.PreparedTake]) -> None:
     """Free the batches of takes that are no longer drawn."""
     unused = {take for take, owner in _owners.items() if store.find_prepared(take) is not owner}
     for key in [key for key in _batches if key[0] in unused]:
@@ -207,9 +206,9 @@ def _ghost_frames(view, shown: DrawnTake) -> list[int]:
     return [frame for frame in range(-(-first // step) * step, last + 1, step) if frame != now]
 
 
-def _build_figure(prepared: PreparedTake, frame: int) -> Mesh:
+def _build_figure(prepared: prepare.PreparedTake, frame: int) -> prepare.Mesh:
     points = prepared.figures[frame][prepared.pairs].reshape(-1, 3)
-    return Mesh("LINES", points, prepared.pair_colours, 2.0)
+    return prepare.Mesh("LINES", points, prepared.pair_colours, 2.0)
 
 
 def _build_batches(key: tuple, meshes) -> list:
@@ -250,9 +249,9 @@ def _draw_contacts(shown: DrawnTake) -> None:
                 _build_batches(("", "disc"), _build_disc)[0][0].draw(shader)
 
 
-def _build_disc() -> list[Mesh]:
+def _build_disc() -> list[prepare.Mesh]:
     points = shapes.build_disc(DISC)
-    return [Mesh("TRIS", points, colours.repeat_colour(colours.WHITE, len(points)))]
+    return [prepare.Mesh("TRIS", points, colours.repeat_colour(colours.WHITE, len(points)))]
 
 
 def _draw_texts():

@@ -16,10 +16,7 @@ import bpy
 from ...beyond_mocap.base.errors import InputError
 from ..core import window
 from ..core.live import Watcher, call_or_describe
-from ..path_editing.armature_adapter import PlainAdapter, check_finite
-from ..path_editing.edited_bodies import find_computed_edit
-from ..path_editing.rig_source import sample_visible_motion
-from ..path_editing.rigs import choose_adapter, is_keyed_on_bones
+from ..path_editing import armature_adapter, edited_bodies, rig_source, rigs
 
 if TYPE_CHECKING:
     from ...beyond_mocap.motion.momentum_trace import MomentumTrace
@@ -129,7 +126,7 @@ def _compute_momentum(scene: bpy.types.Scene, body: bpy.types.Object, digest: tu
     from ...beyond_mocap.motion.momentum_trace import trace_momentum
 
     motion, first = _read_visible_motion(scene, body)
-    check_finite(body, motion)
+    armature_adapter.check_finite(body, motion)
     if len(motion) < 2:
         raise InputError(f"armature {body.name}", "a single pose", "a motion", "import one, or choose an action")
     try:
@@ -141,18 +138,18 @@ def _compute_momentum(scene: bpy.types.Scene, body: bpy.types.Object, digest: tu
 
 def _read_visible_motion(scene: bpy.types.Scene, body: bpy.types.Object) -> tuple["Motion", int]:
     """Read the motion that an armature shows, also on its new path, and the scene frame of its first pose."""
-    edit = find_computed_edit(body)
+    edit = edited_bodies.find_computed_edit(body)
     if edit is not None:
         return edit.edited.motion, edit.first
-    if body.beyond_mocap_ride.on or not is_keyed_on_bones(body):
-        return sample_visible_motion(body, scene)
-    read = PlainAdapter(body).read_motion(scene)
+    if body.beyond_mocap_ride.on or not rigs.is_keyed_on_bones(body):
+        return rig_source.sample_visible_motion(body, scene)
+    read = armature_adapter.PlainAdapter(body).read_motion(scene)
     return read.motion, read.first
 
 
 def _compute_digest(scene: bpy.types.Scene, body: bpy.types.Object) -> tuple:
     """Compute a digest of what the visible motion is read from; keys are read only where they may have changed."""
-    edit, adapter, uid = find_computed_edit(body), choose_adapter(body), body.session_uid
+    edit, adapter, uid = edited_bodies.find_computed_edit(body), rigs.choose_adapter(body), body.session_uid
     if edit is not None:
         return (edit.number,)
     if uid not in _keys:

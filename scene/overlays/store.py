@@ -11,8 +11,8 @@ from typing import TYPE_CHECKING
 import bpy
 from mathutils import Matrix
 
+from ..core import action as actions
 from ..core import background, session, window
-from ..core.action import PLACEMENT
 from ..core.live import Watcher, call_soon
 from ..core.measure import frames_per_second, units_per_metre
 from ..core.properties import find_active_row
@@ -155,7 +155,7 @@ def _run_timer() -> float | None:
 def _read_written_matrix(body: bpy.types.Object) -> Matrix | None:
     """Read the armature's matrix when its take was written; None without one."""
     for action in _iter_actions(body):
-        if (numbers := action.get(PLACEMENT)) is not None:
+        if (numbers := action.get(actions.PLACEMENT)) is not None:
             rows = list(numbers)
             return Matrix([rows[i : i + 4] for i in range(0, 16, 4)])
     return None

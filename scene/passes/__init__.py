@@ -8,3 +8,5 @@
 - `tracked`: the ball of imported tracking data, solved
 - `possession`: a ball carried by a bone for some frames, without a jump at either end
 """
+
+REGISTERED = ("hit_analysis", "live", "settings")

@@ -13,8 +13,7 @@ import numpy as np
 
 from ..core import action, channels
 from ..core.live import Watcher
-from ..path_editing.armature_adapter import check_finite
-from ..path_editing.rigs import choose_adapter, is_edited_as_rig
+from ..path_editing import armature_adapter, rigs
 from .settings import BeyondMocapHits, name_picture, parse_hits, pictures
 
 if TYPE_CHECKING:
@@ -43,9 +42,10 @@ def read_motion(scene: bpy.types.Scene, body: bpy.types.Object) -> tuple["Motion
     Raises:
         InputError: if the armature does not move.
     """
-    if body.beyond_mocap_ride.on or (channels.find_playing_action(body)[0] is not None and not is_edited_as_rig(body)):
+    moves = channels.find_playing_action(body)[0] is not None and not rigs.is_edited_as_rig(body)
+    if body.beyond_mocap_ride.on or moves:
         return action.read_motion(body, scene), action.find_first_frame(body)
-    carrier_motion = choose_adapter(body).read_motion(scene)
+    carrier_motion = rigs.choose_adapter(body).read_motion(scene)
     return carrier_motion.motion, carrier_motion.first
 
 
@@ -69,7 +69,7 @@ def analyse_armature(
 
     channels.check_local(body)
     motion, first = read_motion(scene, body)
-    check_finite(body, motion)
+    armature_adapter.check_finite(body, motion)
     hits_found = find(motion, part, side, threshold or None, bone or None)
     hits = body.beyond_mocap_hits
     hits.part, hits.side, hits.bone, hits.threshold = part, side or "right", bone, threshold

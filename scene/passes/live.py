@@ -102,4 +102,4 @@ def clear_updates() -> None:
 
 
 WATCHER = Watcher(name="Passing scene", changed=mark_edit, settle=settle_edit, dragged=_update_drag,
-                  loaded=make.clear_trajectories, ends=clear_updates)
+                  loaded=lambda: make.clear_trajectories(), ends=clear_updates)

@@ -9,3 +9,5 @@
 - `live`                 detects edits and updates the motion; measures it once the curve is at rest
 - `collision_avoidance`  finds collisions of edited bodies and other bodies, and adds waits and detours
 """
+
+REGISTERED = ("live", "settings")

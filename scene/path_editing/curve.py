@@ -5,6 +5,7 @@ ground.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import bpy
 import numpy as np
@@ -13,9 +14,11 @@ from mathutils import Vector
 from ...beyond_mocap.base.digest import byte_digest
 from ...beyond_mocap.base.errors import InputError
 from ...beyond_mocap.base.vectors import unit_vectors
-from ...beyond_mocap.motion.path.path import Path
 from ..core.measure import units_per_metre
 from ..player.drawn_track import list_points
+
+if TYPE_CHECKING:
+    from ...beyond_mocap.motion.path.path import Path
 
 KINDS = (("BEZIER", "Bezier", "Points on the path, with handles"),
          ("NURBS", "NURBS", "Control points beside the path: a B-spline, smoother, with fewer points"))

@@ -19,8 +19,7 @@ import bpy
 from ...beyond_mocap.base.errors import BeyondMocapError
 from ..core import background
 from ..core.live import Watcher, call_or_describe
-from . import curve, edited_bodies
-from .armature_adapter import invalidate_sources
+from . import armature_adapter, curve, edited_bodies
 from .settings import list_edited_bodies
 
 MATTERS = (bpy.types.Object, bpy.types.Curve, bpy.types.Mesh, bpy.types.Armature, bpy.types.Action, bpy.types.Scene)
@@ -131,8 +130,9 @@ def stop_measuring() -> None:
 
 
 WATCHER = Watcher(
-    name="Path editing", watched_types=MATTERS, follow=update_all, restored=invalidate_sources,
-    loaded=edited_bodies.clear_caches, ends=edited_bodies.clear_caches,
+    name="Path editing", watched_types=MATTERS, follow=update_all,
+    restored=lambda: armature_adapter.invalidate_sources(),
+    loaded=lambda: edited_bodies.clear_caches(), ends=lambda: edited_bodies.clear_caches(),
     framed=lambda _scene: WATCHER.mark_dirty(),  # the only report of edits that take effect with a change of frame
 )
 FIGURES = Watcher(name="Figures of path editing", look=_run_timer, ends=stop_measuring)

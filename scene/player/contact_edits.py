@@ -13,8 +13,7 @@ from bpy.props import EnumProperty, FloatProperty, FloatVectorProperty
 from ...beyond_mocap.base.errors import InputError
 from ...beyond_mocap.base.fixes import Fix
 from ...beyond_mocap.base.time_series import find_runs
-from ...beyond_mocap.synthesis.contact_edit import FEET as FEET_OF_CORE
-from ...beyond_mocap.synthesis.contact_edit import ContactEdit
+from ...beyond_mocap.synthesis import contact_edit
 from ..core import session
 
 FEET = (("left", "Left", "Left foot"), ("right", "Right", "Right foot"))
@@ -62,13 +61,15 @@ class Contact:
         return 0.5 * (self.start + self.end)
 
 
-def read_contact_edits(player) -> tuple[ContactEdit, ...]:
+def read_contact_edits(player) -> tuple[contact_edit.ContactEdit, ...]:
     """Read a player's contact edits."""
-    return tuple(ContactEdit(round(edit.time, 6), edit.foot, edit.kind, round(edit.start, 6), end=round(edit.end, 6),
-                             offset=tuple(round(value, 6) for value in edit.offset)) for edit in player.contact_edits)
+    return tuple(contact_edit.ContactEdit(round(edit.time, 6), edit.foot, edit.kind, round(edit.start, 6),
+                                          end=round(edit.end, 6),
+                                          offset=tuple(round(value, 6) for value in edit.offset))
+                 for edit in player.contact_edits)
 
 
-def write_contact_edits(player, edits: tuple[ContactEdit, ...]) -> None:
+def write_contact_edits(player, edits: tuple[contact_edit.ContactEdit, ...]) -> None:
     """Replace a player's contact edits."""
     player.contact_edits.clear()
     for edit in edits:
@@ -104,7 +105,7 @@ def list_contacts(take) -> list[Contact]:
     for side, limb in enumerate((body.left, body.right)):
         for first, end in find_runs(take.contacts[:, side]):
             heel, toe = (places[first:end, joint, :2].mean(axis=0) for joint in (limb.foot, limb.toe_or_foot))
-            found.append(Contact(FEET_OF_CORE[side], float(times[first]), float(times[end - 1]), heel, toe))
+            found.append(Contact(contact_edit.FEET[side], float(times[first]), float(times[end - 1]), heel, toe))
     return found
 
 

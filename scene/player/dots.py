@@ -5,16 +5,20 @@ A player's dot carries the strips of its timeline, and the data to add its playe
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import bpy
 import numpy as np
 
-from ...beyond_mocap.motion.track import Track
 from ..core import channels
 from ..core.measure import Clock, build_scene_clock, units_per_metre
 from ..core.names import find_named
 from ..core.settings import BeyondMocapPlayer, BeyondMocapSettings, to_absolute_path, to_setting_path
 from ..result import bake
-from .tracks import read_track
+from . import tracks
+
+if TYPE_CHECKING:
+    from ...beyond_mocap.motion.track import Track
 
 BALL = "Ball dot"
 MARK = "beyond_mocap_dot"  # on actions that move a dot and may be regenerated
@@ -44,7 +48,7 @@ def ensure_dot(context: bpy.types.Context, player: BeyondMocapPlayer) -> bpy.typ
         if player.dot.name not in context.scene.objects:  # deleted in the view; the player still refers to it
             collection.objects.link(player.dot)
         return player.dot
-    track = read_track(context.scene.beyond_mocap, player)
+    track = tracks.read_track(context.scene.beyond_mocap, player)
     dot = _create_empty(context.scene, f"{player.name} dot", SIZE, collection)
     player.dot = dot
     update_dot(player)
@@ -62,7 +66,7 @@ def update_dot_track(context: bpy.types.Context, player: BeyondMocapPlayer) -> N
     action = channels.find_playing_action(dot)[0] if dot is not None else None
     if action is None or not action.get(MARK):
         return
-    track = read_track(context.scene.beyond_mocap, player)
+    track = tracks.read_track(context.scene.beyond_mocap, player)
     seconds, places = _select_measured(track.times, track.positions)
     channels.remove_marked_action(dot, MARK)
     _animate_dot(context.scene, dot, seconds, np.pad(places, ((0, 0), (0, 1))), build_scene_clock(context.scene))

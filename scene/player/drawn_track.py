@@ -15,9 +15,8 @@ from bpy_extras.view3d_utils import location_3d_to_region_2d
 from ...beyond_mocap.base.errors import InputError
 from ...beyond_mocap.base.time_series import interpolate_columns
 from ...beyond_mocap.base.vectors import distances_along
-from ...beyond_mocap.motion.humanoid import identify_joints
-from ...beyond_mocap.motion.track import Track
-from ...beyond_mocap.motion.track.line_track import build_line_track, build_moving_track, sample_nurbs
+from ...beyond_mocap.motion import humanoid, track
+from ...beyond_mocap.motion.track import line_track
 from ..core import channels
 from ..core.live import Watcher
 from ..core.measure import build_scene_clock, units_per_metre
@@ -52,7 +51,8 @@ MAX_PLAYED = 32
 _played_paths: dict[tuple[int, int], tuple] = {}  # (scene, object) by session_uid: stamp, frames, places
 
 
-def read_drawn_track(scene: bpy.types.Scene, drawn: bpy.types.Object, start: float = 0.0, still: bool = False) -> Track:
+def read_drawn_track(scene: bpy.types.Scene, drawn: bpy.types.Object, start: float = 0.0,
+                     still: bool = False) -> track.Track:
     """Read the track of a curve or a moving object.
 
     Args:
@@ -71,11 +71,11 @@ def read_drawn_track(scene: bpy.types.Scene, drawn: bpy.types.Object, start: flo
         line = build_line(scene, drawn)
         level = line.line[:, :2]
         distances = distances_along(level)
-        return build_line_track(level, distances[line.point_indices], line.speeds, waits=line.waits, start=start,
-                                name=f"curve {drawn.name}")
+        return line_track.build_line_track(level, distances[line.point_indices], line.speeds, waits=line.waits,
+                                           start=start, name=f"curve {drawn.name}")
     if drawn.type == "CURVES":
         raise InputError(f"object {drawn.name}", "hair curves", "a curve (Add > Curve)", "convert it: Object > Convert")
-    return build_moving_track(*_read_timed_places(scene, drawn, still), f"object {drawn.name}")
+    return line_track.build_moving_track(*_read_timed_places(scene, drawn, still), f"object {drawn.name}")
 
 
 def sample_object(scene: bpy.types.Scene, target: bpy.types.Object, times: np.ndarray, still: bool) -> np.ndarray:
@@ -112,7 +112,7 @@ def build_line(scene: bpy.types.Scene, drawn: bpy.types.Object) -> DrawnLine:
         local, at = _read_values(points, "co", 4)[:, :3], np.arange(len(points))
     else:
         places, weights = _read_values(points, "co", 4)[:, :3], _read_values(points, "weight", 1)
-        local, at = sample_nurbs(places, weights, spline.order_u, spline.use_endpoint_u, BEZIER_PIECES)
+        local, at = line_track.sample_nurbs(places, weights, spline.order_u, spline.use_endpoint_u, BEZIER_PIECES)
     world = np.array(drawn.matrix_world)
     line = (local @ world[:3, :3].T + world[:3, 3]) / units_per_metre(scene)
     return DrawnLine(line, at, _read_values(points, "radius", 1), _read_values(points, "weight_softbody", 1))
@@ -258,7 +258,7 @@ def _find_hips_bone(scene: bpy.types.Scene, moving: bpy.types.Object) -> str:
     """Find the pelvis bone, or the first without a parent."""
     try:
         skeleton = armature.build_skeleton(moving, scene)
-        return skeleton.names[identify_joints(skeleton).hips]
+        return skeleton.names[humanoid.identify_joints(skeleton).hips]
     except InputError:
         if not moving.data.bones:
             raise

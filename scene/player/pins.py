@@ -7,7 +7,7 @@ import numpy as np
 from bpy.props import EnumProperty, FloatProperty, PointerProperty
 
 from ...beyond_mocap.base.errors import InputError
-from ...beyond_mocap.motion.humanoid import identify_joints
+from ...beyond_mocap.motion import humanoid
 from ...beyond_mocap.synthesis.pin import BALL, Pin
 from ..core import window
 from ..core.measure import build_scene_clock, units_per_metre
@@ -89,7 +89,7 @@ def find_part_position(context: bpy.types.Context, player, part: str) -> np.ndar
         raise InputError(f"player {player.name}", "no body", "a body to pin",
                          "Synthesize first, or pin at the 3D cursor")
     skeleton = armature.build_skeleton(player.body, context.scene)
-    body = identify_joints(skeleton)
+    body = humanoid.identify_joints(skeleton)
     sides = {"left": body.left, "right": body.right}
     side, _, what = part.partition("_")
     joint = body.head if part == "gaze" else getattr(sides[side], what)

@@ -17,20 +17,22 @@ import os
 import threading
 import time
 from dataclasses import fields, is_dataclass, replace
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import bpy
 import numpy as np
 from bpy.props import IntProperty, StringProperty
 
-from ...beyond_mocap.annotation import Timeline
+from ...beyond_mocap import annotation
 from ...beyond_mocap.base.errors import BeyondMocapError, format_count
-from ...beyond_mocap.synthesis.plan import Plan
 from ..core import background, channels, session, window
 from ..core.live import Watcher, is_playing
 from ..core.settings import BeyondMocapPlayer, to_absolute_path
 from . import bake, blocks, plans, queue
 from . import manual_keys as hand_keys
+
+if TYPE_CHECKING:
+    from ...beyond_mocap.synthesis.plan import Plan
 
 SECONDS = 1.0  # between two checks
 LIBRARY_SECONDS = 10.0  # between two checks of the library's folder
@@ -105,7 +107,7 @@ def compute_parts(plan: Plan, folder: str, library: str = "") -> dict[str, str]:
 
 def compute_plan_parts(plan: Plan) -> dict[str, str]:
     """Compute the same without the library, which needs a walk over the disk."""
-    rest = replace(plan, track=None, timeline=Timeline(), library="")
+    rest = replace(plan, track=None, timeline=annotation.Timeline(), library="")
     return {"track": compute_fingerprint(plan.track), "words": compute_fingerprint(plan.timeline),
             "choices": compute_fingerprint(rest)}
 

@@ -17,9 +17,8 @@ from ...beyond_mocap.base.errors import InputError
 from ...beyond_mocap.motion import quaternion
 from ..core import channels
 from ..core.measure import frames_per_second
-from . import blocks
+from . import bake, blocks
 from . import manual_keys as hand_keys
-from .bake import MARK
 
 LAYER = "beyond_mocap_layer"  # on the action of a layer
 STACKED = "beyond_mocap_stacked"  # on a take's action that plays as a strip below layers
@@ -103,7 +102,7 @@ def stack_layers(body: bpy.types.Object | None) -> None:
         return
     data = body.animation_data
     action, slot = channels.find_playing_action(body)
-    if action is not None and action.get(MARK):
+    if action is not None and action.get(bake.MARK):
         earlier = blocks.find_track(body)
         if earlier is not None:
             earlier.mute = True
@@ -313,7 +312,7 @@ def _raise_layers(body: bpy.types.Object) -> None:
     data = body.animation_data
     tracks = list(data.nla_tracks)
     takes = [number for number, track in enumerate(tracks)
-             if any(strip.action is not None and strip.action.get(MARK) for strip in track.strips)]
+             if any(strip.action is not None and strip.action.get(bake.MARK) for strip in track.strips)]
     for track in tracks[:takes[-1]] if takes else ():
         if any(strip.action is not None and strip.action.get(LAYER) for strip in track.strips):
             _raise_track(data.nla_tracks, track)

@@ -8,3 +8,5 @@
 - `bone_curves`    poses of driven bones and an exported root at each frame, and the curves of bones' channels
 - `rig_bake`       a motion baked onto a rig; the rig's previous state, and whether its keys are unchanged
 """
+
+REGISTERED = ("rig",)

@@ -13,7 +13,7 @@ from pathlib import Path
 import bpy
 
 from ...beyond_mocap.base.errors import InputError, format_count
-from ..characters.player_character import find_shown_body
+from ..characters import player_character
 from ..core.settings import find_active_player
 from ..match import match_objects
 from . import export, exporters
@@ -69,10 +69,11 @@ def list_delivered_rigs(context: bpy.types.Context, who: str) -> list[bpy.types.
             raise InputError("export", "no match is shown", "a displayed match", "press Show Match first")
         return [body for body in found if body.name in context.view_layer.objects]
     if who == "PLAYERS":
-        return [body for player in settings.players if player.use and (body := find_shown_body(player)) is not None]
+        return [body for player in settings.players
+                if player.use and (body := player_character.find_shown_body(player)) is not None]
     player = find_active_player(settings)
-    if player is not None and find_shown_body(player) is not None:
-        return [find_shown_body(player)]
+    if player is not None and player_character.find_shown_body(player) is not None:
+        return [player_character.find_shown_body(player)]
     active = context.object
     return [active] if active is not None and active.type == "ARMATURE" else []
 

@@ -27,6 +27,7 @@ from .fit import BakeOptions, FittedMotion, Slide, SourceMotion
 _REPORTED_DISTANCE = 1e-3  # metres from which a deviation is reported
 MARK = "beyond_mocap_rig"
 KEYS = "beyond_mocap_keys"  # digest of the baked keys: if it differs, the user has edited them
+BAKE_PROPERTIES = (MARK, PREVIOUS_STATE, KEYS)  # custom properties of a bake that can be removed
 
 
 @dataclass

@@ -1,1 +1,3 @@
 """Pitch, ball, character mesh and cameras."""
+
+REGISTERED = ("settings",)

@@ -4,3 +4,5 @@
 - `follow`: the one listener of the session, and the armature that follows the user
 - `play`: a passing scene that answers the user's strikes
 """
+
+REGISTERED = ("follow", "play", "settings")

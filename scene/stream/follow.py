@@ -10,25 +10,27 @@ from __future__ import annotations
 import statistics
 import time
 from collections import deque
+from typing import TYPE_CHECKING
 
 import bpy
 import numpy as np
 
 from ...beyond_mocap.base.errors import BeyondMocapError, InputError
 from ...beyond_mocap.base.fixes import Fix
+from ...beyond_mocap.motion import motion as motions
 from ...beyond_mocap.motion import quaternion
-from ...beyond_mocap.motion.motion import Motion
-from ...beyond_mocap.motion.skeleton import Skeleton
-from ...beyond_mocap.passes.hits import HitMotion
-from ...beyond_mocap.passes.stream.bvh_stream import read_hierarchy
-from ...beyond_mocap.passes.stream.listener import Listener, convert_poses
-from ...beyond_mocap.passes.stream.live_hits import LiveHits
+from ...beyond_mocap.passes.stream import bvh_stream, live_hits
+from ...beyond_mocap.passes.stream import listener as listening
 from ..core import action, window
 from ..core.live import Watcher, call_or_describe
 from ..core.measure import frames_per_second
 from ..result import bake
 from ..rigs import armature
 from ..stage import body
+
+if TYPE_CHECKING:
+    from ...beyond_mocap.motion.skeleton import Skeleton
+    from ...beyond_mocap.passes.hits import HitMotion
 
 TICK, IDLE = 1.0 / 60.0, 0.25  # s between two timer calls, with and without a stream
 STATUS_SECONDS, DETECT_SECONDS = 0.25, 0.1  # s between two status updates, and two hit detections
@@ -77,7 +79,7 @@ def update_stream(scene: bpy.types.Scene) -> HitMotion | None:
     return found
 
 
-def _receive_frames(scene: bpy.types.Scene, listener: Listener) -> HitMotion | None:
+def _receive_frames(scene: bpy.types.Scene, listener: listening.Listener) -> HitMotion | None:
     """Pose the character by the latest frame, detect hits, and update the status."""
     now = time.monotonic()
     latest = listener.latest_frame()
@@ -103,14 +105,14 @@ def _show_frame(scene, latest) -> str:
     Returns:
         "posed", "made" if it was created first, or "" if it could not be created.
     """
-    settings, (skeleton, root, rotations) = scene.beyond_mocap_stream, convert_poses([latest])
+    settings, (skeleton, root, rotations) = scene.beyond_mocap_stream, listening.convert_poses([latest])
     result = "posed"
     if not can_show(settings.body, scene, skeleton):
         if _state["bodies"] >= MOST_BODIES:
             _give_up(f"The skeleton has changed {MOST_BODIES} times, so the stream is stopped: check the sender")
             return ""
         _state["bodies"] += 1
-        settings.body = create_body(bpy.context, Motion(skeleton, root, rotations, 60.0))
+        settings.body = create_body(bpy.context, motions.Motion(skeleton, root, rotations, 60.0))
         # one undo step, so that undo does not remove the new character silently
         if not bpy.app.background:
             bpy.ops.ed.undo_push(message="Streamed Character")
@@ -186,7 +188,7 @@ def _end_session() -> None:
     _on_look.clear()
 
 
-def start_listening(settings) -> Listener:
+def start_listening(settings) -> listening.Listener:
     """Start to listen as the settings say.
 
     Raises:
@@ -194,14 +196,14 @@ def start_listening(settings) -> Listener:
         changed then.
     """
     clip = bpy.path.abspath(settings.clip) if settings.clip else ""
-    hierarchy = read_hierarchy(clip) if clip else None
+    hierarchy = bvh_stream.read_hierarchy(clip) if clip else None
     before = get_current_listener()
     if before is not None:
         raise InputError(f"port {before.port}", "a stream is already received", "one at a time", "press Stop Stream",
                          fixes=(Fix("press", "beyond_mocap.stream_stop"),))
-    one = Listener(settings.port, settings.protocol, hierarchy, settings.unit or None).start()
+    one = listening.Listener(settings.port, settings.protocol, hierarchy, settings.unit or None).start()
     _session["listener"] = one
-    _session["hits"] = LiveHits(one, settings.part, "" if settings.side == "either" else settings.side,
+    _session["hits"] = live_hits.LiveHits(one, settings.part, "" if settings.side == "either" else settings.side,
                                 settings.threshold or None)
     return one
 
@@ -214,7 +216,7 @@ def stop_listening() -> None:
         one.stop()
 
 
-def get_current_listener() -> Listener | None:
+def get_current_listener() -> listening.Listener | None:
     """The listener of the session, or None."""
     return _session.get("listener")
 
@@ -230,7 +232,7 @@ def can_show(thing: bpy.types.Object | None, scene: bpy.types.Scene, skeleton: S
     )
 
 
-def create_body(context: bpy.types.Context, motion: Motion, name: str = "Stream") -> bpy.types.Object:
+def create_body(context: bpy.types.Context, motion: motions.Motion, name: str = "Stream") -> bpy.types.Object:
     """Create a character with the skeleton of `motion`."""
     where = bake.find_or_create_collection(context.scene)
     thing = armature.create_armature(context, motion.skeleton, name, where)
@@ -271,7 +273,7 @@ def pose_body(
     top.location = quaternion.rotate(quaternion.inverse(rest[0]), shift)  # assigning also makes Blender update
 
 
-def keep_recording(context: bpy.types.Context, motion: Motion, name: str = "Recorded") -> bpy.types.Object:
+def keep_recording(context: bpy.types.Context, motion: motions.Motion, name: str = "Recorded") -> bpy.types.Object:
     """Create a character that plays `motion` from the current frame on."""
     if motion.duration * frames_per_second(context.scene) < 1.0:
         raise InputError("stream", "less than a frame", "a second or more", "let the stream run for a while")

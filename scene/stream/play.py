@@ -14,7 +14,6 @@ import bpy
 
 from ...beyond_mocap.base.errors import BeyondMocapError, InputError
 from ...beyond_mocap.base.fixes import Fix
-from ...beyond_mocap.passes.hits import HitMotion
 from ..core import action, background, channels, frame_range
 from ..core.live import Watcher
 from ..core.measure import frames_per_second
@@ -24,6 +23,7 @@ from . import follow
 
 if TYPE_CHECKING:
     from ...beyond_mocap.library.library import Library
+    from ...beyond_mocap.passes.hits import HitMotion
     from ...beyond_mocap.passes.live_passes import LivePass, Rally
 
 _session: dict[str, object] = {}

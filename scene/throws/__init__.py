@@ -7,3 +7,5 @@
 - `rig_throw`    the same on the controls of a rig
 - `ball_motion`  the ball: held or at rest, then its flight and its trajectory
 """
+
+REGISTERED = ("preview", "settings")

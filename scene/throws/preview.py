@@ -13,12 +13,10 @@ from typing import TYPE_CHECKING
 import bpy
 import numpy as np
 
-from ..core import action, background, channels, frame_range, session
+from ..core import action, background, channels, frame_range, saved_state, session
 from ..core.live import Watcher, call_or_describe
 from ..core.measure import frames_per_second
-from ..core.saved_state import discard_saved_state, restore_playback, save_playback
-from ..rigs.rig_bake import KEYS, PREVIOUS_STATE
-from ..rigs.rig_bake import MARK as BAKE_MARK
+from ..rigs import rig_bake
 from . import ball_motion as flown
 from . import generation as made
 from . import rig_throw as rigged
@@ -29,7 +27,6 @@ if TYPE_CHECKING:
     from .generation import ThrowPreview
 
 MOST_LINES = 12
-BAKE_PROPERTIES = (BAKE_MARK, PREVIOUS_STATE, KEYS)  # custom properties of a bake that can be removed
 RESULTS = ("made", "made_of", "asked", "rigged", "release", "figures", "messages")
 
 HELD_BY = ("BEYOND_MOCAP_OT_throw_at_target", "BEYOND_MOCAP_OT_kick_at_target")
@@ -54,7 +51,7 @@ def show_throw(scene: bpy.types.Scene, body: bpy.types.Object, result: "ThrowPre
         settings.rigged = True
     else:
         if not settings.before.kept:
-            save_playback(settings.before, body)
+            saved_state.save_playback(settings.before, body)
         channels.remove_marked_action(body, MARK)
         action.write_motion(body, joined.motion, scene, start, name, generated=True)[MARK] = True
     messages = [*messages, *flown.show_ball(scene, body, result)]
@@ -77,7 +74,7 @@ def revert_throw(scene: bpy.types.Scene, body: bpy.types.Object) -> None:
     if settings.rigged and current_action is not None and current_action.get(MARK):
         rigged.remove_throw(body)
     elif settings.before.kept:
-        restore_playback(settings.before, body, MARK)
+        saved_state.restore_playback(settings.before, body, MARK)
     _reset_results(settings)
 
 
@@ -87,9 +84,9 @@ def apply_throw(body: bpy.types.Object) -> None:
     channels.check_local(body, settings.flown)
     current_action = channels.find_playing_action(body)[0]
     if current_action is not None and current_action.get(MARK):
-        for name in (MARK, *BAKE_PROPERTIES):
+        for name in (MARK, *rig_bake.BAKE_PROPERTIES):
             current_action.pop(name, None)
-    discard_saved_state(settings.before, MARK)
+    saved_state.discard_saved_state(settings.before, MARK)
     flown.apply_ball(body)
     _reset_results(settings)
 

@@ -6,13 +6,13 @@ from functools import lru_cache
 
 import bpy
 
-from ...beyond_mocap.annotation import KeyMoment, Span, Timeline, find_missing_keys, find_problems
+from ...beyond_mocap import annotation
 from ...beyond_mocap.base.errors import InputError
 from ..core import session
 from ..core.settings import to_absolute_path
 from . import label_tracks as lanes
+from . import strips
 from .strip_lines import CACHE_SIZE, read_key_moment, read_span, remove_name_suffix
-from .strips import describe_target
 
 
 class BeyondMocapProblem(bpy.types.PropertyGroup):
@@ -38,7 +38,8 @@ def find_built_library(scene: bpy.types.Scene):
     return session.find_library(folder, settings.library_unit or None) if folder else None
 
 
-def describe_problems(scene: bpy.types.Scene, item: Span | KeyMoment, for_player: bool = True) -> list[str]:
+def describe_problems(scene: bpy.types.Scene, item: annotation.Span | annotation.KeyMoment,
+                      for_player: bool = True) -> list[str]:
     """Describe what is wrong with one span or key moment.
 
     Words out of the vocabulary, and labels of key moments that the built library lacks, with the nearest that it has.
@@ -52,15 +53,15 @@ def describe_problems(scene: bpy.types.Scene, item: Span | KeyMoment, for_player
     """
     library = find_built_library(scene)
     unknown = _list_unknown_words(item, library.labels if library else frozenset())
-    if for_player and library is not None and isinstance(item, KeyMoment) and not unknown:
-        return _describe_missing(scene, Timeline((), (item,)), library)
+    if for_player and library is not None and isinstance(item, annotation.KeyMoment) and not unknown:
+        return _describe_missing(scene, annotation.Timeline((), (item,)), library)
     return list(unknown)
 
 
 def list_problems(scene: bpy.types.Scene, target: bpy.types.Object) -> list[tuple[int, str]]:
     """List (frame, line) for all problems of an object's strips, by time."""
     found, timeline, for_player = [], [], bool(target.beyond_mocap_dot.player)
-    clock, where = lanes.read_clock(target), describe_target(target)
+    clock, where = lanes.read_clock(target), strips.describe_target(target)
     for track, strip in lanes.iter_strips(target):
         if strip.mute or track.mute:
             continue
@@ -93,10 +94,10 @@ def update_problems(context: bpy.types.Context) -> None:
 
 
 @lru_cache(maxsize=CACHE_SIZE)
-def _list_unknown_words(item: Span | KeyMoment, words: frozenset[str]) -> tuple[str, ...]:
+def _list_unknown_words(item: annotation.Span | annotation.KeyMoment, words: frozenset[str]) -> tuple[str, ...]:
     """List the words that are not in the vocabulary; words: the library's own."""
-    timeline = Timeline((item,)) if isinstance(item, Span) else Timeline((), (item,))
-    return tuple(str(error).removeprefix(f"{error.where}: ") for error in find_problems(timeline, words))
+    timeline = annotation.Timeline((item,)) if isinstance(item, annotation.Span) else annotation.Timeline((), (item,))
+    return tuple(str(error).removeprefix(f"{error.where}: ") for error in annotation.find_problems(timeline, words))
 
 
 def _read_item(timeline: list, name: str, frame: float, read) -> list[tuple[int, str]]:
@@ -123,8 +124,8 @@ _known: tuple = ()
 
 def _list_conflicts(target: bpy.types.Object, items: list) -> list[tuple[int, str]]:
     """List spans that overlap and key moments at the same time."""
-    timeline = Timeline(tuple(item for item in items if isinstance(item, Span) and item.words),
-                        tuple(item for item in items if isinstance(item, KeyMoment)))
+    timeline = annotation.Timeline(tuple(item for item in items if isinstance(item, annotation.Span) and item.words),
+                        tuple(item for item in items if isinstance(item, annotation.KeyMoment)))
     clock, found = lanes.read_clock(target), []
     for a, b in zip(timeline.spans, timeline.spans[1:]):
         if b.start < a.end - 1e-6:
@@ -137,7 +138,7 @@ def _list_conflicts(target: bpy.types.Object, items: list) -> list[tuple[int, st
     return found
 
 
-def _describe_missing(scene: bpy.types.Scene, timeline: Timeline, library) -> list[str]:
+def _describe_missing(scene: bpy.types.Scene, timeline: annotation.Timeline, library) -> list[str]:
     """Find the nearest labels of the library for key moments that it lacks."""
     from ...beyond_mocap.library.missing_actions import list_action_labels
 
@@ -145,7 +146,7 @@ def _describe_missing(scene: bpy.types.Scene, timeline: Timeline, library) -> li
     choices = [key.labels for key in library.keys if mirror or not library.clips[key.clip].mirrored]
     choices += list_action_labels() if has_synthetic else ()
     lines = []
-    for key, nearest in find_missing_keys(timeline, choices):
+    for key, nearest in annotation.find_missing_keys(timeline, choices):
         nearest_text = ", ".join(f"'{' '.join(words)}'" for words in nearest)
         lines.append(f"the library has no '{' '.join(key.words)}'; nearest: {nearest_text or 'nothing'}")
     return lines

@@ -8,10 +8,12 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from functools import lru_cache
+from typing import TYPE_CHECKING
 
-from ...beyond_mocap.annotation.gaits import TURNING
-from ...beyond_mocap.annotation.labels import Label, read_labels
 from ..overlays import colours
+
+if TYPE_CHECKING:
+    from ...beyond_mocap.annotation.labels import Label
 
 KEEPER = frozenset(("catchb", "stomp", "punch", "throwout", "rollout", "punt", "goal_kick", "ready", "shuffle", "dive",
                     "save"))
@@ -51,7 +53,7 @@ AUTOMATIC = LabelGroup("Automatic", (0.42, 0.42, 0.42))
 GROUPS = (RUN, DRIBBLE, KICK, RECEIVE, HEADER, HANDS, GOALKEEPING, GESTURE, OTHER, AUTOMATIC)
 """In the order of the legend."""
 
-_RULES: tuple[tuple[LabelGroup, Callable[[Label], bool]], ...] = (
+_RULES: tuple[tuple[LabelGroup, Callable[["Label"], bool]], ...] = (
     (GOALKEEPING, lambda label: label.name in KEEPER),
     (RECEIVE, lambda label: label.ball == "takes" and "foot" in label.parts),
     (HEADER, lambda label: "head" in label.parts and len(label.parts) == 1),
@@ -60,7 +62,7 @@ _RULES: tuple[tuple[LabelGroup, Callable[[Label], bool]], ...] = (
     (DRIBBLE, lambda label: label.ball == "carries"),
     (OTHER, lambda label: label.ball == "never" and "discrete" in label.kinds),
     (GESTURE, lambda label: label.ball == "never"),
-    (RUN, lambda label: label.gait is not None or label.name == TURNING),
+    (RUN, lambda label: label.gait is not None or label.name == "turning"),
 )  # fmt: skip
 
 
@@ -73,6 +75,8 @@ def find_group(words: tuple[str, ...]) -> LabelGroup:
     Returns:
         The group: by the first of the rules that a root label fulfils, else that any label fulfils.
     """
+    from ...beyond_mocap.annotation.labels import read_labels
+
     known = [read_labels()[word] for word in words if word in read_labels()]
     for labels in ([label for label in known if label.is_root], known):
         for group, fulfils in _RULES:
@@ -90,6 +94,8 @@ def find_group_of_name(name: str) -> LabelGroup:
 @lru_cache(maxsize=4096)
 def find_colour(name: str) -> Colour:
     """Find the colour of a strip or key moment by its name: its group's; on foot, the darker the slower."""
+    from ...beyond_mocap.annotation.labels import read_labels
+
     words, group = split_labels(name), find_group_of_name(name)
     gaits = [label.gait for word in words if (label := read_labels().get(word)) and label.gait is not None]
     slow = 1.0 - min(min(gaits, default=0.0) / FAST, 1.0)
@@ -111,6 +117,8 @@ def find_part_letter(words: tuple[str, ...]) -> str:
 
 def describe_contact(words: Iterable[str]) -> str:
     """Describe side, part and height of the ball: "Right Foot, Low"; "" where labels say nothing of them."""
+    from ...beyond_mocap.annotation.labels import read_labels
+
     words, table = tuple(words), read_labels()
     part, side = _find_part(words), next((word.title() for word in words if word in SIDES), "")
     height = next((word.title() for word in words if word in table and table[word].group == "height"), "")
@@ -158,6 +166,8 @@ def elide(text: str, width: float, measure: Callable[[str], float]) -> str:
 
 def _find_part(words: tuple[str, ...]) -> str:
     """Find the part that meets the ball: of the most special label that names one."""
+    from ...beyond_mocap.annotation.labels import Label, read_labels
+
     known = [read_labels()[word] for word in words if word in read_labels()]
     label = next((label for label in reversed(known) if label.part), Label(name=""))
     return "hands" if label.both_hands else label.part

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import bpy
 from bpy.props import StringProperty
 
-from ...beyond_mocap.annotation import KeyMoment, Span, Timeline
+from ...beyond_mocap import annotation
 from ...beyond_mocap.base.errors import InputError
 from ..core.measure import Clock, round_frame
 from .strip_lines import read_key_moment, read_recorded_span, read_span
@@ -43,7 +43,7 @@ class PlacedSpan:
         is_selected: whether the strip is selected.
     """
 
-    span: Span
+    span: annotation.Span
     track: str
     strip: str
     first: int
@@ -66,7 +66,7 @@ class PlacedMoment:
         is_selected: whether the marker is selected.
     """
 
-    key: KeyMoment
+    key: annotation.KeyMoment
     strip: str
     index: int
     frame: int
@@ -94,7 +94,7 @@ def read_clock(target: bpy.types.Object) -> Clock | None:
     return Clock.from_text(target.beyond_mocap_lanes.clock)
 
 
-def read_timeline(target: bpy.types.Object, where: str = "") -> Timeline | None:
+def read_timeline(target: bpy.types.Object, where: str = "") -> annotation.Timeline | None:
     """Read the timeline of an object's strips.
 
     Args:
@@ -109,7 +109,7 @@ def read_timeline(target: bpy.types.Object, where: str = "") -> Timeline | None:
         return None
     active_spans = [placed.span for placed in list_spans(target, where) if not placed.is_muted
                     and not placed.is_automatic]
-    return Timeline(tuple(active_spans), tuple(placed.key for placed in list_moments(target, where)
+    return annotation.Timeline(tuple(active_spans), tuple(placed.key for placed in list_moments(target, where)
                                                if not placed.is_muted))
 
 

@@ -14,8 +14,8 @@ import bpy
 
 from ..core import window
 from . import label_tracks as lanes
+from . import strips
 from .label_groups import Colour, LabelGroup, elide, find_colour, find_group_of_name, find_part_letter, split_labels
-from .strips import find_target
 
 TEXT, ROW, PAD, GAP = 11, 18, 5, 4  # points: letters, height of a row, around the text, between two names
 BOTTOM, TOP = 44, 26  # points left free for scroll bar, keys and legend, and for the frame numbers
@@ -105,7 +105,7 @@ def list_names(context: bpy.types.Context, region: bpy.types.Region, middles: di
 def list_shown_targets(context: bpy.types.Context) -> list[bpy.types.Object]:
     """List the objects whose names may stand at the foot: the active player's dot and selected ones."""
     chosen = {target.name: target for target in context.selected_objects if lanes.has_label_tracks(target)}
-    active = find_target(context)
+    active = strips.find_target(context)
     if active is not None:
         chosen[active.name] = active
     return list(chosen.values())

@@ -12,9 +12,9 @@ from typing import TYPE_CHECKING
 import bpy
 from bpy.props import CollectionProperty, EnumProperty, FloatProperty, IntProperty, StringProperty
 
-from ...beyond_mocap.annotation import ClipAnnotation, Timeline
+from ...beyond_mocap import annotation
 from ...beyond_mocap.base.errors import InputError
-from ..library.recordings import RATE
+from ..library import recordings
 from . import label_tracks as lanes
 from . import strip_writing as lay_strips
 
@@ -33,7 +33,7 @@ def _go_to_proposal(group, context):
     """Move the playhead to the active proposal."""
     target, one = group.id_data, find_active(group.id_data)
     if one is not None and lanes.read_clock(target) is not None:
-        seconds = (one.start if one.key < 0 else one.key) / target[RATE]
+        seconds = (one.start if one.key < 0 else one.key) / target[recordings.RATE]
         context.scene.frame_current = lanes.read_clock(target).to_whole_frame(seconds)
 
 
@@ -78,7 +78,7 @@ def store_proposals(target: bpy.types.Object, found: Iterable["Proposal"], state
     group.active = first if first < len(group.listed) else 0
 
 
-def add_proposal(target: bpy.types.Object, row: ClipAnnotation, source: str, confidence: float, state: str,
+def add_proposal(target: bpy.types.Object, row: annotation.ClipAnnotation, source: str, confidence: float, state: str,
                  why: str = "") -> None:
     """Add one proposal to the list."""
     one = target.beyond_mocap_proposals.listed.add()
@@ -87,7 +87,7 @@ def add_proposal(target: bpy.types.Object, row: ClipAnnotation, source: str, con
     one.confidence, one.state = confidence, state
 
 
-def has_labels(timeline: Timeline, row: ClipAnnotation, fps: float) -> bool:
+def has_labels(timeline: annotation.Timeline, row: annotation.ClipAnnotation, fps: float) -> bool:
     """Return whether a timeline already has the labels of a row.
 
     That is a key moment with the same first label within SAME_SECONDS seconds of the row's key, or a span with the same
@@ -107,9 +107,9 @@ def find_active(target: bpy.types.Object) -> BeyondMocapProposal | None:
     return group.listed[group.active] if 0 <= group.active < len(group.listed) else None
 
 
-def to_row(one: BeyondMocapProposal) -> ClipAnnotation:
+def to_row(one: BeyondMocapProposal) -> annotation.ClipAnnotation:
     """Convert a proposal to a row of annotation."""
-    return ClipAnnotation(one.start, one.end, None if one.key < 0 else one.key, tuple(one.name.split()))
+    return annotation.ClipAnnotation(one.start, one.end, None if one.key < 0 else one.key, tuple(one.name.split()))
 
 
 def accept_proposal(target: bpy.types.Object, index: int) -> str:
@@ -118,7 +118,7 @@ def accept_proposal(target: bpy.types.Object, index: int) -> str:
 
     one = _find_proposal(target, index)
     if one.state != "ACCEPTED":
-        clock, timeline = lanes.read_clock(target), to_timeline([to_row(one)], target[RATE])
+        clock, timeline = lanes.read_clock(target), to_timeline([to_row(one)], target[recordings.RATE])
         for span in timeline.spans:
             lay_strips.add_span(target, span, clock)
         for key in timeline.keys:
@@ -171,9 +171,9 @@ def _find_proposal(target: bpy.types.Object, index: int) -> BeyondMocapProposal:
     return listed[index]
 
 
-def _remove_labels(target: bpy.types.Object, row: ClipAnnotation) -> None:
+def _remove_labels(target: bpy.types.Object, row: annotation.ClipAnnotation) -> None:
     """Remove the strips and markers with the labels and times of a row."""
-    fps = target[RATE]
+    fps = target[recordings.RATE]
     if row.key is not None:
         for placed in lanes.list_moments(target):
             if placed.labels == row.words and abs(placed.time - row.key / fps) < 0.5 / fps:

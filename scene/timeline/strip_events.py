@@ -10,13 +10,13 @@ from __future__ import annotations
 
 import bpy
 
-from ...beyond_mocap.annotation import Span
+from ...beyond_mocap import annotation
 from ...beyond_mocap.base.errors import InputError
 from ..core.live import Watcher, call_soon, is_running
 from ..core.measure import Clock, build_scene_clock
 from ..player import dots
 from . import label_checks as word_checks
-from . import moment_names
+from . import moment_names, strip_writing
 from .label_tracks import (
     AUTOMATIC,
     WORDS,
@@ -38,7 +38,6 @@ from .strip_lines import (
     store_key_moment,
     store_span,
 )
-from .strip_writing import find_free_track, move_to_clock, place_strip, place_strips
 
 DELAY = 0.1  # seconds after an edit
 RUNNING_OPERATORS = ("TRANSFORM_OT_", "NLA_OT_", "ACTION_OT_", "ANIM_OT_",
@@ -67,7 +66,7 @@ def normalize_strips(scene: bpy.types.Scene, only: set[str] | None = None) -> bo
 def _move_to_clock(target: bpy.types.Object, clock: Clock) -> bool:
     """Move strips to a clock; if one of them cannot be read, they stay until it is renamed."""
     try:
-        return has_label_tracks(target) and move_to_clock(target, clock)
+        return has_label_tracks(target) and strip_writing.move_to_clock(target, clock)
     except InputError:
         return False
 
@@ -116,7 +115,7 @@ def _name_tracks(target: bpy.types.Object) -> bool:
     return changed
 
 
-def _needs_action(track, strip: bpy.types.NlaStrip, span: Span) -> bool:
+def _needs_action(track, strip: bpy.types.NlaStrip, span: annotation.Span) -> bool:
     """Return whether a span's strip needs another action: its line changed, or its action is shared."""
     action = strip.action
     own = action.users - action.use_fake_user == 1
@@ -127,7 +126,7 @@ def _needs_action(track, strip: bpy.types.NlaStrip, span: Span) -> bool:
     return action.beyond_mocap.kind == "none" or is_automatic and not (track.name.startswith(AUTOMATIC) and strip.mute)
 
 
-def _renew_action(target, track, strip: bpy.types.NlaStrip, span: Span, clock: Clock) -> None:
+def _renew_action(target, track, strip: bpy.types.NlaStrip, span: annotation.Span, clock: Clock) -> None:
     """Give a strip an action of its own with its present line and visible markers; a changed automatic strip becomes an
     ordinary one.
     """
@@ -135,7 +134,7 @@ def _renew_action(target, track, strip: bpy.types.NlaStrip, span: Span, clock: C
     keys = _list_visible_keys(strip, clock, target.name)
     new = bpy.data.actions.new(f"{target.name} {format_labels(span)}")
     strip.action = new
-    place_strip(strip, *compute_frames(span, clock))
+    strip_writing.place_strip(strip, *compute_frames(span, clock))
     store_span(strip, span, "span")
     for key, selected in keys:
         marker = new.pose_markers.new("")
@@ -152,11 +151,11 @@ def _move_strip(target, track, strip: bpy.types.NlaStrip) -> None:
     """Move a strip to a label track with room; it is created again, since tracks cannot exchange strips."""
     first, last, action = strip.frame_start, strip.frame_end, strip.action
     selected, muted = strip.select, strip.mute
-    new_track = find_free_track(target, WORDS, int(first), int(last))
+    new_track = strip_writing.find_free_track(target, WORDS, int(first), int(last))
     track.strips.remove(strip)
     strip = new_track.strips.new(action.name, int(first), action)
     strip.extrapolation, strip.select, strip.mute = "NOTHING", selected, muted
-    place_strip(strip, first, last)
+    strip_writing.place_strip(strip, first, last)
     store_span(strip, read_recorded_span(action), action.beyond_mocap.kind)
 
 
@@ -176,7 +175,7 @@ def _align_to_frames(target: bpy.types.Object, clock: Clock) -> bool:
         for strip, first, last in evicted:
             _move_strip(target, track, strip)
         if evicted or any(not _is_in_place(*one) for one in placements):
-            place_strips(placements)
+            strip_writing.place_strips(placements)
             changed = True
     return changed
 
@@ -204,7 +203,7 @@ def _normalize_moments(strip: bpy.types.NlaStrip, clock: Clock, where: str) -> b
     new = bpy.data.actions.new(action.name)
     new.beyond_mocap.kind = "moments"
     strip.action = new
-    place_strip(strip, first, last)
+    strip_writing.place_strip(strip, first, last)
     for key, selected in keys:
         marker = new.pose_markers.new("")
         store_key_moment(marker, key, min(max(clock.to_whole_frame(key.time), first), last))

@@ -14,7 +14,7 @@ from functools import lru_cache
 import bpy
 from bpy.props import EnumProperty, StringProperty
 
-from ...beyond_mocap.annotation import KeyMoment, Span, Timeline, format_timeline, parse_timeline
+from ...beyond_mocap import annotation
 from ...beyond_mocap.base.errors import InputError
 from ..core.measure import Clock, round_frame
 
@@ -38,25 +38,25 @@ class BeyondMocapLine(bpy.types.PropertyGroup):
     shown: StringProperty(name="Shown", description="Its name when it was written; another name means new labels")
 
 
-def compute_frames(span: Span, clock: Clock) -> tuple[int, int]:
+def compute_frames(span: annotation.Span, clock: Clock) -> tuple[int, int]:
     """Compute the first and last whole frame of a span's strip; at least one frame long, so that it is visible."""
     first = clock.to_whole_frame(span.start)
     return first, max(first + 1, clock.to_whole_frame(span.end))
 
 
 @lru_cache(maxsize=CACHE_SIZE)
-def format_line(item: Span | KeyMoment) -> str:
+def format_line(item: annotation.Span | annotation.KeyMoment) -> str:
     """Format a span or key moment as a line of the text form, exactly."""
-    timeline = Timeline((item,)) if isinstance(item, Span) else Timeline((), (item,))
-    return format_timeline(timeline).strip()
+    timeline = annotation.Timeline((item,)) if isinstance(item, annotation.Span) else annotation.Timeline((), (item,))
+    return annotation.format_timeline(timeline).strip()
 
 
-def format_labels(item: Span | KeyMoment) -> str:
+def format_labels(item: annotation.Span | annotation.KeyMoment) -> str:
     """Format the labels of a span or key moment: the name of its strip or marker."""
-    return " ".join(format_line(item).split()[2 if isinstance(item, Span) else 1 :]) or NO_LABELS
+    return " ".join(format_line(item).split()[2 if isinstance(item, annotation.Span) else 1 :]) or NO_LABELS
 
 
-def read_span(strip: bpy.types.NlaStrip, clock: Clock, where: str) -> Span:
+def read_span(strip: bpy.types.NlaStrip, clock: Clock, where: str) -> annotation.Span:
     """Read the span of a strip in its present state. Raises InputError if its name cannot be parsed."""
     record = strip.action.beyond_mocap
     first = round_frame(strip.frame_start)
@@ -74,7 +74,7 @@ def read_span(strip: bpy.types.NlaStrip, clock: Clock, where: str) -> Span:
     return replace(recorded, start=start, end=end, line=None)
 
 
-def read_key_moment(marker: bpy.types.TimelineMarker, frame: int, clock: Clock, where: str) -> KeyMoment:
+def read_key_moment(marker: bpy.types.TimelineMarker, frame: int, clock: Clock, where: str) -> annotation.KeyMoment:
     """Read the key moment of a marker on scene frame `frame`. Raises InputError if its name cannot be parsed."""
     record, recorded = marker.beyond_mocap, None
     if record.line:
@@ -89,7 +89,8 @@ def read_key_moment(marker: bpy.types.TimelineMarker, frame: int, clock: Clock, 
     return replace(recorded, time=time, line=None)
 
 
-def parse_labels(text: str, start: float, end: float | None = None, where: str = "labels") -> Span | KeyMoment:
+def parse_labels(text: str, start: float, end: float | None = None,
+                 where: str = "labels") -> annotation.Span | annotation.KeyMoment:
     """Parse typed labels to a span, or without an end to a key moment.
 
     Args:
@@ -107,13 +108,13 @@ def parse_labels(text: str, start: float, end: float | None = None, where: str =
     return replace(_parse_name("0 1", text, where).spans[0], start=start, end=end, line=None)
 
 
-def read_recorded_span(action: bpy.types.Action) -> Span | None:
+def read_recorded_span(action: bpy.types.Action) -> annotation.Span | None:
     """Read the span for which an action was written; None if the extension did not write it."""
     line = action.beyond_mocap.line
     return _parse_line(line) if line else None
 
 
-def store_span(strip: bpy.types.NlaStrip, span: Span, kind: str) -> None:
+def store_span(strip: bpy.types.NlaStrip, span: annotation.Span, kind: str) -> None:
     """Name a strip by its labels and store the exact line with its action."""
     labels = format_labels(span)
     for blanks in range(_MOST_BLANKS):  # invisible, and keeps Blender from adding a number to the name
@@ -124,7 +125,7 @@ def store_span(strip: bpy.types.NlaStrip, span: Span, kind: str) -> None:
     record.kind, record.line, record.shown = kind, format_line(span), strip.name
 
 
-def store_key_moment(marker: bpy.types.TimelineMarker, key: KeyMoment, frame: int) -> None:
+def store_key_moment(marker: bpy.types.TimelineMarker, key: annotation.KeyMoment, frame: int) -> None:
     """Write a key moment to a marker; frame: on its own action."""
     marker.name, marker.frame = format_labels(key), frame
     record = marker.beyond_mocap
@@ -137,17 +138,17 @@ def remove_name_suffix(name: str) -> str:
 
 
 @lru_cache(maxsize=CACHE_SIZE)
-def _parse_line(line: str) -> Span | KeyMoment:
+def _parse_line(line: str) -> annotation.Span | annotation.KeyMoment:
     """Parse a stored line."""
-    found = parse_timeline(line)
+    found = annotation.parse_timeline(line)
     return replace((*found.spans, *found.keys)[0], line=None)
 
 
-def _parse_name(times: str, name: str, place: str) -> Timeline:
+def _parse_name(times: str, name: str, place: str) -> annotation.Timeline:
     """Parse a name at one time or two. Raises InputError if the text form would read it as something else."""
     labels = remove_name_suffix(name)
     try:
-        found = parse_timeline(f"{times} {'' if labels == NO_LABELS else labels}")
+        found = annotation.parse_timeline(f"{times} {'' if labels == NO_LABELS else labels}")
     except InputError:
         found = None
     if found is None or "#" in name or len(found.keys if times == "0" else found.spans) != 1:

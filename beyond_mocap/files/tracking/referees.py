@@ -7,7 +7,6 @@ import re
 
 import numpy as np
 
-from ...motion.track.match_data import REFEREE
 from .feed import Feed, Samples
 
 _TRACAB_CODE = 3
@@ -51,6 +50,8 @@ def describe_referee(id_: str) -> tuple[str, str, str, str, str]:
     Returns:
         Id, team, name, number and position.
     """
+    from ...motion.track.match_data import REFEREE
+
     return id_, REFEREE, id_.replace("_", " "), "-1", ""
 
 

@@ -1,6 +1,7 @@
 """Switching the extension on and off leaves nothing behind and hides no error."""
 
 import importlib
+import pkgutil
 import subprocess
 import sys
 
@@ -9,13 +10,18 @@ import pytest
 
 TAB = "Beyond Mocap"
 HEAVY = {"scipy", "sklearn", "kloppy", "c3d", "lxml", "joblib", "matplotlib"}
+# Modules of the core that enabling must not load, and how many of the extension's own it loads in all. If one more is
+# loaded, import it as a whole (`from ..scene.rigs import fit`), or inside the function that needs it.
+CORE = {"annotation", "appearance.mesh", "ball.flight", "files.bvh.bvh", "library.library", "motion.humanoid",
+        "motion.motion", "passes.pass_scene", "synthesis.plan", "synthesis.take"}  # fmt: skip
+MOST_MODULES = 210
 # A fresh process with this session's profile: enable, tell what is loaded, end without Blender's own ending (which may
 # hang).
 ENABLE = """
 import os, sys
 import bpy, addon_utils
 assert addon_utils.enable(sys.argv[1]) is not None
-print(*sorted({name.partition(".")[0] for name in sys.modules}), flush=True)
+print(*sorted(sys.modules), flush=True)
 os._exit(0)
 """
 
@@ -140,5 +146,23 @@ def test_the_core_has_one_name():
 def test_enabling_loads_nothing_heavy(extension):
     command = [sys.executable, "-P", "-c", ENABLE, extension.__name__]
     ran = subprocess.run(command, capture_output=True, text=True, timeout=120, check=True)
-    loaded = set(ran.stdout.splitlines()[-1].split())
-    assert "bpy" in loaded and not HEAVY & loaded
+    loaded = ran.stdout.splitlines()[-1].split()
+    own = [name.removeprefix(f"{extension.__name__}.") for name in loaded if name.startswith(extension.__name__)]
+    assert not HEAVY & {name.partition(".")[0] for name in loaded}
+    assert not CORE & {name.removeprefix("beyond_mocap.") for name in own}
+    assert len(own) <= MOST_MODULES
+
+
+def test_what_has_something_to_register_is_named(extension):
+    """Every module of `scene` with a class of Blender, a hook or a watcher is in its package's `REGISTERED`."""
+    registration = importlib.import_module(f"{extension.__name__}.scene.core.registration")
+    live = importlib.import_module(f"{extension.__name__}.scene.core.live")
+    scene = importlib.import_module(f"{extension.__name__}.scene")
+    for found in pkgutil.walk_packages(scene.__path__, f"{scene.__name__}."):
+        package, _, name = found.name.rpartition(".")
+        module = importlib.import_module(found.name)
+        things = [thing for thing in vars(module).values()
+                  if isinstance(thing, live.Watcher) or getattr(thing, "__module__", "") == found.name
+                  and getattr(thing, "__name__", "") in ("register", "unregister")]
+        if things or registration._list_classes(module):
+            assert name in importlib.import_module(package).REGISTERED, found.name
