@@ -146,7 +146,7 @@ class Library:
         place = self.index_place and (*self.index_place[:2], "stance")
         stored = cache.load_arrays(*place) if place else None
         if stored is not None and set(stored) == set(_STANCE_NUMBERS):
-            known = {name: values if values.ndim else float(values) for name, values in stored.items()}
+            known: dict[str, Any] = {name: one if one.ndim else float(one) for name, one in stored.items()}
             return NeutralStance(skeleton=self.skeleton, **known)
         recordings = [clip for clip in self.clips if not clip.is_synthetic] or self.clips
         stance = build_neutral_stance(self.skeleton, sample_upright_example(recordings))

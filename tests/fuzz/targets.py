@@ -199,7 +199,7 @@ def list_targets(files: dict[str, Path]) -> list[Target]:
             1,
             120.0,
         ),
-        _verb("reconstruct by model", "model.json", "reconstruct {trc} --model {bad} --out {out}/o.bvh", files, 1, 99.0),
+        _verb("reconstruct by model", "model.json", "reconstruct {trc} --model {bad} --out {out}/o.bvh", files),
         _verb(
             "propose",
             "classifier.npz",
