@@ -1,4 +1,4 @@
-"""The weight of labels against continuity in the searches `blocks` and `distance`, found anew on the rescaled cost.
+"""The weight of labels against continuity in the searches `blocks` and `distance`, fitted to the rescaled cost.
 
 The thesis found 0.2 by experiment for its own continuity cost. Here that cost is divided by a library's typical
 distance, so the weight has to be found again (`search.block_costs.FITTED_ALPHA`). It is fitted on recordings and a

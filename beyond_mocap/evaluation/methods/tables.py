@@ -173,7 +173,7 @@ HANDICAPS = {
     NO_CATCH_UP: f"`{NO_CATCH_UP}` is `distance` as the thesis measured it: lost distance is never regained.",
     "blocks": "`blocks` goes where its clips lead, so its distance from the track says nothing of its motion.",
     "fs": "`fs` has the clips of `blocks` on the track: it is near the track by construction, and its feet slide.",
-    "baseline": "`baseline` shows no actions, so the labels of key moments are never met; it needs no search.",
+    "baseline": "`baseline` shows no actions, so key moments are never met but for their gait; it needs no search.",
 }  # fmt: skip
 """Method -> what its figures owe to how it works."""
 

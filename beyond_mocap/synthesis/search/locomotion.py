@@ -144,7 +144,8 @@ def _thin_blocks(search: BlockSearch, section: Section, blocks: BlockCandidates)
                   for labels, _ in demands}
     speed = compute_block_distances(search.library, blocks) * search.library.fps / FINEST_LENGTH
     stretch = (blocks.start - frames.first[blocks.clip]) // STRETCH + frames.first[blocks.clip]
-    chosen = blocks.select(choose_stretches(demands, label_cost, speed, blocks.clip, stretch, request.plan.max_blocks))
+    chosen = blocks.select(choose_stretches(demands, label_cost, speed, clip=blocks.clip, stretch=stretch,
+                                            limit=request.plan.max_blocks))
     search.note_thinning(low, high, len(blocks), len(np.unique(blocks.clip)), len(np.unique(chosen.clip)))
     return chosen
 
