@@ -46,6 +46,8 @@ _reported: set[tuple] = set()
 class Watcher:
     """What one feature watches, and what it does then. It has at most one of `follow`, `settle` and `look`.
 
+    A function of a module that enabling need not load is given as a lambda: `restored=lambda: shots.clear_strikes()`.
+
     Attributes:
         name: shown to the user if it fails.
         watched_types: types of data; a change of such data marks the watcher.

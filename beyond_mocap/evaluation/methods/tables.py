@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -55,7 +56,7 @@ def _read_group(*keys: str) -> Read:
     """Build a function that reads a nested figure, None where it is unknown."""
 
     def read(result: MethodResult) -> float | None:
-        value = result.figures
+        value: Any = result.figures
         for key in keys:
             value = value[key]
         return value
