@@ -20,7 +20,7 @@ from ..files.event_providers import EVENT_PROVIDERS
 from .pieces.units import OVERLAP, WINDOW
 
 _DEFAULTS = collect_defaults("match")
-FORM = 4
+FORM = 5
 """Raised whenever the same request would give other results, so that stored ones are not used for it."""
 
 WINDOW_LIMITS = (5.0, 600.0)

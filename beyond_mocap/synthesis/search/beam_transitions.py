@@ -68,6 +68,18 @@ class BeamTransitions:
         pairs = np.arange(least.size)
         return self.base + self._compute_full_costs(to, least, pairs).reshape(least.shape).T.astype(float)
 
+    def bound_own_cost(self, known: np.ndarray, kept_count: int) -> float:
+        """Compute what a candidate that is reached by a cut may cost at most, to be among the `kept_count` cheapest.
+
+        Args:
+            known: (L,) costs of other ways to fill the slot.
+            kept_count: how many the beam keeps.
+        """
+        if len(known) < kept_count:
+            return np.inf
+        limit = np.partition(known, kept_count - 1)[kept_count - 1] - self.base
+        return float(limit) - self.costs.weights.switch - float((self.above + self.young).min())
+
     def find_cheapest(self, to: SlotCandidates, known: np.ndarray, kept_count: int) -> tuple[np.ndarray, np.ndarray,
             np.ndarray]:
         """Find the cheapest transition to each candidate that may be kept.
@@ -85,6 +97,8 @@ class BeamTransitions:
         limit = np.partition(known, kept_count - 1)[kept_count - 1] - self.base if len(known) >= kept_count else np.inf
         # drop candidates whose own cost already exceeds the limit set by `known`
         near = np.flatnonzero((to.piece >= 0) | (to.cost <= limit))
+        if not len(near):
+            return near, np.zeros(0), near
         to = to.select(near)
         least = self._compute_lower_bounds(to)
         count = least.shape[1]

@@ -23,14 +23,12 @@ from .request import SearchRequest
 
 # Finding the cheapest of many pairs of a playback rate and a library frame without evaluating all.
 #
-# Pairs are in order of their speeds, and each costs at least the speed that it misses. The costs of every eighth pair
-# give an upper bound for the cheapest ones, and so a limit of how far from the requested speed they can lie. Of these,
-# the terms that cost little to compute leave a quarter, of which all terms are computed.
+# Pairs are in order of their speeds, and each costs at least the speed that it misses. Of those near enough to the
+# requested speed, the terms that cost little to compute give a lower bound. The pairs with the lowest bounds are
+# evaluated first; their costs leave few others to evaluate.
 
 
-_SAMPLED = 8  # every eighth pair is sampled
-# safety factor on the rank in the sample: so many pairs very likely lie below the cost found there
-_ABOVE = 1.25
+_EVALUATED_FIRST = 2  # times as many pairs as are returned
 _ROUNDING = 1e-3  # m/s or a share of a cost, for float32
 
 _CONTINUITY = ("switch", "other", "young", "pose", "rate_change")
@@ -42,26 +40,44 @@ YOUNG_SLOTS = 7  # slots after a cut before which another one costs more: 1.9 s,
 
 
 def find_cheapest(
-    cost_of: Callable[[slice | np.ndarray], np.ndarray], bound_of: Callable[[slice], np.ndarray], speeds: np.ndarray,
-    speed: float, weight: float, considered: int, count: int,
+    cost_of: Callable[[np.ndarray], np.ndarray], bound_of: Callable[[slice], np.ndarray], speeds: np.ndarray,
+    speed: float, weight: float, considered: int, count: int, most: float = np.inf,
 ) -> tuple[np.ndarray, np.ndarray]:
     """Find the `count` cheapest of the `considered` pairs nearest to a speed.
 
     Args:
-        cost_of: returns the costs (n,) of a slice of the pairs, or of their numbers (n,).
+        cost_of: returns the costs (n,) of pairs by number (n,).
         bound_of: returns what each pair of a slice costs at least (n,), up to rounding.
         speeds: (K,) m/s of the pairs, ascending.
         speed: m/s that is requested.
         weight: least cost of a metre per second of missed speed.
         considered: how many pairs are considered.
         count: how many are returned.
+        most: highest cost of a pair that is returned.
     Returns:
         Their numbers (k,), ascending, and costs (k,).
     """
     near = _nearest_slice(speeds, speed, considered)
-    numbers, cost = _find_promising(cost_of, bound_of, speeds, speed, weight=weight, near=near, count=count)
-    best = np.sort(np.argpartition(cost, count)[:count]) if len(cost) > count else np.arange(len(cost))
+    if weight > 0.0 and np.isfinite(most):  # the missed speed alone costs more than that elsewhere
+        reach = most / weight + FREE_SPEED[0] + FREE_SPEED[1] * speed + _ROUNDING
+        low, high = _locate_speeds(speeds, [speed - reach, speed + reach])
+        near = slice(max(int(low), near.start), max(min(int(high), near.stop), near.start))
+    bound = bound_of(near)
+    within = np.flatnonzero(bound <= most + _ROUNDING)
+    if len(within) > _EVALUATED_FIRST * count:
+        limit = _bound_cost(cost_of, near.start + within, bound[within], count)
+        within = within[bound[within] <= limit + _ROUNDING * max(1.0, limit)]
+    numbers = near.start + within
+    cost = cost_of(numbers)
+    best = np.argpartition(cost, count)[:count] if len(cost) > count else np.arange(len(cost))
+    best = np.sort(best[cost[best] <= most])
     return numbers[best], cost[best]
+
+
+def _bound_cost(cost_of, numbers: np.ndarray, bound: np.ndarray, count: int) -> float:
+    """Compute a cost that the `count` cheapest of pairs (n,) do not exceed, from those with the lowest bounds (n,)."""
+    first = np.argpartition(bound, _EVALUATED_FIRST * count)[: _EVALUATED_FIRST * count]
+    return float(np.partition(cost_of(numbers[first]), count - 1)[count - 1])
 
 
 def _nearest_slice(speeds: np.ndarray, speed: float, count: int) -> slice:
@@ -75,26 +91,6 @@ def _locate_speeds(speeds: np.ndarray, values: Sequence[float]) -> np.ndarray:
     """Find where values (n,) lie in speeds, as np.searchsorted, which would convert float32 speeds to float64."""
     at = np.asarray(values, speeds.dtype)
     return np.searchsorted(speeds, np.where(at < values, np.nextafter(at, speeds.dtype.type(np.inf)), at))
-
-
-def _find_promising(cost_of, bound_of, speeds: np.ndarray, speed: float, weight: float, near: slice, count: int):
-    """Return numbers of pairs in `near`, the `count` cheapest ones among them, and their costs.
-
-    All of `near` where it is small, or where the sample gave too low a bound.
-    """
-    rank = int(_ABOVE * count / _SAMPLED)
-    if near.stop - near.start > 4 * _SAMPLED * rank and weight > 0.0:
-        # cost / weight bounds the missed speed, so the cheapest pairs lie within `reach` of the requested speed
-        upper_bound = np.partition(cost_of(slice(near.start, near.stop, _SAMPLED)), rank)[rank]
-        reach = float(upper_bound) / weight + FREE_SPEED[0] + FREE_SPEED[1] * speed + _ROUNDING
-        low, high = _locate_speeds(speeds, [speed - reach, speed + reach])
-        part = slice(max(int(low), near.start), min(int(high), near.stop))
-        numbers = part.start + np.flatnonzero(bound_of(part) <= upper_bound + _ROUNDING * max(1.0, float(upper_bound)))
-        cost = cost_of(numbers)
-        below = np.flatnonzero(cost <= upper_bound)
-        if len(below) >= count:
-            return numbers[below], cost[below]
-    return np.arange(near.start, near.stop), cost_of(near)
 
 
 TERMS = {
@@ -275,7 +271,7 @@ class PathCosts:
         yield from self._iter_fixed_terms(frame, *self._requested_labels(first, end),
                                           self.request.list_avoided(first, end))
 
-    def find_cheapest(self, first: int, end: int, considered: int, count: int):
+    def find_cheapest(self, first: int, end: int, considered: int, count: int, most: float = np.inf):
         """Find the pairs of playback rate and library frame with the lowest cost among those nearest in speed.
 
         The missed speed alone would put the others behind, so a large library is searched as fast as a small one.
@@ -284,14 +280,17 @@ class PathCosts:
             first, end: output frames of the slot.
             considered: how many pairs are considered.
             count: how many are returned.
+            most: highest cost of those that are returned.
         Returns:
             number (K,), frame (K,), misfit (K,).
         """
+        if most < 0.0:  # no cost is
+            return np.zeros(0, int), np.zeros(0, int), np.zeros(0, np.float32)
         (words, is_asked), avoid = self._requested_labels(first, end), self.request.list_avoided(first, end)
         pairs, fixed_cost, (speed, _) = self.index.pairs_by_speed(avoid), self._fixed_costs(words,
                 is_asked, avoid), self.requested_motion(first, end)
 
-        def cost_of(part: slice | np.ndarray) -> np.ndarray:
+        def cost_of(part: np.ndarray) -> np.ndarray:
             part_pairs = pairs.select_pairs(part)
             return _sum_terms(self._iter_motion_costs(first, end, part_pairs)) + fixed_cost[part_pairs.frame]
 
@@ -299,7 +298,7 @@ class PathCosts:
             return self._bound_motion_costs(first, end, pairs.select_pairs(part), fixed_cost)
 
         best, cost = find_cheapest(cost_of, bound_of, pairs.speed, speed, weight=self.weights.speed,
-                                   considered=considered, count=count)
+                                   considered=considered, count=count, most=most)
         return pairs.number[best], pairs.frame[best], cost
 
     def list_asked_labels(self, first: int, end: int) -> frozenset[str]:

@@ -299,17 +299,21 @@ class PathSearch:
             return np.zeros(len(start), bool)
         return self.index.shows_labels(words)[self.costs.round_frame(start)]
 
-    def collect_candidates(self, slot: int) -> SlotCandidates:
+    def collect_candidates(self, slot: int, most: float = np.inf) -> SlotCandidates:
         """Collect the candidates that can begin in a slot.
 
         These are pieces of key moments, and, unless a key frame lies in the slot, library frames at any playback rate:
         the cheapest ones, those that lead into a piece, and what was shown before an edit.
+
+        Args:
+            slot: its number.
+            most: highest cost of the cheapest ones.
         """
         low, high = self.edges[slot : slot + 2]
         closed, here = slot in self._closed_slots, np.flatnonzero(self.pieces.first == slot)
         candidate_lists = [self._list_piece_candidates(low, high, here)] if closed or len(here) else []
         if not closed:
-            candidate_lists += [self._list_frame_candidates(low, high), *self._iter_lead_in_candidates(slot)]
+            candidate_lists += [self._list_frame_candidates(low, high, most), *self._iter_lead_in_candidates(slot)]
             candidate_lists += [self._previous_candidate(low, high)] if self.stretch else []
         return SlotCandidates(*(np.concatenate(parts) for parts in zip(*candidate_lists)))
 
@@ -319,9 +323,10 @@ class PathSearch:
         cost = self.costs.compute_key_misfit(low, high, clip, start, rate) + self.choice_cost[here]
         return clip, start, rate, cost, here
 
-    def _list_frame_candidates(self, low: int, high: int):
+    def _list_frame_candidates(self, low: int, high: int, most: float):
         """Build the candidates of the cheapest library frames."""
-        number, start, cost = self.costs.find_cheapest(low, high, self.width.considered, self.width.candidates)
+        number, start, cost = self.costs.find_cheapest(low, high, self.width.considered, self.width.candidates,
+                                                       most)
         return self.frames.clip[start], start.astype(float), PLAYBACK_RATES[number], cost, np.full(len(cost), -1)
 
     def _iter_lead_in_candidates(self, slot: int):
@@ -357,7 +362,8 @@ class PathSearch:
         Args:
             known: (L,) costs of other ways to fill the slot.
         """
-        to, transitions = self.collect_candidates(slot), self.build_transitions(before, free, ends[free])
+        transitions = self.build_transitions(before, free, ends[free])
+        to = self.collect_candidates(slot, transitions.bound_own_cost(known, self.width.beam_width))
         which, cost, state = transitions.find_cheapest(to, known, self.width.beam_width)
         acting = np.flatnonzero(self._shows_requested_action(slot, to.start) & (to.piece < 0))
         if len(acting):

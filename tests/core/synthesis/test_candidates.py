@@ -39,9 +39,21 @@ def test_only_the_nearest_in_speed_are_looked_at():
     assert len(number) == 200 and np.all(np.abs(speeds[number] - 3.0) < 0.61)
 
 
-def test_a_sample_that_deceives_costs_time_only():
-    """Every eighth pair is cheap, and no other near it in cost."""
+def test_bounds_that_deceive_cost_time_only():
+    """Pairs with the lowest bounds cost the most."""
     speeds = np.linspace(2.0, 2.001, 40000)
-    every = np.where(np.arange(40000) % 8, 1.0, 0.5) + speeds
-    number, cost = find_cheapest(lambda part: every[part], bound_nothing, speeds, 2.0, 1.0, 40000, 6000)
+    bound = np.linspace(0.0, 1.0, 40000)
+    every = np.where(bound < 0.5, 3.0, 1.0) + bound
+    number, cost = find_cheapest(lambda part: every[part], lambda part: bound[part], speeds, 2.0, 1.0, 40000, 6000)
     assert len(set(number)) == 6000 and np.array_equal(np.sort(cost), np.sort(every)[:6000])
+
+
+@pytest.mark.parametrize("most", [0.0, 0.05, 0.4, 3.0])
+def test_none_costs_more_than_the_most(most):
+    speeds = np.sort(np.random.default_rng(2).uniform(0.0, 6.0, 40000))
+    missed = np.abs(speeds - 2.0)
+    cost_of, every, weighed = costs_of(missed)
+    number, _ = find_cheapest(cost_of, lambda part: missed[part], speeds, 2.0, 1.0, len(speeds), 300, most)
+    rank = np.argsort(every)[:300]
+    assert set(number) == set(rank[every[rank] <= most])
+    assert most > 0.1 or sum(weighed) < 1500

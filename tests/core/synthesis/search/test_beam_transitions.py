@@ -56,6 +56,16 @@ def test_those_that_may_be_kept_come_by_their_cheapest_way(ways, known, most):
     assert most == FRAMES or len(which) < 3 * most + 20
 
 
+def test_what_costs_more_than_the_bound_is_not_kept_after_a_cut(ways):
+    found, offered = ways
+    known = np.array([1000.6, 1000.9, 1003.0])
+    cut = np.abs(found.end[:, None] - offered.start) >= 1.0
+    whole = np.where(cut, found.compute_all(offered), np.inf).min(axis=0)
+    above = offered.cost > found.bound_own_cost(known, 2)
+    assert 0 < np.count_nonzero(above) and np.all(whole[above] > known[1])
+    assert found.bound_own_cost(known, 4) == np.inf
+
+
 def test_nothing_offered_is_nothing_found(ways):
     found, offered = ways
     none = SlotCandidates(*(values[:0] for values in vars(offered).values()))
