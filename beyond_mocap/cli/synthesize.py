@@ -17,8 +17,8 @@ from .library import open_library
 from .outputs import ProgressReporter, Writer, add_take_files, check_outputs, choose_writer, locate_errors
 
 LONG_TRACK, WINDOW = 1200.0, 300.0  # s of a track from which on it is done in windows, and of these
-_FRAME_BYTES = 16e3  # of memory that a frame of a track takes that is not done in windows
-_BASE_BYTES = 4e8  # of memory that any take needs
+_FRAME_BYTES = 27e3  # of memory that a frame of a track takes that is not done in windows
+_BASE_BYTES = 1e8  # of memory that any take needs
 _MAX_REPORT_BYTES = 100_000_000  # no report is as large
 _OTHER_LENGTH, _OTHER_PLACE = 1.0, 2.0  # s and m by which a motion differs from its track at most
 

@@ -24,7 +24,7 @@ TOP = Path(__file__).resolve().parents[2]
 SAMPLE = TOP / "sample_blend"
 KILLS_IN_A_ROW = 4
 _CLIPS = ("walking_1_2", "jogging_2_9", "standing_1", "kick_low_inside", "running_4_2")
-_MATCH = ("--from", "0", "--to", "4", "--workers", "2", "--players", "home_10", "--no-figures")
+_MATCH = ("--from", "0", "--to", "2", "--workers", "2", "--players", "home_10", "--no-figures")
 _TIMED = ("match.json", "report.json", "report.html", "lock")  # files with times of the run
 
 
@@ -77,7 +77,7 @@ def list_jobs(base: Path) -> list[Job]:
 def _build_training(examples: Path, weights: Path) -> list:
     """Build the command of a training, which continues where there is a checkpoint."""
     kept = weights.with_suffix(".checkpoint.npz")
-    command = ["throw", "train", examples, "--epochs", "40", "--out", weights]
+    command = ["throw", "train", examples, "--epochs", "6", "--out", weights]
     return [*command, "--resume"] if kept.exists() else command
 
 
