@@ -18,7 +18,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ..annotation import avoided_labels_per_frame
-from ..base.errors import InputError, TimedMessage, format_count, format_seconds
+from ..base.errors import InputError, TimedMessage, UserCancelledError, format_count, format_seconds
 from ..base.settings import find_setting
 from ..base.time_series import find_runs
 from ..library.library import Library
@@ -206,6 +206,8 @@ def _search(
         return SearchResult(search.run(), hurried_from=search.hurried_from)
     stops = [stop for stop in (cancelled, hurry) if stop]
     if plan.method == "baseline":
+        if cancelled is not None and cancelled():
+            raise UserCancelledError("synthesis: cancelled")
         return SearchResult(build_gait_loops(library, request))
     alpha = rescale_alpha(plan.requested.alpha)
     search = BlockSearch(library, request, alpha, report, lambda: any(stop() for stop in stops))

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
@@ -52,16 +51,9 @@ class Column:
     after: str = ""
 
 
-def _read_group(*keys: str) -> Read:
-    """Build a function that reads a nested figure, None where it is unknown."""
-
-    def read(result: MethodResult) -> float | None:
-        value: Any = result.figures
-        for key in keys:
-            value = value[key]
-        return value
-
-    return read
+def _read_group(group: str, name: str) -> Read:
+    """Build a function that reads a figure of a group, None where it is unknown."""
+    return lambda result: result.figures[group][name]
 
 
 OFF_TRACK, OFF_AT_KEYS = _read_group("pelvis_error_m", "mean"), _read_group("pelvis_error_m", "keys")
