@@ -18,7 +18,7 @@ from types import ModuleType
 PACKAGES = ("scene", "operators", "panels")
 LAZY = ("beyond_mocap", "scene")
 FULL = {"annotation"}
-"""Packages that import their own modules."""
+"""Packages that are loaded as a whole when they are first used: they import their own modules."""
 
 
 def register():

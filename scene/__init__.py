@@ -22,11 +22,12 @@ def register():
 def unregister():
     """Stop what runs, undo the registration, and clear what is stored in memory."""
     from .core import live, registration, session
-    from .markers import solve
-    from .match import command_process as child
 
     live.stop_watching()
-    child.stop_all()
+    from .markers import solve
+    from .match import command_process
+
+    command_process.stop_all()
     registration.unregister_package(__name__)
     session.clear_session()
     solve.clear_reconstructions()

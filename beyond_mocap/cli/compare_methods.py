@@ -53,15 +53,16 @@ def run_compare(options, reporter: ProgressReporter, writers: Mapping[str, Write
         InputError: for other forms of report, unknown methods, or a folder without tracks.
     """
     from ..evaluation.methods.comparison import choose_methods, compare_methods
-    from ..evaluation.methods.scenarios import read_scenarios
+    from ..evaluation.methods.scenarios import check_labels, read_scenarios
     from ..evaluation.methods.tables import describe_differences
 
     methods = choose_methods(options.methods)
     check_report(options.out)
     scenarios, notes = read_scenarios(options.scenarios, _FPS)
     if options.takes is not None:
-        _check_takes(options.takes)
+        _check_takes(options.takes, options.out)
     library = open_library(options, reporter)
+    check_labels(scenarios, library.labels)
     comparison = compare_methods(library, scenarios, methods, _FPS, progress=reporter.show_progress,
                                  cancelled=reporter.is_cancelled)
     write_comparison(comparison, options.out)
@@ -86,8 +87,10 @@ def check_report(out: Path) -> None:
         import_optional("matplotlib", "HTML report")
 
 
-def _check_takes(folder: Path) -> None:
-    """Raise InputError if the folder of the takes exists and has anything in it."""
+def _check_takes(folder: Path, out: Path) -> None:
+    """Raise InputError if the folder of the takes exists and has anything in it, or will have the report in it."""
+    if folder.resolve() in (out.resolve(), *out.resolve().parents):
+        raise InputError(folder, f"the report {out} would be in it", "a folder of its own", "name another folder")
     if folder.exists() and (not folder.is_dir() or any(folder.iterdir())):
         found = "has files in it" if folder.is_dir() else "is a file"
         raise InputError(folder, found, "a new or empty folder", "name another folder")

@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import errno
 import os
+import re
 import shutil
 import threading
 import time
@@ -15,6 +16,7 @@ from ..base.errors import InputError
 
 ABANDONED_SECONDS = 3600.0
 """Age, in seconds, from which on no running process writes what is temporary."""
+_TEMPORARY = re.compile(r"\..+\.\d+\.\d+\.part")  # names that `atomic_path` gives
 _LEAST_FREE = 65536  # bytes on a disk below which a file written by another program may be cut off
 
 
@@ -55,7 +57,7 @@ def remove_abandoned(folder: Path) -> None:
     for pattern in (".*.[0-9]*.[0-9]*.part", "*/.*.[0-9]*.[0-9]*.part"):
         for path in folder.glob(pattern):
             with contextlib.suppress(OSError):
-                if path.is_file() and path.stat().st_mtime < outdated:
+                if _TEMPORARY.fullmatch(path.name) and path.is_file() and path.stat().st_mtime < outdated:
                     path.unlink()
 
 

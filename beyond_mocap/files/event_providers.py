@@ -214,8 +214,8 @@ def read_metrica_events(path: Path, match: Match | None):
         x, y = (tables.parse_number(row[name], name, place, blank=True) for name in ("Start X", "Start Y"))
         team = row["Team"].lower() if row["Team"].lower() in ("home", "away") else ""
         event = event_data.MatchEvent(time=time, period=period, player="", team=team, kind=kind, part=part, side="",
-                           details=details, original_text=event_type, success=None,
-                           place=((x - 0.5) * length, (0.5 - y) * width))
+                                      details=details, original_text=event_type, success=None,
+                                      place=((x - 0.5) * length, (0.5 - y) * width))
         rows.append((event, event_data.EventPlayer.from_text(row["From"], team) if row["From"] else None))
     return rows
 

@@ -38,8 +38,8 @@ from .synthetic_clips import KICK_STEP, iter_synthetic_clips, measure_kick_speed
 MIN_RUN_SECONDS = 2.0  # of a track's runs from which on long runs are needed
 RESTING_SPEED = 0.1  # m/s of a track below which a player stands
 RECORDED_INDEX = "index"
-_STANCE_NUMBERS = tuple(field.name for field in fields(NeutralStance) if field.name != "skeleton")
 """Name under which what is computed from the recordings alone is cached."""
+_STANCE_NUMBERS = tuple(field.name for field in fields(NeutralStance) if field.name != "skeleton")
 Progress = Callable[[float, str], None]
 
 

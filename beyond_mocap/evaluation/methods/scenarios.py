@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import csv
 import hashlib
+import re
+from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
 
-from ...annotation import Timeline, read_timeline
+from ...annotation import Timeline, check_timeline, read_timeline
 from ...base.errors import InputError
 from ...files.tracking.tracking import read_track_csv
 from ...motion.track import Track, clean_track
@@ -25,12 +27,14 @@ class Scenario:
         name: of the file, without its ending.
         track: the player's samples, cleaned.
         timeline: the requested labels, not yet filled.
+        labels: their file, or None.
         thesis: what the thesis measured, where the track is one of those that stand for its scenarios.
     """
 
     name: str
     track: Track
     timeline: Timeline
+    labels: Path | None = None
     thesis: ThesisFigures | None = None
 
 
@@ -48,22 +52,54 @@ def read_scenarios(folder: Path, fps: float) -> tuple[list[Scenario], list[str]]
     if not folder.is_dir():
         found = "is a file" if folder.exists() else "no such folder"
         raise InputError(folder, found, f"a folder of tracks: {_FORM}", "name the folder that has them")
-    tables = sorted(folder.glob("*.csv"))
+    tables = sorted(path for path in folder.iterdir() if path.suffix.lower() == ".csv" and path.is_file())
     tracks = [path for path in tables if _is_track(path)]
     if not tracks:
         found = f"no track among its {len(tables)} .csv files" if tables else "no .csv file in it"
         raise InputError(folder, found, _FORM, "name the folder that has the tracks")
     notes = [f"{path}: not a track, left out" for path in tables if path not in tracks]
     notes += [f"{path}: no labels beside it; all is automatic locomotion" for path in tracks if not find_labels(path)]
-    return [_read_scenario(path, fps) for path in tracks], notes
+    _check_names(tracks)
+    return [_read_scenario(path, fps, notes) for path in tracks], notes
+
+
+def _check_names(tracks: Iterable[Path]) -> None:
+    """Check that no two tracks are the same scenario, NAME.csv and NAME_track.csv; InputError where they are."""
+    known: dict[str, Path] = {}
+    for path in tracks:
+        other = known.setdefault(_name_scenario(path), path)
+        if other != path:
+            raise InputError(path, f"has the name of {other.name}", "one track for each scenario", "rename one")
+
+
+def _name_scenario(path: Path) -> str:
+    return path.stem.removesuffix("_track")
+
+
+def check_labels(scenarios: Iterable[Scenario], known_labels: Iterable[str]) -> None:
+    """Check labels and times of all scenarios.
+
+    Args:
+        scenarios: the scenarios.
+        known_labels: those of the library, beside the usual ones.
+    Raises:
+        InputError: for an unknown label, or a time outside the track.
+    """
+    known = tuple(known_labels)
+    for scenario in scenarios:
+        first, *_, last = scenario.track.times.tolist()
+        check_timeline(scenario.timeline, known, first, last, str(scenario.labels))
 
 
 def _is_track(path: Path) -> bool:
     """Return whether a table's first row has the columns of a track."""
     with path.open("rb") as file:
-        line = file.read(_HEAD_BYTES).decode("utf-8-sig", "replace").partition("\n")[0]
-    names = {name.strip() for name in next(csv.reader([line.strip()]), [])}
-    return {"time_s", "x_m", "y_m"} <= names
+        head = file.read(_HEAD_BYTES).decode("utf-8-sig", "replace").replace("\0", "")
+    try:
+        first = next(csv.reader([re.split("[\r\n]", head, maxsplit=1)[0]]), [])
+    except csv.Error:
+        return False
+    return {"time_s", "x_m", "y_m"} <= {name.strip() for name in first}
 
 
 def find_labels(track: Path) -> Path | None:
@@ -72,10 +108,11 @@ def find_labels(track: Path) -> Path | None:
     return next((path for name in names if (path := track.with_name(f"{name}.txt")).is_file()), None)
 
 
-def _read_scenario(path: Path, fps: float) -> Scenario:
-    """Read a track and its labels."""
-    track, _ = clean_track(read_track_csv(path))
+def _read_scenario(path: Path, fps: float, notes: list[str]) -> Scenario:
+    """Read a track and its labels; what was mended in the track is added to `notes`."""
+    track, data = clean_track(read_track_csv(path))
+    notes += [f"{path}: {line}" for line in data.lines]
     labels = find_labels(path)
     timeline = read_timeline(labels, fps, float(track.times[0])) if labels else Timeline()
-    return Scenario(name=path.stem.removesuffix("_track"), track=track, timeline=timeline,
+    return Scenario(name=_name_scenario(path), track=track, timeline=timeline, labels=labels,
                     thesis=THESIS.get(hashlib.sha256(path.read_bytes()).hexdigest()))

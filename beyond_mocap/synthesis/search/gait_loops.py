@@ -9,6 +9,7 @@ import numpy as np
 
 from ...annotation import DISCRETE
 from ...annotation.vocabulary import DIRECTIONS
+from ...base.errors import InputError
 from ...base.time_series import find_equal_runs, find_runs
 from ...library.library import Gait, Library
 from .block_costs import compute_distances
@@ -47,7 +48,11 @@ def find_gait_loop(library: Library, request: SearchRequest, gait: int) -> tuple
         First library frame, and the frame after its last, which looks like the first.
     """
     nearest = sorted(range(len(library.gaits)), key=lambda other: (abs(other - gait), other))
-    stretches = next(filter(None, (_list_stretches(library, request, library.gaits[other]) for other in nearest)))
+    each = (_list_stretches(library, request, library.gaits[other]) for other in nearest)
+    stretches = next(filter(None, each), None)
+    if stretches is None:
+        raise InputError(library.folder, "no clip shows a gait forwards and nothing else",
+                         "clips annotated walking, jogging or running", "label the clips that do")
     wanted, speed = float(request.track.speed[request.gait == gait].mean()), library.frames.speed
     off_style = np.zeros(len(speed)) if request.style_cost is None else request.style_cost
     missed = [abs(float(speed[low:high].mean()) - wanted) + float(off_style[low:high].mean())

@@ -363,7 +363,9 @@ class PathSearch:
             known: (L,) costs of other ways to fill the slot.
         """
         transitions = self.build_transitions(before, free, ends[free])
-        to = self.collect_candidates(slot, transitions.bound_own_cost(known, self.width.beam_width))
+        asked = ACTING & self.costs.list_asked_labels(*self.edges[slot : slot + 2])  # such candidates are kept below
+        most = np.inf if asked else transitions.bound_own_cost(known, self.width.beam_width)
+        to = self.collect_candidates(slot, most)
         which, cost, state = transitions.find_cheapest(to, known, self.width.beam_width)
         acting = np.flatnonzero(self._shows_requested_action(slot, to.start) & (to.piece < 0))
         if len(acting):
