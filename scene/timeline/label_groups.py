@@ -62,7 +62,7 @@ _RULES: tuple[tuple[LabelGroup, Callable[["Label"], bool]], ...] = (
     (DRIBBLE, lambda label: label.ball == "carries"),
     (OTHER, lambda label: label.ball == "never" and "discrete" in label.kinds),
     (GESTURE, lambda label: label.ball == "never"),
-    (RUN, lambda label: label.gait is not None or label.name == "turning"),
+    (RUN, lambda label: label.gait is not None or _is_turning(label)),
 )  # fmt: skip
 
 
@@ -89,6 +89,12 @@ def find_group(words: tuple[str, ...]) -> LabelGroup:
 def find_group_of_name(name: str) -> LabelGroup:
     """Find the kind of action that the name of a strip or marker names."""
     return find_group(split_labels(name))
+
+
+def _is_turning(label: "Label") -> bool:
+    from ...beyond_mocap.annotation.gaits import TURNING
+
+    return label.name == TURNING
 
 
 @lru_cache(maxsize=4096)

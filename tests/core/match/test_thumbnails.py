@@ -37,7 +37,7 @@ def test_a_picture_is_the_pose_of_that_second(made):
         near = range(frame - 15, frame + 16, 5)  # a keeper who stands moves little in less
         picture = draw("home_1", second)
         off = [np.abs(picture - render_pose(take.motion, one, PICTURE_SIZE)).mean() for one in near]
-        assert near[int(np.argmin(off))] == frame and min(off) < 0.2 * np.median(off)
+        assert near[int(np.argmin(off))] == frame and min(off) < 0.25 * np.median(off)
 
 
 def test_there_is_none_where_he_is_not_or_his_file_is_broken(made):

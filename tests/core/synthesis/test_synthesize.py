@@ -298,7 +298,7 @@ def test_the_library_s_lacks_are_told_and_the_nearest_used_on_demand(take_of):
     with pytest.raises(NotInLibraryError) as told:
         take_of((4.0, "kick subtle"))
     assert told.value.exit_status == 3 and any("kick" in words for words in told.value.nearest)
-    for method in METHODS:
+    for method in SEARCHES:
         key = take_of((4.0, "kick subtle"), nearest=True, method=method).keys[0]
         assert key.used_instead and "kick" in key.used_instead and key.clip == "kick.bvh"
         assert key.frame == pytest.approx(120.0, abs=0.5)

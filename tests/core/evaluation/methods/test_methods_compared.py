@@ -6,7 +6,7 @@ import pytest
 from beyond_mocap.base.errors import InputError
 from beyond_mocap.evaluation.methods.comparison import choose_methods, compare_methods
 from beyond_mocap.evaluation.methods.report import build_comparison_page, build_comparison_report
-from beyond_mocap.evaluation.methods.scenarios import read_scenarios
+from beyond_mocap.evaluation.methods.scenarios import check_labels, read_scenarios
 from beyond_mocap.evaluation.methods.tables import build_tables, describe_differences, format_markdown
 from beyond_mocap.evaluation.methods.thesis import THESIS
 from beyond_mocap.evaluation.report import evaluate
@@ -87,3 +87,24 @@ def test_the_page_has_a_curve_of_every_scenario_and_the_report_every_figure(comp
 def test_methods_that_nobody_has_are_refused(text, found):
     with pytest.raises(InputError, match=found):
         choose_methods(text)
+
+
+def test_odd_tables_are_no_tracks_and_two_tracks_are_not_one_scenario(tmp_path):
+    write_track(tmp_path / "run.CSV", 3.0)
+    (tmp_path / "old.csv").write_text("time_s,x_m,y_m\n0,0,0\n0.1,1,0\n".replace("\n", "\r"), newline="")
+    (tmp_path / "wide.csv").write_bytes("time_s,x_m,y_m\n0,0,0\n".encode("utf-16"))
+    (tmp_path / "folder.csv").mkdir()
+    scenarios, notes = read_scenarios(tmp_path, 30.0)
+    assert "run" in [scenario.name for scenario in scenarios] and any("wide.csv: not a track" in line for line in notes)
+    write_track(tmp_path / "run_track.csv", 2.0)
+    with pytest.raises(InputError, match="run_track.csv: has the name of run.CSV"):
+        read_scenarios(tmp_path, 30.0)
+
+
+@pytest.mark.parametrize("text, found", [("2 kik right", "kik"), ("99 kick right", "99")])
+def test_labels_are_checked_as_synthesize_does(tmp_path, text, found):
+    write_track(tmp_path / "a.csv", 2.0)
+    (tmp_path / "a.txt").write_text(text + "\n")
+    scenarios, _ = read_scenarios(tmp_path, 30.0)
+    with pytest.raises(InputError, match=found):
+        check_labels(scenarios, ())
