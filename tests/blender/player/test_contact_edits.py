@@ -36,7 +36,7 @@ def test_a_contact_is_moved_again_and_taken_back(one, contacts_of, edits):  # no
         assert len(one.contact_edits) == 1 and edits.find_edit(one, now) is not None
         assert one.result.state == "PREVIEW"
     others = [(a, b) for a, b in zip(before, contacts_of()) if a.foot != "right" or a.start != chosen.start]
-    assert max(np.linalg.norm(a.toe - b.toe) for a, b in others) < 6e-3  # an update constructs what is near again
+    assert max(np.linalg.norm(a.toe - b.toe) for a, b in others) < 0.015  # an update constructs what is near again
     assert bpy.ops.beyond_mocap.remove_contact_edit() == {"FINISHED"}
     np.testing.assert_allclose(find(contacts_of(), "right", chosen.middle).toe, chosen.toe, atol=2e-3)
 
