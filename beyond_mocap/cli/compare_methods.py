@@ -89,11 +89,11 @@ def check_report(out: Path) -> None:
 
 def _check_takes(folder: Path, out: Path) -> None:
     """Raise InputError if the folder of the takes exists and has anything in it, or will have the report in it."""
+    from ..files.atomic import check_new_folder
+
     if folder.resolve() in (out.resolve(), *out.resolve().parents):
         raise InputError(folder, f"the report {out} would be in it", "a folder of its own", "name another folder")
-    if folder.exists() and (not folder.is_dir() or any(folder.iterdir())):
-        found = "has files in it" if folder.is_dir() else "is a file"
-        raise InputError(folder, found, "a new or empty folder", "name another folder")
+    check_new_folder(folder)
     if not folder.absolute().parent.is_dir():
         raise InputError(folder, "its folder does not exist", "an existing folder", "create the folder first")
 

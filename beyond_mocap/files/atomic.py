@@ -54,7 +54,7 @@ def remove_abandoned(folder: Path) -> None:
         folder: where `atomic_path` wrote.
     """
     outdated = time.time() - ABANDONED_SECONDS
-    for pattern in (".*.[0-9]*.[0-9]*.part", "*/.*.[0-9]*.[0-9]*.part"):
+    for pattern in (".*.part", "*/.*.part"):
         for path in folder.glob(pattern):
             with contextlib.suppress(OSError):
                 if _TEMPORARY.fullmatch(path.name) and path.is_file() and path.stat().st_mtime < outdated:
@@ -73,6 +73,19 @@ def check_disk(path: Path) -> None:
         raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
 
 
+def check_new_folder(path: Path) -> None:
+    """Check that a folder is new or empty.
+
+    Raises:
+        InputError: if it is not.
+    """
+    if path.exists() and not path.is_dir():
+        raise InputError(path, "is a file", "a new or empty folder", "choose another place")
+    if path.is_dir() and (found := next(path.iterdir(), None)):
+        raise InputError(path, f"the folder is not empty ({found.name})", "a new or empty folder",
+                         "choose another place")
+
+
 @contextlib.contextmanager
 def atomic_folder(path: str | os.PathLike) -> Iterator[Path]:
     """Context manager: a hidden folder in `path` to write to; its content moves up into `path` if the block succeeds.
@@ -85,12 +98,8 @@ def atomic_folder(path: str | os.PathLike) -> Iterator[Path]:
         InputError: if `path` is not empty or cannot be written.
     """
     path = Path(path)
+    check_new_folder(path)
     temporary, is_new = path / f".{os.getpid()}.{threading.get_ident()}.part", not path.exists()
-    if not is_new and not path.is_dir():
-        raise InputError(path, "is a file", "an empty or new folder", "choose another place")
-    if not is_new and (found := next(path.iterdir(), None)):
-        problem = f"the folder is not empty ({found.name})"
-        raise InputError(path, problem, "an empty or new folder", "choose another place")
     try:
         temporary.mkdir(parents=True)
         yield temporary

@@ -17,7 +17,7 @@ from ..html_page import (
 )
 from ..plots import MIDDLE, RIGHT, create_canvas, render_png
 from ..report import round_values
-from .comparison import MethodComparison
+from .comparison import MethodComparison, MethodResult
 from .scenarios import Scenario
 from .tables import ComparisonTable, build_tables, describe_differences, describe_handicaps
 
@@ -88,13 +88,8 @@ def build_comparison_report(comparison: MethodComparison) -> Mapping:
     Args:
         comparison: the methods' results.
     """
-    takes = {
-        scenario.name: {method: {
-            **result.figures, "seconds": result.seconds, "smoothness_times_s": result.times.tolist(),
-            "smoothness_m": result.smoothness.tolist(), "warnings": list(result.take.warnings),
-        } for method in comparison.methods if (result := comparison.results[scenario.name, method])}
-        for scenario in comparison.scenarios
-    }  # fmt: skip
+    takes = {scenario.name: {method: _build_result_values(comparison.results[scenario.name, method])
+                             for method in comparison.methods} for scenario in comparison.scenarios}
     return round_values({
         "library": comparison.library, "clips": comparison.clips, "minutes": comparison.minutes,
         "methods": list(comparison.methods),
@@ -102,3 +97,9 @@ def build_comparison_report(comparison: MethodComparison) -> Mapping:
         "differences": describe_differences(comparison), "handicaps": describe_handicaps(comparison),
         "takes": takes,
     })  # fmt: skip
+
+
+def _build_result_values(result: MethodResult) -> dict:
+    """Build the values of one take."""
+    return {**result.figures, "seconds": result.seconds, "smoothness_times_s": result.times.tolist(),
+            "smoothness_m": result.smoothness.tolist(), "warnings": list(result.take.warnings)}

@@ -294,10 +294,14 @@ class PathSearch:
 
     def _shows_requested_action(self, slot: int, start: np.ndarray) -> np.ndarray:
         """Return (K,) bool: whether library frames (K,) show an action that the user asks for in a slot."""
-        words = self.costs.list_asked_labels(self.edges[slot], self.edges[slot + 1]) & ACTING
+        words = self._list_requested_actions(slot)
         if not words:
             return np.zeros(len(start), bool)
         return self.index.shows_labels(words)[self.costs.round_frame(start)]
+
+    def _list_requested_actions(self, slot: int) -> frozenset[str]:
+        """List the labels of actions that the user asks for in a slot."""
+        return ACTING & self.costs.list_asked_labels(*self.edges[slot : slot + 2])
 
     def collect_candidates(self, slot: int, most: float = np.inf) -> SlotCandidates:
         """Collect the candidates that can begin in a slot.
@@ -363,8 +367,9 @@ class PathSearch:
             known: (L,) costs of other ways to fill the slot.
         """
         transitions = self.build_transitions(before, free, ends[free])
-        asked = ACTING & self.costs.list_asked_labels(*self.edges[slot : slot + 2])  # such candidates are kept below
-        most = np.inf if asked else transitions.bound_own_cost(known, self.width.beam_width)
+        most = np.inf  # candidates of a requested action have a share of the beam whatever they cost
+        if not self._list_requested_actions(slot):
+            most = transitions.bound_own_cost(known, self.width.beam_width)
         to = self.collect_candidates(slot, most)
         which, cost, state = transitions.find_cheapest(to, known, self.width.beam_width)
         acting = np.flatnonzero(self._shows_requested_action(slot, to.start) & (to.piece < 0))
