@@ -36,7 +36,7 @@ def collect_state():
         "stream": to_plain(scene.beyond_mocap_stream), "constraints": sorted((o.name, c.name, round(c.influence, 6))
                                                                              for o in bpy.data.objects
                                                                              for c in o.constraints),
-        "players": [(p.name, p.tracking_file, p.annotation_file, p.take, p.quality, p.body.name if p.body else None)
+        "players": [(p.name, p.tracking_file, p.annotation_file, p.take, p.quality, p.body and name_data(p.body))
                     for p in scene.beyond_mocap.players],
     }
 
@@ -88,18 +88,21 @@ def list_fields(kind):
 
 
 def choose_converter(known):
-    """What makes a plain value of a property's value; of the throw's trajectory in Blender 4.5 only whether it is set,
-    since an undo there can let it point to other data that has come to lie at the same place in memory.
-    """
-    if known.identifier == "curve" and bpy.app.version < (5, 0):
-        return bool
+    """What makes a plain value of a property's value."""
     if known.type == "COLLECTION":
         return lambda value: [to_plain(item) for item in value]
     if known.type == "POINTER":
-        return lambda value: value and (to_plain(value) if isinstance(value, bpy.types.PropertyGroup) else value.name)
+        return lambda value: value and (to_plain if isinstance(value, bpy.types.PropertyGroup) else name_data)(value)
     if getattr(known, "is_array", False):
         return tuple
     return sorted if known.type == "ENUM" and known.is_enum_flag else lambda value: value
+
+
+def name_data(data):
+    """The name of data that a property points to; in Blender 4.5 only that it points to some, since an undo there can
+    let it point to other data that has come to lie at the same place in memory.
+    """
+    return data.name if bpy.app.version >= (5, 0) else True
 
 
 def press_operator(operator, **arguments):
@@ -121,5 +124,15 @@ def assert_one_step(operator, **arguments):
 
 
 def list_differences(found, expected):
-    """What two states differ in, as (found, expected) by name."""
-    return {name: (found[name], value) for name, value in expected.items() if found[name] != value}
+    """What two states differ in, as (found, expected) by path."""
+    return dict(iter_differences(found, expected, ()))
+
+
+def iter_differences(found, expected, path):
+    """(path, (found, expected)) of each value in which two states differ."""
+    if not isinstance(expected, dict) or not isinstance(found, dict):
+        if found != expected:
+            yield "/".join(path), (found, expected)
+        return
+    for name in sorted({*found, *expected}, key=str):
+        yield from iter_differences(found.get(name), expected.get(name), (*path, str(name)))
