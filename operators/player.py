@@ -47,7 +47,9 @@ SkillCorner, Sportec, Second Spectrum, Stats Perform); a text file with the name
         chosen = self.list_chosen_files()
         if not chosen:
             raise InputError("import", "no file given", "a tracking file", "choose one")
-        words = {path.with_suffix(".txt") for path in chosen if path.suffix.lower() == ".csv"}
+        from ..beyond_mocap.annotation.label_candidates import find_track_labels
+
+        words = {find_track_labels(path) for path in chosen if path.suffix.lower() == ".csv"}
         return [str(path) for path in chosen if path not in words]
 
     def do(self, context):
@@ -133,6 +135,8 @@ SkillCorner, Sportec, Second Spectrum, Stats Perform); a text file with the name
 
     def add_player(self, settings, path: str, found: tracks.PlayerInFile, provider: str):
         """Add one player to the list; of a whole match only the first is selected."""
+        from ..beyond_mocap.annotation.label_candidates import find_track_labels
+
         entry = settings.players.add()
         entry.name = find_free_name(found.name, {player.name for player in settings.players})
         entry.tracking_file, entry.metadata_file = to_setting_path(path), to_setting_path(
@@ -142,9 +146,8 @@ SkillCorner, Sportec, Second Spectrum, Stats Perform); a text file with the name
         entry.use = not found.feed_id or len(same_file) == 1
         team = found.team if found.feed_id else ("home", "away")[(len(settings.players) - 1) % 2]
         entry.shirt = SHIRTS.get(team, SHIRTS["home"])[0 if found.feed_id else (len(settings.players) - 1) // 2 % 2]
-        words = Path(path).with_suffix(".txt")
-        if not found.feed_id and words.is_file() and words != Path(path):
-            entry.annotation_file = to_setting_path(str(words))
+        if not found.feed_id and (labels := find_track_labels(path)):
+            entry.annotation_file = to_setting_path(str(labels))
 
 
 def choose_shirt(number: int) -> tuple[float, float, float]:

@@ -1,4 +1,4 @@
-"""Find text files that may have the labels of a track, where none has the track's own name."""
+"""Find the text that has the labels of a track, or those that may have them where none has the track's own name."""
 
 from __future__ import annotations
 
@@ -14,6 +14,19 @@ MOST_READ = 40  # text files of a folder that are looked into
 _FRAMES_PER_SECOND = 30.0  # any rate does: only the form matters here
 
 
+def find_track_labels(track: str | os.PathLike) -> Path | None:
+    """Find the text beside a track that has its labels by its name.
+
+    Args:
+        track: the track's file.
+    Returns:
+        NAME.txt beside NAME.csv, else SCENARIO_annotations.txt beside SCENARIO_track.csv; None without.
+    """
+    track = Path(track)
+    names = (track.stem, *[f"{track.stem.removesuffix('_track')}_annotations"] * track.stem.endswith("_track"))
+    return next((path for name in names if (path := track.with_name(f"{name}.txt")).is_file() and path != track), None)
+
+
 def find_label_candidates(track: str | os.PathLike) -> tuple[Path, ...]:
     """Find text files beside a track that read as labels and whose names begin as the track's does.
 
@@ -25,7 +38,7 @@ def find_label_candidates(track: str | os.PathLike) -> tuple[Path, ...]:
         The files, those with more words of the track's name first; none where one has exactly the track's name.
     """
     track = Path(track)
-    if track.with_suffix(".txt").is_file():
+    if find_track_labels(track):
         return ()
     words = _split_name(track)
     beside = [path for path in sorted(track.parent.glob("*.txt")) if not path.with_suffix(".csv").exists()]

@@ -36,7 +36,8 @@ def add_synthesize(verbs) -> argparse.ArgumentParser:
     verb.add_argument("--track", type=parse_path, required=True, metavar="T.csv",
                       help="the player's track, and the ball")
     verb.add_argument("--annotations", type=parse_path, metavar="A.txt",
-                      help="the labels; default: the text T.txt beside the track, else all automatic")
+                      help="the labels; "
+                           "default: T.txt beside T.csv, or S_annotations.txt beside S_track.csv, else all automatic")
     verb.add_argument("--out", type=parse_path, required=True, metavar="OUT.bvh", help="the motion")
     add_take_files(verb)
     verb.add_argument("--report", type=parse_path, metavar="R.json", help="write all figures to this file")
@@ -63,7 +64,7 @@ def run_synthesize(options, reporter: ProgressReporter, writers: Mapping[str, Wr
         writers: further output formats, by file suffix (Blender's).
     """
     from ..annotation import Timeline, check_timeline, read_timeline
-    from ..annotation.label_candidates import find_label_candidates
+    from ..annotation.label_candidates import find_label_candidates, find_track_labels
     from ..files.tracking.tracking import read_track_csv
     from ..motion.track import clean_track
     from ..synthesis.heading_table import read_heading_keys
@@ -73,7 +74,7 @@ def run_synthesize(options, reporter: ProgressReporter, writers: Mapping[str, Wr
 
     started = time.perf_counter()
     outputs = (options.out, options.provenance, options.ball, options.report)
-    annotations = options.annotations or _find_annotations(options.track)
+    annotations = options.annotations or find_track_labels(options.track)
     check_outputs(*outputs, reserved=(options.track, annotations, options.pins, options.headings,
                                       options.skeleton))
     write = choose_writer(options.out, writers)
@@ -182,12 +183,6 @@ def _synthesize_in_windows(options, reporter: ProgressReporter, library, plan, *
         merged["seconds"] = {**merged["seconds"], **seconds, "total": sum(seconds.values())}
         write_report(options.report, merged)
     return files.frames, files.ball, warnings
-
-
-def _find_annotations(track: Path) -> Path | None:
-    """Find the text beside a track that has its labels; None if there is none."""
-    text = track.with_suffix(".txt")
-    return text if text.is_file() and text != track else None
 
 
 def add_evaluate(verbs) -> argparse.ArgumentParser:

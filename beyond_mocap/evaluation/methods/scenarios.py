@@ -10,6 +10,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from ...annotation import Timeline, check_timeline, read_timeline
+from ...annotation.label_candidates import find_track_labels
 from ...base.errors import InputError
 from ...files.tracking.tracking import read_track_csv
 from ...motion.track import Track, clean_track
@@ -58,7 +59,8 @@ def read_scenarios(folder: Path, fps: float) -> tuple[list[Scenario], list[str]]
         found = f"no track among its {len(tables)} .csv files" if tables else "no .csv file in it"
         raise InputError(folder, found, _FORM, "name the folder that has the tracks")
     notes = [f"{path}: not a track, left out" for path in tables if path not in tracks]
-    notes += [f"{path}: no labels beside it; all is automatic locomotion" for path in tracks if not find_labels(path)]
+    notes += [f"{path}: no labels beside it; all is automatic locomotion" for path in tracks
+              if not find_track_labels(path)]
     _check_names(tracks)
     return [_read_scenario(path, fps, notes) for path in tracks], notes
 
@@ -102,17 +104,11 @@ def _is_track(path: Path) -> bool:
     return {"time_s", "x_m", "y_m"} <= {name.strip() for name in first}
 
 
-def find_labels(track: Path) -> Path | None:
-    """Find the labels of a track: NAME.txt, or SCENARIO_annotations.txt beside SCENARIO_track.csv; None without."""
-    names = (track.stem, f"{track.stem.removesuffix('_track')}_annotations")
-    return next((path for name in names if (path := track.with_name(f"{name}.txt")).is_file()), None)
-
-
 def _read_scenario(path: Path, fps: float, notes: list[str]) -> Scenario:
     """Read a track and its labels; what was mended in the track is added to `notes`."""
     track, data = clean_track(read_track_csv(path))
     notes += [f"{path}: {line}" for line in data.lines]
-    labels = find_labels(path)
+    labels = find_track_labels(path)
     timeline = read_timeline(labels, fps, float(track.times[0])) if labels else Timeline()
     return Scenario(name=_name_scenario(path), track=track, timeline=timeline, labels=labels,
                     thesis=THESIS.get(hashlib.sha256(path.read_bytes()).hexdigest()))

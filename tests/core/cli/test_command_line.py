@@ -223,14 +223,15 @@ def test_evaluate_says_what_it_cannot_know_and_what_it_replaces(synthesize, run,
     assert not any("replaces" in line for line in run(*command)[2])
 
 
-def test_labels_are_those_beside_the_track_or_automatic(synthesize, match, tmp_path):
-    track = tmp_path / "player.csv"
+@pytest.mark.parametrize(("name", "text"), [("player", "player"), ("one_track", "one_annotations")])
+def test_labels_are_those_beside_the_track_or_automatic(synthesize, match, tmp_path, name, text):
+    track, labels = tmp_path / f"{name}.csv", tmp_path / f"{text}.txt"
     track.write_bytes((match / "track.csv").read_bytes())
     for expected in (0, 1):
         status, _, error = synthesize(annotations=None, track=track, report=tmp_path / "r.json")
         assert status == 0 and len(json.loads((tmp_path / "r.json").read_text())["keys"]) == expected
-        assert any("player.csv: with the labels of" in line for line in error) == bool(expected)
-        (tmp_path / "player.txt").write_text("3 kick right\n")
+        assert any(f"{track.name}: with the labels of {labels}" in line for line in error) == bool(expected)
+        labels.write_text("3 kick right\n")
 
 
 def test_same_seed_same_file(synthesize, tmp_path):
