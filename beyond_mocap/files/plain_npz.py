@@ -8,7 +8,9 @@ import struct
 import tokenize
 import zipfile
 import zlib
-from collections.abc import Mapping
+from collections.abc import Collection, Iterator, Mapping
+from contextlib import contextmanager
+from pathlib import Path
 
 import numpy as np
 
@@ -39,22 +41,57 @@ def read_plain_arrays(
     Raises:
         InputError: if it is not a zip of such arrays.
     """
+    with _open_archive(io.BytesIO(data), kind, max_bytes) as archive:
+        members = archive.infolist()
+        names = [member.filename.removesuffix(".npy") for member in members]
+        if HEADER not in names:
+            found = (what for name, what in (other_kinds or {}).items() if name in names)
+            raise InputError("the file", next(found, "an .npz with other content"), kind, "choose another file")
+        if len(set(names)) < len(names):
+            raise InputError("the arrays", "two have the same name", kind, "choose another file")
+        return {name: _read_array(archive.read(member), name, types) for name, member in zip(names, members)}
+
+
+def read_named_arrays(path: Path, kind: str, types: tuple[np.dtype, ...], max_bytes: int,
+                      names: Collection[str]) -> dict[str, np.ndarray]:
+    """Read some arrays of a file; what else it holds is not looked at.
+
+    Args:
+        path: the file.
+        kind, types, max_bytes: see `read_plain_arrays`.
+        names: of the arrays.
+    Returns:
+        Name -> read-only array, of those that the file has.
+    Raises:
+        InputError: if it is not a zip, or one of these arrays is damaged or of another type.
+    """
+    with _open_archive(path, kind, max_bytes, f"{path}: ") as archive:
+        found = {member.filename.removesuffix(".npy"): member for member in archive.infolist()}
+        return {name: _read_array(archive.read(found[name]), f"{path}: {name}", types)
+                for name in names if name in found}
+
+
+def list_arrays(path: Path) -> frozenset[str]:
+    """List the names of a file's arrays; none where it is not a zip of them."""
     try:
-        with zipfile.ZipFile(io.BytesIO(data)) as archive:
-            members = archive.infolist()
-            if sum(member.file_size for member in members) > max_bytes:
-                raise InputError("the arrays", f"more than {max_bytes:,} bytes", kind, "choose another file")
-            names = [member.filename.removesuffix(".npy") for member in members]
-            if HEADER not in names:
-                found = (what for name, what in (other_kinds or {}).items() if name in names)
-                raise InputError("the file", next(found, "an .npz with other content"), kind, "choose another file")
-            if len(set(names)) < len(names):
-                raise InputError("the arrays", "two have the same name", kind, "choose another file")
-            return {name: _read_array(archive.read(member), name, types) for name, member in zip(names, members)}
+        with zipfile.ZipFile(path) as archive:
+            return frozenset(name.removesuffix(".npy") for name in archive.namelist())
+    except _READ_ERRORS:
+        return frozenset()
+
+
+@contextmanager
+def _open_archive(source, kind: str, max_bytes: int, place: str = "") -> Iterator[zipfile.ZipFile]:
+    """Open a zip whose members have a limited size, and translate what goes wrong while it is read."""
+    try:
+        with zipfile.ZipFile(source) as archive:
+            if sum(member.file_size for member in archive.infolist()) > max_bytes:
+                raise InputError(f"{place}the arrays", f"more than {max_bytes:,} bytes", kind, "choose another file")
+            yield archive
     except InputError:
         raise
     except _READ_ERRORS:
-        raise InputError("the file", "damaged, truncated or of another kind", kind,
+        raise InputError(f"{place}the file", "damaged, truncated or of another kind", kind,
                          "copy it again or choose another file") from None  # fmt: skip
 
 
@@ -69,13 +106,13 @@ def _read_array(data: bytes, name: str, types: tuple[np.dtype, ...]) -> np.ndarr
     shape, fortran, dtype = read(handle)
     if dtype not in types and not (name == HEADER and dtype == np.uint8):
         expected = ", ".join(str(each) for each in types)
-        raise InputError(name[:80], f"values of type {str(dtype)[:40]}", f"one of {expected}")
+        raise InputError(name[-200:], f"values of type {str(dtype)[:40]}", f"one of {expected}")
     values = data[handle.tell() :]
     if any(size < 0 for size in shape) or math.prod(shape) * dtype.itemsize != len(values):
-        raise InputError(name[:80], f"{len(values)} bytes for shape {str(shape)[:40]}", "the shape's number of bytes")
+        raise InputError(name[-200:], f"{len(values)} bytes for shape {str(shape)[:40]}", "the shape's number of bytes")
     array = np.frombuffer(values, dtype).reshape(shape, order="F" if fortran else "C")
     if dtype.kind == "f" and not np.isfinite(array).all():
-        raise InputError(name[:80], "NaN or infinite values", "finite numbers", "create the file again")
+        raise InputError(name[-200:], "NaN or infinite values", "finite numbers", "create the file again")
     return array
 
 
