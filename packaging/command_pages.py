@@ -16,7 +16,7 @@ program by `make tables`.*
 
 The same commands run as `python -m beyond_mocap COMMAND`, as `blender --command beyond_mocap COMMAND`, and on farms as
 `blender -b FILE --python batch.py -- COMMAND`. Inside Blender, `--out` (of `match`: `--scene`) may also end
-with `.blend`, `.fbx`, `.glb` or `.usdc`; `mirror` and `retarget` write BVH only.
+with `.blend`, `.fbx`, `.glb` or `.usdc`; `mirror` writes BVH only, `retarget` BVH and SMPL's `.npz`.
 
 Exit status: 0 done; 2 the command line or an input is wrong; 3 the library lacks what was asked for; 130 cancelled; 141
 the reader of the output ended, as `head` does. An error is one line: where, what was found, what was expected, what to

@@ -35,11 +35,11 @@ def add_retarget(verbs) -> argparse.ArgumentParser:
         The parser of this verb.
     """
     verb = verbs.add_parser("retarget", help="move a motion to another skeleton")
-    verb.add_argument("input", type=parse_path, metavar="IN.bvh", help="the motion")
-    verb.add_argument("--to", type=parse_path, required=True, metavar="SKELETON.bvh",
-                      help="a BVH file with the new skeleton")
-    verb.add_argument("--out", type=parse_path, required=True, metavar="OUT.bvh",
-                      help="the motion on it, in centimetres")
+    verb.add_argument("input", type=parse_path, metavar="IN", help="the motion: BVH, or SMPL as .npz")
+    verb.add_argument("--to", type=parse_path, required=True, metavar="SKELETON",
+                      help="a clip with the new skeleton; smpl for SMPL's joints")
+    verb.add_argument("--out", type=parse_path, required=True, metavar="OUT",
+                      help="the motion on it: .bvh in centimetres, or .npz with --to smpl")
     verb.add_argument("--map", type=parse_path, metavar="M.json",
                       help="a JSON object, joint of IN -> joint of SKELETON")
     add_options(verb, "retarget")
@@ -78,22 +78,74 @@ def run_retarget(options, reporter: ProgressReporter, writers: Mapping[str, Writ
         reporter: progress, notes and cancellation.
         writers: further output formats, by file suffix (Blender's).
     """
-    from ..files.bvh import bvh
     from ..library.common_skeleton import retarget_clip
 
     check_outputs(options.out, reserved=(options.input, options.to, options.map))
-    choose_writer(options.out, {}, hint="")
-    clip, target = bvh.read_bvh(options.input, options.unit), bvh.read_bvh(options.to, options.to_unit)
+    write = _choose_clip_writer(options)
+    clip = _read_input(options)
+    target = _read_target(options, clip.motion)
     try:
         motion = retarget_clip(clip.motion, target.motion, options.map)
     except InputError as error:
         if error.where != "skeleton":
             raise
         raise InputError(f"{options.input} to {options.to}", str(error)) from None  # skeletons do not know the file
-    notes = bvh.write_bvh(options.out, motion, target.form)
-    lines = [(options.input, clip.notes[0]), (options.to, target.notes[0]), *((options.out, note) for note in notes)]
+    notes = write(options.out, motion, target.form)
+    lines = [*((options.input, note) for note in _list_told(clip)), *((options.to, note) for note in target.notes[:1]),
+             *((options.out, note) for note in notes)]
     reporter.finish(f"{path}: {note}" for path, note in lines)
     print(f"{options.out}: {len(motion)} frames")
+
+
+def _choose_clip_writer(options):
+    """Choose the function that writes the clip: BVH, or SMPL's form for its skeleton."""
+    from ..files.bvh.bvh import write_bvh
+    from ..files.smpl.smpl import write_smpl
+
+    if options.out.suffix.lower() != ".npz":
+        choose_writer(options.out, {}, hint="")
+        return write_bvh
+    if not _is_to_smpl(options):
+        raise InputError(options.out, "an .npz for another skeleton than SMPL's", "a .bvh file, or --to smpl",
+                         "change one of them")
+    return lambda out, motion, form: write_smpl(out, motion)
+
+
+def _is_to_smpl(options) -> bool:
+    return str(options.to).lower() == "smpl" and not options.to.exists()
+
+
+def _read_input(options):
+    """Read the clip that is retargeted."""
+    from ..files.clip_file import read_clip
+    from ..files.smpl.smpl import read_smpl
+
+    if options.input.suffix.lower() == ".npz":
+        return read_smpl(options.input, options.stature, options.body_model)
+    for name in ("stature", "body_model"):
+        if getattr(options, name) is not None:
+            raise InputError(f"--{name.replace('_', '-')}", f"set for {options.input}", "a motion of SMPL as .npz",
+                             "leave it out")
+    return read_clip(options.input, options.unit)
+
+
+def _read_target(options, motion):
+    """Read the clip with the new skeleton; SMPL's is as tall as the body of the motion."""
+    from ..files.bvh.bvh import BvhClip
+    from ..files.bvh.bvh_write import BvhForm
+    from ..files.clip_file import read_clip
+    from ..files.smpl.smpl_skeleton import build_smpl_pose
+    from ..motion.humanoid import estimate_stature
+
+    if not _is_to_smpl(options):
+        return read_clip(options.to, options.to_unit)
+    with locate_errors(options.input):
+        return BvhClip(build_smpl_pose(estimate_stature(motion.skeleton)), BvhForm(), ())
+
+
+def _list_told(clip) -> tuple[str, ...]:
+    """List what is told of a clip that was read: of BVH its unit alone."""
+    return clip.notes if clip.form.channels == {} else clip.notes[:1]
 
 
 def add_stream(verbs):

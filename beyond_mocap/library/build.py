@@ -20,7 +20,7 @@ from ..annotation import ClipAnnotation
 from ..base.errors import InputError, UserCancelledError
 from ..base.memory import check_memory
 from ..base.settings import find_setting
-from ..files.bvh import bvh
+from ..files.clip_file import read_clip
 from ..files.motion_file import MappedMotions, MotionWriter
 from ..motion.motion import Motion
 from ..synthetic.landing import ends_in_flight
@@ -34,7 +34,8 @@ from .library import RECORDED_INDEX, Library, Progress
 from .proposals import propose_labels
 from .scan import Annotations, find_readable_clips, read_stamp
 
-_BASE_BYTES, _BYTES_PER_BYTE = 1e8, 4.0  # of memory that a build needs, and what it needs for a byte of its BVH files
+_BASE_BYTES = 1e8  # of memory that a build needs
+_BYTES_PER_BYTE = {".bvh": 4.0, ".npz": 16.0}  # of memory that it needs for a byte of its files: text is longer
 
 
 def build_library(
@@ -84,8 +85,8 @@ def build_library(
             digests.save()
             found["notes"] += tuple(waiting)
             return _remember(Library(folder=str(folder), cache_location=(place, key), seed=seed, **found))
-    text_bytes = sum(read_stamp(file)[0] for file in files)
-    check_memory(folder, _BASE_BYTES + _BYTES_PER_BYTE * text_bytes, "use fewer or shorter clips")
+    needed = sum(read_stamp(file)[0] * _BYTES_PER_BYTE[file.suffix.lower()] for file in files)
+    check_memory(folder, _BASE_BYTES + needed, "use fewer or shorter clips")
     messages = [*waiting, *cache.describe_outdated_cache(place)]
     sources_read = _Recordings(
         folder=folder, paths=paths, files=files, annotations=annotations, unit=unit, threads=threads,
@@ -209,7 +210,7 @@ def _repair_clips(recordings: _Recordings, motions: Sequence[Motion], drifts: Se
                   notes: list[str], report: Progress, cancelled) -> tuple[list[repair.Repair], list[np.ndarray]]:
     """Bring motions to one skeleton and repair them into `repaired`; returns what was changed, and their contacts."""
     chosen, paths = recordings.skeleton, recordings.paths
-    example = bvh.read_bvh(chosen, recordings.unit).motion if chosen is not None else None
+    example = read_clip(chosen, recordings.unit).motion if chosen is not None else None
     repairs, contacts = [], []
     for number, unified in enumerate(one_skeleton.unify_skeletons(paths, motions, example, notes)):
         _check_cancelled(cancelled)
@@ -240,7 +241,7 @@ def _propose_rows(recordings: _Recordings, motions: Sequence[Motion], report: Pr
     if not any(rows):
         raise InputError(
             recordings.folder, "no annotation for any clip, and no label to propose",
-            "NAME.txt beside NAME.bvh or an annotations.csv",
+            "NAME.txt beside the clip or an annotations.csv",
             "label frames as standing, walking, jogging, running, kick ...",
         )
     return rows
@@ -256,7 +257,7 @@ def _iter_levelled(recordings: _Recordings, report: Progress,
     paths, ahead = recordings.paths, 2 * max(1, recordings.threads)
 
     def read_one(path: Path, file: Path):
-        source = bvh.read_bvh(file, recordings.unit if file == path else None)
+        source = read_clip(file, recordings.unit if file == path else None)
         motion, pops = repair.remove_pops(source.motion)
         motion, drift = repair.remove_drift(motion)
         return source.notes, motion, pops, drift

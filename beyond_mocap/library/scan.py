@@ -17,6 +17,7 @@ from .. import annotation
 from ..base.errors import InputError, format_count
 from ..base.fixes import Fix
 from ..files.atomic import atomic_write
+from ..files.clip_file import CLIP_ENDINGS, is_clip_file
 
 CACHE_FOLDER = ".beyond_mocap"
 TABLE_NAME = "annotations.csv"
@@ -40,7 +41,7 @@ def find_clips(folder: str | Path) -> list[Path]:
     return found
 
 
-def find_recordings(folder: str | Path, endings: tuple[str, ...] = (".bvh", *FOREIGN)) -> list[Path]:
+def find_recordings(folder: str | Path, endings: tuple[str, ...] = (*CLIP_ENDINGS, *FOREIGN)) -> list[Path]:
     """Find all files below `folder` with one of these endings, as `find_clips`, converted or not; the list may be
     empty.
     """
@@ -58,7 +59,8 @@ def find_recordings(folder: str | Path, endings: tuple[str, ...] = (".bvh", *FOR
             continue
         seen.add((status.st_dev, status.st_ino))
         folders[:] = sorted(name for name in folders if name != CACHE_FOLDER)
-        found += [Path(parent) / name for name in files if name.lower().endswith(endings)]
+        paths = (Path(parent) / name for name in files if name.lower().endswith(endings))
+        found += filter(is_clip_file, paths)
     names = {path: path.relative_to(folder).as_posix() for path in found}
     for path, name in names.items():
         if name.encode("utf-8", "replace").decode() != name:
@@ -67,14 +69,20 @@ def find_recordings(folder: str | Path, endings: tuple[str, ...] = (".bvh", *FOR
 
 
 def list_own_recordings(folder: str | Path) -> list[Path]:
-    """List the recordings that are a library's clips, as `find_recordings`; of `kick.bvh` and `kick.fbx` only the
-    former.
+    """List the recordings that are a library's clips, as `find_recordings`; of `kick.bvh`, `kick.npz` and `kick.fbx`
+    only the first.
     """
     found = find_recordings(folder)
-    if not any(map(is_foreign, found)):
-        return found
-    plain = {path.with_suffix("") for path in found if not is_foreign(path)}
-    return [path for path in found if not is_foreign(path) or path.with_suffix("") not in plain]
+    best: dict[Path, int] = {}
+    for path in found:
+        best[path.with_suffix("")] = min(_rank_form(path), best.get(path.with_suffix(""), len(CLIP_ENDINGS)))
+    return [path for path in found if _rank_form(path) == best[path.with_suffix("")]]
+
+
+def _rank_form(path: Path) -> int:
+    """Return the rank of a recording's form: that of `CLIP_ENDINGS`, then all that Blender converts."""
+    ending = path.suffix.lower()
+    return CLIP_ENDINGS.index(ending) if ending in CLIP_ENDINGS else len(CLIP_ENDINGS)
 
 
 def find_readable_clips(folder: str | Path, place: str | Path) -> tuple[list[Path], Conversions, list[str]]:
@@ -93,10 +101,10 @@ def find_readable_clips(folder: str | Path, place: str | Path) -> tuple[list[Pat
     waiting_set = set(waiting)
     ready = [path for path in found if path not in waiting_set]
     if not ready and waiting:
-        what = f"no BVH file in the folder, but {len(waiting)} that only Blender reads ({waiting[0].name})"
+        what = f"no clip in the folder that can be read, but {len(waiting)} that only Blender reads ({waiting[0].name})"
         raise InputError(folder, what, "at least one .bvh", "press Build Library in Blender")
     if not ready:
-        raise InputError(folder, "no BVH file in the folder", "at least one .bvh", "copy recordings into it")
+        raise InputError(folder, "no clip in the folder", "at least one .bvh or .npz", "copy recordings into it")
     return ready, conversions, describe_waiting(waiting)
 
 

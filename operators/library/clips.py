@@ -10,7 +10,8 @@ import numpy as np
 from bpy.props import BoolProperty, EnumProperty, FloatProperty, StringProperty
 
 from ...beyond_mocap.base.errors import InputError, UserCancelledError, format_count
-from ...beyond_mocap.files.bvh import bvh
+from ...beyond_mocap.files.bvh.bvh import BvhClip
+from ...beyond_mocap.files.clip_file import CLIP_ENDINGS, read_clip
 from ...beyond_mocap.library.scan import FOREIGN, find_recordings, is_foreign
 from ...beyond_mocap.motion import humanoid, quaternion
 from ...beyond_mocap.motion import mirror as mirroring
@@ -22,14 +23,15 @@ from ..operator_base import BackgroundOperator, BaseOperator, ImportOperator
 
 
 class BEYOND_MOCAP_OT_import_clips(ImportOperator, bpy.types.Operator):
-    """Import motion clips (BVH, FBX, glTF, USD) as armatures, from files or from all files below a folder: only the
-motion, from the hips up and in metres"""
+    """Import motion clips (BVH, SMPL, FBX, glTF, USD) as armatures, from files or from all files below a folder: only
+the motion, from the hips up and in metres"""
 
     bl_idname = "beyond_mocap.import_clips"
     bl_label = "Import Motion Clips"
     presents = True
     filename_ext = ".bvh"
-    filter_glob: StringProperty(default=";".join(f"*{ending}" for ending in (".bvh", *FOREIGN)), options={"HIDDEN"})
+    filter_glob: StringProperty(default=";".join(f"*{ending}" for ending in (*CLIP_ENDINGS, *FOREIGN)),
+                                options={"HIDDEN"})
     unit: FloatProperty(name="Metres per Unit", default=0.0, min=0.0, precision=5,
                         description="Size of one unit of the file in metres; 0 guesses it from the height of the hips")
     reuse: BoolProperty(
@@ -41,7 +43,7 @@ motion, from the hips up and in metres"""
         """List the chosen files, and all below a chosen folder."""
         chosen = self.list_chosen_files() or ([Path(self.directory)] if self.directory else [])
         if not chosen:
-            raise InputError("import", "no file given", "a .bvh file or a folder", "choose one")
+            raise InputError("import", "no file given", "a .bvh or .npz file, or a folder", "choose one")
         return [file for path in chosen for file in (_list_clips_below(path) if path.is_dir() else [path])]
 
     def do(self, context):
@@ -64,10 +66,10 @@ motion, from the hips up and in metres"""
         window.select_only(context, bodies[-1], *bodies)
         self.report({"INFO"}, f"Clips imported at the scene's frame rate: {len(bodies)}")
 
-    def read_file(self, path: Path) -> list[tuple[str, bvh.BvhClip]]:
+    def read_file(self, path: Path) -> list[tuple[str, BvhClip]]:
         """Read the clips of one file with their names."""
         if not is_foreign(path):
-            return [(path.stem, bvh.read_bvh(path, self.unit or None))]
+            return [(path.stem, read_clip(path, self.unit or None))]
         takes = foreign.read_takes(path)
         alone = len(takes) == 1
         return [(path.stem if alone else f"{path.stem} {one.name}", foreign.to_bvh_clip(one.motion)) for one in takes]
@@ -95,7 +97,7 @@ class BEYOND_MOCAP_FH_clips(bpy.types.FileHandler):
     bl_idname = "BEYOND_MOCAP_FH_clips"
     bl_label = "Motion Clip"
     bl_import_operator = "beyond_mocap.import_clips"
-    bl_file_extensions = ".bvh"
+    bl_file_extensions = ";".join(CLIP_ENDINGS)
 
     @classmethod
     def poll_drop(cls, context):
@@ -221,7 +223,6 @@ kind, in this file or as a .blend for a folder of asset libraries"""
     @staticmethod
     def run_job(order, progress, cancelled, _hurry):
         """Read the motions and render the pictures."""
-        from ...beyond_mocap.files.bvh import bvh
         from ...beyond_mocap.library.label_files import read_labels
 
         drafts, pictures, total = [], [], len(order.files) + len(order.drafts)
@@ -229,7 +230,7 @@ kind, in this file or as a .blend for a folder of asset libraries"""
             if cancelled():
                 raise UserCancelledError("assets: cancelled")
             progress(number / total, f"Drawing {Path(path).stem}")
-            motion = bvh.read_bvh(file, unit).motion
+            motion = read_clip(file, unit).motion
             rows = read_labels(order.folder / path, order.folder, motion.fps)
             drafts.append(assets.build_draft(Path(path).stem, motion, rows, figures))
             pictures.append(assets.render_picture(drafts[-1]))

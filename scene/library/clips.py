@@ -240,9 +240,10 @@ def _is_label_file(name: str) -> bool:
 
 def _iter_files(folder: str):
     """Iterate over the paths of all recordings and label files below a folder; links are followed, each folder once."""
+    from ...beyond_mocap.files.clip_file import CLIP_ENDINGS
     from ...beyond_mocap.library.scan import CACHE_FOLDER, FOREIGN, TABLE_NAME
 
-    wanted, seen = (".bvh", ".txt", TABLE_NAME, *FOREIGN), set()
+    wanted, seen = (*CLIP_ENDINGS, ".txt", TABLE_NAME, *FOREIGN), set()
     for here, folders, files in os.walk(folder, followlinks=True):
         try:
             status = os.stat(here)

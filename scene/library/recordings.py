@@ -67,9 +67,9 @@ def find_clip_file(settings, path: str, folder: str = "") -> tuple[Path, float |
 
 def read_recording(settings, path: str, folder: str = "") -> tuple["Motion", tuple[str, ...]]:
     """Read the motion of a clip and its reader's notes; arguments and errors as `find_clip_file`."""
-    from ...beyond_mocap.files.bvh import bvh
+    from ...beyond_mocap.files.clip_file import read_clip
 
-    clip = bvh.read_bvh(*find_clip_file(settings, path, folder))
+    clip = read_clip(*find_clip_file(settings, path, folder))
     return clip.motion, clip.notes
 
 

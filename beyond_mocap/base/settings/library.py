@@ -26,6 +26,10 @@ TABLES = {
     "retarget": (
         Setting(name="unit", kind=float, option="--unit", help="metres per unit of IN.bvh", **POSITIVE),
         Setting(name="to_unit", kind=float, option="--to-unit", help="metres per unit of SKELETON.bvh", **POSITIVE),
+        Setting(name="stature", kind=float, least=1.0, most=2.4, unit="metres", option="--stature",
+                help="height of the person of IN.npz; default: the one that the steps fit"),
+        Setting(name="body_model", kind=Path, option="--body-model", metavar="MODEL.npz",
+                help="body model of SMPL's family, for the bones of the person of IN.npz"),
     ),
     "preferences": (
         Setting(name="cache_folder", default="", tooltip="Folder for built libraries, each in its own folder; "

@@ -12,7 +12,7 @@ pelvis tells.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -23,6 +23,8 @@ from ...motion.contacts import measure_floor_height
 from ...motion.motion import Motion
 from ...motion.skeleton import Skeleton
 from ..atomic import atomic_path
+from ..bvh.bvh import BvhClip
+from ..bvh.bvh_write import BvhForm
 from ..plain_npz import list_arrays, read_named_arrays
 from .smpl_skeleton import (
     JOINTS,
@@ -61,26 +63,13 @@ _Z_UP = np.eye(3)
 _Y_UP = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]])
 
 
-@dataclass(frozen=True)
-class SmplClip:
-    """A file's motion, and what the reader assumed, changed or found.
-
-    Attributes:
-        motion: 22 joints, metres, Z up, the toe joints of standing feet at height 0.
-        notes: one line each.
-    """
-
-    motion: Motion
-    notes: tuple[str, ...]
-
-
 def is_smpl_file(path: Path) -> bool:
     """Return whether a file is an .npz whose arrays have the names of a motion of SMPL."""
     names = list_arrays(path)
     return "poses" in names or any(body in names for _, body, _ in _PARTS)
 
 
-def read_smpl(path, stature: float | None = None, body_model: Path | None = None) -> SmplClip:
+def read_smpl(path, stature: float | None = None, body_model: Path | None = None) -> BvhClip:
     """Read the motion of an .npz of SMPL, SMPL-H or SMPL-X (AMASS, ASAP, GVHMR).
 
     Args:
@@ -88,7 +77,7 @@ def read_smpl(path, stature: float | None = None, body_model: Path | None = None
         stature: of the person, metres; None finds the one that the steps fit.
         body_model: the .npz of the model, for the true bones of this person's `betas`; None takes mean proportions.
     Returns:
-        The clip.
+        The clip: 22 joints, the toe joints of standing feet at height 0, and what was assumed, left out or found.
     Raises:
         InputError: if it is not such a file.
     """
@@ -105,7 +94,7 @@ def read_smpl(path, stature: float | None = None, body_model: Path | None = None
     floor = measure_floor_height(motion)
     motion = replace(motion, root_positions=motion.root_positions - (0.0, 0.0, floor))
     first = f"{form}, {up} up, {fps:g} frames per second, {len(motion)} frames; {told}"
-    return SmplClip(motion, (first, *notes, *_list_left_out(form, arrays), *_list_faults(motion)))
+    return BvhClip(motion, BvhForm(), (first, *notes, *_list_left_out(form, arrays), *_list_faults(motion)))
 
 
 def write_smpl(path, motion: Motion) -> tuple[str, ...]:

@@ -13,6 +13,7 @@ from pathlib import Path
 import numpy as np
 
 from ...base.errors import InputError
+from ...motion import quaternion
 from ...motion.motion import Motion, forward_kinematics
 from ...motion.retargeting.adult import build_adult_skeleton
 from ...motion.skeleton import Skeleton
@@ -64,6 +65,14 @@ def build_smpl_skeleton(stature: float) -> Skeleton:
     parts = [_name_smpl_joint(adult.names[joint]) for joint in adult.end_parents]
     tips = [_point_sideways(part, tip) if part.endswith("wrist") else tip for part, tip in zip(parts, tips)]
     return Skeleton(JOINTS, PARENTS, offsets, tuple(map(JOINTS.index, parts)), np.array(tips))
+
+
+def build_smpl_pose(stature: float) -> Motion:
+    """Build a frame in the T-pose on the ground, of a person of mean proportions `stature` metres tall."""
+    skeleton = build_smpl_skeleton(stature)
+    motion = Motion(skeleton, np.zeros((1, 3)), quaternion.identity(1, len(JOINTS)), 30.0)
+    lowest = forward_kinematics(motion)[0][0, :, 2].min()
+    return Motion(skeleton, np.array([[0.0, 0.0, -lowest]]), motion.rotations, 30.0)
 
 
 def _name_adult_joint(joint: str) -> str:

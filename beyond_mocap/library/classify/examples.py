@@ -124,7 +124,7 @@ class _ClipReader:
     def iter_clips(self, has_labels: bool, unit, progress, cancelled) -> Iterator[tuple]:
         """Iterate over (path below the folder, motion, rows) of all clips that have labels, or of those that have none.
         """
-        from ...files.bvh import bvh
+        from ...files.clip_file import read_clip
 
         for number, path in enumerate(self._paths):
             file = self._conversions.find_readable_file(path)
@@ -134,7 +134,7 @@ class _ClipReader:
                 progress(number / len(self._paths), f"Reading {path.name}")
             if bool(self._annotations.read_rows(path, 30.0)) != has_labels:
                 continue
-            motion = bvh.read_bvh(file, unit if file == path else None).motion
+            motion = read_clip(file, unit if file == path else None).motion
             try:
                 identify_joints(motion.skeleton)
             except InputError as error:  # a skeleton does not know its file

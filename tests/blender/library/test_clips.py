@@ -54,6 +54,18 @@ def test_operator_gives_what_the_functions_give(core, rooms, clip):
     assert np.array_equal(again.rotations, read.rotations) and np.array_equal(again.root_positions, read.root_positions)
 
 
+def test_motion_of_smpl_is_imported(core, rooms, clip, tmp_path):
+    smpl, bones = core("files.smpl.smpl"), core("files.smpl.smpl_skeleton")
+    still = bones.build_smpl_pose(1.75)
+    motion = core("motion.motion").Motion(still.skeleton, np.repeat(still.root_positions, 30, axis=0),
+                                          np.repeat(still.rotations, 30, axis=0), 30.0)
+    smpl.write_smpl(tmp_path / "stands.npz", motion)
+    play_at_clip_rate()
+    bpy.ops.beyond_mocap.import_clips(filepath=str(tmp_path / "stands.npz"))
+    assert {bone.name for bone in bpy.context.object.data.bones} == set(bones.JOINTS)
+    assert len(rooms["core.action"].read_motion(bpy.context.object, bpy.context.scene)) == 30
+
+
 def test_export_writes_what_was_imported(core, rooms, clip, tmp_path):
     path, motion = clip
     play_at_clip_rate()

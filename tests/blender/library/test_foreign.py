@@ -171,5 +171,5 @@ def test_a_clip_is_converted_once_and_again_when_it_changes(core, rooms, mixed):
 def test_a_folder_of_broken_clips_alone(tmp_path):
     (tmp_path / "a.fbx").write_bytes(b"no FBX")
     bpy.context.scene.beyond_mocap.library_folder = str(tmp_path)
-    with pytest.raises(RuntimeError, match="no BVH file in the folder"):
+    with pytest.raises(RuntimeError, match="no clip in the folder"):
         bpy.ops.beyond_mocap.build_library()

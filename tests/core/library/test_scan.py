@@ -2,10 +2,11 @@
 
 import os
 
+import numpy as np
 import pytest
 
 from beyond_mocap.base.errors import InputError
-from beyond_mocap.library.scan import Annotations, find_clips
+from beyond_mocap.library.scan import Annotations, find_clips, list_own_recordings
 
 HEADER = "file,fps,start_frame,end_frame,key_frame,labels,comment\n"
 
@@ -31,6 +32,16 @@ def names(folder):
 def words(folder, name, fps=30.0):
     rows = Annotations(folder, find_clips(folder)).read_rows(folder / name, fps)
     return [" ".join(row.words) for row in rows]
+
+
+def test_motion_of_smpl_is_a_clip_and_of_one_name_the_first_form_counts(folder):
+    """An .npz may hold anything; its arrays tell."""
+    for name, arrays in {"b": ("poses", "trans"), "deep/c": ("poses", "trans"), "weights": ("header",)}.items():
+        np.savez(folder / f"{name}.npz", **dict.fromkeys(arrays, np.zeros(3)))
+    for name in ("b.fbx", "deep/c.fbx", "d.fbx", "d.glb"):
+        (folder / name).write_text("")
+    found = [path.relative_to(folder).as_posix() for path in list_own_recordings(folder)]
+    assert found == ["b.bvh", "d.fbx", "d.glb", "deep/a.BVH", "deep/c.npz"]
 
 
 def test_clips_are_found_in_order_whatever_the_case_of_their_suffix(folder):
