@@ -310,7 +310,7 @@ def _collect_unit_notes(read: Sequence[str]) -> list[str]:
     """
     kinds: dict[str, list[str]] = {}
     for note in read:
-        kinds.setdefault(re.sub(r"(?<=hips )[\d.]+", "", note), []).append(note)
+        kinds.setdefault(re.sub(r"(?<=hips )[\d.]+|\d+(?= frames)|[\d.]+(?= m tall)", "", note), []).append(note)
     return [f"{notes[0]} (similar in {len(notes)} clips)" if len(notes) > 1 else notes[0] for notes in kinds.values()]
 
 

@@ -94,7 +94,7 @@ def read_smpl(path, stature: float | None = None, body_model: Path | None = None
     floor = measure_floor_height(motion)
     motion = replace(motion, root_positions=motion.root_positions - (0.0, 0.0, floor))
     first = f"{form}, {up} up, {fps:g} frames per second, {len(motion)} frames; {told}"
-    return BvhClip(motion, BvhForm(), (first, *notes, *_list_left_out(form, arrays), *_list_faults(motion)))
+    return BvhClip(motion, BvhForm(), (first, *notes, *_list_left_out(form, arrays), *_list_faults(path.name, motion)))
 
 
 def write_smpl(path, motion: Motion) -> tuple[str, ...]:
@@ -218,17 +218,17 @@ def _list_left_out(form: str, arrays: Mapping[str, np.ndarray]) -> list[str]:
     return ["fingers, jaw and eyes are left out"] if np.ptp(rest, axis=0).max() > 1e-3 else []
 
 
-def _list_faults(motion: Motion) -> list[str]:
+def _list_faults(name: str, motion: Motion) -> list[str]:
     """List leaps of the body and flips of joints between two frames, which a person does not do."""
     travel = np.diff(motion.root_positions, axis=0)
     turn = quaternion.to_rotation_vector(quaternion.multiply(quaternion.inverse(motion.rotations[:-1]),
                                                              motion.rotations[1:]))
-    lines = [f"frame {frame + 1}: the body leaps by {np.linalg.norm(travel[frame]):.2f} m"
+    lines = [f"{name}, frame {frame + 1}: the body leaps by {np.linalg.norm(travel[frame]):.2f} m"
              for frame in np.flatnonzero(_measure_outliers(travel) * motion.fps > _LEAP)]
     angles = np.degrees(np.linalg.norm(turn, axis=-1))
-    lines += [f"frame {frame + 1}: {JOINTS[joint]} flips by {angles[frame, joint]:.0f} degrees"
+    lines += [f"{name}, frame {frame + 1}: {JOINTS[joint]} flips by {angles[frame, joint]:.0f} degrees"
               for frame, joint in np.argwhere(_measure_outliers(turn) * motion.fps > _FLIP)]
-    more = f"and {format_count(len(lines) - _MOST_FAULTS, 'more fault')} of this kind"
+    more = f"{name}: {format_count(len(lines) - _MOST_FAULTS, 'more fault')} of these kinds"
     return lines[:_MOST_FAULTS] + [more] * (len(lines) > _MOST_FAULTS)
 
 
