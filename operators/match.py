@@ -104,7 +104,8 @@ class BEYOND_MOCAP_FH_match(ViewDropHandler, bpy.types.FileHandler):
     bl_idname = "BEYOND_MOCAP_FH_match"
     bl_label = "Match of All Players"
     bl_import_operator = "beyond_mocap.read_match"
-    bl_file_extensions = ".csv;.json;.jsonl;.xml;.dat"  # dropped texts are labels; tracking as text is chosen by name
+    # dropped texts are labels; tracking as text is chosen by name
+    bl_file_extensions = ".csv;.json;.jsonl;.xml;.dat;.gpx"
 
 
 SELECTION_ITEMS = (("ALL", "All", "Select all"), ("NONE", "None", "Select none"),

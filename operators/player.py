@@ -26,13 +26,14 @@ SECTION_SECONDS = 60.0  # seconds of a whole match that are selected at first
 
 class BEYOND_MOCAP_OT_import_tracking(ImportOperator, bpy.types.Operator):
     """Import players' positions: CSV files with time_s, x_m, y_m, or a provider's tracking file (TRACAB, Metrica,
-SkillCorner, Sportec, Second Spectrum, Stats Perform); a text file with the name of a CSV is read as its labels"""
+SkillCorner, Sportec, Second Spectrum, Stats Perform, Common Data Format, GPS and others); a text file with the name of
+a CSV is read as its labels"""
 
     bl_idname = "beyond_mocap.import_tracking"
     bl_label = "Import Tracking"
     presents = True
     filename_ext = ".csv"
-    filter_glob: StringProperty(default="*.csv;*.txt;*.dat;*.json;*.jsonl;*.xml", options={"HIDDEN"})
+    filter_glob: StringProperty(default="*.csv;*.txt;*.dat;*.json;*.jsonl;*.xml;*.gpx", options={"HIDDEN"})
     metadata: StringProperty(
         name="Metadata", subtype="FILE_PATH",
         description="The provider's second file; empty finds one with a matching name beside the tracking file",
@@ -170,7 +171,7 @@ class BEYOND_MOCAP_FH_tracking(ViewDropHandler, bpy.types.FileHandler):
     bl_idname = "BEYOND_MOCAP_FH_tracking"
     bl_label = "Player Tracking"
     bl_import_operator = "beyond_mocap.import_tracking"
-    bl_file_extensions = ".csv;.json;.jsonl;.xml;.dat"
+    bl_file_extensions = ".csv;.json;.jsonl;.xml;.dat;.gpx"
 
 
 class BEYOND_MOCAP_OT_choose_player(BaseOperator, bpy.types.Operator):

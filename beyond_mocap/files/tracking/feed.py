@@ -11,7 +11,7 @@ import warnings
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TypeVar
+from typing import Any, TypeVar
 from xml.parsers import expat
 
 from ...base.errors import InputError
@@ -62,6 +62,8 @@ class TrackingProvider(Provider):
         has_own_roster: whether names are in a further file that nothing else depends on.
         number_in_tracking, number_in_metadata: from the beginning of a file to the match's number, None if not found.
         read_referees: reads the referees' samples, which kloppy ignores; None if the provider has none.
+        read_samples: reads the files, where kloppy does not know them: feed, and the pitch's size where the user gives
+            one -> `formats.samples.MatchSamples`.
     """
 
     arguments: Mapping[str, str] = field(default_factory=lambda: {"meta_data": "meta", "raw_data": "raw"})
@@ -74,6 +76,7 @@ class TrackingProvider(Provider):
     number_in_tracking: Callable[[bytes], str | None] | None = None
     number_in_metadata: Callable[[bytes], str | None] | None = None
     read_referees: Callable[[Feed], Samples] | None = None
+    read_samples: Callable[[Feed, tuple[float, float] | None], Any] | None = None
 
 
 @dataclass(frozen=True)

@@ -9,7 +9,8 @@ import numpy as np
 from ...motion.track.match_data import REFEREE
 
 USUAL_PITCH = (105.0, 68.0)
-_PERIOD_BREAK = 10.0  # seconds inserted between the periods of a match
+PERIOD_BREAK = 10.0
+"""Seconds inserted between the periods of a match."""
 
 
 def list_records(dataset) -> list:
@@ -83,7 +84,7 @@ def build_clock(records) -> tuple[np.ndarray, list[tuple[float, float, int, floa
     times, spans = np.empty(len(records)), []
     for number_ in dict.fromkeys(period.tolist()):
         members = period == number_
-        begin = spans[-1][1] + _PERIOD_BREAK if spans else 0.0
+        begin = spans[-1][1] + PERIOD_BREAK if spans else 0.0
         times[members] = seconds[members] - seconds[members].min() + begin
         spans.append((begin, float(times[members].max()), number_, float(seconds[members].min())))
     return times, spans

@@ -14,6 +14,10 @@ from pathlib import Path
 
 from ...base.errors import InputError, build_read_error, format_count
 from .feed import Feed, Files, TrackingProvider, find_provider, load_with_kloppy, read_head
+from .formats.cdf import read_cdf
+from .formats.gps import GPS_PATTERNS, find_gps_files, read_gps
+from .formats.respovision import read_respovision
+from .formats.soccernet import read_soccernet
 from .referees import read_signality_referees, read_sportec_referees, read_tracab_referees
 
 _META_NAMES = ("{}_meta.xml", "{}_meta.json", "{}_metadata.xml", "{}_metadata.json", "{}.xml", "{}.json")
@@ -160,6 +164,11 @@ def _find_secondspectrum(path: Path, meta: Path, notes: list[str]) -> Files:
     return (path,), (meta, names)
 
 
+def _find_alone(path: Path, meta: Path | None, notes: list[str]) -> Files:
+    """Find the files of a feed that is one file."""
+    return (path,), (meta,) if meta else ()
+
+
 def _find_pff(path: Path, meta: Path, notes: list[str]) -> Files:
     return (path,), (meta, _find_companion(meta, "roster", path, notes))
 
@@ -251,5 +260,25 @@ PROVIDERS: dict[str, TrackingProvider] = {record.name: record for record in (
         patterns=(rb'(?s)\s*\{\s*"details"\s*:.{0,4000}"heId"',), find_files=_find_hawkeye, needs_metadata=False,
         arguments={"player_centroid_feeds": "first", "ball_feeds": "second", "meta_data": "meta",
                    "pitch_length": "length", "pitch_width": "width"},
+    ),
+    TrackingProvider(
+        name="cdf", title="Common Data Format", files="`tracking.jsonl` with its metadata",
+        patterns=(rb'(?s)\s*\{\s*"frame_id"(?!.{0,2000}"landmarks").{0,600}"teams"\s*:\s*\{\s*"(home|away)"',),
+        renamed=(("tracking.jsonl", "meta.json"), ("tracking.jsonl", "metadata.json")),
+        read_samples=lambda feed, pitch: read_cdf(feed),
+    ),
+    TrackingProvider(
+        name="respovision", title="ReSpo.Vision", files="`.jsonl`", needs_metadata=False, has_pitch_size=False,
+        patterns=(rb'(?s)\s*\{.{0,300}"pitch_side"\s*:',), find_files=_find_alone, read_samples=read_respovision,
+    ),
+    TrackingProvider(
+        name="soccernet", title="SoccerNet Game State", files="`Labels-GameState.json`, or predictions of its form",
+        patterns=(rb'(?s)\s*\{.{0,4000}"bbox_pitch"', rb'(?s)\s*\{\s*"info"\s*:.{0,4000}"(im_dir|im_ext|seq_length)"'),
+        needs_metadata=False, find_files=_find_alone, read_samples=lambda feed, pitch: read_soccernet(feed),
+    ),
+    TrackingProvider(
+        name="gps", title="GPS", files="CSV with latitude, longitude and time (Catapult, STATSports) or GPX, a file "
+        "for each player; the pitch's corners in `..corners.csv`",
+        patterns=GPS_PATTERNS, needs_metadata=False, find_files=find_gps_files, read_samples=read_gps,
     ),
 )}  # fmt: skip

@@ -24,6 +24,7 @@ from ..atomic import atomic_write, remove_abandoned
 from ..tables import parse_number, read_rows
 from . import match_arrays
 from .feed import Feed
+from .formats.samples import MatchSamples
 from .match_repairs import (
     check_periods,
     check_players,
@@ -132,27 +133,37 @@ def read_match(
 def _read_arrays(feed: Feed, pitch: tuple[float, float] | None) -> dict[str, np.ndarray]:
     """Read the match's arrays from its files; a file that ends within a line is read up to that line."""
     check_same_match(feed)
-    size = pitch or match_arrays.USUAL_PITCH
     try:
-        return _build_arrays(load_tracking(feed, size), feed, pitch)
+        return _build_arrays(_read_samples(feed, pitch), pitch)
     except InputError:
         if not feed.is_line_based or all(path.read_bytes()[-1:] == b"\n" for path in feed.tracking):
             raise
         with cut_to_whole_lines(feed) as whole_feed:
             try:
-                dataset = load_tracking(whole_feed, size)
+                samples = _read_samples(whole_feed, pitch, feed)
             except InputError:
-                dataset = None
-        if dataset is None:
+                samples = None
+        if samples is None:
             raise
-    note = "the file ends within a line: it is read up to that line"
-    return _build_arrays(dataset, feed, pitch, [note])
+    samples.lines.insert(0, "the file ends within a line: it is read up to that line")
+    return _build_arrays(samples, pitch)
 
 
-def _build_arrays(dataset, feed: Feed, pitch: tuple[float, float] | None, lines=()) -> dict[str, np.ndarray]:
-    """Build the named arrays of a match, which the cache stores."""
+def _read_samples(feed: Feed, pitch: tuple[float, float] | None, whose: Feed | None = None) -> MatchSamples:
+    """Read the samples of a match; with copies of files, `whose` are the user's."""
+    if feed.provider.read_samples is None:
+        return _convert_dataset(load_tracking(feed, pitch or match_arrays.USUAL_PITCH), whose or feed, pitch)
+    try:
+        return feed.provider.read_samples(feed, pitch)
+    except (KeyError, TypeError, AttributeError, ValueError, IndexError) as error:
+        found = f"values in other places than {feed.provider.title} has them ({type(error).__name__}: {error})"
+        raise InputError(feed.path, found[:200], f"{feed.provider.name} tracking", "export it again") from None
+
+
+def _convert_dataset(dataset, feed: Feed, pitch: tuple[float, float] | None) -> MatchSamples:
+    """Convert kloppy's dataset, with the referees that it ignores."""
     records = match_arrays.list_records(dataset)
-    lines = [*lines, *check_rows(feed), *check_periods(records, dataset, feed)]
+    lines = [*check_rows(feed), *check_periods(records, dataset, feed)]
     players = match_arrays.list_players(records)
     lines += check_players(players, dataset, feed)
     times, periods = match_arrays.build_clock(records)
@@ -164,17 +175,26 @@ def _build_arrays(dataset, feed: Feed, pitch: tuple[float, float] | None, lines=
     referees, places, referee_lines = read_referee_samples(feed, np.array([frame.frame_id for frame in records]))
     people = [*map(match_arrays.describe_player, players), *map(describe_referee, referees)]
     positions = to_metres(np.concatenate([match_arrays.build_player_samples(records, players), places]))
-    positions, player_lines = repair_players(times, positions, length, width, [one[0] for one in people])
-    ball, ball_lines = repair_ball(ball, length, width)
+    return MatchSamples(times=times, periods=periods, people=people, positions=positions, ball=ball,
+                        fps=float(dataset.metadata.frame_rate), size=None if is_default else (length, width),
+                        teams=_list_teams(dataset, feed), lines=[*lines, *referee_lines])
+
+
+def _build_arrays(match: MatchSamples, pitch: tuple[float, float] | None) -> dict[str, np.ndarray]:
+    """Build the named arrays of a match, which the cache stores."""
+    times, people, periods = match.times, match.people, match.periods
+    length, width = match.size or pitch or match_arrays.USUAL_PITCH
+    positions, player_lines = repair_players(times, match.positions, length, width, [one[0] for one in people])
+    ball, ball_lines = repair_ball(match.ball, length, width)
     spans, teams = [one[:2] for one in periods], [one[1] for one in people]
     positions, ball, side_messages = repair_sides(times, positions, ball, spans, teams)
     side_messages += check_side_names(times, positions, spans, teams, [one[4] for one in people])
     return {
         "times": times, "positions": positions, "ball": ball,
         "players": np.array(people, dtype=str).reshape(len(people), 5),
-        "pitch": np.array([length, width, is_default, float(dataset.metadata.frame_rate)]),
-        "periods": np.array(periods), "teams": np.array(_list_teams(dataset, feed), dtype=str).reshape(-1, 3),
-        "lines": np.array([*lines, *side_messages, *ball_lines, *player_lines, *referee_lines], dtype=str),
+        "pitch": np.array([length, width, match.size is None and pitch is None, match.fps]),
+        "periods": np.array(periods), "teams": np.array(match.teams, dtype=str).reshape(-1, 3),
+        "lines": np.array([*match.lines, *side_messages, *ball_lines, *player_lines], dtype=str),
     }
 
 
