@@ -42,8 +42,8 @@ def read_cdf(feed: Feed) -> MatchSamples:
         found.add_ball(moment, ball.get("x"), ball.get("y"), ball.get("z"))
     stadium = meta.get("stadium") or {}
     length, width = stadium.get("pitch_length"), stadium.get("pitch_width")
-    return found.build((float(length), float(width)) if length and width else None,
-                       tuple(str(teams.get(ground, {}).get("name") or "") for ground in ("home", "away")))
+    home, away = (str(teams.get(ground, {}).get("name") or "") for ground in ("home", "away"))
+    return found.build((float(length), float(width)) if length and width else None, (home, away))
 
 
 def add_cdf_player(found: SampleCollector, player: dict, ground: str) -> None:
