@@ -14,6 +14,7 @@ from pathlib import Path
 
 import numpy as np
 
+from ..base.content import open_file
 from ..base.errors import InputError
 
 HEADER = "header"
@@ -65,7 +66,7 @@ def read_named_arrays(path: Path, kind: str, types: tuple[np.dtype, ...], max_by
     Raises:
         InputError: if it is not a zip, or one of these arrays is damaged or of another type.
     """
-    with _open_archive(path, kind, max_bytes, f"{path}: ") as archive:
+    with open_file(path, kind) as file, _open_archive(file, kind, max_bytes, f"{path}: ") as archive:
         found = {member.filename.removesuffix(".npy"): member for member in archive.infolist()}
         return {name: _read_array(archive.read(found[name]), f"{path}: {name}", types)
                 for name in names if name in found}
@@ -73,6 +74,8 @@ def read_named_arrays(path: Path, kind: str, types: tuple[np.dtype, ...], max_by
 
 def list_arrays(path: Path) -> frozenset[str]:
     """List the names of a file's arrays; none where it is not a zip of them."""
+    if not path.is_file():
+        return frozenset()
     try:
         with zipfile.ZipFile(path) as archive:
             return frozenset(name.removesuffix(".npy") for name in archive.namelist())

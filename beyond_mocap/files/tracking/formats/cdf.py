@@ -1,10 +1,11 @@
-"""Tracking data in the Common Data Format: `tracking.jsonl` and its metadata (cdf.football, version 0.2)."""
+"""Tracking data in the Common Data Format: one JSON object a line, with metadata (cdf.football, version 0.2)."""
 
 from __future__ import annotations
 
 import json
 from datetime import datetime, timedelta
 
+from ....base.content import read_utf8
 from ....base.errors import InputError
 from ..feed import Feed
 from .samples import MatchSamples, SampleCollector, iter_json_lines
@@ -73,7 +74,7 @@ def parse_time(text: object, place: str) -> datetime:
 def read_json(path) -> dict:
     """Read a JSON object; NaN is allowed."""
     try:
-        value = json.loads(path.read_text("utf-8-sig"))
+        value = json.loads(read_utf8(path, "a JSON file"))
     except (ValueError, RecursionError):
         raise InputError(path, "not JSON", "a JSON object", "export it again") from None
     if not isinstance(value, dict):

@@ -14,9 +14,10 @@ from xml.parsers import expat
 
 import numpy as np
 
+from ....base.content import open_file
 from ....base.errors import InputError, format_count
 from ...tables import parse_number, read_rows
-from ..feed import Feed
+from ..feed import Feed, read_head
 from .cdf import parse_time
 from .samples import MatchSamples, SampleCollector
 
@@ -95,8 +96,7 @@ GPS_PATTERNS = (
 
 def is_gps_file(path: Path) -> bool:
     """Return whether a file has positions of a receiver with times."""
-    with open(path, "rb") as file:
-        head = file.read(8192).removeprefix(b"\xef\xbb\xbf")
+    head = read_head(path)
     return any(re.match(form, head) for form in GPS_PATTERNS) and (
         b"<trkpt" in head or "corners" not in path.name.lower() and path.suffix.lower() != ".gpx")
 
@@ -162,7 +162,7 @@ def _read_gpx(path: Path) -> tuple[str, list[float], list[tuple[float, float]]]:
     parser = expat.ParserCreate()
     parser.StartElementHandler, parser.EndElementHandler, parser.CharacterDataHandler = start, end, text.append
     try:
-        with open(path, "rb") as file:
+        with open_file(path, "a GPX file") as file:
             parser.ParseFile(file)
     except expat.ExpatError as error:
         raise InputError(f"{path}:{error.lineno}", expat.ErrorString(error.code), "GPX", "export it again") from None

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 import json
 import math
 from array import array
@@ -11,7 +12,8 @@ from pathlib import Path
 
 import numpy as np
 
-from ....base.errors import InputError, build_read_error, format_count
+from ....base.content import open_file
+from ....base.errors import InputError, format_count
 from ....motion.track.match_data import REFEREE
 from ..match_arrays import PERIOD_BREAK
 from ..match_repairs import MAX_PLAYERS
@@ -155,14 +157,12 @@ def iter_json_lines(path: Path) -> Iterator[tuple[int, dict]]:
         InputError: for a line that is none.
     """
     try:
-        with open(path, encoding="utf-8-sig") as file:
+        with io.TextIOWrapper(open_file(path, "a tracking file"), encoding="utf-8-sig") as file:
             for number, line in enumerate(file, 1):
                 if line.strip():
                     yield number, _parse_line(path, number, line)
     except UnicodeDecodeError:
         raise InputError(path, "is not UTF-8 text", "JSON, one object a line", "export it again") from None
-    except OSError:
-        raise build_read_error(path, "a tracking file") from None
 
 
 def _parse_line(path: Path, number: int, line: str) -> dict:
