@@ -16,7 +16,7 @@ from typing import NamedTuple
 
 TOP = pathlib.Path(__file__).resolve().parents[1]
 CORE = "beyond_mocap"
-FEATURES = ("path_editing", "passes", "throws", "markers", "study")
+FEATURES = ("path_editing", "passes", "throws", "markers", "skeletal", "study")
 LAYERS = (("base",), ("motion",), ("annotation", "appearance"), ("synthetic",), ("files", "ball"), ("library",),
           ("synthesis",), ("evaluation",), FEATURES, ("match",), ("cli",))
 """The packages of the core from the bottom up: a package imports only packages of lower layers."""

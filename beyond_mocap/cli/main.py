@@ -18,6 +18,7 @@ from collections.abc import Callable, Mapping
 from .. import __version__
 from ..base.content import is_waiting_for_pipe
 from ..base.errors import BeyondMocapError, InputError, UserCancelledError
+from .bodies import add_bodies
 from .compare_methods import add_compare
 from .convert import add_mirror, add_retarget, add_stream
 from .library import add_library
@@ -31,7 +32,7 @@ from .synthesize import add_evaluate, add_synthesize
 from .throwing import add_throw
 
 VERBS = (add_library, add_synthesize, add_path, add_touches, add_stream, add_passes, add_reconstruct, add_release,
-         add_throw, add_match, add_study, add_mirror, add_retarget, add_evaluate, add_compare)  # fmt: skip
+         add_bodies, add_throw, add_match, add_study, add_mirror, add_retarget, add_evaluate, add_compare)  # fmt: skip
 """Functions that add a verb, in the order of `--help`; each takes the sub-parsers and returns its parser."""
 IsolatedRunner = Callable[[list[str], Callable[[float, str], None], Callable[[], bool]], object]
 """Runs a command line in another process: (arguments, progress callback, cancellation callback)."""

@@ -54,13 +54,14 @@ def read_plain_arrays(
 
 
 def read_named_arrays(path: Path, kind: str, types: tuple[np.dtype, ...], max_bytes: int,
-                      names: Collection[str]) -> dict[str, np.ndarray]:
+                      names: Collection[str], is_finite: bool = True) -> dict[str, np.ndarray]:
     """Read some arrays of a file; what else it holds is not looked at.
 
     Args:
         path: the file.
         kind, types, max_bytes: see `read_plain_arrays`.
         names: of the arrays.
+        is_finite: whether NaN and infinite values are refused.
     Returns:
         Name -> read-only array, of those that the file has.
     Raises:
@@ -68,7 +69,7 @@ def read_named_arrays(path: Path, kind: str, types: tuple[np.dtype, ...], max_by
     """
     with open_file(path, kind) as file, _open_archive(file, kind, max_bytes, f"{path}: ") as archive:
         found = {member.filename.removesuffix(".npy"): member for member in archive.infolist()}
-        return {name: _read_array(archive.read(found[name]), f"{path}: {name}", types)
+        return {name: _read_array(archive.read(found[name]), f"{path}: {name}", types, is_finite)
                 for name in names if name in found}
 
 
@@ -98,7 +99,7 @@ def _open_archive(source, kind: str, max_bytes: int, place: str = "") -> Iterato
                          "copy it again or choose another file") from None  # fmt: skip
 
 
-def _read_array(data: bytes, name: str, types: tuple[np.dtype, ...]) -> np.ndarray:
+def _read_array(data: bytes, name: str, types: tuple[np.dtype, ...], is_finite: bool = True) -> np.ndarray:
     """Read one array from the bytes of a .npy.
 
     Only plain numbers of exactly the stated count are accepted, so neither objects nor false sizes are trusted.
@@ -114,7 +115,7 @@ def _read_array(data: bytes, name: str, types: tuple[np.dtype, ...]) -> np.ndarr
     if any(size < 0 for size in shape) or math.prod(shape) * dtype.itemsize != len(values):
         raise InputError(name[-200:], f"{len(values)} bytes for shape {str(shape)[:40]}", "the shape's number of bytes")
     array = np.frombuffer(values, dtype).reshape(shape, order="F" if fortran else "C")
-    if dtype.kind == "f" and not np.isfinite(array).all():
+    if is_finite and dtype.kind == "f" and not np.isfinite(array).all():
         raise InputError(name[-200:], "NaN or infinite values", "finite numbers", "create the file again")
     return array
 

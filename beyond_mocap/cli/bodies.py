@@ -1,0 +1,75 @@
+"""The verb `bodies`: the motion of all people of skeletal tracking."""
+
+from __future__ import annotations
+
+import argparse
+import re
+from collections.abc import Mapping
+
+from ..base.errors import InputError, format_count
+from ..base.settings.options import parse_path
+from ..files.atomic import atomic_folder, check_new_folder
+from ..files.file_names import avoid_reserved_name
+from .outputs import ProgressReporter, Writer
+
+
+def add_bodies(verbs) -> argparse.ArgumentParser:
+    """Add the verb `bodies`.
+
+    Args:
+        verbs: the sub-parsers to add it to.
+    Returns:
+        The parser of this verb.
+    """
+    verb = verbs.add_parser("bodies", help="bodies of all people from skeletal tracking: joints of each frame")
+    verb.add_argument("--joints", type=parse_path, required=True, metavar="FILE",
+                      help="skeletal tracking: Common Data Format, Hawk-Eye, CSV or .npz")
+    verb.add_argument("--out", type=parse_path, required=True, metavar="FOLDER",
+                      help="a BVH file for each person and stretch, and report.json")
+    verb.set_defaults(run=run_bodies)
+    return verb
+
+
+def run_bodies(options, reporter: ProgressReporter, writers: Mapping[str, Writer]) -> None:
+    """Run `bodies`: fit a body to each person's joints.
+
+    Args:
+        options: the parsed command line.
+        reporter: progress, notes and cancellation.
+        writers: further output formats, by file suffix (Blender's).
+    """
+    from ..files.bvh.bvh import write_bvh
+    from ..files.joints.joint_readers import read_joints
+    from ..files.tables import write_report
+    from ..skeletal.reconstruct_bodies import reconstruct_bodies
+
+    check_new_folder(options.out)
+    feed = read_joints(options.joints)
+    bodies, notes = reconstruct_bodies(feed, reporter.show_progress, reporter.is_cancelled)
+    if not bodies:
+        raise InputError(options.joints, "no stretch of a body: " + "; ".join(notes[:3]), "half a second of joints",
+                         "export more frames or joints")
+    rows: list[dict] = []
+    used: set[str] = set()
+    with atomic_folder(options.out) as folder:
+        for body in bodies:
+            name = _find_free_name(body.id, used)
+            write_bvh(folder / f"{name}.bvh", body.motion)
+            rows.append({"file": f"{name}.bvh", "id": body.id, "team": body.team, "start_s": body.start,
+                         **body.figures})
+        write_report(folder / "report.json", {"fps": feed.fps, "notes": [*feed.notes, *notes], "bodies": rows})
+    reporter.finish([*(f"{options.joints}: {note}" for note in feed.notes), *notes])
+    error = sum(row["joint_error_m"]["mean"] * row["frames"] for row in rows) / sum(row["frames"] for row in rows)
+    print(f"{options.out}: {format_count(len(rows), 'body', 'bodies')}, joints {100 * error:.1f} cm from the seen ones "
+          "on average")
+
+
+def _find_free_name(person: str, used: set[str]) -> str:
+    """Return a file name for a stretch of a person that no other has, and remember it."""
+    base = avoid_reserved_name(re.sub(r"[^\w.-]+", "_", person).strip("._")[:80] or "person")
+    name, number = base, 1
+    while name.lower() in used:
+        number += 1
+        name = f"{base}_{number}"
+    used.add(name.lower())
+    return name

@@ -1,0 +1,158 @@
+"""Read skeletal tracking: Common Data Format, Hawk-Eye, a plain CSV, and arrays of FIFA's fifteen points.
+
+What a provider delivers is told by its content; names of joints by `landmarks.identify_landmark`.
+"""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import numpy as np
+
+from ...base.errors import InputError, format_count
+from ..plain_npz import list_arrays, read_named_arrays
+from ..tables import parse_number, read_rows
+from ..tracking.feed import read_head
+from ..tracking.formats.cdf import parse_time, read_json
+from ..tracking.formats.samples import iter_json_lines
+from .joint_feed import JointCollector, JointFeed
+from .landmarks import identify_landmark
+
+FIFA_15 = ("nose", "right_shoulder", "left_shoulder", "right_elbow", "left_elbow", "right_wrist", "left_wrist",
+           "right_hip", "left_hip", "right_knee", "left_knee", "right_ankle", "left_ankle", "right_big_toe",
+           "left_big_toe")
+"""The points of the FIFA Skeletal Tracking Challenge in their order (numbers 0, 2, 5, 3, 6, 4, 7, 9, 12, 10, 13, 11,
+14, 22, 19 of OpenPose's BODY_25)."""
+_FIFA_RATE = 50.0  # frames per second of the challenge
+_FORMS = "Common Data Format skeletal.jsonl, Hawk-Eye .samples.joints, CSV with time_s,player,joint,x,y,z, or .npz"
+_FLOATS = tuple(np.dtype(kind) for kind in ("<f4", "<f8", "<f2"))
+_MAX_BYTES = 4 << 30
+_CSV_NAMES = {"time": "time_s", "x_m": "x", "y_m": "y", "z_m": "z", "landmark": "joint", "id": "player"}
+
+
+def read_joints(path) -> JointFeed:
+    """Read a file of skeletal tracking.
+
+    Args:
+        path: the file; of Hawk-Eye, one of a half: all of that half beside it are read.
+    Returns:
+        The feed in metres, Z up.
+    Raises:
+        InputError: if it is none, or damaged.
+    """
+    path = Path(path)
+    read = _find_reader(path)
+    try:
+        return read(path)
+    except (KeyError, TypeError, AttributeError, IndexError, ValueError) as error:
+        found = f"values in other places than expected ({type(error).__name__}: {error})"
+        raise InputError(path, found[:200], _FORMS, "export it again") from None
+
+
+def _find_reader(path: Path):
+    """Find the function that reads a file, by its content."""
+    if path.suffix.lower() == ".npz":
+        return _read_fifa
+    head = read_head(path)
+    if re.match(rb'(?s)\s*\{.{0,4000}"landmarks"', head):
+        return _read_cdf
+    if re.match(rb"(?s)\s*\{", head) and path.name.lower().endswith(".joints"):
+        return _read_hawkeye
+    if b"joint" in head.partition(b"\n")[0].lower() or b"landmark" in head.partition(b"\n")[0].lower():
+        return _read_table
+    raise InputError(path, "unknown form" if head else "missing, empty or no file", _FORMS, "choose such a file")
+
+
+def _read_cdf(path: Path) -> JointFeed:
+    """Read the Common Data Format's skeletal data; points that are not visible count as not seen."""
+    found, begin = JointCollector(path), None
+    for line, frame in iter_json_lines(path):
+        stamp = parse_time(frame["timestamp"], f"{path}:{line}")
+        begin = begin or stamp
+        seconds = round((stamp - begin).total_seconds(), 4)
+        for ground, team in frame["teams"].items():
+            for player in team.get("players") or ():
+                found.set_team(str(player["id"]), ground if ground in ("home", "away") else "")
+                for point in player.get("landmarks") or ():
+                    if point.get("is_visible", True):
+                        _add(found, str(player["id"]), seconds, str(point["name"]),
+                             (point.get("x"), point.get("y"), point.get("z")))
+    return found.build()
+
+
+def _read_hawkeye(path: Path) -> JointFeed:
+    """Read Hawk-Eye's joints: a file for each minute, their times from its start."""
+    found, files = JointCollector(path), _list_half(path)
+    begin = None
+    for file in files:
+        content = read_json(file)
+        start = parse_time(content["time"]["startUTC"], str(file))
+        begin = begin or start
+        offset = (start - begin).total_seconds()
+        homes = {str(team["id"]): team.get("home") for team in (content.get("details") or {}).get("teams") or ()}
+        for person in content["samples"]["people"]:
+            ids = person["personId"]
+            key = str(ids.get("fifaId") or ids.get("uefaId") or ids.get("heId"))
+            home = homes.get(str(person.get("teamId")))
+            found.set_team(key, "" if home is None else "home" if home else "away")
+            for sample in person["joints"]:
+                seconds = round(offset + float(sample["time"]), 4)
+                for name, place in sample.items():
+                    if isinstance(place, list):
+                        _add(found, key, seconds, name, place)
+    if len(files) > 1:
+        found.notes.append(f"{format_count(len(files), 'file')} of one half are read, {files[0].name} first")
+    return found.build()
+
+
+def _list_half(path: Path) -> list[Path]:
+    """List the files of the same half from a file on: ..._HALF_MINUTE[_ADDED].football.samples.joints."""
+    parts = re.fullmatch(r"(.*?_?\d+_)(\d+)(?:_(\d+))?(\.football\.samples\.joints)", path.name)
+    if parts is None:
+        return [path]
+    form = re.compile(re.escape(parts[1]) + r"(\d+)(?:_(\d+))?" + re.escape(parts[4]))
+    numbered = {}
+    for one in path.parent.glob(f"*{parts[4]}"):
+        if one.is_file() and (match := form.fullmatch(one.name)):
+            numbered[int(match[1]), int(match[2] or 0)] = one
+    first = int(parts[2]), int(parts[3] or 0)
+    return [numbered[key] for key in sorted(numbered) if key >= first]
+
+
+def _read_table(path: Path) -> JointFeed:
+    """Read a CSV with a row for each point: time_s, player, joint, x, y, z, and team where there is one."""
+    found = JointCollector(path)
+    columns = ("time_s", "player", "joint", "x", "y", "z")
+    for place, row in read_rows(path, columns, others=_CSV_NAMES, separators=",;\t"):
+        seconds = parse_number(row["time_s"], "time_s", place)
+        found.set_team(row["player"], row.get("team", "") if row.get("team", "") in ("home", "away") else "")
+        _add(found, row["player"], round(seconds, 4), row["joint"],
+             [parse_number(row[axis], axis, place, blank=True) for axis in "xyz"])
+    return found.build()
+
+
+def _read_fifa(path: Path) -> JointFeed:
+    """Read arrays (N, T, 15, 3) of FIFA's fifteen points: NaN where a person is absent."""
+    arrays = read_named_arrays(path, _FORMS, _FLOATS, _MAX_BYTES, sorted(list_arrays(path)), is_finite=False)
+    fitting = {name: array for name, array in arrays.items() if array.ndim == 4 and array.shape[2:] == (15, 3)}
+    if len(fitting) != 1:
+        raise InputError(path, f"{format_count(len(fitting), 'array')} of shape (N, T, 15, 3)", "one",
+                         "save the people's fifteen points as one array")
+    (points,) = fitting.values()
+    found = JointCollector(path)
+    found.notes.append(f"{_FIFA_RATE:g} frames per second assumed, which the arrays do not say")
+    for number, person in enumerate(points):
+        for frame in np.flatnonzero(np.isfinite(person).any(axis=(1, 2))).tolist():
+            for landmark, place in zip(FIFA_15, person[frame].tolist()):
+                found.add_point(str(number), frame / _FIFA_RATE, landmark, place)
+    return found.build(_FIFA_RATE)
+
+
+def _add(found: JointCollector, person: str, seconds: float, name: str, place) -> None:
+    """Add a point by its name in the feed."""
+    landmark = identify_landmark(name)
+    if landmark is None:
+        found.unknown.add(name[:40])
+    else:
+        found.add_point(person, seconds, landmark, place)

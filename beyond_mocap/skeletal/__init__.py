@@ -1,0 +1,1 @@
+"""Bodies from skeletal tracking: noisy joints become the motion of one body with bones of fixed length."""

@@ -1,0 +1,133 @@
+"""Bodies of all people of a skeletal feed: repaired, smoothed, fitted, with planted feet, and measured."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..base.errors import UserCancelledError, format_count
+from ..files.joints.joint_feed import JointFeed, PlayerJoints
+from ..files.joints.landmarks import LANDMARKS
+from ..library.repair import plant_contacts
+from ..motion.contacts import detect_heel_toe_contacts
+from ..motion.motion import Motion
+from .body_figures import measure_body
+from .fit_body import NEEDED, collect_joints, fit_body
+from .repair_joints import repair_identities, repair_sides, spread_landmarks
+from .smooth_joints import find_stretches, smooth_joints
+
+SHORTEST = 0.5
+"""Seconds; what is seen for a shorter time is no body."""
+_MIN_SHARE = 0.1  # of a stretch's frames in which a landmark has to be seen to count
+_MOST_FRAMES = 2_000_000  # of one person
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Body:
+    """A stretch of one person.
+
+    Attributes:
+        id: of the person, as the feed spells it.
+        team: "home", "away" or "".
+        start: seconds of the first frame on the feed's clock.
+        motion: world, Z up, at the feed's rate.
+        figures: see `measure_body`.
+    """
+
+    id: str
+    team: str
+    start: float
+    motion: Motion
+    figures: dict
+
+
+def reconstruct_bodies(feed: JointFeed, progress: Callable[[float, str], None] | None = None,
+                       cancelled: Callable[[], bool] | None = None) -> tuple[list[Body], list[str]]:
+    """Reconstruct the bodies of all people of a feed.
+
+    Args:
+        feed: the joints.
+        progress: called with the share that is done and a text.
+        cancelled: returns True when the user stops the job.
+    Returns:
+        The bodies, a stretch without long gaps each, and notes on what was repaired or left out.
+    Raises:
+        UserCancelledError: if the user stops the job.
+    """
+    people, notes = _repair_feed(feed)
+    bodies: list[Body] = []
+    for number, (person, (first, positions)) in enumerate(zip(feed.people, people)):
+        if cancelled is not None and cancelled():
+            raise UserCancelledError("bodies: cancelled")
+        if progress is not None:
+            progress(number / len(people), f"Fitting {person.id}")
+        found, lines = _reconstruct_person(person, first, positions, feed.fps)
+        bodies += found
+        notes += lines
+    return bodies, notes
+
+
+def _repair_feed(feed: JointFeed) -> tuple[list[tuple[int, np.ndarray]], list[str]]:
+    """Return for each person the first frame on the feed's clock and positions (T, LANDMARKS, 3), repaired; and notes.
+    """
+    begin = min(person.times[0] for person in feed.people)
+    grids = [_lay_on_clock(person, begin, feed.fps) for person in feed.people]
+    first, last = min(one for one, _ in grids), max(one + len(positions) for one, positions in grids)
+    together = np.full((len(grids), last - first, len(LANDMARKS), 3), np.nan)
+    for number, (one, positions) in enumerate(grids):
+        together[number, one - first : one - first + len(positions)] = positions
+    together, swaps = repair_identities(together)
+    notes = [f"{(frame + first) / feed.fps + begin:.2f} s: {feed.people[one].id} and {feed.people[other].id} exchanged "
+             "from here on, each leaps to where the other was" for frame, one, other in swaps]
+    out = []
+    for person, positions in zip(feed.people, together):
+        positions, exchanged = repair_sides(LANDMARKS, positions)
+        if exchanged:
+            notes.append(f"{person.id}: left and right exchanged in {format_count(exchanged, 'frame')}")
+        out.append((first, positions))
+    return out, notes
+
+
+def _lay_on_clock(person: PlayerJoints, begin: float, fps: float) -> tuple[int, np.ndarray]:
+    """Lay a person's samples on the feed's frames; return the first of them and positions (T, LANDMARKS, 3)."""
+    frames = np.round((person.times - begin) * fps).astype(int)
+    positions = np.full((min(frames[-1] - frames[0] + 1, _MOST_FRAMES), len(LANDMARKS), 3), np.nan)
+    inside = frames - frames[0] < len(positions)
+    positions[frames[inside] - frames[0]] = spread_landmarks(person.landmarks, person.positions[inside])
+    return int(frames[0]), positions
+
+
+def _reconstruct_person(person: PlayerJoints, first: int, positions: np.ndarray,
+                        fps: float) -> tuple[list[Body], list[str]]:
+    """Reconstruct the stretches of one person, and tell which were left out."""
+    shown = np.flatnonzero(np.isfinite(positions).all(axis=2).sum(axis=1) >= len(NEEDED) // 2)
+    bodies, notes = [], []
+    for start, end in find_stretches(shown / fps, fps):
+        begin, stop = int(shown[start]), int(shown[end - 1]) + 1
+        part = positions[begin:stop]
+        seconds = (first + begin) / fps
+        missing = [name for name in NEEDED if _measure_share(part, LANDMARKS.index(name)) < _MIN_SHARE]
+        if missing or len(part) < SHORTEST * fps:
+            why = f"{missing[0].replace('_', ' ')} is hardly seen" if missing else f"only {len(part) / fps:.2f} s"
+            notes.append(f"{person.id}: from {seconds:.2f} s left out, {why}")
+            continue
+        bodies.append(_reconstruct_stretch(person, seconds, part, fps))
+    return bodies, notes
+
+
+def _measure_share(positions: np.ndarray, landmark: int) -> float:
+    """Measure the share of frames in which a landmark is seen."""
+    return float(np.isfinite(positions[:, landmark]).all(axis=1).mean())
+
+
+def _reconstruct_stretch(person: PlayerJoints, seconds: float, seen: np.ndarray, fps: float) -> Body:
+    """Fit and plant one stretch (T, LANDMARKS, 3)."""
+    used = [number for number in range(len(LANDMARKS)) if _measure_share(seen, number) >= _MIN_SHARE]
+    names = tuple(LANDMARKS[number] for number in used)
+    smooth = smooth_joints(names, seen[:, used])
+    fitted = fit_body(collect_joints(names, smooth), fps)
+    motion = plant_contacts(fitted, detect_heel_toe_contacts(fitted)) if fps >= 25.0 else fitted
+    return Body(id=person.id, team=person.team, start=seconds, motion=motion,
+                figures=measure_body(names, seen[:, used], motion))

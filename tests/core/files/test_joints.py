@@ -1,0 +1,106 @@
+"""Skeletal feeds: the same joints come back from each form; units, axes and names are told; damage ends in one line."""
+
+import json
+import pathlib
+
+import numpy as np
+import pytest
+
+from beyond_mocap.base.errors import InputError
+from beyond_mocap.files.joints.joint_readers import read_joints
+from beyond_mocap.files.joints.landmarks import LANDMARKS, identify_landmark
+from tests.core.joint_feeds import NAMES, sample_joints, write_cdf, write_fifa, write_hawkeye, write_table
+
+SAMPLES = pathlib.Path(__file__).resolve().parents[3] / ".." / "shared" / "data" / "skeletal"
+FPS = 50.0
+
+
+@pytest.fixture(scope="module")
+def people():
+    joints = sample_joints(fps=FPS)
+    return {"7": joints[:100], "9": joints[20:90] + (30.0, -5.0, 0.0)}
+
+
+FORMS = {"cdf": lambda folder, people: write_cdf(folder / "skeletal.jsonl", people, FPS),
+         "hawkeye": lambda folder, people: write_hawkeye(folder, people, FPS),
+         "table": lambda folder, people: write_table(folder / "joints.csv", people, FPS),
+         "fifa": lambda folder, people: write_fifa(folder / "points.npz", people)}
+
+
+@pytest.mark.parametrize("form", FORMS)
+def test_the_same_joints_come_back_from_each_form(form, people, tmp_path):
+    feed = read_joints(FORMS[form](tmp_path, people))
+    assert feed.fps == FPS and len(feed.people) == 2
+    for person, (name, joints) in zip(feed.people, people.items()):
+        assert person.id == name or form == "fifa"
+        assert person.team == ("" if form == "fifa" else "home")
+        assert person.times == pytest.approx(np.arange(len(joints)) / FPS, abs=1e-4)
+        own = person.positions[:, [person.landmarks.index(landmark) for landmark in NAMES]]
+        assert np.abs(own - joints).max() < 1e-5
+
+
+@pytest.mark.parametrize(("unit", "turn", "said"), [
+    (0.01, np.eye(3), "centimetres"), (0.3048, np.eye(3), "feet"), (1.0, [[1, 0, 0], [0, 0, 1], [0, -1, 0]], "y taken"),
+    (1.0, [[1, 0, 0], [0, -1, 0], [0, 0, -1]], "-z taken"), (0.001, [[0, 0, 1], [0, 1, 0], [-1, 0, 0]], "x taken"),
+])  # fmt: skip
+def test_unit_and_axes_are_found_and_told(unit, turn, said, people, tmp_path):
+    turned = {name: joints @ np.array(turn, dtype=float).T for name, joints in people.items()}
+    feed = read_joints(write_table(tmp_path / "a.csv", turned, FPS, unit=unit))
+    assert said in " ".join(feed.notes)
+    own, truth = feed.people[0], people["7"]
+    heights = own.positions[:, [own.landmarks.index(name) for name in NAMES], 2]
+    assert np.abs(heights - truth[..., 2]).max() < 1e-3
+    # a rotation, no mirror image: left stays left
+    left, right = (own.positions[:, own.landmarks.index(f"{side}_shoulder")] for side in ("left", "right"))
+    nose = own.positions[:, own.landmarks.index("nose")]
+    assert np.mean(np.cross(left - right, (0.0, 0.0, 1.0)) * (nose - 0.5 * (left + right))) > 0.0
+
+
+def test_wild_points_are_left_out(people, tmp_path):
+    joints = people["7"].copy()
+    joints[10, 4] += (31.0, 0.0, 0.0)
+    feed = read_joints(write_table(tmp_path / "a.csv", {"7": joints}, FPS))
+    assert "1 point farther than" in " ".join(feed.notes)
+    assert np.isnan(feed.people[0].positions[10, feed.people[0].landmarks.index(NAMES[4])]).all()
+
+
+@pytest.mark.parametrize(("name", "expected"), [
+    ("lBigToe", "left_big_toe"), ("R_1STTOE", "right_big_toe"), ("elbow_right", "right_elbow"), ("midHip", "pelvis"),
+    ("left_hip", "left_hip"), ("LeftShoulder", "left_shoulder"), ("R_CALC", "right_heel"), ("Nose", "nose"),
+    ("torso", None), ("rThumb", "right_thumb"), ("L_5THFINGER", "left_pinky"), ("", None),
+])  # fmt: skip
+def test_names_of_joints(name, expected):
+    assert identify_landmark(name) == expected
+    assert expected is None or expected in LANDMARKS
+
+
+@pytest.mark.parametrize("form", FORMS)
+@pytest.mark.parametrize("damage", ["truncated", "emptied", "renamed"])
+def test_damaged_feeds_end_in_one_line(form, damage, people, tmp_path):
+    path = FORMS[form](tmp_path, people)
+    content = path.read_bytes()
+    path.write_bytes({"truncated": content[: len(content) // 2], "emptied": b"", "renamed": content.replace(
+        b"landmarks", b"x").replace(b"samples", b"y").replace(b"joint", b"z").replace(b"poses", b"posed")}[damage])
+    try:
+        feed = read_joints(path)
+    except InputError as error:
+        assert "\n" not in str(error) and str(tmp_path) in str(error)
+    else:
+        assert feed.people and (damage, form) in {("truncated", "table"), ("renamed", "fifa")}
+
+
+def test_an_array_of_objects_is_never_opened(tmp_path):
+    np.savez(tmp_path / "a.npz", poses=np.array([{}], dtype=object))
+    with pytest.raises(InputError, match="type object"):
+        read_joints(tmp_path / "a.npz")
+
+
+@pytest.mark.skipif(not SAMPLES.is_dir(), reason="the samples in ../shared/data/skeletal are not here")
+def test_real_samples(tmp_path):
+    feed = read_joints(SAMPLES / "derived_hawkeye_1_1.football.samples.joints")
+    assert feed.fps == 30.0 and len(feed.people) == 1 and len(feed.people[0].landmarks) == 29
+    line = json.loads((SAMPLES / "cdf_v0.2.3_skeletal.jsonl").read_text())
+    rows = [{**line, "timestamp": f"2023-10-01T12:00:{number / 25:09.6f}Z"} for number in range(20)]
+    (tmp_path / "a.jsonl").write_text("".join(f"{json.dumps(row)}\n" for row in rows))
+    feed = read_joints(tmp_path / "a.jsonl")  # its one frame, again and again
+    assert len(feed.people) == 4 and "torso" in " ".join(feed.notes)
