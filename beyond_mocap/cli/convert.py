@@ -91,7 +91,7 @@ def run_retarget(options, reporter: ProgressReporter, writers: Mapping[str, Writ
             raise
         raise InputError(f"{options.input} to {options.to}", str(error)) from None  # skeletons do not know the file
     notes = write(options.out, motion, target.form)
-    lines = [*((options.input, note) for note in _list_told(clip)), *((options.to, note) for note in target.notes[:1]),
+    lines = [*((options.input, note) for note in _list_notes(clip)), *((options.to, note) for note in target.notes[:1]),
              *((options.out, note) for note in notes)]
     reporter.finish(f"{path}: {note}" for path, note in lines)
     print(f"{options.out}: {len(motion)} frames")
@@ -143,8 +143,8 @@ def _read_target(options, motion):
         return BvhClip(build_smpl_pose(estimate_stature(motion.skeleton)), BvhForm(), ())
 
 
-def _list_told(clip) -> tuple[str, ...]:
-    """List what is told of a clip that was read: of BVH its unit alone."""
+def _list_notes(clip) -> tuple[str, ...]:
+    """List the notes on a clip that was read: of BVH the unit alone."""
     return clip.notes if clip.form.channels == {} else clip.notes[:1]
 
 

@@ -21,7 +21,7 @@ _STRENGTHS = 10.0 ** np.arange(-1.0, 6.5, 0.5)
 _DIFFERENCE = (1.0, -3.0, 3.0, -1.0)
 """Coefficients of the third difference."""
 _SHORTEST = 8  # frames of a stretch that can be smoothed
-_MIN_OTHERS, _MIN_ROWS = 4, 40  # points and frames from which one that is not seen can be told
+_MIN_OTHERS, _MIN_ROWS = 4, 40  # points and frames from which one that is not seen is predicted
 _NOISE = 0.03  # metres of noise that the regression expects in each coordinate
 _REST_FRAMES = 5  # on each side of a gap, from which what the regression lacks is measured
 _TRUNK = ("pelvis", "left_hip", "right_hip", "left_shoulder", "right_shoulder", "neck")
@@ -60,8 +60,8 @@ def fill_gaps(landmarks: tuple[str, ...], positions: np.ndarray) -> np.ndarray:
         others = np.flatnonzero(seen[gap].all(axis=0))
         rows = known & seen[:, others].all(axis=1)
         if len(others) >= _MIN_OTHERS and rows.sum() >= _MIN_ROWS:
-            told = _predict(turned[:, others].reshape(len(turned), -1), turned[:, line], rows)
-            filled[gap, line] = (told + _interpolate_rest(turned[:, line] - told, rows))[gap]
+            predicted = _predict(turned[:, others].reshape(len(turned), -1), turned[:, line], rows)
+            filled[gap, line] = (predicted + _interpolate_rest(turned[:, line] - predicted, rows))[gap]
     return np.einsum("tji,tlj->tli", turn, filled)
 
 

@@ -93,7 +93,7 @@ class JointCollector:
         Returns:
             The feed.
         Raises:
-            InputError: if nobody is seen, or in a unit that no body fits.
+            InputError: if no person is seen, or in a unit that no body fits.
         """
         people = [self._build_person(person, points) for person, points in self._points.items()]
         people = [person for person in people if len(person.times) >= 2]
@@ -170,7 +170,7 @@ def _measure_bodies(feed: JointFeed, path: Path) -> tuple[float, np.ndarray]:
                 ups.append(hip - ankle)
     found = np.concatenate(lengths) if lengths else np.zeros(0)
     if not np.isfinite(found).any():
-        raise InputError(path, "nobody's hip, knee and ankle", "joints of bodies", "export all joints")
+        raise InputError(path, "no person with hip, knee and ankle", "joints of bodies", "export all joints")
     directions = np.concatenate(ups)
     directions = directions[np.isfinite(directions).all(axis=1)]
     return float(np.nanmedian(found)), np.median(directions / np.linalg.norm(directions, axis=1)[:, None], axis=0)

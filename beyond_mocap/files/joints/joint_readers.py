@@ -1,6 +1,6 @@
 """Read skeletal tracking: Common Data Format, Hawk-Eye, a plain CSV, and arrays of FIFA's fifteen points.
 
-What a provider delivers is told by its content; names of joints by `landmarks.identify_landmark`.
+The content shows whose form a file has; joints are known by `landmarks.identify_landmark`.
 """
 
 from __future__ import annotations

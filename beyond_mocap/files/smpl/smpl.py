@@ -88,12 +88,12 @@ def read_smpl(path, stature: float | None = None, body_model: Path | None = None
     rotations = quaternion.from_rotation_vector(poses)
     to_world, up = _find_up_axis(rotations[:, 0])
     local, root = _to_core(rotations, trans, to_world)
-    skeleton, pelvis, told = _choose_bones(Motion(build_smpl_skeleton(1.0), root, local, fps), arrays, stature,
+    skeleton, pelvis, origin = _choose_bones(Motion(build_smpl_skeleton(1.0), root, local, fps), arrays, stature,
                                            body_model)
     motion = Motion(skeleton, root + to_world @ TO_CORE.T @ pelvis, local, fps)
     floor = measure_floor_height(motion)
     motion = replace(motion, root_positions=motion.root_positions - (0.0, 0.0, floor))
-    first = f"{form}, {up} up, {fps:g} frames per second, {len(motion)} frames; {told}"
+    first = f"{form}, {up} up, {fps:g} frames per second, {len(motion)} frames; {origin}"
     return BvhClip(motion, BvhForm(), (first, *notes, *_list_left_out(form, arrays), *_list_faults(path.name, motion)))
 
 
