@@ -125,7 +125,7 @@ def _build_release_row(name: str, how: str, known: SyntheticTrial, trial, motion
     return effort.format_row([name, f"{how} ({found.method})", f"{truth.speed:.1f}", f"{found.speed:.1f}",
                               f"{100 * (found.speed / truth.speed - 1):+.1f} %",
                               f"{1e3 * time_error:+.1f}, {time_error * fps:+.1f}", f"{direction_error:.1f}",
-                              f"{1e3 * found.time_sigma:.1f}, {found.speed_sigma:.1f}"])
+                              f"{1e3 * found.time_margin:.1f}, {found.speed_margin:.1f}"])
 
 
 def radar_table() -> list[str]:
@@ -137,5 +137,5 @@ def radar_table() -> list[str]:
         radar = found.radar
         lines.append(effort.format_row([trial, f"{found.speed:.1f}", "unknown" if radar is None else f"{radar:.1f}",
                                         "" if radar is None else f"{100 * (found.speed / radar - 1):+.1f} %",
-                                        f"{found.speed_sigma:.1f}", f"{found.time:.3f}"]))
+                                        f"{found.speed_margin:.1f}", f"{found.time:.3f}"]))
     return lines

@@ -6,6 +6,7 @@ finds when and how a ball left the hand.
 
 from __future__ import annotations
 
+import math
 import time
 from collections.abc import Mapping
 from contextlib import suppress
@@ -361,5 +362,6 @@ def run_release(options, reporter: ProgressReporter, writers: Mapping[str, Write
         radar = f", radar {found.radar:.1f} m/s ({100 * (found.speed / found.radar - 1):+.1f} %)"
     print(
         f"{options.report}: {found.side} hand, released at {found.time:.3f} s (frame {found.frame}, +-"
-        f"{1000 * found.time_sigma:.0f} ms), {found.speed:.1f} +- {found.speed_sigma:.1f} m/s{radar}"
+        f"{1000 * found.time_margin:.0f} ms), {found.speed:.1f} +- {found.speed_margin:.1f} m/s{radar}, direction +-"
+        f"{math.degrees(found.direction_margin):.1f} degrees"
     )

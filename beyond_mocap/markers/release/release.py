@@ -23,20 +23,19 @@ from ...motion.motion import Motion, forward_kinematics, resample
 from ...motion.track.ball_path import BallPath
 from ..trial import MarkerTrial, resample_evenly
 from .launch_fit import HeldMarker, fit_launch
+from .throw_check import check_throw
 from .throwing_hand import (
     HandBall,
     compute_speeds,
-    compute_steady_speeds,
     find_fastest_frame,
     find_release_by_distance,
     fit_hand_ball,
     place_ball,
     refine_hand,
 )
-from .without_ball import HOLD, estimate_hand_release
+from .without_ball import HOLD, estimate_hand_release, measure_roll_time
 
 MIN_FRAMES = 12  # frames that a trial with a throw must have
-MIN_HAND_SPEED = 1.5  # m/s that a throwing hand must reach
 _BALL_LABEL = re.compile(r"^(base|tennis|hand|foot|soft)?[ _-]?ball[ _-]?\d*$", re.I)
 _HELD_SECONDS = (0.15, 0.015)  # s before the first guess, between which the marker is fixed in the hand
 _NEARBY_SECONDS = 0.3  # s before a hand is fastest in which it holds the ball
@@ -48,6 +47,10 @@ _MAX_OFFSET = 1.5  # metres between the middle of the markers and that of the jo
 _MAX_FLIGHT = 8.0  # s of flight until the ground
 # Uncertainty in metres of where the marker leaves: visible in the hand, or never visible there.
 _HELD_SIGMA, _HIDDEN_SIGMA = 0.006, 0.05
+
+# Standard deviations that hold 90 % of normal errors: of a number, and of an angle in two directions.
+_INTERVAL_90, _CONE_90 = 1.645, 2.146
+_ROLL_SHARE = 0.5  # share of the roll along the fingers by which 90 % of balls leave later than their markers show
 
 MPH, KMH = 0.44704, 1.0 / 3.6
 # m/s that a thrown ball can have; a number outside is no speed.
@@ -92,9 +95,9 @@ class Release:
         position: (3,) metres, the ball's centre at the release.
         velocity: (3,) m/s.
         spin: (3,) rad/s, zero where unknown.
-        time_sigma: s, one standard deviation.
-        speed_sigma: m/s, one standard deviation.
-        direction_sigma: rad, one standard deviation.
+        time_margin: s, half the interval that holds 90 % of the cases.
+        speed_margin: m/s, likewise.
+        direction_margin: rad, half the angle of the cone that holds 90 %.
         side: of the hand, "left" or "right".
         method: "ball" if estimated from the ball's marker, "hand" if from the hand alone.
         residual: metres of the ball's marker in flight, NaN without.
@@ -113,9 +116,9 @@ class Release:
     position: np.ndarray
     velocity: np.ndarray
     spin: np.ndarray
-    time_sigma: float
-    speed_sigma: float
-    direction_sigma: float
+    time_margin: float
+    speed_margin: float
+    direction_margin: float
     side: str
     method: str
     residual: float
@@ -141,8 +144,8 @@ class Release:
     def report(self) -> dict:
         """Return the figures of the release, as values for JSON."""
         return {"release_time_s": self.time, "release_frame": self.frame, "speed_m_s": self.speed,
-                "direction": self.direction.tolist(), "uncertainty_s": self.time_sigma,
-                "uncertainty_m_s": self.speed_sigma, "uncertainty_deg": float(np.degrees(self.direction_sigma)),
+                "direction": self.direction.tolist(), "uncertainty_s": self.time_margin,
+                "uncertainty_m_s": self.speed_margin, "uncertainty_deg": float(np.degrees(self.direction_margin)),
                 "radar_speed_m_s": self.radar,
                 "against_radar": None if self.radar is None else self.speed / self.radar - 1.0,
                 "position_m": self.position.tolist(), "spin_rad_s": self.spin.tolist(), "hand": self.side,
@@ -179,7 +182,6 @@ def estimate_release(trial: MarkerTrial, motion: Motion, settings: ReleaseSettin
     balls = tuple(name for name in even_trial.labels if name == label or _BALL_LABEL.match(name))
     hands = [refine_hand(build_hand(motion, side), even_trial, balls) for side in sides]
     hand = _choose_hand(hands, marker)
-    _check_hand_speed(hand, even_trial.name)
     hand_ball, notes = _locate_ball(hand, marker, settings, ball)
     notes += even_trial.notes[len(trial.notes) :]
     launch = None
@@ -187,7 +189,9 @@ def estimate_release(trial: MarkerTrial, motion: Motion, settings: ReleaseSettin
         launch = _fit_ball_launch(hand, marker, hand_ball, ball=ball, settings=settings, notes=notes)
         launch = _check_launch(launch, hand, marker, label=label, radius=hand_ball.radius, settings=settings,
                                name=even_trial.name, notes=notes)
-    launch = launch or _estimate_hand_launch(hand, motion, hand_ball, ball, notes)
+    if launch is None:
+        check_throw(hand, [other for other in hands if other is not hand], _find_hips(motion), even_trial.name)
+        launch = _estimate_hand_launch(hand, motion, hand_ball, ball, notes)
     seen = np.zeros(len(hand), bool) if marker is None else np.isfinite(marker).all(axis=-1)
     return _build_release(launch, hand, motion, hand_ball=hand_ball, seen=seen, name=even_trial.name, notes=notes)
 
@@ -213,14 +217,6 @@ def _check_launch(launch: _FittedLaunch | None, hand: Hand, marker, label, radiu
         raise InputError(name, finding, "a marker on the ball in that hand", "check the marker and the hand")
     notes.append(f"{finding}: the release is estimated from the hand alone")
     return None
-
-
-def _check_hand_speed(hand: Hand, name: str) -> None:
-    """Raise InputError if the hand is never fast enough for a throw."""
-    speed = float(np.max(compute_steady_speeds(hand.origin, hand.fps)))
-    if speed < MIN_HAND_SPEED:
-        raise InputError(name, f"a {hand.side} hand of at most {speed:.1f} m/s", "a throw",
-                         "choose another trial, or the other hand")
 
 
 def _check_same_place(trial: MarkerTrial, motion: Motion) -> None:
@@ -257,9 +253,9 @@ class _FittedLaunch:
     launch: Launch
     ball: Ball
     method: str
-    time_sigma: float
-    speed_sigma: float
-    direction_sigma: float
+    time_margin: float
+    speed_margin: float
+    direction_margin: float
     residual: float = float("nan")
     frames: int = 0
     circle: float = 0.0
@@ -274,13 +270,19 @@ def _build_release(fitted: _FittedLaunch, hand: Hand, motion: Motion, hand_ball:
     places = place_ball(shifted_hand, hand_ball.centre, launch, fitted.ball, ground)
     flight = simulate_flight(launch, fitted.ball, _MAX_FLIGHT, ground)
     impact = flight.at(flight.bounces[:1])[0] - [0.0, 0.0, fitted.ball.radius] if len(flight.bounces) else None
-    hips = forward_kinematics(motion.frames(0, 1))[0][0, identify_joints(motion.skeleton).hips]
+    hips = _find_hips(motion.frames(0, 1))[0]
     return Release(time=launch.time, frame=int(np.clip(round(launch.time * hand.fps), 0, len(hand) - 1)),
                    position=launch.position, velocity=launch.velocity, spin=np.asarray(launch.spin, float),
-                   time_sigma=fitted.time_sigma, speed_sigma=fitted.speed_sigma, direction_sigma=fitted.direction_sigma,
-                   side=hand.side, method=fitted.method, residual=fitted.residual, flight_frames=fitted.frames,
+                   time_margin=fitted.time_margin, speed_margin=fitted.speed_margin,
+                   direction_margin=fitted.direction_margin, side=hand.side, method=fitted.method,
+                   residual=fitted.residual, flight_frames=fitted.frames,
                    radar=parse_radar_speed(name), centre=hand_ball.centre, radius=hand_ball.radius,
                    path=BallPath(hand.times, places, seen), impact=impact, hips=hips, notes=tuple(notes))  # fmt: skip
+
+
+def _find_hips(motion: Motion) -> np.ndarray:
+    """Find the hips in all frames, (T, 3) metres."""
+    return forward_kinematics(motion)[0][:, identify_joints(motion.skeleton).hips]
 
 
 def _match_frames(trial: MarkerTrial, motion: Motion) -> Motion:
@@ -384,9 +386,12 @@ def _fit_ball_launch(hand: Hand, marker, hand_ball: HandBall, ball: Ball, settin
     launch = Launch(fit.time, fit.position, fit.velocity, fit.spin)
     air = float(np.linalg.norm(fits[0][0].velocity - fits[1][0].velocity))
     speed_sigma = float(np.hypot(fit.speed_sigma, _AIR_UNCERTAINTY * air))
-    way_sigma = speed_sigma / max(float(np.linalg.norm(fit.velocity)), 1e-9)
-    return _FittedLaunch(launch=launch, ball=ball, method="ball", time_sigma=fit.time_sigma, speed_sigma=speed_sigma,
-                         direction_sigma=way_sigma, residual=fit.residual, frames=fit.frames, circle=fit.circle)
+    angle_sigma = speed_sigma / max(float(np.linalg.norm(fit.velocity)), 1e-9)
+    # the marker shows when the ball begins to move against the hand; it rolls along the fingers before it leaves
+    time_margin = float(np.hypot(_INTERVAL_90 * fit.time_sigma, _ROLL_SHARE * measure_roll_time(hand, fit.time)))
+    return _FittedLaunch(launch=launch, ball=ball, method="ball", time_margin=time_margin,
+                         speed_margin=_INTERVAL_90 * speed_sigma, direction_margin=_CONE_90 * angle_sigma,
+                         residual=fit.residual, frames=fit.frames, circle=fit.circle)
 
 
 def _estimate_hand_launch(hand: Hand, motion: Motion, hand_ball: HandBall, ball: Ball, notes) -> _FittedLaunch:
@@ -395,8 +400,8 @@ def _estimate_hand_launch(hand: Hand, motion: Motion, hand_ball: HandBall, ball:
     if not hand.markers:
         notes.append("no markers near the hand: only the filtered motion is used, so the speed comes out too low")
     launch = Launch(hand_release.time, hand_release.position, hand_release.velocity)
-    return _FittedLaunch(launch=launch, ball=ball, method="hand", time_sigma=hand_release.time_sigma,
-                         speed_sigma=hand_release.speed_sigma, direction_sigma=hand_release.direction_sigma)
+    return _FittedLaunch(launch=launch, ball=ball, method="hand", time_margin=hand_release.time_margin,
+                         speed_margin=hand_release.speed_margin, direction_margin=hand_release.direction_margin)
 
 
 def _compute_stride(motion: Motion) -> np.ndarray:

@@ -14,6 +14,7 @@ from ...base.errors import InputError
 from ...base.time_series import interpolate_columns
 from ...motion import quaternion
 from ...motion.motion import Motion, forward_kinematics
+from .bent_fingers import FingerRoll, roll_ball
 from .synthetic_body import compute_size
 
 GRAVITY = 9.81  # m/s^2
@@ -35,6 +36,7 @@ class BallRequest:
         drag: 1/m, see `ball.physics`.
         label: of the marker.
         grip: (3,) m, the ball's centre in the hand's axes of a T-pose; None: as a hand holds it.
+        roll: how the ball rolls out over bent fingers, instead of leaving a rigid grip; None: it does not.
     """
 
     release: float
@@ -45,6 +47,7 @@ class BallRequest:
     drag: float = 0.0
     label: str = "BALL"
     grip: tuple[float, float, float] | None = None
+    roll: FingerRoll | None = None
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -100,6 +103,9 @@ def build_ball(truth: Motion, request: BallRequest) -> BallTruth:
     outward = request.radius * outward / np.linalg.norm(outward)
     times = np.arange(len(truth)) / truth.fps
     position, velocity, turn = _find_release(times, held, turns, request.release)
+    if request.roll is not None:
+        held, position, velocity = roll_ball(times, positions, turns, request.roll, release=request.release,
+                                             radius=request.radius, side=side_sign)
     spin = 2.0 * np.pi * request.spin_rate * _find_backspin_axis(velocity)
     after = np.maximum(times - request.release, 0.0)
     flight = _simulate_flight(position, velocity, after, request.drag)
