@@ -21,6 +21,7 @@ from .cleaning.clean import CleaningResult, clean_trial
 from .model.model import MarkerModel
 from .pose.pose import HeldBall, PoseSettings, PoseSolution, solve_poses
 from .pose.residuals import collect_markers, measure_floor
+from .reconstruction_figures import collect_figures, describe_foot_slide
 from .trial import MarkerTrial, format_some, resample_evenly
 
 _DEFAULTS = collect_defaults("markers")
@@ -122,8 +123,6 @@ class Reconstruction:
 
     def report(self) -> dict:
         """Return the figures of the reconstruction, as values for JSON."""
-        from .reconstruction_figures import collect_figures
-
         return {"version": __version__, **collect_figures(self)}
 
 
@@ -177,6 +176,7 @@ def _reconstruct_on_one_thread(trial, static, model, settings: ReconstructSettin
         monitor.add_warnings([*solved.notes, *_describe_poor_fit(solved, model)])
     with monitor.time_step("filter", 0.92):
         motion, held = _filter_motion(solved, model, visible, settings, monitor)
+        monitor.add_warnings(describe_foot_slide(motion, held is not None))
     with monitor.time_step("floor", 0.94):
         floor = _measure_floor(model, clean_markers, settings, monitor)
         down = floor if settings.floor else 0.0
