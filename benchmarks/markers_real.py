@@ -88,7 +88,7 @@ def _format_fastest(out: Reconstruction) -> str:
 def planted_table() -> list[str]:
     """Build the rows of each synthetic throw with its ball's marker seen in flight, seen late, and with none."""
     lines = effort.format_head(["throw", "ball's marker", "true m/s", "found m/s", "off", "time off ms, frames",
-                                "direction error deg", "reported sigma ms, m/s"])
+                                "direction error deg", "margin ms, m/s"])
     for distance, speed, arm, style, fps, turns in THROWS:
         thrown = build_throw((distance, 0.0, 1.0), speed, arm, style, fps=fps)
         ball = BallRequest(thrown.release, side=arm.title(), spin_rate=turns)
@@ -130,7 +130,7 @@ def _build_release_row(name: str, how: str, known: SyntheticTrial, trial, motion
 
 def radar_table() -> list[str]:
     """Build the rows of pitches without a marker on the ball."""
-    lines = effort.format_head(["pitch", "found m/s", "radar m/s", "off", "reported sigma m/s", "release s"])
+    lines = effort.format_head(["pitch", "found m/s", "radar m/s", "off", "margin m/s", "release s"])
     for trial in PITCHES:
         body, _ = reconstruct_timed(trial, None)
         found = estimate_release(body.raw, body.motion)

@@ -10,6 +10,7 @@ import time
 from collections.abc import Callable
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -23,6 +24,9 @@ from .pose.pose import HeldBall, PoseSettings, PoseSolution, solve_poses
 from .pose.residuals import collect_markers, measure_floor
 from .reconstruction_figures import collect_figures, describe_foot_slide
 from .trial import MarkerTrial, format_some, resample_evenly
+
+if TYPE_CHECKING:
+    from .release.release import Release
 
 _DEFAULTS = collect_defaults("markers")
 FILTERS = find_setting("markers", "filter").choice_names
@@ -105,7 +109,7 @@ class Reconstruction:
     raw: MarkerTrial
     solved: PoseSolution
     cleaned: CleaningResult
-    release: object | None = None
+    release: Release | None = None
     held: np.ndarray | None = None
     floor: float = 0.0
     grounded: bool = False
@@ -180,8 +184,8 @@ def _reconstruct_on_one_thread(trial, static, model, settings: ReconstructSettin
     with monitor.time_step("floor", 0.94):
         floor = _measure_floor(model, clean_markers, settings, monitor)
         down = floor if settings.floor else 0.0
-        motion, clean_markers, visible = move_down(motion, down), _move_trial_down(clean_markers,
-                                                                                   down), _move_trial_down(visible,
+        motion, clean_markers, visible = move_down(motion, down), move_trial_down(clean_markers,
+                                                                                   down), move_trial_down(visible,
                 down)
     with monitor.time_step("release", 1.0):
         release = _find_release(visible, motion, model, marker_set=marker_set, settings=settings, monitor=monitor)
@@ -455,7 +459,7 @@ def move_down(motion: Motion, by: float) -> Motion:
     return replace(motion, root_positions=motion.root_positions - [0.0, 0.0, by]) if by else motion
 
 
-def _move_trial_down(trial: MarkerTrial, by: float) -> MarkerTrial:
+def move_trial_down(trial: MarkerTrial, by: float) -> MarkerTrial:
     """Return the trial moved down by `by` metres."""
     return trial.with_positions(trial.positions - [0.0, 0.0, by]) if by else trial
 

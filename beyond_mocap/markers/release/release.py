@@ -8,7 +8,7 @@ uncertainty. Neither uses the speed that the file name may give: that is reporte
 from __future__ import annotations
 
 import re
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -108,6 +108,8 @@ class Release:
         path: the ball in all frames.
         impact: (3,) metres, where it first meets the ground, or None.
         hips: (3,) metres in the first frame.
+        ball_label: the ball's marker, "" without.
+        held: (N, 3) metres, that marker in the hand's frame while the ball is held; N is 0 where it is not visible.
         notes: messages for people.
     """
 
@@ -129,6 +131,8 @@ class Release:
     path: BallPath
     impact: np.ndarray | None
     hips: np.ndarray
+    ball_label: str = ""
+    held: np.ndarray = field(default_factory=lambda: np.zeros((0, 3)))
     notes: tuple[str, ...] = ()
 
     @property
@@ -193,7 +197,10 @@ def estimate_release(trial: MarkerTrial, motion: Motion, settings: ReleaseSettin
         check_throw(hand, [other for other in hands if other is not hand], _find_hips(motion), even_trial.name)
         launch = _estimate_hand_launch(hand, motion, hand_ball, ball, notes)
     seen = np.zeros(len(hand), bool) if marker is None else np.isfinite(marker).all(axis=-1)
-    return _build_release(launch, hand, motion, hand_ball=hand_ball, seen=seen, name=even_trial.name, notes=notes)
+    release = _build_release(launch, hand, motion, hand_ball=hand_ball, seen=seen, name=even_trial.name, notes=notes)
+    if label is None or launch.method != "ball":
+        return release
+    return replace(release, ball_label=label, held=hand.to_hand(marker)[_find_held_frames(hand, marker)])
 
 
 def _check_launch(launch: _FittedLaunch | None, hand: Hand, marker, label, radius, settings: ReleaseSettings, name: str,
@@ -331,11 +338,16 @@ def _measure_distance(hand: Hand, marker: np.ndarray, peak: int) -> float:
     return float(np.median(away)) if len(away) >= 3 else np.inf
 
 
-def _locate_ball(hand: Hand, marker, settings: ReleaseSettings, ball: Ball) -> tuple[HandBall, list[str]]:
-    """Estimate where the ball lies in the hand; return it with messages."""
+def estimate_usual_place(hand: Hand) -> np.ndarray:
+    """Estimate where balls usually lie in a hand, (3,) metres in its frame."""
     # direction out of the palm at rest: downwards if the rest pose spreads the arms, else unknown
     palm = np.array([0.0, 0.0, -1.0]) if abs(hand.finger[1]) > 0.9 else None
-    usual_place = estimate_ball_centre(hand.finger, hand.reach, palm)
+    return estimate_ball_centre(hand.finger, hand.reach, palm)
+
+
+def _locate_ball(hand: Hand, marker, settings: ReleaseSettings, ball: Ball) -> tuple[HandBall, list[str]]:
+    """Estimate where the ball lies in the hand; return it with messages."""
+    usual_place = estimate_usual_place(hand)
     radius = settings.radius or ball.radius
     if settings.centre is not None:
         return HandBall(np.array(settings.centre, float), radius, 0.005), []

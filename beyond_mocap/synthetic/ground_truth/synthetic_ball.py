@@ -19,7 +19,6 @@ from .synthetic_body import compute_size
 
 GRAVITY = 9.81  # m/s^2
 _GRIP = (0.012, 0.105, -0.036)  # m, of a left hand in a T-pose: between the fingers, on the palm's side
-_MARKER = (0.25, 0.15, -0.95)  # direction of the marker from the centre of a held ball
 _STEP = 1e-3  # s, step of flights with air drag
 
 
@@ -36,6 +35,7 @@ class BallRequest:
         drag: 1/m, see `ball.physics`.
         label: of the marker.
         grip: (3,) m, the ball's centre in the hand's axes of a T-pose; None: as a hand holds it.
+        outward: direction of the marker from the centre of a held ball, in a left hand's axes of a T-pose.
         roll: how the ball rolls out over bent fingers, instead of leaving a rigid grip; None: it does not.
     """
 
@@ -47,6 +47,7 @@ class BallRequest:
     drag: float = 0.0
     label: str = "BALL"
     grip: tuple[float, float, float] | None = None
+    outward: tuple[float, float, float] = (0.25, 0.15, -0.95)
     roll: FingerRoll | None = None
 
 
@@ -99,7 +100,7 @@ def build_ball(truth: Motion, request: BallRequest) -> BallTruth:
     grip = np.array(request.grip) if request.grip is not None else _GRIP * side_sign * compute_size(truth.skeleton)
     positions, turns = (rows[:, hand] for rows in forward_kinematics(truth))
     held = positions + quaternion.rotate(turns, grip)
-    outward = np.array(_MARKER) * side_sign
+    outward = np.array(request.outward) * side_sign
     outward = request.radius * outward / np.linalg.norm(outward)
     times = np.arange(len(truth)) / truth.fps
     position, velocity, turn = _find_release(times, held, turns, request.release)
