@@ -44,7 +44,7 @@ def margin_table(throws: int = THROWS) -> list[str]:
 
 def refusal_table() -> list[str]:
     """Build a row for each folder of recordings: how many hands are refused as throwing none."""
-    lines = effort.format_head(["recordings", "files", "refused"])
+    lines = ["Only `cmu_pitch` shows throws.", "", *effort.format_head(["recordings", "files", "refused"])]
     for folder in sorted(path for path in (DATA / "mocap").iterdir() if path.is_dir()):
         files = sorted(folder.rglob("*.bvh"))
         refused = sum(is_refused(bvh.read_bvh(file).motion) for file in files)

@@ -468,7 +468,8 @@ def _find_release(trial, motion, model: MarkerModel, marker_set, settings: Recon
     """Find when and how the ball leaves the hand, where the settings ask for it; a model with a ball says where it
     lies.
     """
-    from .release.release import ReleaseSettings, estimate_release, parse_radar_speed
+    from .release.radar_speed import parse_radar_speed
+    from .release.release import ReleaseSettings, estimate_release
 
     label = _find_ball_label(model, marker_set, trial)
     is_throw = label is not None or parse_radar_speed(trial.name) is not None
