@@ -41,6 +41,8 @@ SECTIONS = {  # name -> heading, (subheading, module, function) of each part
                             ("Frames per second", "markers_planted", "speed_table"),
                             ("Real trials", "markers_real", "trial_table"),
                             ("Releases of synthetic throws", "markers_real", "planted_table"),
+                            ("Margins of releases", "release_margins", "margin_table"),
+                            ("Recordings that show no throw", "release_margins", "refusal_table"),
                             ("Pitches against the radar", "markers_real", "radar_table"))),
     "playback": ("Playback in Blender", (("", "playback", "section"),)),
     "scale": ("Large libraries and long tracks", (("", "scale", "section"),)),

@@ -88,7 +88,7 @@ def _format_fastest(out: Reconstruction) -> str:
 def planted_table() -> list[str]:
     """Build the rows of each synthetic throw with its ball's marker seen in flight, seen late, and with none."""
     lines = effort.format_head(["throw", "ball's marker", "true m/s", "found m/s", "off", "time off ms, frames",
-                                "direction error deg", "reported sigma ms, m/s"])
+                                "direction error deg", "margin ms, m/s"])
     for distance, speed, arm, style, fps, turns in THROWS:
         thrown = build_throw((distance, 0.0, 1.0), speed, arm, style, fps=fps)
         ball = BallRequest(thrown.release, side=arm.title(), spin_rate=turns)
@@ -125,17 +125,17 @@ def _build_release_row(name: str, how: str, known: SyntheticTrial, trial, motion
     return effort.format_row([name, f"{how} ({found.method})", f"{truth.speed:.1f}", f"{found.speed:.1f}",
                               f"{100 * (found.speed / truth.speed - 1):+.1f} %",
                               f"{1e3 * time_error:+.1f}, {time_error * fps:+.1f}", f"{direction_error:.1f}",
-                              f"{1e3 * found.time_sigma:.1f}, {found.speed_sigma:.1f}"])
+                              f"{1e3 * found.time_margin:.1f}, {found.speed_margin:.1f}"])
 
 
 def radar_table() -> list[str]:
     """Build the rows of pitches without a marker on the ball."""
-    lines = effort.format_head(["pitch", "found m/s", "radar m/s", "off", "reported sigma m/s", "release s"])
+    lines = effort.format_head(["pitch", "found m/s", "radar m/s", "off", "margin m/s", "release s"])
     for trial in PITCHES:
         body, _ = reconstruct_timed(trial, None)
         found = estimate_release(body.raw, body.motion)
         radar = found.radar
         lines.append(effort.format_row([trial, f"{found.speed:.1f}", "unknown" if radar is None else f"{radar:.1f}",
                                         "" if radar is None else f"{100 * (found.speed / radar - 1):+.1f} %",
-                                        f"{found.speed_sigma:.1f}", f"{found.time:.3f}"]))
+                                        f"{found.speed_margin:.1f}", f"{found.time:.3f}"]))
     return lines

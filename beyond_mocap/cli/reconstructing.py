@@ -6,6 +6,8 @@ finds when and how a ball left the hand.
 
 from __future__ import annotations
 
+import json
+import math
 import time
 from collections.abc import Mapping
 from contextlib import suppress
@@ -132,6 +134,7 @@ def _reconstruct_folder(options, reporter: ProgressReporter) -> None:
     Each gets NAME.bvh, NAME.report.json and, with a static trial, NAME.model.json; trials.json and report.html
     summarize all.
     """
+    from ..markers.pooled_balls import select_throw
     from ..markers.reconstruct_folder import list_recordings, reconstruct_folder
 
     for name in ("static", "report", "save_model"):
@@ -145,12 +148,16 @@ def _reconstruct_folder(options, reporter: ProgressReporter) -> None:
     model = _read_chosen_model(options)
     _check_folder(options.out, options.trial)
     read = partial(read_trial, options=options)
-    rows = []
+    rows, throws = [], []
     for result in reconstruct_folder(options.trial, read, settings, model=model, progress=reporter.show_progress,
                                      cancelled=reporter.is_cancelled):
         rows.append(_write_result(result, options))
+        if result.reconstruction is not None:
+            recording = result.recording
+            throws += select_throw(recording.name, partial(read, recording.path), result.reconstruction)
         reporter.finish()
         print(rows[-1]["line"])
+    _write_pooled_balls(throws, settings, options)
     _write_overview(rows, options, reporter)
     if not any(row["bvh"] for row in rows):
         raise InputError(options.trial, "no trial could be reconstructed", "at least one", rows[0]["line"])
@@ -190,6 +197,19 @@ def _write_result(result, options) -> dict:
             "subject": result.reconstruction.model.subject,
             "line": "; ".join([f"{name}: {describe_result(result.reconstruction)}", *filter(None, [result.note]),
                                *notes])}  # fmt: skip
+
+
+def _write_pooled_balls(throws, settings, options) -> None:
+    """Write reports and models again with the ball's place in the hand that all throws of a hand have together."""
+    from ..files.tables import write_report
+    from ..markers.files.model_json import write_model
+    from ..markers.pooled_balls import pool_balls
+
+    for throw, model, release in pool_balls(throws, settings):
+        place = options.out / f"{throw.name}.report.json"
+        report = json.loads(place.read_text("utf-8"))
+        write_report(place, {**report, "release": release.report()})
+        write_model(model, options.out / f"{throw.name}.model.json")
 
 
 def _write_overview(rows, options, reporter: ProgressReporter) -> None:
@@ -361,5 +381,6 @@ def run_release(options, reporter: ProgressReporter, writers: Mapping[str, Write
         radar = f", radar {found.radar:.1f} m/s ({100 * (found.speed / found.radar - 1):+.1f} %)"
     print(
         f"{options.report}: {found.side} hand, released at {found.time:.3f} s (frame {found.frame}, +-"
-        f"{1000 * found.time_sigma:.0f} ms), {found.speed:.1f} +- {found.speed_sigma:.1f} m/s{radar}"
+        f"{1000 * found.time_margin:.0f} ms), {found.speed:.1f} +- {found.speed_margin:.1f} m/s{radar}, direction +-"
+        f"{math.degrees(found.direction_margin):.1f} degrees"
     )

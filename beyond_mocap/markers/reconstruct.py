@@ -10,6 +10,7 @@ import time
 from collections.abc import Callable
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -21,7 +22,11 @@ from .cleaning.clean import CleaningResult, clean_trial
 from .model.model import MarkerModel
 from .pose.pose import HeldBall, PoseSettings, PoseSolution, solve_poses
 from .pose.residuals import collect_markers, measure_floor
+from .reconstruction_figures import collect_figures, describe_foot_slide
 from .trial import MarkerTrial, format_some, resample_evenly
+
+if TYPE_CHECKING:
+    from .release.release import Release
 
 _DEFAULTS = collect_defaults("markers")
 FILTERS = find_setting("markers", "filter").choice_names
@@ -104,7 +109,7 @@ class Reconstruction:
     raw: MarkerTrial
     solved: PoseSolution
     cleaned: CleaningResult
-    release: object | None = None
+    release: Release | None = None
     held: np.ndarray | None = None
     floor: float = 0.0
     grounded: bool = False
@@ -122,8 +127,6 @@ class Reconstruction:
 
     def report(self) -> dict:
         """Return the figures of the reconstruction, as values for JSON."""
-        from .reconstruction_figures import collect_figures
-
         return {"version": __version__, **collect_figures(self)}
 
 
@@ -177,11 +180,12 @@ def _reconstruct_on_one_thread(trial, static, model, settings: ReconstructSettin
         monitor.add_warnings([*solved.notes, *_describe_poor_fit(solved, model)])
     with monitor.time_step("filter", 0.92):
         motion, held = _filter_motion(solved, model, visible, settings, monitor)
+        monitor.add_warnings(describe_foot_slide(motion, held is not None))
     with monitor.time_step("floor", 0.94):
         floor = _measure_floor(model, clean_markers, settings, monitor)
         down = floor if settings.floor else 0.0
-        motion, clean_markers, visible = move_down(motion, down), _move_trial_down(clean_markers,
-                                                                                   down), _move_trial_down(visible,
+        motion, clean_markers, visible = move_down(motion, down), move_trial_down(clean_markers,
+                                                                                   down), move_trial_down(visible,
                 down)
     with monitor.time_step("release", 1.0):
         release = _find_release(visible, motion, model, marker_set=marker_set, settings=settings, monitor=monitor)
@@ -455,7 +459,7 @@ def move_down(motion: Motion, by: float) -> Motion:
     return replace(motion, root_positions=motion.root_positions - [0.0, 0.0, by]) if by else motion
 
 
-def _move_trial_down(trial: MarkerTrial, by: float) -> MarkerTrial:
+def move_trial_down(trial: MarkerTrial, by: float) -> MarkerTrial:
     """Return the trial moved down by `by` metres."""
     return trial.with_positions(trial.positions - [0.0, 0.0, by]) if by else trial
 
@@ -464,7 +468,8 @@ def _find_release(trial, motion, model: MarkerModel, marker_set, settings: Recon
     """Find when and how the ball leaves the hand, where the settings ask for it; a model with a ball says where it
     lies.
     """
-    from .release.release import ReleaseSettings, estimate_release, parse_radar_speed
+    from .release.radar_speed import parse_radar_speed
+    from .release.release import ReleaseSettings, estimate_release
 
     label = _find_ball_label(model, marker_set, trial)
     is_throw = label is not None or parse_radar_speed(trial.name) is not None

@@ -11,6 +11,9 @@ from ..motion.motion import Motion, forward_kinematics
 from ..synthesis.quality.movement import list_foot_joints, list_stances, measure_contact_speeds, measure_stance_travel
 from .pose.residuals import measure_residuals
 
+# Above these, standing toes are reported: cm/s, and mm in a stance, from which on people notice that feet slide.
+_VISIBLE_TOE_SPEED, _VISIBLE_TRAVEL = 15.0, 21.0
+
 
 def collect_figures(reconstruction) -> dict:
     """Collect the report of a reconstruction.
@@ -87,12 +90,32 @@ def measure_foot_slide(motion: Motion) -> dict | None:
         return None
     if len(motion) < 3:
         return None
-    contacts = foot_contacts.detect_contacts(motion)
+    points = foot_contacts.detect_heel_toe_contacts(motion)
+    contacts = points.all(axis=2)
     places, _ = forward_kinematics(motion)
     feet = places[:, list_foot_joints(motion.skeleton)]
     travel = 1000.0 * measure_stance_travel(feet[:, :, 1], list_stances(contacts))
+    toes = measure_contact_speeds(feet[:, :, 1:], points[..., 1], motion.fps)
     return {"contact_cm_s": _compute_mean(100.0 * measure_contact_speeds(feet, contacts, motion.fps)),
+            "toe_cm_s": _compute_mean(100.0 * toes),
             "stance_mm_median": float(np.median(travel)) if len(travel) else None, "stances": len(travel)}
+
+
+def describe_foot_slide(motion: Motion, is_planted: bool) -> list[str]:
+    """Describe feet that slide so that one sees it; no line where they do not.
+
+    Args:
+        motion: the reconstructed motion.
+        is_planted: whether the foot-plant filter was used.
+    Returns:
+        At most one message.
+    """
+    slide = measure_foot_slide(motion) or {}
+    speed, travel = slide.get("toe_cm_s") or 0.0, slide.get("stance_mm_median") or 0.0
+    if speed <= _VISIBLE_TOE_SPEED and travel <= _VISIBLE_TRAVEL:
+        return []
+    advice = "their markers move further than Plant Feet holds; check them" if is_planted else "use Plant Feet"
+    return [f"standing toes slide {travel:.0f} mm in a stance, {speed:.0f} cm/s: {advice}"]
 
 
 def measure_limit_shares(solved, names) -> dict[str, float]:

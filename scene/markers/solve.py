@@ -266,8 +266,9 @@ def show_release(context: bpy.types.Context, cloud: bpy.types.Object, release: "
 
 def list_release_figures(release: "Release") -> list[str]:
     """List lines "name: value" for the panel."""
-    lines = [f"Speed: {release.speed:.1f} ± {release.speed_sigma:.1f} m/s", f"In km/h: {3.6 * release.speed:.0f} km/h",
-             f"Release: {release.time:.3f} s ± {1000.0 * release.time_sigma:.0f} ms", f"Hand: {release.side}",
+    lines = [f"Speed: {release.speed:.1f} ± {release.speed_margin:.1f} m/s", f"In km/h: {3.6 * release.speed:.0f} km/h",
+             f"Direction: ± {np.degrees(release.direction_margin):.0f}°",
+             f"Release: {release.time:.3f} s ± {1000.0 * release.time_margin:.0f} ms", f"Hand: {release.side}",
              f"Estimated from: {release.method}"]
     if release.radar is not None:
         lines.append(f"Radar: {release.radar:.1f} m/s, {100.0 * (release.speed / release.radar - 1.0):+.1f} %")

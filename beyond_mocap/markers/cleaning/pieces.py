@@ -25,8 +25,9 @@ _MAX_BURST_SECONDS = 0.08  # s, the longest burst that is removed as a jump
 _MIN_BURST_OFFSET, _MIN_BURST_SHARE = 0.015, 0.3
 _MIN_GHOST_OFFSET = 0.06  # metres from where the carriers predict the marker, from which on a longer stretch is a ghost
 # A single sample is off if it leaves the trajectory by this many metres (in the carriers' frame, in the world), by more
-# than limbs can do in a frame, in m/s^2, and by this many times the 90 % quantile of the samples around it.
-_SPIKE_LOCAL, _SPIKE_WORLD, _SPIKE_RATIO = 0.006, 0.015, 3.0
+# than limbs can do in a frame, in m/s^2, and by this many times the 90 % quantile of the samples around it. Cameras and
+# skin move single samples of runs by 6 to 11 mm; real jumps of recordings lie 15 to 100 mm off.
+_SPIKE_LOCAL, _SPIKE_WORLD, _SPIKE_RATIO = 0.012, 0.015, 3.0
 _SPIKE_SWING_LOCAL, _SPIKE_SWING_WORLD = 100.0, 300.0
 _AROUND_FRAMES = 12  # frames before and after that count as around
 # Share of a jump in the carriers' frame that must also show in the world; else it is a carrier that jumps.

@@ -1,9 +1,15 @@
-"""The foot-plant filter (Fredriksson section 5.4): feet in contact with the ground are held in place, without slow
-drift.
+"""The foot-plant filter (Fredriksson section 5.4): feet in contact with the ground are held in place, without drift.
 
-A window passes over the recording. Where an ankle or a toe has the same mean place in the window's first half as in its
-second, it is in contact. It is held at its mean place and released along a Bezier curve, and the leg follows by IK, so
-that no bone changes its length.
+Heels and toes (the ankle and the toe joint) are held one by one, since a foot that rolls stands on one of them. Two
+kinds of contact are found:
+
+- Stances, by height and speed (`motion.contacts`): low, and slower than a part that carries load moves. They last 0.1 s
+  in a sprint, where the source's window never fires: that is half a second long.
+- Long stands, by the source's window. It passes over the recording; where a point has the same mean place in its first
+  half as in its second, it is in contact. This finds feet that stand high, or drift.
+
+Each contact is held at its mean place and released along a Bezier curve, and the leg follows by IK, so that no bone
+changes its length.
 
 Two things are corrected here. A foot that swings back and forth also has the same mean place in both halves: it is in
 contact only where it also stays near that place. And a body that shifts its feet by less than one window shows moves
@@ -20,6 +26,7 @@ from ...base.easing import smoothstep
 from ...base.errors import InputError
 from ...base.time_series import find_runs
 from ...motion import quaternion
+from ...motion.contacts import detect_heel_toe_contacts
 from ...motion.humanoid import Limb, identify_joints
 from ...motion.limb import solve_posed_limb
 from ...motion.motion import Motion, compute_pose
@@ -28,6 +35,11 @@ WINDOW, STILL, EASE, APART = 0.5, 0.0015, 0.1, 0.01
 """Seconds of the window (100 frames at 200 per second in the source), metres between the halves' means, seconds of
 easing in and out, and metres from the held place beyond which a point is not in contact."""
 
+# Ankle and toe in a stance: m/s up to which they stand (a heel that rises over standing toes reaches 1 m/s in sprints),
+# and metres that they may lie off their held place (toe markers of standing feet travel 40 mm in hard pitches).
+_STANCE_LIMITS = ((0.3, 0.012), (0.6, 0.025))
+_MIN_STANCE_SECONDS = 0.03  # s, a third of a sprinter's stance
+_SPEED_SECONDS = 1.0 / 60.0  # s to either side, over which a point's speed is measured
 _SOFT_LENGTH = 0.002  # metres below full length at which a leg with a held foot begins to ease
 
 
@@ -74,9 +86,11 @@ def filter_foot_plants(motion: Motion, window: float = WINDOW, max_drift: float 
     held = np.zeros((len(motion), 2, 2), bool)
     moved, miss = np.zeros((len(motion), 2)), np.zeros((len(motion), 2))
     sizes = max(2, round(window * motion.fps / 2.0)), max_drift, max_distance
+    is_low = detect_heel_toe_contacts(motion)
     for side, limb in enumerate((body.left, body.right)):
         points = [places[:, limb.foot], places[:, limb.toe_or_foot]]
-        contacts = [detect_contacts(point, *sizes) for point in points]
+        contacts = [join_contacts(detect_stances(point, is_low[:, side, kind], motion.fps, *_STANCE_LIMITS[kind]),
+                                  detect_contacts(point, *sizes), len(motion)) for kind, point in enumerate(points)]
         held[:, side] = np.stack([_build_mask(spans, len(motion)) for spans in contacts], axis=1)
         shifts = [compute_hold_shift(point, spans, max(1, round(ease * motion.fps))) for point,
                   spans in zip(points, contacts)]
@@ -88,6 +102,34 @@ def filter_foot_plants(motion: Motion, window: float = WINDOW, max_drift: float 
                 rotations[active, joint] = quaternion.match_signs(local, rotations[active, joint])
             moved[active, side], miss[active, side] = np.linalg.norm(foot.ankle_shift[active], axis=1), missed
     return PlantFilterResult(replace(motion, rotations=rotations), held, moved, miss)
+
+
+def detect_stances(place: np.ndarray, is_low: np.ndarray, fps: float, max_speed: float,
+                   max_distance: float) -> list[tuple[int, int]]:
+    """Detect the stances of a point.
+
+    Args:
+        place: (T, 3) metres.
+        is_low: (T,) bool, where its height and speed allow for contact.
+        fps: frames per second.
+        max_speed: m/s.
+        max_distance: metres from the stance's mean place.
+    Returns:
+        (first, end) frames of each stance, in pieces where the point moves on.
+    """
+    reach = max(1, round(_SPEED_SECONDS * fps))
+    frames = np.arange(len(place))
+    after, before = np.minimum(frames + reach, len(place) - 1), np.maximum(frames - reach, 0)
+    speed = np.linalg.norm(place[after] - place[before], axis=-1) * fps / np.maximum(after - before, 1)
+    least = max(2, round(_MIN_STANCE_SECONDS * fps))
+    return [piece for span in find_runs(is_low & (speed < max_speed))
+            for piece in _split_drifting(place, *span, max_distance) if piece[1] - piece[0] >= least]
+
+
+def join_contacts(stances: list[tuple[int, int]], stands: list[tuple[int, int]], count: int) -> list[tuple[int, int]]:
+    """Join stances with the long stands of `count` frames; where both are, the stance is held as a whole."""
+    rest = _build_mask(stands, count) & ~_build_mask(stances, count)
+    return sorted([*stances, *find_runs(rest)])
 
 
 def detect_contacts(place: np.ndarray, half: int, max_drift: float, max_distance: float) -> list[tuple[int, int]]:
@@ -144,7 +186,8 @@ def compute_hold_shift(place: np.ndarray, spans: list[tuple[int, int]], ease: in
     for first, end in spans:
         distance = np.maximum(np.maximum(first - frames, frames - (end - 1)), 0) / (ease + 1)
         own = smoothstep(1.0 - np.minimum(distance, 1.0))
-        shift += own[:, None] * (place[first:end].mean(axis=0) - place)
+        # beyond its ends the contact's own correction fades; a foot that flies in is not pulled to the ground earlier
+        shift += own[:, None] * (place[first:end].mean(axis=0) - place[np.clip(frames, first, end - 1)])
         share += own
         weight = np.maximum(weight, own)
     return shift / np.maximum(share, 1.0)[:, None], weight

@@ -8,7 +8,7 @@ uncertainty. Neither uses the speed that the file name may give: that is reporte
 from __future__ import annotations
 
 import re
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -23,20 +23,20 @@ from ...motion.motion import Motion, forward_kinematics, resample
 from ...motion.track.ball_path import BallPath
 from ..trial import MarkerTrial, resample_evenly
 from .launch_fit import HeldMarker, fit_launch
+from .radar_speed import parse_radar_speed
+from .throw_check import check_throw
 from .throwing_hand import (
     HandBall,
     compute_speeds,
-    compute_steady_speeds,
     find_fastest_frame,
     find_release_by_distance,
     fit_hand_ball,
     place_ball,
     refine_hand,
 )
-from .without_ball import HOLD, estimate_hand_release
+from .without_ball import HOLD, estimate_hand_release, measure_roll_time
 
 MIN_FRAMES = 12  # frames that a trial with a throw must have
-MIN_HAND_SPEED = 1.5  # m/s that a throwing hand must reach
 _BALL_LABEL = re.compile(r"^(base|tennis|hand|foot|soft)?[ _-]?ball[ _-]?\d*$", re.I)
 _HELD_SECONDS = (0.15, 0.015)  # s before the first guess, between which the marker is fixed in the hand
 _NEARBY_SECONDS = 0.3  # s before a hand is fastest in which it holds the ball
@@ -49,14 +49,9 @@ _MAX_FLIGHT = 8.0  # s of flight until the ground
 # Uncertainty in metres of where the marker leaves: visible in the hand, or never visible there.
 _HELD_SIGMA, _HIDDEN_SIGMA = 0.006, 0.05
 
-MPH, KMH = 0.44704, 1.0 / 3.6
-# m/s that a thrown ball can have; a number outside is no speed.
-MIN_THROW_SPEED, MAX_THROW_SPEED = 2.0, 55.0
-
-# pitcher_session_height(in)_weight(lb)_number_kind_speed(tenths of mph), as in the OpenBiomechanics Project
-_PITCH = re.compile(r"^\d{5,6}_\d{5,6}_\d{2,3}_\d{2,3}_\d{1,3}_[A-Za-z]{2}_(\d{3,4})$")
-_WITH_UNIT = re.compile(r"(?<![\d.])(\d{1,3}(?:[.,p]\d{1,2})?)[ _-]?(mph|kmh|kph|km[_-]h|mps|m[_-]s)(?![a-z])", re.I)
-_UNITS = {"mph": MPH, "kmh": KMH, "kph": KMH, "km_h": KMH, "mps": 1.0, "m_s": 1.0}
+# Standard deviations that hold 90 % of normal errors: of a number, and of an angle in two directions.
+_INTERVAL_90, _CONE_90 = 1.645, 2.146
+_ROLL_SHARE = 0.5  # share of the roll along the fingers by which 90 % of balls leave later than their markers show
 
 
 @dataclass(frozen=True)
@@ -92,9 +87,9 @@ class Release:
         position: (3,) metres, the ball's centre at the release.
         velocity: (3,) m/s.
         spin: (3,) rad/s, zero where unknown.
-        time_sigma: s, one standard deviation.
-        speed_sigma: m/s, one standard deviation.
-        direction_sigma: rad, one standard deviation.
+        time_margin: s, half the interval that holds 90 % of the cases.
+        speed_margin: m/s, likewise.
+        direction_margin: rad, half the angle of the cone that holds 90 %.
         side: of the hand, "left" or "right".
         method: "ball" if estimated from the ball's marker, "hand" if from the hand alone.
         residual: metres of the ball's marker in flight, NaN without.
@@ -105,6 +100,8 @@ class Release:
         path: the ball in all frames.
         impact: (3,) metres, where it first meets the ground, or None.
         hips: (3,) metres in the first frame.
+        ball_label: the ball's marker, "" without.
+        held: (N, 3) metres, that marker in the hand's frame while the ball is held; N is 0 where it is not visible.
         notes: messages for people.
     """
 
@@ -113,9 +110,9 @@ class Release:
     position: np.ndarray
     velocity: np.ndarray
     spin: np.ndarray
-    time_sigma: float
-    speed_sigma: float
-    direction_sigma: float
+    time_margin: float
+    speed_margin: float
+    direction_margin: float
     side: str
     method: str
     residual: float
@@ -126,6 +123,8 @@ class Release:
     path: BallPath
     impact: np.ndarray | None
     hips: np.ndarray
+    ball_label: str = ""
+    held: np.ndarray = field(default_factory=lambda: np.zeros((0, 3)))
     notes: tuple[str, ...] = ()
 
     @property
@@ -141,8 +140,8 @@ class Release:
     def report(self) -> dict:
         """Return the figures of the release, as values for JSON."""
         return {"release_time_s": self.time, "release_frame": self.frame, "speed_m_s": self.speed,
-                "direction": self.direction.tolist(), "uncertainty_s": self.time_sigma,
-                "uncertainty_m_s": self.speed_sigma, "uncertainty_deg": float(np.degrees(self.direction_sigma)),
+                "direction": self.direction.tolist(), "uncertainty_s": self.time_margin,
+                "uncertainty_m_s": self.speed_margin, "uncertainty_deg": float(np.degrees(self.direction_margin)),
                 "radar_speed_m_s": self.radar,
                 "against_radar": None if self.radar is None else self.speed / self.radar - 1.0,
                 "position_m": self.position.tolist(), "spin_rad_s": self.spin.tolist(), "hand": self.side,
@@ -179,7 +178,6 @@ def estimate_release(trial: MarkerTrial, motion: Motion, settings: ReleaseSettin
     balls = tuple(name for name in even_trial.labels if name == label or _BALL_LABEL.match(name))
     hands = [refine_hand(build_hand(motion, side), even_trial, balls) for side in sides]
     hand = _choose_hand(hands, marker)
-    _check_hand_speed(hand, even_trial.name)
     hand_ball, notes = _locate_ball(hand, marker, settings, ball)
     notes += even_trial.notes[len(trial.notes) :]
     launch = None
@@ -187,9 +185,14 @@ def estimate_release(trial: MarkerTrial, motion: Motion, settings: ReleaseSettin
         launch = _fit_ball_launch(hand, marker, hand_ball, ball=ball, settings=settings, notes=notes)
         launch = _check_launch(launch, hand, marker, label=label, radius=hand_ball.radius, settings=settings,
                                name=even_trial.name, notes=notes)
-    launch = launch or _estimate_hand_launch(hand, motion, hand_ball, ball, notes)
+    if launch is None:
+        check_throw(hand, [other for other in hands if other is not hand], _find_hips(motion), even_trial.name)
+        launch = _estimate_hand_launch(hand, motion, hand_ball, ball, notes)
     seen = np.zeros(len(hand), bool) if marker is None else np.isfinite(marker).all(axis=-1)
-    return _build_release(launch, hand, motion, hand_ball=hand_ball, seen=seen, name=even_trial.name, notes=notes)
+    release = _build_release(launch, hand, motion, hand_ball=hand_ball, seen=seen, name=even_trial.name, notes=notes)
+    if label is None or launch.method != "ball":
+        return release
+    return replace(release, ball_label=label, held=hand.to_hand(marker)[_find_held_frames(hand, marker)])
 
 
 def _check_launch(launch: _FittedLaunch | None, hand: Hand, marker, label, radius, settings: ReleaseSettings, name: str,
@@ -213,14 +216,6 @@ def _check_launch(launch: _FittedLaunch | None, hand: Hand, marker, label, radiu
         raise InputError(name, finding, "a marker on the ball in that hand", "check the marker and the hand")
     notes.append(f"{finding}: the release is estimated from the hand alone")
     return None
-
-
-def _check_hand_speed(hand: Hand, name: str) -> None:
-    """Raise InputError if the hand is never fast enough for a throw."""
-    speed = float(np.max(compute_steady_speeds(hand.origin, hand.fps)))
-    if speed < MIN_HAND_SPEED:
-        raise InputError(name, f"a {hand.side} hand of at most {speed:.1f} m/s", "a throw",
-                         "choose another trial, or the other hand")
 
 
 def _check_same_place(trial: MarkerTrial, motion: Motion) -> None:
@@ -257,9 +252,9 @@ class _FittedLaunch:
     launch: Launch
     ball: Ball
     method: str
-    time_sigma: float
-    speed_sigma: float
-    direction_sigma: float
+    time_margin: float
+    speed_margin: float
+    direction_margin: float
     residual: float = float("nan")
     frames: int = 0
     circle: float = 0.0
@@ -274,13 +269,19 @@ def _build_release(fitted: _FittedLaunch, hand: Hand, motion: Motion, hand_ball:
     places = place_ball(shifted_hand, hand_ball.centre, launch, fitted.ball, ground)
     flight = simulate_flight(launch, fitted.ball, _MAX_FLIGHT, ground)
     impact = flight.at(flight.bounces[:1])[0] - [0.0, 0.0, fitted.ball.radius] if len(flight.bounces) else None
-    hips = forward_kinematics(motion.frames(0, 1))[0][0, identify_joints(motion.skeleton).hips]
+    hips = _find_hips(motion.frames(0, 1))[0]
     return Release(time=launch.time, frame=int(np.clip(round(launch.time * hand.fps), 0, len(hand) - 1)),
                    position=launch.position, velocity=launch.velocity, spin=np.asarray(launch.spin, float),
-                   time_sigma=fitted.time_sigma, speed_sigma=fitted.speed_sigma, direction_sigma=fitted.direction_sigma,
-                   side=hand.side, method=fitted.method, residual=fitted.residual, flight_frames=fitted.frames,
+                   time_margin=fitted.time_margin, speed_margin=fitted.speed_margin,
+                   direction_margin=fitted.direction_margin, side=hand.side, method=fitted.method,
+                   residual=fitted.residual, flight_frames=fitted.frames,
                    radar=parse_radar_speed(name), centre=hand_ball.centre, radius=hand_ball.radius,
                    path=BallPath(hand.times, places, seen), impact=impact, hips=hips, notes=tuple(notes))  # fmt: skip
+
+
+def _find_hips(motion: Motion) -> np.ndarray:
+    """Find the hips in all frames, (T, 3) metres."""
+    return forward_kinematics(motion)[0][:, identify_joints(motion.skeleton).hips]
 
 
 def _match_frames(trial: MarkerTrial, motion: Motion) -> Motion:
@@ -329,11 +330,16 @@ def _measure_distance(hand: Hand, marker: np.ndarray, peak: int) -> float:
     return float(np.median(away)) if len(away) >= 3 else np.inf
 
 
-def _locate_ball(hand: Hand, marker, settings: ReleaseSettings, ball: Ball) -> tuple[HandBall, list[str]]:
-    """Estimate where the ball lies in the hand; return it with messages."""
+def estimate_usual_place(hand: Hand) -> np.ndarray:
+    """Estimate where balls usually lie in a hand, (3,) metres in its frame."""
     # direction out of the palm at rest: downwards if the rest pose spreads the arms, else unknown
     palm = np.array([0.0, 0.0, -1.0]) if abs(hand.finger[1]) > 0.9 else None
-    usual_place = estimate_ball_centre(hand.finger, hand.reach, palm)
+    return estimate_ball_centre(hand.finger, hand.reach, palm)
+
+
+def _locate_ball(hand: Hand, marker, settings: ReleaseSettings, ball: Ball) -> tuple[HandBall, list[str]]:
+    """Estimate where the ball lies in the hand; return it with messages."""
+    usual_place = estimate_usual_place(hand)
     radius = settings.radius or ball.radius
     if settings.centre is not None:
         return HandBall(np.array(settings.centre, float), radius, 0.005), []
@@ -384,9 +390,12 @@ def _fit_ball_launch(hand: Hand, marker, hand_ball: HandBall, ball: Ball, settin
     launch = Launch(fit.time, fit.position, fit.velocity, fit.spin)
     air = float(np.linalg.norm(fits[0][0].velocity - fits[1][0].velocity))
     speed_sigma = float(np.hypot(fit.speed_sigma, _AIR_UNCERTAINTY * air))
-    way_sigma = speed_sigma / max(float(np.linalg.norm(fit.velocity)), 1e-9)
-    return _FittedLaunch(launch=launch, ball=ball, method="ball", time_sigma=fit.time_sigma, speed_sigma=speed_sigma,
-                         direction_sigma=way_sigma, residual=fit.residual, frames=fit.frames, circle=fit.circle)
+    angle_sigma = speed_sigma / max(float(np.linalg.norm(fit.velocity)), 1e-9)
+    # the marker shows when the ball begins to move against the hand; it rolls along the fingers before it leaves
+    time_margin = float(np.hypot(_INTERVAL_90 * fit.time_sigma, _ROLL_SHARE * measure_roll_time(hand, fit.time)))
+    return _FittedLaunch(launch=launch, ball=ball, method="ball", time_margin=time_margin,
+                         speed_margin=_INTERVAL_90 * speed_sigma, direction_margin=_CONE_90 * angle_sigma,
+                         residual=fit.residual, frames=fit.frames, circle=fit.circle)
 
 
 def _estimate_hand_launch(hand: Hand, motion: Motion, hand_ball: HandBall, ball: Ball, notes) -> _FittedLaunch:
@@ -395,8 +404,8 @@ def _estimate_hand_launch(hand: Hand, motion: Motion, hand_ball: HandBall, ball:
     if not hand.markers:
         notes.append("no markers near the hand: only the filtered motion is used, so the speed comes out too low")
     launch = Launch(hand_release.time, hand_release.position, hand_release.velocity)
-    return _FittedLaunch(launch=launch, ball=ball, method="hand", time_sigma=hand_release.time_sigma,
-                         speed_sigma=hand_release.speed_sigma, direction_sigma=hand_release.direction_sigma)
+    return _FittedLaunch(launch=launch, ball=ball, method="hand", time_margin=hand_release.time_margin,
+                         speed_margin=hand_release.speed_margin, direction_margin=hand_release.direction_margin)
 
 
 def _compute_stride(motion: Motion) -> np.ndarray:
@@ -404,26 +413,3 @@ def _compute_stride(motion: Motion) -> np.ndarray:
     body = identify_joints(motion.skeleton)
     places, _ = forward_kinematics(motion)
     return places[:, body.left.foot, :2] - places[:, body.right.foot, :2]
-
-
-def parse_radar_speed(name: str) -> float | None:
-    """Parse a measured speed from a file name.
-
-    `000000_000000_74_195_002_FF_808` is a pitch of 80.8 mph; `throw_130kmh`, `throw-36.1mps`, `ff_81mph` contain a
-    unit.
-
-    Args:
-        name: the file name without its ending.
-    Returns:
-        m/s; None where there is no clear speed, or two different ones.
-    """
-    pitch = _PITCH.match(name)
-    if pitch:
-        return _limit_to_throws(int(pitch[1]) / 10.0 * MPH)
-    speeds = {round(float(re.sub("[,p]", ".", number.lower())) * _UNITS[unit.lower().replace("-", "_")], 6) for number,
-              unit in _WITH_UNIT.findall(name)}
-    return _limit_to_throws(speeds.pop()) if len(speeds) == 1 else None
-
-
-def _limit_to_throws(speed: float) -> float | None:
-    return speed if MIN_THROW_SPEED <= speed <= MAX_THROW_SPEED else None

@@ -14,11 +14,11 @@ from ...base.errors import InputError
 from ...base.time_series import interpolate_columns
 from ...motion import quaternion
 from ...motion.motion import Motion, forward_kinematics
+from .bent_fingers import FingerRoll, roll_ball
 from .synthetic_body import compute_size
 
 GRAVITY = 9.81  # m/s^2
 _GRIP = (0.012, 0.105, -0.036)  # m, of a left hand in a T-pose: between the fingers, on the palm's side
-_MARKER = (0.25, 0.15, -0.95)  # direction of the marker from the centre of a held ball
 _STEP = 1e-3  # s, step of flights with air drag
 
 
@@ -35,6 +35,8 @@ class BallRequest:
         drag: 1/m, see `ball.physics`.
         label: of the marker.
         grip: (3,) m, the ball's centre in the hand's axes of a T-pose; None: as a hand holds it.
+        outward: direction of the marker from the centre of a held ball, in a left hand's axes of a T-pose.
+        roll: how the ball rolls out over bent fingers, instead of leaving a rigid grip; None: it does not.
     """
 
     release: float
@@ -45,6 +47,8 @@ class BallRequest:
     drag: float = 0.0
     label: str = "BALL"
     grip: tuple[float, float, float] | None = None
+    outward: tuple[float, float, float] = (0.25, 0.15, -0.95)
+    roll: FingerRoll | None = None
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -96,10 +100,13 @@ def build_ball(truth: Motion, request: BallRequest) -> BallTruth:
     grip = np.array(request.grip) if request.grip is not None else _GRIP * side_sign * compute_size(truth.skeleton)
     positions, turns = (rows[:, hand] for rows in forward_kinematics(truth))
     held = positions + quaternion.rotate(turns, grip)
-    outward = np.array(_MARKER) * side_sign
+    outward = np.array(request.outward) * side_sign
     outward = request.radius * outward / np.linalg.norm(outward)
     times = np.arange(len(truth)) / truth.fps
     position, velocity, turn = _find_release(times, held, turns, request.release)
+    if request.roll is not None:
+        held, position, velocity = roll_ball(times, positions, turns, request.roll, release=request.release,
+                                             radius=request.radius, side=side_sign)
     spin = 2.0 * np.pi * request.spin_rate * _find_backspin_axis(velocity)
     after = np.maximum(times - request.release, 0.0)
     flight = _simulate_flight(position, velocity, after, request.drag)

@@ -119,6 +119,22 @@ def test_samples_that_jump_are_taken_out_and_filled(walk, frames):
     assert off(walk, cleaned, "RTIB").max() < 0.005
 
 
+def test_noise_of_millimetres_is_left_as_it_is():
+    """In a run, cameras and skin move single samples by 6 to 9 mm; a jump of 4 cm is found among them."""
+    run = build_trial(build_gait(5.0, 2.0, fps=200.0), "sprinter", seed=3)
+
+    def shake(positions, index):
+        shaken_markers = np.resize([index[label] for label in ("LTOE", "RTHAD", "LPAT", "C7")], 14)
+        positions[np.arange(60, 340, 20), shaken_markers] += [0.0, 0.0, 0.007]
+        positions[205, index["RTIAD"]] += [0.03, 0.0, -0.03]
+
+    shaken = spoiled(run, shake)
+    cleaned, report = clean_trial(shaken, clusters_of(run))
+    assert [(jump.labels, jump.frames) for jump in report.jumps] == [(("RTIAD",), 1)]
+    changed = np.argwhere((cleaned.positions != shaken.positions).any(axis=-1))
+    assert changed.tolist() == [[205, shaken.index_of("RTIAD")]]
+
+
 def test_gaps_ride_on_the_cluster_without_a_jump_at_either_end(walk):
     def hide(positions, index):
         positions[60:140, index["LFHD"]] = np.nan

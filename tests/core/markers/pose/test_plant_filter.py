@@ -6,7 +6,13 @@ import numpy as np
 import pytest
 
 from beyond_mocap.base.errors import InputError
-from beyond_mocap.markers.pose.plant_filter import detect_contacts, filter_foot_plants
+from beyond_mocap.markers.pose.plant_filter import (
+    compute_hold_shift,
+    detect_contacts,
+    detect_stances,
+    filter_foot_plants,
+)
+from beyond_mocap.motion.contacts import detect_heel_toe_contacts
 from beyond_mocap.motion.humanoid import identify_joints
 from beyond_mocap.motion.motion import Motion, compute_pose
 from beyond_mocap.synthetic.gait import build_gait
@@ -52,10 +58,32 @@ def test_bones_keep_their_length_and_the_rest_of_the_body_its_pose(standing):
     assert not np.array_equal(out.rotations[:, legs], before.rotations[:, legs])
 
 
-def test_a_walk_whose_stances_are_shorter_than_the_window_stays_as_it_is():
-    walk = build_gait(1.4, 3.0, FPS)
-    out = filter_foot_plants(walk, window=1.5)
-    assert not out.held.any() and np.array_equal(out.motion.rotations, walk.rotations)
+@pytest.mark.parametrize("speed", [1.4, 7.0])
+def test_short_stances_of_a_gait_are_held(speed):
+    """A sprinter's stance lasts 0.1 s, a fifth of the source's window."""
+    gait = floating(build_gait(speed, 3.0, FPS), 0.01, 2.0)
+    out = filter_foot_plants(gait)
+    toes = detect_heel_toe_contacts(gait)[..., 1]
+    before, after = (np.median(np.linalg.norm(np.gradient(feet(m)[:, :, 1, :2], axis=0), axis=-1)[toes])
+                     for m in (gait, out.motion))
+    assert toes.mean() > 0.15 and after < 0.4 * before
+    assert np.percentile(out.ankle_shift, 95) < 0.02 and out.miss.max() < 0.01
+
+
+def test_a_heel_that_rises_over_standing_toes_is_not_held():
+    rising = np.zeros((60, 3))
+    rising[:, 0] = 1.0 * np.arange(60) / FPS  # a sprinter's ankle moves at 1 m/s while the toes stand
+    low = np.ones(60, bool)
+    assert detect_stances(rising, low, FPS, 0.3, 0.012) == []
+    assert detect_stances(0.1 * rising, low, FPS, 0.3, 0.025) == [(0, 60)]
+
+
+def test_a_foot_in_flight_is_not_pulled_to_where_it_will_stand():
+    place = np.zeros((100, 3))
+    place[:50, 0] = -9.0 * np.arange(50, 0, -1) / FPS  # flies in at 9 m/s, then stands 4 mm off its mean
+    place[50:75, 0] = 0.004
+    shift, _ = compute_hold_shift(place, [(50, 100)], 20)
+    assert np.abs(shift).max() < 0.004
 
 
 def test_it_comes_and_goes_without_a_jump():

@@ -37,7 +37,7 @@ def test_half_the_frames_tell_the_same(known):
     whole, part = (estimate_hand_release(build_hand(motion, "right"), 0.0366) for motion in (known.motion, half))
     assert abs(whole.time - part.time) < 0.006
     assert abs(np.linalg.norm(whole.velocity) / np.linalg.norm(part.velocity) - 1.0) < 0.04
-    assert whole.speed_sigma > 0.0 and whole.direction_sigma > 0.0
+    assert whole.speed_margin > 0.0 and whole.direction_margin > 0.0
 
 
 def test_without_markers_the_motion_stays(known):

@@ -2,7 +2,7 @@
 
 import pytest
 
-from beyond_mocap.markers.release.release import parse_radar_speed
+from beyond_mocap.markers.release.radar_speed import parse_radar_speed
 
 
 @pytest.mark.parametrize("name, speed", [

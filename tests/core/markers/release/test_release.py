@@ -42,9 +42,9 @@ def test_planted_throws_come_back(arm, fps, speed, drag):
 def test_without_a_marker_the_hand_tells(known):
     found = estimate_release(known.trial, known.motion, ReleaseSettings(ball_marker=""))
     assert (found.side, found.method) == ("right", "hand")
-    assert abs(found.time - known.ball.request.release) < 3.0 * max(found.time_sigma, 0.01)
+    assert abs(found.time - known.ball.request.release) < 3.0 * max(found.time_margin, 0.01)
     assert abs(found.speed / known.ball.speed - 1.0) < 0.1
-    assert found.speed_sigma > 0.5 and np.isnan(found.residual)
+    assert found.speed_margin > 0.5 and np.isnan(found.residual)
     assert found.report()["residual_m"] is None
 
 
