@@ -112,7 +112,9 @@ def run_synthesize(options, reporter: ProgressReporter, writers: Mapping[str, Wr
     for line in (*take_warnings, *(f"{options.track}: {line}" for line in data.lines)):
         reporter.show_note(line)
     if options.ball and ball is None:
-        reporter.show_note(f"{options.track} has no ball, so {options.ball} is not written")
+        hint = "" if options.recorded_ball else "; --recorded-ball takes that of the recordings"
+        hint = hint if any(clip.ball is not None for clip in library.clips) else ""
+        reporter.show_note(f"{options.track} has no ball, so {options.ball} is not written{hint}")
     print(f"{options.out}: {frames} frames, {(frames - 1) / options.fps:.1f} s")
 
 
@@ -124,10 +126,10 @@ def _choose_window(options, track) -> float:
             free.
     """
     seconds, window = float(track.times[-1] - track.times[0]), options.window
-    can_be_cut = options.method == "path" and options.out.suffix.lower() == ".bvh"
+    can_be_cut = options.method == "path" and options.out.suffix.lower() == ".bvh" and not options.recorded_ball
     if window and not can_be_cut:
-        raise InputError("--window", f"method {options.method} to {options.out.suffix}", "method path to .bvh",
-                         "leave it out")
+        found = f"method {options.method} to {options.out.suffix}" + " with --recorded-ball" * options.recorded_ball
+        raise InputError("--window", found, "method path to .bvh, without --recorded-ball", "leave it out")
     if window is None:
         window = WINDOW if can_be_cut and seconds > LONG_TRACK else 0.0
     if not window:
