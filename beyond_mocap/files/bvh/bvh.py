@@ -30,10 +30,9 @@ from . import bvh_text
 from .bvh_ball import find_ball_joints, list_body_joints, read_ball_joint
 from .bvh_channels import BvhChannels, compute_rotations, from_file_axes
 from .bvh_text import POSITIONS, BvhText
-from .bvh_write import BvhForm, JointAboveHips, format_bvh, iter_parts_text
+from .bvh_write import BvhForm, JointAboveHips, format_bvh, iter_parts_text, moves
 
 _STILL_METRES = 1e-3  # smaller motion counts as none
-_STILL_ROTATION = np.cos(np.radians(0.1) / 2)  # w of a rotation by a tenth of a degree
 _LARGEST_METRES = 1e6  # larger positions are in a wrong unit or damaged
 _NTSC = [rate * 1000 / 1001 for rate in (24, 30, 48, 60, 120, 240)]  # frames per second
 _HIP_HEIGHT = (0.75, 1.15)  # metres, adults standing
@@ -190,11 +189,10 @@ def _fold_root(channels: BvhChannels, hips: int) -> tuple[np.ndarray, np.ndarray
         place, local_rotation = channels.compute_position(joint), channels.compute_rotation(joint).T
         position, rotation = quaternion.rotate(local_rotation, position) + place, quaternion.multiply(local_rotation,
                 rotation)
-        moves = _measure_spread(place) > _STILL_METRES or np.abs(local_rotation
-                                                                 @ local_rotation[0]).min() < _STILL_ROTATION
         carries = fixed if joint == parents[hips] else None
         name, channel_names = channels.text.names[joint], channels.text.channels[joint]
-        above.insert(0, JointAboveHips(name=name, channels=channel_names, is_moving=bool(moves), position=place[0],
+        is_moving = moves(place, local_rotation)
+        above.insert(0, JointAboveHips(name=name, channels=channel_names, is_moving=is_moving, position=place[0],
                                        rotation=local_rotation[0], hip_offset=carries))
         joint = parents[joint]
     return position, rotation, tuple(above)

@@ -98,3 +98,24 @@ def test_batch_needs_no_installed_extension(tmp_path, arguments, status):
     done = subprocess.run(command, cwd=tmp_path, env=environment, capture_output=True, text=True, timeout=120)
     assert done.returncode == status, done.stderr
     assert ("missing.bvh" in done.stderr) == (status == 2) and "Traceback" not in done.stderr
+
+
+def test_foreign_recordings_are_converted_first(run, extension, library_folder, tmp_path, capfd):
+    bvh = importlib.import_module(f"{extension.__name__}.beyond_mocap.files.bvh.bvh")
+    rigs = importlib.import_module(f"{extension.__name__}.scene.rigs.armature")
+    action = importlib.import_module(f"{extension.__name__}.scene.core.action")
+    source = next(path for path in sorted(library_folder.rglob("*.bvh")) if path.with_suffix(".txt").is_file())
+    motion, folder = bvh.read_bvh(source).motion, tmp_path / "library"
+    folder.mkdir()
+    bpy.context.scene.render.fps = round(motion.fps)
+    rig = rigs.create_armature(bpy.context, motion.skeleton, "Somebody")
+    action.write_motion(rig, motion, bpy.context.scene, 1.0)
+    bpy.context.scene.frame_end = len(motion)
+    bpy.ops.export_scene.gltf(filepath=str(folder / "walk.glb"), export_format="GLB")
+    (folder / "walk.txt").write_text("0 1 walking\n")
+    (folder / "broken.fbx").write_bytes(b"no FBX")
+    assert run(["library", str(folder), "--cache", str(tmp_path / "cache")]) == 0
+    told = capfd.readouterr()
+    assert "1 clip" in told.out and "skipped:" in told.err and "Traceback" not in told.err
+    assert (tmp_path / "cache/converted/walk.glb.bvh").is_file() and not (folder / ".beyond_mocap").exists()
+    assert run(["library", str(tmp_path / "nowhere")]) == 2
