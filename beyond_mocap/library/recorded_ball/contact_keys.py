@@ -16,6 +16,7 @@ from ...motion.track import BALL_RADIUS
 
 _KEY_SECONDS = 0.4  # by which an annotated key moment may be off its contact
 _REACH = 0.15  # m between ball and part at a contact: a ball's marker lies on its surface, a skeleton has no skin
+_RELEASE = 0.02  # s by which a release is found too late: the hand follows the ball; a key moment so near stays
 _CHANGE_SECONDS = 0.03  # before and after a contact over which the ball's velocity is measured
 _CHANGE = 1.0  # m/s by which a contact changes the ball's velocity
 _BOUNCE_HEIGHT, _BOUNCE_SHARE = 0.05, 0.4  # m above rest, and level share of the change, of a ball that only bounces
@@ -44,7 +45,7 @@ def find_contact_frame(motion: Motion, ball: np.ndarray, row: ClipAnnotation) ->
     gap = measure_contact_gap(part.skeleton, *pose, row.words, ball[first:last])
     is_near = np.nan_to_num(gap, nan=np.inf) <= _REACH
     if comes_from_hands(row.words):
-        frames = [float(end - 1) for _, end in find_runs(is_near) if end < len(gap)]
+        frames = [_find_release(gap, *run) for run in find_runs(is_near) if run[1] < len(gap)]
     else:
         frames = [frame for frame in _find_course_changes(ball[first:last], width, motion.fps)
                   if is_near[max(0, round(frame) - width) : round(frame) + width + 1].any()]
@@ -52,7 +53,17 @@ def find_contact_frame(motion: Motion, ball: np.ndarray, row: ClipAnnotation) ->
     if row.start == row.end:  # a key moment without a span
         low, high = row.key - reach, row.key + reach
     found = [first + frame for frame in frames if low <= first + frame <= high]
-    return min(found, key=lambda frame: abs(frame - row.key), default=None)
+    frame = min(found, key=lambda frame: abs(frame - row.key), default=None)
+    is_late = frame is not None and comes_from_hands(row.words) and abs(frame - row.key) <= _RELEASE * motion.fps
+    return row.key if is_late else frame
+
+
+def _find_release(gap: np.ndarray, start: int, end: int) -> float:
+    """Find the frame, fractional, at which a ball leaves a hand that has been near in frames start .. end - 1, from
+    gaps (N,) m: where the growing gap, taken back, is as it was while the ball was held.
+    """
+    grown, rate = gap[end - 1] - np.median(gap[start:end]), gap[end] - gap[end - 1]
+    return float(np.clip(end - 1 - max(grown, 0.0) / max(rate, 1e-6), start, end - 1))
 
 
 def _find_course_changes(ball: np.ndarray, width: int, fps: float) -> list[float]:
