@@ -121,18 +121,19 @@ def write_bvh(path, motion: Motion, form: BvhForm | None = None) -> tuple[str, .
     return notes
 
 
-def write_bvh_parts(path, parts: Iterable[Motion], count: int) -> None:
+def write_bvh_parts(path, parts: Iterable[Motion], count: int, form: BvhForm | None = None) -> None:
     """Write a motion that comes in parts as BVH, as `write_bvh` writes the whole.
 
     Args:
         path: the file.
         parts: of one skeleton and rate, in order.
         count: frames of all parts.
+        form: as for `write_bvh`.
     Raises:
         InputError: if the folder is not writable.
     """
     with atomic_path(path) as temporary, open(temporary, "w", encoding="utf-8", newline="\n") as file:
-        file.writelines(iter_parts_text(parts, count))
+        file.writelines(iter_parts_text(parts, count, form or BvhForm()))
 
 
 class BvhRows:

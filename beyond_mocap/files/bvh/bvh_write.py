@@ -130,10 +130,10 @@ def format_bvh(motion: Motion, form: BvhForm) -> tuple[Iterator[str], tuple[str,
     return chain(_iter_head(joints, len(motion), motion.fps), _iter_rows(joints)), notes
 
 
-def iter_parts_text(parts: Iterable[Motion], count: int) -> Iterator[str]:
+def iter_parts_text(parts: Iterable[Motion], count: int, form: BvhForm) -> Iterator[str]:
     """Format a motion that comes in parts, of `count` frames in all, as BVH: the text in pieces."""
     for number, part in enumerate(parts):
-        joints = _build_joints(part, BvhForm())
+        joints = _build_joints(part, form)
         if not number:
             yield from _iter_head(joints, count, part.fps)
         yield from _iter_rows(joints)

@@ -6,6 +6,7 @@ import subprocess
 import sys
 
 import bpy
+import numpy as np
 import pytest
 
 TOP = pathlib.Path(__file__).resolve().parents[3]
@@ -119,3 +120,27 @@ def test_foreign_recordings_are_converted_first(run, extension, library_folder, 
     assert "1 clip" in told.out and "skipped:" in told.err and "Traceback" not in told.err
     assert (tmp_path / "cache/converted/walk.glb.bvh").is_file() and not (folder / ".beyond_mocap").exists()
     assert run(["library", str(tmp_path / "nowhere")]) == 2
+
+
+def test_a_root_above_the_hips_comes_back_in_every_form(run, extension, order, library_folder, tmp_path):
+    bvh, form = (importlib.import_module(f"{extension.__name__}.beyond_mocap.files.bvh.{name}")
+                 for name in ("bvh", "bvh_write"))
+    kinematics = importlib.import_module(f"{extension.__name__}.beyond_mocap.motion.motion").forward_kinematics
+    foreign = importlib.import_module(f"{extension.__name__}.scene.library.foreign")
+    root = form.JointAboveHips(name="World", channels=(), is_moving=False, position=np.array([0.0, 0.5, 0.0]),
+                               rotation=np.array([1.0, 0.0, 0.0, 0.0]))
+    folder = tmp_path / "library"
+    folder.mkdir()
+    for source in sorted(library_folder.rglob("*.bvh")):
+        bvh.write_bvh(folder / source.name, bvh.read_bvh(source).motion, form.BvhForm(above=(root,)))
+        if source.with_suffix(".txt").is_file():
+            (folder / source.with_suffix(".txt").name).write_bytes(source.with_suffix(".txt").read_bytes())
+    order = ["synthesize", "--library", str(folder), *order[3:], "--keep-root"]
+    for suffix in (".bvh", ".fbx"):
+        assert run([*order, "--out", str(tmp_path / f"player{suffix}")]) == 0
+    plain = bvh.read_bvh(tmp_path / "player.bvh")
+    take = foreign.read_takes(tmp_path / "player.fbx")[0]
+    assert [joint.name for joint in plain.form.above] == ["World"] == [joint.name for joint in take.form.above]
+    assert np.allclose(take.form.above[0].position, root.position, atol=1e-4)
+    apart = kinematics(plain.motion)[0][:, 0] - kinematics(take.motion)[0][: len(plain.motion), 0]
+    assert np.abs(apart).max() < 2e-3
