@@ -7,6 +7,7 @@ units, rest pose and bone directions are. Bones above the hips, and a ball, are 
 
 from __future__ import annotations
 
+import re
 import tempfile
 from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
@@ -30,6 +31,7 @@ if TYPE_CHECKING:
     from ...beyond_mocap.files.bvh.bvh_write import BvhForm
 
 MIN_FPS, MAX_FPS = 24.0, 240.0  # limits of the frames per second at which keys are sampled
+_STILL = np.cos(np.radians(0.1) / 2)  # w of a rotation by a tenth of a degree
 _USD = (".usd", ".usda", ".usdc", ".usdz")
 
 
@@ -52,15 +54,17 @@ def read_takes(path: str | Path) -> list[ImportedTake]:
     with use_temporary_scene("Import") as scene:
         scene.render.fps_base = 1.0
         scene.render.fps = 30 if path.suffix.lower() not in _USD else _read_usd_rate(path)
+        before = {action.name for action in bpy.data.actions}
         _import_file(path)
         rig = _find_largest_rig(path, scene)
         balls = _keep_balls(scene, rig)
         actions = _collect_actions(rig)
+        actions += [one for one in _find_loose_actions(rig, before) if one not in actions]
         if not actions:
             raise InputError(path, f"armature {rig.name} is not animated", "an animation",
                              "export it with its animation")
         takes = [_sample_action(path, scene, rig, action, slot, balls=balls) for action, slot in actions]
-    takes = [take for take in takes if len(take.motion) > 1]
+    takes = [take for take in takes if len(take.motion) > 1 and _has_moving_joints(take.motion)]
     if not takes:
         raise InputError(path, "an armature that does not move", "an animation of at least two frames")
     return sorted(takes, key=lambda take: -take.motion.duration)
@@ -222,6 +226,27 @@ def _collect_actions(item: bpy.types.Object) -> list[tuple[bpy.types.Action, obj
                     found.setdefault(strip.action.name, (strip.action, strip.action_slot))
             track.mute = True
     return list(found.values())
+
+
+def _find_loose_actions(rig: bpy.types.Object, before: set[str]) -> list[tuple[bpy.types.Action, object]]:
+    """Find the imported actions of an armature that nothing plays, with their slots: of several in an FBX file Blender
+    assigns one.
+
+    before: names of the actions before the import.
+    """
+    names = {rig.name, re.sub(r"\.\d{3}$", "", rig.name)}  # a number is added where the name is taken
+    found = []
+    for action in bpy.data.actions:
+        slots = [slot for slot in action.slots if slot.identifier[2:] in names
+                 or any(action.name.startswith(f"{name}|") for name in names)] if action.name not in before else []
+        found += [(action, slot) for slot in slots[:1]
+                  if any(path.startswith("pose.bones") for path, _ in channels.collect_curves(action, slot))]
+    return found
+
+
+def _has_moving_joints(motion: Motion) -> bool:
+    """Whether any joint turns: exporters also write each object's animation onto all others."""
+    return bool(np.abs(np.sum(motion.rotations * motion.rotations[:1], axis=-1)).min() < _STILL)
 
 
 def _sample_action(path: Path, scene: bpy.types.Scene, rig: bpy.types.Object, action, slot, *,
