@@ -2,7 +2,8 @@
 
 Where a body part touches the ball in the clip, the ball is at the same part of the synthesized body. Between two
 touches, as in a dribble, the ball moves as in the clip, placed by both touches and led from one to the other; before
-the first and after the last it keeps that touch's placement, so a kicked ball flies as it was recorded.
+the first and after the last it keeps that touch's placement, so a kicked ball flies as it was recorded, also while the
+body goes on with another clip.
 """
 
 from __future__ import annotations
@@ -30,6 +31,7 @@ _JUMP = 1.0  # m between two clips' balls from which on they are not joined
 _TOUCH, _NEAR = 0.03, 0.15  # m between part and ball: always a touch; a touch where it is nearest
 _FARTHEST = 1.5  # m from the body at its nearest: a ball that takes no part in what is shown
 _LIFTED = 0.3  # m above rest from which on a ball is as much higher or lower as the part that touches it
+_FREE_SECONDS = 3.0  # for which a ball moves on as recorded, beyond the piece that shows its clip
 _JOIN_SECONDS = 0.3  # before and after a transition over which two clips' balls are joined
 
 
@@ -41,15 +43,32 @@ def carry_recorded_ball(library: Library, source: SourceFrames, motion: Motion) 
         source: what T output frames show.
         motion: T frames on the pitch.
     Returns:
-        (T, 3) m, the ball's centre; NaN where the clip has none, or none near its body.
+        (T, 3) m, the ball's centre; NaN where it is not known.
     """
-    ball = np.full((len(motion), 3), np.nan)
     edges = [0, *source.transitions.tolist(), len(motion)]
+    ball, reach, free = np.full((len(motion), 3), np.nan), int(round(_FREE_SECONDS * motion.fps)), 0
     for start, end in zip(edges, edges[1:]):
         clip = library.clips[source.clip[start]]
-        if clip.ball is not None:
-            ball[start:end] = _carry_piece(clip, source.clip_frame[start:end], motion.frames(start, end))
+        if clip.ball is None:
+            continue
+        window = slice(min(max(free, start - reach), start), min(len(motion), end + reach))
+        clip_frame = _extend_frames(source.clip_frame[start:end], start - window.start, window.stop - end)
+        carried = _carry_piece(clip, clip_frame, motion.frames(window.start, window.stop),
+                               shown=slice(start - window.start, end - window.start))
+        known = np.flatnonzero(np.isfinite(carried[:, 0]))
+        if len(known):  # the ball of the pieces before gives way
+            ball[start:] = np.nan
+            ball[window][known] = carried[known]
+            free = window.start + int(known[-1]) + 2  # a frame without a ball lies between two that do not meet
     return _join_pieces(ball, edges, int(round(_JOIN_SECONDS * motion.fps)))
+
+
+def _extend_frames(clip_frame: np.ndarray, before: int, after: int) -> np.ndarray:
+    """Extend fractional clip frames (N,) by frames before and after, at the playback rates of both ends."""
+    rates = np.diff(clip_frame) if len(clip_frame) > 1 else np.ones(1)
+    first, last = rates[0], rates[-1]
+    return np.concatenate([clip_frame[0] + first * np.arange(-before, 0), clip_frame,
+                           clip_frame[-1] + last * np.arange(1, after + 1)])
 
 
 def build_ball_path(library: Library, plan: Plan, track: SampledTrack, *, source: SourceFrames, motion: Motion,
@@ -92,15 +111,29 @@ def _find_jumps(ball: np.ndarray, transitions: Sequence[int]) -> list[int]:
     return [edge for edge in transitions if np.linalg.norm(ball[edge] - ball[edge - 1]) > _JUMP]
 
 
-def _carry_piece(clip: Clip, clip_frame: np.ndarray, motion: Motion) -> np.ndarray:
-    """Carry the ball (N, 3) m of one clip through one piece, at its fractional frames (N,)."""
+def _carry_piece(clip: Clip, clip_frame: np.ndarray, motion: Motion, shown: slice) -> np.ndarray:
+    """Carry the ball of one clip through one piece, and on until the clip's body touches it again.
+
+    Args:
+        clip: a clip with a ball.
+        clip_frame: (N,) fractional frames of it, which need not lie within it.
+        motion: N frames.
+        shown: the frames of the piece that shows the clip.
+    Returns:
+        (N, 3) m, NaN where it is not known.
+    """
     recorded = interpolate_columns(clip_frame, np.arange(len(clip.ball)), clip.ball, fill_value=np.nan)
-    shown = Motion(motion.skeleton, *sample_frames(clip.motion, clip_frame), motion.fps)
-    gap, here, there = _find_nearest_parts(shown, motion, recorded)
-    touches = _find_touches(gap)
+    played = sample_frames(clip.motion, np.clip(clip_frame, 0, len(clip.motion) - 1))
+    body = Motion(motion.skeleton, *played, motion.fps)
+    gap, here, there = _find_nearest_parts(body, motion, recorded)
+    touches = shown.start + _find_touches(gap[shown])
     if not len(touches):
         return np.full_like(recorded, np.nan)
-    turn = compute_heading(motion) - compute_heading(shown)
+    others = _find_touches(gap)
+    first = max(others[others < shown.start], default=-1) + 1
+    last = min(others[others >= shown.stop], default=len(gap))
+    recorded[:first], recorded[last:] = np.nan, np.nan
+    turn = compute_heading(motion) - compute_heading(body)
     lift = (there - here)[:, 2] * np.clip((recorded[:, 2] - BALL_RADIUS) / _LIFTED, 0.0, 1.0)
 
     def place(touch: np.ndarray) -> np.ndarray:
