@@ -324,7 +324,7 @@ def add_to_library(result, name: str, options) -> list[str]:
     if _names_throw(options.words) and result.release is not None:
         key = result.release.frame / result.motion.fps
     ball, notes = trace_recorded_ball(result, on_floor=True)
-    return [*add_clip(options.add_to, name, result.place_on_floor(), options.words, key, ball), *notes]
+    return [*add_clip(options.add_to, name, result.place_on_floor(), options.words, key, ball=ball), *notes]
 
 
 def add_release(verbs):

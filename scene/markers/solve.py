@@ -187,7 +187,8 @@ def add_to_library(request: ReconstructionRequest, reconstruction: "Reconstructi
     throw = reconstruction.release is not None and any(word.startswith("throw") for word in request.words)
     key = reconstruction.release.time if throw else None
     ball, notes = trace_recorded_ball(reconstruction, on_floor=True)
-    lines = add_clip(request.add.parent, request.add.stem, reconstruction.place_on_floor(), request.words, key, ball)
+    lines = add_clip(request.add.parent, request.add.stem, reconstruction.place_on_floor(), request.words, key,
+                     ball=ball)
     return [*lines, *notes]
 
 

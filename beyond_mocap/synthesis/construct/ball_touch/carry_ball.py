@@ -56,7 +56,7 @@ def carry_recorded_ball(library: Library, source: SourceFrames, motion: Motion) 
         carried = _carry_piece(clip, clip_frame, motion.frames(window.start, window.stop),
                                shown=slice(start - window.start, end - window.start))
         known = np.flatnonzero(np.isfinite(carried[:, 0]))
-        if len(known):  # the ball of the pieces before gives way
+        if len(known):  # instead of the ball of the pieces before
             ball[start:] = np.nan
             ball[window][known] = carried[known]
             free = window.start + int(known[-1]) + 2  # a frame without a ball lies between two that do not meet
