@@ -9,10 +9,11 @@ from bpy.props import BoolProperty, EnumProperty, StringProperty
 from bpy_extras.io_utils import ExportHelper, ImportHelper
 
 from ..beyond_mocap.base.errors import InputError
+from ..beyond_mocap.base.fixes import Fix
 from ..beyond_mocap.files.bvh import bvh
 from ..scene.characters import player_character
-from ..scene.core import action, channels, take_record, window
-from ..scene.core.settings import find_active_player
+from ..scene.core import action, channels, session, take_record, window
+from ..scene.core.settings import find_active_player, to_absolute_path
 from ..scene.match import match_objects
 from ..scene.rigs import armature, bone_maps, driven, engine_files, export, exporters, fit, rig, rig_bake
 from .operator_base import BaseOperator, ExportOperator
@@ -255,6 +256,7 @@ stays unchanged"""
     own_rate: BoolProperty(name="Take Rate", default=False, description="Export at the frame rate of the take")
     deform_only: BoolProperty(name="Deform Bones Only", default=True, description="Leave out control bones")
     meshes: BoolProperty(name="Meshes", default=True, description="Also export the meshes that the armature moves")
+    keep_root: BoolProperty(name="Recorded Root", default=False, description=rig.KEEP_ROOT)
     needs = ("Synthesize and press Apply first, or select an armature that moves",
              lambda context: bool((settings := context.scene.beyond_mocap).players) or settings.rig.target is not None
              or any(one.type == "ARMATURE" for one in context.selected_objects))
@@ -262,7 +264,7 @@ stays unchanged"""
     def invoke(self, context, event):
         """Copy the panel's settings, then open the file browser."""
         settings = context.scene.beyond_mocap.rig
-        for name in ("format", "engine", "who", "root", "own_rate", "deform_only", "meshes"):
+        for name in ("format", "engine", "who", "root", "own_rate", "deform_only", "meshes", "keep_root"):
             setattr(self, name, getattr(settings, name))
         return super().invoke(context, event)
 
@@ -270,7 +272,8 @@ stays unchanged"""
         path = self.output_path()
         rigs = self.list_rigs(context)
         options = export.ExportOptions(path, self.format, self.engine, rate=self.find_rate(context), root=self.root,
-                                       deform_only=self.deform_only, meshes=self.meshes)
+                                       deform_only=self.deform_only, meshes=self.meshes,
+                                       above=self.read_root(context) if self.keep_root else ())
         for line in export.export_motion(context, rigs, options):
             self.report({"INFO"}, line)
         self.report({"INFO"}, f"Written: {path}")
@@ -290,6 +293,22 @@ stays unchanged"""
             return [player_character.find_shown_body(player)]
         active = context.object
         return [active] if active is not None and active.type == "ARMATURE" else []
+
+    def read_root(self, context) -> tuple:
+        """Read the joints above the hips in the library's recordings; InputError without a built library."""
+        from ..beyond_mocap.library.common_skeleton import read_joints_above_hips
+
+        settings = context.scene.beyond_mocap
+        unit = settings.library_unit or None
+        library = session.find_library(to_absolute_path(settings.library_folder), unit)
+        if library is None:
+            raise InputError("export", "no library is built, whose recordings have a root", "the library of step 1",
+                             "press Build Library, or switch Recorded Root off",
+                             fixes=(Fix("press", "beyond_mocap.build_library"),))
+        above = read_joints_above_hips(library, None, unit)
+        if not above:
+            self.report({"WARNING"}, "The library's recordings have no joint above the hips; none is added")
+        return above
 
     def find_rate(self, context) -> float | None:
         """Find the frame rate of the active player's take; None for the scene's."""

@@ -82,7 +82,7 @@ def draw_map(layout, rig) -> None:
 def draw_export(layout, rig) -> None:
     """Draw the export settings."""
     column = create_value_column(layout)
-    for name in ("format", "engine", "who", "own_rate", "deform_only", "meshes"):
+    for name in ("format", "engine", "who", "own_rate", "deform_only", "meshes", "keep_root"):
         column.prop(rig, name)
     row = layout.row()
     row.scale_y = 1.3

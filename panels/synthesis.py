@@ -90,7 +90,7 @@ def draw_settings(layout, settings) -> None:
     layout.prop(settings, "method")
     if settings.method == "distance":
         layout.prop(settings, "catch_up")
-    for name in ("solve_touches", "mirror", "nearest", "rate"):
+    for name in ("solve_touches", "recorded_ball", "mirror", "nearest", "rate"):
         layout.prop(settings, name)
     if body := draw_header(layout, "synthesis_tuning", "Fine-Tuning"):
         for name in settings.list_tuning():

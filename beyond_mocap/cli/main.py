@@ -14,6 +14,7 @@ import signal
 import sys
 import threading
 from collections.abc import Callable, Mapping
+from pathlib import Path
 
 from .. import __version__
 from ..base.content import is_waiting_for_pipe
@@ -36,6 +37,8 @@ VERBS = (add_library, add_synthesize, add_path, add_touches, add_stream, add_pas
 """Functions that add a verb, in the order of `--help`; each takes the sub-parsers and returns its parser."""
 IsolatedRunner = Callable[[list[str], Callable[[float, str], None], Callable[[], bool]], object]
 """Runs a command line in another process: (arguments, progress callback, cancellation callback)."""
+Converter = Callable[[Path, Path | None, ProgressReporter], None]
+"""Converts recordings of a library that only the host reads: (library, cache folder or None for its own, reporter)."""
 _DOCUMENTS = "documents: the folder docs beside the source, docs/reference/commands.md for all commands"
 _UNREAD = 141  # exit status that shells give to a program that SIGPIPE ended
 
@@ -95,7 +98,7 @@ def build_parser(prog: str = "beyond-mocap") -> argparse.ArgumentParser:
 
 def main(
     argv: list[str] | None = None, writers: Mapping[str, Writer] | None = None, prog: str = "beyond-mocap",
-    run_isolated: IsolatedRunner | None = None,
+    run_isolated: IsolatedRunner | None = None, convert: Converter | None = None,
 ) -> int:  # fmt: skip
     """Run one command and return its exit status.
 
@@ -104,11 +107,12 @@ def main(
         writers: further output formats, by file suffix (Blender's).
         prog: the program's name in help and errors.
         run_isolated: runs a command line in a process of its own, for hosts such as Blender that cannot start workers.
+        convert: converts the recordings of every library that the command reads, before it does.
     Returns:
         The exit status, see the module.
     """
     try:
-        status = _run_command(argv, writers or {}, prog, run_isolated)
+        status = _run_command(argv, writers or {}, prog, run_isolated, convert)
     except BrokenPipeError:
         status = _UNREAD
     _discard_unwritable()
@@ -116,7 +120,7 @@ def main(
 
 
 def _run_command(argv: list[str] | None, writers: Mapping[str, Writer], prog: str,
-                 run_isolated: IsolatedRunner | None) -> int:
+                 run_isolated: IsolatedRunner | None, convert: Converter | None) -> int:
     """Run one command, print its error, and return its exit status; BrokenPipeError if nothing reads the output."""
     reporter = None
     _escape_unencodable(sys.stdout)
@@ -126,6 +130,8 @@ def _run_command(argv: list[str] | None, writers: Mapping[str, Writer], prog: st
         options.argv, options.apart = argv, run_isolated
         reporter = ProgressReporter(options.json)
         with _InterruptHandler(reporter):
+            for folder in _list_libraries(options) if convert else ():
+                convert(folder, options.cache, reporter)
             options.run(options, reporter, writers)
         print(end="", flush=True)
         return 0
@@ -146,6 +152,11 @@ def _run_command(argv: list[str] | None, writers: Mapping[str, Writer], prog: st
         reporter.finish()
     print(text if text.startswith(prog) else f"{prog}: {text}", file=sys.stderr)
     return status
+
+
+def _list_libraries(options) -> list[Path]:
+    """List the libraries that a command reads."""
+    return [folder for name in ("library", "against") if (folder := getattr(options, name, None)) is not None]
 
 
 def _discard_unwritable() -> None:

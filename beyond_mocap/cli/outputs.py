@@ -14,8 +14,9 @@ from pathlib import Path
 from ..base.errors import InputError, UserCancelledError
 from ..base.settings.options import parse_path
 
-Writer = Callable[[object, Path], Sequence[str] | None]
-"""Writes a take, or the result of the verb `match`, to a file; returns lines for the user, if any."""
+Writer = Callable[..., Sequence[str] | None]
+"""Writes a take, or the result of the verb `match`, to a file, and joints above a take's hips where they are given:
+(take, path, above=()). Returns lines for the user, if any."""
 
 
 class ProgressReporter:
@@ -145,16 +146,18 @@ def choose_writer(out: Path, writers: Mapping[str, Writer],
     return by_suffix[out.suffix.lower()]
 
 
-def write_bvh(take, out: Path) -> None:
+def write_bvh(take, out: Path, above: Sequence = ()) -> None:
     """Write a take's motion as BVH.
 
     Args:
         take: a `Take`.
         out: the file.
+        above: joints above the hips (`JointAboveHips`), from the root down.
     """
     from ..files.bvh import bvh
+    from ..files.bvh.bvh_write import BvhForm
 
-    bvh.write_bvh(out, take.motion)
+    bvh.write_bvh(out, take.motion, BvhForm(above=tuple(above)))
 
 
 def check_outputs(*paths: Path | None, reserved: tuple[Path | None, ...] = ()) -> None:

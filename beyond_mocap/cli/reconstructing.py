@@ -40,6 +40,8 @@ def add_reconstruct(verbs):
                       help="a folder for a folder of trials")
     verb.add_argument("--report", type=parse_path, metavar="R.json", help="write all figures to this file")
     verb.add_argument("--save-model", type=parse_path, metavar="MODEL.json", help="keep the model for other trials")
+    verb.add_argument("--ball-csv", type=parse_path, metavar="B.csv",
+                      help="the ball, where markers are named so; as OUT.ball.csv a library reads it with the clip")
     add_options(verb, "markers")
     verb.set_defaults(run=run_reconstruct)
     return verb
@@ -74,7 +76,7 @@ def _reconstruct_trial(options, reporter: ProgressReporter, writers: Mapping[str
 
     started = time.perf_counter()
     inputs = (options.trial, options.static, options.model)
-    check_outputs(options.out, options.report, options.save_model, reserved=inputs)
+    check_outputs(options.out, options.report, options.save_model, options.ball_csv, reserved=inputs)
     write = choose_writer(options.out, writers)
     if options.add_to:
         from ..library.label_files import find_free_file
@@ -99,12 +101,26 @@ def _reconstruct_trial(options, reporter: ProgressReporter, writers: Mapping[str
     write(to_take(result), options.out)
     if options.save_model:
         write_model(result.model, options.save_model)
+    if options.ball_csv:
+        notes += _write_ball(result, options.ball_csv)
     reporter.finish()
     lines = [f"{options.trial}: {line}" for line in (*trial.notes, *result.warnings)]
     _show_lines(reporter, [*_compare_up_axes(options, trial, static), *lines], options.report)
     for note in notes:
         reporter.show_note(note)
     print(f"{options.out}: {describe_result(result)}")
+
+
+def _write_ball(result, table: Path) -> list[str]:
+    """Write the ball of a trial, if markers show one; return notes."""
+    from ..files.tables import write_ball
+    from ..markers.recorded_ball import trace_recorded_ball
+
+    ball, notes = trace_recorded_ball(result, on_floor=False)
+    if ball is None:
+        return [f"no marker is named as a ball, so {table} is not written"]
+    write_ball(table, ball)
+    return list(notes)
 
 
 def _compare_up_axes(options, trial, static) -> list[str]:
@@ -137,7 +153,7 @@ def _reconstruct_folder(options, reporter: ProgressReporter) -> None:
     from ..markers.pooled_balls import select_throw
     from ..markers.reconstruct_folder import list_recordings, reconstruct_folder
 
-    for name in ("static", "report", "save_model"):
+    for name in ("static", "report", "save_model", "ball_csv"):
         if getattr(options, name):
             raise InputError(f"--{name.replace('_', '-')}", "set with a folder of trials", "one trial",
                              "remove it: static trials are detected, and each trial gets a report")  # fmt: skip
@@ -312,7 +328,7 @@ def _names_throw(labels) -> bool:
 
 
 def add_to_library(result, name: str, options) -> list[str]:
-    """Add the motion to a library as a clip; a throw's labels are placed at its release.
+    """Add the motion to a library as a clip, with its ball; a throw's labels are placed at its release.
 
     Args:
         result: the reconstruction.
@@ -322,11 +338,13 @@ def add_to_library(result, name: str, options) -> list[str]:
         Notes for the user.
     """
     from ..library.label_files import add_clip
+    from ..markers.recorded_ball import trace_recorded_ball
 
     key = None
     if _names_throw(options.words) and result.release is not None:
         key = result.release.frame / result.motion.fps
-    return add_clip(options.add_to, name, result.place_on_floor(), options.words, key)
+    ball, notes = trace_recorded_ball(result, on_floor=True)
+    return [*add_clip(options.add_to, name, result.place_on_floor(), options.words, key, ball=ball), *notes]
 
 
 def add_release(verbs):

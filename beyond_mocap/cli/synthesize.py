@@ -6,6 +6,7 @@ import argparse
 import json
 import time
 from collections.abc import Mapping
+from functools import partial
 from pathlib import Path
 
 from ..base.errors import InputError, NotInLibraryError, format_count
@@ -42,6 +43,8 @@ def add_synthesize(verbs) -> argparse.ArgumentParser:
     add_take_files(verb)
     verb.add_argument("--report", type=parse_path, metavar="R.json", help="write all figures to this file")
     add_options(verb, "synthesis")
+    verb.add_argument("--keep-root", action="store_true", help="put the joints that the library's skeleton has above "
+                      "the hips in its recordings, such as a root, back above those of OUT")
     verb.add_argument("--window", type=float, metavar="SECONDS",
                       help="search and construct the track in windows of so many seconds, which takes less memory; "
                            f"default: {WINDOW:g} for tracks above {LONG_TRACK / 60.0:g} minutes; 0: never")
@@ -83,6 +86,7 @@ def run_synthesize(options, reporter: ProgressReporter, writers: Mapping[str, Wr
     window, loaded = _choose_window(options, track), time.perf_counter()
     library = open_library(options, reporter, seed=options.seed)
     check_timeline(timeline, library.labels, float(track.times[0]), float(track.times[-1]), str(annotations))
+    above = _read_root(options, library, reporter) if options.keep_root else ()
     ready = time.perf_counter()
     plan = Plan(
         track=track, timeline=timeline, library=str(options.library),
@@ -94,9 +98,10 @@ def run_synthesize(options, reporter: ProgressReporter, writers: Mapping[str, Wr
     try:
         if window:
             frames, ball, warnings = _synthesize_in_windows(options, reporter, library, plan, window=window,
-                                                            seconds=seconds, lines=data.lines)
+                                                            above=above, seconds=seconds, lines=data.lines)
         else:
-            frames, ball, warnings = _synthesize_whole(options, reporter, library, plan, write=write, seconds=seconds,
+            frames, ball, warnings = _synthesize_whole(options, reporter, library, plan, seconds=seconds,
+                                                       write=partial(write, above=above) if above else write,
                                                        lines=data.lines)
     except NotInLibraryError as error:
         message = str(error.locate(annotations)).replace(USE_NEAREST, "add --nearest")
@@ -113,8 +118,20 @@ def run_synthesize(options, reporter: ProgressReporter, writers: Mapping[str, Wr
     for line in (*take_warnings, *(f"{options.track}: {line}" for line in data.lines)):
         reporter.show_note(line)
     if options.ball and ball is None:
-        reporter.show_note(f"{options.track} has no ball, so {options.ball} is not written")
+        hint = "" if options.recorded_ball else "; --recorded-ball takes that of the recordings"
+        hint = hint if any(clip.ball is not None for clip in library.clips) else ""
+        reporter.show_note(f"{options.track} has no ball, so {options.ball} is not written{hint}")
     print(f"{options.out}: {frames} frames, {(frames - 1) / options.fps:.1f} s")
+
+
+def _read_root(options, library, reporter: ProgressReporter) -> tuple:
+    """Read the joints above the hips in the recordings of the library's skeleton; a note where there are none."""
+    from ..library.common_skeleton import read_joints_above_hips
+
+    above = read_joints_above_hips(library, options.skeleton, options.unit)
+    if not above:
+        reporter.show_note(f"{options.library}: no joint above the hips in its recordings; --keep-root adds none")
+    return above
 
 
 def _choose_window(options, track) -> float:
@@ -125,10 +142,10 @@ def _choose_window(options, track) -> float:
             free.
     """
     seconds, window = float(track.times[-1] - track.times[0]), options.window
-    can_be_cut = options.method == "path" and options.out.suffix.lower() == ".bvh"
+    can_be_cut = options.method == "path" and options.out.suffix.lower() == ".bvh" and not options.recorded_ball
     if window and not can_be_cut:
-        raise InputError("--window", f"method {options.method} to {options.out.suffix}", "method path to .bvh",
-                         "leave it out")
+        found = f"method {options.method} to {options.out.suffix}" + " with --recorded-ball" * options.recorded_ball
+        raise InputError("--window", found, "method path to .bvh, without --recorded-ball", "leave it out")
     if window is None:
         window = WINDOW if can_be_cut and seconds > LONG_TRACK else 0.0
     if not window:
@@ -153,19 +170,20 @@ def _synthesize_whole(options, reporter: ProgressReporter, library, plan, *, wri
         with reporter.stop_at_once():
             report = evaluate(take, plan.track, library)
         report["warnings"] = [*report.get("warnings", []), *lines]
-    write(take, options.out)
+    notes = write(take, options.out) or ()
     if options.provenance:
         write_provenance(options.provenance, take)
     if options.ball and take.ball is not None:
         write_ball(options.ball, take.ball)
     if options.report:
         write_report(options.report, report)
-    return len(take.motion), take.ball, take.warnings
+    return len(take.motion), take.ball, (*take.warnings, *notes)
 
 
-def _synthesize_in_windows(options, reporter: ProgressReporter, library, plan, *, window: float, seconds: dict,
-                           lines):
+def _synthesize_in_windows(options, reporter: ProgressReporter, library, plan, *, window: float, above: tuple,
+                           seconds: dict, lines):
     """Synthesize a track in windows and write its files; returns the number of frames, the ball and warnings."""
+    from ..files.bvh.bvh_write import BvhForm
     from ..files.tables import write_report
     from ..match.long_player import LongTakeFiles, iter_parts, search_long_player
     from ..match.pieces.units import count_frames
@@ -174,7 +192,8 @@ def _synthesize_in_windows(options, reporter: ProgressReporter, library, plan, *
     edit = search_long_player(library, plan, window, *report)
     seconds["search"], plan = time.perf_counter() - started, edit.stretches[0].plan
     files = LongTakeFiles(library, plan.track, bool(options.report))
-    files.write_motion(options.out, iter_parts(library, edit, *report), count_frames(plan, plan.fps))
+    parts = iter_parts(library, edit, *report)
+    files.write_motion(options.out, parts, count_frames(plan, plan.fps), BvhForm(above=above))
     files.write_tables(options.provenance, options.ball)
     warnings = (*edit.stretches[0].warnings, *files.warnings)
     if options.report:

@@ -32,6 +32,8 @@ from .clip import Clip
 from .features import FPS, build_frames
 from .library import RECORDED_INDEX, Library, Progress
 from .proposals import propose_labels
+from .recorded_ball.body_ball import BodyBall, find_ball_table, read_recorded_ball
+from .recorded_ball.contact_keys import move_keys_to_contacts
 from .scan import Annotations, find_readable_clips, read_stamp
 
 _BASE_BYTES = 1e8  # of memory that a build needs
@@ -74,7 +76,8 @@ def build_library(
     annotations = Annotations(folder, paths)
     skeleton_file = Path(skeleton) if skeleton else None
     model = _find_model(place, annotations, paths)
-    sources = [*annotations.list_sources(paths), *([model] if model else [])]
+    balls = [table for one in zip(paths, files) if (table := find_ball_table(*one)) is not None]
+    sources = [*annotations.list_sources(paths), *balls, *([model] if model else [])]
     digests = cache.SourceDigests(place)
     key = cache.compute_fingerprint(folder, files, sources, skeleton_file, digests, unit=unit)
     if not rebuild:
@@ -176,10 +179,12 @@ def _read_clips(recordings: _Recordings, arrays: Path | None, notes: list[str], 
     """
     levelled, changes = MotionWriter(arrays and arrays / "levelled.npy"), []
     units: list[str] = []
-    for source_notes, motion, pops, drift in _iter_levelled(recordings, report, cancelled):
+    seen: list[BodyBall | None] = []
+    for source_notes, motion, pops, drift, ball in _iter_levelled(recordings, report, cancelled):
         units += source_notes
         levelled.append(motion)
         changes.append((pops, drift))
+        seen.append(ball)
     notes += _collect_unit_notes(units)
     motions = levelled.finish()
     rows = _read_rows(recordings, motions)
@@ -191,13 +196,15 @@ def _read_clips(recordings: _Recordings, arrays: Path | None, notes: list[str], 
     motions = repaired.finish()
     if is_proposed:
         rows = _propose_rows(recordings, motions, report, cancelled)
+    balls = [None if ball is None else ball.place(motion) for ball, motion in zip(seen, motions)]
+    rows = move_keys_to_contacts(motions, balls, rows, notes)
     notes += repair.describe_repairs([(one, pops) for one, (pops, _) in zip(repairs, changes)])
     figures = [repair.RepairFigures(pops, one.drift, *one.slide) for one, (pops, _) in zip(repairs, changes)]
     complete = MotionWriter(arrays and arrays / cache.MOTIONS)
     known: list[dict] = []  # all of a clip but its motion
-    for original, what in zip(_iter_completed(recordings, motions, rows, contacts, notes), figures):
+    for original, what, ball in zip(_iter_completed(recordings, motions, rows, contacts, notes), figures, balls):
         _check_cancelled(cancelled)
-        original = replace(original, repair_figures=what, has_proposed_labels=is_proposed)
+        original = replace(original, repair_figures=what, has_proposed_labels=is_proposed, ball=ball)
         for clip in (original, original.build_twin()):
             complete.append(clip.motion)
             known.append({name: value for name, value in vars(clip).items() if name != "motion"})
@@ -248,9 +255,9 @@ def _propose_rows(recordings: _Recordings, motions: Sequence[Motion], report: Pr
 
 
 def _iter_levelled(recordings: _Recordings, report: Progress,
-                   cancelled) -> Iterator[tuple[tuple[str, ...], Motion, int, float]]:
-    """Read files, a few at once: the reader's notes, and the motion without pops and drift, with the number of pops and
-    metres of drift.
+                   cancelled) -> Iterator[tuple[tuple[str, ...], Motion, int, float, BodyBall | None]]:
+    """Read files, a few at once: the reader's notes, and the motion without pops and drift, with the number of pops,
+    metres of drift, and the ball.
 
     The unit applies to the user's own files only.
     """
@@ -260,7 +267,8 @@ def _iter_levelled(recordings: _Recordings, report: Progress,
         source = read_clip(file, recordings.unit if file == path else None)
         motion, pops = repair.remove_pops(source.motion)
         motion, drift = repair.remove_drift(motion)
-        return source.notes, motion, pops, drift
+        ball, ball_notes = read_recorded_ball(path, file, source)
+        return (*source.notes, *ball_notes), motion, pops, drift, ball
 
     both, waiting = zip(paths, recordings.files), deque()
     with ThreadPoolExecutor(max(1, recordings.threads)) as pool:

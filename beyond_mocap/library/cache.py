@@ -40,7 +40,7 @@ from .repair import RepairFigures
 from .scan import CACHE_FOLDER, read_stamp
 
 # raised whenever what is computed or stored changes, so that old caches are not used
-VERSION = 41
+VERSION = 42
 MOTIONS = "motions.npy"
 """Name of the file with the motions of all clips (`files.motion_file`)."""
 _DIGESTS, _COVERAGE = "digests.json", "coverage"
@@ -241,6 +241,9 @@ def _list_arrays(library) -> dict[str, np.ndarray]:
     """List the arrays of a library, except its motions, by name."""
     arrays = {f"frames.{part}": getattr(library.frames, part) for part in _FRAME_ARRAYS}
     arrays["contacts"] = np.concatenate([clip.heel_toe_contacts for clip in library.clips])
+    balls = [clip.ball for clip in library.clips if clip.ball is not None]
+    if balls:
+        arrays["balls"] = np.concatenate(balls)
     return {**arrays, "offsets": library.skeleton.offsets, "end_offsets": library.skeleton.end_offsets}
 
 
@@ -300,7 +303,8 @@ def _build_header(key: str, library) -> dict:
         "vocabulary": library.frames.vocabulary, "fps": library.fps, "notes": library.notes,
         "clips": [[clip.path, clip.mirrored, clip.motion.fps, len(clip.motion),
                    [[row.start, row.end, row.key, row.words] for row in clip.annotations], clip.recorded_count,
-                   asdict(clip.repair_figures) if clip.repair_figures else None, clip.has_proposed_labels]
+                   asdict(clip.repair_figures) if clip.repair_figures else None, clip.has_proposed_labels,
+                   0 if clip.ball is None else len(clip.ball)]
                   for clip in library.clips],
     }  # fmt: skip
 
@@ -349,13 +353,14 @@ def _restore_fields(header: dict, arrays: dict) -> dict:
     skeleton = Skeleton(names, parents, arrays["offsets"], ends, arrays["end_offsets"])
     shapes = ((skeleton, row[3], row[2]) for row in header["clips"])
     motions = divide_into_motions(arrays[Path(MOTIONS).stem], shapes)
-    clips, start = [], 0
-    for motion, (path, mirrored, _, count, rows, recorded, mended, is_proposed) in zip(motions, header["clips"]):
+    clips, start, ball_start = [], 0, 0
+    for motion, (path, mirrored, _, count, rows, recorded, mended, is_proposed, known) in zip(motions, header["clips"]):
         annotations = tuple(ClipAnnotation(first, end, key, tuple(words)) for first, end, key, words in rows)
         clips.append(Clip(path=path, mirrored=mirrored, motion=motion, annotations=annotations,
                           heel_toe_contacts=arrays["contacts"][start : start + count], recorded_count=recorded,
-                          repair_figures=mended and RepairFigures(**mended), has_proposed_labels=is_proposed))
-        start += count
+                          repair_figures=mended and RepairFigures(**mended), has_proposed_labels=is_proposed,
+                          ball=arrays["balls"][ball_start : ball_start + known] if known else None))
+        start, ball_start = start + count, ball_start + known
     frames = Frames(
         vocabulary=tuple(header["vocabulary"]), **{name: arrays[f"frames.{name}"] for name in _FRAME_ARRAYS}
     )

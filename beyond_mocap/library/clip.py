@@ -29,6 +29,8 @@ class Clip:
             None: all.
         repair_figures: what the repair found and left; None for synthetic clips.
         has_proposed_labels: whether the annotations are proposed (`library.proposals`), not written by a person.
+        ball: (T, 3) m of the recorded frames, the ball's centre in the motion's world, NaN where it is not known; None
+            without a ball (`library.recorded_ball`).
     """
 
     path: str
@@ -39,6 +41,7 @@ class Clip:
     recorded_count: int | None = None
     repair_figures: repair.RepairFigures | None = None
     has_proposed_labels: bool = False
+    ball: np.ndarray | None = None
 
     @property
     def is_synthetic(self) -> bool:
@@ -73,6 +76,7 @@ class Clip:
         """Build the same clip with left and right exchanged, labels too (Faustino §3.1.2)."""
         rows = tuple(replace(row, words=tuple(swap_sides(row.words))) for row in self.annotations)
         heel_toe_contacts = self.heel_toe_contacts[:, ::-1]
-        return Clip(path=self.path, mirrored=not self.mirrored, motion=mirror(self.motion), annotations=rows,
+        ball = None if self.ball is None else self.ball * (1.0, -1.0, 1.0)
+        return Clip(path=self.path, mirrored=not self.mirrored, motion=mirror(self.motion), annotations=rows, ball=ball,
                     heel_toe_contacts=heel_toe_contacts, recorded_count=self.recorded_count,
                     repair_figures=self.repair_figures, has_proposed_labels=self.has_proposed_labels)

@@ -8,17 +8,23 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from ..base.errors import InputError, format_count
+from ..files.bvh import bvh
+from ..files.bvh.bvh_write import JointAboveHips
 from ..motion import contacts
 from ..motion.humanoid import identify_joints
 from ..motion.motion import Motion
 from ..motion.retargeting.retarget import Retargeter
 from ..motion.skeleton import Skeleton
 from . import repair
+from .scan import Conversions
+
+if TYPE_CHECKING:
+    from .library import Library
 
 BONE_TOLERANCE = 5e-3  # metres between offsets of equal bones
 _SAMPLE_COUNT = 400  # frames from which a rig is analysed
@@ -63,6 +69,26 @@ def unify_skeletons(
         notes.append(f"{format_count(len(rigs), 'clip')} of {format_count(others, 'other skeleton')} retargeted to the "
                      f"one with {len(skeleton)} joints")
     return _iter_unified(motions, contact_mask, skeleton, rigs)
+
+
+def read_joints_above_hips(library: "Library", skeleton: Path | None, unit: float | None) -> tuple[JointAboveHips, ...]:
+    """Read the joints above the hips of the recordings with the library's skeleton, from the first of them.
+
+    Args:
+        library: the library.
+        skeleton: the file with its skeleton, None where a recording has it.
+        unit: metres per file unit of its BVH files, None for estimated.
+    Raises:
+        InputError: if no recording has this skeleton any more.
+    """
+    folder = Path(library.folder)
+    conversions = Conversions(folder, library.cache_location[0] if library.cache_location else folder)
+    for path in [skeleton] if skeleton else [folder / clip.path for clip in library.clips if not clip.mirrored]:
+        file = conversions.find_readable_file(path)
+        clip = bvh.read_bvh(file, unit if file == path else None)
+        if clip.motion.skeleton.has_same_bones(library.skeleton, BONE_TOLERANCE):
+            return clip.form.above
+    raise InputError(folder, "no recording with the library's skeleton", "one", "build the library again")
 
 
 def retarget_clip(motion: Motion, target: Motion, bone_map: dict[str, str] | str | Path | None = None) -> Motion:

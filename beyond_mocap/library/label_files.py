@@ -20,8 +20,11 @@ from ..annotation.vocabulary import list_vocabulary
 from ..base.errors import InputError
 from ..files.atomic import atomic_write
 from ..files.bvh import bvh
+from ..files.tables import write_ball
 from ..motion.motion import Motion
+from ..motion.track.ball_path import BallPath
 from .label_sources import Sources, format_cells, format_comment, read_table_sources, read_text_sources
+from .recorded_ball.body_ball import ENDING
 from .scan import TABLE_NAME, Annotations
 
 TEXT, TABLE = "TEXT", "TABLE"
@@ -178,9 +181,11 @@ def find_free_file(folder: Path, name: str) -> Path:
 
 
 def add_clip(
-    folder: Path, name: str, motion: Motion, words: Sequence[str] = (), key_seconds: float | None = None
+    folder: Path, name: str, motion: Motion, words: Sequence[str] = (), key_seconds: float | None = None,
+    ball: BallPath | None = None,
 ) -> list[str]:
-    """Write NAME.bvh into a library's folder and, if there are labels, NAME.txt. Nothing is replaced.
+    """Write NAME.bvh into a library's folder and, if there are labels or a ball, NAME.txt and NAME.ball.csv. Nothing is
+    replaced.
 
     Args:
         folder: the library's.
@@ -188,6 +193,7 @@ def add_clip(
         motion: its motion.
         words: labels of the annotation.
         key_seconds: seconds from the first frame of the key moment that they name; None labels the whole motion.
+        ball: of the recording, from its first frame at 0 s.
     Returns:
         Lines for people.
     Raises:
@@ -202,7 +208,11 @@ def add_clip(
         rows = [ClipAnnotation(0, len(motion) - 1, None, words)]
     if words and has_labels(clip, folder, motion.fps):
         raise InputError(clip.with_suffix(".txt"), "already has labels", "a new name", "rename the clip")
+    if ball is not None and clip.with_suffix(ENDING).exists():
+        raise InputError(clip.with_suffix(ENDING), "already there", "a new name", "rename the clip")
     bvh.write_bvh(clip, motion)
+    if ball is not None:
+        write_ball(clip.with_suffix(ENDING), ball)
     if words:
         write_labels(clip, folder, rows, motion.fps)
     unknown = sorted(set(words) - list_vocabulary())

@@ -22,7 +22,7 @@ from ..files.clip_file import CLIP_ENDINGS, is_clip_file
 CACHE_FOLDER = ".beyond_mocap"
 TABLE_NAME = "annotations.csv"
 FOREIGN = (".fbx", ".glb", ".gltf", ".usd", ".usda", ".usdc", ".usdz")
-_TABLE = "converted.json"
+_TABLE, _FORM = "converted.json", 1  # raised when conversions hold more: Blender then converts again
 
 
 def find_clips(folder: str | Path) -> list[Path]:
@@ -220,11 +220,19 @@ class Conversions:
         """Whether a recording can be read in its current state."""
         if not is_foreign(path):
             return True
-        return self._stamps.get(self._build_key(path)) == read_stamp(path) and self.find_readable_file(path).is_file()
+        stamp = self._stamps.get(self._build_key(path), [])
+        return stamp[:2] == read_stamp(path) and self.find_readable_file(path).is_file()
 
     def list_waiting(self, paths: Sequence[Path]) -> list[Path]:
         """List the recordings among `paths` that need a conversion."""
         return [path for path in paths if not self.is_current(path)]
+
+    def list_outdated(self, paths: Sequence[Path]) -> list[Path]:
+        """List the recordings among `paths` to convert: those of `list_waiting`, and those that an earlier version of
+        the program has converted, which can be read meanwhile.
+        """
+        return [path for path in paths if is_foreign(path) and not (
+            self.is_current(path) and self._stamps[self._build_key(path)][2:] == [_FORM])]
 
     def prepare_file(self, path: Path) -> Path:
         """Create the folder for a conversion and return the file to write.
@@ -242,7 +250,7 @@ class Conversions:
 
     def record_conversion(self, path: Path, stamp: list[int]) -> None:
         """Record that a recording has been converted in the state of its `stamp`."""
-        self._stamps[self._build_key(path)] = stamp
+        self._stamps[self._build_key(path)] = [*stamp, _FORM]
         atomic_write(self.converted_folder / _TABLE, json.dumps(self._stamps, indent=0, sort_keys=True))
 
     def _build_key(self, path: Path) -> str:

@@ -15,6 +15,7 @@ import numpy as np
 from ..base.errors import UserCancelledError
 from ..evaluation.report import evaluate
 from ..files.bvh.bvh import write_bvh_parts
+from ..files.bvh.bvh_write import BvhForm
 from ..files.tables import write_ball
 from ..library.library import Library
 from ..motion.track import Track
@@ -105,9 +106,9 @@ class LongTakeFiles:
         self._library, self._track, self._has_report = library, track, has_report
         self._tables, self._balls, self._reports, self._weights = [], [], [], []  # type: ignore[var-annotated]
 
-    def write_motion(self, path: Path, parts: Iterable[Take], count: int) -> None:
-        """Write the motion of `count` frames, and keep what the other files need."""
-        write_bvh_parts(path, (self._note(part).motion for part in parts), count)
+    def write_motion(self, path: Path, parts: Iterable[Take], count: int, form: BvhForm) -> None:
+        """Write the motion of `count` frames in a form, and keep what the other files need."""
+        write_bvh_parts(path, (self._note(part).motion for part in parts), count, form)
 
     def _note(self, part: Take) -> Take:
         """Keep of a part what the tables and the report need."""

@@ -24,8 +24,8 @@ from ..base.errors import InputError, format_seconds
 from ..library.library import Library
 from ..motion.motion import Motion
 from ..motion.track import SampledTrack
-from ..motion.track.ball_path import BallPath
 from .body_size import to_library_size
+from .construct.ball_touch.carry_ball import build_ball_path
 from .construct.construction import Construction, build_key_results, find_touches
 from .construct.edit_blending import OldMotion, blend_with_old, compute_old_share
 from .construct.transitions import compute_spread_reaches
@@ -350,7 +350,7 @@ class _TakeUpdate:
         """Build the take as it is now."""
         is_new = self.is_new
         mirrored = np.array([clip.mirrored for clip in self.library.clips])
-        frames = self.frames_shown
+        frames, motion = self.frames_shown, Motion(self.library.skeleton, self.root, self.rotations, self.plan.fps)
         part = SourceFrames(frames.clip[is_new], frames.frame[is_new], frames.clip_frame[is_new], frames.piece[is_new])
         new, sources = iter(list_labels_shown(self.library, part)), list_sources(self.library, part)
         names = tuple(dict.fromkeys((*self.before.clips, *sources)))
@@ -358,7 +358,7 @@ class _TakeUpdate:
         clip[is_new] = [names.index(source) for source in sources]
         return replace(
             self.before,
-            motion=Motion(self.library.skeleton, self.root, self.rotations, self.plan.fps),
+            motion=motion,
             clips=names,
             clip=clip,
             clip_frame=np.where(is_new, self.frames_shown.clip_frame, self.before.clip_frame),
@@ -368,7 +368,8 @@ class _TakeUpdate:
             seams=self.frames_shown.transitions,
             timeline=self.request.timeline,
             keys=self._build_keys(),
-            ball=self._build_ball_path(),
+            ball=build_ball_path(self.library, self.plan.requested, self.track, source=frames, motion=motion,
+                                 ball=self.ball),
             correction=self.correction,
             ik_miss=self.miss,
             stepped=self.stepped,
@@ -377,12 +378,6 @@ class _TakeUpdate:
             plan=self.plan.requested,
             edit=self.edit,
         )
-
-    def _build_ball_path(self) -> BallPath | None:
-        """Return the ball's path, None where it is nowhere known."""
-        if not np.isfinite(self.ball[:, :2]).any():
-            return None
-        return BallPath(self.track.times, self.ball, self.track.ball_measured)
 
     def _build_keys(self) -> tuple[KeyResult, ...]:
         """Return the results; where a key moment's frame was not affected, the old one for the new request."""

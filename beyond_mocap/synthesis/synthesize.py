@@ -24,9 +24,9 @@ from ..base.time_series import find_runs
 from ..library.library import Library
 from ..motion.foot_plant import PlantResult
 from ..motion.motion import Motion
-from ..motion.track.ball_path import BallPath
 from .ball_pins import KEY_REACH, SAME_TOUCH, find_pinned_frame
 from .body_size import to_player_size
+from .construct.ball_touch.carry_ball import build_ball_path, report_recorded_ball
 from .construct.ball_touch.touch_frames import find_nearest_frame
 from .construct.construction import Construction, build_key_results, find_touches
 from .construct.extra_steps import Steps
@@ -184,6 +184,7 @@ def _construct_motion(
     construction = Construction(library=library, plan=plan, track=track, source=source, touches=touches)
     planted, steps, ball = _construct_body(construction, result.interpolate_travelled(index))
     motion = Motion(library.skeleton, planted.root, planted.rotations, plan.fps)
+    ball = build_ball_path(library, plan.requested, track, source=source, motion=motion, ball=ball)
     take = Take(
         **build_provenance_fields(library, source), motion=motion, start_time=float(track.times[0]),
         contacts=steps.contacts, timeline=request.timeline, keys=keys, ball=ball, method=plan.method,
@@ -218,9 +219,8 @@ def _search(
     return SearchResult(*build_warped_edit(search, sections, plan.requested.catch_up), notes=search.notes)
 
 
-def _construct_body(construction: Construction, travelled: np.ndarray | None) -> tuple[PlantResult, Steps,
-        BallPath | None]:
-    """Construct the body, its steps and the ball; travelled: (T,) m by method "distance"."""
+def _construct_body(construction: Construction, travelled: np.ndarray | None) -> tuple[PlantResult, Steps, np.ndarray]:
+    """Construct the body, its steps and the track's ball; travelled: (T,) m by method "distance"."""
     track, ball = construction.track, construction.track.ball
     if construction.plan.method == "path":
         planted, steps = construction.construct_body()
@@ -228,8 +228,7 @@ def _construct_body(construction: Construction, travelled: np.ndarray | None) ->
     else:
         is_on_track = construction.plan.method in ("fs", "baseline")
         planted, steps = construct_blocks(construction, compute_travelled_distance(track) if is_on_track else travelled)
-    known = np.any(np.isfinite(ball[:, :2]))
-    return planted, steps, BallPath(track.times, ball, track.ball_measured) if known else None
+    return planted, steps, ball
 
 
 def finish_take(
@@ -309,7 +308,7 @@ def add_warnings(
         since = take.start_time + hurried_from / recordings.fps
         messages.append(TimedMessage(f"{since:.1f} s: the search was cut short from here on", (since, since)))
     messages += [*_report_avoided_labels(take), *_report_missed_pins(take), *_report_ignored_heading_keys(take.plan),
-                 *_report_ignored_contact_edits(take)]
+                 *_report_ignored_contact_edits(take), *report_recorded_ball(take)]
     unmet = _report_unmet(recordings, take.plan, take) if report_unmet else ()
     return replace(take, is_cut_short=hurried_from is not None, warnings=(*messages, *unmet))
 

@@ -182,10 +182,14 @@ def add_to_library(request: ReconstructionRequest, reconstruction: "Reconstructi
     if request.add is None:
         return []
     from ...beyond_mocap.library.label_files import add_clip
+    from ...beyond_mocap.markers.recorded_ball import trace_recorded_ball
 
     throw = reconstruction.release is not None and any(word.startswith("throw") for word in request.words)
     key = reconstruction.release.time if throw else None
-    return add_clip(request.add.parent, request.add.stem, reconstruction.place_on_floor(), request.words, key)
+    ball, notes = trace_recorded_ball(reconstruction, on_floor=True)
+    lines = add_clip(request.add.parent, request.add.stem, reconstruction.place_on_floor(), request.words, key,
+                     ball=ball)
+    return [*lines, *notes]
 
 
 def store_model(cloud: bpy.types.Object, model: "MarkerModel") -> None:

@@ -9,6 +9,7 @@ from __future__ import annotations
 import json
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
 
 import bpy
 import numpy as np
@@ -19,6 +20,11 @@ from ...beyond_mocap.motion import quaternion
 from ...beyond_mocap.motion.humanoid import identify_joints, split_joint_name
 from ...beyond_mocap.motion.skeleton import Skeleton
 from ..core.measure import units_per_metre
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from ...beyond_mocap.files.bvh.bvh_write import JointAboveHips
 
 SKELETON_PROPERTY = "beyond_mocap_skeleton"
 FINGERS = "Fingers"  # name of the bone collection with the bones beyond the wrists
@@ -89,6 +95,27 @@ def create_armature(context: bpy.types.Context, skeleton: Skeleton, name: str, c
         scene.collection.objects.unlink(body)
     context.view_layer.update()
     return body
+
+
+def add_bones_above(body: bpy.types.Object, joints: "Sequence[JointAboveHips]") -> None:
+    """Add bones that stand still above the root of an armature; its keys stay as they are.
+
+    Args:
+        body: the armature, at the origin.
+        joints: from the uppermost down, each where it stands in the world if those above stand at rest.
+    """
+    units, place, turn, parent = units_per_metre(bpy.context.scene), np.zeros(3), quaternion.identity(), None
+    root = next((bone.name for bone in body.data.bones if bone.parent is None), None)
+    with _edit_mode(bpy.context, body):
+        for joint in joints:
+            if not joint.is_moving:
+                place, turn = place + quaternion.rotate(turn, joint.position), quaternion.multiply(turn, joint.rotation)
+            bone = body.data.edit_bones.new(joint.name)
+            bone.head, bone.tail = place * units, (place + [0.0, 0.1, 0.0]) * units
+            bone.parent = parent
+            parent = bone
+        if parent is not None:
+            body.data.edit_bones[root].parent = parent
 
 
 def _hide_fingers(data: bpy.types.Armature, skeleton: Skeleton) -> None:

@@ -20,27 +20,35 @@ from ..stage import ball, body
 from . import armature, exporters
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from ...beyond_mocap.files.bvh.bvh_write import JointAboveHips
     from ...beyond_mocap.match.synthesize_match import MatchResult
 
 NAME = "Player"
 SHIRT = (0.75, 0.05, 0.06)
 
 
-def write_result(result: "Take | MatchResult", out: Path) -> tuple[str, ...]:
+def write_result(result: "Take | MatchResult", out: Path,
+                 above: "Sequence[JointAboveHips]" = ()) -> tuple[str, ...]:
     """Write a take or a match to `out` in the format of its suffix, completely or not at all.
 
+    Args:
+        result: the take or match.
+        out: the file.
+        above: joints above a take's hips, from the root down.
     Returns:
         Messages about players of a match that could not be shown.
     """
     from ...beyond_mocap.match.synthesize_match import MatchResult  # imports scipy, which is slow
 
-    lines = create_match_scene(result) if isinstance(result, MatchResult) else create_take_scene(result)
+    lines = create_match_scene(result) if isinstance(result, MatchResult) else create_take_scene(result, above)
     exporters.write_whole_file(out, EXPORTERS[out.suffix.lower()])
     return lines
 
 
-def create_take_scene(take: Take) -> tuple[str, ...]:
-    """Create an empty file with the take in it, first frame 0."""
+def create_take_scene(take: Take, above: "Sequence[JointAboveHips]" = ()) -> tuple[str, ...]:
+    """Create an empty file with the take in it, first frame 0, and bones above its hips; returns messages."""
     scene = _create_empty_scene(take.motion.fps)
     scene.frame_start, scene.frame_end = 0, len(take.motion) - 1
     collection = bake.find_or_create_collection(scene)
@@ -50,7 +58,8 @@ def create_take_scene(take: Take) -> tuple[str, ...]:
     if take.ball is not None:
         first = (float(take.ball.times[0]) - take.start_time) * take.motion.fps
         ball.write_trajectory(ball.create_ball(bpy.context, bake.BALL, collection), take.ball, scene, first)
-    return ()
+    armature.add_bones_above(player, above)
+    return tuple(f"{joint.name} stands still: only BVH files have its motion" for joint in above if joint.is_moving)
 
 
 def create_match_scene(result: "MatchResult") -> tuple[str, ...]:

@@ -10,6 +10,7 @@ from __future__ import annotations
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import bpy
 import numpy as np
@@ -21,8 +22,12 @@ from ..core import channels
 from ..core.measure import frames_per_second
 from ..core.saved_state import use_temporary_scene
 from . import exporters
+from .armature import add_bones_above
 from .bone_curves import ROOT_BONE, compute_root_motion, name_root_bone
 from .fit import find_common_extent, sample_motion
+
+if TYPE_CHECKING:
+    from ...beyond_mocap.files.bvh.bvh_write import JointAboveHips
 
 _SCALE_TOLERANCE = 1e-4  # deviation of a scale from 1 that is ignored
 VISIBILITY_CHANNELS = {
@@ -43,6 +48,7 @@ class ExportOptions:
         applies_transforms: objects are at the origin, unscaled and not rotated; bones and meshes have it instead.
         units: of the file for each of the scene's; needs applied transforms where it is not 1.
         armature_name: of the armature in the file; None for its own.
+        above: joints to add above the hips, from the root down.
     """
 
     path: Path
@@ -55,6 +61,7 @@ class ExportOptions:
     applies_transforms: bool = False
     units: float = 1.0
     armature_name: str | None = None
+    above: "tuple[JointAboveHips, ...]" = ()
 
 
 @dataclass(frozen=True, eq=False)
@@ -225,6 +232,10 @@ def _copy_armature(stage: bpy.types.Scene, rig: bpy.types.Object, shown: _Sample
         copy.data.transform(Matrix.Scale(wanted.units, 4))
         poses = {name: _scale_places(pose, wanted.units) for name, pose in poses.items()}
     _create_action(copy, poses, parents, shown.object_matrices)
+    if wanted.above and wanted.format != "BVH":
+        with bpy.context.temp_override(scene=stage, view_layer=stage.view_layers[0], active_object=copy, object=copy,
+                                       selected_objects=[copy]):
+            add_bones_above(copy, wanted.above)
     return copy
 
 
@@ -461,16 +472,17 @@ def _save_file(stage, copies, wanted: ExportOptions) -> None:
         thing.select_set(True)
     layer.objects.active = copies[0]
     if wanted.format == "BVH":
-        _write_bvh(stage, copies, wanted.path)
+        _write_bvh(stage, copies, wanted)
         return
     write = exporters.EXPORTERS[wanted.format]
     exporters.write_whole_file(wanted.path, lambda path: write(path, wanted.engine, "SELECTED"))
 
 
-def _write_bvh(stage: bpy.types.Scene, copies, path: Path) -> None:
+def _write_bvh(stage: bpy.types.Scene, copies, wanted: ExportOptions) -> None:
     from ...beyond_mocap.files.bvh import bvh
+    from ...beyond_mocap.files.bvh.bvh_write import BvhForm
 
-    frames = np.arange(stage.frame_end + 1)
+    frames, path = np.arange(stage.frame_end + 1), wanted.path
     for copy in copies:
         own = path if len(copies) == 1 else path.with_name(f"{path.stem} {copy.name}{path.suffix}")
-        bvh.write_bvh(own, sample_motion(copy, stage, frames))
+        bvh.write_bvh(own, sample_motion(copy, stage, frames), BvhForm(above=wanted.above))

@@ -40,6 +40,8 @@ ENGINES = (("BLENDER", "Blender", "Axes of Blender's exporters: Y up, -Z forward
            ("UNREAL", "Unreal", "For Unreal Engine: FBX in centimetres, X forward, Z up"),
            ("UNITY", "Unity", "For Unity: FBX with its scale as units, Y up, -Z forward"),
            ("GODOT", "Godot", "For Godot: Y up, -Z forward, in USD too"))
+KEEP_ROOT = ("Add the joints that the library's recordings have above the hips, such as a root: in BVH files where "
+             "they stood or below the body, in others standing still")
 EXPORT_CHOICES = (("ACTIVE", "Active", "The active player's rig or body; without players the active armature"),
                   ("SELECTED", "Selected", "All selected armatures"),
                   ("PLAYERS", "All Players", "The rig or body of every selected player"))
@@ -127,3 +129,4 @@ class BeyondMocapRig(bpy.types.PropertyGroup):
     deform_only: BoolProperty(name="Deform Bones Only", default=True,
                               description="Leave controls and helper bones out of the file")
     meshes: BoolProperty(name="Meshes", default=True, description="Also export the meshes that the armature moves")
+    keep_root: BoolProperty(name="Recorded Root", default=False, description=KEEP_ROOT)

@@ -44,7 +44,7 @@ def is_ball(thing: bpy.types.Object) -> bool:
 
 
 def write_trajectory(ball: bpy.types.Object, path: BallPath, scene: bpy.types.Scene, start: float) -> bpy.types.Action:
-    """Bake the ball's trajectory and roll with a key on every whole scene frame.
+    """Bake the ball's trajectory and roll with a key on every whole scene frame; where its place is not known it waits.
 
     Args:
         ball: the object.
@@ -58,12 +58,21 @@ def write_trajectory(ball: bpy.types.Object, path: BallPath, scene: bpy.types.Sc
     seconds = path.times - path.times[0]
     frames = whole_frames(start, float(seconds[-1]), fps)
     at = (frames - start) / fps
-    places = interpolate_columns(at, seconds, path.positions)
+    places = interpolate_columns(at, *_hold_unknown(seconds, path.positions))
     group = "Object Transforms"
     curves = {"location": (group, places * units_per_metre(scene)),
               "rotation_quaternion": (group, compute_roll(places) if path.rotations is None
                                       else _sample_rotations(path, at))}
     return channels.create_action(ball, f"{ball.name} path", frames, curves)
+
+
+def _hold_unknown(seconds: np.ndarray, places: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Let a ball at (T, 3) m wait where it was last known; before it is first known, where that will be."""
+    known = np.isfinite(places).all(axis=1)
+    if known.all() or not known.any():
+        return seconds, places
+    last = np.maximum.accumulate(np.where(known, np.arange(len(places)), -1))
+    return seconds, places[np.where(last < 0, np.argmax(known), last)]
 
 
 def _sample_rotations(path: BallPath, at: np.ndarray) -> np.ndarray:

@@ -76,6 +76,9 @@ TABLES = {
                 "step by step and keeps out of the body",
                 tooltip="Move key moments to the touches found in the ball's samples, within 0.4 s, and let the ball "
                 "follow physics and the dribbling feet, and keep out of the body", in_preset=True),
+        Setting(name="recorded_ball", default=False, option="--recorded-ball", help="where the track has no ball, "
+                "that of the recordings rides along", tooltip="Where the track has no ball, let the ball of the "
+                "recordings ride along on the body, in kicks and dribbles too", in_preset=True),
         Setting(name="alpha", default=0.2, least=0.0, most=1.0, expected=BETWEEN, option="--alpha", metavar="SHARE",
                 help="weight of labels against continuity; default %(default)g", title="Label Weight", tooltip="Weight "
                 "of labels against smooth transitions: 0 for smooth transitions only, 1 for labels only",

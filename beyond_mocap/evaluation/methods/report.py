@@ -19,7 +19,7 @@ from ..plots import MIDDLE, RIGHT, create_canvas, render_png
 from ..report import round_values
 from .comparison import MethodComparison, MethodResult
 from .scenarios import Scenario
-from .tables import ComparisonTable, build_tables, describe_differences, describe_handicaps
+from .tables import ComparisonTable, build_tables, describe_differences, describe_handicaps, list_sections
 
 _ROW = 1.15
 """Inches of height of a method's curve."""
@@ -40,8 +40,7 @@ def build_comparison_page(comparison: MethodComparison) -> str:
         "Methods compared", build_element("h1", "Methods compared"),
         build_element("p", f"{comparison.library}: {comparison.clips} clips, {comparison.minutes:.1f} minutes"),
         *map(_build_section, build_tables(comparison)),
-        build_section("How they differ", build_list(map(_remove_ticks, describe_differences(comparison)))),
-        build_section("What handicaps whom", build_list(map(_remove_ticks, describe_handicaps(comparison)))),
+        *(build_section(title, build_list(map(_remove_ticks, lines))) for title, lines in list_sections(comparison)),
         build_section("Curves of Appendix D", build_element("p", "Distance of the features of consecutive frames, cm; "
                       "all curves of a scenario have one scale. Dotted: key moments. Only the peaks count."), *curves),
     )  # fmt: skip

@@ -207,6 +207,23 @@ def _measure_length(scenario: Scenario) -> float:
     return float(scenario.track.times[-1] - scenario.track.times[0])
 
 
+def list_sections(comparison: MethodComparison) -> list[tuple[str, list[str]]]:
+    """List the titles and lines that follow the tables; what has no line is left out."""
+    found = [("How they differ", describe_differences(comparison)),
+             ("What handicaps whom", describe_handicaps(comparison)), ("Warnings", _describe_warnings(comparison))]
+    return [(title, lines) for title, lines in found if lines]
+
+
+def _describe_warnings(comparison: MethodComparison) -> list[str]:
+    """Describe each warning of the takes once, with the takes that have it."""
+    takes: dict[str, list[str]] = {}
+    for (scenario, method), result in comparison.results.items():
+        for line in result.take.warnings:
+            takes.setdefault(str(line), []).append(f"`{method}` in {scenario}")
+    return [f"{'all takes' if len(found) == len(comparison.results) else ', '.join(found)}: {line}"
+            for line, found in takes.items()]
+
+
 def format_markdown(comparison: MethodComparison, level: int = 2) -> list[str]:
     """Format a comparison as lines of Markdown, without the curves.
 
@@ -218,7 +235,6 @@ def format_markdown(comparison: MethodComparison, level: int = 2) -> list[str]:
     for table in build_tables(comparison):
         lines += [f"{'#' * level} {table.title}", "", table.note, "", f"| {' | '.join(table.head)} |",
                   "|" + "---|" * len(table.head), *(f"| {' | '.join(row)} |" for row in table.rows), ""]
-    for title, found in (("How they differ", describe_differences(comparison)),
-                         ("What handicaps whom", describe_handicaps(comparison))):
-        lines += [f"{'#' * level} {title}", "", *(f"- {line}" for line in found), ""] if found else []
+    for title, found in list_sections(comparison):
+        lines += [f"{'#' * level} {title}", "", *(f"- {line}" for line in found), ""]
     return lines

@@ -27,15 +27,14 @@ from ...motion.retargeting.structure import list_descendants
 from ...motion.skeleton import Skeleton
 from ..atomic import atomic_path
 from . import bvh_text
-from .bvh_text import POSITIONS, ROTATIONS, BvhText
-from .bvh_write import BvhForm, JointAboveHips, format_bvh, iter_parts_text
+from .bvh_ball import find_ball_joints, list_body_joints, read_ball_joint
+from .bvh_channels import BvhChannels, compute_rotations, from_file_axes
+from .bvh_text import POSITIONS, BvhText
+from .bvh_write import BvhForm, JointAboveHips, format_bvh, iter_parts_text, moves
 
 _STILL_METRES = 1e-3  # smaller motion counts as none
-_STILL_ROTATION = np.cos(np.radians(0.1) / 2)  # w of a rotation by a tenth of a degree
 _LARGEST_METRES = 1e6  # larger positions are in a wrong unit or damaged
 _NTSC = [rate * 1000 / 1001 for rate in (24, 30, 48, 60, 120, 240)]  # frames per second
-# file axis -> core axis and sign of a rotation about it; Y up becomes Z up by a quarter turn about X
-AXES = {"Y": {"X": (0, 1.0), "Y": (2, 1.0), "Z": (1, -1.0)}, "Z": {"X": (0, 1.0), "Y": (1, 1.0), "Z": (2, 1.0)}}
 _HIP_HEIGHT = (0.75, 1.15)  # metres, adults standing
 _LEG_LENGTH = 0.88  # m, of an adult of 1.80 m
 # centimetres, metres, inches, CMU's (1 inch / 0.45 in hundredths of it), millimetres, feet, decimetres
@@ -52,11 +51,13 @@ class BvhClip:
         motion: the motion.
         form: what writing it back needs.
         notes: one line each.
+        ball: (T, 3) m of a joint that is named as a ball, in the motion's world; None without one.
     """
 
     motion: Motion
     form: BvhForm
     notes: tuple[str, ...]
+    ball: np.ndarray | None = None
 
 
 def read_bvh(path, unit: float | None = None) -> BvhClip:
@@ -64,7 +65,8 @@ def read_bvh(path, unit: float | None = None) -> BvhClip:
 
     Position channels of any joint replace its OFFSET, as Bandai-Namco's and LAFAN1's files mean them; below the hips
     their mean becomes the bone, and the notes list joints that move by more than 1 mm. Joints above the hips are folded
-    into the hips. Frame rates within 0.1 % of a whole number or an NTSC rate are rounded to it.
+    into the hips. A joint named as a ball is no part of the body (`bvh_ball`). Frame rates within 0.1 % of a whole
+    number or an NTSC rate are rounded to it.
 
     Args:
         path: the file.
@@ -78,9 +80,9 @@ def read_bvh(path, unit: float | None = None) -> BvhClip:
         raise InputError("unit", str(unit), "metres per file unit, above 0", "0.01 for centimetres")
     text = bvh_text.read_bvh_text(path)
     scale = estimate_scale(text, unit)
-    channels = _Channels(text, scale)
+    channels = BvhChannels(text, scale.unit, scale.up)
     hips = _find_root(text, scale.body)
-    body_joints = list_descendants(text.parents, hips)
+    body_joints = list_body_joints(text, hips, scale.body)
     root, root_rotations, above = _fold_root(channels, hips)
     skeleton, drift = _build_skeleton(channels, body_joints)
     rotations = np.stack([root_rotations.T] + [channels.compute_rotation(joint) for joint in body_joints[1:]])
@@ -88,7 +90,9 @@ def read_bvh(path, unit: float | None = None) -> BvhClip:
     motion = Motion(skeleton, root, rotations.transpose(2, 0, 1), _round_rate(text.frame_time))
     orders = {text.names[joint]: text.channels[joint] for joint in body_joints}
     form = BvhForm(orders, _measure_headings(channels, above, motion), scale.unit, scale.up)
-    return BvhClip(motion, form, (*scale.notes, *_list_notes(text, body_joints, above, drift)))
+    ball, ball_notes = read_ball_joint(channels, root, scale.body)
+    notes = (*scale.notes, *_list_notes(text, scale.body, body_joints, above, drift), *ball_notes)
+    return BvhClip(motion, form, notes, ball)
 
 
 def write_bvh(path, motion: Motion, form: BvhForm | None = None) -> tuple[str, ...]:
@@ -117,18 +121,19 @@ def write_bvh(path, motion: Motion, form: BvhForm | None = None) -> tuple[str, .
     return notes
 
 
-def write_bvh_parts(path, parts: Iterable[Motion], count: int) -> None:
+def write_bvh_parts(path, parts: Iterable[Motion], count: int, form: BvhForm | None = None) -> None:
     """Write a motion that comes in parts as BVH, as `write_bvh` writes the whole.
 
     Args:
         path: the file.
         parts: of one skeleton and rate, in order.
         count: frames of all parts.
+        form: as for `write_bvh`.
     Raises:
         InputError: if the folder is not writable.
     """
     with atomic_path(path) as temporary, open(temporary, "w", encoding="utf-8", newline="\n") as file:
-        file.writelines(iter_parts_text(parts, count))
+        file.writelines(iter_parts_text(parts, count, form or BvhForm()))
 
 
 class BvhRows:
@@ -145,9 +150,9 @@ class BvhRows:
     def __init__(self, text: BvhText, unit: float | None = None):
         self.text = text
         self.scale = estimate_scale(text, unit)
-        channels = _Channels(text, self.scale)
+        channels = BvhChannels(text, self.scale.unit, self.scale.up)
         self.hips = _find_root(text, self.scale.body)
-        self.body_joints = list_descendants(text.parents, self.hips)
+        self.body_joints = list_body_joints(text, self.hips, self.scale.body)
         self.skeleton = _build_skeleton(channels, self.body_joints)[0]
 
     def compute_poses(self, values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -158,36 +163,11 @@ class BvhRows:
         Returns:
             Root positions (T, 3) m and local rotations (T, J, 4).
         """
-        channels = _Channels(replace(self.text, values=np.asarray(values, dtype=float)), self.scale)
+        rows = replace(self.text, values=np.asarray(values, dtype=float))
+        channels = BvhChannels(rows, self.scale.unit, self.scale.up)
         root, rotation, _ = _fold_root(channels, self.hips)
         rotations = np.stack([rotation.T] + [channels.compute_rotation(joint) for joint in self.body_joints[1:]])
         return root, rotations.transpose(2, 0, 1)
-
-
-class _Channels:
-    """A file's numbers joint by joint, in core axes and metres."""
-
-    def __init__(self, text: BvhText, scale: FileScale):
-        self.text, self.scale = text, scale
-        self.first = np.concatenate([[0], np.cumsum([len(c) for c in text.channels])])
-
-    def find_columns(self, joint: int, kind: tuple[str, ...]) -> list[tuple[str, int]]:
-        """Find axis letters and columns of a joint's channels of one kind, in their order."""
-        return [(c[0], self.first[joint] + i) for i, c in enumerate(self.text.channels[joint]) if c in kind]
-
-    def compute_position(self, joint: int) -> np.ndarray:
-        """Compute the joint's position relative to its parent: (T, 3) m with position channels, else (1, 3)."""
-        positions = self.text.offsets[joint][None]
-        columns = self.find_columns(joint, POSITIONS)
-        if columns:
-            positions = np.repeat(positions, len(self.text.values), axis=0)
-            for letter, column in columns:
-                positions[:, "XYZ".index(letter)] = self.text.values[:, column]
-        return from_file_axes(positions, self.scale.up) * self.scale.unit
-
-    def compute_rotation(self, joint: int) -> np.ndarray:
-        """Compute the joint's rotation relative to its parent, components first: (4, T)."""
-        return compute_rotations(self.text.values, self.find_columns(joint, ROTATIONS), self.scale.up)
 
 
 def _find_root(text: BvhText, body: Humanoid | None) -> int:
@@ -198,7 +178,7 @@ def _find_root(text: BvhText, body: Humanoid | None) -> int:
     return body.hips if {body.left.upper_leg, body.right.upper_leg} <= hanging else 0
 
 
-def _fold_root(channels: _Channels, hips: int) -> tuple[np.ndarray, np.ndarray, tuple[JointAboveHips, ...]]:
+def _fold_root(channels: BvhChannels, hips: int) -> tuple[np.ndarray, np.ndarray, tuple[JointAboveHips, ...]]:
     """Compute the hips in the world frame, (T, 3) m and (T, 4), and list the joints above them."""
     frames, parents = len(channels.text.values), channels.text.parents
     position = np.broadcast_to(channels.compute_position(hips), (frames, 3))
@@ -210,11 +190,10 @@ def _fold_root(channels: _Channels, hips: int) -> tuple[np.ndarray, np.ndarray, 
         place, local_rotation = channels.compute_position(joint), channels.compute_rotation(joint).T
         position, rotation = quaternion.rotate(local_rotation, position) + place, quaternion.multiply(local_rotation,
                 rotation)
-        moves = _measure_spread(place) > _STILL_METRES or np.abs(local_rotation
-                                                                 @ local_rotation[0]).min() < _STILL_ROTATION
         carries = fixed if joint == parents[hips] else None
         name, channel_names = channels.text.names[joint], channels.text.channels[joint]
-        above.insert(0, JointAboveHips(name=name, channels=channel_names, is_moving=bool(moves), position=place[0],
+        is_moving = moves(place, local_rotation)
+        above.insert(0, JointAboveHips(name=name, channels=channel_names, is_moving=is_moving, position=place[0],
                                        rotation=local_rotation[0], hip_offset=carries))
         joint = parents[joint]
     return position, rotation, tuple(above)
@@ -225,7 +204,7 @@ def _measure_spread(positions: np.ndarray) -> float:
     return float(np.linalg.norm(positions - positions.mean(axis=0), axis=1).max())
 
 
-def _build_skeleton(channels: _Channels, body_joints: list[int]) -> tuple[Skeleton, dict[str, float]]:
+def _build_skeleton(channels: BvhChannels, body_joints: list[int]) -> tuple[Skeleton, dict[str, float]]:
     """Build the skeleton with mean offsets; also return the distance (m) by which joints leave them, above 1 mm."""
     text, offsets, drift = channels.text, [np.zeros(3)], {}
     for joint in body_joints[1:]:
@@ -236,10 +215,10 @@ def _build_skeleton(channels: _Channels, body_joints: list[int]) -> tuple[Skelet
     new_index = {old: i for i, old in enumerate(body_joints)}
     parents = [-1] + [new_index[text.parents[joint]] for joint in body_joints[1:]]
     ends = [(new_index[p], offset) for p, offset in zip(text.end_parents, text.end_offsets) if p in new_index]
-    end_offsets = from_file_axes(np.array([offset for _, offset in ends]).reshape(-1, 3), channels.scale.up)
+    end_offsets = from_file_axes(np.array([offset for _, offset in ends]).reshape(-1, 3), channels.up)
     names = tuple(text.names[joint] for joint in body_joints)
     end_parents = tuple(parent for parent, _ in ends)
-    return Skeleton(names, tuple(parents), np.array(offsets), end_parents, end_offsets * channels.scale.unit), drift
+    return Skeleton(names, tuple(parents), np.array(offsets), end_parents, end_offsets * channels.unit), drift
 
 
 def _check_size(text: BvhText, root: np.ndarray, skeleton: Skeleton) -> None:
@@ -250,7 +229,7 @@ def _check_size(text: BvhText, root: np.ndarray, skeleton: Skeleton) -> None:
         raise InputError(where, "a position beyond 1000 km", "a person's motion", "set the unit, or export again")
 
 
-def _measure_headings(channels: _Channels, above: tuple[JointAboveHips, ...], motion: Motion) -> tuple[JointAboveHips,
+def _measure_headings(channels: BvhChannels, above: tuple[JointAboveHips, ...], motion: Motion) -> tuple[JointAboveHips,
         ...]:
     """Add the mean angle from the body's heading to each moving joint above the hips."""
     if not any(joint.is_moving for joint in above):
@@ -273,14 +252,15 @@ def _round_rate(frame_time: float) -> float:
     return float(nearest) if abs(nearest - rate) <= 1e-3 * nearest else rate
 
 
-def _list_notes(text: BvhText, body_joints: list[int], above: tuple[JointAboveHips, ...],
+def _list_notes(text: BvhText, body: Humanoid | None, body_joints: list[int], above: tuple[JointAboveHips, ...],
                 drift: dict[str, float]) -> list[str]:
     """List what reading changed, one line per kind."""
     notes = [f"joint {old!r} is repeated, the second is renamed {new!r}" for old, new in text.renamed]
     for joint in above:
         state = "moving" if joint.is_moving else "static"
         notes.append(f"{joint.name} ({state}) folded into {text.names[body_joints[0]]}")
-    left_out = sorted(set(text.names) - {text.names[j] for j in body_joints} - {joint.name for joint in above})
+    balls = {text.names[joint] for joint in find_ball_joints(text, body)}
+    left_out = sorted(set(text.names) - {text.names[j] for j in body_joints} - {joint.name for joint in above} - balls)
     if left_out:
         notes.append(f"ignored, not part of the body: {', '.join(left_out)}")
     if drift:
@@ -305,51 +285,6 @@ class FileScale:
     up: str
     body: Humanoid | None
     notes: tuple[str, ...]
-
-
-def from_file_axes(vectors: np.ndarray, up: str) -> np.ndarray:
-    """Convert vectors from a file's axes to the core's.
-
-    Args:
-        vectors: (..., 3) in the file's axes.
-        up: the file's up axis, "Y" or "Z".
-    Returns:
-        (..., 3), Z up.
-    """
-    return vectors[..., (0, 2, 1)] * (1.0, -1.0, 1.0) if up == "Y" else vectors
-
-
-def compute_rotations(values: np.ndarray, columns: list[tuple[str, int]], up: str) -> np.ndarray:
-    """Compute a joint's rotations in core axes from its rotation channels.
-
-    Intrinsic, in the channels' order, degrees. The rotations are multiplied in closed form: each has two non-zero
-    components only.
-
-    Args:
-        values: (T, C) the file's numbers.
-        columns: axis letter and column of each rotation channel.
-        up: the file's up axis, "Y" or "Z".
-    Returns:
-        (4, T), components first.
-    Source: Faustino 2016, section 4.2.1, equations (30) and (31).
-    """
-    out = np.zeros((4, len(values)))
-    out[0] = 1.0
-    columns = [(letter, column) for letter, column in columns if values[:, column].any()]  # many channels are all zero
-    if not columns:
-        return out
-    numbers = [column for _, column in columns]
-    neighbours = values[:, min(numbers) : max(numbers) + 1].T  # a slice: selecting single columns is much slower
-    half = neighbours[np.array(numbers) - min(numbers)] * (np.pi / 360.0)
-    cosines, sines = np.cos(half), np.sin(half)
-    for (letter, _), c, s in zip(columns, cosines, sines):
-        axis, sign = AXES[up][letter]
-        # Quaternion product with (c, s on axis k): the axes i, j follow k cyclically.
-        s = s * sign
-        k, i, j = 1 + axis, 1 + (axis + 1) % 3, 1 + (axis + 2) % 3
-        w, vk, vi, vj = out[0], out[k], out[i], out[j]
-        out[[0, k, i, j]] = w * c - vk * s, vk * c + w * s, vi * c + vj * s, vj * c - vi * s
-    return out
 
 
 def estimate_scale(text: BvhText, unit: float | None) -> FileScale:

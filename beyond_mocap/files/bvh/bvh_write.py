@@ -5,7 +5,7 @@ Hierarchy in file order, Euler angles, centimetres, Y up.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from itertools import chain
 
@@ -18,6 +18,8 @@ from ...motion.skeleton import Skeleton
 from .bvh_text import POSITIONS, ROTATIONS
 
 _CENTIMETRES = 100.0
+_STILL_METRES = 1e-3  # smaller motion counts as none
+_STILL_ROTATION = np.cos(np.radians(0.1) / 2)  # w of a rotation by a tenth of a degree
 _ZXY = ("Zrotation", "Xrotation", "Yrotation")
 _SAME_PLACE = 1e-4  # centimetres
 _SAME_ANGLE = np.degrees(1e-6)
@@ -64,6 +66,33 @@ class BvhForm:
     up: str = "Y"
 
 
+def build_form(names: Sequence[str], places: np.ndarray, turns: np.ndarray, motion: Motion) -> BvhForm:
+    """Build the form of a motion whose source has joints above the hips.
+
+    Args:
+        names: of A joints, from the source's root down.
+        places: (T, A, 3) m, world.
+        turns: (T, A, 4), world.
+        motion: from the hips on, T frames.
+    """
+    joints, parent = [], (np.zeros((len(motion), 3)), quaternion.identity(len(motion)))
+    body_heading = compute_heading(motion) if len(names) else np.zeros(0)
+    for number, name in enumerate(names):
+        world = places[:, number], turns[:, number]
+        place, turn = _to_parent_frame(world, parent)
+        mean = np.angle(np.mean(np.exp(1j * (quaternion.to_yaw(world[1]) - body_heading))))
+        joints.append(JointAboveHips(name=name, channels=(*POSITIONS, *_ZXY), is_moving=moves(place, turn),
+                                     position=place[0], rotation=turn[0], heading=float(mean)))
+        parent = world
+    return BvhForm(above=tuple(joints))
+
+
+def moves(positions: np.ndarray, rotations: np.ndarray) -> bool:
+    """Whether a joint at (T, 3) m and (T, 4), relative to the joint above it, moves by more than noise."""
+    spread = np.linalg.norm(positions - positions.mean(axis=0), axis=1).max()
+    return bool(spread > _STILL_METRES or np.abs(rotations @ rotations[0]).min() < _STILL_ROTATION)
+
+
 @dataclass(frozen=True, kw_only=True)
 class _Joint:
     """A joint as it is written, centimetres and degrees, Y up.
@@ -101,10 +130,10 @@ def format_bvh(motion: Motion, form: BvhForm) -> tuple[Iterator[str], tuple[str,
     return chain(_iter_head(joints, len(motion), motion.fps), _iter_rows(joints)), notes
 
 
-def iter_parts_text(parts: Iterable[Motion], count: int) -> Iterator[str]:
+def iter_parts_text(parts: Iterable[Motion], count: int, form: BvhForm) -> Iterator[str]:
     """Format a motion that comes in parts, of `count` frames in all, as BVH: the text in pieces."""
     for number, part in enumerate(parts):
-        joints = _build_joints(part, BvhForm())
+        joints = _build_joints(part, form)
         if not number:
             yield from _iter_head(joints, count, part.fps)
         yield from _iter_rows(joints)

@@ -19,6 +19,7 @@ from ...annotation.ball_contact import build_surfaces, find_striking_part
 from ...annotation.labels import list_labels
 from ...annotation.striking import trace_fastest_surface
 from ...annotation.vocabulary import SIDES
+from ...base.time_series import interpolate_columns
 from ...base.vectors import arctan2
 from ...library.keys import Key
 from ...library.library import Library
@@ -61,6 +62,7 @@ TURN_REACH = 0.25  # m between part and ball that the ball's noise and the limb 
 _FARTHEST = 1.0  # m on the ground beyond which the cost does not grow
 _LOFT_NOISE = np.radians(15.0)  # a foot that meets the ball below its middle lifts it by more than it rises itself
 _SENDING = frozenset(list_labels(ball="sends"))
+_MET = 0.4  # m between the middle of a part and a recorded ball that it meets
 _STILL_SPEED = 0.5  # m/s up to which a direction of travel is noise: there the body's facing stands for it
 _MOMENT = 1.0 / 30.0  # s before and after a key frame between which velocities are measured: frames of most takes
 
@@ -183,9 +185,19 @@ def _measure_strike(library: Library, key: Key, places: np.ndarray, rotations: n
     if not found:
         return np.full(2, np.nan), np.nan, np.full(3, np.nan), 0.0
     middle = trace_fastest_surface(found, places, rotations)
-    place = quaternion.rotate_level((middle[1] - places[1, 0])[None, :2], np.array([back]))[0]
+    contact = _find_recorded_contact(library, key, middle[1])
+    place = quaternion.rotate_level((contact - places[1, 0])[None, :2], np.array([back]))[0]
     velocity = _rotate_about_up((middle[2] - middle[0]) / (2.0 * _MOMENT), back)
-    return place, float(middle[1, 2]), velocity, _measure_plant_off(library.skeleton, places[1], key.labels)
+    return place, float(contact[2]), velocity, _measure_plant_off(library.skeleton, places[1], key.labels)
+
+
+def _find_recorded_contact(library: Library, key: Key, middle: np.ndarray) -> np.ndarray:
+    """Find where (3,) m the ball is met: where the recording has it, else at the part's middle (3,) m."""
+    clip = library.clips[key.clip]
+    if clip.ball is None:
+        return middle
+    ball = interpolate_columns(key.frame, np.arange(len(clip.ball)), clip.ball)
+    return ball if np.linalg.norm(ball - middle) <= _MET else middle
 
 
 def _measure_plant_off(skeleton: Skeleton, places: np.ndarray, labels: frozenset[str]) -> float:

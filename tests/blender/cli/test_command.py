@@ -6,6 +6,7 @@ import subprocess
 import sys
 
 import bpy
+import numpy as np
 import pytest
 
 TOP = pathlib.Path(__file__).resolve().parents[3]
@@ -98,3 +99,48 @@ def test_batch_needs_no_installed_extension(tmp_path, arguments, status):
     done = subprocess.run(command, cwd=tmp_path, env=environment, capture_output=True, text=True, timeout=120)
     assert done.returncode == status, done.stderr
     assert ("missing.bvh" in done.stderr) == (status == 2) and "Traceback" not in done.stderr
+
+
+def test_foreign_recordings_are_converted_first(run, extension, library_folder, tmp_path, capfd):
+    bvh = importlib.import_module(f"{extension.__name__}.beyond_mocap.files.bvh.bvh")
+    rigs = importlib.import_module(f"{extension.__name__}.scene.rigs.armature")
+    action = importlib.import_module(f"{extension.__name__}.scene.core.action")
+    source = next(path for path in sorted(library_folder.rglob("*.bvh")) if path.with_suffix(".txt").is_file())
+    motion, folder = bvh.read_bvh(source).motion, tmp_path / "library"
+    folder.mkdir()
+    bpy.context.scene.render.fps = round(motion.fps)
+    rig = rigs.create_armature(bpy.context, motion.skeleton, "Somebody")
+    action.write_motion(rig, motion, bpy.context.scene, 1.0)
+    bpy.context.scene.frame_end = len(motion)
+    bpy.ops.export_scene.gltf(filepath=str(folder / "walk.glb"), export_format="GLB")
+    (folder / "walk.txt").write_text("0 1 walking\n")
+    (folder / "broken.fbx").write_bytes(b"no FBX")
+    assert run(["library", str(folder), "--cache", str(tmp_path / "cache")]) == 0
+    told = capfd.readouterr()
+    assert "1 clip" in told.out and "skipped:" in told.err and "Traceback" not in told.err
+    assert (tmp_path / "cache/converted/walk.glb.bvh").is_file() and not (folder / ".beyond_mocap").exists()
+    assert run(["library", str(tmp_path / "nowhere")]) == 2
+
+
+def test_a_root_above_the_hips_comes_back_in_every_form(run, extension, order, library_folder, tmp_path):
+    bvh, form = (importlib.import_module(f"{extension.__name__}.beyond_mocap.files.bvh.{name}")
+                 for name in ("bvh", "bvh_write"))
+    kinematics = importlib.import_module(f"{extension.__name__}.beyond_mocap.motion.motion").forward_kinematics
+    foreign = importlib.import_module(f"{extension.__name__}.scene.library.foreign")
+    root = form.JointAboveHips(name="World", channels=(), is_moving=False, position=np.array([0.0, 0.5, 0.0]),
+                               rotation=np.array([1.0, 0.0, 0.0, 0.0]))
+    folder = tmp_path / "library"
+    folder.mkdir()
+    for source in sorted(library_folder.rglob("*.bvh")):
+        bvh.write_bvh(folder / source.name, bvh.read_bvh(source).motion, form.BvhForm(above=(root,)))
+        if source.with_suffix(".txt").is_file():
+            (folder / source.with_suffix(".txt").name).write_bytes(source.with_suffix(".txt").read_bytes())
+    order = ["synthesize", "--library", str(folder), *order[3:], "--keep-root"]
+    for suffix in (".bvh", ".fbx"):
+        assert run([*order, "--out", str(tmp_path / f"player{suffix}")]) == 0
+    plain = bvh.read_bvh(tmp_path / "player.bvh")
+    take = foreign.read_takes(tmp_path / "player.fbx")[0]
+    assert [joint.name for joint in plain.form.above] == ["World"] == [joint.name for joint in take.form.above]
+    assert np.allclose(take.form.above[0].position, root.position, atol=1e-4)
+    apart = kinematics(plain.motion)[0][:, 0] - kinematics(take.motion)[0][: len(plain.motion), 0]
+    assert np.abs(apart).max() < 2e-3

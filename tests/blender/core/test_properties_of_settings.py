@@ -104,4 +104,4 @@ def test_what_is_not_set_is_left_to_the_core(core):
 def test_presets_keep_what_the_table_says(core):
     stored = {text.removeprefix("settings.") for text in bpy.types.BEYOND_MOCAP_OT_add_preset.preset_values}
     assert stored == {row.identifier for row in core("base.settings").list_settings("synthesis") if row.in_preset}
-    assert len(stored) == 17
+    assert len(stored) == 18

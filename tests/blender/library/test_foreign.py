@@ -2,10 +2,12 @@
 
 import importlib
 
+import bmesh
 import bpy
 import numpy as np
 import pytest
 import synthetic_motion
+from mathutils import Vector
 from undo import assert_one_step, collect_state
 
 
@@ -173,3 +175,89 @@ def test_a_folder_of_broken_clips_alone(tmp_path):
     bpy.context.scene.beyond_mocap.library_folder = str(tmp_path)
     with pytest.raises(RuntimeError, match="no clip in the folder"):
         bpy.ops.beyond_mocap.build_library()
+
+
+def add_ball(scene, places, name="Ball", kind="MESH"):
+    """A sphere, or an empty, with a key on every frame from frame 1 on; its mesh lies beside its origin."""
+    data = None
+    if kind == "MESH":
+        data = bpy.data.meshes.new(name)
+        mesh = bmesh.new()
+        bmesh.ops.create_icosphere(mesh, subdivisions=1, radius=0.11)
+        bmesh.ops.translate(mesh, verts=mesh.verts, vec=(0.0, 0.0, 0.2))
+        mesh.to_mesh(data)
+        mesh.free()
+    ball = bpy.data.objects.new(name, data)
+    scene.collection.objects.link(ball)
+    for frame, place in enumerate(places, 1):
+        ball.location = place - np.array([0.0, 0.0, 0.2 if kind == "MESH" else 0.0])
+        ball.keyframe_insert("location", frame=frame)
+    for curve in find_curves(ball):
+        for point in curve.keyframe_points:
+            point.interpolation = "LINEAR"
+    return ball
+
+
+def find_curves(thing):
+    action = thing.animation_data.action
+    return action.layers[0].strips[0].channelbag(thing.animation_data.action_slot).fcurves
+
+
+def build_kicked_ball(motion, frame, start=(0.3, 0.1, 0.11)):
+    """A ball that lies beside the body until a frame, and then leaves at 12 m/s."""
+    after = np.maximum(np.arange(len(motion)) - frame, 0) / motion.fps
+    return motion.root_positions[frame] * [1, 1, 0] + start + after[:, None] * [12.0, 0.0, 0.0]
+
+
+@pytest.mark.parametrize("ending", sorted(EXPORTERS))
+def test_an_animated_ball_beside_the_armature_comes_back(core, rooms, tmp_path, ending):
+    scene, path = bpy.context.scene, tmp_path / f"kick{ending}"
+    planted = build_kicked_ball(synthetic_motion.build_motion(core, 61), 30)
+
+    def lie(rig):
+        add_ball(scene, planted, kind="MESH" if ending != ".usdc" else "EMPTY")
+        add_ball(scene, planted + 8.0, "Ball.001")
+
+    motion = exported(core, rooms, path, 30, lie)
+    before = collect_state()
+    take = rooms["library.foreign"].read_takes(path)[0]
+    assert collect_state() == before
+    assert np.abs(take.ball - planted[: len(motion)]).max() < 2e-3
+    assert any("2 balls" in note for note in take.notes)
+
+
+def test_a_bone_named_ball_is_the_ball_and_a_root_above_the_hips_is_kept(core, rooms, tmp_path):
+    scene, path = bpy.context.scene, tmp_path / "root.fbx"
+    scene.render.fps = 30
+    motion = synthetic_motion.build_motion(core, 61)
+    planted = build_kicked_ball(motion, 30)
+    skeleton_type, motion_type = core("motion.skeleton").Skeleton, core("motion.motion").Motion
+    own = motion.skeleton
+    whole = skeleton_type(("Root", *own.names, "Ball"), (-1, *(parent + 1 for parent in own.parents), 0),
+                          np.vstack([np.zeros(3), own.offsets, [0.0, 0.0, 0.5]]))
+    still = np.tile([1.0, 0.0, 0.0, 0.0], (61, 1, 1))
+    rig = rooms["rigs.armature"].create_armature(bpy.context, whole, "Somebody")
+    turned = motion_type(whole, np.zeros((61, 3)), np.concatenate([still, motion.rotations, still], axis=1), 30.0)
+    rooms["core.action"].write_motion(rig, turned, scene, 1.0)
+    for name, places in ((own.names[0], motion.root_positions), ("Ball", planted)):
+        bone = rig.pose.bones[name]
+        for frame, place in enumerate(places, 1):
+            moved = Vector(place) - bone.bone.head_local + bone.parent.bone.head_local  # the root stays at the origin
+            bone.location = bone.bone.matrix_local.to_3x3().inverted() @ moved
+            bone.keyframe_insert("location", frame=frame)
+    scene.frame_start, scene.frame_end = 1, 61
+    EXPORTERS[".fbx"](str(path))
+    bpy.ops.wm.read_homefile(use_empty=True)
+    bpy.context.scene.beyond_mocap.library_folder = str(tmp_path)
+    (tmp_path / "root.txt").write_text("0 2 walking\n")
+    take = rooms["library.foreign"].read_takes(path)[0]
+    assert sorted(take.motion.skeleton.names) == sorted(own.names)
+    assert np.abs(take.motion.root_positions - motion.root_positions).max() < 2e-3
+    assert np.abs(take.ball - planted).max() < 2e-3
+    queue = rooms["library.foreign"].ConversionQueue(tmp_path, None)
+    queue.convert_next()
+    clip = core("files.bvh.bvh").read_bvh(tmp_path / ".beyond_mocap/converted/root.fbx.bvh")
+    assert [(joint.name, joint.is_moving) for joint in clip.form.above] == [("Root", False)]
+    assert np.abs(clip.motion.root_positions - motion.root_positions).max() < 2e-3
+    library = core("library.build").build_library(tmp_path)
+    assert library.clips[0].ball is not None

@@ -230,6 +230,32 @@ def test_the_file_browser_shows_the_name_that_is_written(rooms, extension):
         assert not operator.check(asked, None)
 
 
+@pytest.mark.parametrize("format", ("FBX", "BVH"))
+def test_the_root_of_the_recordings_is_added_where_it_is_asked_for(extension, core, body, clip, tmp_path, format):
+    bvh, form = core("files.bvh.bvh"), core("files.bvh.bvh_write")
+    root = form.JointAboveHips(name="World", channels=(), is_moving=False, position=np.array([0.0, 0.5, 0.0]),
+                               rotation=np.array([1.0, 0.0, 0.0, 0.0]))
+    folder = tmp_path / "library"
+    folder.mkdir()
+    bvh.write_bvh(folder / "jog.bvh", clip, form.BvhForm(above=(root,)))
+    (folder / "jog.txt").write_text("0 1 jogging\n")
+    bpy.context.scene.beyond_mocap.library_folder = str(folder)
+    shown, out = look(body, FRAMES_SHOWN), tmp_path / f"out{SUFFIXES[format]}"
+    select(body)
+    with pytest.raises(RuntimeError, match="no library is built"):
+        export(out, format=format, keep_root=True)
+    assert bpy.ops.beyond_mocap.build_library() == {"FINISHED"}
+    select(body)
+    before = collect_state()
+    assert export(out, format=format, keep_root=True) == {"FINISHED"}
+    assert collect_state() == before and len(bpy.data.scenes) == 1
+    foreign = importlib.import_module(f"{extension.__name__}.scene.library.foreign")
+    above = (bvh.read_bvh(out) if format == "BVH" else foreign.read_takes(out)[0]).form.above
+    assert [joint.name for joint in above] == ["World"] and np.allclose(above[0].position, root.position, atol=1e-4)
+    if format == "FBX":
+        assert_same(read_back(out, FRAMES), shown)
+
+
 def test_bad_places_and_choices_are_told(rooms, body, tmp_path, core, monkeypatch):
     select(body)
 

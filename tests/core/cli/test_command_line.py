@@ -16,10 +16,12 @@ from beyond_mocap.annotation import read_timeline
 from beyond_mocap.cli.main import _InterruptHandler, main
 from beyond_mocap.cli.outputs import ProgressReporter
 from beyond_mocap.files.bvh import bvh
-from beyond_mocap.files.tables import read_ball
+from beyond_mocap.files.bvh.bvh_write import BvhForm, JointAboveHips
+from beyond_mocap.files.tables import read_ball, write_ball
 from beyond_mocap.library.missing_actions import ACTION_PREFIX
 from beyond_mocap.library.synthetic_clips import KICK_PREFIX, SYNTHETIC_FOLDER
 from beyond_mocap.motion.humanoid import estimate_stature
+from beyond_mocap.motion.track.ball_path import BallPath
 from beyond_mocap.synthesis.provenance import read_provenance
 
 TOP = Path(__file__).resolve().parents[3]
@@ -251,6 +253,36 @@ def test_a_track_without_a_ball_writes_none_and_tells(synthesize, match, tmp_pat
     status, _, error = synthesize(track=match / "track_only.csv", ball=tmp_path / "b.csv")
     assert status == 0 and not (tmp_path / "b.csv").exists()
     assert any("has no ball" in line for line in error)
+
+
+def test_a_root_above_the_hips_and_a_ball_come_back_where_they_are_asked_for(run, synthesize, match, clips_folder,
+                                                                             tmp_path):
+    folder = tmp_path / "rooted"
+    folder.mkdir()
+    still = JointAboveHips(name="World", channels=(), is_moving=False, position=np.array([0.0, 0.5, 0.0]),
+                           rotation=np.array([1.0, 0.0, 0.0, 0.0]))
+    for name in ("walk", "jog"):
+        motion = bvh.read_bvh(clips_folder / f"{name}.bvh").motion
+        bvh.write_bvh(folder / f"{name}.bvh", motion, BvhForm(above=(still,)))
+        (folder / f"{name}.txt").write_text(f"0 4 {name}ing front\n".replace("jog", "jogg"))
+        ball = motion.root_positions * [1, 1, 0] + [0.4, 0.0, 0.11]
+        write_ball(folder / f"{name}.ball.csv", BallPath(np.arange(len(ball)) / 30.0, ball, np.ones(len(ball), bool)))
+    order = ["synthesize", "--library", folder, "--track", match / "track_only.csv", "--annotations",
+             match / "empty.txt", "--ball", tmp_path / "ball.csv"]
+    status, _, error = run(*order, "--out", tmp_path / "plain.bvh")
+    assert status == 0 and any("--recorded-ball takes that of the recordings" in line for line in error)
+    assert not (tmp_path / "ball.csv").exists()
+    for more in ((), ("--window", "25")):
+        asked = ("--recorded-ball",) if not more else ()
+        status, _, error = run(*order, *more, *asked, "--keep-root", "--out", tmp_path / "rooted.bvh")
+        assert status == 0, error
+        plain, rooted = (bvh.read_bvh(tmp_path / f"{name}.bvh") for name in ("plain", "rooted"))
+        assert [joint.name for joint in rooted.form.above] == ["World"] and plain.form.above == ()
+        assert np.allclose(rooted.form.above[0].position, still.position, atol=1e-6)
+    assert np.isfinite(read_ball(tmp_path / "ball.csv").positions).sum() > 60
+    assert_told(run(*order, "--recorded-ball", "--window", "25", "--out", tmp_path / "a.bvh"), 2, "--recorded-ball")
+    told = synthesize("--keep-root")
+    assert told[0] == 0 and any("--keep-root adds none" in line for line in told[2])
 
 
 def test_windows_line_ends_and_a_byte_order_mark(synthesize, match, tmp_path):

@@ -1,5 +1,8 @@
 """Methods side by side: what the tables say is what the takes are, and what is said of them follows from figures."""
 
+import html
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -80,7 +83,19 @@ def test_the_page_has_a_curve_of_every_scenario_and_the_report_every_figure(comp
     report = build_comparison_report(found)
     take = report["takes"]["scenario1"]["fs"]
     assert len(take["smoothness_m"]) == len(found.results["scenario1", "fs"].take.motion) - 1
-    assert any("key moment" in line for line in report["takes"]["scenario1"]["baseline"]["warnings"])
+    warnings = report["takes"]["scenario1"]["baseline"]["warnings"]
+    assert any("key moment" in line for line in warnings)
+    for text in ("\n".join(format_markdown(found)), build_comparison_page(found)):
+        assert "Warnings" in text and all(line in html.unescape(text) for line in warnings)
+
+
+def test_one_method_alone_has_no_section_on_how_it_differs(comparison):
+    pytest.importorskip("matplotlib")
+    _, found = comparison
+    alone = replace(found, methods=("fs",), results={place: result for place, result in found.results.items()
+                                                     if place[1] == "fs"})
+    assert "How they differ" not in build_comparison_page(alone)
+    assert "How they differ" not in "\n".join(format_markdown(alone))
 
 
 @pytest.mark.parametrize("text, found", [("", "no method"), ("path,magic", "'magic'"), ("fs, path,fs", "fs twice")])

@@ -1,0 +1,1 @@
+"""The ball of a recording, beside its clip."""

@@ -1,0 +1,128 @@
+"""The balls of the clips ride along: at the foot that touches them, on the track, in kicks and dribbles."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from beyond_mocap.annotation.ball_contact import measure_contact_gap
+from beyond_mocap.annotation.striking import build_part_surfaces
+from beyond_mocap.base.time_series import find_runs
+from beyond_mocap.files.bvh import bvh
+from beyond_mocap.files.tables import write_ball
+from beyond_mocap.library.build import build_library
+from beyond_mocap.motion.motion import forward_kinematics
+from beyond_mocap.motion.track import BALL_RADIUS
+from beyond_mocap.motion.track.ball_path import BallPath
+from beyond_mocap.synthesis.plan import Plan
+from beyond_mocap.synthesis.resynthesize import resynthesize
+from beyond_mocap.synthesis.synthesize import synthesize
+from beyond_mocap.synthetic.gait import build_gait
+from beyond_mocap.synthetic.gestures import build_strike
+
+FPS, STEP = 30.0, 20  # frames per second; frames between two touches
+AHEAD = 0.5  # m by which the ball is pushed ahead of the foot
+
+
+def plant_dribble(motion):
+    """A ball (T, 3) m that the right foot touches in every STEP-th frame and pushes ahead."""
+    line = build_part_surfaces(motion.skeleton, "foot", ("right",))[0].compute_line(*forward_kinematics(motion))
+    touches = np.arange(0, len(motion), STEP)
+    at_foot = line[1][touches] + [0.05 + BALL_RADIUS, 0.0, 0.0]
+    frames = np.arange(len(motion))
+    ball = np.column_stack([np.interp(frames, touches, column) for column in at_foot.T])
+    share = (frames % STEP) / STEP
+    ball[:, 0] += 4.0 * AHEAD * share * (1.0 - share)
+    ball[:, 2] = BALL_RADIUS
+    return ball, touches
+
+
+@pytest.fixture(scope="module")
+def dribbles(tmp_path_factory, clips_folder):
+    """Walks without a ball, and a jog with a dribbled one."""
+    folder = tmp_path_factory.mktemp("dribbles")
+    for name in ("walk", "stand"):
+        for ending in (".bvh", ".txt"):
+            (folder / (name + ending)).write_bytes((clips_folder / (name + ending)).read_bytes())
+    motion = build_gait(2.8, 5.0, FPS, seed=3)
+    ball, _ = plant_dribble(motion)
+    bvh.write_bvh(folder / "dribble.bvh", motion)
+    (folder / "dribble.txt").write_text("0 5 dribble jogging front\n")
+    write_ball(folder / "dribble.ball.csv", BallPath(np.arange(len(ball)) / FPS, ball, np.ones(len(ball), bool)))
+    return build_library(folder, unit=0.01)
+
+
+@pytest.fixture(scope="module")
+def take(dribbles, track_of, timeline_of):
+    track = track_of(lambda t: np.where(t < 4.0, 1.4, 2.8), 10.0, turn=0.25)
+    plan = Plan(track=track, timeline=timeline_of((4.5, 9.8, "dribble jogging front")), recorded_ball=True, made=False)
+    return synthesize(dribbles, plan)
+
+
+def show_dribble(take):
+    return np.array([take.clips[clip].startswith("dribble") for clip in take.clip])
+
+
+def measure_touch_gaps(take):
+    """Gaps in m between foot and ball in the output frames that show a touch of the clip."""
+    gap = measure_contact_gap(take.motion.skeleton, *forward_kinematics(take.motion), ("dribble",), take.ball.positions)
+    away = np.abs(take.clip_frame / STEP - np.round(take.clip_frame / STEP)) * STEP
+    return np.abs(gap[show_dribble(take) & (away < 0.5)])
+
+
+def test_a_dribbled_ball_rides_along_at_the_foot_that_touches_it(take):
+    shown, gaps = show_dribble(take), measure_touch_gaps(take)
+    known = np.isfinite(take.ball.positions).all(axis=1)
+    assert shown.sum() > 4 * FPS and known[shown].all()
+    assert (known & ~shown).sum() < 2 * STEP, "the ball went on where a foot of the clip alone would touch it"
+    assert len(gaps) >= 4 and np.median(gaps) < 0.05 and gaps.max() < 0.15, gaps
+    assert not take.ball.measured.any()
+    assert any("a recorded ball is shown for" in line for line in take.warnings)
+
+
+def test_the_ball_rolls_on_the_track_without_jumps(take):
+    first, end = max(find_runs(show_dribble(take)), key=lambda run: run[1] - run[0])
+    ball, root = take.ball.positions[first:end], take.motion.root_positions[first:end]
+    assert np.allclose(ball[:, 2], BALL_RADIUS, atol=0.01)
+    assert np.linalg.norm(ball - root, axis=1).max() < 2.0
+    assert np.linalg.norm(np.diff(ball, axis=0), axis=1).max() * FPS < 8.0
+
+
+def test_an_update_carries_the_ball_too(take, dribbles, track_of, timeline_of):
+    slower = track_of(lambda t: np.where((t < 4.0) | (t > 7.5), 1.4, 2.8), 10.0, turn=0.25)
+    timeline = timeline_of((4.5, 7.0, "dribble jogging front"))
+    again = resynthesize(dribbles, replace(take.plan, track=slower, timeline=timeline), take)
+    shown = show_dribble(again)
+    assert 2 * FPS < shown.sum() < show_dribble(take).sum()
+    assert np.isfinite(again.ball.positions[shown]).all()
+    assert np.median(measure_touch_gaps(again)) < 0.05
+
+
+def test_without_the_setting_and_with_a_ball_in_the_track_nothing_rides_along(dribbles, track_of, timeline_of, take):
+    line = (0.5, 3.5, "dribble jogging front")
+    plain = Plan(track=track_of(2.8, 4.0), timeline=timeline_of(line))
+    assert synthesize(dribbles, plain).ball is None
+    tracked = Plan(track=track_of(2.8, 4.0, ball=True), timeline=timeline_of(line), solve_touches=False)
+    asked = Plan(**{**vars(tracked), "recorded_ball": True})
+    assert np.array_equal(*(synthesize(dribbles, plan).ball.positions for plan in (tracked, asked)))
+
+
+def test_a_kicked_ball_lies_still_is_met_and_flies_on_as_recorded(tmp_path, clips_folder, track_of, timeline_of):
+    for name in ("walk.bvh", "walk.txt", "jog.bvh", "jog.txt", "kick.bvh", "kick.txt"):
+        (tmp_path / name).write_bytes((clips_folder / name).read_bytes())
+    kick = build_strike("kick low inside", fps=60.0)
+    motion, frame = kick.motion, round(kick.key * 60.0)
+    foot = build_part_surfaces(motion.skeleton, "foot", ("right",))[0].compute_line(*forward_kinematics(motion))[1]
+    after = np.maximum(np.arange(len(motion)) - frame, 0) / 60.0
+    ball = foot[frame] * [1, 1, 0] + [0.16, 0.0, BALL_RADIUS] + after[:, None] * [15.0, 0.0, 0.0]
+    write_ball(tmp_path / "kick.ball.csv", BallPath(np.arange(len(ball)) / 60.0, ball, np.ones(len(ball), bool)))
+    plan = Plan(track=track_of(2.8, 7.0), timeline=timeline_of((4.0, "kick low inside right")), recorded_ball=True,
+                made=False)
+    take = synthesize(build_library(tmp_path, unit=0.01), plan)
+    path, at = take.ball.positions, round(take.keys[0].frame)
+    speed = np.linalg.norm(np.diff(path, axis=0), axis=1) * FPS
+    gap = measure_contact_gap(take.motion.skeleton, *forward_kinematics(take.motion), take.keys[0].words, path)
+    assert abs(gap[at]) < 0.05
+    assert np.nanmax(speed[at - 40 : at - 1]) < 0.01, "a ball that lies still in the clip moved"
+    assert np.isfinite(path[at : at + 50]).all() and np.ptp(speed[at + 2 : at + 50]) < 1.0
+    assert 10.0 < speed[at + 10] < 22.0
