@@ -33,7 +33,7 @@ class TrainingConfig:
     Attributes:
         settings: settings of the model; a linear start widens `units` where the skeleton needs more.
         epochs: passes through all frames at most.
-        early_stopping: as many of them as helped on examples that were held out, otherwise all.
+        early_stopping: as many of them as help a subject that is held out, none if there is only one; otherwise all.
         patience: macro-epochs without an improvement there after which the search for their number ends.
         macro: epochs between two checkpoints (section 7.6).
         batch: frames per step.

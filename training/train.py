@@ -97,7 +97,8 @@ def train(
     choice, share = None, 0.0
     if config.early_stopping and config.epochs and not resume:
         share = _CHOOSING_SHARE
-        choice = choose_epochs(problem, config, held, build_model, minutes and share * minutes,
+        others = held if len({example.subject for example in examples}) > 1 else []
+        choice = choose_epochs(problem, config, others, build_model, minutes and share * minutes,
                                lambda done, text: progress(share * done, f"held out: {text}"), cancelled)
     trained = fit(
         problem, config, checkpoint=checkpoint, resume=resume, minutes=minutes and (1.0 - share) * minutes,
@@ -132,14 +133,15 @@ def choose_epochs(
     Args:
         problem: the training problem.
         config: its configuration.
-        held: examples that are held out; if empty, no epoch can be shown to help.
+        held: examples of a subject that is held out; if empty, no epoch can be shown to help. Other movements of a
+            subject that is trained on do not show it: five kicks of one player gained there, and lost on others.
         build_model: function that builds a model from parameters and a line of text.
         minutes: time limit, or None.
         progress: receives a share of 0 .. 1 and a text.
         cancelled: returns True to stop.
     """
     if not held:
-        few = "too few examples to hold some out and to see how many epochs help"
+        few = "there is no second subject to hold out, to see how many epochs help other people"
         return EpochChoice(0, f"the linear start alone: {few}") if config.linear_start else EpochChoice(config.epochs,
                 f"all epochs: {few}")
     tested, kept = _select_tested(held), problem.without_held_out()

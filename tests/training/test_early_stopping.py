@@ -81,6 +81,6 @@ def test_epochs_stop_where_held_out_subjects_improve_no_more(monkeypatch, errors
     assert found.epochs == chosen and "bob" in found.line and trained == [kept]
 
 
-def test_without_any_to_hold_out_the_start_stays():
+def test_without_a_second_subject_the_start_stays():
     found = train.choose_epochs(None, build_config({}), [], None, None)
-    assert found.epochs == 0 and "too few examples" in found.line
+    assert found.epochs == 0 and "no second subject" in found.line
