@@ -20,7 +20,7 @@ help:
 	@echo 'make kill-test      library builds, matches and trainings killed at 100 random moments, and resumed'
 	@echo 'make demo           the sample match, synthesized and rendered into build/demo'
 	@echo 'make bench          time and quality on recordings'
-	@echo 'make weights        train the shipped networks again on synthetic throws and kicks; some minutes'
+	@echo 'make weights        fit the shipped linear starts again to synthetic throws and kicks; some minutes'
 	@echo 'make tables         the pages of docs/ that come from the code: settings, providers'
 	@echo 'make docs           the documents as a site, into build/docs; broken links are errors'
 	@echo 'make package        the Python package, wheel and source archive, into build/package'
@@ -111,7 +111,7 @@ weights: training
 	@rm -rf build/examples
 	@set -ex; for action in throw kick; do \
 	  $(TRAINED) throw examples --out build/examples/$$action --action $$action --seed 0; \
-	  $(TRAINED) throw train build/examples/$$action --action $$action --half --out build/examples/$$action.npz; \
+	  $(TRAINED) throw train build/examples/$$action --action $$action --half --config training/synthetic.json --out build/examples/$$action.npz; \
 	  mv build/examples/$$action.npz $(WEIGHTS)/$$action.npz; \
 	done
 

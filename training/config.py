@@ -21,17 +21,20 @@ LIMITS = {
     "epochs": (0, 1_000_000), "macro": (1, 10_000), "batch": (1, 65_536), "learning_rate": (1e-7, 1.0),
     "final_rate": (0.0, 1.0), "keep": (0.05, 1.0), "l1": (0.0, 10.0), "limb_weight": (0.0, 1000.0),
     "body_weight": (0.0, 1000.0), "rollout": (1, 64), "single_frames": (0.0, 1.0), "noise": (0.0, 0.5),
-    "start_noise": (0.0, 0.5), "seed": (0, 2**31 - 1), "examples": (1, 1000), "ridge": (0.0, 10.0),
+    "start_noise": (0.0, 0.5), "seed": (0, 2**31 - 1), "examples": (1, 1000), "patience": (1, 10_000),
+    "ridge": (0.0, 10.0),
 }
 
 
 @dataclass(frozen=True)
 class TrainingConfig:
-    """How networks are trained; the defaults are those of the weights that are part of the project.
+    """How networks are trained.
 
     Attributes:
-        settings: settings of the model.
-        epochs: passes through all frames.
+        settings: settings of the model; a linear start widens `units` where the skeleton needs more.
+        epochs: passes through all frames at most.
+        early_stopping: as many of them as help a subject that is held out, none if there is only one; otherwise all.
+        patience: macro-epochs without an improvement there after which the search for their number ends.
         macro: epochs between two checkpoints (section 7.6).
         batch: frames per step.
         learning_rate: Adam's learning rate at the start.
@@ -51,14 +54,17 @@ class TrainingConfig:
         ridge: ridge of that regression, per row; 0: chosen on examples that are held out.
         start_noise: rad, error of the joints in a copy of all frames that the regression also uses
             (`disturb_poses`); 0: none.
-        examples: largest number of examples that the model contains for start poses (section 7.7.1).
+        examples: largest number of examples that the model contains for start poses (section 7.7.1) and plans.
+        all_subjects: these are examples of all subjects, otherwise of the first one.
         seed: of first weights, order, dropout and noise.
     """
 
     settings: ModelSettings = field(
         default_factory=lambda: ModelSettings(units=96, conditioned=True, guided=True, carried=True)
     )
-    epochs: int = 0
+    epochs: int = 30
+    early_stopping: bool = True
+    patience: int = 3
     macro: int = 2
     batch: int = 512
     learning_rate: float = 1e-4
@@ -76,7 +82,8 @@ class TrainingConfig:
     linear_start: bool = True
     ridge: float = 0.0
     start_noise: float = 0.07
-    examples: int = 40
+    examples: int = 120
+    all_subjects: bool = True
     seed: int = 0
 
     def __post_init__(self):

@@ -13,7 +13,7 @@ import time
 import zipfile
 import zlib
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from functools import partial
 from pathlib import Path
 from typing import Protocol
@@ -30,7 +30,7 @@ from .config import TrainingConfig
 
 MAX_GRADIENT = 1.0
 """Largest norm of a gradient; feeding a frame back many times can cause large ones."""
-VERSION = 1
+VERSION = 2
 NEXT_STEP = "repeat the same command, or leave --resume out to start again"
 
 
@@ -91,6 +91,19 @@ class Problem(Protocol):
         """Compute the loss (), and its parts by name, of stretches rows (B, 2) of that many frames."""
 
 
+@dataclass(frozen=True)
+class EpochChoice:
+    """How many epochs to train.
+
+    Attributes:
+        epochs: their number.
+        line: why, one line.
+    """
+
+    epochs: int
+    line: str = ""
+
+
 @dataclass(frozen=True, eq=False)
 class TrainingResult:
     """Result of a training.
@@ -101,6 +114,7 @@ class TrainingResult:
         seconds: computing time.
         losses: mean loss of each epoch.
         parts: parts of the loss in the last epoch, by name.
+        line: why it has that number of epochs.
     """
 
     params: dict
@@ -108,11 +122,14 @@ class TrainingResult:
     seconds: float
     losses: tuple[float, ...]
     parts: dict[str, float]
+    line: str = ""
 
 
 def fit(
     problem: Problem, config: TrainingConfig, *, checkpoint: Path | None = None, resume: bool = False,
-    minutes: float | None = None, progress: Callable[[float, str], None] = lambda fraction, text: None,
+    minutes: float | None = None, choice: EpochChoice | None = None,
+    is_done: Callable[[dict, int], bool] = lambda params, epoch: False,
+    progress: Callable[[float, str], None] = lambda fraction, text: None,
     cancelled: Callable[[], bool] = lambda: False,
 ) -> TrainingResult:
     """Train a problem.
@@ -123,6 +140,9 @@ def fit(
         checkpoint: file to write after each macro-epoch and when cancelled, or None.
         resume: continue from the checkpoint.
         minutes: time limit, or None.
+        choice: epochs after which it ends, while the learning rate falls as for `config.epochs`; None for all of
+            these. A checkpoint that is resumed contains it.
+        is_done: receives parameters and epochs after each macro-epoch and the last epoch, and returns True to end.
         progress: receives a share of 0 .. 1 and a text.
         cancelled: returns True to stop.
     Raises:
@@ -136,15 +156,19 @@ def fit(
     if resume and checkpoint is not None:
         previous = read_checkpoint(checkpoint, state, problem.fits)
         state, epoch, earlier_seconds, losses = previous.state, previous.epoch, previous.seconds, previous.losses
+        choice = previous.choice
     start_time = time.perf_counter() - earlier_seconds
     steps, parts = _compile_step(problem, adam), {}
 
     def save_checkpoint() -> None:
         if checkpoint is not None:
             seconds = time.perf_counter() - start_time
-            write_checkpoint(checkpoint, Checkpoint(state, epoch, seconds, losses, problem.fits))
+            write_checkpoint(checkpoint, Checkpoint(state, epoch, seconds, losses, problem.fits, choice))
 
-    while (share := _compute_share(epoch, time.perf_counter() - start_time, config, minutes)) < 1.0:
+    choice = choice or EpochChoice(config.epochs)
+    while epoch < choice.epochs and (
+        share := _compute_share(epoch, time.perf_counter() - start_time, config, minutes)
+    ) < 1.0:
         progress(share, f"epoch {epoch + 1}, loss {losses[-1]:.4f}" if losses else "compiling")
         if cancelled():
             save_checkpoint()
@@ -154,10 +178,12 @@ def fit(
         losses, epoch = (*losses, parts["loss"]), epoch + 1
         if not np.isfinite(losses[-1]):
             raise InputError("training", f"the loss is not finite after {epoch} epochs", "a lower learning_rate")
-        if epoch % config.macro == 0:
+        if epoch % config.macro == 0 or epoch == choice.epochs:
             save_checkpoint()
+            if is_done(jax.tree.map(np.array, state[0]), epoch):
+                break
     save_checkpoint()
-    return TrainingResult(state[0], epoch, time.perf_counter() - start_time, losses, parts)
+    return TrainingResult(state[0], epoch, time.perf_counter() - start_time, losses, parts, choice.line)
 
 
 def compute_rate(share: float, config: TrainingConfig) -> float:
@@ -229,6 +255,7 @@ class Checkpoint:
         seconds: computing time so far.
         losses: (E,) mean loss of each epoch.
         fits: settings and recordings as one text to compare.
+        choice: epochs after which the training ends.
     """
 
     state: object
@@ -236,6 +263,7 @@ class Checkpoint:
     seconds: float
     losses: tuple[float, ...]
     fits: str
+    choice: EpochChoice
 
 
 def build_checkpoint_path(out: str | os.PathLike) -> Path:
@@ -253,7 +281,8 @@ def check_checkpoint(path: Path) -> None:
 def write_checkpoint(path: Path, checkpoint: Checkpoint) -> None:
     """Write a checkpoint completely or not at all; InputError if the folder cannot be written."""
     leaves = [np.asarray(leaf) for leaf in jax.tree.leaves(checkpoint.state)]
-    header = {"version": VERSION, "epoch": checkpoint.epoch, "seconds": checkpoint.seconds, "fits": checkpoint.fits}
+    header = {"version": VERSION, "epoch": checkpoint.epoch, "seconds": checkpoint.seconds, "fits": checkpoint.fits,
+              "choice": asdict(checkpoint.choice)}
     with atomic_path(path, ".npz") as part:
         np.savez(part, told=np.array(json.dumps(header)), losses=np.array(checkpoint.losses, float),
                  **{f"leaf_{i:04d}": leaf for i, leaf in enumerate(leaves)})  # fmt: skip
@@ -276,7 +305,8 @@ def read_checkpoint(path: Path, like: object, fits: str) -> Checkpoint:
             header = json.loads(str(file["told"][()]))
             losses = tuple(float(one) for one in file["losses"])
             leaves = [file[name] for name in sorted(name for name in file.files if name.startswith("leaf_"))]
-        version, epoch, seconds, trained = (header[name] for name in ("version", "epoch", "seconds", "fits"))
+        version, epoch, seconds, trained, choice = (header[name] for name in ("version", "epoch", "seconds",
+                "fits", "choice"))
     except (ValueError, KeyError, TypeError, EOFError, OSError, zipfile.BadZipFile, zlib.error,
             NotImplementedError, RuntimeError, AttributeError) as error:
         raise InputError(path, f"is not a readable checkpoint ({type(error).__name__})", "", NEXT_STEP) from None
@@ -287,4 +317,4 @@ def read_checkpoint(path: Path, like: object, fits: str) -> Checkpoint:
                                                                    for b in map(np.asarray, expected_leaves)]:
         raise InputError(path, "belongs to a training with other settings or recordings", "", NEXT_STEP)
     state = jax.tree.unflatten(tree, [jnp.asarray(leaf) for leaf in leaves])
-    return Checkpoint(state, int(epoch), float(seconds), losses, fits)
+    return Checkpoint(state, int(epoch), float(seconds), losses, fits, EpochChoice(**choice))

@@ -6,6 +6,7 @@ Each alone on the truth (sections 7.5 and 7.6), in order, so that child networks
 
 from __future__ import annotations
 
+import copy
 import json
 
 import jax
@@ -117,7 +118,9 @@ class TrainingProblem:
         self.fits = json.dumps({**config.to_dict(), "recordings": recorded.digest}, sort_keys=True)
         self.ridge = config.ridge
         self.scales, self._sums, alone = {}, {}, {}
+        self._starts_from_held_out = True
         is_held_out = np.zeros(len(self.lengths), bool) if is_held_out is None else is_held_out
+        self._is_held_out = is_held_out
         is_held_out = np.repeat(is_held_out, np.array(self.lengths) - 1)
         steps = build_single_steps(recorded)
         disturbed_steps = None  # the same steps from disturbed poses
@@ -157,6 +160,13 @@ class TrainingProblem:
             found.append(every[0] if len(every) == 1 else every[0].add_sums(every[1]))
         return found
 
+    def without_held_out(self) -> TrainingProblem:
+        """Return the same problem without the examples that are held out: neither start nor training use them."""
+        found = copy.copy(self)
+        found._starts_from_held_out = False
+        found.lengths = tuple(0 if out else length for out, length in zip(self._is_held_out, self.lengths))
+        return found
+
     def count_frames(self, share: float) -> int:
         """Return the number of frames to feed back when `share` of the training is done.
 
@@ -172,7 +182,7 @@ class TrainingProblem:
 
     def build_parameters(self, key) -> dict:
         """Build the first weights of all networks, by name."""
-        return self.build_weights(key, self.fit_linear(self.ridge or RIDGES[-1]))
+        return self.build_weights(key, self.fit_linear(self.ridge or RIDGES[-1], self._starts_from_held_out))
 
     def build_weights(self, key, linear: dict[str, LinearOutput]) -> dict:
         """Build first weights by name, starting from linear outputs where given."""

@@ -8,6 +8,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
+from beyond_mocap.base.errors import InputError
 from beyond_mocap.throws.networks.network import PhaseNetwork
 
 SMALLEST_SCALE = 1e-3
@@ -54,18 +55,21 @@ def build_first_weights(
         layers: hidden layers.
         units: units per hidden layer.
         points: control points K.
-        linear: linear output to start from, on `outputs` of the units, lifted so that ELUs pass it, if they are at
-            most half of the units.
+        linear: linear output to start from, on `outputs` of the units, lifted so that ELUs pass it, or None.
     Returns:
         {"weights": [(K, out, in)], "biases": [(K, out)]}.
+    Raises:
+        InputError: if there are fewer units than outputs of the linear start.
     """
+    if linear is not None and outputs > units:
+        raise InputError("training: units", f"{units} for {outputs} outputs", f"{outputs} or more, for linear_start")
     widths = [inputs, *[units] * layers, outputs]
     weights, biases = [], []
     for layer, (width, out) in enumerate(zip(widths, widths[1:])):
         bound = np.sqrt(6.0 / (width + out)) * (0.1 if layer == layers else 1.0)
         initial = jax.random.uniform(jax.random.fold_in(key, layer), (out, width), jnp.float32, -bound, bound)
         weight, bias = jnp.tile(initial[None], (points, 1, 1)), jnp.zeros((points, out), jnp.float32)
-        if linear is not None and 2 * outputs <= units:
+        if linear is not None:
             weight, bias = _set_linear_units(weight, bias, linear, layer, layers)
         weights.append(weight)
         biases.append(bias)

@@ -1,13 +1,14 @@
-"""Train a model from a folder of examples: used by `throw train` and the experiments.
+"""Train a model from a folder of examples: used by `throw train`.
 
-The ridge of the linear start is chosen by its purpose: frames fed back on movements that were not used in the
-regression.
+The ridge of the linear start and the number of epochs are chosen by their purpose: frames fed back on movements that
+were held out, those of one subject where there are several. The model itself is then trained on all.
 """
 
 from __future__ import annotations
 
 import time
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from pathlib import Path
 
 import jax
@@ -18,8 +19,9 @@ from beyond_mocap.cli.outputs import ProgressReporter, check_outputs
 from beyond_mocap.files.bvh import bvh
 from beyond_mocap.motion.skeleton import Skeleton
 from beyond_mocap.throws.network_npz import write_model
-from beyond_mocap.throws.networks.chains import find_chains
+from beyond_mocap.throws.networks.chains import Chains, find_chains
 from beyond_mocap.throws.networks.example import Example, build_description
+from beyond_mocap.throws.networks.features import count_widths
 from beyond_mocap.throws.networks.generate import Options, generate_motion
 from beyond_mocap.throws.networks.limits import JointLimits, estimate_joint_limits
 from beyond_mocap.throws.networks.model import ThrowModel
@@ -32,7 +34,7 @@ from beyond_mocap.throws.networks.training_set import (
 from beyond_mocap.throws.throw_examples import read_examples
 
 from .config import TrainingConfig, read_config
-from .fit import TrainingResult, build_checkpoint_path, check_checkpoint, fit
+from .fit import EpochChoice, TrainingResult, build_checkpoint_path, check_checkpoint, fit
 from .hierarchy import TrainingProblem
 from .networks import RIDGES, to_phase_network
 from .recordings import build_recordings
@@ -43,6 +45,7 @@ _MAX_TESTED = 8  # movements that are generated for each ridge
 _TOLERANCE = 1.05  # errors up to this multiple of the lowest count as equal; the largest ridge of those is the safest
 READING_SHARE = 0.05
 """Share of the progress for reading the folder."""
+_CHOOSING_SHARE = 0.4  # share of progress and time for choosing the number of epochs
 
 
 def train(
@@ -65,14 +68,17 @@ def train(
         UserCancelledError: if `cancelled` returns True.
     """
     _check_rates(examples, config)
-    settings = config.settings
+    _check_start(config)
     chains = find_shared_chains(examples)
+    config, notes = widen_units(config, chains)
+    settings = config.settings
     training_examples = add_mirror_images(examples) if config.mirrored else list(examples)
     reference = build_reference_curve(training_examples) if settings.phase == "warped" else None
     reach = measure_leg_reach(training_examples)
     limits = estimate_joint_limits(np.concatenate([one.motion.rotations for one in training_examples]),
                                    (0, *chains.above, chains.hips))
     is_held_out = select_held_out(training_examples)
+    held = [one for one, out in zip(training_examples, is_held_out) if out]
     problem = TrainingProblem(build_recordings(training_examples, reference), chains, config, reach,
                               JointLimits(chains.skeleton, limits), is_held_out)
 
@@ -80,27 +86,101 @@ def train(
         return ThrowModel(
             settings=settings, skeleton=chains.skeleton,
             networks={name: to_phase_network(params[name], problem.scales[name]) for name in settings.networks},
-            leg_reach=reach, examples=select_spread(examples, config.examples),
+            leg_reach=reach, examples=select_spread(examples, config.examples, config.all_subjects),
             stature=float(np.mean([example.stature for example in examples])), joint_limits=limits, reference=reference,
-            trained_on=line,
+            trained_on=line, notes=notes,
         )
 
     if config.linear_start and not config.ridge:
         progress(0.0, "choosing the start")
-        problem.ridge = choose_ridge(problem, [one for one, out in zip(training_examples, is_held_out) if out],
-                                     build_model, cancelled)
+        problem.ridge = choose_ridge(problem, held, build_model, cancelled)
+    choice, share = None, 0.0
+    if config.early_stopping and config.epochs and not resume:
+        share = _CHOOSING_SHARE
+        others = held if len({example.subject for example in examples}) > 1 else []
+        choice = choose_epochs(problem, config, others, build_model, minutes and share * minutes,
+                               lambda done, text: progress(share * done, f"held out: {text}"), cancelled)
     trained = fit(
-        problem, config, checkpoint=checkpoint, resume=resume, minutes=minutes, progress=progress, cancelled=cancelled,
+        problem, config, checkpoint=checkpoint, resume=resume, minutes=minutes and (1.0 - share) * minutes,
+        choice=choice, progress=lambda done, text: progress(share + (1.0 - share) * done, text), cancelled=cancelled,
     )
+    notes = (*notes, trained.line) if trained.line else notes
     return build_model(trained.params, _describe_training(examples, trained))
 
 
-def select_spread(examples: Sequence[Example], most: int) -> list[Example]:
-    """Select at most `most` examples of the first one's subject with different targets.
+def widen_units(config: TrainingConfig, chains: Chains) -> tuple[TrainingConfig, tuple[str, ...]]:
+    """Widen the networks where the linear start needs it: twice as many units as a network has outputs.
 
-    The first, then always the one whose impact is farthest from those selected. Movements of one style blend better.
+    Returns:
+        The config, and a line about it if it is another one.
     """
-    examples = [example for example in examples if example.subject == examples[0].subject]
+    widths = count_widths(chains, config.settings)
+    name = max(widths, key=lambda each: widths[each][1])
+    outputs, units = widths[name][1], config.settings.units
+    if not config.linear_start or 2 * outputs <= units:
+        return config, ()
+    line = f"{2 * outputs} units instead of {units}, because the network {name} has {outputs} outputs"
+    return replace(config, settings=replace(config.settings, units=2 * outputs)), (line,)
+
+
+def choose_epochs(
+    problem: TrainingProblem, config: TrainingConfig, held: Sequence[Example],
+    build_model: Callable[[dict, str], ThrowModel], minutes: float | None,
+    progress: Callable[[float, str], None] = lambda share, text: None, cancelled: Callable[[], bool] = lambda: False,
+) -> EpochChoice:
+    """Choose the number of epochs by training without the held out examples until they no longer improve.
+
+    Args:
+        problem: the training problem.
+        config: its configuration.
+        held: examples of a subject that is held out; if empty, no epoch can be shown to help. Other movements of a
+            subject that is trained on do not show it: five kicks of one player gained there, and lost on others.
+        build_model: function that builds a model from parameters and a line of text.
+        minutes: time limit, or None.
+        progress: receives a share of 0 .. 1 and a text.
+        cancelled: returns True to stop.
+    """
+    if not held:
+        few = "there is no second subject to hold out, to see how many epochs help other people"
+        return EpochChoice(0, f"the linear start alone: {few}") if config.linear_start else EpochChoice(config.epochs,
+                f"all epochs: {few}")
+    tested, kept = _select_tested(held), problem.without_held_out()
+    start = build_model(kept.build_parameters(jax.random.key(config.seed)), "")
+    epochs, errors = [0], [_measure_errors(start, tested)]
+
+    def is_done(params: dict, epoch: int) -> bool:
+        epochs.append(epoch)
+        errors.append(_measure_errors(build_model(params, ""), tested))
+        return len(errors) - 1 - int(np.argmin(errors)) >= config.patience
+
+    fit(kept, config, minutes=minutes, is_done=is_done, progress=progress, cancelled=cancelled)
+    best = int(np.argmin(errors))
+    who = ", ".join(dict.fromkeys(example.subject for example in held))
+    return EpochChoice(epochs[best] or (0 if config.linear_start else config.epochs), (
+        f"{epochs[best]} of {config.epochs} epochs: held out to choose that, {len(tested)} movements of {who}, hands "
+        f"and feet {100 * errors[0]:.2f} cm off before and {100 * errors[best]:.2f} cm after, networks alone"))
+
+
+def select_spread(examples: Sequence[Example], most: int, all_subjects: bool = True) -> list[Example]:
+    """Select at most `most` examples with different targets, as many of each subject as of any other.
+
+    Args:
+        examples: the examples.
+        most: largest number of them.
+        all_subjects: of all subjects, otherwise of the first one.
+    """
+    subjects = list(dict.fromkeys(example.subject for example in examples))[: None if all_subjects else 1]
+    own = [[example for example in examples if example.subject == subject] for subject in subjects]
+    found: list[Example] = []
+    for number, part in enumerate(sorted(own, key=len)):  # what few examples leave free is for the others
+        found += _select_spread_of_subject(part, (most - len(found)) // (len(own) - number))
+    return [example for example in examples if any(example is one for one in found)]
+
+
+def _select_spread_of_subject(examples: Sequence[Example], most: int) -> list[Example]:
+    """Select at most `most` examples: the first, then always the one whose impact is farthest from those selected."""
+    if not most:
+        return []
     places = np.array([(*example.impact, 10.0 * example.limb) for example in examples])
     selected = [0]
     nearest = np.linalg.norm(places - places[0], axis=1)
@@ -118,6 +198,13 @@ def _check_rates(examples: Sequence[Example], config: TrainingConfig) -> None:
         if abs(example.motion.fps - rate) > 1e-6:
             found = f"{example.motion.fps:g} frames per second"
             raise InputError(f"example {example.name}", found, f"{rate:g}, the config's rate", "read it at that rate")
+
+
+def _check_start(config: TrainingConfig) -> None:
+    """Raise InputError if the networks would stay random."""
+    if not config.linear_start and not config.epochs:
+        raise InputError("training: epochs", "0 from random weights", "1 or more, or linear_start true",
+                         "networks that are not trained move nothing")  # fmt: skip
 
 
 def _describe_training(examples: Sequence[Example], trained: TrainingResult) -> str:
@@ -161,15 +248,25 @@ def choose_ridge(
     """
     if not held:
         return RIDGES[-1]
-    tested = [held[i] for i in np.unique(np.linspace(0, len(held) - 1, _MAX_TESTED).round().astype(int))]
+    tested = _select_tested(held)
     errors = []
     for ridge in RIDGES:
         if cancelled():
             raise UserCancelledError("cancelled while choosing the start")
         model = build_model(problem.build_weights(jax.random.key(0), problem.fit_linear(ridge, use_held_out=False)), "")
-        errors.append(np.mean([_measure_error(model, example) for example in tested]))
+        errors.append(_measure_errors(model, tested))
     good = [ridge for ridge, one in zip(RIDGES, errors) if one <= _TOLERANCE * min(errors)]
     return good[-1] if good else RIDGES[-1]
+
+
+def _select_tested(held: Sequence[Example]) -> list[Example]:
+    """Select the examples that are generated, evenly."""
+    return [held[i] for i in np.unique(np.linspace(0, len(held) - 1, _MAX_TESTED).round().astype(int))]
+
+
+def _measure_errors(model: ThrowModel, examples: Sequence[Example]) -> float:
+    """Measure the mean of `_measure_error` over examples."""
+    return float(np.mean([_measure_error(model, example) for example in examples]))
 
 
 def _measure_error(model: ThrowModel, example: Example) -> float:
@@ -201,6 +298,8 @@ def train_folder(options, report: ProgressReporter) -> None:
     )
     write_model(model, options.out, half=options.half)
     report.finish()
+    for note in model.notes:
+        report.show_note(note)
     weights = sum(network.parameters for network in model.networks.values())
     seconds = time.perf_counter() - start_time
     print(f"{options.out}: {model.trained_on}; {len(model.networks)} networks, {weights} weights, {seconds:.0f} s")

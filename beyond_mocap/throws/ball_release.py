@@ -20,7 +20,6 @@ from ..annotation.striking import FOOT_RADIUS
 from ..ball.contact import find_striking_surface
 from ..ball.physics import Ball
 from ..base.errors import InputError
-from ..base.vectors import unit_vector
 from ..motion import quaternion
 from ..motion.humanoid import identify_joints
 from ..motion.motion import Motion, compute_pose, forward_kinematics, sample_frames_cubic
@@ -32,6 +31,9 @@ _CONTACT_SPEED = 0.8  # m/s; a slower foot is in contact with the ground
 _STEP = 1e-3  # frames, step of numerical derivatives
 SPEED_RATIO = 1.2
 """Speed of the ball divided by that of the foot, along the line between them."""
+_SIDES = np.radians(np.linspace(-90.0, 90.0, 61))  # directions from the foot to the ball that are tried
+_FARTHEST, _HALVINGS = 0.6, 24  # m from the middle of the foot to a ball that it touches, and steps of the bisection
+_GAP_COST = 1e3  # for each metre of gap, against 1 - cos of the angle between launch and target
 FRICTION = 0.4
 """Coulomb friction coefficient of shoe on ball: 0.3 to 0.5 (Asai et al. 2002)."""
 
@@ -126,13 +128,8 @@ class AtFoot:
         """Choose the initial position (3,) m of the ball: the given one, or in contact with the foot."""
         if self.position is not None:
             return np.asarray(self.position, float)
-        points, velocities = sample_points_and_velocities(self, motion, np.array([frame]))
-        middle = points[0].mean(axis=0)
-        ahead = (target - middle) * [1.0, 1.0, 0.0]
-        ahead = unit_vector(ahead)
-        apart, up = FOOT_RADIUS + ball.radius, ball.radius - middle[2]
-        level = middle + np.sqrt(max(apart**2 - up**2, 0.25 * apart**2)) * ahead
-        return np.array([level[0], level[1], ball.radius])
+        ends, velocities = sample_points_and_velocities(self, motion, np.array([frame]))
+        return find_rest_positions(ends, velocities, target, ball)[0]
 
 
 def compute_launch(
@@ -166,6 +163,36 @@ def sample_points_and_velocities(part: InHand | AtFoot, motion: Motion, frames: 
     count = len(frames)
     found = sample_points(motion, part, np.concatenate([frames, frames - _STEP, frames + _STEP]))
     return found[:count], (found[2 * count :] - found[count : 2 * count]) * (0.5 * motion.fps / _STEP)
+
+
+def find_rest_positions(ends: np.ndarray, velocities: np.ndarray, target: np.ndarray, ball: Ball) -> np.ndarray:
+    """Find where balls on the ground touch a foot and leave it most nearly towards the target.
+
+    Args:
+        ends: (N, 2, 3) m, both ends of the foot's line.
+        velocities: (N, 2, 3) m/s of the ends.
+        target: (3,) m.
+        ball: kind of ball.
+    Returns:
+        (N, 3) m, centres of the balls; nearest to the foot where no ball on the ground touches it.
+    """
+    count = len(_SIDES)
+    middle = ends.mean(axis=1) * [1.0, 1.0, 0.0] + [0.0, 0.0, ball.radius]
+    ahead = np.arctan2(*(target - middle)[:, 1::-1].T)
+    angle = (ahead[:, None] + _SIDES).ravel()
+    direction = np.stack([np.cos(angle), np.sin(angle), np.zeros_like(angle)], axis=-1)
+    middle, ends, velocities = (np.repeat(one, count, axis=0) for one in (middle, ends, velocities))
+    low, high = np.zeros(len(angle)), np.full(len(angle), _FARTHEST)
+    for _ in range(_HALVINGS):  # the gap grows along each direction
+        distance = 0.5 * (low + high)
+        overlaps = strike_ball(ends, velocities, FOOT_RADIUS, middle + distance[:, None] * direction, ball).gap < 0.0
+        low, high = np.where(overlaps, distance, low), np.where(overlaps, high, distance)
+    centre = middle + high[:, None] * direction
+    struck = strike_ball(ends, velocities, FOOT_RADIUS, centre, ball)
+    aside = np.arctan2(struck.velocity[:, 1], struck.velocity[:, 0]) - np.repeat(ahead, count)
+    cost = 1.0 - np.cos(aside) + _GAP_COST * np.abs(struck.gap)
+    best = np.argmin(cost.reshape(-1, count), axis=1)
+    return centre.reshape(-1, count, 3)[np.arange(len(best)), best]
 
 
 @dataclass(frozen=True, eq=False)

@@ -36,7 +36,11 @@ from .networks.model import ModelSettings, ThrowModel
 from .networks.network import PhaseNetwork
 
 WEIGHTS = Path(__file__).parent / "networks" / "weights"
-"""Folder of the weights that are part of the project, one file per action."""
+"""Folder of the weights that are part of the project: ACTION.npz of synthetic examples, ACTION_recorded.npz of
+recordings (docs/reference/model-card.md).
+"""
+RECORDED = "recorded"
+"""Name that chooses the weights of recordings where a file of weights may be chosen."""
 VERSION = 1
 FORMAT = "Beyond Mocap throw model"
 MAX_FILE_SIZE = 300_000_000
@@ -70,12 +74,26 @@ def read_model(path: str | os.PathLike) -> ThrowModel:
         raise InputError(path, str(error)) from None
 
 
+def read_chosen_model(choice: str | os.PathLike | None, action: str) -> ThrowModel:
+    """Read the model that a user chose for "throw" or "kick".
+
+    Args:
+        choice: a file; `RECORDED`: the project's weights of recordings; None or empty: those of synthetic examples.
+        action: "throw" or "kick".
+    Raises:
+        InputError: if the file is faulty, or the project has no such weights.
+    """
+    if not choice or str(choice) == RECORDED:
+        return read_shipped_model(f"{action}_{RECORDED}" if choice else action)
+    return read_model(choice)
+
+
 @lru_cache(maxsize=4)
-def read_shipped_model(action: str) -> ThrowModel:
-    """Read the model of "throw" or "kick" that is part of the project; InputError if it is missing."""
-    path = WEIGHTS / f"{action}.npz"
+def read_shipped_model(name: str) -> ThrowModel:
+    """Read the model of that name that is part of the project; InputError if it is missing."""
+    path = WEIGHTS / f"{name}.npz"
     if not path.is_file():
-        raise InputError(path, "no such file", "weights of this action",
+        raise InputError(path, "no such file", "weights of this name",
                          "train a model with beyond-mocap throw train")  # fmt: skip
     return read_model(path)
 

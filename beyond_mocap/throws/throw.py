@@ -10,12 +10,11 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
-from functools import lru_cache
 
 import numpy as np
 
 from ..ball.flight import Launch, find_crossing, simulate_flight
-from ..ball.physics import HUMAN_BALL_SPEEDS, Ball
+from ..ball.physics import HUMAN_BALL_SPEEDS
 from ..ball.shot import is_out_of_reach, solve_arcs
 from ..base.errors import InputError, UserCancelledError
 from ..base.vectors import arctan2
@@ -28,6 +27,7 @@ from ..motion.skeleton import Skeleton
 from ..synthetic.throws import FASTEST as FASTEST_HAND
 from .ball_release import AtFoot, InHand, compute_launch
 from .correction import FINE_MISS, SMALL_DISPLACEMENT, CorrectedMotion, correct_motion
+from .example_launches import compute_launches
 from .networks.chains import EFFECTORS
 from .networks.limits import LimbLimits
 from .networks.model import ThrowModel
@@ -115,22 +115,6 @@ def _compute_cost(correction: CorrectedMotion) -> float:
     return correction.total_miss + 0.2 * correction.displacement
 
 
-@lru_cache(maxsize=8)
-def compute_launches(model: ThrowModel, limb: int, ball: Ball) -> tuple[np.ndarray, ...]:
-    """Compute how a ball leaves each example of a model, zero for examples of another limb.
-
-    Returns:
-        Positions (E, 3) m, velocities (E, 3) m/s and spins (E, 3) rad/s.
-    """
-    part = build_release_part(model.skeleton, limb, ball)
-    none = np.zeros((3, 3))
-    found = [
-        compute_launch(example.motion, part, example.release, example.impact, ball) if example.limb == limb else none
-        for example in model.examples
-    ]
-    return tuple(np.array(values) for values in zip(*found))
-
-
 class _ThrowGenerator:
     """Generation of one requested throw."""
 
@@ -191,31 +175,28 @@ class _ThrowGenerator:
     def iter_plans(self) -> Iterator[PlannedMotion]:
         """Iterate over the plans to try: other paces, or other weights, if the first does not hit."""
         for wish, seed in self._list_launch_requests():
-            yield plan_motion(self.model.examples, self.launches, wish, seed)
+            yield plan_motion(self.launches.examples, self.launches.velocities, wish, seed)
 
     def _list_launch_requests(self) -> list[tuple[LaunchRequest, int]]:
         """List launch requests, the best first, and seeds."""
-        examples = self.model.examples
-        places, self.launches, spins = compute_launches(self.model, self.own_limb, self.ball)
-        own = [n for n, example in enumerate(examples) if example.limb == self.own_limb]
-        if not own:
-            raise InputError("model", f"no example with the {EFFECTORS[self.limb].replace('_', ' ')}",
-                             "examples with this limb")  # fmt: skip
-        begin, _ = self._place_frame(np.median([self._find_anchor(examples[n], places[n]) for n in own], axis=0))
+        self.launches = launches = compute_launches(self.model, self.own_limb, self.ball)
+        anchors = [self._find_anchor(*one) for one in zip(launches.examples, launches.positions)]
+        begin, _ = self._place_frame(np.median(anchors, axis=0))
         ahead = float(np.linalg.norm(self.target[:2] - begin))
         if ahead < MIN_TARGET_DISTANCE:
             found = f"{ahead:.2f} m from the body"
             raise InputError("target", found, f"at least {MIN_TARGET_DISTANCE:g} m", "move the target or the body away")
-        place = np.median(places[own], axis=0)
+        place = np.median(launches.positions, axis=0)
         start, end = np.array([place[0], 0.0, place[2]]), np.array([ahead, 0.0, self.target[2]])
-        spin, fastest = np.median(spins[own], axis=0), float(np.linalg.norm(self.launches[own], axis=1).max())
+        spin = np.median(launches.spins, axis=0)
+        fastest = float(np.linalg.norm(launches.velocities, axis=1).max())
         self._check_distance(start, end, spin, fastest)
         self.arcs = solve_arcs(start, end, self.ball, spin)
         if self.arcs.slowest > self.max_speed:
             raise self._describe_too_far(f"{self.arcs.slowest:.0f} m/s or more", self.max_speed, self._human_limit)
         self._check_speed(fastest)
-        self._check_elevation(own, min(self.max_speed, _MAX_SPEED_RATIO * fastest))
-        wishes, seed = self._rank_launch_requests(own, ahead), self.request.seed
+        self._check_elevation(min(self.max_speed, _MAX_SPEED_RATIO * fastest))
+        wishes, seed = self._rank_launch_requests(ahead), self.request.seed
         return [(wish, seed) for wish in wishes] if len(wishes) > 1 else [(wishes[0], seed + n)
                                                                           for n in range(_MAX_PLANS)]
 
@@ -260,10 +241,10 @@ class _ThrowGenerator:
         return InputError("target", f"{far:.0f} m away, which needs {takes}", f"at most {most:.0f} m/s, {what}",
                           "choose a nearer or lower target")  # fmt: skip
 
-    def _check_elevation(self, own: list[int], most: float) -> None:
+    def _check_elevation(self, most: float) -> None:
         """Raise InputError if the ball has to leave far more steeply than in any of the examples."""
         along, _, up = self.arcs.at(most)
-        elevation, known = arctan2(up, along), self.launches[own]
+        elevation, known = arctan2(up, along), self.launches.velocities
         steepest = float(arctan2(known[:, 2], np.hypot(known[:, 0], known[:, 1])).max())
         if elevation > steepest + _MAX_EXTRA_ELEVATION:
             found = f"the ball has to leave at an elevation of {np.degrees(elevation):.0f} degrees"
@@ -283,18 +264,19 @@ class _ThrowGenerator:
             most = f"at most {_MAX_SPEED_RATIO * own:.0f} m/s, since the model's fastest example has {own:.0f}"
             raise InputError(what, found, most, "choose a lower speed, or train on faster examples")
 
-    def _rank_launch_requests(self, own: list[int], ahead: float) -> list[LaunchRequest]:
+    def _rank_launch_requests(self, ahead: float) -> list[LaunchRequest]:
         """List launch requests, the best first, each of another speed.
 
         The requested speed, or of those that reach the target the ones most similar to the examples, preferably not
         faster than the distance requires.
         """
-        thrown = np.linalg.norm(self.launches[own], axis=1)
+        launches = self.launches.velocities
+        thrown = np.linalg.norm(launches, axis=1)
         speeds = np.array([self.request.speed]) if self.request.speed else np.maximum(thrown, _MIN_SPEED_RATIO
                 * self.arcs.slowest)
         requests = [self._build_launch_request(float(speed), ahead) for speed in speeds]
-        impacts = np.array([self.model.examples[n].impact for n in own])
-        dissimilarity = [float(np.sort(compute_dissimilarity(self.launches[own], impacts, wish))[:3].mean())
+        impacts = np.array([example.impact for example in self.launches.examples])
+        dissimilarity = [float(np.sort(compute_dissimilarity(launches, impacts, wish))[:3].mean())
                          for wish in requests]
         preferred_speed = np.clip(_PREFERRED_SPEED_RATIO * self.arcs.slowest, thrown.min(), thrown.max())
         chosen: list[LaunchRequest] = []

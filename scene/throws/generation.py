@@ -155,12 +155,12 @@ def _generate_placed(order: ThrowTask, target, own: "Motion", start: float, join
     release; otherwise it begins where the own motion leads, since it is blended with that.
     """
     from ...beyond_mocap.throws.leave_path import find_stopping_position, is_in_reach
-    from ...beyond_mocap.throws.network_npz import read_model, read_shipped_model
+    from ...beyond_mocap.throws.network_npz import read_chosen_model
 
     def find_root(seconds: float) -> tuple[float, ...]:
         return tuple(own.root_positions[int(np.clip(round((seconds - start) * own.fps), 0, len(own) - 1)), :2])
 
-    model = read_model(order.model) if order.model else read_shipped_model(order.action)
+    model = read_chosen_model(order.model, order.action)
     throw = partial(_generate_from, order, target, model, progress=progress, cancelled=cancelled)
     if order.ball_place is not None:
         return throw(where={"ball_place": tuple(order.ball_place)})

@@ -25,11 +25,13 @@ class BeyondMocapThrow(bpy.types.PropertyGroup):
                           description="Ball to throw, or to kick from where it is; if empty, a ball is created")
     throw_model: StringProperty(
         name="Throw Model", subtype="FILE_PATH",
-        description="Trained model (.npz) of throws; if empty, the one included in the extension",
+        description="Trained model (.npz) of throws; if empty, the included one of synthetic throws, which does not "
+        "follow recorded pitches closely",
     )
     kick_model: StringProperty(
         name="Kick Model", subtype="FILE_PATH",
-        description="Trained model (.npz) of kicks; if empty, the one included in the extension",
+        description="Trained model (.npz) of kicks; if empty, the included one of synthetic kicks, which follows "
+        "recorded kicks to 11 to 17 cm only; the word recorded chooses the included one of five recorded kicks",
     )
     made_of: StringProperty(name="Settings Digest", options={"HIDDEN"},
                             description="Settings that the preview was generated with")

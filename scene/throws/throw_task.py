@@ -15,6 +15,7 @@ import numpy as np
 from mathutils import Matrix
 
 from ...beyond_mocap.base.errors import InputError
+from ...beyond_mocap.throws.network_npz import RECORDED
 from ..core import action, channels, preferences, session
 from ..core.measure import frames_per_second, units_per_metre
 from ..core.saved_state import read_stance
@@ -105,6 +106,11 @@ def build_digest(scene: bpy.types.Scene, body: bpy.types.Object, act: str) -> st
     return json.dumps([*plain, build_target_key(scene, settings)])
 
 
+def _find_model(model: str) -> str:
+    """Return the path of a chosen file of weights; the included ones are chosen by no name or one without a folder."""
+    return model if model in ("", RECORDED) else to_absolute_path(model)
+
+
 def build_request(scene: bpy.types.Scene, body: bpy.types.Object, act: str, frame: int = 0) -> ThrowTask:
     """Build the request of an armature's settings.
 
@@ -135,8 +141,8 @@ def build_request(scene: bpy.types.Scene, body: bpy.types.Object, act: str, fram
                      targets=read_target_positions(scene, settings, frame), at=frame / fps,
                      scene_start=scene.frame_start / fps, may_wait=waits, speed=settings.speed, kind=DEFAULT_BALLS[act]
                      if settings.kind == "usual" else settings.kind, ball_place=find_ball_position(scene, settings.ball,
-            settings, frame) if act == "kick" and settings.ball else None, model=to_absolute_path(model) if model
-                     else "", seed=settings.seed, folder=folder, unit=unit, library=session.find_library(folder, unit)
+            settings, frame) if act == "kick" and settings.ball else None, model=_find_model(model),
+                     seed=settings.seed, folder=folder, unit=unit, library=session.find_library(folder, unit)
                      if folder else None, build=preferences.build_library_options(folder) if folder else {},
                      digest=build_digest(scene, body, act))
 

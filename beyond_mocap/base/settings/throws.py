@@ -47,7 +47,7 @@ TABLES = {
         Setting(name="action", default="throw", choices=("throw", "kick"), option="--action",
                 help="what the networks learn"),
         Setting(name="config", kind=Path, option="--config", metavar="C.json", help="sizes and rates of the training; "
-                "default: those of the weights that are included"),
+                "see docs/reference/network-weights.md"),
         Setting(name="subject", default=(), option="--subject", metavar="S", help="train on this subject only; "
                 "repeatable", option_more=dict(action="append")),
         Setting(name="skeleton", kind=Path, option="--skeleton", metavar="S.bvh", help="skeleton of the model; "
@@ -58,7 +58,7 @@ TABLES = {
         Setting(name="minutes", kind=float, least=0.01, most=1e5, unit="minutes", option="--minutes", metavar="M",
                 help="stop after this time and write the current weights"),
         Setting(name="epochs", kind=int, least=0, most=1000000, option="--epochs", metavar="N",
-                help="passes through the examples; default: the config's"),
+                help="passes through the examples at most; default: the config's, else 30; 0: the linear start alone"),
         Setting(name="half", default=False, option="--half", help="store the weights in 16 bits"),
     ),
     "throw.evaluate": (

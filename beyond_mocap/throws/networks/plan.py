@@ -106,12 +106,22 @@ def choose_examples(
     if not len(usable):
         raise InputError("throw", "no example that uses this limb", "a model trained on examples of it")
     dissimilarity = compute_dissimilarity(launches[usable], np.array([examples[n].impact for n in usable]), request)
-    order = np.argsort(dissimilarity, kind="stable")[:MAX_BLENDED]
+    order = _select_blended([examples[n] for n in usable], np.argsort(dissimilarity, kind="stable"))
     scale = max(float(dissimilarity[order[-1]]), 1e-9)
     weights = np.exp(-_SHARPNESS * dissimilarity[order] / scale) - np.exp(-_SHARPNESS) * (len(order) > 1) + 1e-6
     if seed:
         weights = weights * np.exp(_WEIGHT_SPREAD * np.random.default_rng(seed).normal(size=len(weights)))
     return usable[order], weights / weights.sum()
+
+
+def _select_blended(examples: Sequence[Example], order: np.ndarray) -> np.ndarray:
+    """Select the first movements of an order: each once, all of one subject, since movements of one style blend."""
+    found: list[int] = []
+    for number in order:
+        one = examples[number]
+        if one.subject == examples[order[0]].subject and all(one.motion is not examples[n].motion for n in found):
+            found.append(int(number))
+    return np.array(found[:MAX_BLENDED])
 
 
 def compute_dissimilarity(launches: np.ndarray, impacts: np.ndarray, request: LaunchRequest) -> np.ndarray:

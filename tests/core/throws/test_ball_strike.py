@@ -9,7 +9,7 @@ from beyond_mocap.ball.physics import FOOTBALL
 from beyond_mocap.motion.humanoid import identify_joints
 from beyond_mocap.motion.motion import forward_kinematics
 from beyond_mocap.synthetic.gestures import build_strike
-from beyond_mocap.throws.ball_release import SPEED_RATIO, AtFoot, compute_launch, strike_ball
+from beyond_mocap.throws.ball_release import SPEED_RATIO, AtFoot, compute_launch, find_rest_positions, strike_ball
 from beyond_mocap.throws.correction import Freedom, correct_motion
 
 R = FOOTBALL.radius
@@ -62,3 +62,22 @@ def test_a_kick_hits_another_target(lies):
     changed = set(np.argwhere(np.any(found.motion.rotations != made.motion.rotations, axis=2))[:, 1])
     assert changed <= {legs.upper_leg, legs.lower_leg, legs.foot}
     assert places[:, legs.toe, 2].min() > -0.02
+
+
+@pytest.mark.parametrize("height", [0.0, 0.06, 0.11])
+def test_a_ball_on_the_ground_is_found_that_the_foot_sends_to_the_target(height):
+    foot = np.array([[[0.3, 0.2 + side, R + height] for side in (0.1, -0.1)]])
+    velocity = np.tile([18.0, 2.0, 0.0], (1, 2, 1))
+    target = np.array([12.0, 1.0, 0.5])
+    centre = find_rest_positions(foot, velocity, target, FOOTBALL)
+    struck = strike_ball(foot, velocity, FOOT_RADIUS, centre, FOOTBALL)
+    assert centre[0, 2] == R and abs(struck.gap[0]) < 1e-4
+    aside = np.arctan2(*struck.velocity[0, 1::-1]) - np.arctan2(*(target - centre[0])[1::-1])
+    assert abs(aside) < np.radians(2.0)
+
+
+def test_a_foot_above_every_ball_on_the_ground_leaves_a_gap():
+    foot = np.array([[[0.0, 0.1, 0.7], [0.0, -0.1, 0.7]]])
+    centre = find_rest_positions(foot, np.tile([18.0, 0.0, 0.0], (1, 2, 1)), np.array([9.0, 0.0, 0.0]), FOOTBALL)
+    gap = strike_ball(foot, np.tile([18.0, 0.0, 0.0], (1, 2, 1)), FOOT_RADIUS, centre, FOOTBALL).gap[0]
+    assert 0.7 - 2.0 * R - FOOT_RADIUS - 1e-9 <= gap < 0.7

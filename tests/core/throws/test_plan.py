@@ -46,6 +46,14 @@ def test_the_nearest_examples_count_most(examples, launches):
     assert not np.allclose(weights, other) and np.isclose(other.sum(), 1.0)
 
 
+def test_a_movement_counts_once_and_other_peoples_movements_are_not_blended(examples, launches):
+    people = [replace(each, subject="ann" if n % 2 else "bob") for n, each in enumerate(examples)]
+    twice = [*people, *(replace(each, release=each.release + 1.0) for each in people)]
+    chosen, weights = choose_examples(twice, np.concatenate([launches, launches]), wish_of(examples[3], launches[3]))
+    assert {twice[n].subject for n in chosen} == {"ann"} and np.isclose(weights.sum(), 1.0)
+    assert len({id(twice[n].motion) for n in chosen}) == len(chosen)
+
+
 def test_blends_keep_the_release_and_the_speed_of_the_hand(examples, launches):
     wish = wish_of(examples[2], 0.5 * (launches[2] + launches[5]))
     made = plan_motion(examples, launches, wish).description

@@ -9,7 +9,7 @@ from beyond_mocap.base.errors import InputError
 from beyond_mocap.motion.retargeting.adult import build_adult_skeleton
 from beyond_mocap.synthetic.performers import build_thrower
 from beyond_mocap.throws.evaluate_throws import measure_deviations
-from beyond_mocap.throws.network_npz import WEIGHTS, read_shipped_model
+from beyond_mocap.throws.network_npz import RECORDED, WEIGHTS, read_chosen_model, read_shipped_model
 from beyond_mocap.throws.networks.description import scale_description
 from beyond_mocap.throws.networks.example import build_description, build_example
 from beyond_mocap.throws.networks.generate import Options, generate_motion
@@ -34,6 +34,16 @@ def test_they_are_small_and_of_the_projects_own_adult(action):
     order = [adult.index(name) for name in skeleton.names]
     assert np.abs(skeleton.offsets - adult.offsets[order]).max() < 1e-3
     assert {example.subject for example in model.examples} == {"adult"}
+
+
+def test_the_recorded_kicks_hit_and_throws_of_people_are_not_there():
+    model = read_chosen_model(RECORDED, "kick")
+    assert (WEIGHTS / "kick_recorded.npz").stat().st_size <= _LARGEST and model.settings.action == "kick"
+    assert {example.subject for example in model.examples} == {"CMU10"} and "linear start alone" in model.notes[0]
+    thrown = throw_at(model, ThrowRequest((9.0, -2.5, 0.4)))
+    assert thrown.impact_error <= 0.02 and thrown.displacement <= 0.05 and thrown.limit_excess < 1e-6
+    with pytest.raises(InputError, match="throw_recorded"):
+        read_chosen_model(RECORDED, "throw")
 
 
 @pytest.mark.parametrize("action", ACTIONS)
@@ -91,6 +101,15 @@ def test_joints_of_a_generated_kick_are_within_limits():
 def test_limits_of_other_bones_are_judged():
     thrown = throw_at(read_shipped_model("throw"), ThrowRequest((15.0, 4.0, 1.5)), build_thrower(5).skeleton)
     assert thrown.limit_excess < 1e-6
+
+
+def test_kicks_hit_although_contact_was_labelled_late():
+    """In recordings of people contact is known to some 0.03 s, and that much later the foot is above the ball."""
+    model = read_shipped_model("kick")
+    late = replace(model, examples=tuple(replace(each, release=each.release + 0.9) for each in model.examples))
+    for target in TARGETS["kick"]:
+        thrown = throw_at(late, ThrowRequest(np.array(target)))
+        assert thrown.impact_error <= 0.02 and thrown.displacement <= 0.02
 
 
 def test_where_the_nearest_examples_do_not_hit_others_do():
