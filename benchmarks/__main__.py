@@ -34,6 +34,7 @@ SECTIONS = {  # name -> heading, (subheading, module, function) of each part
     "paths": ("Path editing", (("", "path_editing", "section"),)),
     "ball": ("The tracked ball", (("", "ball_touches", "section"),)),
     "passes": ("Passes and solved touches", (("", "ball_contact", "section"),)),
+    "live": ("Play Live", (("", "live", "section"),)),
     "markers": ("Markers", (("Synthetic markers on known motions", "markers_planted", "truth_table"),
                             ("Synthetic markers on bone", "markers_planted", "bone_table"),
                             ("Filters on synthetic markers", "markers_planted", "filter_table"),
@@ -46,7 +47,7 @@ SECTIONS = {  # name -> heading, (subheading, module, function) of each part
     "scale": ("Large libraries and long tracks", (("", "scale", "section"),)),
     "throws": ("Throws and kicks", (("", "throws", "section"),)),
 }  # fmt: skip
-WITHOUT_DATA = ("methods",)
+WITHOUT_DATA = ("methods", "live")
 """Sections that measure on the shipped sample too; the others need the recordings."""
 LIMIT = 900.0
 """Seconds of clock time that a section may take."""

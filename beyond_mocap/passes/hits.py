@@ -166,7 +166,8 @@ def detect_hit_under_way(motion: Motion, part: str = "foot", side: str = "right"
                          tool: Tool | None = None) -> HitMotion | None:
     """Detect a hit motion that is not over yet, but whose strike has just been: the part slows down again.
 
-    It has to be as fast as `detect_hits` wants, and above the threshold before, at or since the strike.
+    It has to be as fast as `detect_hits` wants, to move ahead of the body, and to be above the threshold before, at or
+    since the strike.
 
     Args:
         motion: the motion up to now, three frames or more.
@@ -194,6 +195,8 @@ def detect_hit_under_way(motion: Motion, part: str = "foot", side: str = "right"
     if threshold is None and not _is_hit((first, now), part, trajectory, body, other):
         return None
     hit = _build_hit_motion(part, side if part in _SIDED else "", (first, now), trajectory, body, key=key)
+    if hit.velocity[0] < 0.0:  # it draws back for the strike
+        return None
     coming = np.arange(4) >= (1 if hit.high > key else 3)
     return replace(hit, vectors=np.where(coming[:, None], np.nan, hit.vectors),
                    times=np.where(coming, np.nan, hit.times))

@@ -8,11 +8,12 @@ are those of the passing scene.
 from __future__ import annotations
 
 import time
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from types import SimpleNamespace
 from typing import TYPE_CHECKING
 
 import bpy
+import numpy as np
 
 from ...beyond_mocap.base.errors import BeyondMocapError, InputError, UserCancelledError
 from ...beyond_mocap.base.fixes import Fix
@@ -29,6 +30,9 @@ if TYPE_CHECKING:
     from ...beyond_mocap.passes.hits import HitMotion
     from ...beyond_mocap.passes.live_passes import LivePass, Rally
     from ...beyond_mocap.passes.strike_means import StrikeMeans
+
+FIRST_SECONDS = 3.0
+"""Seconds of standing that are written with a pass; the rest follows when its players stand."""
 
 _session: dict[str, object] = {}
 
@@ -143,6 +147,7 @@ def update_rally(scene: bpy.types.Scene) -> None:
         _end_rally("The scene has been updated or cleared: press Play Live to continue")
         return
     _update_target(scene)
+    _write_rest(scene)
     _collect_answer()
     try:
         target = find_target(scene)
@@ -238,22 +243,31 @@ def _plan_ahead(scene, target: str) -> None:
 def _apply_pass(scene, piece: LivePass, hit: HitMotion | None = None, seconds: float = 0.0) -> None:
     """Insert a pass that answers a hit into the scene from now on."""
     next_rally = get_current_rally().add_pass(piece, max(compute_rally_seconds(scene), get_current_rally().ready_time))
-    _apply_players(scene, next_rally, list(piece.motions))
+    _apply_players(scene, next_rally, list(piece.motions), next_rally.ready_time + FIRST_SECONDS)
     _wait_for_strike(next_rally, hit)
+    _session["unwritten"] = list(piece.motions)
     scene.beyond_mocap_stream.target = ""
     _write_status(piece, time.monotonic() - seconds if seconds else None)
+
+
+def _write_rest(scene) -> None:
+    """Write the standing that follows a pass, once its players stand: a moment's halt is not seen then."""
+    if _session["unwritten"] and compute_rally_seconds(scene) >= get_current_rally().ready_time:
+        _apply_players(scene, get_current_rally(), _session["unwritten"])
+        _session["unwritten"] = []
 
 
 def _wait_for_strike(rally: Rally, latest: HitMotion | None = None) -> None:
     """Let the rally wait for the user's next strike; nothing is planned for it yet."""
     from ...beyond_mocap.passes.answers_ahead import AnswersAhead
 
-    _session.update(rally=rally, ahead=AnswersAhead(_session["means"], rally, latest), pending=None)
+    _session.update(rally=rally, ahead=AnswersAhead(_session["means"], rally, latest), pending=None,
+                    unwritten=[])
     _session.pop("job", None)
 
 
-def _apply_players(scene, one: Rally, names: list[str]) -> None:
-    """Apply a rally's motions and ball to the named players."""
+def _apply_players(scene, one: Rally, names: list[str], until: float = np.inf) -> None:
+    """Apply a rally's motions, up to `until` s, and its ball to the named players."""
     from ...beyond_mocap.passes.passes import build_ball
 
     # players may have been renamed or removed since the rally started
@@ -264,8 +278,13 @@ def _apply_players(scene, one: Rally, names: list[str]) -> None:
     start = float(scene.beyond_mocap_passes.start_frame)
     for name in names:
         played = one.players[name]
-        make.apply_motion(scene, rows[name], SimpleNamespace(motion=played.motion, start_time=played.start), start)
-    make.apply_ball(scene, SimpleNamespace(ball=one.ball, kind=build_ball(one.scene)), start)
+        count = int(np.clip((until - played.start) * played.motion.fps, 2, len(played.motion)))
+        shown = SimpleNamespace(motion=played.motion.frames(0, count), start_time=played.start)
+        make.apply_motion(scene, rows[name], shown, start)
+    path, count = one.ball, max(int(np.searchsorted(one.ball.times, until)), 2)
+    path = replace(path, times=path.times[:count], positions=path.positions[:count], measured=path.measured[:count],
+                   rotations=path.rotations[:count])
+    make.apply_ball(scene, SimpleNamespace(ball=path, kind=build_ball(one.scene)), start)
     frame_range.extend_range(scene, start + float(one.ball.times[-1]) * frames_per_second(scene))
 
 

@@ -102,6 +102,11 @@ def test_an_answer_that_is_planned_ahead_begins_at_once(playing, room, core):
     play.update_rally(playing)
     assert play.get_current_rally().passes == 1 and "The answer began 0." in told().played
     assert play._session["ahead"] is not ahead and play._session["pending"] is None
+    body = playing.beyond_mocap_passes.players[0].body
+    assert body.animation_data.action.frame_range[1] < 5 + 20 * 24
+    playing.frame_set(int(5 + 24 * play.get_current_rally().ready_time) + 1)
+    play.update_rally(playing)
+    assert body.animation_data.action.frame_range[1] > 5 + 60 * 24
 
 
 def test_whom_the_user_chooses_gets_it(playing, room, core):
