@@ -39,8 +39,10 @@ BLEND_SECONDS = 0.4
 """Seconds over which a player's previous motion blends into the new one."""
 BALL_DISTANCE = 0.6
 """Metres from the holder to the ball at the start."""
-_TAIL, _SWAY = 4.0, 2.5  # s: standing that is synthesized after a pass; its end that is repeated forward and backward
+# s: standing that is synthesized after a pass, and its end that is repeated forward and backward; the same at the start
+_TAIL, _SWAY, _START_TAIL, _START_SWAY = 6.0, 4.0, 12.0, 11.0
 _READY_SECONDS = 1.2  # s after the last strike at which the receiver can act
+_SETTLING_SECONDS = 1.0  # s after that at which all have turned to the ball
 _ROUNDS = 2  # plans before the final one, each moving the holder nearer to where the ball lies
 
 
@@ -87,8 +89,8 @@ class Rally:
 
     @property
     def stances(self) -> dict[str, Stance]:
-        """Where each player stands when the holder can act."""
-        return {name: played.stance_at(self.ready_time) for name, played in self.players.items()}
+        """Where each player stands once they have come to rest after the last pass."""
+        return {name: played.stance_at(self.ready_time + _SETTLING_SECONDS) for name, played in self.players.items()}
 
     def add_pass(self, live_pass: LivePass, at: float) -> Rally:
         """Build the rally with a pass that begins on the next frame after `at` s.
@@ -102,7 +104,7 @@ class Rally:
         at = self.start + np.ceil((at - self.start) * self.scene.fps - 1e-6) / self.scene.fps
         players = dict(self.players)
         for name, motion in live_pass.motions.items():
-            players[name] = _continue_motion(self.players[name], _extend_standing(motion), at)
+            players[name] = _continue_motion(self.players[name], _extend_standing(motion, _SWAY), at)
         ball = _continue_ball(self.ball, live_pass.ball, at, min(BLEND_SECONDS, live_pass.strike))
         return replace(self, holder=live_pass.receiver, players=players, ball=ball, ready_time=at + live_pass.seconds,
                        passes=self.passes + 1)
@@ -155,7 +157,7 @@ def start_rally(library: Library, scene: PassScene, holder: str, start: float = 
     facing, place, radius = scene.find_facing(holder), scene.find_player(holder).place, build_ball(scene).radius
     ball_place = np.array([place[0] + BALL_DISTANCE * np.cos(facing), place[1] + BALL_DISTANCE * np.sin(facing),
                            radius])
-    times = np.arange(int(_TAIL * scene.fps) + 1) / scene.fps
+    times = np.arange(int(_START_TAIL * scene.fps) + 1) / scene.fps
     ball = BallPath(times, np.tile(ball_place, (len(times), 1)), np.ones(len(times), bool))
     players = {}
     for number, player in enumerate(scene.players):
@@ -164,7 +166,7 @@ def start_rally(library: Library, scene: PassScene, holder: str, start: float = 
         stance = Stance(player.place, scene.find_facing(player.name))
         player_motion = build_player_motion(library, stance, (), ball=ball, ball_radius=radius, fps=scene.fps,
                                             settings=_build_settings(scene), cancelled=cancelled)
-        players[player.name] = PlayerTimeline(start, _extend_standing(player_motion.take.motion))
+        players[player.name] = PlayerTimeline(start, _extend_standing(player_motion.take.motion, _START_SWAY))
     return Rally(scene=scene, holder=holder, players=players, ball=_continue_ball(None, ball, start, 0.0), start=start,
                  ready_time=start)
 
@@ -179,8 +181,8 @@ def build_answer(library: Library, rally: Rally, hit: HitMotion, target: str, bo
                  | None = None) -> LivePass:
     """Build the pass with which the holder answers a hit of the user: the most similar motion of the library (eq. 2).
 
-    The kind of the pass is that of the library's motion. It is planned from where the players stand when the holder can
-    act, and the ball lies.
+    The kind of the pass is that of the library's motion. It is planned from where the players and the ball come to
+    rest.
 
     Args:
         library: the library.
@@ -262,10 +264,10 @@ def _roll_ball(path: BallPath, ball_place: np.ndarray, strike: float) -> np.ndar
     return path.positions + (1.0 - smoothstep(path.times / max(strike, 1e-6)))[:, None] * offset
 
 
-def _extend_standing(motion: Motion) -> Motion:
-    """Extend a motion that ends standing by STANDING_SECONDS, playing its last seconds forward and backward."""
+def _extend_standing(motion: Motion, sway_seconds: float) -> Motion:
+    """Extend a motion that ends standing by STANDING_SECONDS, playing its last `sway_seconds` forward and backward."""
     count = len(motion)
-    sway = min(int(_SWAY * motion.fps), count - 1)
+    sway = min(int(sway_seconds * motion.fps), count - 1)
     # a triangle wave over the last `sway` frames
     more = np.arange(1, int(STANDING_SECONDS * motion.fps) + 1) % (2 * sway)
     frames = np.concatenate([np.arange(count), count - 1 - np.where(more <= sway, more, 2 * sway - more)])
