@@ -188,7 +188,7 @@ def _build_last_link(options: _Options) -> Link:
 
 
 def compute_reuse_cost(moments: StrikeMoments, later: Sequence[Link]) -> np.ndarray:
-    """Compute what it costs to play hit motions that strikes of the scene play soon after, whoever plays them.
+    """Compute what it costs to play hit motions that strikes of the scene play soon after, by any player.
 
     Args:
         moments: N moments.
