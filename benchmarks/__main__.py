@@ -32,8 +32,10 @@ SECTIONS = {  # name -> heading, (subheading, module, function) of each part
     "stages": ("Stages of a match", (("", "match", "stages_section"),)),
     "crowd": ("All players of a match", (("", "match", "crowd_section"),)),
     "paths": ("Path editing", (("", "path_editing", "section"),)),
+    "experiments": ("Experiments of the thesis on path editing", (("", "path_experiments", "section"),)),
     "ball": ("The tracked ball", (("", "ball_touches", "section"),)),
     "passes": ("Passes and solved touches", (("", "ball_contact", "section"),)),
+    "live": ("Play Live", (("", "live", "section"),)),
     "markers": ("Markers", (("Synthetic markers on known motions", "markers_planted", "truth_table"),
                             ("Synthetic markers on bone", "markers_planted", "bone_table"),
                             ("Filters on synthetic markers", "markers_planted", "filter_table"),
@@ -48,7 +50,7 @@ SECTIONS = {  # name -> heading, (subheading, module, function) of each part
     "scale": ("Large libraries and long tracks", (("", "scale", "section"),)),
     "throws": ("Throws and kicks", (("", "throws", "section"),)),
 }  # fmt: skip
-WITHOUT_DATA = ("methods",)
+WITHOUT_DATA = ("methods", "experiments", "live")
 """Sections that measure on the shipped sample too; the others need the recordings."""
 LIMIT = 900.0
 """Seconds of clock time that a section may take."""

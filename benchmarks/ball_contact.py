@@ -58,8 +58,10 @@ def build_scene_row(name: str, library: Library, label: str) -> str:
     scene = read_scene(SAMPLES / "passes" / f"{name}.json")
     took, result = effort.measure_seconds(lambda: synthesize_passes(library, scene), 1)
     gaps_m, arrival_errors = measure_gaps(result)
-    moved = np.concatenate([player.part_shifts for player in result.players])
-    return format_row([f"{name}, {label}", str(len(result.plan.strikes)), str(len(gaps_m)),
+    moved, strikes = np.concatenate([player.part_shifts for player in result.players]), result.plan.strikes
+    distinct = {(one.order.clip, one.order.hit.first) for one in strikes[:8]}
+    return format_row([f"{name}, {label}", str(len(strikes)), f"{len(distinct)} of {len(strikes[:8])}",
+                       f"{np.mean([one.cost for one in strikes[:-1]]):.1f}", str(len(gaps_m)),
                        f"{1000 * np.median(gaps_m):.1f} / {1000 * gaps_m.max():.1f}",
                        f"{1000 * arrival_errors.max():.1f}", f"{100 * np.nanmax(moved, initial=0.0):.0f}",
                        f"{result.plan.seconds:.1f}", f"{took:.1f}", str(len(result.warnings))])
@@ -84,7 +86,8 @@ def build_take_rows(name: str, library: Library) -> list[str]:
 
 def section() -> list[str]:
     """Build the lines for results.md."""
-    lines = format_head(("passing scene, library", "strikes", "with contact", "gap mm (median / worst, target 5)",
+    lines = format_head(("passing scene, library", "strikes", "distinct of the first",
+                         "mean cost m/s", "with contact", "gap mm (median / worst, target 5)",
                          "ball off its arrival mm", "part moved cm", "seconds of scene", "processor seconds",
                          "warnings"))  # fmt: skip
     with tempfile.TemporaryDirectory() as place:

@@ -14,7 +14,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from benchmarks import effort
-from benchmarks.places import CMU_UNIT, DATA
+from benchmarks.places import CMU_UNIT, DATA, SAMPLE
 from beyond_mocap.base.errors import InputError
 from beyond_mocap.files.bvh import bvh
 from beyond_mocap.motion.motion import resample
@@ -33,7 +33,9 @@ CLIPS = {
     "runs15": ("sie_humanoid3d_run_forward04", "sie_humanoid3d_run_forward12", "sie_humanoid3d_run_left07"),
     "lmd": ("Player1/P1_S21_dribble_long", "Player1/P1_S27_dribble_straight", "Player1/P1_S01_penalty_kick"),
     "sprinter": ("run0350cms", "run0900cms"),
+    "sample": ("walking_1_2", "walk_jog_walk", "jogging_weave", "running_turn_left"),
 }  # fmt: skip
+RECORDED = tuple(kind for kind in CLIPS if kind != "sample")
 COLUMNS = {
     "root error cm, mean / p95": ("root_error_m.mean", "root_error_m.p95"),
     "kept speed off %, path / body": ("kept_speed.path.max", "kept_speed.body.total"),
@@ -143,7 +145,7 @@ class EditRow:
     ms: float
 
 
-def measure_edits(kinds: Iterable[str] = tuple(CLIPS), paths: Iterable[str] = tuple(ALL), **settings) -> list[EditRow]:
+def measure_edits(kinds: Iterable[str] = RECORDED, paths: Iterable[str] = tuple(ALL), **settings) -> list[EditRow]:
     """Measure each recording of `kinds` on each of `paths`.
 
     Args:
@@ -161,7 +163,7 @@ def measure_edits(kinds: Iterable[str] = tuple(CLIPS), paths: Iterable[str] = tu
 
 def read_recording(kind: str, name: str):
     """Read the first ten seconds of a recording."""
-    file = DATA / "mocap" / kind / f"{name}.bvh"
+    file = (SAMPLE / "library" if kind == "sample" else DATA / "mocap" / kind) / f"{name}.bvh"
     motion = bvh.read_bvh(file, CMU_UNIT if kind == "cmu10" else None).motion
     return motion.frames(0, min(len(motion), int(SECONDS * motion.fps) + 1))
 
@@ -288,7 +290,7 @@ def measure_timing() -> str:
     return f"{len(motion)} frames, {len(motion.skeleton)} joints: {text} (target of an edit: {BUDGET_MS:g} ms)."
 
 
-def measure_cycles(kinds: Iterable[str] = tuple(CLIPS)) -> list[str]:
+def measure_cycles(kinds: Iterable[str] = RECORDED) -> list[str]:
     """Measure jerk at the transitions of recordings cycled along 25 m of the winding path, a line per kind."""
     lines = ["Cycled on the winding path, jerk at transitions over the recording's own at that speed (95th "
              "percentile):", ""]
@@ -309,7 +311,7 @@ def measure_cycles(kinds: Iterable[str] = tuple(CLIPS)) -> list[str]:
     return [*lines, ""]
 
 
-def section(kinds: Iterable[str] = tuple(CLIPS), paths: Iterable[str] = tuple(ALL), count: int = 3) -> list[str]:
+def section(kinds: Iterable[str] = RECORDED, paths: Iterable[str] = tuple(ALL), count: int = 3) -> list[str]:
     """Build the lines of a report: what is kept, by path, by recordings, the worst `count`, cycling."""
     rows = measure_edits(kinds, paths)
     return [describe_fair_paths(rows), "", measure_timing(), "", *build_table(rows, "path"), "",

@@ -24,7 +24,7 @@ class EditedBodyVerb(BaseOperator):
 
 COUNT = {"name": "Points", "default": 0, "min": 0, "max": 200,
          "description": "Number of control points of the curve; 0: as many as it needs to stay within 3 cm"}
-DEGREE = {"name": "Degree", "default": 3, "min": 2, "max": 5,
+DEGREE = {"name": "Degree", "default": 3, "min": 1, "max": curve.MOST_DEGREE,
           "description": "Degree of a NURBS curve: how smooth it is, and how far each control point reaches"}
 
 

@@ -98,8 +98,8 @@ motion of the library, to the player chosen with keys 1 to 9 or a click"""
     def order(self, context):
         """Collect the order of the scene, the holder of the ball and the rally's time."""
         settings = context.scene.beyond_mocap_passes
-        return make.build_order(context.scene), self.holder or settings.players[0].name, play.compute_rally_seconds(
-            context.scene)
+        return (make.build_order(context.scene), self.holder or settings.players[0].name,
+                play.compute_rally_seconds(context.scene), context.scene.beyond_mocap_stream.part)
 
     @staticmethod
     def run_job(order, progress, cancelled, _hurry):

@@ -127,7 +127,8 @@ class HitLibrary:
                            side: str | None = None) -> tuple[np.ndarray, np.ndarray]:
         """Compute how much each hit motion differs from an example (eq. 2), and sort them.
 
-        Displacements are compared in each body's own frame, so headings do not matter.
+        Displacements are compared in each body's own frame, so headings do not matter. Those that an example under way
+        has not come to (NaN) are left out.
 
         Args:
             example: the example, of a body of any size.
@@ -143,8 +144,8 @@ class HitLibrary:
         scale = size / max(example.size, 1e-6)
         distance = weights.speed * np.abs(speed - scale * example.max_speed)
         difference = vectors - scale[:, None, None] * example.vectors
-        distance += weights.vector * np.sqrt(np.einsum("hik,hik->hi", difference, difference)).sum(axis=1)
-        distance += weights.time * np.abs(times - example.times).sum(axis=1)
+        distance += weights.vector * np.nansum(np.sqrt(np.einsum("hik,hik->hi", difference, difference)), axis=1)
+        distance += weights.time * np.nansum(np.abs(times - example.times), axis=1)
         order = np.argsort(distance, kind="stable")
         return (order if side is None else order[self.sides[order] == side]), distance
 

@@ -16,7 +16,7 @@ them from hits.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -32,6 +32,8 @@ _SIDED = ("foot", "hand", "tool")
 _SMOOTHING = 0.1  # s: Hann window over positions; markers and suits shake at an impact
 _APART = 0.25  # s: least distance of two fast frames; the part's return after a hit is closer
 _SLOW = 0.4  # of the highest speed in a hit motion: the part is at most so fast at its ends
+_SLOWED = 0.85  # of the highest speed: a part that is slower again has struck
+_RECENT = 0.3  # s after a strike in which a hit motion under way is noticed
 _LEAST_RISE_AFTER = 0.03  # m: least rise after the strike for the high frame to lie after it
 # with an automatic threshold: least rise in m above the part's typical height, and least speed in m/s, of a hit
 _LEAST_RISE = {"foot": 0.10, "head": 0.10, "chest": 0.08, "hand": 0.15, "tool": 0.20}
@@ -52,8 +54,8 @@ class HitMotion:
         key: most likely frame of the strike (no ball is observed): the faster of the two.
         max_speed: highest speed of the part, m/s.
         vectors: (4, 3) m, displacements first - fast - high - fast - last in the body's frame (x: its mean heading, y:
-            to its left), pelvis travel removed (eq. 2: m_i).
-        times: (4,) s, duration of each displacement (eq. 2: t_i).
+            to its left), pelvis travel removed (eq. 2: m_i); NaN where a motion under way has not come to them.
+        times: (4,) s, duration of each displacement (eq. 2: t_i); NaN likewise.
         velocity: (3,) m/s of the part at the key, in the same axes but including the body's travel.
         facing: mean heading, rad, world.
         size: the body's leg length, m.
@@ -144,17 +146,13 @@ def detect_hits(motion: Motion, part: str = "foot", side: str = "right", thresho
     Source: Ball handling, section 3.
     """
     _check_input(motion, threshold)
-    positions, rotations = forward_kinematics(motion)
-    place = compute_strike_place(motion.skeleton, positions, rotations, part=joint or part, side=side, tool=tool)
+    body, trajectory, other, place = _measure(motion, part, side, joint=joint, tool=tool)
     side = side if part in _SIDED else ""
-    body = _Body.from_motion(motion, positions)
-    trajectory = _PartTrajectory.from_positions(place, body, part, motion.fps)
     peaks = _find_peaks(trajectory.height)
     height_threshold = _find_threshold(trajectory.height, peaks, part) if threshold is None else float(threshold)
     highs = [frame for frame in peaks if trajectory.height[frame] > height_threshold]
     spans = _find_spans(trajectory, highs)
     if threshold is None:
-        other = _other_foot_speed(motion.skeleton, positions, side, motion.fps) if part == "foot" else None
         spans = [span for span in spans if _is_hit(span, part, trajectory, body, other)]
     hit_motions = tuple(_build_hit_motion(part, side, span, trajectory, body) for span in spans)
     return Hits(part=part, side=side, fps=motion.fps, threshold=height_threshold, height=trajectory.height,
@@ -162,6 +160,46 @@ def detect_hits(motion: Motion, part: str = "foot", side: str = "right", thresho
                 fasts=tuple(_find_fast_frames(trajectory.speed, motion.fps)), motions=hit_motions,
                 ball_stretches=tuple(one.ball_stretch for one in hit_motions),
                 links=_find_links(hit_motions, len(motion)))
+
+
+def detect_hit_under_way(motion: Motion, part: str = "foot", side: str = "right", threshold: float | None = None,
+                         tool: Tool | None = None) -> HitMotion | None:
+    """Detect a hit motion that is not over yet, but whose strike has just been: the part slows down again.
+
+    It has to be as fast as `detect_hits` wants, to move ahead of the body, and to be above the threshold before, at or
+    since the strike.
+
+    Args:
+        motion: the motion up to now, three frames or more.
+        part, side, threshold, tool: as in `detect_hits`.
+    Returns:
+        The hit motion up to now, with NaN for the displacements and durations that are still to come; None if there
+        is none.
+    Raises:
+        InputError: as `detect_hits`.
+    """
+    _check_input(motion, threshold)
+    body, trajectory, other, _ = _measure(motion, part, side, tool=tool)
+    speed, height, now = trajectory.speed, trajectory.height, len(motion) - 1
+    earliest = max(now - int(_RECENT * motion.fps), 0)
+    key = earliest + int(np.argmax(speed[earliest:]))
+    if key == earliest or speed[now] > _SLOWED * speed[key]:
+        return None
+    peaks = _find_peaks(height)
+    lows = [0, *_find_peaks(-height)]
+    first = _find_lowest(speed, key, [low for low in reversed(lows) if low < key])
+    top = first + int(np.argmax(height[first:]))
+    least_height = _find_threshold(height, sorted({*peaks, top}), part) if threshold is None else threshold
+    if first == 0 or speed[first:].max() > speed[key] or height[top] <= least_height:
+        return None
+    if threshold is None and not _is_hit((first, now), part, trajectory, body, other):
+        return None
+    hit = _build_hit_motion(part, side if part in _SIDED else "", (first, now), trajectory, body, key=key)
+    if hit.velocity[0] < 0.0:  # it draws back for the strike
+        return None
+    coming = np.arange(4) >= (1 if hit.high > key else 3)
+    return replace(hit, vectors=np.where(coming[:, None], np.nan, hit.vectors),
+                   times=np.where(coming, np.nan, hit.times))
 
 
 def find_strongest_hit(motion: Motion, part: str, side: str = "", tool: Tool | None = None) -> HitMotion | None:
@@ -201,15 +239,12 @@ def build_hit_at(motion: Motion, frame: int, span: tuple[int, int], part: str = 
         InputError: as `detect_hits`.
     """
     _check_input(motion, None)
-    positions, rotations = forward_kinematics(motion)
-    place = compute_strike_place(motion.skeleton, positions, rotations, part=part, side=side, tool=tool)
-    body = _Body.from_motion(motion, positions)
+    body, trajectory, _, _ = _measure(motion, part, side, tool=tool)
     first = int(np.clip(span[0], 0, len(motion) - 3))
     last = int(np.clip(span[1], first + 2, len(motion) - 1))
     key = int(np.clip(frame, first + 1, last - 1))
     side = side if part in _SIDED else ""
-    return _build_hit_motion(part, side, (first, last), trajectory=_PartTrajectory.from_positions(place, body, part,
-            motion.fps), body=body, key=key)
+    return _build_hit_motion(part, side, (first, last), trajectory, body, key=key)
 
 
 def compute_strike_place(skeleton: Skeleton, positions: np.ndarray, rotations: np.ndarray, part: str, side: str,
@@ -299,6 +334,18 @@ class _PartTrajectory:
         relative_velocity = _differentiate(smooth - body.pelvis, fps) if part in ("head", "chest") else velocity
         return _PartTrajectory(place=smooth, velocity=velocity, height=smooth[:, 2] - body.ground,
                                speed=np.linalg.norm(relative_velocity, axis=1), fps=fps)
+
+
+def _measure(motion: Motion, part: str, side: str, joint: str | None = None, tool: Tool | None = None):
+    """Measure a motion: its body, the part's trajectory, the speed (T,) m/s of the other foot where a foot strikes,
+    else None, and the part's places (T, 3) m.
+    """
+    positions, rotations = forward_kinematics(motion)
+    place = compute_strike_place(motion.skeleton, positions, rotations, part=joint or part, side=side, tool=tool)
+    body = _Body.from_motion(motion, positions)
+    trajectory = _PartTrajectory.from_positions(place, body, part, motion.fps)
+    other = _other_foot_speed(motion.skeleton, positions, side, motion.fps) if part == "foot" else None
+    return body, trajectory, other, place
 
 
 def _other_foot_speed(skeleton: Skeleton, positions: np.ndarray, side: str, fps: float) -> np.ndarray:

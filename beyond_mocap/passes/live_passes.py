@@ -4,6 +4,9 @@ The holder of the ball repeats the strike that the user has just done, and the b
 chose. Until the user acts, all players stand and the ball lies at the holder's feet. A pass is planned from where all
 players stand, only passer and receiver are rebuilt, and it is inserted into the running scene when it is ready. The
 receiver stops the ball and is the next to act.
+
+An answer depends on the rally, the library's strike that is played, the receiver and the bounces, but not on when it
+begins: what is planned before the user strikes is, to the bit, what is planned after it.
 """
 
 from __future__ import annotations
@@ -15,6 +18,7 @@ import numpy as np
 
 from ..base.easing import smoothstep
 from ..base.errors import InputError
+from ..base.time_series import interpolate_columns
 from ..library.library import Library
 from ..motion import quaternion
 from ..motion.humanoid import compute_heading
@@ -27,6 +31,7 @@ from .pass_scene import GROUND, Example, Pass, PassScene
 from .passes import build_ball, build_ball_path, build_bone_weights, plan_scene
 from .player_motion import BodySettings, build_player_motion, estimate_least_seconds
 from .player_path import Stance
+from .strike_means import StrikeMeans
 
 STANDING_SECONDS = 60.0
 """Seconds that all players keep standing if the user does not act."""
@@ -34,8 +39,10 @@ BLEND_SECONDS = 0.4
 """Seconds over which a player's previous motion blends into the new one."""
 BALL_DISTANCE = 0.6
 """Metres from the holder to the ball at the start."""
-_TAIL, _SWAY = 4.0, 2.5  # s: standing that is synthesized after a pass; its end that is repeated forward and backward
+# s: standing that is synthesized after a pass, and its end that is repeated forward and backward; the same at the start
+_TAIL, _SWAY, _START_TAIL, _START_SWAY = 6.0, 4.0, 12.0, 11.0
 _READY_SECONDS = 1.2  # s after the last strike at which the receiver can act
+_SETTLING_SECONDS = 1.0  # s after that at which all have turned to the ball
 _ROUNDS = 2  # plans before the final one, each moving the holder nearer to where the ball lies
 
 
@@ -80,6 +87,11 @@ class Rally:
     ready_time: float
     passes: int = 0
 
+    @property
+    def stances(self) -> dict[str, Stance]:
+        """Where each player stands once they have come to rest after the last pass."""
+        return {name: played.stance_at(self.ready_time + _SETTLING_SECONDS) for name, played in self.players.items()}
+
     def add_pass(self, live_pass: LivePass, at: float) -> Rally:
         """Build the rally with a pass that begins on the next frame after `at` s.
 
@@ -92,8 +104,8 @@ class Rally:
         at = self.start + np.ceil((at - self.start) * self.scene.fps - 1e-6) / self.scene.fps
         players = dict(self.players)
         for name, motion in live_pass.motions.items():
-            players[name] = _continue_motion(self.players[name], motion, at)
-        ball = _continue_ball(self.ball, live_pass.ball, at)
+            players[name] = _continue_motion(self.players[name], _extend_standing(motion, _SWAY), at)
+        ball = _continue_ball(self.ball, live_pass.ball, at, min(BLEND_SECONDS, live_pass.strike))
         return replace(self, holder=live_pass.receiver, players=players, ball=ball, ready_time=at + live_pass.seconds,
                        passes=self.passes + 1)
 
@@ -105,7 +117,7 @@ class LivePass:
     Attributes:
         giver: name of the player who passes.
         receiver: name.
-        motions: name -> motion, of passer and receiver.
+        motions: name -> motion, of passer and receiver; each ends standing.
         ball: its path.
         strike: s of the passer's strike.
         seconds: s until the receiver can act.
@@ -145,7 +157,7 @@ def start_rally(library: Library, scene: PassScene, holder: str, start: float = 
     facing, place, radius = scene.find_facing(holder), scene.find_player(holder).place, build_ball(scene).radius
     ball_place = np.array([place[0] + BALL_DISTANCE * np.cos(facing), place[1] + BALL_DISTANCE * np.sin(facing),
                            radius])
-    times = np.arange(int(_TAIL * scene.fps) + 1) / scene.fps
+    times = np.arange(int(_START_TAIL * scene.fps) + 1) / scene.fps
     ball = BallPath(times, np.tile(ball_place, (len(times), 1)), np.ones(len(times), bool))
     players = {}
     for number, player in enumerate(scene.players):
@@ -154,21 +166,28 @@ def start_rally(library: Library, scene: PassScene, holder: str, start: float = 
         stance = Stance(player.place, scene.find_facing(player.name))
         player_motion = build_player_motion(library, stance, (), ball=ball, ball_radius=radius, fps=scene.fps,
                                             settings=_build_settings(scene), cancelled=cancelled)
-        players[player.name] = PlayerTimeline(start, _extend_standing(player_motion.take.motion))
-    return Rally(scene=scene, holder=holder, players=players, ball=_continue_ball(None, ball, start), start=start,
+        players[player.name] = PlayerTimeline(start, _extend_standing(player_motion.take.motion, _START_SWAY))
+    return Rally(scene=scene, holder=holder, players=players, ball=_continue_ball(None, ball, start, 0.0), start=start,
                  ready_time=start)
 
 
-def build_answer(library: Library, rally: Rally, now: float, hit: HitMotion, target: str, bounces: int = 0,
+def collect_means(library: Library, scene: PassScene) -> StrikeMeans:
+    """Collect the motions with which the players of a rally can strike, all in the library's size."""
+    return StrikeMeans(library, scene, {player.name: 1.0 for player in scene.players})
+
+
+def build_answer(library: Library, rally: Rally, hit: HitMotion, target: str, bounces: int = 0,
                  progress: Callable[[float, str], None] | None = None, cancelled: Callable[[], bool]
                  | None = None) -> LivePass:
     """Build the pass with which the holder answers a hit of the user: the most similar motion of the library (eq. 2).
 
+    The kind of the pass is that of the library's motion. It is planned from where the players and the ball come to
+    rest.
+
     Args:
         library: the library.
         rally: the rally.
-        now: s on the scene's clock, when all players stand.
-        hit: the user's hit motion.
+        hit: the user's hit motion, or the library's own that is most similar to it: the pass is the same.
         target: name of the receiver.
         bounces: how often the ball bounces on its trajectory.
         progress: receives the share of the work done and a short text.
@@ -180,10 +199,10 @@ def build_answer(library: Library, rally: Rally, now: float, hit: HitMotion, tar
         NotInLibrary: if no clip strikes with that part.
         UserCancelledError: if `cancelled` returns True.
     """
-    stances = {name: played.stance_at(now) for name, played in rally.players.items()}
-    ball_place = rally.ball.positions[min(int(np.searchsorted(rally.ball.times, now)), len(rally.ball.times) - 1)]
-    one = Pass(rally.holder, target, classify_hit(hit), bounces=bounces, part=hit.part, side=hit.side,
-               example=Example("", hit=hit))
+    stances, ball_place = rally.stances, rally.ball.positions[-1]
+    played = collect_means(library, rally.scene).find_similar(rally.holder, hit).hit
+    one = Pass(rally.holder, target, classify_hit(played), bounces=bounces, part=played.part, side=played.side,
+               example=Example("", hit=played))
     scene = replace(
         rally.scene, passes=(one,), repeat=1, missed=0.0, dropped=0.0, lead_in=0.0, lead_out=_TAIL, serve=GROUND,
         players=tuple(
@@ -200,7 +219,7 @@ def build_answer(library: Library, rally: Rally, now: float, hit: HitMotion, tar
         player_motion = build_player_motion(library, stances[name], plan.list_orders(name), ball=path,
                                             ball_radius=build_ball(scene).radius, fps=scene.fps,
                                             settings=_build_settings(scene), cancelled=cancelled)
-        motions[name] = _extend_standing(player_motion.take.motion)
+        motions[name] = player_motion.take.motion
     strikes = plan.strikes
     clip = library.clips[strikes[0].order.clip].path
     seconds = strikes[-1].order.time + _READY_SECONDS
@@ -245,10 +264,10 @@ def _roll_ball(path: BallPath, ball_place: np.ndarray, strike: float) -> np.ndar
     return path.positions + (1.0 - smoothstep(path.times / max(strike, 1e-6)))[:, None] * offset
 
 
-def _extend_standing(motion: Motion) -> Motion:
-    """Extend a motion that ends standing by STANDING_SECONDS, playing its last seconds forward and backward."""
+def _extend_standing(motion: Motion, sway_seconds: float) -> Motion:
+    """Extend a motion that ends standing by STANDING_SECONDS, playing its last `sway_seconds` forward and backward."""
     count = len(motion)
-    sway = min(int(_SWAY * motion.fps), count - 1)
+    sway = min(int(sway_seconds * motion.fps), count - 1)
     # a triangle wave over the last `sway` frames
     more = np.arange(1, int(STANDING_SECONDS * motion.fps) + 1) % (2 * sway)
     frames = np.concatenate([np.arange(count), count - 1 - np.where(more <= sway, more, 2 * sway - more)])
@@ -277,8 +296,10 @@ def _blend_in(before: PlayerTimeline, motion: Motion, at: float) -> tuple[np.nda
     return root, rotations
 
 
-def _continue_ball(before: BallPath | None, path: BallPath, at: float) -> BallPath:
-    """Join the ball's path so far with `path` from `at` s on, then let it lie for STANDING_SECONDS."""
+def _continue_ball(before: BallPath | None, path: BallPath, at: float, blend: float) -> BallPath:
+    """Join the ball's path so far with `path` from `at` s on, blended in over `blend` s; then let it lie for
+    STANDING_SECONDS.
+    """
     step = path.times[1] - path.times[0]
     added = int(round(STANDING_SECONDS / step))
     times = np.concatenate([path.times, path.times[-1] + step * np.arange(1, added + 1)]) + at
@@ -288,6 +309,9 @@ def _continue_ball(before: BallPath | None, path: BallPath, at: float) -> BallPa
     if before is None:
         return BallPath(times, places, np.ones(len(times), bool), rotations)
     is_before = before.times < at - 0.5 * step
+    # it may still roll out from the pass before
+    weight = 1.0 - smoothstep((times - at) / max(blend, 1e-6))[:, None]
+    places = places + weight * (interpolate_columns(times, before.times, before.positions) - places)
     rotations = quaternion.multiply(rotations, before.rotations[is_before][-1] if is_before.any()
                                     else quaternion.identity(1)[0])
     return BallPath(np.concatenate([before.times[is_before], times]),

@@ -7,7 +7,7 @@ and of many travel times are solved. The flight that changes the natural velocit
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -26,9 +26,12 @@ from .strike_choice import StrikeMoments, compute_natural_launch
 TURNS = np.radians([0.0, 20.0, -20.0, 40.0, -40.0])
 """Rad added to the heading with which the motion sends the ball to its target."""
 EIGHTH_TURN = 0.25 * np.pi  # rad: an eighth of a whole turn
-MOST_OPTIONS, MOST_PER_HIT, MOST_TIMES = 8, 2, 4  # kept for a strike, of these from one hit motion; travel times
-RANDOM_COST, REUSE_COST = 0.4, 0.6
-"""m/s: random cost that separates equally good hit motions, and cost of each earlier use by the same player."""
+MOST_OPTIONS, MOST_PER_HIT, MOST_TIMES = 12, 2, 4  # kept for a strike, of these from one hit motion; travel times
+RANDOM_COST = 0.4
+"""m/s: random cost that separates equally good hit motions."""
+REUSE_COST, REUSE_FADE, REUSE_OF_RECORDING, MOST_REUSE_COST = 0.8, 0.85, 0.5, 2.4
+"""Cost in m/s of a hit motion that the next strike of the scene plays; its share for each strike further away; its
+share for another hit motion of the same recording, such as its mirror image; the most in m/s that variety costs."""
 SHORTEST_TRAVEL, LONGEST_TRAVEL, TRAVEL_PER_BOUNCE, TRAVEL_TIMES = 0.4, 2.6, 0.5, 16
 """Shortest and longest travel time in s, more for each bounce, and the number of times tried between."""
 GROUND_REACH = 0.2
@@ -103,19 +106,18 @@ def choose_strikes(problem: PassProblem, progress: Callable[[float, str], None])
         UserCancelledError: if the user cancels.
     """
     random = np.random.default_rng(problem.scene.seed & (2**64 - 1))
-    use_counts: dict[tuple, int] = {}
     options = []
     for number, site in enumerate(problem.sites):
         problem.check_cancelled()
         progress(0.5 * number / len(problem.sites), f"{site.player}'s strike")
-        options.append(_select_options(problem, number, site, use_counts, random))
+        options.append(_select_options(problem, number, site, random))
     chain: list[Link | None] = [None] * len(problem.sites)
     chain[-1] = _build_last_link(options[-1])
     # backwards: a flight's target is the place of the strike after it
     for number in range(problem.last - 1, -1, -1):
         problem.check_cancelled()
         progress(1.0 - 0.5 * (number + 1) / len(problem.sites), f"{problem.sites[number].player}'s flight")
-        chain[number] = _choose_link(problem, number, options[number], chain[number + 1])
+        chain[number] = _choose_link(problem, number, options[number], chain[number + 1 :])
     return chain
 
 
@@ -127,8 +129,7 @@ def list_travel_times(one: Pass, fps: float) -> np.ndarray:
     return np.unique(np.round(np.geomspace(SHORTEST_TRAVEL, longest, TRAVEL_TIMES) * fps)) / fps
 
 
-def _select_options(problem: PassProblem, number: int, site: Site, use_counts: dict,
-                    random: np.random.Generator) -> _Options:
+def _select_options(problem: PassProblem, number: int, site: Site, random: np.random.Generator) -> _Options:
     """Select the moments whose natural trajectories come nearest to the target (steps 2, 3, 5, 6)."""
     toward = problem.find_target(number)
     moments, facing = _combine_headings(problem, _select_possible(problem, number, site), site, toward)
@@ -142,9 +143,8 @@ def _select_options(problem: PassProblem, number: int, site: Site, use_counts: d
     keys = [(site.player, moments.hits[which].clip, moments.hits[which].hit.first) for which in moments.which]
     # one random number per hit motion, drawn in sorted order: results do not depend on order of moments
     random_costs = dict(zip(sorted(set(keys)), random.uniform(0.0, RANDOM_COST, len(set(keys)))))
-    cost += np.array([random_costs[key] + REUSE_COST * use_counts.get(key, 0) for key in keys])
+    cost += np.array([random_costs[key] for key in keys])
     best = _find_best(cost, moments.which)
-    use_counts[keys[best[0]]] = use_counts.get(keys[best[0]], 0) + 1
     flights = NaturalFlights(starts, velocities, int(best[0]))
     return _Options(moments.select_moments(best), facing[best], cost[best], flights)
 
@@ -184,15 +184,36 @@ def _build_last_link(options: _Options) -> Link:
     """Build the last strike: the option with the lowest cost, without a flight."""
     best = int(np.argmin(options.cost))
     return Link(moment=options.moments.select_moments([best]), facing=float(options.facing[best]), seconds=0.0,
-                velocity=np.zeros(3), natural=options.natural)
+                velocity=np.zeros(3), cost=float(options.cost[best]), natural=options.natural)
 
 
-def _choose_link(problem: PassProblem, number: int, options: _Options, after: Link) -> Link:
+def compute_reuse_cost(moments: StrikeMoments, later: Sequence[Link]) -> np.ndarray:
+    """Compute what it costs to play hit motions that strikes of the scene play soon after, by any player.
+
+    Args:
+        moments: N moments.
+        later: the strikes after this one, the next one first.
+    Returns:
+        (N,) m/s.
+    """
+    cost = np.zeros(len(moments.hits))
+    for number, link in enumerate(later):
+        played = int(link.moment.which[0])
+        used, recording = link.moment.hits[played], link.moment.recordings[played]
+        is_same = np.array([(one.clip, one.hit.first) == (used.clip, used.hit.first) for one in moments.hits])
+        is_near = np.array([path == recording for path in moments.recordings])
+        cost += REUSE_COST * REUSE_FADE**number * np.where(is_same, 1.0, REUSE_OF_RECORDING * is_near)
+    return np.minimum(cost, MOST_REUSE_COST)[moments.which]
+
+
+def _choose_link(problem: PassProblem, number: int, options: _Options, later: list[Link]) -> Link:
     """Choose the option and travel time that change the natural velocity least (step 8 for each).
 
     All times are tried with the best option, then the best times with all options.
     """
     seconds = list_travel_times(problem.passes[number], problem.scene.fps)
+    after, reuse = later[0], compute_reuse_cost(options.moments, later)
+    options = replace(options, cost=options.cost + reuse)
     flights = _solve_flights(problem, number, options, after=after, option=np.zeros(len(seconds), int), seconds=seconds)
     # without any possible flight all times are tried with the other options
     best = np.argsort(flights.cost, kind="stable")[:MOST_TIMES] if np.isfinite(flights.cost).any() else slice(None)
@@ -206,6 +227,7 @@ def _choose_link(problem: PassProblem, number: int, options: _Options, after: Li
     chosen_index = int(np.argmin(np.linalg.norm(options.natural.starts - flights.starts[best], axis=1)))
     return Link(moment=options.moments.select_moments([option]), facing=float(options.facing[option]),
                 seconds=float(flights.seconds[best]), velocity=flights.velocity[best],
+                cost=float(flights.cost[best] - reuse[option]),
                 natural=replace(options.natural, chosen_index=chosen_index))  # fmt: skip
 
 

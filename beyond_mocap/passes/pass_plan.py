@@ -155,6 +155,7 @@ class Strike:
         outcome: "struck", "received", "missed" or "dropped".
         bounces: of the flight that leaves.
         travel: s of the flight that leaves; 0 for the last strike.
+        cost: m/s, how badly motion and flight fit; variety does not count.
         natural: the natural trajectories it was chosen from; None for the last strike.
     """
 
@@ -166,6 +167,7 @@ class Strike:
     outcome: str
     bounces: int
     travel: float
+    cost: float
     natural: NaturalFlights | None
 
 
@@ -256,7 +258,7 @@ def _build_strikes(problem: PassProblem, chain: Sequence[Link], flights: SolvedF
     orders = [_build_order(problem, chain, number, float(time), *contacts) for number, time in enumerate(times)]
     played = [
         Strike(player=site.player, order=order, velocity_in=arriving, velocity_out=leaving, spin=spin, outcome="struck",
-               bounces=site.requested.bounces, travel=link.seconds, natural=link.natural)
+               bounces=site.requested.bounces, travel=link.seconds, cost=link.cost, natural=link.natural)
         for site, order, arriving, leaving, spin, link in zip(
             problem.sites, orders, flights.arriving, flights.leaving, flights.spin, chain
         )
@@ -264,7 +266,8 @@ def _build_strikes(problem: PassProblem, chain: Sequence[Link], flights: SolvedF
     # what happens to the ball after the last strike
     last_velocity = _find_last_velocity(outcome, chain[-1], flights.arriving[-1])
     last = Strike(player=problem.sites[-1].player, order=orders[-1], velocity_in=flights.arriving[-1],
-                  velocity_out=last_velocity, spin=np.zeros(3), outcome=outcome, bounces=0, travel=0.0, natural=None)
+                  velocity_out=last_velocity, spin=np.zeros(3), outcome=outcome, bounces=0, travel=0.0,
+                  cost=chain[-1].cost, natural=None)
     return (*played, last)
 
 

@@ -117,6 +117,7 @@ class Link:
         facing: rad.
         seconds: travel time of the ball to the next strike, s.
         velocity: (3,) m/s, approximate velocity with which the ball leaves.
+        cost: m/s, how badly the motion and its flight fit, without the cost of playing a motion again.
         natural: the natural trajectories it was chosen from.
     """
 
@@ -124,6 +125,7 @@ class Link:
     facing: float
     seconds: float
     velocity: np.ndarray
+    cost: float
     natural: NaturalFlights
 
 

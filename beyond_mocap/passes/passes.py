@@ -12,9 +12,8 @@ from typing import Any
 
 import numpy as np
 
-from ..ball.contact import Tool
 from ..ball.physics import BALLS, Ball
-from ..base.errors import InputError, NotInLibraryError, UserCancelledError
+from ..base.errors import InputError, UserCancelledError
 from ..base.settings import find_setting
 from ..library.library import Library
 from ..motion.humanoid import estimate_stature
@@ -22,18 +21,15 @@ from ..motion.quaternion import multiply
 from ..motion.track.ball_path import BallPath
 from ..synthesis.body_size import to_player_size
 from ..synthesis.take import Take
-from .hit_library import MatchWeights
-from .hits import HitMotion, find_strongest_hit
 from .pass_plan import PassPlan, plan_passes
 from .pass_problem import Site
-from .pass_scene import BONES, Pass, PassScene, Player, Weights
+from .pass_scene import BONES, PassScene, Player, Weights
 from .player_motion import BodySettings, PlayerMotion, build_player_motion, estimate_least_seconds
 from .player_path import HitOrder, Stance
 from .pose_distance import BoneWeights
-from .strike_choice import PartStrikes, StrikeMoments, collect_strike_moments, is_unlabelled_strike
+from .strike_choice import is_unlabelled_strike
+from .strike_means import StrikeMeans
 
-MOST_HITS = 24
-"""Most hit motions that are tried for one strike; those that suit its kind best come first."""
 BALL_LIMITS: dict[str, Any] = {
     **{name: (find_setting("passes", name).least, find_setting("passes", name).most)
        for name in ("radius", "gravity", "linear_drag", "drag", "restitution")},
@@ -43,7 +39,6 @@ BALL_LIMITS: dict[str, Any] = {
 """Lowest and highest value of a ball's numbers."""
 PLAN_SHARE = 0.3
 """Share of the whole work after which the plan is ready."""
-_SIDED = ("foot", "hand", "tool")
 
 
 @dataclass(frozen=True, eq=False)
@@ -237,7 +232,7 @@ def _apply_chance(scene: PassScene) -> PassScene:
 
 def _build_sites(library: Library, scene: PassScene, sizes: dict[str, float]) -> list[Site]:
     """Build the site of each strike."""
-    means = _StrikeMeans(library, scene, sizes)
+    means = StrikeMeans(library, scene, sizes)
     places = {player.name: np.array(player.place, float) for player in scene.players}
     out = []
     for number, one in enumerate(scene.passes):
@@ -246,89 +241,6 @@ def _build_sites(library: Library, scene: PassScene, sizes: dict[str, float]) ->
             places[one.receiver] = np.array(one.at, float)
     last = scene.passes[-1].receiver
     return [*out, means.build_site(last, places[last], None, len(scene.passes))]
-
-
-class _StrikeMeans:
-    """The motions with which players can strike; each result is stored."""
-
-    def __init__(self, library: Library, scene: PassScene, sizes: dict[str, float]):
-        self.library, self.scene, self.sizes = library, scene, sizes
-        self._choices: dict[tuple[str, Tool | None], PartStrikes] = {}
-        self._moments: dict[tuple, StrikeMoments] = {}
-
-    def build_site(self, name: str, place: np.ndarray, one: Pass | None, number: int) -> Site:
-        """Build the site of a strike of one player.
-
-        Args:
-            name: the player.
-            place: (2,) m where they strike.
-            one: the pass that leaves; None for the last strike.
-            number: number of the pass that an error names.
-        """
-        player = self.scene.find_player(name)
-        part = (one and one.part) or player.part
-        side = player.side if one is None or one.side is None else one.side
-        tool = (player.tool or Tool()) if part == "tool" else None
-        kind = "receive" if one is None else one.kind
-        try:
-            size, example = self.sizes[name], one.example if one else None
-            moments = self._collect_moments(part, side, tool and tool.scale_to_library(size), size=size, kind=kind,
-                                            example=example)
-        except InputError as error:
-            raise InputError(f"pass {number}, {name}", str(error)) from None
-        return Site(player=name, place=place, facing=self.scene.find_facing(name), kind=kind, part=part, tool=tool,
-                    size=size, moments=moments, requested=one)
-
-    def _collect_moments(self, part, side, tool, size: float, kind: str, example) -> StrikeMoments:
-        """Collect the moments with which a body of some size can strike."""
-        key = (part, side, tool, size, kind, example)
-        if key not in self._moments:
-            if (part, tool) not in self._choices:
-                self._choices[part, tool] = PartStrikes.from_library(self.library, part, tool)
-            own, side_wanted = self._choices[part, tool], side if part in _SIDED else ""
-            if example is None:
-                hits = own.select_by_kind(kind, side_wanted)[:MOST_HITS]
-            else:
-                order, _ = own.measured.sort_by_similarity(self._find_example(example, part, side, tool),
-                                                           self._build_weights(), side_wanted or None)
-                hits = tuple(own.hits[index] for index in order[:1])
-            if not hits:
-                with_what = f"the {side} {part}" if side_wanted else part
-                others = self._list_parts()
-                other = f"choose another part ({', '.join(others)}) or " if others else ""
-                message = f"no clip of the library strikes with {with_what}; {other}add clips that do"
-                raise NotInLibraryError(message, others)
-            self._moments[key] = collect_strike_moments(self.library, hits, tool, size)
-        return self._moments[key]
-
-    def _list_parts(self) -> tuple[str, ...]:
-        """List the parts with which clips of the library strike."""
-        return tuple(part for part in ("foot", "head", "chest", "hand") if PartStrikes.from_library(self.library,
-                part).hits)
-
-    def _build_weights(self) -> MatchWeights:
-        """Build the weights of eq. 2."""
-        own, requested = MatchWeights(), self.scene.weights
-        return MatchWeights(own.speed * requested.speed, own.vector * requested.vectors, own.time * requested.times)
-
-    def _find_example(self, example, part: str, side: str, tool: Tool | None) -> HitMotion:
-        """Find the strongest hit motion in a stretch of a recording, or return the given one."""
-        if example.hit is not None:
-            return example.hit
-        clip = next((clip for clip in self.library.clips if clip.path == example.clip and not clip.mirrored), None)
-        if clip is None:
-            names = ", ".join(sorted({clip.path for clip in self.library.clips if not clip.is_synthetic})[:5])
-            raise InputError("example", f"no recording {example.clip!r} in the library", f"one such as {names}")
-        motion = clip.recording
-        first = int(np.floor(example.start * motion.fps))
-        last = len(motion) if example.end is None else int(np.ceil(example.end * motion.fps)) + 1
-        if first > len(motion) - 3:
-            found = f"{example.clip} from {example.start:g} s"
-            raise InputError("example", found, f"a time up to {motion.duration:.2f} s")
-        found = find_strongest_hit(motion.frames(first, min(last, len(motion))), part, side, tool)
-        if found is None:
-            raise InputError("example", f"no strike by {part} there in {example.clip}", "a stretch with a whole strike")
-        return found
 
 
 def _build_need(library: Library, sizes: dict[str, float]):

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..annotation import Timeline, choose_gaits
-from ..annotation.gaits import compute_heading_offset
+from ..annotation.gaits import STANDING, compute_heading_offset
 from ..annotation.striking import BODY_PARTS
 from ..annotation.timeline import KeyMoment
 from ..ball.contact import find_striking_surface
@@ -45,6 +45,8 @@ from .pose_distance import BoneWeights, weigh_bones
 
 TRANSITION = 0.4
 """Seconds over which one piece of a clip blends into the next."""
+READY = "ready"
+"""Label of waiting for the ball, which players who stand show where the library has it."""
 FASTEST_FACTOR = 1.15
 """Times the library's highest speed that a player reaches without a warning."""
 _PART_LABELS = {**{part: part for part in BODY_PARTS}, "hand": "throw"}  # there is no label "hand"
@@ -224,6 +226,8 @@ class _PlayerBuilder:
         speeds = np.array([gait.speed for gait in library.gaits])
         gait = choose_gaits(track.speed, library.fps, speeds, library.gait_thresholds)
         labels = [frozenset(labels) for labels in build_automatic_labels(library, gait, track)]
+        if any(READY in row.words for clip in library.clips for row in clip.annotations):
+            labels = [one | {READY} if STANDING in one else one for one in labels]
         strikes = collect_strike_labels(library)
         keys = tuple(self._build_key(hit, (hit.order.time - self.start) * library.fps) for hit in self.hits)
         for hit in self.hits:

@@ -146,6 +146,7 @@ class StrikeMoments:
 
     Attributes:
         hits: (H,) hit motions.
+        recordings: (H,) path of the recording of each; a mirror image has the path of its original.
         which: (N,) index into `hits`.
         frame: (N,) frame in the clip's own rate.
         part_states: the part at these moments.
@@ -155,6 +156,7 @@ class StrikeMoments:
     """
 
     hits: tuple[LibraryHit, ...]
+    recordings: tuple[str, ...]
     which: np.ndarray
     frame: np.ndarray
     part_states: StrikeSurface
@@ -227,12 +229,14 @@ def collect_strike_moments(library: Library, hits: Sequence[LibraryHit], tool: T
     if not hits:
         nothing = np.zeros(0)
         empty = StrikeSurface(np.zeros((0, 3)), np.zeros((0, 3)), 0.0, np.zeros((0, 3)))
-        return StrikeMoments(hits=(), which=nothing.astype(int), frame=nothing, part_states=empty, lead=nothing,
-                             trail=nothing, travel=nothing)
+        return StrikeMoments(hits=(), recordings=(), which=nothing.astype(int), frame=nothing, part_states=empty,
+                             lead=nothing, trail=nothing, travel=nothing)
     scaled = (np.concatenate([getattr(one, name) for one in part_states]) * size
               for name in ("start", "end", "velocity"))
     start, end, velocity = scaled
-    return StrikeMoments(hits=tuple(hits), which=np.concatenate(which), frame=np.concatenate(frames),
+    recordings = tuple(library.clips[one.clip].path for one in hits)
+    return StrikeMoments(hits=tuple(hits), recordings=recordings, which=np.concatenate(which),
+                         frame=np.concatenate(frames),
                          part_states=StrikeSurface(start, end, part_states[0].radius * size, velocity),
                          lead=np.concatenate(lead), trail=np.concatenate(trail), travel=np.concatenate(travel))
 

@@ -28,9 +28,10 @@ PEAK_TURN_RATE = np.radians(140.0)  # rad/s of a turn on the spot
 # crossing: m that the trailing foot is ahead of the leading one, widths of the base against those of feet that do not
 # cross, longer steps than without crossing, and rad by which the pelvis turns with the legs
 _CROSS_AHEAD, _CROSS_WIDTH, _CROSS_CADENCE, _CROSS_TURN = 0.34, 0.25, 0.80, np.radians(20.0)
-# s: a stand before the first step and after the last one, the part of it that is planned, a swing, and from one landing
-# to the next lift. A search holds a clip longer than its steps take if it goes on standing
-_REST, _PLANNED_REST, _SWING, _BOTH_DOWN = 2.5, 0.5, 0.38, 0.10
+REST = 2.5
+"""Seconds of a stand before the first step and after the last one: so a search holds a clip longer than its steps."""
+# s: the part of the rest that is planned, a swing, and from one landing to the next lift
+_PLANNED_REST, _SWING, _BOTH_DOWN = 0.5, 0.38, 0.10
 _MOST_TURN_OF_TWO_STEPS = np.radians(100.0)
 _SWAY = 0.045  # m that an adult's hips move over the standing foot
 _QUINTIC_PEAK = 1.875  # largest slope of `quintic_step`
@@ -120,7 +121,7 @@ def build_steps_in_place(move: tuple[float, float], turn: float, fps: float, neu
     hips[:, :2] = path + quaternion.rotate_level(_compute_sway(plan.times, swings, neutral), heading)
     posture = plant_feet(posture.replace_arrays(hips=hips, heading=heading), plan.times, steps, neutral)
     posture = posture.frames(plan.requested_slice)
-    longer = int((_REST - _PLANNED_REST) * fps)
+    longer = int((REST - _PLANNED_REST) * fps)
     posture = posture.frames(np.clip(np.arange(-longer, len(posture) + longer), 0, len(posture) - 1))
     return StepSequence(posture, np.zeros(len(posture)))
 

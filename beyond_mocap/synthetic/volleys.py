@@ -20,12 +20,12 @@ from .footsteps import Footsteps, compute_ground_lift
 from .gait_legs import ease_reach, measure_leg, plant_feet
 from .gait_plan import GaitPlan
 from .gestures import LEFT, RIGHT, Gesture, blend_arrays, compute_envelope, interpolate_rows
-from .moves import build_standing, build_steps
+from .idle import build_ready, plan_still_feet
+from .moves import build_steps
 
 BEFORE, AFTER = 1.6, 1.9
 """Seconds of the clip before and after the touch."""
 
-_READY_DROP = 0.012  # m by which the hips are lower when ready for a ball than in standing
 _LONGEST_REACH, _EASE_SHARE = 0.985, 0.06  # shares of a leg's length: longest reach, and range over which it is eased
 
 
@@ -228,7 +228,7 @@ VOLLEYS = {
 
 def build_volley(
     kind: str, skeleton: Skeleton | None = None, fps: float = 30.0, seed: int = 0, *, speed: float = 1.0,
-    example: Motion | None = None,
+    example: Motion | None = None, crouch: float = 0.0,
 ) -> Gesture:
     """Build a strike out of standing with the right side, facing +X.
 
@@ -239,69 +239,39 @@ def build_volley(
         seed: of the variation of standing.
         speed: playback rate of the strike's rows.
         example: a recording on `skeleton`, for its neutral stance.
+        crouch: m of an adult by which the hips are lower before and after, see `idle`.
     Returns:
         The move.
     """
-    return build_standing_touch(VOLLEYS[kind], skeleton, fps, seed, speed=speed, example=example)
+    return build_standing_touch(VOLLEYS[kind], skeleton, fps, seed, speed=speed, example=example, crouch=crouch)
 
 
 def build_standing_touch(
     recipe: Volley, skeleton: Skeleton | None = None, fps: float = 30.0, seed: int = 0, *, speed: float = 1.0,
-    example: Motion | None = None,
+    example: Motion | None = None, crouch: float = 0.0,
 ) -> Gesture:
     """Build a touch of the ball out of standing as a recipe says; see `build_volley` for the other arguments.
 
     Args:
         recipe: how the body moves.
-        skeleton, fps, seed, speed, example: as for `build_volley`.
+        skeleton, fps, seed, speed, example, crouch: as for `build_volley`.
     Returns:
         The move.
     """
     neutral = build_neutral_stance(skeleton or build_adult_skeleton(), example)
-    gait_plan, posture = _build_ready(neutral, BEFORE + AFTER, fps, seed)
+    gait_plan, posture = build_ready(neutral, BEFORE + AFTER, fps, seed, crouch)
     times = (gait_plan.times - BEFORE) * speed
     begin, end = recipe.span
     ease = compute_envelope(times, begin, 0.6 * begin, 0.55 * end, end)
     posture = _blend_recipe(posture, recipe, times, ease, neutral)
-    posture = plant_feet(posture, gait_plan.times, _build_still_steps(gait_plan, neutral), neutral)
+    feet = _build_still_steps(gait_plan, neutral) if crouch == 0.0 else plan_still_feet(neutral, crouch)
+    posture = plant_feet(posture, gait_plan.times, feet, neutral)
     if recipe.foot is not None:
         posture = _guide_foot(posture, recipe.foot, times, neutral)
     return Gesture(
         to_motion(posture.frames(gait_plan.requested_slice), neutral), BEFORE, BEFORE + begin / speed, BEFORE + end
         / speed
     )
-
-
-def build_idle(duration: float, skeleton: Skeleton | None = None, fps: float = 30.0, seed: int = 0) -> Motion:
-    """Build standing ready for a ball: knees slightly bent, the weight shifting from foot to foot, feet in place.
-
-    Args:
-        duration: s.
-        skeleton: any humanoid skeleton; default: the project's adult.
-        fps: frames per second.
-        seed: of the variation.
-    Returns:
-        The motion.
-    """
-    neutral = build_neutral_stance(skeleton or build_adult_skeleton())
-    gait_plan, posture = _build_ready(neutral, duration, fps, seed)
-    posture = plant_feet(posture, gait_plan.times, _build_still_steps(gait_plan, neutral), neutral)
-    return to_motion(posture.frames(gait_plan.requested_slice), neutral)
-
-
-def _build_ready(neutral: NeutralStance, duration: float, fps: float, seed: int) -> tuple[GaitPlan, Posture]:
-    """Build the plan and posture of standing with bent knees and shifting weight for `duration` seconds."""
-    gait_plan, _, posture = build_standing(neutral, duration, fps, seed)
-    scale, times = neutral.leg / tables.LEG, gait_plan.times
-    phase = np.random.default_rng(seed).uniform(0.0, 2.0 * np.pi, 3)
-    sway = 0.020 * np.sin(2.0 * np.pi * times / 4.3 + phase[0]) + 0.008 * np.sin(2.0 * np.pi * times / 1.9 + phase[1])
-    turn = np.radians(3.0) * np.sin(2.0 * np.pi * times / 5.1 + phase[2])
-    nothing = np.zeros_like(times)
-    hips = posture.hips + scale * np.stack([nothing, sway, nothing - _READY_DROP], axis=-1)
-    lean = np.stack([-1.5 * sway, nothing + np.radians(4.0), turn], axis=-1)
-    spine = posture.spine + np.stack([1.5 * sway, nothing + np.radians(5.0), -0.5 * turn], axis=-1)
-    head = posture.head + np.stack([nothing, nothing - np.radians(7.0), -0.5 * turn], axis=-1)
-    return gait_plan, posture.replace_arrays(hips=hips, pelvis=posture.pelvis + lean, spine=spine, head=head)
 
 
 def _build_still_steps(gait_plan: GaitPlan, neutral: NeutralStance) -> tuple[Footsteps, ...]:

@@ -26,6 +26,8 @@ SHAPES = (("FITTED", "Original", "Along the original path"),
           ("STRAIGHT", "Straight", "A straight line, as long as the original path, toward its end"),
           ("PRESENT", "As It Is", "Along the current path, with other points"))
 MARK = "beyond_mocap_path"  # on curve objects that the extension created
+MOST_ORDER, MOST_DEGREE = 6, 20  # highest order that Blender draws, and highest degree that a motion follows
+DEGREE = "beyond_mocap_degree"  # on curve data whose degree is higher than Blender draws
 _STEP, _PIECES = 0.04, (8, 600)  # metres between samples of a Bezier segment; limits of their number
 _NURBS_PIECES = 48
 _COUNTS = (6, 7, 8, 10, 12, 14, 16, 20, 24, 28, 32, 40, 48, 60, 80)
@@ -119,10 +121,21 @@ def read_curve(scene: bpy.types.Scene, drawn: bpy.types.Object | None) -> DrawnC
         raise InputError(f"curve {drawn.name}", "a point with NaN or infinite values", "finite coordinates",
                          "move or delete that point")
     kind = spline.type if spline.type in {"BEZIER", "POLY"} else "NURBS"
-    order = spline.order_u if kind == "NURBS" else 0
+    order = _read_order(drawn.data, spline) if kind == "NURBS" else 0
+    if order > MOST_ORDER:
+        notes.append(f"curve {drawn.name}: Blender draws it with degree {MOST_ORDER - 1}, the motion follows degree "
+                     f"{order - 1}, which the overlay shows")
     static_bytes = points.tobytes() + repr(units).encode() if animated else values.tobytes()
     return DrawnCurve(drawn.name, kind, values, order=order, clamped=spline.use_endpoint_u, closed=spline.use_cyclic_u,
                       static_bytes=static_bytes, notes=tuple(notes))
+
+
+def _read_order(data: bpy.types.Curve, spline: bpy.types.Spline) -> int:
+    """Read the order of a NURBS curve: that of its data where Blender's is at its limit and the curve is ours."""
+    degree = data.get(DEGREE)
+    if spline.order_u < MOST_ORDER or not isinstance(degree, int):
+        return spline.order_u
+    return max(MOST_ORDER, min(degree, MOST_DEGREE) + 1)
 
 
 def create_curve(
@@ -163,7 +176,9 @@ def create_curve(
     else:
         spline.points.add(len(points) - 1)
         spline.points.foreach_set("co", np.column_stack([local, np.ones(len(local), np.float32)]).ravel())
-        spline.order_u, spline.use_endpoint_u = min(degree + 1, len(points)), True
+        spline.order_u, spline.use_endpoint_u = min(degree + 1, len(points), MOST_ORDER), True
+        if degree >= MOST_ORDER:
+            data[DEGREE] = degree
     created = bpy.data.objects.new(name, data)
     created.location, created[MARK] = origin, True
     room = context.scene.collection if context.layer_collection.exclude else context.collection

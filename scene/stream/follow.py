@@ -33,7 +33,7 @@ if TYPE_CHECKING:
     from ...beyond_mocap.passes.hits import HitMotion
 
 TICK, IDLE = 1.0 / 60.0, 0.25  # s between two timer calls, with and without a stream
-STATUS_SECONDS, DETECT_SECONDS = 0.25, 0.1  # s between two status updates, and two hit detections
+STATUS_SECONDS, DETECT_SECONDS = 0.25, 0.05  # s between two status updates, and two hit detections
 MOST_BODIES = 20  # characters created in one stream: a sender that keeps changing its skeleton is stopped
 
 MARK = "beyond_mocap_stream"

@@ -1,18 +1,21 @@
 """Play Live: while the scene plays, the holder of the ball repeats the user's strikes and passes to the chosen player.
 
-`follow` detects the user's strikes. The pass is computed in a thread, from where all players stand, and inserted into
-the running scene when it is ready. The characters and the ball are those of the passing scene.
+`follow` detects the user's strikes. While the user has not struck, the likely answers are planned in a thread, from
+where all players stand; the one that answers the strike is inserted into the running scene. The characters and the ball
+are those of the passing scene.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+import time
+from dataclasses import dataclass, replace
 from types import SimpleNamespace
 from typing import TYPE_CHECKING
 
 import bpy
+import numpy as np
 
-from ...beyond_mocap.base.errors import BeyondMocapError, InputError
+from ...beyond_mocap.base.errors import BeyondMocapError, InputError, UserCancelledError
 from ...beyond_mocap.base.fixes import Fix
 from ..core import action, background, channels, frame_range
 from ..core.live import Watcher
@@ -23,8 +26,13 @@ from . import follow
 
 if TYPE_CHECKING:
     from ...beyond_mocap.library.library import Library
+    from ...beyond_mocap.passes.answers_ahead import AnswerRequest
     from ...beyond_mocap.passes.hits import HitMotion
     from ...beyond_mocap.passes.live_passes import LivePass, Rally
+    from ...beyond_mocap.passes.strike_means import StrikeMeans
+
+FIRST_SECONDS = 3.0
+"""Seconds of standing that are written with a pass; the rest follows when its players stand."""
 
 _session: dict[str, object] = {}
 
@@ -36,31 +44,38 @@ class NewRally:
     Attributes:
         order: as `generate.build_order` builds it.
         library: the library.
+        means: what the players can strike with.
         rally: the rally.
     """
 
     order: make.Order
     library: Library
+    means: StrikeMeans
     rally: Rally
 
 
-def start_rally(order: make.Order, holder: str, start: float, progress, cancelled) -> NewRally:
-    """Build the library if it is not loaded, and start a rally with all players standing. Does not use bpy."""
+def start_rally(order: make.Order, holder: str, start: float, part: str, progress, cancelled) -> NewRally:
+    """Build the library if it is not loaded, find its strikes with `part`, and start a rally with all players standing.
+    Does not use bpy.
+    """
     from ...beyond_mocap.library.build import build_library
     from ...beyond_mocap.passes import live_passes
 
     library = order.library
     if library is None:
         library = build_library(order.folder, unit=order.unit, **order.build, progress=progress, cancelled=cancelled)
-    return NewRally(order, library, live_passes.start_rally(library, order.scene, holder, start=start,
-                                                            progress=progress, cancelled=cancelled))
+    rally = live_passes.start_rally(library, order.scene, holder, start=start, progress=progress, cancelled=cancelled)
+    means = live_passes.collect_means(library, order.scene)
+    means.list_likely(holder, part, "", None)
+    return NewRally(order, library, means, rally)
 
 
 def apply_rally(scene: bpy.types.Scene, new_rally: NewRally) -> None:
     """Apply a rally to characters and ball, and answer the user's strikes from now on."""
     stop_rally()
     make.session.store_library(new_rally.library, new_rally.order.unit)
-    _session.update(scene=scene.session_uid, library=new_rally.library, rally=new_rally.rally, seen=None, took=0.0)
+    _session.update(scene=scene.session_uid, means=new_rally.means, seen=None)
+    _wait_for_strike(new_rally.rally)
     for name in ("strikes", "figures", "messages"):
         scene.beyond_mocap_passes.property_unset(name)
     scene.beyond_mocap_passes.made_of = PLAYED
@@ -99,9 +114,9 @@ def find_target(scene: bpy.types.Scene) -> str:
     return names[(names.index(holder) + 1) % len(names)] if holder in names else names[0]
 
 
-def store_strike(_scene: bpy.types.Scene, hit: HitMotion, _seconds: float) -> None:
-    """Store the user's strike; only the latest one counts."""
-    _session["pending"] = hit
+def store_strike(_scene: bpy.types.Scene, hit: HitMotion, seconds: float) -> None:
+    """Store the user's strike of `seconds` on the monotonic clock; only the latest one counts."""
+    _session["pending"] = hit, seconds
 
 
 def find_shown_strike(scene: bpy.types.Scene, body: bpy.types.Object) -> HitMotion:
@@ -125,25 +140,23 @@ def find_shown_strike(scene: bpy.types.Scene, body: bpy.types.Object) -> HitMoti
 
 
 def update_rally(scene: bpy.types.Scene) -> None:
-    """Start a requested pass, or insert one that is ready."""
+    """Insert the answer to the user's strike as soon as it is planned; while they have not struck, plan ahead."""
     if get_current_rally() is None or scene.session_uid != _session["scene"]:
         return
     if scene.beyond_mocap_passes.made_of != PLAYED:
         _end_rally("The scene has been updated or cleared: press Play Live to continue")
         return
     _update_target(scene)
-    job = _session.get("job")
-    if job is not None:
-        if job.poll():
-            _session.pop("job")
-            _finish_job(scene, job)
-    elif _session.get("pending") is not None and compute_rally_seconds(scene) >= get_current_rally().ready_time:
-        try:
-            order = _collect_request(scene, _session.pop("pending"))
-        except InputError as error:
-            return _end_rally(str(error))
-        _session["job"] = background.Job("live", lambda progress, cancelled,
-                                         _hurry: _build_answer(*order, progress, cancelled))
+    _write_rest(scene)
+    _collect_answer()
+    try:
+        target = find_target(scene)
+    except InputError as error:
+        return _end_rally(str(error))
+    if _session["pending"] is not None:
+        _answer_strike(scene, target)
+    elif "job" not in _session:
+        _plan_ahead(scene, target)
 
 
 def answer_now(scene: bpy.types.Scene, hit: HitMotion) -> LivePass:
@@ -151,48 +164,110 @@ def answer_now(scene: bpy.types.Scene, hit: HitMotion) -> LivePass:
     if get_current_rally() is None:
         raise InputError("play live", "no rally is being played", "a rally", "press Play Live",
                          fixes=(Fix("press", "beyond_mocap.stream_play"),))
-    piece = _build_answer(*_collect_request(scene, hit), None, None)
+    piece = _build_answer(*_collect_order(_build_request(scene, hit, find_target(scene))), None, None)
     _apply_pass(scene, piece)
     return piece
 
 
-def _collect_request(scene, hit: HitMotion) -> tuple:
-    """Collect what a pass needs: library, rally, time, hit, receiver, bounces."""
-    # not before the holder can act
-    now = max(compute_rally_seconds(scene), get_current_rally().ready_time)
-    return _session["library"], get_current_rally(), now, hit, find_target(scene), scene.beyond_mocap_stream.bounces
+def _build_request(scene, hit: HitMotion, target: str) -> AnswerRequest:
+    """Build the request that answers a hit of the user."""
+    return _session["ahead"].request_for(hit, target, scene.beyond_mocap_stream.bounces)
 
 
-def _build_answer(library, one, now: float, hit: HitMotion, to: str, bounces: int, progress, cancelled) -> LivePass:
+def _collect_order(request: AnswerRequest) -> tuple:
+    """Collect what a pass needs: library, rally, hit, receiver, bounces."""
+    return _session["means"].library, get_current_rally(), request.strike.hit, request.target, request.bounces
+
+
+def _build_answer(library, one, hit: HitMotion, target: str, bounces: int, progress, cancelled) -> LivePass:
     from ...beyond_mocap.passes.live_passes import build_answer
 
-    return build_answer(library, one, now, hit=hit, target=to, bounces=bounces, progress=progress, cancelled=cancelled)
+    return build_answer(library, one, hit, target, bounces, progress=progress, cancelled=cancelled)
 
 
-def _finish_job(scene, job) -> None:
-    """Insert a pass that is ready, or show its error."""
+def _start_planning(request: AnswerRequest) -> None:
+    """Plan an answer in a thread; another one that is being planned is cancelled."""
+    order = _collect_order(request)
+    _session["job"] = request, background.Job("live", lambda progress, cancelled, _hurry: _build_answer(
+        *order, progress, cancelled))
+
+
+def _collect_answer() -> None:
+    """Collect the answer that has just been planned, or its error; one that was cancelled is no longer waited for."""
+    if "job" not in _session or not _session["job"][1].poll():
+        return
+    request, job = _session.pop("job")
+    if isinstance(job.error, UserCancelledError):
+        _session["pending"] = None
+    elif job.error is None or isinstance(job.error, BeyondMocapError):
+        _session["ahead"].add(request, job.error or job.result)
+    else:
+        raise job.error
+
+
+def _answer_strike(scene, target: str) -> None:
+    """Plan the answer to the user's strike if it is not planned yet; insert it as soon as the holder can act."""
+    hit, seconds = _session["pending"]
     try:
-        if job.error is not None:
-            raise job.error
-        _apply_pass(scene, job.result)
+        request = _build_request(scene, hit, target)
+        answer = _session["ahead"].find(request)
+        if isinstance(answer, BeyondMocapError):
+            raise answer
+        if answer is None and ("job" not in _session or _session["job"][0].key != request.key):
+            _start_planning(request)
+        if answer is None or compute_rally_seconds(scene) < get_current_rally().ready_time:
+            return
+        _apply_pass(scene, answer, hit, seconds)
     except BeyondMocapError as error:
+        _session["pending"] = None
         bpy.context.window_manager.beyond_mocap_streaming.played = str(error)
         return
     if not bpy.app.background:
         bpy.ops.ed.undo_push(message="Live Pass")
 
 
-def _apply_pass(scene, piece: LivePass) -> None:
-    """Insert a pass into the scene from now on."""
+def _plan_ahead(scene, target: str) -> None:
+    """Plan the likeliest answer that is not planned yet."""
+    settings = scene.beyond_mocap_stream
+    others = [player.name for player in get_current_rally().scene.players
+              if player.name not in (target, get_current_rally().holder)]
+    side = settings.side if settings.part in ("foot", "hand", "tool") and settings.side != "either" else ""
+    try:
+        request = _session["ahead"].choose_next(settings.part, side, [target, *others], settings.bounces)
+    except BeyondMocapError:  # a part that the library's skeleton lacks: said when the user strikes
+        return
+    if request is not None:
+        _start_planning(request)
+
+
+def _apply_pass(scene, piece: LivePass, hit: HitMotion | None = None, seconds: float = 0.0) -> None:
+    """Insert a pass that answers a hit into the scene from now on."""
     next_rally = get_current_rally().add_pass(piece, max(compute_rally_seconds(scene), get_current_rally().ready_time))
-    _apply_players(scene, next_rally, list(piece.motions))
-    _session["rally"] = next_rally
+    _apply_players(scene, next_rally, list(piece.motions), next_rally.ready_time + FIRST_SECONDS)
+    _wait_for_strike(next_rally, hit)
+    _session["unwritten"] = list(piece.motions)
     scene.beyond_mocap_stream.target = ""
-    _write_status(piece)
+    _write_status(piece, time.monotonic() - seconds if seconds else None)
 
 
-def _apply_players(scene, one: Rally, names: list[str]) -> None:
-    """Apply a rally's motions and ball to the named players."""
+def _write_rest(scene) -> None:
+    """Write the standing that follows a pass, once its players stand: a moment's halt is not seen then."""
+    if _session["unwritten"] and compute_rally_seconds(scene) >= get_current_rally().ready_time:
+        _apply_players(scene, get_current_rally(), _session["unwritten"])
+        _session["unwritten"] = []
+
+
+def _wait_for_strike(rally: Rally, latest: HitMotion | None = None) -> None:
+    """Let the rally wait for the user's next strike; nothing is planned for it yet."""
+    from ...beyond_mocap.passes.answers_ahead import AnswersAhead
+
+    _session.update(rally=rally, ahead=AnswersAhead(_session["means"], rally, latest), pending=None,
+                    unwritten=[])
+    _session.pop("job", None)
+
+
+def _apply_players(scene, one: Rally, names: list[str], until: float = np.inf) -> None:
+    """Apply a rally's motions, up to `until` s, and its ball to the named players."""
     from ...beyond_mocap.passes.passes import build_ball
 
     # players may have been renamed or removed since the rally started
@@ -203,8 +278,13 @@ def _apply_players(scene, one: Rally, names: list[str]) -> None:
     start = float(scene.beyond_mocap_passes.start_frame)
     for name in names:
         played = one.players[name]
-        make.apply_motion(scene, rows[name], SimpleNamespace(motion=played.motion, start_time=played.start), start)
-    make.apply_ball(scene, SimpleNamespace(ball=one.ball, kind=build_ball(one.scene)), start)
+        count = int(np.clip((until - played.start) * played.motion.fps, 2, len(played.motion)))
+        shown = SimpleNamespace(motion=played.motion.frames(0, count), start_time=played.start)
+        make.apply_motion(scene, rows[name], shown, start)
+    path, count = one.ball, max(int(np.searchsorted(one.ball.times, until)), 2)
+    path = replace(path, times=path.times[:count], positions=path.positions[:count], measured=path.measured[:count],
+                   rotations=path.rotations[:count])
+    make.apply_ball(scene, SimpleNamespace(ball=path, kind=build_ball(one.scene)), start)
     frame_range.extend_range(scene, start + float(one.ball.times[-1]) * frames_per_second(scene))
 
 
@@ -229,13 +309,14 @@ def _end_rally(reason: str) -> None:
     status_texts.playing, status_texts.played = False, reason
 
 
-def _write_status(piece: LivePass | None = None) -> None:
-    """Write the state of the rally for the panel."""
+def _write_status(piece: LivePass | None = None, delay: float | None = None) -> None:
+    """Write the state of the rally for the panel; `delay`: s from the strike to the beginning of its answer."""
     status_texts, one = bpy.context.window_manager.beyond_mocap_streaming, get_current_rally()
     status_texts.playing = True
     lines = [f"{one.holder} has the ball, passes so far: {one.passes}"]
     if piece is not None:
         lines.append(f"{piece.giver} played {piece.clip} to {piece.receiver}")
+        lines += [] if delay is None else [f"The answer began {delay:.2f} s after the strike"]
         lines += piece.warnings[:2]
     status_texts.played = "\n".join(lines)
 

@@ -80,8 +80,8 @@ TABLES = {
     "path.new_curve": (
         Setting(name="curve_points", default=0, least=0, most=200, title="Points", tooltip="Number of control points "
                 "of a new curve; 0: as many as it needs to stay within 3 cm"),
-        Setting(name="curve_degree", default=3, least=2, most=5, tooltip="Degree of a NURBS curve: how smooth it is, "
-                "and how far each control point reaches"),
+        Setting(name="curve_degree", default=3, least=1, most=20, tooltip="Degree of a NURBS curve: how smooth it is, "
+                "and how far each control point reaches; above 5 the overlay shows the path, since Blender draws 5"),
         Setting(name="curve_kind", default="BEZIER", choices=CURVES, title="Kind", tooltip="Kind of a new "
                 "curve"),
         Setting(name="nudge_step", default=0.1, least=0.001, most=10.0, unit="metres", tooltip="Metres by which a "

@@ -1,8 +1,9 @@
 """Hits detected while frames arrive: the last seconds of a stream are analysed again and again (Ball handling, section
 4).
 
-A hit motion is reported when it is over, that is when the part is at rest again: only then can its whole movement be
-compared with others (eq. 2). This takes the seconds of the follow-through; the paper's user waits as long.
+A strike is reported as soon as the part slows down again, some 0.1 s after it was fastest, and compared by what eq. 2
+knows by then: the highest speed, and the way to the strike. A hit motion that is noticed only as a whole, such as one
+that rises late, is reported when it is over.
 """
 
 from __future__ import annotations
@@ -11,7 +12,7 @@ import numpy as np
 
 from ...ball.contact import Tool
 from ...motion.motion import Motion
-from ..hits import HitMotion, detect_hits
+from ..hits import HitMotion, detect_hit_under_way, detect_hits
 from .listener import Listener, StreamFrame, convert_poses
 
 WINDOW = 4.0
@@ -41,7 +42,7 @@ class LiveHits:
         self._last_number = 0
 
     def find_new_hit(self) -> tuple[HitMotion, float] | None:
-        """Find the strongest hit motion that has ended since the last call.
+        """Find the strongest hit motion whose strike has been since the last one that was found.
 
         Returns:
             The hit motion and the time of its key (s, monotonic clock), or None.
@@ -56,7 +57,7 @@ class LiveHits:
         if frames[-1].time - frames[0].time < _LEAST_SECONDS:
             return None
         motion, times = space_evenly(frames, _RATE)
-        found = [hit for side in self.sides for hit in self._detect_complete_hits(motion, side)]
+        found = [hit for side in self.sides for hit in self._detect_hits(motion, side)]
         new = [hit for hit in found if times[hit.first] > self._after]
         if not new:
             return None
@@ -64,11 +65,12 @@ class LiveHits:
         self._after = float(times[best.key])
         return best, float(times[best.key])
 
-    def _detect_complete_hits(self, motion: Motion, side: str) -> list[HitMotion]:
-        """Find the complete hit motions: begun within the window and already over."""
+    def _detect_hits(self, motion: Motion, side: str) -> list[HitMotion]:
+        """Find the hit motions that have begun within the window: the one under way, and those that are over."""
+        under_way = detect_hit_under_way(motion, self.part, side, self.threshold, self.tool)
         settled = len(motion) - 1 - int(np.ceil(_SETTLE_SECONDS * motion.fps))
         found = detect_hits(motion, self.part, side, self.threshold, tool=self.tool).motions
-        return [hit for hit in found if 0 < hit.first and hit.last < settled]
+        return [hit for hit in found if 0 < hit.first and hit.last < settled] + ([under_way] if under_way else [])
 
 
 def build_recording(listener: Listener, seconds: float, rate: float | None = None) -> Motion | None:

@@ -443,7 +443,7 @@ def test_a_deleted_curve_and_ground_are_not_kept_for_who_rode_them(scene, part):
     assert body.beyond_mocap_ride.curve is None and body.beyond_mocap_ride.ground is None
 
 
-def test_another_curve_takes_the_place_of_one_that_was_made_here(scene, part):
+def test_another_curve_takes_the_place_of_one_that_was_made_here(scene, part, extension):
     body = walker()
     bpy.ops.beyond_mocap.edit_path()
     name = bpy.context.object.name
@@ -454,6 +454,17 @@ def test_another_curve_takes_the_place_of_one_that_was_made_here(scene, part):
         spline = bpy.context.object.data.splines[0]
         assert len(spline.bezier_points or spline.points) >= points and body.beyond_mocap_ride.messages == ""
         assert [curve.name for curve in bpy.data.curves] == [name] == [bpy.context.object.name]
+    assert bpy.ops.beyond_mocap.path_curve(kind="NURBS", degree=9, count=14) == {"FINISHED"}
+    drawn = part("path_editing.curve").read_curve(bpy.context.scene, bpy.context.object)
+    assert drawn.order == 10 and "follows degree 9" in drawn.notes[0] and len(drawn.points) == 14
+    spline = bpy.context.object.data.splines[0]
+    assert spline.order_u == 6 and "follows degree 9" in body.beyond_mocap_ride.messages
+    core = importlib.import_module(f"{extension.__name__}.beyond_mocap.path_editing.path_line")
+    exact = core.build_b_spline(drawn.points[:, :3], 9).at(np.linspace(0.0, 1.0, 200))
+    line = drawn.sample_line()
+    assert max(np.linalg.norm(line - place, axis=1).min() for place in exact) < 0.02
+    spline.order_u = 4
+    assert part("path_editing.curve").read_curve(bpy.context.scene, bpy.context.object).order == 4
     with pytest.raises(RuntimeError, match="control points"):
         bpy.ops.beyond_mocap.path_curve(kind="NURBS", degree=5, count=4)
     assert [curve.name for curve in bpy.data.curves] == [name] == [body.beyond_mocap_ride.curve.name]

@@ -91,6 +91,24 @@ def test_a_strike_is_answered_from_now_on(playing, room, core):
     )
 
 
+def test_an_answer_that_is_planned_ahead_begins_at_once(playing, room, core):
+    """Within the update in which the strike is noticed, and the same pass as when it is planned then."""
+    play = room("stream.play")
+    ahead, end = play._session["ahead"], time.monotonic() + 120.0
+    while ahead.find(ahead.request_for(kick(core), "Ben", 0)) is None and time.monotonic() < end:
+        play.update_rally(playing)
+        time.sleep(0.01)
+    play.store_strike(playing, kick(core), time.monotonic())
+    play.update_rally(playing)
+    assert play.get_current_rally().passes == 1 and "The answer began 0." in told().played
+    assert play._session["ahead"] is not ahead and play._session["pending"] is None
+    body = playing.beyond_mocap_passes.players[0].body
+    assert body.animation_data.action.frame_range[1] < 5 + 20 * 24
+    playing.frame_set(int(5 + 24 * play.get_current_rally().ready_time) + 1)
+    play.update_rally(playing)
+    assert body.animation_data.action.frame_range[1] > 5 + 60 * 24
+
+
 def test_whom_the_user_chooses_gets_it(playing, room, core):
     play = room("stream.play")
     with pytest.raises(RuntimeError, match="Ann has the ball"):

@@ -9,8 +9,9 @@ import pytest
 from beyond_mocap.base.errors import InputError
 from beyond_mocap.files.bvh import bvh
 from beyond_mocap.motion.motion import forward_kinematics
-from beyond_mocap.passes.hits import detect_hits
-from beyond_mocap.passes.live_passes import BLEND_SECONDS, build_answer, start_rally
+from beyond_mocap.passes.answers_ahead import MOST_ANSWERS, AnswersAhead
+from beyond_mocap.passes.hits import detect_hit_under_way, detect_hits
+from beyond_mocap.passes.live_passes import BLEND_SECONDS, build_answer, collect_means, start_rally
 from beyond_mocap.passes.scene_json import SAMPLES, parse_scene
 
 CLIPS = Path(__file__).resolve().parents[3] / "sample_blend" / "passes" / "library"
@@ -33,9 +34,9 @@ def hit_of(name, side="right"):
 @pytest.fixture(scope="module")
 def passed(library, rally):
     """A pass to Cho at 2 s, then a toss to Ben."""
-    first = build_answer(library, rally, 2.0, hit_of("volley_pass"), "Cho")
+    first = build_answer(library, rally, hit_of("volley_pass"), "Cho")
     after = rally.add_pass(first, 2.0)
-    second = build_answer(library, after, after.ready_time + 0.5, hit_of("volley_toss"), "Ben", bounces=1)
+    second = build_answer(library, after, hit_of("volley_toss"), "Ben", bounces=1)
     return first, after, second, after.add_pass(second, after.ready_time + 0.5)
 
 
@@ -81,14 +82,38 @@ def test_what_was_done_goes_over_into_the_pass(rally, passed):
     old, new = rally.players["Ann"].motion, after.players["Ann"].motion
     np.testing.assert_allclose(new.root_positions[:61], old.root_positions[:61], atol=1e-9)
     later = int(BLEND_SECONDS * new.fps) + 1
-    np.testing.assert_allclose(new.root_positions[60 + later :], first.motions["Ann"].root_positions[later:])
+    piece = first.motions["Ann"]
+    np.testing.assert_allclose(new.root_positions[60 + later : 60 + len(piece)], piece.root_positions[later:])
     assert after.players["Ben"] is rally.players["Ben"]
+
+
+def test_what_is_planned_ahead_is_what_is_planned_after_the_strike(library, rally):
+    """The same bits, for the user's whole strike and for the little of it that is known as it is done."""
+    ahead = AnswersAhead(collect_means(library, rally.scene), rally)
+    planned = []
+    while (request := ahead.choose_next("foot", "right", ("Ben", "Cho"), 0)) is not None:
+        planned.append(request)
+        ahead.add(request, request)
+    assert 8 <= len(planned) <= MOST_ANSWERS and {one.target for one in planned} == {"Ben", "Cho"}
+    clip, whole = bvh.read_bvh(CLIPS / "volley_pass.bvh").motion, hit_of("volley_pass")
+    request = next(one for one in planned if one.key == ahead.request_for(whole, "Ben", 0).key)
+    ahead.add(request, build_answer(library, rally, request.strike.hit, "Ben"))
+    begun = next(hit for now in range(whole.key, len(clip))
+                 if (hit := detect_hit_under_way(clip.frames(0, now), "foot", "right")) is not None)
+    assert np.isnan(begun.times).any() and (begun.last - whole.key) / clip.fps <= 0.2
+    answer = build_answer(library, rally, whole, "Ben")
+    for hit in (whole, begun):
+        found = ahead.find(ahead.request_for(hit, "Ben", 0))
+        assert found.ball.positions.tobytes() == answer.ball.positions.tobytes()
+        for name, motion in answer.motions.items():
+            assert found.motions[name].rotations.tobytes() == motion.rotations.tobytes()
+    assert ahead.find(ahead.request_for(whole, "Ben", 2)) is None
 
 
 def test_the_left_foot_is_answered_with_the_left(library, rally):
     hit = hit_of("volley_pass")
     left = replace(hit, side="left", vectors=hit.vectors * [1.0, -1.0, 1.0], velocity=hit.velocity * [1.0, -1.0, 1.0])
-    piece = build_answer(library, rally, 2.0, left, "Ben")
+    piece = build_answer(library, rally, left, "Ben")
     places, _ = forward_kinematics(piece.motions["Ann"])
     feet = [piece.motions["Ann"].skeleton.names.index(name) for name in ("LeftFoot", "RightFoot")]
     frame = round(piece.strike * piece.motions["Ann"].fps)
@@ -99,7 +124,7 @@ def test_the_left_foot_is_answered_with_the_left(library, rally):
 @pytest.mark.parametrize("target, said", [("Ann", "both passer and receiver"), ("Zoe", "one of Ann")])
 def test_a_target_that_is_none(library, rally, target, said):
     with pytest.raises(InputError, match=said):
-        build_answer(library, rally, 2.0, hit_of("volley_pass"), target)
+        build_answer(library, rally, hit_of("volley_pass"), target)
 
 
 def test_an_unknown_holder(library, rally):

@@ -13,6 +13,7 @@ from beyond_mocap.base.errors import InputError, NotInLibraryError, UserCancelle
 from beyond_mocap.motion import quaternion
 from beyond_mocap.motion.humanoid import compute_heading_from_positions
 from beyond_mocap.motion.motion import compute_pose, sample_frames
+from beyond_mocap.passes import pass_choice
 from beyond_mocap.passes.pass_problem import ON_TARGET
 from beyond_mocap.passes.passes import build_ball, build_ball_path, plan_scene
 from beyond_mocap.passes.scene_json import SAMPLES, parse_scene
@@ -136,6 +137,21 @@ def test_the_same_scene_is_the_same_bits(strikes_library):
     first, again = (plan_scene(strikes_library, scene_of("dropped")) for _ in range(2))
     assert build_ball_path(first).positions.tobytes() == build_ball_path(again).positions.tobytes()
     assert [one.order.clip for one in first.strikes] == [one.order.clip for one in again.strikes]
+
+
+def test_strikes_vary_and_never_at_the_price_of_a_much_worse_fit(strikes_library, monkeypatch):
+    """Distinct strikes of the first eight, and the mean cost of all, over two scenes and two seeds."""
+    def measure():
+        found = [plan_scene(strikes_library, scene_of(name, seed=seed)).strikes
+                 for name in ("three", "six") for seed in (0, 3)]
+        distinct = [len({(one.order.clip, one.order.hit.first) for one in strikes[:8]}) for strikes in found]
+        return np.mean(distinct), np.mean([one.cost for strikes in found for one in strikes[:-1]])
+
+    distinct, cost = measure()
+    monkeypatch.setattr(pass_choice, "MOST_REUSE_COST", 0.0)
+    distinct_before, cost_before = measure()
+    assert distinct >= 5.5 and distinct > distinct_before + 1.0
+    assert cost <= 1.1 * cost_before
 
 
 def test_eighths_of_a_turn(strikes_library):

@@ -14,7 +14,7 @@ from beyond_mocap.cli.main import main
 from beyond_mocap.cli.outputs import ProgressReporter
 from beyond_mocap.files.bvh import bvh
 from beyond_mocap.files.tables import read_ball
-from beyond_mocap.motion.humanoid import estimate_stature
+from beyond_mocap.motion.humanoid import estimate_stature, identify_joints
 from beyond_mocap.motion.motion import forward_kinematics
 from beyond_mocap.passes.pass_scene import Weights
 from beyond_mocap.passes.passes import (
@@ -73,6 +73,20 @@ def test_everybody_is_there_for_the_whole_scene(played):
     for player, asked in zip(whole.players, whole.scene.players):
         way = player.take.motion.root_positions[:, :2] - asked.place
         assert np.linalg.norm(way[0]) < 0.1 and np.linalg.norm(way, axis=1).max() < 1.0
+
+
+def test_who_waits_stands_ready(played):
+    """Bent knees, as the library's own waiting players have them, not upright as its walkers stand."""
+    whole = played("dropped")
+    for player in whole.players:
+        times = [order.time for order in whole.plan.list_orders(player.name)]
+        motion = player.take.motion
+        places, _ = forward_kinematics(motion)
+        leg = identify_joints(motion.skeleton).left
+        bones = [np.linalg.norm(places[:, a] - places[:, b], axis=1)
+                 for a, b in ((leg.upper_leg, leg.lower_leg), (leg.lower_leg, leg.foot), (leg.upper_leg, leg.foot))]
+        waits = np.all([np.abs(np.arange(len(motion)) / motion.fps - time) > 1.2 for time in times], axis=0)
+        assert waits.sum() > 30 and np.median((bones[2] / (bones[0] + bones[1]))[waits]) < 0.97
 
 
 def test_a_small_players_tool_keeps_its_size(strikes_library):

@@ -289,7 +289,7 @@ def test_a_kick_is_recognised_once_while_it_arrives(tmp_path, fps):
         found += [(*hit, played.now)] if hit else []
     assert len(found) == 1
     hit, moment, now = found[0]
-    assert hit.side == "right" and abs(moment - made.key) < 0.1 and now - made.key < 1.0
+    assert hit.side == "right" and abs(moment - made.key) < 0.1 and now - made.key < 0.2
 
 
 def test_walking_is_no_hit(tmp_path, clip):
