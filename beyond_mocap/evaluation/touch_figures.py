@@ -21,9 +21,9 @@ from ..synthesis.search.key_fit import SPEED_RATIO
 from . import touches
 from .contact_figures import measure_contacts
 from .naturalness import format_event
-from .reference import View
 from .titles import Title
 from .touch_view import TouchView
+from .view import View
 
 FAST_BALL = 18.0  # m/s of the ball just after a kick, from which on it is a fast one
 LEAST_BALL = 5.0  # m/s from which on ball and foot speed are compared; slower balls are nudged, or taken along

@@ -5,6 +5,7 @@ In a folder without any annotation, labels are proposed (`library.proposals`), u
 
 from __future__ import annotations
 
+import errno
 import re
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator, Sequence
@@ -35,6 +36,7 @@ from .proposals import propose_labels
 from .scan import Annotations, find_readable_clips, read_stamp
 
 _BASE_BYTES, _BYTES_PER_BYTE = 1e8, 4.0  # of memory that a build needs, and what it needs for a byte of its BVH files
+_FULL = (errno.ENOSPC, errno.EDQUOT)
 
 
 def build_library(
@@ -132,7 +134,7 @@ def _build_cached(recordings: _Recordings, place: Path, key: str, seed: int, rep
     """Build the library in files of its cache; in memory, with a note, where the cache's folder cannot be made.
 
     Raises:
-        InputError: if the disk gets full, where memory would too.
+        InputError: if a file cannot be written or read in the middle: the disk gets full, where memory would too.
     """
     with ExitStack() as stack:
         try:
@@ -147,10 +149,18 @@ def _build_cached(recordings: _Recordings, place: Path, key: str, seed: int, rep
             write_synthetic_clips(place, _list_completed(library.clips))
             cache.save_library(place, key, library, arrays=arrays)
         except OSError as error:
-            raise InputError(place, f"the library's cache cannot be written ({error.strerror or error})", "",
-                             "free space on its disk, or choose another cache folder") from None
+            raise _describe_failure(place, error) from None
         cache.save_coverage(place, key, library.coverage)
         return library
+
+
+def _describe_failure(place: Path, error: OSError) -> InputError:
+    """Describe what ended a build in the cache's folder `place`: a full disk, or anything else."""
+    if error.errno in _FULL:
+        return InputError(place, f"the library's cache cannot be written ({error.strerror})", "",
+                          "free space on its disk, or choose another cache folder")
+    return InputError(error.filename or place, f"failed while the library was built ({error.strerror or error})",
+                      "files that can be read and written until the end", "try again, or choose another cache folder")
 
 
 def _list_completed(clips: Iterable[Clip]) -> list[Clip]:
