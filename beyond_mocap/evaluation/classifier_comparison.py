@@ -24,7 +24,7 @@ from ..annotation import LOCOMOTION
 from ..annotation.vocabulary import DIRECTIONS
 from ..base.errors import InputError, format_count
 from ..base.optional_packages import import_optional
-from ..library.landings import LANDING_FOLDER
+from ..library.clip import LANDING_FOLDER
 from ..library.library import Library
 from ..motion.motion import Motion, resample, sample_frames
 from ..synthesis.quality.playback import Playback, find_transitions

@@ -13,7 +13,7 @@ from ..annotation.ball_contact import find_striking_part
 from ..annotation.labels import find_label, list_labels
 from ..base.errors import TimedMessage
 from ..base.time_series import find_runs
-from ..library.synthetic_clips import SYNTHETIC_FOLDER
+from ..library.clip import SYNTHETIC_FOLDER
 from ..motion import quaternion
 from ..synthesis.quality.moments import KeyMomentResult, list_contact_labels
 from ..synthesis.quality.unmet_constraints import format_stretches

@@ -14,6 +14,7 @@ from contextlib import ExitStack
 from dataclasses import dataclass, replace
 from itertools import islice
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -24,16 +25,16 @@ from ..base.settings import find_setting
 from ..files.bvh import bvh
 from ..files.motion_file import MappedMotions, MotionWriter
 from ..motion.motion import Motion
-from ..synthetic.landing import ends_in_flight
-from . import cache, landings, repair
-from . import common_skeleton as one_skeleton
+from . import cache
 from .cache import write_synthetic_clips
-from .classify.classifier import FILE_NAME, Classifier, read_classifier
-from .clip import Clip
+from .clip import Clip, RepairFigures
 from .features import FPS, build_frames
 from .library import RECORDED_INDEX, Library, Progress
-from .proposals import propose_labels
-from .scan import Annotations, find_readable_clips, read_stamp
+from .scan import CLASSIFIER_FILE, Annotations, find_readable_clips, read_stamp
+
+if TYPE_CHECKING:
+    from .classify.classifier import Classifier
+    from .repair import Repair
 
 _BASE_BYTES, _BYTES_PER_BYTE = 1e8, 4.0  # of memory that a build needs, and what it needs for a byte of its BVH files
 _FULL = (errno.ENOSPC, errno.EDQUOT)
@@ -91,7 +92,7 @@ def build_library(
     messages = [*waiting, *cache.describe_outdated_cache(place)]
     sources_read = _Recordings(
         folder=folder, paths=paths, files=files, annotations=annotations, unit=unit, threads=threads,
-        skeleton=skeleton_file, classifier=read_classifier(model) if model else None,
+        skeleton=skeleton_file, classifier=_read_model(model) if model else None,
         notes=(*([cache_note] if cache_note else []), *annotations.describe_unknown_files(folder),
                *annotations.describe_lone_texts(folder)),
     )
@@ -170,8 +171,15 @@ def _list_completed(clips: Iterable[Clip]) -> list[Clip]:
 
 def _find_model(place: Path, annotations: Annotations, paths: list[Path]) -> Path | None:
     """Find the learned model in the cache folder; None where there is none, or where any clip has annotations."""
-    model = place / FILE_NAME
+    model = place / CLASSIFIER_FILE
     return model if model.is_file() and not any(annotations.read_rows(path, FPS) for path in paths) else None
+
+
+def _read_model(file: Path) -> Classifier:
+    """Read a learned model."""
+    from .classify.classifier import read_classifier
+
+    return read_classifier(file)
 
 
 def _read_clips(recordings: _Recordings, arrays: Path | None, notes: list[str], report: Progress,
@@ -183,6 +191,8 @@ def _read_clips(recordings: _Recordings, arrays: Path | None, notes: list[str], 
     Returns:
         The clips, and their motions, which let go of memory where they lie in a file.
     """
+    from .repair import describe_repairs
+
     levelled, changes = MotionWriter(arrays and arrays / "levelled.npy"), []
     units: list[str] = []
     for source_notes, motion, pops, drift in _iter_levelled(recordings, report, cancelled):
@@ -200,8 +210,8 @@ def _read_clips(recordings: _Recordings, arrays: Path | None, notes: list[str], 
     motions = repaired.finish()
     if is_proposed:
         rows = _propose_rows(recordings, motions, report, cancelled)
-    notes += repair.describe_repairs([(one, pops) for one, (pops, _) in zip(repairs, changes)])
-    figures = [repair.RepairFigures(pops, one.drift, *one.slide) for one, (pops, _) in zip(repairs, changes)]
+    notes += describe_repairs([(one, pops) for one, (pops, _) in zip(repairs, changes)])
+    figures = [RepairFigures(pops, one.drift, *one.slide) for one, (pops, _) in zip(repairs, changes)]
     complete = MotionWriter(arrays and arrays / cache.MOTIONS)
     known: list[dict] = []  # all of a clip but its motion
     for original, what in zip(_iter_completed(recordings, motions, rows, contacts, notes), figures):
@@ -216,12 +226,15 @@ def _read_clips(recordings: _Recordings, arrays: Path | None, notes: list[str], 
 
 
 def _repair_clips(recordings: _Recordings, motions: Sequence[Motion], drifts: Sequence[float], repaired: MotionWriter,
-                  notes: list[str], report: Progress, cancelled) -> tuple[list[repair.Repair], list[np.ndarray]]:
+                  notes: list[str], report: Progress, cancelled) -> tuple[list[Repair], list[np.ndarray]]:
     """Bring motions to one skeleton and repair them into `repaired`; returns what was changed, and their contacts."""
+    from . import repair
+    from .common_skeleton import unify_skeletons
+
     chosen, paths = recordings.skeleton, recordings.paths
     example = bvh.read_bvh(chosen, recordings.unit).motion if chosen is not None else None
     repairs, contacts = [], []
-    for number, unified in enumerate(one_skeleton.unify_skeletons(paths, motions, example, notes)):
+    for number, unified in enumerate(unify_skeletons(paths, motions, example, notes)):
         _check_cancelled(cancelled)
         report(0.4 + 0.3 * number / len(paths), f"Repairing and mirroring {paths[number].name}")
         one = repair.repair_floor_and_feet(*unified)
@@ -241,6 +254,8 @@ def _read_rows(recordings: _Recordings, motions: Sequence[Motion]) -> list[tuple
 def _propose_rows(recordings: _Recordings, motions: Sequence[Motion], report: Progress,
                   cancelled) -> list[tuple[ClipAnnotation, ...]]:
     """Propose the annotations of all clips; InputError where nothing is proposed."""
+    from .proposals import propose_labels
+
     rows, least = [], find_setting("library.learn", "least").default
     for number, motion in enumerate(motions):
         _check_cancelled(cancelled)
@@ -263,6 +278,8 @@ def _iter_levelled(recordings: _Recordings, report: Progress,
 
     The unit applies to the user's own files only.
     """
+    from . import repair
+
     paths, ahead = recordings.paths, 2 * max(1, recordings.threads)
 
     def read_one(path: Path, file: Path):
@@ -287,6 +304,9 @@ def _iter_levelled(recordings: _Recordings, report: Progress,
 def _iter_completed(recordings: _Recordings, motions: Sequence[Motion], rows: Sequence[tuple[ClipAnnotation, ...]],
                     contacts: Sequence[np.ndarray], notes: list[str]) -> Iterator[Clip]:
     """Iterate over the clips; those that end in flight get a landing and getting up, and notes a line about them."""
+    from ..synthetic.landing import ends_in_flight
+    from . import landings
+
     flying = [ends_in_flight(motion) for motion in motions]
     getting_ups = landings.collect_getting_ups(motions, rows, contacts) if any(flying) else []
     seconds = []

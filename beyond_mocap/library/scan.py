@@ -19,6 +19,8 @@ from ..base.fixes import Fix
 from ..files.atomic import atomic_write
 
 CACHE_FOLDER = ".beyond_mocap"
+CLASSIFIER_FILE = "learned_words.npz"
+"""Name of the learned classifier of labels in the cache's folder."""
 TABLE_NAME = "annotations.csv"
 FOREIGN = (".fbx", ".glb", ".gltf", ".usd", ".usda", ".usdc", ".usdz")
 _TABLE = "converted.json"

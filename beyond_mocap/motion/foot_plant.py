@@ -14,10 +14,9 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.ndimage import maximum_filter1d
 
 from ..base.banded_least_squares import BandedLeastSquares
-from ..base.time_series import hann_smooth, number_runs
+from ..base.time_series import compute_running_maximum, hann_smooth, number_runs
 from ..base.vectors import arctan2, cross_product
 from . import quaternion
 from .contacts import measure_sole_height
@@ -401,7 +400,7 @@ def compute_pelvis_drop(feet: list[Foot], goals: list[np.ndarray], spread: int, 
 
 def spread_peaks(need: np.ndarray, reach: int) -> np.ndarray:
     """Build a smooth curve (T,) that is nowhere below `need` (T,), widened by `reach` frames."""
-    return hann_smooth(maximum_filter1d(need, 2 * reach + 1, mode="nearest"), reach)
+    return hann_smooth(compute_running_maximum(need, reach, reach), reach)
 
 
 def measure_shortfall(foot: Foot, goal: np.ndarray, drop: np.ndarray) -> np.ndarray:

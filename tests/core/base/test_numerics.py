@@ -4,10 +4,17 @@ import hashlib
 
 import numpy as np
 import pytest
+from scipy.ndimage import maximum_filter1d
 
 from beyond_mocap.base.digest import byte_digest, hex_digest
 from beyond_mocap.base.easing import hermite, quintic_step, quintic_step_by_powers, smoothstep
-from beyond_mocap.base.time_series import gaussian_smooth, hann_smooth, interpolate_columns, time_derivative
+from beyond_mocap.base.time_series import (
+    compute_running_maximum,
+    gaussian_smooth,
+    hann_smooth,
+    interpolate_columns,
+    time_derivative,
+)
 from beyond_mocap.base.vectors import (
     cross_on_ground,
     distances_along,
@@ -72,3 +79,16 @@ def test_digests_are_those_of_the_joined_bytes():
     joined = "\u00e9".encode() + table.tobytes() + b"x"
     assert hex_digest("\u00e9", table, b"x", digits=8) == hashlib.sha256(joined).hexdigest()[:8]
     assert byte_digest("\u00e9", table, np.zeros((0, 3)), b"x") == hashlib.blake2b(joined, digest_size=16).digest()
+
+
+@pytest.mark.parametrize("kind", [float, np.float32, bool])
+def test_the_running_maximum_is_scipys_to_the_bit(kind):
+    random = np.random.default_rng(0)
+    for count in (1, 2, 7, 40):
+        values = (random.normal(size=count) > 1.0) if kind is bool else random.normal(size=count).astype(kind)
+        for size in range(1, 20):
+            around = maximum_filter1d(values, 2 * size + 1, mode="nearest")
+            ahead = maximum_filter1d(values, size + 1, origin=-((size + 1) // 2), mode="nearest")
+            for expected, window in ((around, (size, size)), (ahead, (0, size))):
+                found = compute_running_maximum(values, *window)
+                assert found.dtype == expected.dtype and found.tobytes() == expected.tobytes()

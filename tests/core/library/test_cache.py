@@ -15,7 +15,7 @@ import pytest
 
 from beyond_mocap.base.errors import InputError
 from beyond_mocap.files import motion_file
-from beyond_mocap.library import build, cache
+from beyond_mocap.library import build, cache, synthetic_clips
 from beyond_mocap.library import library as library_module
 from beyond_mocap.library.build import build_library
 from beyond_mocap.library.library import Library
@@ -81,7 +81,7 @@ def test_from_the_cache_come_the_same_bits(clips_folder, library):
 
 def test_the_stance_of_all_recordings_is_measured_once(folder, monkeypatch):
     first = build_library(folder).neutral_stance
-    monkeypatch.setattr(library_module, "sample_upright_example", None)
+    monkeypatch.setattr(synthetic_clips, "sample_upright_example", None)
     again = build_library(folder).neutral_stance
     assert all(np.array_equal(getattr(first, name), getattr(again, name)) for name in library_module._STANCE_NUMBERS)
 
