@@ -18,7 +18,9 @@ from beyond_mocap.base.time_series import (
 from beyond_mocap.base.vectors import (
     cross_on_ground,
     distances_along,
+    dot_products,
     find_nearest_axis,
+    measure_lengths,
     skew_matrix,
     unit_vector,
     unit_vectors,
@@ -60,6 +62,17 @@ def test_hermite_is_the_cubic_itself():
     assert hermite(share, 1.0, 2.0, 1.0 + 2.0 - 3.0 + 4.0, 2.0 - 6.0 + 12.0) == pytest.approx(
         1.0 + 2.0 * share - 3.0 * share**2 + 4.0 * share**3
     )
+
+
+@pytest.mark.parametrize("size", [2, 3, 4])
+def test_dot_products_and_lengths_are_numpys_to_the_bit(size):
+    random = np.random.default_rng(0)
+    for shape in ((size,), (1, size), (500, size), (40, 7, size)):
+        a, b = random.normal(size=shape) * 10.0 ** random.uniform(-9, 9, shape), random.normal(size=shape)
+        a[..., 0], b[:1] = np.where(random.random(shape[:-1]) < 0.1, -0.0, a[..., 0]), 0.0  # zeros of both signs
+        for one in (a, np.asfortranarray(a), -0.0 * np.abs(a)):
+            assert np.asarray(dot_products(one, b)).tobytes() == np.sum(one * b, axis=-1).tobytes()
+            assert np.asarray(measure_lengths(one)).tobytes() == np.linalg.norm(one, axis=-1).tobytes()
 
 
 def test_values_over_time():
