@@ -47,6 +47,21 @@ def hann_smooth(values: np.ndarray, reach: int) -> np.ndarray:
     return np.convolve(np.pad(values, reach, mode="edge"), window / window.sum(), mode="valid")
 
 
+def compute_running_maximum(values: np.ndarray, before: int, after: int) -> np.ndarray:
+    """Compute the largest value around each frame; windows end with the values.
+
+    Args:
+        values: (T,) numbers or bool.
+        before, after: frames of the window before and after each frame.
+    Returns:
+        (T,), the same unit and type.
+    """
+    largest, span, width = np.pad(values, (before, after), mode="edge"), 1, before + after + 1
+    while 2 * span <= width:  # largest[i] is that of the frames i to i + span - 1
+        largest, span = np.maximum(largest[:-span], largest[span:]), 2 * span
+    return np.maximum(largest[: len(values)], largest[width - span :])
+
+
 def interpolate_columns(
     sample_times: float | np.ndarray, times: np.ndarray, values: np.ndarray, fill_value: float | None = None
 ) -> np.ndarray:

@@ -2,7 +2,8 @@
 
 - `figures`    the report's groups of figures, among them the similarity of labels (Faustino §3.2.2 eq. 18)
 - `realism`    distance to the nearest recorded pose; the smoothness curve (Faustino App. D)
-- `reference`  a library's own scores, once per library and frame rate, and a take beside them
+- `view`       a take beside its track and the recordings of its library
+- `reference`  a library's own scores, once per library and frame rate, kept beside the library's cache
 - `naturalness` and `touches` what the eye sees: of the body's course, and at the ball; their groups of figures in
                `naturalness_figures`, `touch_figures`, how pages name them in `titles`
 - `physics`, `sprint_form` and `boots` how a body's mass, limbs and soles move; one body in `body_physics`, the group of

@@ -24,12 +24,12 @@ from ..annotation import LOCOMOTION
 from ..annotation.vocabulary import DIRECTIONS
 from ..base.errors import InputError, format_count
 from ..base.optional_packages import import_optional
-from ..library.landings import LANDING_FOLDER
+from ..library.clip import LANDING_FOLDER
 from ..library.library import Library
 from ..motion.motion import Motion, resample, sample_frames
 from ..synthesis.quality.playback import Playback, find_transitions
 from ..synthesis.synthesize import estimate_look
-from .reference import compute_scale
+from .view import compute_scale
 from .window_features import SECONDS, Feature, WindowFeatures, list_window_frames, measure_windows
 
 SPEED_EDGES = (1.0, 2.0, 4.5)  # m/s between the classes that have figures of their own

@@ -14,7 +14,7 @@ from ..synthesis.construct.ball_touch.touch_problem import BALL_NOISE, FILLED_NO
 from ..synthesis.construct.held_ball import HELD_DISTANCE
 from ..synthesis.construct.step_to_ball import compute_allowed_step
 from ..synthesis.quality.moments import KeyMomentResult, list_contact_labels, measure_contact
-from .reference import View
+from .view import View
 
 MET_GAP = 0.005
 """Metres between the surfaces of part and ball up to which a touch is met."""

@@ -33,7 +33,7 @@ from ..synthesis.quality.playback import find_replayed, list_warp_rates
 from ..synthesis.quality.unmet_constraints import report_unmet_constraints
 from . import realism
 from .contact_figures import find_reachable
-from .reference import View, compute_source_poses
+from .view import View, compute_source_poses
 
 SPEED_NAMES = ("0-1", "1-2", "2-3", "3-4.5", "4.5+")
 """Names of the classes of `movement.classify_speed`, m/s."""

@@ -35,9 +35,9 @@ from .html_page import (
     build_title,
     join_html,
 )
-from .reference import View
 from .report import find_twin_name, flatten_report, format_rest, judge_figures
 from .titles import Title
+from .view import View
 
 MAX_MOMENTS = 12
 """Key moments with stick figures on the page; the table lists all."""

@@ -32,8 +32,8 @@ from .naturalness import (
     measure_standing,
     select_unasked_spins,
 )
-from .reference import View
 from .titles import Title
+from .view import View
 
 JOLT_RATIO = TARGETS["seam_jerk_ratio.max"].most
 STRIKE_SECONDS = 0.4  # s to either side of a strike in which it may jolt: its swing, and half a window of the jerk

@@ -14,7 +14,7 @@ from ..annotation.ball_contact import build_surfaces
 from ..annotation.striking import find_nearest_point, trace_fastest_surface
 from ..synthesis.quality import movement
 from ..synthesis.quality.moments import KeyMomentResult, find_written_ball, list_contact_labels, measure_contact
-from .reference import View
+from .view import View
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)

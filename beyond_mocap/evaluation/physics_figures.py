@@ -14,8 +14,8 @@ from ..base.time_series import time_derivative
 from ..motion.track import smooth_zero_phase_hann
 from ..synthesis.quality.unmet_constraints import report_hard_pushes
 from .body_physics import SPEED_CLASSES, measure_body_physics, summarize_physics
-from .reference import View
 from .titles import Title
+from .view import View
 
 FRAMES_KEYS = {
     **dict.fromkeys(("vertical_m_s2_median", "level_m_s2_median"), "flights"),

@@ -18,7 +18,7 @@ from ..motion.track import BALL_RADIUS
 from ..synthesis.quality import movement
 from ..synthesis.quality.playback import compute_playback_rate
 from . import figures, realism
-from .reference import View
+from .view import View
 
 WIDTH = 11.0
 DPI = 100

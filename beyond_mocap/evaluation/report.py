@@ -20,10 +20,10 @@ from ..synthesis.take import Take
 from . import figures, naturalness_figures, physics_figures, touch_figures
 from .naturalness_figures import find_planned_headings, list_naturalness_messages, measure_naturalness
 from .physics_figures import list_physics_notes, measure_physics
-from .reference import View
 from .touch_figures import list_touch_messages, measure_touches
 from .touch_view import TouchView
 from .unknown_figures import list_unknown_figures
+from .view import View
 
 VERSION = 1
 MAX_DEPTH = 30

@@ -13,7 +13,7 @@ from ..annotation.ball_contact import find_striking_part
 from ..annotation.labels import find_label, list_labels
 from ..base.errors import TimedMessage
 from ..base.time_series import find_runs
-from ..library.synthetic_clips import SYNTHETIC_FOLDER
+from ..library.clip import SYNTHETIC_FOLDER
 from ..motion import quaternion
 from ..synthesis.quality.moments import KeyMomentResult, list_contact_labels
 from ..synthesis.quality.unmet_constraints import format_stretches
@@ -21,9 +21,9 @@ from ..synthesis.search.key_fit import SPEED_RATIO
 from . import touches
 from .contact_figures import measure_contacts
 from .naturalness import format_event
-from .reference import View
 from .titles import Title
 from .touch_view import TouchView
+from .view import View
 
 FAST_BALL = 18.0  # m/s of the ball just after a kick, from which on it is a fast one
 LEAST_BALL = 5.0  # m/s from which on ball and foot speed are compared; slower balls are nudged, or taken along

@@ -15,7 +15,7 @@ from ..annotation.striking import build_part_surfaces, measure_smallest_gap
 from ..annotation.vocabulary import SIDES
 from ..synthesis.quality.moments import KeyMomentResult, list_contact_labels
 from . import touches
-from .reference import View
+from .view import View
 
 SECOND_STRIKE_SECONDS = 2.5  # s after a reception in which a strike counts as a second one
 _ASKED_SECONDS = 0.5  # s about a requested action of a foot in which a strike belongs to it

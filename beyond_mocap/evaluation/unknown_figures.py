@@ -6,7 +6,7 @@ import re
 from collections.abc import Mapping
 
 from ..synthesis.quality.targets import find_target
-from .reference import View
+from .view import View
 
 _NEEDS_TRACK = r"(slow_)?root_error_m|pelvis_error_m\.(mean|keys)|pelvis_surge_m_s\.track|speed_coverage|keys \d+\."
 _NEEDS_TRACK += r"(position|pelvis)_error_m|naturalness\.(off_plan|unasked|off_travel_aside|standing)"

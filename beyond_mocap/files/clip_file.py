@@ -1,11 +1,15 @@
-"""Read a clip from a file of any form that needs no Blender: BVH, or motion of SMPL in an .npz."""
+"""Read a clip from a file of any form that needs no Blender: BVH, or motion of SMPL in an .npz.
+
+The readers are imported where they are used: lists of clips are needed at every start.
+"""
 
 from __future__ import annotations
 
 from pathlib import Path
+from typing import TYPE_CHECKING
 
-from .bvh.bvh import BvhClip, read_bvh
-from .smpl.smpl import is_smpl_file, read_smpl
+if TYPE_CHECKING:
+    from .bvh.bvh import BvhClip
 
 CLIP_ENDINGS = (".bvh", ".npz")
 
@@ -21,9 +25,19 @@ def read_clip(path, unit: float | None = None) -> BvhClip:
     Raises:
         InputError: if it is neither form.
     """
-    return read_bvh(path, unit) if Path(path).suffix.lower() not in (".npz", ".pkl") else read_smpl(path)
+    if Path(path).suffix.lower() in (".npz", ".pkl"):
+        from .smpl.smpl import read_smpl
+
+        return read_smpl(path)
+    from .bvh.bvh import read_bvh
+
+    return read_bvh(path, unit)
 
 
 def is_clip_file(path: Path) -> bool:
     """Return whether a file with one of `CLIP_ENDINGS` is a clip: an .npz may hold anything."""
-    return path.suffix.lower() != ".npz" or is_smpl_file(path)
+    if path.suffix.lower() != ".npz":
+        return True
+    from .smpl.smpl import is_smpl_file
+
+    return is_smpl_file(path)

@@ -5,6 +5,7 @@ In a folder without any annotation, labels are proposed (`library.proposals`), u
 
 from __future__ import annotations
 
+import errno
 import re
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator, Sequence
@@ -13,6 +14,7 @@ from contextlib import ExitStack
 from dataclasses import dataclass, replace
 from itertools import islice
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -23,21 +25,22 @@ from ..base.settings import find_setting
 from ..files.clip_file import read_clip
 from ..files.motion_file import MappedMotions, MotionWriter
 from ..motion.motion import Motion
-from ..synthetic.landing import ends_in_flight
-from . import cache, landings, repair
-from . import common_skeleton as one_skeleton
+from . import cache
 from .cache import write_synthetic_clips
-from .classify.classifier import FILE_NAME, Classifier, read_classifier
-from .clip import Clip
+from .clip import Clip, RepairFigures
 from .features import FPS, build_frames
 from .library import RECORDED_INDEX, Library, Progress
-from .proposals import propose_labels
-from .recorded_ball.body_ball import BodyBall, find_ball_table, read_recorded_ball
-from .recorded_ball.contact_keys import move_keys_to_contacts
-from .scan import Annotations, find_readable_clips, read_stamp
+from .recorded_ball.ball_table import find_ball_table
+from .scan import CLASSIFIER_FILE, Annotations, find_readable_clips, read_stamp
+
+if TYPE_CHECKING:
+    from .classify.classifier import Classifier
+    from .recorded_ball.body_ball import BodyBall
+    from .repair import Repair
 
 _BASE_BYTES = 1e8  # of memory that a build needs
 _BYTES_PER_BYTE = {".bvh": 4.0, ".npz": 16.0}  # of memory that it needs for a byte of its files: text is longer
+_FULL = (errno.ENOSPC, errno.EDQUOT)
 
 
 def build_library(
@@ -93,7 +96,7 @@ def build_library(
     messages = [*waiting, *cache.describe_outdated_cache(place)]
     sources_read = _Recordings(
         folder=folder, paths=paths, files=files, annotations=annotations, unit=unit, threads=threads,
-        skeleton=skeleton_file, classifier=read_classifier(model) if model else None,
+        skeleton=skeleton_file, classifier=_read_model(model) if model else None,
         notes=(*([cache_note] if cache_note else []), *annotations.describe_unknown_files(folder),
                *annotations.describe_lone_texts(folder)),
     )
@@ -136,7 +139,7 @@ def _build_cached(recordings: _Recordings, place: Path, key: str, seed: int, rep
     """Build the library in files of its cache; in memory, with a note, where the cache's folder cannot be made.
 
     Raises:
-        InputError: if the disk gets full, where memory would too.
+        InputError: if a file cannot be written or read in the middle: the disk gets full, where memory would too.
     """
     with ExitStack() as stack:
         try:
@@ -151,10 +154,18 @@ def _build_cached(recordings: _Recordings, place: Path, key: str, seed: int, rep
             write_synthetic_clips(place, _list_completed(library.clips))
             cache.save_library(place, key, library, arrays=arrays)
         except OSError as error:
-            raise InputError(place, f"the library's cache cannot be written ({error.strerror or error})", "",
-                             "free space on its disk, or choose another cache folder") from None
+            raise _describe_failure(place, error) from None
         cache.save_coverage(place, key, library.coverage)
         return library
+
+
+def _describe_failure(place: Path, error: OSError) -> InputError:
+    """Describe what ended a build in the cache's folder `place`: a full disk, or anything else."""
+    if error.errno in _FULL:
+        return InputError(place, f"the library's cache cannot be written ({error.strerror})", "",
+                          "free space on its disk, or choose another cache folder")
+    return InputError(error.filename or place, f"failed while the library was built ({error.strerror or error})",
+                      "files that can be read and written until the end", "try again, or choose another cache folder")
 
 
 def _list_completed(clips: Iterable[Clip]) -> list[Clip]:
@@ -164,8 +175,15 @@ def _list_completed(clips: Iterable[Clip]) -> list[Clip]:
 
 def _find_model(place: Path, annotations: Annotations, paths: list[Path]) -> Path | None:
     """Find the learned model in the cache folder; None where there is none, or where any clip has annotations."""
-    model = place / FILE_NAME
+    model = place / CLASSIFIER_FILE
     return model if model.is_file() and not any(annotations.read_rows(path, FPS) for path in paths) else None
+
+
+def _read_model(file: Path) -> Classifier:
+    """Read a learned model."""
+    from .classify.classifier import read_classifier
+
+    return read_classifier(file)
 
 
 def _read_clips(recordings: _Recordings, arrays: Path | None, notes: list[str], report: Progress,
@@ -177,6 +195,9 @@ def _read_clips(recordings: _Recordings, arrays: Path | None, notes: list[str], 
     Returns:
         The clips, and their motions, which let go of memory where they lie in a file.
     """
+    from .recorded_ball.contact_keys import move_keys_to_contacts
+    from .repair import describe_repairs
+
     levelled, changes = MotionWriter(arrays and arrays / "levelled.npy"), []
     units: list[str] = []
     seen: list[BodyBall | None] = []
@@ -198,8 +219,8 @@ def _read_clips(recordings: _Recordings, arrays: Path | None, notes: list[str], 
         rows = _propose_rows(recordings, motions, report, cancelled)
     balls = [None if ball is None else ball.place(motion) for ball, motion in zip(seen, motions)]
     rows = move_keys_to_contacts(motions, balls, rows, notes)
-    notes += repair.describe_repairs([(one, pops) for one, (pops, _) in zip(repairs, changes)])
-    figures = [repair.RepairFigures(pops, one.drift, *one.slide) for one, (pops, _) in zip(repairs, changes)]
+    notes += describe_repairs([(one, pops) for one, (pops, _) in zip(repairs, changes)])
+    figures = [RepairFigures(pops, one.drift, *one.slide) for one, (pops, _) in zip(repairs, changes)]
     complete = MotionWriter(arrays and arrays / cache.MOTIONS)
     known: list[dict] = []  # all of a clip but its motion
     for original, what, ball in zip(_iter_completed(recordings, motions, rows, contacts, notes), figures, balls):
@@ -214,12 +235,15 @@ def _read_clips(recordings: _Recordings, arrays: Path | None, notes: list[str], 
 
 
 def _repair_clips(recordings: _Recordings, motions: Sequence[Motion], drifts: Sequence[float], repaired: MotionWriter,
-                  notes: list[str], report: Progress, cancelled) -> tuple[list[repair.Repair], list[np.ndarray]]:
+                  notes: list[str], report: Progress, cancelled) -> tuple[list[Repair], list[np.ndarray]]:
     """Bring motions to one skeleton and repair them into `repaired`; returns what was changed, and their contacts."""
+    from . import repair
+    from .common_skeleton import unify_skeletons
+
     chosen, paths = recordings.skeleton, recordings.paths
     example = read_clip(chosen, recordings.unit).motion if chosen is not None else None
     repairs, contacts = [], []
-    for number, unified in enumerate(one_skeleton.unify_skeletons(paths, motions, example, notes)):
+    for number, unified in enumerate(unify_skeletons(paths, motions, example, notes)):
         _check_cancelled(cancelled)
         report(0.4 + 0.3 * number / len(paths), f"Repairing and mirroring {paths[number].name}")
         one = repair.repair_floor_and_feet(*unified)
@@ -239,6 +263,8 @@ def _read_rows(recordings: _Recordings, motions: Sequence[Motion]) -> list[tuple
 def _propose_rows(recordings: _Recordings, motions: Sequence[Motion], report: Progress,
                   cancelled) -> list[tuple[ClipAnnotation, ...]]:
     """Propose the annotations of all clips; InputError where nothing is proposed."""
+    from .proposals import propose_labels
+
     rows, least = [], find_setting("library.learn", "least").default
     for number, motion in enumerate(motions):
         _check_cancelled(cancelled)
@@ -261,6 +287,9 @@ def _iter_levelled(recordings: _Recordings, report: Progress,
 
     The unit applies to the user's own files only.
     """
+    from . import repair
+    from .recorded_ball.body_ball import read_recorded_ball
+
     paths, ahead = recordings.paths, 2 * max(1, recordings.threads)
 
     def read_one(path: Path, file: Path):
@@ -286,6 +315,9 @@ def _iter_levelled(recordings: _Recordings, report: Progress,
 def _iter_completed(recordings: _Recordings, motions: Sequence[Motion], rows: Sequence[tuple[ClipAnnotation, ...]],
                     contacts: Sequence[np.ndarray], notes: list[str]) -> Iterator[Clip]:
     """Iterate over the clips; those that end in flight get a landing and getting up, and notes a line about them."""
+    from ..synthetic.landing import ends_in_flight
+    from . import landings
+
     flying = [ends_in_flight(motion) for motion in motions]
     getting_ups = landings.collect_getting_ups(motions, rows, contacts) if any(flying) else []
     seconds = []

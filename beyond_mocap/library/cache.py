@@ -33,10 +33,9 @@ from ..files.atomic import ABANDONED_SECONDS, atomic_write, remove_abandoned
 from ..files.bvh import bvh
 from ..files.motion_file import MotionWriter, divide_into_motions, map_array
 from ..motion.skeleton import Skeleton
-from .clip import Clip
+from .clip import Clip, RepairFigures
 from .coverage import Coverage
 from .features import Frames
-from .repair import RepairFigures
 from .scan import CACHE_FOLDER, read_stamp
 
 # raised whenever what is computed or stored changes, so that old caches are not used

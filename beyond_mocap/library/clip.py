@@ -9,9 +9,32 @@ import numpy as np
 from ..annotation import ClipAnnotation, swap_sides
 from ..motion.mirror import mirror
 from ..motion.motion import Motion
-from . import repair
-from .landings import LANDING_FOLDER
-from .synthetic_clips import SYNTHETIC_FOLDER
+from .scan import CACHE_FOLDER
+
+SYNTHETIC_FOLDER, LANDING_FOLDER = f"{CACHE_FOLDER}/made-gait/", f"{CACHE_FOLDER}/made-landing/"
+"""Below a library: synthetic clips, and recordings that end in flight with their synthetic end."""
+
+SYNTHETIC_FPS = 60.0  # of synthetic clips
+# how the file names of blends, kicks, long stands, long runs, walks and synthetic stands begin, and those of steps
+BLEND_PREFIX, KICK_PREFIX, STAND_PREFIX, LOOP_PREFIX = "blend_", "kick_", "stand_", "loop_"
+WALK_PREFIX, STILL_PREFIX = "walk_", "still_"
+BACK_PREFIX, SIDE_PREFIX, TURN_PREFIX, STEP_PREFIX = "back_", "side_", "turn_", "step_"
+
+
+@dataclass(frozen=True)
+class RepairFigures:
+    """Figures of one clip's repair.
+
+    Attributes:
+        pops: rotations replaced.
+        drift: metres between the lowest and the highest floor.
+        slid, slides: m/s of heels and toes in contact, before and after.
+    """
+
+    pops: int
+    drift: float
+    slid: float
+    slides: float
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -39,7 +62,7 @@ class Clip:
     annotations: tuple[ClipAnnotation, ...]
     heel_toe_contacts: np.ndarray
     recorded_count: int | None = None
-    repair_figures: repair.RepairFigures | None = None
+    repair_figures: RepairFigures | None = None
     has_proposed_labels: bool = False
     ball: np.ndarray | None = None
 

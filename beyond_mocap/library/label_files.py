@@ -24,7 +24,7 @@ from ..files.tables import write_ball
 from ..motion.motion import Motion
 from ..motion.track.ball_path import BallPath
 from .label_sources import Sources, format_cells, format_comment, read_table_sources, read_text_sources
-from .recorded_ball.body_ball import ENDING
+from .recorded_ball.ball_table import ENDING
 from .scan import TABLE_NAME, Annotations
 
 TEXT, TABLE = "TEXT", "TABLE"

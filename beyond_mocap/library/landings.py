@@ -17,9 +17,7 @@ from ..base.errors import format_count
 from ..motion.motion import Motion
 from ..synthetic.landing import add_landing, ends_in_flight
 from ..synthetic.moves import build_get_up
-from .scan import CACHE_FOLDER
 
-LANDING_FOLDER = f"{CACHE_FOLDER}/made-landing/"
 _UPRIGHT, _MADE_FPS = frozenset(LOCOMOTION[:2]), 60.0
 _FEET_DOWN = 0.35  # seconds at the start of getting up in which the body still turns over: no foot is in contact
 

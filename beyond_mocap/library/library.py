@@ -27,13 +27,12 @@ from .clip import Clip
 from .clusters import BLOCK_LENGTHS, Clusters, cluster_blocks
 from .coverage import BACK_SPEEDS, TURNS, Coverage, measure_coverage
 from .features import FPS, Frames, build_frames, join_frames
-from .keys import Key, collect_keys
+from .keys import KICK_STEP, Key, collect_keys, measure_kick_speed
 from .loops.run_loops import MIN_SPEED
 from .loops.standing_loops import MIN_STAND_SECONDS
 from .manners import Manners, measure_manners
 from .posture import NormalPostures, fit_normal_postures
 from .receptions import find_cut_receptions
-from .synthetic_clips import KICK_STEP, iter_synthetic_clips, measure_kick_speed, sample_upright_example
 
 MIN_RUN_SECONDS = 2.0  # of a track's runs from which on long runs are needed
 RESTING_SPEED = 0.1  # m/s of a track below which a player stands
@@ -148,6 +147,8 @@ class Library:
         if stored is not None and set(stored) == set(_STANCE_NUMBERS):
             known: dict[str, Any] = {name: one if one.ndim else float(one) for name, one in stored.items()}
             return NeutralStance(skeleton=self.skeleton, **known)
+        from .synthetic_clips import sample_upright_example
+
         recordings = [clip for clip in self.clips if not clip.is_synthetic] or self.clips
         stance = build_neutral_stance(self.skeleton, sample_upright_example(recordings))
         if place:
@@ -283,6 +284,8 @@ class Library:
 
 def _build_synthetic_library(library: Library) -> Library:
     """Build the clips that the recordings lack (`library.synthetic_clips`), described like them."""
+    from .synthetic_clips import iter_synthetic_clips
+
     speeds = {gait.label: gait.speed for gait in library.gaits if gait.label != STANDING}
     clips = []
     for synthetic in iter_synthetic_clips(library.clips, library.frames, library.fps, speeds, keys=library.keys,

@@ -1,6 +1,6 @@
 """A library's clips, one by one, for browsing: labels, length, speed and quality.
 
-The figures come from building the library: what the repair found and left (`repair.RepairFigures`), and how much the
+The figures come from building the library: what the repair found and left (`clip.RepairFigures`), and how much the
 recording jerks compared with the library's others of the same speed.
 """
 

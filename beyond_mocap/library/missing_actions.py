@@ -12,7 +12,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import TYPE_CHECKING, Any
 from weakref import WeakKeyDictionary
 
 import numpy as np
@@ -27,15 +27,14 @@ from ..base.time_series import find_equal_runs
 from ..motion import contacts
 from ..motion.motion import compute_pose, forward_kinematics, sample_frames
 from ..motion.track import smooth_zero_phase_hann
-from ..synthetic.actions.action import Action, ActionSetting
-from ..synthetic.actions.table import ACTIONS
-from ..synthetic.lying import detect_lying_legs
 from .cache import write_synthetic_clips
-from .clip import Clip
+from .clip import KICK_PREFIX, SYNTHETIC_FOLDER, SYNTHETIC_FPS, Clip
 from .features import SMOOTH_SECONDS
 from .keys import Key, select_keys
 from .library import Library
-from .synthetic_clips import FPS, KICK_PREFIX, SYNTHETIC_FOLDER, detect_still_points, sample_upright_example
+
+if TYPE_CHECKING:
+    from ..synthetic.actions.action import Action, ActionSetting
 
 ACTION_PREFIX = "action_"
 _FOLDER = SYNTHETIC_FOLDER + ACTION_PREFIX
@@ -85,6 +84,13 @@ class ActionMoment:
     seconds: float = 0.0
 
 
+def list_actions() -> tuple[Action, ...]:
+    """List all actions with a synthetic clip; their tables are loaded on first use, since most takes need none."""
+    from ..synthetic.actions.table import ACTIONS
+
+    return ACTIONS
+
+
 def find_action(moment: ActionMoment) -> Action | None:
     """Find the synthetic action that answers to a requested one.
 
@@ -95,7 +101,7 @@ def find_action(moment: ActionMoment) -> Action | None:
         where the labels name none.
     """
     requested = moment.labels - frozenset(SIDES)
-    serving = [action for action in ACTIONS
+    serving = [action for action in list_actions()
                if action.is_span == moment.is_span and _answers(action, moment) and moment.lead >= action.least_lead]
     names = {action.name for action in serving}
 
@@ -161,7 +167,7 @@ def _list_actions(moment: ActionMoment) -> list[Action]:
     best = find_action(moment)
     if best is None:
         return []
-    return [best, *(one for one in ACTIONS if one.varies == best.name and _answers(one, moment)
+    return [best, *(one for one in list_actions() if one.varies == best.name and _answers(one, moment)
                     and _is_speed_near(one, moment.speed) and moment.ball_speed <= one.most_ball_speed)]
 
 
@@ -219,7 +225,7 @@ def list_action_labels(is_span: bool = False) -> tuple[frozenset[str], ...]:
     Args:
         is_span: those of spans instead of key moments.
     """
-    return tuple(action.labels | {side} for action in ACTIONS if action.is_span == is_span for side in SIDES)
+    return tuple(action.labels | {side} for action in list_actions() if action.is_span == is_span for side in SIDES)
 
 
 def is_action_clip(clip: Clip) -> bool:
@@ -285,7 +291,7 @@ def _name_clips(action: Action, moment: ActionMoment) -> list[str]:
 def _parse_path(path: str) -> tuple[Action, dict[str, Any], frozenset[str]]:
     """Parse a clip's path: its action, what of the situation it is built for, and the sides that it carries."""
     found = _NAME.fullmatch(path.removeprefix(_FOLDER))
-    named = {action.name.replace(" ", "_").replace("-", "_"): action for action in ACTIONS}
+    named = {action.name.replace(" ", "_").replace("-", "_"): action for action in list_actions()}
     if found is None or found["name"] not in named:
         raise InputError(path, "an unknown synthetic action", "one of this version's", "synthesize the take again")
     action = named[found["name"]]
@@ -314,24 +320,30 @@ def _make_room(kept: dict, most: int) -> None:
 
 def _build_clip(library: Library, path: str) -> Clip:
     """Build the clip of a path."""
+    from ..synthetic.lying import detect_lying_legs
+    from .synthetic_clips import detect_still_points
+
     action, numbers, sides = _parse_path(path)
     gesture = action.build(replace(_find_setting(library), **numbers))
-    motion, first, last = gesture.motion, np.ceil(gesture.start * FPS), np.floor(gesture.end * FPS)
+    motion, first, last = gesture.motion, np.ceil(gesture.start * SYNTHETIC_FPS), np.floor(gesture.end * SYNTHETIC_FPS)
     last = min(last, len(motion) - 1)
-    key = None if action.is_span else gesture.key * FPS
+    key = None if action.is_span else gesture.key * SYNTHETIC_FPS
     row = ClipAnnotation(first, last, key, sort_labels(action.labels | sides))
     touched = contacts.detect_heel_toe_contacts(motion) & detect_still_points(motion) & ~detect_lying_legs(motion)
-    fades = int(_FADE_SECONDS * FPS) if action.can_last else 0
+    fades = int(_FADE_SECONDS * SYNTHETIC_FPS) if action.can_last else 0
     rows = (row, *_build_gait_rows(library, motion, before=int(first), after=int(last) + 1 + fades))
     return Clip(path=path, mirrored=False, motion=motion, annotations=rows, heel_toe_contacts=touched)
 
 
 def _find_setting(library: Library) -> ActionSetting:
     """Find the setting of a library's actions: its skeleton and how people stand on it."""
+    from ..synthetic.actions.action import ActionSetting
+    from .synthetic_clips import sample_upright_example
+
     if library not in _settings:
         recordings = [clip for clip in library.clips if not clip.is_synthetic]
         _settings[library] = ActionSetting(skeleton=library.skeleton, example=sample_upright_example(recordings),
-                                           fps=FPS)
+                                           fps=SYNTHETIC_FPS)
     return _settings[library]
 
 

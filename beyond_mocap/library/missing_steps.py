@@ -28,11 +28,11 @@ from ..motion.retargeting.structure import list_descendants
 from ..motion.skeleton import Skeleton
 from ..motion.track import smooth_zero_phase_hann
 from ..synthetic.steps import StepSequence, build_side_walk, build_steps_in_place
+from .clip import BACK_PREFIX, SIDE_PREFIX, STEP_PREFIX, TURN_PREFIX
 from .coverage import Coverage, find_calm_walks, select_calm_frames
 from .features import Frames
 from .loops.standing_loops import iter_standing_loops
 
-BACK_PREFIX, SIDE_PREFIX, TURN_PREFIX, STEP_PREFIX = "back_", "side_", "turn_", "step_"
 """How the names of the clips begin."""
 
 _LOOP_SECONDS = 4.5  # of a walk

@@ -14,7 +14,6 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.ndimage import maximum_filter1d, minimum_filter1d
 
 from ..annotation import DISCRETE
 from ..base.time_series import time_derivative
@@ -195,6 +194,8 @@ def fit_normal_postures(frames, is_recorded: np.ndarray, fps: float) -> NormalPo
 
 def find_steady_travel(frames, fps: float) -> np.ndarray:
     """Find the frames (N,) bool in which a body travels forward at one speed and nearly straight for a while."""
+    from scipy.ndimage import maximum_filter1d, minimum_filter1d
+
     found, count = np.zeros(len(frames.speed), bool), int(_STEADY_SECONDS * fps)
     forward = frames.velocity[:, 0] / np.maximum(frames.speed, 1e-6)
     for first, length in zip(frames.first, frames.count):

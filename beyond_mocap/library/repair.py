@@ -77,22 +77,6 @@ class RepairedClip(Repair):
     heel_toe_contacts: np.ndarray
 
 
-@dataclass(frozen=True)
-class RepairFigures:
-    """Figures of one clip's repair.
-
-    Attributes:
-        pops: rotations replaced.
-        drift: metres between the lowest and the highest floor.
-        slid, slides: m/s of heels and toes in contact, before and after.
-    """
-
-    pops: int
-    drift: float
-    slid: float
-    slides: float
-
-
 def remove_pops(motion: Motion) -> tuple[Motion, int]:
     """Remove rotations that jump for one or two frames and return.
 

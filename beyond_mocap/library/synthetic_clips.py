@@ -39,23 +39,29 @@ from ..motion.motion import Motion, forward_kinematics, sample_frames
 from ..motion.phase_blend import Strides, blend_strides, find_strides
 from ..synthetic.gait import build_gait
 from ..synthetic.gait_plan import GaitStyle
-from ..synthetic.recorded_kicks import KICK_LABELS, RunningKick, iter_running_kicks
+from ..synthetic.recorded_kicks import RunningKick, iter_running_kicks
+from .clip import (
+    BACK_PREFIX,
+    BLEND_PREFIX,
+    KICK_PREFIX,
+    LOOP_PREFIX,
+    STAND_PREFIX,
+    STEP_PREFIX,
+    STILL_PREFIX,
+    SYNTHETIC_FOLDER,
+    SYNTHETIC_FPS,
+    TURN_PREFIX,
+    WALK_PREFIX,
+)
 from .coverage import MAX_SPEED, MIN_SPEED_SECONDS, Coverage, select_locomotion
 from .features import Frames
+from .keys import KICK_STEP, measure_kick_speed
 from .loops.run_loops import LOOP_SECONDS, iter_run_loops
 from .loops.standing_loops import LOOP_SECONDS as STAND_SECONDS
 from .loops.standing_loops import iter_standing_loops
-from .missing_steps import BACK_PREFIX, STEP_PREFIX, TURN_PREFIX, iter_missing_steps
-from .scan import CACHE_FOLDER
+from .missing_steps import iter_missing_steps
 
-SYNTHETIC_FOLDER = f"{CACHE_FOLDER}/made-gait/"
-# how the file names of blends, kicks, long stands, long runs, walks and synthetic stands begin, in that folder
-BLEND_PREFIX, KICK_PREFIX, STAND_PREFIX, LOOP_PREFIX = "blend_", "kick_", "stand_", "loop_"
-WALK_PREFIX, STILL_PREFIX = "walk_", "still_"
-FPS = 60.0  # of synthetic clips
 _MIN_RUN_SPEED = 2.4  # m/s, lowest speed of synthetic running; blends cover slower speeds
-# factor on the fastest recorded kick's speed from which on kicks are synthetic
-KICK_STEP = 1.3
 # ratios of neighbouring speeds of blends, and of runs at an even speed
 _BLEND_STEP, _EVEN_STEP = 1.06, 1.1
 _PAIRS = 3  # pairs of recordings blended into each gap, at most
@@ -88,23 +94,6 @@ class SyntheticClip:
     heel_toe_contacts: np.ndarray
 
 
-def measure_kick_speed(frames: Frames, clips: Sequence, keys: Sequence) -> float:
-    """Measure the fastest approach of a kick.
-
-    Args:
-        frames: of the library.
-        clips: of the library.
-        keys: its key moments.
-    Returns:
-        m/s; infinite without any kick.
-    """
-    found = [
-        frames.speed[frames.first[key.clip] + int(key.frame / clips[key.clip].motion.fps * 30.0 + 0.5)]
-        for key in keys if KICK_LABELS <= key.labels and not clips[key.clip].is_synthetic
-    ]
-    return float(max(found)) if found else np.inf
-
-
 def iter_synthetic_clips(
     clips: Sequence, frames: Frames, fps: float, gait_speeds: dict[str, float], keys: Sequence,
     strangeness: np.ndarray, coverage: Coverage,
@@ -133,19 +122,20 @@ def iter_synthetic_clips(
     fastest = measure_kick_speed(frames, clips, keys)
     for kick in iter_running_kicks(clips, keys, KICK_STEP * fastest, example, style):
         yield _build_kick_clip(kick, speeds)
-    stands = [(STAND_PREFIX, motion) for _, motion in iter_standing_loops(clips, frames, fps, strangeness, FPS)]
+    stands = [(STAND_PREFIX, motion)
+              for _, motion in iter_standing_loops(clips, frames, fps, strangeness, SYNTHETIC_FPS)]
     if not coverage.has_stand:
-        stands = [(STILL_PREFIX, build_gait(0.0, STAND_SECONDS, FPS, example.skeleton, example=example))]
+        stands = [(STILL_PREFIX, build_gait(0.0, STAND_SECONDS, SYNTHETIC_FPS, example.skeleton, example=example))]
     for number, (prefix, motion) in enumerate(stands):
         row = ClipAnnotation(0, len(motion) - 1, None, (STANDING,))
         contacts = np.ones((len(motion), 2, 2), bool)
         yield SyntheticClip(f"{SYNTHETIC_FOLDER}{prefix}{number + 1}.bvh", motion, (row,), contacts)
     is_run = select_locomotion(frames, clips) & (strangeness <= 1.0)
-    for speed, motion, contacts in iter_run_loops(clips, frames, fps, is_run, FPS):
+    for speed, motion, contacts in iter_run_loops(clips, frames, fps, is_run, SYNTHETIC_FPS):
         rows = _build_gait_rows(np.full(len(motion), speed), speeds)
         yield _ground_clip(f"{SYNTHETIC_FOLDER}{LOOP_PREFIX}{speed:.2f}.bvh", motion, contacts, rows, plants_feet=True)
     for name, motion, heel_toe_contacts, speed in iter_missing_steps(
-        clips, frames, fps, strangeness, coverage=coverage, example=example, rate=FPS
+        clips, frames, fps, strangeness, coverage=coverage, example=example, rate=SYNTHETIC_FPS
     ):
         rows = _build_step_rows(name, len(motion), speed, speeds)
         yield _ground_clip(f"{SYNTHETIC_FOLDER}{name}.bvh", motion, heel_toe_contacts, rows)
@@ -215,7 +205,8 @@ def _iter_blends(clips, frames: Frames, fps: float, low: float, high: float,
     top = min(high, max(one.speed for one in fast))
     count = max(1, int(np.ceil(np.log(top / low) / np.log(_BLEND_STEP))))
     for number, speed in enumerate(low * (top / low) ** ((np.arange(count) + 0.5) / count)):
-        motion, contacts = blend_strides(slow[number % len(slow)], fast[number % len(fast)], float(speed), FPS)
+        pair = slow[number % len(slow)], fast[number % len(fast)]
+        motion, contacts = blend_strides(*pair, float(speed), SYNTHETIC_FPS)
         rows = _build_gait_rows(np.full(len(motion), speed), speeds)
         yield _ground_clip(f"{SYNTHETIC_FOLDER}{BLEND_PREFIX}{speed:.2f}.bvh", motion, contacts, rows, plants_feet=True)
 
@@ -267,7 +258,7 @@ def _find_stretches(clips, found) -> list[Strides]:
 def _iter_walks(low: float, high: float, example: Motion, speeds: dict[str, float]) -> Iterator[SyntheticClip]:
     """Iterate over walks from `low` to `high` m/s, where recordings on one side are missing for blends."""
     for speed in low * _WALK_STEP ** np.arange(max(0.0, np.ceil(np.log(high / low) / np.log(_WALK_STEP)))):
-        motion = build_gait(float(speed), _WALK_SECONDS, FPS, example.skeleton, example=example)
+        motion = build_gait(float(speed), _WALK_SECONDS, SYNTHETIC_FPS, example.skeleton, example=example)
         rows = _build_gait_rows(np.full(len(motion), speed), speeds)
         yield _ground_clip(f"{SYNTHETIC_FOLDER}{WALK_PREFIX}{speed:.2f}.bvh", motion, None, rows)
 
@@ -280,22 +271,24 @@ def _iter_runs(low: float, high: float, example: Motion, style: GaitStyle,
     if high < 1.1 * low:
         return
     for speed in np.exp(np.arange(np.log(low), np.log(high), np.log(_EVEN_STEP))):
-        even = np.full(int(LOOP_SECONDS * FPS), speed)
-        motion = build_gait(even, None, FPS, example.skeleton, style=style, example=example)
+        even = np.full(int(LOOP_SECONDS * SYNTHETIC_FPS), speed)
+        motion = build_gait(even, None, SYNTHETIC_FPS, example.skeleton, style=style, example=example)
         yield _ground_clip(f"{SYNTHETIC_FOLDER}even_{speed:.2f}.bvh", motion, None, _build_gait_rows(even, speeds))
     for name, pace, weaves in (("slow", 0.8, False), ("quick", 2.5, False), ("weave", 1.0, True)):
-        ramp = np.linspace(low, high, max(int((high - low) / pace * FPS), int(1.5 * FPS)))
+        ramp = np.linspace(low, high, max(int((high - low) / pace * SYNTHETIC_FPS), int(1.5 * SYNTHETIC_FPS)))
         speed = np.concatenate([ramp, ramp[::-1]])
         # as much sideways acceleration as players show at speed, about 4 m/s^2, alternating left and right
-        turn = np.sin(2.0 * np.pi * np.arange(len(speed)) / (3.0 * FPS)) * np.minimum(1.2, 4.0 / speed) * weaves
-        motion = build_gait(speed, None, FPS, example.skeleton, turn_rate=turn, style=style, example=example)
+        sway = np.sin(2.0 * np.pi * np.arange(len(speed)) / (3.0 * SYNTHETIC_FPS))
+        turn = sway * np.minimum(1.2, 4.0 / speed) * weaves
+        motion = build_gait(speed, None, SYNTHETIC_FPS, example.skeleton, turn_rate=turn, style=style, example=example)
         yield _ground_clip(f"{SYNTHETIC_FOLDER}{name}_{low:.1f}.bvh", motion, None, _build_gait_rows(speed, speeds))
 
 
 def _build_kick_clip(kick: RunningKick, speeds: dict[str, float]) -> SyntheticClip:
     """Build the clip of a kick on the run."""
     gesture = kick.gesture
-    row = ClipAnnotation(np.ceil(gesture.start * FPS), np.floor(gesture.end * FPS), gesture.key * FPS, kick.words)
+    first, last, key = (SYNTHETIC_FPS * time for time in (gesture.start, gesture.end, gesture.key))
+    row = ClipAnnotation(np.ceil(first), np.floor(last), key, kick.words)
     gait_row = _build_gait_rows(np.full(len(gesture.motion), kick.speed), speeds)
     return _ground_clip(f"{SYNTHETIC_FOLDER}{KICK_PREFIX}{kick.name}.bvh", gesture.motion, None, (row, *gait_row))
 

@@ -7,6 +7,7 @@ from __future__ import annotations
 import numpy as np
 
 from ..ball.tracked.solve import find_goal_lines
+from ..base.vectors import measure_lengths
 from ..motion.track.match_data import REFEREE, Match
 from ..synthesis.heading_plan import Play
 
@@ -86,7 +87,7 @@ def _find_faced_places(own: np.ndarray, others: np.ndarray, goal: np.ndarray) ->
     middle = np.column_stack([goal, 0.0 * goal])
     if not len(others):
         return middle
-    distance = np.linalg.norm(others - own, axis=2)
+    distance = measure_lengths(others - own)
     distance = np.where(np.isfinite(distance), distance, np.inf)
     nearest = distance.argmin(axis=0)
     least = distance[nearest, np.arange(len(own))]

@@ -16,10 +16,10 @@ import numpy as np
 from ..annotation import Span, Timeline
 from ..base.errors import InputError, line_spans
 from ..library.automatic_locomotion import apply_chosen_gaits
+from ..library.clip import SYNTHETIC_FOLDER
 from ..library.features import FPS
 from ..library.library import Library
 from ..library.missing_actions import add_actions
-from ..library.synthetic_clips import SYNTHETIC_FOLDER
 from ..motion.motion import concatenate_motions
 from ..motion.track.ball_path import BallPath
 from ..synthesis.construct.contact_geometry import ease_in_out

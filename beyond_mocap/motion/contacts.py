@@ -11,7 +11,6 @@ keep the labels from flickering.
 from __future__ import annotations
 
 import numpy as np
-from scipy.ndimage import grey_opening, maximum_filter1d
 
 from ..base.time_series import find_runs, number_runs
 from .humanoid import Humanoid, identify_joints, measure_leg_length
@@ -124,6 +123,8 @@ def _detect_joint_contacts(positions: np.ndarray, joints: tuple[int, int], body:
     """Detect the contact (T, 2) of the left and right joint of one kind; positions (T, J, 3) metres, leg length in
     metres.
     """
+    from scipy.ndimage import grey_opening, maximum_filter1d
+
     heights = positions[:, joints, 2]
     above = heights - _estimate_contact_heights(heights, positions[:, body.hips, 2], leg, fps)
     speed = _compute_horizontal_speed(positions[:, joints, :2], fps)
@@ -144,6 +145,8 @@ def _estimate_contact_heights(heights: np.ndarray, hips: np.ndarray, leg: float,
     Upright: the lower envelope, a morphological opening, which follows a drifting floor without lag. Where the hips are
     low (lying, getting up) a resting foot need not be on its sole, so there the clip's own contact height is the limit.
     """
+    from scipy.ndimage import grey_opening
+
     envelope = grey_opening(heights, size=(_count_window_frames(_ENVELOPE_SECONDS, fps), 1), mode="nearest")
     other = envelope[:, ::-1]
     envelope = np.where(envelope - other > _RAISED, other, envelope)

@@ -14,11 +14,10 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.ndimage import maximum_filter1d
 
 from ..base.banded_least_squares import BandedLeastSquares
-from ..base.time_series import hann_smooth, number_runs
-from ..base.vectors import arctan2, cross_product
+from ..base.time_series import compute_running_maximum, hann_smooth, number_runs
+from ..base.vectors import arctan2, cross_product, dot_products, measure_lengths
 from . import quaternion
 from .contacts import measure_sole_height
 from .humanoid import Limb, identify_joints
@@ -177,7 +176,7 @@ def plant_feet(
         reached = solve_two_bone(skeleton, root, out, chain, target, end_rotation=foot_rotation,
                                  soft=foot.ease_distance)
         out, miss[:, side] = reached.rotations, reached.miss
-        correction[:, side] = np.linalg.norm(target - places[:, foot.limb.foot], axis=1)
+        correction[:, side] = measure_lengths(target - places[:, foot.limb.foot])
     return PlantResult(root, out, correction, miss)
 
 
@@ -194,8 +193,8 @@ def build_foot(places: np.ndarray, world: np.ndarray, limb: Limb, contacts: np.n
     """
     hip, knee, heel, toe = (places[:, j] for j in (limb.upper_leg, limb.lower_leg, limb.foot, limb.toe_or_foot))
     weight = compute_contact_weights(contacts)
-    length = np.linalg.norm(knee - hip, axis=1) + np.linalg.norm(heel - knee, axis=1)
-    own = length - np.linalg.norm(heel - hip, axis=1)
+    length = measure_lengths(knee - hip) + measure_lengths(heel - knee)
+    own = length - measure_lengths(heel - hip)
     along = toe - heel if limb.toe is not None else quaternion.rotate(world[:, limb.foot], np.array([1.0, 0.0, 0.0]))
     yaw = arctan2(along[:, 1], along[:, 0])
     left = np.stack([-np.sin(yaw), np.cos(yaw), np.zeros(len(yaw))], axis=1)
@@ -252,12 +251,12 @@ def solve_heel_rise(foot: Foot, shift: np.ndarray) -> np.ndarray:
         (T,) radians, at most MAX_HEEL_RISE.
     """
     u, a, n = foot.hip - foot.toe - shift, foot.heel - foot.toe, foot.left
-    across = np.sum(a * n, axis=1, keepdims=True)
+    across = dot_products(a, n)[..., None]
     level = a - across * n
     # even, odd and target are A, B and K of the docstring; `level` is the part of a that rotates
-    even, odd = np.sum(u * level, axis=1), np.sum(u * cross_product(n, level), axis=1)
+    even, odd = dot_products(u, level), dot_products(u, cross_product(n, level))
     length = foot.max_reach
-    target = 0.5 * (np.sum(u * u, axis=1) + np.sum(a * a, axis=1) - length**2) - across[:, 0] * np.sum(u * n, axis=1)
+    target = 0.5 * (dot_products(u, u) + dot_products(a, a) - length**2) - across[:, 0] * dot_products(u, n)
     most = np.hypot(even, odd)
     rise = arctan2(odd, even) - np.arccos(np.clip(target / np.maximum(most, 1e-9), -1.0, 1.0))
     return np.where((target > even) & (odd > 0.0), np.clip(rise, 0.0, MAX_HEEL_RISE), 0.0)
@@ -280,7 +279,7 @@ def solve_limited_shift(
     """
     ground = solve_shift(velocity, weight, scale)
     for _ in range(4):
-        far = np.where(weight.max(axis=1) > 0, np.linalg.norm(ground, axis=1), 0.0)
+        far = np.where(weight.max(axis=1) > 0, measure_lengths(ground), 0.0)
         if far.max(initial=0.0) <= max_shift:
             break
         weight = relax_contact_weights(weight, far - max_shift)
@@ -392,7 +391,7 @@ def compute_pelvis_drop(feet: list[Foot], goals: list[np.ndarray], spread: int, 
     need = np.zeros(len(goals[0]))
     for foot, goal in zip(feet, goals):
         length = foot.max_reach
-        level = np.linalg.norm(goal[:, :2] - foot.hip[:, :2], axis=1)
+        level = measure_lengths(goal[:, :2] - foot.hip[:, :2])
         highest = goal[:, 2] + np.sqrt(np.maximum(length**2 - level**2, 0.0))
         lacks = np.where(level < length, foot.hip[:, 2] - highest, most)
         need = np.maximum(need, np.where(foot.contact_weight > 0, lacks, 0.0))
@@ -401,7 +400,7 @@ def compute_pelvis_drop(feet: list[Foot], goals: list[np.ndarray], spread: int, 
 
 def spread_peaks(need: np.ndarray, reach: int) -> np.ndarray:
     """Build a smooth curve (T,) that is nowhere below `need` (T,), widened by `reach` frames."""
-    return hann_smooth(maximum_filter1d(need, 2 * reach + 1, mode="nearest"), reach)
+    return hann_smooth(compute_running_maximum(need, reach, reach), reach)
 
 
 def measure_shortfall(foot: Foot, goal: np.ndarray, drop: np.ndarray) -> np.ndarray:
@@ -409,7 +408,7 @@ def measure_shortfall(foot: Foot, goal: np.ndarray, drop: np.ndarray) -> np.ndar
     pelvis.
     """
     reach = goal - foot.hip + drop[:, None] * [0.0, 0.0, 1.0]
-    return np.where(foot.contact_weight > 0, np.linalg.norm(reach, axis=1) - foot.max_reach, 0.0)
+    return np.where(foot.contact_weight > 0, measure_lengths(reach) - foot.max_reach, 0.0)
 
 
 def limit_to_reach(foot: Foot, goal: np.ndarray, drop: np.ndarray) -> np.ndarray:
@@ -424,8 +423,8 @@ def limit_to_reach(foot: Foot, goal: np.ndarray, drop: np.ndarray) -> np.ndarray
     """
     hip = foot.hip - drop[:, None] * [0.0, 0.0, 1.0]
     reach = goal - hip
-    far = np.linalg.norm(reach, axis=1)
-    own = np.minimum(np.linalg.norm(foot.heel - foot.hip, axis=1), foot.max_reach)
+    far = measure_lengths(reach)
+    own = np.minimum(measure_lengths(foot.heel - foot.hip), foot.max_reach)
     longest = np.maximum(foot.length - AIR_RESERVE, own)
     over = np.maximum(far - longest, 0.0) * (1.0 - np.minimum(foot.contact_weight, 1.0))
     return goal - reach * (over / far)[:, None]

@@ -18,7 +18,7 @@ import numpy as np
 
 from ..base.easing import quintic_step, smoothstep
 from ..base.time_series import find_runs, hann_smooth, interpolate_columns, time_derivative
-from ..base.vectors import cross_on_ground, unit_vectors
+from ..base.vectors import cross_on_ground, dot_products, measure_lengths, unit_vectors
 from . import quaternion
 from .humanoid import Humanoid, identify_joints
 from .mass import compute_centre_of_mass
@@ -55,7 +55,7 @@ class Lean:
     @property
     def missing(self) -> np.ndarray:
         """(S, 2) m by which the centre of mass should lie farther from the foot."""
-        size = np.linalg.norm(self.acceleration, axis=1, keepdims=True)
+        size = measure_lengths(self.acceleration)[..., None]
         asked = self.acceleration * np.minimum(1.0, MOST_ACCELERATION / np.maximum(size, 1e-9))
         return self.height[:, None] * asked / GRAVITY - self.offset
 
@@ -106,7 +106,7 @@ def compute_lean_slopes(skeleton: Skeleton, positions: np.ndarray, fps: float) -
         return np.zeros((len(positions), 2))
     lean = measure_lean(body, positions, compute_centre_of_mass(body, positions), stances, fps)
     slope, ahead = lean.offset / lean.lever[:, None], lean.travel
-    own = np.stack([np.sum(slope * ahead, axis=1), cross_on_ground(ahead, slope)], axis=1)
+    own = np.stack([dot_products(slope, ahead), cross_on_ground(ahead, slope)], axis=1)
     return interpolate_columns(np.arange(len(positions)), stances.middle, own)
 
 
@@ -121,11 +121,11 @@ def choose_shifts(lean: Lean, share: np.ndarray) -> np.ndarray:
     """
     ahead = lean.travel
     aside = np.stack([-ahead[:, 1], ahead[:, 0]], axis=1)
-    speed = np.linalg.norm(lean.velocity, axis=1)
+    speed = measure_lengths(lean.velocity)
     counts = share * smoothstep(speed, *_SPEEDS)
     shift = np.zeros_like(lean.offset)
     for direction, dead, most in zip((ahead, aside), _DEAD_ZONE, _MOST_SHIFT):
-        lacks = np.sum(lean.missing * direction, axis=1)
+        lacks = dot_products(lean.missing, direction)
         wanted = most * np.tanh(np.maximum(np.abs(lacks) - dead, 0.0) / most)
         shift += (counts * np.sign(lacks) * wanted)[:, None] * direction
     return shift
@@ -141,7 +141,7 @@ def choose_angles(lean: Lean, shifts: np.ndarray) -> np.ndarray:
         (S, 2) rad by which the body tilts towards x and y, world.
     """
     slope, ahead = shifts / lean.lever[:, None], lean.travel
-    along = np.sum(slope * ahead, axis=1, keepdims=True) * ahead
+    along = dot_products(slope, ahead)[..., None] * ahead
     return _TURN_SHARE[0] * along + _TURN_SHARE[1] * (slope - along)
 
 

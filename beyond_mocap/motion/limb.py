@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 
 from ..base.errors import InputError
-from ..base.vectors import cross_product, unit_vectors
+from ..base.vectors import cross_product, dot_products, measure_lengths, unit_vectors
 from . import quaternion
 from .motion import compute_pose
 from .retargeting.structure import list_ancestors, list_between
@@ -76,11 +76,11 @@ def solve_limb_bend(
         direction of the limb x pole.
     """
     line = target - top
-    target_distance = np.linalg.norm(line, axis=-1)
+    target_distance = measure_lengths(line)
     direction = unit_vectors(line, np.array([0.0, 0.0, -1.0]))
     nearest = np.abs(upper - lower) + 0.02 * (upper + lower)
     reach = np.maximum(soften_distance(target_distance, upper + lower, soft), nearest)
-    across = pole - np.sum(pole * direction, axis=-1, keepdims=True) * direction
+    across = pole - dot_products(pole, direction)[..., None] * direction
     across = _normalize_across(across, direction)
     # position of the middle joint along the line and its height off it, from the triangle's three sides
     along = (upper**2 - lower**2 + reach**2) / (2.0 * reach)
@@ -100,7 +100,7 @@ def build_bone_frame(direction: np.ndarray, hinge: np.ndarray) -> np.ndarray:
     Returns:
         (..., 4) unit quaternions.
     """
-    left = -(hinge - np.sum(hinge * direction, axis=-1, keepdims=True) * direction)
+    left = -(hinge - dot_products(hinge, direction)[..., None] * direction)
     left = _normalize_across(left, direction)
     forward = cross_product(left, -direction)
     return quaternion.from_matrix(np.stack([forward, left, -direction], axis=-1))
@@ -176,7 +176,7 @@ def solve_posed_limb(
     upper, middle, end = joints
     target = np.asarray(target, dtype=float)
     top, knee, ankle = places[:, upper], places[:, middle], places[:, end]
-    lengths = (np.linalg.norm(knee - top, axis=-1), np.linalg.norm(ankle - knee, axis=-1))
+    lengths = (measure_lengths(knee - top), measure_lengths(ankle - knee))
     old_pole = _estimate_pole(top, knee, ankle, world[:, upper], min_bend)
     swing = quaternion.rotation_between(ankle - top, target - top)
     new_pole = quaternion.rotate(swing, old_pole) if pole is None else np.asarray(pole, dtype=float)
@@ -197,19 +197,19 @@ def solve_posed_limb(
         new_world[:, end] = quaternion.multiply(bone_rotations[1], world[:, end])
     changed = [upper, *list_between(skeleton.parents, upper, end), end]
     local = {joint: _compute_local_rotation(skeleton, new_world, joint) for joint in changed}
-    return local, np.linalg.norm(new_ankle - target, axis=-1)
+    return local, measure_lengths(new_ankle - target)
 
 
 def _normalize_across(v: np.ndarray, direction: np.ndarray) -> np.ndarray:
     """Normalize vectors (..., 3); where they have no length take any unit vector square to `direction` (..., 3)."""
-    length = np.linalg.norm(v, axis=-1, keepdims=True)
+    length = measure_lengths(v)[..., None]
     return v / length if np.all(length > 1e-9) else unit_vectors(v, _find_normal(direction))
 
 
 def _find_normal(direction: np.ndarray) -> np.ndarray:
     other = np.where(np.abs(direction[..., :1]) < 0.9, np.array([1.0, 0.0, 0.0]), np.array([0.0, 1.0, 0.0]))
-    normal = other - np.sum(other * direction, axis=-1, keepdims=True) * direction
-    return normal / np.linalg.norm(normal, axis=-1, keepdims=True)
+    normal = other - dot_products(other, direction)[..., None] * direction
+    return normal / measure_lengths(normal)[..., None]
 
 
 def _check_chain(skeleton: Skeleton, joints: tuple[int, int, int]) -> None:
@@ -247,18 +247,18 @@ def _estimate_pole(
     upper bone (a knee is a hinge), weighted by how clearly each frame shows it.
     """
     line = unit_vectors(ankle - top, np.array([0.0, 0.0, -1.0]))
-    off = knee - top - np.sum((knee - top) * line, axis=-1, keepdims=True) * line
-    length = np.linalg.norm(knee - top, axis=-1) + np.linalg.norm(ankle - knee, axis=-1)
-    bent = (np.linalg.norm(off, axis=-1) / np.maximum(length, 1e-9))[:, None]
+    off = knee - top - dot_products(knee - top, line)[..., None] * line
+    length = measure_lengths(knee - top) + measure_lengths(ankle - knee)
+    bent = (measure_lengths(off) / np.maximum(length, 1e-9))[:, None]
     in_bone = quaternion.rotate(quaternion.inverse(upper_world), off)
     mean = np.sum(in_bone * bent, axis=0)
     if np.linalg.norm(mean) < 1e-9:
         across = unit_vectors(np.array([1.0, 0.0, 0.0]) - line[..., :1] * line, np.array([0.0, 0.0, 1.0]))
         return unit_vectors(off, across)
     steady = quaternion.rotate(upper_world, mean / np.linalg.norm(mean))
-    steady = unit_vectors(steady - np.sum(steady * line, axis=-1, keepdims=True) * line, off)
+    steady = unit_vectors(steady - dot_products(steady, line)[..., None] * line, off)
     # a frame that bends the other way, as blended poses may, gets no weight: its knee would flip
-    agreement = np.sum(unit_vectors(off, steady) * steady, axis=-1, keepdims=True)
+    agreement = dot_products(unit_vectors(off, steady), steady)[..., None]
     weight = np.clip(bent / np.reshape(min_bend, (-1, 1)), 0.0, 1.0) ** 2 * np.clip(2.0 * agreement, 0.0, 1.0)
     mixed = weight * unit_vectors(off, steady) + (1.0 - weight) * steady
     return unit_vectors(mixed, steady)

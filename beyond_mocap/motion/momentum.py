@@ -17,6 +17,7 @@ import numpy as np
 
 from ..base.banded_least_squares import BandedLeastSquares
 from ..base.easing import smoothstep
+from ..base.vectors import measure_lengths
 from .supports import GRAVITY, list_flights
 
 STRENGTH = 4.5
@@ -101,7 +102,7 @@ class MomentumPlanner:
         for _ in range(_CLAMP_ROUNDS + 1):
             solved = squares.solve()
             force = solved[self._knot_index]
-            size = np.linalg.norm(force, axis=1)
+            size = measure_lengths(force)
             beyond = size > most
             if not beyond.any():
                 break

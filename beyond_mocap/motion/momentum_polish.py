@@ -16,6 +16,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from ..base.vectors import measure_lengths
 from . import quaternion
 from .foot_plant import AIR_RESERVE, Foot, build_foot, solve_heel_rise, spread_peaks
 from .humanoid import Humanoid, identify_joints
@@ -160,7 +161,7 @@ class _Legs:
         """Measure the metres (T,) that standing legs lack for a root moved by (T, 3) m, beyond what a heel may rise."""
         lacks = np.zeros(len(move))
         for foot, standing in zip(self.feet, self.standing):
-            far = np.linalg.norm(foot.heel - places[:, foot.limb.upper_leg] - move, axis=1)
+            far = measure_lengths(foot.heel - places[:, foot.limb.upper_leg] - move)
             lacks = np.maximum(lacks, np.where(standing >= 1.0, far - foot.max_reach - _HEEL_REACH, 0.0))
         return lacks
 
@@ -179,11 +180,11 @@ class _Legs:
 
 def _measure_excess(foot: Foot, reach: np.ndarray, standing: np.ndarray) -> np.ndarray:
     """Measure the share (T,) of its reach (T, 3) m by which a swinging leg would be too long: it keeps a reserve."""
-    far = np.linalg.norm(reach, axis=1)
+    far = measure_lengths(reach)
     longest = foot.length - np.minimum(AIR_RESERVE, foot.recorded_slack)
     return np.maximum(far - longest, 0.0) / far * (1.0 - standing)
 
 
 def _limit_moves(moves: np.ndarray) -> np.ndarray:
     """Limit moves (T, 3) m to _MOST_MOVE."""
-    return moves * np.minimum(1.0, _MOST_MOVE / np.maximum(np.linalg.norm(moves, axis=1, keepdims=True), 1e-9))
+    return moves * np.minimum(1.0, _MOST_MOVE / np.maximum(measure_lengths(moves)[..., None], 1e-9))

@@ -10,9 +10,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ..base.errors import InputError
+from ..base.vectors import dot_products
 from . import quaternion
 from .skeleton import Skeleton, freeze_array
 
+_PLUS, _MINUS = np.add, np.subtract
 _CUBIC_REACH = 8
 """Frames to either side on which a value between two frames depends; a spline's memory fades by 0.27 a frame."""
 
@@ -81,7 +83,7 @@ def _normalize_rotations(q: np.ndarray) -> np.ndarray:
     """Normalize quaternions, but leave each unit one as it is: dividing again would change its last bits at every copy.
     """
     q = np.asarray(q, dtype=float)
-    is_unit = np.abs(np.sum(q * q, axis=-1, keepdims=True) - 1.0) < 1e-12
+    is_unit = np.abs(dot_products(q, q)[..., None] - 1.0) < 1e-12
     return q if np.all(is_unit) else np.where(is_unit, q, quaternion.normalize(q))
 
 
@@ -93,8 +95,8 @@ def forward_kinematics(motion: Motion) -> tuple[np.ndarray, np.ndarray]:
 def compute_pose(skeleton: Skeleton, root: np.ndarray, local: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Compute world positions and rotations of poses.
 
-    Works on component-first arrays, one contiguous run per component, and on all joints of a depth at once: this is
-    what makes numpy fast for long motions and for a few frames.
+    Works joint by joint on component-first arrays, one contiguous run per component, and without new arrays: what it
+    works on stays in the processor's cache.
 
     Args:
         skeleton: J joints.
@@ -108,24 +110,43 @@ def compute_pose(skeleton: Skeleton, root: np.ndarray, local: np.ndarray) -> tup
     world = np.empty_like(flat)
     places = np.empty((len(skeleton), 3, flat.shape[2]))
     world[0], places[0] = flat[0], root.reshape(-1, 3).T
-    for joints, parents in skeleton.levels:
-        aw, ax, ay, az = world[parents].transpose(1, 0, 2)
-        bw, bx, by, bz = flat[joints].transpose(1, 0, 2)
+    spare, turned = np.empty(flat.shape[2]), np.empty((3, flat.shape[2]))
+    for joint, (parent, offset) in enumerate(zip(skeleton.parents[1:], skeleton.offsets[1:]), 1):
+        aw, ax, ay, az = world[parent]
+        bw, bx, by, bz = flat[joint]
         # the quaternion product parent x local, written out by component
-        world[joints, 0] = aw * bw - ax * bx - ay * by - az * bz
-        world[joints, 1] = aw * bx + ax * bw + ay * bz - az * by
-        world[joints, 2] = aw * by - ax * bz + ay * bw + az * bx
-        world[joints, 3] = aw * bz + ax * by - ay * bx + az * bw
-        # and the offset, rotated by the parent
-        vx, vy, vz = skeleton.offsets[joints].T[..., None]
-        tx, ty, tz = 2 * (ay * vz - az * vy), 2 * (az * vx - ax * vz), 2 * (ax * vy - ay * vx)
-        places[joints, 0] = places[parents, 0] + (vx + aw * tx + ay * tz - az * ty)
-        places[joints, 1] = places[parents, 1] + (vy + aw * ty + az * tx - ax * tz)
-        places[joints, 2] = places[parents, 2] + (vz + aw * tz + ax * ty - ay * tx)
+        w, x, y, z = np.multiply(aw, flat[joint], world[joint])
+        _add_products(w, spare, (_MINUS, ax, bx), (_MINUS, ay, by), (_MINUS, az, bz))
+        _add_products(x, spare, (_PLUS, ax, bw), (_PLUS, ay, bz), (_MINUS, az, by))
+        _add_products(y, spare, (_MINUS, ax, bz), (_PLUS, ay, bw), (_PLUS, az, bx))
+        _add_products(z, spare, (_PLUS, ax, by), (_MINUS, ay, bx), (_PLUS, az, bw))
+        # and the offset v, rotated by the parent: v + w t + (x, y, z) x t, where t is twice (x, y, z) x v
+        vx, vy, vz = offset.tolist()
+        for t, first, second in zip(turned, ((ay, vz), (az, vx), (ax, vy)), ((az, vy), (ax, vz), (ay, vx))):
+            np.multiply(*first, t)
+            _add_products(t, spare, (_MINUS, *second))
+        turned *= 2
+        tx, ty, tz = turned
+        places[joint] = offset[:, None]
+        _add_products(places[joint, 0], spare, (_PLUS, aw, tx), (_PLUS, ay, tz), (_MINUS, az, ty))
+        _add_products(places[joint, 1], spare, (_PLUS, aw, ty), (_PLUS, az, tx), (_MINUS, ax, tz))
+        _add_products(places[joint, 2], spare, (_PLUS, aw, tz), (_PLUS, ax, ty), (_MINUS, ay, tx))
+        places[joint] += places[parent]
     return (
         places.transpose(2, 0, 1).reshape(*lead, len(skeleton), 3),
         world.transpose(2, 0, 1).reshape(*lead, len(skeleton), 4),
     )
+
+
+def _add_products(out: np.ndarray, spare: np.ndarray, *terms: tuple) -> None:
+    """Add products to `out` (T,), one after the other.
+
+    Args:
+        out, spare: (T,), both overwritten.
+        terms: _PLUS or _MINUS, and what is multiplied.
+    """
+    for combine, a, b in terms:
+        combine(out, np.multiply(a, b, spare), out)
 
 
 def compute_local_rotations(skeleton: Skeleton, world: np.ndarray) -> np.ndarray:

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..base.vectors import arctan2, cross_product, unit_vectors
+from ..base.vectors import arctan2, cross_product, dot_products, measure_lengths, unit_vectors
 
 IDENTITY = np.array([1.0, 0.0, 0.0, 0.0])
 IDENTITY.setflags(write=False)
@@ -102,7 +102,7 @@ def rotate_about_up(v: np.ndarray, angle: np.ndarray) -> np.ndarray:
 def from_rotation_vector(v: np.ndarray) -> np.ndarray:
     """Convert rotation vectors (..., 3) in radians to quaternions (..., 4): the exponential map."""
     v = np.asarray(v, dtype=float)
-    angle = np.linalg.norm(v, axis=-1, keepdims=True)
+    angle = measure_lengths(v)[..., None]
     half = 0.5 * angle
     scale = np.where(angle > 1e-9, np.sin(half) / np.maximum(angle, 1e-9), 0.5 - angle**2 / 48.0)
     return np.concatenate([np.cos(half), scale * v], axis=-1)
@@ -114,7 +114,7 @@ def to_rotation_vector(q: np.ndarray) -> np.ndarray:
     """
     q = np.asarray(q, dtype=float)
     q = np.where(q[..., :1] < 0.0, -q, q)
-    length = np.linalg.norm(q[..., 1:], axis=-1, keepdims=True)
+    length = measure_lengths(q[..., 1:])[..., None]
     angle = 2.0 * arctan2(length, q[..., :1])
     scale = np.where(length > 1e-9, angle / np.maximum(length, 1e-9), 2.0)
     return scale * q[..., 1:]
@@ -205,7 +205,7 @@ def rotation_between(a: np.ndarray, b: np.ndarray) -> np.ndarray:
     b = np.asarray(b, dtype=float)
     a = unit_vectors(a, min_length=1e-12)
     b = unit_vectors(b, min_length=1e-12)
-    dot = np.sum(a * b, axis=-1, keepdims=True)
+    dot = dot_products(a, b)[..., None]
     axis = cross_product(a, b)
     other = np.where(np.abs(a[..., :1]) < 0.9, np.array([1.0, 0.0, 0.0]), np.array([0.0, 1.0, 0.0]))
     axis = np.where(dot < -1.0 + 1e-9, cross_product(a, other), axis)
@@ -217,7 +217,7 @@ def unify_signs(q: np.ndarray) -> np.ndarray:
     q = np.asarray(q, dtype=float)
     if len(q) < 2:
         return q.copy()
-    flips = np.sum(q[1:] * q[:-1], axis=-1) < 0.0
+    flips = dot_products(q[1:], q[:-1]) < 0.0
     sign = np.where(np.cumsum(flips, axis=0) % 2 == 1, -1.0, 1.0)
     out = q.copy()
     out[1:] *= sign[..., None]
@@ -226,7 +226,7 @@ def unify_signs(q: np.ndarray) -> np.ndarray:
 
 def match_signs(q: np.ndarray, reference: np.ndarray) -> np.ndarray:
     """Choose the signs of rotations (..., 4) that are nearer to `reference` (..., 4)."""
-    return np.where(np.sum(q * reference, axis=-1, keepdims=True) < 0.0, -q, q)
+    return np.where(dot_products(q, reference)[..., None] < 0.0, -q, q)
 
 
 def slerp(a: np.ndarray, b: np.ndarray, weight: float | np.ndarray) -> np.ndarray:
@@ -241,7 +241,7 @@ def slerp(a: np.ndarray, b: np.ndarray, weight: float | np.ndarray) -> np.ndarra
     """
     a, b = np.asarray(a, dtype=float), np.asarray(b, dtype=float)
     weight = np.asarray(weight, dtype=float)
-    dot = np.sum(a * b, axis=-1)
+    dot = dot_products(a, b)
     b = np.where(dot[..., None] < 0.0, -b, b)
     theta = np.arccos(np.clip(np.abs(dot), 0.0, 1.0))
     small = theta < 1e-4

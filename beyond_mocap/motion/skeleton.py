@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Collection
 from dataclasses import dataclass, field, replace
-from functools import cached_property
 
 import numpy as np
 
@@ -64,15 +63,6 @@ class Skeleton:
             return self.names.index(name)
         except ValueError:
             raise InputError("skeleton", f"no joint {name!r}", f"one of {', '.join(self.names)}") from None
-
-    @cached_property
-    def levels(self) -> tuple[tuple[list[int], list[int]], ...]:
-        """Joints at each depth below the root, and their parents: joints of a level do not depend on each other."""
-        depths = [0] * len(self)
-        for joint, parent in enumerate(self.parents[1:], 1):
-            depths[joint] = depths[parent] + 1
-        levels = [[joint for joint, depth in enumerate(depths) if depth == level] for level in range(max(depths) + 1)]
-        return tuple((joints, [self.parents[joint] for joint in joints]) for joints in levels[1:])
 
     def children(self, joint: int) -> tuple[int, ...]:
         """Return the indices of the joints that hang on `joint`."""

@@ -15,6 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..base.time_series import find_runs, time_derivative
+from ..base.vectors import measure_lengths
 from .humanoid import Limb, identify_joints
 from .skeleton import Skeleton
 from .track import smooth_zero_phase_hann
@@ -194,7 +195,7 @@ def measure_speed(points: np.ndarray, fps: float) -> np.ndarray:
     Returns:
         (T,) m/s.
     """
-    return np.linalg.norm(time_derivative(smooth_level(points, _SPEED_SECONDS, fps), fps), axis=1)
+    return measure_lengths(time_derivative(smooth_level(points, _SPEED_SECONDS, fps), fps))
 
 
 def smooth_level(points: np.ndarray, reach: float, fps: float) -> np.ndarray:

@@ -6,7 +6,6 @@ A skeleton has no flesh; a joint lies as far above the ground as the body is thi
 from __future__ import annotations
 
 import numpy as np
-from scipy.ndimage import maximum_filter1d, uniform_filter1d
 
 from ..base.vectors import unit_vectors
 from ..motion import quaternion
@@ -101,6 +100,8 @@ def raise_arms(skeleton: Skeleton, root: np.ndarray, rotations: np.ndarray, fps:
 def smooth_above(values: np.ndarray, fps: float) -> np.ndarray:
     """Compute a smooth curve (T,) that is nowhere below `values` (T,) >= 0: a running maximum, then a running mean."""
     width = 2 * int(_SMOOTH_SECONDS * fps / 2) + 1
+    from scipy.ndimage import maximum_filter1d, uniform_filter1d
+
     return uniform_filter1d(maximum_filter1d(values, width), width)
 
 

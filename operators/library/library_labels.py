@@ -337,13 +337,13 @@ others; the result is a file that works with any library"""
     @staticmethod
     def run_job(order, progress, cancelled, _hurry):
         """Read the clips, train and write the classifier; returns the file and lines about what was learned."""
-        from ...beyond_mocap.library import cache
+        from ...beyond_mocap.library import cache, scan
         from ...beyond_mocap.library.classify import classifier
         from ...beyond_mocap.library.classify.examples import read_examples
         from ...beyond_mocap.library.classify.train import train_classifier
 
         out = Path(order.out) if order.out else cache.find_cache_folder(Path(order.folder),
-                                                                        order.cache)[0] / classifier.FILE_NAME
+                                                                        order.cache)[0] / scan.CLASSIFIER_FILE
         on_progress = lambda done, text: progress(0.7 * done, text)  # noqa: E731
         notes = []
         examples = read_examples(order.folder, order.unit, on_progress, cache_dir=order.cache, cancelled=cancelled,

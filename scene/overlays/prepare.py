@@ -145,7 +145,7 @@ def prepare_take(plan: "Plan", take: "Take", library: "Library | None") -> Prepa
         Meshes and texts.
     """
     from ...beyond_mocap.evaluation.per_frame import find_footprints, find_strikes, measure_per_frame
-    from ...beyond_mocap.evaluation.reference import View
+    from ...beyond_mocap.evaluation.view import View
     from ...beyond_mocap.synthesis.quality.playback import playback_from_take
     from ...beyond_mocap.synthesis.resolve_plan import resolve_plan
 

@@ -187,7 +187,7 @@ def _scale_value(value: float, factor: float) -> float:
 def _compute_errors(scene: bpy.types.Scene, result: session.StoredTake) -> np.ndarray:
     """Compute (C, T) values in the order of CURVES; 0 where unknown, since a key needs a number."""
     from ...beyond_mocap.evaluation.per_frame import measure_per_frame
-    from ...beyond_mocap.evaluation.reference import View
+    from ...beyond_mocap.evaluation.view import View
     from ...beyond_mocap.synthesis.quality.playback import playback_from_take
 
     take, unit = result.take, scene.beyond_mocap.library_unit or None

@@ -25,7 +25,10 @@ SAMPLE = TOP / "sample_blend"
 KILLS_IN_A_ROW = 4
 _CLIPS = ("walking_1_2", "jogging_2_9", "standing_1", "kick_low_inside", "running_4_2")
 _MATCH = ("--from", "0", "--to", "2", "--workers", "2", "--players", "home_10", "--no-figures")
-_TIMED = ("match.json", "report.json", "report.html", "lock")  # files with times of the run
+# a compiled step takes a minute and is no part of what is tested: it is small, and kept for the runs that follow
+_NETWORK = {"units": 8, "rollout": 1, "examples": 4, "ridge": 0.01}
+_COMPILER = {"XLA_FLAGS": "--xla_backend_optimization_level=0", "JAX_PERSISTENT_CACHE_MIN_COMPILE_TIME_SECS": "0"}
+_TIMED = ("match.json", "report.json", "report.html", "lock", "checkpoint.npz")  # files with times of the run
 
 
 @dataclass(frozen=True)
@@ -70,14 +73,18 @@ def list_jobs(base: Path) -> list[Job]:
     if not trainer.exists():
         print("kill-test: no .venv-training; training is skipped (make training)")
         return jobs
+    os.environ.update(_COMPILER, JAX_COMPILATION_CACHE_DIR=str(base / "compiled"))
     run(trainer, ["throw", "examples", "--out", base / "examples", "--subjects", "1", "--throws", "4", "--seed", "0"])
-    return [*jobs, Job("training", trainer, lambda out: _build_training(base / "examples", out / "w.npz"))]
+    (base / "network.json").write_text(json.dumps(_NETWORK))
+    run(trainer, _build_training(base, base / "first.npz"))
+    return [*jobs, Job("training", trainer, lambda out: _build_training(base, out / "w.npz"))]
 
 
-def _build_training(examples: Path, weights: Path) -> list:
+def _build_training(base: Path, weights: Path) -> list:
     """Build the command of a training, which continues where there is a checkpoint."""
     kept = weights.with_suffix(".checkpoint.npz")
-    command = ["throw", "train", examples, "--epochs", "6", "--out", weights]
+    options = ["--config", base / "network.json", "--epochs", "6", "--out", weights]
+    command = ["throw", "train", base / "examples", *options]
     return [*command, "--resume"] if kept.exists() else command
 
 

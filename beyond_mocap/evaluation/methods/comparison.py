@@ -16,7 +16,7 @@ from ...synthesis.synthesize import synthesize
 from ...synthesis.take import Take
 from .. import figures
 from ..realism import measure_smoothness
-from ..reference import View
+from ..view import View
 from .scenarios import Scenario
 
 NO_CATCH_UP = "distance-no-catch-up"

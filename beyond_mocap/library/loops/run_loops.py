@@ -15,7 +15,6 @@ from ...base.time_series import find_runs
 from ...base.vectors import arctan2
 from ...motion.motion import Motion
 from ...motion.phase_blend import Strides, find_strides, repeat_strides
-from ...synthetic.gait_tables import interpolate_figure
 from ..features import Frames
 
 LOOP_SECONDS = 8.0  # of a loop
@@ -91,5 +90,7 @@ def iter_steady_parts(strides: Strides) -> Iterator[tuple[float, Strides]]:
 
 def _has_usual_cadence(strides: Strides) -> bool:
     """Whether strides are about as frequent as people's at that speed."""
+    from ...synthetic.gait_tables import interpolate_figure
+
     usual = float(interpolate_figure("frequency", strides.speed))
     return _CADENCE[0] <= 0.5 / strides.seconds.mean() / usual <= _CADENCE[1]

@@ -18,9 +18,8 @@ from ...motion.humanoid import measure_leg_length
 from ...motion.motion import Motion
 from ...motion.skeleton import Skeleton
 from ...motion.track import BALL_RADIUS
+from .ball_table import find_ball_table
 
-ENDING = ".ball.csv"
-"""Of the table with a recording's ball, in place of the recording's own ending."""
 _FARTHEST = 150.0  # m from the body, as far as a pitch is long; a ball beyond is in a wrong unit or place
 _GAP_SECONDS = 0.25  # within which a ball that is not known is interpolated
 _UP = np.array([0.0, 0.0, BALL_RADIUS])
@@ -49,19 +48,6 @@ class BodyBall:
         size = measure_leg_length(motion.skeleton) / measure_leg_length(self.skeleton)
         ball = motion.root_positions + size * self.offset + _UP
         return np.where(ball < [-np.inf, -np.inf, BALL_RADIUS], BALL_RADIUS, ball) if size != 1.0 else ball
-
-
-def find_ball_table(path: Path, file: Path) -> Path | None:
-    """Find the table with the ball of a recording.
-
-    Args:
-        path: the recording.
-        file: what is read in its place (`scan.Conversions`).
-    Returns:
-        The table beside the recording, else that of its conversion, else None.
-    """
-    tables = (path.with_suffix(ENDING), file.with_suffix(ENDING))
-    return next((table for table in tables if table.is_file()), None)
 
 
 def read_recorded_ball(path: Path, file: Path, source: BvhClip) -> tuple[BodyBall | None, tuple[str, ...]]:

@@ -11,7 +11,6 @@ one banded system. A body's path is the curve of least acceleration that stays n
 from __future__ import annotations
 
 import numpy as np
-from scipy.ndimage import maximum_filter1d, uniform_filter1d
 
 DEGREE = 3
 _WIDTH = DEGREE + 1
@@ -89,6 +88,7 @@ def fit_spline_within(
         Knots (P + 4,) and coefficients (P, K).
     """
     from scipy.interpolate import BSpline
+    from scipy.ndimage import maximum_filter1d, uniform_filter1d
 
     weights, around = np.ones(len(at)), int(_PULL_RANGE * stiff * (len(at) - 1) / (at[-1] - at[0])) + 1
     for round_ in range(_ROUNDS):

@@ -6,7 +6,7 @@ import numpy as np
 
 from ...base.errors import InputError, format_count
 from ...base.time_series import interpolate_columns
-from ...base.vectors import arctan2
+from ...base.vectors import arctan2, measure_lengths
 from .data import BALL_RADIUS, SampledTrack, Track
 
 SMOOTHING_SECONDS = 1.2
@@ -47,7 +47,7 @@ def sample_track(track: Track, fps: float, window: float = SMOOTHING_SECONDS) ->
     velocity = np.broadcast_to((positions[-1] - positions[0]) * fps, positions.shape)  # of one or two frames
     if len(times) > 2:
         velocity = np.gradient(positions, 1.0 / fps, axis=0, edge_order=2)
-    speed = np.linalg.norm(velocity, axis=1)
+    speed = measure_lengths(velocity)
     ball, ball_measured = _sample_ball(track, times)
     return SampledTrack(
         times=times, positions=positions, raw=interpolate_columns(times, track.times[measured],
@@ -115,7 +115,7 @@ def compute_travel_direction(velocity: np.ndarray, fps: float) -> np.ndarray:
     Returns:
         (T,) radians from +x, unwrapped.
     """
-    speed = np.linalg.norm(velocity, axis=1)
+    speed = measure_lengths(velocity)
     moving = np.flatnonzero(speed >= min(MOVING_SPEED, speed.max(initial=0.0)))
     if not len(moving) or not speed.any():
         return np.zeros(len(velocity))

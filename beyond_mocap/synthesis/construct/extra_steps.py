@@ -17,7 +17,7 @@ import numpy as np
 
 from ...base.easing import smoothstep
 from ...base.time_series import find_runs
-from ...base.vectors import arctan2
+from ...base.vectors import arctan2, measure_lengths
 from ...motion import quaternion
 from ...motion.humanoid import Limb, identify_joints
 from ...motion.limb import solve_two_bone
@@ -114,7 +114,7 @@ def add_steps(
     feet = [_Foot(limb, places, world, root=root, heading=heading, heel_toe_contacts=heel_toe_contacts[:, side])
             for side, limb in enumerate((body.left, body.right))]
     upright = root[:, 2] > UPRIGHT_SHARE * np.median(root[:, 2])
-    speed = np.linalg.norm(np.gradient(smooth_zero_phase_hann(root[:, :2], fps, 1.0), axis=0), axis=1) * fps
+    speed = measure_lengths(np.gradient(smooth_zero_phase_hann(root[:, :2], fps, 1.0), axis=0)) * fps
     stepped = empty.stepped if steps_taken is None else steps_taken
     plan = _StepPlan(feet, stepped, speed, fps, upright if free is None else free & upright)
     plan.run()
@@ -269,7 +269,7 @@ class _StepPlan:
         centre = 0.5 * (left + right)
         drift = np.gradient(smooth_zero_phase_hann(np.stack([centre.real, centre.imag], axis=1), self.fps, 1.0), axis=0)
         # vector between the feet in the frame of the drift: real part along it, imaginary part across
-        width = (left - right) * (drift[:, 0] - 1j * drift[:, 1]) / np.maximum(np.linalg.norm(drift, axis=1), 1e-9)
+        width = (left - right) * (drift[:, 0] - 1j * drift[:, 1]) / np.maximum(measure_lengths(drift), 1e-9)
         along, across = np.abs(width.real), np.abs(width.imag)
         room = 2.0 * (along - np.sqrt(np.maximum(FOOT_SEPARATION**2 - across**2, 0.0)))
         return np.where(across > FOOT_SEPARATION, np.inf, np.maximum(room, STRIDE[0]))

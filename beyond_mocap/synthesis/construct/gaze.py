@@ -21,7 +21,7 @@ import numpy as np
 from ...annotation import LOCOMOTION_LABELS
 from ...base.easing import smoothstep
 from ...base.time_series import interpolate_columns
-from ...base.vectors import arctan2, unit_vectors
+from ...base.vectors import arctan2, measure_lengths, unit_vectors
 from ...library.library import Library
 from ...motion import quaternion
 from ...motion.humanoid import identify_joints
@@ -100,7 +100,7 @@ def watch_ball(
     habits, eased = draw_habits(seed), _fade_beside_gaps(known, fps)
     away = interpolate_columns(frames, frames[known], ball[known]) - joints[:, body.head_or_neck]
     sprint = smoothstep(speed, *SPRINT_SPEEDS)
-    attention = compute_attention(habits, start + frames / fps, np.linalg.norm(away[:, :2], axis=1), sprint, fps)
+    attention = compute_attention(habits, start + frames / fps, measure_lengths(away[:, :2]), sprint, fps)
 
     def see(delay: float) -> np.ndarray:
         """The direction (T, 3) m to the ball `delay` s ago, as the body stands now."""
@@ -239,7 +239,7 @@ def compute_twist(seen: np.ndarray, own: np.ndarray, fps: float) -> np.ndarray:
     Returns:
         (T,) rad to the left.
     """
-    side = compute_bearing(seen)[0] * smoothstep(np.linalg.norm(seen[:, :2], axis=1) / _NEAR_BALL)
+    side = compute_bearing(seen)[0] * smoothstep(measure_lengths(seen[:, :2]) / _NEAR_BALL)
     wanted = _limit_softly(TWIST_SHARE * np.sign(side) * _leave_rest(np.abs(side), TWIST_FREE_ANGLE), MAX_TWIST)
     wanted = np.clip(wanted, np.minimum(-MAX_TWIST - own, 0.0), np.maximum(MAX_TWIST - own, 0.0))
     return smooth_zero_phase_hann(_limit_speed(wanted, SHOULDER_SPEED / fps)[:, None], fps, SHOULDER_SECONDS)[:, 0]
@@ -364,7 +364,7 @@ def _compute_head_turn(sight: np.ndarray, yaw: np.ndarray, pitch: np.ndarray) ->
     """
     target = np.column_stack([np.cos(pitch) * np.cos(yaw), np.cos(pitch) * np.sin(yaw), np.sin(pitch)])
     turn = quaternion.to_rotation_vector(quaternion.rotation_between(sight, target))
-    angle = np.linalg.norm(turn, axis=1, keepdims=True)
+    angle = measure_lengths(turn)[..., None]
     return turn * _leave_rest(angle, EYE_ANGLE) / np.maximum(angle, 1e-9)
 
 

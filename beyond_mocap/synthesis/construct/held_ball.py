@@ -23,8 +23,8 @@ from ...base.vectors import cross_product, unit_vectors
 from ...motion import quaternion
 from ...motion.humanoid import identify_joints
 from ...motion.motion import Motion, compute_pose
+from ...motion.supports import GRAVITY
 from ...motion.track import BALL_RADIUS
-from ...synthetic.gait_tables import GRAVITY
 
 _TOUCHING = HAND_RADIUS + BALL_RADIUS
 _CLOSE, _OPEN = 0.42, 0.6  # m between both hands up to which they hold a ball, and from which on one holds it alone

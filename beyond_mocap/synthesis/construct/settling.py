@@ -12,6 +12,7 @@ from dataclasses import replace
 import numpy as np
 
 from ...base.banded_least_squares import BandedLeastSquares
+from ...base.vectors import measure_lengths
 from ...motion import quaternion
 from ...motion.foot_plant import compute_contact_weights
 from ...motion.humanoid import identify_joints
@@ -104,7 +105,7 @@ def settle_on_track(
     for _ in range(_ROUNDS + 1):
         root = _follow_steps(steps, firm, weight, goal)
         off = root - planned
-        away = np.linalg.norm(off, axis=1)
+        away = measure_lengths(off)
         beyond = (away > track.leeway) & ~is_given
         weight = np.where(beyond, np.maximum(weight, (_HELD_SECONDS * track.fps) ** -2.0), weight)
         share = track.leeway / np.maximum(away, track.leeway)

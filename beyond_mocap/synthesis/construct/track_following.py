@@ -12,7 +12,7 @@ import numpy as np
 
 from ...base.banded_least_squares import BandedLeastSquares
 from ...base.time_series import find_runs
-from ...base.vectors import arctan2
+from ...base.vectors import arctan2, measure_lengths
 from ...motion import quaternion
 from ...motion.foot_plant import compute_contact_weights
 from ...motion.humanoid import identify_joints
@@ -81,7 +81,7 @@ def fit_heading(
     """
     # the heading that keeps the recorded angle between travel and facing
     goal = direction - arctan2(velocity[:, 1], velocity[:, 0])
-    trust = _motion_weight(speed) ** 2 * _motion_weight(np.linalg.norm(velocity, axis=1)) ** 2
+    trust = _motion_weight(speed) ** 2 * _motion_weight(measure_lengths(velocity)) ** 2
     if plan is not None:
         return follow_plan(plan, goal, trust, speed=speed, turn=turn, given=given, firm=firm, freedom=freedom,
                            held=held)
@@ -233,7 +233,7 @@ def compute_missing_lean(
     Returns:
         (T,) lateral acceleration over g, to the left; legs get at most MAX_LEAN, nothing below UPRIGHT_SPEED.
     """
-    own_speed = np.linalg.norm(velocity, axis=1)
+    own_speed = measure_lengths(velocity)
     # turning of the recording's direction of travel, per frame: of the facing plus of the angle between the two
     own_turn = turn + np.diff(arctan2(velocity[:, 1], velocity[:, 0]), prepend=arctan2(*velocity[:1, ::-1].T))
     own_turn[transitions] = own_turn[np.minimum(transitions + 1, len(turn) - 1)]

@@ -15,7 +15,7 @@ from __future__ import annotations
 import numpy as np
 
 from ...base.easing import quintic_step
-from ...base.vectors import arctan2
+from ...base.vectors import arctan2, dot_products, measure_lengths
 from ...motion import quaternion
 
 LONGEST_SPREAD = 12  # frames to either side of a jump
@@ -84,14 +84,14 @@ def _steady_arc(turn: np.ndarray, through: np.ndarray) -> np.ndarray:
     """
     begins = np.diff(through, prepend=np.inf) <= 0.0
     # make quaternions continuous within each blend: an odd number of sign flips so far changes the sign
-    flips = np.sum(turn * np.roll(turn, 1, axis=0), axis=-1) < 0.0
+    flips = dot_products(turn, np.roll(turn, 1, axis=0)) < 0.0
     turn = turn * np.where(np.cumsum(flips & ~begins[:, None], axis=0) % 2 == 1, -1.0, 1.0)[..., None]
     fade = np.cumsum(begins) - 1
     # sum of the scalar parts per blend and joint: negative means that the long arc is the mean
     middle = np.zeros((begins.sum(), turn.shape[1]))
     np.add.at(middle, fade, turn[..., 0])
     turn = turn * np.where(middle < 0.0, -1.0, 1.0)[fade][..., None]
-    length = np.linalg.norm(turn[..., 1:], axis=-1, keepdims=True)
+    length = measure_lengths(turn[..., 1:])[..., None]
     angle = 2.0 * arctan2(length, turn[..., :1])
     return np.where(length > 1e-9, angle / np.maximum(length, 1e-9), 2.0) * turn[..., 1:]
 

@@ -10,9 +10,9 @@ import numpy as np
 from ...annotation import KeyMoment
 from ...annotation.ball_contact import choose_contact_labels, find_contact_window, measure_contact_gap, takes_with_foot
 from ...annotation.striking import build_part_surfaces, measure_smallest_gap
+from ...library.clip import SYNTHETIC_FOLDER
 from ...library.library import Library
 from ...library.missing_actions import add_actions
-from ...library.synthetic_clips import SYNTHETIC_FOLDER
 from ...motion.track import Track
 from ..take import DribbleTouch
 from .playback import Playback, find_transitions, number_pieces

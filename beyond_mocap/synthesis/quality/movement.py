@@ -14,7 +14,6 @@ carried along, so that moving a foot cannot change what is counted (`../shared/p
 from __future__ import annotations
 
 import numpy as np
-from scipy.ndimage import maximum_filter1d, uniform_filter1d
 
 from ...base.time_series import find_runs, interpolate_columns, time_derivative
 from ...base.vectors import unit_vectors
@@ -164,6 +163,8 @@ def compute_jerk(positions: np.ndarray, fps: float) -> np.ndarray:
 
 def compute_window_maxima(values: np.ndarray) -> np.ndarray:
     """Compute the largest value within +-8 indices: (N,) -> (N,); windows end with the values."""
+    from scipy.ndimage import maximum_filter1d
+
     return maximum_filter1d(values, _WIDTH, mode="nearest") if len(values) else values
 
 
@@ -307,6 +308,8 @@ def find_skating_steps(toes: np.ndarray, floor: float, fps: float) -> np.ndarray
         (T-1,) bool.
     Source: Karunratanakul et al. 2023, Guided Motion Diffusion, `calculate_skating_ratio` (their code works at 20 fps).
     """
+    from scipy.ndimage import uniform_filter1d
+
     speed = np.linalg.norm(np.diff(toes[..., :2], axis=0), axis=-1) * fps
     width = 2 * int(GMD_SECONDS * fps / 2) + 1
     mean = uniform_filter1d(speed, width, axis=0, mode="constant") if len(speed) else speed

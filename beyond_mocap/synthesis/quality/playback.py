@@ -13,11 +13,9 @@ from functools import cached_property
 import numpy as np
 
 from ...base.errors import InputError
-from ...library.landings import LANDING_FOLDER
+from ...library.clip import LANDING_FOLDER, SYNTHETIC_FOLDER, SYNTHETIC_FPS
 from ...library.library import Library
 from ...library.scan import CACHE_FOLDER
-from ...library.synthetic_clips import FPS as MADE_FPS
-from ...library.synthetic_clips import SYNTHETIC_FOLDER
 from ...motion import contacts as foot_contacts
 from ...motion.humanoid import Humanoid, identify_joints
 from ...motion.motion import Motion, forward_kinematics
@@ -114,7 +112,7 @@ class Playback:
         known = {} if library is None else {clip.path: clip.motion.fps for clip in library.clips}
         rates = np.ones(len(self.clips) + 1)
         for index, path in enumerate(self.clips):
-            fps = MADE_FPS if path.startswith(SYNTHETIC_FOLDER) else known.get(path.removeprefix(LANDING_FOLDER))
+            fps = SYNTHETIC_FPS if path.startswith(SYNTHETIC_FOLDER) else known.get(path.removeprefix(LANDING_FOLDER))
             rates[index] = fps / self.motion.fps if fps else _measure_usual_step(self.clip_frame, self.clip == index)
         return rates[self.clip]
 

@@ -18,21 +18,24 @@ from ...annotation import Timeline, labels_per_frame
 from ...annotation.ball_contact import takes_with_foot
 from ...base.errors import TimedMessage, format_seconds
 from ...base.time_series import find_runs, time_derivative
-from ...library.coverage import CALM_SPEED, STEP_SPEEDS, classify_steps, compute_turn_rate, describe_lack
-from ...library.features import SMOOTH_SECONDS
-from ...library.landings import LANDING_FOLDER
-from ...library.library import RESTING_SPEED, Library
-from ...library.missing_actions import ACTION_PREFIX, describe_action, list_action_labels
-from ...library.missing_steps import BACK_PREFIX, SIDE_PREFIX, STEP_PREFIX, TURN_PREFIX
-from ...library.synthetic_clips import (
+from ...library.clip import (
+    BACK_PREFIX,
     BLEND_PREFIX,
     KICK_PREFIX,
+    LANDING_FOLDER,
     LOOP_PREFIX,
+    SIDE_PREFIX,
     STAND_PREFIX,
+    STEP_PREFIX,
     STILL_PREFIX,
     SYNTHETIC_FOLDER,
+    TURN_PREFIX,
     WALK_PREFIX,
 )
+from ...library.coverage import CALM_SPEED, STEP_SPEEDS, classify_steps, compute_turn_rate, describe_lack
+from ...library.features import SMOOTH_SECONDS
+from ...library.library import RESTING_SPEED, Library
+from ...library.missing_actions import ACTION_PREFIX, describe_action, list_action_labels
 from ...motion import quaternion
 from ...motion.humanoid import compute_heading_from_positions
 from ...motion.supports import GRAVITY
@@ -365,8 +368,10 @@ def _report_missing_labels(
     """
     if timeline is None or played.words is None or library is None:
         return None
-    known = library.labels.union(*(list_action_labels(is_span=True) if has_actions else ()))
-    available = [(words or frozenset()) & known for words in labels_per_frame(timeline, played.times)]
+    wanted = [words or frozenset() for words in labels_per_frame(timeline, played.times)]
+    is_recorded = library.labels.issuperset(frozenset().union(*wanted))
+    known = library.labels.union(*(list_action_labels(is_span=True) if has_actions and not is_recorded else ()))
+    available = [words & known for words in wanted]
     missing = [want.difference(labels_shown) for want, labels_shown in zip(available, played.words)]
     for moment in keys:
         missing[moment.entry : moment.exit + 1] = [frozenset()] * (moment.exit + 1 - moment.entry)

@@ -6,11 +6,11 @@ import weakref
 from dataclasses import dataclass, fields
 
 import numpy as np
-from scipy.ndimage import maximum_filter1d, uniform_filter1d
 
 from ...annotation import CONTINUOUS, DISCRETE
 from ...annotation.gaits import TURNING
 from ...annotation.labels import list_gaits, list_labels
+from ...base.time_series import compute_running_maximum
 from ...base.vectors import arctan2
 from ...library import cache
 from ...library.library import Library
@@ -127,8 +127,10 @@ class CandidateIndex:
 
     def _compute(self, library: Library, allowed: np.ndarray) -> None:
         """Compute what depends on the clips."""
+        from scipy.ndimage import uniform_filter1d
+
         self.is_synthetic = np.array([clip.is_synthetic for clip in library.clips])[library.frames.clip]
-        strange = maximum_filter1d(library.strangeness, SLOT, origin=-(SLOT // 2), mode="nearest")
+        strange = compute_running_maximum(library.strangeness, 0, SLOT - 1)
         self.strange = np.clip(strange - 1.0, 0.0, MOST_STRANGE)
         recording = np.unique([clip.path for clip in library.clips], return_inverse=True)[1]
         self.recording = recording[library.frames.clip]
@@ -169,8 +171,7 @@ class CandidateIndex:
         """Return (N,) bool: a slot from there on shows one of the labels."""
         if words not in self._showing:
             carried = self.annotation.find_frames_with(words)
-            # the filter looks at the frames ahead only, by its origin
-            self._showing[words] = maximum_filter1d(carried, _SHOWN, origin=-(_SHOWN // 2), mode="nearest")
+            self._showing[words] = compute_running_maximum(carried, 0, _SHOWN - 1)
         return self._showing[words]
 
     def measure_lacking(self, words: frozenset[str]) -> tuple[np.ndarray, np.ndarray]:
@@ -186,14 +187,15 @@ class CandidateIndex:
             names, frames = self.frames.vocabulary, self.frames
             missing = self.annotation.compute_missing_share(words) if words else np.zeros(len(frames))
             if ACTING & words:  # a slot that begins with the last frame of an action does not show it
+                from scipy.ndimage import uniform_filter1d
+
                 missing = uniform_filter1d(missing, SLOT, origin=-(SLOT // 2), mode="nearest")
             actions, spans = ([i for i, word in enumerate(names) if word in kind and word not in words]
                               for kind in (DISCRETE, ACTING))
             acts = frames.words[:, actions].any(axis=1) | (frames.words[:, spans].any(axis=1) & self.is_synthetic)
             strikes = frames.words[:, [i for i, word in enumerate(names) if word in STRIKES - words]].any(axis=1)
             shown = np.where(strikes, STRIKE_COST, acts)
-            lacking = np.maximum(maximum_filter1d(shown, SLOT + 1, origin=-(SLOT // 2), mode="nearest"),
-                                 ~frames.words.any(axis=1))
+            lacking = np.maximum(compute_running_maximum(shown, 0, SLOT), ~frames.words.any(axis=1))
             self._by_words[words] = missing.astype(np.float32), lacking.astype(np.float32)
         return self._by_words[words]
 
@@ -211,6 +213,8 @@ def measure_wildness(library: Library) -> tuple[np.ndarray, np.ndarray]:
     Returns:
         (N,) and (N,) for the JERK_REACH frames before and after each frame, as a share; 0 where it does not exceed it.
     """
+    from scipy.ndimage import maximum_filter1d
+
     frames = library.frames
     kind = np.digitize(frames.speed, _SPEED_CLASSES)
     around = maximum_filter1d(frames.jerk, 2 * JERK_REACH + 1, mode="nearest")

@@ -4,14 +4,23 @@ import hashlib
 
 import numpy as np
 import pytest
+from scipy.ndimage import maximum_filter1d
 
 from beyond_mocap.base.digest import byte_digest, hex_digest
 from beyond_mocap.base.easing import hermite, quintic_step, quintic_step_by_powers, smoothstep
-from beyond_mocap.base.time_series import gaussian_smooth, hann_smooth, interpolate_columns, time_derivative
+from beyond_mocap.base.time_series import (
+    compute_running_maximum,
+    gaussian_smooth,
+    hann_smooth,
+    interpolate_columns,
+    time_derivative,
+)
 from beyond_mocap.base.vectors import (
     cross_on_ground,
     distances_along,
+    dot_products,
     find_nearest_axis,
+    measure_lengths,
     skew_matrix,
     unit_vector,
     unit_vectors,
@@ -55,6 +64,17 @@ def test_hermite_is_the_cubic_itself():
     )
 
 
+@pytest.mark.parametrize("size", [2, 3, 4])
+def test_dot_products_and_lengths_are_numpys_to_the_bit(size):
+    random = np.random.default_rng(0)
+    for shape in ((size,), (1, size), (500, size), (40, 7, size)):
+        a, b = random.normal(size=shape) * 10.0 ** random.uniform(-9, 9, shape), random.normal(size=shape)
+        a[..., 0], b[:1] = np.where(random.random(shape[:-1]) < 0.1, -0.0, a[..., 0]), 0.0  # zeros of both signs
+        for one in (a, np.asfortranarray(a), -0.0 * np.abs(a)):
+            assert np.asarray(dot_products(one, b)).tobytes() == np.sum(one * b, axis=-1).tobytes()
+            assert np.asarray(measure_lengths(one)).tobytes() == np.linalg.norm(one, axis=-1).tobytes()
+
+
 def test_values_over_time():
     line = np.array([[0.0, 0.0], [3.0, 4.0], [3.0, 5.0]])
     assert np.array_equal(distances_along(line), [0.0, 5.0, 6.0])
@@ -72,3 +92,16 @@ def test_digests_are_those_of_the_joined_bytes():
     joined = "\u00e9".encode() + table.tobytes() + b"x"
     assert hex_digest("\u00e9", table, b"x", digits=8) == hashlib.sha256(joined).hexdigest()[:8]
     assert byte_digest("\u00e9", table, np.zeros((0, 3)), b"x") == hashlib.blake2b(joined, digest_size=16).digest()
+
+
+@pytest.mark.parametrize("kind", [float, np.float32, bool])
+def test_the_running_maximum_is_scipys_to_the_bit(kind):
+    random = np.random.default_rng(0)
+    for count in (1, 2, 7, 40):
+        values = (random.normal(size=count) > 1.0) if kind is bool else random.normal(size=count).astype(kind)
+        for size in range(1, 20):
+            around = maximum_filter1d(values, 2 * size + 1, mode="nearest")
+            ahead = maximum_filter1d(values, size + 1, origin=-((size + 1) // 2), mode="nearest")
+            for expected, window in ((around, (size, size)), (ahead, (0, size))):
+                found = compute_running_maximum(values, *window)
+                assert found.dtype == expected.dtype and found.tobytes() == expected.tobytes()

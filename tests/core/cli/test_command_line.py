@@ -18,8 +18,8 @@ from beyond_mocap.cli.outputs import ProgressReporter
 from beyond_mocap.files.bvh import bvh
 from beyond_mocap.files.bvh.bvh_write import BvhForm, JointAboveHips
 from beyond_mocap.files.tables import read_ball, write_ball
+from beyond_mocap.library.clip import KICK_PREFIX, SYNTHETIC_FOLDER
 from beyond_mocap.library.missing_actions import ACTION_PREFIX
-from beyond_mocap.library.synthetic_clips import KICK_PREFIX, SYNTHETIC_FOLDER
 from beyond_mocap.motion.humanoid import estimate_stature
 from beyond_mocap.motion.track.ball_path import BallPath
 from beyond_mocap.synthesis.provenance import read_provenance

@@ -12,8 +12,8 @@ from beyond_mocap.annotation import KeyMoment, Span, Timeline
 from beyond_mocap.base.errors import InputError
 from beyond_mocap.cli import main as command
 from beyond_mocap.evaluation.html import build_html_report, find_worst_frames
-from beyond_mocap.evaluation.reference import View
 from beyond_mocap.evaluation.report import describe_figures, evaluate, evaluate_played
+from beyond_mocap.evaluation.view import View
 from beyond_mocap.files.bvh import bvh
 from beyond_mocap.motion.motion import Motion
 from beyond_mocap.synthesis.provenance import write_provenance

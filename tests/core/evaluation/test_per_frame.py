@@ -7,8 +7,8 @@ import pytest
 
 from beyond_mocap.annotation import KeyMoment, Timeline
 from beyond_mocap.evaluation.per_frame import find_footprints, find_strikes, measure_per_frame
-from beyond_mocap.evaluation.reference import View
 from beyond_mocap.evaluation.report import evaluate
+from beyond_mocap.evaluation.view import View
 from beyond_mocap.synthesis.quality.playback import playback_from_take
 
 

@@ -15,9 +15,9 @@ from beyond_mocap.evaluation.html import build_physics_section
 from beyond_mocap.evaluation.naturalness import measure_course
 from beyond_mocap.evaluation.physics import MassCourse, compute_bounce, measure_flights, measure_leans, measure_steps
 from beyond_mocap.evaluation.physics_figures import measure_physics
-from beyond_mocap.evaluation.reference import View
 from beyond_mocap.evaluation.report import evaluate, evaluate_played, flatten_report
 from beyond_mocap.evaluation.sprint_form import measure_knee_flexion, measure_trunk_lean
+from beyond_mocap.evaluation.view import View
 from beyond_mocap.motion.humanoid import identify_joints
 from beyond_mocap.motion.lean import Lean
 from beyond_mocap.motion.motion import forward_kinematics, place_motion

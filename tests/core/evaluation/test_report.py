@@ -16,9 +16,9 @@ from beyond_mocap.evaluation.report import evaluate, evaluate_played, flatten_re
 from beyond_mocap.files import tables
 from beyond_mocap.files.bvh import bvh
 from beyond_mocap.library.build import build_library
+from beyond_mocap.library.clip import SYNTHETIC_FOLDER
 from beyond_mocap.library.features import build_frames
 from beyond_mocap.library.library import Gait
-from beyond_mocap.library.synthetic_clips import SYNTHETIC_FOLDER
 from beyond_mocap.motion import quaternion
 from beyond_mocap.motion.motion import resample, sample_frames
 from beyond_mocap.motion.track import Track

@@ -10,10 +10,11 @@ from beyond_mocap.annotation import KeyMoment, Span, Timeline
 from beyond_mocap.base.errors import line_spans
 from beyond_mocap.evaluation import touch_figures, touches
 from beyond_mocap.evaluation.html import build_touch_section
-from beyond_mocap.evaluation.reference import View, load_reference
+from beyond_mocap.evaluation.reference.reference_cache import load_reference
 from beyond_mocap.evaluation.report import evaluate, flatten_report
 from beyond_mocap.evaluation.touch_view import TouchView
 from beyond_mocap.evaluation.touches import LegCourse
+from beyond_mocap.evaluation.view import View
 from beyond_mocap.motion import quaternion
 from beyond_mocap.motion.humanoid import measure_leg_length
 from beyond_mocap.motion.motion import Motion

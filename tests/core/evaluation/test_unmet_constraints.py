@@ -7,7 +7,7 @@ import pytest
 
 from beyond_mocap.annotation import KeyMoment, Span, Timeline
 from beyond_mocap.evaluation.report import evaluate
-from beyond_mocap.library.synthetic_clips import SYNTHETIC_FOLDER
+from beyond_mocap.library.clip import SYNTHETIC_FOLDER
 from beyond_mocap.motion.track import Track
 from beyond_mocap.synthesis.quality.playback import playback_from_take
 from beyond_mocap.synthesis.quality.unmet_constraints import format_stretches, report_jolts, report_unmet_constraints

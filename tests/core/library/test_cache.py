@@ -1,5 +1,6 @@
 """What is kept of a library: the same bits back, never anything old, damaged or foreign, and no harm from others."""
 
+import errno
 import gc
 import os
 import shutil
@@ -14,7 +15,7 @@ import pytest
 
 from beyond_mocap.base.errors import InputError
 from beyond_mocap.files import motion_file
-from beyond_mocap.library import cache
+from beyond_mocap.library import build, cache, synthetic_clips
 from beyond_mocap.library import library as library_module
 from beyond_mocap.library.build import build_library
 from beyond_mocap.library.library import Library
@@ -80,7 +81,7 @@ def test_from_the_cache_come_the_same_bits(clips_folder, library):
 
 def test_the_stance_of_all_recordings_is_measured_once(folder, monkeypatch):
     first = build_library(folder).neutral_stance
-    monkeypatch.setattr(library_module, "sample_upright_example", None)
+    monkeypatch.setattr(synthetic_clips, "sample_upright_example", None)
     again = build_library(folder).neutral_stance
     assert all(np.array_equal(getattr(first, name), getattr(again, name)) for name in library_module._STANCE_NUMBERS)
 
@@ -361,6 +362,18 @@ def test_a_full_disk_is_told_in_one_line_and_leaves_no_half_of_a_cache(folder, m
         build_library(folder, rebuild=True)
     gc.collect()
     assert ignored == []
+    assert {path.name for path in (folder / CACHE_FOLDER).iterdir()} == before
+
+
+def test_another_fault_in_the_middle_of_a_build_is_not_told_as_a_full_disk(folder, monkeypatch):
+    def fail(place, clips):
+        raise OSError(errno.EIO, os.strerror(errno.EIO), str(place / "walk_1.bvh"))
+
+    monkeypatch.setattr(build, "write_synthetic_clips", fail)
+    before = {path.name for path in (folder / CACHE_FOLDER).iterdir()}
+    with pytest.raises(InputError, match="walk_1.bvh: failed .* .Input/output error.") as told:
+        build_library(folder, rebuild=True)
+    assert "space" not in str(told.value)
     assert {path.name for path in (folder / CACHE_FOLDER).iterdir()} == before
 
 

@@ -5,9 +5,16 @@ import pytest
 
 from beyond_mocap.files.bvh import bvh
 from beyond_mocap.library.build import build_library
+from beyond_mocap.library.clip import (
+    BACK_PREFIX,
+    SIDE_PREFIX,
+    STEP_PREFIX,
+    STILL_PREFIX,
+    SYNTHETIC_FOLDER,
+    TURN_PREFIX,
+    WALK_PREFIX,
+)
 from beyond_mocap.library.coverage import BACK_SPEEDS, MIN_MOVES, MOVES, SIDE_WALKS
-from beyond_mocap.library.missing_steps import BACK_PREFIX, SIDE_PREFIX, STEP_PREFIX, TURN_PREFIX
-from beyond_mocap.library.synthetic_clips import STILL_PREFIX, SYNTHETIC_FOLDER, WALK_PREFIX
 from beyond_mocap.motion.retargeting.neutral import build_neutral_stance
 from beyond_mocap.motion.retargeting.posture import to_motion
 from beyond_mocap.synthetic.gait import build_gait

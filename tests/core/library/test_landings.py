@@ -7,10 +7,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from beyond_mocap.evaluation.reference import load_reference
+from beyond_mocap.evaluation.reference.reference_cache import load_reference
 from beyond_mocap.files.bvh import bvh
 from beyond_mocap.library.build import build_library
-from beyond_mocap.library.landings import LANDING_FOLDER
+from beyond_mocap.library.clip import LANDING_FOLDER
 from beyond_mocap.synthesis.plan import Plan
 from beyond_mocap.synthesis.resynthesize import resynthesize
 from beyond_mocap.synthesis.synthesize import synthesize

@@ -11,10 +11,10 @@ import pytest
 from beyond_mocap.annotation import KeyMoment, Timeline
 from beyond_mocap.files.bvh import bvh
 from beyond_mocap.library.build import build_library
+from beyond_mocap.library.clip import BLEND_PREFIX, KICK_PREFIX, SYNTHETIC_FOLDER
 from beyond_mocap.library.coverage import MAX_SPEED, find_speed_gaps
 from beyond_mocap.library.keys import Key, select_substitutes
 from beyond_mocap.library.missing_actions import describe_action
-from beyond_mocap.library.synthetic_clips import BLEND_PREFIX, KICK_PREFIX, SYNTHETIC_FOLDER
 from beyond_mocap.motion.humanoid import identify_joints
 from beyond_mocap.motion.motion import forward_kinematics
 from beyond_mocap.motion.track import Track

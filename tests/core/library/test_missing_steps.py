@@ -7,8 +7,9 @@ import pytest
 from beyond_mocap.files.bvh import bvh
 from beyond_mocap.library import coverage
 from beyond_mocap.library.build import build_library
-from beyond_mocap.library.missing_steps import BACK_PREFIX, SIDE_PREFIX, STEP_PREFIX, TURN_PREFIX, iter_missing_steps
-from beyond_mocap.library.synthetic_clips import SYNTHETIC_FOLDER, sample_upright_example
+from beyond_mocap.library.clip import BACK_PREFIX, SIDE_PREFIX, STEP_PREFIX, SYNTHETIC_FOLDER, TURN_PREFIX
+from beyond_mocap.library.missing_steps import iter_missing_steps
+from beyond_mocap.library.synthetic_clips import sample_upright_example
 from beyond_mocap.motion.humanoid import compute_heading_from_positions, identify_joints
 from beyond_mocap.motion.motion import forward_kinematics
 from beyond_mocap.motion.track import Track

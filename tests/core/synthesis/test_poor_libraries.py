@@ -5,8 +5,7 @@ import pytest
 
 from beyond_mocap.files.bvh import bvh
 from beyond_mocap.library.build import build_library
-from beyond_mocap.library.missing_steps import TURN_PREFIX
-from beyond_mocap.library.synthetic_clips import SYNTHETIC_FOLDER
+from beyond_mocap.library.clip import SYNTHETIC_FOLDER, TURN_PREFIX
 from beyond_mocap.motion import quaternion
 from beyond_mocap.motion.humanoid import identify_joints
 from beyond_mocap.motion.motion import Motion, compute_local_rotations, forward_kinematics

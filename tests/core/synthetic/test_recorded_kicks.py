@@ -74,7 +74,7 @@ def test_without_a_recorded_kick_there_is_none():
 
 
 def test_a_synthetic_clip_is_no_recording(clips):
-    from beyond_mocap.library.synthetic_clips import SYNTHETIC_FOLDER
+    from beyond_mocap.library.clip import SYNTHETIC_FOLDER
 
     made = [replace(clips[1], path=f"{SYNTHETIC_FOLDER}kick.bvh")]
     swing = choose_swing(made, collect_keys(made), NEUTRAL, "top")
