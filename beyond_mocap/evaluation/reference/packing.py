@@ -38,11 +38,11 @@ def pack_values(kind: Any, values: Sequence, name: str) -> dict[str, np.ndarray]
 def restore_values(kind: Any, arrays: dict[str, np.ndarray], name: str) -> list:
     """Restore what `pack_values` packed; KeyError or ValueError for arrays of another form."""
     if kind is np.ndarray:
-        return _cut(arrays[name], arrays[f"{name}.{_COUNT}"])
+        return _cut_parts(arrays[name], arrays[f"{name}.{_COUNT}"])
     if kind in (float, int):
         return arrays[name].tolist()
     if (item := _find_item(kind)) is not None:
-        rows = _cut(restore_values(item, arrays, f"{name}.item"), arrays[f"{name}.{_COUNT}"])
+        rows = _cut_parts(restore_values(item, arrays, f"{name}.item"), arrays[f"{name}.{_COUNT}"])
         return [tuple(row) if get_origin(kind) is tuple else row[0] if row else None for row in rows]
     hints = get_type_hints(kind)
     columns = (restore_values(part, arrays, f"{name}.{field}") for field, part in hints.items())
@@ -54,7 +54,7 @@ def _find_item(kind: Any) -> Any:
     return get_args(kind)[0] if get_origin(kind) is tuple or type(None) in get_args(kind) else None
 
 
-def _cut(values, counts: np.ndarray) -> list:
+def _cut_parts(values, counts: np.ndarray) -> list:
     """Cut a list or an array into parts of these lengths; ValueError where it has another length."""
     ends = np.cumsum(counts).tolist()
     if len(values) != (ends[-1] if ends else 0):
