@@ -48,9 +48,9 @@ SECTIONS = {  # name -> heading, (subheading, module, function) of each part
                             ("Pitches against the radar", "markers_real", "radar_table"))),
     "playback": ("Playback in Blender", (("", "playback", "section"),)),
     "scale": ("Large libraries and long tracks", (("", "scale", "section"),)),
-    "throws": ("Throws and kicks", (("", "throws", "section"),)),
+    "throws": ("Throws and kicks", (("", "throws", "section"), ("The thrower's body", "pitching", "body_table"))),
 }  # fmt: skip
-WITHOUT_DATA = ("methods", "experiments", "live")
+WITHOUT_DATA = ("methods", "experiments", "live", "throws")
 """Sections that measure on the shipped sample too; the others need the recordings."""
 LIMIT = 900.0
 """Seconds of clock time that a section may take."""

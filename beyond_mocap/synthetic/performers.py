@@ -1,8 +1,8 @@
 """Synthetic performers who throw or kick: each has a body, a fastest throw or kick and a manner of their own.
 
-They perform the same action alike, but never twice the same: harder throws have a larger wind-up (longer stride, more
-turn of pelvis and chest, arm turned out further), and everything has some random variation. So what a network learns
-from one performer, and what it has to predict for another, is ground truth.
+They perform the same action alike, but never twice the same: harder throws have a larger wind-up (longer stride, leg
+lifted higher, deeper hips, more turn of pelvis and chest, arm turned out further), and everything has some random
+variation. So what a network learns from one performer, and what it has to predict for another, is ground truth.
 """
 
 from __future__ import annotations
@@ -280,9 +280,13 @@ def build_performer_throw(
         InputError: as for `throws.build_throw`.
     """
     manner = vary_manner(thrower.manner, _THROW_SCATTER, chance)
-    effort = float(np.clip((speed - _LEAST_THROW) / (thrower.fastest - _LEAST_THROW), 0.0, 1.0))
-    style = style_throw(STYLES["overarm"], manner, effort)
+    style = style_throw(STYLES["overarm"], manner, compute_effort(thrower, speed))
     return build_throw(target, speed, thrower.side, style=style, skeleton=thrower.skeleton, fps=fps)
+
+
+def compute_effort(thrower: Performer, speed: float) -> float:
+    """Compute the effort (0 to 1) of a performer's throw of a ball at `speed` m/s."""
+    return float(np.clip((speed - _LEAST_THROW) / (thrower.fastest - _LEAST_THROW), 0.0, 1.0))
 
 
 def style_throw(base: ThrowStyle, manner: ThrowManner, effort: float = 1.0) -> ThrowStyle:
@@ -296,18 +300,18 @@ def style_throw(base: ThrowStyle, manner: ThrowManner, effort: float = 1.0) -> T
         The style.
     """
     turn, out = 0.62 + 0.38 * effort, 0.78 + 0.22 * effort
-    stride = manner.stride * (0.62 + 0.38 * effort)
-    raised = manner.lift * (0.25 + 0.75 * effort)
-    lean = manner.lean * (0.55 + 0.45 * effort)
-    spine = [(t, side - manner.slot * _weight_near_zero(t), lean * tilt, turn * about) for t, side, tilt,
+    stride, aside = manner.stride * (0.62 + 0.38 * effort), 0.5 + 0.5 * effort
+    raised = manner.lift * (0.4 + 0.6 * effort)
+    lean = manner.lean * (0.75 + 0.25 * effort)
+    spine = [(t, lean * side - manner.slot * _weight_near_zero(t), lean * tilt, turn * about) for t, side, tilt,
              about in base.spine]
     style = ThrowStyle(
-        pelvis=scale_rows(base.pelvis, 1.0, lean, turn), spine=tuple(spine),
+        pelvis=scale_rows(base.pelvis, lean, lean, turn), spine=tuple(spine),
         right_arm=tuple((t, a, b, c if c > -60.0 else -60.0 + out * (c + 60.0), e) for t, a, b, c, e in base.right_arm),
         left_arm=scale_rows(base.left_arm, manner.off_arm, manner.off_arm, 1.0, 1.0), forearm=base.forearm,
-        hips=scale_rows(base.hips, stride, 0.4 + 0.6 * stride),
-        left_foot=scale_rows(base.left_foot, stride, 1.0, raised, raised, turn),
-        right_foot=scale_rows(base.right_foot, stride, 1.0, 1.0, 1.0, turn),
+        hips=scale_rows(base.hips, stride, aside, stride * (0.35 + 0.65 * effort)),
+        left_foot=scale_rows(base.left_foot, stride, aside, raised, raised, turn),
+        right_foot=scale_rows(base.right_foot, stride, aside, aside, 1.0, turn),
     )
     brisk = replace(manner, wind_up=manner.wind_up * (0.6 + 0.4 * effort), follow=manner.follow * (0.7 + 0.3 * effort))
     return ThrowStyle(*(_scale_times(getattr(style, field.name), brisk) for field in fields(style)))

@@ -26,7 +26,7 @@ from beyond_mocap.throws.join_throw import (
     trim_waiting,
 )
 from beyond_mocap.throws.leave_path import find_stopping_position, is_in_reach, leave_path
-from beyond_mocap.throws.run_up import OWN_LABEL, add_throw_clip, construct_run_up
+from beyond_mocap.throws.run_up import EDGE, OWN_LABEL, add_throw_clip, construct_run_up
 
 LIBRARY = pathlib.Path(__file__).resolve().parents[3] / "sample_blend" / "library"
 FPS, AT = 30.0, 6.0
@@ -96,7 +96,8 @@ def test_a_body_that_walks_across_turns_to_the_throw_before_it(library):
     across = np.stack([np.zeros_like(TIMES), 1.2 * (TIMES - AT)], axis=1)
     way = construct_run_up(library, replace(plan, track=Track(TIMES, across, None)), motion, release, AT)
     heading = np.unwrap(compute_heading(way.motion))
-    assert np.ptp(heading) > 1.0 and np.abs(np.diff(heading)).max() * FPS < 10.0
+    own = np.abs(np.diff(np.unwrap(compute_heading(motion)))).max()
+    assert np.ptp(heading) > 1.0 and np.abs(np.diff(heading)).max() < 1.05 * own  # the throw's own turn is the fastest
     joined = join_throw(way.motion, way.start, motion, release, at=AT)
     assert np.all(measure_transition_jerk(joined) <= measure_library_jerk(library, FPS))
 
@@ -198,9 +199,9 @@ def test_what_cannot_be_joined(library, made):
 
 def test_out_of_a_walk_and_back_by_the_library(library, made):
     walk = build_gait(1.4, 14.0, FPS)
-    motion = released_over(made, walk.root_positions[210, :2])
-    way = leave_path(library, walk, 0.0, motion, made.release, at=7.0)
-    joined = join_throw(way.motion, way.start, motion, made.release, at=7.0)
+    motion, release = trim_waiting(released_over(made, walk.root_positions[210, :2]), made.release, EDGE)
+    way = leave_path(library, walk, 0.0, motion, release, at=7.0)
+    joined = join_throw(way.motion, way.start, motion, release, at=7.0)
     assert same_where_kept(joined, motion) and len(joined.motion) == len(walk)
     for part in (slice(0, 4), slice(-4, None)):
         assert np.array_equal(joined.motion.rotations[part], walk.rotations[part])

@@ -120,7 +120,7 @@ def test_within_a_longer_motion_the_ball_flies_as_it_did(model):
 
 @pytest.mark.parametrize("order, says", [
     (ThrowRequest((320.0, 0.0, 1.0)), "the human limit for a throw"),
-    (ThrowRequest((60.0, 0.0, 1.0)), "fastest example"),
+    (ThrowRequest((90.0, 0.0, 1.0)), "fastest example"),
     (ThrowRequest((12.0, 0.0, 1.0), speed=60.0), "at most 45 m/s"),
     (ThrowRequest((12.0, 0.0, 1.0), speed=5.0), "to reach the target"),
     (ThrowRequest((12.0, 0.0, 1.0), limb="right_foot"), "trained for throws"),

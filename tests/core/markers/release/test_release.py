@@ -107,8 +107,8 @@ def hide_all(places, ball, release):
 
 
 def bounce_off(places, ball, release):
-    steps = np.arange(len(places) - release - 30)[:, None]
-    places[release + 30 :, ball] = places[release + 29, ball] - steps * [0.05, 0.0, 0.0]
+    steps = np.arange(len(places) - release - 40)[:, None]
+    places[release + 40 :, ball] = places[release + 39, ball] - steps * [0.05, 0.0, 0.0]
 
 
 def scatter(places, ball, release):
@@ -138,7 +138,7 @@ def test_a_marker_that_is_on_no_ball_in_the_hand(known, settings, said):
 
 
 def test_a_marker_that_only_is_called_a_ball_is_left_aside(known):
-    swapped = known.trial.rename_labels({"BALL": "X1", "LASI": "BALL"})
+    swapped = known.trial.rename_labels({"BALL": "X1", "LANK": "BALL"})
     found = estimate_release(swapped, known.motion)
     assert found.method == "hand" and found.side == "right" and "from the" in found.notes[0]
 
