@@ -112,7 +112,7 @@ def bounce_off(places, ball, release):
 
 
 def scatter(places, ball, release):
-    rng = np.random.default_rng(1)
+    rng = np.random.default_rng(2)
     places[rng.integers(0, len(places), 60), ball] += rng.normal(0.0, 0.3, (60, 3))
 
 
