@@ -111,14 +111,17 @@ def bounce_off(places, ball, release):
     places[release + 40 :, ball] = places[release + 39, ball] - steps * [0.05, 0.0, 0.0]
 
 
-def scatter(places, ball, release):
-    rng = np.random.default_rng(2)
-    places[rng.integers(0, len(places), 60), ball] += rng.normal(0.0, 0.3, (60, 3))
+def scatter(seed):
+    def change(places, ball, release):
+        rng = np.random.default_rng(seed)
+        places[rng.integers(0, len(places), 60), ball] += rng.normal(0.0, 0.3, (60, 3))
+
+    return change
 
 
 @pytest.mark.parametrize("change, how, frames, share", [
-    (hide_held, "ball", 1.0, 0.02), (bounce_off, "ball", 1.0, 0.02), (scatter, "ball", 2.0, 0.02),
-    (hide_all, "hand", 4.0, 0.1),
+    (hide_held, "ball", 1.0, 0.02), (bounce_off, "ball", 1.0, 0.02), (hide_all, "hand", 4.0, 0.1),
+    *((scatter(seed), "ball", 3.0, 0.03) for seed in range(6)),
 ])
 def test_a_ball_that_is_badly_seen(known, change, how, frames, share):
     found = estimate_release(seen_as(known, change), known.motion)
