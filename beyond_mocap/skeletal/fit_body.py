@@ -125,9 +125,9 @@ class _BodyFit:
     def bend_leg(self, side: str, joints_of: Limb) -> None:
         """Bend a leg so that its ankle is where it is seen, and lay its foot along the toes."""
         pelvis = self.turns[self.body.hips]
-        hinge, thigh, shank = self._bend(f"{side}_knee", f"{side}_ankle", pelvis, 1.0,
-                                         (joints_of.upper_leg, joints_of.lower_leg, joints_of.foot),
-                                         self.places[:, joints_of.upper_leg])
+        chain = (joints_of.upper_leg, joints_of.lower_leg, joints_of.foot)
+        hinge, thigh, shank = self._bend((f"{side}_knee", f"{side}_ankle"), chain, self.places[:, chain[0]],
+                                         quaternion.rotate(pelvis, _FORWARD))
         self.turns[joints_of.upper_leg] = limb.build_bone_frame(thigh, hinge)
         self.turns[joints_of.lower_leg] = limb.build_bone_frame(shank, hinge)
         if f"{side}_toe" in self.joints and joints_of.toe is not None:
@@ -142,8 +142,9 @@ class _BodyFit:
             return
         chest = self.turns[self.body.chest]
         top = self._raise_shoulder(side, joints_of, chest)
-        hinge, upper, lower = self._bend(f"{side}_elbow", f"{side}_wrist", chest, -1.0,
-                                         (joints_of.upper_arm, joints_of.lower_arm, joints_of.hand), top)
+        chain = (joints_of.upper_arm, joints_of.lower_arm, joints_of.hand)
+        hinge, upper, lower = self._bend((f"{side}_elbow", f"{side}_wrist"), chain, top,
+                                         -quaternion.rotate(chest, _FORWARD))
         self.turns[joints_of.upper_arm] = limb.build_bone_frame(upper, -hinge)
         self.turns[joints_of.lower_arm] = limb.build_bone_frame(lower, -hinge)
 
@@ -160,17 +161,19 @@ class _BodyFit:
         self.turns[joints_of.shoulder] = quaternion.multiply(turn, chest)
         return base + quaternion.rotate(turn, own)
 
-    def _bend(self, middle: str, end: str, trunk: np.ndarray, ahead: float, chain: tuple[int, int, int],
-              top: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Solve a limb that begins at `top` (T, 3); return its hinge and unit directions of both bones, (T, 3) each."""
-        rest = self.neutral.positions
+    def _bend(self, names: tuple[str, str], chain: tuple[int, int, int], top: np.ndarray,
+              usual: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Solve a limb that begins at `top` (T, 3), so that its middle and end joint are where those names are seen; a
+        straight one bends towards `usual` (T, 3). Return its hinge and unit directions of both bones, (T, 3) each.
+        """
+        rest, (middle, end) = self.neutral.positions, (self.joints[name] for name in names)
         upper, lower = (np.linalg.norm(rest[last] - rest[first]) for first, last in zip(chain, chain[1:]))
-        seen = self.joints[middle] - top
-        line = unit_vectors(self.joints[end] - top, -_UP)
+        seen = middle - top
+        line = unit_vectors(end - top, -_UP)
         pole = seen - np.sum(seen * line, axis=1, keepdims=True) * line
-        pole = pole + _USUAL_BEND * ahead * quaternion.rotate(trunk, _FORWARD)
-        bent, reached, hinge = limb.solve_limb_bend(top, self.joints[end], np.array(upper), lower=np.array(lower),
-                                                    pole=pole, soft=_SOFT)
+        pole = pole + _USUAL_BEND * usual
+        bent, reached, hinge = limb.solve_limb_bend(top, end, np.array(upper), lower=np.array(lower), pole=pole,
+                                                    soft=_SOFT)
         return hinge, unit_vectors(bent - top, -_UP), unit_vectors(reached - bent, -_UP)
 
     def _measure_across(self, part: str) -> np.ndarray:
