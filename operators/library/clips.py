@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import bpy
 import numpy as np
 from bpy.props import BoolProperty, EnumProperty, FloatProperty, StringProperty
 
 from ...beyond_mocap.base.errors import InputError, UserCancelledError, format_count
-from ...beyond_mocap.files.bvh.bvh import BvhClip
 from ...beyond_mocap.files.clip_file import CLIP_ENDINGS, read_clip
 from ...beyond_mocap.library.scan import FOREIGN, find_recordings, is_foreign
 from ...beyond_mocap.motion import humanoid, quaternion
@@ -20,6 +20,9 @@ from ...scene.core import action, channels, frame_range, window
 from ...scene.library import assets, clips, foreign, recordings
 from ...scene.rigs import armature, exporters
 from ..operator_base import BackgroundOperator, BaseOperator, ImportOperator
+
+if TYPE_CHECKING:
+    from ...beyond_mocap.files.bvh.bvh import BvhClip
 
 
 class BEYOND_MOCAP_OT_import_clips(ImportOperator, bpy.types.Operator):

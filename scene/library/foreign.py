@@ -127,7 +127,7 @@ class ConversionQueue:
 def _write_ball(file: Path, take: ImportedTake) -> None:
     """Write the ball of a take beside its conversion, or remove that of an earlier one."""
     from ...beyond_mocap.files.tables import write_ball
-    from ...beyond_mocap.library.recorded_ball.body_ball import ENDING
+    from ...beyond_mocap.library.recorded_ball.ball_table import ENDING
     from ...beyond_mocap.motion.track.ball_path import BallPath
 
     table = file.with_suffix(ENDING)

@@ -17,6 +17,8 @@ from xml.parsers import expat
 from ...base.errors import InputError
 from ...base.optional_packages import import_optional
 
+MAX_PLAYERS = 60
+"""Two squads of 26 and the referees have fewer; more are two matches in one file."""
 _HEAD_BYTES = 8192  # bytes that identify a format
 _LINE_SUFFIXES = {".dat", ".csv", ".txt", ".jsonl"}  # suffixes of files that are read line by line
 

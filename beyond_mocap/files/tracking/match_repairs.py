@@ -18,7 +18,7 @@ import numpy as np
 from ...base.errors import InputError, format_count
 from ...base.time_series import find_runs
 from ...motion.track import MAX_SPEED, is_ball_sentinel
-from .feed import Feed
+from .feed import MAX_PLAYERS, Feed
 
 _MAX_OUTSIDE = 12.0  # m beyond the lines, where no player is
 _MAX_BALL_OUTSIDE = 25.0  # m beyond the lines, where feeds park an absent ball
@@ -32,8 +32,6 @@ _SIDES = ("left", "right")
 _WRONG_SIDE = 5.0  # m by which left players must be to the right of right players
 _MIN_PLAYERS = 6  # players in both halves at least
 
-MAX_PLAYERS = 60
-"""Two squads of 26 and the referees have fewer; more are two matches in one file."""
 
 _MAX_UNKNOWN_SHARE = 0.3  # share of players missing in the metadata above which it is of another match
 _COMPARED_ROWS = 200  # rows of two teams' files whose balls are compared

@@ -11,14 +11,14 @@ import os
 import re
 from functools import partial
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from ...base.errors import InputError, build_read_error, format_count
-from .feed import Feed, Files, TrackingProvider, find_provider, load_with_kloppy, read_head
-from .formats.cdf import read_cdf
-from .formats.gps import GPS_PATTERNS, find_gps_files, read_gps
-from .formats.respovision import read_respovision
-from .formats.soccernet import read_soccernet
+from .feed import MAX_PLAYERS, Feed, Files, TrackingProvider, find_provider, load_with_kloppy, read_head
 from .referees import read_signality_referees, read_sportec_referees, read_tracab_referees
+
+if TYPE_CHECKING:
+    from .formats.samples import MatchSamples
 
 _META_NAMES = ("{}_meta.xml", "{}_meta.json", "{}_metadata.xml", "{}_metadata.json", "{}.xml", "{}.json")
 
@@ -164,6 +164,58 @@ def _find_secondspectrum(path: Path, meta: Path, notes: list[str]) -> Files:
     return (path,), (meta, names)
 
 
+# Readers are imported where a feed is read: a panel that lists the providers needs none.
+
+
+def _read_cdf(feed: Feed, _pitch: tuple[float, float] | None) -> MatchSamples:
+    from .formats.cdf import read_cdf
+
+    return read_cdf(feed)
+
+
+def _read_respovision(feed: Feed, pitch: tuple[float, float] | None) -> MatchSamples:
+    from .formats.respovision import read_respovision
+
+    return read_respovision(feed, pitch)
+
+
+def _read_soccernet(feed: Feed, _pitch: tuple[float, float] | None) -> MatchSamples:
+    from .formats.soccernet import read_soccernet
+
+    return read_soccernet(feed)
+
+
+def _read_gps(feed: Feed, pitch: tuple[float, float] | None) -> MatchSamples:
+    from .formats.gps import read_gps
+
+    return read_gps(feed, pitch)
+
+
+def _find_gps(path: Path, meta: Path | None, notes: list[str]) -> Files:
+    """Find the files of all players and of the pitch's corners beside a receiver's file."""
+    beside = sorted(one for one in path.parent.glob(f"*{path.suffix}") if one != path and _is_gps_file(one))
+    corners = meta or next((one for one in sorted(path.parent.glob("*.csv")) if "corners" in one.name.lower()), None)
+    players = [one for one in beside if one != corners][: MAX_PLAYERS - 1]
+    if players:
+        notes.append(f"{format_count(len(players) + 1, 'file')} of {path.parent.name or path.parent} are used, "
+                     "a player each")
+    return (path, *players), (corners,) if corners else ()
+
+
+_GPS_PATTERNS = (
+    rb"(?i)[^\n]{0,400}\blat(itude)?\b[^\n]{0,80}\b(lon|long|lng|longitude)\b",
+    rb"(?i)[^\n]{0,400}\b(lon|long|lng|longitude)\b[^\n]{0,80}\blat(itude)?\b",
+    rb"(?is)\s*(<\?xml[^>]*>\s*)?(<!--.{0,2000}?-->\s*)*<gpx\b",
+)  # fmt: skip
+
+
+def _is_gps_file(path: Path) -> bool:
+    """Return whether a file has positions of a receiver with times."""
+    head = read_head(path)
+    return any(re.match(form, head) for form in _GPS_PATTERNS) and (
+        b"<trkpt" in head or "corners" not in path.name.lower() and path.suffix.lower() != ".gpx")
+
+
 def _find_alone(path: Path, meta: Path | None, notes: list[str]) -> Files:
     """Find the files of a feed that is one file."""
     return (path,), (meta,) if meta else ()
@@ -265,20 +317,20 @@ PROVIDERS: dict[str, TrackingProvider] = {record.name: record for record in (
         name="cdf", title="Common Data Format", files="`tracking.jsonl` with its metadata",
         patterns=(rb'(?s)\s*\{\s*"frame_id"(?!.{0,2000}"landmarks").{0,600}"teams"\s*:\s*\{\s*"(home|away)"',),
         renamed=(("tracking.jsonl", "meta.json"), ("tracking.jsonl", "metadata.json")),
-        read_samples=lambda feed, pitch: read_cdf(feed),
+        read_samples=_read_cdf,
     ),
     TrackingProvider(
         name="respovision", title="ReSpo.Vision", files="`.jsonl`", needs_metadata=False, has_pitch_size=False,
-        patterns=(rb'(?s)\s*\{.{0,300}"pitch_side"\s*:',), find_files=_find_alone, read_samples=read_respovision,
+        patterns=(rb'(?s)\s*\{.{0,300}"pitch_side"\s*:',), find_files=_find_alone, read_samples=_read_respovision,
     ),
     TrackingProvider(
         name="soccernet", title="SoccerNet Game State", files="`Labels-GameState.json`, or predictions of its form",
         patterns=(rb'(?s)\s*\{.{0,4000}"bbox_pitch"', rb'(?s)\s*\{\s*"info"\s*:.{0,4000}"(im_dir|im_ext|seq_length)"'),
-        needs_metadata=False, find_files=_find_alone, read_samples=lambda feed, pitch: read_soccernet(feed),
+        needs_metadata=False, find_files=_find_alone, read_samples=_read_soccernet,
     ),
     TrackingProvider(
         name="gps", title="GPS", files="CSV with latitude, longitude and time (Catapult, STATSports) or GPX, a file "
         "for each player; the pitch's corners in `..corners.csv`",
-        patterns=GPS_PATTERNS, needs_metadata=False, find_files=find_gps_files, read_samples=read_gps,
+        patterns=_GPS_PATTERNS, needs_metadata=False, find_files=_find_gps, read_samples=_read_gps,
     ),
 )}  # fmt: skip

@@ -139,13 +139,13 @@ def test_a_lost_labels_file_is_chosen(places, tmp_path):
 
 def test_labels_named_otherwise_are_offered_and_not_guessed(places, tmp_path):
     shutil.copy(places.match / "player1.csv", tmp_path / "heldout1_track.csv")
-    (tmp_path / "heldout1_annotations.txt").write_text("0.5 1.5 walking\n2.4 kick right\n")
+    (tmp_path / "heldout1_labels.txt").write_text("0.5 1.5 walking\n2.4 kick right\n")
     bpy.ops.beyond_mocap.import_tracking(directory=str(tmp_path), files=[{"name": "heldout1_track.csv"}])
     player, row = bpy.context.scene.beyond_mocap.players[0], list_notices()[-1]
     assert player.annotation_file == "" and not row.is_error
-    assert [fix.name for fix in row.fixes] == ["Use heldout1_annotations.txt", "Choose Labels File"]
+    assert [fix.name for fix in row.fixes] == ["Use heldout1_labels.txt", "Choose Labels File"]
     apply_fix("use_labels")
-    assert Path(player.annotation_file).name == "heldout1_annotations.txt" and list_notices() == []
+    assert Path(player.annotation_file).name == "heldout1_labels.txt" and list_notices() == []
     assert player.dot.animation_data.nla_tracks["Words"].strips
 
 

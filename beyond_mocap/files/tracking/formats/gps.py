@@ -17,7 +17,7 @@ import numpy as np
 from ....base.content import open_file
 from ....base.errors import InputError, format_count
 from ...tables import parse_number, read_rows
-from ..feed import Feed, read_head
+from ..feed import Feed
 from .cdf import parse_time
 from .samples import MatchSamples, SampleCollector
 
@@ -33,7 +33,6 @@ _EXCEL_DAYS = (20_000.0, 80_000.0)  # 1954 to 2119
 _EPOCH = (1e9, 1e11)  # seconds since 1970, 2001 to 5138; thousand times as much in milliseconds
 _PITCH_RANGE = (10.0, 400.0)  # metres of a pitch's side
 _FARTHEST = 500.0  # metres from the players to the middle of their pitch
-_MOST_PLAYERS = 60
 _RATE_RANGE = (0.5, 100.0)
 
 
@@ -74,31 +73,6 @@ def read_gps(feed: Feed, pitch: tuple[float, float] | None) -> MatchSamples:
         found.add_person(receiver.name, "home", receiver.name)
         _add_samples(found, receiver, to_pitch(receiver.degrees), begin, step)
     return found.build(pitch or size, fps=1.0 / step)
-
-
-def find_gps_files(path: Path, meta: Path | None, notes: list[str]):
-    """Find the files of all players and of the pitch's corners beside a receiver's file."""
-    beside = sorted(one for one in path.parent.glob(f"*{path.suffix}") if one != path and is_gps_file(one))
-    corners = meta or next((one for one in sorted(path.parent.glob("*.csv")) if "corners" in one.name.lower()), None)
-    players = [one for one in beside if one != corners][: _MOST_PLAYERS - 1]
-    if players:
-        notes.append(f"{format_count(len(players) + 1, 'file')} of {path.parent.name or path.parent} are used, "
-                     "a player each")
-    return (path, *players), (corners,) if corners else ()
-
-
-GPS_PATTERNS = (
-    rb"(?i)[^\n]{0,400}\blat(itude)?\b[^\n]{0,80}\b(lon|long|lng|longitude)\b",
-    rb"(?i)[^\n]{0,400}\b(lon|long|lng|longitude)\b[^\n]{0,80}\blat(itude)?\b",
-    rb"(?is)\s*(<\?xml[^>]*>\s*)?(<!--.{0,2000}?-->\s*)*<gpx\b",
-)  # fmt: skip
-
-
-def is_gps_file(path: Path) -> bool:
-    """Return whether a file has positions of a receiver with times."""
-    head = read_head(path)
-    return any(re.match(form, head) for form in GPS_PATTERNS) and (
-        b"<trkpt" in head or "corners" not in path.name.lower() and path.suffix.lower() != ".gpx")
 
 
 def _read_receiver(path: Path) -> _Receiver:

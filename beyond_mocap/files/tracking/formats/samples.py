@@ -15,8 +15,8 @@ import numpy as np
 from ....base.content import open_file
 from ....base.errors import InputError, format_count
 from ....motion.track.match_data import REFEREE
+from ..feed import MAX_PLAYERS
 from ..match_arrays import PERIOD_BREAK
-from ..match_repairs import MAX_PLAYERS
 
 _MOST_SAMPLES = 20_000_000
 _KEEPER = "goalkeeper"
