@@ -53,12 +53,24 @@ a CSV is read as its labels"""
         words = {find_track_labels(path) for path in chosen if path.suffix.lower() == ".csv"}
         return [str(path) for path in chosen if path not in words]
 
+    def read_files(self, provider):
+        """Read all files, as path, players and notes; one that an earlier one has brought with it is left out, as the
+        receivers of a squad do.
+        """
+        known = set()
+        for path in self.list_paths():
+            found, notes = tracks.list_players(path, self.metadata, provider)
+            people = Path(path).parent, frozenset(player.feed_id or path for player in found)
+            if people not in known:
+                known.add(people)
+                yield path, found, notes
+
     def do(self, context):
         """Read all files, then add the players."""
         self.offers = []
         settings = context.scene.beyond_mocap
         provider = "" if self.provider == "AUTO" else self.provider
-        read = [(path, *tracks.list_players(path, self.metadata, provider)) for path in self.list_paths()]
+        read = list(self.read_files(provider))
         if not settings.players:
             self.set_clock(settings, [player for _, found, _ in read for player in found])
         for path, found, notes in read:

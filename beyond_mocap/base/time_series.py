@@ -56,6 +56,8 @@ def compute_running_maximum(values: np.ndarray, before: int, after: int) -> np.n
     Returns:
         (T,), the same unit and type.
     """
+    if not len(values):
+        return values
     largest, span, width = np.pad(values, (before, after), mode="edge"), 1, before + after + 1
     while 2 * span <= width:  # largest[i] is that of the frames i to i + span - 1
         largest, span = np.maximum(largest[:-span], largest[span:]), 2 * span

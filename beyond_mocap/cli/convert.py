@@ -121,6 +121,11 @@ def _read_input(options):
     from ..files.smpl.smpl import read_smpl
 
     if options.input.suffix.lower() == ".npz":
+        if options.unit is not None:
+            raise InputError("--unit", f"set for {options.input}, which is in metres", "a BVH file", "leave it out")
+        if options.stature is not None and options.body_model is not None:
+            raise InputError("--stature", "set beside --body-model, which has the person's size", "one of them",
+                             "leave one out")
         return read_smpl(options.input, options.stature, options.body_model)
     for name in ("stature", "body_model"):
         if getattr(options, name) is not None:
@@ -139,6 +144,8 @@ def _read_target(options, motion):
 
     if not _is_to_smpl(options):
         return read_clip(options.to, options.to_unit)
+    if options.to_unit is not None:
+        raise InputError("--to-unit", "set for SMPL, which is in metres", "a BVH file", "leave it out")
     with locate_errors(options.input):
         return BvhClip(build_smpl_pose(estimate_stature(motion.skeleton)), BvhForm(), ())
 

@@ -173,7 +173,10 @@ def _reconstruct_folder(options, reporter: ProgressReporter) -> None:
             throws += select_throw(recording.name, partial(read, recording.path), result.reconstruction)
         reporter.finish()
         print(rows[-1]["line"])
-    _write_pooled_balls(throws, settings, options)
+    try:
+        _write_pooled_balls(throws, settings, options, reporter)
+    except InputError as error:  # a throw that cannot be read again; each has its own release
+        reporter.show_note(f"the ball's place in the hand is each throw's own: {error}")
     _write_overview(rows, options, reporter)
     if not any(row["bvh"] for row in rows):
         raise InputError(options.trial, "no trial could be reconstructed", "at least one", rows[0]["line"])
@@ -215,13 +218,14 @@ def _write_result(result, options) -> dict:
                                *notes])}  # fmt: skip
 
 
-def _write_pooled_balls(throws, settings, options) -> None:
+def _write_pooled_balls(throws, settings, options, reporter: ProgressReporter) -> None:
     """Write reports and models again with the ball's place in the hand that all throws of a hand have together."""
     from ..files.tables import write_report
     from ..markers.files.model_json import write_model
     from ..markers.pooled_balls import pool_balls
 
     for throw, model, release in pool_balls(throws, settings):
+        reporter.check_cancelled()
         place = options.out / f"{throw.name}.report.json"
         report = json.loads(place.read_text("utf-8"))
         write_report(place, {**report, "release": release.report()})

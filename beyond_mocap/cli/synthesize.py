@@ -149,7 +149,8 @@ def _choose_window(options, track) -> float:
     if window is None:
         window = WINDOW if can_be_cut and seconds > LONG_TRACK else 0.0
     if not window:
-        next_step = "use --window" if can_be_cut else "use a shorter track"
+        next_step = ("use --window" if can_be_cut else "leave out --recorded-ball" if options.recorded_ball
+                     else "use a shorter track")
         check_memory(options.track, _BASE_BYTES + _FRAME_BYTES * seconds * options.fps, next_step)
     return window
 

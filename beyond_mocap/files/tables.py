@@ -48,7 +48,7 @@ def write_ball(path: str | os.PathLike, ball: BallPath) -> None:
 
 
 def read_ball(path: str | os.PathLike) -> BallPath:
-    """Read a table that `write_ball` wrote.
+    """Read a table that `write_ball` wrote; without the column `measured` all is measured.
 
     Args:
         path: the file.
@@ -57,9 +57,11 @@ def read_ball(path: str | os.PathLike) -> BallPath:
     Raises:
         InputError: with the line, if a row is invalid.
     """
-    rows = list(read_rows(path, BALL_COLUMNS))
+    rows = list(read_rows(path, BALL_COLUMNS[:4]))
     positions = np.column_stack([parse_column(rows, name, blank=True) for name in BALL_COLUMNS[1:4]])
-    times, measured = parse_column(rows, "time_s"), parse_flags(rows, "measured")
+    times = parse_column(rows, "time_s")
+    has_flags = bool(rows) and "measured" in rows[0][1]
+    measured = parse_flags(rows, "measured") if has_flags else np.ones(len(rows), dtype=bool)
     return BallPath(freeze_array(times), freeze_array(positions), freeze_array(measured, bool))
 
 

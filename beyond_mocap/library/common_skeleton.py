@@ -13,8 +13,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..base.errors import InputError, format_count
-from ..files.bvh import bvh
 from ..files.bvh.bvh_write import JointAboveHips
+from ..files.clip_file import read_clip
 from ..motion import contacts
 from ..motion.humanoid import identify_joints
 from ..motion.motion import Motion
@@ -83,9 +83,10 @@ def read_joints_above_hips(library: "Library", skeleton: Path | None, unit: floa
     """
     folder = Path(library.folder)
     conversions = Conversions(folder, library.cache_location[0] if library.cache_location else folder)
-    for path in [skeleton] if skeleton else [folder / clip.path for clip in library.clips if not clip.mirrored]:
+    own = [folder / clip.path for clip in library.clips if not clip.mirrored and not clip.is_synthetic]
+    for path in [skeleton] if skeleton else own:
         file = conversions.find_readable_file(path)
-        clip = bvh.read_bvh(file, unit if file == path else None)
+        clip = read_clip(file, unit if file == path else None)
         if clip.motion.skeleton.has_same_bones(library.skeleton, BONE_TOLERANCE):
             return clip.form.above
     raise InputError(folder, "no recording with the library's skeleton", "one", "build the library again")

@@ -12,7 +12,7 @@ from ..synthesis.quality.movement import list_foot_joints, list_stances, measure
 from .pose.residuals import measure_residuals
 
 # Above these, standing toes are reported: cm/s, and mm in a stance, from which on people notice that feet slide.
-_VISIBLE_TOE_SPEED, _VISIBLE_TRAVEL = 15.0, 21.0
+_VISIBLE_TOE_SPEED, _VISIBLE_TRAVEL = 15.0, 25.0
 
 
 def collect_figures(reconstruction) -> dict:

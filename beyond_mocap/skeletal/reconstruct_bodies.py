@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..base.errors import UserCancelledError, format_count
+from ..base.errors import InputError, UserCancelledError, format_count
 from ..files.joints.joint_feed import JointFeed, PlayerJoints
 from ..files.joints.landmarks import LANDMARKS
 from ..library.repair import plant_contacts
@@ -54,23 +54,25 @@ def reconstruct_bodies(feed: JointFeed, progress: Callable[[float, str], None] |
     Returns:
         The bodies, a stretch without long gaps each, and notes on what was repaired or left out.
     Raises:
+        InputError: if a person's times span too many frames.
         UserCancelledError: if the user stops the job.
     """
-    people, notes = _repair_feed(feed)
+    begin, people, notes = _repair_feed(feed)
     bodies: list[Body] = []
     for number, (person, (first, positions)) in enumerate(zip(feed.people, people)):
         if cancelled is not None and cancelled():
             raise UserCancelledError("bodies: cancelled")
         if progress is not None:
             progress(number / len(people), f"Fitting {person.id}")
-        found, lines = _reconstruct_person(person, first, positions, feed.fps)
+        found, lines = _reconstruct_person(person, begin + first / feed.fps, positions, feed.fps)
         bodies += found
         notes += lines
     return bodies, notes
 
 
-def _repair_feed(feed: JointFeed) -> tuple[list[tuple[int, np.ndarray]], list[str]]:
-    """Return for each person the first frame on the feed's clock and positions (T, LANDMARKS, 3), repaired; and notes.
+def _repair_feed(feed: JointFeed) -> tuple[float, list[tuple[int, np.ndarray]], list[str]]:
+    """Return the feed's first second, for each person the first frame from there on and repaired positions
+    (T, LANDMARKS, 3), and notes.
     """
     begin = min(person.times[0] for person in feed.people)
     grids = [_lay_on_clock(person, begin, feed.fps) for person in feed.people]
@@ -87,19 +89,22 @@ def _repair_feed(feed: JointFeed) -> tuple[list[tuple[int, np.ndarray]], list[st
         if exchanged:
             notes.append(f"{person.id}: left and right exchanged in {format_count(exchanged, 'frame')}")
         out.append((first, positions))
-    return out, notes
+    return begin, out, notes
 
 
 def _lay_on_clock(person: PlayerJoints, begin: float, fps: float) -> tuple[int, np.ndarray]:
     """Lay a person's samples on the feed's frames; return the first of them and positions (T, LANDMARKS, 3)."""
     frames = np.round((person.times - begin) * fps).astype(int)
-    positions = np.full((min(frames[-1] - frames[0] + 1, _MOST_FRAMES), len(LANDMARKS), 3), np.nan)
-    inside = frames - frames[0] < len(positions)
-    positions[frames[inside] - frames[0]] = spread_landmarks(person.landmarks, person.positions[inside])
+    count = int(frames[-1] - frames[0] + 1)
+    if count > _MOST_FRAMES:
+        raise InputError(f"joints of {person.id}", f"{count:,} frames", f"{_MOST_FRAMES:,} at most",
+                         "divide the file, or check its times")
+    positions = np.full((count, len(LANDMARKS), 3), np.nan)
+    positions[frames - frames[0]] = spread_landmarks(person.landmarks, person.positions)
     return int(frames[0]), positions
 
 
-def _reconstruct_person(person: PlayerJoints, first: int, positions: np.ndarray,
+def _reconstruct_person(person: PlayerJoints, first: float, positions: np.ndarray,
                         fps: float) -> tuple[list[Body], list[str]]:
     """Reconstruct the stretches of one person, and tell which were left out."""
     shown = np.flatnonzero(np.isfinite(positions).all(axis=2).sum(axis=1) >= len(NEEDED) // 2)
@@ -107,7 +112,7 @@ def _reconstruct_person(person: PlayerJoints, first: int, positions: np.ndarray,
     for start, end in find_stretches(shown / fps, fps):
         begin, stop = int(shown[start]), int(shown[end - 1]) + 1
         part = positions[begin:stop]
-        seconds = (first + begin) / fps
+        seconds = first + begin / fps
         missing = [name for name in NEEDED if _measure_share(part, LANDMARKS.index(name)) < _MIN_SHARE]
         if missing or len(part) < SHORTEST * fps:
             why = f"{missing[0].replace('_', ' ')} is hardly seen" if missing else f"only {len(part) / fps:.2f} s"

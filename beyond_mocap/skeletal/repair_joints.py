@@ -18,7 +18,7 @@ def repair_sides(landmarks: tuple[str, ...], positions: np.ndarray) -> tuple[np.
     nose.
 
     Args:
-        landmarks: L names.
+        landmarks: L names, each side's with the other side's.
         positions: (T, L, 3) metres, NaN where not seen.
     Returns:
         (T, L, 3), and the number of frames in which sides were exchanged.
@@ -43,13 +43,9 @@ def repair_sides(landmarks: tuple[str, ...], positions: np.ndarray) -> tuple[np.
 
 
 def _list_mirrored(landmarks: tuple[str, ...]) -> list[int]:
-    """List for each landmark the index of the one on the other side; its own where that is not delivered."""
-    def swap(name: str) -> str:
-        return "right" + name[4:] if name.startswith("left") else "left" + name[5:] if name.startswith(
-            "right") else name
-
-    return [landmarks.index(swap(name)) if swap(name) in landmarks else number
-            for number, name in enumerate(landmarks)]
+    """List for each of LANDMARKS the index of the one on the other side."""
+    other = {"left": "right", "right": "left"}
+    return [landmarks.index("_".join(other.get(word, word) for word in name.split("_"))) for name in landmarks]
 
 
 def _measure_across(landmarks: tuple[str, ...], positions: np.ndarray) -> np.ndarray:

@@ -240,10 +240,11 @@ def _is_label_file(name: str) -> bool:
 
 def _iter_files(folder: str):
     """Iterate over the paths of all recordings and label files below a folder; links are followed, each folder once."""
-    from ...beyond_mocap.files.clip_file import CLIP_ENDINGS
+    from ...beyond_mocap.files.clip_file import CLIP_ENDINGS, is_clip_file
+    from ...beyond_mocap.library.recorded_ball.ball_table import ENDING
     from ...beyond_mocap.library.scan import CACHE_FOLDER, FOREIGN, TABLE_NAME
 
-    wanted, seen = (*CLIP_ENDINGS, ".txt", TABLE_NAME, *FOREIGN), set()
+    wanted, seen = (*CLIP_ENDINGS, ".txt", TABLE_NAME, ENDING, *FOREIGN), set()
     for here, folders, files in os.walk(folder, followlinks=True):
         try:
             status = os.stat(here)
@@ -254,7 +255,8 @@ def _iter_files(folder: str):
             continue
         seen.add((status.st_dev, status.st_ino))
         folders[:] = [name for name in folders if name != CACHE_FOLDER]
-        yield from (os.path.join(here, name) for name in files if name.lower().endswith(wanted))
+        paths = (os.path.join(here, name) for name in files if name.lower().endswith(wanted))
+        yield from (path for path in paths if is_clip_file(Path(path)))
 
 
 def _after_load() -> None:

@@ -116,11 +116,14 @@ def compute_library_stamp(folder: str) -> str:
     """Compute a fingerprint of the clips and labels of a folder: number, size and time of the files, without reading
     them.
     """
-    found = []
+    from ...beyond_mocap.files.clip_file import CLIP_ENDINGS
+    from ...beyond_mocap.library.scan import FOREIGN
+
+    found, watched = [], (*CLIP_ENDINGS, *FOREIGN, ".txt", ".csv")
     for place, folders, names in os.walk(folder, followlinks=True):
         folders[:] = sorted(name for name in folders if not name.startswith("."))
         for name in sorted(names):
-            if name.lower().endswith((".bvh", ".txt", ".csv", ".fbx", ".glb", ".gltf")):
+            if name.lower().endswith(watched):
                 try:
                     status = os.stat(os.path.join(place, name))
                 except OSError:

@@ -26,7 +26,7 @@ KILLS_IN_A_ROW = 4
 _CLIPS = ("walking_1_2", "jogging_2_9", "standing_1", "kick_low_inside", "running_4_2")
 _MATCH = ("--from", "0", "--to", "2", "--workers", "2", "--players", "home_10", "--no-figures")
 # a compiled step takes a minute and is no part of what is tested: it is small, and kept for the runs that follow
-_NETWORK = {"units": 8, "rollout": 1, "examples": 4, "ridge": 0.01}
+_NETWORK = {"units": 8, "rollout": 1, "examples": 4, "ridge": 0.01, "early_stopping": False, "linear_start": False}
 _COMPILER = {"XLA_FLAGS": "--xla_backend_optimization_level=0", "JAX_PERSISTENT_CACHE_MIN_COMPILE_TIME_SECS": "0"}
 _TIMED = ("match.json", "report.json", "report.html", "lock", "checkpoint.npz")  # files with times of the run
 

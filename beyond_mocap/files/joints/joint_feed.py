@@ -79,7 +79,8 @@ class JointCollector:
         if len(place) == 3 and all(isinstance(value, (int, float)) and math.isfinite(value) for value in place):
             points.extend((seconds, LANDMARKS.index(landmark), *place))
         if len(points) > 5 * _MOST_POINTS:
-            raise InputError(self._path, f"more than {_MOST_POINTS:,} points", "a part of a match", "divide the file")
+            raise InputError(self._path, f"more than {_MOST_POINTS:,} points", "a part of a match",
+                             "divide the file, or move later ones out of its folder")
 
     def set_team(self, person: str, team: str) -> None:
         """Set a person's team: "home", "away" or ""."""

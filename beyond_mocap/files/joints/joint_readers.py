@@ -126,7 +126,8 @@ def _read_table(path: Path) -> JointFeed:
     columns = ("time_s", "player", "joint", "x", "y", "z")
     for place, row in read_rows(path, columns, others=_CSV_NAMES, separators=",;\t"):
         seconds = parse_number(row["time_s"], "time_s", place)
-        found.set_team(row["player"], row.get("team", "") if row.get("team", "") in ("home", "away") else "")
+        team = row.get("team", "").lower()
+        found.set_team(row["player"], team if team in ("home", "away") else "")
         _add(found, row["player"], round(seconds, 4), row["joint"],
              [parse_number(row[axis], axis, place, blank=True) for axis in "xyz"])
     return found.build()

@@ -13,7 +13,7 @@ the front of a foot of which no single toe is seen."""
 _SIDES = {"l": "left", "left": "left", "r": "right", "right": "right"}
 _PARTS = {
     "bigtoe": "big_toe", "1sttoe": "big_toe", "smalltoe": "small_toe", "5thtoe": "small_toe", "toe": "foot",
-    "calc": "heel", "calcaneus": "heel", "1stfinger": "index", "5thfinger": "pinky", "hand": "wrist",
+    "calc": "heel", "calcaneus": "heel", "1stfinger": "index", "5thfinger": "pinky",
     "midhip": "pelvis", "hips": "pelvis", "root": "pelvis",
 }  # fmt: skip
 _WORD = re.compile(r"[0-9]+[a-z]+|[A-Z]?[a-z]+|[A-Z]+(?![a-z])|[0-9]+[A-Z]+")

@@ -28,7 +28,7 @@ from ..bvh.bvh_write import BvhForm
 from ..plain_npz import list_arrays, read_named_arrays
 from .smpl_skeleton import (
     JOINTS,
-    ORIGIN_ABOVE_PELVIS,
+    PELVIS_AT_REST,
     STATURE_RANGE,
     TO_CORE,
     build_smpl_skeleton,
@@ -53,6 +53,7 @@ _PARTS = (
     ("global_orient", "body_pose", "transl"),
 )  # fmt: skip
 _MOST_FAULTS = 3
+_SHORTEST = 1.0  # seconds of steps that tell a stature
 _USUAL_STATURE = 1.70  # metres, where neither the user nor the steps tell it
 _LEAP = 2.5
 """m/s by which the pelvis' velocity may differ from those one frame before and after: no leg changes it so (1.2 at most
@@ -117,7 +118,7 @@ def write_smpl(path, motion: Motion) -> tuple[str, ...]:
     poses = np.zeros((len(motion), 24, 3))
     poses[:, : len(JOINTS)] = quaternion.to_rotation_vector(local)
     with atomic_path(Path(path)) as temporary, open(temporary, "wb") as file:
-        np.savez(file, poses=poses.reshape(len(motion), -1), trans=motion.root_positions + (0, 0, ORIGIN_ABOVE_PELVIS),
+        np.savez(file, poses=poses.reshape(len(motion), -1), trans=motion.root_positions - PELVIS_AT_REST,
                  betas=np.zeros(10), gender=np.array("neutral"), mocap_framerate=np.array(motion.fps))
     return ("the hands of SMPL are straight, its betas 0: bones of other lengths are not part of this form",)
 
@@ -200,12 +201,12 @@ def _choose_bones(unit: Motion, arrays: Mapping[str, np.ndarray], stature: float
     if body_model is not None:
         skeleton, pelvis = read_model_skeleton(Path(body_model), betas)
         return skeleton, pelvis, f"bones of {Path(body_model).name}"
-    found = stature or estimate_smpl_stature(unit)
+    found = stature or (estimate_smpl_stature(unit) if unit.duration >= _SHORTEST else 0.0)
     if stature is not None and not STATURE_RANGE[0] <= stature <= STATURE_RANGE[1]:
         raise InputError("stature", f"{stature:g} m", f"{STATURE_RANGE[0]:g} to {STATURE_RANGE[1]:g} m")
-    why = "as given" if stature else "as the steps fit" if found else "assumed, the feet hardly move"
+    why = "as given" if stature else "as the steps fit" if found else "assumed, there are too few steps to tell"
     shaped = "; its betas need the body model" if np.any(np.abs(betas) > 1e-6) else ""
-    return (build_smpl_skeleton(found or _USUAL_STATURE), np.zeros(3),
+    return (build_smpl_skeleton(found or _USUAL_STATURE), TO_CORE @ PELVIS_AT_REST,
             f"mean proportions, {found or _USUAL_STATURE:.2f} m tall {why}{shaped}")
 
 

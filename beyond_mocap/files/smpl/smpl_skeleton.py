@@ -26,8 +26,11 @@ JOINTS = (
 )  # fmt: skip
 """The 22 joints that SMPL, SMPL-H and SMPL-X share, in their order."""
 PARENTS = (-1, 0, 0, 0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 9, 9, 12, 13, 14, 16, 17, 18, 19)
-ORIGIN_ABOVE_PELVIS = 0.22
-"""Metres from the pelvis up to the model's origin, whose place `trans` is; known to a centimetre without the model."""
+PELVIS_AT_REST = np.array([0.0, -0.22, 0.03])
+"""Metres from the model's origin, whose place `trans` is, to the pelvis, in the file's axes: no rotation moves it.
+Known to a centimetre without the model."""
+LEG_RANGE = (0.4, 1.3)
+"""Metres, thigh and shank of a body model."""
 MAX_MODEL_BYTES = 1 << 30
 STATURE_RANGE = (1.0, 2.4)
 """Metres; children of school age to the tallest adults."""
@@ -147,6 +150,11 @@ def read_model_skeleton(path: Path, betas: np.ndarray) -> tuple[Skeleton, np.nda
     count = min(len(betas), shapes.shape[2])
     places = regressor @ (mean + shapes[:, :, :count] @ betas[:count])
     places = places[: len(JOINTS)] @ TO_CORE.T
+    leg = sum(float(np.linalg.norm(places[JOINTS.index(f"left_{one}")] - places[JOINTS.index(f"left_{other}")]))
+              for one, other in (("hip", "knee"), ("knee", "ankle")))
+    if not LEG_RANGE[0] <= leg <= LEG_RANGE[1]:
+        raise InputError(path, f"legs of {leg:.3g} m", f"{LEG_RANGE[0]:g} to {LEG_RANGE[1]:g} m",
+                         "choose a body model in metres")
     offsets = places - places[np.maximum(PARENTS, 0)]
     stature = float(np.ptp(mean[:, 1]))
     plain = build_smpl_skeleton(stature)

@@ -195,7 +195,10 @@ def _find_gps(path: Path, meta: Path | None, notes: list[str]) -> Files:
     """Find the files of all players and of the pitch's corners beside a receiver's file."""
     beside = sorted(one for one in path.parent.glob(f"*{path.suffix}") if one != path and _is_gps_file(one))
     corners = meta or next((one for one in sorted(path.parent.glob("*.csv")) if "corners" in one.name.lower()), None)
-    players = [one for one in beside if one != corners][: MAX_PLAYERS - 1]
+    players = [one for one in beside if one != corners]
+    if len(players) >= MAX_PLAYERS:
+        raise InputError(path.parent, f"{len(players) + 1} files of players", f"at most {MAX_PLAYERS} of one match",
+                         "move the others away")
     if players:
         notes.append(f"{format_count(len(players) + 1, 'file')} of {path.parent.name or path.parent} are used, "
                      "a player each")

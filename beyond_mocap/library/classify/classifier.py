@@ -38,7 +38,6 @@ _MIN_LEAD = 0.01  # seconds: shorter leads are within the accuracy of annotation
 _STRIKE_SEARCH = 0.12  # seconds around a candidate in which its strike is searched
 
 _FILE_VERSION = 1
-"""The file's name beside a library's cache."""
 
 _MAX_BYTES = 256 * 1024 * 1024
 _NEXT_STEP = "learn from annotated clips again"

@@ -7,7 +7,7 @@ import pytest
 
 from beyond_mocap.base.errors import InputError
 from beyond_mocap.files.smpl.smpl import is_smpl_file, read_smpl, write_smpl
-from beyond_mocap.files.smpl.smpl_skeleton import JOINTS, TO_CORE, build_smpl_skeleton
+from beyond_mocap.files.smpl.smpl_skeleton import JOINTS, PELVIS_AT_REST, TO_CORE, build_smpl_skeleton
 from beyond_mocap.motion import quaternion
 from beyond_mocap.motion.humanoid import identify_joints
 from beyond_mocap.motion.motion import Motion, forward_kinematics
@@ -75,6 +75,7 @@ def test_there_and_back(walk, stored):
     assert np.ptp(moved[..., :2]) < 1e-3 and np.ptp(moved[..., 2]) < 1e-3  # but for the ground's height
     with np.load(stored) as file:
         assert file["poses"].shape == (len(walk), 72)
+        assert file["trans"] + PELVIS_AT_REST == pytest.approx(walk.root_positions)  # z is up, the pelvis turns not
 
 
 def test_feet_are_on_the_ground_and_the_body_is_known(stored):
@@ -106,7 +107,8 @@ def test_y_up_and_parts_of_gvhmr(walk, stored):
     prefix = "net_outputs_pred_smpl_params_global_"
     plain = read_smpl(stored)
     save(stored, poses=None, trans=None, mocap_framerate=None, **{
-        f"{prefix}global_orient": quaternion.to_rotation_vector(root)[None], f"{prefix}transl": (trans @ turn.T)[None],
+        f"{prefix}global_orient": quaternion.to_rotation_vector(root)[None],
+        f"{prefix}transl": ((trans + PELVIS_AT_REST) @ turn.T - PELVIS_AT_REST)[None],
         f"{prefix}body_pose": poses[:, 1:22].reshape(1, len(walk), 63)})
     clip = read_smpl(stored)
     assert "y up" in clip.notes[0] and "no frame rate" in clip.notes[1] and clip.motion.fps == 30.0
@@ -126,6 +128,15 @@ def test_true_bones_come_from_a_body_model(walk, stored, tmp_path):
     assert "need the body model" in read_smpl(stored).notes[0]
     with pytest.raises(InputError, match="v_template"):
         read_smpl(stored, body_model=stored)
+    np.savez(tmp_path / "nothing.npz", v_template=mean, J_regressor=np.zeros((22, 22)), shapedirs=np.zeros((22, 3, 1)))
+    with pytest.raises(InputError, match="legs of 0 m"):
+        read_smpl(stored, body_model=tmp_path / "nothing.npz")
+
+
+def test_a_glimpse_tells_no_stature(stored):
+    with np.load(stored) as file:
+        short = {name: file[name][:20] for name in ("poses", "trans")}
+    assert "1.70 m tall assumed" in read_smpl(save(stored, **short)).notes[0]
 
 
 def test_faults_are_told(stored):

@@ -22,9 +22,10 @@ def add_noise(joints, metres, seed=1):
     return joints + np.random.default_rng(seed).normal(0.0, metres / np.sqrt(3.0), joints.shape)
 
 
-def build_feed(people, fps):
-    return JointFeed(tuple(PlayerJoints(id=str(number), team="", landmarks=NAMES, times=np.arange(len(joints)) / fps,
-                                        positions=joints) for number, joints in enumerate(people)), fps, ())
+def build_feed(people, fps, begin=0.0):
+    return JointFeed(tuple(PlayerJoints(id=str(number), team="", landmarks=NAMES, positions=joints,
+                                        times=begin + np.arange(len(joints)) / fps)
+                           for number, joints in enumerate(people)), fps, ())
 
 
 def measure_error(body, truth, frames=slice(None)):
@@ -109,9 +110,9 @@ def test_a_person_who_leaves_is_two_stretches_and_a_glimpse_none():
     joints = sample_joints()
     seen = joints.copy()
     seen[60:130] = np.nan
-    bodies, notes = reconstruct_bodies(build_feed([seen, joints[:10]], 50.0))
-    assert [(body.id, body.start, len(body.motion)) for body in bodies][0] == ("0", 0.0, 60)
-    assert bodies[1].start == pytest.approx(2.6) and "1: from 0.00 s left out, only 0.20 s" in notes
+    bodies, notes = reconstruct_bodies(build_feed([seen, joints[:10]], 50.0, begin=100.0))
+    assert [(body.id, body.start, len(body.motion)) for body in bodies][0] == ("0", 100.0, 60)
+    assert bodies[1].start == pytest.approx(102.6) and "1: from 100.00 s left out, only 0.20 s" in notes
 
 
 def test_half_the_joints_are_told(tmp_path, capsys):

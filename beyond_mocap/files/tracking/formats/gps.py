@@ -58,11 +58,15 @@ def read_gps(feed: Feed, pitch: tuple[float, float] | None) -> MatchSamples:
     """
     chosen = _read_receiver(feed.path)
     others, left_out = [], []
+    found = SampleCollector(feed.path)
     for path in feed.tracking[1:]:
-        other = _read_receiver(path)
+        try:
+            other = _read_receiver(path)
+        except InputError as error:  # another player's file
+            found.lines.append(f"left out: {error}")
+            continue
         (others if _overlap(chosen, other) else left_out).append(other)
     receivers = [chosen, *others]
-    found = SampleCollector(feed.path)
     if left_out:
         found.lines.append(f"{format_count(len(left_out), 'file')} of other times left out: "
                            f"{', '.join(one.name for one in left_out[:5])}")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import re
 
 from ....base.errors import InputError
@@ -61,7 +62,7 @@ def _find_moment(frame: dict, place: str) -> tuple[int, float]:
         passed = 60.0 * int(minutes) + float(seconds)
     except ValueError:
         passed = None
-    if period is None or passed is None:
+    if period is None or passed is None or not math.isfinite(passed):
         raise InputError(place, f"period {str(frame.get('period'))[:20]!r}, time {str(frame.get('time'))[:20]!r}",
                          "half_1 or half_2, and MM:SS.f", "export it again")
     return int(period[2]) + 2 * (period[1] == "extra"), round(passed, 3)

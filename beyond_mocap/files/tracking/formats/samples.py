@@ -69,6 +69,8 @@ class SampleCollector:
     def add_person(self, key: str, team: str, name: str = "", number: object = None, position: str = "") -> None:
         """Add a person who may have samples; team is "home", "away", or anything else for a referee."""
         ground = team if team in ("home", "away") else REFEREE
+        if isinstance(number, str) and number.isdigit() and len(number) < 4:
+            number = int(number)
         shirt = int(number) if isinstance(number, (int, float)) and math.isfinite(number) else -1
         self.people.setdefault(key, (key, ground, name or key, str(shirt),
                                      _KEEPER if "keeper" in position.lower() else position))
