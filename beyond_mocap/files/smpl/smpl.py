@@ -20,6 +20,7 @@ import numpy as np
 from ...base.errors import InputError, format_count
 from ...motion import quaternion
 from ...motion.contacts import measure_floor_height
+from ...motion.humanoid import estimate_stature
 from ...motion.motion import Motion
 from ...motion.skeleton import Skeleton
 from ..atomic import atomic_path
@@ -31,6 +32,7 @@ from .smpl_skeleton import (
     PELVIS_AT_REST,
     STATURE_RANGE,
     TO_CORE,
+    TOE_HEIGHT,
     build_smpl_skeleton,
     estimate_smpl_stature,
     read_model_skeleton,
@@ -78,7 +80,7 @@ def read_smpl(path, stature: float | None = None, body_model: Path | None = None
         stature: of the person, metres; None finds the one that the steps fit.
         body_model: the .npz of the model, for the true bones of this person's `betas`; None takes mean proportions.
     Returns:
-        The clip: 22 joints, the toe joints of standing feet at height 0, and what was assumed, left out or found.
+        The clip: 22 joints, the soles of standing feet at height 0, and what was assumed, left out or found.
     Raises:
         InputError: if it is not such a file.
     """
@@ -92,7 +94,7 @@ def read_smpl(path, stature: float | None = None, body_model: Path | None = None
     skeleton, pelvis, origin = _choose_bones(Motion(build_smpl_skeleton(1.0), root, local, fps), arrays, stature,
                                            body_model)
     motion = Motion(skeleton, root + to_world @ TO_CORE.T @ pelvis, local, fps)
-    floor = measure_floor_height(motion)
+    floor = measure_floor_height(motion) - TOE_HEIGHT * estimate_stature(skeleton)
     motion = replace(motion, root_positions=motion.root_positions - (0.0, 0.0, floor))
     first = f"{form}, {up} up, {fps:g} frames per second, {len(motion)} frames; {origin}"
     return BvhClip(motion, BvhForm(), (first, *notes, *_list_left_out(form, arrays), *_list_faults(path.name, motion)))

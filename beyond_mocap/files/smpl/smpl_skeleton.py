@@ -42,6 +42,10 @@ _ADULT_JOINTS = {
 _SHANK_LEAN = np.radians(6.0)
 """How far the shank leans back in the rest pose. The straightest knees of SMPL motions are rotated by -5 to -6 degrees
 (1st percentile of 18 estimated from video); no knee bends that far backwards, so the rest pose is bent by that."""
+_PELVIS_HEIGHT = 0.033
+"""Share of the stature by which SMPL's pelvis lies higher above the hips than the adult's: some 9 cm in all."""
+TOE_HEIGHT = 0.009
+"""Share of the stature from the sole up to the toe joint of the adult (the ankle's .039 less .030)."""
 _STANCE_SHARE = 0.35  # of all foot joints and frames: the slowest, which stand, where both feet do for half of a walk
 _ROUNDS = 20
 # core axes (forward, left, up) of SMPL's (left, up, forward)
@@ -58,6 +62,8 @@ def build_smpl_skeleton(stature: float) -> Skeleton:
     """
     adult = build_adult_skeleton(stature)
     offsets = np.array([adult.offsets[adult.index(_name_adult_joint(joint))] for joint in JOINTS])
+    for joint in ("left_hip", "right_hip", "spine1"):
+        offsets[JOINTS.index(joint), 2] -= _PELVIS_HEIGHT * stature
     tips = adult.end_offsets.copy()
     for number, joint in enumerate(JOINTS):
         if joint.endswith(("elbow", "wrist")):
