@@ -325,9 +325,9 @@ def two_clouds():
     a_cloud("static.trc")
 
 
-def a_body_of_markers():
+def a_body_of_markers(name="walk.trc"):
     """The same, reconstructed."""
-    a_cloud()
+    a_cloud(name)
     bpy.ops.beyond_mocap.reconstruct_markers()
 
 
@@ -438,7 +438,7 @@ ROWS = {
     ),
     "export_words": Row("imported", lambda places: {"filepath": f"{places.out}/out.txt"}, changes=False),
     "fix_foot": Row("synthesized", lambda places: {"time": 3.0, "offset": (0.05, 0.0)}),
-    "find_release": Row("imported", prepare=a_body_of_markers),
+    "find_release": Row("imported", prepare=lambda: a_body_of_markers("throw.trc")),
     "free_ball": Row("accepted", prepare=carry),
     "go_to_strike": Row("accepted", lambda places: {"frame": 7}, analyse),
     "go_to_moment": Row("imported", lambda places: {"strip": "Moments", "index": 0}),

@@ -55,7 +55,8 @@ def make_places(top):
 
 
 def write_synthetic_markers():
-    """walk.trc and static.trc below MARKERS: markers on a made walk of half a second, and on the same body standing."""
+    """walk.trc, static.trc and throw.trc below MARKERS: markers on a made walk of half a second, on the same body standing,
+    and around the release of a throw."""
     if (MARKERS / "static.trc").exists():
         return
     core = f"{EXTENSION}.beyond_mocap"
@@ -65,6 +66,11 @@ def write_synthetic_markers():
     )
     write = importlib.import_module(f"{core}.markers.files.trc").write_trc
     write(known.trial, MARKERS / "walk.trc")
+    made = importlib.import_module(f"{core}.synthetic.throws").build_throw((12.0, 0.0, 1.0), 20.0, fps=100.0)
+    thrown = importlib.import_module(f"{core}.synthetic.ground_truth.synthetic_markers").build_trial(
+        made.motion, "plug_in_gait", seed=3, occlusion=0.0, swaps=0, jumps=0, unlabeled=0)
+    release = int(100 * made.release)
+    write(thrown.trial.select_frames(release - 60, release + 30), MARKERS / "throw.trc")
     write(known.static.select_frames(0, 40), MARKERS / "static.trc")
 
 
