@@ -55,8 +55,8 @@ def make_places(top):
 
 
 def write_synthetic_markers():
-    """walk.trc, static.trc and throw.trc below MARKERS: markers on a made walk of half a second, on the same body standing,
-    and around the release of a throw."""
+    """walk.trc, static.trc and throw.trc below MARKERS: markers on a made walk of half a second, on the same body
+    standing, and around the release of a throw."""
     if (MARKERS / "static.trc").exists():
         return
     core = f"{EXTENSION}.beyond_mocap"
