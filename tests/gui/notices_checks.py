@@ -20,7 +20,7 @@ def list_notices():
     return list(bpy.context.window_manager.beyond_mocap_notices.rows)
 
 
-def open_track(labels, name="heldout1_annotations.txt"):
+def open_track(labels, name="heldout1_labels.txt"):
     """A track, and labels beside it under another name; the sample's library."""
     bpy.ops.wm.read_homefile(app_template="")
     yield 1.0
