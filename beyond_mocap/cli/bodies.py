@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 import argparse
-import re
 from collections.abc import Mapping
 
 from ..base.errors import InputError, format_count
 from ..base.settings.options import parse_path
 from ..files.atomic import atomic_folder, check_new_folder
-from ..files.file_names import avoid_reserved_name
+from ..files.file_names import choose_file_name
 from .outputs import ProgressReporter, Writer
 
 
@@ -53,7 +52,7 @@ def run_bodies(options, reporter: ProgressReporter, writers: Mapping[str, Writer
     used: set[str] = set()
     with atomic_folder(options.out) as folder:
         for body in bodies:
-            name = _find_free_name(body.id, used)
+            name = choose_file_name(body.id, used)
             write_bvh(folder / f"{name}.bvh", body.motion)
             rows.append({"file": f"{name}.bvh", "id": body.id, "team": body.team, "start_s": body.start,
                          **body.figures})
@@ -62,14 +61,3 @@ def run_bodies(options, reporter: ProgressReporter, writers: Mapping[str, Writer
     error = sum(row["joint_error_m"]["mean"] * row["frames"] for row in rows) / sum(row["frames"] for row in rows)
     print(f"{options.out}: {format_count(len(rows), 'body', 'bodies')}, joints {100 * error:.1f} cm from the seen ones "
           "on average")
-
-
-def _find_free_name(person: str, used: set[str]) -> str:
-    """Return a file name for a stretch of a person that no other has, and remember it."""
-    base = avoid_reserved_name(re.sub(r"[^\w.-]+", "_", person).strip("._")[:80] or "person")
-    name, number = base, 1
-    while name.lower() in used:
-        number += 1
-        name = f"{base}_{number}"
-    used.add(name.lower())
-    return name

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Iterable
 
+_MAX_NAME = 100  # characters of a file name
 _RESERVED = re.compile(r"(con|prn|aux|nul|com\d|lpt\d)(\.|$)", re.IGNORECASE)
 
 
@@ -16,3 +18,36 @@ def avoid_reserved_name(name: str) -> str:
         A name that every system can have.
     """
     return f"_{name}" if _RESERVED.match(name) else name
+
+
+def build_file_names(ids: Iterable[str]) -> dict[str, str]:
+    """Build the file name of each player from their id; see `choose_file_name`.
+
+    Args:
+        ids: of the players.
+    Returns:
+        Name by id.
+    """
+    used: set[str] = set()
+    return {player: choose_file_name(player, used) for player in ids}
+
+
+def choose_file_name(player: str, used: set[str]) -> str:
+    """Choose a file name for a player's id, and add it to those that are used, in lower case.
+
+    Characters other than letters, digits, dot, minus and underscore are replaced; no two names are equal, ignoring
+    case.
+
+    Args:
+        player: the id.
+        used: names that are taken.
+    Returns:
+        The name.
+    """
+    base = re.sub(r"[^\w.-]", "_", player, flags=re.ASCII).strip(".")[:_MAX_NAME] or "player"
+    base = avoid_reserved_name(base)
+    name, number = base, 2
+    while name.lower() in used:
+        name, number = f"{base}-{number}", number + 1
+    used.add(name.lower())
+    return name

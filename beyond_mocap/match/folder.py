@@ -22,7 +22,6 @@ from pathlib import Path
 from ..base.content import read_bytes
 from ..base.errors import InputError
 from ..files.atomic import atomic_write
-from ..files.file_names import avoid_reserved_name
 from ..files.tables import to_plain
 from .request import compute_digest
 
@@ -30,7 +29,6 @@ STATE = "match.json"
 LABELS_FOLDER = "annotations"
 VERSION = 1
 _WORK, _LOCK, _ORDER = ".work", "lock", "order"  # the last file has the request's digest, in case match.json is lost
-_MAX_NAME = 100  # characters of a file name
 _PART = re.compile(r"\..+\.\d+\.\d+\.part")  # temporary files of `files.atomic`
 _HEAD_BYTES, _DIGEST = 1000, re.compile(
     rb'"digest": *"([0-9a-f]+)"')  # first bytes of match.json, which contain its digest
@@ -196,30 +194,6 @@ def read_state(folder: str | os.PathLike) -> dict:
     if state["version"] != VERSION:
         raise InputError(path, f"version {state['version']}", f"{VERSION}", "run the match again with this version")
     return state
-
-
-def build_file_names(ids: Iterable[str]) -> dict[str, str]:
-    """Build the file name of each player from their id.
-
-    Characters other than letters, digits, dot, minus and underscore are replaced; no two names are equal, ignoring
-    case.
-
-    Args:
-        ids: of the players.
-    Returns:
-        Name by id.
-    """
-    out: dict[str, str] = {}
-    used: set[str] = set()
-    for player in ids:
-        base = re.sub(r"[^\w.-]", "_", player, flags=re.ASCII).strip(".")[:_MAX_NAME] or "player"
-        base = avoid_reserved_name(base)
-        name, number = base, 2
-        while name.lower() in used:
-            name, number = f"{base}-{number}", number + 1
-        used.add(name.lower())
-        out[player] = name
-    return out
 
 
 def check_folder(path: Path) -> None:

@@ -20,13 +20,14 @@ from ..base.errors import BeyondMocapError, InputError, UserCancelledError
 from ..files.atomic import atomic_write
 from ..files.event_data import MatchEvents
 from ..files.events import read_events
+from ..files.file_names import build_file_names
 from ..files.tables import write_ball
 from ..files.tracking.tracking import read_match
 from ..library.build import build_library
 from ..library.library import Library
 from ..motion.track.ball_path import BallPath
 from ..motion.track.match_data import Match
-from .folder import build_file_names, check_folder, open_folder, read_state
+from .folder import check_folder, open_folder, read_state
 from .goalkeeping.positions import fill_keepers
 from .labels import MatchLabels, label_match
 from .match_ball import apply_led_ball, build_ball_plan, sample_ball

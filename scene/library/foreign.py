@@ -16,7 +16,7 @@ import bpy
 import numpy as np
 
 from ...beyond_mocap.base.errors import InputError
-from ...beyond_mocap.files.bvh.bvh_write import build_form
+from ...beyond_mocap.files.bvh.bvh_write import STILL_ROTATION, build_form
 from ...beyond_mocap.motion import quaternion
 from ...beyond_mocap.motion.ball_names import choose_ball, is_ball_name
 from ...beyond_mocap.motion.humanoid import identify_joints
@@ -31,7 +31,6 @@ if TYPE_CHECKING:
     from ...beyond_mocap.files.bvh.bvh_write import BvhForm
 
 MIN_FPS, MAX_FPS = 24.0, 240.0  # limits of the frames per second at which keys are sampled
-_STILL = np.cos(np.radians(0.1) / 2)  # w of a rotation by a tenth of a degree
 _USD = (".usd", ".usda", ".usdc", ".usdz")
 
 
@@ -246,7 +245,7 @@ def _find_loose_actions(rig: bpy.types.Object, before: set[str]) -> list[tuple[b
 
 def _has_moving_joints(motion: Motion) -> bool:
     """Whether any joint turns: exporters also write each object's animation onto all others."""
-    return bool(np.abs(np.sum(motion.rotations * motion.rotations[:1], axis=-1)).min() < _STILL)
+    return bool(np.abs(np.sum(motion.rotations * motion.rotations[:1], axis=-1)).min() < STILL_ROTATION)
 
 
 def _sample_action(path: Path, scene: bpy.types.Scene, rig: bpy.types.Object, action, slot, *,

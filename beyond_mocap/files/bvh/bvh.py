@@ -30,9 +30,8 @@ from . import bvh_text
 from .bvh_ball import find_ball_joints, list_body_joints, read_ball_joint
 from .bvh_channels import BvhChannels, compute_rotations, from_file_axes
 from .bvh_text import POSITIONS, BvhText
-from .bvh_write import BvhForm, JointAboveHips, format_bvh, iter_parts_text, moves
+from .bvh_write import STILL_METRES, BvhForm, JointAboveHips, format_bvh, iter_parts_text, measure_spread, moves
 
-_STILL_METRES = 1e-3  # smaller motion counts as none
 _LARGEST_METRES = 1e6  # larger positions are in a wrong unit or damaged
 _NTSC = [rate * 1000 / 1001 for rate in (24, 30, 48, 60, 120, 240)]  # frames per second
 _HIP_HEIGHT = (0.75, 1.15)  # metres, adults standing
@@ -199,19 +198,14 @@ def _fold_root(channels: BvhChannels, hips: int) -> tuple[np.ndarray, np.ndarray
     return position, rotation, tuple(above)
 
 
-def _measure_spread(positions: np.ndarray) -> float:
-    """Measure the largest distance in metres of (T, 3) positions from their mean."""
-    return float(np.linalg.norm(positions - positions.mean(axis=0), axis=1).max())
-
-
 def _build_skeleton(channels: BvhChannels, body_joints: list[int]) -> tuple[Skeleton, dict[str, float]]:
     """Build the skeleton with mean offsets; also return the distance (m) by which joints leave them, above 1 mm."""
     text, offsets, drift = channels.text, [np.zeros(3)], {}
     for joint in body_joints[1:]:
         places = channels.compute_position(joint)
         offsets.append(places.mean(axis=0))
-        if _measure_spread(places) > _STILL_METRES:
-            drift[text.names[joint]] = _measure_spread(places)
+        if measure_spread(places) > STILL_METRES:
+            drift[text.names[joint]] = measure_spread(places)
     new_index = {old: i for i, old in enumerate(body_joints)}
     parents = [-1] + [new_index[text.parents[joint]] for joint in body_joints[1:]]
     ends = [(new_index[p], offset) for p, offset in zip(text.end_parents, text.end_offsets) if p in new_index]

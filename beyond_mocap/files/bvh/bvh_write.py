@@ -18,8 +18,10 @@ from ...motion.skeleton import Skeleton
 from .bvh_text import POSITIONS, ROTATIONS
 
 _CENTIMETRES = 100.0
-_STILL_METRES = 1e-3  # smaller motion counts as none
-_STILL_ROTATION = np.cos(np.radians(0.1) / 2)  # w of a rotation by a tenth of a degree
+STILL_METRES = 1e-3
+"""Metres of motion below which a joint counts as still."""
+STILL_ROTATION = np.cos(np.radians(0.1) / 2)
+"""The same for rotations: w of a tenth of a degree."""
 _ZXY = ("Zrotation", "Xrotation", "Yrotation")
 _SAME_PLACE = 1e-4  # centimetres
 _SAME_ANGLE = np.degrees(1e-6)
@@ -89,8 +91,12 @@ def build_form(names: Sequence[str], places: np.ndarray, turns: np.ndarray, moti
 
 def moves(positions: np.ndarray, rotations: np.ndarray) -> bool:
     """Whether a joint at (T, 3) m and (T, 4), relative to the joint above it, moves by more than noise."""
-    spread = np.linalg.norm(positions - positions.mean(axis=0), axis=1).max()
-    return bool(spread > _STILL_METRES or np.abs(rotations @ rotations[0]).min() < _STILL_ROTATION)
+    return bool(measure_spread(positions) > STILL_METRES or np.abs(rotations @ rotations[0]).min() < STILL_ROTATION)
+
+
+def measure_spread(positions: np.ndarray) -> float:
+    """Measure the largest distance in metres of (T, 3) positions from their mean."""
+    return float(np.linalg.norm(positions - positions.mean(axis=0), axis=1).max())
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -79,9 +79,20 @@ def build_clock(records) -> tuple[np.ndarray, list[tuple[float, float, int, floa
         (N,) seconds of every frame; and for each period its start and end on that clock, its number, and the seconds
         that had passed at its first frame.
     """
-    period = np.array([frame.period.id for frame in records])
-    seconds = np.array([frame.timestamp.total_seconds() for frame in records])
-    times, spans = np.empty(len(records)), []
+    return lay_periods(np.array([frame.period.id for frame in records]),
+                       np.array([frame.timestamp.total_seconds() for frame in records]))
+
+
+def lay_periods(period: np.ndarray, seconds: np.ndarray) -> tuple[np.ndarray, list[tuple[float, float, int, float]]]:
+    """Lay periods one after the other on one clock, with a break between them.
+
+    Args:
+        period: (N,) the number of each moment's period.
+        seconds: (N,) on the clock of that period.
+    Returns:
+        As `build_clock`.
+    """
+    times, spans = np.empty(len(period)), []
     for number_ in dict.fromkeys(period.tolist()):
         members = period == number_
         begin = spans[-1][1] + PERIOD_BREAK if spans else 0.0

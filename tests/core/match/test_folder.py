@@ -10,7 +10,8 @@ import numpy as np
 import pytest
 
 from beyond_mocap.base.errors import InputError
-from beyond_mocap.match.folder import build_file_names, open_folder, read_state
+from beyond_mocap.files.file_names import build_file_names
+from beyond_mocap.match.folder import open_folder, read_state
 from beyond_mocap.match.request import MatchRequest, build_identity, compute_digest
 
 TOP = Path(__file__).resolve().parents[3]

@@ -16,7 +16,7 @@ from ....base.content import open_file
 from ....base.errors import InputError, format_count
 from ....motion.track.match_data import REFEREE
 from ..feed import MAX_PLAYERS
-from ..match_arrays import PERIOD_BREAK
+from ..match_arrays import lay_periods
 
 _MOST_SAMPLES = 20_000_000
 _KEEPER = "goalkeeper"
@@ -118,7 +118,7 @@ class SampleCollector:
         ball = np.full((len(order), 3), np.nan)
         found = np.frombuffer(self._ball).reshape(-1, 4) if self._ball else np.zeros((0, 4))
         ball[rows[found[:, 0].astype(int)]] = found[:, 1:]
-        times, periods = _build_clock(order)
+        times, periods = lay_periods(*(np.array(column) for column in zip(*order)))
         people = [self.people.get(key, (key, REFEREE, key, "-1", "")) for key in self._who]
         unknown = [key for key in self._who if key not in self.people]
         lines = [f"{format_count(len(unknown), 'person')} without a team, {unknown[0]}: taken for "
@@ -138,18 +138,6 @@ def _to_place(x: object, y: object) -> tuple[float, float] | None:
     if isinstance(x, (int, float)) and isinstance(y, (int, float)) and math.isfinite(x) and math.isfinite(y):
         return float(x), float(y)
     return None
-
-
-def _build_clock(order: list[tuple[int, float]]) -> tuple[np.ndarray, list[tuple[float, float, int, float]]]:
-    """Build one clock of sorted moments, periods one after the other with a break between them."""
-    times, spans = np.array([seconds for _, seconds in order]), []
-    numbers = np.array([number for number, _ in order])
-    for number in dict.fromkeys(numbers.tolist()):
-        members = numbers == number
-        passed, begin = float(times[members][0]), spans[-1][1] + PERIOD_BREAK if spans else 0.0
-        times[members] += begin - passed
-        spans.append((begin, float(times[members][-1]), int(number), passed))
-    return times, spans
 
 
 def iter_json_lines(path: Path) -> Iterator[tuple[int, dict]]:
