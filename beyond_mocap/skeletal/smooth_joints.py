@@ -13,6 +13,7 @@ import numpy as np
 from scipy.linalg import solveh_banded
 
 from ..base.time_series import find_runs
+from ..motion import quaternion
 
 LONGEST_GAP = 1.0
 """Seconds; longer, and a person counts as away."""
@@ -53,7 +54,8 @@ def fill_gaps(landmarks: tuple[str, ...], positions: np.ndarray) -> np.ndarray:
     seen = np.isfinite(positions).all(axis=2)
     if seen.all():
         return positions
-    turned, turn = _remove_heading(landmarks, positions)
+    heading = _measure_heading(landmarks, positions)[:, None]
+    turned = quaternion.rotate_about_up(positions, -heading)
     filled = turned.copy()
     for line in np.flatnonzero(~seen.all(axis=0)):
         known, gap = seen[:, line], ~seen[:, line]
@@ -62,21 +64,17 @@ def fill_gaps(landmarks: tuple[str, ...], positions: np.ndarray) -> np.ndarray:
         if len(others) >= _MIN_OTHERS and rows.sum() >= _MIN_ROWS:
             predicted = _predict(turned[:, others].reshape(len(turned), -1), turned[:, line], rows)
             filled[gap, line] = (predicted + _interpolate_rest(turned[:, line] - predicted, rows))[gap]
-    return np.einsum("tji,tlj->tli", turn, filled)
+    return quaternion.rotate_about_up(filled, heading)
 
 
-def _remove_heading(landmarks: tuple[str, ...], positions: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Turn points so that hips or shoulders lie along Y; return them and the rotations (T, 3, 3)."""
+def _measure_heading(landmarks: tuple[str, ...], positions: np.ndarray) -> np.ndarray:
+    """Measure the angle (T,) about Z by which hips, or else shoulders, are turned from lying along Y."""
     across = np.zeros((len(positions), 2))
     for part in ("shoulder", "hip"):
         if f"left_{part}" in landmarks and f"right_{part}" in landmarks:
             left, right = (positions[:, landmarks.index(f"{side}_{part}"), :2] for side in ("left", "right"))
             across = np.where(np.isfinite(left - right).all(axis=1)[:, None], left - right, across)
-    angle = np.unwrap(np.arctan2(-across[:, 0], across[:, 1]))
-    turn = np.zeros((len(positions), 3, 3))
-    turn[:, 0, 0] = turn[:, 1, 1] = np.cos(angle)
-    turn[:, 0, 1], turn[:, 1, 0], turn[:, 2, 2] = np.sin(angle), -np.sin(angle), 1.0
-    return np.einsum("tij,tlj->tli", turn, positions), turn
+    return np.arctan2(-across[:, 0], across[:, 1])
 
 
 def _predict(others: np.ndarray, own: np.ndarray, rows: np.ndarray) -> np.ndarray:
