@@ -156,8 +156,22 @@ def check_whole(path: Path) -> None:
 
 def read_digests(out: Path) -> dict[str, str]:
     """Read the digests of all results by name, without those that contain times of the run."""
+    if (out / "library.json").exists():
+        return read_cache_digests(out)
     results = [path for path in list_files(out) if not path.name.endswith(_TIMED) and ".work" not in path.parts]
     return {str(path.relative_to(out)): hashlib.sha256(path.read_bytes()).hexdigest() for path in results}
+
+
+def read_cache_digests(cache: Path) -> dict[str, str]:
+    """Read the digests of the arrays that a library's header names, and of what it says of them.
+
+    The folder's name differs from build to build, and the header has it, the files' times and a digest of itself. A
+    killed build's folder may stay until it is old, and figures that are stored beside a library may be missing.
+    """
+    saved = json.loads((cache / "library.json").read_text().split("\n", 1)[1])
+    folder, files = cache / saved.pop("folder"), saved.pop("files")
+    digests = {name: hashlib.sha256((folder / name).read_bytes()).hexdigest() for name in files}
+    return digests | {"library.json": hashlib.sha256(json.dumps(saved).encode()).hexdigest()}
 
 
 def test_job(job: Job, base: Path, kills: int, rng: random.Random) -> int:
