@@ -12,6 +12,7 @@ import numpy as np
 from ...base.errors import InputError, format_count
 from .landmarks import LANDMARKS
 
+_FAR = 1e9  # farther than any stadium in any unit: damaged numbers stay outliers, and their squares are finite
 _MOST_POINTS = 60_000_000
 _UNITS = {"metres": 1.0, "centimetres": 0.01, "millimetres": 0.001, "feet": 0.3048, "decimetres": 0.1}
 _LEG = 0.87  # metres, thigh and shank of an adult
@@ -77,7 +78,7 @@ class JointCollector:
         """Add where a landmark of a person is at a time; a place that is no three finite numbers is not seen."""
         points = self._points.setdefault(person, array("d"))
         if len(place) == 3 and all(isinstance(value, (int, float)) and math.isfinite(value) for value in place):
-            points.extend((seconds, LANDMARKS.index(landmark), *place))
+            points.extend((seconds, LANDMARKS.index(landmark), *(min(max(value, -_FAR), _FAR) for value in place)))
         if len(points) > 5 * _MOST_POINTS:
             raise InputError(self._path, f"more than {_MOST_POINTS:,} points", "a part of a match",
                              "divide the file, or move later ones out of its folder")
