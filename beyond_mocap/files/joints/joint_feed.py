@@ -78,7 +78,7 @@ class JointCollector:
         """Add where a landmark of a person is at a time; a place that is no three finite numbers is not seen."""
         points = self._points.setdefault(person, array("d"))
         if len(place) == 3 and all(isinstance(value, (int, float)) and math.isfinite(value) for value in place):
-            points.extend((seconds, LANDMARKS.index(landmark), *(min(max(value, -_FAR), _FAR) for value in place)))
+            points.extend((seconds, LANDMARKS.index(landmark), *place))
         if len(points) > 5 * _MOST_POINTS:
             raise InputError(self._path, f"more than {_MOST_POINTS:,} points", "a part of a match",
                              "divide the file, or move later ones out of its folder")
@@ -114,7 +114,7 @@ class JointCollector:
         times, at = np.unique(rows[:, 0], return_inverse=True)
         used = np.unique(rows[:, 1]).astype(int)
         positions = np.full((len(times), len(used), 3), np.nan)
-        positions[at.reshape(-1), np.searchsorted(used, rows[:, 1].astype(int))] = rows[:, 2:]
+        positions[at.reshape(-1), np.searchsorted(used, rows[:, 1].astype(int))] = np.clip(rows[:, 2:], -_FAR, _FAR)
         return PlayerJoints(id=person, team=self._teams.get(person, ""),
                             landmarks=tuple(LANDMARKS[number] for number in used), times=times, positions=positions)
 
