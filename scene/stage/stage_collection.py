@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import bpy
 
+from ...beyond_mocap.appearance.pitch.sports import Sport, load_sports
 from ..core.names import find_named
-from .pitch import SIZE
 
 NAME = "Stage"
 FOCUS = "Stage focus"
@@ -50,10 +50,15 @@ def find_focus(scene: bpy.types.Scene) -> bpy.types.Object | None:
     return find_named(stage.objects, FOCUS) if stage is not None else None
 
 
+def find_sport(scene: bpy.types.Scene) -> Sport:
+    """Return the sport that the scene's stage is for."""
+    return load_sports()[scene.beyond_mocap_stage.sport]
+
+
 def find_pitch_size(scene: bpy.types.Scene) -> tuple[float, float]:
-    """Return length and width of the scene's pitch in metres; the regular size where there is none."""
-    stage = find_stage(scene)
-    return tuple(stage.get(PITCH_SIZE, SIZE)) if stage is not None else SIZE
+    """Return length and width of the scene's pitch in metres; the sport's regular size where there is none."""
+    stage, regular = find_stage(scene), find_sport(scene).size
+    return tuple(stage.get(PITCH_SIZE, regular)) if stage is not None else regular
 
 
 def remove_objects(things: list[bpy.types.Object]) -> None:

@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import Any, TypeVar
 from xml.parsers import expat
 
-from ...base.errors import InputError
+from ...base.errors import InputError, build_read_error
 from ...base.optional_packages import import_optional
 
 MAX_PLAYERS = 60
@@ -123,6 +123,19 @@ def read_head(path: Path) -> bytes:
         return b""
     with open(path, "rb") as file:
         return file.read(_HEAD_BYTES).removeprefix(b"\xef\xbb\xbf")
+
+
+def is_track_csv(path: Path) -> bool:
+    """Return whether a file is a table of one player's track: its first line names `time_s` and no `player`.
+
+    Raises:
+        InputError: if it cannot be read.
+    """
+    try:
+        first = read_head(path).partition(b"\n")[0]
+    except OSError as error:
+        raise build_read_error(path, "a tracking file", error) from None
+    return b"time_s" in first and b"player" not in first
 
 
 Known = TypeVar("Known", bound=Provider)

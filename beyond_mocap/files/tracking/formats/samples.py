@@ -20,6 +20,7 @@ from ..match_arrays import lay_periods
 
 _MOST_SAMPLES = 20_000_000
 _KEEPER = "goalkeeper"
+_LONGEST_GAP = 1.0  # seconds between two samples that are joined by a line
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -82,6 +83,26 @@ class SampleCollector:
             self._samples.extend((self._find_moment(moment), self._who.setdefault(key, len(self._who)), *place))
             if len(self._samples) > 4 * _MOST_SAMPLES:
                 raise InputError(self._path, f"more than {_MOST_SAMPLES:,} samples", "one match", "divide the file")
+
+    def add_track(self, period: int, key: str, times: np.ndarray, places: np.ndarray, step: float) -> None:
+        """Add where a person is at the multiples of `step` s, by lines between own samples, none within a gap.
+
+        Args:
+            period: number.
+            key: whose.
+            times: (N,) s, increasing.
+            places: (N, 2) metres.
+            step: s.
+        """
+        first, last = int(np.ceil(times[0] / step - 1e-6)), int(np.floor(times[-1] / step + 1e-6))
+        moments = np.arange(first, last + 1)
+        at = np.clip(moments * step, times[0], times[-1])
+        after = np.clip(np.searchsorted(times, at), 1, len(times) - 1)
+        joined = times[after] - times[after - 1] <= max(_LONGEST_GAP, 2.0 * step)
+        x, y = (np.interp(at, times, column) for column in places.T)
+        for number, is_joined, one, other in zip(moments.tolist(), joined.tolist(), x.tolist(), y.tolist()):
+            if is_joined:
+                self.add_sample((period, round(number * step, 4)), key, one, other)
 
     def add_ball(self, moment: tuple[int, float], x: object, y: object, z: object = None) -> None:
         """Add where the ball is, metres."""
