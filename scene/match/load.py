@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ...beyond_mocap.appearance.pitch.sports import load_sports
+from ...beyond_mocap.appearance.sports import load_sports
 from ...beyond_mocap.base.errors import InputError, UserCancelledError, format_seconds
 from ...beyond_mocap.base.fixes import Fix
 from ...beyond_mocap.motion.motion import Motion

@@ -6,7 +6,7 @@ import bmesh
 import bpy
 import numpy as np
 
-from ...beyond_mocap.appearance.pitch.sports import SportBall
+from ...beyond_mocap.appearance.sports import SportBall
 from ...beyond_mocap.base.time_series import interpolate_columns
 from ...beyond_mocap.motion import quaternion
 from ...beyond_mocap.motion.track.ball_path import BallPath

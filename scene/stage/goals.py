@@ -5,7 +5,7 @@ from __future__ import annotations
 import bpy
 import numpy as np
 
-from ...beyond_mocap.appearance.pitch.sports import Goal
+from ...beyond_mocap.appearance.sports import Goal
 from ..core.material import get_material
 from .meshes import create_cords, create_mesh, create_object, create_tubes
 

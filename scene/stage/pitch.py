@@ -11,8 +11,8 @@ import numpy as np
 from mathutils import Vector
 from mathutils.geometry import delaunay_2d_cdt
 
-from ...beyond_mocap.appearance.pitch.markings import Marking, build_markings
-from ...beyond_mocap.appearance.pitch.sports import Sport
+from ...beyond_mocap.appearance.pitch_markings import Marking, build_markings
+from ...beyond_mocap.appearance.sports import Sport
 from . import surfaces
 from .meshes import create_mesh, create_object
 

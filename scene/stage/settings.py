@@ -5,7 +5,6 @@ from __future__ import annotations
 import bpy
 from bpy.props import BoolProperty, EnumProperty
 
-from ...beyond_mocap.appearance.pitch.sports import load_sports
 from ..core.properties import with_settings
 from . import stage
 
@@ -27,7 +26,7 @@ def _update_stage(settings, _context) -> None:
 def _update_sport(settings, _context) -> None:
     """Rebuild the stage for another sport, in its regular size."""
     if stage.find_stage(settings.id_data) is not None:
-        stage.create_stage(settings.id_data, load_sports()[settings.sport].size)
+        stage.create_stage(settings.id_data, stage.find_sport(settings.id_data).size)
 
 
 @with_settings("pitch", update=_update_sport)

@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import bpy
 
-from ...beyond_mocap.appearance.pitch.sports import Sport, load_sports
 from ..core.names import find_named
+
+if TYPE_CHECKING:
+    from ...beyond_mocap.appearance.sports import Sport
 
 NAME = "Stage"
 FOCUS = "Stage focus"
@@ -50,8 +54,10 @@ def find_focus(scene: bpy.types.Scene) -> bpy.types.Object | None:
     return find_named(stage.objects, FOCUS) if stage is not None else None
 
 
-def find_sport(scene: bpy.types.Scene) -> Sport:
+def find_sport(scene: bpy.types.Scene) -> "Sport":
     """Return the sport that the scene's stage is for."""
+    from ...beyond_mocap.appearance.sports import load_sports
+
     return load_sports()[scene.beyond_mocap_stage.sport]
 
 

@@ -10,13 +10,13 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import Any
 
-from . import aim, library, markers, match, passes, path_editing, pitch, stream, study, synthesis, throws, view
+from . import aim, library, markers, match, passes, path_editing, stream, study, synthesis, throws, view
 from .setting import Setting
 
 FEATURES = {
     "Synthesis": synthesis, "Library": library, "Path editing": path_editing, "Passes and ball": passes,
-    "Aimed ball": aim, "Throws and kicks": throws, "Markers": markers, "Match": match, "Pitch": pitch,
-    "Live stream": stream, "Study": study, "Overlays": view,
+    "Aimed ball": aim, "Throws and kicks": throws, "Markers": markers, "Match": match, "Live stream": stream,
+    "Study": study, "Overlays": view,
 }
 TABLES: dict[str, tuple[Setting, ...]] = {
     group: tuple(replace(row, feature=feature) for row in rows)

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from beyond_mocap.appearance.pitch.markings import build_markings
-from beyond_mocap.appearance.pitch.sports import load_sports
+from beyond_mocap.appearance.pitch_markings import build_markings
+from beyond_mocap.appearance.sports import load_sports
 from beyond_mocap.base.settings import find_setting
 
 SPORTS = load_sports()

@@ -31,7 +31,7 @@ def read_table(feed: Feed, pitch: tuple[float, float] | None) -> MatchSamples:
     """Read a table with time, player, x and y, and team, z, number, name, position and period where they are there.
 
     The ball is the player `ball`. Teams are home, away, and else in their order in the file. The origin is the pitch's
-    centre or, where nobody is left of or below it and someone is beyond half of the pitch, a corner.
+    centre or, where all players are right of and above it and some beyond half of the pitch, a corner.
 
     Args:
         feed: the file.

@@ -74,7 +74,7 @@ class Sport:
         ground: what it is played on, a key of the stage's surfaces.
         goal: the goal.
         ball: the ball.
-        marks: kind, numbers and options of each line, see `markings.build_markings`.
+        marks: kind, numbers and options of each line, see `pitch_markings.build_markings`.
         behind: depth of the area behind each end line that is marked too, m.
         rounding: radius of the corners, m.
         boards: height of the boards around it, m; 0: none.

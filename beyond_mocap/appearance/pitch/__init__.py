@@ -1,1 +1,0 @@
-"""Pitches of sports: their sizes, lines, goals and balls as data, and the geometry of their lines."""
