@@ -57,7 +57,7 @@ def _write_bodies(folder: Path) -> dict[str, Path]:
 
 
 def _write_matches(folder: Path) -> dict[str, Path]:
-    """Write a match in each form of tracking that the program itself reads: tracking file, then metadata, then others."""
+    """Write a match in each form of tracking that the program itself reads: tracking file, metadata, other files."""
     seeds = {}
     for form, write in WRITERS.items():
         written = folder / f"written_{form}"
