@@ -206,7 +206,7 @@ def _find_syntax_error(files: Iterable) -> str:
             return f"{path}:{error.lineno}: {error.msg.lower()} at column {error.colno}"
         except expat.ExpatError as error:
             return f"{path}:{error.lineno}: {expat.ErrorString(error.code)} at column {error.offset + 1}"
-        except (ValueError, OSError, RecursionError):
+        except (ValueError, OSError, RecursionError, LookupError):  # the last: an encoding that does not exist
             return f"{path}: damaged"
     return ""
 

@@ -21,6 +21,7 @@ from ..feed import Feed
 from .cdf import parse_time
 from .samples import MatchSamples, SampleCollector
 
+_MOST_DEGREES = (90.0, 180.0)  # of latitude and longitude
 _EARTH_RADIUS = 6_371_008.8  # metres, mean (IUGG)
 _NAMES = {
     "latitude": ("lat", "latitude"), "longitude": ("lon", "long", "lng", "longitude"),
@@ -83,7 +84,7 @@ def _read_receiver(path: Path) -> _Receiver:
     name, times, degrees = _read_gpx(path) if path.suffix.lower() == ".gpx" else _read_table(path)
     times, degrees = np.array(times, dtype=float), np.array(degrees, dtype=float).reshape(-1, 2)
     good = np.isfinite(times) & np.isfinite(degrees).all(axis=1) & np.any(degrees != 0.0, axis=1)
-    good &= (np.abs(degrees) <= (90.0, 180.0)).all(axis=1)
+    good &= (np.abs(degrees) <= _MOST_DEGREES).all(axis=1)
     times, order = np.unique(times[good], return_index=True)
     if len(times) < 2:
         raise InputError(path, format_count(len(times), "sample"), "at least two with a time and a place",
@@ -103,7 +104,16 @@ def _read_table(path: Path) -> tuple[str, list[float], list[tuple[float, float]]
 
 
 def parse_clock(text: str, place: str) -> float:
-    """Parse a time of any usual form to seconds: HH:MM:SS.s, days of a table program, seconds since 1970, ISO 8601."""
+    """Parse a time of any usual form to seconds: HH:MM:SS.s, days of a table program, seconds since 1970, ISO 8601.
+
+    Args:
+        text: the time.
+        place: where it stands, for errors.
+    Returns:
+        Seconds.
+    Raises:
+        InputError: if it is none.
+    """
     if re.fullmatch(r"\d{1,2}:\d{2}:\d{2}([.,]\d+)?", text):
         hours, minutes, seconds = text.replace(",", ".").split(":")
         return 3600.0 * int(hours) + 60.0 * int(minutes) + float(seconds)
@@ -111,6 +121,8 @@ def parse_clock(text: str, place: str) -> float:
         value = float(text)
     except ValueError:
         return (parse_time(text, place) - datetime(1970, 1, 1)).total_seconds()
+    if not abs(value) < 1000.0 * _EPOCH[1]:
+        raise InputError(place, f"time {text[:40]!r}", "seconds", "export it again")
     if _EXCEL_DAYS[0] <= value <= _EXCEL_DAYS[1] and "." in text:
         return 86_400.0 * value
     return value / 1000.0 if value > _EPOCH[1] else value
@@ -192,8 +204,11 @@ def _read_corners(path: Path) -> np.ndarray:
     rows = list(read_rows(path, ("latitude", "longitude"), others=_COLUMNS, separators=",;\t"))
     if len(rows) != 4:
         raise InputError(path, format_count(len(rows), "corner"), "4", "keep the pitch's four corners")
-    return np.array([[parse_number(row[name], name, place) for name in ("latitude", "longitude")]
-                     for place, row in rows])
+    corners = np.array([[parse_number(row[name], name, place) for name in ("latitude", "longitude")]
+                        for place, row in rows])
+    if (np.abs(corners) > _MOST_DEGREES).any():
+        raise InputError(path, f"{np.abs(corners).max():.6g} degrees", "latitudes and longitudes", "export it again")
+    return corners
 
 
 def _measure_corners(path: Path, places: np.ndarray) -> tuple[np.ndarray, np.ndarray, tuple[float, float]]:
