@@ -59,6 +59,7 @@ def draw_more_files(layout, match) -> None:
     column = create_value_column(layout)
     for name in ("metadata_file", "provider", "events_file"):
         column.prop(match, name)
+    column.prop(match.id_data.beyond_mocap_stage, "sport")
     if match.events_file:
         for name in ("events_metadata_file", "events_provider"):
             column.prop(match, name)

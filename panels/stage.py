@@ -5,7 +5,7 @@ from __future__ import annotations
 import bpy
 
 from ..scene.stage.settings import VIEWS
-from .tab import TabPanel, with_progress
+from .tab import TabPanel, create_value_column, with_progress
 
 MARK = "beyond_mocap_view"  # custom property of the stage's cameras: their view
 
@@ -21,6 +21,7 @@ class BEYOND_MOCAP_PT_stage(TabPanel, bpy.types.Panel):
         """Draw the button that adds the stage, its light, buttons for views, looks and pictures."""
         layout, settings, scene = self.layout, context.scene.beyond_mocap_stage, context.scene
         layout.operator("beyond_mocap.add_stage", icon="VIEW_CAMERA")
+        create_value_column(layout).prop(settings, "sport")
         layout.row().prop(settings, "light", expand=True)
         layout.prop(settings, "stands")
         shown = scene.camera.get(MARK) if scene.camera is not None else None

@@ -19,6 +19,8 @@ from .outputs import ProgressReporter, Writer, check_outputs
 if TYPE_CHECKING:
     import numpy as np
 
+_PITCH_SIDES = (10.0, 400.0)  # metres
+
 
 class _ProviderOption(argparse.Action):
     """An option whose help names all providers; they are imported only where it is shown, so that the program starts
@@ -66,6 +68,9 @@ def add_match(verbs):
     add_options(verb.add_mutually_exclusive_group(), "match.work")
     add_options(verb, "match")
     verb.add_argument("--nearest", action="store_true", help="use the nearest labels for missing ones; the default")
+    add_options(verb, "pitch")
+    verb.add_argument("--pitch", type=parse_pitch, metavar="LENGTHxWIDTH",
+                      help="its size in metres, for tracking data without it; default: the sport's regular size")
     add_options(verb, "library")
     verb.set_defaults(run=run_match)
     return verb
@@ -86,7 +91,8 @@ def run_match(options, reporter: ProgressReporter, writers: Mapping[str, Writer]
     order = MatchRequest(
         tracking=options.tracking, library=options.library, out=options.out, meta=options.meta, events=options.events,
         events_meta=options.events_meta, events_provider=options.events_provider, provider=options.provider,
-        **{**option_values(MatchRequest, options, "match.section", "match.work", "match", "library"),
+        pitch=options.pitch,
+        **{**option_values(MatchRequest, options, "match.section", "match.work", "match", "pitch", "library"),
            "players": tuple(dict.fromkeys(options.players)), "workers": options.workers or len(_list_cores())},
     )  # fmt: skip
     if options.apart is None:
@@ -104,6 +110,26 @@ def run_match(options, reporter: ProgressReporter, writers: Mapping[str, Writer]
             reporter.show_note(line)
     print(f"{options.out}: {len(result.finished)} of {len(result.finished) + len(result.failed)} players, "
           f"{result.span[1] - result.span[0]:.1f} s")  # fmt: skip
+
+
+def parse_pitch(text: str) -> tuple[float, float]:
+    """Parse the size of a pitch, LENGTHxWIDTH in metres.
+
+    Args:
+        text: the option's text.
+    Returns:
+        Length and width.
+    Raises:
+        ArgumentTypeError: if it is none.
+    """
+    try:
+        length, width = map(float, text.lower().split("x"))
+    except ValueError:
+        length = width = 0.0
+    if not all(_PITCH_SIDES[0] <= side <= _PITCH_SIDES[1] for side in (length, width)):
+        raise argparse.ArgumentTypeError(f"{text!r}: expected a length and a width of {_PITCH_SIDES[0]:g} to "
+                                         f"{_PITCH_SIDES[1]:g} metres, such as 105x68")
+    return length, width
 
 
 def choose_scene_writer(scene: Path, writers: Mapping[str, Writer]) -> Writer:
@@ -206,15 +232,13 @@ def run_touches(options, reporter: ProgressReporter, writers: Mapping[str, Write
 
 def _read_tracking(options):
     """Read the match, or the track where the file is the project's own table."""
+    from ..files.tracking.feed import is_track_csv
     from ..files.tracking.tracking import read_match, read_track_csv
 
-    if options.input.is_file() and not options.provider:
-        with open(options.input, "rb") as file:
-            if b"time_s" in file.readline(4096):
-                if options.meta:
-                    found = f"{options.meta} beside a player's track"
-                    raise InputError("--meta", found, "no metadata for a track")
-                return replace(read_track_csv(options.input), name=options.input.stem)  # the player's name in the table
+    if not options.provider and is_track_csv(options.input):
+        if options.meta:
+            raise InputError("--meta", f"{options.meta} beside a player's track", "no metadata for a track")
+        return replace(read_track_csv(options.input), name=options.input.stem)  # the player's name in the table
     return read_match(options.input, options.meta, options.provider)
 
 

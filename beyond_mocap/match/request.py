@@ -54,6 +54,7 @@ class MatchRequest:
         variety: as in a plan.
         workers: as for `pool.WorkerConfig`.
         scheduler: as for `pool.WorkerConfig`.
+        pitch: length and width, m, for tracking data without them; None: the sport's regular size.
     Raises:
         InputError: for numbers outside their limits, a span that ends before it starts, times that are NaN, event
             settings without events, or an unknown provider of events.
@@ -89,6 +90,8 @@ class MatchRequest:
     scheduler: str = ""
     events_meta: Path | None = None
     events_provider: str = ""
+    sport: str = collect_defaults("pitch")["sport"]
+    pitch: tuple[float, float] | None = None
 
     def __post_init__(self):
         for option, value in (("start time", self.start), ("end time", self.end)):
@@ -113,7 +116,8 @@ class MatchRequest:
 
 
 _RESULTS = ("provider", "start", "end", "players", "fps", "seed", "nearest", "solve_touches", "watch", "strength",
-            "masses", "fatigue", "window", "overlap", "variety", "events_provider")
+            "masses", "fatigue", "window", "overlap", "variety", "events_provider", "sport",
+            "pitch")
 _FILES = ("tracking", "meta", "events", "events_meta")
 
 

@@ -15,6 +15,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from ..appearance.sports import load_sports
 from ..ball.tracked.solve import SolvedBall, solve_ball
 from ..base.errors import BeyondMocapError, InputError, UserCancelledError
 from ..files.atomic import atomic_write
@@ -43,6 +44,7 @@ from .request import MatchRequest, build_identity
 from .roles import build_roles, list_absent_players, resolve_span, separate_roles
 from .state import build_player_row, build_state, read_clocks
 
+FOOTBALL = "football"
 BALL_MARGIN = 5.0
 """s before and after the span in which the ball is solved too."""
 
@@ -112,7 +114,8 @@ def synthesize_match(
     check_workers(place)
     clock = read_clocks()
     report(0.0, f"Reading {request.tracking.name}")
-    match = read_match(request.tracking, request.meta, request.provider or None)
+    match = read_match(request.tracking, request.meta, request.provider or None,
+                       pitch=_choose_pitch(request))
     span = resolve_span(match, request)
     events = None if request.events is None else read_events(request.events, request.events_meta,
                                                              request.events_provider or None, match)
@@ -140,6 +143,11 @@ def synthesize_match(
     return read_result(request)
 
 
+def _choose_pitch(request: MatchRequest) -> tuple[float, float] | None:
+    """Choose the pitch's size for tracking data without it; None: what the reader assumes of a football pitch."""
+    return request.pitch or (None if request.sport == FOOTBALL else load_sports()[request.sport].size)
+
+
 def _build_library(request: MatchRequest, report: Progress, cancelled) -> tuple[Library, LibrarySource]:
     """Build the library, with everything it derives stored beside its cache, and the source by which workers find
     it.
@@ -158,7 +166,7 @@ def _run_stages(
 ) -> None:
     """Run all stages after reading."""
     state, begin = job.state, read_clocks()
-    present, filled = fill_keepers(match, find_kept_lines(match))
+    present, filled = fill_keepers(match, find_kept_lines(match)) if job.request.sport == FOOTBALL else (match, ())
     state.report["notes"] += filled
     roles = build_roles(present, job.request, span)
     state.report["notes"] += list_absent_players(job.request, roles, span)
@@ -199,6 +207,9 @@ def _run_stages(
 def _solve_ball(job: Job, match: Match, span: tuple[float, float], report: Progress) -> SolvedBall | None:
     """Solve the ball around the span; None if it is not requested or not possible."""
     if not job.request.solve_touches:
+        return None
+    if job.request.sport != FOOTBALL:
+        job.state.report["notes"].append("touches of the ball are found in football only: it stays as tracked")
         return None
     try:
         return solve_ball(match, report, job.cancelled, span[0] - BALL_MARGIN, span[1] + BALL_MARGIN)

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from ...beyond_mocap.appearance.sports import load_sports
 from ...beyond_mocap.base.errors import InputError, UserCancelledError, format_seconds
 from ...beyond_mocap.base.fixes import Fix
 from ...beyond_mocap.motion.motion import Motion
@@ -57,6 +58,7 @@ class MatchSection:
         colours: "#RRGGBB" of shirts by team.
         characters: players and referees who are present.
         ball: where it is known, else None.
+        sport: whose pitch it is.
     """
 
     start: float
@@ -66,6 +68,7 @@ class MatchSection:
     colours: dict[str, str]
     characters: tuple[Character, ...]
     ball: BallPath | None
+    sport: str = "football"
 
 
 @dataclass(frozen=True)
@@ -125,7 +128,7 @@ def load_section(request: DisplayRequest, library: "Library | None", progress: C
         raise InputError(request.folder, found, "a time of play", *lines[:1])
     length, width = map(float, state["pitch_m"])
     section = MatchSection(start, end, length, width=width, colours=request.colours, characters=tuple(characters),
-                           ball=_cut_ball(ball, start, end))
+                           ball=_cut_ball(ball, start, end), sport=_find_sport(state))
     return library, section, tuple(lines)
 
 
@@ -141,6 +144,13 @@ def _read_state(folder: str) -> dict:
         raise InputError(Path(folder) / STATE, "times, pitch or a player's file are missing", "the state of a match",
                          "choose another folder for the match")
     return state
+
+
+def _find_sport(state: dict) -> str:
+    """Return the sport of a match; football for one of an earlier version, or of a sport that is not known."""
+    order = state.get("order")
+    sport = order.get("sport") if isinstance(order, dict) else None
+    return sport if isinstance(sport, str) and sport in load_sports() else "football"
 
 
 def _resolve_span(request: DisplayRequest, state: dict) -> tuple[float, float]:

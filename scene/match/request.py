@@ -13,12 +13,16 @@ import bpy
 from ...beyond_mocap.base.digest import hex_digest
 from ...beyond_mocap.base.errors import InputError
 from ...beyond_mocap.base.fixes import Fix
+from ...beyond_mocap.files.tracking.feed import is_track_csv
 from ..core import preferences, sample
 from ..core.settings import to_absolute_path, to_setting_path
 from ..player import tracks
+from ..stage.stage_collection import find_sport
 from .kits import DEFAULT_COLOURS, to_linear
 from .load import TEAMS, DisplayRequest
 from .settings import AUTO, FIRST_SECONDS, BeyondMocapMatch, collect_colours, format_float
+
+FOOTBALL = "football"
 
 if TYPE_CHECKING:
     from ...beyond_mocap.motion.track.match_data import Match
@@ -85,11 +89,13 @@ class ReadRequest:
         tracking: absolute path.
         metadata: absolute path, "" if there is none.
         provider: "" to detect it.
+        pitch: length and width, m, for a feed without them; None: those of a football pitch.
     """
 
     tracking: str
     metadata: str
     provider: str
+    pitch: tuple[float, float] | None = None
 
 
 def build_read_request(match: BeyondMocapMatch, chosen: str = "") -> ReadRequest:
@@ -104,17 +110,20 @@ def build_read_request(match: BeyondMocapMatch, chosen: str = "") -> ReadRequest
     tracking = chosen or to_absolute_path(match.tracking_file)
     if not tracking:
         raise InputError("match", "no tracking file", "a provider's tracking of a match", "choose one, or drop it here")
-    if tracks.is_plain_csv(tracking):
+    if is_track_csv(Path(tracking)):
         raise InputError(tracking, "one player's track", "a provider's tracking of a match",
                          "import it in step 2")
     metadata = "" if chosen else to_absolute_path(match.metadata_file)
-    return ReadRequest(tracking, metadata, "" if match.provider == AUTO else match.provider)
+    sport = find_sport(match.id_data)
+    return ReadRequest(tracking, metadata, "" if match.provider == AUTO else match.provider,
+                       None if sport.name == FOOTBALL else sport.size)
 
 
 def read_match(request: ReadRequest, progress) -> tuple[ReadRequest, "Match"]:
     """Read the match, in any thread; return the request and the data."""
     progress(0.05, "reading the match")
-    return request, tracks.read_match(request.tracking, request.metadata, request.provider)
+    return request, tracks.read_match(request.tracking, request.metadata, request.provider,
+                                      request.pitch)
 
 
 def update_match(match: BeyondMocapMatch, request: ReadRequest, data: "Match") -> None:
@@ -167,6 +176,8 @@ def _build_arguments(scene: bpy.types.Scene) -> list[str]:
                          "set To, or set it to 0 for the end of the match")
     out += ["--from", format_float(match.start)] + (["--to", format_float(match.end)] if match.end else [])
     out += _build_player_arguments(match)
+    sport = scene.beyond_mocap_stage.sport
+    out += ["--sport", sport] if sport != FOOTBALL else []
     out += [] if match.solve_touches else ["--no-solve-touches"]
     out += ["--fps", format_float(settings.rate), "--seed", str(settings.seed), "--watch", format_float(settings.watch)]
     out += ["--strength", format_float(match.strength), "--masses", match.masses,

@@ -43,6 +43,8 @@ def show_match(context: bpy.types.Context, section: MatchSection, first: int) ->
     with _measure_seconds(durations, "pitch"):
         if stage.find_stage(scene) is None:
             scene.beyond_mocap_stage.stands = True
+        if scene.beyond_mocap_stage.sport != section.sport:
+            scene.beyond_mocap_stage.sport = section.sport
         stage.create_stage(scene, (section.length, section.width))
     with _measure_seconds(durations, "bodies"):
         own = TeamCharacters(context, scene.beyond_mocap_match.list_characters())

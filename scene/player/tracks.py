@@ -7,9 +7,10 @@ from functools import lru_cache
 from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
-from ...beyond_mocap.base.errors import InputError, build_read_error
+from ...beyond_mocap.base.errors import InputError
 from ...beyond_mocap.base.fixes import Fix
 from ...beyond_mocap.files.tracking import tracking
+from ...beyond_mocap.files.tracking.feed import is_track_csv
 from ..core.settings import BeyondMocapPlayer, BeyondMocapSettings, to_absolute_path
 from . import drawn_track
 
@@ -36,7 +37,7 @@ class PlayerInFile(NamedTuple):
 
 def list_players(path: str, metadata: str = "", provider: str = "") -> tuple[list[PlayerInFile], tuple[str, ...]]:
     """List the players of a tracking file, and notes on assumptions; InputError where it cannot be read."""
-    if is_plain_csv(path):
+    if is_track_csv(Path(path)):
         track = _read_plain_track(path)
         return [PlayerInFile(Path(path).stem, "", "home", float(track.times.min()), float(track.times.max()))], ()
     match = read_match(path, metadata, provider)
@@ -61,15 +62,6 @@ def read_track(settings: BeyondMocapSettings, player: BeyondMocapPlayer, still: 
     return match.track(player.feed_id, settings.section_start, end)
 
 
-def is_plain_csv(path: str) -> bool:
-    """Whether this is a file of one player in our own form: its first line names the column time_s."""
-    try:
-        with open(path, "rb") as file:
-            return b"time_s" in file.readline(4096)
-    except OSError as error:
-        raise build_read_error(path, "a tracking file", error) from None
-
-
 def _read_plain_track(path: str) -> "Track":
     return _read_plain_cached(path, _read_stamp(path))
 
@@ -79,9 +71,19 @@ def _read_plain_cached(path: str, _changed: tuple[int, int]) -> "Track":
     return tracking.read_track_csv(path)
 
 
-def read_match(path: str, metadata: str = "", provider: str = "") -> tracking.Match:
-    """Read a whole match as its feed has it, once; InputError where it cannot be read."""
-    return _read_match_cached(path, metadata or None, provider or None, _read_stamp(path))
+def read_match(path: str, metadata: str = "", provider: str = "",
+               pitch: tuple[float, float] | None = None) -> tracking.Match:
+    """Read a whole match as its feed has it, once; InputError where it cannot be read.
+
+    Args:
+        path: the tracking file.
+        metadata: the provider's second file; "" searches it.
+        provider: its form; "" detects it.
+        pitch: length and width, m, for a feed without them; None: those of a football pitch.
+    Returns:
+        The match.
+    """
+    return _read_match_cached(path, metadata or None, provider or None, _read_stamp(path), pitch)
 
 
 def _read_stamp(path: str) -> tuple[int, int]:
@@ -91,8 +93,9 @@ def _read_stamp(path: str) -> tuple[int, int]:
 
 
 @lru_cache(maxsize=1)
-def _read_match_cached(path: str, metadata: str | None, provider: str | None, _changed) -> tracking.Match:
-    return tracking.read_match(path, metadata, provider)
+def _read_match_cached(path: str, metadata: str | None, provider: str | None, _changed,
+                       pitch: tuple[float, float] | None) -> tracking.Match:
+    return tracking.read_match(path, metadata, provider, pitch=pitch)
 
 
 def _build_player_name(player: tracking.MatchPlayer) -> str:

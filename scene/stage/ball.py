@@ -6,33 +6,56 @@ import bmesh
 import bpy
 import numpy as np
 
+from ...beyond_mocap.appearance.sports import SportBall
 from ...beyond_mocap.base.time_series import interpolate_columns
 from ...beyond_mocap.motion import quaternion
 from ...beyond_mocap.motion.track.ball_path import BallPath
 from ..core import channels
 from ..core.material import get_material
 from ..core.measure import frames_per_second, units_per_metre, whole_frames
+from .stage_collection import find_sport
 
 RADIUS = 0.11  # metres, Laws of the Game: circumference 0.68 to 0.70 m
 MATERIAL = "Ball white"
+ROLLING_RADIUS = "beyond_mocap_rolling_radius"  # custom property of a ball: metres, 0 for a disc, which slides
 ROLLING_BELOW = 0.16  # metres, height of the centre up to which the ball rolls on the ground
 
 
-def create_ball(context: bpy.types.Context, name: str, collection, radius: float = RADIUS) -> bpy.types.Object:
-    """Create a ball of `radius` metres in a collection, with dark patches where a football has its pentagons."""
+def create_ball(context: bpy.types.Context, name: str, collection, radius: float | None = None) -> bpy.types.Object:
+    """Create a ball in a collection.
+
+    Args:
+        context: Blender's context.
+        name: of the ball.
+        collection: where it is linked.
+        radius: of a football of another size, m; None for the ball of the sport that the scene's stage is for.
+    Returns:
+        The ball.
+    """
+    kind = SportBall(radius) if radius is not None else find_sport(context.scene).ball
     mesh = bpy.data.meshes.new(name)
     shape = bmesh.new()
-    bmesh.ops.create_icosphere(shape, subdivisions=4, radius=radius * units_per_metre(context.scene))
+    if kind.thickness:
+        bmesh.ops.create_cone(shape, cap_ends=True, segments=32, radius1=kind.radius, radius2=kind.radius,
+                              depth=kind.thickness)
+    else:
+        bmesh.ops.create_icosphere(shape, subdivisions=4, radius=kind.radius)
+    along = kind.length / (2.0 * kind.radius) if kind.length else 1.0
     patches = _build_pentagons()
     for face in shape.faces:
-        face.smooth = True
-        face.material_index = int(np.max(patches @ np.array(face.normal)) > 0.94)
+        face.smooth = not kind.thickness
+        face.material_index = int(kind.colour is None and np.max(patches @ np.array(face.normal)) > 0.94)
+    bmesh.ops.scale(shape, vec=units_per_metre(context.scene) * np.array([along, 1.0, 1.0]), verts=shape.verts)
     shape.to_mesh(mesh)
     shape.free()
-    mesh.materials.append(get_material(MATERIAL, (0.9, 0.9, 0.9), 0.4))
-    mesh.materials.append(get_material("Ball black", (0.01, 0.01, 0.012), 0.4))
+    if kind.colour is None:
+        mesh.materials.append(get_material(MATERIAL, (0.9, 0.9, 0.9), 0.4))
+        mesh.materials.append(get_material("Ball black", (0.01, 0.01, 0.012), 0.4))
+    else:
+        mesh.materials.append(get_material(f"{MATERIAL} {find_sport(context.scene).name}", kind.colour, 0.5))
     ball = bpy.data.objects.new(name, mesh)
     ball.rotation_mode = "QUATERNION"
+    ball[ROLLING_RADIUS] = 0.0 if kind.thickness else kind.radius
     collection.objects.link(ball)
     return ball
 
@@ -60,8 +83,9 @@ def write_trajectory(ball: bpy.types.Object, path: BallPath, scene: bpy.types.Sc
     at = (frames - start) / fps
     places = interpolate_columns(at, *_hold_unknown(seconds, path.positions))
     group = "Object Transforms"
+    radius = ball.get(ROLLING_RADIUS, RADIUS)
     curves = {"location": (group, places * units_per_metre(scene)),
-              "rotation_quaternion": (group, compute_roll(places) if path.rotations is None
+              "rotation_quaternion": (group, compute_roll(places, radius) if path.rotations is None
                                       else _sample_rotations(path, at))}
     return channels.create_action(ball, f"{ball.name} path", frames, curves)
 
@@ -83,17 +107,20 @@ def _sample_rotations(path: BallPath, at: np.ndarray) -> np.ndarray:
     return quaternion.unify_signs(quaternion.slerp(path.rotations[after - 1], path.rotations[after], share))
 
 
-def compute_roll(places: np.ndarray) -> np.ndarray:
+def compute_roll(places: np.ndarray, radius: float = RADIUS) -> np.ndarray:
     """Compute the rotations of a ball that rolls on the ground; in the air it keeps its rotation per frame.
 
     Args:
         places: (F, 3) metres, the ball's centre.
+        radius: metres; 0: it never turns.
     Returns:
         (F, 4) quaternions.
     """
+    if not radius:
+        return quaternion.identity(len(places))
     step = np.diff(places, axis=0)
     rotation_steps = np.stack([-step[:, 1], step[:, 0], np.zeros(len(step))],
-                              axis=1) / RADIUS  # up x step: rotation vectors
+                              axis=1) / radius  # up x step: rotation vectors
     for i in np.flatnonzero(places[1:, 2] > ROLLING_BELOW):
         rotation_steps[i] = rotation_steps[i - 1] if i else rotation_steps[i]
     out = quaternion.identity(len(places))

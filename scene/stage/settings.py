@@ -5,6 +5,7 @@ from __future__ import annotations
 import bpy
 from bpy.props import BoolProperty, EnumProperty
 
+from ..core.properties import with_settings
 from . import stage
 
 LIGHTS = (("DAYLIGHT", "Daylight", "Afternoon sun and a blue sky", "LIGHT_SUN", 0),
@@ -22,6 +23,13 @@ def _update_stage(settings, _context) -> None:
         stage.create_stage(settings.id_data)
 
 
+def _update_sport(settings, _context) -> None:
+    """Rebuild the stage for another sport, in its regular size."""
+    if stage.find_stage(settings.id_data) is not None:
+        stage.create_stage(settings.id_data, stage.find_sport(settings.id_data).size)
+
+
+@with_settings("pitch", update=_update_sport)
 class BeyondMocapStage(bpy.types.PropertyGroup):
     """How a scene's stage looks."""
 

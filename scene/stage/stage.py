@@ -1,4 +1,4 @@
-"""The stage: a pitch of any size that the Laws of the Game allow, with goals, stands, light, sky and cameras.
+"""The stage: a sport's pitch of any size, with goals, stands, light, sky and cameras.
 
 A scene has one stage, for single players and for matches alike.
 """
@@ -10,8 +10,16 @@ import bpy
 from ..core.measure import units_per_metre
 from . import cameras, lighting
 from .goals import create_goals
-from .pitch import create_pitch
-from .stage_collection import PITCH_SIZE, STAGE_MARK, find_pitch_size, find_stage, get_stage, list_own_objects
+from .pitch import create_boards, create_pitch
+from .stage_collection import (
+    PITCH_SIZE,
+    STAGE_MARK,
+    find_pitch_size,
+    find_sport,
+    find_stage,
+    get_stage,
+    list_own_objects,
+)
 from .stage_collection import remove_objects as _remove_objects
 from .stands import create_stands
 
@@ -32,11 +40,13 @@ def create_stage(scene: bpy.types.Scene, size: tuple[float, float] | None = None
     is_new = PITCH_SIZE not in stage  # none, only cameras, or one of version 0.1
     _remove_objects([thing for thing in list_own_objects(stage) if not cameras.is_part_of_view(thing)])
     stage[STAGE_MARK], stage[PITCH_SIZE] = True, size
-    units, before = units_per_metre(scene), set(stage.objects)
-    create_pitch(stage, units, size)
-    create_goals(stage, units, size[0])
+    units, before, sport = units_per_metre(scene), set(stage.objects), find_sport(scene)
+    create_pitch(stage, units, sport, size)
+    create_goals(stage, units, sport.goal, size[0])
+    if sport.boards:
+        create_boards(stage, units, sport, size)
     if scene.beyond_mocap_stage.stands:
-        create_stands(stage, units, size)
+        create_stands(stage, units, (size[0] + 2.0 * sport.behind, size[1]))
     settings = scene.beyond_mocap_stage
     lighting.create_lights(stage, units, size, settings.light, masts=not settings.stands)
     for thing in set(stage.objects) - before:
@@ -49,9 +59,9 @@ def create_stage(scene: bpy.types.Scene, size: tuple[float, float] | None = None
 
 
 def find_pitch(scene: bpy.types.Scene) -> list[bpy.types.Object]:
-    """Find grass, lines and goals of the scene's stage."""
+    """Find ground, lines, boards and goals of the scene's stage."""
     stage = find_stage(scene)
-    names = ("Grass", "Lines", "Goal", "Net")
+    names = ("Grass", "Lines", "Goal", "Net", "Boards")
     return [thing for thing in list_own_objects(stage) if thing.name.startswith(names)] if stage is not None else []
 
 

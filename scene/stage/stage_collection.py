@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import bpy
 
 from ..core.names import find_named
-from .pitch import SIZE
+
+if TYPE_CHECKING:
+    from ...beyond_mocap.appearance.sports import Sport
 
 NAME = "Stage"
 FOCUS = "Stage focus"
@@ -50,10 +54,17 @@ def find_focus(scene: bpy.types.Scene) -> bpy.types.Object | None:
     return find_named(stage.objects, FOCUS) if stage is not None else None
 
 
+def find_sport(scene: bpy.types.Scene) -> "Sport":
+    """Return the sport that the scene's stage is for."""
+    from ...beyond_mocap.appearance.sports import load_sports
+
+    return load_sports()[scene.beyond_mocap_stage.sport]
+
+
 def find_pitch_size(scene: bpy.types.Scene) -> tuple[float, float]:
-    """Return length and width of the scene's pitch in metres; the regular size where there is none."""
-    stage = find_stage(scene)
-    return tuple(stage.get(PITCH_SIZE, SIZE)) if stage is not None else SIZE
+    """Return length and width of the scene's pitch in metres; the sport's regular size where there is none."""
+    stage, regular = find_stage(scene), find_sport(scene).size
+    return tuple(stage.get(PITCH_SIZE, regular)) if stage is not None else regular
 
 
 def remove_objects(things: list[bpy.types.Object]) -> None:

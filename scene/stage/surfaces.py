@@ -10,7 +10,12 @@ from .shader_tree import ShaderTree
 
 STRIPES = {"Pitch grass": ((0.026, 0.086, 0.013), (0.062, 0.165, 0.027)),
            "Pitch grass mown": ((0.042, 0.122, 0.018), (0.095, 0.225, 0.038))}  # linear RGB, dark and light blades
-PAINT, WHITE = "Pitch line", ((0.42, 0.50, 0.38), (0.86, 0.86, 0.83))
+PAINTS = {"white": "Pitch line", "red": "Red pitch line", "blue": "Blue pitch line"}
+# linear RGB of paint on grass, between blades and on them
+WORN = {"Pitch line": ((0.42, 0.50, 0.38), (0.86, 0.86, 0.83))}
+COLOURS = {"white": (0.86, 0.86, 0.83), "red": (0.5, 0.01, 0.015), "blue": (0.01, 0.03, 0.35)}
+FLOORS = {"wood": ("Wooden floor", (0.36, 0.2, 0.085), 0.35), "blue floor": ("Blue floor", (0.02, 0.09, 0.26), 0.5),
+          "ice": ("Ice", (0.78, 0.86, 0.92), 0.12), "turf": ("Artificial turf", (0.03, 0.11, 0.2), 0.85)}
 GRAIN = ((0.09, 0.32), (1.3, 0.23), (30.0, 0.45))  # per metre, weight: patches, tufts, blades
 CROWD, SEAT = "Stand crowd", (0.5, 0.8)  # metres of a seat, along the row and up the rows
 SHADE = 0.10  # strength of the crowd's own light: below a roof few bounces of light arrive
@@ -19,12 +24,19 @@ SHIRTS = ((0.015, 0.018, 0.03), (0.17, 0.025, 0.028), (0.30, 0.30, 0.29), (0.03,
 BOARDS = ((0.01, 0.03, 0.16), (0.62, 0.62, 0.60), (0.30, 0.01, 0.02), (0.01, 0.01, 0.012), (0.02, 0.18, 0.10))
 
 
-def get_pitch_materials(units: float) -> list[bpy.types.Material]:
-    """Return the materials of both stripes and of the lines; `units` are Blender units in a metre."""
-    blades = {**STRIPES, PAINT: WHITE}
-    plain = {**{name: tuple(np.mean(pair, axis=0)) for name, pair in STRIPES.items()}, PAINT: WHITE[1]}
-    return [_get_material(name, plain[name], lambda tree, pair=pair: _paint_grass(tree, pair, units))
-            for name, pair in blades.items()]
+def get_pitch_materials(ground: str, paints: list[str], units: float) -> list[bpy.types.Material]:
+    """Return the materials of both stripes of a ground and of its paints; `units` are Blender units in a metre."""
+    if ground == "grass":
+        return [_get_grass(name, units) for name in (*STRIPES, *(PAINTS[paint] for paint in paints))]
+    floor = get_material(*FLOORS[ground])
+    return [floor, floor, *(get_material(f"{PAINTS[paint]} on a floor", COLOURS[paint], 0.4) for paint in paints)]
+
+
+def _get_grass(name: str, units: float) -> bpy.types.Material:
+    """Return the material of a stripe, or of the paint on it."""
+    blades = STRIPES.get(name) or WORN[name]
+    plain = tuple(np.mean(blades, axis=0)) if name in STRIPES else blades[1]
+    return _get_material(name, plain, lambda tree: _paint_grass(tree, blades, units))
 
 
 def get_crowd_material() -> bpy.types.Material:

@@ -1,11 +1,12 @@
-"""Valid files to damage that the program itself writes: tables, pieces, models, a player, joints, motion of SMPL."""
+"""Valid files to damage that the program itself writes: tables, pieces, models, a player, joints, motion of SMPL,
+matches."""
 
 import json
 import shutil
 from pathlib import Path
 
 import numpy as np
-from seeds import SAMPLE
+from seeds import SAMPLE, copy_group
 
 from beyond_mocap.annotation import event_labels
 from beyond_mocap.cli.main import main
@@ -14,6 +15,7 @@ from beyond_mocap.markers.files.marker_set_text import SHIPPED
 from beyond_mocap.markers.files.model_json import write_model
 from beyond_mocap.match.piece_file import write_piece_file
 from beyond_mocap.match.player_edit import write_player
+from tests.core.files.test_formats import WRITERS
 from tests.core.files.test_smpl import build_walk
 from tests.core.joint_feeds import sample_joints, write_cdf, write_fifa, write_hawkeye, write_table
 from tests.core.markers.files.small_model import small_model
@@ -36,6 +38,7 @@ def build_made_seeds(folder: Path) -> dict[str, Path]:
     seeds["set.txt"] = sorted(SHIPPED.glob("*.txt"))[0]
     seeds["event_labels.csv"] = Path(event_labels.__file__).parent / "event_words.csv"
     seeds.update(_write_bodies(folder))
+    seeds.update(_write_matches(folder))
     return {**seeds, "classifier.npz": _learn(folder / "learned", folder / "classifier.npz")}
 
 
@@ -51,6 +54,19 @@ def _write_bodies(folder: Path) -> dict[str, Path]:
         "hawkeye.joints": write_hawkeye(folder, people, 25.0),
         "walk_smpl.npz": walk,
     }
+
+
+def _write_matches(folder: Path) -> dict[str, Path]:
+    """Write a match in each form of tracking that the program itself reads: tracking file, metadata, other files."""
+    seeds = {}
+    for form, write in WRITERS.items():
+        written = folder / f"written_{form}"
+        written.mkdir()
+        tracking = write(written)
+        beside = (path for path in written.iterdir() if path != tracking)
+        others = sorted(beside, key=lambda path: ("corners" not in path.name, path.name))
+        seeds[f"match_{form}"] = copy_group(folder / f"match_{form}", [tracking, *others])
+    return seeds
 
 
 def _learn(clips: Path, out: Path) -> Path:

@@ -82,7 +82,7 @@ def build_seeds(folder: Path) -> dict[str, Path]:
     seeds["weights.npz"] = TOP / "beyond_mocap" / "throws" / "networks" / "weights" / "throw.npz"
     seeds["walk.bvh"] = shorten_bvh(SAMPLE / "library" / "walking_1_2.bvh", folder / "walk.bvh", 24)
     small = SAMPLE / "match" / "small"
-    seeds["match_small"] = _copy_group(folder / "match_small", [small / "small.dat", small / "small_meta.xml"])
+    seeds["match_small"] = copy_group(folder / "match_small", [small / "small.dat", small / "small_meta.xml"])
     return {**seeds, **_build_shared_seeds(folder), **_build_kloppy_seeds(folder)}
 
 
@@ -91,7 +91,7 @@ def _build_shared_seeds(folder: Path) -> dict[str, Path]:
     other, seeds = SHARED / "tracking" / "other", {}
     for name, files in SHARED_GROUPS.items():
         if all((other / file).is_file() for file in files):
-            seeds[f"match_{name}"] = _copy_group(folder / f"match_{name}", [other / file for file in files])
+            seeds[f"match_{name}"] = copy_group(folder / f"match_{name}", [other / file for file in files])
     for path in (
         SHARED / "mocap" / "getup" / "humanoid3d_run.bvh",
         SHARED / "mocap" / "bandai" / "dataset-1_run_normal_001.bvh",
@@ -111,13 +111,21 @@ def _build_kloppy_seeds(folder: Path) -> dict[str, Path]:
         print("fuzz: this kloppy comes without its own test files; events of providers and HawkEye are skipped")
         return {}
     return {
-        name: _copy_group(folder / name, [source / file for file in files], has_numbers=name != "hawkeye")
+        name: copy_group(folder / name, [source / file for file in files], has_numbers=name != "hawkeye")
         for name, files in KLOPPY_GROUPS.items()
     }
 
 
-def _copy_group(folder: Path, files: list[Path], has_numbers: bool = True) -> Path:
-    """Copy the files of one match, with numbers before their names to keep the order; long ones are cut."""
+def copy_group(folder: Path, files: list[Path], has_numbers: bool = True) -> Path:
+    """Copy the files of one match, with numbers before their names to keep the order; long ones are cut.
+
+    Args:
+        folder: the new folder.
+        files: in their order.
+        has_numbers: False where a reader knows their names.
+    Returns:
+        The folder.
+    """
     folder.mkdir()
     for number, path in enumerate(files):
         target = folder / (f"{number}_{path.name}" if has_numbers else path.name)

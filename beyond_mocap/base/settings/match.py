@@ -1,10 +1,17 @@
-"""Settings of matches, and of `touches`."""
+"""Settings of matches, of their pitch, and of `touches`."""
 # fmt: off
 
 from pathlib import Path
 
 from .setting import BETWEEN, Setting
 from .synthesis import BODY
+
+SPORTS = (
+    ("football", "Football", "105 x 68 m"), ("futsal", "Futsal", "40 x 20 m"), ("handball", "Handball", "40 x 20 m"),
+    ("basketball", "Basketball", "28 x 15 m"), ("ice_hockey", "Ice Hockey", "60 x 30 m"),
+    ("field_hockey", "Field Hockey", "91.4 x 55 m"), ("rugby", "Rugby", "100 x 70 m between the goal lines"),
+    ("american_football", "American Football", "91.44 x 48.77 m between the goal lines"),
+)
 
 TABLES = {
     "match.section": (
@@ -43,6 +50,10 @@ TABLES = {
                 help="how much heads and shoulders turn to the ball, 0 for not at all; default %(default)g"),
         *BODY,
         Setting(name="first_frame", default=1, tooltip="Scene frame on which the stretch starts"),
+    ),
+    "pitch": (
+        Setting(name="sport", default="football", choices=SPORTS, option="--sport", help="whose pitch it is; touches "
+                "of the ball are found in football only", tooltip="Whose pitch, lines, goals and ball are shown"),
     ),
     "touches": (
         Setting(name="start", kind=float, unit="seconds", option="--from", help="solve from this time"),

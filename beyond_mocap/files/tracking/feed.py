@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import Any, TypeVar
 from xml.parsers import expat
 
-from ...base.errors import InputError
+from ...base.errors import InputError, build_read_error
 from ...base.optional_packages import import_optional
 
 MAX_PLAYERS = 60
@@ -125,6 +125,19 @@ def read_head(path: Path) -> bytes:
         return file.read(_HEAD_BYTES).removeprefix(b"\xef\xbb\xbf")
 
 
+def is_track_csv(path: Path) -> bool:
+    """Return whether a file is a table of one player's track: its first line names `time_s` and no `player`.
+
+    Raises:
+        InputError: if it cannot be read.
+    """
+    try:
+        first = read_head(path).partition(b"\n")[0]
+    except OSError as error:
+        raise build_read_error(path, "a tracking file", error) from None
+    return b"time_s" in first and b"player" not in first
+
+
 Known = TypeVar("Known", bound=Provider)
 
 
@@ -193,7 +206,7 @@ def _find_syntax_error(files: Iterable) -> str:
             return f"{path}:{error.lineno}: {error.msg.lower()} at column {error.colno}"
         except expat.ExpatError as error:
             return f"{path}:{error.lineno}: {expat.ErrorString(error.code)} at column {error.offset + 1}"
-        except (ValueError, OSError, RecursionError):
+        except (ValueError, OSError, RecursionError, LookupError):  # the last: an encoding that does not exist
             return f"{path}: damaged"
     return ""
 

@@ -6,11 +6,15 @@ import re
 
 import numpy as np
 
+from ...base.errors import InputError
 from ...motion.track.match_data import REFEREE
 
 USUAL_PITCH = (105.0, 68.0)
 PERIOD_BREAK = 10.0
 """Seconds inserted between the periods of a match."""
+_FARTHEST = 1e7  # of any unit from the origin; anything beyond is no place
+_LONGEST = 86_400.0  # seconds of a match
+_SIDES = (8.0, 400.0)  # metres of a pitch's side
 
 
 def list_records(dataset) -> list:
@@ -50,7 +54,7 @@ def build_player_samples(records, players) -> np.ndarray:
         for player, data in frame.players_data.items():
             if data.coordinates is not None:
                 out[row[player.player_id], index] = data.coordinates.x, data.coordinates.y
-    return out
+    return _drop_absurd(out)
 
 
 def build_ball_samples(records) -> np.ndarray:
@@ -67,7 +71,12 @@ def build_ball_samples(records) -> np.ndarray:
         if point is not None:
             height = getattr(point, "z", None)
             out[index] = point.x, point.y, np.nan if height is None else height
-    return out
+    return _drop_absurd(out)
+
+
+def _drop_absurd(places: np.ndarray) -> np.ndarray:
+    """Return places with NaN for numbers that no unit explains."""
+    return np.where(np.abs(places) < _FARTHEST, places, np.nan)
 
 
 def build_clock(records) -> tuple[np.ndarray, list[tuple[float, float, int, float]]]:
@@ -99,6 +108,21 @@ def lay_periods(period: np.ndarray, seconds: np.ndarray) -> tuple[np.ndarray, li
         times[members] = seconds[members] - seconds[members].min() + begin
         spans.append((begin, float(times[members].max()), number_, float(seconds[members].min())))
     return times, spans
+
+
+def check_clock(path, times: np.ndarray) -> None:
+    """Raise an error where the times (N,) s of a match cannot be: unknown, all the same, or of more than a day."""
+    if not np.isfinite(times).all() or not 0.0 < np.ptp(times) < _LONGEST:
+        raise InputError(path, f"times from {times.min():.6g} to {times.max():.6g} s", "the times of one match",
+                         "export it again")
+
+
+def check_size(path, size: tuple[float, float]) -> None:
+    """Raise an error where a pitch's length and width, m, cannot be."""
+    if not all(_SIDES[0] <= side <= _SIDES[1] for side in size):
+        raise InputError(path, f"a pitch of {size[0]:.6g} x {size[1]:.6g} m",
+                         f"sides of {_SIDES[0]:g} to {_SIDES[1]:g} m",
+                         "correct its metadata")
 
 
 def _sort_key(player) -> tuple[str, int, str]:

@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from ...base.errors import InputError, build_read_error, format_count
-from .feed import MAX_PLAYERS, Feed, Files, TrackingProvider, find_provider, load_with_kloppy, read_head
+from .feed import MAX_PLAYERS, Feed, Files, TrackingProvider, find_provider, is_track_csv, load_with_kloppy, read_head
 from .referees import read_signality_referees, read_sportec_referees, read_tracab_referees
 
 if TYPE_CHECKING:
@@ -96,7 +96,7 @@ def _detect_provider(path: Path, notes: list[str]) -> TrackingProvider:
     head, providers = read_head(path), ", ".join(PROVIDERS)
     if not head.strip():
         raise InputError(path, "the file is empty", "positions", "export it again")
-    if b"time_s" in head.partition(b"\n")[0]:
+    if is_track_csv(path):
         expected = f"a match's tracking data from one of {providers}"
         raise InputError(path, "one player's track", expected, "use synthesize for one player")
     raise InputError(path, "unknown format", f"one of {providers}, or for one player a CSV file with time_s,x_m,y_m",
@@ -189,6 +189,12 @@ def _read_gps(feed: Feed, pitch: tuple[float, float] | None) -> MatchSamples:
     from .formats.gps import read_gps
 
     return read_gps(feed, pitch)
+
+
+def _read_table(feed: Feed, pitch: tuple[float, float] | None) -> MatchSamples:
+    from .formats.table import read_table
+
+    return read_table(feed, pitch)
 
 
 def _find_gps(path: Path, meta: Path | None, notes: list[str]) -> Files:
@@ -335,5 +341,11 @@ PROVIDERS: dict[str, TrackingProvider] = {record.name: record for record in (
         name="gps", title="GPS", files="CSV with latitude, longitude and time (Catapult, STATSports) or GPX, a file "
         "for each player; the pitch's corners in `..corners.csv`",
         patterns=_GPS_PATTERNS, needs_metadata=False, find_files=_find_gps, read_samples=_read_gps,
+    ),
+    TrackingProvider(
+        name="table", title="Plain CSV", files="one CSV with `time_s,player,x_m,y_m`, a row for each player and moment",
+        patterns=(rb"(?i)(?=[^\n]{0,400}\btime)(?=[^\n]{0,400}\bplayer)(?=[^\n]{0,400}\bx(_m)?\b)"
+                  rb"(?![^\n]{0,400}\b(lat|latitude|joint|landmark|type)\b)",),
+        needs_metadata=False, has_pitch_size=False, find_files=_find_alone, read_samples=_read_table,
     ),
 )}  # fmt: skip

@@ -151,11 +151,11 @@ def _read_arrays(feed: Feed, pitch: tuple[float, float] | None) -> dict[str, np.
 
 def _read_samples(feed: Feed, pitch: tuple[float, float] | None, whose: Feed | None = None) -> MatchSamples:
     """Read the samples of a match; with copies of files, `whose` are the user's."""
-    if feed.provider.read_samples is None:
-        return _convert_dataset(load_tracking(feed, pitch or match_arrays.USUAL_PITCH), whose or feed, pitch)
     try:
-        return feed.provider.read_samples(feed, pitch)
-    except (KeyError, TypeError, AttributeError, ValueError, IndexError) as error:
+        if feed.provider.read_samples is not None:
+            return feed.provider.read_samples(feed, pitch)
+        return _convert_dataset(load_tracking(feed, pitch or match_arrays.USUAL_PITCH), whose or feed, pitch)
+    except (LookupError, TypeError, AttributeError, ValueError, ArithmeticError) as error:
         found = f"values in other places than {feed.provider.title} has them ({type(error).__name__}: {error})"
         raise InputError(feed.path, found[:200], f"{feed.provider.name} tracking", "export it again") from None
 
@@ -167,7 +167,9 @@ def _convert_dataset(dataset, feed: Feed, pitch: tuple[float, float] | None) -> 
     players = match_arrays.list_players(records)
     lines += check_players(players, dataset, feed)
     times, periods = match_arrays.build_clock(records)
+    match_arrays.check_clock(feed.path, times)
     length, width, is_default = match_arrays.find_pitch_size(dataset, pitch, feed.provider.has_pitch_size)
+    match_arrays.check_size(feed.path, (length, width))
     to_metres = match_arrays.build_metre_map(dataset.metadata.coordinate_system, length, width,
                                              upward=feed.has_team_files)
     ball = match_arrays.build_ball_samples(records)

@@ -42,7 +42,7 @@ def lines_of(names):
 def test_the_properties_of_0_1_are_still_as_they_were():
     """tests/data/properties-0.1.txt is never made again; since then the hidden status texts have another name,
     touches are solved by default, IK targets are baked by default, a path's degree is freer, and there are one more
-    format and pin, two more methods, and four more providers."""
+    format and pin, two more methods, and five more providers."""
     now = set(lines_of((bpy.types.PropertyGroup, bpy.types.AddonPreferences)))
     then = PROPERTIES.read_text("utf-8").replace(".told | STRING |", ".messages | STRING |")
     then = then.replace("Settings.solve_touches | BOOLEAN | False", "Settings.solve_touches | BOOLEAN | True")
@@ -50,7 +50,7 @@ def test_the_properties_of_0_1_are_still_as_they_were():
     then = then.replace("FBX=0 GLB=1 USD=2 BVH=3", "FBX=0 GLB=1 USD=2 BVH=3 ABC=4")
     then = then.replace("path=0 distance=1 blocks=2", "path=0 distance=1 blocks=2 fs=3 baseline=4")
     then = then.replace("left_foot=2 right_foot=3 gaze=4", "left_foot=2 right_foot=3 gaze=4 ball=5")
-    then = then.replace("hawkeye=9", "hawkeye=9 cdf=10 respovision=11 soccernet=12 gps=13")
+    then = then.replace("hawkeye=9", "hawkeye=9 cdf=10 respovision=11 soccernet=12 gps=13 table=14")
     then = then.replace("curve_degree | INT | 3 | 2 5", "curve_degree | INT | 3 | 1 20")
     then = then.splitlines()
     assert len(then) > 400

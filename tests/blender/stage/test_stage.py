@@ -76,6 +76,38 @@ def test_goals_fit_the_pitch(size):
         assert 2.4 < corners[:, 2].max() < 2.6 and 7.3 < np.ptp(corners[:, 1]) < 7.7
 
 
+@pytest.mark.parametrize("sport", ["futsal", "handball", "basketball", "ice_hockey", "field_hockey", "rugby",
+                                   "american_football"])
+def test_each_sport_has_its_ground_goals_and_ball(sport):
+    scene = bpy.context.scene
+    stage = room("stage.stage")
+    stage.create_stage(scene)
+    scene.beyond_mocap_stage.sport = sport
+    kind = room("stage.stage_collection").find_sport(scene)
+    length, width = kind.size
+    assert room("stage.stage_collection").find_pitch_size(scene) == kind.size
+    bpy.context.view_layer.update()
+    grounds = [thing for thing in scene.objects if thing.name.startswith("Grass")]
+    assert len(grounds) == 1
+    areas = np.array([face.area for face in grounds[0].data.polygons])
+    around = (length + 2 * kind.behind + 12.0) * (width + 12.0)
+    assert areas.sum() == pytest.approx(around, rel=1e-4) and areas.min() > 0.0  # nothing twice, no hole
+    paints = {face.material_index for face in grounds[0].data.polygons} - {0, 1}
+    assert len(paints) == (3 if sport == "ice_hockey" else 1)
+    goals = [thing for thing in stage.find_pitch(scene) if thing.name.startswith("Goal ") and len(
+        thing.name.split()) == 2]
+    assert sorted(goal.location.x for goal in goals) == pytest.approx(
+        [kind.goal.inset - length / 2, length / 2 - kind.goal.inset], abs=1e-4)
+    assert max(goal.dimensions.z for goal in goals) >= min(kind.goal.height, 0.01)
+    ball = room("stage.ball").create_ball(bpy.context, "Ball", scene.collection)
+    bpy.context.view_layer.update()
+    across = 2 * kind.ball.radius
+    wanted = (kind.ball.length or across, across, kind.ball.thickness or across)
+    assert tuple(ball.dimensions) == pytest.approx(wanted, rel=0.01)
+    scene.beyond_mocap_stage.sport = "football"
+    assert room("stage.stage_collection").find_pitch_size(scene) == (105.0, 68.0)
+
+
 @pytest.mark.parametrize("when", ["before", "after", "reopened"])
 def test_the_camera_follows_the_bodies_whenever_the_stage_is_added(walker, when, tmp_path):
     if when == "before":

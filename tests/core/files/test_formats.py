@@ -120,8 +120,18 @@ def write_gpx(folder):
     return folder / "p7.gpx"
 
 
+def write_table(folder, shift=(SIZE[0] / 2, SIZE[1] / 2), scale=1.0):
+    """From a corner; the players' moments are those of the ball."""
+    rows = [(time, key, *(place + shift) * scale, *more) for row, time in enumerate(TIME) for key, place, more in (
+        ("p7", HOME[row], ("", "Reds", 7, "GK keeper")), ("p9", AWAY[row], ("", "Blues", 9, "")),
+        ("ball", HOME[row] + (0.5, 0), (0.2, "", "", "")))]
+    text = "".join(",".join(map(str, row)) + "\n" for row in rows)
+    (folder / "game.csv").write_text("time_s,player,x_m,y_m,z_m,team,number,position\n" + text)
+    return folder / "game.csv"
+
+
 WRITERS = {"cdf": write_cdf, "respovision": write_respovision, "soccernet": write_soccernet, "catapult": write_catapult,
-           "statsports": write_statsports, "gpx": write_gpx}
+           "statsports": write_statsports, "gpx": write_gpx, "table": write_table}
 
 
 @pytest.mark.parametrize("form", WRITERS)
@@ -146,6 +156,26 @@ def test_planted_players_come_back(form, tmp_path):
     assert (striker.team, striker.number) == ("away", 9)
     assert match.ball[:, 0] == pytest.approx(HOME[:, 0] + 0.5)
     assert (match.length, match.width) == (SIZE if form != "soccernet" else (105.0, 68.0))
+
+
+def test_a_table_of_wearables_has_moments_of_each_player(tmp_path):
+    """Ten times a second each, but never together, in metres from the centre."""
+    players = (("a", HOME, 0.0), ("b", AWAY, 0.043))
+    rows = [f"{time + late:.3f};{key};{place[0]};{place[1]}\n" for key, places, late in players
+            for time, place in zip(TIME, places)]
+    (tmp_path / "game.csv").write_text("Timestamp;Player;x;y\n" + "".join(rows))
+    match = read_match(tmp_path / "game.csv", cache_dir=tmp_path / "cache")
+    assert match.fps == RATE and len(match.times) in (COUNT - 1, COUNT, COUNT + 1)
+    for found, (_, truth, late) in zip(match.positions, players):
+        known = np.isfinite(found[:, 0])
+        wanted = np.interp(match.times[known], TIME + late, truth[:, 0])
+        assert known.sum() >= COUNT - 2 and np.abs(found[known, 0] - wanted).max() < 0.01
+
+
+@pytest.mark.parametrize(("scale", "line"), [(100.0, "metres"), (0.01, "metres")])
+def test_a_table_in_another_unit_is_refused(scale, line, tmp_path):
+    with pytest.raises(InputError, match=line):
+        read_match(write_table(tmp_path, scale=scale), cache_dir=tmp_path / "cache")
 
 
 def test_two_halves_follow_each_other(tmp_path):

@@ -304,8 +304,8 @@ def test_a_provider_is_one_record(tmp_path, monkeypatch, capsys):
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "home"))
     touches = ["touches", str(tmp_path / "game.acme"), "--provider", "acme", "--out", str(tmp_path / "t.csv")]
     assert main(touches) == 0 and main([*touches, "--provider", "acne"]) == 2
-    assert "gps, acme" in capsys.readouterr().err
-    assert main(["match", "--help"]) == 0 and "gps, acme" in " ".join(capsys.readouterr().out.split())
+    assert "table, acme" in capsys.readouterr().err
+    assert main(["match", "--help"]) == 0 and "table, acme" in " ".join(capsys.readouterr().out.split())
     assert "| Acme Sports | `.acme` with TRACAB's metadata |\n" in replace_tables(PROVIDERS_PAGE.read_text("utf-8"))
 
 

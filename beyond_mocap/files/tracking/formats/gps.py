@@ -21,6 +21,7 @@ from ..feed import Feed
 from .cdf import parse_time
 from .samples import MatchSamples, SampleCollector
 
+_MOST_DEGREES = (90.0, 180.0)  # of latitude and longitude
 _EARTH_RADIUS = 6_371_008.8  # metres, mean (IUGG)
 _NAMES = {
     "latitude": ("lat", "latitude"), "longitude": ("lon", "long", "lng", "longitude"),
@@ -28,7 +29,6 @@ _NAMES = {
 }  # fmt: skip
 _COLUMNS = {variant: column for column, names in _NAMES.items() for name in names
             for variant in (name, name.capitalize(), name.title(), name.upper()) if variant != column}
-_LONGEST_GAP = 1.0  # seconds between two samples that are joined by a line
 _EXCEL_DAYS = (20_000.0, 80_000.0)  # 1954 to 2119
 _EPOCH = (1e9, 1e11)  # seconds since 1970, 2001 to 5138; thousand times as much in milliseconds
 _PITCH_RANGE = (10.0, 400.0)  # metres of a pitch's side
@@ -50,7 +50,7 @@ def read_gps(feed: Feed, pitch: tuple[float, float] | None) -> MatchSamples:
 
     Args:
         feed: the chosen file first, then all others beside it; the corners as metadata, if there are any.
-        pitch: length and width in metres, which win over the corners' distances; None: those.
+        pitch: length and width in metres, where there are no corners; None: not known.
     Returns:
         The match, all in the home team.
     Raises:
@@ -75,8 +75,8 @@ def read_gps(feed: Feed, pitch: tuple[float, float] | None) -> MatchSamples:
     begin = min(one.times[0] for one in receivers)
     for receiver in receivers:
         found.add_person(receiver.name, "home", receiver.name)
-        _add_samples(found, receiver, to_pitch(receiver.degrees), begin, step)
-    return found.build(pitch or size, fps=1.0 / step)
+        found.add_track(1, receiver.name, receiver.times - begin, to_pitch(receiver.degrees), step)
+    return found.build(size or pitch, fps=1.0 / step)
 
 
 def _read_receiver(path: Path) -> _Receiver:
@@ -84,7 +84,7 @@ def _read_receiver(path: Path) -> _Receiver:
     name, times, degrees = _read_gpx(path) if path.suffix.lower() == ".gpx" else _read_table(path)
     times, degrees = np.array(times, dtype=float), np.array(degrees, dtype=float).reshape(-1, 2)
     good = np.isfinite(times) & np.isfinite(degrees).all(axis=1) & np.any(degrees != 0.0, axis=1)
-    good &= (np.abs(degrees) <= (90.0, 180.0)).all(axis=1)
+    good &= (np.abs(degrees) <= _MOST_DEGREES).all(axis=1)
     times, order = np.unique(times[good], return_index=True)
     if len(times) < 2:
         raise InputError(path, format_count(len(times), "sample"), "at least two with a time and a place",
@@ -96,15 +96,24 @@ def _read_table(path: Path) -> tuple[str, list[float], list[tuple[float, float]]
     """Read name, times and degrees of a CSV."""
     times, degrees, name = [], [], ""
     for place, row in read_rows(path, ("time", "latitude", "longitude"), others=_COLUMNS, separators=",;\t"):
-        times.append(_parse_clock(row["time"], place))
+        times.append(parse_clock(row["time"], place))
         degrees.append((parse_number(row["latitude"], "latitude", place, blank=True),
                         parse_number(row["longitude"], "longitude", place, blank=True)))
         name = name or row.get("name", "")
     return f"{name} ({path.stem})" if name else path.stem, times, degrees
 
 
-def _parse_clock(text: str, place: str) -> float:
-    """Parse a time of any usual form to seconds: HH:MM:SS.s, days of a table program, seconds since 1970, ISO 8601."""
+def parse_clock(text: str, place: str) -> float:
+    """Parse a time of any usual form to seconds: HH:MM:SS.s, days of a table program, seconds since 1970, ISO 8601.
+
+    Args:
+        text: the time.
+        place: where it stands, for errors.
+    Returns:
+        Seconds.
+    Raises:
+        InputError: if it is none.
+    """
     if re.fullmatch(r"\d{1,2}:\d{2}:\d{2}([.,]\d+)?", text):
         hours, minutes, seconds = text.replace(",", ".").split(":")
         return 3600.0 * int(hours) + 60.0 * int(minutes) + float(seconds)
@@ -112,6 +121,8 @@ def _parse_clock(text: str, place: str) -> float:
         value = float(text)
     except ValueError:
         return (parse_time(text, place) - datetime(1970, 1, 1)).total_seconds()
+    if not abs(value) < 1000.0 * _EPOCH[1]:
+        raise InputError(place, f"time {text[:40]!r}", "seconds", "export it again")
     if _EXCEL_DAYS[0] <= value <= _EXCEL_DAYS[1] and "." in text:
         return 86_400.0 * value
     return value / 1000.0 if value > _EPOCH[1] else value
@@ -134,7 +145,7 @@ def _read_gpx(path: Path) -> tuple[str, list[float], list[tuple[float, float]]]:
 
     def end(_name):
         if is_open[-2:] == ["trkpt", "time"]:
-            times[-1] = _parse_clock("".join(text).strip(), str(path))
+            times[-1] = parse_clock("".join(text).strip(), str(path))
         is_open.pop()
 
     parser = expat.ParserCreate()
@@ -193,8 +204,11 @@ def _read_corners(path: Path) -> np.ndarray:
     rows = list(read_rows(path, ("latitude", "longitude"), others=_COLUMNS, separators=",;\t"))
     if len(rows) != 4:
         raise InputError(path, format_count(len(rows), "corner"), "4", "keep the pitch's four corners")
-    return np.array([[parse_number(row[name], name, place) for name in ("latitude", "longitude")]
-                     for place, row in rows])
+    corners = np.array([[parse_number(row[name], name, place) for name in ("latitude", "longitude")]
+                        for place, row in rows])
+    if (np.abs(corners) > _MOST_DEGREES).any():
+        raise InputError(path, f"{np.abs(corners).max():.6g} degrees", "latitudes and longitudes", "export it again")
+    return corners
 
 
 def _measure_corners(path: Path, places: np.ndarray) -> tuple[np.ndarray, np.ndarray, tuple[float, float]]:
@@ -212,17 +226,3 @@ def _measure_corners(path: Path, places: np.ndarray) -> tuple[np.ndarray, np.nda
         raise InputError(path, f"corners of a pitch of {size[0]:.0f} x {size[1]:.0f} m",
                          f"sides of {_PITCH_RANGE[0]:g} to {_PITCH_RANGE[1]:g} m", "check latitude and longitude")
     return centre, axis, size
-
-
-def _add_samples(found: SampleCollector, receiver: _Receiver, places: np.ndarray, begin: float, step: float) -> None:
-    """Add a receiver's places at the common moments, none within a gap."""
-    times = receiver.times - begin
-    first, last = int(np.ceil(times[0] / step - 1e-6)), int(np.floor(times[-1] / step + 1e-6))
-    moments = np.arange(first, last + 1)
-    at = np.clip(moments * step, times[0], times[-1])
-    after = np.clip(np.searchsorted(times, at), 1, len(times) - 1)
-    joined = times[after] - times[after - 1] <= max(_LONGEST_GAP, 2.0 * step)
-    x, y = (np.interp(at, times, column) for column in places.T)
-    for number, is_joined, one, other in zip(moments.tolist(), joined.tolist(), x.tolist(), y.tolist()):
-        if is_joined:
-            found.add_sample((1, round(number * step, 4)), receiver.name, one, other)

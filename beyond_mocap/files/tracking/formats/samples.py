@@ -16,10 +16,12 @@ from ....base.content import open_file
 from ....base.errors import InputError, format_count
 from ....motion.track.match_data import REFEREE
 from ..feed import MAX_PLAYERS
-from ..match_arrays import lay_periods
+from ..match_arrays import check_clock, check_size, lay_periods
 
 _MOST_SAMPLES = 20_000_000
+_FARTHEST = 1e4  # metres; anything beyond is no place
 _KEEPER = "goalkeeper"
+_LONGEST_GAP = 1.0  # seconds between two samples that are joined by a line
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -83,11 +85,34 @@ class SampleCollector:
             if len(self._samples) > 4 * _MOST_SAMPLES:
                 raise InputError(self._path, f"more than {_MOST_SAMPLES:,} samples", "one match", "divide the file")
 
+    def add_track(self, period: int, key: str, times: np.ndarray, places: np.ndarray, step: float) -> None:
+        """Add where a person is at the multiples of `step` s, by lines between own samples, none within a gap.
+
+        Args:
+            period: number.
+            key: whose.
+            times: (N,) s, increasing.
+            places: (N, 2) metres.
+            step: s.
+        Raises:
+            InputError: for times of more than a day.
+        """
+        check_clock(self._path, times)
+        first, last = int(np.ceil(times[0] / step - 1e-6)), int(np.floor(times[-1] / step + 1e-6))
+        moments = np.arange(first, last + 1)
+        at = np.clip(moments * step, times[0], times[-1])
+        after = np.clip(np.searchsorted(times, at), 1, len(times) - 1)
+        joined = times[after] - times[after - 1] <= max(_LONGEST_GAP, 2.0 * step)
+        x, y = (np.interp(at, times, column) for column in places.T)
+        for number, is_joined, one, other in zip(moments.tolist(), joined.tolist(), x.tolist(), y.tolist()):
+            if is_joined:
+                self.add_sample((period, round(number * step, 4)), key, one, other)
+
     def add_ball(self, moment: tuple[int, float], x: object, y: object, z: object = None) -> None:
         """Add where the ball is, metres."""
         place = _to_place(x, y)
         if place is not None:
-            height = z if isinstance(z, (int, float)) and math.isfinite(z) else math.nan
+            height = z if isinstance(z, (int, float)) and abs(z) < _FARTHEST else math.nan
             self._ball.extend((self._find_moment(moment), *place, height))
 
     def build(self, size: tuple[float, float] | None = None, team_names: tuple[str, str] = ("", ""),
@@ -119,6 +144,9 @@ class SampleCollector:
         found = np.frombuffer(self._ball).reshape(-1, 4) if self._ball else np.zeros((0, 4))
         ball[rows[found[:, 0].astype(int)]] = found[:, 1:]
         times, periods = lay_periods(*(np.array(column) for column in zip(*order)))
+        check_clock(self._path, times)
+        if size is not None:
+            check_size(self._path, size)
         people = [self.people.get(key, (key, REFEREE, key, "-1", "")) for key in self._who]
         unknown = [key for key in self._who if key not in self.people]
         lines = [f"{format_count(len(unknown), 'person')} without a team, {unknown[0]}: taken for "
@@ -134,8 +162,8 @@ class SampleCollector:
 
 
 def _to_place(x: object, y: object) -> tuple[float, float] | None:
-    """Return finite coordinates; None for what is missing."""
-    if isinstance(x, (int, float)) and isinstance(y, (int, float)) and math.isfinite(x) and math.isfinite(y):
+    """Return coordinates; None for what is missing or absurd."""
+    if isinstance(x, (int, float)) and isinstance(y, (int, float)) and abs(x) < _FARTHEST and abs(y) < _FARTHEST:
         return float(x), float(y)
     return None
 

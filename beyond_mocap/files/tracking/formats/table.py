@@ -1,0 +1,129 @@
+"""Positions of all players in one plain table: a row for each player and moment, metres."""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from pathlib import Path
+
+import numpy as np
+
+from ....base.errors import InputError
+from ...tables import parse_number, read_rows
+from ..feed import Feed
+from ..match_arrays import USUAL_PITCH
+from .gps import parse_clock
+from .samples import MatchSamples, SampleCollector
+
+_NAMES = {
+    "time_s": ("time", "timestamp", "t", "seconds"), "player": ("player_id", "id", "track_id"), "x_m": ("x",),
+    "y_m": ("y",), "z_m": ("z",), "number": ("jersey", "jersey_number", "shirt"), "position": ("role",),
+    "period": ("half",), "name": ("player_name",), "team": (),
+}  # fmt: skip
+_COLUMNS = {variant: column for column, names in _NAMES.items() for name in (column, *names)
+            for variant in {name, name.capitalize(), name.upper()} if variant != column}
+_BALL = "ball"
+_BESIDE = 5.0  # metres beside the pitch where players still are
+_FARTHEST = 250.0  # metres from the origin; more is another unit
+_SHARED = 1.5  # as many moments as the busiest player has samples: above, players have moments of their own
+
+
+def read_table(feed: Feed, pitch: tuple[float, float] | None) -> MatchSamples:
+    """Read a table with time, player, x and y, and team, z, number, name, position and period where they are there.
+
+    The ball is the player `ball`. Teams are home, away, and else in their order in the file. The origin is the pitch's
+    centre or, where all players are right of and above it and some beyond half of the pitch, a corner.
+
+    Args:
+        feed: the file.
+        pitch: length and width in metres; None: 105 x 68.
+    Returns:
+        The match.
+    Raises:
+        InputError: with the line, for cells that are no numbers; for other units than metres.
+    """
+    found = SampleCollector(feed.path)
+    tracks = _read_tracks(feed.path, found)
+    corner = _find_origin(feed.path, tracks, pitch or USUAL_PITCH, found)
+    step = _find_step(tracks)
+    for key, rows in tracks.items():
+        samples = np.array(rows, dtype=float)
+        samples[:, 2:4] -= corner
+        if step is None or key == _BALL:
+            _add_rows(found, key, samples)
+        else:
+            _add_resampled(found, key, samples, step)
+    return found.build(pitch)
+
+
+def _read_tracks(path: Path, found: SampleCollector) -> dict[str, list[tuple[int, float, float, float, float]]]:
+    """Read period, seconds, x, y and z of each player, and add the people."""
+    tracks: dict[str, list] = defaultdict(list)
+    grounds: dict[str, str] = {}
+    for place, row in read_rows(path, ("time_s", "player", "x_m", "y_m"), others=_COLUMNS, separators=",;\t"):
+        x, y, z = (parse_number(row.get(name, ""), name, place, blank=True) for name in ("x_m", "y_m", "z_m"))
+        period = parse_number(row["period"], "period", place) if row.get("period") else 1
+        key = row["player"]
+        if key.lower() == _BALL:
+            key = _BALL
+        else:
+            found.add_person(key, _find_ground(row.get("team", ""), grounds, found.lines), row.get("name", ""),
+                             row.get("number", ""), row.get("position", ""))
+        tracks[key].append((int(period), round(parse_clock(row["time_s"], place), 4), x, y, z))
+    if not tracks:
+        raise InputError(path, "no rows", "a row for each player and moment", "export it again")
+    return tracks
+
+
+def _find_ground(team: str, grounds: dict[str, str], lines: list[str]) -> str:
+    """Return "home" or "away" for a team's name, anything else for referees."""
+    if team.lower() in ("home", "away", "referee"):
+        return team.lower()
+    if team not in grounds:
+        grounds[team] = ("home", "away", "referee")[min(len(grounds), 2)]
+        if team:
+            lines.append(f"{team} is taken as {'referees' if len(grounds) > 2 else f'the {grounds[team]} team'}")
+    return grounds[team]
+
+
+def _find_origin(path: Path, tracks, pitch: tuple[float, float], found: SampleCollector) -> np.ndarray:
+    """Return where the pitch's centre is in the file's coordinates, (2,)."""
+    places = np.array([row[2:4] for key, rows in tracks.items() if key != _BALL for row in rows], dtype=float)
+    places = places[np.isfinite(places).all(axis=1)]
+    if not len(places):
+        raise InputError(path, "no position of a player", "x and y in metres", "export it again")
+    low, high = np.percentile(places, (1, 99), axis=0)
+    if max(abs(low).max(), abs(high).max()) > _FARTHEST or np.ptp([low, high], axis=0).max() <= 1.0:
+        raise InputError(path, f"players between {low[0]:.4g} and {high[0]:.4g} along the pitch", "metres",
+                         "convert x and y to metres")
+    half = np.array(pitch) / 2.0
+    if (low > -_BESIDE).all() and (high > half + 1.0).any():
+        found.lines.append("the origin is taken as a corner of the pitch")
+        return half
+    return np.zeros(2)
+
+
+def _add_rows(found: SampleCollector, key: str, samples: np.ndarray) -> None:
+    """Add samples (N, 5) as they are."""
+    for period, seconds, x, y, z in samples.tolist():
+        if key == _BALL:
+            found.add_ball((int(period), seconds), x, y, z)
+        else:
+            found.add_sample((int(period), seconds), key, x, y)
+
+
+def _find_step(tracks) -> float | None:
+    """Find the seconds between moments that all players can share; None where they share those of the file."""
+    moments = {row[:2] for rows in tracks.values() for row in rows}
+    if len(moments) <= _SHARED * max(map(len, tracks.values())):
+        return None
+    steps = np.concatenate([np.diff(np.unique([row[1] for row in rows])) for rows in tracks.values()])
+    return round(float(np.median(steps)), 3)
+
+
+def _add_resampled(found: SampleCollector, key: str, samples: np.ndarray, step: float) -> None:
+    """Add a player's samples (N, 5) at moments that all players share."""
+    for period in np.unique(samples[:, 0]):
+        own = samples[(samples[:, 0] == period) & np.isfinite(samples[:, 2:4]).all(axis=1)]
+        times, order = np.unique(own[:, 1], return_index=True)
+        if len(times) > 1:
+            found.add_track(int(period), key, times, own[order, 2:4], step)
