@@ -1,4 +1,4 @@
-"""Read skeletal tracking: Common Data Format, Hawk-Eye, a plain CSV, and arrays of FIFA's fifteen points.
+"""Read skeletal tracking: Common Data Format, Hawk-Eye, a plain CSV, arrays of FIFA's fifteen points, and of SMPL.
 
 The content shows whose form a file has; joints are known by `landmarks.identify_landmark`.
 """
@@ -18,6 +18,7 @@ from ..tracking.formats.cdf import parse_time, read_json
 from ..tracking.formats.samples import iter_json_lines
 from .joint_feed import JointCollector, JointFeed
 from .landmarks import identify_landmark
+from .smpl_people import is_people_file, read_smpl_people
 
 FIFA_15 = ("nose", "right_shoulder", "left_shoulder", "right_elbow", "left_elbow", "right_wrist", "left_wrist",
            "right_hip", "left_hip", "right_knee", "left_knee", "right_ankle", "left_ankle", "right_big_toe",
@@ -53,7 +54,7 @@ def read_joints(path) -> JointFeed:
 def _find_reader(path: Path):
     """Find the function that reads a file, by its content."""
     if path.suffix.lower() == ".npz":
-        return _read_fifa
+        return read_smpl_people if is_people_file(path) else _read_fifa
     head = read_head(path)
     if re.match(rb'(?s)\s*\{.{0,4000}"landmarks"', head):
         return _read_cdf

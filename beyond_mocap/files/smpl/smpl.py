@@ -90,8 +90,8 @@ def read_smpl(path, stature: float | None = None, body_model: Path | None = None
     poses, trans, form = _find_poses(path, arrays)
     fps, notes = _find_rate(path, arrays)
     rotations = quaternion.from_rotation_vector(poses)
-    to_world, up = _find_up_axis(rotations[:, 0])
-    local, root = _to_core(rotations, trans, to_world)
+    to_world, up = find_up_axis(rotations[:, 0])
+    local, root = to_core_axes(rotations, trans, to_world)
     skeleton, pelvis, origin = _choose_bones(Motion(build_smpl_skeleton(1.0), root, local, fps), arrays, stature,
                                            body_model)
     motion = Motion(skeleton, root + to_world @ TO_CORE.T @ pelvis, local, fps)
@@ -150,7 +150,8 @@ def _find_poses(path: Path, arrays: Mapping[str, np.ndarray]) -> tuple[np.ndarra
             raise InputError(path, f"{part[0]} {root.shape}, {part[1]} {body.shape}", "(T, 3) and (T, 63 or 69)")
         flat, form = np.hstack([root, body]), "SMPL in parts"
     if not form or trans.shape != (len(flat), 3):
-        raise InputError(path, f"poses {flat.shape}, trans {trans.shape}", _KIND, "export one person's motion")
+        raise InputError(path, f"poses {flat.shape}, trans {trans.shape}", _KIND,
+                         "export one person's motion; bodies --joints reads many")
     if not 2 <= len(flat) <= _MAX_FRAMES:
         raise InputError(path, format_count(len(flat), "frame"), f"2 to {_MAX_FRAMES:,}")
     if np.abs(trans).max() > _MAX_METRES:
@@ -178,7 +179,7 @@ def _find_rate(path: Path, arrays: Mapping[str, np.ndarray]) -> tuple[float, lis
     return rate, []
 
 
-def _find_up_axis(pelvis: np.ndarray) -> tuple[np.ndarray, str]:
+def find_up_axis(pelvis: np.ndarray) -> tuple[np.ndarray, str]:
     """Find the world's up axis, towards which the pelvis' own points most.
 
     Args:
@@ -190,8 +191,16 @@ def _find_up_axis(pelvis: np.ndarray) -> tuple[np.ndarray, str]:
     return (_Z_UP, "z") if abs(up[2]) >= abs(up[1]) else (_Y_UP, "y")
 
 
-def _to_core(rotations: np.ndarray, trans: np.ndarray, to_world: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return local rotations (T, 22, 4) and places of the model's origin (T, 3) in the core's axes."""
+def to_core_axes(rotations: np.ndarray, trans: np.ndarray, to_world: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Turn a motion into the core's axes.
+
+    Args:
+        rotations: (T, 22, 4) local, in the file's axes.
+        trans: (T, 3) metres, the model's origin.
+        to_world: (3, 3), see `find_up_axis`.
+    Returns:
+        Local rotations (T, 22, 4) and places of the model's origin (T, 3) m.
+    """
     axes = quaternion.from_matrix(TO_CORE)
     local = quaternion.multiply(quaternion.multiply(axes, rotations), quaternion.inverse(axes))
     world = quaternion.multiply(quaternion.from_matrix(to_world), rotations[:, 0])

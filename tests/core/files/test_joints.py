@@ -9,6 +9,10 @@ import pytest
 from beyond_mocap.base.errors import InputError
 from beyond_mocap.files.joints.joint_readers import read_joints
 from beyond_mocap.files.joints.landmarks import LANDMARKS, identify_landmark
+from beyond_mocap.files.smpl.smpl import write_smpl
+from beyond_mocap.files.smpl.smpl_skeleton import JOINTS
+from beyond_mocap.motion.motion import forward_kinematics
+from tests.core.files.test_smpl import build_walk
 from tests.core.joint_feeds import NAMES, sample_joints, write_cdf, write_fifa, write_hawkeye, write_table
 
 SAMPLES = pathlib.Path(__file__).resolve().parents[3] / ".." / "shared" / "data" / "skeletal"
@@ -37,6 +41,46 @@ def test_the_same_joints_come_back_from_each_form(form, people, tmp_path):
         assert person.times == pytest.approx(np.arange(len(joints)) / FPS, abs=1e-4)
         own = person.positions[:, [person.landmarks.index(landmark) for landmark in NAMES]]
         assert np.abs(own - joints).max() < 1e-5
+
+
+@pytest.fixture
+def smpl_people(tmp_path):
+    """The same walk by two people, 20 m apart; the second is absent for a while."""
+    walk = build_walk()
+    write_smpl(tmp_path / "walk.npz", walk)
+    with np.load(tmp_path / "walk.npz") as stored:
+        poses, trans = stored["poses"], stored["trans"]
+    absent = np.zeros((2, len(walk), 1), bool)
+    absent[1, 150:200] = True
+    parts = {"global_orient": poses[:, :3], "body_pose": poses[:, 3:], "transl": trans}
+    arrays = {name: np.where(absent, np.nan, np.stack([part, part])) for name, part in parts.items()}
+    arrays["transl"][1, :, 0] += 20.0
+    return walk, absent[..., 0], arrays
+
+
+def test_people_of_smpl_have_joints_of_mean_proportions(smpl_people, tmp_path):
+    walk, absent, arrays = smpl_people
+    np.savez(tmp_path / "people.npz", **arrays, betas=np.zeros((2, 10)), fps=np.array(walk.fps))
+    feed = read_joints(tmp_path / "people.npz")
+    assert feed.fps == walk.fps and [person.id for person in feed.people] == ["0", "1"]
+    truth, _ = forward_kinematics(walk)
+    floor = truth[:, JOINTS.index("left_foot"), 2].min() - 0.009 * 1.76  # what read_smpl takes for the ground
+    for person, missing, aside in zip(feed.people, absent, (0.0, 20.0)):
+        assert person.times == pytest.approx(np.flatnonzero(~missing) / walk.fps)
+        wanted = truth[~missing][:, [JOINTS.index(landmark) for landmark in person.landmarks]] + (aside, 0.0, -floor)
+        assert np.abs(person.positions - wanted).max() < 0.03
+    assert "mean proportions" in " ".join(feed.notes)
+
+
+@pytest.mark.parametrize(("change", "line"), [
+    ({"body_pose": np.zeros((2, 240, 30))}, "shapes"), ({"fps": np.array(9000.0)}, "1 to 400"),
+    ({"transl": np.full((2, 240, 3), np.nan)}, "no person"), ({"transl": np.zeros((3, 240, 3))}, "shapes"),
+    ({"global_orient": np.array([object()] * 3)}, "global_orient"),
+])  # fmt: skip
+def test_damaged_people_of_smpl_end_with_one_line(change, line, smpl_people, tmp_path):
+    np.savez(tmp_path / "people.npz", **{**smpl_people[2], **change})
+    with pytest.raises(InputError, match=line):
+        read_joints(tmp_path / "people.npz")
 
 
 @pytest.mark.parametrize(("unit", "turn", "said"), [
