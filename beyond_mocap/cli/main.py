@@ -22,6 +22,7 @@ from ..base.errors import BeyondMocapError, InputError, UserCancelledError
 from .bodies import add_bodies
 from .compare_methods import add_compare
 from .convert import add_mirror, add_retarget, add_stream
+from .freezing import add_freeze_frame
 from .library import add_library
 from .matching import add_match, add_touches
 from .outputs import ProgressReporter, Writer
@@ -33,7 +34,8 @@ from .synthesize import add_evaluate, add_synthesize
 from .throwing import add_throw
 
 VERBS = (add_library, add_synthesize, add_path, add_touches, add_stream, add_passes, add_reconstruct, add_release,
-         add_bodies, add_throw, add_match, add_study, add_mirror, add_retarget, add_evaluate, add_compare)  # fmt: skip
+         add_bodies, add_throw, add_match, add_freeze_frame, add_study, add_mirror, add_retarget, add_evaluate,
+         add_compare)  # fmt: skip
 """Functions that add a verb, in the order of `--help`; each takes the sub-parsers and returns its parser."""
 IsolatedRunner = Callable[[list[str], Callable[[float, str], None], Callable[[], bool]], object]
 """Runs a command line in another process: (arguments, progress callback, cancellation callback)."""

@@ -61,7 +61,7 @@ def read_smpl_people(path: Path) -> JointFeed:
         places = trans[number].astype(float)
         seen = (np.abs(poses) < _MAX_TURN).all(axis=1) & (np.abs(places) < _MAX_METRES).all(axis=1)
         if seen.sum() >= 2:
-            _add_person(found, str(number), poses.reshape(len(poses), len(JOINTS), 3), places, seen, fps)
+            _add_person(found, str(number), poses.reshape(len(poses), len(JOINTS), 3), places, seen=seen, fps=fps)
     return found.build(fps)
 
 

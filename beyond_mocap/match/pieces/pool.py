@@ -17,6 +17,7 @@ import signal
 import sys
 import threading
 import time
+import warnings
 from collections import deque
 from collections.abc import Callable, Generator, Iterable, Iterator
 from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, CancelledError, Executor, Future, wait
@@ -265,6 +266,8 @@ class _Processes:
         """
         if self._executor is None:
             loky = import_optional("joblib.externals.loky", "workers")
+            # with psutil, loky replaces a worker that has grown by 300 MB: our libraries do that, and nothing is lost
+            warnings.filterwarnings("ignore", message="A worker stopped while some jobs were given", module="joblib")
             self._executor = loky.get_reusable_executor(
                 self._workers, timeout=_IDLE_SECONDS, reuse=True, initializer=_start_worker, initargs=(os.getpid(),),
                 env={name: "1" for name in _THREADS},

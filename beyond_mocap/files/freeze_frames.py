@@ -1,0 +1,225 @@
+"""Single moments of StatsBomb 360: where the people in the picture were at an event, as a still with a moving ball.
+
+A freeze frame has places and nothing before or after. The still lasts four seconds: all stand where they were, the
+player of the event does what it says, and the ball rests until then and goes straight to where the event ends.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from ..annotation.event_labels import read_event_labels
+from ..annotation.vocabulary import SIDES
+from ..base.content import read_utf8
+from ..base.errors import InputError, format_count
+from .atomic import atomic_folder
+from .file_names import build_file_names
+from .tables import format_csv
+
+COLUMNS = ("time_s", "player", "x_m", "y_m", "z_m", "team", "position")
+_FIELD = np.array([120.0, 80.0])  # StatsBomb's units, which stretch to the pitch; y grows to the right of the attack
+_PITCH = np.array([105.0, 68.0])  # metres, where the user gives no size
+_YARD = 0.9144  # metres, of heights
+_BALL = 0.11  # metres, height of a ball on the ground
+_RATE, _SECONDS, EVENT_TIME = 25.0, 4.0, 2.0
+_FASTEST = 38.0  # m/s of a kicked ball
+_MOST_PEOPLE = 60
+TRACKING, LABELS = "moment.csv", "labels"
+_KINDS = {"Pass": "pass", "Shot": "shot", "Clearance": "clearance", "Ball Receipt*": "receive", "Goal Keeper": "save",
+          "Interception": "interception", "Duel": "tackle"}
+"""StatsBomb's types -> kinds of `event_labels.KINDS`."""
+_ENDED = ("pass", "shot", "carry", "goalkeeper")  # parts of an event with an end_location
+
+
+@dataclass(frozen=True, eq=False)
+class FreezeFrame:
+    """The people in the picture at an event.
+
+    Attributes:
+        id: of the event.
+        clock: "MM:SS" of the match.
+        kind: of the event.
+        player: who it is of.
+        team: of that player.
+        places: (P, 2) StatsBomb's units.
+        roles: of each of P: "actor", "teammate" or "opponent", with " keeper" behind it where it is one.
+        ball: (2,) StatsBomb's units.
+        end: (2,) or (3,) of the ball; None: it rests.
+        duration: s until then.
+        labels: what the player does, () where the event does not say.
+    """
+
+    id: str
+    clock: str
+    kind: str
+    player: str
+    team: str
+    places: np.ndarray
+    roles: tuple[str, ...]
+    ball: np.ndarray
+    end: np.ndarray | None
+    duration: float
+    labels: tuple[str, ...]
+
+
+def read_freeze_frames(frames: Path, events: Path) -> list[FreezeFrame]:
+    """Read the freeze frames of a match's events.
+
+    Args:
+        frames: StatsBomb's 360 file.
+        events: the events of the same match.
+    Returns:
+        The frames whose events have a place, in the events' order.
+    Raises:
+        InputError: if one is another file, or they are of two matches.
+    """
+    pictures, rows = _read_list(frames, "freeze_frame"), _read_list(events, "type")
+    by_event = {str(picture.get("event_uuid")): picture for picture in pictures}
+    try:
+        found = [_build_frame(row, by_event[row["id"]]) for row in rows
+                 if row.get("id") in by_event and row.get("location") and by_event[row["id"]]["freeze_frame"]]
+    except (LookupError, TypeError, AttributeError, ValueError, ArithmeticError) as error:
+        raise InputError(frames, f"values in other places than StatsBomb has them ({type(error).__name__}: {error})"[
+            :200], "StatsBomb's 360 data and events", "export them again") from None
+    if not found:
+        raise InputError(frames, f"no event of {events.name} has a freeze frame", "the events of the same match",
+                         "choose the file with its number")
+    return found
+
+
+def _read_list(path: Path, key: str) -> list[dict]:
+    try:
+        value = json.loads(read_utf8(path, "a JSON file of StatsBomb"))
+    except (ValueError, RecursionError):
+        raise InputError(path, "not JSON", "a JSON file of StatsBomb", "export it again") from None
+    if not isinstance(value, list) or not value or not all(isinstance(one, dict) and key in one for one in value):
+        raise InputError(path, f"no list of objects with {key!r}", "a JSON file of StatsBomb", "choose the right file")
+    return value
+
+
+def _build_frame(event: dict, picture: dict) -> FreezeFrame:
+    people = picture["freeze_frame"]
+    ended = next((event[part] for part in _ENDED if part in event and event[part].get("end_location")), None)
+    duration = float(event.get("duration") or 0.0)
+    places = _to_places([person["location"] for person in people])
+    return FreezeFrame(
+        id=str(event["id"]), clock=f"{int(event['minute']):02d}:{int(event['second']):02d}",
+        kind=str(event["type"]["name"]), player=str((event.get("player") or {}).get("name") or ""),
+        team=str((event.get("team") or {}).get("name") or ""), places=places,
+        roles=tuple(_name_role(person) for person in people), ball=_to_places([event["location"][:2]])[0],
+        end=None if ended is None else _to_places([ended["end_location"]])[0],
+        duration=duration if math.isfinite(duration) else 0.0, labels=_find_labels(event),
+    )  # fmt: skip
+
+
+def _find_labels(event: dict) -> tuple[str, ...]:
+    """Find what a standing player does at an event, by the table of events."""
+    kind = _KINDS.get(str(event["type"]["name"]), "other")
+    detail = next((event[part] for part in (kind, *_ENDED) if isinstance(event.get(part), dict)), {})
+    body = str((detail.get("body_part") or {}).get("name") or "").lower()
+    part = "head" if "head" in body else "hand" if "arm" in body or "hand" in body else "foot"
+    height = str((detail.get("height") or {}).get("name") or "").lower()
+    way = str((detail.get("type") or {}).get("name") or "").lower()
+    values = {"side": next((side for side in SIDES if side in body), ""), "gait": "standing",
+              "height": "high" if "high" in height else "low"}
+    return read_event_labels().find_labels(kind, part, (way,), values)
+
+
+def _to_places(rows: list) -> np.ndarray:
+    places = np.array(rows, dtype=float)
+    if places.ndim != 2 or not np.all(np.abs(places) < 10.0 * _FIELD[0]):
+        raise ValueError(f"location {rows[0]}")
+    return places
+
+
+def _name_role(person: dict) -> str:
+    side = "actor" if person.get("actor") else "teammate" if person.get("teammate") else "opponent"
+    return f"{side} keeper" if person.get("keeper") else side
+
+
+def find_freeze_frame(frames: Sequence[FreezeFrame], wanted: str, path: Path) -> FreezeFrame:
+    """Find a frame by its event's id or its time.
+
+    Args:
+        frames: all frames.
+        wanted: an event's id, or the beginning of one that no other has, or "MM:SS".
+        path: their file, for errors.
+    Returns:
+        The frame; of several in one second the first.
+    Raises:
+        InputError: if there is none, or several ids begin so.
+    """
+    by_clock = [frame for frame in frames if frame.clock == wanted]
+    found = by_clock[:1] or [frame for frame in frames if wanted and frame.id.startswith(wanted)]
+    if len(found) != 1:
+        raise InputError(path, f"{format_count(len(found), 'event')} {wanted!r}", "one with a freeze frame",
+                         "leave --event out to list them")
+    return found[0]
+
+
+def write_still(folder: Path, frame: FreezeFrame, size: tuple[float, float] | None = None) -> int:
+    """Write a frame into a new folder: `moment.csv`, a plain CSV of tracking, and `labels` with what the player does.
+
+    The team of the event's player attacks along +x.
+
+    Args:
+        folder: new or empty.
+        frame: the frame.
+        size: length and width of the pitch, m; None: 105 x 68.
+    Returns:
+        How many people it has.
+    Raises:
+        InputError: if it has too many, or the folder is not empty or cannot be written.
+    """
+    if len(frame.roles) > _MOST_PEOPLE:
+        raise InputError(folder, format_count(len(frame.roles), "person", "people"), f"at most {_MOST_PEOPLE}")
+    pitch = _PITCH if size is None else np.array(size)
+    people, places = _name_people(frame), _to_metres(frame.places, pitch)
+    times = np.arange(int(_RATE * _SECONDS) + 1) / _RATE
+    rows: list[tuple[str, ...]] = [(f"{time:.2f}", name, f"{x:.3f}", f"{y:.3f}", "", ground, position)
+            for time in times for (name, ground, position), (x, y) in zip(people, places)]
+    rows += [(f"{time:.2f}", "ball", *(f"{value:.3f}" for value in place), "", "")
+             for time, place in zip(times, _move_ball(frame, pitch, times))]
+    names = build_file_names(name for name, _, _ in people)
+    with atomic_folder(folder) as inside:
+        (inside / LABELS).mkdir()
+        (inside / TRACKING).write_text(format_csv(COLUMNS, rows), "utf-8")
+        for (name, _, _), role in zip(people, frame.roles):
+            if role.startswith("actor") and frame.labels:
+                text = f"{EVENT_TIME:g} {' '.join(frame.labels)}\n"
+                (inside / LABELS / f"{names[name]}.txt").write_text(text, "utf-8")
+    return len(people)
+
+
+def _name_people(frame: FreezeFrame) -> list[tuple[str, str, str]]:
+    """Return name, team and position of each person."""
+    counts, people = {"home": 0, "away": 0}, []
+    for role in frame.roles:
+        ground = "away" if role.startswith("opponent") else "home"
+        counts[ground] += 1
+        name = frame.player if role.startswith("actor") and frame.player else f"{ground} {counts[ground]}"
+        people.append((name, ground, "goalkeeper" if role.endswith("keeper") else ""))
+    return people
+
+
+def _to_metres(places: np.ndarray, pitch: np.ndarray) -> np.ndarray:
+    """Turn places (..., 2) in StatsBomb's units into metres from the pitch's centre, y to the left."""
+    return (places / _FIELD - 0.5) * pitch * (1.0, -1.0)
+
+
+def _move_ball(frame: FreezeFrame, pitch: np.ndarray, times: np.ndarray) -> np.ndarray:
+    """Return the ball's places (T, 3) m: at rest until the event, then straight to its end."""
+    start = np.array([*_to_metres(frame.ball, pitch), _BALL])
+    if frame.end is None:
+        return np.tile(start, (len(times), 1))
+    height = max(frame.end[2] * _YARD, _BALL) if len(frame.end) > 2 else _BALL
+    end = np.array([*_to_metres(frame.end[:2], pitch), height])
+    seconds = max(frame.duration, float(np.linalg.norm(end - start)) / _FASTEST, 1.0 / _RATE)
+    share = np.clip((times - EVENT_TIME) / seconds, 0.0, 1.0)
+    return start + share[:, None] * (end - start)
