@@ -16,7 +16,8 @@ REPOSITORY = "beyond_mocap_batch"
 def find_extension():
     """Find the package of the enabled extension; without one, that of this file's folder.
 
-    Blender itself makes the folder importable: it becomes an extension repository of this session.
+    Blender itself makes the folder importable: it becomes an extension repository of this session. Its classes are
+    registered, because a scene that is written (`match --scene`) has the extension's properties.
 
     Returns:
         The package's name.
@@ -29,6 +30,7 @@ def find_extension():
             return name
     folder, saved = pathlib.Path(__file__).resolve().parent, preferences.is_dirty
     preferences.extensions.repos.new(name=REPOSITORY, module=REPOSITORY, custom_directory=str(folder))
+    importlib.import_module(f"bl_ext.{REPOSITORY}.__init__").register()
     preferences.is_dirty = saved  # nothing to save: the repository is gone when Blender ends
     return f"bl_ext.{REPOSITORY}"
 

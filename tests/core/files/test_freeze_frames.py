@@ -46,7 +46,9 @@ def test_a_pass_becomes_a_still_with_a_moving_ball(write, tmp_path, capsys):
     # 120 x 80 units on 105 x 68 m, the origin in the middle, y to the left of the attack
     assert still[:, 0] == pytest.approx(np.array([(0.0, 0.0), (26.25, 25.5), (50.75, -0.85)]), abs=1e-3)
     at = np.searchsorted(match.times + 1e-6, [0.0, EVENT_TIME, EVENT_TIME + 0.4, EVENT_TIME + 1.0, 4.0])
-    assert match.ball[at, :2] == pytest.approx(np.outer([0, 0, 0.4, 1, 1], (17.5, 17.0)), abs=1e-3)
+    end = np.array([17.5, 17.0])
+    start = 0.45 * end / np.linalg.norm(end)  # a step before the player
+    assert match.ball[at, :2] == pytest.approx(start + np.outer([0, 0, 0.4, 1, 1], end - start), abs=1e-3)
     assert [path.read_text() for path in (tmp_path / "still" / "labels").iterdir()] == ["2 kick left standing low\n"]
 
 
