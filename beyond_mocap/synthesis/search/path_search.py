@@ -16,11 +16,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ...base.errors import InputError, UserCancelledError
+from ...library.keys import Key
 from ...library.library import Library
 from .beam_transitions import SAME_FRAME, BeamTransitions, SlotCandidates
 from .candidate_index import ACTING, PLAYBACK_RATES, SLOT
 from .edit_list import EditList, PlacedKey, find_transitions, replace_stretch
-from .key_fit import compute_key_misfit, compute_swing_rates, measure_ball, measure_strikes
+from .key_fit import StrikeMeasurements, compute_key_misfit, compute_swing_rates, measure_ball, measure_strikes
 from .path_costs import YOUNG_SLOTS, BoneDistance, PathCosts, Weights
 from .preferences import UNUSUAL_FOOT_WEIGHT, UsedStretch, compute_weak_foot_cost, find_unusual_foot
 from .request import RequestedKey, SearchRequest
@@ -191,11 +192,14 @@ class PathSearch:
         rate of the swing.
         """
         costs = np.zeros(len(self.pieces.number))
+        measured: dict[tuple[Key, ...], StrikeMeasurements] = {}
         for number in np.unique(self.pieces.number):
             key, at = self.request.keys[number], self.pieces.number == number
             ball = measure_ball(self.request.track, key.frame, key.is_ball_height_known)
             keeps_rate = np.array([len(list_playback_rates(self.library, key, one)) == 1 for one in key.choices])
-            strikes = replace(measure_strikes(self.library, key.choices), keeps_rate=keeps_rate)
+            if key.choices not in measured:
+                measured[key.choices] = measure_strikes(self.library, key.choices)
+            strikes = replace(measured[key.choices], keeps_rate=keeps_rate)
             played = strikes.play(self.pieces.choice[at], self.pieces.rate[at])
             costs[at], self.swing_rates[at] = compute_key_misfit(played, ball), compute_swing_rates(played, ball)
             costs[at] += self._compute_foot_cost(key)[self.pieces.choice[at]]
