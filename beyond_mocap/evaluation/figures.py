@@ -33,7 +33,7 @@ from ..synthesis.quality.playback import find_replayed, list_warp_rates
 from ..synthesis.quality.unmet_constraints import report_unmet_constraints
 from . import realism
 from .contact_figures import find_reachable
-from .view import View, compute_source_poses
+from .view import View, measure_source_heights
 
 SPEED_NAMES = ("0-1", "1-2", "2-3", "3-4.5", "4.5+")
 """Names of the classes of `movement.classify_speed`, m/s."""
@@ -180,13 +180,13 @@ def _measure_pelvis_drop(view: View) -> float:
     """Measure the largest drop of the pelvis below the source poses, m, away from transitions, which are blended."""
     if view.library is None or not len(view.used_rows):
         return math.nan
-    played, hips = view.played, view.played.body.hips
-    local = realism.compute_local_positions(played.motion.skeleton, played.positions, hips)
-    source = compute_source_poses(view.library, played.clips, played.clip, played.mirrored, played.clip_frame)
-    is_unblended = np.isfinite(source[:, 0, 0])
+    played = view.played
+    own = played.positions[:, played.body.hips, 2].astype(np.float32)
+    source = measure_source_heights(view.library, played.clips, played.clip, played.mirrored, played.clip_frame)
+    is_unblended = np.isfinite(source)
     for seam in view.transitions:
         is_unblended[max(seam - movement.JERK_REACH, 0) : seam + movement.JERK_REACH] = False
-    drop = (source[:, hips, 2] - local[:, hips, 2])[is_unblended]
+    drop = (source - own)[is_unblended]
     return float(max(drop.max(), 0.0)) if len(drop) else math.nan
 
 

@@ -10,13 +10,12 @@ from ..annotation import Timeline
 from ..base.errors import InputError
 from ..library.library import Library
 from ..motion.humanoid import estimate_stature, identify_joints
-from ..motion.motion import compute_pose, sample_frames
+from ..motion.motion import Motion, compute_pose, sample_frames
 from ..motion.skeleton import Skeleton
 from ..motion.track import SampledTrack, Track, sample_track
 from ..synthesis.quality import movement
 from ..synthesis.quality.moments import evaluate_moments
 from ..synthesis.quality.playback import Playback, find_transitions
-from . import realism
 from .naturalness import BodyCourse, measure_course
 from .reference.reference_cache import load_reference
 
@@ -109,28 +108,30 @@ class View:
         return self.reference.find_rows(self.played.clips, self.played.clip, self.played.clip_frame)
 
 
-def compute_source_poses(library: Library, clips: tuple[str, ...], clip, mirrored, clip_frame) -> np.ndarray:
-    """Compute the recorded pose of each output frame's source, in the body's frame.
+def measure_source_heights(library: Library, clips: tuple[str, ...], clip, mirrored, clip_frame) -> np.ndarray:
+    """Measure the height of the hips in the recorded pose of each output frame's source.
 
     Args:
-        library: the library, J joints.
+        library: the library.
         clips: table of paths.
         clip: (T,) int, index into the table, -1 if unknown.
         mirrored: (T,) bool.
         clip_frame: (T,) at the clip's own frame rate.
     Returns:
-        (T, J, 3) m, NaN if unknown.
+        (T,) m, rounded to float32, NaN if unknown.
     """
     table = {(source.path, source.mirrored): source.motion for source in library.clips}
-    out = np.full((len(clip), len(library.skeleton), 3), np.nan)
+    hips = identify_joints(library.skeleton).hips
+    skeleton, joints = library.skeleton.select_joints([hips])
+    out = np.full(len(clip), np.nan)
     for number, side in set(zip(clip.tolist(), mirrored.tolist())):
         motion = table.get((clips[number], side)) if number >= 0 else None
         if motion is None:
             continue
         selected = (clip == number) & (mirrored == side)
-        positions = compute_pose(motion.skeleton, *sample_frames(motion, clip_frame[selected]))[0]
-        out[selected] = realism.compute_local_positions(motion.skeleton, positions,
-                                                        identify_joints(motion.skeleton).hips)
+        chain = Motion.from_stored(skeleton, motion.root_positions, motion.rotations[:, joints], motion.fps)
+        positions = compute_pose(skeleton, *sample_frames(chain, clip_frame[selected]))[0]
+        out[selected] = positions[:, joints.index(hips), 2].astype(np.float32)
     return out
 
 

@@ -4,7 +4,7 @@ contact restored.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import replace
 
 import numpy as np
@@ -43,7 +43,13 @@ def construct_displayed_player(
     if not end > start:
         raise InputError("times", f"{start:g} to {end:g} s", "an end after the start")
     takes = construct_player(library, edit, start - MARGIN_SECONDS, end + MARGIN_SECONDS, progress)
-    inside = (_cut_take(display_take(take, edit.correction, ball), start, end) for take in takes)
+    return display_takes(takes, edit.correction, ball, start, end)
+
+
+def display_takes(takes: Iterable[Take], correction: Correction | None, ball: BallPath | None, start: float,
+                  end: float) -> tuple[Take, ...]:
+    """Display takes (`display_take`) that reach MARGIN_SECONDS beyond `start` and `end` s, cut to that span."""
+    inside = (_cut_take(display_take(take, correction, ball), start, end) for take in takes)
     return tuple(take for take in inside if take is not None)
 
 

@@ -201,7 +201,7 @@ def _run_stages(
     stages.finish_players(replace(job, report=_scale_progress(report, "figures")), parts, motion, crowd, ball)
     state.record_stage("figures", clock)
     state.record_stage("total", begin)
-    _finish_match(job, crowd)
+    _finish_match(job, crowd, motion)
 
 
 def _solve_ball(job: Job, match: Match, span: tuple[float, float], report: Progress) -> SolvedBall | None:
@@ -247,8 +247,8 @@ def _write_match_ball(job: Job, match: Match, solved: SolvedBall | None, span, c
     return ball
 
 
-def _finish_match(job: Job, crowd) -> None:
-    """Write the final state and the page."""
+def _finish_match(job: Job, crowd, motion: ConstructedMotion) -> None:
+    """Write the final state and the page, then remove the stored motion."""
     state = job.state
     state.report["crowd"] = {
         "overlap_before_m": max((part.before for part in crowd.values()), default=0.0),
@@ -261,9 +261,11 @@ def _finish_match(job: Job, crowd) -> None:
         from .report.page import build_match_page
 
         path, clock = job.folder.path, read_clocks()
-        atomic_write(path / "report.html", build_match_page(path, build_thumbnail_renderer(job.library, path)))
+        thumbnail = build_thumbnail_renderer(job.library, path, motion.load_takes)
+        atomic_write(path / "report.html", build_match_page(path, thumbnail))
         state.record_stage("page", clock)
         state.write_state()
+    motion.remove()
 
 
 def read_result(request: MatchRequest) -> MatchResult:

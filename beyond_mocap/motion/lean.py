@@ -85,7 +85,8 @@ def measure_lean(body: Humanoid, positions: np.ndarray, centre: np.ndarray, stan
     velocity = time_derivative(smooth_level(centre, _ACCELERATION_SECONDS, fps), fps)
     curves = np.concatenate([centre, time_derivative(velocity, fps), velocity], axis=1)
     feet = [0.5 * (positions[:, limb.foot] + positions[:, limb.toe_or_foot]) for limb in (body.left, body.right)]
-    rows = [_average_stance(np.concatenate([curves, feet[side]], axis=1), start, stop)
+    columns = [np.concatenate([curves, foot], axis=1) for foot in feet]
+    rows = [_average_stance(columns[side], start, stop)
             for side, start, stop in zip(stances.side, stances.start, stances.stop)]
     means = _average_neighbours(np.array(rows).reshape(-1, 10), stances.middle / fps)
     return Lean(means[:, 0:2] - means[:, 7:9], means[:, 2] - means[:, 9], means[:, 3:5], means[:, 5:7])

@@ -147,7 +147,7 @@ def solve_two_bone(
     Source: Tolani, Goswami and Badler 2000.
     """
     _check_chain(skeleton, joints)
-    places, world = compute_pose(skeleton, root, rotations)
+    places, world = compute_pose(skeleton, root, rotations, list_ancestors(skeleton.parents, joints[2]))
     end: dict[str, Any] = {"end_rotation": end_rotation, "keep_end_rotation": keep_end_rotation}
     found, miss = solve_posed_limb(skeleton, places, world, joints, target, pole=pole, soft=soft, **end)
     out = np.array(rotations, dtype=float)

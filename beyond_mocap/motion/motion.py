@@ -5,6 +5,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -92,7 +93,9 @@ def forward_kinematics(motion: Motion) -> tuple[np.ndarray, np.ndarray]:
     return compute_pose(motion.skeleton, motion.root_positions, motion.rotations)
 
 
-def compute_pose(skeleton: Skeleton, root: np.ndarray, local: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def compute_pose(
+    skeleton: Skeleton, root: np.ndarray, local: np.ndarray, joints: Collection[int] | None = None
+) -> tuple[np.ndarray, np.ndarray]:
     """Compute world positions and rotations of poses.
 
     Works joint by joint on component-first arrays, one contiguous run per component, and without new arrays: what it
@@ -102,16 +105,17 @@ def compute_pose(skeleton: Skeleton, root: np.ndarray, local: np.ndarray) -> tup
         skeleton: J joints.
         root: (..., 3) root positions, metres, world.
         local: (..., J, 4) local rotations.
+        joints: that are computed, with each all that are above it; None: all.
     Returns:
-        Positions (..., J, 3) in metres and rotations (..., J, 4), world.
+        Positions (..., J, 3) in metres and rotations (..., J, 4), world; NaN for joints that are not computed.
     """
     lead = local.shape[:-2]
     flat = np.ascontiguousarray(local.reshape(-1, len(skeleton), 4).transpose(1, 2, 0))
-    world = np.empty_like(flat)
-    places = np.empty((len(skeleton), 3, flat.shape[2]))
+    world, places = np.full_like(flat, np.nan), np.full((len(skeleton), 3, flat.shape[2]), np.nan)
     world[0], places[0] = flat[0], root.reshape(-1, 3).T
     spare, turned = np.empty(flat.shape[2]), np.empty((3, flat.shape[2]))
-    for joint, (parent, offset) in enumerate(zip(skeleton.parents[1:], skeleton.offsets[1:]), 1):
+    for joint in range(1, len(skeleton)) if joints is None else sorted({*joints} - {0}):
+        parent, offset = skeleton.parents[joint], skeleton.offsets[joint]
         aw, ax, ay, az = world[parent]
         bw, bx, by, bz = flat[joint]
         # the quaternion product parent x local, written out by component

@@ -11,6 +11,7 @@ from pathlib import Path
 
 from ...base.errors import InputError
 from ...files.atomic import atomic_write
+from ...synthesis.take import Take
 from ..crowd.window import cut_edit
 from ..player_edit import PlayerEdit
 from ..player_motion import MARGIN_SECONDS, StretchWindows
@@ -95,6 +96,15 @@ class ConstructedMotion:
             if (frames := grid.find_frames(start, end)) is not None:
                 spans.append(MotionSpan(grid.cut_plan(*frames), tuple(self._iter_parts(grid, files, *frames))))
         return tuple(spans)
+
+    def load_takes(self, player: str, start: float, end: float) -> list[Take] | None:
+        """Load what a player does from `start` to `end` s, one take for each stretch; None where it is not stored."""
+        if player not in self.edits:
+            return None
+        try:
+            return [span.load_take(self._job.library.skeleton) for span in self.find_spans(player, start, end)]
+        except (OSError, ValueError):
+            return None
 
     def remove(self) -> None:
         """Remove the stored motion."""

@@ -1,5 +1,5 @@
 """Constructed motion on disk: a file for each window of a player. It is constructed once, read by the collision
-avoidance of every minute and by the player's figures, and removed when these are done.
+avoidance of every minute, by the player's figures and by the page, and removed when these are done.
 
 Numbers keep every bit. `list_blocks` cuts a player into pieces of work, `pack_part` and `load_part` store one window,
 and `MotionSpan` says which windows show a span.

@@ -182,8 +182,7 @@ def finish_players(
     job: Job, parts: Sequence[PlayerPlans], motion: ConstructedMotion, crowd: dict[str, PlayerCorrection],
     ball: BallPath
 ) -> None:
-    """Write all players' files: the corrected edit list and, where requested, report, provenance and BVH. Then remove
-    the stored motion.
+    """Write all players' files: the corrected edit list and, where requested, report, provenance and BVH.
 
     Args:
         job: what all stages share.
@@ -215,7 +214,6 @@ def finish_players(
         done += 1
         job.report(done / len(parts_by_id), f"Figures: {done} of {len(parts_by_id)} players")
         job.state.update_player(player, status="done", **files)
-    motion.remove()
 
 
 def _build_finish_request(job: Job, part: PlayerPlans, motion: ConstructedMotion, found: PlayerCorrection,

@@ -4,7 +4,7 @@ second.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -12,7 +12,8 @@ import numpy as np
 from ...appearance.picture import encode_png, render_pose
 from ...base.errors import BeyondMocapError
 from ...library.library import Library
-from ..displayed_motion import construct_displayed_player
+from ...synthesis.take import Take
+from ..displayed_motion import MARGIN_SECONDS, construct_displayed_player, display_takes
 from ..folder import read_state
 from ..player_edit import read_player
 
@@ -47,12 +48,16 @@ def render_heat_strip(bad: np.ndarray, start: float, span: tuple[float, float], 
     return encode_png(np.repeat(compute_colours(np.fmax.reduceat(whole, edges))[None], height, axis=0))
 
 
-def build_thumbnail_renderer(library: Library, folder: Path) -> Callable[[str, float], np.ndarray | None]:
+def build_thumbnail_renderer(
+    library: Library, folder: Path, load_takes: Callable[[str, float, float], Sequence[Take] | None] | None = None
+) -> Callable[[str, float], np.ndarray | None]:
     """Build a function that renders a player at a second of the match.
 
     Args:
         library: the clips.
         folder: the match's folder.
+        load_takes: loads what a player, by id, does from one second to another, as `construct_player` constructs it;
+            None, or a result of None: it is constructed.
     Returns:
         A function of id and second that gives (PICTURE_SIZE, PICTURE_SIZE, 4) as `render_pose` does, or None if the
         player has no motion then or their edit list cannot be read.
@@ -64,7 +69,10 @@ def build_thumbnail_renderer(library: Library, folder: Path) -> Callable[[str, f
     def render_thumbnail(player: str, second: float) -> np.ndarray | None:
         path = folder / f"{files[player]}.take.npz"
         try:
-            takes = construct_displayed_player(library, read_player(path), None, second, second + 1.0)
+            edit, end = read_player(path), second + 1.0
+            stored = load_takes and load_takes(player, second - MARGIN_SECONDS, end + MARGIN_SECONDS)
+            takes = (construct_displayed_player(library, edit, None, second, end) if stored is None
+                     else display_takes(stored, edit.correction, None, second, end))
             return render_pose(takes[0].motion, 0, PICTURE_SIZE) if takes else None
         except BeyondMocapError:
             return None

@@ -1,8 +1,8 @@
 """The transitions with the lowest cost from the states of one slot to the candidates of the next.
 
 A beam keeps a few dozen of the hundred thousand pairs of a state and a candidate. The change of pose, which bounds the
-cost of a pair from below, is computed for all of them at once; feet, replayed stretches and playback rates only for
-pairs that may still be kept. The result is the same as if every pair were evaluated.
+cost of a pair from below, is computed for all of them at once; replayed stretches and playback rates only for pairs
+that may still be kept, and feet only for what remains of these. The result is the same as if every pair were evaluated.
 """
 
 from __future__ import annotations
@@ -65,8 +65,8 @@ class BeamTransitions:
     def compute_all(self, to: SlotCandidates) -> np.ndarray:
         """Compute the cost (B, K) of each transition, including what the candidate shows."""
         least = self._compute_lower_bounds(to)
-        pairs = np.arange(least.size)
-        return self.base + self._compute_full_costs(to, least, pairs).reshape(least.shape).T.astype(float)
+        _, cost = self._compute_full_costs(to, least, np.arange(least.size))
+        return self.base + cost.reshape(least.shape).T.astype(float)
 
     def bound_own_cost(self, known: np.ndarray, kept_count: int) -> float:
         """Compute what a candidate that is reached by a cut may cost at most, to be among the `kept_count` cheapest.
@@ -104,7 +104,7 @@ class BeamTransitions:
         count = least.shape[1]
         # bound[k]: full cost of the pair with the lowest lower bound, so an upper bound of the candidate's cost
         first = np.arange(len(least)) * count + np.argmin(least, axis=1)
-        bound = self._compute_full_costs(to, least, first)
+        _, bound = self._compute_full_costs(to, least, first)
         free = to.piece < 0
         # no free candidate above the `kept_count`-th best of all upper bounds can be kept
         rivals = np.concatenate([bound[free], known - self.base])
@@ -112,9 +112,8 @@ class BeamTransitions:
             bound[free] = np.minimum(bound[free], np.partition(rivals, kept_count - 1)[kept_count - 1])
         # only pairs whose lower bound is within the upper bound are evaluated in full; flat index = candidate * B +
         # state
-        pairs = np.flatnonzero(least <= bound[:, None])
+        pairs, cost = self._compute_full_costs(to, least, np.flatnonzero(least <= bound[:, None]), bound)
         candidate = pairs // count
-        cost = self._compute_full_costs(to, least, pairs)
         # `pairs` is sorted by candidate, so each candidate is one run
         begins = np.flatnonzero(np.diff(candidate, prepend=-1))
         at = _find_cheapest_of_runs(cost, begins)
@@ -135,28 +134,57 @@ class BeamTransitions:
         lower_bound[candidate, state] = self.above[state] + cost[candidate]
         return lower_bound
 
-    def _compute_full_costs(self, to: SlotCandidates, lower_bound: np.ndarray, pairs: np.ndarray) -> np.ndarray:
+    def _compute_full_costs(
+        self, to: SlotCandidates, lower_bound: np.ndarray, pairs: np.ndarray, most: np.ndarray | None = None
+    ) -> tuple[np.ndarray, np.ndarray]:
         """Compute the full costs of some pairs.
 
         Args:
             to: K candidates.
             lower_bound: (K, B) lower bounds.
             pairs: (P,) flat indices into `lower_bound`.
+            most: (K,) of each candidate's pairs, those that cost more are left out; None for no limit.
         Returns:
-            (P,) float32, above the base.
+            (p,) flat indices of those that are not left out, and (p,) float32 costs, above the base.
         """
-        costs, weights = self.costs, self.costs.weights
         candidate, state = np.divmod(pairs, lower_bound.shape[1])
-        frame, left = costs.round_frame(to.start)[candidate], costs.round_frame(self.end)[state]
-        cut = np.float32(weights.feet) * costs.measure_foot_jump(left, frame)
-        cut += costs.compute_recording_change(left, frame)
+        least, rate = lower_bound.ravel().take(pairs), self._compute_rate_changes(to, candidate, state)
+        goes_on = self._goes_on(to, candidate, state)
+        change, replay = self._compute_repetition(to, candidate, state)
+        if most is not None:  # rounded sums do not fall where a term is added, so feet cannot make a pair cheaper
+            within = np.flatnonzero(least + np.where(goes_on, np.float32(0.0), change + replay) + rate
+                                    <= most.take(candidate))
+            pairs, candidate, state, least, rate, goes_on, change, replay = (
+                values.take(within) for values in (pairs, candidate, state, least, rate, goes_on, change, replay))
+        frame, left = self._round_frames(to, candidate, state)
+        cut = np.float32(self.costs.weights.feet) * self.costs.measure_foot_jump(left, frame)
+        cut += change
+        cut += replay
+        cut[goes_on] = 0.0
+        return pairs, least + cut + rate
+
+    def _round_frames(self, to: SlotCandidates, candidate: np.ndarray, state: np.ndarray):
+        """Round the library frames (P,) that pairs enter and leave."""
+        return self.costs.round_frame(to.start).take(candidate), self.costs.round_frame(self.end).take(state)
+
+    def _compute_repetition(self, to: SlotCandidates, candidate: np.ndarray, state: np.ndarray):
+        """Compute what pairs (P,) cost for another recording, and (P,) for what has been shown lately."""
+        costs, (frame, left) = self.costs, self._round_frames(to, candidate, state)
+        bucket = costs.index.bucket.take(frame)
+        shown = self.seen.ravel().take(state * self.seen.shape[1] + bucket)
         # a stand may be shown again: nothing in it is recognized
-        shown = self.seen[state, costs.index.bucket[frame]]
-        cut += np.float32(weights.replay) * shown * np.maximum(costs.index.lifted[frame], np.float32(0.1))
-        is_same = _is_same_frame(to.start[candidate], self.end[state])
-        cut[is_same & (to.clip[candidate] == self.clip[state])] = 0.0
-        rate = np.float32(weights.rate_change) * np.abs(to.rate.astype(np.float32)[candidate] - self.rate[state])
-        return lower_bound.ravel()[pairs] + cut + rate
+        lifted = np.maximum(costs.index.lifted.take(frame), np.float32(0.1))
+        return costs.compute_recording_change(left, frame), np.float32(costs.weights.replay) * shown * lifted
+
+    def _compute_rate_changes(self, to: SlotCandidates, candidate: np.ndarray, state: np.ndarray) -> np.ndarray:
+        """Compute what pairs (P,) cost for the change of the playback rate."""
+        change = np.abs(to.rate.astype(np.float32).take(candidate) - self.rate.take(state))
+        return np.float32(self.costs.weights.rate_change) * change
+
+    def _goes_on(self, to: SlotCandidates, candidate: np.ndarray, state: np.ndarray) -> np.ndarray:
+        """Return (P,) bool: whether pairs continue without a cut."""
+        is_same = np.abs(to.start.take(candidate) - self.end.take(state)) < SAME_FRAME
+        return is_same & (to.clip.take(candidate) == self.clip.take(state))
 
     def _find_uncut_pairs(self, to: SlotCandidates) -> tuple[np.ndarray, np.ndarray]:
         """Find all pairs that continue without a cut.
@@ -172,13 +200,8 @@ class BeamTransitions:
         # enumerate all ranges in one array: position in the run of repeats plus the run's own `low`
         at = np.arange(many.sum()) - np.repeat(np.cumsum(many) - many - low[candidate], many)
         candidate, state = np.repeat(candidate, many), by_end[at]
-        meets = _is_same_frame(to.start[candidate], self.end[state]) & (to.clip[candidate] == self.clip[state])
+        meets = self._goes_on(to, candidate, state)
         return candidate[meets], state[meets]
-
-
-def _is_same_frame(start: np.ndarray, end: np.ndarray) -> np.ndarray:
-    """Return (P,) bool: whether library frames are the same, apart from rounding."""
-    return np.abs(start - end) < SAME_FRAME
 
 
 def _find_cheapest_of_runs(cost: np.ndarray, begins: np.ndarray) -> np.ndarray:

@@ -67,7 +67,10 @@ class RatePairs:
 
     def select_pairs(self, which: slice | np.ndarray) -> "RatePairs":
         """Select a slice of the pairs, or pairs by index."""
-        return RatePairs(*(values[which] for values in vars(self).values()))
+        if isinstance(which, slice):
+            return RatePairs(*(values[which] for values in vars(self).values()))
+        # `take`: rows by index cost ten times as much
+        return RatePairs(*(values.take(which, axis=0) for values in vars(self).values()))
 
 
 class CandidateIndex:

@@ -64,20 +64,32 @@ def find_cheapest(
         near = slice(max(int(low), near.start), max(min(int(high), near.stop), near.start))
     bound = bound_of(near)
     within = np.flatnonzero(bound <= most + _ROUNDING)
-    if len(within) > _EVALUATED_FIRST * count:
-        limit = _bound_cost(cost_of, near.start + within, bound[within], count)
-        within = within[bound[within] <= limit + _ROUNDING * max(1.0, limit)]
     numbers = near.start + within
-    cost = cost_of(numbers)
+    if len(within) > _EVALUATED_FIRST * count:
+        numbers, cost = _evaluate_nearest(cost_of, numbers, bound.take(within), count)
+    else:
+        cost = cost_of(numbers)
     best = np.argpartition(cost, count)[:count] if len(cost) > count else np.arange(len(cost))
     best = np.sort(best[cost[best] <= most])
     return numbers[best], cost[best]
 
 
-def _bound_cost(cost_of, numbers: np.ndarray, bound: np.ndarray, count: int) -> float:
-    """Compute a cost that the `count` cheapest of pairs (n,) do not exceed, from those with the lowest bounds (n,)."""
-    first = np.argpartition(bound, _EVALUATED_FIRST * count)[: _EVALUATED_FIRST * count]
-    return float(np.partition(cost_of(numbers[first]), count - 1)[count - 1])
+def _evaluate_nearest(cost_of, numbers: np.ndarray, bound: np.ndarray, count: int) -> tuple[np.ndarray, np.ndarray]:
+    """Evaluate the pairs (n,) with the lowest bounds (n,), then all others that may be among the `count` cheapest.
+
+    Returns:
+        Numbers (k,) of those that may be, and their costs (k,).
+    """
+    is_first = bound <= np.partition(bound, _EVALUATED_FIRST * count)[_EVALUATED_FIRST * count]
+    first = np.flatnonzero(is_first)
+    first_cost = cost_of(numbers.take(first))
+    limit = float(np.partition(first_cost, count - 1)[count - 1])
+    may_be = bound <= limit + _ROUNDING * max(1.0, limit)
+    others = np.flatnonzero(may_be & ~is_first)
+    cost = np.empty(len(numbers), first_cost.dtype)
+    cost[first], cost[others] = first_cost, cost_of(numbers.take(others))
+    within = np.flatnonzero(may_be)
+    return numbers.take(within), cost.take(within)
 
 
 def _nearest_slice(speeds: np.ndarray, speed: float, count: int) -> slice:
@@ -292,7 +304,7 @@ class PathCosts:
 
         def cost_of(part: np.ndarray) -> np.ndarray:
             part_pairs = pairs.select_pairs(part)
-            return _sum_terms(self._iter_motion_costs(first, end, part_pairs)) + fixed_cost[part_pairs.frame]
+            return _sum_terms(self._iter_motion_costs(first, end, part_pairs)) + fixed_cost.take(part_pairs.frame)
 
         def bound_of(part: slice) -> np.ndarray:
             return self._bound_motion_costs(first, end, pairs.select_pairs(part), fixed_cost)
@@ -322,7 +334,7 @@ class PathCosts:
 
     def _bound_motion_costs(self, first: int, end: int, pairs: RatePairs, fixed_cost: np.ndarray) -> np.ndarray:
         """Compute what pairs (K,) cost at least: the terms that cost little to compute; fixed_cost: (N,) of frames."""
-        total = fixed_cost[pairs.frame]
+        total = fixed_cost.take(pairs.frame)
         for name, values in self._iter_pair_terms(first, end, pairs):
             total += values
             if name == "turn":  # the terms behind it take longest, and are not computed
@@ -340,7 +352,7 @@ class PathCosts:
 
     def _iter_rate_terms(self, first: int, pairs: RatePairs) -> Iterator[Term]:
         """Generate the terms of the playback rate and the player's lag of pairs (K,)."""
-        yield "rate", self._rate_cost[pairs.number]
+        yield "rate", self._rate_cost.take(pairs.number)
         if self.request.lag_preference is not None:
             yield "variety", self.request.lag_preference.compute_cost(first, pairs.frame)
 
@@ -499,7 +511,8 @@ class PathCosts:
         """Compute the cost (B, K) of the change of pose between library frames ends (B,) and start (K,)."""
         weight = np.float32(self.weights.pose)
         if self.bone_distance is None:
-            return compute_distances(weight * self.frames.features[ends], weight * self.frames.features[start])
+            features = self.frames.features
+            return compute_distances(weight * features.take(ends, axis=0), weight * features.take(start, axis=0))
         total = np.zeros((len(ends), len(start)), np.float32)
         for offset in self.bone_distance.offsets:
             a, b = (weight * self.bone_distance.bones[self._offset_frames(frames, offset)] for frames in (ends, start))
@@ -522,8 +535,9 @@ class PathCosts:
         Returns:
             m, summed over both feet.
         """
-        feet, in_contact = self.frames.feet, self.index.is_in_contact
-        moved, stay = feet[ends] - feet[start], in_contact[ends] & in_contact[start]
+        feet, in_contact = self.frames.feet, self.index.is_in_contact  # `take`: rows by index cost ten times as much
+        moved = feet.take(ends, axis=0) - feet.take(start, axis=0)
+        stay = in_contact.take(ends, axis=0) & in_contact.take(start, axis=0)
         moved *= moved
         apart = np.zeros(moved.shape[:-1], np.float32)
         for foot in (0, 1):

@@ -16,11 +16,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ...base.errors import InputError, UserCancelledError
+from ...library.keys import Key
 from ...library.library import Library
 from .beam_transitions import SAME_FRAME, BeamTransitions, SlotCandidates
 from .candidate_index import ACTING, PLAYBACK_RATES, SLOT
 from .edit_list import EditList, PlacedKey, find_transitions, replace_stretch
-from .key_fit import compute_key_misfit, compute_swing_rates, measure_ball, measure_strikes
+from .key_fit import StrikeMeasurements, compute_key_misfit, compute_swing_rates, measure_ball, measure_strikes
 from .path_costs import YOUNG_SLOTS, BoneDistance, PathCosts, Weights
 from .preferences import UNUSUAL_FOOT_WEIGHT, UsedStretch, compute_weak_foot_cost, find_unusual_foot
 from .request import RequestedKey, SearchRequest
@@ -92,10 +93,6 @@ class BeamStates:
     piece: np.ndarray
     recent: np.ndarray
     age: np.ndarray
-
-    def select(self, which: np.ndarray) -> "BeamStates":
-        """Select states by index."""
-        return BeamStates(*(values[which] for values in vars(self).values()))
 
 
 class PathSearch:
@@ -195,11 +192,14 @@ class PathSearch:
         rate of the swing.
         """
         costs = np.zeros(len(self.pieces.number))
+        measured: dict[tuple[Key, ...], StrikeMeasurements] = {}
         for number in np.unique(self.pieces.number):
             key, at = self.request.keys[number], self.pieces.number == number
             ball = measure_ball(self.request.track, key.frame, key.is_ball_height_known)
             keeps_rate = np.array([len(list_playback_rates(self.library, key, one)) == 1 for one in key.choices])
-            strikes = replace(measure_strikes(self.library, key.choices), keeps_rate=keeps_rate)
+            if key.choices not in measured:
+                measured[key.choices] = measure_strikes(self.library, key.choices)
+            strikes = replace(measured[key.choices], keeps_rate=keeps_rate)
             played = strikes.play(self.pieces.choice[at], self.pieces.rate[at])
             costs[at], self.swing_rates[at] = compute_key_misfit(played, ball), compute_swing_rates(played, ball)
             costs[at] += self._compute_foot_cost(key)[self.pieces.choice[at]]
@@ -215,10 +215,10 @@ class PathSearch:
     def _build_first_states(self) -> BeamStates:
         """Build the states of the first slot."""
         to = self.collect_candidates(0)
-        recent = np.full((len(to.clip), MEMORY_SLOTS), -1)
-        states = BeamStates(to.clip, to.start, to.rate, cost=to.cost, back=np.zeros(len(to.clip), int), piece=to.piece,
-                            recent=recent, age=np.full(len(to.clip), YOUNG_SLOTS))
-        return self._prune_states(0, states)
+        to = to.select(self._choose_states(0, to.start, to.cost, to.piece))
+        recent = self._remember(np.full((len(to.clip), MEMORY_SLOTS), -1), to.start)
+        return BeamStates(to.clip, to.start, to.rate, cost=to.cost, back=np.zeros(len(to.clip), int), piece=to.piece,
+                          recent=recent, age=np.full(len(to.clip), YOUNG_SLOTS))
 
     def _build_arrival(self) -> tuple[BeamStates, int]:
         """Build the state from which a stretch starts, the frame before it; and that state's length, 1."""
@@ -266,26 +266,30 @@ class PathSearch:
             going_on = [] if slot in self._closed_slots else [self._continue_clips(slot, before, ends, free)]
             known = np.concatenate([np.zeros(0), *(cost for _, _, _, cost, _, _ in going_on)])
             options += [self._find_transitions(slot, before, ends, free, known), *going_on]
-        clip, start, rate, cost, back, piece = (np.concatenate(parts) for parts in zip(*options))
+        every = [np.concatenate(parts) for parts in zip(*options)]
+        kept = self._choose_states(slot, start=every[1], cost=every[3], piece=every[5])
+        clip, start, rate, cost, back, piece = (values.take(kept) for values in every)
         goes_on = (clip == before.clip[back]) & (np.abs(start - ends[back]) < SAME_FRAME)
         age = np.where(goes_on, np.minimum(before.age[back] + 1, YOUNG_SLOTS), 1)
-        return self._prune_states(slot, BeamStates(clip, start, rate, cost=cost, back=back, piece=piece,
-                                                   recent=np.roll(before.recent[back], -1, axis=1), age=age))
+        return BeamStates(clip, start, rate, cost=cost, back=back, piece=piece,
+                          recent=self._remember(before.recent.take(back, axis=0), start), age=age)
 
-    def _prune_states(self, slot: int, states: BeamStates) -> BeamStates:
-        """Keep the cheapest free and the cheapest bound states, a beam of each, and update their memory.
+    def _choose_states(self, slot: int, start: np.ndarray, cost: np.ndarray, piece: np.ndarray) -> np.ndarray:
+        """Choose the cheapest free and the cheapest bound states (K,), a beam of each; their indices.
 
         Beside them the cheapest ones are kept that show a requested action: while a body kneels down or turns to jog
         backward, one that does nothing costs less for a moment, in more ways than a beam holds.
         """
-        width, order = self.width.beam_width, np.argsort(states.cost, kind="stable")
-        free, acts = states.piece[order] < 0, self._shows_requested_action(slot, states.start[order])
+        width, order = self.width.beam_width, np.argsort(cost, kind="stable")
+        free, acts = piece[order] < 0, self._shows_requested_action(slot, start[order])
         kept = (order[free][:width], order[~free][:width])
         acting = order[free & acts][: self._acting_width]
         acting = np.setdiff1d(acting, kept[0]) if len(acting) else acting
-        best = states.select(np.concatenate([*kept, acting]))
-        best.recent[:, -1] = self.index.bucket[self.costs.round_frame(best.start)]
-        return best
+        return np.concatenate([*kept, acting])
+
+    def _remember(self, recent: np.ndarray, start: np.ndarray) -> np.ndarray:
+        """Forget the oldest of the buckets (B, M) shown lately, and append those of library frames (B,)."""
+        return np.column_stack([recent[:, 1:], self.index.bucket[self.costs.round_frame(start)]])
 
     @property
     def _acting_width(self) -> int:

@@ -163,7 +163,7 @@ class LagPreference:
         """Compute the cost (K,) of showing library frames (K,) from the track's frame `first` on."""
         # place - time modulo the period; the table holds two periods, so the sum of two remainders needs no further
         # modulo
-        return self.table[self.place[frame] + (-first - self.start) % (len(self.table) // 2)]
+        return self.table[(-first - self.start) % (len(self.table) // 2) :].take(self.place.take(frame))
 
 
 def build_lag_preference(library: Library, lag: float, variety: float, start: float) -> LagPreference | None:

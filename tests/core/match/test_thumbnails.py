@@ -9,6 +9,7 @@ from beyond_mocap.appearance.picture import render_pose
 from beyond_mocap.library.build import build_library
 from beyond_mocap.match.displayed_motion import construct_displayed_player
 from beyond_mocap.match.player_edit import read_player
+from beyond_mocap.match.player_motion import construct_player
 from beyond_mocap.match.report.pictures import PICTURE_SIZE, build_thumbnail_renderer
 from beyond_mocap.match.request import MatchRequest
 from beyond_mocap.match.synthesize_match import synthesize_match
@@ -30,12 +31,15 @@ def made(sample_cache, tmp_path_factory):
 
 def test_a_picture_is_the_pose_of_that_second(made):
     folder, library = made
-    take = construct_displayed_player(library, read_player(folder / "home_1.take.npz"), None, 2.0, 6.0)[0]
+    edit = read_player(folder / "home_1.take.npz")
+    take = construct_displayed_player(library, edit, None, 2.0, 6.0)[0]
     draw = build_thumbnail_renderer(library, folder)
+    draw_stored = build_thumbnail_renderer(library, folder, lambda _, *span: construct_player(library, edit, *span))
     for second in (2.5, 4.0):
         frame = round((second - take.start_time) * take.motion.fps)
         near = range(frame - 15, frame + 16, 5)  # a keeper who stands moves little in less
         picture = draw("home_1", second)
+        assert np.array_equal(picture, draw_stored("home_1", second))
         off = [np.abs(picture - render_pose(take.motion, one, PICTURE_SIZE)).mean() for one in near]
         assert near[int(np.argmin(off))] == frame and min(off) < 0.25 * np.median(off)
 

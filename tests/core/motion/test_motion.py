@@ -9,6 +9,7 @@ from beyond_mocap.motion import quaternion
 from beyond_mocap.motion.motion import (
     Motion,
     compute_end_positions,
+    compute_pose,
     compute_world_rotation,
     concatenate_motions,
     forward_kinematics,
@@ -50,6 +51,13 @@ def test_forward_kinematics_is_the_chain_of_its_parents(motion):
         assert np.allclose(quaternion.to_matrix(rotations[frame]), [turn.as_matrix() for turn in turns])
         tip = places[2] + turns[2].apply([0, 0, 0.1])
         assert np.allclose(compute_end_positions(motion)[frame, 0], tip)
+
+
+def test_of_some_joints_no_bit_differs_and_others_are_unknown(motion):
+    chain = [2, 1, 0]
+    some, whole = (compute_pose(TREE, motion.root_positions, motion.rotations, joints) for joints in (chain, None))
+    for found, every in zip(some, whole):
+        assert np.array_equal(found[:, chain], every[:, chain]) and np.isnan(found[:, 3]).all()
 
 
 def test_rotations_are_unit_continuous_and_read_only(motion):
