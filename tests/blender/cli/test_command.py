@@ -81,14 +81,16 @@ def test_the_blend_file_of_a_ride_holds_the_rider_on_its_path(run, tmp_path):
     assert hips.x == pytest.approx(5.0, abs=0.1) and hips.y > 0.0
 
 
-def test_batch_makes_blenders_own_files_without_an_installed_extension(tmp_path):
-    (tmp_path / "line.csv").write_text("x_m,y_m\n0,0\n0,9\n")
-    walk = SAMPLE / "library" / "walking_1_2.bvh"
-    words = ["path", walk, "--path", tmp_path / "line.csv", "--loop", "--out", tmp_path / "rider.blend"]
+def test_batch_writes_a_scene_without_an_installed_extension(library_folder, tmp_path):
+    """A match in a .blend has the extension's own properties."""
+    rows = "".join(f"{number / 10},ada,{0.12 * number},0\n" for number in range(21))
+    (tmp_path / "game.csv").write_text("time_s,player,x_m,y_m\n" + rows)
+    words = ["match", "--tracking", "game.csv", "--library", library_folder, "--out", "made", "--no-figures",
+             "--scene", "game.blend"]
     command = [sys.executable, "-P", TOP / "batch.py", "--", *words]
     environment = {"BLENDER_USER_RESOURCES": str(tmp_path), "PATH": "/usr/bin:/bin"}
     done = subprocess.run(command, cwd=tmp_path, env=environment, capture_output=True, text=True, timeout=120)
-    assert done.returncode == 0 and (tmp_path / "rider.blend").stat().st_size > 1000, done.stderr
+    assert done.returncode == 0 and (tmp_path / "game.blend").stat().st_size > 1000, done.stderr
     assert "Traceback" not in done.stderr
 
 
