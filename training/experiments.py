@@ -202,6 +202,9 @@ def main(argv: list[str] | None = None) -> int:
     except BeyondMocapError as error:
         print(f"experiments: {error}", file=sys.stderr)
         return error.exit_status
+    except OSError as error:
+        print(f"experiments: {error.filename}: {error.strerror}; choose a folder that can be written", file=sys.stderr)
+        return InputError.exit_status
     except KeyboardInterrupt:
         print("experiments: stopped; the same command continues", file=sys.stderr)
         return UserCancelledError.exit_status

@@ -75,7 +75,9 @@ def test_stopped_and_killed_it_continues_to_the_same_results(data, tmp_path):
 def test_what_cannot_run_is_one_line(data, tmp_path, capsys):
     assert main(["--data", str(tmp_path), "--out", str(tmp_path / "out"), "--hours", "1"]) == 0
     assert "skipped" in capsys.readouterr().out and not (tmp_path / "out").exists()
-    for more in (["--row", "nobody"], ["--hours", "nan"], ["--experiments", str(data / "people" / "throws.csv")]):
+    (tmp_path / "file").write_text("")
+    for more in (["--row", "nobody"], ["--out", str(tmp_path / "file" / "out")], ["--hours", "nan"],
+                 ["--experiments", str(data / "people" / "throws.csv")]):
         assert main([*words(data, tmp_path / "out", 1), *more]) == 2
         assert capsys.readouterr().err.count("\n") == 1 and not (tmp_path / "out").exists()
 
