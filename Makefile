@@ -7,7 +7,7 @@ REAL_BLENDER ?= ../shared/tools/real-blender
 
 .DEFAULT_GOAL := help
 .NOTPARALLEL:
-.PHONY: help venv venv-oldest training lint quick test test-core test-blender test-oldest test-training demo bench weights tables docs package extension extension-all repository \
+.PHONY: help venv venv-oldest training lint quick test test-core test-blender test-oldest test-training demo bench weights experiments tables docs package extension extension-all repository \
   repository-test pins window-test window-bench fuzz kill-test pictures clean
 
 help:
@@ -21,6 +21,7 @@ help:
 	@echo 'make demo           the sample match, synthesized and rendered into build/demo'
 	@echo 'make bench          time and quality on recordings'
 	@echo 'make weights        fit the shipped linear starts again to synthetic throws and kicks; some minutes'
+	@echo 'make experiments    networks of full size on recorded kicks, for HOURS=8, into OUT=build/experiments; repeated, it continues'
 	@echo 'make tables         the pages of docs/ that come from the code: settings, providers'
 	@echo 'make docs           the documents as a site, into build/docs; broken links are errors'
 	@echo 'make package        the Python package, wheel and source archive, into build/package'
@@ -114,6 +115,16 @@ weights: training
 	  $(TRAINED) throw train build/examples/$$action --action $$action --half --config training/synthetic.json --out build/examples/$$action.npz; \
 	  mv build/examples/$$action.npz $(WEIGHTS)/$$action.npz; \
 	done
+
+# Not a part of `make test`: hours. Repeated, it continues; ROWS="name name" runs these alone, beside another if you like.
+HOURS ?= 8
+OUT ?= build/experiments
+DATA ?= ../shared/data/mocap
+ROWS ?=
+experiments: export OPENBLAS_NUM_THREADS = 1
+experiments: export OMP_NUM_THREADS = 1
+experiments: training
+	.venv-training/bin/python -m training.experiments --data $(DATA) --out $(OUT) --hours $(HOURS) $(ROWS:%=--row %)
 
 tables: venv
 	.venv/bin/python packaging/pages.py

@@ -13,7 +13,7 @@ import time
 import zipfile
 import zlib
 from collections.abc import Callable, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from functools import partial
 from pathlib import Path
 from typing import Protocol
@@ -299,6 +299,22 @@ def read_checkpoint(path: Path, like: object, fits: str) -> Checkpoint:
         InputError: one line: missing, damaged, of another version, or of a training with other settings or
             recordings.
     """
+    found = read_progress(path)
+    leaves, (expected_leaves, tree) = found.state, jax.tree.flatten(like)
+    if found.fits != fits or [(a.shape, a.dtype) for a in leaves] != [(b.shape, b.dtype)
+                                                                      for b in map(np.asarray, expected_leaves)]:
+        raise InputError(path, "belongs to a training with other settings or recordings", "", NEXT_STEP)
+    return replace(found, state=jax.tree.unflatten(tree, [jnp.asarray(leaf) for leaf in leaves]))
+
+
+def read_progress(path: Path) -> Checkpoint:
+    """Read a checkpoint of any training; its state is the list of its arrays.
+
+    Args:
+        path: the file.
+    Raises:
+        InputError: one line: missing, damaged, or of another version.
+    """
     check_checkpoint(path)
     try:
         with np.load(path, allow_pickle=False) as file:
@@ -312,9 +328,4 @@ def read_checkpoint(path: Path, like: object, fits: str) -> Checkpoint:
         raise InputError(path, f"is not a readable checkpoint ({type(error).__name__})", "", NEXT_STEP) from None
     if version != VERSION:
         raise InputError(path, f"version {version}", f"version {VERSION}", NEXT_STEP)
-    expected_leaves, tree = jax.tree.flatten(like)
-    if trained != fits or [(a.shape, a.dtype) for a in leaves] != [(b.shape, b.dtype)
-                                                                   for b in map(np.asarray, expected_leaves)]:
-        raise InputError(path, "belongs to a training with other settings or recordings", "", NEXT_STEP)
-    state = jax.tree.unflatten(tree, [jnp.asarray(leaf) for leaf in leaves])
-    return Checkpoint(state, int(epoch), float(seconds), losses, fits, EpochChoice(**choice))
+    return Checkpoint(leaves, int(epoch), float(seconds), losses, trained, EpochChoice(**choice))

@@ -16,6 +16,7 @@ import numpy as np
 
 from beyond_mocap.base.errors import InputError, UserCancelledError
 from beyond_mocap.cli.outputs import ProgressReporter, check_outputs
+from beyond_mocap.cli.throwing import select_subjects
 from beyond_mocap.files.bvh import bvh
 from beyond_mocap.motion.skeleton import Skeleton
 from beyond_mocap.throws.network_npz import write_model
@@ -50,8 +51,8 @@ _CHOOSING_SHARE = 0.4  # share of progress and time for choosing the number of e
 
 def train(
     examples: Sequence[Example], config: TrainingConfig, *, checkpoint: Path | None = None, resume: bool = False,
-    minutes: float | None = None, progress: Callable[[float, str], None] = lambda fraction, text: None,
-    cancelled: Callable[[], bool] = lambda: False,
+    minutes: float | None = None, is_done: Callable[[int], bool] = lambda epoch: False,
+    progress: Callable[[float, str], None] = lambda fraction, text: None, cancelled: Callable[[], bool] = lambda: False,
 ) -> ThrowModel:
     """Train a model on examples of one skeleton, at the config's frame rate.
 
@@ -61,6 +62,8 @@ def train(
         checkpoint: file of the checkpoint, used by `resume`, or None.
         resume: continue from the checkpoint.
         minutes: time limit, or None.
+        is_done: receives the epochs after each macro-epoch, and returns True to end with the model as it is then;
+            `resume` continues from there.
         progress: receives a share of 0 .. 1 and a text.
         cancelled: returns True to stop.
     Raises:
@@ -102,7 +105,8 @@ def train(
                                lambda done, text: progress(share * done, f"held out: {text}"), cancelled)
     trained = fit(
         problem, config, checkpoint=checkpoint, resume=resume, minutes=minutes and (1.0 - share) * minutes,
-        choice=choice, progress=lambda done, text: progress(share + (1.0 - share) * done, text), cancelled=cancelled,
+        choice=choice, is_done=lambda params, epoch: is_done(epoch),
+        progress=lambda done, text: progress(share + (1.0 - share) * done, text), cancelled=cancelled,
     )
     notes = (*notes, trained.line) if trained.line else notes
     return build_model(trained.params, _describe_training(examples, trained))
@@ -287,7 +291,8 @@ def train_folder(options, report: ProgressReporter) -> None:
     check_outputs(options.out, checkpoint, reserved=(options.config, options.skeleton))
     if options.resume:
         check_checkpoint(checkpoint)
-    examples = _read_examples(options, config, report)
+    skeleton = _read_skeleton(options.skeleton) if options.skeleton else None
+    examples = read_training_examples(options.folder, config, options.subject, skeleton, report)
 
     def progress(share: float, text: str) -> None:
         report.show_progress(READING_SHARE + (1.0 - READING_SHARE) * share, text)
@@ -305,13 +310,24 @@ def train_folder(options, report: ProgressReporter) -> None:
     print(f"{options.out}: {model.trained_on}; {len(model.networks)} networks, {weights} weights, {seconds:.0f} s")
 
 
-def _read_examples(options, config: TrainingConfig, report: ProgressReporter) -> list[Example]:
-    """Read the folder's examples of the requested subjects, on the given skeleton or the first one's."""
-    skeleton = _read_skeleton(options.skeleton) if options.skeleton else None
-    found = _read_selected(options, config, report, skeleton)
+def read_training_examples(
+    folder: Path, config: TrainingConfig, subjects: Sequence[str], skeleton: Skeleton | None, report: ProgressReporter,
+) -> list[Example]:
+    """Read a folder's examples, all on one skeleton.
+
+    Args:
+        folder: folder of recordings.
+        config: configuration of the training.
+        subjects: names of the subjects to select; if empty, all.
+        skeleton: skeleton of the examples; None for that of the first one.
+        report: receives notes and progress.
+    Raises:
+        InputError: if there is no example, or a subject is unknown.
+    """
+    found = _read_selected(folder, config, subjects, skeleton, report)
     first = found[0].motion.skeleton
     if skeleton is None and not all(example.motion.skeleton.has_same_bones(first) for example in found):
-        found = _read_selected(options, config, report, first)
+        found = _read_selected(folder, config, subjects, first, report)
     return found
 
 
@@ -325,19 +341,14 @@ def _read_skeleton(path: Path) -> Skeleton:
     return skeleton
 
 
-def _read_selected(options, config: TrainingConfig, report: ProgressReporter, skeleton) -> list[Example]:
+def _read_selected(folder, config: TrainingConfig, subjects, skeleton, report: ProgressReporter) -> list[Example]:
     """Read the examples and select the requested subjects."""
     def progress(share: float, text: str) -> None:
         report.show_progress(READING_SHARE * share, text)
 
     settings = config.settings
     found = read_examples(
-        options.folder, settings.action, settings.fps, skeleton, report.show_note, progress=progress,
+        folder, settings.action, settings.fps, skeleton, report.show_note, progress=progress,
         cancelled=report.is_cancelled,
     )
-    chosen = [example for example in found if not options.subject or example.subject in options.subject]
-    there = sorted({example.subject for example in found})
-    for name in options.subject:
-        if name not in there:
-            raise InputError("--subject", name, f"one of {', '.join(there)}", f"see {options.folder}")
-    return chosen
+    return select_subjects(found, subjects, folder)

@@ -304,8 +304,8 @@ def run_evaluate(options, reporter: ProgressReporter, writers: Mapping[str, Writ
     started = time.perf_counter()
     check_outputs(options.report, options.html, reserved=(options.model, options.examples / TABLE_NAME))
     model = read_chosen_model(options.model, "kick")
-    examples = _read_examples(options.examples, model, reporter)
-    chosen = select_of_each(_choose_subjects(examples, options.subject, options.examples), options.motions)
+    examples = read_test_examples(options.examples, model, reporter)
+    chosen = select_of_each(select_subjects(examples, options.subject, options.examples), options.motions)
     loaded = time.perf_counter()
     evaluation = evaluate_throws(
         model, chosen, RAW_OPTIONS if options.raw else FULL_OPTIONS, by_height=not options.as_they_are,
@@ -325,11 +325,20 @@ def run_evaluate(options, reporter: ProgressReporter, writers: Mapping[str, Writ
     print(f"{options.report}: {report['motions']} of {len(chosen)} motions")
 
 
-def _read_examples(folder: Path, model, reporter: ProgressReporter) -> list:
-    """Read the examples of a folder.
+def read_test_examples(folder: Path, model, reporter: ProgressReporter) -> list:
+    """Read the examples of a folder to evaluate a model on.
 
     Examples on the model's joint names stay as they are; otherwise all are retargeted to the model's skeleton, because
     hands with another rest pose rotate differently.
+
+    Args:
+        folder: folder of recordings.
+        model: the model.
+        reporter: receives notes.
+    Returns:
+        The examples.
+    Raises:
+        InputError: if there is no example.
     """
     from ..throws.throw_examples import read_examples
 
@@ -342,8 +351,18 @@ def _read_examples(folder: Path, model, reporter: ProgressReporter) -> list:
     return read_examples(folder, settings.action, settings.fps, model.skeleton, cancelled=reporter.is_cancelled)
 
 
-def _choose_subjects(examples, subjects: list[str], folder: Path):
-    """Select the examples of some subjects, all without any name; InputError for an unknown subject."""
+def select_subjects(examples, subjects, folder: Path) -> list:
+    """Select the examples of some subjects.
+
+    Args:
+        examples: the examples.
+        subjects: names of the subjects; if empty, all.
+        folder: folder of the examples, for the error.
+    Returns:
+        The selected examples.
+    Raises:
+        InputError: for an unknown subject.
+    """
     known = sorted({example.subject for example in examples})
     for name in subjects:
         if name not in known:

@@ -21,10 +21,10 @@ from ..base.errors import InputError, UserCancelledError
 from ..evaluation.paired_tests import find_inliers
 from ..files.tables import to_plain
 from ..motion import quaternion
-from ..motion.hand import build_hand, estimate_ball_centre
 from ..motion.humanoid import identify_joints
 from ..motion.motion import Motion, compute_pose, forward_kinematics, sample_frames_cubic
 from ..synthesis.quality.movement import compute_jerk
+from ..synthetic.throws import find_grip
 from .networks.chains import EFFECTORS, find_chains
 from .networks.description import scale_description
 from .networks.example import Example, build_description
@@ -211,8 +211,7 @@ def _measure_impacts(motion: Motion, shift: np.ndarray, example: Example, ratio:
     """
     if example.limb not in (0, 1):
         return np.nan, np.nan, np.nan
-    hand = build_hand(motion, ("left", "right")[example.limb])
-    grip = estimate_ball_centre(hand.finger, hand.reach)
+    grip = find_grip(motion.skeleton, ("left", "right")[example.limb], BASEBALL.radius)
     own_hand, example_hand = (find_chains(of.skeleton).effectors[example.limb] for of in (motion, example.motion))
     generated_ball = release_ball(motion, own_hand, grip, example.release, shift[:, example.limb])
     place, speed = release_ball(example.motion, example_hand, grip / ratio, example.release)

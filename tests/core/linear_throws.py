@@ -22,12 +22,14 @@ from beyond_mocap.throws.networks.training_set import (
     measure_leg_reach,
 )
 from beyond_mocap.throws.synthetic_examples import generate_kick_at
+from beyond_mocap.throws.throw_records import ACTIONS
 
 HIDDEN_OFFSET = 1e3  # hidden values are moved by it, so that no unit is ever below 0, where it would bend
 
 
 def build_throw_examples(count=12, seed=0, fps=30.0):
-    """Made throws of one body at known targets, in the normalised frame."""
+    """Made throws of one body at known targets, in the normalised frame, as long as recorded ones are cut at least:
+    shorter ones begin and end with a foot in the air, from which no library goes on smoothly."""
     random, found = np.random.default_rng(seed), []
     while len(found) < count:
         speed, far, high = random.uniform(14, 24), random.uniform(8, 20), random.uniform(0.4, 2.0)
@@ -35,7 +37,7 @@ def build_throw_examples(count=12, seed=0, fps=30.0):
             throw_result = build_throw((far, 0.0, high), speed, fps=120.0)
         except InputError:
             continue
-        span = (throw_result.release - 1.2, throw_result.release + 0.8)
+        span = (throw_result.release - ACTIONS["throw"].before[0], throw_result.release + ACTIONS["throw"].after[0])
         found.append(build_example(f"throw{len(found)}", "one", throw_result.motion, "right_hand", throw_result.release,
                                    (far, 0.0, high), throw_result.velocity, fps, span))  # fmt: skip
     return tuple(found)

@@ -100,7 +100,8 @@ def hand_and_grip(made):
 
 
 def test_a_ball_is_let_go_with_its_own_velocity_even_at_30_frames_a_second():
-    for fps, slack, off in ((240.0, 0.01, 0.003), (30.0, 0.05, 0.02)):
+    # the hand turns by up to 140 degrees from one of 30 frames a second to the next
+    for fps, slack, off in ((240.0, 0.01, 0.003), (30.0, 0.045, 0.01)):
         made = build_throw((18.0, 0.0, 1.0), 25.0, fps=fps)
         place, velocity = release_ball(made.motion, *hand_and_grip(made), made.release * fps)
         assert np.linalg.norm(place - made.position) < off
