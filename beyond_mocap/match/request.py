@@ -36,6 +36,7 @@ class MatchRequest:
     Attributes:
         tracking: the provider's tracking file.
         meta: its metadata; None: searched beside it, or none.
+        joints: skeletal tracking of the same match; None: none, or `tracking` itself.
         events: the events file; None: no events.
         provider: the form of the files; "": detected.
         events_meta: metadata of the events.
@@ -89,6 +90,7 @@ class MatchRequest:
     scheduler: str = ""
     events_meta: Path | None = None
     events_provider: str = ""
+    joints: Path | None = None
 
     def __post_init__(self):
         for option, value in (("start time", self.start), ("end time", self.end)):
@@ -114,7 +116,7 @@ class MatchRequest:
 
 _RESULTS = ("provider", "start", "end", "players", "fps", "seed", "nearest", "solve_touches", "watch", "strength",
             "masses", "fatigue", "window", "overlap", "variety", "events_provider")
-_FILES = ("tracking", "meta", "events", "events_meta")
+_FILES = ("tracking", "meta", "events", "events_meta", "joints")
 
 
 def build_identity(request: MatchRequest, library_key: str) -> dict[str, object]:

@@ -21,14 +21,15 @@ from ..files.atomic import atomic_write
 from ..files.event_data import MatchEvents
 from ..files.events import read_events
 from ..files.file_names import build_file_names
+from ..files.joints.joint_feed import JointFeed
 from ..files.tables import write_ball
-from ..files.tracking.tracking import read_match
 from ..library.build import build_library
 from ..library.library import Library
 from ..motion.track.ball_path import BallPath
 from ..motion.track.match_data import Match
 from .folder import check_folder, open_folder, read_state
 from .goalkeeping.positions import fill_keepers
+from .known_bodies import build_known_bodies, follow_bodies, read_tracked
 from .labels import MatchLabels, label_match
 from .match_ball import apply_led_ball, build_ball_plan, sample_ball
 from .pieces import stages
@@ -112,7 +113,7 @@ def synthesize_match(
     check_workers(place)
     clock = read_clocks()
     report(0.0, f"Reading {request.tracking.name}")
-    match = read_match(request.tracking, request.meta, request.provider or None)
+    match, feed = read_tracked(request)
     span = resolve_span(match, request)
     events = None if request.events is None else read_events(request.events, request.events_meta,
                                                              request.events_provider or None, match)
@@ -128,7 +129,7 @@ def synthesize_match(
                          report=report, cancelled=cancelled)
         try:
             with threadpool_limits(limits=1):  # more threads would change the order of sums
-                _run_stages(job, match, events, span, report)
+                _run_stages(job, (match, feed), events, span, report)
         except BeyondMocapError as error:
             if state.players:  # otherwise no work has started
                 state.update_report(status="cancelled" if isinstance(error, UserCancelledError) else "failed",
@@ -154,10 +155,14 @@ def _build_library(request: MatchRequest, report: Progress, cancelled) -> tuple[
 
 
 def _run_stages(
-    job: Job, match: Match, events: MatchEvents | None, span: tuple[float, float], report: Progress
+    job: Job, tracked: tuple[Match, JointFeed | None], events: MatchEvents | None, span: tuple[float, float], report: Progress
 ) -> None:
     """Run all stages after reading."""
     state, begin = job.state, read_clocks()
+    match, feed = tracked
+    bodies, seen = build_known_bodies(feed, match, job.request, job.library, span)
+    state.report["notes"] += seen.notes
+    match = follow_bodies(match, bodies, job.library.skeleton)
     present, filled = fill_keepers(match, find_kept_lines(match))
     state.report["notes"] += filled
     roles = build_roles(present, job.request, span)
@@ -172,10 +177,13 @@ def _run_stages(
     roles, state.report["spacing"] = separate_roles(roles, match.times[inside], touches)
     names = build_file_names(player.id for player in match.players)
     parts = build_player_plans(roles, names, words, solved=solved, request=job.request, folder=job.folder,
-                               library=job.library, plays=build_plays(match))
+                               library=job.library, plays=build_plays(match), bodies=bodies)
     rows = job.folder.previous_state.get("players", ())
     finished = {row["id"]: row["finished"] for row in rows if isinstance(row.get("finished"), str)}
     state.players = {part.role.player.id: build_player_row(part, finished.get(part.role.player.id)) for part in parts}
+    for player, rows in seen.rows.items():
+        if player in state.players:
+            state.players[player]["joints"] = rows
     state.report["notes"] += list_unknown_texts(job.request.annotations, names.values())
     state.report["notes"] += list_unused_labels(parts, job.request, names)
     state.record_stage("words", clock)

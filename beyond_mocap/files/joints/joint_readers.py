@@ -50,6 +50,16 @@ def read_joints(path) -> JointFeed:
         raise InputError(path, found[:200], _FORMS, "export it again") from None
 
 
+def is_joint_file(path) -> bool:
+    """Say whether a file looks like skeletal tracking."""
+    path = Path(path)
+    if path.suffix.lower() in (".npz", ".joints"):
+        return True
+    head = read_head(path)
+    first = head.partition(b"\n")[0].lower()
+    return re.match(rb'(?s)\s*\{.{0,4000}"landmarks"', head) is not None or b"joint" in first and b"time" in first
+
+
 def _find_reader(path: Path):
     """Find the function that reads a file, by its content."""
     if path.suffix.lower() == ".npz":

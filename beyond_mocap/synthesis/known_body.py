@@ -1,0 +1,251 @@
+"""Stretches of a player whose body is known, as cameras have seen it: they are shown as they are, and what is
+synthesized around them leads into them.
+
+The search is drawn to source frames that move as the known body does near its ends (`KnownFeatures`). There the known
+body's lead over the synthesized one fades within FADE_SECONDS, its feet where they stand (`edit_blending`).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from ..base.easing import quintic_step_by_powers
+from ..base.vectors import measure_lengths
+from ..library.features import Frames, compute_raw_features, select_feature_joints
+from ..motion import quaternion
+from ..motion.foot_plant import PlantResult
+from ..motion.humanoid import compute_heading_from_positions
+from ..motion.motion import compute_pose
+from ..motion.skeleton import Skeleton, freeze_array
+from .construct.edit_blending import Pose, step_over
+from .construct.extra_steps import Steps
+
+SOURCE = "joints"
+"""What stands for a clip where a known body is shown."""
+
+FADE_SECONDS = 0.6
+"""Seconds beside a known body in which its lead over the synthesized one fades: a step."""
+
+LEAD_SECONDS = 0.6
+"""Seconds within a known body, from either end, in which the search follows it."""
+
+_VELOCITY_SECONDS = 0.1  # s over which the difference in velocity at an end goes on
+_MARGIN = 1.0  # s of a body that are kept beyond the span that it is cut to
+
+
+@dataclass(frozen=True, eq=False)
+class KnownBody:
+    """A stretch of a body, in the player's size on the library's skeleton.
+
+    Attributes:
+        first: frame of the first one on the track's clock, counted from 0 s.
+        fps: frames per second, the plan's.
+        root: (T, 3) m, world, whole millimetres.
+        rotations: (T, J, 4) local, as whole numbers of 1 / UNIT.
+        heel_toe_contacts: (T, 2, 2) bool.
+    """
+
+    UNIT = 32767
+
+    first: int
+    fps: float
+    root: np.ndarray
+    rotations: np.ndarray
+    heel_toe_contacts: np.ndarray
+
+    def __post_init__(self):
+        for name, kind in (("root", float), ("rotations", np.int16), ("heel_toe_contacts", bool)):
+            object.__setattr__(self, name, freeze_array(getattr(self, name), kind))
+
+    def __len__(self) -> int:
+        return len(self.root)
+
+    @property
+    def start(self) -> float:
+        """Seconds of the first frame."""
+        return self.first / self.fps
+
+    @property
+    def end(self) -> float:
+        """Seconds of the last frame."""
+        return (self.first + len(self) - 1) / self.fps
+
+    @property
+    def pose(self) -> Pose:
+        """Root (T, 3) m and local rotations (T, J, 4)."""
+        turns = self.rotations / float(self.UNIT)
+        return self.root, turns / measure_lengths(turns)[..., None]
+
+    def compute_heading(self, skeleton: Skeleton) -> np.ndarray:
+        """Compute the heading (T,) rad, unwrapped."""
+        return np.unwrap(compute_heading_from_positions(skeleton, compute_pose(skeleton, *self.pose)[0]))
+
+
+def build_known_body(first: int, fps: float, pose: Pose, heel_toe_contacts: np.ndarray) -> KnownBody:
+    """Build a known body from root (T, 3) m and local rotations (T, J, 4), rounded as files store it."""
+    return KnownBody(first, fps, np.round(pose[0], 3), np.rint(pose[1] * KnownBody.UNIT), heel_toe_contacts)
+
+
+def cut_bodies(bodies: Sequence[KnownBody], start: float, end: float) -> tuple[KnownBody, ...]:
+    """Cut known bodies to what a span, s, shows, with a second on either side."""
+    out = []
+    for body in bodies:
+        low = max(int(np.ceil((start - _MARGIN) * body.fps)) - body.first, 0)
+        high = min(int(np.floor((end + _MARGIN) * body.fps)) + 1 - body.first, len(body))
+        if high - low >= 2:
+            out.append(replace(body, first=body.first + low, root=body.root[low:high],
+                               rotations=body.rotations[low:high],
+                               heel_toe_contacts=body.heel_toe_contacts[low:high]))
+    return tuple(out)
+
+
+class KnownFeatures:
+    """How known bodies move near their ends, as features of a library.
+
+    Attributes:
+        values: (T, D) of each frame of a track at the library's rate.
+        counts: (T,) bool, frames within LEAD_SECONDS of an end of a body, and within it.
+    """
+
+    def __init__(self, bodies: Sequence[KnownBody], frames: Frames, skeleton: Skeleton, times: np.ndarray,
+                 size: float = 1.0):
+        """Compute the features.
+
+        Args:
+            bodies: the known bodies.
+            frames: of the library.
+            skeleton: its skeleton.
+            times: (T,) s of the track's frames.
+            size: how many times as tall as the library's skeleton the player is.
+        """
+        self.values = np.zeros((len(times), frames.features.shape[1]), np.float32)
+        self.counts = np.zeros(len(times), bool)
+        for body in bodies:
+            away = np.minimum(times - body.start, body.end - times)
+            near = np.flatnonzero((away > -1e-6) & (away <= LEAD_SECONDS))
+            if len(body) >= 3 and len(near):
+                own = _compute_features(body, frames, skeleton, size)
+                self.values[near] = own[np.clip(np.rint(times[near] * body.fps).astype(int) - body.first, 0,
+                                                len(body) - 1)]
+                self.counts[near] = True
+
+    def measure_distance(self, frame: int, features: np.ndarray) -> np.ndarray:
+        """Measure how far (K,) m features (K, D) are from the known body at a frame of the track."""
+        return measure_lengths(features - self.values[frame])
+
+
+def _compute_features(body: KnownBody, frames: Frames, skeleton: Skeleton, size: float) -> np.ndarray:
+    """Compute the features (T, D) of a body."""
+    places = compute_pose(skeleton, body.pose[0] / size, body.pose[1])[0]
+    heading = np.unwrap(compute_heading_from_positions(skeleton, places))
+    return (compute_raw_features(places[:, select_feature_joints(skeleton)], heading, body.fps).astype(np.float32)
+            - frames.mean) @ frames.basis
+
+
+def find_shown_frames(bodies: Sequence[KnownBody], times: np.ndarray) -> np.ndarray:
+    """Find the frames (T,) bool, at times (T,) s, that show a known body."""
+    shown = np.zeros(len(times), bool)
+    for body in bodies:
+        shown |= (times >= body.start - 1e-6) & (times <= body.end + 1e-6)
+    return shown
+
+
+def name_known_frames(fields: Mapping[str, Any], bodies: Sequence[KnownBody], times: np.ndarray) -> dict[str, Any]:
+    """Name SOURCE as the clip of the frames that show a known body, and add its ends to the transitions.
+
+    Args:
+        fields: `clips`, `clip` and `seams` of a take, among others (`provenance.build_provenance_fields`).
+        bodies: the known bodies.
+        times: (T,) s of the take's frames.
+    Returns:
+        The fields.
+    """
+    shown = find_shown_frames(bodies, times)
+    if not shown.any():
+        return dict(fields)
+    ends = np.flatnonzero(np.diff(shown.astype(np.int8))) + 1
+    kept = fields["seams"][~shown[np.minimum(fields["seams"], len(shown) - 1)]]
+    return {**fields, "clips": (*fields["clips"], SOURCE), "clip": np.where(shown, len(fields["clips"]), fields["clip"]),
+            "clip_frame": np.where(shown, np.arange(len(times)), fields["clip_frame"]),
+            "mirrored": fields["mirrored"] & ~shown, "seams": np.union1d(kept, ends)}
+
+
+def show_bodies(skeleton: Skeleton, planted: PlantResult, steps: Steps, bodies: Sequence[KnownBody], first: int,
+                *, fps: float, size: float = 1.0) -> tuple[PlantResult, Steps]:  # fmt: skip
+    """Show known bodies in a constructed motion, and let the frames beside them lead into them.
+
+    Args:
+        skeleton: the library's.
+        planted: T frames.
+        steps: their contacts.
+        bodies: known bodies at the same rate.
+        first: frame of the track's clock of the motion's first one.
+        fps: frames per second.
+        size: how many times as tall as the library's skeleton the player is.
+    Returns:
+        The motion and its contacts; frames farther than FADE_SECONDS from a known body keep their bits.
+    """
+    if not bodies:
+        return planted, steps
+    root, rotations = planted.root.copy(), planted.rotations.copy()
+    contacts, shown = steps.heel_toe_contacts.copy(), np.zeros(len(root), bool)
+    for body in bodies:
+        low, high = max(body.first - first, 0), min(body.first + len(body) - first, len(root))
+        if high > low:
+            own, (place, turn) = slice(low + first - body.first, high + first - body.first), body.pose
+            root[low:high] = place[own] / size
+            rotations[low:high] = quaternion.match_signs(turn[own], planted.rotations[low:high])
+            contacts[low:high], shown[low:high] = body.heel_toe_contacts[own], True
+    pose = _join(skeleton, (root, rotations), planted, contacts, shown, fps)
+    moved = np.where(shown[:, None], 0.0, planted.correction), np.where(shown[:, None], 0.0, planted.miss)
+    flat = np.where(shown[:, None], contacts.all(axis=2), steps.contacts)
+    return (
+        replace(planted, root=pose[0], rotations=pose[1], correction=moved[0], miss=moved[1]),
+        replace(steps, rotations=pose[1], heel_toe_contacts=contacts, contacts=flat,
+                stepped=steps.stepped & ~shown[:, None]),
+    )
+
+
+def _join(skeleton: Skeleton, pose: Pose, planted: PlantResult, contacts: np.ndarray, shown: np.ndarray,
+          fps: float) -> Pose:
+    """Fade the lead of the known bodies into the frames beside them."""
+    edges = np.flatnonzero(np.diff(shown.astype(np.int8)))
+    for number, edge in enumerate(edges):
+        ends = edges[number - 1] if number else -1, edges[number + 1] if number + 1 < len(edges) else len(shown) - 1
+        after = bool(shown[edge])  # the body ends here, and the fade lies behind it
+        room = ends[1] - edge if after else edge - ends[0]
+        shared = (number + 1 < len(edges)) if after else number > 0
+        reach = min(int(FADE_SECONDS * fps), room // 2 if shared else room - 1)
+        if reach >= 2:
+            pose = _fade(skeleton, pose, planted, contacts, edge=edge if after else edge + 1,
+                         step=1 if after else -1, reach=reach, fps=fps)
+    return pose
+
+
+def _fade(skeleton: Skeleton, pose: Pose, planted: PlantResult, contacts: np.ndarray, *, edge: int, step: int,
+          reach: int, fps: float) -> Pose:
+    """Fade the lead of the body's last frame `edge` over `reach` frames in the direction of `step`."""
+    at = edge + step * np.arange(reach + 1)
+    new = planted.root[at], planted.rotations[at]
+    inner = int(np.clip(edge - step, 0, len(pose[0]) - 1))
+    gone = _VELOCITY_SECONDS * fps * (1.0 - np.exp(-np.arange(reach + 1) / (_VELOCITY_SECONDS * fps)))
+    move, before = (pose[0][one] - planted.root[one] for one in (edge, inner))
+    turn, turn_before = (_measure_turn(planted.rotations[one], pose[1][one]) for one in (edge, inner))
+    lead = move + gone[:, None] * (move - before)
+    turns = turn + gone[:, None, None] * (turn - turn_before)
+    old = new[0] + lead, quaternion.multiply(new[1], quaternion.from_rotation_vector(turns))
+    share = quintic_step_by_powers(1.0 - np.arange(reach + 1) / (reach + 1.0))
+    out = pose[0].copy(), pose[1].copy()
+    out[0][at[1:]] = (new[0] + share[:, None] * (old[0] - new[0]))[1:]
+    out[1][at[1:]] = quaternion.slerp(new[1], quaternion.match_signs(old[1], new[1]), share[:, None])[1:]
+    low, high = sorted((int(at[1]), int(at[-1])))
+    return step_over(skeleton, out, contacts, (low, high + 1), fps)
+
+
+def _measure_turn(source: np.ndarray, target: np.ndarray) -> np.ndarray:
+    """Measure the rotation vectors (J, 3) from local rotations (J, 4) to others."""
+    return quaternion.to_rotation_vector(quaternion.multiply(quaternion.inverse(source), target))

@@ -1,0 +1,81 @@
+"""Players whose joints are seen: shown as they are, synthesized where they are not, without a jump in between."""
+
+import json
+
+import numpy as np
+import pytest
+
+from beyond_mocap.cli.main import main
+from beyond_mocap.library.build import build_library
+from beyond_mocap.match.player_edit import read_player, write_player
+from beyond_mocap.match.player_motion import construct_player
+from beyond_mocap.motion.humanoid import identify_joints
+from beyond_mocap.motion.motion import forward_kinematics
+from beyond_mocap.synthesis.known_body import SOURCE
+from beyond_mocap.synthesis.quality.movement import compute_jerk
+from tests.core.joint_feeds import NAMES, sample_joints, write_table
+from tests.core.match.small_match import LIBRARY
+
+GAP = (2.2, 3.8)
+FPS = 50.0
+
+
+@pytest.fixture(scope="module")
+def seen_match(tmp_path_factory):
+    """A walk with 5 cm of noise and a gap of 1.6 s in which no joint is seen but dots are; and a player never seen."""
+    folder = tmp_path_factory.mktemp("seen")
+    truth = sample_joints("walking_1_2", FPS)
+    truth = np.concatenate([truth, truth[-1:] + 0.0 * truth[:1]]) if len(truth) % 2 else truth
+    seen = truth + np.random.default_rng(3).normal(0.0, 0.05 / np.sqrt(3.0), truth.shape)
+    seen[int(GAP[0] * FPS) : int(GAP[1] * FPS)] = np.nan
+    joints = write_table(folder / "joints.csv", {"A": seen}, FPS)
+    hips = truth[:, [NAMES.index("left_hip"), NAMES.index("right_hip")], :2].mean(axis=1)
+    times = np.arange(len(truth)) / FPS
+    rows = [f"{time:.3f},{x:.3f},{y:.3f}\n" for time, (x, y) in zip(times, hips)]
+    (folder / "dots.csv").write_text("time_s,x_m,y_m\n" + "".join(rows))
+    out = folder / "match"
+    assert main(["match", "--tracking", str(joints), "--library", str(LIBRARY), "--out", str(out), "--bvh"]) == 0
+    return folder, truth, out
+
+
+def measure_places(out, start, end):
+    edit = read_player(next(out.glob("*.take.npz")))
+    library = build_library(LIBRARY)
+    return edit, [take for take in construct_player(library, edit, start, end)]
+
+
+def test_seen_joints_are_shown_and_gaps_are_synthesized(seen_match):
+    _, truth, out = seen_match
+    _, takes = measure_places(out, 0.0, len(truth) / FPS)
+    (take,) = takes
+    places, _ = forward_kinematics(take.motion)
+    times = take.start_time + np.arange(len(places)) / take.motion.fps
+    body = identify_joints(take.motion.skeleton)
+    at = np.clip(np.rint(times * FPS).astype(int), 0, len(truth) - 1)
+    is_seen = np.array([take.clips[clip] == SOURCE for clip in take.clip])
+    gap = (times > GAP[0] + 0.1) & (times < GAP[1] - 0.1)
+    assert is_seen[(times < GAP[0] - 0.1) | (times > GAP[1] + 0.1)].all() and not is_seen[gap].any()
+    for name, joint in (("left_ankle", body.left.foot), ("right_wrist", body.right.hand), ("left_knee",
+                        body.left.lower_leg)):
+        error = np.linalg.norm(places[:, joint] - truth[at, NAMES.index(name)], axis=1)
+        assert error[is_seen].mean() < 0.05
+    jerk = compute_jerk(places, take.motion.fps)
+    inner = np.percentile(jerk[is_seen[:-3]], 99)
+    assert jerk.max() < max(2.0 * inner, 4000.0)
+
+
+def test_the_report_names_what_was_seen(seen_match):
+    _, _, out = seen_match
+    (row,) = json.loads((out / "match.json").read_text())["players"]
+    assert row["status"] == "done" and len(row["joints"]) == 2
+    assert row["joints"][0]["to_s"] == pytest.approx(GAP[0], abs=0.1)
+    assert all(one["joint_error_m"]["mean"] < 0.06 for one in row["joints"])
+    assert SOURCE in next(out.glob("*.provenance.csv")).read_text()
+
+
+def test_a_player_with_bodies_comes_back_from_a_file(seen_match, tmp_path):
+    _, _, out = seen_match
+    path = next(out.glob("*.take.npz"))
+    edit = read_player(path)
+    write_player(tmp_path / "again.npz", edit)
+    assert (tmp_path / "again.npz").read_bytes() == path.read_bytes() and edit.stretches[0].plan.bodies
