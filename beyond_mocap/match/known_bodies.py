@@ -10,7 +10,7 @@ import numpy as np
 
 from ..base.errors import InputError, format_count
 from ..files.joints.joint_feed import JointFeed, PlayerJoints
-from ..files.joints.joint_readers import is_joint_file, read_joints
+from ..files.joints.joint_readers import read_joints
 from ..files.tracking.tracking import read_match
 from ..library.library import Library
 from ..library.repair import plant_contacts
@@ -54,11 +54,11 @@ def read_tracked(request: MatchRequest) -> tuple[Match, JointFeed | None]:
     Raises:
         InputError: if a file cannot be read.
     """
-    if request.joints is None and not request.provider and is_joint_file(request.tracking):
-        feed = read_joints(request.tracking)
+    path = request.find_joint_file()
+    feed = None if path is None else read_joints(path)
+    if feed is not None and request.joints is None:
         return build_match(feed), feed
-    match = read_match(request.tracking, request.meta, request.provider or None)
-    return match, None if request.joints is None else read_joints(request.joints)
+    return read_match(request.tracking, request.meta, request.provider or None), feed
 
 
 def build_match(feed: JointFeed) -> Match:

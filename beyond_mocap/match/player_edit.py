@@ -65,7 +65,8 @@ _MAX_FRAMES, _MAX_RATE = 1e7, 100.0
 _MIN_WINDOW = 1.0  # s
 _DEFAULTS = {
     field.name: field.default for field in fields(Plan)
-    if field.name not in ("track", "timeline", "pins", "heading_keys", "contact_edits", "solved", "heading_path", "bodies")
+    if field.name not in ("track", "timeline", "pins", "heading_keys", "contact_edits", "solved", "heading_path",
+                          "bodies")
 }  # fmt: skip
 _RUN_TYPES = {"clip": "<i2", "first": "<f8", "rate": "<f8", "length": "<i4", "cut": "|u1"}
 _UNKNOWN = -(2**31)
@@ -229,7 +230,8 @@ def _build_stretch_header(stretch: Stretch) -> dict:
         "clips": [list(clip) for clip in stretch.edit.clips],
         "placed": [list(asdict(key).values()) for key in stretch.edit.keys],
         "warnings": [str(line) for line in stretch.warnings], "short": [list(span) for span in stretch.short],
-        **({"bodies": [[body.first, body.fps, body.rotations.shape[1]] for body in plan.bodies]} if plan.bodies else {}),
+        **({"bodies": [[body.first, body.fps, body.rotations.shape[1]] for body in plan.bodies]} if plan.bodies
+           else {}),
     }  # fmt: skip
 
 

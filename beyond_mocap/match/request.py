@@ -17,6 +17,7 @@ from .. import __version__
 from ..base.errors import InputError, build_read_error, format_seconds
 from ..base.settings import collect_defaults
 from ..files.event_providers import EVENT_PROVIDERS
+from ..files.joints.joint_readers import is_joint_file, list_joint_files
 from .pieces.units import OVERLAP, WINDOW
 
 _DEFAULTS = collect_defaults("match")
@@ -109,6 +110,12 @@ class MatchRequest:
         if self.events_provider and self.events_provider.lower() not in EVENT_PROVIDERS:
             raise InputError("events provider", f"{self.events_provider!r}", f"one of {', '.join(EVENT_PROVIDERS)}")
 
+    def find_joint_file(self) -> Path | None:
+        """Find the skeletal tracking: the file of joints, or the tracking itself where that is skeletal."""
+        if self.joints is not None:
+            return self.joints
+        return self.tracking if not self.provider and is_joint_file(self.tracking) else None
+
     def to_plain(self) -> dict:
         """Convert the request to plain values, for match.json."""
         return {name: value.as_posix() if isinstance(value, Path) else value for name, value in asdict(self).items()}
@@ -116,7 +123,7 @@ class MatchRequest:
 
 _RESULTS = ("provider", "start", "end", "players", "fps", "seed", "nearest", "solve_touches", "watch", "strength",
             "masses", "fatigue", "window", "overlap", "variety", "events_provider")
-_FILES = ("tracking", "meta", "events", "events_meta", "joints")
+_FILES = ("tracking", "meta", "events", "events_meta")
 
 
 def build_identity(request: MatchRequest, library_key: str) -> dict[str, object]:
@@ -137,12 +144,19 @@ def build_identity(request: MatchRequest, library_key: str) -> dict[str, object]
     out |= {name: getattr(request, name) for name in _RESULTS}
     for name in _FILES:
         path = getattr(request, name)
-        try:
-            out[name] = None if path is None else compute_file_digest(path)
-        except OSError as error:
-            raise build_read_error(path, "a file of the match", error) from None
+        out[name] = None if path is None else _compute_input_digest(path)
+    if (joints := request.find_joint_file()) is not None:
+        out["joints"] = [_compute_input_digest(path) for path in list_joint_files(joints)]
     out["library"] = library_key
     return out
+
+
+def _compute_input_digest(path: Path) -> str:
+    """Compute the digest of a file of the match; InputError if it cannot be read."""
+    try:
+        return compute_file_digest(path)
+    except OSError as error:
+        raise build_read_error(path, "a file of the match", error) from None
 
 
 def compute_digest(*values: object) -> str:
@@ -182,9 +196,15 @@ def _add_to_hash(hashed, value: object) -> None:
         _add_parts_to_hash(hashed, value)
 
 
+def _is_absent_part(field, content) -> bool:
+    """Say whether a field is a part that was added later and is not there (`LATER_PART`)."""
+    return bool(field.metadata.get("is_part")) and not content
+
+
 def _add_parts_to_hash(hashed, value: object) -> None:
     if is_dataclass(value) and not isinstance(value, type):
-        parts = [(field.name, getattr(value, field.name)) for field in fields(value)]
+        parts = [(field.name, content) for field in fields(value)
+                 if not _is_absent_part(field, content := getattr(value, field.name))]
         kind = type(value).__name__
     elif isinstance(value, Mapping):
         parts, kind = sorted(value.items()), "mapping"

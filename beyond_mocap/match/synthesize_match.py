@@ -155,7 +155,8 @@ def _build_library(request: MatchRequest, report: Progress, cancelled) -> tuple[
 
 
 def _run_stages(
-    job: Job, tracked: tuple[Match, JointFeed | None], events: MatchEvents | None, span: tuple[float, float], report: Progress
+    job: Job, tracked: tuple[Match, JointFeed | None], events: MatchEvents | None, span: tuple[float, float],
+    report: Progress,
 ) -> None:
     """Run all stages after reading."""
     state, begin = job.state, read_clocks()
@@ -183,7 +184,7 @@ def _run_stages(
     state.players = {part.role.player.id: build_player_row(part, finished.get(part.role.player.id)) for part in parts}
     for player, rows in seen.rows.items():
         if player in state.players:
-            state.players[player]["joints"] = rows
+            state.players[player]["bodies"] = rows
     state.report["notes"] += list_unknown_texts(job.request.annotations, names.values())
     state.report["notes"] += list_unused_labels(parts, job.request, names)
     state.record_stage("words", clock)

@@ -169,7 +169,8 @@ def name_known_frames(fields: Mapping[str, Any], bodies: Sequence[KnownBody], ti
         return dict(fields)
     ends = np.flatnonzero(np.diff(shown.astype(np.int8))) + 1
     kept = fields["seams"][~shown[np.minimum(fields["seams"], len(shown) - 1)]]
-    return {**fields, "clips": (*fields["clips"], SOURCE), "clip": np.where(shown, len(fields["clips"]), fields["clip"]),
+    return {**fields, "clips": (*fields["clips"], SOURCE),
+            "clip": np.where(shown, len(fields["clips"]), fields["clip"]),
             "clip_frame": np.where(shown, np.arange(len(times)), fields["clip_frame"]),
             "mirrored": fields["mirrored"] & ~shown, "seams": np.union1d(kept, ends)}
 

@@ -15,7 +15,7 @@ import numpy as np
 from ..annotation import Timeline
 from ..base.errors import InputError, format_seconds
 from ..base.settings import collect_defaults, find_setting, list_settings
-from ..base.settings.setting import LATER, add_fields, check_limits
+from ..base.settings.setting import LATER, LATER_PART, add_fields, check_limits
 from ..base.time_series import interpolate_columns
 from ..motion.skeleton import freeze_array
 from ..motion.track import SampledTrack, Track, sample_track
@@ -157,7 +157,7 @@ class Plan:
     manner: int = field(default=_DEFAULTS["manner"], metadata=LATER)
     solved: SolvedTrajectory | None = field(default=None, compare=False, repr=False, metadata=LATER)
     heading_path: HeadingPath | None = field(default=None, compare=False, repr=False, metadata=LATER)
-    bodies: tuple[KnownBody, ...] = field(default=(), compare=False, repr=False, metadata=LATER)
+    bodies: tuple[KnownBody, ...] = field(default=(), compare=False, repr=False, metadata=LATER_PART)
     watch: float = field(default=_DEFAULTS["watch"], metadata=LATER)
     strength: float = field(default=_DEFAULTS["strength"], metadata=LATER)
     masses: str = field(default=_DEFAULTS["masses"], metadata=LATER)

@@ -67,9 +67,9 @@ def test_seen_joints_are_shown_and_gaps_are_synthesized(seen_match):
 def test_the_report_names_what_was_seen(seen_match):
     _, _, out = seen_match
     (row,) = json.loads((out / "match.json").read_text())["players"]
-    assert row["status"] == "done" and len(row["joints"]) == 2
-    assert row["joints"][0]["to_s"] == pytest.approx(GAP[0], abs=0.1)
-    assert all(one["joint_error_m"]["mean"] < 0.06 for one in row["joints"])
+    assert row["status"] == "done" and len(row["bodies"]) == 2
+    assert row["bodies"][0]["to_s"] == pytest.approx(GAP[0], abs=0.1)
+    assert all(one["joint_error_m"]["mean"] < 0.06 for one in row["bodies"])
     assert SOURCE in next(out.glob("*.provenance.csv")).read_text()
 
 
