@@ -161,9 +161,9 @@ def _run_stages(
     """Run all stages after reading."""
     state, begin = job.state, read_clocks()
     match, feed = tracked
-    bodies, seen = build_known_bodies(feed, match, job.request, job.library, span)
-    state.report["notes"] += seen.notes
-    match = follow_bodies(match, bodies, job.library.skeleton)
+    bodies = build_known_bodies(feed, match, job.request, job.library, span)
+    state.report["notes"] += bodies.notes
+    match = follow_bodies(match, bodies)
     present, filled = fill_keepers(match, find_kept_lines(match))
     state.report["notes"] += filled
     roles = build_roles(present, job.request, span)
@@ -182,9 +182,9 @@ def _run_stages(
     rows = job.folder.previous_state.get("players", ())
     finished = {row["id"]: row["finished"] for row in rows if isinstance(row.get("finished"), str)}
     state.players = {part.role.player.id: build_player_row(part, finished.get(part.role.player.id)) for part in parts}
-    for player, rows in seen.rows.items():
+    for player, one in bodies.players.items():
         if player in state.players:
-            state.players[player]["bodies"] = rows
+            state.players[player]["bodies"] = one.rows
     state.report["notes"] += list_unknown_texts(job.request.annotations, names.values())
     state.report["notes"] += list_unused_labels(parts, job.request, names)
     state.record_stage("words", clock)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Collection
 from dataclasses import dataclass
 
 import numpy as np
@@ -33,24 +33,32 @@ class Body:
         team: "home", "away" or "".
         start: seconds of the first frame on the feed's clock.
         motion: world, Z up, at the feed's rate.
-        figures: see `measure_body`.
+        landmarks: L names of the joints that it is fitted to.
+        seen: (T, L, 3) m, these joints, repaired and not smoothed; NaN where not seen.
     """
 
     id: str
     team: str
     start: float
     motion: Motion
-    figures: dict
+    landmarks: tuple[str, ...]
+    seen: np.ndarray
+
+    def measure(self) -> dict:
+        """Measure how near the body is to the joints (`measure_body`)."""
+        return measure_body(self.landmarks, self.seen, self.motion)
 
 
 def reconstruct_bodies(feed: JointFeed, progress: Callable[[float, str], None] | None = None,
-                       cancelled: Callable[[], bool] | None = None) -> tuple[list[Body], list[str]]:
+                       cancelled: Callable[[], bool] | None = None,
+                       ids: Collection[str] | None = None) -> tuple[list[Body], list[str]]:
     """Reconstruct the bodies of all people of a feed.
 
     Args:
         feed: the joints.
         progress: called with the share that is done and a text.
         cancelled: returns True when the user stops the job.
+        ids: people whose bodies are wanted; None: all. All count where two are exchanged.
     Returns:
         The bodies, a stretch without long gaps each, and notes on what was repaired or left out.
     Raises:
@@ -60,6 +68,8 @@ def reconstruct_bodies(feed: JointFeed, progress: Callable[[float, str], None] |
     begin, people, notes = _repair_feed(feed)
     bodies: list[Body] = []
     for number, (person, (first, positions)) in enumerate(zip(feed.people, people)):
+        if ids is not None and person.id not in ids:
+            continue
         if cancelled is not None and cancelled():
             raise UserCancelledError("bodies: cancelled")
         if progress is not None:
@@ -134,5 +144,5 @@ def _reconstruct_stretch(person: PlayerJoints, seconds: float, seen: np.ndarray,
     smooth = smooth_joints(names, seen[:, used])
     fitted = fit_body(collect_joints(names, smooth), fps)
     motion = plant_contacts(fitted, detect_heel_toe_contacts(fitted)) if fps >= 25.0 else fitted
-    return Body(id=person.id, team=person.team, start=seconds, motion=motion,
-                figures=measure_body(names, seen[:, used], motion))
+    return Body(id=person.id, team=person.team, start=seconds, motion=motion, landmarks=names,
+                seen=seen[:, used])
