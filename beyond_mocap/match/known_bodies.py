@@ -14,20 +14,19 @@ from ..files.joints.joint_feed import JointFeed
 from ..files.joints.joint_readers import read_joints
 from ..files.tracking.tracking import read_match
 from ..library.library import Library
-from ..library.repair import plant_contacts
 from ..motion.contacts import detect_heel_toe_contacts
 from ..motion.humanoid import estimate_stature
-from ..motion.motion import Motion, sample_frames_cubic
-from ..motion.retargeting.retarget import Retargeter
+from ..motion.motion import sample_frames_cubic
+from ..motion.retargeting.neutral import scale_stance
 from ..motion.track.match_data import REFEREE, Match, MatchPlayer, Team
-from ..skeletal.reconstruct_bodies import Body, reconstruct_bodies
+from ..skeletal.fit_body import fit_body
+from ..skeletal.reconstruct_bodies import PLANTED_RATE, Body, plant_body, reconstruct_bodies
 from ..synthesis.known_body import KnownBody, build_known_body
 from .joint_clock import MOST_APART, align_joints, find_pelvis, name_people
 from .request import MatchRequest
 
 _PITCH = (105.0, 68.0)
 _HEIGHT = find_setting("player", "height")
-_PLANTED_RATE = 25.0  # frames per second from which contacts are detected
 _AROUND = 2.0  # s of joints that are fitted beyond the span
 _FADE = 1.0  # s over which the offset between dot and body fades
 
@@ -158,26 +157,16 @@ def _convert_bodies(bodies: list[Body], library: Library, fps: float) -> SeenPla
     frames = [len(body.motion) for body in bodies]
     height = np.average([estimate_stature(body.motion.skeleton) for body in bodies], weights=frames)
     height = round(float(np.clip(height, _HEIGHT.least, _HEIGHT.most)), 2)
-    size = height / estimate_stature(library.skeleton)
+    stance = scale_stance(library.neutral_stance, height / estimate_stature(library.skeleton))
     out, rows, end = [], [], -np.inf
     for body in bodies:
-        moved = replace(body, motion=_retarget(body.motion, library, size))
+        moved = replace(body, motion=plant_body(fit_body(body.joints, body.motion.fps, stance)))
         known = _sample_body(moved, fps) if body.start > end else None
         if known is not None:
             out.append(known)
             rows.append({"from_s": known.start, "to_s": known.end, **moved.measure()})
             end = known.end
     return SeenPlayer(bodies=tuple(out), height=height, rows=tuple(rows))
-
-
-def _retarget(motion: Motion, library: Library, size: float) -> Motion:
-    """Retarget a motion to the library's skeleton, `size` times as large, with planted feet."""
-    small = Motion(motion.skeleton.scale(1.0 / size), motion.root_positions / size, motion.rotations, motion.fps)
-    rig = Retargeter(small, library.skeleton, example=library.clips[0].motion, keeps_travel=True)
-    on_rig = rig.retarget(small)
-    if motion.fps >= _PLANTED_RATE:
-        on_rig = plant_contacts(on_rig, detect_heel_toe_contacts(on_rig))
-    return Motion(on_rig.skeleton.scale(size), on_rig.root_positions * size, on_rig.rotations, on_rig.fps)
 
 
 def _sample_body(body: Body, fps: float) -> KnownBody | None:
@@ -188,7 +177,7 @@ def _sample_body(body: Body, fps: float) -> KnownBody | None:
     if last - first < 3:
         return None
     at = (np.arange(first, last + 1) / fps - body.start) * motion.fps
-    contacts = (detect_heel_toe_contacts(motion) if motion.fps >= _PLANTED_RATE
+    contacts = (detect_heel_toe_contacts(motion) if motion.fps >= PLANTED_RATE
                 else np.zeros((len(motion), 2, 2), bool))
     return build_known_body(first, fps, sample_frames_cubic(motion, at),
                             contacts[np.clip(np.rint(at).astype(int), 0, len(motion) - 1)])

@@ -20,6 +20,9 @@ from .smooth_joints import find_stretches, smooth_joints
 
 SHORTEST = 0.5
 """Seconds; what is seen for a shorter time is no body."""
+PLANTED_RATE = 25.0
+"""Frames per second from which contacts are detected."""
+
 _MIN_SHARE = 0.1  # of a stretch's frames in which a landmark has to be seen to count
 _MOST_FRAMES = 2_000_000  # of one person
 
@@ -33,7 +36,8 @@ class Body:
         team: "home", "away" or "".
         start: seconds of the first frame on the feed's clock.
         motion: world, Z up, at the feed's rate.
-        landmarks: L names of the joints that it is fitted to.
+        joints: (T, 3) m by name, smoothed and without gaps, to which it is fitted (`fit_body`).
+        landmarks: L names of the joints that were seen.
         seen: (T, L, 3) m, these joints, repaired and not smoothed; NaN where not seen.
     """
 
@@ -41,6 +45,7 @@ class Body:
     team: str
     start: float
     motion: Motion
+    joints: dict[str, np.ndarray]
     landmarks: tuple[str, ...]
     seen: np.ndarray
 
@@ -132,6 +137,11 @@ def _reconstruct_person(person: PlayerJoints, first: float, positions: np.ndarra
     return bodies, notes
 
 
+def plant_body(motion: Motion) -> Motion:
+    """Plant the feet of a body where they are in contact; at too few frames per second to tell it stays as it is."""
+    return plant_contacts(motion, detect_heel_toe_contacts(motion)) if motion.fps >= PLANTED_RATE else motion
+
+
 def _measure_share(positions: np.ndarray, landmark: int) -> float:
     """Measure the share of frames in which a landmark is seen."""
     return float(np.isfinite(positions[:, landmark]).all(axis=1).mean())
@@ -141,8 +151,7 @@ def _reconstruct_stretch(person: PlayerJoints, seconds: float, seen: np.ndarray,
     """Fit and plant one stretch (T, LANDMARKS, 3)."""
     used = [number for number in range(len(LANDMARKS)) if _measure_share(seen, number) >= _MIN_SHARE]
     names = tuple(LANDMARKS[number] for number in used)
-    smooth = smooth_joints(names, seen[:, used])
-    fitted = fit_body(collect_joints(names, smooth), fps)
-    motion = plant_contacts(fitted, detect_heel_toe_contacts(fitted)) if fps >= 25.0 else fitted
-    return Body(id=person.id, team=person.team, start=seconds, motion=motion, landmarks=names,
+    joints = collect_joints(names, smooth_joints(names, seen[:, used]))
+    motion = plant_body(fit_body(joints, fps))
+    return Body(id=person.id, team=person.team, start=seconds, motion=motion, joints=joints, landmarks=names,
                 seen=seen[:, used])
