@@ -28,6 +28,7 @@ from .request import MatchRequest
 _PITCH = (105.0, 68.0)
 _HEIGHT = find_setting("player", "height")
 _AROUND = 2.0  # s of joints that are fitted beyond the span
+_LONGEST_GAP = 0.25  # s without joints: a longer one is synthesized, which is nearer than what is bridged
 _FADE = 1.0  # s over which the offset between dot and body fades
 
 
@@ -133,7 +134,7 @@ def build_known_bodies(feed: JointFeed | None, match: Match, request: MatchReque
     notes = [f"{person.id}: joints without a dot within {MOST_APART:g} m are left out" for person in part.people
              if person.id not in who]
     wanted = {person for person, player in who.items() if not request.players or player in request.players}
-    found, lines = reconstruct_bodies(part, ids=wanted)
+    found, lines = reconstruct_bodies(part, ids=wanted, longest_gap=_LONGEST_GAP)
     players: dict[str, list[Body]] = {}
     for body in sorted(found, key=lambda one: one.start):
         players.setdefault(who[body.id], []).append(body)

@@ -16,7 +16,7 @@ from ..motion.motion import Motion
 from .body_figures import measure_body
 from .fit_body import NEEDED, collect_joints, fit_body
 from .repair_joints import repair_identities, repair_sides, spread_landmarks
-from .smooth_joints import find_stretches, smooth_joints
+from .smooth_joints import LONGEST_GAP, find_stretches, smooth_joints
 
 SHORTEST = 0.5
 """Seconds; what is seen for a shorter time is no body."""
@@ -55,8 +55,8 @@ class Body:
 
 
 def reconstruct_bodies(feed: JointFeed, progress: Callable[[float, str], None] | None = None,
-                       cancelled: Callable[[], bool] | None = None,
-                       ids: Collection[str] | None = None) -> tuple[list[Body], list[str]]:
+                       cancelled: Callable[[], bool] | None = None, ids: Collection[str] | None = None,
+                       longest_gap: float = LONGEST_GAP) -> tuple[list[Body], list[str]]:
     """Reconstruct the bodies of all people of a feed.
 
     Args:
@@ -64,6 +64,7 @@ def reconstruct_bodies(feed: JointFeed, progress: Callable[[float, str], None] |
         progress: called with the share that is done and a text.
         cancelled: returns True when the user stops the job.
         ids: people whose bodies are wanted; None: all. All count where two are exchanged.
+        longest_gap: seconds without joints that are bridged; a longer gap begins another body.
     Returns:
         The bodies, a stretch without long gaps each, and notes on what was repaired or left out.
     Raises:
@@ -79,7 +80,7 @@ def reconstruct_bodies(feed: JointFeed, progress: Callable[[float, str], None] |
             raise UserCancelledError("bodies: cancelled")
         if progress is not None:
             progress(number / len(people), f"Fitting {person.id}")
-        found, lines = _reconstruct_person(person, begin + first / feed.fps, positions, feed.fps)
+        found, lines = _reconstruct_person(person, begin + first / feed.fps, positions, feed.fps, longest_gap)
         bodies += found
         notes += lines
     return bodies, notes
@@ -119,12 +120,12 @@ def _lay_on_clock(person: PlayerJoints, begin: float, fps: float) -> tuple[int, 
     return int(frames[0]), positions
 
 
-def _reconstruct_person(person: PlayerJoints, first: float, positions: np.ndarray,
-                        fps: float) -> tuple[list[Body], list[str]]:
+def _reconstruct_person(person: PlayerJoints, first: float, positions: np.ndarray, fps: float,
+                        longest_gap: float) -> tuple[list[Body], list[str]]:
     """Reconstruct the stretches of one person, and tell which were left out."""
     shown = np.flatnonzero(np.isfinite(positions).all(axis=2).sum(axis=1) >= len(NEEDED) // 2)
     bodies, notes = [], []
-    for start, end in find_stretches(shown / fps, fps):
+    for start, end in find_stretches(shown / fps, fps, longest_gap):
         begin, stop = int(shown[start]), int(shown[end - 1]) + 1
         part = positions[begin:stop]
         seconds = first + begin / fps

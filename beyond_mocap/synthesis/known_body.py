@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 
 from ..base.easing import quintic_step_by_powers
+from ..base.time_series import find_runs
 from ..base.vectors import measure_lengths
 from ..library.features import Frames, compute_raw_features, select_feature_joints
 from ..motion import quaternion
@@ -33,7 +34,7 @@ FADE_SECONDS = 0.6
 LEAD_SECONDS = 0.6
 """Seconds within a known body, from either end, in which the search follows it."""
 
-_VELOCITY_SECONDS = 0.1  # s over which the difference in velocity at an end goes on
+_VELOCITY_SECONDS = 0.05  # s over which the difference in velocity at an end goes on
 _MARGIN = 1.0  # s of a body that are kept beyond the span that it is cut to
 
 
@@ -213,40 +214,44 @@ def show_bodies(skeleton: Skeleton, planted: PlantResult, steps: Steps, bodies: 
 
 def _join(skeleton: Skeleton, pose: Pose, planted: PlantResult, contacts: np.ndarray, shown: np.ndarray,
           fps: float) -> Pose:
-    """Fade the lead of the known bodies into the frames beside them."""
-    edges = np.flatnonzero(np.diff(shown.astype(np.int8)))
-    for number, edge in enumerate(edges):
-        ends = edges[number - 1] if number else -1, edges[number + 1] if number + 1 < len(edges) else len(shown) - 1
-        after = bool(shown[edge])  # the body ends here, and the fade lies behind it
-        room = ends[1] - edge if after else edge - ends[0]
-        shared = (number + 1 < len(edges)) if after else number > 0
-        reach = min(int(FADE_SECONDS * fps), room // 2 if shared else room - 1)
-        if reach >= 2:
-            pose = _fade(skeleton, pose, planted, contacts, edge=edge if after else edge + 1,
-                         step=1 if after else -1, reach=reach, fps=fps)
+    """Let the frames beside known bodies lead into them."""
+    for low, high in find_runs(~shown):
+        sides = [edge for edge in (low - 1, high) if 0 <= edge < len(shown)]
+        reach = min(int(FADE_SECONDS * fps), high - low if len(sides) > 1 else len(shown))
+        if sides:
+            pose = _fade_leads(pose, planted, (low, high), sides, reach=reach, fps=fps)
+            near = np.min([np.abs(np.arange(low, high) - edge) for edge in sides], axis=0) <= reach
+            for first, end in find_runs(near):
+                pose = step_over(skeleton, pose, contacts, (low + int(first), low + int(end)), fps)
     return pose
 
 
-def _fade(skeleton: Skeleton, pose: Pose, planted: PlantResult, contacts: np.ndarray, *, edge: int, step: int,
-          reach: int, fps: float) -> Pose:
-    """Fade the lead of the body's last frame `edge` over `reach` frames in the direction of `step`."""
-    at = edge + step * np.arange(reach + 1)
-    new = planted.root[at], planted.rotations[at]
-    inner = int(np.clip(edge - step, 0, len(pose[0]) - 1))
-    gone = _VELOCITY_SECONDS * fps * (1.0 - np.exp(-np.arange(reach + 1) / (_VELOCITY_SECONDS * fps)))
-    move, before = (pose[0][one] - planted.root[one] for one in (edge, inner))
-    turn, turn_before = (_measure_turn(planted.rotations[one], pose[1][one]) for one in (edge, inner))
-    lead = move + gone[:, None] * (move - before)
-    turns = turn + gone[:, None, None] * (turn - turn_before)
-    old = new[0] + lead, quaternion.multiply(new[1], quaternion.from_rotation_vector(turns))
-    share = quintic_step_by_powers(1.0 - np.arange(reach + 1) / (reach + 1.0))
+def _fade_leads(pose: Pose, planted: PlantResult, run: tuple[int, int], sides: Sequence[int], *, reach: int,
+                fps: float) -> Pose:
+    """Add the leads of the known bodies at `sides` to a run of frames; each fades over `reach` frames, so that in a
+    short run the one passes into the other.
+    """
+    at = np.arange(*run)
+    move, turns = np.zeros((len(at), 3)), np.zeros((len(at), pose[1].shape[1], 3))
+    for edge in sides:
+        away = np.abs(at - edge)
+        share = quintic_step_by_powers(np.clip(1.0 - away / (reach + 1.0), 0.0, 1.0))
+        lead = _measure_lead(pose, planted, edge, inner=edge - 1 if edge < run[0] else edge + 1)
+        gone = _VELOCITY_SECONDS * fps * (1.0 - np.exp(-away / (_VELOCITY_SECONDS * fps)))
+        move += share[:, None] * (lead[0] + gone[:, None] * lead[1])
+        turns += share[:, None, None] * (lead[2] + gone[:, None, None] * lead[3])
     out = pose[0].copy(), pose[1].copy()
-    out[0][at[1:]] = (new[0] + share[:, None] * (old[0] - new[0]))[1:]
-    out[1][at[1:]] = quaternion.slerp(new[1], quaternion.match_signs(old[1], new[1]), share[:, None])[1:]
-    low, high = sorted((int(at[1]), int(at[-1])))
-    return step_over(skeleton, out, contacts, (low, high + 1), fps)
+    out[0][run[0] : run[1]] = planted.root[at] + move
+    out[1][run[0] : run[1]] = quaternion.multiply(planted.rotations[at], quaternion.from_rotation_vector(turns))
+    return out
 
 
-def _measure_turn(source: np.ndarray, target: np.ndarray) -> np.ndarray:
-    """Measure the rotation vectors (J, 3) from local rotations (J, 4) to others."""
-    return quaternion.to_rotation_vector(quaternion.multiply(quaternion.inverse(source), target))
+def _measure_lead(pose: Pose, planted: PlantResult, edge: int, inner: int) -> tuple[np.ndarray, ...]:
+    """Measure how far the known body is ahead of the synthesized one in its last frame `edge`, and how fast that grows
+    from the frame `inner` on: of the root (3,) m and a frame, of joints (J, 3) rad and a frame.
+    """
+    inner = int(np.clip(inner, 0, len(pose[0]) - 1))
+    move, before = (pose[0][one] - planted.root[one] for one in (edge, inner))
+    turn, earlier = (quaternion.to_rotation_vector(quaternion.multiply(
+        quaternion.inverse(planted.rotations[one]), pose[1][one])) for one in (edge, inner))
+    return move, move - before, turn, turn - earlier
