@@ -8,6 +8,7 @@ distance of two paths at all offsets in time is a correlation, which fast Fourie
 from __future__ import annotations
 
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 
@@ -26,15 +27,17 @@ _NEAR = 1.0  # s: offsets so near the best are the same one
 _PAUSE = 30.0  # s without anybody, such as half-time: the clock may differ after it
 _STEP, _REACH = 0.02, 0.3  # s between offsets, and on either side of the coarse one, when it is refined
 _BETTER = 0.8  # share of the distance that a refined clock leaves; otherwise the told one stays
+_STEADY = 0.2  # share by which a steady distance counts there: trackers measure another point of the body
 _SAME_ID = 0.5  # m by which a dot of the same id counts as nearer
 
 
-def align_joints(feed: JointFeed, match: Match) -> JointFeed:
+def align_joints(feed: JointFeed, match: Match, path: Path | str = "joints") -> JointFeed:
     """Bring the joints to a match's clock and pitch.
 
     Args:
         feed: the joints on their own clock, s.
         match: the match.
+        path: of the joints, for errors.
     Returns:
         The joints on the match's clock; its notes name what was changed.
     Raises:
@@ -46,7 +49,7 @@ def align_joints(feed: JointFeed, match: Match) -> JointFeed:
     for start, end in _find_blocks(feed):
         try:
             part = _cut_people(feed, start, end)
-            told, is_turned = _find_clock(list(part.values()), match, told)
+            told, is_turned = _find_clock(list(part.values()), match, told, path)
         except InputError as error:
             problem = error
             notes.append(f"joints from {format_seconds(start)} to {format_seconds(end)} s left out: {error}")
@@ -155,13 +158,14 @@ def _sample_person(person: PlayerJoints, at: np.ndarray) -> np.ndarray:
             else np.full((len(at), 2), np.nan))
 
 
-def _find_clock(people: list[PlayerJoints], match: Match, told: float) -> tuple[float, bool]:
+def _find_clock(people: list[PlayerJoints], match: Match, told: float, where: Path | str) -> tuple[float, bool]:
     """Find what has to be added to the people's clock, s, and whether they are turned by half a turn.
 
     Args:
         people: who is seen.
         match: the match.
         told: s, what counts as told.
+        where: for errors.
     """
     begin, end = min(one.times[0] for one in people), max(one.times[-1] for one in people)
     grid = _build_grid(match.times[0], match.times[-1])
@@ -172,14 +176,14 @@ def _find_clock(people: list[PlayerJoints], match: Match, told: float) -> tuple[
     offsets = grid[0] - begin + (np.arange(costs.shape[1]) - paths.shape[1] + 1) / _RATE
     best = float(costs.min())
     if best > MOST_APART:
-        raise InputError("joints", f"the nearest body is {best:.1f} m from any player",
+        raise InputError(where, f"the nearest body is {best:.1f} m from any player",
                          f"{MOST_APART:g} m or less", "give joints of this match and pitch")
     fits = costs <= max(best + _SAME, best * _SAME_SHARE)
     if fits[0, np.abs(offsets - told) < 1e-6].any():
         return _refine_clock(people, match, told, told, 1.0), False
     turned, place = np.unravel_index(int(costs.argmin()), costs.shape)
     if fits[1 - turned].any() or (np.abs(offsets[fits[turned]] - offsets[place]) > _NEAR).any():
-        raise InputError("joints", "they fit the tracking at several times, and not as they are told",
+        raise InputError(where, "the joints fit the tracking at several times, and not as they are told",
                          "joints on the tracking's clock", "give joints of more players or of a longer time")
     return _refine_clock(people, match, float(offsets[place]), None, -1.0 if turned else 1.0), bool(turned)
 
@@ -224,9 +228,16 @@ def _refine_clock(people: list[PlayerJoints], match: Match, offset: float, told:
 
 
 def _measure_nearest(times: np.ndarray, path: np.ndarray, match: Match) -> float:
-    """Measure the median distance, m, of a path (T, 2) from the nearest player; NaN where none is there."""
+    """Measure how far, m, a path (T, 2) is from the nearest player, a steady distance between the two counting little;
+    NaN where none is there.
+    """
     at = slice(None, None, max(1, len(times) // 500))
-    apart = [np.linalg.norm(_sample_path(match.times, dots, times[at]) - path[at], axis=1) for dots in match.positions]
-    known = [one[np.isfinite(one)] for one in apart]
-    return min((float(np.median(one)) for one in known if len(one)), default=np.nan)
+    apart = [_sample_path(match.times, dots, times[at]) - path[at] for dots in match.positions]
+    known = [one[np.isfinite(one[:, 0])] for one in apart]
+    return min((_measure_spread(one) for one in known if len(one)), default=np.nan)
 
+
+def _measure_spread(apart: np.ndarray) -> float:
+    """Measure the usual length, m, of differences (T, 2) m, their steady part by the share _STEADY."""
+    steady = np.median(apart, axis=0)
+    return float(np.median(np.linalg.norm(apart - steady, axis=1)) + _STEADY * np.linalg.norm(steady))

@@ -75,7 +75,7 @@ def read_tracked(request: MatchRequest) -> tuple[Match, JointFeed | None]:
         feed = _begin_at_zero(read_joints(path))
         return build_match(feed), feed
     match = read_match(request.tracking, request.meta, request.provider or None)
-    return match, None if path is None else align_joints(read_joints(path), match)
+    return match, None if path is None else align_joints(read_joints(path), match, path)
 
 
 def build_match(feed: JointFeed) -> Match:
