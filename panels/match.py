@@ -57,7 +57,7 @@ class BEYOND_MOCAP_PT_match(TabPanel, bpy.types.Panel):
 def draw_more_files(layout, match) -> None:
     """Draw the files that are not found from the tracking file's name."""
     column = create_value_column(layout)
-    for name in ("metadata_file", "provider", "events_file"):
+    for name in ("metadata_file", "provider", "joints_file", "events_file"):
         column.prop(match, name)
     if match.events_file:
         for name in ("events_metadata_file", "events_provider"):

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
+from pathlib import Path
 
 import numpy as np
 
@@ -72,10 +73,23 @@ def read_tracked(request: MatchRequest) -> tuple[Match, JointFeed | None]:
     """
     path = request.find_joint_file()
     if path is not None and request.joints is None:
-        feed = _begin_at_zero(read_joints(path))
-        return build_match(feed), feed
+        return read_joint_match(path)
     match = read_match(request.tracking, request.meta, request.provider or None)
     return match, None if path is None else align_joints(read_joints(path), match, path)
+
+
+def read_joint_match(path: Path | str) -> tuple[Match, JointFeed]:
+    """Read skeletal tracking as a match.
+
+    Args:
+        path: the file.
+    Returns:
+        The match, whose clock begins at the first sample, and the joints on it.
+    Raises:
+        InputError: if the file cannot be read.
+    """
+    feed = _begin_at_zero(read_joints(path))
+    return build_match(feed), feed
 
 
 def build_match(feed: JointFeed) -> Match:

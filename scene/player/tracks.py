@@ -9,7 +9,9 @@ from typing import TYPE_CHECKING, NamedTuple
 
 from ...beyond_mocap.base.errors import InputError, build_read_error
 from ...beyond_mocap.base.fixes import Fix
+from ...beyond_mocap.files.joints.joint_readers import is_joint_file
 from ...beyond_mocap.files.tracking import tracking
+from ...beyond_mocap.match.known_bodies import read_joint_match
 from ..core.settings import BeyondMocapPlayer, BeyondMocapSettings, to_absolute_path
 from . import drawn_track
 
@@ -62,10 +64,10 @@ def read_track(settings: BeyondMocapSettings, player: BeyondMocapPlayer, still: 
 
 
 def is_plain_csv(path: str) -> bool:
-    """Whether this is a file of one player in our own form: its first line names the column time_s."""
+    """Whether this is a file of one player in our own form: its first line names the column time_s, and no joints."""
     try:
         with open(path, "rb") as file:
-            return b"time_s" in file.readline(4096)
+            return b"time_s" in file.readline(4096) and not is_joint_file(path)
     except OSError as error:
         raise build_read_error(path, "a tracking file", error) from None
 
@@ -92,6 +94,8 @@ def _read_stamp(path: str) -> tuple[int, int]:
 
 @lru_cache(maxsize=1)
 def _read_match_cached(path: str, metadata: str | None, provider: str | None, _changed) -> tracking.Match:
+    if not provider and is_joint_file(path):
+        return read_joint_match(path)[0]
     return tracking.read_match(path, metadata, provider)
 
 
