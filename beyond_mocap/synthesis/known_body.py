@@ -19,7 +19,7 @@ from ..base.vectors import measure_lengths
 from ..library.features import Frames, compute_raw_features, select_feature_joints
 from ..motion import quaternion
 from ..motion.foot_plant import PlantResult
-from ..motion.humanoid import compute_heading_from_positions
+from ..motion.humanoid import compute_heading_from_positions, identify_joints
 from ..motion.motion import compute_pose
 from ..motion.skeleton import Skeleton, freeze_array
 from .construct.edit_blending import Pose, step_over
@@ -31,10 +31,15 @@ SOURCE = "joints"
 FADE_SECONDS = 0.6
 """Seconds beside a known body in which its lead over the synthesized one fades: a step."""
 
+LONGEST_FADE = 1.2
+"""Seconds in which it fades at most, where a foot stands."""
+
 LEAD_SECONDS = 0.6
 """Seconds within a known body, from either end, in which the search follows it."""
 
 _VELOCITY_SECONDS = 0.05  # s over which the difference in velocity at an end goes on
+_FIXED_SECONDS = 0.15  # s at either end of a fade in which feet stay where they are (`edit_blending.step_over`)
+_RAISED = 0.03  # m by which a foot that was in contact is off the ground
 _MARGIN = 1.0  # s of a body that are kept beyond the span that it is cut to
 
 
@@ -202,9 +207,10 @@ def show_bodies(skeleton: Skeleton, planted: PlantResult, steps: Steps, bodies: 
             root[low:high] = place[own] / size
             rotations[low:high] = quaternion.match_signs(turn[own], planted.rotations[low:high])
             contacts[low:high], shown[low:high] = body.heel_toe_contacts[own], True
-    pose = _join(skeleton, (root, rotations), planted, contacts, shown, fps)
+    pose, contacts = _join(skeleton, (root, rotations), planted, contacts, shown, fps)
     moved = np.where(shown[:, None], 0.0, planted.correction), np.where(shown[:, None], 0.0, planted.miss)
-    flat = np.where(shown[:, None], contacts.all(axis=2), steps.contacts)
+    raised = steps.heel_toe_contacts.any(axis=2) & ~contacts.any(axis=2)
+    flat = np.where(shown[:, None], contacts.all(axis=2), steps.contacts & ~raised)
     return (
         replace(planted, root=pose[0], rotations=pose[1], correction=moved[0], miss=moved[1]),
         replace(steps, rotations=pose[1], heel_toe_contacts=contacts, contacts=flat,
@@ -213,17 +219,50 @@ def show_bodies(skeleton: Skeleton, planted: PlantResult, steps: Steps, bodies: 
 
 
 def _join(skeleton: Skeleton, pose: Pose, planted: PlantResult, contacts: np.ndarray, shown: np.ndarray,
-          fps: float) -> Pose:
-    """Let the frames beside known bodies lead into them."""
+          fps: float) -> tuple[Pose, np.ndarray]:
+    """Let the frames beside known bodies lead into them; contacts end where a foot is raised by that."""
+    frames = int(np.ceil(_FIXED_SECONDS * fps))
     for low, high in find_runs(~shown):
         sides = [edge for edge in (low - 1, high) if 0 <= edge < len(shown)]
-        reach = min(int(FADE_SECONDS * fps), high - low if len(sides) > 1 else len(shown))
         if sides:
+            reach = _find_reach(contacts[low:high], len(sides) > 1, edge_is_first=low > 0, fps=fps)
             pose = _fade_leads(pose, planted, (low, high), sides, reach=reach, fps=fps)
+            run = slice(low, high)
+            contacts[run] &= ~_find_raised(skeleton, [(one[0][run], one[1][run]) for one in (
+                pose, (planted.root, planted.rotations))])
             near = np.min([np.abs(np.arange(low, high) - edge) for edge in sides], axis=0) <= reach
+            for edge in sides:  # a foot that the body has in the air does not land at once
+                fixed = slice(max(edge - frames, low), min(edge + frames + 1, high))
+                contacts[fixed] &= contacts[edge].any(axis=1)[:, None]
             for first, end in find_runs(near):
                 pose = step_over(skeleton, pose, contacts, (low + int(first), low + int(end)), fps)
-    return pose
+    return pose, contacts
+
+
+def _find_reach(contacts: np.ndarray, is_between: bool, *, edge_is_first: bool, fps: float) -> int:
+    """Find over how many frames beside a body its lead fades: until both feet have been lifted, so that neither has to
+    slide to where the synthesized one stands.
+
+    Args:
+        contacts: (T, 2, 2) bool, heel and toe contacts of the frames beside the body, or between two.
+        is_between: whether there is a body at either end.
+        edge_is_first: whether a body is at the first end.
+        fps: frames per second.
+    """
+    lifted = ~contacts.any(axis=2)
+    ways = [lifted] * edge_is_first + [lifted[::-1]] * (is_between or not edge_is_first)
+    fixed = int(np.ceil(_FIXED_SECONDS * fps))
+    first = fixed + max(int(np.argmax(np.append(way[fixed:, side], True))) for way in ways for side in (0, 1))
+    frames = np.clip(first + fixed, FADE_SECONDS * fps, LONGEST_FADE * fps)
+    return int(min(frames, len(contacts))) if is_between else int(frames)
+
+
+def _find_raised(skeleton: Skeleton, poses: Sequence[Pose]) -> np.ndarray:
+    """Find where heel and toe (T, 2, 2) bool are clearly higher in the first of two motions than in the second."""
+    body = identify_joints(skeleton)
+    ends = [[limb.foot, limb.foot if limb.toe is None else limb.toe] for limb in (body.left, body.right)]
+    faded, before = (compute_pose(skeleton, *pose)[0][:, ends, 2] for pose in poses)
+    return faded - before > _RAISED
 
 
 def _fade_leads(pose: Pose, planted: PlantResult, run: tuple[int, int], sides: Sequence[int], *, reach: int,
