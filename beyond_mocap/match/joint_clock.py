@@ -1,6 +1,6 @@
 """Bring skeletal tracking to the clock and pitch of a match's dots, and tell who is whom, by where people are.
 
-Feeds count from kick-off, from the first frame of a file, or from midnight. The clock as told holds where it fits about
+Feeds count from kick-off, from the first frame of a file, or from midnight. The own clock holds where it fits about
 as well as any other; otherwise one that fits clearly better than all others is taken, and reported. The mean square
 distance of two paths at all offsets in time is a correlation, which fast Fourier transforms compute at once.
 """
@@ -24,9 +24,9 @@ _CAP = 10.0  # m; a person farther from all dots counts as this far
 _FEWEST, _ENOUGH = 10, 50  # samples that two paths share, at least; below the second, half of a person's do
 _SAME, _SAME_SHARE = 0.15, 1.5  # m, and times the best cost, up to which another clock fits about as well
 _NEAR = 1.0  # s: offsets so near the best are the same one
-_PAUSE = 30.0  # s without anybody, such as half-time: the clock may differ after it
+_PAUSE = 30.0  # s without people, such as half-time: the clock may differ after it
 _STEP, _REACH = 0.02, 0.3  # s between offsets, and on either side of the coarse one, when it is refined
-_BETTER = 0.8  # share of the distance that a refined clock leaves; otherwise the told one stays
+_BETTER = 0.8  # share of the distance that a refined clock leaves; otherwise the expected one stays
 _STEADY = 0.2  # share by which a steady distance counts there: trackers measure another point of the body
 _SAME_ID = 0.5  # m by which a dot of the same id counts as nearer
 
@@ -45,18 +45,18 @@ def align_joints(feed: JointFeed, match: Match, path: Path | str = "joints") -> 
     """
     aligned: dict[int, list[PlayerJoints]] = {number: [] for number in range(len(feed.people))}
     notes: list[str] = []
-    told, problem = 0.0, None
+    expected, problem = 0.0, None
     for start, end in _find_blocks(feed):
         try:
             part = _cut_people(feed, start, end)
-            told, is_turned = _find_clock(list(part.values()), match, told, path)
+            expected, is_turned = _find_clock(list(part.values()), match, expected, path)
         except InputError as error:
             problem = error
             notes.append(f"joints from {format_seconds(start)} to {format_seconds(end)} s left out: {error}")
             continue
-        notes += _describe_clock(told, is_turned)
+        notes += _describe_clock(expected, is_turned)
         for number, person in part.items():
-            aligned[number].append(_move_person(person, told, is_turned))
+            aligned[number].append(_move_person(person, expected, is_turned))
     if problem is not None and not any(aligned.values()):
         raise problem
     people = [_join_person(parts) for parts in aligned.values() if parts]
@@ -103,7 +103,7 @@ def find_pelvis(person: PlayerJoints) -> np.ndarray:
 
 
 def _find_blocks(feed: JointFeed) -> list[tuple[float, float]]:
-    """Find the (start, end) s between pauses in which nobody is seen."""
+    """Find the (start, end) s between pauses in which no person is seen."""
     times = np.unique(np.concatenate([person.times for person in feed.people]))
     edges = np.flatnonzero(np.diff(times) > _PAUSE)
     return [(float(part[0]), float(part[-1])) for part in np.split(times, edges + 1)]
@@ -158,18 +158,19 @@ def _sample_person(person: PlayerJoints, at: np.ndarray) -> np.ndarray:
             else np.full((len(at), 2), np.nan))
 
 
-def _find_clock(people: list[PlayerJoints], match: Match, told: float, where: Path | str) -> tuple[float, bool]:
+def _find_clock(people: list[PlayerJoints], match: Match, expected: float, where: Path | str) -> tuple[float, bool]:
     """Find what has to be added to the people's clock, s, and whether they are turned by half a turn.
 
     Args:
         people: who is seen.
         match: the match.
-        told: s, what counts as told.
+        expected: s, the offset that holds where it fits.
         where: for errors.
     """
     begin, end = min(one.times[0] for one in people), max(one.times[-1] for one in people)
     grid = _build_grid(match.times[0], match.times[-1])
-    begin = grid[0] - told + np.floor((begin + told - grid[0]) * _RATE + 1e-6) / _RATE  # so that `told` is an offset
+    # begin where the expected offset is one of those that are measured
+    begin = grid[0] - expected + np.floor((begin + expected - grid[0]) * _RATE + 1e-6) / _RATE
     paths = np.stack([_sample_person(one, _build_grid(begin, end)) for one in people])
     dots = np.stack([_sample_path(match.times, path, grid) for path in match.positions])
     costs = np.stack([_measure_all_offsets(sign * paths, dots) for sign in (1.0, -1.0)])
@@ -179,13 +180,13 @@ def _find_clock(people: list[PlayerJoints], match: Match, told: float, where: Pa
         raise InputError(where, f"the nearest body is {best:.1f} m from any player",
                          f"{MOST_APART:g} m or less", "give joints of this match and pitch")
     fits = costs <= max(best + _SAME, best * _SAME_SHARE)
-    if fits[0, np.abs(offsets - told) < 1e-6].any():
-        return _refine_clock(people, match, told, told, 1.0), False
+    if fits[0, np.abs(offsets - expected) < 1e-6].any():
+        return _refine_clock(people, match, expected, 1.0, is_expected=True), False
     turned, place = np.unravel_index(int(costs.argmin()), costs.shape)
     if fits[1 - turned].any() or (np.abs(offsets[fits[turned]] - offsets[place]) > _NEAR).any():
-        raise InputError(where, "the joints fit the tracking at several times, and not as they are told",
+        raise InputError(where, "the joints fit the tracking at several times, and not as they are",
                          "joints on the tracking's clock", "give joints of more players or of a longer time")
-    return _refine_clock(people, match, float(offsets[place]), None, -1.0 if turned else 1.0), bool(turned)
+    return _refine_clock(people, match, float(offsets[place]), -1.0 if turned else 1.0), bool(turned)
 
 
 def _measure_all_offsets(paths: np.ndarray, dots: np.ndarray) -> np.ndarray:
@@ -215,15 +216,16 @@ def _measure_person(path: np.ndarray, seen: np.ndarray, spectra: list[np.ndarray
     return np.where(shared >= needed - 0.5, np.minimum(apart, _CAP), _CAP).min(axis=0)
 
 
-def _refine_clock(people: list[PlayerJoints], match: Match, offset: float, told: float | None, side: float) -> float:
-    """Refine an offset, s, to the smallest distance; the one that is told stays unless another is clearly better."""
+def _refine_clock(people: list[PlayerJoints], match: Match, offset: float, side: float,
+                  is_expected: bool = False) -> float:
+    """Refine an offset, s, to the smallest distance; the expected one stays unless another is clearly better."""
     near = offset + np.arange(-round(_REACH / _STEP), round(_REACH / _STEP) + 1) * _STEP
     pairs = [(person, side * find_pelvis(person)[:, :2]) for person in people if len(person.times) > 1]
     apart = np.array([[_measure_nearest(person.times + one, path, match) for person, path in pairs] for one in near])
     costs = np.sort(np.where(np.isfinite(apart), apart, _CAP), axis=1)[:, : (len(pairs) + 1) // 2].mean(axis=1)
     best = int(costs.argmin())
-    if told is not None and costs[best] > _BETTER * costs[len(near) // 2]:
-        return told
+    if is_expected and costs[best] > _BETTER * costs[len(near) // 2]:
+        return offset
     return round(float(near[best]), 2)
 
 

@@ -1,4 +1,4 @@
-"""Bodies of players whom skeletal tracking shows: read, told apart, brought to the library's skeleton, and their places
+"""Bodies of players whom skeletal tracking shows: read, named, brought to the library's skeleton, and their places
 given to the match's dots."""
 
 from __future__ import annotations

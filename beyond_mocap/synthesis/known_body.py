@@ -207,7 +207,7 @@ def show_bodies(skeleton: Skeleton, planted: PlantResult, steps: Steps, bodies: 
             root[low:high] = place[own] / size
             rotations[low:high] = quaternion.match_signs(turn[own], planted.rotations[low:high])
             contacts[low:high], shown[low:high] = body.heel_toe_contacts[own], True
-    pose, contacts = _join(skeleton, (root, rotations), planted, contacts, shown, fps)
+    pose, contacts = _join(skeleton, (root, rotations), planted, contacts, shown=shown, fps=fps)
     moved = np.where(shown[:, None], 0.0, planted.correction), np.where(shown[:, None], 0.0, planted.miss)
     raised = steps.heel_toe_contacts.any(axis=2) & ~contacts.any(axis=2)
     flat = np.where(shown[:, None], contacts.all(axis=2), steps.contacts & ~raised)
@@ -218,7 +218,7 @@ def show_bodies(skeleton: Skeleton, planted: PlantResult, steps: Steps, bodies: 
     )
 
 
-def _join(skeleton: Skeleton, pose: Pose, planted: PlantResult, contacts: np.ndarray, shown: np.ndarray,
+def _join(skeleton: Skeleton, pose: Pose, planted: PlantResult, contacts: np.ndarray, *, shown: np.ndarray,
           fps: float) -> tuple[Pose, np.ndarray]:
     """Let the frames beside known bodies lead into them; contacts end where a foot is raised by that."""
     frames = int(np.ceil(_FIXED_SECONDS * fps))
