@@ -10,7 +10,7 @@ However a run ends, the same request resumes where it was, with the same bits.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -42,6 +42,7 @@ from .player_plans import build_player_plans, check_label_folder, list_unknown_t
 from .report.pictures import build_thumbnail_renderer
 from .request import MatchRequest, build_identity
 from .roles import build_roles, list_absent_players, resolve_span, separate_roles
+from .seen_touches import name_seen_touches
 from .state import build_player_row, build_state, read_clocks
 
 BALL_MARGIN = 5.0
@@ -169,9 +170,10 @@ def _run_stages(
     roles = build_roles(present, job.request, span)
     state.report["notes"] += list_absent_players(job.request, roles, span)
     solved = _solve_ball(job, match, span, _scale_progress(report, "ball"))
+    solved, sides = (solved, {}) if solved is None else name_seen_touches(solved, bodies, job.library)
     state.record_stage("ball", begin)
     clock = read_clocks()
-    words = _label_players(job, match, events, solved)
+    words = _label_players(job, match, events, solved, sides)
     inside = (match.times >= span[0] - 1e-6) & (match.times <= span[1] + 1e-6)
     touches = {player: [one.time for one in moments if one.end is None and not one.misses_ball]
                for player, moments in words.players.items()}
@@ -216,12 +218,13 @@ def _solve_ball(job: Job, match: Match, span: tuple[float, float], report: Progr
         return None
 
 
-def _label_players(job: Job, match: Match, events: MatchEvents | None, solved: SolvedBall | None) -> MatchLabels:
-    """Label all players from touches and, if there are any, events."""
+def _label_players(job: Job, match: Match, events: MatchEvents | None, solved: SolvedBall | None,
+                   sides: Mapping[int, str]) -> MatchLabels:
+    """Label all players from touches, their sides where these were seen, and, if there are any, events."""
     report = job.state.report
     if events is not None and solved is None:
         report["notes"].append(f"{job.request.events}: ignored, because without ball touches its clock is unknown")
-    labels = label_match(match, solved, events)
+    labels = label_match(match, solved, events, sides=sides)
     report["notes"] += labels.notes
     report["events"] = dict(labels.figures) or None
     return labels
