@@ -105,7 +105,7 @@ class BEYOND_MOCAP_FH_match(ViewDropHandler, bpy.types.FileHandler):
     bl_label = "Match of All Players"
     bl_import_operator = "beyond_mocap.read_match"
     # dropped texts are labels; tracking as text is chosen by name
-    bl_file_extensions = ".csv;.json;.jsonl;.xml;.dat;.gpx"
+    bl_file_extensions = ".csv;.json;.jsonl;.joints;.xml;.dat;.gpx"
 
 
 SELECTION_ITEMS = (("ALL", "All", "Select all"), ("NONE", "None", "Select none"),

@@ -57,7 +57,7 @@ class BEYOND_MOCAP_PT_match(TabPanel, bpy.types.Panel):
 def draw_more_files(layout, match) -> None:
     """Draw the files that are not found from the tracking file's name."""
     column = create_value_column(layout)
-    for name in ("metadata_file", "provider", "events_file"):
+    for name in ("metadata_file", "provider", "joints_file", "events_file"):
         column.prop(match, name)
     column.prop(match.id_data.beyond_mocap_stage, "sport")
     if match.events_file:

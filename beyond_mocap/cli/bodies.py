@@ -55,7 +55,7 @@ def run_bodies(options, reporter: ProgressReporter, writers: Mapping[str, Writer
             name = choose_file_name(body.id, used)
             write_bvh(folder / f"{name}.bvh", body.motion)
             rows.append({"file": f"{name}.bvh", "id": body.id, "team": body.team, "start_s": body.start,
-                         **body.figures})
+                         **body.measure()})
         write_report(folder / "report.json", {"fps": feed.fps, "notes": [*feed.notes, *notes], "bodies": rows})
     reporter.finish([*(f"{options.joints}: {note}" for note in feed.notes), *notes])
     error = sum(row["joint_error_m"]["mean"] * row["frames"] for row in rows) / sum(row["frames"] for row in rows)

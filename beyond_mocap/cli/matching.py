@@ -52,7 +52,10 @@ def add_match(verbs):
         The parser of this verb.
     """
     verb = verbs.add_parser("match", help="all players' motion and the ball of a tracked match, resumable")
-    verb.add_argument("--tracking", type=parse_path, required=True, metavar="FILE", help="a provider's tracking data")
+    verb.add_argument("--tracking", type=parse_path, required=True, metavar="FILE",
+                      help="a provider's tracking data, or skeletal tracking")
+    verb.add_argument("--joints", type=parse_path, metavar="FILE",
+                      help="skeletal tracking of the same match: bodies where it shows them")
     verb.add_argument("--meta", type=parse_path, metavar="FILE", help="the provider's metadata; default: beside FILE")
     verb.add_argument("--events", type=parse_path, metavar="FILE", help="event data, from a provider or as CSV")
     verb.add_argument("--events-meta", type=parse_path, metavar="FILE",
@@ -90,8 +93,8 @@ def run_match(options, reporter: ProgressReporter, writers: Mapping[str, Writer]
     write = choose_scene_writer(options.scene, writers) if options.scene else None
     order = MatchRequest(
         tracking=options.tracking, library=options.library, out=options.out, meta=options.meta, events=options.events,
-        events_meta=options.events_meta, events_provider=options.events_provider, provider=options.provider,
-        pitch=options.pitch,
+        joints=options.joints, events_meta=options.events_meta, events_provider=options.events_provider,
+        provider=options.provider, pitch=options.pitch,
         **{**option_values(MatchRequest, options, "match.section", "match.work", "match", "pitch", "library"),
            "players": tuple(dict.fromkeys(options.players)), "workers": options.workers or len(_list_cores())},
     )  # fmt: skip

@@ -216,8 +216,8 @@ def _check_identity(path: Path, before: dict, identity: Mapping[str, object]) ->
     if not before or before.get("digest") == compute_digest(identity):
         return
     earlier = before.get("identity")
-    known = to_plain(dict(identity)).items() if isinstance(earlier, dict) else ()
-    other = next((name for name, value in known if earlier.get(name) != value), None)
+    known = to_plain(dict(identity)) if isinstance(earlier, dict) else {}
+    other = next((name for name in {**known, **(earlier or {})} if earlier.get(name) != known.get(name)), None)
     what = f" (its {_FIELD_NAMES.get(other, other)} differs)" if other else ""
     raise InputError(path, f"holds the results of another request{what}", "a folder for this request only",
                      "choose another folder, or delete this one")
@@ -226,7 +226,8 @@ def _check_identity(path: Path, before: dict, identity: Mapping[str, object]) ->
 _FIELD_NAMES = {
     "start": "start time", "end": "end time", "tracking": "tracking file", "meta": "metadata", "events": "events file",
     "events_meta": "events metadata", "events_provider": "events provider",
-    "solve_touches": "touch solving", "players": "list of players", "fps": "frame rate", "seed": "seed",
+    "joints": "file of joints", "solve_touches": "touch solving", "players": "list of players", "fps": "frame rate",
+    "seed": "seed",
     "watch": "strength of watching the ball", "nearest": "nearest labels setting", "provider": "provider",
     "strength": "strength of the legs", "masses": "segment masses", "fatigue": "fatigue",
     "form": "version", "software": "version",

@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from types import MappingProxyType
 
 import numpy as np
 
@@ -68,7 +69,8 @@ class MatchLabels:
 
 
 def label_match(
-    match: Match, solved: SolvedBall | None, events: MatchEvents | None = None, table: EventLabelTable | None = None
+    match: Match, solved: SolvedBall | None, events: MatchEvents | None = None, table: EventLabelTable | None = None,
+    sides: Mapping[int, str] = MappingProxyType({}),
 ) -> MatchLabels:
     """Label all players of a match.
 
@@ -84,6 +86,7 @@ def label_match(
         solved: the ball, on the match's clock; None if it cannot be solved.
         events: the provider's events; None: no events.
         table: labels by event; None: the built-in table.
+        sides: "left" or "right" by the touch's number, where that was seen.
     Returns:
         The labels.
     Raises:
@@ -103,7 +106,7 @@ def label_match(
         player_touches = [(i, touch) for i, touch in enumerate(touches) if touch.player == player.id]
         found = [moment for i, touch in player_touches if (moment := build_touch_moment(
             touch, match.times, path, heights, table, event=aligned.events[event_by_touch[i]] if i in event_by_touch
-            else None, shot=saves.get(i), is_block=i in blocks,
+            else None, shot=saves.get(i), is_block=i in blocks, side=sides.get(i, ""),
         ))]  # fmt: skip
         confident = [moment for moment in found if moment.confidence >= MIN_CONFIDENCE]
         if aligned:
@@ -166,7 +169,7 @@ def has_heights(match: Match) -> bool:
 
 def build_touch_moment(
     touch: SolvedTouch, times: np.ndarray, path: np.ndarray, heights: bool, table: EventLabelTable,
-    event: MatchEvent | None = None, shot: Shot | None = None, is_block: bool = False,
+    event: MatchEvent | None = None, shot: Shot | None = None, is_block: bool = False, side: str = "",
 ) -> Moment | None:  # fmt: skip
     """Build the key moment of a touch.
 
@@ -179,6 +182,7 @@ def build_touch_moment(
         event: the event paired with the touch; its labels take precedence.
         shot: the shot that the touch saves, None for another touch.
         is_block: whether the touch blocks a kick.
+        side: "left" or "right" where that was seen, else "".
     Returns:
         The key moment, None if the table has no labels for it.
     """
@@ -190,14 +194,14 @@ def build_touch_moment(
     elif touch.kind == kinds.SAVE and np.linalg.norm(touch.after) > _CAUGHT_SPEED:
         details = (*details, "parried")
     values = {**find_gait_label(touch.time, times, path), **find_height_labels(own_part, touch.position[2], heights),
-              **({} if shot is None else find_save_values(shot, heights))}
+              **({} if shot is None else find_save_values(shot, heights)), **({"side": side} if side else {})}
     if is_block and shot is None:
         kind, details = _BLOCK_IN_RUN if values.get("gait") == RUNNING else _BLOCK
     if event is None:
         labels = table.find_labels(kind, own_part, details, values)
         return build_moment(touch.time, labels, TOUCHES if shot is None else SHOTS, touch.confidence)
     part = event.part or own_part
-    values = values if shot is not None else {**values, "side": event.side}
+    values = values if shot is not None else {**values, "side": side or event.side}
     if part != own_part:
         values.update(find_height_labels(part, touch.position[2], heights))
     labels = table.find_labels(event.kind, part, event.details, values) or table.find_labels(kind, part, details,

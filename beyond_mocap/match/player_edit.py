@@ -35,6 +35,7 @@ from ..files.plain_npz import HEADER, read_plain_arrays, take_header_text
 from ..motion.track import Track
 from ..synthesis.heading_path import HeadingPath
 from ..synthesis.heading_plan import HeadingKey
+from ..synthesis.known_body import KnownBody
 from ..synthesis.pin import Pin
 from ..synthesis.plan import METHODS, Plan, PlayerTouch, SolvedTrajectory
 from ..synthesis.resolved_touches import resolve_touches
@@ -64,7 +65,8 @@ _MAX_FRAMES, _MAX_RATE = 1e7, 100.0
 _MIN_WINDOW = 1.0  # s
 _DEFAULTS = {
     field.name: field.default for field in fields(Plan)
-    if field.name not in ("track", "timeline", "pins", "heading_keys", "contact_edits", "solved", "heading_path")
+    if field.name not in ("track", "timeline", "pins", "heading_keys", "contact_edits", "solved", "heading_path",
+                          "bodies")
 }  # fmt: skip
 _RUN_TYPES = {"clip": "<i2", "first": "<f8", "rate": "<f8", "length": "<i4", "cut": "|u1"}
 _UNKNOWN = -(2**31)
@@ -228,6 +230,8 @@ def _build_stretch_header(stretch: Stretch) -> dict:
         "clips": [list(clip) for clip in stretch.edit.clips],
         "placed": [list(asdict(key).values()) for key in stretch.edit.keys],
         "warnings": [str(line) for line in stretch.warnings], "short": [list(span) for span in stretch.short],
+        **({"bodies": [[body.first, body.fps, body.rotations.shape[1]] for body in plan.bodies]} if plan.bodies
+           else {}),
     }  # fmt: skip
 
 
@@ -241,6 +245,10 @@ def _build_stretch_arrays(stretch: Stretch) -> dict[str, np.ndarray]:
     if plan.heading_path is not None:
         steps = np.column_stack([np.round(plan.heading_path.times * 1e6), plan.heading_path.bins])
         arrays |= {"heading_path": pack_differences(steps)}
+    for number, body in enumerate(plan.bodies):
+        arrays |= {f"body_{number}_root": pack_positions(body.root),
+                   f"body_{number}_turns": body.rotations.reshape(len(body), -1),
+                   f"body_{number}_contacts": body.heel_toe_contacts.reshape(-1, 4).astype(np.uint8)}
     if course is not None:
         arrays |= {"course": pack_positions(course.ball), "course_filled": course.filled.astype(np.uint8)}
     return arrays
@@ -284,7 +292,7 @@ def _parse_stretch(row, index: int, arrays: dict[str, np.ndarray]) -> Stretch:
     """Parse a stretch from its header row and arrays."""
     where = f"stretch {index}"
     names = ("name", "settings", "spans", "keys", "pins", "touches", "clips", "placed", "warnings", "short")
-    check_names(row, where, (*names, "headings"), names)  # files of 0.1 have no headings
+    check_names(row, where, (*names, "headings", "bodies"), names)  # files of 0.1 have no headings
 
     def take_array(name: str, columns: int | None = None, count: int | None = None, is_needed: bool = True):
         values = arrays.pop(f"{index}/{name}", None)
@@ -338,6 +346,7 @@ def _parse_plan(row, where: str, take_array) -> Plan:
         track=track, timeline=Timeline(tuple(spans), tuple(keys)), pins=tuple(pins),
         heading_keys=tuple(headings), heading_path=_parse_heading_path(where, take_array),
         solved=_parse_trajectory(row, where, take_array, float(first), float(last)),
+        bodies=_parse_bodies(row, where, take_array),
         **_parse_settings(row["settings"], f"{where}: settings"),
     )  # fmt: skip
 
@@ -368,6 +377,21 @@ def _parse_heading_path(where: str, take_array) -> HeadingPath | None:
     if not len(values) or np.any(np.diff(values[:, 0]) <= 0.0):
         raise InputError(f"{where}: heading_path", f"{len(values)} times", "one or more, ascending")
     return HeadingPath(values[:, 0] / 1e6, values[:, 1])
+
+
+def _parse_bodies(row, where: str, take_array) -> tuple[KnownBody, ...]:
+    """Parse the bodies that cameras have seen."""
+    bodies = []
+    for number, value in enumerate(check_list(row.get("bodies", []), f"{where}: bodies")):
+        first, fps, joints = _parse_row(value, f"{where}: bodies", 3)
+        root = unpack_positions(take_array(f"body_{number}_root", 3), f"{where}: bodies")
+        turns = take_array(f"body_{number}_turns", 4 * check_whole_number(joints, where), len(root))
+        if np.isnan(root).any() or turns.dtype != np.int16 or not turns.reshape(len(root), -1, 4).any(axis=2).all():
+            raise InputError(f"{where}: bodies", "an unknown pose", "root and rotations of every frame")
+        contacts = take_array(f"body_{number}_contacts", 4, len(root)) > 0
+        bodies.append(KnownBody(check_whole_number(first, where), check_number(fps, where), root,
+                                turns.reshape(len(root), -1, 4), contacts.reshape(-1, 2, 2)))
+    return tuple(bodies)
 
 
 def _parse_settings(value, where: str) -> dict:

@@ -12,11 +12,13 @@ from ..annotation import Timeline, format_timeline
 from ..ball.tracked.solve import SolvedBall
 from ..base.errors import InputError, format_seconds
 from ..library.library import Library
-from ..synthesis.heading_plan import Play
+from ..synthesis.heading_plan import HeadingKey, Play
+from ..synthesis.known_body import cut_bodies
 from ..synthesis.plan import Plan
 from ..synthesis.resolve_plan import resolve_plan
 from ..synthesis.resolved_touches import build_trajectory
 from .folder import MatchFolder
+from .known_bodies import SeenBodies, SeenPlayer
 from .labels import MatchLabels
 from .moments import USER, Moment, build_timeline, is_edited, read_labels, write_labels
 from .player_edit import to_stored_plan
@@ -44,6 +46,7 @@ class PlayerPlans:
 def build_player_plans(
     roles: tuple[Role, ...], files: Mapping[str, str], labels: MatchLabels, solved: SolvedBall | None,
     request: MatchRequest, folder: MatchFolder, library: Library, plays: Mapping[str, Play],
+    bodies: SeenBodies | None = None,
 ) -> list[PlayerPlans]:
     """Build the plans of all players.
 
@@ -59,16 +62,18 @@ def build_player_plans(
         folder: the match's folder.
         library: the clips; its labels are known beyond the vocabulary.
         plays: what players face beside the ball, by id.
+        bodies: what cameras have seen of players, None for nothing.
     Returns:
         One entry per role.
     """
-    out = []
+    out, seen = [], bodies.players if bodies else {}
     for role in roles:
         file = files[role.player.id]
         try:
             moments = () if role.reason else _read_moments(file, role, labels, request=request, folder=folder,
                                                            known_labels=library.labels)
-            plans = tuple(_plan_heading(_build_plan(role, number, moments, solved, request), library,
+            plans = tuple(_plan_heading(_add_bodies(_build_plan(role, number, moments, solved, request),
+                                                    seen.get(role.player.id)), library,
                                         plays.get(role.player.id)) for number in range(len(role.target_tracks)))
             unused = tuple(one for one in moments if one.source == USER and not _is_used(one, role))
             out.append(PlayerPlans(role, file, () if role.reason else plans, unused))
@@ -163,7 +168,18 @@ def _build_plan(role: Role, number: int, moments, solved: SolvedBall | None, req
                           else replace(plan, solved=build_trajectory(solved, role.player.id, plan)))
 
 
+def _add_bodies(plan: Plan, seen: SeenPlayer | None) -> Plan:
+    """Add what cameras have seen in the time of a plan, and how tall the player is."""
+    if seen is None:
+        return plan
+    bodies = cut_bodies(seen.bodies, float(plan.track.times[0]), float(plan.track.times[-1]))
+    return replace(plan, bodies=bodies, height=seen.height)
+
+
 def _plan_heading(plan: Plan, library: Library, play: Play | None) -> Plan:
     """Plan the heading over a whole stretch, so that all windows that are cut out of it agree."""
-    resolved = resolve_plan(plan, library, are_touches_resolved=True)
+    keys = [HeadingKey(time, heading=float(heading), target=None, hold=0.0) for body in plan.bodies
+            for time, heading in zip((body.start, body.end), body.compute_heading(library.skeleton)[[0, -1]])
+            if plan.track.times[0] <= time <= plan.track.times[-1]]
+    resolved = resolve_plan(replace(plan, heading_keys=tuple(keys)), library, are_touches_resolved=True)
     return replace(plan, heading_path=resolved.plan_heading(play))

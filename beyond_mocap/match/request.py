@@ -14,11 +14,14 @@ from pathlib import Path
 import numpy as np
 
 from .. import __version__
+from ..appearance.sports import load_sports
 from ..base.errors import InputError, build_read_error, format_seconds
 from ..base.settings import collect_defaults
 from ..files.event_providers import EVENT_PROVIDERS
+from ..files.joints.joint_readers import is_joint_file, list_joint_files
 from .pieces.units import OVERLAP, WINDOW
 
+FOOTBALL = "football"
 _DEFAULTS = collect_defaults("match")
 FORM = 5
 """Raised whenever the same request would give other results, so that stored ones are not used for it."""
@@ -36,6 +39,7 @@ class MatchRequest:
     Attributes:
         tracking: the provider's tracking file.
         meta: its metadata; None: searched beside it, or none.
+        joints: skeletal tracking of the same match; None: none, or `tracking` itself.
         events: the events file; None: no events.
         provider: the form of the files; "": detected.
         events_meta: metadata of the events.
@@ -92,6 +96,7 @@ class MatchRequest:
     events_provider: str = ""
     sport: str = collect_defaults("pitch")["sport"]
     pitch: tuple[float, float] | None = None
+    joints: Path | None = None
 
     def __post_init__(self):
         for option, value in (("start time", self.start), ("end time", self.end)):
@@ -109,6 +114,16 @@ class MatchRequest:
                 raise InputError(option, f"{value}, without an events file", "an events file", "choose the events file")
         if self.events_provider and self.events_provider.lower() not in EVENT_PROVIDERS:
             raise InputError("events provider", f"{self.events_provider!r}", f"one of {', '.join(EVENT_PROVIDERS)}")
+
+    def find_pitch(self) -> tuple[float, float] | None:
+        """Find the pitch's size, m, for tracking data without it; None: what readers assume of a football pitch."""
+        return self.pitch or (None if self.sport == FOOTBALL else load_sports()[self.sport].size)
+
+    def find_joint_file(self) -> Path | None:
+        """Find the skeletal tracking: the file of joints, or the tracking itself where that is skeletal."""
+        if self.joints is not None:
+            return self.joints
+        return self.tracking if not self.provider and is_joint_file(self.tracking) else None
 
     def to_plain(self) -> dict:
         """Convert the request to plain values, for match.json."""
@@ -139,12 +154,19 @@ def build_identity(request: MatchRequest, library_key: str) -> dict[str, object]
     out |= {name: getattr(request, name) for name in _RESULTS}
     for name in _FILES:
         path = getattr(request, name)
-        try:
-            out[name] = None if path is None else compute_file_digest(path)
-        except OSError as error:
-            raise build_read_error(path, "a file of the match", error) from None
+        out[name] = None if path is None else _compute_input_digest(path)
+    if (joints := request.find_joint_file()) is not None:
+        out["joints"] = [_compute_input_digest(path) for path in list_joint_files(joints)]
     out["library"] = library_key
     return out
+
+
+def _compute_input_digest(path: Path) -> str:
+    """Compute the digest of a file of the match; InputError if it cannot be read."""
+    try:
+        return compute_file_digest(path)
+    except OSError as error:
+        raise build_read_error(path, "a file of the match", error) from None
 
 
 def compute_digest(*values: object) -> str:
@@ -184,9 +206,15 @@ def _add_to_hash(hashed, value: object) -> None:
         _add_parts_to_hash(hashed, value)
 
 
+def _is_absent_part(field, content) -> bool:
+    """Say whether a field is a part that was added later and is not there (`LATER_PART`)."""
+    return bool(field.metadata.get("is_part")) and not content
+
+
 def _add_parts_to_hash(hashed, value: object) -> None:
     if is_dataclass(value) and not isinstance(value, type):
-        parts = [(field.name, getattr(value, field.name)) for field in fields(value)]
+        parts = [(field.name, content) for field in fields(value)
+                 if not _is_absent_part(field, content := getattr(value, field.name))]
         kind = type(value).__name__
     elif isinstance(value, Mapping):
         parts, kind = sorted(value.items()), "mapping"

@@ -10,26 +10,26 @@ However a run ends, the same request resumes where it was, with the same bits.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ..appearance.sports import load_sports
 from ..ball.tracked.solve import SolvedBall, solve_ball
 from ..base.errors import BeyondMocapError, InputError, UserCancelledError
 from ..files.atomic import atomic_write
 from ..files.event_data import MatchEvents
 from ..files.events import read_events
 from ..files.file_names import build_file_names
+from ..files.joints.joint_feed import JointFeed
 from ..files.tables import write_ball
-from ..files.tracking.tracking import read_match
 from ..library.build import build_library
 from ..library.library import Library
 from ..motion.track.ball_path import BallPath
 from ..motion.track.match_data import Match
 from .folder import check_folder, open_folder, read_state
 from .goalkeeping.positions import fill_keepers
+from .known_bodies import build_known_bodies, follow_bodies, read_tracked
 from .labels import MatchLabels, label_match
 from .match_ball import apply_led_ball, build_ball_plan, sample_ball
 from .pieces import stages
@@ -40,11 +40,11 @@ from .pieces.tasks import LibrarySource, set_library
 from .play import build_plays, find_kept_lines
 from .player_plans import build_player_plans, check_label_folder, list_unknown_texts, list_unused_labels
 from .report.pictures import build_thumbnail_renderer
-from .request import MatchRequest, build_identity
+from .request import FOOTBALL, MatchRequest, build_identity
 from .roles import build_roles, list_absent_players, resolve_span, separate_roles
+from .seen_touches import name_seen_touches
 from .state import build_player_row, build_state, read_clocks
 
-FOOTBALL = "football"
 BALL_MARGIN = 5.0
 """s before and after the span in which the ball is solved too."""
 
@@ -114,8 +114,7 @@ def synthesize_match(
     check_workers(place)
     clock = read_clocks()
     report(0.0, f"Reading {request.tracking.name}")
-    match = read_match(request.tracking, request.meta, request.provider or None,
-                       pitch=_choose_pitch(request))
+    match, feed = read_tracked(request)
     span = resolve_span(match, request)
     events = None if request.events is None else read_events(request.events, request.events_meta,
                                                              request.events_provider or None, match)
@@ -131,7 +130,7 @@ def synthesize_match(
                          report=report, cancelled=cancelled)
         try:
             with threadpool_limits(limits=1):  # more threads would change the order of sums
-                _run_stages(job, match, events, span, report)
+                _run_stages(job, (match, feed), events, span, report)
         except BeyondMocapError as error:
             if state.players:  # otherwise no work has started
                 state.update_report(status="cancelled" if isinstance(error, UserCancelledError) else "failed",
@@ -141,11 +140,6 @@ def synthesize_match(
             if not request.scheduler:
                 stop_workers()
     return read_result(request)
-
-
-def _choose_pitch(request: MatchRequest) -> tuple[float, float] | None:
-    """Choose the pitch's size for tracking data without it; None: what the reader assumes of a football pitch."""
-    return request.pitch or (None if request.sport == FOOTBALL else load_sports()[request.sport].size)
 
 
 def _build_library(request: MatchRequest, report: Progress, cancelled) -> tuple[Library, LibrarySource]:
@@ -162,28 +156,37 @@ def _build_library(request: MatchRequest, report: Progress, cancelled) -> tuple[
 
 
 def _run_stages(
-    job: Job, match: Match, events: MatchEvents | None, span: tuple[float, float], report: Progress
+    job: Job, tracked: tuple[Match, JointFeed | None], events: MatchEvents | None, span: tuple[float, float],
+    report: Progress,
 ) -> None:
     """Run all stages after reading."""
     state, begin = job.state, read_clocks()
+    match, feed = tracked
+    bodies = build_known_bodies(feed, match, job.request, job.library, span)
+    state.report["notes"] += bodies.notes
+    match = follow_bodies(match, bodies)
     present, filled = fill_keepers(match, find_kept_lines(match)) if job.request.sport == FOOTBALL else (match, ())
     state.report["notes"] += filled
     roles = build_roles(present, job.request, span)
     state.report["notes"] += list_absent_players(job.request, roles, span)
     solved = _solve_ball(job, match, span, _scale_progress(report, "ball"))
+    solved, sides = (solved, {}) if solved is None else name_seen_touches(solved, bodies, job.library)
     state.record_stage("ball", begin)
     clock = read_clocks()
-    words = _label_players(job, match, events, solved)
+    words = _label_players(job, match, events, solved, sides)
     inside = (match.times >= span[0] - 1e-6) & (match.times <= span[1] + 1e-6)
     touches = {player: [one.time for one in moments if one.end is None and not one.misses_ball]
                for player, moments in words.players.items()}
     roles, state.report["spacing"] = separate_roles(roles, match.times[inside], touches)
     names = build_file_names(player.id for player in match.players)
     parts = build_player_plans(roles, names, words, solved=solved, request=job.request, folder=job.folder,
-                               library=job.library, plays=build_plays(match))
+                               library=job.library, plays=build_plays(match), bodies=bodies)
     rows = job.folder.previous_state.get("players", ())
     finished = {row["id"]: row["finished"] for row in rows if isinstance(row.get("finished"), str)}
     state.players = {part.role.player.id: build_player_row(part, finished.get(part.role.player.id)) for part in parts}
+    for player, one in bodies.players.items():
+        if player in state.players:
+            state.players[player]["bodies"] = one.rows
     state.report["notes"] += list_unknown_texts(job.request.annotations, names.values())
     state.report["notes"] += list_unused_labels(parts, job.request, names)
     state.record_stage("words", clock)
@@ -218,12 +221,13 @@ def _solve_ball(job: Job, match: Match, span: tuple[float, float], report: Progr
         return None
 
 
-def _label_players(job: Job, match: Match, events: MatchEvents | None, solved: SolvedBall | None) -> MatchLabels:
-    """Label all players from touches and, if there are any, events."""
+def _label_players(job: Job, match: Match, events: MatchEvents | None, solved: SolvedBall | None,
+                   sides: Mapping[int, str]) -> MatchLabels:
+    """Label all players from touches, their sides where these were seen, and, if there are any, events."""
     report = job.state.report
     if events is not None and solved is None:
         report["notes"].append(f"{job.request.events}: ignored, because without ball touches its clock is unknown")
-    labels = label_match(match, solved, events)
+    labels = label_match(match, solved, events, sides=sides)
     report["notes"] += labels.notes
     report["events"] = dict(labels.figures) or None
     return labels

@@ -45,16 +45,17 @@ def collect_joints(landmarks: tuple[str, ...], positions: np.ndarray) -> dict[st
     return joints
 
 
-def fit_body(joints: dict[str, np.ndarray], fps: float) -> Motion:
+def fit_body(joints: dict[str, np.ndarray], fps: float, stance: NeutralStance | None = None) -> Motion:
     """Fit a body with bones of fixed length to joints.
 
     Args:
         joints: name -> (T, 3) metres, world, Z up, smooth and without gaps; NEEDED at least.
         fps: frames per second.
+        stance: of the skeleton; None for the one that `build_measured_skeleton` makes of the joints.
     Returns:
-        The motion of the skeleton that `build_measured_skeleton` makes of them.
+        The motion.
     """
-    fit = _BodyFit(joints)
+    fit = _BodyFit(joints, stance or build_neutral_stance(build_measured_skeleton(joints)))
     fit.turn_trunk()
     fit.turn_head()
     for side, joints_of in (("left", fit.body.left), ("right", fit.body.right)):
@@ -69,14 +70,13 @@ class _BodyFit:
 
     Attributes:
         joints: name -> (T, 3) metres.
-        neutral: the neutral stance of the measured skeleton.
+        neutral: the neutral stance of the skeleton.
         body: its joints by meaning.
         turns: joint -> (T, 4) world rotation relative to the neutral stance; others follow their parent.
     """
 
-    def __init__(self, joints: dict[str, np.ndarray]):
-        self.joints = joints
-        self.neutral: NeutralStance = build_neutral_stance(build_measured_skeleton(joints))
+    def __init__(self, joints: dict[str, np.ndarray], neutral: NeutralStance):
+        self.joints, self.neutral = joints, neutral
         self.body = identify_joints(self.neutral.skeleton)
         self.turns: dict[int, np.ndarray] = {}
         self.places = np.zeros(0)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Collection
 from dataclasses import dataclass
 
 import numpy as np
@@ -16,10 +16,13 @@ from ..motion.motion import Motion
 from .body_figures import measure_body
 from .fit_body import NEEDED, collect_joints, fit_body
 from .repair_joints import repair_identities, repair_sides, spread_landmarks
-from .smooth_joints import find_stretches, smooth_joints
+from .smooth_joints import LONGEST_GAP, find_stretches, smooth_joints
 
 SHORTEST = 0.5
 """Seconds; what is seen for a shorter time is no body."""
+PLANTED_RATE = 25.0
+"""Frames per second from which contacts are detected."""
+
 _MIN_SHARE = 0.1  # of a stretch's frames in which a landmark has to be seen to count
 _MOST_FRAMES = 2_000_000  # of one person
 
@@ -33,24 +36,35 @@ class Body:
         team: "home", "away" or "".
         start: seconds of the first frame on the feed's clock.
         motion: world, Z up, at the feed's rate.
-        figures: see `measure_body`.
+        joints: (T, 3) m by name, smoothed and without gaps, to which it is fitted (`fit_body`).
+        landmarks: L names of the joints that were seen.
+        seen: (T, L, 3) m, these joints, repaired and not smoothed; NaN where not seen.
     """
 
     id: str
     team: str
     start: float
     motion: Motion
-    figures: dict
+    joints: dict[str, np.ndarray]
+    landmarks: tuple[str, ...]
+    seen: np.ndarray
+
+    def measure(self) -> dict:
+        """Measure how near the body is to the joints (`measure_body`)."""
+        return measure_body(self.landmarks, self.seen, self.motion)
 
 
 def reconstruct_bodies(feed: JointFeed, progress: Callable[[float, str], None] | None = None,
-                       cancelled: Callable[[], bool] | None = None) -> tuple[list[Body], list[str]]:
+                       cancelled: Callable[[], bool] | None = None, ids: Collection[str] | None = None,
+                       longest_gap: float = LONGEST_GAP) -> tuple[list[Body], list[str]]:
     """Reconstruct the bodies of all people of a feed.
 
     Args:
         feed: the joints.
         progress: called with the share that is done and a text.
         cancelled: returns True when the user stops the job.
+        ids: people whose bodies are wanted; None: all. All count where two are exchanged.
+        longest_gap: seconds without joints that are bridged; a longer gap begins another body.
     Returns:
         The bodies, a stretch without long gaps each, and notes on what was repaired or left out.
     Raises:
@@ -60,11 +74,13 @@ def reconstruct_bodies(feed: JointFeed, progress: Callable[[float, str], None] |
     begin, people, notes = _repair_feed(feed)
     bodies: list[Body] = []
     for number, (person, (first, positions)) in enumerate(zip(feed.people, people)):
+        if ids is not None and person.id not in ids:
+            continue
         if cancelled is not None and cancelled():
             raise UserCancelledError("bodies: cancelled")
         if progress is not None:
             progress(number / len(people), f"Fitting {person.id}")
-        found, lines = _reconstruct_person(person, begin + first / feed.fps, positions, feed.fps)
+        found, lines = _reconstruct_person(person, begin + first / feed.fps, positions, feed.fps, longest_gap)
         bodies += found
         notes += lines
     return bodies, notes
@@ -104,12 +120,12 @@ def _lay_on_clock(person: PlayerJoints, begin: float, fps: float) -> tuple[int, 
     return int(frames[0]), positions
 
 
-def _reconstruct_person(person: PlayerJoints, first: float, positions: np.ndarray,
-                        fps: float) -> tuple[list[Body], list[str]]:
+def _reconstruct_person(person: PlayerJoints, first: float, positions: np.ndarray, fps: float,
+                        longest_gap: float) -> tuple[list[Body], list[str]]:
     """Reconstruct the stretches of one person, and tell which were left out."""
     shown = np.flatnonzero(np.isfinite(positions).all(axis=2).sum(axis=1) >= len(NEEDED) // 2)
     bodies, notes = [], []
-    for start, end in find_stretches(shown / fps, fps):
+    for start, end in find_stretches(shown / fps, fps, longest_gap):
         begin, stop = int(shown[start]), int(shown[end - 1]) + 1
         part = positions[begin:stop]
         seconds = first + begin / fps
@@ -122,6 +138,11 @@ def _reconstruct_person(person: PlayerJoints, first: float, positions: np.ndarra
     return bodies, notes
 
 
+def plant_body(motion: Motion) -> Motion:
+    """Plant the feet of a body where they are in contact; at too few frames per second to tell it stays as it is."""
+    return plant_contacts(motion, detect_heel_toe_contacts(motion)) if motion.fps >= PLANTED_RATE else motion
+
+
 def _measure_share(positions: np.ndarray, landmark: int) -> float:
     """Measure the share of frames in which a landmark is seen."""
     return float(np.isfinite(positions[:, landmark]).all(axis=1).mean())
@@ -131,8 +152,7 @@ def _reconstruct_stretch(person: PlayerJoints, seconds: float, seen: np.ndarray,
     """Fit and plant one stretch (T, LANDMARKS, 3)."""
     used = [number for number in range(len(LANDMARKS)) if _measure_share(seen, number) >= _MIN_SHARE]
     names = tuple(LANDMARKS[number] for number in used)
-    smooth = smooth_joints(names, seen[:, used])
-    fitted = fit_body(collect_joints(names, smooth), fps)
-    motion = plant_contacts(fitted, detect_heel_toe_contacts(fitted)) if fps >= 25.0 else fitted
-    return Body(id=person.id, team=person.team, start=seconds, motion=motion,
-                figures=measure_body(names, seen[:, used], motion))
+    joints = collect_joints(names, smooth_joints(names, seen[:, used]))
+    motion = plant_body(fit_body(joints, fps))
+    return Body(id=person.id, team=person.team, start=seconds, motion=motion, joints=joints, landmarks=names,
+                seen=seen[:, used])

@@ -7,6 +7,7 @@ import numpy as np
 from ..files.joints.landmarks import LANDMARKS
 
 _MIN_WIDTH = 0.08  # metres between left and right on the ground; nearer, the body is seen from above its side
+_LONGEST_GAP = 10  # frames in which a person cannot turn round
 _SWAP_GAIN = 1.0  # metres by which the steps of two people must be shorter if they are exchanged
 
 
@@ -15,7 +16,7 @@ def repair_sides(landmarks: tuple[str, ...], positions: np.ndarray) -> tuple[np.
 
     The line from the right to the left of hips and shoulders turns steadily; where it leaps to its opposite, sides were
     exchanged or come back. Which of the two stretches is right follows from the feet, whose toes are ahead, and the
-    nose.
+    nose. In a gap a person may turn round: what lies behind it is judged by itself.
 
     Args:
         landmarks: L names, each side's with the other side's.
@@ -25,21 +26,25 @@ def repair_sides(landmarks: tuple[str, ...], positions: np.ndarray) -> tuple[np.
     """
     across = _measure_across(landmarks, positions)
     wide = np.flatnonzero(np.linalg.norm(across, axis=1) > _MIN_WIDTH)
-    if len(wide) < 2:
-        return positions, 0
-    leaps = np.sum(across[wide[1:]] * across[wide[:-1]], axis=1) < 0.0
-    parity = np.concatenate([[0], np.cumsum(leaps)]) % 2
-    ahead = _measure_ahead(landmarks, positions)[wide]
-    # with left across, forward is left turned by a right angle: (y, -x)
-    facing = np.sum(np.stack([across[wide][:, 1], -across[wide][:, 0]], axis=1) * ahead, axis=1)
-    evidence = np.nansum(np.where(parity == 0, facing, -facing))
-    if evidence == 0.0:  # no toes and no nose: most frames are right
-        evidence = np.sum(parity == 0) - np.sum(parity == 1)
+    ahead = _measure_ahead(landmarks, positions)
     is_wrong = np.zeros(len(positions), dtype=bool)
-    is_wrong[wide] = parity == (1 if evidence > 0.0 else 0)
+    for part in np.split(wide, np.flatnonzero(np.diff(wide) > _LONGEST_GAP) + 1):
+        is_wrong[part] = _find_exchanged(across[part], ahead[part])
     out = positions.copy()
     out[is_wrong] = positions[is_wrong][:, _list_mirrored(landmarks)]
     return out, int(is_wrong.sum())
+
+
+def _find_exchanged(across: np.ndarray, ahead: np.ndarray) -> np.ndarray:
+    """Find the frames (T,) bool in which sides are exchanged, from right to left and to the front (T, 2)."""
+    leaps = np.sum(across[1:] * across[:-1], axis=1) < 0.0
+    parity = np.concatenate([np.zeros(min(len(across), 1)), np.cumsum(leaps)]) % 2
+    # with left across, forward is left turned by a right angle: (y, -x)
+    facing = np.sum(np.stack([across[:, 1], -across[:, 0]], axis=1) * ahead, axis=1)
+    evidence = np.nansum(np.where(parity == 0, facing, -facing))
+    if evidence == 0.0:  # no toes and no nose: most frames are right
+        evidence = np.sum(parity == 0) - np.sum(parity == 1)
+    return parity == (1 if evidence > 0.0 else 0)
 
 
 def _list_mirrored(landmarks: tuple[str, ...]) -> list[int]:

@@ -15,7 +15,7 @@ import numpy as np
 from ..annotation import Timeline
 from ..base.errors import InputError, format_seconds
 from ..base.settings import collect_defaults, find_setting, list_settings
-from ..base.settings.setting import LATER, add_fields, check_limits
+from ..base.settings.setting import LATER, LATER_PART, add_fields, check_limits
 from ..base.time_series import interpolate_columns
 from ..motion.skeleton import freeze_array
 from ..motion.track import SampledTrack, Track, sample_track
@@ -32,6 +32,7 @@ from .heading_plan import (
     sample_heading,
     update_heading_path,
 )
+from .known_body import KnownBody
 from .pin import GAZE, PARTS, Pin
 
 FEET = ("", "left", "right")
@@ -115,6 +116,7 @@ class Plan:
         style: labels, or names or patterns of folders and clips ("academy", "lmd/*").
         solved: the ball's trajectory where it is known already, such as from a whole match.
         heading_path: the planned heading where it is known already, such as over a whole match.
+        bodies: stretches that are shown as cameras have seen them, in order of time.
     Raises:
         InputError: for a number outside the limits of its setting, and for two pins of one part or two heading keys at
             one time.
@@ -155,6 +157,7 @@ class Plan:
     manner: int = field(default=_DEFAULTS["manner"], metadata=LATER)
     solved: SolvedTrajectory | None = field(default=None, compare=False, repr=False, metadata=LATER)
     heading_path: HeadingPath | None = field(default=None, compare=False, repr=False, metadata=LATER)
+    bodies: tuple[KnownBody, ...] = field(default=(), compare=False, repr=False, metadata=LATER_PART)
     watch: float = field(default=_DEFAULTS["watch"], metadata=LATER)
     strength: float = field(default=_DEFAULTS["strength"], metadata=LATER)
     masses: str = field(default=_DEFAULTS["masses"], metadata=LATER)

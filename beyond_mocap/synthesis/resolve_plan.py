@@ -13,6 +13,7 @@ from dataclasses import replace
 
 from ..library.library import Library
 from ..motion.humanoid import estimate_stature
+from ..motion.skeleton import Skeleton
 from ..motion.track import Track
 from .plan import Plan, ResolvedPlan, SolvedTrajectory
 from .resolved_touches import resolve_touches
@@ -31,11 +32,16 @@ def resolve_plan(
             (`resolved_touches.resolve_touches`).
     """
     with_touches = plan if are_touches_resolved else resolve_touches(plan, trajectory)
-    size = plan.height / estimate_stature(library.skeleton) if plan.height else 1.0
+    size = measure_size(plan, library.skeleton)
     return ResolvedPlan(
         requested=plan, timeline=with_touches.timeline, track=_scale_track(with_touches.track, size),
         trajectory=with_touches.solved, size=size
     )
+
+
+def measure_size(plan: Plan, skeleton: Skeleton) -> float:
+    """Measure how many times as tall as the library's skeleton a plan's player is."""
+    return plan.height / estimate_stature(skeleton) if plan.height else 1.0
 
 
 def _scale_track(track: Track, size: float) -> Track:

@@ -34,6 +34,7 @@ from .construct.gaze import estimate_look
 from .construct.pins import apply_pins
 from .construct.thesis_methods import construct_blocks
 from .contact_edit import FEET
+from .known_body import name_known_frames
 from .pin import BALL, Pin
 from .plan import METHODS, Plan, ResolvedPlan
 from .provenance import build_provenance_fields
@@ -186,7 +187,8 @@ def _construct_motion(
     motion = Motion(library.skeleton, planted.root, planted.rotations, plan.fps)
     ball = build_ball_path(library, plan.requested, track, source=source, motion=motion, ball=ball)
     take = Take(
-        **build_provenance_fields(library, source), motion=motion, start_time=float(track.times[0]),
+        **name_known_frames(build_provenance_fields(library, source), plan.requested.bodies, track.times),
+        motion=motion, start_time=float(track.times[0]),
         contacts=steps.contacts, timeline=request.timeline, keys=keys, ball=ball, method=plan.method,
         seed=plan.requested.seed, correction=planted.correction, ik_miss=planted.miss, stepped=steps.stepped,
         plan=plan.requested, edit=edit, planned_heading=track.heading,

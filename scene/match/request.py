@@ -143,7 +143,7 @@ def update_match(match: BeyondMocapMatch, request: ReadRequest, data: "Match") -
         match.tracking_file = to_setting_path(request.tracking)
         match.metadata_file = to_setting_path(request.metadata) if request.metadata else ""
         if match.read_of:
-            match.events_file = match.events_metadata_file = match.folder = match.made = ""
+            match.joints_file = match.events_file = match.events_metadata_file = match.folder = match.made = ""
         match.start = math.floor(float(data.times[0]))
         match.end = min(match.start + FIRST_SECONDS, math.floor(10.0 * float(data.times[-1])) / 10.0)
         match.active = 0
@@ -164,7 +164,8 @@ def _build_arguments(scene: bpy.types.Scene) -> list[str]:
     if not match.tracking_file:
         raise InputError("match", "no tracking file", "a provider's tracking of a match", "choose one, or drop it here")
     out = ["--tracking", to_absolute_path(match.tracking_file), "--library", _find_library_folder(settings)]
-    for option, path in (("--meta", match.metadata_file), ("--events", match.events_file)):
+    for option, path in (("--meta", match.metadata_file), ("--joints", match.joints_file),
+                         ("--events", match.events_file)):
         out += [option, to_absolute_path(path)] if path else []
     out += ["--provider", match.provider] if match.provider != AUTO else []
     if match.events_file:

@@ -67,9 +67,14 @@ class BeyondMocapMatch(bpy.types.PropertyGroup):
     """Settings of a match: its files, what is requested of it, and what is displayed."""
 
     attached_to = ("Scene.beyond_mocap_match",)
-    tracking_file: StringProperty(name="Tracking", description="A provider's tracking file of a match", **FILE)
+    tracking_file: StringProperty(
+        name="Tracking", description="A provider's tracking file of a match, or skeletal tracking", **FILE
+    )
     metadata_file: StringProperty(
         name="Metadata", description="The provider's second file; empty: a matching file beside the first", **FILE
+    )
+    joints_file: StringProperty(
+        name="Joints", description="Skeletal tracking of the same match: bodies where it shows them", **FILE
     )
     events_file: StringProperty(
         name="Events", description="Events from a provider or as CSV; empty: found from the ball's trajectory", **FILE

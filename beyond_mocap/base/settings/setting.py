@@ -13,6 +13,8 @@ WHOLE = "a whole number from {least} to {most}"
 LATER = {"later": True}
 """Metadata of fields that were added after files had stored fingerprints of the other fields; with "was" where their
 default has changed since: the value that files without them have."""
+LATER_PART = {**LATER, "is_part": True}
+"""Metadata of `LATER` fields that are left out of digests where they are empty: what lacks them keeps its digest."""
 POSITIVE: dict[str, Any] = {"least": 1e-9, "most": 1e6, "unit": "metres", "expected": "a positive number"}
 
 # Choices shared by settings of several features: identifier, title, tooltip[, icon, number].

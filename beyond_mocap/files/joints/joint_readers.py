@@ -51,18 +51,34 @@ def read_joints(path) -> JointFeed:
         raise InputError(path, found[:200], _FORMS, "export it again") from None
 
 
+def is_joint_file(path) -> bool:
+    """Say whether a file looks like skeletal tracking."""
+    path = Path(path)
+    if path.suffix.lower() == ".npz":
+        return path.is_file()  # no other tracking comes as arrays
+    return _find_text_reader(path) is not None
+
+
 def _find_reader(path: Path):
     """Find the function that reads a file, by its content."""
     if path.suffix.lower() == ".npz":
         return read_smpl_people if is_people_file(path) else _read_fifa
+    found = _find_text_reader(path)
+    if found is None:
+        what = "unknown form" if read_head(path) else "missing, empty or no file"
+        raise InputError(path, what, _FORMS, "choose such a file")
+    return found
+
+
+def _find_text_reader(path: Path):
+    """Find the function that reads a file that is no .npz; None if it is no skeletal tracking."""
     head = read_head(path)
     if re.match(rb'(?s)\s*\{.{0,4000}"landmarks"', head):
         return _read_cdf
     if re.match(rb"(?s)\s*\{", head) and path.name.lower().endswith(".joints"):
         return _read_hawkeye
-    if b"joint" in head.partition(b"\n")[0].lower() or b"landmark" in head.partition(b"\n")[0].lower():
-        return _read_table
-    raise InputError(path, "unknown form" if head else "missing, empty or no file", _FORMS, "choose such a file")
+    columns = re.findall(rb"[a-z_]+", head.partition(b"\n")[0].lower())
+    return _read_table if b"joint" in columns or b"landmark" in columns else None
 
 
 def _read_cdf(path: Path) -> JointFeed:
@@ -84,7 +100,7 @@ def _read_cdf(path: Path) -> JointFeed:
 
 def _read_hawkeye(path: Path) -> JointFeed:
     """Read Hawk-Eye's joints: a file for each minute, their times from its start."""
-    found, files = JointCollector(path), _list_half(path)
+    found, files = JointCollector(path), list_joint_files(path)
     begin = None
     for file in files:
         content = read_json(file)
@@ -107,8 +123,10 @@ def _read_hawkeye(path: Path) -> JointFeed:
     return found.build()
 
 
-def _list_half(path: Path) -> list[Path]:
-    """List the files of the same half from a file on: ..._HALF_MINUTE[_ADDED].football.samples.joints."""
+def list_joint_files(path: Path) -> list[Path]:
+    """List the files that `read_joints` reads: of Hawk-Eye those of the same half from `path` on,
+    ..._HALF_MINUTE[_ADDED].football.samples.joints.
+    """
     parts = re.fullmatch(r"(.*?_?\d+_)(\d+)(?:_(\d+))?(\.football\.samples\.joints)", path.name)
     if parts is None:
         return [path]

@@ -19,6 +19,7 @@ from ...base.optional_packages import import_optional
 
 MAX_PLAYERS = 60
 """Two squads of 26 and the referees have fewer; more are two matches in one file."""
+_MANY = rb"(?i)\b(player(_id)?|track_id|id|joint|landmark)\b"  # columns of tables of several people
 _HEAD_BYTES = 8192  # bytes that identify a format
 _LINE_SUFFIXES = {".dat", ".csv", ".txt", ".jsonl"}  # suffixes of files that are read line by line
 
@@ -126,7 +127,8 @@ def read_head(path: Path) -> bytes:
 
 
 def is_track_csv(path: Path) -> bool:
-    """Return whether a file is a table of one player's track: its first line names `time_s` and no `player`.
+    """Return whether a file is a table of one player's track: its first line names `time_s` and neither players nor
+    joints.
 
     Raises:
         InputError: if it cannot be read.
@@ -135,7 +137,7 @@ def is_track_csv(path: Path) -> bool:
         first = read_head(path).partition(b"\n")[0]
     except OSError as error:
         raise build_read_error(path, "a tracking file", error) from None
-    return b"time_s" in first and b"player" not in first
+    return b"time_s" in first and not re.search(_MANY, first)
 
 
 Known = TypeVar("Known", bound=Provider)

@@ -344,7 +344,7 @@ PROVIDERS: dict[str, TrackingProvider] = {record.name: record for record in (
     ),
     TrackingProvider(
         name="table", title="Plain CSV", files="one CSV with `time_s,player,x_m,y_m`, a row for each player and moment",
-        patterns=(rb"(?i)(?=[^\n]{0,400}\btime)(?=[^\n]{0,400}\bplayer)(?=[^\n]{0,400}\bx(_m)?\b)"
+        patterns=(rb"(?i)(?=[^\n]{0,400}\btime)(?=[^\n]{0,400}\b(player(_id)?|track_id|id)\b)(?=[^\n]{0,400}\bx(_m)?\b)"
                   rb"(?![^\n]{0,400}\b(lat|latitude|joint|landmark|type)\b)",),
         needs_metadata=False, has_pitch_size=False, find_files=_find_alone, read_samples=_read_table,
     ),

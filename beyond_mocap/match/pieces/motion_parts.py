@@ -21,6 +21,7 @@ from ...motion.motion import Motion
 from ...motion.skeleton import Skeleton
 from ...motion.track.ball_path import BallPath
 from ...synthesis.plan import Plan
+from ...synthesis.resolve_plan import measure_size
 from ...synthesis.take import DribbleTouch, KeyResult, Take
 from ..player_edit import PlayerEdit, Stretch
 from ..player_motion import StretchConstructor, StretchWindows, cut_take, join_takes
@@ -85,7 +86,9 @@ class MotionSpan:
         """Load what `player_motion.construct_player` constructs for the span; OSError or ValueError if a file is
         damaged.
         """
-        parts = (cut_take(load_part(content, skeleton), first, end) for content, first, end in self.parts)
+        size = measure_size(self.plan, skeleton)
+        own = skeleton if size == 1.0 else skeleton.scale(size)
+        parts = (cut_take(load_part(content, own), first, end) for content, first, end in self.parts)
         return join_takes(list(parts), self.plan)
 
 
@@ -112,7 +115,7 @@ def load_part(content: Content, skeleton: Skeleton) -> Take:
 
     Args:
         content: the file, or what is in it.
-        skeleton: the library's.
+        skeleton: the player's.
     Returns:
         The take, without a plan.
     """

@@ -17,6 +17,7 @@ from ...library.features import FPS
 from ...motion.track import Track
 from ...synthesis.exertion import measure_exertion
 from ...synthesis.heading_plan import HOLD_FADE
+from ...synthesis.known_body import cut_bodies
 from ...synthesis.plan import Plan, SolvedTrajectory
 from ...synthesis.search.candidate_index import SLOT
 from ..player_edit import to_stored_plan
@@ -147,6 +148,7 @@ def cut_plan(plan: Plan, start: float, end: float) -> Plan:
         heading_keys=tuple(key for key in plan.heading_keys if key.is_within(start - HOLD_FADE, end + HOLD_FADE)),
         heading_path=None if plan.heading_path is None else plan.heading_path.cut_span(start - HOLD_FADE,
                                                                                        end + HOLD_FADE),
+        bodies=cut_bodies(plan.bodies, start, end),
         solved=None if plan.solved is None else _cut_trajectory(plan.solved, start - _BALL_MARGIN, end + _BALL_MARGIN),
     )
 

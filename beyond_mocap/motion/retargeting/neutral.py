@@ -6,7 +6,7 @@ anatomical terms ("thigh 20 degrees forward") is relative to this one stance, so
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -76,6 +76,13 @@ def build_neutral_stance(skeleton: Skeleton, example: Motion | None = None) -> N
     local = compute_local_rotations(skeleton, world)
     positions, _ = compute_pose(skeleton, np.zeros((1, 3)), local[None])
     return _measure_stance(skeleton, body, world, positions[0])
+
+
+def scale_stance(stance: NeutralStance, size: float) -> NeutralStance:
+    """Scale a stance, with its skeleton."""
+    names = "positions", "leg", "ankle_height", "ball", "heel", "tip"
+    lengths = {name: getattr(stance, name) * size for name in names}
+    return replace(stance, skeleton=stance.skeleton.scale(size), **lengths)
 
 
 def is_rest_upright(skeleton: Skeleton) -> bool:

@@ -32,6 +32,7 @@ from ..ball_pins import SAME_TOUCH
 from ..body_size import scale_ball
 from ..edited_contacts import apply_contact_edits
 from ..exertion import compute_exertion
+from ..known_body import find_shown_frames, show_bodies
 from ..plan import ResolvedPlan
 from ..search.edit_list import EditList
 from ..search.request import SearchRequest, compute_needed_frames
@@ -136,7 +137,9 @@ class Construction:
         planted, steps_taken = self._plant_feet(np.column_stack([ground, self.smooth_source.height]), pose)
         planted = self._obey_momentum(self._breathe(self._watch_ball(planted)))
         planted, steps_taken = self._edit_contacts(planted, steps_taken)
-        return replace(planted, rotations=self._roll_toes(planted.root, planted.rotations)), steps_taken
+        planted = replace(planted, rotations=self._roll_toes(planted.root, planted.rotations))
+        return show_bodies(self.library.skeleton, planted, steps_taken, self.plan.requested.bodies,
+                           round(float(self.track.times[0]) * self.plan.fps), fps=self.plan.fps, size=self.plan.size)
 
     def _edit_contacts(self, planted: PlantResult, steps_taken: Steps) -> tuple[PlantResult, Steps]:
         """Apply the plan's contact edits."""
@@ -237,7 +240,9 @@ class Construction:
         meet = partial(strike_ball, skeleton, root, contacts=contacts, ball=ball, touches=self._pin_touches(),
                        fps=self.plan.fps, measured=track.ball_measured, height_known=is_height_known)
         contact = meet(rotations)
-        placed = place_plant_feet(skeleton, root, rotations, contact, contacts, touches=self.touches, fps=self.plan.fps)
+        shown = find_shown_frames(self.plan.requested.bodies, track.times)  # seen feet stand where they were seen
+        free = [touch for touch in self.touches if not shown[int(np.clip(touch.frame, 0, len(shown) - 1))]]
+        placed = place_plant_feet(skeleton, root, rotations, contact, contacts, touches=free, fps=self.plan.fps)
         if placed is not rotations:
             contact = meet(placed)
         root, ball = (contact.root, contact.ball) if size == 1.0 else (contact.root / size, contact.ball / size)

@@ -15,6 +15,7 @@ from ...annotation import LOCOMOTION
 from ...annotation.gaits import TURNING, compute_heading_offset
 from ...annotation.vocabulary import DIRECTIONS
 from ...library.library import Library
+from ..known_body import KnownFeatures
 from ..plan import Plan
 from .candidate_index import ACTING, PLAYBACK_RATES, SLOT, CandidateIndex, RatePairs
 from .lean_cost import compute_lean_cost, compute_wanted_lean
@@ -112,6 +113,7 @@ TERMS = {
     "facing": "faces another direction",
     "drag": "feet on the ground are dragged",
     "lean": "leans otherwise than the track is accelerated",
+    "known": "moves unlike the body that cameras have seen",
     "words": "requested labels that the clip lacks",
     "unasked": "an action not requested, or no labels at all",
     "strange": "not how people stand, walk or run in this library",
@@ -145,6 +147,7 @@ class Weights:
         facing: per m/s of missed velocity in the body's frame beyond the missed speed.
         slide: per (m/s)^2 of missed velocity, by which a foot on the ground is dragged.
         lean: per unit of slope by which the body leans otherwise than its track is accelerated.
+        known: per metre of joint distance from a body that cameras have seen, near its ends.
         words: for lacking all labels that the user asks for.
         automatic_words: for lacking all labels of automatic locomotion.
         unasked: for frames of an action that is not requested, or that carry no label.
@@ -172,6 +175,7 @@ class Weights:
     facing: float = 1.0
     slide: float = 2.0
     lean: float = 3.0
+    known: float = 12.0
     words: float = 3.0
     automatic_words: float = 1.0
     unasked: float = 2.0
@@ -237,6 +241,9 @@ class PathCosts:
         self.frames, self.index = library.frames, CandidateIndex.for_library(library, request.allowed)
         self.wanted_offset = compute_heading_offset(request.track)
         self.wanted_lean, self.lean_counts = compute_wanted_lean(request.track, request.size)
+        bodies = request.plan.bodies
+        self.known = KnownFeatures(bodies, self.frames, library.skeleton, request.track.times,
+                                   request.size) if bodies else None
         self._rate_cost = (weights.rate * np.abs(PLAYBACK_RATES - 1.0)).astype(np.float32)
         self._cached_costs: dict[tuple[frozenset[str], bool, frozenset[str]], np.ndarray] = {}
         # a strike turns as it was recorded: the body follows it there (`construct.construction`)
@@ -330,6 +337,9 @@ class PathCosts:
         if self.lean_counts[middle] > 0.0:
             weight = np.float32(self.weights.lean * self.lean_counts[middle])
             yield "lean", weight * compute_lean_cost(pairs.lean, self._find_wanted_lean(first, end))
+        if self.known is not None and self.known.counts[first]:
+            away = self.known.measure_distance(first, self.frames.features[pairs.frame])
+            yield "known", np.float32(self.weights.known) * away.astype(np.float32)
         yield from self._iter_rate_terms(first, pairs)
 
     def _bound_motion_costs(self, first: int, end: int, pairs: RatePairs, fixed_cost: np.ndarray) -> np.ndarray:

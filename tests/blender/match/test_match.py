@@ -116,6 +116,20 @@ def test_what_goes_with_the_events_is_asked_for_where_there_are_events(place):
     assert f"--events-meta {place / 'f7.xml'} --events-provider opta" in text
 
 
+def test_joints_are_read_as_a_match_and_requested_beside_one(place):
+    joints, body = place / "joints.csv", {"hip": 0.9, "knee": 0.48, "ankle": 0.08, "shoulder": 1.42}
+    joints.write_text("time_s,player,joint,x,y,z\n" + "".join(
+        f"{frame / 25:.2f},A,{side}_{name},{0.04 * frame:.2f},{y},{z}\n" for frame in range(50)
+        for side, y in (("left", 0.1), ("right", -0.1)) for name, z in body.items()))
+    match = a_match(place, "")
+    match.joints_file = str(joints)
+    arguments = room("request").build_command(bpy.context.scene)
+    assert arguments[arguments.index("--joints") + 1] == str(joints)
+    assert bpy.ops.beyond_mocap.read_match(filepath=str(joints)) == {"FINISHED"}
+    assert [player.feed_id for player in match.players] == ["A"] and match.joints_file == ""
+    assert match.tracking_file == str(joints) and "one team" in match.report
+
+
 def test_no_digit_of_a_late_time_is_lost(place, core):
     match = a_match(place, "")
     match.start, match.end = 1234.567, 2700.04

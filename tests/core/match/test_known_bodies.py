@@ -1,0 +1,98 @@
+"""Players whose joints are seen: shown as they are, synthesized where they are not, without a jump in between."""
+
+import json
+
+import numpy as np
+import pytest
+
+from beyond_mocap.cli.main import main
+from beyond_mocap.files.tracking.tracking import read_match
+from beyond_mocap.library.build import build_library
+from beyond_mocap.match.player_edit import read_player, write_player
+from beyond_mocap.match.player_motion import construct_player
+from beyond_mocap.motion.humanoid import identify_joints
+from beyond_mocap.motion.motion import forward_kinematics
+from beyond_mocap.synthesis.known_body import SOURCE
+from beyond_mocap.synthesis.quality.movement import compute_jerk
+from tests.core.joint_feeds import NAMES, sample_joints, write_table
+from tests.core.match.small_match import LIBRARY, SMALL
+
+GAP = (2.2, 3.8)
+FPS = 50.0
+
+
+@pytest.fixture(scope="module")
+def seen_match(tmp_path_factory):
+    """A walk with 5 cm of noise and a gap of 1.6 s in which no joint is seen but dots are; and a player never seen."""
+    folder = tmp_path_factory.mktemp("seen")
+    truth = sample_joints("walking_1_2", FPS)
+    seen = truth + np.random.default_rng(3).normal(0.0, 0.05 / np.sqrt(3.0), truth.shape)
+    seen[int(GAP[0] * FPS) : int(GAP[1] * FPS)] = np.nan
+    joints = write_table(folder / "joints.csv", {"A": seen}, FPS)
+    out = folder / "match"
+    assert main(["match", "--tracking", str(joints), "--library", str(LIBRARY), "--out", str(out), "--bvh"]) == 0
+    return folder, truth, out
+
+
+def measure_places(out, start, end):
+    edit = read_player(next(out.glob("*.take.npz")))
+    library = build_library(LIBRARY)
+    return edit, [take for take in construct_player(library, edit, start, end)]
+
+
+def test_seen_joints_are_shown_and_gaps_are_synthesized(seen_match):
+    _, truth, out = seen_match
+    _, takes = measure_places(out, 0.0, len(truth) / FPS)
+    (take,) = takes
+    places, _ = forward_kinematics(take.motion)
+    times = take.start_time + np.arange(len(places)) / take.motion.fps
+    body = identify_joints(take.motion.skeleton)
+    at = np.clip(np.rint(times * FPS).astype(int), 0, len(truth) - 1)
+    is_seen = np.array([take.clips[clip] == SOURCE for clip in take.clip])
+    gap = (times > GAP[0] + 0.1) & (times < GAP[1] - 0.1)
+    assert is_seen[(times < GAP[0] - 0.1) | (times > GAP[1] + 0.1)].all() and not is_seen[gap].any()
+    for name, joint in (("left_ankle", body.left.foot), ("right_wrist", body.right.hand), ("left_knee",
+                        body.left.lower_leg)):
+        error = np.linalg.norm(places[:, joint] - truth[at, NAMES.index(name)], axis=1)
+        assert error[is_seen].mean() < 0.05
+    jerk = compute_jerk(places, take.motion.fps)
+    inner = np.percentile(jerk[is_seen[:-3]], 99)
+    assert jerk.max() < max(2.0 * inner, 4000.0)
+
+
+def test_the_report_names_what_was_seen(seen_match):
+    _, _, out = seen_match
+    (row,) = json.loads((out / "match.json").read_text())["players"]
+    assert row["status"] == "done" and len(row["bodies"]) == 2
+    assert row["bodies"][0]["to_s"] == pytest.approx(GAP[0], abs=0.1)
+    assert all(one["joint_error_m"]["mean"] < 0.06 for one in row["bodies"])
+    assert SOURCE in next(out.glob("*.provenance.csv")).read_text()
+
+
+def test_a_player_with_bodies_comes_back_from_a_file(seen_match, tmp_path):
+    _, _, out = seen_match
+    path = next(out.glob("*.take.npz"))
+    edit = read_player(path)
+    write_player(tmp_path / "again.npz", edit)
+    assert (tmp_path / "again.npz").read_bytes() == path.read_bytes() and edit.stretches[0].plan.bodies
+
+
+def test_beside_dots_only_what_is_seen_comes_from_joints(tmp_path):
+    """A walk on the spot that is carried along a player's dots from 4 to 7 s, on a clock of its own."""
+    dots = read_match(SMALL / "small.dat")
+    at = np.arange(4.0, 7.0, 1.0 / FPS)
+    path = np.stack([np.interp(at, dots.times, values) for values in dots.positions[
+        [player.id for player in dots.players].index("home_10")].T], axis=1)
+    joints = sample_joints("walking_1_2", FPS)[: len(at)].copy()
+    hips = joints[:, [NAMES.index("left_hip"), NAMES.index("right_hip")], :2].mean(axis=1)
+    joints[..., :2] += (path[: len(joints)] - hips)[:, None]
+    table = write_table(tmp_path / "joints.csv", {"7": joints}, FPS)
+    status = main(["match", "--tracking", str(SMALL / "small.dat"), "--joints", str(table), "--library", str(LIBRARY),
+                   "--out", str(tmp_path / "out"), "--from", "3", "--to", "8", "--players", "home_10", "home_7",
+                   "--no-figures", "--workers", "1"])  # fmt: skip
+    state = json.loads((tmp_path / "out" / "match.json").read_text())
+    rows = {row["id"]: row for row in state["players"]}
+    assert status == 0 and "bodies" not in rows["home_7"] and "joints" in state["identity"]
+    (body,) = rows["home_10"]["bodies"]
+    assert [body["from_s"], body["to_s"]] == pytest.approx([4.0, 4.0 + (len(joints) - 1) / FPS], abs=0.06)
+    assert body["joint_error_m"]["mean"] < 0.03 and any("clock is 4.0" in note for note in state["notes"])
