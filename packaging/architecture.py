@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import ast
 import functools
+import gc
 import pathlib
 import sys
 from collections.abc import Iterator
@@ -28,7 +29,22 @@ BLENDER = {"bpy", "mathutils", "gpu", "gpu_extras", "bpy_extras", "blf", "bl_ui"
            "addon_utils", "rna_prop_ui", "rna_keymap_ui", "imbuf", "aud", "idprop", "pxr"}  # fmt: skip
 MAX_FILES = 25
 """Python files in one folder at most."""
-parse_source = functools.cache(ast.parse)
+
+
+@functools.cache
+def parse_source(text: str) -> ast.Module:
+    """Parse a source; its tree is kept. Python does not look for garbage meanwhile, over and over in all trees."""
+    gc.disable()
+    try:
+        return ast.parse(text)
+    finally:
+        gc.enable()
+
+
+@functools.cache
+def list_nodes(text: str) -> tuple[ast.AST, ...]:
+    """List all nodes of a source's syntax tree, as `ast.walk` gives them; kept, for every check of the source asks."""
+    return tuple(ast.walk(parse_source(text)))
 
 
 class Import(NamedTuple):
@@ -58,7 +74,8 @@ def list_sources(*folders: str) -> list[pathlib.Path]:
     return sorted(path.relative_to(TOP) for folder in folders for path in (TOP / folder).rglob("*.py"))
 
 
-def read_imports(path: pathlib.Path, text: str) -> list[Import]:
+@functools.cache
+def read_imports(path: pathlib.Path, text: str) -> tuple[Import, ...]:
     """Read all imports of a file.
 
     Args:
@@ -70,17 +87,18 @@ def read_imports(path: pathlib.Path, text: str) -> list[Import]:
     found: list[Import] = []
 
     def visit(node: ast.AST, lazy: bool) -> None:
-        where = f"{path}:{getattr(node, 'lineno', 0)}"
         if isinstance(node, ast.Import):
-            found.extend(Import(where, alias.name, lazy, False) for alias in node.names)
+            found.extend(Import(f"{path}:{node.lineno}", alias.name, lazy, False) for alias in node.names)
         elif isinstance(node, ast.ImportFrom):
-            found.extend(Import(where, name, lazy, node.level > 0) for name in _absolute_names(path, node))
-        lazy = lazy or isinstance(node, (ast.FunctionDef, ast.AsyncFunctionDef, ast.Lambda))
+            names = _absolute_names(path, node)
+            found.extend(Import(f"{path}:{node.lineno}", name, lazy, node.level > 0) for name in names)
+        lazy = lazy or isinstance(node, (ast.FunctionDef, ast.AsyncFunctionDef))
         for child in ast.iter_child_nodes(node):
-            visit(child, lazy)
+            if not isinstance(child, ast.expr):  # imports are statements
+                visit(child, lazy)
 
     visit(parse_source(text), False)
-    return found
+    return tuple(found)
 
 
 def _absolute_names(path: pathlib.Path, node: ast.ImportFrom) -> list[str]:

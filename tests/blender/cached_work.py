@@ -1,20 +1,31 @@
-"""What operators work out between order and apply, worked out once for the same order.
+"""What operators work out between reading and writing a scene, worked out once in a session for the same order.
 
-Work never touches bpy, and the same order gives the same bits (tests/core proves both). Where hundreds of calls try
-what operators read from a scene and write into it, the same few pieces of work come again and again; each is done
-once, and every further call gets the same frozen values.
+Work never touches bpy, and the same order gives the same bits (tests/core proves both). What Blender's tests try is
+how operators read from a scene and write into it, and there the same few pieces of work come again and again. Each is
+done once; every further call gets its own copy of the result. Work in a thread is done each time: how it is cancelled
+and how it reports is tried there.
 """
 
 import io
 import pickle
-from types import MappingProxyType
+import sys
+import threading
+from importlib import import_module
+from types import FunctionType, MappingProxyType
 
 import bpy
 
-CACHED_OPERATORS = (
+FUNCTIONS = {
+    "evaluation.report": "evaluate", "library.library": "_build_synthetic_library",
+    "markers.reconstruct": "reconstruct", "passes.passes": "synthesize_passes",
+    "synthesis.resynthesize": "resynthesize", "synthesis.synthesize": "synthesize", "throws.throw": "throw_at",
+}  # fmt: skip
+"""Module of the core -> its function that takes long."""
+OPERATORS = (
     "clean_markers", "kick_at_target", "learn_words", "passes_make", "reconstruct_markers", "stream_play",
     "throw_at_target",
 )  # fmt: skip
+"""Operators whose work is more than one of these functions, or reads files."""
 
 
 def _build_view(values: dict) -> MappingProxyType:
@@ -22,39 +33,84 @@ def _build_view(values: dict) -> MappingProxyType:
 
 
 class _Packer(pickle.Pickler):
-    """Values as bytes. Libraries go by name, for nobody changes one and they are large."""
+    """Values as bytes, the same for equal values. Libraries go by what they were built from, since they are large and
+    nobody changes one; a function within a function has no form, and is equal to itself alone."""
 
-    def __init__(self, out, library: type, known: dict):
+    def __init__(self, out, kept: dict, library: type):
         super().__init__(out)
-        self.library, self.known = library, known
+        self.fast = True  # no note of which equal parts are one
+        self.kept, self.library = kept, library
 
     def persistent_id(self, value):
-        if not isinstance(value, self.library):
+        if isinstance(value, FunctionType) and "<locals>" in value.__qualname__:
+            name = "function", id(value)
+        elif isinstance(value, self.library):
+            name = vars(value).get("index_place", (None, id(value)))[1:]
+        else:
             return None
-        self.known[id(value)] = value
-        return id(value)
+        self.kept[name] = value
+        return name
 
     def reducer_override(self, value):
         """Read-only views of dictionaries have no form of their own."""
         return (_build_view, (dict(value),)) if isinstance(value, MappingProxyType) else NotImplemented
 
 
-def cache_work(monkeypatch, library: type) -> None:
-    """Lets PURE operators work once for the same order, until monkeypatch takes it back. library: the core's class."""
-    done, known = {}, {}
-    for name in CACHED_OPERATORS:
-        operator = getattr(bpy.types, f"BEYOND_MOCAP_OT_{name}")
-        cached = _build_cached(name, operator.run_job, library, done, known)
-        monkeypatch.setattr(operator, "run_job", staticmethod(cached))
+class _Unpacker(pickle.Unpickler):
+    """The values again."""
+
+    def __init__(self, packed: bytes, kept: dict):
+        super().__init__(io.BytesIO(packed))
+        self.kept = kept
+
+    def persistent_load(self, name):
+        return self.kept[name]
 
 
-def _build_cached(name: str, work, library: type, done: dict, known: dict):
-    def run_cached(order, *asking):
+class WorkCache:
+    """The results of a session by function and order."""
+
+    def __init__(self, library: type):
+        """library: the core's class of libraries."""
+        self.library, self.kept, self.results = library, {}, {}
+
+    def pack(self, value) -> bytes:
         out = io.BytesIO()
-        _Packer(out, library, known).dump(order)
-        key = name, out.getvalue()
-        if key not in done:
-            done[key] = work(order, *asking)
-        return done[key]
+        _Packer(out, self.kept, self.library).dump(value)
+        return out.getvalue()
 
-    return run_cached
+    def keep_results(self, work):
+        """A function that does `work` once for equal arguments; those for progress and cancelling do not count."""
+
+        def work_once(*args, **named):
+            if threading.current_thread() is not threading.main_thread():
+                return work(*args, **named)
+            asked = [value for value in args if not callable(value)], [
+                item for item in sorted(named.items()) if not callable(item[1])]
+            order = work.__module__, work.__qualname__, self.pack(asked)
+            if order in self.results:
+                return _Unpacker(self.results[order], self.kept).load()
+            result = work(*args, **named)
+            self.results[order] = self.pack(result)
+            return result
+
+        return work_once
+
+
+def cache_functions(monkeypatch, core: str) -> WorkCache:
+    """Let FUNCTIONS work once for the same order, until monkeypatch takes it back. core: the core's dotted name."""
+    cache = WorkCache(import_module(f"{core}.library.library").Library)
+    for module, name in FUNCTIONS.items():
+        work = getattr(import_module(f"{core}.{module}"), name)
+        once = cache.keep_results(work)
+        for user in [user for place, user in sys.modules.items() if place.startswith(core)]:
+            if vars(user).get(name) is work:
+                monkeypatch.setattr(user, name, once)
+    return cache
+
+
+def cache_operators(monkeypatch, cache: WorkCache) -> None:
+    """The same for OPERATORS, where no test changes the files that they read."""
+    for name in OPERATORS:
+        operator = getattr(bpy.types, f"BEYOND_MOCAP_OT_{name}")
+        monkeypatch.setattr(operator, "run_job", staticmethod(cache.keep_results(operator.run_job)))

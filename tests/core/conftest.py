@@ -32,12 +32,15 @@ SPEEDS = {"stand": (0.0, "standing"), "walk": (1.4, "walking"), "jog": (2.8, "jo
 KICK = "kick low inside right"
 HERE = Path(__file__).resolve().parent
 SAMPLE_LIBRARY = HERE.parents[1] / "sample_blend" / "library"
+RECORDINGS = HERE.parents[2] / "shared" / "data" / "mocap" / "cmu10"
 
 
 def pytest_collection_modifyitems(items):
-    """The tests of one room run in one process, so that its session fixtures are made once."""
+    """The tests of one room run in one process, so that its session fixtures are made once; so do all checks of the
+    source, which share its syntax trees."""
     for item in items:
         room = item.path.relative_to(HERE).parts[0] if item.path.is_relative_to(HERE) else item.path.name
+        room = "source" if item.path.parent == HERE else room
         item.add_marker(pytest.mark.xdist_group(room))
 
 
@@ -51,10 +54,23 @@ def pytest_sessionfinish():
 @pytest.fixture(scope="session")
 def sample_cache(tmp_path_factory) -> Path:
     """The cache of the sample library, with its synthetic clips in it; processes side by side share it."""
-    base = tmp_path_factory.getbasetemp()
-    place = (base.parent if "PYTEST_XDIST_WORKER" in os.environ else base) / "sample_cache"
+    place = find_shared_folder(tmp_path_factory) / "sample_cache"
     assert build_library(SAMPLE_LIBRARY, cache_dir=place).with_synthetic_clips.clips
     return place
+
+
+@pytest.fixture(scope="session")
+def recordings_cache(tmp_path_factory) -> Path:
+    """The same of RECORDINGS, whose unit is an inch over 0.45."""
+    place = find_shared_folder(tmp_path_factory) / "recordings_cache"
+    assert build_library(RECORDINGS, unit=0.05644, cache_dir=place).with_synthetic_clips.clips
+    return place
+
+
+def find_shared_folder(tmp_path_factory) -> Path:
+    """Find the folder of all processes of this run."""
+    base = tmp_path_factory.getbasetemp()
+    return base.parent if "PYTEST_XDIST_WORKER" in os.environ else base
 
 
 def write_clip(path: Path, motion: Motion, text: str) -> Path:

@@ -5,6 +5,8 @@ from pathlib import Path
 
 import pytest
 
+from architecture import list_nodes
+
 ROOT = Path(__file__).parents[2]
 MOST = 5
 TAKE_ANY_NUMBER = {"_build_key_row", "_join_row", "build_page", "build_row", "scale_rows", "option_values", "pack",
@@ -14,7 +16,7 @@ TAKE_ANY_NUMBER = {"_build_key_row", "_join_row", "build_page", "build_row", "sc
 
 def crowded_calls(source: str) -> list[int]:
     """Lines of calls with more than MOST arguments without a name; stars do not count."""
-    calls = [node for node in ast.walk(ast.parse(source)) if isinstance(node, ast.Call)]
+    calls = [node for node in list_nodes(source) if isinstance(node, ast.Call)]
     return [call.lineno for call in calls if _too_many(call.args) and _name(call.func) not in TAKE_ANY_NUMBER]
 
 

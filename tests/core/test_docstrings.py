@@ -7,6 +7,8 @@ from pathlib import Path
 
 import pytest
 
+from architecture import list_nodes
+
 TOP = Path(__file__).resolve().parents[2]
 ROOMS = ("beyond_mocap", "scene", "operators", "panels", "training")
 ALL = (*ROOMS, "packaging", "sample_blend", "benchmarks", "tests")
@@ -31,15 +33,10 @@ def list_paths(*folders):
 
 
 @cache
-def read_nodes(source):
-    return list(ast.walk(ast.parse(source)))
-
-
-@cache
 def collect_names(path):
     """Names that a module's code binds: functions, classes, parameters, variables, attributes, imports."""
     names = set()
-    for node in read_nodes(path.read_text("utf-8")):
+    for node in list_nodes(path.read_text("utf-8")):
         match node:
             case ast.FunctionDef(name=name) | ast.ClassDef(name=name) | ast.arg(arg=name):
                 names.add(name)
@@ -82,7 +79,7 @@ def find_modules(parts):
 def list_texts(source):
     """Line and text of each docstring line and comment."""
     lines, inside = source.splitlines(), set()
-    for node in read_nodes(source):
+    for node in list_nodes(source):
         if isinstance(node, ast.Expr) and isinstance(node.value, ast.Constant) and isinstance(node.value.value, str):
             inside |= set(range(node.lineno, node.end_lineno + 1))
     return [(number, line) for number, line in enumerate(lines, 1) if number in inside or "# " in line]
@@ -117,7 +114,7 @@ def find_unknown(source, own):
 def find_unknown_arguments(source):
     """(function, name) of what stands under Args and is no parameter."""
     found = []
-    for node in read_nodes(source):
+    for node in list_nodes(source):
         if not isinstance(node, FUNCTIONS):
             continue
         block = re.search(r"^Args:\n((?:    .*\n?)*)", ast.get_docstring(node) or "", re.M)

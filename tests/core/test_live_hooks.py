@@ -5,6 +5,8 @@ import pathlib
 
 import pytest
 
+from architecture import list_nodes
+
 TOP = pathlib.Path(__file__).resolve().parents[2]
 FOLDERS = ("scene", "operators", "panels", "sample_blend")
 LISTENS = ("scene/core/live.py", ("bpy.app.handlers", "bpy.app.timers", "bpy.msgbus"))
@@ -14,7 +16,7 @@ HANGS = ("scene/core/window.py", ("draw_handler_add", "draw_handler_remove", "ev
 
 def names_of(text):
     """(line, dotted name) of everything that is imported or looked up in a file's text."""
-    for node in ast.walk(ast.parse(text)):
+    for node in list_nodes(text):
         if isinstance(node, ast.ImportFrom):
             yield from ((node.lineno, f"{node.module}.{alias.name}") for alias in node.names)
         elif isinstance(node, ast.Import):

@@ -7,6 +7,8 @@ from pathlib import Path
 
 import pytest
 
+from architecture import list_nodes
+
 TOP = Path(__file__).resolve().parents[2]
 CODE = ("beyond_mocap", "scene", "operators", "panels", "packaging", "sample_blend", "benchmarks", "training")
 ROOMS = ("beyond_mocap", "scene", "operators", "panels")
@@ -45,7 +47,7 @@ def function_names(paths):
     """Distinct names of functions and methods, those with two underscores in front left out."""
     found = set()
     for path in paths:
-        nodes = ast.walk(ast.parse(path.read_text("utf-8")))
+        nodes = list_nodes(path.read_text("utf-8"))
         found |= {node.name for node in nodes if isinstance(node, (ast.FunctionDef, ast.AsyncFunctionDef))}
     return {name for name in found if not name.startswith("__")}
 
@@ -80,7 +82,7 @@ def test_more_than_a_fifth_of_the_core_is_documentation():
         text = path.read_text("utf-8")
         lines += text.count("\n")
         documented += sum(line.lstrip().startswith("#") for line in text.splitlines())
-        for node in ast.walk(ast.parse(text)):
+        for node in list_nodes(text):
             if isinstance(node, (ast.FunctionDef, ast.ClassDef, ast.Module)) and ast.get_docstring(node) is not None:
                 documented += node.body[0].end_lineno - node.body[0].lineno + 1
     assert documented >= 0.22 * lines

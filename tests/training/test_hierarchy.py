@@ -60,7 +60,7 @@ def test_training_predicts_what_use_predicts(examples, kind):
     recorded, _, _ = trained.data
     batch = jnp.array([0])
     (start, told), (truth, _) = recorded.select_frames(batch, batch + 7), recorded.select_frames(batch, batch + 8)
-    theirs, _ = trained._predict_frame(params, start, truth, told, jax.random.key(0))
+    theirs, _ = jax.jit(trained._predict_frame)(params, start, truth, told, jax.random.key(0))
     assert np.abs(mine.positions - np.asarray(theirs.positions[0])).max() < 2e-4
     assert np.linalg.norm(mine.positions - pose.positions[7], axis=-1).max() > 0.01
 

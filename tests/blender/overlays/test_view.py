@@ -10,18 +10,7 @@ from mathutils import Vector
 from undo import assert_one_step, collect_state
 
 SAMPLE = pathlib.Path(__file__).resolve().parents[3] / "sample_blend"
-CLIPS = ("standing_1", "walking_1_2", "walk_jog_walk", "jogging_2_9", "jogging_turn_left", "running_4_2",
-         "kick_low_inside")
 WORDS = "5.0 kick right low inside\n"
-
-
-@pytest.fixture(scope="session")
-def library_folder(tmp_path_factory):
-    folder = tmp_path_factory.mktemp("seen_library")
-    for name in CLIPS:
-        for suffix in (".bvh", ".txt"):
-            (folder / f"{name}{suffix}").symlink_to(SAMPLE / "library" / f"{name}{suffix}")
-    return folder
 
 
 @pytest.fixture

@@ -2,7 +2,6 @@
 
 import importlib
 import json
-import pathlib
 
 import bpy
 import numpy as np
@@ -239,15 +238,11 @@ def test_what_is_a_players_own_is_in_his_plan(extension, scene):
     assert (plan.strength, plan.masses, plan.fatigue) == (4.0, "women", 0.5)
 
 
-def test_a_drawn_player_is_synthesized_updated_and_pinned(extension, scene, core, tmp_path):
-    sample = pathlib.Path(__file__).resolve().parents[3] / "sample_blend" / "library"
-    for name in ("standing_1", "walking_1_2", "jogging_2_9"):
-        for suffix in (".bvh", ".txt"):
-            (tmp_path / f"{name}{suffix}").symlink_to(sample / f"{name}{suffix}")
+def test_a_drawn_player_is_synthesized_updated_and_pinned(extension, scene, core, library_folder):
     freshness = importlib.import_module(f"{extension.__name__}.scene.result.freshness")
     session = importlib.import_module(f"{extension.__name__}.scene.core.session")
     settings = scene.beyond_mocap
-    settings.library_folder = str(tmp_path)
+    settings.library_folder = str(library_folder)
     bpy.ops.beyond_mocap.draw_track()
     player = settings.players[0]
     assert not freshness.compute_edited_parts(scene, player)  # nothing made yet

@@ -5,7 +5,6 @@ import json
 import pathlib
 
 import bpy
-import cached_work
 import numpy as np
 import path_edit_rigs
 import pytest
@@ -17,15 +16,6 @@ from undo import assert_one_step, collect_state, press_operator
 
 SAMPLE = pathlib.Path(__file__).resolve().parents[3] / "sample_blend" / "library"
 TARGET = (18.0, 1.0, 1.2)
-
-
-@pytest.fixture(scope="module", autouse=True)
-def work_once(extension):
-    """The same order is worked out once."""
-    core = importlib.import_module(f"{extension.__name__}.beyond_mocap.library.library")
-    with pytest.MonkeyPatch.context() as monkeypatch:
-        cached_work.cache_work(monkeypatch, core.Library)
-        yield
 
 
 @pytest.fixture(autouse=True)

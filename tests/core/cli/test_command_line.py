@@ -117,7 +117,7 @@ def test_a_library_without_labels_is_described_and_used_with_proposed_ones(run, 
     assert (status, error) == (0, []) and "labels proposed for 2 clips" in out
     report = json.loads((tmp_path / "r.json").read_text())
     assert report["proposed_clips"] == 2 and {"walking", "running"} <= set(report["words"])
-    status, _, error = run("synthesize", "--library", clips, "--track", match / "track_only.csv",
+    status, _, error = run("synthesize", "--library", clips, "--track", match / "track_only.csv", "--no-made",
                            "--annotations", match / "empty.txt", "--out", tmp_path / "out.bvh")
     assert status == 0 and any("labels proposed for 2 clips" in line for line in error)
 
@@ -268,7 +268,7 @@ def test_a_root_above_the_hips_and_a_ball_come_back_where_they_are_asked_for(run
         ball = motion.root_positions * [1, 1, 0] + [0.4, 0.0, 0.11]
         write_ball(folder / f"{name}.ball.csv", BallPath(np.arange(len(ball)) / 30.0, ball, np.ones(len(ball), bool)))
     order = ["synthesize", "--library", folder, "--track", match / "track_only.csv", "--annotations",
-             match / "empty.txt", "--ball", tmp_path / "ball.csv"]
+             match / "empty.txt", "--ball", tmp_path / "ball.csv", "--no-made"]
     status, _, error = run(*order, "--out", tmp_path / "plain.bvh")
     assert status == 0 and any("--recorded-ball takes that of the recordings" in line for line in error)
     assert not (tmp_path / "ball.csv").exists()
@@ -641,14 +641,13 @@ needs_data = pytest.mark.skipif(
 
 @needs_data
 @pytest.mark.parametrize("scenario", [3, 4])
-def test_real_recordings(run, tmp_path_factory, scenario):
+def test_real_recordings(run, tmp_path_factory, recordings_cache, scenario):
     """CMU's subject 10 as the library: all methods with the nearest words, key times exact; without, status 3."""
     folder = tmp_path_factory.mktemp("real")
-    cache = tmp_path_factory.getbasetemp() / "cmu10"
     track, words = (
         DATA / "tracking" / "scenarios" / f"scenario{scenario}_{kind}" for kind in ("track.csv", "annotations.txt")
     )
-    library = ("--library", DATA / "mocap" / "cmu10", "--unit", 0.05644, "--cache", cache)
+    library = ("--library", DATA / "mocap" / "cmu10", "--unit", 0.05644, "--cache", recordings_cache)
     written = ("--out", folder / "out.bvh", "--report", folder / "r.json")
     common = ("synthesize", *library, "--track", track, "--annotations", words, *written)
     asked = read_timeline(words, 30.0).keys

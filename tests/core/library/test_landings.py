@@ -103,7 +103,7 @@ def test_a_dive_is_played_to_its_feet_on_the_track(keeper, track_of, timeline_of
     track = track_of(
         speed=lambda t: 2.2 * np.exp(-(((t - 5.0) / 0.4) ** 2)), seconds=11.0, turn=lambda t: 0.0 * t + 1.0
     )
-    take = synthesize(keeper, Plan(track=track, timeline=timeline_of((5.0, "dive left"))))
+    take = synthesize(keeper, Plan(track=track, timeline=timeline_of((5.0, "dive left")), made=False))
     sources = np.array(take.clips)[take.clip]
     played = np.flatnonzero(sources == LANDING_FOLDER + "saves/dive.bvh")
     assert (sources == "saves/dive.bvh").any() and len(played) > 60 and np.all(np.diff(played) == 1)
@@ -118,7 +118,7 @@ def test_an_edit_far_from_a_dive_leaves_what_is_made_as_it_was(keeper, track_of,
     track = track_of(
         speed=lambda t: 2.2 * np.exp(-(((t - 5.0) / 0.4) ** 2)), seconds=24.0, turn=lambda t: 0.0 * t + 1.0
     )
-    plan = Plan(track=track, timeline=timeline_of((5.0, "dive left")))
+    plan = Plan(track=track, timeline=timeline_of((5.0, "dive left")), made=False)
     before = synthesize(keeper, plan)
     after = resynthesize(keeper, replace(plan, timeline=timeline_of((5.0, "dive left"), (18.0, "dive right"))), before)
     sources = np.array(after.clips)[after.clip]

@@ -134,6 +134,7 @@ def test_a_span_that_ends_before_it_starts_is_told(library, weaving_player):
         construct_player(library, weaving_player, 20.0, 10.0)
 
 
-def test_another_library_is_told(strikes_library, weaving_player):
+def test_another_library_is_told(library, weaving_player):
+    other = replace(library, clips=tuple(replace(clip, path=f"other/{clip.path}") for clip in library.clips))
     with pytest.raises(InputError, match="the library of this match"):
-        construct_player(strikes_library, weaving_player, 5.0, 10.0)
+        construct_player(other, weaving_player, 5.0, 10.0)

@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from threadpoolctl import threadpool_limits
 
 from beyond_mocap.annotation.ball_contact import build_surfaces
 from beyond_mocap.annotation.striking import HEAD_RADIUS
@@ -100,36 +101,43 @@ def test_the_same_order_gives_the_same_bits(take_of, method):
     assert digest(take_of(*lines, method=method)) == digest(take_of(*lines, method=method))
 
 
-REMOTE = """
-import sys, hashlib, numpy as np
+DIGESTS = """
+def list_digests(library):
+    import hashlib
+    import numpy as np
+    from beyond_mocap.annotation import KeyMoment, Timeline
+    from beyond_mocap.motion.track import Track
+    from beyond_mocap.synthesis.plan import METHODS, Plan
+    from beyond_mocap.synthesis.synthesize import synthesize
+    times, kick = np.arange(0, 6.01, 0.04), Timeline(keys=(KeyMoment(3.0, ("kick",)),))
+    track = Track(times, np.stack([2.0 * times, np.sin(times)], axis=1))
+    for method in METHODS:
+        take = synthesize(library, Plan(track=track, timeline=kick, method=method))
+        parts = (take.motion.root_positions, take.motion.rotations, take.clip_frame, library.frames.features,
+                 library.clusters[16].label)
+        yield method, hashlib.sha256(b"".join(np.ascontiguousarray(p).tobytes() for p in parts)).hexdigest()
+"""
+REMOTE = DIGESTS + """
+import sys
 from beyond_mocap.library.build import build_library
-from beyond_mocap.annotation import KeyMoment, Timeline
-from beyond_mocap.motion.track import Track
-from beyond_mocap.synthesis.plan import METHODS, Plan
-from beyond_mocap.synthesis.synthesize import synthesize
 library = build_library(sys.argv[1], rebuild=True, cache_dir=sys.argv[2])
-times = np.arange(0, 6.01, 0.04)
-track = Track(times, np.stack([2.0 * times, np.sin(times)], axis=1))
-for method in METHODS:
-    take = synthesize(library, Plan(track=track, timeline=Timeline(keys=(KeyMoment(3.0, ("kick",)),)), method=method))
-    motion = take.motion
-    own = (library.frames.features, library.clusters[16].label)
-    parts = (motion.root_positions, motion.rotations, take.clip_frame, *own)
-    print(method, hashlib.sha256(b"".join(np.ascontiguousarray(p).tobytes() for p in parts)).hexdigest())
+for line in list_digests(library):
+    print(*line)
 """
 
 
-def test_the_number_of_threads_changes_no_bit(clips_folder, tmp_path):
-    """Library and takes worked out anew in two processes, with one and with three threads for linear algebra."""
-    running = []
-    for threads in ("1", "3"):
-        names = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
-        environment = {**os.environ, "PYTHONPATH": str(TOP), **dict.fromkeys(names, threads)}
-        command = [sys.executable, "-c", REMOTE, str(clips_folder), str(tmp_path / threads)]
-        running.append(subprocess.Popen(command, env=environment, stdout=-1, stderr=-1, text=True))
-    outs = [process.communicate(timeout=180) for process in running]
-    assert [process.returncode for process in running] == [0, 0], outs
-    assert outs[0][0] == outs[1][0] and len(outs[0][0].splitlines()) == len(METHODS)
+def test_the_number_of_threads_changes_no_bit(library, clips_folder, tmp_path):
+    """Library and takes worked out anew in a process with three threads for linear algebra, and here with one."""
+    names = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
+    environment = {**os.environ, "PYTHONPATH": str(TOP), **dict.fromkeys(names, "3")}
+    command = [sys.executable, "-c", REMOTE, str(clips_folder), str(tmp_path)]
+    told = subprocess.run(command, env=environment, capture_output=True, text=True, timeout=180)
+    assert told.returncode == 0, told.stderr
+    here = {}
+    exec(DIGESTS, here)
+    with threadpool_limits(1):
+        lines = [" ".join(line) for line in here["list_digests"](library)]
+    assert told.stdout.splitlines() == lines and len(lines) == len(METHODS)
 
 
 @pytest.mark.parametrize("fps", [24.0, 25.0, 30.0, 60.0])

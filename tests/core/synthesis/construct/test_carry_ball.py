@@ -100,9 +100,10 @@ def test_an_update_carries_the_ball_too(take, dribbles, track_of, timeline_of):
 
 def test_without_the_setting_and_with_a_ball_in_the_track_nothing_rides_along(dribbles, track_of, timeline_of, take):
     line = (0.5, 3.5, "dribble jogging front")
-    plain = Plan(track=track_of(2.8, 4.0), timeline=timeline_of(line))
+    plain = Plan(track=track_of(2.8, 4.0), timeline=timeline_of(line), made=False)
     assert synthesize(dribbles, plain).ball is None
-    tracked = Plan(track=track_of(2.8, 4.0, ball=True), timeline=timeline_of(line), solve_touches=False)
+    tracked = Plan(track=track_of(2.8, 4.0, ball=True), timeline=timeline_of(line), solve_touches=False,
+                   made=False)
     asked = Plan(**{**vars(tracked), "recorded_ball": True})
     assert np.array_equal(*(synthesize(dribbles, plan).ball.positions for plan in (tracked, asked)))
 

@@ -77,7 +77,7 @@ def test_only_a_search_that_leaves_it_out_says_so(with_header, track_of, timelin
     """By distance, what another key moment leaves no room for is cut off whether it drags or not."""
     moments = ((KEY, "header standing"), (KEY + 0.4, "header standing"))
     track = track_of(lambda t: np.full(len(t), 4.5))
-    take = synthesize(with_header, Plan(track=track, timeline=timeline_of(*moments), method=method))
+    take = synthesize(with_header, Plan(track=track, timeline=timeline_of(*moments), method=method, made=False))
     assert any("is left out" in line for line in take.warnings) == (method == "path")
 
 
