@@ -346,7 +346,6 @@ def a_match_child(room, _context):
 def a_stream(room, _context):
     bpy.context.scene.beyond_mocap_stream.port = find_free_port()
     room("scene.stream.follow").start_listening(bpy.context.scene.beyond_mocap_stream)
-    room("scene.stream.follow").reset_status()
 
 
 def a_live_update(room, _context):

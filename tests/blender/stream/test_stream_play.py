@@ -23,7 +23,7 @@ def room():
     yield found
     found("stream.play").stop_rally()
     found("stream.follow").stop_listening()
-    found("stream.follow").write_status()
+    found("stream.follow").write_stopped()
 
 
 @pytest.fixture(scope="module")
@@ -98,7 +98,7 @@ def test_an_answer_that_is_planned_ahead_begins_at_once(playing, room, core):
     while ahead.find(ahead.request_for(kick(core), "Ben", 0)) is None and time.monotonic() < end:
         play.update_rally(playing)
         time.sleep(0.01)
-    play.store_strike(playing, kick(core), time.monotonic())
+    play.store_strike(kick(core), time.monotonic())
     play.update_rally(playing)
     assert play.get_current_rally().passes == 1 and "The answer began 0." in told().played
     assert play._session["ahead"] is not ahead and play._session["pending"] is None
@@ -132,7 +132,7 @@ def test_a_stream_is_answered(playing, room, core):
     sender = core("passes.stream.sender").Sender(CLIPS / "volley_toss.bvh", port)
     thread = threading.Thread(target=sender.send_file, args=(lambda: False,))
     thread.start()
-    look, end = room("stream.follow").update_stream, time.monotonic() + 60.0
+    look, end = room("stream.follow").update_streams, time.monotonic() + 60.0
     while room("stream.play").get_current_rally().passes == 0 and time.monotonic() < end:
         look(playing)
         time.sleep(0.02)
@@ -144,7 +144,7 @@ def test_what_cannot_be_answered_is_told_and_changes_nothing(playing, room, core
     play = room("stream.play")
     actions = {row.name: row.body.animation_data.action.name for row in playing.beyond_mocap_passes.players}
     tail = replace(kick(core), part="tail")
-    play.store_strike(playing, tail, 0.0)
+    play.store_strike(tail, 0.0)
     end = time.monotonic() + 60.0
     while "has the ball" in told().played and time.monotonic() < end:
         play.update_rally(playing)

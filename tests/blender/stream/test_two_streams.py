@@ -1,0 +1,205 @@
+"""Two streams at once: each character follows its own user, and the users pass the ball to each other."""
+
+import socket
+import threading
+import time
+from contextlib import contextmanager
+
+import bpy
+import numpy as np
+import pytest
+from conftest import find_free_port
+from test_stream import CLIP, OPS, room, send  # noqa: F401
+from test_stream_play import CLIPS, cache, playing  # noqa: F401
+from undo import press_operator
+
+OTHER = CLIP.with_name("walking_1_2.bvh")
+
+
+@pytest.fixture
+def streams():
+    """Two streams, each on a port of its own."""
+    first = bpy.context.scene.beyond_mocap_stream
+    press_operator(OPS.stream_list, what="ADD")
+    first.port, first.further[0].port = find_free_port(), find_free_port()
+    return first, first.further[0]
+
+
+def get_status(number):
+    """Status of a stream."""
+    manager = bpy.context.window_manager.beyond_mocap_streaming
+    return next(one for one in (manager, *manager.further) if one.number == number)
+
+
+def start_both():
+    for number in (1, 2):
+        assert press_operator(OPS.stream_start, number=number) == {"FINISHED"}
+
+
+def follow_until(room, is_true, seconds=60.0):  # noqa: F811
+    """Update until something is true."""
+    end = time.monotonic() + seconds
+    while not is_true():
+        assert time.monotonic() < end, (get_status(1).line, get_status(2).line)
+        room("stream.follow").update_streams(bpy.context.scene)
+        time.sleep(0.01)
+
+
+def send_all(room, core, *sent):  # noqa: F811
+    """Send clips at once, each to the port of a stream, and follow until all of their frames are shown."""
+    threads = [send(core, stream.port, rate, "tcp", path) for stream, path, rate in sent]
+    wanted = [len(core("files.bvh.bvh").read_bvh(path).motion) for _, path, _ in sent]
+    shown = room("stream.follow")._streams
+    follow_until(room, lambda: all(shown[stream.number].seen % count == 0 and shown[stream.number].seen
+                                   for (stream, _, _), count in zip(sent, wanted)))
+    for thread in threads:
+        thread.join()
+
+
+def measure_joints(body, motion):
+    """Where the joints of a streamed character are, (J, 3) m."""
+    bpy.context.view_layer.update()
+    return np.array([(body.matrix_world @ body.pose.bones[name].head)[:] for name in motion.skeleton.names])
+
+
+def assert_shows_the_end(core, stream, path):
+    motion = core("files.bvh.bvh").read_bvh(path).motion
+    joints, _ = core("motion.motion").forward_kinematics(motion)
+    np.testing.assert_allclose(measure_joints(stream.body, motion), joints[-1], atol=2e-3)
+
+
+def test_each_character_follows_its_own_and_one_goes_on_alone(room, core, streams):  # noqa: F811
+    first, second = streams
+    first.protocol = second.protocol = "tcp"  # a busy machine drops datagrams
+    start_both()
+    send_all(room, core, (first, CLIP, 600.0), (second, OTHER, 600.0))
+    assert (first.body.name, second.body.name) == ("Stream", "Stream 2")
+    assert_shows_the_end(core, first, CLIP)
+    assert_shows_the_end(core, second, OTHER)
+    press_operator(OPS.stream_stop, number=1)
+    send_all(room, core, (second, CLIP, 600.0))
+    assert (get_status(1).on, get_status(2).on) == (False, True)
+    assert_shows_the_end(core, first, CLIP)
+    assert room("stream.follow").find_listener(1) is None
+
+
+def test_the_same_avatar_in_both_is_two_users(room, core, streams):  # noqa: F811
+    for stream, path in zip(streams, (CLIP, OTHER)):
+        stream.clip, stream.protocol = str(path), "tcp"
+    start_both()
+    senders = [core("passes.stream.sender").Sender(path, stream.port, "tcp", form="neuron", rate=600.0)
+               for stream, path in zip(streams, (CLIP, OTHER))]
+    threads = [threading.Thread(target=sender.send_file, args=(lambda: False,)) for sender in senders]
+    for thread in threads:
+        thread.start()
+    shown = room("stream.follow")._streams
+    follow_until(room, lambda: all(shown[number].seen == len(sender.rows) for number, sender in enumerate(senders, 1)))
+    for stream, path in zip(streams, (CLIP, OTHER)):
+        assert_shows_the_end(core, stream, path)
+
+
+@pytest.mark.parametrize("change, says", [
+    (lambda first, second: setattr(second, "port", first.port), "stream 1 receives on port"),
+    (lambda first, second: [setattr(one, "player", "Ann") for one in (first, second)], "Ann already repeats"),
+])
+def test_port_and_player_are_of_one_stream_only(room, streams, change, says):  # noqa: F811
+    change(*streams)
+    OPS.stream_start()
+    with pytest.raises(RuntimeError, match=says) as told:
+        press_operator(OPS.stream_start, number=2)
+    assert len(str(told.value).strip().splitlines()) == 1
+    assert room("stream.follow").find_listener(1).is_running and room("stream.follow").find_listener(2) is None
+
+
+@pytest.mark.parametrize("online", [False, True])
+def test_both_listen_to_this_machine_only(room, streams, online):  # noqa: F811
+    """With and without Allow Online Access: nothing comes from another machine, and nothing is sent."""
+    system = bpy.context.preferences.system
+    system.use_online_access = online
+    try:
+        start_both()
+        sockets = [room("stream.follow").find_listener(number)._server for number in (1, 2)]
+        assert {one.getsockname()[0] for one in sockets} == {"127.0.0.1"}
+    finally:
+        system.use_online_access = False
+
+
+def test_a_saved_file_has_both_and_closing_ends_both(room, streams, tmp_path):  # noqa: F811
+    start_both()
+    ports = [stream.port for stream in streams]
+    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "two.blend"))
+    listeners = [room("stream.follow").find_listener(number) for number in (1, 2)]
+    assert all(one.is_running for one in listeners)
+    bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "two.blend"))
+    assert not any(one.is_running for one in listeners)
+    settings = bpy.context.scene.beyond_mocap_stream
+    assert [settings.port, settings.further[0].port] == ports
+    for port in ports:
+        with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as again:
+            again.bind(("127.0.0.1", port))
+
+
+def test_undo_of_adding_a_stream_ends_it_and_not_the_other(room):  # noqa: F811
+    bpy.context.scene.beyond_mocap_stream.port = find_free_port()
+    bpy.ops.ed.undo_push(message="before")
+    press_operator(OPS.stream_list, what="ADD")
+    bpy.context.scene.beyond_mocap_stream.further[0].port = find_free_port()
+    start_both()
+    bpy.ops.ed.undo()
+    room("stream.follow").update_streams(bpy.context.scene)
+    assert not len(bpy.context.scene.beyond_mocap_stream.further)
+    assert room("stream.follow").find_listener(1).is_running and room("stream.follow").find_listener(2) is None
+
+
+def test_removing_a_stream_ends_it(room, streams):  # noqa: F811
+    start_both()
+    press_operator(OPS.stream_list, what="REMOVE", number=2)
+    assert room("stream.follow").find_listener(2) is None and room("stream.follow").find_listener(1).is_running
+    with pytest.raises(RuntimeError, match="no number 2"):
+        OPS.stream_start(number=2)
+
+
+@contextmanager
+def kicking(core, port):
+    """A user who kicks again and again."""
+    stop = threading.Event()
+    sender = core("passes.stream.sender").Sender(CLIPS / "volley_pass.bvh", port, loop=True)
+    thread = threading.Thread(target=sender.send_file, args=(stop.is_set,))
+    thread.start()
+    try:
+        yield
+    finally:
+        stop.set()
+        thread.join()
+
+
+def test_two_users_pass_to_each_other(playing, room, core):  # noqa: F811
+    """Ann's user kicks to Ben, whose user kicks back; a kick of one who has no ball does nothing."""
+    press_operator(OPS.stream_list, what="ADD")
+    first, second = playing.beyond_mocap_stream, playing.beyond_mocap_stream.further[0]
+    first.port, second.port, first.player, second.player = find_free_port(), find_free_port(), "Ann", "Cho"
+    start_both()
+    rally = room("stream.play").get_current_rally
+    with kicking(core, second.port):  # Cho's user, while Ann has the ball
+        follow_until(room, lambda: bool(get_status(2).hit))
+    assert rally().passes == 0
+    with kicking(core, first.port):
+        follow_until(room, lambda: rally().passes == 1, 120.0)
+    assert rally().holder == "Cho", "the next with a user, not Ben, who is the next of the list"
+    playing.frame_set(int(5 + 24 * rally().ready_time) + 2)
+    with kicking(core, second.port):
+        follow_until(room, lambda: rally().passes == 2, 120.0)
+    assert rally().holder == "Ann"
+
+
+def test_a_player_of_no_scene_is_told(playing, room):  # noqa: F811
+    playing.beyond_mocap_stream.port, playing.beyond_mocap_stream.player = find_free_port(), "Zoe"
+    OPS.stream_start()
+    with pytest.raises(RuntimeError, match="no player 'Zoe' in the passing scene"):
+        press_operator(OPS.stream_play)
+
+
+def test_a_renamed_player_keeps_the_stream(playing):  # noqa: F811
+    playing.beyond_mocap_stream.player = "Ann"
+    playing.beyond_mocap_passes.players["Ann"].name = "Anna"
+    assert playing.beyond_mocap_stream.player == "Anna"
