@@ -1,4 +1,4 @@
-"""Valid files to damage that the program itself writes: tables, pieces, a model of markers, a classifier, a player."""
+"""Valid files to damage that the program itself writes: tables, pieces, models, a player, joints, motion of SMPL."""
 
 import json
 import shutil
@@ -9,10 +9,13 @@ from seeds import SAMPLE
 
 from beyond_mocap.annotation import event_labels
 from beyond_mocap.cli.main import main
+from beyond_mocap.files.smpl.smpl import write_smpl
 from beyond_mocap.markers.files.marker_set_text import SHIPPED
 from beyond_mocap.markers.files.model_json import write_model
 from beyond_mocap.match.piece_file import write_piece_file
 from beyond_mocap.match.player_edit import write_player
+from tests.core.files.test_smpl import build_walk
+from tests.core.joint_feeds import sample_joints, write_cdf, write_fifa, write_hawkeye, write_table
 from tests.core.markers.files.small_model import small_model
 from tests.core.match.made_player import made_player
 
@@ -32,7 +35,22 @@ def build_made_seeds(folder: Path) -> dict[str, Path]:
     write_player(seeds["player.npz"], made_player())
     seeds["set.txt"] = sorted(SHIPPED.glob("*.txt"))[0]
     seeds["event_labels.csv"] = Path(event_labels.__file__).parent / "event_words.csv"
+    seeds.update(_write_bodies(folder))
     return {**seeds, "classifier.npz": _learn(folder / "learned", folder / "classifier.npz")}
+
+
+def _write_bodies(folder: Path) -> dict[str, Path]:
+    """Write a player's joints in four forms, and a walk of SMPL."""
+    people = {"7": sample_joints(fps=25.0)[:40]}
+    walk = folder / "walk_smpl.npz"
+    write_smpl(walk, build_walk(60))
+    return {
+        "joints.csv": write_table(folder / "joints.csv", people, 25.0),
+        "joints.jsonl": write_cdf(folder / "joints.jsonl", people, 25.0),
+        "joints.npz": write_fifa(folder / "joints.npz", people),
+        "hawkeye.joints": write_hawkeye(folder, people, 25.0),
+        "walk_smpl.npz": walk,
+    }
 
 
 def _learn(clips: Path, out: Path) -> Path:

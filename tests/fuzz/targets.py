@@ -9,7 +9,9 @@ from beyond_mocap.annotation.event_labels import read_event_labels
 from beyond_mocap.cli.main import main
 from beyond_mocap.files.bvh.bvh import read_bvh
 from beyond_mocap.files.events import read_events
+from beyond_mocap.files.joints.joint_readers import read_joints
 from beyond_mocap.files.obj import read_mesh
+from beyond_mocap.files.smpl.smpl import read_smpl
 from beyond_mocap.files.tables import read_ball
 from beyond_mocap.files.tracking.tracking import read_match, read_track_csv
 from beyond_mocap.library.classify.classifier import read_classifier
@@ -132,6 +134,8 @@ def list_targets(files: dict[str, Path]) -> list[Target]:
         _read("classifier", "classifier.npz", read_classifier),
         _read("edit list", "player.npz", read_player, 8),
         _read("piece", "piece.npz", read_piece_file),
+        _read("joints", "joints.* *.joints", read_joints, 12),
+        _read("smpl", "walk_smpl.npz", read_smpl, 8),
         _read("state of a match", "match.json", lambda path: read_state(path.parent)),
     ]
     matches = [
@@ -199,6 +203,8 @@ def list_targets(files: dict[str, Path]) -> list[Target]:
             1,
             120.0,
         ),
+        _verb("bodies", "joints.*", "bodies --joints {bad} --out {out}/bodies", files, 2, 60.0),
+        _verb("retarget smpl", "walk_smpl.npz", "retarget {bad} --to {walk} --out {out}/o.bvh", files, 2, 60.0),
         _verb("reconstruct by model", "model.json", "reconstruct {trc} --model {bad} --out {out}/o.bvh", files),
         _verb(
             "propose",

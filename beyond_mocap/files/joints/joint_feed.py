@@ -12,6 +12,7 @@ import numpy as np
 from ...base.errors import InputError, format_count
 from .landmarks import LANDMARKS
 
+_FAR = 1e9  # farther than any stadium in any unit: damaged numbers stay outliers, and their squares are finite
 _MOST_POINTS = 60_000_000
 _UNITS = {"metres": 1.0, "centimetres": 0.01, "millimetres": 0.001, "feet": 0.3048, "decimetres": 0.1}
 _LEG = 0.87  # metres, thigh and shank of an adult
@@ -113,7 +114,7 @@ class JointCollector:
         times, at = np.unique(rows[:, 0], return_inverse=True)
         used = np.unique(rows[:, 1]).astype(int)
         positions = np.full((len(times), len(used), 3), np.nan)
-        positions[at.reshape(-1), np.searchsorted(used, rows[:, 1].astype(int))] = rows[:, 2:]
+        positions[at.reshape(-1), np.searchsorted(used, rows[:, 1].astype(int))] = np.clip(rows[:, 2:], -_FAR, _FAR)
         return PlayerJoints(id=person, team=self._teams.get(person, ""),
                             landmarks=tuple(LANDMARKS[number] for number in used), times=times, positions=positions)
 

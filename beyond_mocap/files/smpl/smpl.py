@@ -42,6 +42,7 @@ _KIND = "a motion of SMPL as .npz: poses (T, 72, 156 or 165), trans (T, 3), moca
 _NUMBERS = tuple(np.dtype(kind) for kind in ("<f4", "<f8", "<i4", "<i8", "|u1", "<u4", "<u8", "<i2"))
 _MAX_BYTES = 1 << 30
 _MAX_FRAMES = 1_000_000
+_MAX_TURN = 1000.0  # radians; rotation vectors are hardly above 2 pi: beyond this a number is damaged
 _MAX_METRES = 10_000.0
 _WIDTHS = {72: "SMPL", 156: "SMPL-H", 165: "SMPL-X"}
 _RATES = ("mocap_framerate", "mocap_frame_rate", "fps")
@@ -154,6 +155,8 @@ def _find_poses(path: Path, arrays: Mapping[str, np.ndarray]) -> tuple[np.ndarra
         raise InputError(path, format_count(len(flat), "frame"), f"2 to {_MAX_FRAMES:,}")
     if np.abs(trans).max() > _MAX_METRES:
         raise InputError(path, f"trans up to {np.abs(trans).max():.3g}", f"metres, below {_MAX_METRES:g}")
+    if np.abs(flat).max() > _MAX_TURN:
+        raise InputError(path, f"poses up to {np.abs(flat).max():.3g}", f"radians, below {_MAX_TURN:g}")
     return flat[:, : 3 * len(JOINTS)].reshape(len(flat), len(JOINTS), 3).astype(float), trans.astype(float), form
 
 

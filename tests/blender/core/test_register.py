@@ -14,7 +14,7 @@ HEAVY = {"scipy", "sklearn", "kloppy", "c3d", "lxml", "joblib", "matplotlib"}
 # loaded, import it as a whole (`from ..scene.rigs import fit`), or inside the function that needs it.
 CORE = {"annotation", "appearance.mesh", "ball.flight", "files.bvh.bvh", "library.library", "motion.humanoid",
         "motion.motion", "passes.pass_scene", "synthesis.plan", "synthesis.take"}  # fmt: skip
-MOST_MODULES = 218
+MOST_MODULES = 216
 # A fresh process with this session's profile: enable, tell what is loaded, end without Blender's own ending (which may
 # hang).
 ENABLE = """
