@@ -83,8 +83,8 @@ def start_listening(stream: StreamSettings) -> listening.Listener:
     """Start to receive a stream as its settings say.
 
     Raises:
-        InputError: if it is received already, its port or player is that of another stream, the port is in use, or
-        the suit's file is no BVH file; nothing is changed then.
+        InputError: if it is received already, its port, player or armature is that of another stream, the port is in
+        use, or the suit's file is no BVH file; nothing is changed then.
     """
     clip = bpy.path.abspath(stream.clip) if stream.clip else ""
     hierarchy = bvh_stream.read_hierarchy(clip) if clip else None
@@ -98,17 +98,21 @@ def start_listening(stream: StreamSettings) -> listening.Listener:
 
 
 def _check_can_start(stream: StreamSettings) -> None:
-    """Raise an InputError if a stream is received already, or shares port or player with one that is."""
+    """Raise an InputError if a stream is received already, or shares player, armature or port with one that is."""
     where = f"stream {stream.number}"
     if stream.number in _streams:
         raise InputError(where, "is already received", "one that is stopped", "press Stop Stream")
-    for other in list_streams(stream.id_data):
-        if other.number in _streams and stream.player and other.player == stream.player:
+    for other in list_received(stream.id_data):
+        if stream.player and other.player == stream.player:
             raise InputError(where, f"{stream.player} already repeats the strikes of stream {other.number}",
                              "another player", "choose one under Player, or none")
-    for other in _streams.values():
-        if other.listener.port == stream.port and (other.listener.protocol == "udp") == (stream.protocol == "udp"):
-            raise InputError(where, f"stream {other.number} receives on port {stream.port}", "a port of its own",
+        if stream.body is not None and other.body == stream.body:
+            raise InputError(where, f"armature {stream.body.name} follows stream {other.number}",
+                             "an armature of its own", "choose another one under Streamed Body, or none")
+    for received in _streams.values():
+        listener = received.listener
+        if listener.port == stream.port and (listener.protocol == "udp") == (stream.protocol == "udp"):
+            raise InputError(where, f"stream {received.number} receives on port {stream.port}", "a port of its own",
                              "choose another port, here and in the sender")
 
 

@@ -16,7 +16,8 @@ class StreamSettings:
                         description="Number of the stream in its scene; it stays when other streams are removed")
     clip: StringProperty(name="Suit's BVH", subtype="FILE_PATH",
                          description="BVH file of the same suit, needed for streams that send numbers only")
-    body: PointerProperty(name="Streamed Body", type=bpy.types.Object, poll=lambda _, thing: thing.type == "ARMATURE",
+    body: PointerProperty(name="Streamed Body", type=bpy.types.Object,
+                          poll=lambda stream, thing: can_follow(stream, thing),
                           description="Armature that follows the user; created if empty")
     player: StringProperty(name="Player", description="Player who repeats this user's strikes in Play Live; leave "
                            "empty for each player who has the ball and no user")
@@ -73,6 +74,12 @@ def list_streams(scene: bpy.types.Scene) -> list[StreamSettings]:
 def find_stream(scene: bpy.types.Scene, number: int) -> StreamSettings | None:
     """Find a stream of a scene by its number; None if the scene has none of that number."""
     return next((stream for stream in list_streams(scene) if stream.number == number), None)
+
+
+def can_follow(stream: StreamSettings, thing: bpy.types.Object) -> bool:
+    """Whether an object can be chosen as a stream's body: an armature that is no other stream's."""
+    others = (one for one in list_streams(stream.id_data) if one.number != stream.number)
+    return thing.type == "ARMATURE" and all(one.body != thing for one in others)
 
 
 def list_statuses() -> list[StreamStatus]:

@@ -2,7 +2,6 @@
 
 import importlib
 import pathlib
-import socket
 import threading
 import time
 
@@ -32,6 +31,14 @@ def streams():
     press_operator(OPS.stream_list, what="ADD")
     first.port, first.further[0].port = find_free_port(), find_free_port()
     return first, first.further[0]
+
+
+def create_armature():
+    """The armature Mine, without bones."""
+    mine = bpy.data.objects.get("Mine") or bpy.data.objects.new("Mine", bpy.data.armatures.new("Mine"))
+    if mine.name not in bpy.context.scene.objects:
+        bpy.context.scene.collection.objects.link(mine)
+    return mine
 
 
 def get_status(number):
@@ -96,6 +103,20 @@ def test_each_character_follows_its_own_and_one_goes_on_alone(room, core, stream
     assert room("stream.follow").find_listener(1) is None
 
 
+def test_a_deleted_character_is_made_anew_and_the_other_stays(room, core, streams):
+    for stream in streams:
+        stream.protocol = "tcp"
+    start_both()
+    send_all(room, core, (streams[0], CLIP), (streams[1], OTHER))
+    stays = streams[0].body
+    bpy.data.objects.remove(streams[1].body)
+    bpy.context.scene.frame_set(20)  # as playback does
+    send_all(room, core, (streams[1], CLIP))
+    assert streams[0].body == stays and get_status(1).on
+    assert_shows_the_end(core, streams[0], CLIP)
+    assert_shows_the_end(core, streams[1], CLIP)
+
+
 def test_the_same_avatar_in_both_is_two_users(room, core, streams):
     for stream, path in zip(streams, (CLIP, OTHER)):
         stream.clip, stream.protocol = str(path), "tcp"
@@ -108,8 +129,10 @@ def test_the_same_avatar_in_both_is_two_users(room, core, streams):
 @pytest.mark.parametrize("change, says", [
     (lambda first, second: setattr(second, "port", first.port), "stream 1 receives on port"),
     (lambda first, second: [setattr(one, "player", "Ann") for one in (first, second)], "Ann already repeats"),
+    (lambda first, second: [setattr(one, "body", create_armature()) for one in (first, second)],
+     "armature Mine follows stream 1"),
 ])
-def test_port_and_player_are_of_one_stream_only(room, streams, change, says):
+def test_port_player_and_armature_are_of_one_stream_only(room, streams, change, says):
     change(*streams)
     OPS.stream_start()
     with pytest.raises(RuntimeError, match=says) as told:
@@ -131,19 +154,26 @@ def test_both_listen_to_this_machine_only(room, streams, online):
         system.use_online_access = False
 
 
-def test_a_saved_file_has_both_and_closing_ends_both(room, streams, tmp_path):
+def test_a_saved_file_goes_on_with_both_and_closing_ends_both(room, core, streams, tmp_path):
+    for stream, player in zip(streams, ("Ann", "Ben")):
+        stream.protocol, stream.player = "tcp", player
     start_both()
+    send_all(room, core, (streams[0], CLIP), (streams[1], OTHER))
     ports = [stream.port for stream in streams]
     bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "two.blend"))
     listeners = [room("stream.follow").find_listener(number) for number in (1, 2)]
     assert all(one.is_running for one in listeners)
     bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "two.blend"))
     assert not any(one.is_running for one in listeners)
-    settings = bpy.context.scene.beyond_mocap_stream
-    assert [settings.port, settings.further[0].port] == ports
-    for port in ports:
-        with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as again:
-            again.bind(("127.0.0.1", port))
+    first = bpy.context.scene.beyond_mocap_stream
+    saved = (first, first.further[0])
+    assert [(one.port, one.player, one.body.name) for one in saved] == [
+        (ports[0], "Ann", "Stream"), (ports[1], "Ben", "Stream 2")]
+    start_both()  # on the same ports, which are free again
+    send_all(room, core, (saved[0], OTHER), (saved[1], CLIP))
+    assert_shows_the_end(core, saved[0], OTHER)
+    assert_shows_the_end(core, saved[1], CLIP)
+    assert [one.body.name for one in saved] == ["Stream", "Stream 2"]
 
 
 def test_undo_of_adding_a_stream_ends_it_and_not_the_other(room):
