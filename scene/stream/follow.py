@@ -42,7 +42,8 @@ class ReceivedStream:
         listener: receives its frames.
         hits: detects strikes in them.
         seen: number of the last frame that was shown.
-        written, looked: s of the last status update and the last hit detection, monotonic clock.
+        looked: s of the last hit detection, monotonic clock.
+        written: number of the quarter second of the last status update, so that all streams share one redraw.
         bodies: characters created.
         latencies: s from sender to pose, of the last frames.
     """
@@ -51,8 +52,8 @@ class ReceivedStream:
     listener: listening.Listener
     hits: live_hits.LiveHits
     seen: int = 0
-    written: float = 0.0
     looked: float = 0.0
+    written: int = 0
     bodies: int = 0
     latencies: deque[float] = field(default_factory=lambda: deque(maxlen=60))
 
@@ -164,8 +165,8 @@ def _update_stream(scene: bpy.types.Scene, received: ReceivedStream) -> HitMotio
     if now - received.looked >= DETECT_SECONDS:
         received.looked = now
         found = _detect_hit(scene, find_stream(scene, received.number), received)
-    if now - received.written >= STATUS_SECONDS:
-        received.written = now
+    if int(now / STATUS_SECONDS) != received.written:
+        received.written = int(now / STATUS_SECONDS)
         write_status(received.number)
     return found
 
