@@ -198,6 +198,29 @@ def check_one_streams_answer_comes_at_once():
     assert_no_errors_since(mark)
 
 
+def list_streamed():
+    """The characters of both streams."""
+    first = get_scene().beyond_mocap_stream
+    return [stream.body for stream in (first, *first.further)]
+
+
+def move_both(ends):
+    """Send another motion to each stream, until both characters have moved; a picture is taken. What ends the senders
+    is added to `ends`."""
+    def list_poses():
+        return [tuple(round(value, 2) for value in body.pose.bones[0].rotation_quaternion) for body in list_streamed()]
+
+    for body, place in zip(list_streamed(), ((-2.0, 3.5, 0.0), (1.5, 3.5, 0.0))):
+        body.location = place
+    before = list_poses()
+    for clip, port in (("library/standing_turn_left.bvh", PORT), ("library/standing_turn_right.bvh", PORT + 1)):
+        ends.append(start_sending(clip, port=port))
+    yield from wait_until(lambda: all(new != old for new, old in zip(list_poses(), before)), what="both move")
+    yield from window.move_pointer(300, 300)
+    yield 1.5
+    window.save_picture(PICTURES / "two_streams.png")
+
+
 def check_two_users_pass_to_each_other():
     mark = len(output.text())
     back = yield from isolate_panel("draw_streams")
@@ -213,15 +236,12 @@ def check_two_users_pass_to_each_other():
     ends = []
     try:
         for port, other in ((PORT, PORT + 1), (PORT + 1, PORT)):
-            ends.append(start_sending("library/walking_1_2.bvh", port=other))  # the other user walks meanwhile
+            ends.append(start_sending("library/standing_2.bvh", port=other))  # the other user stands meanwhile
             seconds = yield from measure_answer(port)
             ends.pop()()
             report_time("two streams: from strike to the answer's first drawing, s", seconds, 0.3)
         assert (get_rally().holder, get_rally().passes) == ("Ann", 2)
-        second = get_scene().beyond_mocap_stream.further[0]
-        get_scene().beyond_mocap_stream.body.location, second.body.location = (2.5, 3.5, 0.0), (4.0, 3.5, 0.0)
-        yield 1.0
-        window.save_picture(PICTURES / "two_streams.png")
+        yield from move_both(ends)
     finally:
         for end in ends:
             end()
