@@ -2,15 +2,21 @@
 
 from __future__ import annotations
 
+from itertools import count
+
 import bpy
-from bpy.props import FloatProperty, IntProperty, StringProperty
+from bpy.props import EnumProperty, FloatProperty, IntProperty, StringProperty
 
 from ..beyond_mocap.base.errors import InputError
 from ..beyond_mocap.passes.stream import live_hits
 from ..scene.passes import generate as make
 from ..scene.passes.settings import find_armature
-from ..scene.stream import follow, play
+from ..scene.stream import follow, play, streamed_body
+from ..scene.stream.settings import find_stream, list_streams
 from .operator_base import BackgroundOperator, BaseOperator
+
+NUMBER = {"name": "Number", "default": 1, "min": 1, "options": {"SKIP_SAVE"}, "description": "Number of the stream"}
+WHAT = (("ADD", "Add", "Add a stream"), ("REMOVE", "Remove", "Remove a stream"))
 
 
 class BEYOND_MOCAP_OT_stream_start(BaseOperator, bpy.types.Operator):
@@ -20,20 +26,19 @@ character; nothing is received from other machines, and nothing is sent"""
     bl_idname = "beyond_mocap.stream_start"
     bl_label = "Start Stream"
     bl_options = {"REGISTER"}
-    needs = ("A stream is already received: press Stop Stream first",
-             lambda context: follow.get_current_listener() is None)
+    number: IntProperty(**NUMBER)
+    needs = ("Every stream is already received: press Stop Stream first",
+             lambda context: len(follow.list_received(context.scene)) < len(list_streams(context.scene)))
 
     def do(self, context):
         """Bind the port and start to listen."""
-        follow.start_listening(context.scene.beyond_mocap_stream)
-        follow.reset_status()
+        follow.start_listening(require_stream(context, self.number))
 
 
 class ListeningVerb(BaseOperator):
-    """An operator for the stream that is received."""
+    """An operator for a stream that is received."""
 
-    needs = ("No stream is received: press Start Stream first",
-             lambda context: follow.get_current_listener() is not None)
+    needs = "No stream is received: press Start Stream first", lambda context: bool(follow.list_received(context.scene))
 
 
 class BEYOND_MOCAP_OT_stream_stop(ListeningVerb, bpy.types.Operator):
@@ -42,10 +47,63 @@ class BEYOND_MOCAP_OT_stream_stop(ListeningVerb, bpy.types.Operator):
     bl_idname = "beyond_mocap.stream_stop"
     bl_label = "Stop Stream"
     bl_options = {"REGISTER"}
+    number: IntProperty(**NUMBER)
+
+    def do(self, _context):
+        require_listener(self.number)
+        follow.stop_listening(self.number)
+        follow.write_status(self.number)
+
+
+class BEYOND_MOCAP_OT_stream_list(BaseOperator, bpy.types.Operator):
+    """Add or remove a stream"""
+
+    bl_idname = "beyond_mocap.stream_list"
+    bl_label = "Streams"
+    what: EnumProperty(name="What", items=WHAT, options={"SKIP_SAVE"}, description="Change to make")
+    number: IntProperty(name="Number", default=2, min=2, options={"SKIP_SAVE"}, description="Stream to remove")
+
+    @classmethod
+    def description(cls, _context, properties):
+        return {"ADD": "Add a stream for another user, on a port of its own",
+                "REMOVE": "Stop and remove this stream; its character stays"}[properties.what]
 
     def do(self, context):
-        follow.stop_listening()
-        follow.write_status()
+        """Change the list."""
+        if self.what == "ADD":
+            return add_stream(context.scene)
+        require_stream(context, self.number)
+        further = context.scene.beyond_mocap_stream.further
+        follow.stop_listening(self.number)
+        further.remove([stream.number for stream in further].index(self.number))
+
+
+def add_stream(scene) -> None:
+    """Add a stream with the lowest number and the lowest port that are free; the rest is as in the first stream."""
+    streams, first = list_streams(scene), scene.beyond_mocap_stream
+    numbers, ports = {stream.number for stream in streams}, {stream.port for stream in streams}
+    stream = first.further.add()
+    stream.number = next(number for number in count(2) if number not in numbers)
+    stream.port = next(port for port in (*range(first.port + 1, 65536), *range(1024, first.port)) if port not in ports)
+    for name in ("protocol", "unit", "part", "side", "threshold", "clip"):
+        setattr(stream, name, getattr(first, name))
+
+
+def require_stream(context, number: int):
+    """Find a stream of the scene by its number, or raise an InputError."""
+    stream = find_stream(context.scene, number)
+    if stream is None:
+        numbers = ", ".join(str(one.number) for one in list_streams(context.scene))
+        raise InputError("stream", f"no number {number}", f"one of {numbers}", "press Add Stream")
+    return stream
+
+
+def require_listener(number: int):
+    """Find what receives a stream, or raise an InputError."""
+    listener = follow.find_listener(number)
+    if listener is None:
+        raise InputError(f"stream {number}", "is not received", "one that is received", "press Start Stream first")
+    return listener
 
 
 class PlayingVerb(BaseOperator):
@@ -74,17 +132,18 @@ class BEYOND_MOCAP_OT_stream_keep(ListeningVerb, bpy.types.Operator):
     bl_label = "Keep Recording"
     seconds: FloatProperty(name="Seconds", default=10.0, min=0.1, max=20.0,
                            description="Length of the recording")
+    number: IntProperty(**NUMBER)
 
     def do(self, context):
         """Build a motion from the ring buffer and write it to an action."""
-        motion = live_hits.build_recording(follow.get_current_listener(), self.seconds)
+        motion = live_hits.build_recording(require_listener(self.number), self.seconds)
         if motion is None:
             raise InputError("stream", "nothing has arrived yet", "frames", "start the sender")
-        follow.keep_recording(context, motion)
+        streamed_body.keep_recording(context, motion)
 
 
 class BEYOND_MOCAP_OT_stream_play(BackgroundOperator, bpy.types.Operator):
-    """Turn each strike of the streamed character into a pass of the player who has the ball, with the most similar
+    """Turn each strike of a streamed character into a pass of the player who has the ball, with the most similar
 motion of the library, to the player chosen with keys 1 to 9 or a click"""
 
     bl_idname = "beyond_mocap.stream_play"
@@ -97,9 +156,10 @@ motion of the library, to the player chosen with keys 1 to 9 or a click"""
 
     def order(self, context):
         """Collect the order of the scene, the holder of the ball and the rally's time."""
-        settings = context.scene.beyond_mocap_passes
-        return (make.build_order(context.scene), self.holder or settings.players[0].name,
-                play.compute_rally_seconds(context.scene), context.scene.beyond_mocap_stream.part)
+        holder = self.holder or context.scene.beyond_mocap_passes.players[0].name
+        play.check_players(context.scene)
+        return (make.build_order(context.scene), holder, play.compute_rally_seconds(context.scene),
+                play.find_main_stream(context.scene, holder).part)
 
     @staticmethod
     def run_job(order, progress, cancelled, _hurry):
@@ -140,4 +200,4 @@ class BEYOND_MOCAP_OT_stream_act(BaseOperator, bpy.types.Operator):
         if bpy.app.background:
             play.answer_now(context.scene, hit)
         else:
-            play.store_strike(context.scene, hit, 0.0)
+            play.store_strike(hit, 0.0)

@@ -37,7 +37,7 @@ def mark_edited(_settings, _context) -> None:
 
 
 def update_name(player, context) -> None:
-    """Write a player's new name to all passes; a name that another player has is refused."""
+    """Write a player's new name to all passes and streams; a name that another player has is refused."""
     if player.known and any(
         row != player and row.name == player.name for row in player.id_data.beyond_mocap_passes.players
     ):
@@ -49,6 +49,9 @@ def update_name(player, context) -> None:
             one.who = player.name if one.who == player.known else one.who
             one.to = player.name if one.to == player.known else one.to
         settings.serve = player.name if settings.serve == player.known else settings.serve
+        first = player.id_data.beyond_mocap_stream
+        for stream in (first, *first.further):
+            stream.player = player.name if stream.player == player.known else stream.player
     player.known = player.name
     mark_edited(player, context)
 

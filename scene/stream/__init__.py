@@ -1,8 +1,9 @@
-"""Motion that arrives over this machine's own network: the character that shows it, and the use of its hits.
+"""Motion that arrives over this machine's own network: the characters that show it, and the use of its hits.
 
-- `settings`: where to listen, what to detect, and the status for the panel
-- `follow`: the one listener of the session, and the armature that follows the user
-- `play`: a passing scene that answers the user's strikes
+- `settings`: where each stream is received, what is detected, and the status for the panel
+- `follow`: the streams that are received in this session
+- `streamed_body`: the armature that follows a user
+- `play`: a passing scene that answers the users' strikes
 """
 
 REGISTERED = ("follow", "play", "settings")

@@ -1,8 +1,8 @@
-"""The stream that is received, and the armature that follows the user.
+"""The streams that are received, and the armatures that follow their users.
 
-A timer updates it where there is a window; scripts call `update_stream`. What arrives changes nothing but the pose of
-the streamed character, which is created with the first frame. The user starts and stops the one listener of the
-session; it also stops when a file is loaded or the extension is disabled.
+A timer updates them where there is a window; scripts call `update_streams`. What arrives changes nothing but the pose
+of each stream's character, which is created with the first frame. The user starts and stops each stream; all stop when
+a file is loaded or the extension is disabled, and one that an undo has removed stops as well.
 """
 
 from __future__ import annotations
@@ -10,273 +10,283 @@ from __future__ import annotations
 import statistics
 import time
 from collections import deque
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 import bpy
-import numpy as np
 
 from ...beyond_mocap.base.errors import BeyondMocapError, InputError
-from ...beyond_mocap.base.fixes import Fix
 from ...beyond_mocap.motion import motion as motions
-from ...beyond_mocap.motion import quaternion
 from ...beyond_mocap.passes.stream import bvh_stream, live_hits
 from ...beyond_mocap.passes.stream import listener as listening
-from ..core import action, window
+from ..core import window
 from ..core.live import Watcher, call_or_describe
-from ..core.measure import frames_per_second
-from ..result import bake
-from ..rigs import armature
-from ..stage import body
+from . import streamed_body
+from .settings import find_status, find_stream, list_statuses, list_streams
 
 if TYPE_CHECKING:
-    from ...beyond_mocap.motion.skeleton import Skeleton
     from ...beyond_mocap.passes.hits import HitMotion
+    from .settings import StreamSettings, StreamStatus
 
 TICK, IDLE = 1.0 / 60.0, 0.25  # s between two timer calls, with and without a stream
 STATUS_SECONDS, DETECT_SECONDS = 0.25, 0.05  # s between two status updates, and two hit detections
 MOST_BODIES = 20  # characters created in one stream: a sender that keeps changing its skeleton is stopped
 
-MARK = "beyond_mocap_stream"
-SHIRT = (0.55, 0.55, 0.58)
 
-_session: dict[str, object] = {}
-_state = {"seen": 0, "written": 0.0, "looked": 0.0, "bodies": 0}
-_latencies: deque[float] = deque(maxlen=60)
+@dataclass(eq=False, kw_only=True)
+class ReceivedStream:
+    """A stream that is received.
+
+    Attributes:
+        number: the stream's number in its scene.
+        listener: receives its frames.
+        hits: detects strikes in them.
+        seen: number of the last frame that was shown.
+        looked: s of the last hit detection, monotonic clock.
+        written: number of the quarter second of the last status update, so that all streams share one redraw.
+        bodies: characters created.
+        latencies: s from sender to pose, of the last frames.
+    """
+
+    number: int
+    listener: listening.Listener
+    hits: live_hits.LiveHits
+    seen: int = 0
+    looked: float = 0.0
+    written: int = 0
+    bodies: int = 0
+    latencies: deque[float] = field(default_factory=lambda: deque(maxlen=60))
+
+
+_streams: dict[int, ReceivedStream] = {}
 _on_hit: list = []
-_on_look: list = []
+_on_update: list = []
 
 
 def add_hit_call(call) -> None:
-    """Call `call(scene, hit, seconds)` for every detected strike, until `remove_call`."""
+    """Call `call(scene, stream, hit, seconds)` for every detected strike, until `remove_call`."""
     _on_hit.append(call)
 
 
 def add_update_call(call) -> None:
     """Call `call(scene)` at every update, until `remove_call`."""
-    _on_look.append(call)
+    _on_update.append(call)
 
 
 def remove_call(call) -> None:
     """Stop calling `call`."""
-    for calls in (_on_hit, _on_look):
+    for calls in (_on_hit, _on_update):
         if call in calls:
             calls.remove(call)
 
 
-def reset_status() -> None:
-    """Reset the status for a stream that has started."""
-    _state.update(seen=0, written=0.0, looked=0.0, bodies=0)
-    _latencies.clear()
-    write_status()
+def start_listening(stream: StreamSettings) -> listening.Listener:
+    """Start to receive a stream as its settings say.
 
-
-def update_stream(scene: bpy.types.Scene) -> HitMotion | None:
-    """Show what has arrived in a scene, update the status, and return the strike that was just detected, if any."""
-    listener = get_current_listener()
-    found = _receive_frames(scene, listener) if listener is not None else None
-    for call in list(_on_look):
-        call(scene)
-    return found
-
-
-def _receive_frames(scene: bpy.types.Scene, listener: listening.Listener) -> HitMotion | None:
-    """Pose the character by the latest frame, detect hits, and update the status."""
-    now = time.monotonic()
-    latest = listener.latest_frame()
-    if latest is not None and latest.number != _state["seen"]:
-        _state["seen"] = latest.number
-        if _show_frame(scene, latest) == "posed":
-            _latencies.append(time.monotonic() - (latest.time if latest.sent is None else latest.sent))
-        if get_current_listener() is None:  # the stream has been stopped
-            return None
-    found = None
-    if now - _state["looked"] >= DETECT_SECONDS:
-        _state["looked"] = now
-        found = _detect_hit(scene)
-    if now - _state["written"] >= STATUS_SECONDS:
-        _state["written"] = now
-        write_status()
-    return found
-
-
-def _show_frame(scene, latest) -> str:
-    """Pose the streamed character.
-
-    Returns:
-        "posed", "made" if it was created first, or "" if it could not be created.
+    Raises:
+        InputError: if it is received already, its port, player or armature is that of another stream, the port is in
+        use, or the suit's file is no BVH file; nothing is changed then.
     """
-    settings, (skeleton, root, rotations) = scene.beyond_mocap_stream, listening.convert_poses([latest])
-    result = "posed"
-    if not can_show(settings.body, scene, skeleton):
-        if _state["bodies"] >= MOST_BODIES:
-            _give_up(f"The skeleton has changed {MOST_BODIES} times, so the stream is stopped: check the sender")
-            return ""
-        _state["bodies"] += 1
-        settings.body = create_body(bpy.context, motions.Motion(skeleton, root, rotations, 60.0))
+    clip = bpy.path.abspath(stream.clip) if stream.clip else ""
+    hierarchy = bvh_stream.read_hierarchy(clip) if clip else None
+    _check_can_start(stream)
+    one = listening.Listener(stream.port, stream.protocol, hierarchy, stream.unit or None).start()
+    hits = live_hits.LiveHits(one, stream.part, "" if stream.side == "either" else stream.side,
+                              stream.threshold or None)
+    _streams[stream.number] = ReceivedStream(number=stream.number, listener=one, hits=hits)
+    write_status(stream.number)
+    return one
+
+
+def _check_can_start(stream: StreamSettings) -> None:
+    """Raise an InputError if a stream is received already, or shares player, armature or port with one that is."""
+    where = f"stream {stream.number}"
+    if stream.number in _streams:
+        raise InputError(where, "is already received", "one that is stopped", "press Stop Stream")
+    for other in list_received(stream.id_data):
+        if stream.player and other.player == stream.player:
+            raise InputError(where, f"{stream.player} already repeats the strikes of stream {other.number}",
+                             "another player", "choose one under Player, or none")
+        if stream.body is not None and other.body == stream.body:
+            raise InputError(where, f"armature {stream.body.name} follows stream {other.number}",
+                             "an armature of its own", "choose another one under Streamed Body, or none")
+    for received in _streams.values():
+        listener = received.listener
+        if listener.port == stream.port and (listener.protocol == "udp") == (stream.protocol == "udp"):
+            raise InputError(where, f"stream {received.number} receives on port {stream.port}", "a port of its own",
+                             "choose another port, here and in the sender")
+
+
+def stop_listening(number: int | None = None) -> None:
+    """Stop receiving a stream; None: all."""
+    for received in [_streams[one] for one in list(_streams) if number in (None, one)]:
+        del _streams[received.number]
+        received.listener.stop()
+
+
+def find_listener(number: int = 1) -> listening.Listener | None:
+    """Find what receives a stream; None if it is not received."""
+    received = _streams.get(number)
+    return None if received is None else received.listener
+
+
+def list_received(scene: bpy.types.Scene) -> list[StreamSettings]:
+    """List the streams of a scene that are received."""
+    return [stream for stream in list_streams(scene) if stream.number in _streams]
+
+
+def update_streams(scene: bpy.types.Scene) -> list[HitMotion]:
+    """Show what has arrived in a scene, update the status of each stream, and list the strikes just detected.
+
+    A stream in which something goes wrong is stopped with a message; the others go on.
+    """
+    hits = []
+    for received in list(_streams.values()):
+        hit = call_or_describe(lambda one=received: _update_stream(scene, one),
+                               lambda reason, one=received: _give_up(one.number, reason),
+                               f"Stream {received.number} has stopped because of an error")
+        hits += [] if hit is None else [hit]
+    for call in list(_on_update):
+        call(scene)
+    return hits
+
+
+def _update_stream(scene: bpy.types.Scene, received: ReceivedStream) -> HitMotion | None:
+    """Pose a stream's character by the latest frame, detect hits, and update the status."""
+    stream, now = find_stream(scene, received.number), time.monotonic()
+    if stream is None:  # of another scene
+        return None
+    latest = received.listener.latest_frame()
+    if latest is not None and latest.number != received.seen:
+        received.seen = latest.number
+        if _show_frame(scene, stream, received, latest):
+            received.latencies.append(time.monotonic() - (latest.time if latest.sent is None else latest.sent))
+    found = None
+    if now - received.looked >= DETECT_SECONDS:
+        received.looked = now
+        found = _detect_hit(scene, find_stream(scene, received.number), received)
+    if int(now / STATUS_SECONDS) != received.written:
+        received.written = int(now / STATUS_SECONDS)
+        write_status(received.number)
+    return found
+
+
+def _show_frame(scene, stream: StreamSettings, received: ReceivedStream, latest) -> bool:
+    """Pose the streamed character; return False if it had to be created first, which takes longer.
+
+    Raises:
+        InputError: if the skeleton has changed too often.
+    """
+    skeleton, root, rotations = listening.convert_poses([latest])
+    can_show = streamed_body.can_show(stream.body, scene, skeleton)
+    if not can_show:
+        if received.bodies >= MOST_BODIES:
+            raise InputError(f"stream {stream.number}", f"the skeleton has changed {MOST_BODIES} times", "one skeleton",
+                             "the stream is stopped: check the sender")
+        received.bodies += 1
+        name = "Stream" if stream.number == 1 else f"Stream {stream.number}"
+        motion = motions.Motion(skeleton, root, rotations, 60.0)
+        stream.body = streamed_body.create_body(bpy.context, motion, name, stream.number)
         # one undo step, so that undo does not remove the new character silently
         if not bpy.app.background:
             bpy.ops.ed.undo_push(message="Streamed Character")
-        result = "made"
-    pose_body(settings.body, scene, skeleton, root[0], rotations[0])
-    return result
+            stream = find_stream(scene, received.number)
+    streamed_body.pose_body(stream.body, scene, skeleton, root[0], rotations[0])
+    return can_show
 
 
-def _detect_hit(scene) -> HitMotion | None:
+def _detect_hit(scene, stream: StreamSettings, received: ReceivedStream) -> HitMotion | None:
     """Detect a strike, show it in the panel and pass it on."""
     try:
-        found = _session["hits"].find_new_hit()
+        found = received.hits.find_new_hit()
     except BeyondMocapError as error:
-        bpy.context.window_manager.beyond_mocap_streaming.hit = str(error)
+        find_status(received.number).hit = str(error)
         return None
     if found is None:
         return None
     hit, seconds = found
     side = f"{hit.side} " if hit.side else ""
-    bpy.context.window_manager.beyond_mocap_streaming.hit = f"{side}{hit.part}, {hit.max_speed:.1f} m/s"
+    find_status(received.number).hit = f"{side}{hit.part}, {hit.max_speed:.1f} m/s"
     for call in list(_on_hit):
-        call(scene, hit, seconds)
+        call(scene, stream, hit, seconds)
     return hit
 
 
-def write_status() -> None:
-    """Write the status of the stream for the panel."""
-    status_texts, listener = bpy.context.window_manager.beyond_mocap_streaming, get_current_listener()
-    if listener is None:
-        status_texts.on, status_texts.state, status_texts.line, status_texts.figures = False, "stopped", "", ""
+def write_status(number: int = 1) -> None:
+    """Write the status of a stream for the panel."""
+    status, received = _find_or_create_status(number), _streams.get(number)
+    if received is None:
+        status.on, status.state, status.line, status.figures = False, "stopped", "", ""
         return
-    status = listener.measure_status()
-    lines = [f"Frames: {status.frames}", f"Frame Rate: {status.rate:.0f}"]
-    if _latencies and status.state == "receiving":
-        latency_name = "Latency" if status.delay is not None else "Latency, from Arrival"
-        lines.append(f"{latency_name}: {1000.0 * statistics.median(_latencies):.0f} ms")
-    if status.invalid_count:
-        lines.append(f"Invalid Pieces: {status.invalid_count}")
-    status_texts.on, status_texts.state, status_texts.line = True, status.state, status.line
-    status_texts.figures = "\n".join(lines)
+    measured = received.listener.measure_status()
+    lines = [f"Frames: {measured.frames}", f"Frame Rate: {measured.rate:.0f}"]
+    if received.latencies and measured.state == "receiving":
+        latency_name = "Latency" if measured.delay is not None else "Latency, from Arrival"
+        lines.append(f"{latency_name}: {1000.0 * statistics.median(received.latencies):.0f} ms")
+    if measured.invalid_count:
+        lines.append(f"Invalid Pieces: {measured.invalid_count}")
+    status.on, status.state, status.line = True, measured.state, measured.line
+    status.figures = "\n".join(lines)
 
 
-def _give_up(reason: str) -> None:
-    """Stop the stream because of an error; its message stays."""
-    stop_listening()
-    write_status()
-    status_texts = bpy.context.window_manager.beyond_mocap_streaming
-    status_texts.state, status_texts.line = "failed", reason
+def write_stopped() -> None:
+    """Write the status of streams that have been stopped without it, as by opening a file."""
+    stopped = [status.number for status in list_statuses() if status.on and status.number not in _streams]
+    for number in stopped:
+        write_status(number)
+    if stopped:
+        window.redraw_editors()
+
+
+def _find_or_create_status(number: int) -> StreamStatus:
+    """Find the status of a stream, or create it."""
+    status = find_status(number)
+    if status is None:
+        status = bpy.context.window_manager.beyond_mocap_streaming.further.add()
+        status.number = number
+    return status
+
+
+def _give_up(number: int, reason: str) -> None:
+    """Stop a stream because of an error; its message stays."""
+    stop_listening(number)
+    write_status(number)
+    status = find_status(number)
+    status.state, status.line = "failed", reason
 
 
 def _run_timer() -> float:
-    """Update the stream, and return the seconds until the next call."""
-    if get_current_listener() is None and not _on_look:
-        if bpy.context.window_manager.beyond_mocap_streaming.on:
-            write_status()
-            window.redraw_editors()
+    """Update the streams, and return the seconds until the next call."""
+    write_stopped()
+    if not _streams and not _on_update:
         return IDLE
     if bpy.app.is_job_running("RENDER"):
         return IDLE
-    before = (status_texts := bpy.context.window_manager.beyond_mocap_streaming).figures, status_texts.played
+    before = _collect_texts()
     for shown in bpy.context.window_manager.windows[:1]:
         with bpy.context.temp_override(window=shown):
-            call_or_describe(lambda: update_stream(shown.scene), _give_up, "The stream has stopped because of an error")
-    status_texts = bpy.context.window_manager.beyond_mocap_streaming
-    if (status_texts.figures, status_texts.played) != before:
+            update_streams(shown.scene)
+    if _collect_texts() != before:
         window.redraw_editors()
     return TICK
+
+
+def _collect_texts() -> list[str]:
+    """Collect the texts of the panel that change by themselves."""
+    return [*(status.figures for status in list_statuses()), bpy.context.window_manager.beyond_mocap_streaming.played]
+
+
+def _stop_removed() -> None:
+    """Stop the streams that no scene has any more, after an undo."""
+    for number in list(_streams):
+        if all(find_stream(scene, number) is None for scene in bpy.data.scenes):
+            stop_listening(number)
 
 
 def _end_session() -> None:
     stop_listening()
     _on_hit.clear()
-    _on_look.clear()
+    _on_update.clear()
 
 
-def start_listening(settings) -> listening.Listener:
-    """Start to listen as the settings say.
-
-    Raises:
-        InputError: if a stream is received already, the port is in use, or the suit's file is no BVH file; nothing is
-        changed then.
-    """
-    clip = bpy.path.abspath(settings.clip) if settings.clip else ""
-    hierarchy = bvh_stream.read_hierarchy(clip) if clip else None
-    before = get_current_listener()
-    if before is not None:
-        raise InputError(f"port {before.port}", "a stream is already received", "one at a time", "press Stop Stream",
-                         fixes=(Fix("press", "beyond_mocap.stream_stop"),))
-    one = listening.Listener(settings.port, settings.protocol, hierarchy, settings.unit or None).start()
-    _session["listener"] = one
-    _session["hits"] = live_hits.LiveHits(one, settings.part, "" if settings.side == "either" else settings.side,
-                                settings.threshold or None)
-    return one
-
-
-def stop_listening() -> None:
-    """Stop listening."""
-    one = _session.pop("listener", None)
-    _session.clear()
-    if one is not None:
-        one.stop()
-
-
-def get_current_listener() -> listening.Listener | None:
-    """The listener of the session, or None."""
-    return _session.get("listener")
-
-
-WATCHER = Watcher(name="Stream", look=_run_timer, closing=stop_listening, ends=_end_session)
-
-
-def can_show(thing: bpy.types.Object | None, scene: bpy.types.Scene, skeleton: Skeleton) -> bool:
-    """Whether an object can show this skeleton: an armature of the scene and file with a bone for every joint."""
-    return (
-        thing is not None and thing.type == "ARMATURE" and thing.library is None and thing.name in scene.objects
-        and all(name in thing.data.bones for name in skeleton.names)
-    )
-
-
-def create_body(context: bpy.types.Context, motion: motions.Motion, name: str = "Stream") -> bpy.types.Object:
-    """Create a character with the skeleton of `motion`."""
-    where = bake.find_or_create_collection(context.scene)
-    thing = armature.create_armature(context, motion.skeleton, name, where)
-    body.create_character(thing, name, SHIRT, collection=where, scene=context.scene, example=motion)
-    thing[MARK] = True
-    return thing
-
-
-def pose_body(
-    thing: bpy.types.Object, scene: bpy.types.Scene, skeleton: Skeleton, root: np.ndarray, local: np.ndarray
-) -> None:
-    """Pose an armature.
-
-    Its location and its rotation about the vertical are left to the user, so that it can stand beside other characters.
-
-    Args:
-        thing: the armature.
-        scene: the scene.
-        skeleton: skeleton of the pose.
-        root: (3,) m, root position.
-        local: (J, 4) local rotations.
-    """
-    placement, rest = armature.find_current_placement(thing, scene), armature.compute_rest_rotations(thing,
-            skeleton.names)
-    # the object's rotation about the vertical turns the streamed motion with it
-    turn = quaternion.from_up_angle(quaternion.to_yaw(placement.rotation))
-    root, local = placement.origin + quaternion.rotate(turn, root), np.array(local)
-    local[0] = quaternion.multiply(quaternion.inverse(placement.rotation), quaternion.multiply(turn, local[0]))
-    # pose rotations are relative to the bones' rest rotations
-    pose_rotations = quaternion.multiply(quaternion.inverse(rest), quaternion.multiply(local, rest))
-    bones = thing.pose.bones
-    all_rotations = np.empty((len(bones), 4), np.float32)
-    bones.foreach_get("rotation_quaternion", all_rotations.ravel())
-    all_rotations[[bones.find(name) for name in skeleton.names]] = pose_rotations
-    bones.foreach_set("rotation_quaternion", all_rotations.ravel())
-    top = bones[skeleton.names[0]]
-    shift = placement.to_armature(root) - np.array(top.bone.head_local)
-    top.location = quaternion.rotate(quaternion.inverse(rest[0]), shift)  # assigning also makes Blender update
-
-
-def keep_recording(context: bpy.types.Context, motion: motions.Motion, name: str = "Recorded") -> bpy.types.Object:
-    """Create a character that plays `motion` from the current frame on."""
-    if motion.duration * frames_per_second(context.scene) < 1.0:
-        raise InputError("stream", "less than a frame", "a second or more", "let the stream run for a while")
-    thing = create_body(context, motion, name)
-    action.write_motion(thing, motion, context.scene, float(context.scene.frame_current), f"{thing.name} motion")
-    return thing
+WATCHER = Watcher(name="Stream", look=_run_timer, restored=_stop_removed, closing=stop_listening, ends=_end_session)

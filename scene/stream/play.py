@@ -1,8 +1,9 @@
-"""Play Live: while the scene plays, the holder of the ball repeats the user's strikes and passes to the chosen player.
+"""Play Live: while the scene plays, the holder of the ball repeats their user's strikes and passes to the chosen
+player.
 
-`follow` detects the user's strikes. While the user has not struck, the likely answers are planned in a thread, from
-where all players stand; the one that answers the strike is inserted into the running scene. The characters and the ball
-are those of the passing scene.
+`follow` detects the strikes of each stream's user. While the user has not struck, the likely answers are planned in a
+thread, from where all players stand; the one that answers the strike is inserted into the running scene. The characters
+and the ball are those of the passing scene.
 """
 
 from __future__ import annotations
@@ -18,7 +19,7 @@ import numpy as np
 from ...beyond_mocap.base.errors import BeyondMocapError, InputError, UserCancelledError
 from ...beyond_mocap.base.fixes import Fix
 from ..core import action, background, channels, frame_range
-from ..core.live import Watcher
+from ..core.live import Watcher, call_or_describe
 from ..core.measure import frames_per_second
 from ..passes import generate as make
 from ..passes.settings import PLAYED
@@ -30,6 +31,7 @@ if TYPE_CHECKING:
     from ...beyond_mocap.passes.hits import HitMotion
     from ...beyond_mocap.passes.live_passes import LivePass, Rally
     from ...beyond_mocap.passes.strike_means import StrikeMeans
+    from .settings import StreamSettings
 
 FIRST_SECONDS = 3.0
 """Seconds of standing that are written with a pass; the rest follows when its players stand."""
@@ -74,22 +76,22 @@ def apply_rally(scene: bpy.types.Scene, new_rally: NewRally) -> None:
     """Apply a rally to characters and ball, and answer the user's strikes from now on."""
     stop_rally()
     make.session.store_library(new_rally.library, new_rally.order.unit)
-    _session.update(scene=scene.session_uid, means=new_rally.means, seen=None)
-    _wait_for_strike(new_rally.rally)
+    _session.update(scene=scene.session_uid, means=new_rally.means, seen=None, latest={})
+    _wait_for_strike(scene, new_rally.rally)
     for name in ("strikes", "figures", "messages"):
         scene.beyond_mocap_passes.property_unset(name)
     scene.beyond_mocap_passes.made_of = PLAYED
     _apply_players(scene, new_rally.rally, [player.name for player in new_rally.rally.scene.players])
-    follow.add_hit_call(store_strike)
-    follow.add_update_call(update_rally)
+    follow.add_hit_call(receive_strike)
+    follow.add_update_call(_update_or_end)
     _write_status()
 
 
 def stop_rally() -> None:
     """Stop answering; what was played stays."""
     background.cancel_jobs("live")
-    follow.remove_call(store_strike)
-    follow.remove_call(update_rally)
+    follow.remove_call(receive_strike)
+    follow.remove_call(_update_or_end)
     _session.clear()
 
 
@@ -103,19 +105,51 @@ def compute_rally_seconds(scene: bpy.types.Scene) -> float:
     return (scene.frame_current_final - scene.beyond_mocap_passes.start_frame) / frames_per_second(scene)
 
 
+def check_players(scene: bpy.types.Scene) -> None:
+    """Raise an InputError if the player of a stream that is received is not in the passing scene."""
+    names = [row.name for row in scene.beyond_mocap_passes.players]
+    for stream in follow.list_received(scene):
+        if stream.player and stream.player not in names:
+            raise InputError(f"stream {stream.number}", f"no player {stream.player!r} in the passing scene",
+                             f"one of {', '.join(names)}", "press Stop Stream, and choose one under Player, or none")
+
+
+def list_own_streams(scene: bpy.types.Scene, name: str) -> list[StreamSettings]:
+    """List the streams whose strikes a player repeats: their own, otherwise those of no player, otherwise all."""
+    received = follow.list_received(scene)
+    own = [stream for stream in received if stream.player == name]
+    return own or [stream for stream in received if not stream.player] or received
+
+
+def find_main_stream(scene: bpy.types.Scene, name: str) -> StreamSettings:
+    """Find the stream that says what counts as a player's strike: their own, or the scene's first one."""
+    return next(iter(list_own_streams(scene, name)), scene.beyond_mocap_stream)
+
+
 def find_target(scene: bpy.types.Scene) -> str:
-    """Find the receiver of the next pass: the chosen player, otherwise the next one in the list."""
+    """Find the receiver of the next pass: the chosen player, otherwise the next in the list who has a stream of their
+    own, otherwise the next in the list.
+    """
     names = [row.name for row in scene.beyond_mocap_passes.players]
     chosen, holder = scene.beyond_mocap_stream.target, get_current_rally().holder
     if chosen in names and chosen != holder:
         return chosen
     if not names:
         raise InputError("players", "the list is empty", "two or more", "choose a sample, and press Play Live again")
-    return names[(names.index(holder) + 1) % len(names)] if holder in names else names[0]
+    after = names.index(holder) + 1 if holder in names else 0
+    in_turn = [name for name in names[after:] + names[:after] if name != holder]
+    users = {stream.player for stream in follow.list_received(scene)}
+    return next((name for name in in_turn if name in users), in_turn[0])
 
 
-def store_strike(_scene: bpy.types.Scene, hit: HitMotion, seconds: float) -> None:
-    """Store the user's strike of `seconds` on the monotonic clock; only the latest one counts."""
+def receive_strike(scene: bpy.types.Scene, stream: StreamSettings, hit: HitMotion, seconds: float) -> None:
+    """Store the strike of a stream's user if the player who has the ball repeats it."""
+    if stream.number in [one.number for one in list_own_streams(scene, get_current_rally().holder)]:
+        store_strike(hit, seconds)
+
+
+def store_strike(hit: HitMotion, seconds: float) -> None:
+    """Store a user's strike of `seconds` on the monotonic clock; only the latest one counts."""
     _session["pending"] = hit, seconds
 
 
@@ -137,6 +171,11 @@ def find_shown_strike(scene: bpy.types.Scene, body: bpy.types.Object) -> HitMoti
                          "choose the part under Live Stream")
     now = scene.frame_current - (action.find_first_frame(body) or 0)
     return min(hits, key=lambda hit: (abs(hit.key - now), -hit.max_speed))
+
+
+def _update_or_end(scene: bpy.types.Scene) -> None:
+    """Update the rally; an error ends it, and the streams go on."""
+    call_or_describe(lambda: update_rally(scene), _end_rally, "Play Live has stopped because of an error")
 
 
 def update_rally(scene: bpy.types.Scene) -> None:
@@ -228,12 +267,13 @@ def _answer_strike(scene, target: str) -> None:
 
 def _plan_ahead(scene, target: str) -> None:
     """Plan the likeliest answer that is not planned yet."""
-    settings = scene.beyond_mocap_stream
+    stream = find_main_stream(scene, get_current_rally().holder)
     others = [player.name for player in get_current_rally().scene.players
               if player.name not in (target, get_current_rally().holder)]
-    side = settings.side if settings.part in ("foot", "hand", "tool") and settings.side != "either" else ""
+    side = stream.side if stream.part in ("foot", "hand", "tool") and stream.side != "either" else ""
     try:
-        request = _session["ahead"].choose_next(settings.part, side, [target, *others], settings.bounces)
+        request = _session["ahead"].choose_next(stream.part, side, [target, *others],
+                                                scene.beyond_mocap_stream.bounces)
     except BeyondMocapError:  # a part that the library's skeleton lacks: said when the user strikes
         return
     if request is not None:
@@ -244,7 +284,8 @@ def _apply_pass(scene, piece: LivePass, hit: HitMotion | None = None, seconds: f
     """Insert a pass that answers a hit into the scene from now on."""
     next_rally = get_current_rally().add_pass(piece, max(compute_rally_seconds(scene), get_current_rally().ready_time))
     _apply_players(scene, next_rally, list(piece.motions), next_rally.ready_time + FIRST_SECONDS)
-    _wait_for_strike(next_rally, hit)
+    _session["latest"][find_main_stream(scene, piece.giver).number] = hit
+    _wait_for_strike(scene, next_rally)
     _session["unwritten"] = list(piece.motions)
     scene.beyond_mocap_stream.target = ""
     _write_status(piece, time.monotonic() - seconds if seconds else None)
@@ -257,10 +298,11 @@ def _write_rest(scene) -> None:
         _session["unwritten"] = []
 
 
-def _wait_for_strike(rally: Rally, latest: HitMotion | None = None) -> None:
-    """Let the rally wait for the user's next strike; nothing is planned for it yet."""
+def _wait_for_strike(scene, rally: Rally) -> None:
+    """Let the rally wait for the next strike of its holder's user; nothing is planned for it yet."""
     from ...beyond_mocap.passes.answers_ahead import AnswersAhead
 
+    latest = _session["latest"].get(find_main_stream(scene, rally.holder).number)
     _session.update(rally=rally, ahead=AnswersAhead(_session["means"], rally, latest), pending=None,
                     unwritten=[])
     _session.pop("job", None)

@@ -1,39 +1,93 @@
-"""Settings of the live stream and, for the panel, its status."""
+"""Settings of the live streams and, for the panel, their status."""
 
 from __future__ import annotations
 
 import bpy
-from bpy.props import BoolProperty, PointerProperty, StringProperty
+from bpy.props import BoolProperty, CollectionProperty, IntProperty, PointerProperty, StringProperty
 
 from ..core.properties import with_settings
 
 
 @with_settings("stream")
-class BeyondMocapStream(bpy.types.PropertyGroup):
-    """A stream of BVH frames from a program on this machine."""
+class StreamSettings:
+    """What every stream has."""
+
+    number: IntProperty(name="Number", default=1, options={"HIDDEN"},
+                        description="Number of the stream in its scene; it stays when other streams are removed")
+    clip: StringProperty(name="Suit's BVH", subtype="FILE_PATH",
+                         description="BVH file of the same suit, needed for streams that send numbers only")
+    body: PointerProperty(name="Streamed Body", type=bpy.types.Object,
+                          poll=lambda stream, thing: can_follow(stream, thing),
+                          description="Armature that follows the user; created if empty")
+    player: StringProperty(name="Player", description="Player who repeats this user's strikes in Play Live; leave "
+                           "empty for each player who has the ball and no user")
+
+
+class BeyondMocapFurtherStream(StreamSettings, bpy.types.PropertyGroup):
+    """A stream beside the first one."""
+
+
+@with_settings("stream.play")
+class BeyondMocapStream(StreamSettings, bpy.types.PropertyGroup):
+    """The first stream of BVH frames from a program on this machine, those beside it, and Play Live."""
 
     attached_to = ("Scene.beyond_mocap_stream",)
 
-    clip: StringProperty(name="Suit's BVH", subtype="FILE_PATH",
-                         description="BVH file of the same suit, needed for streams that send numbers only")
     target: StringProperty(
         name="Target",
         description="Player who receives the next pass in Play Live, also chosen by keys 1 to 9 or a click; "
-        "leave empty for the next one in the list",
+        "leave empty for the next one in the list, or the next one with a user",
     )
-    body: PointerProperty(name="Streamed Body", type=bpy.types.Object, poll=lambda _, thing: thing.type == "ARMATURE",
-                          description="Armature that follows the user; created if empty")
+    further: CollectionProperty(type=BeyondMocapFurtherStream, description="Streams beside the first one")
 
 
-class BeyondMocapStreaming(bpy.types.PropertyGroup):
-    """Status of the stream. It belongs to the session and is not saved."""
+class StreamStatus:
+    """How one stream does."""
 
-    attached_to = ("WindowManager.beyond_mocap_streaming",)
-
+    number: IntProperty(default=1, description="Number of the stream")
     on: BoolProperty(description="Whether a stream is being received")
     state: StringProperty(description="Waiting, receiving, stalled, ended, failed or stopped")
     line: StringProperty(description="State of the stream in a sentence")
     figures: StringProperty(description="Figures of the stream")
     hit: StringProperty(description="Last strike that was detected")
+
+
+class BeyondMocapFurtherStreaming(StreamStatus, bpy.types.PropertyGroup):
+    """Status of a stream beside the first one."""
+
+
+class BeyondMocapStreaming(StreamStatus, bpy.types.PropertyGroup):
+    """Status of the streams and of Play Live. It belongs to the session and is not saved."""
+
+    attached_to = ("WindowManager.beyond_mocap_streaming",)
+
+    further: CollectionProperty(type=BeyondMocapFurtherStreaming, description="Status of the streams beside the first")
     playing: BoolProperty(description="Whether the passing scene is being played live")
     played: StringProperty(description="State of the rally that is being played live")
+
+
+def list_streams(scene: bpy.types.Scene) -> list[StreamSettings]:
+    """List the streams of a scene, the first one first."""
+    return [scene.beyond_mocap_stream, *scene.beyond_mocap_stream.further]
+
+
+def find_stream(scene: bpy.types.Scene, number: int) -> StreamSettings | None:
+    """Find a stream of a scene by its number; None if the scene has none of that number."""
+    return next((stream for stream in list_streams(scene) if stream.number == number), None)
+
+
+def can_follow(stream: StreamSettings, thing: bpy.types.Object) -> bool:
+    """Whether an object can be chosen as a stream's body: an armature that is no other stream's."""
+    others = (one for one in list_streams(stream.id_data) if one.number != stream.number)
+    return thing.type == "ARMATURE" and all(one.body != thing for one in others)
+
+
+def list_statuses() -> list[StreamStatus]:
+    """List the status of each stream that has been started in this session, and of the first one."""
+    streaming = bpy.context.window_manager.beyond_mocap_streaming
+    return [streaming, *streaming.further]
+
+
+def find_status(number: int) -> StreamStatus | None:
+    """Find the status of a stream; None if it has not been started in this session."""
+    return next((status for status in list_statuses() if status.number == number), None)

@@ -270,7 +270,7 @@ def listen():
     """A stream is listened to, and a few frames have arrived."""
     scene = importlib.import_module(f"{EXTENSION}.scene.stream.follow")
     bpy.ops.beyond_mocap.stream_start()
-    listener, text = scene.get_current_listener(), (worlds.SAMPLE / "walking_1_2.bvh").read_text()
+    listener, text = scene.find_listener(), (worlds.SAMPLE / "walking_1_2.bvh").read_text()
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as out:
         for piece in (text.split("MOTION")[0], *text.strip().split("\n")[-40:]):
             out.sendto(piece.encode(), ("127.0.0.1", listener.port))
@@ -539,6 +539,7 @@ ROWS = {
     "split_span": Row("imported", prepare=lambda: bpy.context.scene.frame_set(25)),
     "stream_act": Row("imported", prepare=show_how),
     "stream_end": Row("imported", prepare=play_live, changes=False),
+    "stream_list": Row("imported", lambda places: {"what": "ADD"}),
     "stream_keep": Row("imported", prepare=listen),
     "stream_play": Row("imported", prepare=fill_scene),
     "stage_view": Row("accepted", lambda places: {"view": "BROADCAST"}),

@@ -38,7 +38,7 @@ def find_object(name):
 def isolate_panel(part):
     """One part of the panel alone in a tab of its own, so that its buttons are found quickly; returns what puts it
     back. part: name of the function that draws it."""
-    name = "stream" if part in ("draw_stream", "draw_play_live") else "ball"
+    name = "stream" if part in ("draw_streams", "draw_play_live") else "ball"
     kind, drawn = (getattr(import_module(f"panels.{name}"), one) for one in (f"BEYOND_MOCAP_PT_{name}", part))
     was, draw = (kind.bl_category, getattr(kind, "bl_options", set())), kind.draw
     kind.draw = lambda self, context: drawn(self.layout, context)

@@ -16,11 +16,13 @@ from tab import (
     import_module,
     output,
     report_time,
+    run_operator,
     wait_until,
     window,
 )
 
 PORT = 7361 + os.getpid() % 997  # another session's stream may be on this machine
+KICK = "passes/library/volley_pass.bvh"
 SENT = {}
 
 
@@ -34,11 +36,11 @@ def get_scene():
     return window.window.scene
 
 
-def start_sending(clip, loop=True):
+def start_sending(clip, loop=True, port=PORT, report=lambda frames: None):
     """Begin to send a clip; returns what ends it."""
-    sender = import_module("beyond_mocap.passes.stream.sender").Sender(copy_sample() / clip, PORT, loop=loop)
+    sender = import_module("beyond_mocap.passes.stream.sender").Sender(copy_sample() / clip, port, loop=loop)
     stop = threading.Event()
-    thread = threading.Thread(target=sender.send_file, args=(stop.is_set,))
+    thread = threading.Thread(target=sender.send_file, args=(stop.is_set, report))
     thread.start()
 
     def stop_sending():
@@ -59,7 +61,7 @@ def check_a_body_does_what_arrives():
     mark = len(output.text())
     bpy.data.objects.remove(find_object("Cube"))
     get_scene().beyond_mocap_stream.port = PORT
-    back = yield from isolate_panel("draw_stream")
+    back = yield from isolate_panel("draw_streams")
     yield from click_operator("stream_start")
     yield from wait_until(lambda: get_stream_status().on and get_stream_status().state == "waiting",
                           what=lambda: get_stream_status().state)
@@ -125,9 +127,135 @@ def check_strikes_are_answered_while_the_scene_plays():
     assert_no_errors_since(mark)
 
 
+def get_rally():
+    """The rally that is played; None where there is none."""
+    return import_module("scene.stream.play").get_current_rally()
+
+
+def find_strike_frame():
+    """Number of the sent frame in which the clip's part is fastest, from 1."""
+    motion = import_module("beyond_mocap.files.bvh.bvh").read_bvh(copy_sample() / KICK).motion
+    return import_module("beyond_mocap.passes.hits").detect_hits(motion).strongest.key + 1
+
+
+def measure_answer(port):
+    """Seconds from the strike of a clip that is streamed to a port, to the first drawing of the view that shows the
+    answer."""
+    ahead = import_module("scene.stream.play")._session["ahead"]
+    request = ahead.request_for(find_streamed_hit(), import_module("scene.stream.play").find_target(get_scene()), 0)
+    yield from wait_until(lambda: ahead.find(request) is not None, what="the answer is planned ahead")
+    yield from wait_until(lambda: import_module("scene.stream.play").compute_rally_seconds(get_scene())
+                          > get_rally().ready_time)
+    passes, strike, times = get_rally().passes, find_strike_frame(), {}
+
+    def note_strike(frames):
+        if frames == strike:
+            times["struck"] = time.monotonic()
+
+    def note_drawing():
+        if get_rally() is not None and get_rally().passes > passes:
+            times.setdefault("drawn", time.monotonic())
+
+    drawing = bpy.types.SpaceView3D.draw_handler_add(note_drawing, (), "WINDOW", "POST_PIXEL")
+    end = start_sending(KICK, False, port, note_strike)
+    try:
+        yield from wait_until(lambda: "drawn" in times, 60.0, lambda: f"{times} {get_stream_status().played}")
+    finally:
+        end()
+        bpy.types.SpaceView3D.draw_handler_remove(drawing, "WINDOW")
+    return times["drawn"] - times["struck"]
+
+
+def find_streamed_hit():
+    """The clip's strike as it is recognised under way."""
+    motion = import_module("beyond_mocap.files.bvh.bvh").read_bvh(copy_sample() / KICK).motion
+    return import_module("beyond_mocap.passes.hits").detect_hits(motion).strongest
+
+
+def play_scene():
+    """Begin Play Live with the streams that there are, and play the scene."""
+    get_scene().frame_set(1)
+    bpy.ops.beyond_mocap.passes_sample(sample="three")
+    get_scene().beyond_mocap_passes.library_folder = str(copy_sample() / "passes" / "library")
+    run_operator("beyond_mocap.stream_play")
+    yield from wait_until(lambda: get_stream_status().playing)
+    bpy.ops.screen.animation_play()
+
+
+def end_playing():
+    """End Play Live and the playback."""
+    bpy.ops.screen.animation_cancel(restore_frame=False)
+    bpy.ops.beyond_mocap.stream_end()
+
+
+def check_one_streams_answer_comes_at_once():
+    mark = len(output.text())
+    yield from play_scene()
+    try:
+        report_time("one stream: from strike to the answer's first drawing, s", (yield from measure_answer(PORT)), 0.3)
+    finally:
+        end_playing()
+    assert_no_errors_since(mark)
+
+
+def list_streamed():
+    """The characters of both streams."""
+    first = get_scene().beyond_mocap_stream
+    return [stream.body for stream in (first, *first.further)]
+
+
+def move_both(ends):
+    """Send another motion to each stream, until both characters have moved; a picture is taken. What ends the senders
+    is added to `ends`."""
+    def list_poses():
+        return [tuple(round(value, 2) for value in body.pose.bones[0].rotation_quaternion) for body in list_streamed()]
+
+    for body, place in zip(list_streamed(), ((-2.0, 3.5, 0.0), (1.5, 3.5, 0.0))):
+        body.location = place
+    before = list_poses()
+    for clip, port in (("library/standing_turn_left.bvh", PORT), ("library/standing_turn_right.bvh", PORT + 1)):
+        ends.append(start_sending(clip, port=port))
+    yield from wait_until(lambda: all(new != old for new, old in zip(list_poses(), before)), what="both move")
+    yield from window.move_pointer(300, 300)
+    yield 1.5
+    window.save_picture(PICTURES / "two_streams.png")
+
+
+def check_two_users_pass_to_each_other():
+    mark = len(output.text())
+    back = yield from isolate_panel("draw_streams")
+    yield from click_operator("stream_list")
+    yield from wait_until(lambda: len(get_scene().beyond_mocap_stream.further) == 1)
+    second = get_scene().beyond_mocap_stream.further[0]
+    assert second.port == PORT + 1
+    get_scene().beyond_mocap_stream.player, second.player = "Ann", "Ben"
+    yield from click_operator("stream_start", "number=2")
+    status = get_stream_status().further[0]
+    yield from wait_until(lambda: status.on and status.state == "waiting", what=lambda: status.line)
+    yield from play_scene()
+    ends = []
+    try:
+        for port, other in ((PORT, PORT + 1), (PORT + 1, PORT)):
+            ends.append(start_sending("library/standing_2.bvh", port=other))  # the other user stands meanwhile
+            seconds = yield from measure_answer(port)
+            ends.pop()()
+            report_time("two streams: from strike to the answer's first drawing, s", seconds, 0.3)
+        assert (get_rally().holder, get_rally().passes) == ("Ann", 2)
+        yield from move_both(ends)
+    finally:
+        for end in ends:
+            end()
+        end_playing()
+    yield from click_operator("stream_stop", "number=2")
+    yield from wait_until(lambda: not get_stream_status().further[0].on)
+    assert get_stream_status().on, "the first goes on"
+    back()
+    assert_no_errors_since(mark)
+
+
 def check_it_is_stopped():
     mark = len(output.text())
-    back = yield from isolate_panel("draw_stream")
+    back = yield from isolate_panel("draw_streams")
     start = time.monotonic()
     yield from click_operator("stream_stop")
     yield from wait_until(lambda: not get_stream_status().on)

@@ -19,6 +19,8 @@ TABLES = {
         Setting(name="side", default="either", choices=EITHER, tooltip="Side of the part, where there are two"),
         Setting(name="threshold", default=0.0, least=0.0, most=5.0, unit="metres", tooltip="Height in metres that "
                 "the part has to exceed in a strike; 0 finds it automatically"),
+    ),
+    "stream.play": (
         Setting(name="bounces", default=0, least=0, most=5, tooltip="Bounces of the ball in each pass of Play Live"),
     ),
     "stream.way": (

@@ -20,6 +20,7 @@ WINDOW = 4.0
 _RATE = 60.0  # Hz: most frames per second that are analysed
 _LEAST_SECONDS = 0.5  # s of frames without which nothing is analysed
 _SETTLE_SECONDS = 0.05  # s by which a hit motion has to be over
+_LOOK_SECONDS = 0.1  # s between two moments that are analysed at most: a strike shows for some 0.2 s while under way
 
 
 class LiveHits:
@@ -38,7 +39,7 @@ class LiveHits:
         self.listener, self.part, self.threshold, self.tool = listener, part, threshold, tool
         sided = part in ("foot", "hand", "tool")
         self.sides = ((side,) if side else ("left", "right")) if sided else ("",)
-        self._after = float("-inf")
+        self._after = self._seen_until = float("-inf")
         self._last_number = 0
 
     def find_new_hit(self) -> tuple[HitMotion, float] | None:
@@ -57,7 +58,9 @@ class LiveHits:
         if frames[-1].time - frames[0].time < _LEAST_SECONDS:
             return None
         motion, times = space_evenly(frames, _RATE)
-        found = [hit for side in self.sides for hit in self._detect_hits(motion, side)]
+        unseen = int(np.count_nonzero(times > self._seen_until))
+        self._seen_until = float(times[-1])
+        found = [hit for side in self.sides for hit in self._detect_hits(motion, side, unseen)]
         new = [hit for hit in found if times[hit.first] > self._after]
         if not new:
             return None
@@ -65,12 +68,20 @@ class LiveHits:
         self._after = float(times[best.key])
         return best, float(times[best.key])
 
-    def _detect_hits(self, motion: Motion, side: str) -> list[HitMotion]:
-        """Find the hit motions that have begun within the window: the one under way, and those that are over."""
-        under_way = detect_hit_under_way(motion, self.part, side, self.threshold, self.tool)
+    def _detect_hits(self, motion: Motion, side: str, unseen: int) -> list[HitMotion]:
+        """Find the hit motions that have begun within the window: the one under way, and those that are over.
+
+        A busy program looks seldom, so the one under way is searched at each moment of the last `unseen` frames.
+        """
         settled = len(motion) - 1 - int(np.ceil(_SETTLE_SECONDS * motion.fps))
         found = detect_hits(motion, self.part, side, self.threshold, tool=self.tool).motions
-        return [hit for hit in found if 0 < hit.first and hit.last < settled] + ([under_way] if under_way else [])
+        found = [hit for hit in found if 0 < hit.first and hit.last < settled]
+        step = max(int(_LOOK_SECONDS * motion.fps), 1)
+        for end in range(len(motion), max(len(motion) - unseen, 2), -step):
+            under_way = detect_hit_under_way(motion.frames(0, end), self.part, side, self.threshold, self.tool)
+            if under_way is not None:
+                return [*found, under_way]
+        return found
 
 
 def build_recording(listener: Listener, seconds: float, rate: float | None = None) -> Motion | None:

@@ -301,7 +301,7 @@ def left_over(room):
     found += [*map(str, (*window._draw_handlers, *window._timers, *live._timers,
                          *room("scene.result.queue").list_players()))]
     found += [job.kind for job in room("scene.core.background")._newest.values() if not job.is_stale]
-    found += ["stream"] if room("scene.stream.follow").get_current_listener() is not None else []
+    found += [f"stream {number}" for number in room("scene.stream.follow")._streams]
     found += ["rally"] if room("scene.stream.play").get_current_rally() is not None else []
     return found + ["queue"] * room("scene.result.queue").is_busy()
 
@@ -343,10 +343,12 @@ def a_match_child(room, _context):
         child.subprocess = kept
 
 
-def a_stream(room, _context):
-    bpy.context.scene.beyond_mocap_stream.port = find_free_port()
-    room("scene.stream.follow").start_listening(bpy.context.scene.beyond_mocap_stream)
-    room("scene.stream.follow").reset_status()
+def two_streams(room, _context):
+    first = bpy.context.scene.beyond_mocap_stream
+    bpy.ops.beyond_mocap.stream_list(what="ADD")
+    for stream in (first, first.further[0]):
+        stream.port = find_free_port()
+        room("scene.stream.follow").start_listening(stream)
 
 
 def a_live_update(room, _context):
@@ -366,7 +368,7 @@ def a_menu_of_words(room, _context):
     room("operators.timeline.annotate")._start_drawing()
 
 
-STARTS = (a_background_job, a_match_child, a_stream, a_live_update, a_menu_of_words)
+STARTS = (a_background_job, a_match_child, two_streams, a_live_update, a_menu_of_words)
 
 
 def assert_nothing_is_left(extension, room, windowed):

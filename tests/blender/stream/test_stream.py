@@ -21,7 +21,7 @@ def room():
     found = lambda name: importlib.import_module(f"{EXTENSION}.scene.{name}")  # noqa: E731
     yield found
     found("stream.follow").stop_listening()
-    found("stream.follow").write_status()
+    found("stream.follow").write_stopped()
 
 
 @pytest.fixture
@@ -47,12 +47,12 @@ def follow(room, thread, seconds=20.0):
     stream, found, end = room("stream.follow"), [], time.monotonic() + seconds
     shown, rest = None, end
     while time.monotonic() < min(end, rest):
-        found.append(stream.update_stream(bpy.context.scene))
-        latest = (listener := stream.get_current_listener()) and listener.latest_frame()
+        found.extend(stream.update_streams(bpy.context.scene))
+        latest = (listener := stream.find_listener()) and listener.latest_frame()
         if thread.is_alive() or (latest and latest.number != shown):
             shown, rest = latest and latest.number, time.monotonic() + 0.4
         time.sleep(0.01)
-    return [one for one in found if one is not None]
+    return found
 
 
 def test_the_body_does_what_arrives(room, core, port):
@@ -122,7 +122,7 @@ def test_rubbish_changes_nothing(room, port, rubbish):
             out.sendto(rubbish, ("127.0.0.1", port))
     end = time.monotonic() + 5.0
     while "invalid pieces" not in told().line and time.monotonic() < end:  # the first alone is "1 invalid piece"
-        room("stream.follow").update_stream(bpy.context.scene)
+        room("stream.follow").update_streams(bpy.context.scene)
         time.sleep(0.02)
     assert "invalid pieces" in told().line
     OPS.stream_stop()
@@ -148,16 +148,16 @@ def test_a_stream_that_stops_is_told_and_the_pose_stays(room, core, port, monkey
     room("stream.follow").write_status()
     assert told().state == "stalled" and "no frame" in told().line
     before = [tuple(bone.rotation_quaternion) for bone in bpy.context.scene.beyond_mocap_stream.body.pose.bones]
-    room("stream.follow").update_stream(bpy.context.scene)
+    room("stream.follow").update_streams(bpy.context.scene)
     assert before == [tuple(bone.rotation_quaternion) for bone in bpy.context.scene.beyond_mocap_stream.body.pose.bones]
 
 
 def test_a_file_that_is_loaded_ends_the_stream(room, core, port, tmp_path):
     bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "a.blend"))
     OPS.stream_start()
-    listener = room("stream.follow").get_current_listener()
+    listener = room("stream.follow").find_listener()
     bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "a.blend"))
-    assert room("stream.follow").get_current_listener() is None and not listener.is_running
+    assert room("stream.follow").find_listener() is None and not listener.is_running
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as again:
         again.bind(("127.0.0.1", port))
 
@@ -184,7 +184,7 @@ def test_a_suits_file_that_is_none(room, port, tmp_path):
     bpy.context.scene.beyond_mocap_stream.clip = str(tmp_path / "none.bvh")
     with pytest.raises(RuntimeError, match="no such file"):
         press_operator(OPS.stream_start)
-    assert room("stream.follow").get_current_listener() is None
+    assert room("stream.follow").find_listener() is None
 
 
 def test_a_body_that_was_removed_is_made_anew(room, core, port):
@@ -201,7 +201,7 @@ def test_a_stream_that_is_given_up_says_why(room, core, port, monkeypatch):
     follow(room, send(core, port, 600.0))
     told = bpy.context.window_manager.beyond_mocap_streaming
     assert not told.on and told.state == "failed" and "skeleton has changed" in told.line
-    assert room("stream.follow").get_current_listener() is None and bpy.context.scene.beyond_mocap_stream.body is None
+    assert room("stream.follow").find_listener() is None and bpy.context.scene.beyond_mocap_stream.body is None
 
 
 def test_a_chosen_armature_is_used(room, core, port):

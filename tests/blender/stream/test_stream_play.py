@@ -4,6 +4,7 @@ import importlib
 import pathlib
 import threading
 import time
+from contextlib import contextmanager
 from dataclasses import replace
 
 import bpy
@@ -23,7 +24,7 @@ def room():
     yield found
     found("stream.play").stop_rally()
     found("stream.follow").stop_listening()
-    found("stream.follow").write_status()
+    found("stream.follow").write_stopped()
 
 
 @pytest.fixture(scope="module")
@@ -63,6 +64,29 @@ def places(scene, frames):
     return np.array(found)
 
 
+def follow_until(room, is_true):
+    """Update until something is true."""
+    end = time.monotonic() + 120.0
+    while not is_true():
+        assert time.monotonic() < end, told().played
+        room("stream.follow").update_streams(bpy.context.scene)
+        time.sleep(0.02)
+
+
+@contextmanager
+def kicking(core, port):
+    """A user who kicks again and again."""
+    stop = threading.Event()
+    sender = core("passes.stream.sender").Sender(CLIPS / "volley_pass.bvh", port, loop=True)
+    thread = threading.Thread(target=sender.send_file, args=(stop.is_set,))
+    thread.start()
+    try:
+        yield
+    finally:
+        stop.set()
+        thread.join()
+
+
 def test_all_stand_and_the_ball_lies(playing, room):
     assert (
         room("stream.play").get_current_rally().holder == "Ann" and told().playing
@@ -98,7 +122,7 @@ def test_an_answer_that_is_planned_ahead_begins_at_once(playing, room, core):
     while ahead.find(ahead.request_for(kick(core), "Ben", 0)) is None and time.monotonic() < end:
         play.update_rally(playing)
         time.sleep(0.01)
-    play.store_strike(playing, kick(core), time.monotonic())
+    play.store_strike(kick(core), time.monotonic())
     play.update_rally(playing)
     assert play.get_current_rally().passes == 1 and "The answer began 0." in told().played
     assert play._session["ahead"] is not ahead and play._session["pending"] is None
@@ -132,10 +156,7 @@ def test_a_stream_is_answered(playing, room, core):
     sender = core("passes.stream.sender").Sender(CLIPS / "volley_toss.bvh", port)
     thread = threading.Thread(target=sender.send_file, args=(lambda: False,))
     thread.start()
-    look, end = room("stream.follow").update_stream, time.monotonic() + 60.0
-    while room("stream.play").get_current_rally().passes == 0 and time.monotonic() < end:
-        look(playing)
-        time.sleep(0.02)
+    follow_until(room, lambda: room("stream.play").get_current_rally().passes)
     thread.join()
     assert room("stream.play").get_current_rally().passes == 1 and "Ann played volley_toss" in told().played
 
@@ -144,7 +165,7 @@ def test_what_cannot_be_answered_is_told_and_changes_nothing(playing, room, core
     play = room("stream.play")
     actions = {row.name: row.body.animation_data.action.name for row in playing.beyond_mocap_passes.players}
     tail = replace(kick(core), part="tail")
-    play.store_strike(playing, tail, 0.0)
+    play.store_strike(tail, 0.0)
     end = time.monotonic() + 60.0
     while "has the ball" in told().played and time.monotonic() < end:
         play.update_rally(playing)
@@ -196,3 +217,36 @@ def test_choosing_is_one_step(playing):
 def test_an_unknown_holder_is_told(playing):
     with pytest.raises(RuntimeError, match="holder"):
         press_operator(OPS.stream_play, holder="Zoe")
+
+
+def test_two_users_pass_to_each_other(playing, room, core):
+    """Ann's user kicks to Ben, whose user kicks back; a kick of one who has no ball does nothing."""
+    press_operator(OPS.stream_list, what="ADD")
+    first, second = playing.beyond_mocap_stream, playing.beyond_mocap_stream.further[0]
+    first.port, second.port, first.player, second.player = find_free_port(), find_free_port(), "Ann", "Cho"
+    for number in (1, 2):
+        press_operator(OPS.stream_start, number=number)
+    rally = room("stream.play").get_current_rally
+    with kicking(core, second.port):  # Cho's user, while Ann has the ball
+        follow_until(room, lambda: bool(told().further[0].hit))
+    assert rally().passes == 0
+    with kicking(core, first.port):
+        follow_until(room, lambda: rally().passes == 1)
+    assert rally().holder == "Cho", "the next with a user, not Ben, who is the next of the list"
+    playing.frame_set(int(5 + 24 * rally().ready_time) + 2)
+    with kicking(core, second.port):
+        follow_until(room, lambda: rally().passes == 2)
+    assert rally().holder == "Ann"
+
+
+def test_a_player_of_no_scene_is_told(playing, room):
+    playing.beyond_mocap_stream.port, playing.beyond_mocap_stream.player = find_free_port(), "Zoe"
+    OPS.stream_start()
+    with pytest.raises(RuntimeError, match="no player 'Zoe' in the passing scene"):
+        press_operator(OPS.stream_play)
+
+
+def test_a_renamed_player_keeps_the_stream(playing):
+    playing.beyond_mocap_stream.player = "Ann"
+    playing.beyond_mocap_passes.players["Ann"].name = "Anna"
+    assert playing.beyond_mocap_stream.player == "Anna"

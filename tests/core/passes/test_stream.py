@@ -278,18 +278,19 @@ class Played:
         ) for n, frame in some]
 
 
-@pytest.mark.parametrize("fps", [30.0, 60.0, 120.0])
-def test_a_kick_is_recognised_once_while_it_arrives(tmp_path, fps):
+@pytest.mark.parametrize("fps, every", [(30.0, 0.05), (60.0, 0.05), (120.0, 0.05), (60.0, 0.5)])
+def test_a_kick_is_recognised_once_while_it_arrives(tmp_path, fps, every):
+    """Also by a busy program that looks every half second: at its next look."""
     made = build_strike("kick low top", fps=fps)
     bvh.write_bvh(tmp_path / "kick.bvh", made.motion)
     played = Played(tmp_path / "kick.bvh")
     watch, found = LiveHits(played), []
-    for played.now in np.arange(0.0, made.motion.duration, 0.05):
+    for played.now in np.arange(0.0, made.motion.duration, every):
         hit = watch.find_new_hit()
         found += [(*hit, played.now)] if hit else []
     assert len(found) == 1
     hit, moment, now = found[0]
-    assert hit.side == "right" and abs(moment - made.key) < 0.1 and now - made.key < 0.2
+    assert hit.side == "right" and abs(moment - made.key) < 0.1 and now - made.key < 0.15 + every
 
 
 def test_walking_is_no_hit(tmp_path, clip):
