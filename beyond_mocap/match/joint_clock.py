@@ -111,7 +111,7 @@ def _find_blocks(feed: JointFeed) -> list[tuple[float, float]]:
 
 def _cut_people(feed: JointFeed, start: float, end: float) -> dict[int, PlayerJoints]:
     """Cut people to a time, s, by their place in the feed."""
-    parts = {number: person.cut(start, end) for number, person in enumerate(feed.people)}
+    parts = {number: person.cut_span(start, end) for number, person in enumerate(feed.people)}
     return {number: part for number, part in parts.items() if len(part.times)}
 
 

@@ -13,7 +13,7 @@ from ..base.errors import format_count, format_seconds
 from ..base.settings import find_setting
 from ..files.joints.joint_feed import JointFeed
 from ..files.joints.joint_readers import read_joints
-from ..files.tracking.match_arrays import USUAL_PITCH
+from ..files.tracking.match_arrays import USUAL_PITCH, check_clock
 from ..files.tracking.tracking import read_match
 from ..library.library import Library
 from ..motion.contacts import detect_heel_toe_contacts
@@ -87,9 +87,10 @@ def read_joint_match(path: Path | str, pitch: tuple[float, float] | None = None)
     Returns:
         The match, whose clock begins at the first sample, and the joints on it.
     Raises:
-        InputError: if the file cannot be read.
+        InputError: if the file cannot be read, or has times of more than a day.
     """
     feed = _begin_at_zero(read_joints(path))
+    check_clock(path, np.concatenate([person.times for person in feed.people]))
     return build_match(feed, pitch or USUAL_PITCH), feed
 
 
@@ -161,7 +162,7 @@ def build_known_bodies(feed: JointFeed | None, match: Match, request: MatchReque
 
 def _cut_feed(feed: JointFeed, start: float, end: float) -> JointFeed:
     """Cut a feed to a time, s; people with fewer than two frames in it are left out."""
-    people = (person.cut(start, end) for person in feed.people)
+    people = (person.cut_span(start, end) for person in feed.people)
     return replace(feed, people=tuple(person for person in people if len(person.times) >= 2))
 
 

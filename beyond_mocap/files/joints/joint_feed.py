@@ -42,7 +42,7 @@ class PlayerJoints:
     times: np.ndarray
     positions: np.ndarray
 
-    def cut(self, start: float, end: float) -> PlayerJoints:
+    def cut_span(self, start: float, end: float) -> PlayerJoints:
         """Cut the joints to a time, s."""
         inside = (self.times >= start) & (self.times <= end)
         return replace(self, times=self.times[inside], positions=self.positions[inside])

@@ -96,5 +96,9 @@ def test_bad_joints_end_with_one_line(tmp_path, capsys):
                            (tmp_path / "ball.csv", "unknown form"), (tmp_path / "none.csv", "missing")):
         status, line = _run(capsys, tmp_path, *dots, "--joints", path)
         assert status == 2 and expected in line, line
-    status, line = _run(capsys, tmp_path, "--tracking", tmp_path / "objects.npz")
-    assert status == 2 and "objects.npz" in line, line
+    times = write_table(tmp_path / "years.csv", {"A": joints}, 25.0)
+    head, *rows = times.read_text().splitlines(keepends=True)
+    times.write_text(head + "".join(rows) + "".join(f"1.7e9{row[row.index(','):]}" for row in rows[:20]))
+    for path, expected in ((tmp_path / "objects.npz", "objects.npz"), (times, "the times of one match")):
+        status, line = _run(capsys, tmp_path, "--tracking", path)
+        assert status == 2 and expected in line, line
