@@ -2,6 +2,7 @@
 
 import json
 from importlib import import_module
+from types import SimpleNamespace
 
 import bpy
 import numpy as np
@@ -40,6 +41,15 @@ def see(camera, body, frame):
     scene.frame_set(frame)
     body = body.evaluated_get(bpy.context.evaluated_depsgraph_get())
     return np.array(world_to_camera_view(scene, camera, body.matrix_world @ body.pose.bones[0].head))
+
+
+def test_the_ball_of_passes_is_as_large_as_they_say_in_every_sport(core):
+    scene = bpy.context.scene
+    scene.beyond_mocap_stage.sport = "ice_hockey"
+    path = core("motion.track.ball_path").BallPath(np.arange(3.0), np.zeros((3, 3)), np.ones(3, bool))
+    room("passes.generate").apply_ball(scene, SimpleNamespace(ball=path, kind=SimpleNamespace(radius=0.105)), 1.0)
+    bpy.context.view_layer.update()
+    assert tuple(scene.beyond_mocap_passes.rally.dimensions) == pytest.approx(3 * (0.21,), rel=0.01)
 
 
 @pytest.mark.parametrize("size", [(105.0, 68.0), (90.0, 45.0)])
