@@ -1,6 +1,8 @@
 """Joints beside dots: their clock, pitch and people are found by where they are, and what is not of the match is
 refused."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -62,6 +64,9 @@ def test_the_clock_behind_a_pause_is_its_own():
                         positions=np.concatenate([one.people[0].positions for one in (first, second)]))
     (person,) = align_joints(JointFeed((both,), FPS, ()), build_match(paths)).people
     assert person.times[[0, -1]] == pytest.approx([10.0, 80.0], abs=0.021)
+    moved = replace(both, times=person.times - 7.0)
+    (line,) = align_joints(JointFeed((moved,), FPS, ()), build_match(paths)).notes  # once, not for each part
+    assert "7.00 s" in line
 
 
 def test_pieces_of_a_player_are_one_player_and_strangers_none():
