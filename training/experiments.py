@@ -80,6 +80,8 @@ def read_experiments(path: Path) -> Experiments:
     entries = values.parse_json(read_utf8(path, "experiments", MAX_FILE_SIZE), str(path), PAGE)
     values.check_names(entries, str(path), _NAMES, _NAMES)
     action = values.check_text(entries["action"], f"{path}: action")
+    for name in ("tests", "rows"):
+        values.check_object(entries[name], f"{path}: {name}")
     rows = {name: _parse_row(name, row, action, f"{path}: {name}") for name, row in entries["rows"].items()}
     tests = {name: _parse_source(source, f"{path}: {name}") for name, source in entries["tests"].items()}
     return Experiments(_parse_source(entries["training"], f"{path}: training"), tests, rows)
@@ -90,6 +92,7 @@ def _parse_row(name: str, entry, action: str, where: str) -> Row:
     if not re.fullmatch(r"[a-z0-9-]+", name):
         raise InputError(where, values.describe_value(name), "small letters, digits and hyphens")
     values.check_names(entry, where, ("title", "config"), ("title", "config"))
+    values.check_object(entry["config"], f"{where}: config")
     config = build_config({"action": action, **entry["config"]}, where)
     return Row(values.check_text(entry["title"], where), config)
 

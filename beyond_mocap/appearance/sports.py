@@ -15,6 +15,9 @@ from dataclasses import dataclass, field
 from functools import cache
 from pathlib import Path
 
+FOOTBALL = "football"
+"""The sport whose touches of the ball and goalkeepers are known, and whose pitch readers assume."""
+
 
 @dataclass(frozen=True)
 class Goal:
@@ -102,6 +105,11 @@ def load_sports() -> Mapping[str, Sport]:
     """
     content = json.loads((Path(__file__).parent / "sports.json").read_text("utf-8"))
     return {name: _build_sport(name, entry) for name, entry in content.items()}
+
+
+def find_assumed_pitch(sport: str) -> tuple[float, float] | None:
+    """Find the size of the pitch, m, for tracking data without it; None: what readers assume, a football pitch."""
+    return None if sport == FOOTBALL else load_sports()[sport].size
 
 
 def _build_sport(name: str, entry: dict) -> Sport:

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -18,15 +18,15 @@ from ..annotation.event_labels import read_event_labels
 from ..annotation.vocabulary import SIDES
 from ..base.content import read_utf8
 from ..base.errors import InputError, format_count
+from ..motion.track import BALL_RADIUS
 from .atomic import atomic_folder
 from .file_names import build_file_names
 from .tables import format_csv
+from .tracking.match_arrays import USUAL_PITCH
 
 COLUMNS = ("time_s", "player", "x_m", "y_m", "z_m", "team", "position")
 _FIELD = np.array([120.0, 80.0])  # StatsBomb's units, which stretch to the pitch; y grows to the right of the attack
-_PITCH = np.array([105.0, 68.0])  # metres, where the user gives no size
 _YARD = 0.9144  # metres, of heights
-_BALL = 0.11  # metres, height of a ball on the ground
 _RATE, _SECONDS, EVENT_TIME = 25.0, 4.0, 2.0
 _STEP = 0.45  # metres from a standing player to the ball
 _FASTEST = 38.0  # m/s of a kicked ball
@@ -114,7 +114,7 @@ def _build_frame(event: dict, picture: dict) -> FreezeFrame:
         kind=str(event["type"]["name"]), player=str((event.get("player") or {}).get("name") or ""),
         team=str((event.get("team") or {}).get("name") or ""), places=places,
         roles=tuple(_name_role(person) for person in people), ball=_to_places([event["location"][:2]])[0],
-        end=None if ended is None else _to_places([ended["end_location"]])[0],
+        end=None if ended is None else _to_places([ended["end_location"]], (2, 3))[0],
         duration=duration if math.isfinite(duration) else 0.0, labels=_find_labels(event),
     )  # fmt: skip
 
@@ -132,9 +132,10 @@ def _find_labels(event: dict) -> tuple[str, ...]:
     return read_event_labels().find_labels(kind, part, (way,), values)
 
 
-def _to_places(rows: list) -> np.ndarray:
+def _to_places(rows: list, counts: Collection[int] = (2,)) -> np.ndarray:
+    """Return locations of as many numbers as one of `counts`; ValueError for others."""
     places = np.array(rows, dtype=float)
-    if places.ndim != 2 or not np.all(np.abs(places) < 10.0 * _FIELD[0]):
+    if places.ndim != 2 or places.shape[1] not in counts or not np.all(np.abs(places) < 10.0 * _FIELD[0]):
         raise ValueError(f"location {rows[0]}")
     return places
 
@@ -180,7 +181,7 @@ def write_still(folder: Path, frame: FreezeFrame, size: tuple[float, float] | No
     """
     if len(frame.roles) > _MOST_PEOPLE:
         raise InputError(folder, format_count(len(frame.roles), "person", "people"), f"at most {_MOST_PEOPLE}")
-    pitch = _PITCH if size is None else np.array(size)
+    pitch = np.array(size or USUAL_PITCH)
     people, places = _name_people(frame), _to_metres(frame.places, pitch)
     times = np.arange(int(_RATE * _SECONDS) + 1) / _RATE
     rows: list[tuple[str, ...]] = [(f"{time:.2f}", name, f"{x:.3f}", f"{y:.3f}", "", ground, position)
@@ -220,11 +221,11 @@ def _move_ball(frame: FreezeFrame, pitch: np.ndarray, times: np.ndarray) -> np.n
     It rests a step before the player of the event, where that player is in the picture: the place that StatsBomb notes
     for the event is a metre or two beside the one that it sees.
     """
-    start = np.array([*_to_metres(frame.ball, pitch), _BALL])
+    start = np.array([*_to_metres(frame.ball, pitch), BALL_RADIUS])
     actor = next((place for place, role in zip(frame.places, frame.roles) if role.startswith("actor")), None)
     if frame.end is None:
         return np.tile(start, (len(times), 1))
-    height = max(frame.end[2] * _YARD, _BALL) if len(frame.end) > 2 else _BALL
+    height = max(frame.end[2] * _YARD, BALL_RADIUS) if len(frame.end) > 2 else BALL_RADIUS
     end = np.array([*_to_metres(frame.end[:2], pitch), height])
     if actor is not None:
         foot = _to_metres(actor, pitch)

@@ -60,7 +60,7 @@ def align_joints(feed: JointFeed, match: Match, path: Path | str = "joints") -> 
     if problem is not None and not any(aligned.values()):
         raise problem
     people = [_join_person(parts) for parts in aligned.values() if parts]
-    return replace(feed, people=tuple(people), notes=(*feed.notes, *notes))
+    return replace(feed, people=tuple(people), notes=(*feed.notes, *dict.fromkeys(notes)))
 
 
 def name_people(feed: JointFeed, match: Match) -> dict[str, str]:
@@ -111,10 +111,8 @@ def _find_blocks(feed: JointFeed) -> list[tuple[float, float]]:
 
 def _cut_people(feed: JointFeed, start: float, end: float) -> dict[int, PlayerJoints]:
     """Cut people to a time, s, by their place in the feed."""
-    inside = {number: (person.times >= start) & (person.times <= end) for number, person in enumerate(feed.people)}
-    return {number: replace(feed.people[number], times=feed.people[number].times[there],
-                            positions=feed.people[number].positions[there])
-            for number, there in inside.items() if there.any()}
+    parts = {number: person.cut_span(start, end) for number, person in enumerate(feed.people)}
+    return {number: part for number, part in parts.items() if len(part.times)}
 
 
 def _move_person(person: PlayerJoints, offset: float, is_turned: bool) -> PlayerJoints:

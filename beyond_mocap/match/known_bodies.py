@@ -13,6 +13,7 @@ from ..base.errors import format_count, format_seconds
 from ..base.settings import find_setting
 from ..files.joints.joint_feed import JointFeed
 from ..files.joints.joint_readers import read_joints
+from ..files.tracking.match_arrays import USUAL_PITCH, check_clock
 from ..files.tracking.tracking import read_match
 from ..library.library import Library
 from ..motion.contacts import detect_heel_toe_contacts
@@ -22,11 +23,10 @@ from ..motion.retargeting.neutral import scale_stance
 from ..motion.track.match_data import REFEREE, Match, MatchPlayer, Team
 from ..skeletal.fit_body import fit_body
 from ..skeletal.reconstruct_bodies import PLANTED_RATE, Body, plant_body, reconstruct_bodies
-from ..synthesis.known_body import KnownBody, build_known_body
+from ..synthesis.known_body import KnownBody, build_known_body, find_shown_frames
 from .joint_clock import MOST_APART, align_joints, find_pelvis, name_people
 from .request import MatchRequest
 
-_PITCH = (105.0, 68.0)
 _HEIGHT = find_setting("player", "height")
 _AROUND = 2.0  # s of joints that are fitted beyond the span
 _LONGEST_GAP = 0.25  # s without joints: a longer one is synthesized, which is nearer than what is bridged
@@ -87,13 +87,14 @@ def read_joint_match(path: Path | str, pitch: tuple[float, float] | None = None)
     Returns:
         The match, whose clock begins at the first sample, and the joints on it.
     Raises:
-        InputError: if the file cannot be read.
+        InputError: if the file cannot be read, or has times of more than a day.
     """
     feed = _begin_at_zero(read_joints(path))
-    return build_match(feed, pitch or _PITCH), feed
+    check_clock(path, np.concatenate([person.times for person in feed.people]))
+    return build_match(feed, pitch or USUAL_PITCH), feed
 
 
-def build_match(feed: JointFeed, pitch: tuple[float, float] = _PITCH) -> Match:
+def build_match(feed: JointFeed, pitch: tuple[float, float] = USUAL_PITCH) -> Match:
     """Build a match whose dots are the pelvis of each person.
 
     Args:
@@ -161,12 +162,8 @@ def build_known_bodies(feed: JointFeed | None, match: Match, request: MatchReque
 
 def _cut_feed(feed: JointFeed, start: float, end: float) -> JointFeed:
     """Cut a feed to a time, s; people with fewer than two frames in it are left out."""
-    people = []
-    for person in feed.people:
-        inside = (person.times >= start) & (person.times <= end)
-        if inside.sum() >= 2:
-            people.append(replace(person, times=person.times[inside], positions=person.positions[inside]))
-    return replace(feed, people=tuple(people))
+    people = (person.cut_span(start, end) for person in feed.people)
+    return replace(feed, people=tuple(person for person in people if len(person.times) >= 2))
 
 
 def _convert_bodies(bodies: list[Body], library: Library, fps: float) -> SeenPlayer:
@@ -234,5 +231,4 @@ def _follow(times: np.ndarray, path: np.ndarray, bodies: tuple[KnownBody, ...]) 
             gap = place[near] - path[near]
             stronger = (weight > share) & np.isfinite(gap).all()
             offset[stronger], share[stronger] = weight[stronger, None] * gap, weight[stronger]
-    shown = np.any([(times >= body.start - 1e-6) & (times <= body.end + 1e-6) for body in bodies], axis=0)
-    return np.where(shown[:, None], own, path + offset)
+    return np.where(find_shown_frames(bodies, times)[:, None], own, path + offset)

@@ -327,7 +327,7 @@ def _parse_row(value, where: str, count: int) -> list:
 
 def _parse_plan(row, where: str, take_array) -> Plan:
     """Parse the plan of a stretch."""
-    track = _parse_track(row, where, take_array)
+    track, settings = _parse_track(row, where, take_array), _parse_settings(row["settings"], f"{where}: settings")
     first, last = track.times[0], track.times[-1]
     spans, keys = [], []
     for value in check_list(row["spans"], f"{where}: spans"):
@@ -346,8 +346,7 @@ def _parse_plan(row, where: str, take_array) -> Plan:
         track=track, timeline=Timeline(tuple(spans), tuple(keys)), pins=tuple(pins),
         heading_keys=tuple(headings), heading_path=_parse_heading_path(where, take_array),
         solved=_parse_trajectory(row, where, take_array, float(first), float(last)),
-        bodies=_parse_bodies(row, where, take_array),
-        **_parse_settings(row["settings"], f"{where}: settings"),
+        bodies=_parse_bodies(row, where, take_array, settings.get("fps", _DEFAULTS["fps"])), **settings,
     )  # fmt: skip
 
 
@@ -379,17 +378,19 @@ def _parse_heading_path(where: str, take_array) -> HeadingPath | None:
     return HeadingPath(values[:, 0] / 1e6, values[:, 1])
 
 
-def _parse_bodies(row, where: str, take_array) -> tuple[KnownBody, ...]:
-    """Parse the bodies that cameras have seen."""
+def _parse_bodies(row, where: str, take_array, rate: float) -> tuple[KnownBody, ...]:
+    """Parse the bodies that cameras have seen, at the plan's frames per second."""
     bodies = []
     for number, value in enumerate(check_list(row.get("bodies", []), f"{where}: bodies")):
         first, fps, joints = _parse_row(value, f"{where}: bodies", 3)
+        if check_number(fps, where) != rate:
+            raise InputError(f"{where}: bodies", f"{fps:g} frames per second", f"{rate:g}, as the plan has")
         root = unpack_positions(take_array(f"body_{number}_root", 3), f"{where}: bodies")
         turns = take_array(f"body_{number}_turns", 4 * check_whole_number(joints, where), len(root))
         if np.isnan(root).any() or turns.dtype != np.int16 or not turns.reshape(len(root), -1, 4).any(axis=2).all():
             raise InputError(f"{where}: bodies", "an unknown pose", "root and rotations of every frame")
         contacts = take_array(f"body_{number}_contacts", 4, len(root)) > 0
-        bodies.append(KnownBody(check_whole_number(first, where), check_number(fps, where), root,
+        bodies.append(KnownBody(check_whole_number(first, where), rate, root,
                                 turns.reshape(len(root), -1, 4), contacts.reshape(-1, 2, 2)))
     return tuple(bodies)
 

@@ -14,14 +14,13 @@ from pathlib import Path
 import numpy as np
 
 from .. import __version__
-from ..appearance.sports import load_sports
+from ..appearance.sports import find_assumed_pitch
 from ..base.errors import InputError, build_read_error, format_seconds
 from ..base.settings import collect_defaults
 from ..files.event_providers import EVENT_PROVIDERS
 from ..files.joints.joint_readers import is_joint_file, list_joint_files
 from .pieces.units import OVERLAP, WINDOW
 
-FOOTBALL = "football"
 _DEFAULTS = collect_defaults("match")
 FORM = 5
 """Raised whenever the same request would give other results, so that stored ones are not used for it."""
@@ -117,7 +116,7 @@ class MatchRequest:
 
     def find_pitch(self) -> tuple[float, float] | None:
         """Find the pitch's size, m, for tracking data without it; None: what readers assume of a football pitch."""
-        return self.pitch or (None if self.sport == FOOTBALL else load_sports()[self.sport].size)
+        return self.pitch or find_assumed_pitch(self.sport)
 
     def find_joint_file(self) -> Path | None:
         """Find the skeletal tracking: the file of joints, or the tracking itself where that is skeletal."""
@@ -131,8 +130,7 @@ class MatchRequest:
 
 
 _RESULTS = ("provider", "start", "end", "players", "fps", "seed", "nearest", "solve_touches", "watch", "strength",
-            "masses", "fatigue", "window", "overlap", "variety", "events_provider", "sport",
-            "pitch")
+            "masses", "fatigue", "window", "overlap", "variety", "events_provider", "sport", "pitch")
 _FILES = ("tracking", "meta", "events", "events_meta")
 
 

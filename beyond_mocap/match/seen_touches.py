@@ -76,7 +76,7 @@ def _list_points(skeleton: Skeleton, places: np.ndarray) -> dict[Place, np.ndarr
     out = {}
     for side, limb in sides:
         foot = places[:, limb.foot]
-        toe = foot if limb.toe is None else places[:, limb.toe]
+        toe = places[:, limb.toe_or_foot]
         out["foot", side] = np.stack([foot, 0.5 * (foot + toe), toe], axis=1)
         if limb.hand is not None:
             out["hand", side] = places[:, [limb.hand]]

@@ -15,6 +15,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from ..appearance.sports import FOOTBALL
 from ..ball.tracked.solve import SolvedBall, solve_ball
 from ..base.errors import BeyondMocapError, InputError, UserCancelledError
 from ..files.atomic import atomic_write
@@ -40,7 +41,7 @@ from .pieces.tasks import LibrarySource, set_library
 from .play import build_plays, find_kept_lines
 from .player_plans import build_player_plans, check_label_folder, list_unknown_texts, list_unused_labels
 from .report.pictures import build_thumbnail_renderer
-from .request import FOOTBALL, MatchRequest, build_identity
+from .request import MatchRequest, build_identity
 from .roles import build_roles, list_absent_players, resolve_span, separate_roles
 from .seen_touches import name_seen_touches
 from .state import build_player_row, build_state, read_clocks

@@ -260,7 +260,7 @@ def _find_reach(contacts: np.ndarray, is_between: bool, *, edge_is_first: bool, 
 def _find_raised(skeleton: Skeleton, poses: Sequence[Pose]) -> np.ndarray:
     """Find where heel and toe (T, 2, 2) bool are clearly higher in the first of two motions than in the second."""
     body = identify_joints(skeleton)
-    ends = [[limb.foot, limb.foot if limb.toe is None else limb.toe] for limb in (body.left, body.right)]
+    ends = [[limb.foot, limb.toe_or_foot] for limb in (body.left, body.right)]
     faded, before = (compute_pose(skeleton, *pose)[0][:, ends, 2] for pose in poses)
     return faded - before > _RAISED
 

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ...beyond_mocap.appearance.sports import load_sports
+from ...beyond_mocap.appearance.sports import FOOTBALL, load_sports
 from ...beyond_mocap.base.errors import InputError, UserCancelledError, format_seconds
 from ...beyond_mocap.base.fixes import Fix
 from ...beyond_mocap.motion.motion import Motion
@@ -68,7 +68,7 @@ class MatchSection:
     colours: dict[str, str]
     characters: tuple[Character, ...]
     ball: BallPath | None
-    sport: str = "football"
+    sport: str = FOOTBALL
 
 
 @dataclass(frozen=True)
@@ -150,7 +150,7 @@ def _find_sport(state: dict) -> str:
     """Return the sport of a match; football for one of an earlier version, or of a sport that is not known."""
     order = state.get("order")
     sport = order.get("sport") if isinstance(order, dict) else None
-    return sport if isinstance(sport, str) and sport in load_sports() else "football"
+    return sport if isinstance(sport, str) and sport in load_sports() else FOOTBALL
 
 
 def _resolve_span(request: DisplayRequest, state: dict) -> tuple[float, float]:

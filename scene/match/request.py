@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 
 import bpy
 
+from ...beyond_mocap.appearance.sports import FOOTBALL, find_assumed_pitch
 from ...beyond_mocap.base.digest import hex_digest
 from ...beyond_mocap.base.errors import InputError
 from ...beyond_mocap.base.fixes import Fix
@@ -17,12 +18,9 @@ from ...beyond_mocap.files.tracking.feed import is_track_csv
 from ..core import preferences, sample
 from ..core.settings import to_absolute_path, to_setting_path
 from ..player import tracks
-from ..stage.stage_collection import find_sport
 from .kits import DEFAULT_COLOURS, to_linear
 from .load import TEAMS, DisplayRequest
 from .settings import AUTO, FIRST_SECONDS, BeyondMocapMatch, collect_colours, format_float
-
-FOOTBALL = "football"
 
 if TYPE_CHECKING:
     from ...beyond_mocap.motion.track.match_data import Match
@@ -114,16 +112,14 @@ def build_read_request(match: BeyondMocapMatch, chosen: str = "") -> ReadRequest
         raise InputError(tracking, "one player's track", "a provider's tracking of a match",
                          "import it in step 2")
     metadata = "" if chosen else to_absolute_path(match.metadata_file)
-    sport = find_sport(match.id_data)
     return ReadRequest(tracking, metadata, "" if match.provider == AUTO else match.provider,
-                       None if sport.name == FOOTBALL else sport.size)
+                       find_assumed_pitch(match.id_data.beyond_mocap_stage.sport))
 
 
 def read_match(request: ReadRequest, progress) -> tuple[ReadRequest, "Match"]:
     """Read the match, in any thread; return the request and the data."""
     progress(0.05, "reading the match")
-    return request, tracks.read_match(request.tracking, request.metadata, request.provider,
-                                      request.pitch)
+    return request, tracks.read_match(request.tracking, request.metadata, request.provider, request.pitch)
 
 
 def update_match(match: BeyondMocapMatch, request: ReadRequest, data: "Match") -> None:

@@ -264,7 +264,8 @@ def apply_ball(scene: bpy.types.Scene, played_scene: "PlayedScene", start: float
     settings, path = scene.beyond_mocap_passes, played_scene.ball
     target = settings.rally
     if target is None or target.name not in scene.objects:
-        target = settings.rally = ball.create_ball(bpy.context, BALL, bake.find_or_create_collection(scene))
+        collection = bake.find_or_create_collection(scene)  # not the sport's ball: it is as large as the passes say
+        target = settings.rally = ball.create_ball(bpy.context, BALL, collection, ball.RADIUS)
         target[KEPT] = True
     if target.get(KEPT):
         target.scale = 3 * (played_scene.kind.radius / ball.RADIUS,)

@@ -18,7 +18,7 @@ STAND, ARM = 1.0, 0.06  # metres from the end line to the post that carries a bo
 def create_goals(collection: bpy.types.Collection, units: float, goal: Goal, length: float) -> list[bpy.types.Object]:
     """Create both goals of a pitch of `length` metres, with one shared mesh for each part."""
     parts = {"Goal": create_tubes("Goal", _build_frame(goal), goal.post)}
-    parts["Goal"].materials.append(get_material(*_choose_paint(goal), 0.35))
+    parts["Goal"].materials.append(_get_paint(goal.colour))
     if goal.form == "net":
         parts["Net"] = create_cords("Net", _build_net(goal), CORD)
         parts["Net"].materials.append(get_material("Net white", (0.75, 0.75, 0.75), 0.9))
@@ -26,7 +26,7 @@ def create_goals(collection: bpy.types.Collection, units: float, goal: Goal, len
         parts["Goal stand"] = create_tubes("Goal stand", _build_stand(goal), ARM)
         parts["Goal board"] = create_mesh("Goal board", _build_board(goal), [(0, 1, 2, 3)])
         for part in ("Goal stand", "Goal board"):
-            parts[part].materials.append(get_material("Goal white", Goal.colour, 0.35))
+            parts[part].materials.append(_get_paint(Goal.colour))
     objects = []
     for side, turn in (("right", 0.0), ("left", np.pi)):
         for name, mesh in parts.items():
@@ -38,9 +38,10 @@ def create_goals(collection: bpy.types.Collection, units: float, goal: Goal, len
     return objects
 
 
-def _choose_paint(goal: Goal) -> tuple[str, tuple[float, float, float]]:
-    """Choose the material of posts and bar by name and colour."""
-    return "Goal white" if goal.colour == Goal.colour else "Goal paint", goal.colour
+def _get_paint(colour: tuple[float, float, float]) -> bpy.types.Material:
+    """Return the material of posts and boards, one for each colour (linear RGB): sports in one file differ."""
+    name = "white" if colour == Goal.colour else " ".join(f"{value:g}" for value in colour)
+    return get_material(f"Goal {name}", colour, 0.35)
 
 
 def _build_frame(goal: Goal) -> list[tuple[np.ndarray, np.ndarray]]:

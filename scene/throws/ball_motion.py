@@ -56,7 +56,8 @@ def show_ball(scene: bpy.types.Scene, body: bpy.types.Object, result: "ThrowPrev
     ball = settings.ball or settings.flown
     if ball is None:
         remove_unused_actions()
-        ball = balls.create_ball(bpy.context, NAMES[result.order.action], bake.find_or_create_collection(scene))
+        collection = bake.find_or_create_collection(scene)  # not the sport's ball: it is the one that is thrown
+        ball = balls.create_ball(bpy.context, NAMES[result.order.action], collection, balls.RADIUS)
         ball[KEPT], settings.flown = True, ball
         discard_saved_state(settings.ball_before, MARK)
     is_created = ball == settings.flown and _is_created(settings)

@@ -76,8 +76,13 @@ def test_what_cannot_run_is_one_line(data, tmp_path, capsys):
     assert main(["--data", str(tmp_path), "--out", str(tmp_path / "out"), "--hours", "1"]) == 0
     assert "skipped" in capsys.readouterr().out and not (tmp_path / "out").exists()
     (tmp_path / "file").write_text("")
+    damaged = [tmp_path / "rows.json", tmp_path / "config.json"]
+    for path, rows in zip(damaged, ([], {"one": {"title": "one", "config": []}})):
+        source = {"folder": "people", "subjects": []}
+        path.write_text(json.dumps({"action": "throw", "training": source, "tests": {"one": source}, "rows": rows}))
     for more in (["--row", "nobody"], ["--out", str(tmp_path / "file" / "out")], ["--hours", "nan"],
-                 ["--experiments", str(data / "people" / "throws.csv")]):
+                 ["--experiments", str(data / "people" / "throws.csv")],
+                 *(["--experiments", str(path)] for path in damaged)):
         assert main([*words(data, tmp_path / "out", 1), *more]) == 2
         assert capsys.readouterr().err.count("\n") == 1 and not (tmp_path / "out").exists()
 

@@ -42,6 +42,11 @@ class PlayerJoints:
     times: np.ndarray
     positions: np.ndarray
 
+    def cut_span(self, start: float, end: float) -> PlayerJoints:
+        """Cut the joints to a time, s."""
+        inside = (self.times >= start) & (self.times <= end)
+        return replace(self, times=self.times[inside], positions=self.positions[inside])
+
 
 @dataclass(frozen=True, eq=False)
 class JointFeed:

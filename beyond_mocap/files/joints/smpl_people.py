@@ -12,19 +12,17 @@ from ...motion import quaternion
 from ...motion.contacts import measure_floor_height
 from ...motion.motion import Motion, forward_kinematics
 from ..plain_npz import list_arrays, read_named_arrays
-from ..smpl.smpl import find_up_axis, to_core_axes
+from ..smpl.smpl import MAX_METRES, MAX_TURN, RATES, find_rate, find_up_axis, to_core_axes
 from ..smpl.smpl_skeleton import JOINTS, PELVIS_AT_REST, TOE_HEIGHT, build_smpl_skeleton, estimate_smpl_stature
 from .joint_feed import JointCollector, JointFeed
 
 _KIND = "motion of SMPL of many people: global_orient (P, T, 3), body_pose (P, T, 69), transl (P, T, 3)"
 _ARRAYS = ("global_orient", "body_pose", "transl")
-_RATES = ("fps", "mocap_framerate")
 _TYPES = tuple(np.dtype(kind) for kind in ("<f4", "<f8", "<i4", "<i8"))
 _MAX_BYTES = 4 << 30
 _USUAL_RATE = 50.0  # frames per second of WorldPose's cameras, which the arrays do not say
 _USUAL_STATURE = 1.81  # metres, the mean of professional footballers, where the steps do not tell it
 _SHORTEST = 1.0  # seconds of steps that tell a stature
-_MAX_TURN, _MAX_METRES = 1000.0, 10_000.0  # radians and metres; a number beyond is damaged
 LANDMARKS = tuple(f"{side}_{part}" for side in ("left", "right")
                 for part in ("shoulder", "elbow", "wrist", "hip", "knee", "ankle", "foot"))  # fmt: skip
 """The joints of SMPL that are landmarks of the same name."""
@@ -45,34 +43,22 @@ def read_smpl_people(path: Path) -> JointFeed:
     Raises:
         InputError: if it is not such a file.
     """
-    arrays = read_named_arrays(path, _KIND, _TYPES, _MAX_BYTES, (*_ARRAYS, *_RATES), is_finite=False)
+    arrays = read_named_arrays(path, _KIND, _TYPES, _MAX_BYTES, (*_ARRAYS, *RATES), is_finite=False)
     root, body, trans = (arrays[name] for name in _ARRAYS)
     if root.ndim != 3 or root.shape[2] != 3 or trans.shape != root.shape or body.ndim != 3 or body.shape[
             :2] != root.shape[:2] or body.shape[2] not in (63, 69):
         raise InputError(path, f"arrays of shapes {root.shape}, {body.shape}, {trans.shape}", _KIND,
                          "export them so; one person's motion is a clip of the library")
-    found, fps = JointCollector(path), _find_rate(path, arrays)
-    if fps is None:
-        found.notes.append(f"{_USUAL_RATE:g} frames per second assumed, which the arrays do not say")
-        fps = _USUAL_RATE
+    found, (fps, notes) = JointCollector(path), find_rate(path, arrays, _USUAL_RATE)
+    found.notes += notes
     found.notes.append("joints are those of mean proportions, as tall as the steps fit; shapes need the body model")
     for number in range(len(root)):
         poses = np.concatenate([root[number], body[number, :, :63]], axis=1).astype(float)
         places = trans[number].astype(float)
-        seen = (np.abs(poses) < _MAX_TURN).all(axis=1) & (np.abs(places) < _MAX_METRES).all(axis=1)
+        seen = (np.abs(poses) < MAX_TURN).all(axis=1) & (np.abs(places) < MAX_METRES).all(axis=1)
         if seen.sum() >= 2:
             _add_person(found, str(number), poses.reshape(len(poses), len(JOINTS), 3), places, seen=seen, fps=fps)
     return found.build(fps)
-
-
-def _find_rate(path: Path, arrays) -> float | None:
-    name = next((name for name in _RATES if name in arrays and arrays[name].size), None)
-    if name is None:
-        return None
-    rate = float(arrays[name].reshape(-1)[0])
-    if not 1.0 <= rate <= 400.0:
-        raise InputError(path, f"{name} {rate:g}", "1 to 400 frames per second")
-    return rate
 
 
 def _add_person(found: JointCollector, name: str, poses: np.ndarray, trans: np.ndarray, seen: np.ndarray,

@@ -38,14 +38,16 @@ from .smpl_skeleton import (
     read_model_skeleton,
 )
 
+MAX_TURN, MAX_METRES = 1000.0, 10_000.0
+"""Radians and metres beyond which a number is damaged: rotation vectors are hardly above 2 pi."""
+RATES = ("mocap_framerate", "mocap_frame_rate", "fps")
+"""Arrays that hold the frames per second."""
+
 _KIND = "a motion of SMPL as .npz: poses (T, 72, 156 or 165), trans (T, 3), mocap_framerate"
 _NUMBERS = tuple(np.dtype(kind) for kind in ("<f4", "<f8", "<i4", "<i8", "|u1", "<u4", "<u8", "<i2"))
 _MAX_BYTES = 1 << 30
 _MAX_FRAMES = 1_000_000
-_MAX_TURN = 1000.0  # radians; rotation vectors are hardly above 2 pi: beyond this a number is damaged
-_MAX_METRES = 10_000.0
 _WIDTHS = {72: "SMPL", 156: "SMPL-H", 165: "SMPL-X"}
-_RATES = ("mocap_framerate", "mocap_frame_rate", "fps")
 _DEFAULT_RATE = 30.0  # of GVHMR, which stores none
 # (root rotation, body rotations, translation) of forms without `poses`
 _PARTS = (
@@ -88,7 +90,7 @@ def read_smpl(path, stature: float | None = None, body_model: Path | None = None
     path = Path(path)
     arrays = _read_arrays(path)
     poses, trans, form = _find_poses(path, arrays)
-    fps, notes = _find_rate(path, arrays)
+    fps, notes = find_rate(path, arrays)
     rotations = quaternion.from_rotation_vector(poses)
     to_world, up = find_up_axis(rotations[:, 0])
     local, root = to_core_axes(rotations, trans, to_world)
@@ -131,7 +133,7 @@ def _read_arrays(path: Path) -> Mapping[str, np.ndarray]:
     if path.suffix.lower() != ".npz":
         raise InputError(path, f"a {path.suffix or 'file without ending'}: pickles can run code and are never opened",
                          _KIND, "save its arrays with numpy.savez")
-    names = ("poses", "trans", "betas", *_RATES, *(name for part in _PARTS for name in part))
+    names = ("poses", "trans", "betas", *RATES, *(name for part in _PARTS for name in part))
     return read_named_arrays(path, _KIND, _NUMBERS, _MAX_BYTES, names)
 
 
@@ -154,10 +156,10 @@ def _find_poses(path: Path, arrays: Mapping[str, np.ndarray]) -> tuple[np.ndarra
                          "export one person's motion; bodies --joints reads many")
     if not 2 <= len(flat) <= _MAX_FRAMES:
         raise InputError(path, format_count(len(flat), "frame"), f"2 to {_MAX_FRAMES:,}")
-    if np.abs(trans).max() > _MAX_METRES:
-        raise InputError(path, f"trans up to {np.abs(trans).max():.3g}", f"metres, below {_MAX_METRES:g}")
-    if np.abs(flat).max() > _MAX_TURN:
-        raise InputError(path, f"poses up to {np.abs(flat).max():.3g}", f"radians, below {_MAX_TURN:g}")
+    if np.abs(trans).max() > MAX_METRES:
+        raise InputError(path, f"trans up to {np.abs(trans).max():.3g}", f"metres, below {MAX_METRES:g}")
+    if np.abs(flat).max() > MAX_TURN:
+        raise InputError(path, f"poses up to {np.abs(flat).max():.3g}", f"radians, below {MAX_TURN:g}")
     return flat[:, : 3 * len(JOINTS)].reshape(len(flat), len(JOINTS), 3).astype(float), trans.astype(float), form
 
 
@@ -168,11 +170,21 @@ def _flatten(array: np.ndarray) -> np.ndarray:
     return array.reshape(len(array), -1) if array.ndim > 1 and array.size else np.zeros((0, 0))
 
 
-def _find_rate(path: Path, arrays: Mapping[str, np.ndarray]) -> tuple[float, list[str]]:
-    """Return the frames per second, and a line where the file has none."""
-    name = next((name for name in _RATES if name in arrays), None)
+def find_rate(path: Path, arrays: Mapping[str, np.ndarray], usual: float = _DEFAULT_RATE) -> tuple[float, list[str]]:
+    """Find the frames per second.
+
+    Args:
+        path: the file, for errors.
+        arrays: its arrays.
+        usual: of a file that has none.
+    Returns:
+        Frames per second, and a line where they are assumed.
+    Raises:
+        InputError: if they cannot be.
+    """
+    name = next((name for name in RATES if name in arrays), None)
     if name is None:
-        return _DEFAULT_RATE, [f"no frame rate in the file; {_DEFAULT_RATE:g} frames per second assumed"]
+        return usual, [f"no frame rate in the file; {usual:g} frames per second assumed"]
     rate = float(arrays[name].reshape(-1)[0]) if arrays[name].size else 0.0
     if not 1.0 <= rate <= 1000.0:
         raise InputError(path, f"{name} {rate:g}", "1 to 1000 frames per second")

@@ -178,6 +178,14 @@ def test_a_table_in_another_unit_is_refused(scale, line, tmp_path):
         read_match(write_table(tmp_path, scale=scale), cache_dir=tmp_path / "cache")
 
 
+@pytest.mark.parametrize(("rows", "line"), [("0,ball,1,2\n1,ball,3,4\n", "no position of a player"),
+                                            ("0,a,1,2\n1,b,10,4\n2,c,20,6\n", "moments of their own")])
+def test_a_table_without_motion_of_players_is_refused(rows, line, tmp_path):
+    (tmp_path / "game.csv").write_text("time_s,player,x_m,y_m\n" + rows)
+    with pytest.raises(InputError, match=line):
+        read_match(tmp_path / "game.csv", cache_dir=tmp_path / "cache")
+
+
 def test_two_halves_follow_each_other(tmp_path):
     path = write_cdf(tmp_path)
     rows = [json.loads(line) for line in path.read_text().splitlines()]

@@ -80,6 +80,8 @@ def test_headers_fly_and_all_moments_are_listed(write, tmp_path, capsys):
     ({"pictures": "{"}, [], "not JSON"), ({"pictures": [{"a": 1}]}, [], "no list of objects"),
     ({"pictures": [{"event_uuid": "zz", "freeze_frame": PEOPLE}]}, [], "the same match"),
     ({"pictures": [{"event_uuid": "aa-1", "freeze_frame": [{"location": [1e300, "x"]}]}]}, [], "other places"),
+    ({"pictures": [{"event_uuid": "aa-1", "freeze_frame": [{"location": [60.0, 40.0, 1.0]}]}]}, ["--event", "aa-1"],
+     "other places"),
     ({"pictures": [{"event_uuid": "aa-1", "freeze_frame": PEOPLE * 40}]}, ["--event", "aa-1"], "at most 60"),
 ])  # fmt: skip
 def test_bad_input_ends_with_one_line(change, more, line, write, tmp_path, capsys):

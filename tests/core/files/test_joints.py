@@ -73,7 +73,7 @@ def test_people_of_smpl_have_joints_of_mean_proportions(smpl_people, tmp_path):
 
 
 @pytest.mark.parametrize(("change", "line"), [
-    ({"body_pose": np.zeros((2, 240, 30))}, "shapes"), ({"fps": np.array(9000.0)}, "1 to 400"),
+    ({"body_pose": np.zeros((2, 240, 30))}, "shapes"), ({"fps": np.array(9000.0)}, "1 to 1000"),
     ({"transl": np.full((2, 240, 3), np.nan)}, "no person"), ({"transl": np.zeros((3, 240, 3))}, "shapes"),
     ({"global_orient": np.array([object()] * 3)}, "global_orient"),
 ])  # fmt: skip

@@ -1,6 +1,8 @@
 """Joints beside dots: their clock, pitch and people are found by where they are, and what is not of the match is
 refused."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -62,6 +64,9 @@ def test_the_clock_behind_a_pause_is_its_own():
                         positions=np.concatenate([one.people[0].positions for one in (first, second)]))
     (person,) = align_joints(JointFeed((both,), FPS, ()), build_match(paths)).people
     assert person.times[[0, -1]] == pytest.approx([10.0, 80.0], abs=0.021)
+    moved = replace(both, times=person.times - 7.0)
+    (line,) = align_joints(JointFeed((moved,), FPS, ()), build_match(paths)).notes  # once, not for each part
+    assert "7.00 s" in line
 
 
 def test_pieces_of_a_player_are_one_player_and_strangers_none():
@@ -96,5 +101,9 @@ def test_bad_joints_end_with_one_line(tmp_path, capsys):
                            (tmp_path / "ball.csv", "unknown form"), (tmp_path / "none.csv", "missing")):
         status, line = _run(capsys, tmp_path, *dots, "--joints", path)
         assert status == 2 and expected in line, line
-    status, line = _run(capsys, tmp_path, "--tracking", tmp_path / "objects.npz")
-    assert status == 2 and "objects.npz" in line, line
+    times = write_table(tmp_path / "years.csv", {"A": joints}, 25.0)
+    head, *rows = times.read_text().splitlines(keepends=True)
+    times.write_text(head + "".join(rows) + "".join(f"1.7e9{row[row.index(','):]}" for row in rows[:20]))
+    for path, expected in ((tmp_path / "objects.npz", "objects.npz"), (times, "the times of one match")):
+        status, line = _run(capsys, tmp_path, "--tracking", path)
+        assert status == 2 and expected in line, line

@@ -1,10 +1,12 @@
 """Players whose joints are seen: shown as they are, synthesized where they are not, without a jump in between."""
 
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
+from beyond_mocap.base.errors import InputError
 from beyond_mocap.cli.main import main
 from beyond_mocap.files.tracking.tracking import read_match
 from beyond_mocap.library.build import build_library
@@ -74,7 +76,12 @@ def test_a_player_with_bodies_comes_back_from_a_file(seen_match, tmp_path):
     path = next(out.glob("*.take.npz"))
     edit = read_player(path)
     write_player(tmp_path / "again.npz", edit)
-    assert (tmp_path / "again.npz").read_bytes() == path.read_bytes() and edit.stretches[0].plan.bodies
+    (stretch,) = edit.stretches
+    assert (tmp_path / "again.npz").read_bytes() == path.read_bytes() and stretch.plan.bodies
+    stopped = replace(stretch.plan, bodies=tuple(replace(body, fps=0.0) for body in stretch.plan.bodies))
+    write_player(tmp_path / "damaged.npz", replace(edit, stretches=(replace(stretch, plan=stopped),)))
+    with pytest.raises(InputError, match="0 frames per second"):
+        read_player(tmp_path / "damaged.npz")
 
 
 def test_beside_dots_only_what_is_seen_comes_from_joints(tmp_path):

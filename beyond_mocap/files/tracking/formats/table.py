@@ -44,7 +44,7 @@ def read_table(feed: Feed, pitch: tuple[float, float] | None) -> MatchSamples:
     found = SampleCollector(feed.path)
     tracks = _read_tracks(feed.path, found)
     corner = _find_origin(feed.path, tracks, pitch or USUAL_PITCH, found)
-    step = _find_step(tracks)
+    step = _find_step(feed.path, tracks)
     for key, rows in tracks.items():
         samples = np.array(rows, dtype=float)
         samples[:, 2:4] -= corner
@@ -87,7 +87,8 @@ def _find_ground(team: str, grounds: dict[str, str], lines: list[str]) -> str:
 
 def _find_origin(path: Path, tracks, pitch: tuple[float, float], found: SampleCollector) -> np.ndarray:
     """Return where the pitch's centre is in the file's coordinates, (2,)."""
-    places = np.array([row[2:4] for key, rows in tracks.items() if key != _BALL for row in rows], dtype=float)
+    found_places = [row[2:4] for key, rows in tracks.items() if key != _BALL for row in rows]
+    places = np.array(found_places, dtype=float).reshape(-1, 2)
     places = places[np.isfinite(places).all(axis=1)]
     if not len(places):
         raise InputError(path, "no position of a player", "x and y in metres", "export it again")
@@ -111,13 +112,17 @@ def _add_rows(found: SampleCollector, key: str, samples: np.ndarray) -> None:
             found.add_sample((int(period), seconds), key, x, y)
 
 
-def _find_step(tracks) -> float | None:
+def _find_step(path: Path, tracks) -> float | None:
     """Find the seconds between moments that all players can share; None where they share those of the file."""
     moments = {row[:2] for rows in tracks.values() for row in rows}
     if len(moments) <= _SHARED * max(map(len, tracks.values())):
         return None
     steps = np.concatenate([np.diff(np.unique([row[1] for row in rows])) for rows in tracks.values()])
-    return round(float(np.median(steps)), 3)
+    step = round(float(np.median(steps)), 3) if len(steps) else 0.0
+    if not step:
+        raise InputError(path, "players at moments of their own, not steps of a millisecond or more apart",
+                         "several rows for each player", "export it again")
+    return step
 
 
 def _add_resampled(found: SampleCollector, key: str, samples: np.ndarray, step: float) -> None:
