@@ -16,8 +16,7 @@ REPOSITORY = "beyond_mocap_batch"
 def find_extension():
     """Find the package of the enabled extension; without one, that of this file's folder.
 
-    Blender itself makes the folder importable: it becomes an extension repository of this session. Its classes are
-    registered, because a scene that is written (`match --scene`) has the extension's properties.
+    Blender itself makes the folder importable: it becomes an extension repository of this session.
 
     Returns:
         The package's name.
@@ -30,7 +29,6 @@ def find_extension():
             return name
     folder, saved = pathlib.Path(__file__).resolve().parent, preferences.is_dirty
     preferences.extensions.repos.new(name=REPOSITORY, module=REPOSITORY, custom_directory=str(folder))
-    importlib.import_module(f"bl_ext.{REPOSITORY}.__init__").register()
     preferences.is_dirty = saved  # nothing to save: the repository is gone when Blender ends
     return f"bl_ext.{REPOSITORY}"
 
@@ -38,8 +36,10 @@ def find_extension():
 def main():
     """Run the command after `--`; return its exit status."""
     arguments = sys.argv[sys.argv.index("--") + 1 :] if "--" in sys.argv else sys.argv[1:]
-    command = importlib.import_module(f"{find_extension()}.operators.command")
-    return command.run(arguments)
+    package = find_extension()
+    if package.endswith(REPOSITORY):  # nothing has registered it; a scene that is written has its properties
+        importlib.import_module(f"{package}.__init__").register()
+    return importlib.import_module(f"{package}.operators.command").run(arguments)
 
 
 if __name__ == "__main__":

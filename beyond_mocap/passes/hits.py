@@ -39,6 +39,9 @@ _LEAST_RISE_AFTER = 0.03  # m: least rise after the strike for the high frame to
 _LEAST_RISE = {"foot": 0.10, "head": 0.10, "chest": 0.08, "hand": 0.15, "tool": 0.20}
 _LEAST_SPEED = {"foot": 1.5, "head": 0.8, "chest": 0.6, "hand": 2.0, "tool": 2.5}
 
+Poses = tuple[np.ndarray, np.ndarray]
+"""World positions (T, J, 3) m and rotations (T, J, 4) of all joints."""
+
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class HitMotion:
@@ -127,7 +130,7 @@ class Hits:
 
 
 def detect_hits(motion: Motion, part: str = "foot", side: str = "right", threshold: float | None = None,
-                joint: str | None = None, tool: Tool | None = None) -> Hits:
+                joint: str | None = None, tool: Tool | None = None, poses: Poses | None = None) -> Hits:
     """Detect the hits of one part of the body in a motion.
 
     Args:
@@ -138,6 +141,7 @@ def detect_hits(motion: Motion, part: str = "foot", side: str = "right", thresho
             steps of walking and running are left out.
         joint: name of a joint to use instead of the part's own position.
         tool: what is in the hand; default: a racquet.
+        poses: `forward_kinematics` of the motion, where it is known.
     Returns:
         All high and fast frames, hit motions, ball stretches and link stretches.
     Raises:
@@ -146,7 +150,7 @@ def detect_hits(motion: Motion, part: str = "foot", side: str = "right", thresho
     Source: Ball handling, section 3.
     """
     _check_input(motion, threshold)
-    body, trajectory, other, place = _measure(motion, part, side, joint=joint, tool=tool)
+    body, trajectory, other, place = _measure(motion, part, side, joint=joint, tool=tool, poses=poses)
     side = side if part in _SIDED else ""
     peaks = _find_peaks(trajectory.height)
     height_threshold = _find_threshold(trajectory.height, peaks, part) if threshold is None else float(threshold)
@@ -163,7 +167,7 @@ def detect_hits(motion: Motion, part: str = "foot", side: str = "right", thresho
 
 
 def detect_hit_under_way(motion: Motion, part: str = "foot", side: str = "right", threshold: float | None = None,
-                         tool: Tool | None = None) -> HitMotion | None:
+                         tool: Tool | None = None, poses: Poses | None = None) -> HitMotion | None:
     """Detect a hit motion that is not over yet, but whose strike has just been: the part slows down again.
 
     It has to be as fast as `detect_hits` wants, to move ahead of the body, and to be above the threshold before, at or
@@ -171,7 +175,7 @@ def detect_hit_under_way(motion: Motion, part: str = "foot", side: str = "right"
 
     Args:
         motion: the motion up to now, three frames or more.
-        part, side, threshold, tool: as in `detect_hits`.
+        part, side, threshold, tool, poses: as in `detect_hits`.
     Returns:
         The hit motion up to now, with NaN for the displacements and durations that are still to come; None if there
         is none.
@@ -179,7 +183,7 @@ def detect_hit_under_way(motion: Motion, part: str = "foot", side: str = "right"
         InputError: as `detect_hits`.
     """
     _check_input(motion, threshold)
-    body, trajectory, other, _ = _measure(motion, part, side, tool=tool)
+    body, trajectory, other, _ = _measure(motion, part, side, tool=tool, poses=poses)
     speed, height, now = trajectory.speed, trajectory.height, len(motion) - 1
     earliest = max(now - int(_RECENT * motion.fps), 0)
     key = earliest + int(np.argmax(speed[earliest:]))
@@ -336,11 +340,12 @@ class _PartTrajectory:
                                speed=np.linalg.norm(relative_velocity, axis=1), fps=fps)
 
 
-def _measure(motion: Motion, part: str, side: str, joint: str | None = None, tool: Tool | None = None):
+def _measure(motion: Motion, part: str, side: str, joint: str | None = None, tool: Tool | None = None,
+             poses: Poses | None = None):
     """Measure a motion: its body, the part's trajectory, the speed (T,) m/s of the other foot where a foot strikes,
     else None, and the part's places (T, 3) m.
     """
-    positions, rotations = forward_kinematics(motion)
+    positions, rotations = forward_kinematics(motion) if poses is None else poses
     place = compute_strike_place(motion.skeleton, positions, rotations, part=joint or part, side=side, tool=tool)
     body = _Body.from_motion(motion, positions)
     trajectory = _PartTrajectory.from_positions(place, body, part, motion.fps)

@@ -11,8 +11,8 @@ from __future__ import annotations
 import numpy as np
 
 from ...ball.contact import Tool
-from ...motion.motion import Motion
-from ..hits import HitMotion, detect_hit_under_way, detect_hits
+from ...motion.motion import Motion, forward_kinematics
+from ..hits import HitMotion, Poses, detect_hit_under_way, detect_hits
 from .listener import Listener, StreamFrame, convert_poses
 
 WINDOW = 4.0
@@ -60,7 +60,8 @@ class LiveHits:
         motion, times = space_evenly(frames, _RATE)
         unseen = int(np.count_nonzero(times > self._seen_until))
         self._seen_until = float(times[-1])
-        found = [hit for side in self.sides for hit in self._detect_hits(motion, side, unseen)]
+        poses = forward_kinematics(motion)  # once, for both sides and all moments
+        found = [hit for side in self.sides for hit in self._detect_hits(motion, poses, side, unseen)]
         new = [hit for hit in found if times[hit.first] > self._after]
         if not new:
             return None
@@ -68,17 +69,19 @@ class LiveHits:
         self._after = float(times[best.key])
         return best, float(times[best.key])
 
-    def _detect_hits(self, motion: Motion, side: str, unseen: int) -> list[HitMotion]:
+    def _detect_hits(self, motion: Motion, poses: Poses, side: str, unseen: int) -> list[HitMotion]:
         """Find the hit motions that have begun within the window: the one under way, and those that are over.
 
         A busy program looks seldom, so the one under way is searched at each moment of the last `unseen` frames.
         """
         settled = len(motion) - 1 - int(np.ceil(_SETTLE_SECONDS * motion.fps))
-        found = detect_hits(motion, self.part, side, self.threshold, tool=self.tool).motions
+        found = detect_hits(motion, self.part, side, self.threshold, tool=self.tool, poses=poses).motions
         found = [hit for hit in found if 0 < hit.first and hit.last < settled]
         step = max(int(_LOOK_SECONDS * motion.fps), 1)
         for end in range(len(motion), max(len(motion) - unseen, 2), -step):
-            under_way = detect_hit_under_way(motion.frames(0, end), self.part, side, self.threshold, self.tool)
+            until = poses[0][:end], poses[1][:end]
+            under_way = detect_hit_under_way(motion.frames(0, end), self.part, side, self.threshold, tool=self.tool,
+                                             poses=until)
             if under_way is not None:
                 return [*found, under_way]
         return found
