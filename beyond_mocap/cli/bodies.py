@@ -46,7 +46,7 @@ def run_bodies(options, reporter: ProgressReporter, writers: Mapping[str, Writer
     feed = read_joints(options.joints)
     bodies, notes = reconstruct_bodies(feed, reporter.show_progress, reporter.is_cancelled)
     if not bodies:
-        raise InputError(options.joints, "no stretch of a body: " + "; ".join(notes[:3]), "half a second of joints",
+        raise InputError(options.joints, "; ".join(["no stretch of a body", *notes[:3]]), "half a second of joints",
                          "export more frames or joints")
     rows: list[dict] = []
     used: set[str] = set()

@@ -51,7 +51,13 @@ def run_freeze_frame(options, reporter: ProgressReporter, writers: Mapping[str, 
         for frame in frames:
             print(f"{frame.id}  {frame.clock}  {frame.kind}, {frame.player} ({frame.team})")
         return
-    frame = find_freeze_frame(frames, options.event, options.input)
+    frame, others = find_freeze_frame(frames, options.event, options.input)
     count = write_still(options.out, frame, options.pitch)
+    for other in others:
+        reporter.show_note(f"also at {other.clock}: {other.kind} of {other.player or other.team}, {other.id}")
+    if not frame.labels:
+        reporter.show_note(f"{frame.kind} says no action: the player stands")
+    if options.pitch is not None:
+        reporter.show_note("use the same --pitch with match")
     print(f"{options.out}: {frame.kind} of {frame.player or frame.team} at {frame.clock}, "
           f"{format_count(count, 'person', 'people')}, the event at {EVENT_TIME:g} s")

@@ -86,8 +86,9 @@ def read_freeze_frames(frames: Path, events: Path) -> list[FreezeFrame]:
         found = [_build_frame(row, by_event[row["id"]]) for row in rows
                  if row.get("id") in by_event and row.get("location") and by_event[row["id"]]["freeze_frame"]]
     except (LookupError, TypeError, AttributeError, ValueError, ArithmeticError) as error:
-        raise InputError(frames, f"values in other places than StatsBomb has them ({type(error).__name__}: {error})"[
-            :200], "StatsBomb's 360 data and events", "export them again") from None
+        found_instead = f"values in other places than StatsBomb has them ({type(error).__name__}: {error})"
+        raise InputError(f"{frames.name} and {events.name}", found_instead[:200], "its 360 data and events",
+                         "export them again") from None
     if not found:
         raise InputError(frames, f"no event of {events.name} has a freeze frame", "the events of the same match",
                          "choose the file with its number")
@@ -145,7 +146,8 @@ def _name_role(person: dict) -> str:
     return f"{side} keeper" if person.get("keeper") else side
 
 
-def find_freeze_frame(frames: Sequence[FreezeFrame], wanted: str, path: Path) -> FreezeFrame:
+def find_freeze_frame(frames: Sequence[FreezeFrame], wanted: str,
+                      path: Path) -> tuple[FreezeFrame, list[FreezeFrame]]:
     """Find a frame by its event's id or its time.
 
     Args:
@@ -153,16 +155,16 @@ def find_freeze_frame(frames: Sequence[FreezeFrame], wanted: str, path: Path) ->
         wanted: an event's id, or the beginning of one that no other has, or "MM:SS".
         path: their file, for errors.
     Returns:
-        The frame; of several in one second the first.
+        The frame, of several in one second the first whose player does something; and those others.
     Raises:
         InputError: if there is none, or several ids begin so.
     """
-    by_clock = [frame for frame in frames if frame.clock == wanted]
-    found = by_clock[:1] or [frame for frame in frames if wanted and frame.id.startswith(wanted)]
+    at_time = sorted((frame for frame in frames if frame.clock == wanted), key=lambda frame: not frame.labels)
+    found = at_time[:1] or [frame for frame in frames if wanted and frame.id.startswith(wanted)]
     if len(found) != 1:
-        raise InputError(path, f"{format_count(len(found), 'event')} {wanted!r}", "one with a freeze frame",
-                         "leave --event out to list them")
-    return found[0]
+        what = f"{len(found)} events whose ids begin with" if found else "no freeze frame of event"
+        raise InputError(path, f"{what} {wanted!r}", "an event's id or time MM:SS", "leave --event out to list them")
+    return found[0], at_time[1:]
 
 
 def write_still(folder: Path, frame: FreezeFrame, size: tuple[float, float] | None = None) -> int:
@@ -180,7 +182,8 @@ def write_still(folder: Path, frame: FreezeFrame, size: tuple[float, float] | No
         InputError: if it has too many, or the folder is not empty or cannot be written.
     """
     if len(frame.roles) > _MOST_PEOPLE:
-        raise InputError(folder, format_count(len(frame.roles), "person", "people"), f"at most {_MOST_PEOPLE}")
+        raise InputError(f"event {frame.id}", format_count(len(frame.roles), "person", "people"),
+                         f"at most {_MOST_PEOPLE}", "choose another event")
     pitch = np.array(size or USUAL_PITCH)
     people, places = _name_people(frame), _to_metres(frame.places, pitch)
     times = np.arange(int(_RATE * _SECONDS) + 1) / _RATE

@@ -55,7 +55,8 @@ def resolve_span(match: Match, request: MatchRequest) -> tuple[float, float]:
     start = first if request.start is None else max(request.start, first)
     end = last if request.end is None else min(request.end, last)
     if end - start < MIN_SECONDS:
-        low, high = (format_seconds(value) if value is not None else "" for value in (request.start, request.end))
+        low, high = (format_seconds(one if asked is None else asked)
+                     for one, asked in ((first, request.start), (last, request.end)))
         expected = f"a second or more within {format_seconds(first)} to {format_seconds(last)} s"
         raise InputError("time range", f"{low} to {high} s", expected, "choose other times")
     return start, end

@@ -163,6 +163,9 @@ def _run_stages(
     """Run all stages after reading."""
     state, begin = job.state, read_clocks()
     match, feed = tracked
+    if job.request.pitch not in (None, (match.length, match.width)):
+        state.report["notes"].append(f"the tracking data has its own pitch, {match.length:g} x {match.width:g} m: the "
+                                     "requested size is not used")
     bodies = build_known_bodies(feed, match, job.request, job.library, span)
     state.report["notes"] += bodies.notes
     match = follow_bodies(match, bodies)

@@ -178,6 +178,8 @@ def _measure_bodies(feed: JointFeed, path: Path) -> tuple[float, np.ndarray]:
     found = np.concatenate(lengths) if lengths else np.zeros(0)
     if not np.isfinite(found).any():
         raise InputError(path, "no person with hip, knee and ankle", "joints of bodies", "export all joints")
+    if not np.nanmedian(found) > 0.0:
+        raise InputError(path, "hip, knee and ankle at one place", "joints of bodies", "export them again")
     directions = np.concatenate(ups)
     directions = directions[np.isfinite(directions).all(axis=1)]
     return float(np.nanmedian(found)), np.median(directions / np.linalg.norm(directions, axis=1)[:, None], axis=0)

@@ -12,6 +12,7 @@ import numpy as np
 
 from ...base.errors import InputError, format_count
 from ..plain_npz import list_arrays, read_named_arrays
+from ..smpl.smpl import is_smpl_file
 from ..tables import parse_number, read_rows
 from ..tracking.feed import read_head
 from ..tracking.formats.cdf import parse_time, read_json
@@ -62,7 +63,12 @@ def is_joint_file(path) -> bool:
 def _find_reader(path: Path):
     """Find the function that reads a file, by its content."""
     if path.suffix.lower() == ".npz":
-        return read_smpl_people if is_people_file(path) else _read_fifa
+        if is_people_file(path):
+            return read_smpl_people
+        if is_smpl_file(path) and list_arrays(path) & {"trans", "transl"}:
+            raise InputError(path, "one person's motion of SMPL", "the joints of people",
+                             "put it into a library of clips, or retarget it")
+        return _read_fifa
     found = _find_text_reader(path)
     if found is None:
         what = "unknown form" if read_head(path) else "missing, empty or no file"
@@ -157,8 +163,8 @@ def _read_fifa(path: Path) -> JointFeed:
     arrays = read_named_arrays(path, _FORMS, _FLOATS, _MAX_BYTES, sorted(list_arrays(path)), is_finite=False)
     fitting = {name: array for name, array in arrays.items() if array.ndim == 4 and array.shape[2:] == (15, 3)}
     if len(fitting) != 1:
-        raise InputError(path, f"{format_count(len(fitting), 'array')} of shape (N, T, 15, 3)", "one",
-                         "save the people's fifteen points as one array")
+        raise InputError(path, f"{format_count(len(fitting), 'array')} of shape (N, T, 15, 3)", "one, or those "
+                         "of SMPL: global_orient, body_pose, transl", "save the people's fifteen points as one array")
     (points,) = fitting.values()
     found = JointCollector(path)
     found.notes.append(f"{_FIFA_RATE:g} frames per second assumed, which the arrays do not say")

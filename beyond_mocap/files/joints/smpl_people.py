@@ -17,11 +17,12 @@ from ..smpl.smpl_skeleton import JOINTS, PELVIS_AT_REST, TOE_HEIGHT, build_smpl_
 from .joint_feed import JointCollector, JointFeed
 
 _KIND = "motion of SMPL of many people: global_orient (P, T, 3), body_pose (P, T, 69), transl (P, T, 3)"
-_ARRAYS = ("global_orient", "body_pose", "transl")
+_SPELLINGS = (("global_orient", "body_pose", "transl"), ("global_orients", "body_poses", "transl"))
 _TYPES = tuple(np.dtype(kind) for kind in ("<f4", "<f8", "<i4", "<i8"))
 _MAX_BYTES = 4 << 30
 _USUAL_RATE = 50.0  # frames per second of WorldPose's cameras, which the arrays do not say
 _USUAL_STATURE = 1.81  # metres, the mean of professional footballers, where the steps do not tell it
+_DEGREES = 2.0  # the middle of a body's rotation vectors is some .1 rad: above, they are degrees
 _SHORTEST = 1.0  # seconds of steps that tell a stature
 LANDMARKS = tuple(f"{side}_{part}" for side in ("left", "right")
                 for part in ("shoulder", "elbow", "wrist", "hip", "knee", "ankle", "foot"))  # fmt: skip
@@ -30,7 +31,13 @@ LANDMARKS = tuple(f"{side}_{part}" for side in ("left", "right")
 
 def is_people_file(path: Path) -> bool:
     """Return whether a file is an .npz whose arrays have the names of such motion."""
-    return set(_ARRAYS) <= list_arrays(path)
+    return _find_names(path) is not None
+
+
+def _find_names(path: Path) -> tuple[str, str, str] | None:
+    """Find the names of root rotations, body rotations and translations in a file; None where it has others."""
+    found = list_arrays(path)
+    return next((names for names in _SPELLINGS if found.issuperset(names)), None)
 
 
 def read_smpl_people(path: Path) -> JointFeed:
@@ -43,12 +50,16 @@ def read_smpl_people(path: Path) -> JointFeed:
     Raises:
         InputError: if it is not such a file.
     """
-    arrays = read_named_arrays(path, _KIND, _TYPES, _MAX_BYTES, (*_ARRAYS, *RATES), is_finite=False)
-    root, body, trans = (arrays[name] for name in _ARRAYS)
+    names = _find_names(path) or _SPELLINGS[0]
+    arrays = read_named_arrays(path, _KIND, _TYPES, _MAX_BYTES, (*names, *RATES), is_finite=False)
+    root, body, trans = (arrays[name] for name in names)
     if root.ndim != 3 or root.shape[2] != 3 or trans.shape != root.shape or body.ndim != 3 or body.shape[
             :2] != root.shape[:2] or body.shape[2] not in (63, 69):
         raise InputError(path, f"arrays of shapes {root.shape}, {body.shape}, {trans.shape}", _KIND,
                          "export them so; one person's motion is a clip of the library")
+    if root.size and np.nanmedian(np.abs(body)) > _DEGREES:
+        raise InputError(path, f"rotations of {np.nanmedian(np.abs(body)):.3g} in the middle", "radians",
+                         "convert degrees to radians")
     found, (fps, notes) = JointCollector(path), find_rate(path, arrays, _USUAL_RATE)
     found.notes += notes
     found.notes.append("joints are those of mean proportions, as tall as the steps fit; shapes need the body model")

@@ -99,7 +99,8 @@ def _detect_provider(path: Path, notes: list[str]) -> TrackingProvider:
     if is_track_csv(path):
         expected = f"a match's tracking data from one of {providers}"
         raise InputError(path, "one player's track", expected, "use synthesize for one player")
-    raise InputError(path, "unknown format", f"one of {providers}, or for one player a CSV file with time_s,x_m,y_m",
+    raise InputError(path, "unknown format", f"one of {providers}, or a CSV file: of one player with "
+                     "time_s,x_m,y_m, of all with time_s,player,x_m,y_m",
                      "choose the provider, or rename the columns")
 
 
@@ -227,7 +228,9 @@ def _is_gps_file(path: Path) -> bool:
 
 def _find_alone(path: Path, meta: Path | None, notes: list[str]) -> Files:
     """Find the files of a feed that is one file."""
-    return (path,), (meta,) if meta else ()
+    if meta:
+        notes.append(f"{meta.name} is not used: this form has no metadata")
+    return (path,), ()
 
 
 def _find_pff(path: Path, meta: Path, notes: list[str]) -> Files:

@@ -186,6 +186,15 @@ def test_a_table_without_motion_of_players_is_refused(rows, line, tmp_path):
         read_match(tmp_path / "game.csv", cache_dir=tmp_path / "cache")
 
 
+def test_rows_that_a_table_has_twice_and_metadata_that_it_has_not_are_told(tmp_path):
+    path = write_table(tmp_path)
+    path.write_text(path.read_text() + path.read_text().splitlines()[1] + "\n")
+    (tmp_path / "other.json").write_text("{}")
+    match = read_match(path, tmp_path / "other.json", cache_dir=tmp_path / "cache")
+    told = " ".join(match.report)
+    assert "1 row of a player and moment" in told and "other.json is not used" in told
+
+
 def test_two_halves_follow_each_other(tmp_path):
     path = write_cdf(tmp_path)
     rows = [json.loads(line) for line in path.read_text().splitlines()]

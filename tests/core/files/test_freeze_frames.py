@@ -75,7 +75,8 @@ def test_headers_fly_and_all_moments_are_listed(write, tmp_path, capsys):
 
 
 @pytest.mark.parametrize(("change", "more", "line"), [
-    ({}, ["--event", "aa"], "2 events 'aa'"), ({}, ["--event", "99:99"], "0 events"),
+    ({}, ["--event", "aa"], "2 events whose ids begin with 'aa'"),
+    ({}, ["--event", "99:99"], "no freeze frame of event"),
     ({}, ["--event", "aa-1", "--out", ""], "no file or folder"), ({}, ["--event", "aa-1"], "one without the other"),
     ({"pictures": "{"}, [], "not JSON"), ({"pictures": [{"a": 1}]}, [], "no list of objects"),
     ({"pictures": [{"event_uuid": "zz", "freeze_frame": PEOPLE}]}, [], "the same match"),

@@ -58,8 +58,10 @@ def smpl_people(tmp_path):
     return walk, absent[..., 0], arrays
 
 
-def test_people_of_smpl_have_joints_of_mean_proportions(smpl_people, tmp_path):
+@pytest.mark.parametrize("ending", ["", "s"])  # both spellings are in use
+def test_people_of_smpl_have_joints_of_mean_proportions(ending, smpl_people, tmp_path):
     walk, absent, arrays = smpl_people
+    arrays = {name if name == "transl" else name + ending: array for name, array in arrays.items()}
     np.savez(tmp_path / "people.npz", **arrays, betas=np.zeros((2, 10)), fps=np.array(walk.fps))
     feed = read_joints(tmp_path / "people.npz")
     assert feed.fps == walk.fps and [person.id for person in feed.people] == ["0", "1"]
@@ -74,13 +76,25 @@ def test_people_of_smpl_have_joints_of_mean_proportions(smpl_people, tmp_path):
 
 @pytest.mark.parametrize(("change", "line"), [
     ({"body_pose": np.zeros((2, 240, 30))}, "shapes"), ({"fps": np.array(9000.0)}, "1 to 1000"),
-    ({"transl": np.full((2, 240, 3), np.nan)}, "no person"), ({"transl": np.zeros((3, 240, 3))}, "shapes"),
+    ({"transl": np.full((2, 240, 3), np.nan)}, "no person"), ({"body_pose": np.full((2, 240, 69), 30.0)}, "radians"),
+    ({"transl": np.zeros((3, 240, 3))}, "shapes"),
     ({"global_orient": np.array([object()] * 3)}, "global_orient"),
 ])  # fmt: skip
 def test_damaged_people_of_smpl_end_with_one_line(change, line, smpl_people, tmp_path):
     np.savez(tmp_path / "people.npz", **{**smpl_people[2], **change})
     with pytest.raises(InputError, match=line):
         read_joints(tmp_path / "people.npz")
+
+
+def test_the_joints_of_one_person_of_smpl_are_a_clip(tmp_path):
+    write_smpl(tmp_path / "walk.npz", build_walk(60))
+    with pytest.raises(InputError, match="one person's motion of SMPL.*library"):
+        read_joints(tmp_path / "walk.npz")
+
+
+def test_joints_at_one_place_are_no_body(people, tmp_path):
+    with pytest.raises(InputError, match="at one place"):
+        read_joints(write_table(tmp_path / "a.csv", {"7": np.zeros_like(people["7"])}, FPS))
 
 
 @pytest.mark.parametrize(("unit", "turn", "said"), [

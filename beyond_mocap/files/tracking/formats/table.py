@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from ....base.errors import InputError
+from ....base.errors import InputError, format_count
 from ...tables import parse_number, read_rows
 from ..feed import Feed
 from ..match_arrays import USUAL_PITCH
@@ -44,6 +44,9 @@ def read_table(feed: Feed, pitch: tuple[float, float] | None) -> MatchSamples:
     found = SampleCollector(feed.path)
     tracks = _read_tracks(feed.path, found)
     corner = _find_origin(feed.path, tracks, pitch or USUAL_PITCH, found)
+    if doubled := sum(len(rows) - len({row[:2] for row in rows}) for rows in tracks.values()):
+        found.lines.append(f"{format_count(doubled, 'row')} of a player and moment that the file has already: the last "
+                           "one is used")
     step = _find_step(feed.path, tracks)
     for key, rows in tracks.items():
         samples = np.array(rows, dtype=float)
