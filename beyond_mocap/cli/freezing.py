@@ -44,6 +44,8 @@ def run_freeze_frame(options, reporter: ProgressReporter, writers: Mapping[str, 
 
     if (options.event is None) != (options.out is None):
         raise InputError("--event and --out", "one without the other", "both, or none to list the events")
+    if options.pitch is not None and options.event is None:
+        raise InputError("--pitch", "without --event", "the event whose moment has this pitch")
     if options.out is not None:
         check_new_folder(options.out)
     frames = read_freeze_frames(options.input, options.events)

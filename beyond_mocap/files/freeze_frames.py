@@ -31,6 +31,7 @@ _RATE, _SECONDS, EVENT_TIME = 25.0, 4.0, 2.0
 _STEP = 0.45  # metres from a standing player to the ball
 _FASTEST = 38.0  # m/s of a kicked ball
 _MOST_PEOPLE = 60
+BALL = "ball"  # the player of a plain CSV that is the ball
 TRACKING, LABELS = "moment.csv", "labels"
 _KINDS = {"Pass": "pass", "Shot": "shot", "Clearance": "clearance", "Ball Receipt*": "receive", "Goal Keeper": "save",
           "Interception": "interception", "Duel": "tackle"}
@@ -189,7 +190,7 @@ def write_still(folder: Path, frame: FreezeFrame, size: tuple[float, float] | No
     times = np.arange(int(_RATE * _SECONDS) + 1) / _RATE
     rows: list[tuple[str, ...]] = [(f"{time:.2f}", name, f"{x:.3f}", f"{y:.3f}", "", ground, position)
             for time in times for (name, ground, position), (x, y) in zip(people, places)]
-    rows += [(f"{time:.2f}", "ball", *(f"{value:.3f}" for value in place), "", "")
+    rows += [(f"{time:.2f}", BALL, *(f"{value:.3f}" for value in place), "", "")
              for time, place in zip(times, _move_ball(frame, pitch, times))]
     names = build_file_names(name for name, _, _ in people)
     with atomic_folder(folder) as inside:
@@ -203,12 +204,14 @@ def write_still(folder: Path, frame: FreezeFrame, size: tuple[float, float] | No
 
 
 def _name_people(frame: FreezeFrame) -> list[tuple[str, str, str]]:
-    """Return name, team and position of each person."""
-    counts, people = {"home": 0, "away": 0}, []
+    """Return name, team and position of each person; the first actor has the player's name."""
+    counts, people, known = {"home": 0, "away": 0}, [], {"", BALL}
     for role in frame.roles:
         ground = "away" if role.startswith("opponent") else "home"
         counts[ground] += 1
-        name = frame.player if role.startswith("actor") and frame.player else f"{ground} {counts[ground]}"
+        is_player = role.startswith("actor") and frame.player.lower() not in known
+        name = frame.player if is_player else f"{ground} {counts[ground]}"
+        known.add(name.lower())
         people.append((name, ground, "goalkeeper" if role.endswith("keeper") else ""))
     return people
 

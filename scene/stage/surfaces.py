@@ -10,10 +10,10 @@ from .shader_tree import ShaderTree
 
 STRIPES = {"Pitch grass": ((0.026, 0.086, 0.013), (0.062, 0.165, 0.027)),
            "Pitch grass mown": ((0.042, 0.122, 0.018), (0.095, 0.225, 0.038))}  # linear RGB, dark and light blades
-PAINTS = {"white": "Pitch line", "red": "Red pitch line", "blue": "Blue pitch line"}
-# linear RGB of paint on grass, between blades and on them
-WORN = {"Pitch line": ((0.42, 0.50, 0.38), (0.86, 0.86, 0.83))}
-COLOURS = {"white": (0.86, 0.86, 0.83), "red": (0.5, 0.01, 0.015), "blue": (0.01, 0.03, 0.35)}
+PAINTS = {"white": ("Pitch line", ((0.42, 0.50, 0.38), (0.86, 0.86, 0.83))),
+          "red": ("Red pitch line", ((0.22, 0.06, 0.01), (0.5, 0.01, 0.015))),
+          "blue": ("Blue pitch line", ((0.02, 0.09, 0.14), (0.01, 0.03, 0.35)))}
+"""Paint -> material, and linear RGB on grass: between the blades, and on them, which is the paint's own."""
 FLOORS = {"wood": ("Wooden floor", (0.36, 0.2, 0.085), 0.35), "blue floor": ("Blue floor", (0.02, 0.09, 0.26), 0.5),
           "ice": ("Ice", (0.78, 0.86, 0.92), 0.12), "turf": ("Artificial turf", (0.03, 0.11, 0.2), 0.85)}
 GRAIN = ((0.09, 0.32), (1.3, 0.23), (30.0, 0.45))  # per metre, weight: patches, tufts, blades
@@ -26,16 +26,16 @@ BOARDS = ((0.01, 0.03, 0.16), (0.62, 0.62, 0.60), (0.30, 0.01, 0.02), (0.01, 0.0
 
 def get_pitch_materials(ground: str, paints: list[str], units: float) -> list[bpy.types.Material]:
     """Return the materials of both stripes of a ground and of its paints; `units` are Blender units in a metre."""
+    chosen = [PAINTS[paint] for paint in paints]
     if ground == "grass":
-        return [_get_grass(name, units) for name in (*STRIPES, *(PAINTS[paint] for paint in paints))]
+        stripes = [_get_grass(name, blades, tuple(np.mean(blades, axis=0)), units) for name, blades in STRIPES.items()]
+        return [*stripes, *(_get_grass(name, blades, blades[1], units) for name, blades in chosen)]
     floor = get_material(*FLOORS[ground])
-    return [floor, floor, *(get_material(f"{PAINTS[paint]} on a floor", COLOURS[paint], 0.4) for paint in paints)]
+    return [floor, floor, *(get_material(f"{name} on a floor", blades[1], 0.4) for name, blades in chosen)]
 
 
-def _get_grass(name: str, units: float) -> bpy.types.Material:
-    """Return the material of a stripe, or of the paint on it."""
-    blades = STRIPES.get(name) or WORN[name]
-    plain = tuple(np.mean(blades, axis=0)) if name in STRIPES else blades[1]
+def _get_grass(name: str, blades, plain: tuple[float, float, float], units: float) -> bpy.types.Material:
+    """Return the material of a stripe, or of the paint on it, from its two colours and that of the solid view."""
     return _get_material(name, plain, lambda tree: _paint_grass(tree, blades, units))
 
 

@@ -74,11 +74,21 @@ def test_headers_fly_and_all_moments_are_listed(write, tmp_path, capsys):
     assert [path.read_text() for path in (tmp_path / "still" / "labels").iterdir()] == ["2 header standing\n"]
 
 
+def test_each_person_has_a_name_of_their_own(write, tmp_path):
+    pictures = [{"event_uuid": "aa-1", "freeze_frame": [*PEOPLE, {**PEOPLE[0], "location": [70.0, 30.0]}]}]
+    for number, player in enumerate(("Ada Öst", "Ball")):
+        order = write(({**PASS, "player": {"name": player}},), pictures)
+        assert main([*order, "--event", "aa-1", "--out", str(tmp_path / f"still{number}")]) == 0
+        match = read_match(tmp_path / f"still{number}" / "moment.csv", cache_dir=tmp_path / "cache")
+        assert len(match.players) == 4 and np.isfinite(match.ball).all()
+
+
 @pytest.mark.parametrize(("change", "more", "line"), [
     ({}, ["--event", "aa"], "2 events whose ids begin with 'aa'"),
     ({}, ["--event", "99:99"], "no freeze frame of event"),
     ({}, ["--event", "aa-1", "--out", ""], "no file or folder"), ({}, ["--event", "aa-1"], "one without the other"),
-    ({"pictures": "{"}, [], "not JSON"), ({"pictures": [{"a": 1}]}, [], "no list of objects"),
+    ({}, ["--pitch", "100x60"], "without --event"), ({"pictures": "{"}, [], "not JSON"),
+    ({"pictures": [{"a": 1}]}, [], "no list of objects"),
     ({"pictures": [{"event_uuid": "zz", "freeze_frame": PEOPLE}]}, [], "the same match"),
     ({"pictures": [{"event_uuid": "aa-1", "freeze_frame": [{"location": [1e300, "x"]}]}]}, [], "other places"),
     ({"pictures": [{"event_uuid": "aa-1", "freeze_frame": [{"location": [60.0, 40.0, 1.0]}]}]}, ["--event", "aa-1"],
