@@ -19,7 +19,6 @@ from .outputs import ProgressReporter, Writer, check_outputs
 if TYPE_CHECKING:
     import numpy as np
 
-_PITCH_SIDES = (10.0, 400.0)  # metres
 
 
 class _ProviderOption(argparse.Action):
@@ -125,13 +124,15 @@ def parse_pitch(text: str) -> tuple[float, float]:
     Raises:
         ArgumentTypeError: if it is none.
     """
+    from ..files.tracking.match_arrays import PITCH_SIDES, is_pitch_size
+
     try:
         length, width = map(float, text.lower().split("x"))
     except ValueError:
         length = width = 0.0
-    if not all(_PITCH_SIDES[0] <= side <= _PITCH_SIDES[1] for side in (length, width)):
-        raise argparse.ArgumentTypeError(f"{text!r}: expected a length and a width of {_PITCH_SIDES[0]:g} to "
-                                         f"{_PITCH_SIDES[1]:g} metres, such as 105x68")
+    if not is_pitch_size((length, width)):
+        raise argparse.ArgumentTypeError(f"{text!r}: expected a length and a width of {PITCH_SIDES[0]:g} to "
+                                         f"{PITCH_SIDES[1]:g} metres, such as 105x68")
     return length, width
 
 

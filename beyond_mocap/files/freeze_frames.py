@@ -6,7 +6,6 @@ player of the event does what it says, and the ball rests until then and goes st
 
 from __future__ import annotations
 
-import json
 import math
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass
@@ -21,6 +20,7 @@ from ..base.errors import InputError, format_count
 from ..motion.track import BALL_RADIUS
 from .atomic import atomic_folder
 from .file_names import build_file_names
+from .json_values import parse_json
 from .tables import format_csv
 from .tracking.match_arrays import USUAL_PITCH
 
@@ -97,10 +97,7 @@ def read_freeze_frames(frames: Path, events: Path) -> list[FreezeFrame]:
 
 
 def _read_list(path: Path, key: str) -> list[dict]:
-    try:
-        value = json.loads(read_utf8(path, "a JSON file of StatsBomb"))
-    except (ValueError, RecursionError):
-        raise InputError(path, "not JSON", "a JSON file of StatsBomb", "export it again") from None
+    value = parse_json(read_utf8(path, "a JSON file of StatsBomb"), str(path), "docs/reference/match-input.md")
     if not isinstance(value, list) or not value or not all(isinstance(one, dict) and key in one for one in value):
         raise InputError(path, f"no list of objects with {key!r}", "a JSON file of StatsBomb", "choose the right file")
     return value

@@ -14,7 +14,8 @@ PERIOD_BREAK = 10.0
 """Seconds inserted between the periods of a match."""
 _FARTHEST = 1e7  # of any unit from the origin; anything beyond is no place
 _LONGEST = 86_400.0  # seconds of a match
-_SIDES = (8.0, 400.0)  # metres of a pitch's side
+PITCH_SIDES = (10.0, 400.0)
+"""Metres: the shortest and the longest side of a pitch."""
 
 
 def list_records(dataset) -> list:
@@ -117,11 +118,16 @@ def check_clock(path, times: np.ndarray) -> None:
                          "export it again")
 
 
+def is_pitch_size(size: tuple[float, float]) -> bool:
+    """Return whether length and width, m, can be those of a pitch."""
+    return all(PITCH_SIDES[0] <= side <= PITCH_SIDES[1] for side in size)
+
+
 def check_size(path, size: tuple[float, float]) -> None:
     """Raise an error where a pitch's length and width, m, cannot be."""
-    if not all(_SIDES[0] <= side <= _SIDES[1] for side in size):
+    if not is_pitch_size(size):
         raise InputError(path, f"a pitch of {size[0]:.6g} x {size[1]:.6g} m",
-                         f"sides of {_SIDES[0]:g} to {_SIDES[1]:g} m",
+                         f"sides of {PITCH_SIDES[0]:g} to {PITCH_SIDES[1]:g} m",
                          "correct its metadata")
 
 

@@ -1,6 +1,5 @@
 """A stream in Blender: a body does what arrives, strikes are recognised, and nothing else in the file changes."""
 
-import importlib
 import pathlib
 import socket
 import threading
@@ -9,19 +8,12 @@ import time
 import bpy
 import numpy as np
 import pytest
-from conftest import EXTENSION, find_free_port
+from conftest import find_free_port
+from stream_room import room  # noqa: F401
 from undo import assert_one_step, collect_state, press_operator
 
 CLIP = pathlib.Path(__file__).resolve().parents[3] / "sample_blend" / "library" / "kick_low_top.bvh"
 OPS = bpy.ops.beyond_mocap
-
-
-@pytest.fixture
-def room():
-    found = lambda name: importlib.import_module(f"{EXTENSION}.scene.{name}")  # noqa: E731
-    yield found
-    found("stream.follow").stop_listening()
-    found("stream.follow").write_stopped()
 
 
 @pytest.fixture

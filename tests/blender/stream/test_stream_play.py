@@ -1,6 +1,5 @@
 """Play live: strikes of the streamed body become passes of the scene's players, while the scene goes on."""
 
-import importlib
 import pathlib
 import threading
 import time
@@ -11,20 +10,12 @@ import bpy
 import numpy as np
 import pytest
 from conftest import EXTENSION, find_free_port
+from stream_room import room  # noqa: F401
 from undo import assert_one_step, press_operator
 
 SAMPLE = pathlib.Path(__file__).resolve().parents[3] / "sample_blend"
 CLIPS = SAMPLE / "passes" / "library"
 OPS = bpy.ops.beyond_mocap
-
-
-@pytest.fixture
-def room():
-    found = lambda name: importlib.import_module(f"{EXTENSION}.scene.{name}")  # noqa: E731
-    yield found
-    found("stream.play").stop_rally()
-    found("stream.follow").stop_listening()
-    found("stream.follow").write_stopped()
 
 
 @pytest.fixture(scope="module")

@@ -1,6 +1,5 @@
 """Two streams at once: each character follows its own user, and the users pass the ball to each other."""
 
-import importlib
 import pathlib
 import threading
 import time
@@ -8,20 +7,13 @@ import time
 import bpy
 import numpy as np
 import pytest
-from conftest import EXTENSION, find_free_port
+from conftest import find_free_port
+from stream_room import room  # noqa: F401
 from undo import press_operator
 
 CLIP = pathlib.Path(__file__).resolve().parents[3] / "sample_blend" / "library" / "kick_low_top.bvh"
 OTHER = CLIP.with_name("walking_1_2.bvh")
 OPS = bpy.ops.beyond_mocap
-
-
-@pytest.fixture
-def room():
-    found = lambda name: importlib.import_module(f"{EXTENSION}.scene.{name}")  # noqa: E731
-    yield found
-    found("stream.follow").stop_listening()
-    found("stream.follow").write_stopped()
 
 
 @pytest.fixture

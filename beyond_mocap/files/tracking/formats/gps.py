@@ -18,6 +18,7 @@ from ....base.content import open_file
 from ....base.errors import InputError, format_count
 from ...tables import parse_number, read_rows
 from ..feed import Feed
+from ..match_arrays import PITCH_SIDES, is_pitch_size
 from .cdf import parse_time
 from .samples import MatchSamples, SampleCollector
 
@@ -31,7 +32,6 @@ _COLUMNS = {variant: column for column, names in _NAMES.items() for name in name
             for variant in (name, name.capitalize(), name.title(), name.upper()) if variant != column}
 _EXCEL_DAYS = (20_000.0, 80_000.0)  # 1954 to 2119
 _EPOCH = (1e9, 1e11)  # seconds since 1970, 2001 to 5138; thousand times as much in milliseconds
-_PITCH_RANGE = (10.0, 400.0)  # metres of a pitch's side
 _FARTHEST = 500.0  # metres from the players to the middle of their pitch
 _RATE_RANGE = (0.5, 100.0)
 
@@ -222,7 +222,7 @@ def _measure_corners(path: Path, places: np.ndarray) -> tuple[np.ndarray, np.nda
     axis = sides[longer] - sides[longer + 2]
     axis = axis / np.linalg.norm(axis) * (1.0 if axis[0] >= 0.0 else -1.0)
     size = (float(pairs[longer] / 2), float(pairs[1 - longer] / 2))
-    if not all(_PITCH_RANGE[0] <= side <= _PITCH_RANGE[1] for side in size):
+    if not is_pitch_size(size):
         raise InputError(path, f"corners of a pitch of {size[0]:.0f} x {size[1]:.0f} m",
-                         f"sides of {_PITCH_RANGE[0]:g} to {_PITCH_RANGE[1]:g} m", "check latitude and longitude")
+                         f"sides of {PITCH_SIDES[0]:g} to {PITCH_SIDES[1]:g} m", "check latitude and longitude")
     return centre, axis, size
