@@ -12,10 +12,22 @@ from ..base.errors import InputError
 
 
 def freeze_array(values, dtype=float) -> np.ndarray:
-    """Copy values into a read-only array."""
+    """Copy values into a read-only array; one that nobody can write any more is returned as it is."""
+    if isinstance(values, np.ndarray) and values.dtype == dtype and _is_frozen(values):
+        return values
     out = np.array(values, dtype=dtype)
     out.setflags(write=False)
     return out
+
+
+def _is_frozen(values: np.ndarray) -> bool:
+    """Return whether nobody can write an array any more, and it keeps no greater one alive as a part of it."""
+    owner = values
+    while isinstance(owner, np.ndarray) and not owner.flags.writeable:
+        if owner.base is None:
+            return owner.size == values.size
+        owner = owner.base
+    return False
 
 
 @dataclass(frozen=True, eq=False)

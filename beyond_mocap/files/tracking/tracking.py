@@ -6,6 +6,7 @@ In the core: metres from the pitch's centre, x along its length, y to the left o
 from __future__ import annotations
 
 import contextlib
+import gc
 import hashlib
 import io
 import os
@@ -154,7 +155,9 @@ def _read_samples(feed: Feed, pitch: tuple[float, float] | None, whose: Feed | N
     try:
         if feed.provider.read_samples is not None:
             return feed.provider.read_samples(feed, pitch)
-        return _convert_dataset(load_tracking(feed, pitch or match_arrays.USUAL_PITCH), whose or feed, pitch)
+        samples = _convert_dataset(load_tracking(feed, pitch or match_arrays.USUAL_PITCH), whose or feed, pitch)
+        gc.collect()  # kloppy's frames refer to each other in circles: 1.3 GB of a match
+        return samples
     except (LookupError, TypeError, AttributeError, ValueError, ArithmeticError) as error:
         found = f"values in other places than {feed.provider.title} has them ({type(error).__name__}: {error})"
         raise InputError(feed.path, found[:200], f"{feed.provider.name} tracking", "export it again") from None

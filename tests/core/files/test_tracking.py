@@ -1,5 +1,6 @@
 """Tracking in: the contract's CSV, and providers' files through kloppy and their cache."""
 
+import gc
 import os
 import pathlib
 import sys
@@ -168,6 +169,19 @@ def test_tracab_becomes_metres_and_is_kept(tmp_path, monkeypatch):
     assert again.players == match.players and again.periods == match.periods
     for name in ("times", "positions", "ball"):
         np.testing.assert_array_equal(getattr(again, name), getattr(match, name))
+
+
+def test_frames_of_a_match_are_gone_once_it_is_read(tmp_path):
+    """They refer to each other in circles: 1.3 GB of a whole match would stay until chance ends them."""
+    pytest.importorskip("kloppy")
+    file, _ = made_tracab(tmp_path)
+    gc.disable()
+    try:
+        read_match(file, cache_dir=tmp_path / "cache")
+        left = [one for one in gc.get_objects() if type(one).__module__ == "kloppy.domain.models.tracking"]
+    finally:
+        gc.enable()
+    assert not [one for one in left if not isinstance(one, type)]
 
 
 def test_metrica_agrees_with_tracab_of_the_same_match(tmp_path):

@@ -40,6 +40,10 @@ def test_arrays_are_copies_that_cannot_be_written():
     assert np.all(skeleton.offsets == 0.0)
     with pytest.raises(ValueError):
         skeleton.offsets[0, 0] = 1.0
+    assert np.shares_memory(dataclasses.replace(skeleton, names=("hips",)).offsets, skeleton.offsets)
+    view = offsets[:]
+    view.setflags(write=False)  # but can be written by its owner
+    assert not np.shares_memory(Skeleton(("root",), (-1,), view).offsets, view)
 
 
 def test_same_bones_within_a_millimetre_and_the_same_fingerprint_within_a_tenth():
