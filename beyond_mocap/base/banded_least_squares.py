@@ -110,11 +110,11 @@ class BandedLeastSquares:
             sums += np.bincount(index.ravel(), (weighted_values * column[:, None]).ravel(), size)
         for a in range(index.shape[1]):
             # Keep the pairs on or below the diagonal. Diagonal d and column c of the band are element d * size + c of
-            # the flat band, so one bincount sums repeated entries.
+            # the flat band. One bincount sums repeated entries, over those that occur: the band is many times longer.
             lower = index[:, a, None] >= index
-            rows = (index[:, a, None] - index) * size + index
-            products = (weighted_values[:, a, None] * values)[lower]
-            self.band += np.bincount(rows[lower], products, self.band.size).reshape(self.band.shape)
+            entries = ((index[:, a, None] - index) * size + index)[lower]
+            found, number = np.unique(entries, return_inverse=True)
+            self.band.reshape(-1)[found] += np.bincount(number, (weighted_values[:, a, None] * values)[lower])
 
     def copy(self) -> BandedLeastSquares:
         """Copy the sum, so that other squares can be added to the copy.
