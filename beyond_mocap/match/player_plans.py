@@ -4,8 +4,9 @@ player.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, replace
+from functools import lru_cache, partial
 from pathlib import Path
 
 from ..annotation import Timeline, format_timeline
@@ -14,9 +15,9 @@ from ..base.errors import InputError, format_seconds
 from ..library.library import Library
 from ..synthesis.heading_plan import HeadingKey, Play
 from ..synthesis.known_body import cut_bodies
-from ..synthesis.plan import Plan
+from ..synthesis.plan import Plan, SolvedTrajectory
 from ..synthesis.resolve_plan import resolve_plan
-from ..synthesis.resolved_touches import build_trajectory
+from ..synthesis.resolved_touches import build_trajectory, sample_solved_ball
 from .folder import MatchFolder
 from .known_bodies import SeenBodies, SeenPlayer
 from .labels import MatchLabels
@@ -67,12 +68,14 @@ def build_player_plans(
         One entry per role.
     """
     out, seen = [], bodies.players if bodies else {}
+    sample = lru_cache(maxsize=1)(sample_solved_ball)  # most players are present for the same time
+    build_course = None if solved is None else partial(build_trajectory, solved, sample=sample)
     for role in roles:
         file = files[role.player.id]
         try:
             moments = () if role.reason else _read_moments(file, role, labels, request=request, folder=folder,
                                                            known_labels=library.labels)
-            plans = tuple(_plan_heading(_add_bodies(_build_plan(role, number, moments, solved, request),
+            plans = tuple(_plan_heading(_add_bodies(_build_plan(role, number, moments, request, build_course),
                                                     seen.get(role.player.id)), library,
                                         plays.get(role.player.id)) for number in range(len(role.target_tracks)))
             unused = tuple(one for one in moments if one.source == USER and not _is_used(one, role))
@@ -153,19 +156,20 @@ def _find_text(annotations: Path | None, file: str) -> Path | None:
     return text if text is not None and text.is_file() else None
 
 
-def _build_plan(role: Role, number: int, moments, solved: SolvedBall | None, request: MatchRequest) -> Plan:
+def _build_plan(role: Role, number: int, moments, request: MatchRequest,
+                build_course: Callable[[str, Plan], SolvedTrajectory] | None) -> Plan:
     """Build the plan of one stretch, as stored in files."""
     track = role.target_tracks[number]
     start, end = float(track.times[0]), float(track.times[-1])
     timeline: Timeline = build_timeline(moments, start, end)
     plan = Plan(
         track=track, timeline=timeline, library=str(request.library), nearest=request.nearest,
-        seed=request.seed + role.number, fps=request.fps, solve_touches=solved is not None, variety=request.variety,
-        lag=role.lag, manner=role.number, watch=request.watch, strength=request.strength,
+        seed=request.seed + role.number, fps=request.fps, solve_touches=build_course is not None,
+        variety=request.variety, lag=role.lag, manner=role.number, watch=request.watch, strength=request.strength,
         masses=request.masses, fatigue=request.fatigue,
     )
-    return to_stored_plan(plan if solved is None
-                          else replace(plan, solved=build_trajectory(solved, role.player.id, plan)))
+    return to_stored_plan(plan if build_course is None
+                          else replace(plan, solved=build_course(role.player.id, plan)))
 
 
 def _add_bodies(plan: Plan, seen: SeenPlayer | None) -> Plan:

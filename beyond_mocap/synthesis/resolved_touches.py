@@ -83,20 +83,17 @@ def solve_track_ball(plan: Plan) -> SolvedTrajectory | None:
     return build_trajectory(solved, plan.track.name, plan)
 
 
-def build_trajectory(solved: SolvedBall, player: str, plan: Plan) -> SolvedTrajectory:
-    """Convert a solved ball to the trajectory of one player's plan.
+def sample_solved_ball(solved: SolvedBall, first: float, last: float) -> tuple[np.ndarray, np.ndarray]:
+    """Sample a solved ball every _STEP and at each touch.
 
     Args:
         solved: the solved ball.
-        player: name of the player.
-        plan: the player's plan; its time is covered.
+        first, last: s, the span.
     Returns:
-        The trajectory, with the player's touches marked.
+        Times (N,) s and positions (N, 3) m, NaN where the ball is not known.
     """
-    first, last = plan.track.times[[0, -1]]
-    inside = [touch for touch in solved.touches if first <= touch.time <= last]
     even = np.linspace(first, last, int(np.ceil((last - first) / _STEP)) + 1)
-    times = np.union1d(even, [touch.time for touch in inside])
+    times = np.union1d(even, [touch.time for touch in solved.touches if first <= touch.time <= last])
     begins, ends = solved.pieces[0].start, solved.pieces[-1].end
     pairs = zip(solved.pieces, solved.pieces[1:])
     # gaps between pieces in which the ball is not known
@@ -105,7 +102,23 @@ def build_trajectory(solved: SolvedBall, player: str, plan: Plan) -> SolvedTraje
     for end, start in gaps[gaps[:, 1] - gaps[:, 0] > _STEP]:
         unknown |= (times > end) & (times < start)
     ball = np.maximum(solved.ball.at(times), [-np.inf, -np.inf, BALL_RADIUS])
-    ball = np.where(unknown[:, None], np.nan, ball)
+    return times, np.where(unknown[:, None], np.nan, ball)
+
+
+def build_trajectory(solved: SolvedBall, player: str, plan: Plan, sample=sample_solved_ball) -> SolvedTrajectory:
+    """Convert a solved ball to the trajectory of one player's plan.
+
+    Args:
+        solved: the solved ball.
+        player: name of the player.
+        plan: the player's plan; its time is covered.
+        sample: `sample_solved_ball`, or one that remembers its result for plans of the same span.
+    Returns:
+        The trajectory, with the player's touches marked.
+    """
+    first, last = plan.track.times[[0, -1]].tolist()
+    inside = [touch for touch in solved.touches if first <= touch.time <= last]
+    times, ball = sample(solved, first, last)
     seen = solved.times[solved.measured]
     carried = _find_carries(plan.track)
     filled = _is_far(times, seen) | _is_within(times, carried)
