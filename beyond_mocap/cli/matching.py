@@ -110,6 +110,7 @@ def run_match(options, reporter: ProgressReporter, writers: Mapping[str, Writer]
     if write is not None:
         for line in write(result, options.scene) or ():
             reporter.show_note(line)
+        print(f"{options.scene}: written")
     print(f"{options.out}: {len(result.finished)} of {len(result.finished) + len(result.failed)} players, "
           f"{result.span[1] - result.span[0]:.1f} s")  # fmt: skip
 

@@ -51,7 +51,7 @@ def build_player_plans(
     """Build the plans of all players.
 
     Labels are read from the texts of `request.annotations`, else from edited texts in the folder; else they are the
-    automatic ones, which are written there. An error in a player's text is the reason why this player fails.
+    automatic ones, which are written there. An error in a plan is the reason why this player fails.
 
     Args:
         roles: the players.
@@ -65,13 +65,17 @@ def build_player_plans(
         bodies: what cameras have seen of players, None for nothing.
     Returns:
         One entry per role.
+    Raises:
+        InputError: for a mistake in a player's text, before anything is searched.
     """
     out, seen = [], bodies.players if bodies else {}
+    present = {files[role.player.id]: labels.players.get(role.player.id, ()) for role in roles if not role.reason}
+    own = {file: read_labels(text, automatic, library.labels) for file, automatic in present.items()
+           if (text := _find_own_text(file, request, folder)) is not None}
     for role in roles:
         file = files[role.player.id]
+        moments = () if role.reason else own[file] if file in own else _write_automatic(file, role, labels, folder)
         try:
-            moments = () if role.reason else _read_moments(file, role, labels, request=request, folder=folder,
-                                                           known_labels=library.labels)
             plans = tuple(_plan_heading(_add_bodies(_build_plan(role, number, moments, solved, request),
                                                     seen.get(role.player.id)), library,
                                         plays.get(role.player.id)) for number in range(len(role.target_tracks)))
@@ -132,19 +136,19 @@ def _is_used(moment: Moment, role: Role) -> bool:
     return any(one.spans or one.keys for one in cut)
 
 
-def _read_moments(
-    file: str, role: Role, labels: MatchLabels, request: MatchRequest, folder: MatchFolder, known_labels: frozenset[str]
-) -> tuple[Moment, ...]:
-    """Read a player's moments from their text, or write the automatic ones and return them."""
-    automatic = labels.players.get(role.player.id, ())
+def _find_own_text(file: str, request: MatchRequest, folder: MatchFolder) -> Path | None:
+    """Find the text with the user's labels of a player: theirs, or an edited one in the folder; None without any."""
     text = _find_text(request.annotations, file)
-    if text is None:
-        text = folder.labels_path(file)
-        if not is_edited(text):
-            text.parent.mkdir(exist_ok=True)
-            write_labels(text, role.player.id, automatic)
-            return automatic
-    return read_labels(text, automatic, known_labels)
+    edited = folder.labels_path(file)
+    return text or (edited if is_edited(edited) else None)
+
+
+def _write_automatic(file: str, role: Role, labels: MatchLabels, folder: MatchFolder) -> tuple[Moment, ...]:
+    """Write a player's automatic moments into the folder, and return them."""
+    automatic, text = labels.players.get(role.player.id, ()), folder.labels_path(file)
+    text.parent.mkdir(exist_ok=True)
+    write_labels(text, role.player.id, automatic)
+    return automatic
 
 
 def _find_text(annotations: Path | None, file: str) -> Path | None:

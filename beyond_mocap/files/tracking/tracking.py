@@ -43,7 +43,7 @@ RATES = (5.0, 100.0)
 """Smallest and largest sampling rate of a track, samples per second."""
 
 _BALL = ("ball_x_m", "ball_y_m", "ball_z_m")
-_CACHE_VERSION = 3
+_CACHE_VERSION = 4
 _CACHE_BYTES = 4_000_000_000  # of all matches in the cache, some 40
 _CACHE_NAME = re.compile(r"[0-9a-f]{40}\.npz")
 _ARRAY_NAMES = ("times", "positions", "ball", "players", "pitch", "periods", "teams", "lines")
@@ -157,7 +157,7 @@ def _read_samples(feed: Feed, pitch: tuple[float, float] | None, whose: Feed | N
         return _convert_dataset(load_tracking(feed, pitch or match_arrays.USUAL_PITCH), whose or feed, pitch)
     except (LookupError, TypeError, AttributeError, ValueError, ArithmeticError) as error:
         found = f"values in other places than {feed.provider.title} has them ({type(error).__name__}: {error})"
-        raise InputError(feed.path, found[:200], f"{feed.provider.name} tracking", "export it again") from None
+        raise InputError(feed.path, found[:200], f"{feed.provider.title} tracking", "export it again") from None
 
 
 def _convert_dataset(dataset, feed: Feed, pitch: tuple[float, float] | None) -> MatchSamples:
@@ -233,7 +233,7 @@ def _find_cache_folder() -> Path | None:
 
 def _compute_key(feed: Feed, pitch: tuple[float, float] | None) -> str:
     """Compute a key from the files' contents, independent of their names."""
-    digest = hashlib.sha256(f"{_CACHE_VERSION} {feed.provider.name} {pitch}".encode())
+    digest = hashlib.sha256(f"{_CACHE_VERSION} {feed.provider.name} {pitch} {feed.is_meta_chosen}".encode())
     for file in (*feed.tracking, *feed.meta):
         with open(file, "rb") as stream:
             digest.update(hashlib.file_digest(stream, "sha256").digest())

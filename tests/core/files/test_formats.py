@@ -178,6 +178,36 @@ def test_a_table_in_another_unit_is_refused(scale, line, tmp_path):
         read_match(write_table(tmp_path, scale=scale), cache_dir=tmp_path / "cache")
 
 
+@pytest.mark.parametrize(("write_time", "line"), [(lambda time: f"{time * 1000:.0f}", "look like milliseconds"),
+                                                  (lambda time: f"{time * RATE:.0f}", "look like frame numbers")])
+def test_a_table_with_times_of_another_unit_is_refused(write_time, line, tmp_path):
+    rows = [f"{write_time(time)},{key},{x},{y}\n" for row, time in enumerate(TIME)
+            for key, (x, y) in (("p7", HOME[row] / 10), ("p9", AWAY[row] / 10))]
+    (tmp_path / "game.csv").write_text("time_s,player,x_m,y_m\n" + "".join(rows))
+    with pytest.raises(InputError, match=line):
+        read_match(tmp_path / "game.csv", cache_dir=tmp_path / "cache")
+
+
+@pytest.mark.parametrize(("place", "line"), [
+    (lambda x, y: (x - 50, y + 32), ""), (lambda x, y: (x - 50, y - 32), ""),
+    (lambda x, y: (y, x), "exchange x and y"), (lambda x, y: (y + 32, x + 50), "exchange x and y"),
+    (lambda x, y: (x + 400, y), "move the origin"),
+])  # fmt: skip
+def test_origin_and_axes_of_a_table_are_found_or_told(place, line, tmp_path):
+    """One player runs along the pitch, one across it."""
+    known = {"p7": [(2.0 * x - 1.0 * row / COUNT, 3.0) for row, x in enumerate(np.linspace(-25, 25, COUNT))],
+             "p9": [(10.0, y) for y in np.linspace(-30, 30, COUNT)]}
+    rows = [f"{time:.1f},{key},{','.join(f'{value:.3f}' for value in place(*places[row]))}\n"
+            for row, time in enumerate(TIME) for key, places in known.items()]
+    (tmp_path / "game.csv").write_text("time_s,player,x_m,y_m\n" + "".join(rows))
+    if line:
+        with pytest.raises(InputError, match=line):
+            read_match(tmp_path / "game.csv", cache_dir=tmp_path / "cache", pitch=SIZE)
+        return
+    match = read_match(tmp_path / "game.csv", cache_dir=tmp_path / "cache", pitch=SIZE)
+    assert match.positions == pytest.approx(np.array(list(known.values())), abs=2e-3)
+
+
 @pytest.mark.parametrize(("rows", "line"), [("0,ball,1,2\n1,ball,3,4\n", "no position of a player"),
                                             ("0,a,1,2\n1,b,10,4\n2,c,20,6\n", "moments of their own")])
 def test_a_table_without_motion_of_players_is_refused(rows, line, tmp_path):
@@ -217,12 +247,15 @@ def test_receivers_of_another_time_or_pitch_are_left_out(tmp_path):
     path = write_gpx(tmp_path)
     other = tmp_path / "p9.gpx"
     other.write_text(other.read_text().replace("2024-12-21", "2023-01-01"))
-    corners = tmp_path / "pitch_corners.csv"
-    corners.write_text(corners.read_text().replace(",52.", ",51."))
     match = read_match(path, cache_dir=tmp_path / "cache")
     assert len(match.players) == 1
-    assert any("of other times left out: p9" in line for line in match.report)
-    assert any("km away, not used" in line for line in match.report)
+    told = " ".join(match.report)
+    assert "1 of 2 files" in told and "of other times left out: p9" in told and "the one of pitch_corners.csv" in told
+    corners = tmp_path / "pitch_corners.csv"
+    corners.write_text(corners.read_text().replace(",52.", ",51."))
+    assert any("km away from the players: not used" in line for line in read_match(path, cache_dir=tmp_path).report)
+    with pytest.raises(InputError, match="pitch_corners.csv: corners of a pitch .* km away"):
+        read_match(path, corners, cache_dir=tmp_path)
 
 
 @pytest.mark.parametrize("form", WRITERS)
