@@ -20,7 +20,7 @@ from beyond_mocap.library.build import build_library
 from beyond_mocap.match.displayed_motion import construct_displayed_player
 from beyond_mocap.match.folder import read_state
 from beyond_mocap.match.pieces.constructed_motion import MOTION
-from beyond_mocap.match.player_edit import read_player
+from beyond_mocap.match.player_file import read_player
 from beyond_mocap.match.synthesize_match import synthesize_match
 from beyond_mocap.motion.track.ball_path import BallPath
 from beyond_mocap.synthesis.provenance import read_provenance
