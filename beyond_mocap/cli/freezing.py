@@ -10,7 +10,6 @@ from ..base.settings.options import parse_path
 from .matching import parse_pitch
 from .outputs import ProgressReporter, Writer
 
-
 _EXAMPLES = """examples, the first lists the events:
   %(prog)s 360.json --events events.json
   %(prog)s 360.json --events events.json --event 13:25 --out shot"""
