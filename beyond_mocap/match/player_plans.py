@@ -183,7 +183,9 @@ def _add_bodies(plan: Plan, seen: SeenPlayer | None) -> Plan:
 def _plan_heading(plan: Plan, library: Library, play: Play | None) -> Plan:
     """Plan the heading over a whole stretch, so that all windows that are cut out of it agree."""
     keys = [HeadingKey(time, heading=float(heading), target=None, hold=0.0) for body in plan.bodies
-            for time, heading in zip((body.start, body.end), body.compute_heading(library.skeleton)[[0, -1]])
-            if plan.track.times[0] <= time <= plan.track.times[-1]]
+            for time, heading in zip((body.start, body.end), body.compute_heading(library.skeleton)[[0, -1]])]
+    keys += [key for key in (play.keys if play else ())
+             if not any(body.start <= key.time <= body.end for body in plan.bodies)]
+    keys = [key for key in keys if plan.track.times[0] <= key.time <= plan.track.times[-1]]
     resolved = resolve_plan(replace(plan, heading_keys=tuple(keys)), library, are_touches_resolved=True)
     return replace(plan, heading_path=resolved.plan_heading(play))

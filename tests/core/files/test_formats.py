@@ -10,6 +10,7 @@ import pytest
 from beyond_mocap.base.errors import InputError
 from beyond_mocap.files.tracking.providers import PROVIDERS
 from beyond_mocap.files.tracking.tracking import read_match
+from beyond_mocap.match.play import build_plays
 
 OTHER = pathlib.Path(__file__).resolve().parents[3] / ".." / "shared" / "data" / "tracking" / "other"
 RATE, COUNT, SIZE = 10, 60, (100.0, 64.0)
@@ -214,6 +215,33 @@ def test_a_table_without_motion_of_players_is_refused(rows, line, tmp_path):
     (tmp_path / "game.csv").write_text("time_s,player,x_m,y_m\n" + rows)
     with pytest.raises(InputError, match=line):
         read_match(tmp_path / "game.csv", cache_dir=tmp_path / "cache")
+
+
+@pytest.mark.parametrize(("sign", "zero"), [(1.0, 0.0), (1.0, np.pi), (-1.0, 0.5 * np.pi), (None, 0.0)])
+def test_angles_of_bodies_are_headings_whatever_they_are_measured_from(sign, zero, tmp_path):
+    """A player runs in a circle, then stands and looks along -y; random angles are not used, with a line."""
+    moments = np.arange(400) / RATE
+    running = moments < 30.0
+    around = np.where(running, 0.4 * moments, 12.0)
+    faces = np.where(running, around + 0.5 * np.pi, -0.5 * np.pi)
+    random = np.random.default_rng(1)
+    angles = random.uniform(-3, 3, len(faces)) if sign is None else sign * (
+        faces - zero + 0.1 * random.normal(size=len(faces)))
+    rows = [{"frame_id": row, "time": f"00:{time:09.6f}", "period": "half_1", "pitch_side": {"left": "A", "right": "B"},
+             "players": [{"person_id": 1, "team_name": "A", "x": 50 + 10 * np.cos(place), "y": 32 + 10 * np.sin(place),
+                          "head_angle": 0.0, "shoulders_angle": 0.0, "hips_angle": (angle + 9) % (2 * np.pi) - np.pi}]}
+            for row, (time, place, angle) in enumerate(zip(moments, around, angles + np.pi - 9))]
+    match = read_match(write_lines(tmp_path / "game.jsonl", rows), cache_dir=tmp_path / "cache", pitch=SIZE)
+    told = " ".join(match.report)
+    if sign is None:
+        assert "angles of bodies are not used" in told and not np.isfinite(match.headings).any()
+        return
+    away = np.abs(np.angle(np.exp(1j * (match.headings[0] - faces))))
+    assert "bodies face where their angles say" in told and away.mean() < 0.12
+    again = read_match(tmp_path / "game.jsonl", cache_dir=tmp_path / "cache", pitch=SIZE)
+    assert np.array_equal(again.headings, match.headings)
+    (play,) = build_plays(match).values()
+    assert len(play.keys) == 80 and play.keys[-1].heading == pytest.approx(-0.5 * np.pi, abs=0.1)
 
 
 def test_rows_that_a_table_has_twice_and_metadata_that_it_has_not_are_told(tmp_path):
