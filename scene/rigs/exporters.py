@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import ctypes
 import errno
 import os
 import re
@@ -28,14 +29,18 @@ _MEGABYTE = 1e6
 @contextlib.contextmanager
 def silence_blender() -> Iterator[None]:
     """Context manager: what Blender prints itself is left out, such as the name of a temporary file."""
-    sys.stdout.flush()
-    kept = os.dup(1)
-    with open(os.devnull, "wb") as nowhere:
-        os.dup2(nowhere.fileno(), 1)
-    try:
+    if sys.stdout is None:  # nothing can be printed
         yield
+        return
+    library = ctypes.CDLL("ucrtbase" if os.name == "nt" else None)  # lines of Blender wait in the buffer of C
+    library.fflush(None)
+    kept = os.dup(1)
+    try:
+        with open(os.devnull, "w", encoding="utf-8") as nowhere, contextlib.redirect_stdout(nowhere):
+            os.dup2(nowhere.fileno(), 1)
+            yield
     finally:
-        sys.stdout.flush()
+        library.fflush(None)
         os.dup2(kept, 1)
         os.close(kept)
 
