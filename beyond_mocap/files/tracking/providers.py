@@ -89,18 +89,23 @@ def _check_file(path: str | os.PathLike, kind: str = "a tracking file") -> Path:
 
 
 def _detect_provider(path: Path, notes: list[str]) -> TrackingProvider:
+    from ..joints.joint_readers import is_joint_file  # not needed by a panel that lists the providers
+
     record = find_provider(path, PROVIDERS)
     if record is not None:
         notes.append(f"{path.name} is read as {record.title}")
         return record
-    head, providers = read_head(path), ", ".join(PROVIDERS)
+    head, titles = read_head(path), ", ".join(one.title for one in PROVIDERS.values())
     if not head.strip():
         raise InputError(path, "the file is empty", "positions", "export it again")
     if is_track_csv(path):
-        expected = f"a match's tracking data from one of {providers}"
+        expected = f"a match's tracking data from one of {titles}"
         raise InputError(path, "one player's track", expected, "use synthesize for one player")
-    raise InputError(path, "unknown format", f"one of {providers}, or a CSV file: of one player with "
-                     "time_s,x_m,y_m, of all with time_s,player,x_m,y_m",
+    if is_joint_file(path):
+        raise InputError(path, "skeletal tracking", f"positions of players and ball, from one of {titles}",
+                         "use match or bodies for it")
+    raise InputError(path, "unknown format", f"one of {titles}, or a CSV of one player with time_s,x_m,y_m; "
+                     "a Plain CSV has time_s,player,x_m,y_m",
                      "choose the provider, or rename the columns")
 
 

@@ -229,11 +229,13 @@ def test_wrong_files_get_one_line(tmp_path):
     pytest.importorskip("kloppy")
     file, _ = made_tracab(tmp_path)
     (tmp_path / "odd.txt").write_text("hello\n")
+    (tmp_path / "joints.csv").write_text("time_s,player,joint,x,y,z\n0,a,nose,1,2,3\n")
     (tmp_path / "bad_meta.xml").write_text("<nonsense/>")
     (tmp_path / "lonely.dat").write_bytes(file.read_bytes())
     cases = [
         ((tmp_path / "none.dat",), "no such file"),
         ((tmp_path / "odd.txt",), "unknown format"),
+        ((tmp_path / "joints.csv",), "joints.csv: skeletal tracking; expected positions of players and ball"),
         ((file, tmp_path / "bad_meta.xml"), "not readable as TRACAB"),
         ((file, tmp_path / "odd.txt"), "odd.txt: neither XML nor JSON; expected the metadata of TRACAB"),
         ((file, None, "metrica"), "not readable as Metrica tracking; expected"),
