@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 _MATCH_EXAMPLES = """examples:
   %(prog)s --tracking game.dat --library clips --from 60 --to 120 --out minute
   %(prog)s --tracking game.dat --joints joints.jsonl --library clips --out bodies
-  %(prog)s --tracking moment.csv --sport handball --library clips --out still"""
+  %(prog)s --tracking players.csv --sport handball --library clips --out handball"""
 
 
 class _ProviderOption(argparse.Action):

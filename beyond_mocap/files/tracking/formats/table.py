@@ -88,13 +88,15 @@ def _read_tracks(path: Path, found: SampleCollector) -> tuple[_Tracks, bool]:
 
 def _check_seconds(path: Path, tracks: _Tracks, has_whole_times: bool) -> None:
     """Raise an error for times that are milliseconds, frame numbers or of another unit."""
-    moves = [np.diff(np.array(sorted(rows))[:, :4], axis=0) for key, rows in tracks.items() if key != _BALL]
-    period, seconds, x, y = np.concatenate([np.zeros((0, 4)), *moves]).T
+    with np.errstate(over="ignore", invalid="ignore"):  # absurd numbers are nowhere, later
+        moves = [np.diff(np.array(sorted(rows), dtype=float)[:, :4], axis=0)
+                 for key, rows in tracks.items() if key != _BALL]
+        period, seconds, x, y = np.concatenate([np.zeros((0, 4)), *moves]).T
+        metres = np.hypot(x, y)
     follows = (period == 0.0) & (seconds > 0.0)
     if not follows.any():
         return
-    step, metres = float(np.median(seconds[follows])), np.hypot(x, y)[follows & (seconds == 1.0)]
-    metres = metres[np.isfinite(metres)]
+    step, metres = float(np.median(seconds[follows])), metres[follows & (seconds == 1.0) & np.isfinite(metres)]
     if step > 1.0 / _SLOWEST_RATE:
         hint = "the times look like milliseconds: divide them by 1000" if has_whole_times else "convert the times"
         raise InputError(path, f"positions of a player {step:.4g} s apart", "times in seconds", hint)
