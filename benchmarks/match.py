@@ -24,7 +24,7 @@ from beyond_mocap.match.crowd.collision_avoidance import measure_overlap_depths,
 from beyond_mocap.match.crowd.correction import ARMS, ROOT, Correction, apply_correction
 from beyond_mocap.match.crowd.variety import measure_share_in_step
 from beyond_mocap.match.folder import read_state
-from beyond_mocap.match.player_edit import read_player
+from beyond_mocap.match.player_file import read_player
 from beyond_mocap.match.player_motion import construct_player
 from beyond_mocap.match.request import MatchRequest
 from beyond_mocap.match.synthesize_match import synthesize_match

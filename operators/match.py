@@ -9,6 +9,7 @@ from bpy.props import BoolProperty, CollectionProperty, EnumProperty, FloatPrope
 
 from ..beyond_mocap.base.errors import InputError, format_count
 from ..beyond_mocap.base.fixes import Fix
+from ..beyond_mocap.files.tracking.providers import PROVIDERS
 from ..scene.core import channels, session, window
 from ..scene.core.measure import frames_per_second
 from ..scene.core.settings import to_setting_path
@@ -95,7 +96,7 @@ select the first minute"""
         for line in match.report.splitlines()[:6]:
             self.report({"INFO"}, line)
         self.report({"INFO"}, f"{format_count(len(read.players), 'player')}, {match.length_s / 60.0:.1f} minutes, "
-                    f"{read.provider}")
+                    + (PROVIDERS[read.provider].title if read.provider in PROVIDERS else "skeletal tracking"))
 
 
 class BEYOND_MOCAP_FH_match(ViewDropHandler, bpy.types.FileHandler):

@@ -10,7 +10,6 @@ preview.png, a sheet of rendered frames, and says how to open them.
 from __future__ import annotations
 
 import argparse
-import contextlib
 import importlib
 import os
 import pathlib
@@ -66,21 +65,6 @@ class Steps:
         """Show the progress of the part."""
         self.reporter.show_progress(self.done + fraction * self.shares[self.current_part],
                                     f"{self.current_part}: {text}")
-
-
-@contextlib.contextmanager
-def silence_blender():
-    """Hide what Blender prints, so that the progress bar stays intact."""
-    sys.stdout.flush()
-    terminal, nowhere = os.dup(1), os.open(os.devnull, os.O_WRONLY)
-    os.dup2(nowhere, 1)
-    try:
-        yield
-    finally:
-        sys.stdout.flush()
-        os.dup2(terminal, 1)
-        os.close(terminal)
-        os.close(nowhere)
 
 
 def prepare_scene(bpy) -> None:
@@ -302,6 +286,7 @@ def run_demo(out: pathlib.Path) -> None:
     load, unregister = load_extension()
     import bpy
 
+    silence_blender = load("scene.rigs.exporters").silence_blender
     reporter = load("beyond_mocap.cli.main").ProgressReporter(False)
     steps = Steps(reporter,
                   {"Library": 0.2, "player1": 0.05, "player2": 0.05, "Apply": 0.03, "Render": 0.65, "Save": 0.02})

@@ -22,6 +22,7 @@ import numpy as np
 
 from beyond_mocap.base.content import read_utf8
 from beyond_mocap.base.errors import BeyondMocapError, InputError, UserCancelledError
+from beyond_mocap.base.optional_packages import import_optional
 from beyond_mocap.cli.main import OneLineParser
 from beyond_mocap.cli.outputs import ProgressReporter
 from beyond_mocap.cli.throwing import read_test_examples, select_subjects
@@ -34,8 +35,6 @@ from beyond_mocap.throws.networks.model import ThrowModel
 
 from .config import MAX_FILE_SIZE, PAGE, TrainingConfig, build_config
 from .experiment_table import RowResult, build_table
-from .fit import read_progress
-from .train import read_training_examples, train
 
 EXPERIMENTS = Path(__file__).with_name("experiments.json")
 TABLE = "experiments.md"
@@ -134,6 +133,9 @@ class Runner:
 
     def run_row(self, name: str, deadline: float) -> None:
         """Train a row until it is complete or `deadline` (s, `time.monotonic`) has passed, and test it."""
+        from .fit import read_progress
+        from .train import train
+
         config = self.experiments.rows[name].config
         examples = self._read_training(config)
         checkpoint = self._checkpoint(name)
@@ -167,6 +169,8 @@ class Runner:
         Raises:
             InputError: if it was run with another configuration, or its files are damaged.
         """
+        from .fit import read_progress
+
         row, path, checkpoint = self.experiments.rows[name], self._report(name), self._checkpoint(name)
         reached = read_progress(checkpoint).epoch if checkpoint.exists() else None
         report = _read_report(path) if path.exists() else None
@@ -181,6 +185,8 @@ class Runner:
 
     def _read_training(self, config: TrainingConfig) -> list[Example]:
         """Read the recordings that rows are trained on."""
+        from .train import read_training_examples
+
         source = self.experiments.training
         return read_training_examples(self.data / source.folder, config, source.subjects, None, self.reporter)
 
@@ -236,6 +242,7 @@ def _run(options) -> int:
     if missing:
         print(f"experiments: skipped, {options.data} has no folder {missing[0]}")
         return 0
+    import_optional("jax", "training")  # .fit and .train need it, --help does not
     options.out.mkdir(parents=True, exist_ok=True)
     reporter = ProgressReporter(False)
     Runner(experiments, options.data, options.out, reporter).run_rows(options.row or list(experiments.rows),

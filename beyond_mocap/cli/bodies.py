@@ -20,7 +20,8 @@ def add_bodies(verbs) -> argparse.ArgumentParser:
     Returns:
         The parser of this verb.
     """
-    verb = verbs.add_parser("bodies", help="bodies of all people from skeletal tracking: joints of each frame")
+    verb = verbs.add_parser("bodies", help="the motion of all people of skeletal tracking",
+                            epilog="example:\n  %(prog)s --joints skeletal.jsonl --out bodies")
     verb.add_argument("--joints", type=parse_path, required=True, metavar="FILE",
                       help="skeletal tracking: Common Data Format, Hawk-Eye, CSV or .npz")
     verb.add_argument("--out", type=parse_path, required=True, metavar="FOLDER",

@@ -10,6 +10,10 @@ from ..base.settings.options import parse_path
 from .matching import parse_pitch
 from .outputs import ProgressReporter, Writer
 
+_EXAMPLES = """examples, the first lists the events:
+  %(prog)s 360.json --events events.json
+  %(prog)s 360.json --events events.json --event 13:25 --out shot"""
+
 
 def add_freeze_frame(verbs) -> argparse.ArgumentParser:
     """Add the verb `freeze-frame`.
@@ -19,7 +23,8 @@ def add_freeze_frame(verbs) -> argparse.ArgumentParser:
     Returns:
         The parser of this verb.
     """
-    verb = verbs.add_parser("freeze-frame", help="one moment of StatsBomb 360 as tracking data for match")
+    verb = verbs.add_parser("freeze-frame", help="one moment of StatsBomb 360 as tracking data for match",
+                            epilog=_EXAMPLES)
     verb.add_argument("input", type=parse_path, metavar="FRAMES.json", help="the freeze frames of a match")
     verb.add_argument("--events", type=parse_path, required=True, metavar="EVENTS.json", help="the same match's events")
     verb.add_argument("--event", metavar="ID", help="the event's id, or its time MM:SS; default: list all")

@@ -41,7 +41,7 @@ IsolatedRunner = Callable[[list[str], Callable[[float, str], None], Callable[[],
 """Runs a command line in another process: (arguments, progress callback, cancellation callback)."""
 Converter = Callable[[Path, Path | None, ProgressReporter], None]
 """Converts recordings of a library that only the host reads: (library, cache folder or None for its own, reporter)."""
-_DOCUMENTS = "documents: the folder docs beside the source, docs/reference/commands.md for all commands"
+_DOCUMENTS = "documents: the folder docs beside the source; all commands: docs/reference/commands.md"
 _UNREAD = 141  # exit status that shells give to a program that SIGPIPE ended
 
 
@@ -93,7 +93,8 @@ def build_parser(prog: str = "beyond-mocap") -> argparse.ArgumentParser:
     verbs = top.add_subparsers(dest="verb", required=True, metavar="VERB", parser_class=OneLineParser)
     for add in VERBS:
         verb = add(verbs)
-        verb.epilog = _DOCUMENTS
+        verb.formatter_class = argparse.RawDescriptionHelpFormatter  # keeps the lines of examples
+        verb.epilog = "\n\n".join(filter(None, (verb.epilog, _DOCUMENTS)))
         verb.add_argument("--json", action="store_true", help="progress as JSON lines on stderr")
     return top
 

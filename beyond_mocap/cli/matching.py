@@ -19,6 +19,10 @@ from .outputs import ProgressReporter, Writer, check_outputs
 if TYPE_CHECKING:
     import numpy as np
 
+_MATCH_EXAMPLES = """examples:
+  %(prog)s --tracking game.dat --library clips --from 60 --to 120 --out minute
+  %(prog)s --tracking game.dat --joints joints.jsonl --library clips --out bodies
+  %(prog)s --tracking players.csv --sport handball --library clips --out handball"""
 
 
 class _ProviderOption(argparse.Action):
@@ -50,7 +54,8 @@ def add_match(verbs):
     Returns:
         The parser of this verb.
     """
-    verb = verbs.add_parser("match", help="all players' motion and the ball of a tracked match, resumable")
+    verb = verbs.add_parser("match", help="all players' motion and the ball of a tracked match, resumable",
+                            epilog=_MATCH_EXAMPLES)
     verb.add_argument("--tracking", type=parse_path, required=True, metavar="FILE",
                       help="a provider's tracking data, or skeletal tracking")
     verb.add_argument("--joints", type=parse_path, metavar="FILE",
@@ -110,6 +115,7 @@ def run_match(options, reporter: ProgressReporter, writers: Mapping[str, Writer]
     if write is not None:
         for line in write(result, options.scene) or ():
             reporter.show_note(line)
+        print(f"{options.scene}: written")
     print(f"{options.out}: {len(result.finished)} of {len(result.finished) + len(result.failed)} players, "
           f"{result.span[1] - result.span[0]:.1f} s")  # fmt: skip
 

@@ -80,7 +80,8 @@ def check_new_folder(path: Path) -> None:
         InputError: if it is not.
     """
     if path.exists() and not path.is_dir():
-        raise InputError(path, "is a file", "a new or empty folder", "choose another place")
+        raise InputError(path, "is a file" if path.is_file() else "is a device or a pipe", "a new or empty folder",
+                         "choose another place")
     if path.is_dir() and (found := next(path.iterdir(), None)):
         raise InputError(path, f"the folder is not empty ({found.name})", "a new or empty folder",
                          "choose another place")

@@ -7,12 +7,15 @@ from __future__ import annotations
 import numpy as np
 
 from ..ball.tracked.solve import find_goal_lines
-from ..base.vectors import measure_lengths
+from ..base.vectors import arctan2, measure_lengths
 from ..motion.track.match_data import REFEREE, Match
-from ..synthesis.heading_plan import Play
+from ..synthesis.heading_plan import HeadingKey, Play
 
 NEAR_OPPONENT = 15.0
 """Metres within which a player faces the nearest opponent rather than the goal."""
+
+KEY_SECONDS = 0.5
+"""Seconds from one measured heading to the next that the plan follows."""
 
 _RATE = 5.0  # samples per second
 _KEEPER = "goalkeeper"  # `MatchPlayer.position`
@@ -36,8 +39,22 @@ def build_plays(match: Match) -> dict[str, Play]:
         others = np.array([other.team not in (player.team, REFEREE) for other in match.players])
         goal = goals.get(player.team, np.full(len(times), np.nan))
         places = _find_faced_places(positions[number], positions[others], goal)
-        out[player.id] = Play(times, places, number in keepers)
+        out[player.id] = Play(times, places, number in keepers, _build_heading_keys(match, number))
     return out
+
+
+def _build_heading_keys(match: Match, number: int) -> tuple[HeadingKey, ...]:
+    """Build a key for each KEY_SECONDS in most of which the feed has measured where a player's body faces."""
+    if match.headings is None:
+        return ()
+    step = max(1, round(KEY_SECONDS * match.fps))
+    shape = len(match.times) // step, step
+    times, headings = (values[: shape[0] * step].reshape(shape) for values in (match.times, match.headings[number]))
+    is_known = np.isfinite(headings)
+    along, across = (np.where(is_known, turn, 0.0).sum(axis=1) for turn in (np.cos(headings), np.sin(headings)))
+    used = (is_known.mean(axis=1) > 0.5) & (np.ptp(times, axis=1) < 2.0 * KEY_SECONDS)  # no break within
+    return tuple(HeadingKey(time, heading) for time, heading in zip(
+        times.mean(axis=1)[used].tolist(), arctan2(across, along)[used].tolist()))
 
 
 def find_kept_lines(match: Match) -> dict[str, np.ndarray]:

@@ -149,7 +149,14 @@ class StretchConstructor:
         Args:
             library: the clips.
             grid: the stretch.
+        Raises:
+            InputError: if bodies of the stretch have other joints than the library.
         """
+        joints = len(library.skeleton)
+        for body in grid.plan.bodies:
+            if body.rotations.shape[1] != joints:
+                raise InputError(library.folder, f"a skeleton of {joints} joints", f"{body.rotations.shape[1]}, as the "
+                                 "player's bodies have", "run the match again")
         paths = [path for path, _ in grid.edit.clips]
         if any(path.startswith(SYNTHETIC_FOLDER) for path in paths):
             library = add_actions(library.with_synthetic_clips, paths)

@@ -52,7 +52,7 @@ def build_player_plans(
     """Build the plans of all players.
 
     Labels are read from the texts of `request.annotations`, else from edited texts in the folder; else they are the
-    automatic ones, which are written there. An error in a player's text is the reason why this player fails.
+    automatic ones, which are written there. An error in a plan is the reason why this player fails.
 
     Args:
         roles: the players.
@@ -66,15 +66,19 @@ def build_player_plans(
         bodies: what cameras have seen of players, None for nothing.
     Returns:
         One entry per role.
+    Raises:
+        InputError: for a mistake in a player's text, before anything is searched.
     """
     out, seen = [], bodies.players if bodies else {}
     sample = lru_cache(maxsize=1)(sample_solved_ball)  # most players are present for the same time
     build_course = None if solved is None else partial(build_trajectory, solved, sample=sample)
+    present = {files[role.player.id]: labels.players.get(role.player.id, ()) for role in roles if not role.reason}
+    own = {file: read_labels(text, automatic, library.labels) for file, automatic in present.items()
+           if (text := _find_own_text(file, request, folder)) is not None}
     for role in roles:
         file = files[role.player.id]
+        moments = () if role.reason else own[file] if file in own else _write_automatic(file, role, labels, folder)
         try:
-            moments = () if role.reason else _read_moments(file, role, labels, request=request, folder=folder,
-                                                           known_labels=library.labels)
             plans = tuple(_plan_heading(_add_bodies(_build_plan(role, number, moments, request, build_course),
                                                     seen.get(role.player.id)), library,
                                         plays.get(role.player.id)) for number in range(len(role.target_tracks)))
@@ -135,19 +139,19 @@ def _is_used(moment: Moment, role: Role) -> bool:
     return any(one.spans or one.keys for one in cut)
 
 
-def _read_moments(
-    file: str, role: Role, labels: MatchLabels, request: MatchRequest, folder: MatchFolder, known_labels: frozenset[str]
-) -> tuple[Moment, ...]:
-    """Read a player's moments from their text, or write the automatic ones and return them."""
-    automatic = labels.players.get(role.player.id, ())
+def _find_own_text(file: str, request: MatchRequest, folder: MatchFolder) -> Path | None:
+    """Find the text with the user's labels of a player: theirs, or an edited one in the folder; None without any."""
     text = _find_text(request.annotations, file)
-    if text is None:
-        text = folder.labels_path(file)
-        if not is_edited(text):
-            text.parent.mkdir(exist_ok=True)
-            write_labels(text, role.player.id, automatic)
-            return automatic
-    return read_labels(text, automatic, known_labels)
+    edited = folder.labels_path(file)
+    return text or (edited if is_edited(edited) else None)
+
+
+def _write_automatic(file: str, role: Role, labels: MatchLabels, folder: MatchFolder) -> tuple[Moment, ...]:
+    """Write a player's automatic moments into the folder, and return them."""
+    automatic, text = labels.players.get(role.player.id, ()), folder.labels_path(file)
+    text.parent.mkdir(exist_ok=True)
+    write_labels(text, role.player.id, automatic)
+    return automatic
 
 
 def _find_text(annotations: Path | None, file: str) -> Path | None:
@@ -183,7 +187,9 @@ def _add_bodies(plan: Plan, seen: SeenPlayer | None) -> Plan:
 def _plan_heading(plan: Plan, library: Library, play: Play | None) -> Plan:
     """Plan the heading over a whole stretch, so that all windows that are cut out of it agree."""
     keys = [HeadingKey(time, heading=float(heading), target=None, hold=0.0) for body in plan.bodies
-            for time, heading in zip((body.start, body.end), body.compute_heading(library.skeleton)[[0, -1]])
-            if plan.track.times[0] <= time <= plan.track.times[-1]]
+            for time, heading in zip((body.start, body.end), body.compute_heading(library.skeleton)[[0, -1]])]
+    keys += [key for key in (play.keys if play else ())
+             if not any(body.start <= key.time <= body.end for body in plan.bodies)]
+    keys = [key for key in keys if plan.track.times[0] <= key.time <= plan.track.times[-1]]
     resolved = resolve_plan(replace(plan, heading_keys=tuple(keys)), library, are_touches_resolved=True)
     return replace(plan, heading_path=resolved.plan_heading(play))

@@ -119,10 +119,17 @@ class MatchRequest:
         return self.pitch or find_assumed_pitch(self.sport)
 
     def find_joint_file(self) -> Path | None:
-        """Find the skeletal tracking: the file of joints, or the tracking itself where that is skeletal."""
-        if self.joints is not None:
-            return self.joints
-        return self.tracking if not self.provider and is_joint_file(self.tracking) else None
+        """Find the skeletal tracking: the file of joints, or the tracking itself where that is skeletal.
+
+        Raises:
+            InputError: if both are skeletal.
+        """
+        is_skeletal = not self.provider and is_joint_file(self.tracking)
+        if is_skeletal and self.joints is not None:
+            raise InputError(self.tracking, "skeletal tracking, beside which no joints can be given",
+                             f"positions of the players for the joints in {self.joints.name}",
+                             "leave the joints out: the tracking has its own")
+        return self.tracking if is_skeletal else self.joints
 
     def to_plain(self) -> dict:
         """Convert the request to plain values, for match.json."""

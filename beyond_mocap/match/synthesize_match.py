@@ -15,7 +15,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ..appearance.sports import FOOTBALL
+from ..appearance.sports import FOOTBALL, load_sports
 from ..ball.tracked.solve import SolvedBall, solve_ball
 from ..base.errors import BeyondMocapError, InputError, UserCancelledError
 from ..files.atomic import atomic_write
@@ -48,6 +48,8 @@ from .state import build_player_row, build_state, read_clocks
 
 BALL_MARGIN = 5.0
 """s before and after the span in which the ball is solved too."""
+
+_OTHER_SIZE = 2.0  # ratio of a side of the pitch to the regular one from which a message is given
 
 _STAGE_ENDS = {"read": 0.02, "library": 0.07, "ball": 0.12, "search": 0.55, "motion": 0.8, "crowd": 0.85,
                "figures": 0.98, "page": 1.0}
@@ -166,6 +168,7 @@ def _run_stages(
     if job.request.pitch not in (None, (match.length, match.width)):
         state.report["notes"].append(f"the tracking data has its own pitch, {match.length:g} x {match.width:g} m: the "
                                      "requested size is not used")
+    state.report["notes"] += _check_sport(match, job.request.sport)
     bodies = build_known_bodies(feed, match, job.request, job.library, span)
     state.report["notes"] += bodies.notes
     match = follow_bodies(match, bodies)
@@ -211,9 +214,22 @@ def _run_stages(
     _finish_match(job, crowd, motion)
 
 
+def _check_sport(match: Match, sport: str) -> list[str]:
+    """Return a message where the pitch is not of a size that the sport has."""
+    regular = load_sports()[sport].size
+    if all(1.0 / _OTHER_SIZE < side / usual < _OTHER_SIZE for side, usual in zip((match.length, match.width), regular)):
+        return []
+    return [f"the pitch of {match.length:g} x {match.width:g} m is not of the size of {sport.replace('_', ' ')}, "
+            f"{regular[0]:g} x {regular[1]:g} m: check the sport"]
+
+
 def _solve_ball(job: Job, match: Match, span: tuple[float, float], report: Progress) -> SolvedBall | None:
     """Solve the ball around the span; None if it is not requested or not possible."""
     if not job.request.solve_touches:
+        return None
+    if not np.isfinite(match.ball[:, :2]).any():
+        job.state.report["notes"].append("without a ball in the tracking data, players run, and your labels say what "
+                                         "else they do")
         return None
     if job.request.sport != FOOTBALL:
         job.state.report["notes"].append("touches of the ball are found in football only: it stays as tracked")

@@ -120,11 +120,13 @@ class Play:
         times: (M,) s on the track's clock, ascending.
         places: (M, 2) m that the body faces while the ball is not known, NaN where there is nothing to face.
         is_keeper: whether this is a goalkeeper, who faces the ball also when moving.
+        keys: headings that the feed has measured, in order of time.
     """
 
     times: np.ndarray
     places: np.ndarray
     is_keeper: bool = False
+    keys: tuple[HeadingKey, ...] = ()
 
     def __post_init__(self):
         object.__setattr__(self, "times", freeze_array(self.times))

@@ -43,9 +43,9 @@ from .search.affected_frames import (
     merge_stretches,
 )
 from .search.candidate_index import SLOT
-from .search.edit_list import EditList
+from .search.edit_list import EditList, SearchStretch
 from .search.path_costs import balance_weights
-from .search.path_search import PathSearch, SearchStretch
+from .search.path_search import PathSearch
 from .search.preferences import UsedStretch, list_used_stretches
 from .search.request import SearchRequest, build_request
 from .search.source_frames import SourceFrames, fetch_motion, look_up_frames, output_index

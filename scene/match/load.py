@@ -169,7 +169,7 @@ def _construct_characters(request, state, library, ball, span, progress, cancell
         list[str]]:
     """Construct all players who are present and finished; return them and messages about the others."""
     from ...beyond_mocap.match.displayed_motion import construct_displayed_player
-    from ...beyond_mocap.match.player_edit import read_player
+    from ...beyond_mocap.match.player_file import read_player
 
     characters, lines, last_error = [], [], None
     selected = [player for player in state["players"] if not request.players or player["id"] in request.players]

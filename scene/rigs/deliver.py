@@ -43,7 +43,8 @@ def write_result(result: "Take | MatchResult", out: Path,
     from ...beyond_mocap.match.synthesize_match import MatchResult  # imports scipy, which is slow
 
     lines = create_match_scene(result) if isinstance(result, MatchResult) else create_take_scene(result, above)
-    exporters.write_whole_file(out, EXPORTERS[out.suffix.lower()])
+    with exporters.silence_blender():
+        exporters.write_whole_file(out, EXPORTERS[out.suffix.lower()])
     return lines
 
 

@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+import contextlib
+import ctypes
 import errno
 import os
 import re
 import shutil
+import sys
+from collections.abc import Iterator
 from pathlib import Path
 
 import bpy
@@ -20,6 +24,25 @@ _FBX_AXES = {"BLENDER": ("-Z", "Y"), "UNITY": ("-Z", "Y"), "GODOT": ("-Z", "Y"),
 _USD_AXES = {"UNITY": ("NEGATIVE_Z", "Y"), "GODOT": ("NEGATIVE_Z", "Y")}
 _VECTOR_BYTES, _CORNER_BYTES = 12, 40  # of Alembic: a position or normal on each frame; all else of a corner, once
 _MEGABYTE = 1e6
+
+
+@contextlib.contextmanager
+def silence_blender() -> Iterator[None]:
+    """Context manager: what Blender prints itself is left out, such as the name of a temporary file."""
+    if sys.stdout is None:  # nothing can be printed
+        yield
+        return
+    library = ctypes.CDLL("ucrtbase" if os.name == "nt" else None)  # lines of Blender wait in the buffer of C
+    library.fflush(None)
+    kept = os.dup(1)
+    try:
+        with open(os.devnull, "w", encoding="utf-8") as nowhere, contextlib.redirect_stdout(nowhere):
+            os.dup2(nowhere.fileno(), 1)
+            yield
+    finally:
+        library.fflush(None)
+        os.dup2(kept, 1)
+        os.close(kept)
 
 
 def check_exporter(format: str) -> None:

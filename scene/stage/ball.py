@@ -18,7 +18,9 @@ from .stage_collection import find_sport
 RADIUS = 0.11  # metres, Laws of the Game: circumference 0.68 to 0.70 m
 MATERIAL = "Ball white"
 ROLLING_RADIUS = "beyond_mocap_rolling_radius"  # custom property of a ball: metres, 0 for a disc, which slides
-ROLLING_BELOW = 0.16  # metres, height of the centre up to which the ball rolls on the ground
+ROLLS = "beyond_mocap_rolls"  # custom property of an action whose rotations are the ball's roll
+SPORT = "beyond_mocap_sport"  # custom property of a mesh: the sport whose ball it is, which changes with the stage's
+_ABOVE_GROUND = 0.05  # metres between a ball and the ground up to which it rolls
 
 
 def create_ball(context: bpy.types.Context, name: str, collection, radius: float | None = None) -> bpy.types.Object:
@@ -32,9 +34,25 @@ def create_ball(context: bpy.types.Context, name: str, collection, radius: float
     Returns:
         The ball.
     """
-    kind = SportBall(radius) if radius is not None else find_sport(context.scene).ball
-    mesh = bpy.data.meshes.new(name)
-    shape = bmesh.new()
+    sport = find_sport(context.scene)
+    kind = sport.ball if radius is None else SportBall(radius)
+    mesh = _build_mesh(name, context.scene, kind, sport.name)
+    if radius is None:
+        mesh[SPORT] = sport.name
+    ball = bpy.data.objects.new(name, mesh)
+    ball[ROLLING_RADIUS] = _find_rolling_radius(kind)
+    ball.rotation_mode = "QUATERNION"
+    collection.objects.link(ball)
+    return ball
+
+
+def _find_rolling_radius(kind: SportBall) -> float:
+    return 0.0 if kind.thickness else kind.radius
+
+
+def _build_mesh(name: str, scene: bpy.types.Scene, kind: SportBall, sport: str) -> bpy.types.Mesh:
+    """Build the mesh of a ball with its materials."""
+    mesh, shape = bpy.data.meshes.new(name), bmesh.new()
     if kind.thickness:
         bmesh.ops.create_cone(shape, cap_ends=True, segments=32, radius1=kind.radius, radius2=kind.radius,
                               depth=kind.thickness)
@@ -45,19 +63,49 @@ def create_ball(context: bpy.types.Context, name: str, collection, radius: float
     for face in shape.faces:
         face.smooth = not kind.thickness
         face.material_index = int(kind.colour is None and np.max(patches @ np.array(face.normal)) > 0.94)
-    bmesh.ops.scale(shape, vec=units_per_metre(context.scene) * np.array([along, 1.0, 1.0]), verts=shape.verts)
+    bmesh.ops.scale(shape, vec=units_per_metre(scene) * np.array([along, 1.0, 1.0]), verts=shape.verts)
     shape.to_mesh(mesh)
     shape.free()
-    if kind.colour is None:
-        mesh.materials.append(get_material(MATERIAL, (0.9, 0.9, 0.9), 0.4))
-        mesh.materials.append(get_material("Ball black", (0.01, 0.01, 0.012), 0.4))
-    else:
-        mesh.materials.append(get_material(f"{MATERIAL} {find_sport(context.scene).name}", kind.colour, 0.5))
-    ball = bpy.data.objects.new(name, mesh)
-    ball.rotation_mode = "QUATERNION"
-    ball[ROLLING_RADIUS] = 0.0 if kind.thickness else kind.radius
-    collection.objects.link(ball)
-    return ball
+    for material in _get_materials(kind, sport):
+        mesh.materials.append(material)
+    return mesh
+
+
+def _get_materials(kind: SportBall, sport: str) -> tuple[bpy.types.Material, ...]:
+    if kind.colour is not None:
+        return (get_material(f"{MATERIAL} {sport}", kind.colour, 0.5),)
+    return get_material(MATERIAL, (0.9, 0.9, 0.9), 0.4), get_material("Ball black", (0.01, 0.01, 0.012), 0.4)
+
+
+def update_sport_balls(scene: bpy.types.Scene) -> None:
+    """Give the balls of a scene that are its sport's the look, the radius and the roll of the sport that it has now.
+
+    Balls of a size of their own, and meshes of the user, stay as they are.
+    """
+    sport = find_sport(scene)
+    for ball in scene.objects:
+        mesh = ball.data if is_ball(ball) and ball.library is None else None
+        if mesh is None or mesh.get(SPORT, sport.name) == sport.name:
+            continue
+        ball.data = _build_mesh(mesh.name, scene, sport.ball, sport.name)
+        ball.data[SPORT], ball[ROLLING_RADIUS] = sport.name, _find_rolling_radius(sport.ball)
+        if not mesh.users:
+            bpy.data.meshes.remove(mesh)
+        _write_roll(ball, scene)
+
+
+def _write_roll(ball: bpy.types.Object, scene: bpy.types.Scene) -> None:
+    """Write the roll of a ball again where `write_trajectory` gave it one."""
+    action, slot = channels.find_playing_action(ball)
+    if action is None or not action.get(ROLLS) or action.library is not None:
+        return
+    curves = channels.collect_curves(action, slot)
+    location, turn = [curves.get(("location", axis)) for axis in range(3)], curves.get(("rotation_quaternion", 0))
+    if None in location or turn is None:
+        return
+    frames = channels.read_keys(turn)["co"][:, 0]
+    places = np.stack([channels.sample_curve(curve, frames) for curve in location], axis=1) / units_per_metre(scene)
+    channels.replace_keys(ball, frames, {"rotation_quaternion": compute_roll(places, find_rolling_radius(ball, scene))})
 
 
 def is_ball(thing: bpy.types.Object) -> bool:
@@ -83,11 +131,20 @@ def write_trajectory(ball: bpy.types.Object, path: BallPath, scene: bpy.types.Sc
     at = (frames - start) / fps
     places = interpolate_columns(at, *_hold_unknown(seconds, path.positions))
     group = "Object Transforms"
-    radius = ball.get(ROLLING_RADIUS, RADIUS)
     curves = {"location": (group, places * units_per_metre(scene)),
-              "rotation_quaternion": (group, compute_roll(places, radius) if path.rotations is None
-                                      else _sample_rotations(path, at))}
-    return channels.create_action(ball, f"{ball.name} path", frames, curves)
+              "rotation_quaternion": (group, compute_roll(places, find_rolling_radius(ball, scene))
+                                      if path.rotations is None else _sample_rotations(path, at))}
+    action = channels.create_action(ball, f"{ball.name} path", frames, curves)
+    action[ROLLS] = path.rotations is None
+    return action
+
+
+def find_rolling_radius(ball: bpy.types.Object, scene: bpy.types.Scene) -> float:
+    """Find the radius in metres by which a ball rolls, also of the user's own; 0 for a disc, which slides."""
+    if ROLLING_RADIUS in ball:
+        return ball[ROLLING_RADIUS] * ball.scale[1]
+    across = min(ball.dimensions) / units_per_metre(scene)
+    return across / 2.0 if across > 0.0 else RADIUS
 
 
 def _hold_unknown(seconds: np.ndarray, places: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -121,7 +178,7 @@ def compute_roll(places: np.ndarray, radius: float = RADIUS) -> np.ndarray:
     step = np.diff(places, axis=0)
     rotation_steps = np.stack([-step[:, 1], step[:, 0], np.zeros(len(step))],
                               axis=1) / radius  # up x step: rotation vectors
-    for i in np.flatnonzero(places[1:, 2] > ROLLING_BELOW):
+    for i in np.flatnonzero(places[1:, 2] > radius + _ABOVE_GROUND):
         rotation_steps[i] = rotation_steps[i - 1] if i else rotation_steps[i]
     out = quaternion.identity(len(places))
     for i, spin in enumerate(quaternion.from_rotation_vector(rotation_steps)):

@@ -6,7 +6,7 @@ import bpy
 from bpy.props import BoolProperty, EnumProperty
 
 from ..core.properties import with_settings
-from . import stage
+from . import ball, stage
 
 LIGHTS = (("DAYLIGHT", "Daylight", "Afternoon sun and a blue sky", "LIGHT_SUN", 0),
           ("FLOODLIGHT", "Floodlight", "Night, with four masts of floodlights", "LIGHT_AREA", 1))
@@ -24,7 +24,8 @@ def _update_stage(settings, _context) -> None:
 
 
 def _update_sport(settings, _context) -> None:
-    """Rebuild the stage for another sport, in its regular size."""
+    """Rebuild the stage for another sport, in its regular size; its balls become that sport's."""
+    ball.update_sport_balls(settings.id_data)
     if stage.find_stage(settings.id_data) is not None:
         stage.create_stage(settings.id_data, stage.find_sport(settings.id_data).size)
 

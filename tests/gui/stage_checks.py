@@ -4,7 +4,7 @@ import bpy
 import numpy as np
 from bpy_extras.view3d_utils import location_3d_to_region_2d
 from mathutils import Euler
-from tab import PICTURES, copy_sample, output, run_operator, wait_until_settled, window
+from tab import PICTURES, copy_sample, import_module, output, run_operator, wait_until_settled, window
 
 DISTANCES = (1.5, 10.0, 30.0, 60.0, 90.0, 140.0, 200.0)  # metres
 BLENDERS_CLIP_START, NO_FLICKER = 0.01, 0.5
@@ -49,6 +49,34 @@ def check_lines_hold_from_near_to_far():
         found = count_white(BLENDERS_CLIP_START, f"lines-{distance:g}")
         output.write_line(f"     lines at {distance:g} m: {found} white pixels, {expected} without flicker")
         assert expected > 50 and abs(found - expected) <= 0.03 * expected, (distance, found, expected)
+
+
+def check_another_sport_brings_its_ball_and_undo_takes_it_back():
+    bpy.ops.wm.read_homefile(use_empty=True)
+    yield 0.5
+    run_operator("beyond_mocap.add_stage", "EXEC_DEFAULT")
+    scene = window.window.scene
+    balls = import_module("scene.stage.ball")
+    with bpy.context.temp_override(window=window.window):
+        balls.create_ball(bpy.context, "Ball", scene.collection)
+    bpy.ops.ed.undo_push(message="a ball")
+    yield 0.3
+    for sport in ("basketball", "ice_hockey"):
+        scene.beyond_mocap_stage.sport = sport
+        bpy.ops.ed.undo_push(message="sport")
+        yield 0.5
+    window.save_picture(PICTURES / "puck.png")
+    assert scene.objects["Ball"].data.materials[0].name.endswith("ice_hockey")
+    run_operator("ed.undo", "EXEC_DEFAULT")
+    yield 0.5
+    scene = window.window.scene
+    assert scene.beyond_mocap_stage.sport == "basketball" and abs(scene.objects["Ball"].dimensions.x - 0.24) < 0.02
+    run_operator("ed.undo", "EXEC_DEFAULT")
+    yield 0.5
+    scene = window.window.scene
+    names = [material.name for material in scene.objects["Ball"].data.materials]
+    assert scene.beyond_mocap_stage.sport == "football" and names == ["Ball white", "Ball black"]
+    assert abs(scene.objects["Ball"].dimensions.x - 0.22) < 0.02
 
 
 def measure_height(body):

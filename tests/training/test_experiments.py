@@ -94,3 +94,14 @@ def test_the_rows_are_those_of_the_thesis_and_ours():
     assert (six.settings.layers, six.settings.units, six.epochs, six.batch, six.keep) == (3, 256, 400, 32, 0.7)
     assert rows["gradient-ik"].config.settings.ik_layer and not rows["gradient"].config.settings.ik_layer
     assert not any(row.config.linear_start for name, row in rows.items() if name.startswith(("thesis", "chance")))
+
+
+@pytest.mark.parametrize(("words", "status", "told"), [
+    ("--help", 0, "--hours HOURS"),
+    ("--data . --out out --hours 0 --experiments {}", 2, "the extra 'training'"),
+])
+def test_without_jax_there_is_help_and_one_line(words, status, told, tmp_path, data):
+    code = "import sys; sys.modules['jax'] = None; from training.experiments import main; sys.exit(main(sys.argv[1:]))"
+    command = words.format(data / "rows.json").replace("--data .", f"--data {data}").split()
+    ran = subprocess.run([sys.executable, "-c", code, *command], cwd=TOP, capture_output=True, text=True)
+    assert ran.returncode == status and told in ran.stdout + ran.stderr and ran.stderr.count("\n") <= 1

@@ -426,5 +426,5 @@ def solve_ball(source: Match | Track, progress: Callable[[float, str], None] | N
     players = [source.players[index] for index in playing]
     return solve_samples(source.times[part], source.ball[part], source.positions[playing][:, part],
                          players=[player.id for player in players], teams=[player.team for player in players],
-                         pitch=(source.length, source.width), where=source.provider, progress=progress,
+                         pitch=(source.length, source.width), where="the tracking data", progress=progress,
                          cancelled=cancelled)

@@ -14,6 +14,7 @@ from .landmarks import LANDMARKS
 
 _FAR = 1e9  # farther than any stadium in any unit: damaged numbers stay outliers, and their squares are finite
 _MOST_POINTS = 60_000_000
+_MOST_NAMES = 30  # that are listed in one line
 _UNITS = {"metres": 1.0, "centimetres": 0.01, "millimetres": 0.001, "feet": 0.3048, "decimetres": 0.1}
 _LEG = 0.87  # metres, thigh and shank of an adult
 _LEG_RANGE = (0.55, 1.25)  # metres, of children of school age to the tallest, with noise
@@ -104,6 +105,9 @@ class JointCollector:
         """
         people = [self._build_person(person, points) for person, points in self._points.items()]
         people = [person for person in people if len(person.times) >= 2]
+        if not people and self.unknown:
+            raise InputError(self._path, f"no known joint in two frames, but {self._list_unknown()}",
+                             "names such as left_hip, left_knee, left_ankle and nose", "rename the joints")
         if not people:
             raise InputError(self._path, "no person with joints in two frames", "skeletal tracking", "export it again")
         rate = fps or _find_rate(np.concatenate([np.diff(person.times) for person in people]))
@@ -111,8 +115,12 @@ class JointCollector:
             raise InputError(self._path, f"{rate:g} frames per second", f"{_RATES[0]:g} to {_RATES[1]:g}",
                              "check that times are seconds")
         if self.unknown:
-            self.notes.append(f"{format_count(len(self.unknown), 'point')} not used: {', '.join(sorted(self.unknown))}")
+            self.notes.append(f"{format_count(len(self.unknown), 'point')} not used: {self._list_unknown()}")
         return normalize_feed(JointFeed(tuple(people), rate, tuple(self.notes)), self._path)
+
+    def _list_unknown(self) -> str:
+        names = sorted(self.unknown)
+        return ", ".join(names[:_MOST_NAMES]) + f" and {len(names) - _MOST_NAMES} more" * (len(names) > _MOST_NAMES)
 
     def _build_person(self, person: str, points: array) -> PlayerJoints:
         rows = np.frombuffer(points).reshape(-1, 5) if points else np.zeros((0, 5))

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import numpy as np
 
-from ...base.errors import InputError, format_count
+from ...base.errors import InputError, build_read_error, format_count
 from ..plain_npz import list_arrays, read_named_arrays
 from ..smpl.smpl import is_smpl_file
 from ..tables import parse_number, read_rows
@@ -44,6 +44,8 @@ def read_joints(path) -> JointFeed:
         InputError: if it is none, or damaged.
     """
     path = Path(path)
+    if not path.is_file():
+        raise build_read_error(path, "a file of skeletal tracking")
     read = _find_reader(path)
     try:
         return read(path)
@@ -71,7 +73,7 @@ def _find_reader(path: Path):
         return _read_fifa
     found = _find_text_reader(path)
     if found is None:
-        what = "unknown form" if read_head(path) else "missing, empty or no file"
+        what = "unknown form" if read_head(path).strip() else "the file is empty"
         raise InputError(path, what, _FORMS, "choose such a file")
     return found
 

@@ -59,6 +59,7 @@ class TrackingProvider(Provider):
     Attributes:
         coordinates: kloppy's name of the provider's coordinates, "" if it is the provider's name.
         needs_metadata: whether there is always a second file; its name is also found without `renamed`.
+        metadata_kinds: suffixes that the second file can have.
         find_files: the tracking file, its metadata, and notes to add to -> all files of the match.
         team_loader: kloppy's function for one CSV per team, "" if there is none.
         has_pitch_size: whether the files contain the pitch's size.
@@ -72,6 +73,7 @@ class TrackingProvider(Provider):
     arguments: Mapping[str, str] = field(default_factory=lambda: {"meta_data": "meta", "raw_data": "raw"})
     coordinates: str = ""
     needs_metadata: bool = True
+    metadata_kinds: tuple[str, ...] = (".xml", ".json")
     find_files: Callable[[Path, Path | None, list[str]], Files] = lambda path, meta, notes: ((path,), (meta,))
     team_loader: str = ""
     has_pitch_size: bool = True
@@ -90,11 +92,13 @@ class Feed:
         provider: the provider.
         tracking: tracking files in time order; with one CSV per team the home team's first.
         meta: the metadata first, then further files; () without any.
+        is_meta_chosen: whether the user named the metadata.
     """
 
     provider: TrackingProvider
     tracking: tuple[Path, ...]
     meta: tuple[Path, ...] = ()
+    is_meta_chosen: bool = False
 
     @property
     def path(self) -> Path:

@@ -14,6 +14,8 @@ PERIOD_BREAK = 10.0
 """Seconds inserted between the periods of a match."""
 _FARTHEST = 1e7  # of any unit from the origin; anything beyond is no place
 _LONGEST = 86_400.0  # seconds of a match
+MAX_OUTSIDE = 12.0
+"""Metres beyond the lines where no player is."""
 PITCH_SIDES = (10.0, 400.0)
 """Metres: the shortest and the longest side of a pitch."""
 

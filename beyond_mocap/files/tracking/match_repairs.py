@@ -19,8 +19,8 @@ from ...base.errors import InputError, format_count
 from ...base.time_series import find_runs
 from ...motion.track import MAX_SPEED, is_ball_sentinel
 from .feed import MAX_PLAYERS, Feed
+from .match_arrays import MAX_OUTSIDE
 
-_MAX_OUTSIDE = 12.0  # m beyond the lines, where no player is
 _MAX_BALL_OUTSIDE = 25.0  # m beyond the lines, where feeds park an absent ball
 _MAX_HEIGHT = 60.0  # m, height of a ball at most
 _FROZEN_SECONDS = 30.0  # s at exactly one position: a repeated sample of an absent player
@@ -192,7 +192,8 @@ def repair_ball(ball: np.ndarray, length: float, width: float) -> tuple[np.ndarr
     if too_high:
         lines.append(f"{format_count(too_high, 'height')} of the ball above {_MAX_HEIGHT:g} m, set to unknown")
     heights = np.isfinite(out[known, 2]).mean() if known.any() else 0.0
-    coverage = f"the ball is known in {known.mean():.0%} of the samples, its height in {heights:.0%} of these"
+    coverage = (f"the ball is known in {known.mean():.0%} of the samples, its height in {heights:.0%} of these"
+                if known.any() else "no ball in the tracking data")
     return out, [*lines, coverage]
 
 
@@ -211,7 +212,7 @@ def repair_players(times, positions, length: float, width: float, ids) -> tuple[
     out = np.array(positions)
     lines, jumps = [], 0
     with np.errstate(invalid="ignore"):
-        is_outside = (np.abs(out) > np.array([length, width]) / 2.0 + _MAX_OUTSIDE).any(axis=2)
+        is_outside = (np.abs(out) > np.array([length, width]) / 2.0 + MAX_OUTSIDE).any(axis=2)
     for index, name in enumerate(ids):
         frozen = _find_frozen(times, out[index]) & ~is_outside[index]
         for reason, flags in (("beside the pitch", is_outside[index]), ("at exactly one position", frozen)):

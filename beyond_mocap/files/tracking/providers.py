@@ -20,7 +20,7 @@ from .referees import read_signality_referees, read_sportec_referees, read_traca
 if TYPE_CHECKING:
     from .formats.samples import MatchSamples
 
-_META_NAMES = ("{}_meta.xml", "{}_meta.json", "{}_metadata.xml", "{}_metadata.json", "{}.xml", "{}.json")
+_META_ENDS = ("_meta", "_metadata", "")  # of metadata's names behind the tracking file's
 
 
 def find_feed(path: str | os.PathLike, meta: str | os.PathLike | None, provider: str | None) -> tuple[Feed, list[str]]:
@@ -41,7 +41,7 @@ def find_feed(path: str | os.PathLike, meta: str | os.PathLike | None, provider:
         second = _check_file(meta, "a metadata file")
     else:
         second = _find_metadata(path, record, notes) if record.needs_metadata else None
-    return Feed(record, *record.find_files(path, second, notes)), notes
+    return Feed(record, *record.find_files(path, second, notes), is_meta_chosen=bool(meta)), notes
 
 
 def load_tracking(feed: Feed, pitch: tuple[float, float]):
@@ -66,7 +66,7 @@ def load_tracking(feed: Feed, pitch: tuple[float, float]):
     arguments["coordinates"] = record.coordinates or record.name
     others = f" and its metadata {', '.join(one.name for one in feed.meta) or feed.tracking[-1].name}"
     loader = record.team_loader if feed.has_team_files else record.loader
-    return load_with_kloppy(feed.path, record.name, loader, arguments=arguments, expected=f"{record.name} tracking",
+    return load_with_kloppy(feed.path, record.name, loader, arguments=arguments, expected=f"{record.title} tracking",
                             others=others)
 
 
@@ -74,11 +74,11 @@ def _check_second_file(feed: Feed) -> None:
     """Check the form of the metadata, or of the two teams' files, so that an error does not blame the tracking file."""
     for path in feed.tracking if feed.has_team_files else ():
         if not any(re.match(form, read_head(path)) for form in feed.provider.patterns):
-            raise InputError(path, "not a team's positions", f"the CSV file of a team by {feed.provider.name}",
+            raise InputError(path, "not a team's positions", f"the CSV file of a team by {feed.provider.title}",
                              "choose the other team's file")
     for path in feed.meta[:1]:
         if read_head(path).lstrip()[:1] not in (b"<", b"{", b"[", b"\xff", b"\xfe"):  # the last two: UTF-16
-            raise InputError(path, "neither XML nor JSON", f"the metadata of {feed.provider.name}",
+            raise InputError(path, "neither XML nor JSON", f"the metadata of {feed.provider.title}",
                              "choose the metadata file")
 
 
@@ -89,32 +89,37 @@ def _check_file(path: str | os.PathLike, kind: str = "a tracking file") -> Path:
 
 
 def _detect_provider(path: Path, notes: list[str]) -> TrackingProvider:
+    from ..joints.joint_readers import is_joint_file  # not needed by a panel that lists the providers
+
     record = find_provider(path, PROVIDERS)
     if record is not None:
-        notes.append(f"{path.name} is read as {record.name}")
+        notes.append(f"{path.name} is read as {record.title}")
         return record
-    head, providers = read_head(path), ", ".join(PROVIDERS)
+    head, titles = read_head(path), ", ".join(one.title for one in PROVIDERS.values())
     if not head.strip():
         raise InputError(path, "the file is empty", "positions", "export it again")
     if is_track_csv(path):
-        expected = f"a match's tracking data from one of {providers}"
+        expected = f"a match's tracking data from one of {titles}"
         raise InputError(path, "one player's track", expected, "use synthesize for one player")
-    raise InputError(path, "unknown format", f"one of {providers}, or a CSV file: of one player with "
-                     "time_s,x_m,y_m, of all with time_s,player,x_m,y_m",
+    if is_joint_file(path):
+        raise InputError(path, "skeletal tracking", f"positions of players and ball, from one of {titles}",
+                         "use match or bodies for it")
+    raise InputError(path, "unknown format", f"one of {titles}, or a CSV of one player with time_s,x_m,y_m; "
+                     "a Plain CSV has time_s,player,x_m,y_m",
                      "choose the provider, or rename the columns")
 
 
 def _find_metadata(path: Path, record: TrackingProvider, notes: list[str]) -> Path:
     """Find the metadata file by the tracking file's name."""
     names = [path.name.replace(a, b) for a, b in record.renamed if a in path.name]
-    names += [form.format(path.stem) for form in _META_NAMES]
+    names += [f"{path.stem}{end}{kind}" for end in _META_ENDS for kind in record.metadata_kinds]
     for name in names:
         candidate = path.with_name(name)
         if candidate.is_file() and candidate != path:
             notes.append(f"{name} is used as its {'second' if candidate.suffix == path.suffix else 'metadata'} file")
             return candidate
     raise InputError(
-        path, f"the metadata file for {record.name} is missing", names[0],
+        path, f"the metadata file of {record.title} is missing", f"{names[0]} beside it",
         "add it there, or choose the metadata file",
     )
 
@@ -206,9 +211,6 @@ def _find_gps(path: Path, meta: Path | None, notes: list[str]) -> Files:
     if len(players) >= MAX_PLAYERS:
         raise InputError(path.parent, f"{len(players) + 1} files of players", f"at most {MAX_PLAYERS} of one match",
                          "move the others away")
-    if players:
-        notes.append(f"{format_count(len(players) + 1, 'file')} of {path.parent.name or path.parent} are used, "
-                     "a player each")
     return (path, *players), (corners,) if corners else ()
 
 
@@ -281,6 +283,8 @@ PROVIDERS: dict[str, TrackingProvider] = {record.name: record for record in (
     ),
     TrackingProvider(
         name="skillcorner", title="SkillCorner", files="`.json` or `.jsonl` with the match's JSON",
+        renamed=(("tracking_extrapolated.jsonl", "match.json"), ("tracking.jsonl", "match.json"),
+                 ("structured_data", "match_data")), metadata_kinds=(".json",),
         patterns=(rb'(?s)\s*[\[{].{0,4000}("trackable_object"|"image_corners_projection"|"player_data")',),
     ),
     TrackingProvider(
@@ -306,6 +310,7 @@ PROVIDERS: dict[str, TrackingProvider] = {record.name: record for record in (
         files="`.jsonl`, metadata, and the roster (in the same folder, or in one with `roster` in its name); colours "
               "of shirts",
         patterns=(rb'(?s)\s*\{.{0,400}"gameRefId"',), find_files=_find_pff, loader="load_tracking",
+        metadata_kinds=(".json",),
         arguments={"meta_data": "meta", "raw_data": "raw", "roster_meta_data": "more"},
         number_in_tracking=partial(_find_number, rb'"gameRefId"\s*:\s*"?(\d+)'), number_in_metadata=_find_pff_number,
     ),
@@ -313,7 +318,7 @@ PROVIDERS: dict[str, TrackingProvider] = {record.name: record for record in (
         name="signality", title="Signality",
         files="`..p1...json` (the other half is found by its name), metadata, and the file with `venue` in its "
               "name; referees",
-        patterns=(rb'(?s)\s*\[\s*\{.{0,400}"utc_time"',), find_files=_find_signality,
+        patterns=(rb'(?s)\s*\[\s*\{.{0,400}"utc_time"',), find_files=_find_signality, metadata_kinds=(".json",),
         arguments={"meta_data": "meta", "raw_data_feeds": "all", "venue_information": "more"},
         read_referees=read_signality_referees,
     ),
@@ -328,7 +333,7 @@ PROVIDERS: dict[str, TrackingProvider] = {record.name: record for record in (
     TrackingProvider(
         name="cdf", title="Common Data Format", files="`tracking.jsonl` with its metadata",
         patterns=(rb'(?s)\s*\{\s*"frame_id"(?!.{0,2000}"landmarks").{0,600}"teams"\s*:\s*\{\s*"(home|away)"',),
-        renamed=(("tracking.jsonl", "meta.json"), ("tracking.jsonl", "metadata.json")),
+        renamed=(("tracking.jsonl", "meta.json"), ("tracking.jsonl", "metadata.json")), metadata_kinds=(".json",),
         read_samples=_read_cdf,
     ),
     TrackingProvider(

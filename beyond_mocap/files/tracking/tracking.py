@@ -24,6 +24,7 @@ from ...motion.track.match_data import REFEREE, Match, MatchPlayer, Team, descri
 from ..atomic import atomic_write, remove_abandoned
 from ..tables import parse_number, read_rows
 from . import match_arrays
+from .body_angles import find_headings
 from .feed import Feed
 from .formats.samples import MatchSamples
 from .match_repairs import (
@@ -44,10 +45,10 @@ RATES = (5.0, 100.0)
 """Smallest and largest sampling rate of a track, samples per second."""
 
 _BALL = ("ball_x_m", "ball_y_m", "ball_z_m")
-_CACHE_VERSION = 3
+_CACHE_VERSION = 4
 _CACHE_BYTES = 4_000_000_000  # of all matches in the cache, some 40
 _CACHE_NAME = re.compile(r"[0-9a-f]{40}\.npz")
-_ARRAY_NAMES = ("times", "positions", "ball", "players", "pitch", "periods", "teams", "lines")
+_ARRAY_NAMES = ("times", "positions", "ball", "players", "pitch", "periods", "teams", "lines", "headings")
 
 
 def read_track_csv(path: str | os.PathLike) -> Track:
@@ -160,7 +161,7 @@ def _read_samples(feed: Feed, pitch: tuple[float, float] | None, whose: Feed | N
         return samples
     except (LookupError, TypeError, AttributeError, ValueError, ArithmeticError) as error:
         found = f"values in other places than {feed.provider.title} has them ({type(error).__name__}: {error})"
-        raise InputError(feed.path, found[:200], f"{feed.provider.name} tracking", "export it again") from None
+        raise InputError(feed.path, found[:200], f"{feed.provider.title} tracking", "export it again") from None
 
 
 def _convert_dataset(dataset, feed: Feed, pitch: tuple[float, float] | None) -> MatchSamples:
@@ -193,13 +194,17 @@ def _build_arrays(match: MatchSamples, pitch: tuple[float, float] | None) -> dic
     ball, ball_lines = repair_ball(match.ball, length, width)
     spans, teams = [one[:2] for one in periods], [one[1] for one in people]
     positions, ball, side_messages = repair_sides(times, positions, ball, spans, teams)
+    headings, heading_lines = np.zeros((0, 0)), []
+    if match.angles is not None:
+        headings, heading_lines = find_headings(times, positions, match.angles, spans)
     side_messages += check_side_names(times, positions, spans, teams, [one[4] for one in people])
     return {
         "times": times, "positions": positions, "ball": ball,
         "players": np.array(people, dtype=str).reshape(len(people), 5),
         "pitch": np.array([length, width, match.size is None and pitch is None, match.fps]),
         "periods": np.array(periods), "teams": np.array(match.teams, dtype=str).reshape(-1, 3),
-        "lines": np.array([*match.lines, *side_messages, *ball_lines, *player_lines], dtype=str),
+        "lines": np.array([*match.lines, *side_messages, *heading_lines, *ball_lines, *player_lines], dtype=str),
+        "headings": headings,
     }
 
 
@@ -224,6 +229,7 @@ def _build_match(arrays: dict[str, np.ndarray], feed: Feed, notes: list[str]) ->
         periods=tuple((start, end) for start, end, _, _ in arrays["periods"].tolist()), notes=tuple(notes),
         teams=(*(Team(*team) for team in arrays["teams"].tolist()), *referees),
         elapsed=tuple((int(number), before) for _, _, number, before in arrays["periods"].tolist()),
+        headings=freeze_array(arrays["headings"]) if arrays["headings"].size else None,
     )
     return replace(match, report=(*notes, *arrays["lines"].tolist(), *describe_presence(match)))
 
@@ -236,7 +242,7 @@ def _find_cache_folder() -> Path | None:
 
 def _compute_key(feed: Feed, pitch: tuple[float, float] | None) -> str:
     """Compute a key from the files' contents, independent of their names."""
-    digest = hashlib.sha256(f"{_CACHE_VERSION} {feed.provider.name} {pitch}".encode())
+    digest = hashlib.sha256(f"{_CACHE_VERSION} {feed.provider.name} {pitch} {feed.is_meta_chosen}".encode())
     for file in (*feed.tracking, *feed.meta):
         with open(file, "rb") as stream:
             digest.update(hashlib.file_digest(stream, "sha256").digest())
@@ -256,6 +262,7 @@ def _load_cache(cache: Path) -> dict[str, np.ndarray] | None:
     shapes = {"times": (count,), "positions": (player_count, count, 2), "ball": (count, 3), "pitch": (4,),
               "players": (player_count, 5)}
     fits = all(arrays[name].shape == shape for name, shape in shapes.items())
+    fits = fits and arrays["headings"].shape in ((0, 0), (player_count, count))
     return arrays if fits and arrays["periods"].shape[1:] == (4,) and arrays["teams"].shape[1:] == (3,) else None
 
 

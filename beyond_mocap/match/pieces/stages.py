@@ -18,7 +18,8 @@ from ...files.atomic import atomic_write
 from ...files.tables import to_plain
 from ...motion.track.ball_path import BallPath
 from ..crowd.window import MARGIN_SECONDS, MAX_SECONDS, PlayerCorrection, cut_edit, join_windows, load_parts, save_parts
-from ..player_edit import PlayerEdit, write_player
+from ..player_edit import PlayerEdit
+from ..player_file import write_player
 from ..player_plans import PlayerPlans
 from .constructed_motion import ConstructedMotion
 from .job import Job, remove_library_paths, run_stage

@@ -15,7 +15,7 @@ from ...library.library import Library
 from ...synthesis.take import Take
 from ..displayed_motion import MARGIN_SECONDS, construct_displayed_player, display_takes
 from ..folder import read_state
-from ..player_edit import read_player
+from ..player_file import read_player
 
 MAX_CELLS = 900
 """Most cells of a strip; if a match has more seconds, each cell shows the worst of its seconds."""

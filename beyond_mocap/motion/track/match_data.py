@@ -85,6 +85,7 @@ class Match:
         report: the data report, a line each: assumptions, corrections, and how long each player is present.
         elapsed: for each period its number and the seconds on its clock at its first frame; () where the numbers are
             1, 2, ... and the clocks start at 0.
+        headings: (P, N) rad from +x to the left in which bodies face, NaN where not known; None for a feed without.
     """
 
     times: np.ndarray
@@ -100,6 +101,7 @@ class Match:
     teams: tuple[Team, ...] = ()
     report: tuple[str, ...] = ()
     elapsed: tuple[tuple[int, float], ...] = ()
+    headings: np.ndarray | None = None
 
     @property
     def halves(self) -> tuple[Half, ...]:

@@ -49,6 +49,24 @@ class EditList:
         return list(zip(edges, edges[1:]))
 
 
+@dataclass(frozen=True, eq=False)
+class SearchStretch:
+    """A stretch to be searched again.
+
+    What the edit list shows before and behind stays: the search starts from the one and pays for the transition to the
+    other.
+
+    Attributes:
+        edit: the edit list, at the library's rate.
+        first: first frame of the stretch.
+        end: frame after its last one.
+    """
+
+    edit: EditList
+    first: int
+    end: int
+
+
 def find_transitions(clip: np.ndarray, frame: np.ndarray, step: float = 1.5) -> np.ndarray:
     """Find the frames at which the clip changes, or the frame jumps by more than `step` library frames or backwards.
 
@@ -85,6 +103,22 @@ def replace_stretch(
     transitions = np.concatenate([edit.transitions[edit.transitions < first], found,
                                   edit.transitions[edit.transitions > end]])
     return EditList(new_clip, new_frame, transitions, tuple(sorted((*edit.keys, *keys), key=lambda key: key.number)))
+
+
+def compute_steps(edit: EditList, at: np.ndarray) -> np.ndarray:
+    """Compute the steps of an edit list as played within its pieces.
+
+    Args:
+        edit: the edit list.
+        at: (K,) output frames.
+    Returns:
+        (K,) library frames.
+    """
+    starts = np.array([low for low, _ in edit.pieces])
+    piece = np.searchsorted(starts, at, side="right") - 1
+    low, high = starts[piece], np.append(starts[1:], len(edit))[piece]
+    one = np.clip(at, low, np.maximum(high - 2, low))
+    return np.where(high - low > 1, edit.frame[np.minimum(one + 1, len(edit) - 1)] - edit.frame[one], 1.0)
 
 
 def sample_edit(edit: EditList, index: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

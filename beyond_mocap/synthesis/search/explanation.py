@@ -17,12 +17,13 @@ import numpy as np
 from ...library.library import Library
 from ..plan import ResolvedPlan
 from ..search_library import extend_library
+from .beam_states import MEMORY_SLOTS, BeamStates
 from .beam_transitions import SAME_FRAME, SlotCandidates
 from .block_costs import AnnotationCost, collect_windows, compute_distances, measure_typical_distance, rescale_alpha
 from .candidate_index import PLAYBACK_RATES, SLOT
 from .edit_list import EditList
 from .path_costs import YOUNG_SLOTS, Term, Weights, balance_weights
-from .path_search import MEMORY_SLOTS, BeamStates, PathSearch
+from .path_search import PathSearch
 from .request import SearchRequest, build_request
 from .slots import KeyPieces, build_slot_edges
 

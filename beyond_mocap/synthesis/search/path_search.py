@@ -18,9 +18,10 @@ import numpy as np
 from ...base.errors import InputError, UserCancelledError
 from ...library.keys import Key
 from ...library.library import Library
+from .beam_states import MEMORY_SLOTS, BeamStates
 from .beam_transitions import SAME_FRAME, BeamTransitions, SlotCandidates
 from .candidate_index import ACTING, PLAYBACK_RATES, SLOT
-from .edit_list import EditList, PlacedKey, find_transitions, replace_stretch
+from .edit_list import EditList, PlacedKey, SearchStretch, compute_steps, find_transitions, replace_stretch
 from .key_fit import StrikeMeasurements, compute_key_misfit, compute_swing_rates, measure_ball, measure_strikes
 from .path_costs import YOUNG_SLOTS, BoneDistance, PathCosts, Weights
 from .preferences import UNUSUAL_FOOT_WEIGHT, UsedStretch, compute_weak_foot_cost, find_unusual_foot
@@ -28,7 +29,6 @@ from .request import RequestedKey, SearchRequest
 from .slots import build_key_pieces, build_slot_edges, find_slot, list_playback_rates
 from .swing_rate import retime_swing
 
-MEMORY_SLOTS = 15  # slots whose buckets a state remembers (4 s at 30 frames per second)
 _ACTING_SHARE = 4  # of the beam, one part in this many is kept for states that show a requested action
 _LEAD_IN = 2  # slots ahead of a piece in which frames that lead into it are candidates
 
@@ -50,49 +50,6 @@ class SearchWidth:
 
 NARROW = SearchWidth(beam_width=4, candidates=100, considered=2000)
 """Width of a search that is cut short, or quick from the start."""
-
-
-@dataclass(frozen=True, eq=False)
-class SearchStretch:
-    """A stretch to be searched again.
-
-    What the edit list shows before and behind stays: the search starts from the one and pays for the transition to the
-    other.
-
-    Attributes:
-        edit: the edit list, at the library's rate.
-        first: first frame of the stretch.
-        end: frame after its last one.
-    """
-
-    edit: EditList
-    first: int
-    end: int
-
-
-@dataclass(frozen=True, eq=False)
-class BeamStates:
-    """B ways to fill a slot.
-
-    Attributes:
-        clip: (B,) clip index.
-        start: (B,) fractional library frame.
-        rate: (B,) playback rate.
-        cost: (B,) of the best sequence that ends here.
-        back: (B,) state of the slot before.
-        piece: (B,) of a key moment, or -1.
-        recent: (B, M) buckets shown lately.
-        age: (B,) slots since the last cut.
-    """
-
-    clip: np.ndarray
-    start: np.ndarray
-    rate: np.ndarray
-    cost: np.ndarray
-    back: np.ndarray
-    piece: np.ndarray
-    recent: np.ndarray
-    age: np.ndarray
 
 
 class PathSearch:
@@ -227,7 +184,7 @@ class PathSearch:
         frames_shown = edit.frame[np.maximum(first - SLOT * np.arange(MEMORY_SLOTS, 0, -1), 0)]
         recent = self.index.bucket[self.costs.round_frame(frames_shown)][None, :]
         nothing = np.zeros(1, int)
-        return BeamStates(edit.clip[at], edit.frame[at], _compute_steps(edit, at), cost=np.zeros(1), back=nothing,
+        return BeamStates(edit.clip[at], edit.frame[at], compute_steps(edit, at), cost=np.zeros(1), back=nothing,
                           piece=nothing - 1, recent=recent, age=self._measure_arrival_age()), 1
 
     def _measure_arrival_age(self) -> np.ndarray:
@@ -244,7 +201,7 @@ class PathSearch:
             frames_shown: frames of the last slot.
         """
         edit, at = self.stretch.edit, np.array([self.stretch.end])
-        goal = SlotCandidates(edit.clip[at], edit.frame[at], _compute_steps(edit, at), np.zeros(1), np.array([-1]))
+        goal = SlotCandidates(edit.clip[at], edit.frame[at], compute_steps(edit, at), np.zeros(1), np.array([-1]))
         transitions = self.build_transitions(states, np.arange(len(states.cost)), states.start + states.rate
                                              * frames_shown)
         return replace(states, cost=transitions.compute_all(goal)[:, 0])
@@ -352,7 +309,7 @@ class PathSearch:
         """Build the candidate of what the edit list shows in a slot, none if it is cut there."""
         edit = self.stretch.edit
         at = np.array([] if np.any((edit.transitions > low) & (edit.transitions < high)) else [low], int)
-        start, rate = edit.frame[at], _compute_steps(edit, at)
+        start, rate = edit.frame[at], compute_steps(edit, at)
         number = np.abs(PLAYBACK_RATES - rate[:, None]).argmin(axis=1)
         cost = self.costs.compute_misfit(low, high, number, self.costs.round_frame(start))
         return edit.clip[at], start, rate, cost, np.full(len(at), -1)
@@ -437,12 +394,3 @@ class PathSearch:
             return replace_stretch(self.stretch.edit, int(self.edges[0]), int(self.edges[-1]), clip=clip, frame=frame,
                                    keys=keys)
         return EditList(clip, frame, find_transitions(clip, frame), keys)
-
-
-def _compute_steps(edit: EditList, at: np.ndarray) -> np.ndarray:
-    """Compute the step (K,) in library frames of an edit list at frames `at` (K,), as played within their pieces."""
-    starts = np.array([low for low, _ in edit.pieces])
-    piece = np.searchsorted(starts, at, side="right") - 1
-    low, high = starts[piece], np.append(starts[1:], len(edit))[piece]
-    one = np.clip(at, low, np.maximum(high - 2, low))
-    return np.where(high - low > 1, edit.frame[np.minimum(one + 1, len(edit) - 1)] - edit.frame[one], 1.0)

@@ -25,6 +25,7 @@ def order(sample_cache):
 def test_everybody_comes_out_as_one_file(run, order, tmp_path, capfd):
     out = tmp_path / "match.blend"
     assert run([*order, "--out", str(tmp_path / "made"), "--scene", str(out)]) == 0
+    assert capfd.readouterr().out.splitlines()[0] == f"{out}: written"  # and no name of a temporary file before it
     bpy.ops.wm.open_mainfile(filepath=str(out))
     scene = bpy.context.scene
     assert scene.render.fps == 30 and (scene.frame_start, scene.frame_end) == (0, 60)

@@ -121,6 +121,34 @@ def test_each_sport_has_its_ground_goals_and_ball(sport):
     assert room("stage.stage_collection").find_pitch_size(scene) == (105.0, 68.0)
 
 
+def test_balls_become_those_of_the_sport_and_roll_by_their_own_radius(core):
+    """A ball of a size of its own stays; what a ball has rolled after a metre is a metre over its radius."""
+    scene, balls = bpy.context.scene, room("stage.ball")
+    x = np.linspace(0.0, 1.0, 25)
+    path = core("motion.track.ball_path").BallPath(x, np.column_stack([x, 0 * x, 0 * x + 0.1]), np.ones(25, bool))
+    ball = balls.create_ball(bpy.context, "Ball", scene.collection)
+    small = balls.create_ball(bpy.context, "Small", scene.collection, 0.03)
+    for thing in (ball, small):
+        balls.write_trajectory(thing, path, scene, 1.0)
+
+    def measure(thing):
+        scene.frame_set(1 + round(scene.render.fps * 0.5))
+        return thing.rotation_quaternion.angle, max(thing.dimensions), thing.data.materials[0].name
+
+    before = measure(ball)
+    assert before[:2] == pytest.approx((0.5 / 0.11, 0.22), rel=0.02)
+    assert measure(small)[:2] == pytest.approx(((0.5 / 0.03) % (2 * np.pi), 0.06), rel=0.02)
+    scene.beyond_mocap_stage.sport = "basketball"
+    radius = room("stage.stage_collection").find_sport(scene).ball.radius
+    assert measure(ball) == (pytest.approx(0.5 / radius, rel=0.02), pytest.approx(2 * radius, rel=0.02),
+                             "Ball white basketball")
+    assert measure(small)[1] == pytest.approx(0.06, rel=0.02)
+    scene.beyond_mocap_stage.sport = "ice_hockey"  # a puck slides
+    assert measure(ball)[0] == 0.0
+    scene.beyond_mocap_stage.sport = "football"
+    assert measure(ball) == before and len([one for one in bpy.data.meshes if one.name.startswith("Ball")]) == 1
+
+
 @pytest.mark.parametrize("when", ["before", "after", "reopened"])
 def test_the_camera_follows_the_bodies_whenever_the_stage_is_added(walker, when, tmp_path):
     if when == "before":

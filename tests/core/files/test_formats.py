@@ -10,6 +10,7 @@ import pytest
 from beyond_mocap.base.errors import InputError
 from beyond_mocap.files.tracking.providers import PROVIDERS
 from beyond_mocap.files.tracking.tracking import read_match
+from beyond_mocap.match.play import build_plays
 
 OTHER = pathlib.Path(__file__).resolve().parents[3] / ".." / "shared" / "data" / "tracking" / "other"
 RATE, COUNT, SIZE = 10, 60, (100.0, 64.0)
@@ -178,12 +179,69 @@ def test_a_table_in_another_unit_is_refused(scale, line, tmp_path):
         read_match(write_table(tmp_path, scale=scale), cache_dir=tmp_path / "cache")
 
 
+@pytest.mark.parametrize(("write_time", "line"), [(lambda time: f"{time * 1000:.0f}", "look like milliseconds"),
+                                                  (lambda time: f"{time * RATE:.0f}", "look like frame numbers")])
+def test_a_table_with_times_of_another_unit_is_refused(write_time, line, tmp_path):
+    rows = [f"{write_time(time)},{key},{x},{y}\n" for row, time in enumerate(TIME)
+            for key, (x, y) in (("p7", HOME[row] / 10), ("p9", AWAY[row] / 10))]
+    (tmp_path / "game.csv").write_text("time_s,player,x_m,y_m\n" + "".join(rows))
+    with pytest.raises(InputError, match=line):
+        read_match(tmp_path / "game.csv", cache_dir=tmp_path / "cache")
+
+
+@pytest.mark.parametrize(("place", "line"), [
+    (lambda x, y: (x - 50, y + 32), ""), (lambda x, y: (x - 50, y - 32), ""),
+    (lambda x, y: (y, x), "exchange x and y"), (lambda x, y: (y + 32, x + 50), "exchange x and y"),
+    (lambda x, y: (x + 400, y), "move the origin"),
+])  # fmt: skip
+def test_origin_and_axes_of_a_table_are_found_or_told(place, line, tmp_path):
+    """One player runs along the pitch, one across it."""
+    known = {"p7": [(2.0 * x - 1.0 * row / COUNT, 3.0) for row, x in enumerate(np.linspace(-25, 25, COUNT))],
+             "p9": [(10.0, y) for y in np.linspace(-30, 30, COUNT)]}
+    rows = [f"{time:.1f},{key},{','.join(f'{value:.3f}' for value in place(*places[row]))}\n"
+            for row, time in enumerate(TIME) for key, places in known.items()]
+    (tmp_path / "game.csv").write_text("time_s,player,x_m,y_m\n" + "".join(rows))
+    if line:
+        with pytest.raises(InputError, match=line):
+            read_match(tmp_path / "game.csv", cache_dir=tmp_path / "cache", pitch=SIZE)
+        return
+    match = read_match(tmp_path / "game.csv", cache_dir=tmp_path / "cache", pitch=SIZE)
+    assert match.positions == pytest.approx(np.array(list(known.values())), abs=2e-3)
+
+
 @pytest.mark.parametrize(("rows", "line"), [("0,ball,1,2\n1,ball,3,4\n", "no position of a player"),
                                             ("0,a,1,2\n1,b,10,4\n2,c,20,6\n", "moments of their own")])
 def test_a_table_without_motion_of_players_is_refused(rows, line, tmp_path):
     (tmp_path / "game.csv").write_text("time_s,player,x_m,y_m\n" + rows)
     with pytest.raises(InputError, match=line):
         read_match(tmp_path / "game.csv", cache_dir=tmp_path / "cache")
+
+
+@pytest.mark.parametrize(("sign", "zero"), [(1.0, 0.0), (1.0, np.pi), (-1.0, 0.5 * np.pi), (None, 0.0)])
+def test_angles_of_bodies_are_headings_whatever_they_are_measured_from(sign, zero, tmp_path):
+    """A player runs in a circle, then stands and looks along -y; random angles are not used, with a line."""
+    moments = np.arange(400) / RATE
+    running = moments < 30.0
+    around = np.where(running, 0.4 * moments, 12.0)
+    faces = np.where(running, around + 0.5 * np.pi, -0.5 * np.pi)
+    random = np.random.default_rng(1)
+    angles = random.uniform(-3, 3, len(faces)) if sign is None else sign * (
+        faces - zero + 0.1 * random.normal(size=len(faces)))
+    rows = [{"frame_id": row, "time": f"00:{time:09.6f}", "period": "half_1", "pitch_side": {"left": "A", "right": "B"},
+             "players": [{"person_id": 1, "team_name": "A", "x": 50 + 10 * np.cos(place), "y": 32 + 10 * np.sin(place),
+                          "head_angle": 0.0, "shoulders_angle": 0.0, "hips_angle": (angle + 9) % (2 * np.pi) - np.pi}]}
+            for row, (time, place, angle) in enumerate(zip(moments, around, angles + np.pi - 9))]
+    match = read_match(write_lines(tmp_path / "game.jsonl", rows), cache_dir=tmp_path / "cache", pitch=SIZE)
+    told = " ".join(match.report)
+    if sign is None:
+        assert "angles of bodies are not used" in told and not np.isfinite(match.headings).any()
+        return
+    away = np.abs(np.angle(np.exp(1j * (match.headings[0] - faces))))
+    assert "bodies face where their angles say" in told and away.mean() < 0.12
+    again = read_match(tmp_path / "game.jsonl", cache_dir=tmp_path / "cache", pitch=SIZE)
+    assert np.array_equal(again.headings, match.headings)
+    (play,) = build_plays(match).values()
+    assert len(play.keys) == 80 and play.keys[-1].heading == pytest.approx(-0.5 * np.pi, abs=0.1)
 
 
 def test_rows_that_a_table_has_twice_and_metadata_that_it_has_not_are_told(tmp_path):
@@ -217,12 +275,15 @@ def test_receivers_of_another_time_or_pitch_are_left_out(tmp_path):
     path = write_gpx(tmp_path)
     other = tmp_path / "p9.gpx"
     other.write_text(other.read_text().replace("2024-12-21", "2023-01-01"))
-    corners = tmp_path / "pitch_corners.csv"
-    corners.write_text(corners.read_text().replace(",52.", ",51."))
     match = read_match(path, cache_dir=tmp_path / "cache")
     assert len(match.players) == 1
-    assert any("of other times left out: p9" in line for line in match.report)
-    assert any("km away, not used" in line for line in match.report)
+    told = " ".join(match.report)
+    assert "1 of 2 files" in told and "of other times left out: p9" in told and "the one of pitch_corners.csv" in told
+    corners = tmp_path / "pitch_corners.csv"
+    corners.write_text(corners.read_text().replace(",52.", ",51."))
+    assert any("km away from the players: not used" in line for line in read_match(path, cache_dir=tmp_path).report)
+    with pytest.raises(InputError, match="pitch_corners.csv: corners of a pitch .* km away"):
+        read_match(path, corners, cache_dir=tmp_path)
 
 
 @pytest.mark.parametrize("form", WRITERS)

@@ -147,6 +147,16 @@ def test_damaged_feeds_end_in_one_line(form, damage, people, tmp_path):
         assert feed.people and (damage, form) in {("truncated", "table"), ("renamed", "fifa")}
 
 
+def test_names_that_are_not_known_are_named_where_none_is(people, tmp_path):
+    path = write_table(tmp_path / "a.csv", {"7": people["7"]}, FPS)
+    header, _, rows = path.read_text().partition("\n")
+    for name in NAMES:
+        rows = rows.replace(f",{name},", f",x_{name},")
+    path.write_text(f"{header}\n{rows}")
+    with pytest.raises(InputError, match="no known joint in two frames, but .*x_left_knee.*; rename"):
+        read_joints(path)
+
+
 def test_an_array_of_objects_is_never_opened(tmp_path):
     np.savez(tmp_path / "a.npz", poses=np.array([{}], dtype=object))
     with pytest.raises(InputError, match="type object"):

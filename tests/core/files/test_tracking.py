@@ -243,14 +243,16 @@ def test_wrong_files_get_one_line(tmp_path):
     pytest.importorskip("kloppy")
     file, _ = made_tracab(tmp_path)
     (tmp_path / "odd.txt").write_text("hello\n")
+    (tmp_path / "joints.csv").write_text("time_s,player,joint,x,y,z\n0,a,nose,1,2,3\n")
     (tmp_path / "bad_meta.xml").write_text("<nonsense/>")
     (tmp_path / "lonely.dat").write_bytes(file.read_bytes())
     cases = [
         ((tmp_path / "none.dat",), "no such file"),
         ((tmp_path / "odd.txt",), "unknown format"),
-        ((file, tmp_path / "bad_meta.xml"), "not readable as tracab"),
-        ((file, tmp_path / "odd.txt"), "odd.txt: neither XML nor JSON; expected the metadata of tracab"),
-        ((file, None, "metrica"), "not readable as metrica tracking; expected"),
+        ((tmp_path / "joints.csv",), "joints.csv: skeletal tracking; expected positions of players and ball"),
+        ((file, tmp_path / "bad_meta.xml"), "not readable as TRACAB"),
+        ((file, tmp_path / "odd.txt"), "odd.txt: neither XML nor JSON; expected the metadata of TRACAB"),
+        ((file, None, "metrica"), "not readable as Metrica tracking; expected"),
         ((file, None, "fifa"), "one of tracab"),
         ((tmp_path / "lonely.dat",), "choose the metadata file"),
         ((file, tmp_path / "none.xml"), "no such file"),
@@ -312,7 +314,7 @@ def test_a_provider_is_one_record(tmp_path, monkeypatch, capsys):
     monkeypatch.setitem(sys.modules, "kloppy.acme", types.SimpleNamespace(load_lines=load))
     monkeypatch.setitem(PROVIDERS, "acme", acme)
     match = read_match(tmp_path / "game.acme", cache_dir=tmp_path / "cache")
-    assert match.provider == "acme" and "game.acme is read as acme" in match.notes
+    assert match.provider == "acme" and "game.acme is read as Acme Sports" in match.notes
     np.testing.assert_allclose(match.positions[:2], players[::-1], atol=1e-9)
     assert (match.players[2].team, match.positions[2, 0].tolist()) == ("referee", [0.0, 5.0])
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "home"))

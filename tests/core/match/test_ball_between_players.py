@@ -9,7 +9,7 @@ from beyond_mocap.annotation.body_solid import BodySolid, build_solid_surfaces
 from beyond_mocap.library.build import build_library
 from beyond_mocap.match.displayed_motion import construct_displayed_player
 from beyond_mocap.match.match_ball import apply_led_ball, find_led_ball, lead_ball_between_players, sample_ball
-from beyond_mocap.match.player_edit import read_player
+from beyond_mocap.match.player_file import read_player
 from beyond_mocap.motion.motion import forward_kinematics
 from beyond_mocap.synthesis.construct.ball_touch.touch_frames import compute_contact_frames
 from beyond_mocap.synthesis.construct.contact_geometry import BALL_SECONDS

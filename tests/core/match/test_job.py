@@ -20,7 +20,7 @@ from beyond_mocap.library.build import build_library
 from beyond_mocap.match.displayed_motion import construct_displayed_player
 from beyond_mocap.match.folder import read_state
 from beyond_mocap.match.pieces.constructed_motion import MOTION
-from beyond_mocap.match.player_edit import read_player
+from beyond_mocap.match.player_file import read_player
 from beyond_mocap.match.synthesize_match import synthesize_match
 from beyond_mocap.motion.track.ball_path import BallPath
 from beyond_mocap.synthesis.provenance import read_provenance
@@ -212,15 +212,15 @@ def test_edited_words_touch_their_player_and_nobody_else(made, order_to, tmp_pat
 
 def test_one_bad_player_stops_nobody(made, order_to, tmp_path):
     (tmp_path / "words").mkdir()
-    (tmp_path / "words" / "home_7.txt").write_text("5 kick wrongword\n")
-    result = synthesize_match(order_to(tmp_path / "bad", annotations=tmp_path / "words", figures=True))
+    (tmp_path / "words" / "home_7.txt").write_text("5 header subtle\n")
+    result = synthesize_match(order_to(tmp_path / "bad", annotations=tmp_path / "words", nearest=False))
     assert {one.id for one in result.finished} == {"away_6", "home_10"}
-    assert [one.id for one in result.failed] == ["home_7"] and "wrongword" in result.failed[0].reason
+    assert [one.id for one in result.failed] == ["home_7"] and "header subtle" in result.failed[0].reason
     state = read_state(tmp_path / "bad")
     assert state["status"] == "partial"
     assert {row["id"]: row["status"] for row in state["players"]}["home_7"] == "failed"
     good = read_reproducible_files(made[0])
-    assert read_reproducible_files(tmp_path / "bad")["away_6.take.npz"] == good["away_6.take.npz"]
+    assert read_reproducible_files(tmp_path / "bad")["away_6.bvh"] == good["away_6.bvh"]
 
 
 def test_a_cluster_that_loses_a_worker_gives_the_same_bits(made, order_to, tmp_path, cluster):

@@ -10,7 +10,7 @@ from beyond_mocap.base.errors import InputError
 from beyond_mocap.cli.main import main
 from beyond_mocap.files.tracking.tracking import read_match
 from beyond_mocap.library.build import build_library
-from beyond_mocap.match.player_edit import read_player, write_player
+from beyond_mocap.match.player_file import read_player, write_player
 from beyond_mocap.match.player_motion import construct_player
 from beyond_mocap.motion.humanoid import identify_joints
 from beyond_mocap.motion.motion import forward_kinematics

@@ -67,6 +67,40 @@ def test_a_player_whose_words_the_library_lacks_fails_where_that_is_asked(match,
     assert read_state(tmp_path / "out")["status"] == "failed"
 
 
+def test_a_label_that_nobody_knows_ends_the_run_before_it_begins(match, tmp_path):
+    """Also in a text that was edited in the folder; corrected, the same command works."""
+    (tmp_path / "words").mkdir()
+    text = tmp_path / "words" / "home_7.txt"
+    text.write_text("5 kikc right\n")
+    command = ("--no-figures", "--players", "home_7", "home_10")
+    status, out, error = match(*command, players=None, annotations=tmp_path / "words")
+    assert status == 2 and error == [f"beyond-mocap: {text}:1: the label 'kikc' is not in the vocabulary; expected one "
+                                     "like kick; correct it, or use it in an annotation of the library"]
+    assert out == "" and not (tmp_path / "out").exists()
+    text.write_text("5 kick right\n")
+    assert match(*command, players=None, annotations=tmp_path / "words")[0] == 0
+    edited = tmp_path / "out" / "annotations" / "home_10.txt"
+    edited.write_text(edited.read_text() + "5 haeder\n")
+    status, _, error = match(*command, players=None, annotations=tmp_path / "words")
+    assert status == 2 and "home_10.txt:" in error[0] and "header" in error[0]
+
+
+def test_joints_beside_tracking_that_is_skeletal_are_refused(match, tmp_path):
+    (tmp_path / "joints.csv").write_text("time_s,player,joint,x,y,z\n")
+    status, _, error = match(tracking=tmp_path / "joints.csv", joints=tmp_path / "joints.csv")
+    assert status == 2 and "joints.csv: skeletal tracking, beside which no joints can be given" in error[0]
+
+
+def test_a_match_without_a_ball_on_the_pitch_of_another_sport_says_both(match, tmp_path):
+    rows = "".join(f"{row / 10},home_7,{row / 10},3\n" for row in range(80))
+    (tmp_path / "game.csv").write_text("time_s,player,x_m,y_m\n" + rows)
+    status, _, error = match("--no-figures", "--sport", "basketball", "--pitch", "105x68",
+                             tracking=tmp_path / "game.csv")
+    told = " ".join(error)
+    assert status == 0 and "without a ball in the tracking data" in told and "cannot be solved" not in told
+    assert "105 x 68 m is not of the size of basketball, 28 x 15 m" in told
+
+
 def test_who_is_not_there_and_texts_of_nobody_are_told(match, tmp_path):
     words = tmp_path / "words"
     words.mkdir()

@@ -13,6 +13,7 @@ from beyond_mocap.motion import quaternion
 from beyond_mocap.motion.humanoid import identify_joints
 from beyond_mocap.motion.motion import forward_kinematics
 from beyond_mocap.motion.track import sample_track
+from beyond_mocap.synthesis.known_body import KnownBody
 from beyond_mocap.synthesis.quality.playback import playback_from_take
 from beyond_mocap.synthesis.quality.unmet_constraints import report_unmet_constraints
 from beyond_mocap.synthesis.resolve_plan import resolve_plan
@@ -52,6 +53,14 @@ def test_any_span_shows_the_same_frames(library, weaving_player, fps):
         assert same_frames(whole, part)
         assert len(part.keys) == (start <= KICK_TIME <= end)
         assert part.timeline.spans[0].start == pytest.approx(part.start_time)
+
+
+def test_bodies_of_another_skeleton_are_told(library, weaving_player):
+    (stretch,) = weaving_player.stretches
+    body = KnownBody(200, 30.0, np.zeros((30, 3)), np.ones((30, 3, 4), np.int16), np.zeros((30, 2, 2), bool))
+    player = replace(weaving_player, stretches=(replace(stretch, plan=replace(stretch.plan, bodies=(body,))),))
+    with pytest.raises(InputError, match="expected 3, as the player's bodies have; run the match again"):
+        construct_player(library, player, 5.0, 30.0)
 
 
 def test_stored_windows_show_what_is_constructed(library, weaving_player, monkeypatch):

@@ -11,7 +11,7 @@ from beyond_mocap.library.build import build_library
 from beyond_mocap.match.crowd.correction import CURVES, FEET, ROOT, Correction
 from beyond_mocap.match.displayed_motion import construct_displayed_player
 from beyond_mocap.match.match_ball import MIN_GAP, restore_ball_contact
-from beyond_mocap.match.player_edit import read_player
+from beyond_mocap.match.player_file import read_player
 from beyond_mocap.motion.motion import compute_pose
 from tests.core.match.small_match import LIBRARY, SECONDS
 

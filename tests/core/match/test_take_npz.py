@@ -10,7 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from beyond_mocap.base.errors import InputError
-from beyond_mocap.match.player_edit import read_player, write_player
+from beyond_mocap.match.player_file import read_player, write_player
 from tests.core.match.made_player import made_player
 
 RUNS = ("clip", "first", "rate", "length", "cut")

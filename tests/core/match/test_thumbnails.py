@@ -8,7 +8,7 @@ import pytest
 from beyond_mocap.appearance.picture import render_pose
 from beyond_mocap.library.build import build_library
 from beyond_mocap.match.displayed_motion import construct_displayed_player
-from beyond_mocap.match.player_edit import read_player
+from beyond_mocap.match.player_file import read_player
 from beyond_mocap.match.player_motion import construct_player
 from beyond_mocap.match.report.pictures import PICTURE_SIZE, build_thumbnail_renderer
 from beyond_mocap.match.request import MatchRequest

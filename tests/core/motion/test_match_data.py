@@ -177,7 +177,7 @@ def test_a_damaged_line_in_the_middle_is_refused(tmp_path):
     file = tracab(tmp_path)
     text = file.read_bytes()
     file.write_bytes(text[:2000] + b"??,," + text[2100:])
-    with pytest.raises(InputError, match="not readable as tracab"):
+    with pytest.raises(InputError, match="not readable as TRACAB"):
         read_match(file, cache_dir=tmp_path)
 
 

@@ -67,6 +67,9 @@ def read_gps(feed: Feed, pitch: tuple[float, float] | None) -> MatchSamples:
             continue
         (others if _overlap(chosen, other) else left_out).append(other)
     receivers = [chosen, *others]
+    if len(feed.tracking) > 1:
+        found.lines.append(f"{len(receivers)} of {len(feed.tracking)} files of "
+                           f"{feed.path.parent.name or feed.path.parent} are used, a player each")
     if left_out:
         found.lines.append(f"{format_count(len(left_out), 'file')} of other times left out: "
                            f"{', '.join(one.name for one in left_out[:5])}")
@@ -184,9 +187,13 @@ def _find_pitch(feed: Feed, receivers: list[_Receiver], lines: list[str]):
 
     corners = to_plane(_read_corners(feed.meta[0])) if feed.meta else None
     if corners is not None and (away := float(np.linalg.norm(corners.mean(axis=0)))) > _FARTHEST:
-        lines.append(f"{feed.meta[0].name} has the corners of a pitch {away / 1000.0:.1f} km away, not used")
+        found = f"corners of a pitch {away / 1000.0:.1f} km away from the players"
+        if feed.is_meta_chosen:
+            raise InputError(feed.meta[0], found, "those of the pitch they are on", "choose another file, or none")
+        lines.append(f"{feed.meta[0].name} has the {found}: not used")
         corners = None
     if corners is not None:
+        lines.append(f"the pitch is the one of {feed.meta[0].name}")
         centre, axis, size = _measure_corners(feed.meta[0], corners)
     else:
         places = to_plane(degrees)

@@ -37,6 +37,8 @@ def read_respovision(feed: Feed, pitch: tuple[float, float] | None) -> MatchSamp
             x, y = player.get("x"), player.get("y")
             if x is not None and y is not None:
                 found.add_sample(moment, key, x - length / 2, y - width / 2)
+                if not player.get("is_imputed"):
+                    found.add_angle(moment, key, _choose_angle(player))
         ball = frame.get("ball") or {}
         if ball.get("x") is not None and ball.get("y") is not None:
             found.add_ball(moment, ball["x"] - length / 2, ball["y"] - width / 2, ball.get("z"))
@@ -66,6 +68,12 @@ def _find_moment(frame: dict, place: str) -> tuple[int, float]:
         raise InputError(place, f"period {str(frame.get('period'))[:20]!r}, time {str(frame.get('time'))[:20]!r}",
                          "half_1 or half_2, and MM:SS.f", "export it again")
     return int(period[2]) + 2 * (period[1] == "extra"), round(passed, 3)
+
+
+def _choose_angle(player: dict) -> object:
+    """Return the angle of the hips, else that of the shoulders."""
+    return next((angle for part in ("hips", "shoulders") if isinstance(angle := player.get(f"{part}_angle"), float)
+                 and math.isfinite(angle)), None)
 
 
 def _name_position(player: dict) -> str:

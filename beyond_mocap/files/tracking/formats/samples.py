@@ -38,6 +38,7 @@ class MatchSamples:
         size: length and width of the pitch in metres; None where the feed does not say.
         teams: ground, name and colour of home and away.
         lines: what was left out or assumed.
+        angles: (P, N) rad of bodies as the feed measures them, NaN where not known; None for a feed without.
     """
 
     times: np.ndarray
@@ -49,6 +50,7 @@ class MatchSamples:
     size: tuple[float, float] | None
     teams: list[tuple[str, str, str]]
     lines: list[str] = field(default_factory=list)
+    angles: np.ndarray | None = None
 
 
 class SampleCollector:
@@ -66,7 +68,7 @@ class SampleCollector:
         self._path = path
         self._moments: dict[tuple[int, float], int] = {}
         self._who: dict[str, int] = {}
-        self._samples, self._ball = array("d"), array("d")
+        self._samples, self._ball, self._angles = array("d"), array("d"), array("d")
 
     def add_person(self, key: str, team: str, name: str = "", number: object = None, position: str = "") -> None:
         """Add a person who may have samples; team is "home", "away", or anything else for a referee."""
@@ -84,6 +86,12 @@ class SampleCollector:
             self._samples.extend((self._find_moment(moment), self._who.setdefault(key, len(self._who)), *place))
             if len(self._samples) > 4 * _MOST_SAMPLES:
                 raise InputError(self._path, f"more than {_MOST_SAMPLES:,} samples", "one match", "divide the file")
+
+    def add_angle(self, moment: tuple[int, float], key: str, angle: object) -> None:
+        """Add where the body of a person with a sample at this moment faces, rad; anything but a number is not known.
+        """
+        if isinstance(angle, (int, float)) and math.isfinite(angle) and key in self._who and moment in self._moments:
+            self._angles.extend((self._moments[moment], self._who[key], angle))
 
     def add_track(self, period: int, key: str, times: np.ndarray, places: np.ndarray, step: float) -> None:
         """Add where a person is at the multiples of `step` s, by lines between own samples, none within a gap.
@@ -140,6 +148,9 @@ class SampleCollector:
         positions = np.full((len(self._who), len(order), 2), np.nan)
         samples = np.frombuffer(self._samples).reshape(-1, 4)
         positions[samples[:, 1].astype(int), rows[samples[:, 0].astype(int)]] = samples[:, 2:]
+        angles = np.full((len(self._who), len(order)), np.nan)
+        turned = np.frombuffer(self._angles).reshape(-1, 3) if self._angles else np.zeros((0, 3))
+        angles[turned[:, 1].astype(int), rows[turned[:, 0].astype(int)]] = turned[:, 2]
         ball = np.full((len(order), 3), np.nan)
         found = np.frombuffer(self._ball).reshape(-1, 4) if self._ball else np.zeros((0, 4))
         ball[rows[found[:, 0].astype(int)]] = found[:, 1:]
@@ -155,7 +166,7 @@ class SampleCollector:
         return MatchSamples(times=times, periods=periods, people=people, positions=positions, ball=ball,
                             fps=fps or round(1.0 / step, 3), size=size,
                             teams=[(ground, name, "") for ground, name in zip(("home", "away"), team_names)],
-                            lines=[*self.lines, *lines])
+                            lines=[*self.lines, *lines], angles=angles if self._angles else None)
 
     def _find_moment(self, moment: tuple[int, float]) -> int:
         return self._moments.setdefault(moment, len(self._moments))

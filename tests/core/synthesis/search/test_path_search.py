@@ -9,7 +9,8 @@ from beyond_mocap.base.errors import InputError, UserCancelledError
 from beyond_mocap.library.build import build_library
 from beyond_mocap.synthesis.plan import Plan
 from beyond_mocap.synthesis.resolve_plan import resolve_plan
-from beyond_mocap.synthesis.search.path_search import PathSearch, SearchStretch
+from beyond_mocap.synthesis.search.edit_list import SearchStretch
+from beyond_mocap.synthesis.search.path_search import PathSearch
 from beyond_mocap.synthesis.search.request import build_request
 
 
