@@ -73,7 +73,7 @@ def name_people(feed: JointFeed, match: Match) -> dict[str, str]:
         The player's id by the person's, without people who are no player.
     """
     grid = _build_grid(match.times[0], match.times[-1])
-    dots = [_sample_path(match.times, path, grid) for path in match.positions]
+    dots = [sample_path(match.times, path, grid) for path in match.positions]
     paths = [_sample_person(person, grid) for person in feed.people]
     found: dict[int, str] = {}
     for apart, number, place in sorted(_iter_pairs(feed, match, paths, dots)):
@@ -140,7 +140,7 @@ def _build_grid(start: float, end: float) -> np.ndarray:
     return start + np.arange(int(np.floor((end - start) * _RATE + 1e-6)) + 1) / _RATE
 
 
-def _sample_path(times: np.ndarray, path: np.ndarray, at: np.ndarray) -> np.ndarray:
+def sample_path(times: np.ndarray, path: np.ndarray, at: np.ndarray) -> np.ndarray:
     """Sample a path (N, 2) m at times (T,) s: linear between two samples, NaN beside any that is unknown or far."""
     after = np.clip(np.searchsorted(times, at), 1, len(times) - 1)
     step = times[after] - times[after - 1]
@@ -152,7 +152,7 @@ def _sample_path(times: np.ndarray, path: np.ndarray, at: np.ndarray) -> np.ndar
 
 def _sample_person(person: PlayerJoints, at: np.ndarray) -> np.ndarray:
     """Sample a person's place (T, 2) m at times (T,) s."""
-    return (_sample_path(person.times, find_pelvis(person)[:, :2], at) if len(person.times) > 1
+    return (sample_path(person.times, find_pelvis(person)[:, :2], at) if len(person.times) > 1
             else np.full((len(at), 2), np.nan))
 
 
@@ -170,7 +170,7 @@ def _find_clock(people: list[PlayerJoints], match: Match, expected: float, where
     # begin where the expected offset is one of those that are measured
     begin = grid[0] - expected + np.floor((begin + expected - grid[0]) * _RATE + 1e-6) / _RATE
     paths = np.stack([_sample_person(one, _build_grid(begin, end)) for one in people])
-    dots = np.stack([_sample_path(match.times, path, grid) for path in match.positions])
+    dots = np.stack([sample_path(match.times, path, grid) for path in match.positions])
     costs = np.stack([_measure_all_offsets(sign * paths, dots) for sign in (1.0, -1.0)])
     offsets = grid[0] - begin + (np.arange(costs.shape[1]) - paths.shape[1] + 1) / _RATE
     best = float(costs.min())
@@ -232,7 +232,7 @@ def _measure_nearest(times: np.ndarray, path: np.ndarray, match: Match) -> float
     NaN where none is there.
     """
     at = slice(None, None, max(1, len(times) // 500))
-    apart = [_sample_path(match.times, dots, times[at]) - path[at] for dots in match.positions]
+    apart = [sample_path(match.times, dots, times[at]) - path[at] for dots in match.positions]
     known = [one[np.isfinite(one[:, 0])] for one in apart]
     return min((_measure_spread(one) for one in known if len(one)), default=np.nan)
 

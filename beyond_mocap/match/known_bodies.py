@@ -5,6 +5,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -22,14 +23,14 @@ from ..motion.motion import sample_frames_cubic
 from ..motion.retargeting.neutral import scale_stance
 from ..motion.track.match_data import REFEREE, Match, MatchPlayer, Team
 from ..skeletal.fit_body import fit_body
-from ..skeletal.reconstruct_bodies import PLANTED_RATE, Body, plant_body, reconstruct_bodies
+from ..skeletal.joint_examples import read_examples
+from ..skeletal.reconstruct_bodies import PLANTED_RATE, Body, KnownElsewhere, plant_body, reconstruct_bodies
 from ..synthesis.known_body import KnownBody, build_known_body, find_shown_frames
-from .joint_clock import MOST_APART, align_joints, find_pelvis, name_people
+from .joint_clock import MOST_APART, align_joints, find_pelvis, name_people, sample_path
 from .request import MatchRequest
 
 _HEIGHT = find_setting("player", "height")
 _AROUND = 2.0  # s of joints that are fitted beyond the span
-_LONGEST_GAP = 0.25  # s without joints: a longer one is synthesized, which is nearer than what is bridged
 _FADE = 1.0  # s over which the offset between dot and body fades
 
 
@@ -151,13 +152,20 @@ def build_known_bodies(feed: JointFeed | None, match: Match, request: MatchReque
     notes = [f"{person.id}: joints without a dot within {MOST_APART:g} m are left out" for person in part.people
              if person.id not in who]
     wanted = {person for person, player in who.items() if not request.players or player in request.players}
-    found, lines = reconstruct_bodies(part, ids=wanted, longest_gap=_LONGEST_GAP)
+    known = KnownElsewhere(examples=read_examples(library), path_of=partial(_sample_dot, match, who))
+    found, lines = reconstruct_bodies(part, ids=wanted, known=known)
     players: dict[str, list[Body]] = {}
     for body in sorted(found, key=lambda one: one.start):
         players.setdefault(who[body.id], []).append(body)
     shown = {player: _convert_bodies(bodies, library, request.fps) for player, bodies in players.items()}
     return SeenBodies(players={player: one for player, one in shown.items() if one.bodies},
                       notes=(*feed.notes, *notes, *lines))
+
+
+def _sample_dot(match: Match, who: Mapping[str, str], person: str, times: np.ndarray) -> np.ndarray:
+    """Sample the dot (T, 2) m of a person at times (T,) s, NaN where it is not known."""
+    number = next(number for number, player in enumerate(match.players) if player.id == who[person])
+    return sample_path(match.times, match.positions[number], times)
 
 
 def _cut_feed(feed: JointFeed, start: float, end: float) -> JointFeed:
