@@ -96,7 +96,7 @@ def read_joint_match(path: Path | str, pitch: tuple[float, float] | None = None)
 
 
 def build_match(feed: JointFeed, pitch: tuple[float, float] = USUAL_PITCH) -> Match:
-    """Build a match whose dots are the pelvis of each person.
+    """Build a match whose dots are the pelvis of each person, and whose ball is the feed's.
 
     Args:
         feed: the joints; 0 s is their first sample.
@@ -115,7 +115,8 @@ def build_match(feed: JointFeed, pitch: tuple[float, float] = USUAL_PITCH) -> Ma
                     for person in feed.people)
     times = np.arange(count) / feed.fps
     notes = () if knows_teams else ("no teams in the joints: all people are taken for one team",)
-    return Match(times=times, players=players, positions=positions, ball=np.full((count, 3), np.nan), length=pitch[0],
+    ball = sample_path(feed.ball[:, 0], feed.ball[:, 1:], times) if len(feed.ball) > 1 else np.full((count, 3), np.nan)
+    return Match(times=times, players=players, positions=positions, ball=ball, length=pitch[0],
                  width=pitch[1], fps=feed.fps, provider="joints", periods=((0.0, float(times[-1])),),
                  notes=(*feed.notes, *notes), teams=(Team("home"), Team("away")))
 
@@ -125,7 +126,7 @@ def _begin_at_zero(feed: JointFeed) -> JointFeed:
     begin = min(person.times[0] for person in feed.people)
     notes = (f"the joints begin at {format_seconds(begin)} s of their own clock, which is 0 s here",) * bool(begin)
     people = tuple(replace(person, times=person.times - begin) for person in feed.people)
-    return replace(feed, people=people, notes=(*feed.notes, *notes))
+    return replace(feed, people=people, ball=feed.ball - [begin, 0.0, 0.0, 0.0], notes=(*feed.notes, *notes))
 
 
 def build_known_bodies(feed: JointFeed | None, match: Match, request: MatchRequest, library: Library,
