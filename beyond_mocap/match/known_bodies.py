@@ -22,9 +22,8 @@ from ..motion.humanoid import estimate_stature
 from ..motion.motion import sample_frames_cubic
 from ..motion.retargeting.neutral import scale_stance
 from ..motion.track.match_data import REFEREE, Match, MatchPlayer, Team
-from ..skeletal.fit_body import fit_body
 from ..skeletal.joint_examples import read_examples
-from ..skeletal.reconstruct_bodies import PLANTED_RATE, Body, KnownElsewhere, plant_body, reconstruct_bodies
+from ..skeletal.reconstruct_bodies import PLANTED_RATE, Body, KnownElsewhere, fit_planted_body, reconstruct_bodies
 from ..synthesis.known_body import KnownBody, build_known_body, find_shown_frames
 from .joint_clock import MOST_APART, align_joints, find_pelvis, name_people, sample_path
 from .request import MatchRequest
@@ -183,7 +182,7 @@ def _convert_bodies(bodies: list[Body], library: Library, fps: float) -> SeenPla
     stance = scale_stance(library.neutral_stance, height / estimate_stature(library.skeleton))
     out, rows, end = [], [], -np.inf
     for body in bodies:
-        moved = replace(body, motion=plant_body(fit_body(body.joints, body.motion.fps, stance)))
+        moved = replace(body, motion=fit_planted_body(body.joints, body.motion.fps, stance))
         known = _sample_body(moved, fps) if body.start > end else None
         if known is not None:
             out.append(known)

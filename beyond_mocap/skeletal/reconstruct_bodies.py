@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Collection
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import takewhile
 
 import numpy as np
@@ -15,10 +15,13 @@ from ..files.joints.landmarks import LANDMARKS
 from ..library.repair import plant_contacts
 from ..motion.contacts import detect_heel_toe_contacts
 from ..motion.motion import Motion
+from ..motion.retargeting.neutral import NeutralStance, build_neutral_stance
+from ..motion.toe_roll import roll_toes
 from .body_figures import measure_body
 from .bridge_gaps import SHORTEST_GAP, bridge_gaps
 from .fit_body import NEEDED, collect_joints, fit_body
 from .joint_examples import COMPARED, JointExamples
+from .measured_skeleton import build_measured_skeleton
 from .repair_joints import repair_identities, repair_sides, spread_landmarks
 from .smooth_joints import find_stretches, smooth_joints
 
@@ -160,9 +163,20 @@ def _find_shown(positions: np.ndarray) -> np.ndarray:
     return np.isfinite(positions).all(axis=2).sum(axis=1) >= len(NEEDED) // 2
 
 
-def plant_body(motion: Motion) -> Motion:
-    """Plant the feet of a body where they are in contact; at too few frames per second to tell it stays as it is."""
-    return plant_contacts(motion, detect_heel_toe_contacts(motion)) if motion.fps >= PLANTED_RATE else motion
+def fit_planted_body(joints: dict[str, np.ndarray], fps: float, stance: NeutralStance) -> Motion:
+    """Fit a body whose feet are planted where they are in contact, and whose toes bend where they would dig in.
+
+    Args:
+        joints: as for `fit_body`.
+        fps: frames per second; below PLANTED_RATE contacts cannot be told, and feet are not planted.
+        stance: of the skeleton.
+    Returns:
+        The motion.
+    """
+    motion = fit_body(joints, fps, stance)
+    if fps >= PLANTED_RATE:
+        motion = plant_contacts(motion, detect_heel_toe_contacts(motion))
+    return replace(motion, rotations=roll_toes(stance, motion.root_positions, motion.rotations))
 
 
 def _measure_share(positions: np.ndarray, landmark: int) -> float:
@@ -177,7 +191,7 @@ def _reconstruct_stretch(person: PlayerJoints, seconds: float, seen: np.ndarray,
     names = tuple(LANDMARKS[number] for number in used)
     path = None if known.path_of is None else known.path_of(person.id, seconds + np.arange(len(seen)) / fps)
     joints = collect_joints(names, _smooth_and_bridge(names, seen[:, used], fps, known.examples, path))
-    motion = plant_body(fit_body(joints, fps))
+    motion = fit_planted_body(joints, fps, build_neutral_stance(build_measured_skeleton(joints)))
     return Body(id=person.id, team=person.team, start=seconds, motion=motion, joints=joints, landmarks=names,
                 seen=seen[:, used])
 
