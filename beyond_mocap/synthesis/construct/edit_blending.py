@@ -178,7 +178,7 @@ def blend_with_old(skeleton: Skeleton, new: Pose, old: Pose, share: np.ndarray, 
 
 
 def step_over(skeleton: Skeleton, pose: Pose, heel_toe_contacts: np.ndarray, stretch: tuple[int, int],
-              fps: float) -> tuple[Pose, np.ndarray]:
+              fps: float, level_feet: bool = False) -> tuple[Pose, np.ndarray]:
     """Plant the feet and let them step within a stretch; all other frames stay bit for bit.
 
     Args:
@@ -187,6 +187,7 @@ def step_over(skeleton: Skeleton, pose: Pose, heel_toe_contacts: np.ndarray, str
         heel_toe_contacts: (T, 2, 2) bool, heel and toe contacts of the motion that is shown most.
         stretch: first and end frame.
         fps: frames per second.
+        level_feet: as for `plant_feet`.
     Returns:
         Root (T, 3) m and local rotations (T, J, 4); and the contacts, without those of feet that step.
     """
@@ -200,7 +201,7 @@ def step_over(skeleton: Skeleton, pose: Pose, heel_toe_contacts: np.ndarray, str
     steps_taken = add_steps(skeleton, root, rotations, heel_toe_contacts[low:high], fps, free=inside)
     swayed = root + np.column_stack([steps_taken.sway, np.zeros(len(root))])
     found = plant_feet(skeleton, swayed, steps_taken.rotations, steps_taken.heel_toe_contacts, fps,
-                       foot_moves=steps_taken.moves, level_feet=False)
+                       foot_moves=steps_taken.moves, level_feet=level_feet)
     share = compute_old_share(high - low, (first + joins - low, end - joins - low), joins)
     share[~inside] = 1.0
     new = blend_with_old(skeleton, (found.root, found.rotations), (root, rotations), share=share,

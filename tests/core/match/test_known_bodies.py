@@ -59,6 +59,11 @@ def test_seen_joints_are_shown_and_gaps_are_synthesized(seen_match):
                         body.left.lower_leg)):
         error = np.linalg.norm(places[:, joint] - truth[at, NAMES.index(name)], axis=1)
         assert error[is_seen].mean() < 0.05
+    feet = places[:, [[limb.foot, limb.toe] for limb in (body.left, body.right)]]
+    moved = np.linalg.norm(np.diff(feet[..., :2], axis=0), axis=-1).min(axis=2) * take.motion.fps
+    stands = take.contacts[1:] & take.contacts[:-1] & ~is_seen[1:, None]
+    assert stands.sum() > 20 and moved[stands].mean() < 0.05 and moved[stands].max() < 0.3
+    assert feet[~is_seen, ..., 2].min() > -0.02
     jerk = compute_jerk(places, take.motion.fps)
     inner = np.percentile(jerk[is_seen[:-3]], 99)
     assert jerk.max() < max(2.0 * inner, 4000.0)
