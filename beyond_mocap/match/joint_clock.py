@@ -63,7 +63,8 @@ def align_joints(feed: JointFeed, match: Match, path: Path | str = "joints") -> 
     if problem is not None and not any(aligned.values()):
         raise problem
     people = [_join_person(parts) for parts in aligned.values() if parts]
-    return replace(feed, people=tuple(people), notes=(*feed.notes, *dict.fromkeys(notes)))
+    # the match has a ball of its own
+    return replace(feed, people=tuple(people), ball=feed.ball[:0], notes=(*feed.notes, *dict.fromkeys(notes)))
 
 
 def name_people(feed: JointFeed, match: Match) -> dict[str, str]:
@@ -195,6 +196,7 @@ def _measure_clocks(people: list[PlayerJoints], match: Match, expected: float) -
     """
     begin, end = min(one.times[0] for one in people), max(one.times[-1] for one in people)
     grid = _build_grid(match.times[0], match.times[-1])
+    # begin where the expected offset is one of those that are measured
     begin = grid[0] - expected + np.floor((begin + expected - grid[0]) * _RATE + 1e-6) / _RATE
     paths = np.stack([_sample_person(one, _build_grid(begin, end)) for one in people])
     dots = np.stack([sample_path(match.times, path, grid) for path in match.positions])

@@ -237,7 +237,7 @@ def _join_run(skeleton: Skeleton, pose: Pose, planted: PlantResult, contacts: np
     contacts = _lift_feet(skeleton, pose, planted, contacts, run=run, sides=sides, fps=fps)
     near = np.min([np.abs(np.arange(low, high) - edge) for edge in sides], axis=0) <= reach
     for first, end in find_runs(near):
-        pose, contacts = step_over(skeleton, pose, contacts, (low + first, low + end), fps, level_feet=True)
+        pose, contacts = step_over(skeleton, pose, contacts, (low + first, low + end), fps, is_firm=True)
     return pose, contacts
 
 

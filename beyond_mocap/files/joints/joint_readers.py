@@ -108,9 +108,10 @@ def _read_cdf(path: Path) -> JointFeed:
 def _read_hawkeye(path: Path) -> JointFeed:
     """Read Hawk-Eye's joints, and the ball: files for each minute, their times from its start."""
     found, files = JointCollector(path), _list_minutes(path)
-    begin, _ = _read_minute(files[0])
+    begin = None
     for file in files:
         start, content = _read_minute(file)
+        begin = begin or start
         offset = (start - begin).total_seconds()
         homes = {str(team["id"]): team.get("home") for team in (content.get("details") or {}).get("teams") or ()}
         for person in content["samples"]["people"]:

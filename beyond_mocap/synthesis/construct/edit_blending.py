@@ -178,7 +178,7 @@ def blend_with_old(skeleton: Skeleton, new: Pose, old: Pose, share: np.ndarray, 
 
 
 def step_over(skeleton: Skeleton, pose: Pose, heel_toe_contacts: np.ndarray, stretch: tuple[int, int],
-              fps: float, level_feet: bool = False) -> tuple[Pose, np.ndarray]:
+              fps: float, is_firm: bool = False) -> tuple[Pose, np.ndarray]:
     """Plant the feet and let them step within a stretch; all other frames stay bit for bit.
 
     Args:
@@ -187,7 +187,8 @@ def step_over(skeleton: Skeleton, pose: Pose, heel_toe_contacts: np.ndarray, str
         heel_toe_contacts: (T, 2, 2) bool, heel and toe contacts of the motion that is shown most.
         stretch: first and end frame.
         fps: frames per second.
-        level_feet: as for `plant_feet`.
+        is_firm: feet stand on the ground, and at the stretch's ends where the motion beside it has them; False: at
+            their own heights, and as they fade in the motion.
     Returns:
         Root (T, 3) m and local rotations (T, J, 4); and the contacts, without those of feet that step.
     """
@@ -201,11 +202,12 @@ def step_over(skeleton: Skeleton, pose: Pose, heel_toe_contacts: np.ndarray, str
     steps_taken = add_steps(skeleton, root, rotations, heel_toe_contacts[low:high], fps, free=inside)
     swayed = root + np.column_stack([steps_taken.sway, np.zeros(len(root))])
     found = plant_feet(skeleton, swayed, steps_taken.rotations, steps_taken.heel_toe_contacts, fps,
-                       foot_moves=steps_taken.moves, level_feet=level_feet)
+                       foot_moves=steps_taken.moves, level_feet=is_firm)
     share = compute_old_share(high - low, (first + joins - low, end - joins - low), joins)
     share[~inside] = 1.0
     new = blend_with_old(skeleton, (found.root, found.rotations), (root, rotations), share=share,
-                         heel_toe_contacts=steps_taken.heel_toe_contacts, fps=fps, least=_STAYS)
+                         heel_toe_contacts=steps_taken.heel_toe_contacts, fps=fps,
+                         least=_STAYS if is_firm else 0.0)
     changed = pose[0].copy(), pose[1].copy()
     for whole, part in zip(changed, new):
         whole[first:end] = part[first - low : end - low]
