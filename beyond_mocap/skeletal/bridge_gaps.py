@@ -114,13 +114,14 @@ def _follow_path(joints: np.ndarray, gap: tuple[int, int], path: np.ndarray, fps
     joints[first:end, :, :2] += own / (own + other) * (waves @ np.linalg.lstsq(waves, rest, rcond=None)[0])[:, None]
 
 
-def _collect_own(joints: np.ndarray, hidden: np.ndarray, gap: tuple[int, int], fps: float) -> JointExamples:
-    """Collect what is seen of the person around a gap, and its mirror image."""
+def _collect_own(joints: np.ndarray, hidden: np.ndarray, gap: tuple[int, int],
+                 fps: float) -> JointExamples | None:
+    """Collect what is seen of the person around a gap, and its mirror image; None where that is too short."""
     low, high = max(gap[0] - int(_OWN * fps), 0), gap[1] + int(_OWN * fps)
     runs = [(low + first, low + end) for first, end in find_runs(~hidden[low:high])]
     parts = [_sample(joints[first:end], np.arange(0.0, end - first - 1, fps / RATE)) for first, end in runs
              if end - first > _SHORTEST_OWN * fps]
-    return build_examples([*parts, *map(mirror_joints, parts)])
+    return build_examples([*parts, *map(mirror_joints, parts)]) if parts else None
 
 
 def _sample(values: np.ndarray, at: np.ndarray) -> np.ndarray:
@@ -137,7 +138,7 @@ def _bridge(joints: np.ndarray, gap: tuple[int, int], last: int, banks: Sequence
     reach = int(round(CONTEXT * fps))
     sides = [np.arange(max(first - 1 - reach, 0), first), np.arange(end, min(end + reach + 1, last))]
     before, after = joints[sides[0]], joints[sides[1]]
-    if min(len(before), len(after)) < 2:
+    if not banks or min(len(before), len(after)) < 2:
         return joints[first:end]
     frames = np.arange(first, end) - first + 1
     known = _describe_gap(before, after, (end - first + 1) / fps, frames / (end - first + 1), fps)

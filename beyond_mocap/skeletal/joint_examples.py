@@ -104,12 +104,11 @@ def measure_size(joints: np.ndarray) -> float:
 
 
 def build_examples(recordings: Iterable[np.ndarray]) -> JointExamples:
-    """Build examples of recordings, each (T, K, 3) m of two frames or more."""
+    """Build examples of recordings, one or more, each (T, K, 3) m of two frames or more."""
     parts = [(measure_size(one) * one).astype(np.float32) for one in recordings]
-    counts = [len(part) for part in parts]
-    end = np.cumsum(counts, dtype=int)
-    joints = np.concatenate(parts) if parts else np.zeros((0, len(COMPARED), 3), np.float32)
-    return JointExamples(joints, np.repeat(end - counts, counts), np.repeat(end - 1, counts))
+    counts = np.array([len(part) for part in parts], int)
+    end = np.cumsum(counts)
+    return JointExamples(np.concatenate(parts), np.repeat(end - counts, counts), np.repeat(end - 1, counts))
 
 
 def read_examples(library: Library) -> JointExamples:

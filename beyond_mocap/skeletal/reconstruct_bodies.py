@@ -203,6 +203,7 @@ def _smooth_and_bridge(names: tuple[str, ...], seen: np.ndarray, fps: float, exa
     if not any(end - first >= SHORTEST_GAP * fps for first, end in find_runs(hidden)):
         return smooth
     columns = [names.index(name) for name in takewhile(names.__contains__, COMPARED)]
+    columns = columns[: len(columns) // 2 * 2]  # of both sides
     bridged = seen.copy()
     bridged[np.ix_(hidden, np.array(columns))] = bridge_gaps(smooth[:, columns], hidden, fps, examples, path)[hidden]
     return smooth_joints(names, bridged)

@@ -93,6 +93,19 @@ def test_a_gap_without_any_joint_is_bridged_as_others_move(clip, most, sample_ca
     assert again.motion.rotations.tobytes() == body.motion.rotations.tobytes()
 
 
+@pytest.mark.parametrize("part", ["wrist", "elbow"])
+def test_a_gap_between_glimpses_and_without_an_arm_is_smoothed_over_or_bridged(part):
+    """Too short for examples of the person's own; and a limb that is seen on one side alone."""
+    truth = sample_joints("walking_1_2", 50.0)
+    seen = truth.copy()
+    seen[:, NAMES.index(f"right_{part}")] = np.nan
+    for length, gap in ((100, slice(35, 60)), (300, slice(140, 170))):
+        hidden = seen[:length].copy()
+        hidden[gap] = np.nan
+        (body,), _ = reconstruct_bodies(build_feed([hidden], 50.0))
+        assert np.isfinite(body.motion.rotations).all() and len(body.motion) == length
+
+
 def test_a_gap_follows_where_another_tracking_has_the_person():
     truth = sample_joints("jogging_weave", 50.0)
     gap = np.arange(len(truth)) // 30 == 6
