@@ -6,9 +6,10 @@ import argparse
 from collections.abc import Mapping
 
 from ..base.errors import InputError, format_count
-from ..base.settings.options import parse_path
+from ..base.settings.options import add_options, parse_path
 from ..files.atomic import atomic_folder, check_new_folder
 from ..files.file_names import choose_file_name
+from .library import open_library
 from .outputs import ProgressReporter, Writer
 
 
@@ -26,6 +27,9 @@ def add_bodies(verbs) -> argparse.ArgumentParser:
                       help="skeletal tracking: Common Data Format, Hawk-Eye, CSV or .npz")
     verb.add_argument("--out", type=parse_path, required=True, metavar="FOLDER",
                       help="a BVH file for each person and stretch, and report.json")
+    verb.add_argument("--library", type=parse_path,
+                      help="a folder of clips: how people move where the cameras see nothing of a person")
+    add_options(verb, "library")
     verb.set_defaults(run=run_bodies)
     return verb
 
@@ -41,11 +45,14 @@ def run_bodies(options, reporter: ProgressReporter, writers: Mapping[str, Writer
     from ..files.bvh.bvh import write_bvh
     from ..files.joints.joint_readers import read_joints
     from ..files.tables import write_report
-    from ..skeletal.reconstruct_bodies import reconstruct_bodies
+    from ..skeletal.joint_examples import read_examples
+    from ..skeletal.reconstruct_bodies import KnownElsewhere, reconstruct_bodies
 
     check_new_folder(options.out)
     feed = read_joints(options.joints)
-    bodies, notes = reconstruct_bodies(feed, reporter.show_progress, reporter.is_cancelled)
+    examples = read_examples(open_library(options, reporter)) if options.library else None
+    bodies, notes = reconstruct_bodies(feed, reporter.show_progress, reporter.is_cancelled,
+                                       known=KnownElsewhere(examples=examples))
     if not bodies:
         raise InputError(options.joints, "; ".join(["no stretch of a body", *notes[:3]]), "half a second of joints",
                          "export more frames or joints")

@@ -24,6 +24,9 @@ _CAP = 10.0  # m; a person farther from all dots counts as this far
 _FEWEST, _ENOUGH = 10, 50  # samples that two paths share, at least; below the second, half of a person's do
 _SAME, _SAME_SHARE = 0.15, 1.5  # m, and times the best cost, up to which another clock fits about as well
 _NEAR = 1.0  # s: offsets so near the best are the same one
+_WELL = 0.5  # m; joints that are nearer have the right frame rate
+_USUAL_RATES = (25.0, 50.0, 30.0, 60.0)  # frames per second
+_OTHER_RATE = 0.5  # share of the distance that another frame rate has to leave
 _PAUSE = 30.0  # s without people, such as half-time: the clock may differ after it
 _STEP, _REACH = 0.02, 0.3  # s between offsets, and on either side of the coarse one, when it is refined
 _BETTER = 0.8  # share of the distance that a refined clock leaves; otherwise the expected one stays
@@ -41,7 +44,7 @@ def align_joints(feed: JointFeed, match: Match, path: Path | str = "joints") -> 
     Returns:
         The joints on the match's clock; its notes name what was changed.
     Raises:
-        InputError: if they fit at no time, or at several.
+        InputError: if they fit at no time, at several, or at another frame rate.
     """
     aligned: dict[int, list[PlayerJoints]] = {number: [] for number in range(len(feed.people))}
     notes: list[str] = []
@@ -49,7 +52,7 @@ def align_joints(feed: JointFeed, match: Match, path: Path | str = "joints") -> 
     for start, end in _find_blocks(feed):
         try:
             part = _cut_people(feed, start, end)
-            expected, is_turned = _find_clock(list(part.values()), match, expected, path)
+            expected, is_turned = _find_clock(list(part.values()), match, expected, feed.fps, path)
         except InputError as error:
             problem = error
             notes.append(f"joints from {format_seconds(start)} to {format_seconds(end)} s left out: {error}")
@@ -60,7 +63,8 @@ def align_joints(feed: JointFeed, match: Match, path: Path | str = "joints") -> 
     if problem is not None and not any(aligned.values()):
         raise problem
     people = [_join_person(parts) for parts in aligned.values() if parts]
-    return replace(feed, people=tuple(people), notes=(*feed.notes, *dict.fromkeys(notes)))
+    # the match has a ball of its own
+    return replace(feed, people=tuple(people), ball=feed.ball[:0], notes=(*feed.notes, *dict.fromkeys(notes)))
 
 
 def name_people(feed: JointFeed, match: Match) -> dict[str, str]:
@@ -73,7 +77,7 @@ def name_people(feed: JointFeed, match: Match) -> dict[str, str]:
         The player's id by the person's, without people who are no player.
     """
     grid = _build_grid(match.times[0], match.times[-1])
-    dots = [_sample_path(match.times, path, grid) for path in match.positions]
+    dots = [sample_path(match.times, path, grid) for path in match.positions]
     paths = [_sample_person(person, grid) for person in feed.people]
     found: dict[int, str] = {}
     for apart, number, place in sorted(_iter_pairs(feed, match, paths, dots)):
@@ -140,8 +144,8 @@ def _build_grid(start: float, end: float) -> np.ndarray:
     return start + np.arange(int(np.floor((end - start) * _RATE + 1e-6)) + 1) / _RATE
 
 
-def _sample_path(times: np.ndarray, path: np.ndarray, at: np.ndarray) -> np.ndarray:
-    """Sample a path (N, 2) m at times (T,) s: linear between two samples, NaN beside any that is unknown or far."""
+def sample_path(times: np.ndarray, path: np.ndarray, at: np.ndarray) -> np.ndarray:
+    """Sample a path (N, D) m at times (T,) s: linear between two samples, NaN beside any that is unknown or far."""
     after = np.clip(np.searchsorted(times, at), 1, len(times) - 1)
     step = times[after] - times[after - 1]
     share = (at - times[after - 1]) / step
@@ -152,28 +156,25 @@ def _sample_path(times: np.ndarray, path: np.ndarray, at: np.ndarray) -> np.ndar
 
 def _sample_person(person: PlayerJoints, at: np.ndarray) -> np.ndarray:
     """Sample a person's place (T, 2) m at times (T,) s."""
-    return (_sample_path(person.times, find_pelvis(person)[:, :2], at) if len(person.times) > 1
+    return (sample_path(person.times, find_pelvis(person)[:, :2], at) if len(person.times) > 1
             else np.full((len(at), 2), np.nan))
 
 
-def _find_clock(people: list[PlayerJoints], match: Match, expected: float, where: Path | str) -> tuple[float, bool]:
+def _find_clock(people: list[PlayerJoints], match: Match, expected: float, rate: float,
+                where: Path | str) -> tuple[float, bool]:
     """Find what has to be added to the people's clock, s, and whether they are turned by half a turn.
 
     Args:
         people: who is seen.
         match: the match.
         expected: s, the offset that holds where it fits.
+        rate: frames per second of the joints.
         where: for errors.
     """
-    begin, end = min(one.times[0] for one in people), max(one.times[-1] for one in people)
-    grid = _build_grid(match.times[0], match.times[-1])
-    # begin where the expected offset is one of those that are measured
-    begin = grid[0] - expected + np.floor((begin + expected - grid[0]) * _RATE + 1e-6) / _RATE
-    paths = np.stack([_sample_person(one, _build_grid(begin, end)) for one in people])
-    dots = np.stack([_sample_path(match.times, path, grid) for path in match.positions])
-    costs = np.stack([_measure_all_offsets(sign * paths, dots) for sign in (1.0, -1.0)])
-    offsets = grid[0] - begin + (np.arange(costs.shape[1]) - paths.shape[1] + 1) / _RATE
+    offsets, costs = _measure_clocks(people, match, expected)
     best = float(costs.min())
+    if best > _WELL:
+        _check_rate(people, match, rate, best, where)
     if best > MOST_APART:
         raise InputError(where, f"the nearest body is {best:.1f} m from any player",
                          f"{MOST_APART:g} m or less", "give joints of this match and pitch")
@@ -185,6 +186,33 @@ def _find_clock(people: list[PlayerJoints], match: Match, expected: float, where
         raise InputError(where, "the joints fit the tracking at several times, and not as they are",
                          "joints on the tracking's clock", "give joints of more players or of a longer time")
     return _refine_clock(people, match, float(offsets[place]), -1.0 if turned else 1.0), bool(turned)
+
+
+def _measure_clocks(people: list[PlayerJoints], match: Match, expected: float) -> tuple[np.ndarray, np.ndarray]:
+    """Measure how far people are from the match at all offsets, one of which is `expected`.
+
+    Returns:
+        Offsets (N,) s, and the mean distance (2, N) m at each, as people are and turned by half a turn.
+    """
+    begin, end = min(one.times[0] for one in people), max(one.times[-1] for one in people)
+    grid = _build_grid(match.times[0], match.times[-1])
+    # begin where the expected offset is one of those that are measured
+    begin = grid[0] - expected + np.floor((begin + expected - grid[0]) * _RATE + 1e-6) / _RATE
+    paths = np.stack([_sample_person(one, _build_grid(begin, end)) for one in people])
+    dots = np.stack([sample_path(match.times, path, grid) for path in match.positions])
+    costs = np.stack([_measure_all_offsets(sign * paths, dots) for sign in (1.0, -1.0)])
+    return grid[0] - begin + (np.arange(costs.shape[1]) - paths.shape[1] + 1) / _RATE, costs
+
+
+def _check_rate(people: list[PlayerJoints], match: Match, rate: float, best: float, where: Path | str) -> None:
+    """Refuse joints that are `best` m from the match, and clearly nearer at another usual frame rate than theirs."""
+    begin = min(one.times[0] for one in people)
+    for other in _USUAL_RATES:
+        if abs(rate - other) > 0.01 * other:
+            timed = [replace(one, times=begin + (one.times - begin) * rate / other) for one in people]
+            if _measure_clocks(timed, match, 0.0)[1].min() < _OTHER_RATE * best:
+                raise InputError(where, f"{rate:g} frames per second, at which they are {best:.1f} m from the players",
+                                 f"{other:g}, at which they fit", "correct the frame rate or the times")
 
 
 def _measure_all_offsets(paths: np.ndarray, dots: np.ndarray) -> np.ndarray:
@@ -232,7 +260,7 @@ def _measure_nearest(times: np.ndarray, path: np.ndarray, match: Match) -> float
     NaN where none is there.
     """
     at = slice(None, None, max(1, len(times) // 500))
-    apart = [_sample_path(match.times, dots, times[at]) - path[at] for dots in match.positions]
+    apart = [sample_path(match.times, dots, times[at]) - path[at] for dots in match.positions]
     known = [one[np.isfinite(one[:, 0])] for one in apart]
     return min((_measure_spread(one) for one in known if len(one)), default=np.nan)
 

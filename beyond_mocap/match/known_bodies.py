@@ -5,6 +5,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -21,15 +22,14 @@ from ..motion.humanoid import estimate_stature
 from ..motion.motion import sample_frames_cubic
 from ..motion.retargeting.neutral import scale_stance
 from ..motion.track.match_data import REFEREE, Match, MatchPlayer, Team
-from ..skeletal.fit_body import fit_body
-from ..skeletal.reconstruct_bodies import PLANTED_RATE, Body, plant_body, reconstruct_bodies
+from ..skeletal.joint_examples import read_examples
+from ..skeletal.reconstruct_bodies import PLANTED_RATE, Body, KnownElsewhere, fit_planted_body, reconstruct_bodies
 from ..synthesis.known_body import KnownBody, build_known_body, find_shown_frames
-from .joint_clock import MOST_APART, align_joints, find_pelvis, name_people
+from .joint_clock import MOST_APART, align_joints, find_pelvis, name_people, sample_path
 from .request import MatchRequest
 
 _HEIGHT = find_setting("player", "height")
 _AROUND = 2.0  # s of joints that are fitted beyond the span
-_LONGEST_GAP = 0.25  # s without joints: a longer one is synthesized, which is nearer than what is bridged
 _FADE = 1.0  # s over which the offset between dot and body fades
 
 
@@ -95,7 +95,7 @@ def read_joint_match(path: Path | str, pitch: tuple[float, float] | None = None)
 
 
 def build_match(feed: JointFeed, pitch: tuple[float, float] = USUAL_PITCH) -> Match:
-    """Build a match whose dots are the pelvis of each person.
+    """Build a match whose dots are the pelvis of each person, and whose ball is the feed's.
 
     Args:
         feed: the joints; 0 s is their first sample.
@@ -114,7 +114,8 @@ def build_match(feed: JointFeed, pitch: tuple[float, float] = USUAL_PITCH) -> Ma
                     for person in feed.people)
     times = np.arange(count) / feed.fps
     notes = () if knows_teams else ("no teams in the joints: all people are taken for one team",)
-    return Match(times=times, players=players, positions=positions, ball=np.full((count, 3), np.nan), length=pitch[0],
+    ball = sample_path(feed.ball[:, 0], feed.ball[:, 1:], times) if len(feed.ball) > 1 else np.full((count, 3), np.nan)
+    return Match(times=times, players=players, positions=positions, ball=ball, length=pitch[0],
                  width=pitch[1], fps=feed.fps, provider="joints", periods=((0.0, float(times[-1])),),
                  notes=(*feed.notes, *notes), teams=(Team("home"), Team("away")))
 
@@ -124,7 +125,7 @@ def _begin_at_zero(feed: JointFeed) -> JointFeed:
     begin = min(person.times[0] for person in feed.people)
     notes = (f"the joints begin at {format_seconds(begin)} s of their own clock, which is 0 s here",) * bool(begin)
     people = tuple(replace(person, times=person.times - begin) for person in feed.people)
-    return replace(feed, people=people, notes=(*feed.notes, *notes))
+    return replace(feed, people=people, ball=feed.ball - [begin, 0.0, 0.0, 0.0], notes=(*feed.notes, *notes))
 
 
 def build_known_bodies(feed: JointFeed | None, match: Match, request: MatchRequest, library: Library,
@@ -151,13 +152,20 @@ def build_known_bodies(feed: JointFeed | None, match: Match, request: MatchReque
     notes = [f"{person.id}: joints without a dot within {MOST_APART:g} m are left out" for person in part.people
              if person.id not in who]
     wanted = {person for person, player in who.items() if not request.players or player in request.players}
-    found, lines = reconstruct_bodies(part, ids=wanted, longest_gap=_LONGEST_GAP)
+    known = KnownElsewhere(examples=read_examples(library), path_of=partial(_sample_dot, match, who))
+    found, lines = reconstruct_bodies(part, ids=wanted, known=known)
     players: dict[str, list[Body]] = {}
     for body in sorted(found, key=lambda one: one.start):
         players.setdefault(who[body.id], []).append(body)
     shown = {player: _convert_bodies(bodies, library, request.fps) for player, bodies in players.items()}
     return SeenBodies(players={player: one for player, one in shown.items() if one.bodies},
                       notes=(*feed.notes, *notes, *lines))
+
+
+def _sample_dot(match: Match, who: Mapping[str, str], person: str, times: np.ndarray) -> np.ndarray:
+    """Sample the dot (T, 2) m of a person at times (T,) s, NaN where it is not known."""
+    number = next(number for number, player in enumerate(match.players) if player.id == who[person])
+    return sample_path(match.times, match.positions[number], times)
 
 
 def _cut_feed(feed: JointFeed, start: float, end: float) -> JointFeed:
@@ -174,7 +182,7 @@ def _convert_bodies(bodies: list[Body], library: Library, fps: float) -> SeenPla
     stance = scale_stance(library.neutral_stance, height / estimate_stature(library.skeleton))
     out, rows, end = [], [], -np.inf
     for body in bodies:
-        moved = replace(body, motion=plant_body(fit_body(body.joints, body.motion.fps, stance)))
+        moved = replace(body, motion=fit_planted_body(body.joints, body.motion.fps, stance))
         known = _sample_body(moved, fps) if body.start > end else None
         if known is not None:
             out.append(known)

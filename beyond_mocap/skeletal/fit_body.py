@@ -13,8 +13,7 @@ from ..base.vectors import cross_product, unit_vectors
 from ..motion import limb, quaternion
 from ..motion.humanoid import Limb, identify_joints
 from ..motion.motion import Motion, compute_local_rotations, compute_pose
-from ..motion.retargeting.neutral import NeutralStance, build_neutral_stance
-from .measured_skeleton import build_measured_skeleton
+from ..motion.retargeting.neutral import NeutralStance
 
 NEEDED = tuple(f"{side}_{part}" for part in ("shoulder", "hip", "knee", "ankle") for side in ("left", "right"))
 """Landmarks without which a body cannot be fitted."""
@@ -45,17 +44,17 @@ def collect_joints(landmarks: tuple[str, ...], positions: np.ndarray) -> dict[st
     return joints
 
 
-def fit_body(joints: dict[str, np.ndarray], fps: float, stance: NeutralStance | None = None) -> Motion:
+def fit_body(joints: dict[str, np.ndarray], fps: float, stance: NeutralStance) -> Motion:
     """Fit a body with bones of fixed length to joints.
 
     Args:
         joints: name -> (T, 3) metres, world, Z up, smooth and without gaps; NEEDED at least.
         fps: frames per second.
-        stance: of the skeleton; None for the one that `build_measured_skeleton` makes of the joints.
+        stance: of the skeleton.
     Returns:
         The motion.
     """
-    fit = _BodyFit(joints, stance or build_neutral_stance(build_measured_skeleton(joints)))
+    fit = _BodyFit(joints, stance)
     fit.turn_trunk()
     fit.turn_head()
     for side, joints_of in (("left", fit.body.left), ("right", fit.body.right)):

@@ -3,20 +3,27 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Collection
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from itertools import takewhile
 
 import numpy as np
 
 from ..base.errors import InputError, UserCancelledError, format_count
+from ..base.time_series import find_runs
 from ..files.joints.joint_feed import JointFeed, PlayerJoints
 from ..files.joints.landmarks import LANDMARKS
 from ..library.repair import plant_contacts
 from ..motion.contacts import detect_heel_toe_contacts
 from ..motion.motion import Motion
+from ..motion.retargeting.neutral import NeutralStance, build_neutral_stance
+from ..motion.toe_roll import roll_toes
 from .body_figures import measure_body
+from .bridge_gaps import SHORTEST_GAP, bridge_gaps
 from .fit_body import NEEDED, collect_joints, fit_body
+from .joint_examples import COMPARED, JointExamples
+from .measured_skeleton import build_measured_skeleton
 from .repair_joints import repair_identities, repair_sides, spread_landmarks
-from .smooth_joints import LONGEST_GAP, find_stretches, smooth_joints
+from .smooth_joints import find_stretches, smooth_joints
 
 SHORTEST = 0.5
 """Seconds; what is seen for a shorter time is no body."""
@@ -54,9 +61,22 @@ class Body:
         return measure_body(self.landmarks, self.seen, self.motion)
 
 
+@dataclass(frozen=True, eq=False, kw_only=True)
+class KnownElsewhere:
+    """What is known of people where none of their joints is seen.
+
+    Attributes:
+        examples: how people move (`read_examples`); None: only as the person does beside the gap.
+        path_of: tells where another tracking has a person, by id, at times (T,) s: (T, 2) m, NaN where it does not.
+    """
+
+    examples: JointExamples | None = None
+    path_of: Callable[[str, np.ndarray], np.ndarray] | None = None
+
+
 def reconstruct_bodies(feed: JointFeed, progress: Callable[[float, str], None] | None = None,
                        cancelled: Callable[[], bool] | None = None, ids: Collection[str] | None = None,
-                       longest_gap: float = LONGEST_GAP) -> tuple[list[Body], list[str]]:
+                       known: KnownElsewhere = KnownElsewhere()) -> tuple[list[Body], list[str]]:
     """Reconstruct the bodies of all people of a feed.
 
     Args:
@@ -64,9 +84,9 @@ def reconstruct_bodies(feed: JointFeed, progress: Callable[[float, str], None] |
         progress: called with the share that is done and a text.
         cancelled: returns True when the user stops the job.
         ids: people whose bodies are wanted; None: all. All count where two are exchanged.
-        longest_gap: seconds without joints that are bridged; a longer gap begins another body.
+        known: what is known of people where no joint is seen.
     Returns:
-        The bodies, a stretch without long gaps each, and notes on what was repaired or left out.
+        The bodies, a stretch without a gap over a second each, and notes on what was repaired or left out.
     Raises:
         InputError: if a person's times span too many frames.
         UserCancelledError: if the user stops the job.
@@ -80,7 +100,7 @@ def reconstruct_bodies(feed: JointFeed, progress: Callable[[float, str], None] |
             raise UserCancelledError("bodies: cancelled")
         if progress is not None:
             progress(number / len(people), f"Fitting {person.id}")
-        found, lines = _reconstruct_person(person, begin + first / feed.fps, positions, feed.fps, longest_gap)
+        found, lines = _reconstruct_person(person, begin + first / feed.fps, positions, feed.fps, known)
         bodies += found
         notes += lines
     return bodies, notes
@@ -121,11 +141,11 @@ def _lay_on_clock(person: PlayerJoints, begin: float, fps: float) -> tuple[int, 
 
 
 def _reconstruct_person(person: PlayerJoints, first: float, positions: np.ndarray, fps: float,
-                        longest_gap: float) -> tuple[list[Body], list[str]]:
+                        known: KnownElsewhere) -> tuple[list[Body], list[str]]:
     """Reconstruct the stretches of one person, and tell which were left out."""
-    shown = np.flatnonzero(np.isfinite(positions).all(axis=2).sum(axis=1) >= len(NEEDED) // 2)
+    shown = np.flatnonzero(_find_shown(positions))
     bodies, notes = [], []
-    for start, end in find_stretches(shown / fps, fps, longest_gap):
+    for start, end in find_stretches(shown / fps, fps):
         begin, stop = int(shown[start]), int(shown[end - 1]) + 1
         part = positions[begin:stop]
         seconds = first + begin / fps
@@ -134,13 +154,29 @@ def _reconstruct_person(person: PlayerJoints, first: float, positions: np.ndarra
             why = f"{missing[0].replace('_', ' ')} is hardly seen" if missing else f"only {len(part) / fps:.2f} s"
             notes.append(f"{person.id}: from {seconds:.2f} s left out, {why}")
             continue
-        bodies.append(_reconstruct_stretch(person, seconds, part, fps))
+        bodies.append(_reconstruct_stretch(person, seconds, part, fps, known))
     return bodies, notes
 
 
-def plant_body(motion: Motion) -> Motion:
-    """Plant the feet of a body where they are in contact; at too few frames per second to tell it stays as it is."""
-    return plant_contacts(motion, detect_heel_toe_contacts(motion)) if motion.fps >= PLANTED_RATE else motion
+def _find_shown(positions: np.ndarray) -> np.ndarray:
+    """Find the frames (T,) bool that show enough of a body."""
+    return np.isfinite(positions).all(axis=2).sum(axis=1) >= len(NEEDED) // 2
+
+
+def fit_planted_body(joints: dict[str, np.ndarray], fps: float, stance: NeutralStance) -> Motion:
+    """Fit a body whose feet are planted where they are in contact, and whose toes bend where they would dig in.
+
+    Args:
+        joints: as for `fit_body`.
+        fps: frames per second; below PLANTED_RATE contacts cannot be told, and feet are not planted.
+        stance: of the skeleton.
+    Returns:
+        The motion.
+    """
+    motion = fit_body(joints, fps, stance)
+    if fps >= PLANTED_RATE:
+        motion = plant_contacts(motion, detect_heel_toe_contacts(motion))
+    return replace(motion, rotations=roll_toes(stance, motion.root_positions, motion.rotations))
 
 
 def _measure_share(positions: np.ndarray, landmark: int) -> float:
@@ -148,11 +184,26 @@ def _measure_share(positions: np.ndarray, landmark: int) -> float:
     return float(np.isfinite(positions[:, landmark]).all(axis=1).mean())
 
 
-def _reconstruct_stretch(person: PlayerJoints, seconds: float, seen: np.ndarray, fps: float) -> Body:
+def _reconstruct_stretch(person: PlayerJoints, seconds: float, seen: np.ndarray, fps: float,
+                         known: KnownElsewhere) -> Body:
     """Fit and plant one stretch (T, LANDMARKS, 3)."""
     used = [number for number in range(len(LANDMARKS)) if _measure_share(seen, number) >= _MIN_SHARE]
     names = tuple(LANDMARKS[number] for number in used)
-    joints = collect_joints(names, smooth_joints(names, seen[:, used]))
-    motion = plant_body(fit_body(joints, fps))
+    path = None if known.path_of is None else known.path_of(person.id, seconds + np.arange(len(seen)) / fps)
+    joints = collect_joints(names, _smooth_and_bridge(names, seen[:, used], fps, known.examples, path))
+    motion = fit_planted_body(joints, fps, build_neutral_stance(build_measured_skeleton(joints)))
     return Body(id=person.id, team=person.team, start=seconds, motion=motion, joints=joints, landmarks=names,
                 seen=seen[:, used])
+
+
+def _smooth_and_bridge(names: tuple[str, ...], seen: np.ndarray, fps: float, examples: JointExamples | None,
+                       path: np.ndarray | None) -> np.ndarray:
+    """Smooth joints (T, L, 3) m, and bridge the gaps in which nothing is seen."""
+    smooth, hidden = smooth_joints(names, seen), ~_find_shown(seen)
+    if not any(end - first >= SHORTEST_GAP * fps for first, end in find_runs(hidden)):
+        return smooth
+    columns = [names.index(name) for name in takewhile(names.__contains__, COMPARED)]
+    columns = columns[: len(columns) // 2 * 2]  # of both sides
+    bridged = seen.copy()
+    bridged[np.ix_(hidden, np.array(columns))] = bridge_gaps(smooth[:, columns], hidden, fps, examples, path)[hidden]
+    return smooth_joints(names, bridged)

@@ -149,7 +149,7 @@ def _solve(values: np.ndarray, weight: np.ndarray, strength: float) -> np.ndarra
     return solveh_banded(bands, weight[:, None] * values, check_finite=False)
 
 
-def find_stretches(times: np.ndarray, fps: float, longest: float = LONGEST_GAP) -> list[tuple[int, int]]:
-    """Find the stretches without a gap over `longest` s: the first sample of each, and the one after its last."""
-    near = np.diff(times) <= longest + 0.5 / fps
+def find_stretches(times: np.ndarray, fps: float) -> list[tuple[int, int]]:
+    """Find the stretches without a gap over LONGEST_GAP s: the first sample of each, and the one after its last."""
+    near = np.diff(times) <= LONGEST_GAP + 0.5 / fps
     return [(first, last + 1) for first, last in find_runs(near)]

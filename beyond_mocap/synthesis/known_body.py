@@ -198,16 +198,11 @@ def show_bodies(skeleton: Skeleton, planted: PlantResult, steps: Steps, bodies: 
     """
     if not bodies:
         return planted, steps
-    root, rotations = planted.root.copy(), planted.rotations.copy()
-    contacts, shown = steps.heel_toe_contacts.copy(), np.zeros(len(root), bool)
-    for body in bodies:
-        low, high = max(body.first - first, 0), min(body.first + len(body) - first, len(root))
-        if high > low:
-            own, (place, turn) = slice(low + first - body.first, high + first - body.first), body.pose
-            root[low:high] = place[own] / size
-            rotations[low:high] = quaternion.match_signs(turn[own], planted.rotations[low:high])
-            contacts[low:high], shown[low:high] = body.heel_toe_contacts[own], True
-    pose, contacts = _join(skeleton, (root, rotations), planted, contacts, shown=shown, fps=fps)
+    pose, contacts, shown = _lay_bodies(planted, steps, bodies, first, size)
+    for run in find_runs(~shown):
+        sides = [edge for edge in (run[0] - 1, run[1]) if 0 <= edge < len(shown)]
+        if sides:
+            pose, contacts = _join_run(skeleton, pose, planted, contacts, run=run, sides=sides, fps=fps)
     moved = np.where(shown[:, None], 0.0, planted.correction), np.where(shown[:, None], 0.0, planted.miss)
     raised = steps.heel_toe_contacts.any(axis=2) & ~contacts.any(axis=2)
     flat = np.where(shown[:, None], contacts.all(axis=2), steps.contacts & ~raised)
@@ -218,25 +213,47 @@ def show_bodies(skeleton: Skeleton, planted: PlantResult, steps: Steps, bodies: 
     )
 
 
-def _join(skeleton: Skeleton, pose: Pose, planted: PlantResult, contacts: np.ndarray, *, shown: np.ndarray,
-          fps: float) -> tuple[Pose, np.ndarray]:
-    """Let the frames beside known bodies lead into them; contacts end where a foot is raised by that."""
-    frames = int(np.ceil(_FIXED_SECONDS * fps))
-    for low, high in find_runs(~shown):
-        sides = [edge for edge in (low - 1, high) if 0 <= edge < len(shown)]
-        if sides:
-            reach = _find_reach(contacts[low:high], len(sides) > 1, edge_is_first=low > 0, fps=fps)
-            pose = _fade_leads(pose, planted, (low, high), sides, reach=reach, fps=fps)
-            run = slice(low, high)
-            contacts[run] &= ~_find_raised(skeleton, [(one[0][run], one[1][run]) for one in (
-                pose, (planted.root, planted.rotations))])
-            near = np.min([np.abs(np.arange(low, high) - edge) for edge in sides], axis=0) <= reach
-            for edge in sides:  # a foot that the body has in the air does not land at once
-                fixed = slice(max(edge - frames, low), min(edge + frames + 1, high))
-                contacts[fixed] &= contacts[edge].any(axis=1)[:, None]
-            for first, end in find_runs(near):
-                pose = step_over(skeleton, pose, contacts, (low + int(first), low + int(end)), fps)
+def _lay_bodies(planted: PlantResult, steps: Steps, bodies: Sequence[KnownBody], first: int,
+                size: float) -> tuple[Pose, np.ndarray, np.ndarray]:
+    """Lay known bodies over a motion: the pose, heel and toe contacts (T, 2, 2), and the frames (T,) that show one."""
+    root, rotations = planted.root.copy(), planted.rotations.copy()
+    contacts, shown = steps.heel_toe_contacts.copy(), np.zeros(len(root), bool)
+    for body in bodies:
+        low, high = max(body.first - first, 0), min(body.first + len(body) - first, len(root))
+        if high > low:
+            own, (place, turn) = slice(low + first - body.first, high + first - body.first), body.pose
+            root[low:high] = place[own] / size
+            rotations[low:high] = quaternion.match_signs(turn[own], planted.rotations[low:high])
+            contacts[low:high], shown[low:high] = body.heel_toe_contacts[own], True
+    return (root, rotations), contacts, shown
+
+
+def _join_run(skeleton: Skeleton, pose: Pose, planted: PlantResult, contacts: np.ndarray, *, run: tuple[int, int],
+              sides: Sequence[int], fps: float) -> tuple[Pose, np.ndarray]:
+    """Let a run of frames lead into the known bodies at `sides`; contacts end where a foot is raised by that."""
+    low, high = run
+    reach = _find_reach(contacts[low:high], len(sides) > 1, edge_is_first=low > 0, fps=fps)
+    pose = _fade_leads(pose, planted, run, sides, reach=reach, fps=fps)
+    contacts = _lift_feet(skeleton, pose, planted, contacts, run=run, sides=sides, fps=fps)
+    near = np.min([np.abs(np.arange(low, high) - edge) for edge in sides], axis=0) <= reach
+    for first, end in find_runs(near):
+        pose, contacts = step_over(skeleton, pose, contacts, (low + first, low + end), fps, is_firm=True)
     return pose, contacts
+
+
+def _lift_feet(skeleton: Skeleton, pose: Pose, planted: PlantResult, contacts: np.ndarray, *, run: tuple[int, int],
+               sides: Sequence[int], fps: float) -> np.ndarray:
+    """Return contacts (T, 2, 2) that end where a foot of a run is raised by its lead, and beside a body that has it in
+    the air.
+    """
+    (low, high), out, frames = run, contacts.copy(), int(np.ceil(_FIXED_SECONDS * fps))
+    inside = slice(low, high)
+    out[inside] &= ~_find_raised(skeleton, [(one[0][inside], one[1][inside]) for one in (
+        pose, (planted.root, planted.rotations))])
+    for edge in sides:
+        fixed = slice(max(edge - frames, low), min(edge + frames + 1, high))
+        out[fixed] &= out[edge].any(axis=1)[:, None]
+    return out
 
 
 def _find_reach(contacts: np.ndarray, is_between: bool, *, edge_is_first: bool, fps: float) -> int:

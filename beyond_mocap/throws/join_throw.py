@@ -133,7 +133,7 @@ def join_throw(
         ground_contacts[inside] = contacts.detect_heel_toe_contacts(throw)[inside - first]
         for stretch in ((first, unblended[0]), (unblended[1], end)):
             if _mean_speed(old[0], stretch, fps) <= _MAX_STEPPING_SPEED:
-                pose = step_over(motion_around.skeleton, pose, ground_contacts, stretch, fps)
+                pose, _ = step_over(motion_around.skeleton, pose, ground_contacts, stretch, fps)
     motion = Motion(motion_around.skeleton, *pose, fps)
     total_offset = old[0][unblended[1]] - motion_around.root_positions[unblended[1]]
     warnings = _describe_turning(before, start + first / fps, rotation, total_offset, start + end / fps)

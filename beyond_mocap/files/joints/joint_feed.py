@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from array import array
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
@@ -57,11 +57,13 @@ class JointFeed:
         people: in the order of the file.
         fps: frames per second.
         notes: what was assumed or repaired, one line each.
+        ball: (N, 4) seconds, ascending, and the ball's centre in m; (0, 4) where the feed has no ball.
     """
 
     people: tuple[PlayerJoints, ...]
     fps: float
     notes: tuple[str, ...]
+    ball: np.ndarray = field(default_factory=lambda: np.zeros((0, 4)))
 
 
 class JointCollector:
@@ -79,15 +81,21 @@ class JointCollector:
         self._path = path
         self._points: dict[str, array] = {}
         self._teams: dict[str, str] = {}
+        self._ball = array("d")
 
     def add_point(self, person: str, seconds: float, landmark: str, place) -> None:
         """Add where a landmark of a person is at a time; a place that is no three finite numbers is not seen."""
         points = self._points.setdefault(person, array("d"))
-        if len(place) == 3 and all(isinstance(value, (int, float)) and math.isfinite(value) for value in place):
+        if _is_place(place):
             points.extend((seconds, LANDMARKS.index(landmark), *place))
         if len(points) > 5 * _MOST_POINTS:
             raise InputError(self._path, f"more than {_MOST_POINTS:,} points", "a part of a match",
                              "divide the file, or move later ones out of its folder")
+
+    def add_ball(self, seconds: float, place) -> None:
+        """Add where the ball is at a time."""
+        if _is_place(place):
+            self._ball.extend((seconds, *place))
 
     def set_team(self, person: str, team: str) -> None:
         """Set a person's team: "home", "away" or ""."""
@@ -116,7 +124,12 @@ class JointCollector:
                              "check that times are seconds")
         if self.unknown:
             self.notes.append(f"{format_count(len(self.unknown), 'point')} not used: {self._list_unknown()}")
-        return normalize_feed(JointFeed(tuple(people), rate, tuple(self.notes)), self._path)
+        return normalize_feed(JointFeed(tuple(people), rate, tuple(self.notes), self._build_ball()), self._path)
+
+    def _build_ball(self) -> np.ndarray:
+        rows = np.frombuffer(self._ball).reshape(-1, 4) if self._ball else np.zeros((0, 4))
+        _, first = np.unique(rows[:, 0], return_index=True)
+        return np.clip(rows[first], -_FAR, _FAR)
 
     def _list_unknown(self) -> str:
         names = sorted(self.unknown)
@@ -130,6 +143,11 @@ class JointCollector:
         positions[at.reshape(-1), np.searchsorted(used, rows[:, 1].astype(int))] = np.clip(rows[:, 2:], -_FAR, _FAR)
         return PlayerJoints(id=person, team=self._teams.get(person, ""),
                             landmarks=tuple(LANDMARKS[number] for number in used), times=times, positions=positions)
+
+
+def _is_place(place) -> bool:
+    """Say whether a place is three finite numbers."""
+    return len(place) == 3 and all(isinstance(value, (int, float)) and math.isfinite(value) for value in place)
 
 
 def _find_rate(steps: np.ndarray) -> float:
@@ -169,7 +187,8 @@ def normalize_feed(feed: JointFeed, path: Path) -> JointFeed:
                for one, other in zip(people, cleaned))
     if wild:
         notes.append(f"{format_count(wild, 'point')} farther than {_FARTHEST_POINT:g} m from their body left out")
-    return JointFeed(tuple(cleaned), feed.fps, tuple(notes))
+    ball = np.column_stack([feed.ball[:, 0], feed.ball[:, 1:] @ turn.T * unit])
+    return JointFeed(tuple(cleaned), feed.fps, tuple(notes), ball[(np.abs(ball[:, 1:]) <= _MOST_METRES).all(axis=1)])
 
 
 def _measure_bodies(feed: JointFeed, path: Path) -> tuple[float, np.ndarray]:

@@ -28,6 +28,7 @@ FIFA_15 = ("nose", "right_shoulder", "left_shoulder", "right_elbow", "left_elbow
 14, 22, 19 of OpenPose's BODY_25)."""
 _FIFA_RATE = 50.0  # frames per second of the challenge
 _FORMS = "Common Data Format skeletal.jsonl, Hawk-Eye .samples.joints, CSV with time_s,player,joint,x,y,z, or .npz"
+_JOINTS = ".joints"  # how Hawk-Eye's files end
 _FLOATS = tuple(np.dtype(kind) for kind in ("<f4", "<f8", "<f2"))
 _MAX_BYTES = 4 << 30
 _CSV_NAMES = {"time": "time_s", "x_m": "x", "y_m": "y", "z_m": "z", "landmark": "joint", "id": "player"}
@@ -83,7 +84,7 @@ def _find_text_reader(path: Path):
     head = read_head(path)
     if re.match(rb'(?s)\s*\{.{0,4000}"landmarks"', head):
         return _read_cdf
-    if re.match(rb"(?s)\s*\{", head) and path.name.lower().endswith(".joints"):
+    if re.match(rb"(?s)\s*\{", head) and path.name.lower().endswith(_JOINTS):
         return _read_hawkeye
     columns = re.findall(rb"[a-z_]+", head.partition(b"\n")[0].lower())
     return _read_table if b"joint" in columns or b"landmark" in columns else None
@@ -107,12 +108,11 @@ def _read_cdf(path: Path) -> JointFeed:
 
 
 def _read_hawkeye(path: Path) -> JointFeed:
-    """Read Hawk-Eye's joints: a file for each minute, their times from its start."""
-    found, files = JointCollector(path), list_joint_files(path)
+    """Read Hawk-Eye's joints, and the ball: files for each minute, their times from its start."""
+    found, files = JointCollector(path), _list_minutes(path)
     begin = None
     for file in files:
-        content = read_json(file)
-        start = parse_time(content["time"]["startUTC"], str(file))
+        start, content = _read_minute(file)
         begin = begin or start
         offset = (start - begin).total_seconds()
         homes = {str(team["id"]): team.get("home") for team in (content.get("details") or {}).get("teams") or ()}
@@ -126,15 +126,38 @@ def _read_hawkeye(path: Path) -> JointFeed:
                 for name, place in sample.items():
                     if isinstance(place, list):
                         _add(found, key, seconds, name, place)
+    balls = [ball for file in files for ball in _find_balls(file)]
+    for file in balls:
+        start, content = _read_minute(file)
+        for sample in content["samples"]["ball"]:
+            found.add_ball(round((start - begin).total_seconds() + float(sample["time"]), 4), sample["pos"])
     if len(files) > 1:
         found.notes.append(f"{format_count(len(files), 'file')} of one half are read, {files[0].name} first")
+    if balls:
+        found.notes.append(f"the ball is read from {format_count(len(balls), 'file')}, {balls[0].name} first")
     return found.build()
 
 
+def _read_minute(file: Path):
+    """Read a file of Hawk-Eye: when it starts, and its content."""
+    content = read_json(file)
+    return parse_time(content["time"]["startUTC"], str(file)), content
+
+
 def list_joint_files(path: Path) -> list[Path]:
-    """List the files that `read_joints` reads: of Hawk-Eye those of the same half from `path` on,
-    ..._HALF_MINUTE[_ADDED].football.samples.joints.
-    """
+    """List the files that `read_joints` reads: of Hawk-Eye all of the same half from `path` on, and their balls."""
+    files = _list_minutes(path)
+    return [*files, *(ball for file in files for ball in _find_balls(file))]
+
+
+def _find_balls(file: Path) -> list[Path]:
+    """Find the ball's file of the same minute of Hawk-Eye."""
+    ball = file.with_name(file.name.removesuffix(_JOINTS) + ".ball")
+    return [ball] if file.name.endswith(_JOINTS) and ball.is_file() else []
+
+
+def _list_minutes(path: Path) -> list[Path]:
+    """List the files of joints of the same half from `path` on, ..._HALF_MINUTE[_ADDED].football.samples.joints."""
     parts = re.fullmatch(r"(.*?_?\d+_)(\d+)(?:_(\d+))?(\.football\.samples\.joints)", path.name)
     if parts is None:
         return [path]

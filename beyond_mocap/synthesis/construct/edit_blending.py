@@ -30,6 +30,7 @@ Pose = tuple[np.ndarray, np.ndarray]
 _MAX_TURN = 1.5 * np.pi  # rad, largest turn on the spot to keep the old direction of turning
 _OFFSET_SECONDS = 1.0  # s from an end of the stretch over which the root's offset to the old one fades
 _AROUND = 0.5  # s on either side of the stretch that are solved with it
+_STAYS = 0.999  # share of the old motion from which on, where feet step, they are where it has them: what fades slides
 _BLEND_SECONDS = 0.12  # s at either end of the stretch in which the planted motion is blended into the old one
 
 
@@ -142,7 +143,7 @@ def compute_old_share(count: int, stretch: tuple[int, int], frames: int) -> np.n
 
 
 def blend_with_old(skeleton: Skeleton, new: Pose, old: Pose, share: np.ndarray, heel_toe_contacts: np.ndarray,
-                   fps: float) -> Pose:
+                   fps: float, least: float = 0.0) -> Pose:
     """Blend a new motion into an old one without sliding feet.
 
     Args:
@@ -152,6 +153,7 @@ def blend_with_old(skeleton: Skeleton, new: Pose, old: Pose, share: np.ndarray, 
         share: (T,) of the old motion.
         heel_toe_contacts: (T, 2, 2) bool, heel and toe of the left and right foot in contact.
         fps: frames per second.
+        least: share above which feet are where the old motion has them.
     Returns:
         Root (T, 3) m and local rotations (T, J, 4).
     """
@@ -162,8 +164,8 @@ def blend_with_old(skeleton: Skeleton, new: Pose, old: Pose, share: np.ndarray, 
     legs = identify_joints(skeleton)
     for side, limb in enumerate((legs.left, legs.right)):
         carries = heel_toe_contacts[:, side].any(axis=1).astype(float)[:, None]
-        moved, turned = _solve_foot_offsets([values[:, limb.foot] for values in (*new_joints, *old_joints)], share,
-                                            carries, fps)
+        moved, turned = _solve_foot_offsets([values[:, limb.foot] for values in (*new_joints, *old_joints)],
+                                            share > least, carries, fps)
         chain, foot = leg_chain(limb), quaternion.multiply(turned, new_joints[1][:, limb.foot])
         place = new_joints[0][:, limb.foot] + moved
         place[:, 2] += _measure_sinking(skeleton, limb, place, foot=foot, motions=[new_joints[0], old_joints[0]],
@@ -176,7 +178,7 @@ def blend_with_old(skeleton: Skeleton, new: Pose, old: Pose, share: np.ndarray, 
 
 
 def step_over(skeleton: Skeleton, pose: Pose, heel_toe_contacts: np.ndarray, stretch: tuple[int, int],
-              fps: float) -> Pose:
+              fps: float, is_firm: bool = False) -> tuple[Pose, np.ndarray]:
     """Plant the feet and let them step within a stretch; all other frames stay bit for bit.
 
     Args:
@@ -185,28 +187,33 @@ def step_over(skeleton: Skeleton, pose: Pose, heel_toe_contacts: np.ndarray, str
         heel_toe_contacts: (T, 2, 2) bool, heel and toe contacts of the motion that is shown most.
         stretch: first and end frame.
         fps: frames per second.
+        is_firm: feet stand on the ground, and at the stretch's ends where the motion beside it has them; False: at
+            their own heights, and as they fade in the motion.
     Returns:
-        Root (T, 3) m and local rotations (T, J, 4).
+        Root (T, 3) m and local rotations (T, J, 4); and the contacts, without those of feet that step.
     """
     first, end = stretch
     around, joins = int(_AROUND * fps), max(int(round(_BLEND_SECONDS * fps)), 1)
     if end - first < 2 * joins + 3:
-        return pose
+        return pose, heel_toe_contacts
     low, high = max(first - around, 0), min(end + around, len(pose[0]))
     root, rotations = pose[0][low:high], pose[1][low:high]
     inside = (np.arange(low, high) >= first) & (np.arange(low, high) < end)
     steps_taken = add_steps(skeleton, root, rotations, heel_toe_contacts[low:high], fps, free=inside)
     swayed = root + np.column_stack([steps_taken.sway, np.zeros(len(root))])
     found = plant_feet(skeleton, swayed, steps_taken.rotations, steps_taken.heel_toe_contacts, fps,
-                       foot_moves=steps_taken.moves, level_feet=False)
+                       foot_moves=steps_taken.moves, level_feet=is_firm)
     share = compute_old_share(high - low, (first + joins - low, end - joins - low), joins)
     share[~inside] = 1.0
     new = blend_with_old(skeleton, (found.root, found.rotations), (root, rotations), share=share,
-                         heel_toe_contacts=steps_taken.heel_toe_contacts, fps=fps)
+                         heel_toe_contacts=steps_taken.heel_toe_contacts, fps=fps,
+                         least=_STAYS if is_firm else 0.0)
     changed = pose[0].copy(), pose[1].copy()
     for whole, part in zip(changed, new):
         whole[first:end] = part[first - low : end - low]
-    return changed
+    contacts = heel_toe_contacts.copy()
+    contacts[first:end] = steps_taken.heel_toe_contacts[first - low : end - low]
+    return changed, contacts
 
 
 def _measure_sinking(skeleton: Skeleton, limb: Limb, place, foot, motions: list[np.ndarray], share) -> np.ndarray:
@@ -223,13 +230,12 @@ def _measure_sinking(skeleton: Skeleton, limb: Limb, place, foot, motions: list[
     return np.maximum(allowed - np.min(ends, axis=0), 0.0)
 
 
-def _solve_foot_offsets(feet: list[np.ndarray], share: np.ndarray, is_planted: np.ndarray, fps: float) -> Pose:
+def _solve_foot_offsets(feet: list[np.ndarray], known: np.ndarray, is_planted: np.ndarray, fps: float) -> Pose:
     """Compute the shift (T, 3) m and turn (T, 4) that bring a new foot to where the old one is, wherever that is known.
 
     feet: place and rotation of the new foot and of the old one.
     """
     place, turn, old_place, old_turn = feet
-    known = share > 0.0
     away = quaternion.to_rotation_vector(quaternion.multiply(old_turn, quaternion.inverse(turn)))
     known_offsets = np.where(known[:, None], np.column_stack([old_place - place, away]), np.nan)
     # six columns, metres and radians, solved together: they stay constant while the foot is in contact

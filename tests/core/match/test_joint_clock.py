@@ -84,6 +84,15 @@ def test_joints_of_another_match_and_of_several_times_are_refused():
         align_joints(build_feed(paths, [(2, 60.0, 66.0)], 200.0), build_match(paths))
 
 
+@pytest.mark.parametrize("rate", [50.0, 30.0])
+def test_joints_with_a_wrong_frame_rate_are_refused(rate):
+    paths = build_paths(5)
+    feed = build_feed(paths, [(0, 10.0, 50.0), (3, 12.0, 50.0)])
+    wrong = replace(feed, fps=rate, people=tuple(replace(one, times=one.times * FPS / rate) for one in feed.people))
+    with pytest.raises(InputError, match=f"{rate:g} frames per second.*expected 25, at which they fit"):
+        align_joints(wrong, build_match(paths))
+
+
 def _run(capsys, folder, *options):
     status = main(["match", "--library", str(LIBRARY), "--out", str(folder / "out"), *map(str, options)])
     lines = capsys.readouterr().err.strip().splitlines()

@@ -8,15 +8,17 @@ import pytest
 
 from beyond_mocap.base.errors import InputError
 from beyond_mocap.cli.main import main
+from beyond_mocap.files.joints.joint_readers import list_joint_files
 from beyond_mocap.files.tracking.tracking import read_match
 from beyond_mocap.library.build import build_library
+from beyond_mocap.match.known_bodies import read_joint_match
 from beyond_mocap.match.player_file import read_player, write_player
 from beyond_mocap.match.player_motion import construct_player
 from beyond_mocap.motion.humanoid import identify_joints
 from beyond_mocap.motion.motion import forward_kinematics
 from beyond_mocap.synthesis.known_body import SOURCE
 from beyond_mocap.synthesis.quality.movement import compute_jerk
-from tests.core.joint_feeds import NAMES, sample_joints, write_table
+from tests.core.joint_feeds import NAMES, sample_joints, write_hawkeye, write_table
 from tests.core.match.small_match import LIBRARY, SMALL
 
 GAP = (2.2, 3.8)
@@ -57,9 +59,34 @@ def test_seen_joints_are_shown_and_gaps_are_synthesized(seen_match):
                         body.left.lower_leg)):
         error = np.linalg.norm(places[:, joint] - truth[at, NAMES.index(name)], axis=1)
         assert error[is_seen].mean() < 0.05
+    feet = places[:, [[limb.foot, limb.toe] for limb in (body.left, body.right)]]
+    moved = np.linalg.norm(np.diff(feet[..., :2], axis=0), axis=-1).min(axis=2) * take.motion.fps
+    stands = take.contacts[1:] & take.contacts[:-1] & ~is_seen[1:, None]
+    assert stands.sum() > 20 and moved[stands].mean() < 0.05 and moved[stands].max() < 0.3
+    assert feet[~is_seen, ..., 2].min() > -0.02
     jerk = compute_jerk(places, take.motion.fps)
     inner = np.percentile(jerk[is_seen[:-3]], 99)
     assert jerk.max() < max(2.0 * inner, 4000.0)
+
+
+def test_the_ball_beside_hawkeyes_joints_is_that_of_the_match(tmp_path):
+    """In centimetres and in two files, as the joints are, with half a second in which it is not seen."""
+    joints = sample_joints("walking_1_2", FPS)[:150]
+    path = write_hawkeye(tmp_path, {"7": 100.0 * joints}, FPS)
+    times = np.arange(150) / FPS
+    ball = np.column_stack([5.0 + 3.0 * times, -times, 0.11 + 0.0 * times])
+    is_seen = (times < 1.2) | (times > 1.7)
+    for minute, begin, end in ((1, 0.0, 1.0), (2, 1.0, 3.0)):
+        rows = [{"time": times[frame] - begin, "pos": (100.0 * ball[frame]).tolist()}
+                for frame in np.flatnonzero(is_seen & (times >= begin) & (times < end))]  # fmt: skip
+        content = {"time": {"startUTC": f"2024-09-22T21:00:{10 + minute:02d}.000Z"}, "samples": {"ball": rows}}
+        path.with_name(f"match_1_{minute}.football.samples.ball").write_text(json.dumps(content))
+    match, _ = read_joint_match(path)
+    known = np.isfinite(match.ball[:, 0])
+    assert known[is_seen].mean() > 0.95 and not known[~is_seen].any()
+    assert np.abs(match.ball[known] - ball[known]).max() < 1e-3
+    assert "the ball is read from 2 files" in " ".join(match.notes)
+    assert len(list_joint_files(path)) == 4  # whose content makes a stored match out of date
 
 
 def test_the_report_names_what_was_seen(seen_match):

@@ -59,6 +59,23 @@ def test_a_motion_beside_the_old_one_joins_it(walk):
     assert (speed - own)[still[1:] & still[:-1]].max() < 0.02
 
 
+def test_a_foot_that_fades_in_the_old_motion_stands_where_that_has_it_alone(walk):
+    """The old motion drifts by 6 cm while it fades; feet slide with it only where they have to be in it."""
+    share, stands = compute_old_share(len(walk), STRETCH, HAND), contacts.detect_heel_toe_contacts(walk)
+    drift = np.zeros((len(walk), 3))
+    drift[:, 1] = 0.06 * (1.0 - share)
+    new, old = (walk.root_positions, walk.rotations), (walk.root_positions + drift, walk.rotations)
+    still = stands.all(axis=2)
+    still = still[1:] & still[:-1] & ((share > 0.0) & (share < 1.0))[1:, None]
+
+    def slide(least):
+        feet = ankles(walk, blend_with_old(walk.skeleton, new, old, share, stands, 30.0, least=least))
+        speed = np.linalg.norm(np.diff(feet - ankles(walk, new), axis=0)[..., :2], axis=-1) * 30.0
+        return speed[still].max()
+
+    assert slide(0.999) < 0.02 < 0.08 < slide(0.0)
+
+
 def test_no_foot_goes_below_the_ground_for_what_the_old_one_had(walk):
     """The old motion's toes point down, into the ground; where the new one alone counts they are above it."""
     body, old = identify_joints(walk.skeleton), walk.rotations.copy()
