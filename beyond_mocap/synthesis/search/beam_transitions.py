@@ -9,6 +9,7 @@ were evaluated.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -49,19 +50,29 @@ class BeamTransitions:
         clip: (B,) clip that each state shows.
         end: (B,) library frame at which it ends.
         rate: (B,) playback rate.
-        seen: (B, buckets) bool, what it has shown lately.
+        recent: (B, M) buckets of frames that it has shown lately, -1 for none.
         young: (B,) what each state's last cut adds to the next one.
         base: cost of the cheapest state.
         above: (B,) float32, cost above the base.
     """
 
-    def __init__(self, costs, clip: np.ndarray, end: np.ndarray, rate: np.ndarray, cost: np.ndarray, seen: np.ndarray,
+    def __init__(self, costs, clip: np.ndarray, end: np.ndarray, rate: np.ndarray, cost: np.ndarray, recent: np.ndarray,
                  young: np.ndarray):
-        self.costs, self.clip, self.end, self.seen = costs, clip, end, seen
+        self.costs, self.clip, self.end, self.recent = costs, clip, end, recent
         self.rate = rate.astype(np.float32)
         self.young = young.astype(np.float32)
         self.base = float(cost.min())
         self.above = (cost - self.base).astype(np.float32)
+
+    @cached_property
+    def seen(self) -> np.ndarray:
+        """(B, buckets) bool: whether a state has lately shown a bucket of frames or its neighbours."""
+        # one bucket more on either side, cut off in the end; -1 (nothing shown) falls into the first of these
+        seen = np.zeros((len(self.recent), self.costs.index.bucket[-1] + 3), bool)
+        row = np.arange(len(self.recent))[:, None]
+        for shift in (0, 1, 2):
+            seen[row, np.maximum(self.recent + shift, 0)] = True
+        return seen[:, 1:-1]
 
     def compute_all(self, to: SlotCandidates) -> np.ndarray:
         """Compute the cost (B, K) of each transition, including what the candidate shows."""
