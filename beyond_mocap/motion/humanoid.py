@@ -135,7 +135,7 @@ def identify_joints(skeleton: Skeleton) -> Humanoid:
 
 
 def pose_legs(skeleton: Skeleton, root: np.ndarray, rotations: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Compute the pose of both legs, and of what carries them, from hips to toes; other joints cost twice as much again.
+    """Compute the pose of both legs, and of what carries them, down to the toes; other joints would cost as much again.
 
     Args:
         skeleton: J joints.
