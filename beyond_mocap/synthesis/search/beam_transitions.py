@@ -65,7 +65,7 @@ class BeamTransitions:
         self.above = (cost - self.base).astype(np.float32)
 
     @cached_property
-    def seen(self) -> np.ndarray:
+    def seen_buckets(self) -> np.ndarray:
         """(B, buckets) bool: whether a state has lately shown a bucket of frames or its neighbours."""
         # one bucket more on either side, cut off in the end; -1 (nothing shown) falls into the first of these
         seen = np.zeros((len(self.recent), self.costs.index.bucket[-1] + 3), bool)
@@ -187,7 +187,7 @@ class BeamTransitions:
         """Compute what pairs (P,) cost for another recording, and (P,) for what has been shown lately."""
         costs, (frame, left) = self.costs, self._round_frames(to, candidate, state)
         bucket = costs.index.bucket.take(frame)
-        shown = self.seen.ravel().take(state * self.seen.shape[1] + bucket)
+        shown = self.seen_buckets.ravel().take(state * self.seen_buckets.shape[1] + bucket)
         # a stand may be shown again: nothing in it is recognized
         lifted = np.maximum(costs.index.lifted.take(frame), np.float32(0.1))
         return costs.compute_recording_change(left, frame), np.float32(costs.weights.replay) * shown * lifted
