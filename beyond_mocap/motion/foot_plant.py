@@ -20,9 +20,8 @@ from ..base.time_series import compute_running_maximum, hann_smooth, number_runs
 from ..base.vectors import arctan2, cross_product, dot_products, measure_lengths
 from . import quaternion
 from .contacts import measure_sole_height
-from .humanoid import Limb, identify_joints
+from .humanoid import Limb, identify_joints, pose_legs
 from .limb import solve_two_bone
-from .motion import compute_pose
 from .skeleton import Skeleton
 
 SMOOTH_WEIGHT, PULL_WEIGHT = 0.005, 3e-4
@@ -147,7 +146,7 @@ def plant_feet(
         InputError: if the skeleton has no legs.
     """
     body = identify_joints(skeleton)
-    places, world = compute_pose(skeleton, root, rotations)
+    places, world = pose_legs(skeleton, root, rotations)
     scale, spread = 30.0 / fps, int(round(_SPREAD_FRAMES * fps / 30.0))
     foot_moves = np.zeros((len(root), 2, 4)) if foot_moves is None else foot_moves
     feet = [build_foot(places, world, limb, heel_toe_contacts[:, side]) for side,

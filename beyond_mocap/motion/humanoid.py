@@ -134,6 +134,25 @@ def identify_joints(skeleton: Skeleton) -> Humanoid:
     return _identify_from_arrays(skeleton.names, skeleton.parents, skeleton.offsets.tobytes(), tips)
 
 
+def pose_legs(skeleton: Skeleton, root: np.ndarray, rotations: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Compute the pose of both legs, and of what carries them, down to the toes; other joints would cost as much again.
+
+    Args:
+        skeleton: J joints.
+        root: (T, 3) m, world.
+        rotations: (T, J, 4) local rotations.
+    Returns:
+        Positions (T, J, 3) m and rotations (T, J, 4), world; NaN for other joints.
+    Raises:
+        InputError: if the skeleton has no legs.
+    """
+    body = identify_joints(skeleton)
+    ends = (joint for limb in (body.left, body.right)
+            for joint in (limb.upper_leg, limb.lower_leg, limb.foot, limb.toe_or_foot))
+    legs = {joint for end in ends for joint in structure.list_ancestors(skeleton.parents, end)}
+    return compute_pose(skeleton, root, rotations, legs)
+
+
 def identify_posed_joints(motion: Motion) -> Humanoid:
     """Identify joints as `identify_joints` does, but tell left from right by recorded poses where names say nothing.
 

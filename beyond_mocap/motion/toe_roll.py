@@ -11,8 +11,7 @@ import numpy as np
 
 from ..base.vectors import unit_vectors
 from . import quaternion
-from .humanoid import Limb, identify_joints
-from .motion import compute_pose
+from .humanoid import Limb, identify_joints, pose_legs
 from .retargeting.neutral import NeutralStance
 
 DEEPEST = 0.005  # m below the ground that a tip may be: grass gives, and floors of recordings are uneven by as much
@@ -32,7 +31,7 @@ def roll_toes(neutral: NeutralStance, root: np.ndarray, rotations: np.ndarray) -
         (T, J, 4) local rotations; those that need no bend are unchanged.
     """
     skeleton = neutral.skeleton
-    places, world = compute_pose(skeleton, root, rotations)
+    places, world = pose_legs(skeleton, root, rotations)
     body, out = identify_joints(skeleton), rotations.copy()
     for limb in (body.left, body.right):
         joint = limb.toe_or_foot

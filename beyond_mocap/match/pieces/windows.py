@@ -19,7 +19,7 @@ from ...library.automatic_locomotion import apply_chosen_gaits
 from ...library.features import FPS
 from ...library.library import Library
 from ...library.missing_actions import add_actions
-from ...synthesis.plan import Plan
+from ...synthesis.plan import Plan, ResolvedPlan
 from ...synthesis.resolve_plan import resolve_plan
 from ...synthesis.search.distance import align_keys
 from ...synthesis.search.path_costs import PathCosts, balance_weights
@@ -98,8 +98,8 @@ def search_window(library: Library, unit: Unit, cancelled: Callable[[], bool] | 
 
     started = time.process_time()
     with threadpool_limits(limits=1):
-        library = build_search_library(library, unit.plan)
         plan = resolve_plan(unit.plan, library, are_touches_resolved=True)
+        library = build_search_library(library, plan)
         order = build_request(library, plan)
         search = PathSearch(library, order, balance_weights(unit.plan.alpha), cancelled=cancelled, hurry=hurry,
                             on_grid=True)
@@ -109,7 +109,7 @@ def search_window(library: Library, unit: Unit, cancelled: Callable[[], bool] | 
                  warnings=order.warnings, hurried_from=search.hurried_from)  # fmt: skip
 
 
-def build_search_library(library: Library, plan: Plan, used: Iterable[str] = ()) -> Library:
+def build_search_library(library: Library, plan: ResolvedPlan, used: Iterable[str] = ()) -> Library:
     """Build the library in which a window of a plan is searched.
 
     Args:
@@ -117,10 +117,11 @@ def build_search_library(library: Library, plan: Plan, used: Iterable[str] = ())
         plan: of the window.
         used: paths of clips that other windows show; synthetic actions among them are added.
     """
-    if not plan.made:
-        return apply_chosen_gaits(library, dict(plan.gaits))
-    actions = find_plan_actions(library, resolve_plan(plan, library, are_touches_resolved=True))
-    return apply_chosen_gaits(add_actions(library.with_synthetic_clips, [*actions, *used]), dict(plan.gaits))
+    gaits = dict(plan.requested.gaits)
+    if not plan.requested.made:
+        return apply_chosen_gaits(library, gaits)
+    actions = find_plan_actions(library, plan)
+    return apply_chosen_gaits(add_actions(library.with_synthetic_clips, [*actions, *used]), gaits)
 
 
 def save_piece(path: Path, piece: Piece) -> None:
@@ -227,11 +228,10 @@ def _find_joint(library: Library, plan: Plan, before: Piece, after: Piece) -> Jo
 
 def _compute_joint_costs(library: Library, plan: Plan, before: Piece, after: Piece, low: int, high: int) -> np.ndarray:
     """Compute the costs (high - low - 1,) of joints at frames low + 1 .. high."""
-    shown = [path for piece in (before, after) for path, _ in piece.edit.clips]
-    library = build_search_library(library, plan, shown)
-    begin = float(plan.track.times[0])
-    here = cut_plan(plan, begin + low / FPS, begin + (high - 1) / FPS)
-    order = build_request(library, resolve_plan(here, library, are_touches_resolved=True))
+    shown, begin = [path for piece in (before, after) for path, _ in piece.edit.clips], float(plan.track.times[0])
+    here = resolve_plan(cut_plan(plan, begin + low / FPS, begin + (high - 1) / FPS), library, are_touches_resolved=True)
+    library = build_search_library(library, here, shown)
+    order = build_request(library, here)
     left_edit, entered_edit = (to_library_edit(library, cut_named_edit(p.edit, low - p.first, high - p.first))
                                for p in (before, after))
     costs = PathCosts(library, order, balance_weights(plan.alpha))

@@ -8,7 +8,6 @@ in the middle of that box.
 from __future__ import annotations
 
 import heapq
-from collections import deque
 from collections.abc import Iterator
 from dataclasses import replace
 
@@ -148,48 +147,51 @@ def measure_rest_lengths(positions: np.ndarray, half_diagonal: float, least: int
         (T,) int.
     """
     out, limit = np.zeros(len(positions), dtype=int), (2.0 * half_diagonal) ** 2
-    values = {(axis, sign): (sign * positions[:, axis]).tolist() for axis in (0, 1) for sign in (1.0, -1.0)}
-    for first, end in find_runs(_may_rest(positions, limit, least)):
-        out[first:end] = _measure_run(values, range(first, end), limit)
+    places = np.ascontiguousarray(positions.T)
+    for first, end in find_runs(_may_rest(places, limit, least)):
+        # from the frame behind the run on no `least` frames fit, so no box of the run ends later than that
+        out[first:end] = _measure_run(places[:, first : end + least], end - first, limit)
     return out
 
 
-def _may_rest(positions: np.ndarray, limit: float, least: int) -> np.ndarray:
-    """Return (T,) bool: frames from which on so many frames fit the box with the squared diagonal `limit`, about."""
-    may, count = np.zeros(len(positions), bool), len(positions) - least + 1
+def _may_rest(places: np.ndarray, limit: float, least: int) -> np.ndarray:
+    """Return (T,) bool: frames from which on so many of places (2, T) fit the box with the squared diagonal `limit`."""
+    may, count = np.zeros(places.shape[1], bool), places.shape[1] - least + 1
     if count > 0:
-        windows = np.lib.stride_tricks.sliding_window_view(positions, least, axis=0)
-        size = windows.max(axis=2) - windows.min(axis=2)
-        may[:count] = np.sum(size**2, axis=1) <= limit * (1.0 + 1e-9)
+        *_, (size, low, high) = (one for one in _iter_extremes(places) if one[0] <= least)
+        last = slice(least - size, least - size + count)  # two stretches of a power of two that overlap
+        may[:count] = _fits(np.minimum(low[:, :count], low[:, last]), np.maximum(high[:, :count], high[:, last]), limit)
     return may
 
 
-def _measure_run(values: dict[tuple[int, float], list[float]], run: range, limit: float) -> list[int]:
-    """Measure how many frames fit the box from each frame of a run on.
+def _measure_run(places: np.ndarray, count: int, limit: float) -> np.ndarray:
+    """Measure how many frames fit the box from each of the first `count` frames of places (2, N) on.
 
-    Two ends move forwards, with the extremes between them in queues, so the time is linear.
+    A box grows with its frames, so each length is put together from powers of two, the largest first.
     """
-    count, out, end = len(values[0, 1.0]), [], run[0]
-    queues = [(axis, sign, deque()) for axis, sign in values]
-    for first in run:
-        while end < count and _fits(queues, values, end, limit):
-            for axis, sign, queue in queues:
-                row = values[axis, sign]
-                while queue and row[queue[-1]] <= row[end]:
-                    queue.pop()
-                queue.append(end)
-            end += 1
-        out.append(end - first)
-        for _, _, queue in queues:
-            if queue and queue[0] == first:
-                queue.popleft()
-    return out
+    at, length = np.arange(count), np.zeros(count, dtype=int)
+    lowest, highest = np.full((2, count), np.inf), np.full((2, count), -np.inf)
+    for size, low, high in reversed(list(_iter_extremes(places))):
+        ahead = at + length
+        inside = np.minimum(ahead, low.shape[1] - 1)
+        lower = np.minimum(lowest, low.take(inside, axis=1))
+        higher = np.maximum(highest, high.take(inside, axis=1))
+        fits = (ahead == inside) & _fits(lower, higher, limit)
+        length[fits] += size
+        lowest, highest = np.where(fits, lower, lowest), np.where(fits, higher, highest)
+    return length
 
 
-def _fits(queues, values, frame: int, limit: float) -> bool:
-    """Return whether the box with one more frame has at most the squared diagonal `limit`."""
-    size = [0.0, 0.0]
-    for axis, sign, queue in queues:
-        row = values[axis, sign]
-        size[axis] += max(row[queue[0]], row[frame]) if queue else row[frame]
-    return size[0] ** 2 + size[1] ** 2 <= limit
+def _iter_extremes(places: np.ndarray) -> Iterator[tuple[int, np.ndarray, np.ndarray]]:
+    """Yield each power of two, and the least and the greatest places (2, N) of so many frames from each one on."""
+    size, low, high = 1, places, places
+    while low.shape[1]:
+        yield size, low, high
+        low, high = np.minimum(low[:, :-size], low[:, size:]), np.maximum(high[:, :-size], high[:, size:])
+        size *= 2
+
+
+def _fits(low: np.ndarray, high: np.ndarray, limit: float) -> np.ndarray:
+    """Return (N,) bool: whether boxes from low (2, N) to high (2, N) have at most the squared diagonal `limit`."""
+    across, along = high - low
+    return across**2 + along**2 <= limit

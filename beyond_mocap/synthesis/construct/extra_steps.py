@@ -19,9 +19,8 @@ from ...base.easing import smoothstep
 from ...base.time_series import find_runs
 from ...base.vectors import arctan2, measure_lengths
 from ...motion import quaternion
-from ...motion.humanoid import Limb, identify_joints
+from ...motion.humanoid import Limb, identify_joints, pose_legs
 from ...motion.limb import solve_two_bone
-from ...motion.motion import compute_pose
 from ...motion.skeleton import Skeleton
 from ...motion.track import smooth_zero_phase_hann
 from .move_body_part import leg_chain
@@ -109,7 +108,7 @@ def add_steps(
     if len(root) < 2:
         return empty
     body = identify_joints(skeleton)
-    places, world = compute_pose(skeleton, root, rotations)
+    places, world = pose_legs(skeleton, root, rotations)
     heading = np.unwrap(quaternion.to_yaw(rotations[:, 0]))
     feet = [_Foot(limb, places, world, root=root, heading=heading, heel_toe_contacts=heel_toe_contacts[:, side])
             for side, limb in enumerate((body.left, body.right))]

@@ -15,8 +15,7 @@ from ...base.banded_least_squares import BandedLeastSquares
 from ...base.vectors import measure_lengths
 from ...motion import quaternion
 from ...motion.foot_plant import compute_contact_weights
-from ...motion.humanoid import identify_joints
-from ...motion.motion import compute_pose
+from ...motion.humanoid import identify_joints, pose_legs
 from ...motion.skeleton import Skeleton
 from ...motion.track import SampledTrack
 from ..search.source_frames import SourceMotion
@@ -48,7 +47,7 @@ def measure_foot_moves(skeleton: Skeleton, source: SourceMotion, fps: float) -> 
     """
     body, count = identify_joints(skeleton), len(source.clip)
     root = np.column_stack([np.zeros((count, 2)), source.height])
-    places, _ = compute_pose(skeleton, root, source.pose)
+    places, _ = pose_legs(skeleton, root, source.pose)
     joints = [joint for limb in (body.left, body.right) for joint in (limb.foot, limb.toe_or_foot)]
     points = places[:, joints, :2]
     firm = np.concatenate([compute_contact_weights(source.heel_toe_contacts[:, side]) for side in (0, 1)], axis=1)

@@ -15,8 +15,8 @@ from ...base.time_series import find_runs
 from ...base.vectors import arctan2, measure_lengths
 from ...motion import quaternion
 from ...motion.foot_plant import compute_contact_weights
-from ...motion.humanoid import identify_joints
-from ...motion.motion import compute_pose, compute_world_rotation
+from ...motion.humanoid import identify_joints, pose_legs
+from ...motion.motion import compute_world_rotation
 from ...motion.skeleton import Skeleton
 from ...motion.track import smooth_zero_phase_hann
 
@@ -311,7 +311,7 @@ def absorb_foot_slide(
         (T, 2) m by which the root moves, and (T,) rad by which the body turns about it.
     """
     body = identify_joints(skeleton)
-    places, _ = compute_pose(skeleton, root, rotations)
+    places, _ = pose_legs(skeleton, root, rotations)
     count, scale = len(root), 30.0 / fps
     squares = BandedLeastSquares(count, _UNKNOWNS)
     for side, limb in enumerate((body.left, body.right)):

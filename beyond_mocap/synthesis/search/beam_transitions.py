@@ -1,13 +1,15 @@
 """The transitions with the lowest cost from the states of one slot to the candidates of the next.
 
-A beam keeps a few dozen of the hundred thousand pairs of a state and a candidate. The change of pose, which bounds the
-cost of a pair from below, is computed for all of them at once; replayed stretches and playback rates only for pairs
-that may still be kept, and feet only for what remains of these. The result is the same as if every pair were evaluated.
+A beam keeps a few dozen of the many thousand pairs of a state and a candidate. The changes of pose and of recording,
+which bound the cost of a pair from below, are computed for all of them at once; replayed stretches and playback rates
+only for pairs that may still be kept, and feet only for what remains of these. The result is the same as if every pair
+were evaluated.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -48,23 +50,33 @@ class BeamTransitions:
         clip: (B,) clip that each state shows.
         end: (B,) library frame at which it ends.
         rate: (B,) playback rate.
-        seen: (B, buckets) bool, what it has shown lately.
+        recent: (B, M) buckets of frames that it has shown lately, -1 for none.
         young: (B,) what each state's last cut adds to the next one.
         base: cost of the cheapest state.
         above: (B,) float32, cost above the base.
     """
 
-    def __init__(self, costs, clip: np.ndarray, end: np.ndarray, rate: np.ndarray, cost: np.ndarray, seen: np.ndarray,
+    def __init__(self, costs, clip: np.ndarray, end: np.ndarray, rate: np.ndarray, cost: np.ndarray, recent: np.ndarray,
                  young: np.ndarray):
-        self.costs, self.clip, self.end, self.seen = costs, clip, end, seen
+        self.costs, self.clip, self.end, self.recent = costs, clip, end, recent
         self.rate = rate.astype(np.float32)
         self.young = young.astype(np.float32)
         self.base = float(cost.min())
         self.above = (cost - self.base).astype(np.float32)
 
+    @cached_property
+    def seen_buckets(self) -> np.ndarray:
+        """(B, buckets) bool: whether a state has lately shown a bucket of frames or its neighbours."""
+        # one bucket more on either side, cut off in the end; -1 (nothing shown) falls into the first of these
+        seen = np.zeros((len(self.recent), self.costs.index.bucket[-1] + 3), bool)
+        row = np.arange(len(self.recent))[:, None]
+        for shift in (0, 1, 2):
+            seen[row, np.maximum(self.recent + shift, 0)] = True
+        return seen[:, 1:-1]
+
     def compute_all(self, to: SlotCandidates) -> np.ndarray:
         """Compute the cost (B, K) of each transition, including what the candidate shows."""
-        least = self._compute_lower_bounds(to)
+        least, _ = self._compute_lower_bounds(to)
         _, cost = self._compute_full_costs(to, least, np.arange(least.size))
         return self.base + cost.reshape(least.shape).T.astype(float)
 
@@ -100,10 +112,10 @@ class BeamTransitions:
         if not len(near):
             return near, np.zeros(0), near
         to = to.select(near)
-        least = self._compute_lower_bounds(to)
+        least, changed = self._compute_lower_bounds(to)
         count = least.shape[1]
         # bound[k]: full cost of the pair with the lowest lower bound, so an upper bound of the candidate's cost
-        first = np.arange(len(least)) * count + np.argmin(least, axis=1)
+        first = np.arange(len(least)) * count + np.argmin(changed, axis=1)
         _, bound = self._compute_full_costs(to, least, first)
         free = to.piece < 0
         # no free candidate above the `kept_count`-th best of all upper bounds can be kept
@@ -112,7 +124,7 @@ class BeamTransitions:
             bound[free] = np.minimum(bound[free], np.partition(rivals, kept_count - 1)[kept_count - 1])
         # only pairs whose lower bound is within the upper bound are evaluated in full; flat index = candidate * B +
         # state
-        pairs, cost = self._compute_full_costs(to, least, np.flatnonzero(least <= bound[:, None]), bound)
+        pairs, cost = self._compute_full_costs(to, least, np.flatnonzero(changed <= bound[:, None]), bound)
         candidate = pairs // count
         # `pairs` is sorted by candidate, so each candidate is one run
         begins = np.flatnonzero(np.diff(candidate, prepend=-1))
@@ -120,8 +132,10 @@ class BeamTransitions:
         at = at[cost[at] <= bound[candidate[at]]]
         return near[candidate[at]], self.base + cost[at].astype(float), pairs[at] % count
 
-    def _compute_lower_bounds(self, to: SlotCandidates) -> np.ndarray:
-        """Compute the lower bounds (K, B) float32, above the base, of all transitions."""
+    def _compute_lower_bounds(self, to: SlotCandidates) -> tuple[np.ndarray, np.ndarray]:
+        """Compute lower bounds (K, B) float32, above the base, of all transitions: what each costs without repetition,
+        rates and feet, and the same with the change of recording.
+        """
         costs = self.costs
         end, start = costs.round_frame(self.end), costs.round_frame(to.start)
         lower_bound = costs.compute_pose_cost(start, end)
@@ -132,7 +146,9 @@ class BeamTransitions:
         # without a cut nothing but the costs of state and candidate remains
         candidate, state = self._find_uncut_pairs(to)
         lower_bound[candidate, state] = self.above[state] + cost[candidate]
-        return lower_bound
+        changed = lower_bound + costs.compute_recording_change(end, start[:, None])
+        changed[candidate, state] = lower_bound[candidate, state]
+        return lower_bound, changed
 
     def _compute_full_costs(
         self, to: SlotCandidates, lower_bound: np.ndarray, pairs: np.ndarray, most: np.ndarray | None = None
@@ -171,7 +187,7 @@ class BeamTransitions:
         """Compute what pairs (P,) cost for another recording, and (P,) for what has been shown lately."""
         costs, (frame, left) = self.costs, self._round_frames(to, candidate, state)
         bucket = costs.index.bucket.take(frame)
-        shown = self.seen.ravel().take(state * self.seen.shape[1] + bucket)
+        shown = self.seen_buckets.ravel().take(state * self.seen_buckets.shape[1] + bucket)
         # a stand may be shown again: nothing in it is recognized
         lifted = np.maximum(costs.index.lifted.take(frame), np.float32(0.1))
         return costs.compute_recording_change(left, frame), np.float32(costs.weights.replay) * shown * lifted

@@ -22,15 +22,7 @@ from .lean_cost import compute_lean_cost, compute_wanted_lean
 from .preferences import UsedStretch, compute_reuse_cost
 from .request import SearchRequest
 
-# Finding the cheapest of many pairs of a playback rate and a library frame without evaluating all.
-#
-# Pairs are in order of their speeds, and each costs at least the speed that it misses. Of those near enough to the
-# requested speed, the terms that cost little to compute give a lower bound. The pairs with the lowest bounds are
-# evaluated first; their costs leave few others to evaluate.
-
-
-_EVALUATED_FIRST = 2  # times as many pairs as are returned
-_ROUNDING = 1e-3  # m/s or a share of a cost, for float32
+_ROUNDING = 1e-3  # m/s, for float32
 
 _CONTINUITY = ("switch", "other", "young", "pose", "rate_change")
 FREE_SPEED, FREE_TURN, FREE_ASIDE = (0.05, 0.06), np.radians(5.0), np.float32(np.radians(12.0))
@@ -41,14 +33,15 @@ YOUNG_SLOTS = 7  # slots after a cut before which another one costs more: 1.9 s,
 
 
 def find_cheapest(
-    cost_of: Callable[[np.ndarray], np.ndarray], bound_of: Callable[[slice], np.ndarray], speeds: np.ndarray,
-    speed: float, weight: float, considered: int, count: int, most: float = np.inf,
+    cost_of: Callable[[slice], np.ndarray], speeds: np.ndarray, speed: float, weight: float, *, considered: int,
+    count: int, most: float = np.inf,
 ) -> tuple[np.ndarray, np.ndarray]:
     """Find the `count` cheapest of the `considered` pairs nearest to a speed.
 
+    All of them are evaluated: they lie side by side in memory, so that costs less than to pick those worth evaluating.
+
     Args:
-        cost_of: returns the costs (n,) of pairs by number (n,).
-        bound_of: returns what each pair of a slice costs at least (n,), up to rounding.
+        cost_of: returns the costs (n,) of a slice of the pairs.
         speeds: (K,) m/s of the pairs, ascending.
         speed: m/s that is requested.
         weight: least cost of a metre per second of missed speed.
@@ -63,34 +56,11 @@ def find_cheapest(
         reach = most / weight + FREE_SPEED[0] + FREE_SPEED[1] * speed + _ROUNDING
         low, high = _locate_speeds(speeds, [speed - reach, speed + reach])
         near = slice(max(int(low), near.start), max(min(int(high), near.stop), near.start))
-    bound = bound_of(near)
-    within = np.flatnonzero(bound <= most + _ROUNDING)
-    numbers = near.start + within
-    if len(within) > _EVALUATED_FIRST * count:
-        numbers, cost = _evaluate_nearest(cost_of, numbers, bound.take(within), count)
-    else:
-        cost = cost_of(numbers)
-    best = np.argpartition(cost, count)[:count] if len(cost) > count else np.arange(len(cost))
-    best = np.sort(best[cost[best] <= most])
-    return numbers[best], cost[best]
-
-
-def _evaluate_nearest(cost_of, numbers: np.ndarray, bound: np.ndarray, count: int) -> tuple[np.ndarray, np.ndarray]:
-    """Evaluate the pairs (n,) with the lowest bounds (n,), then all others that may be among the `count` cheapest.
-
-    Returns:
-        Numbers (k,) of those that may be, and their costs (k,).
-    """
-    is_first = bound <= np.partition(bound, _EVALUATED_FIRST * count)[_EVALUATED_FIRST * count]
-    first = np.flatnonzero(is_first)
-    first_cost = cost_of(numbers.take(first))
-    limit = float(np.partition(first_cost, count - 1)[count - 1])
-    may_be = bound <= limit + _ROUNDING * max(1.0, limit)
-    others = np.flatnonzero(may_be & ~is_first)
-    cost = np.empty(len(numbers), first_cost.dtype)
-    cost[first], cost[others] = first_cost, cost_of(numbers.take(others))
-    within = np.flatnonzero(may_be)
-    return numbers.take(within), cost.take(within)
+    cost = cost_of(near)
+    within = np.flatnonzero(cost <= most)
+    if len(within) > count:
+        within = np.sort(within[np.argpartition(cost[within], count)[:count]])
+    return near.start + within, cost[within]
 
 
 def _nearest_slice(speeds: np.ndarray, speed: float, count: int) -> slice:
@@ -309,15 +279,12 @@ class PathCosts:
         pairs, fixed_cost, (speed, _) = self.index.pairs_by_speed(avoid), self._fixed_costs(words,
                 is_asked, avoid), self.requested_motion(first, end)
 
-        def cost_of(part: np.ndarray) -> np.ndarray:
+        def cost_of(part: slice) -> np.ndarray:
             part_pairs = pairs.select_pairs(part)
             return _sum_terms(self._iter_motion_costs(first, end, part_pairs)) + fixed_cost.take(part_pairs.frame)
 
-        def bound_of(part: slice) -> np.ndarray:
-            return self._bound_motion_costs(first, end, pairs.select_pairs(part), fixed_cost)
-
-        best, cost = find_cheapest(cost_of, bound_of, pairs.speed, speed, weight=self.weights.speed,
-                                   considered=considered, count=count, most=most)
+        best, cost = find_cheapest(cost_of, pairs.speed, speed, self.weights.speed, considered=considered, count=count,
+                                   most=most)
         return pairs.number[best], pairs.frame[best], cost
 
     def list_asked_labels(self, first: int, end: int) -> frozenset[str]:
@@ -332,7 +299,10 @@ class PathCosts:
 
     def _iter_motion_costs(self, first: int, end: int, pairs: RatePairs) -> Iterator[Term]:
         """Generate the terms that depend on the track: motion of pairs (K,), playback rate, and the player's lag."""
-        yield from self._iter_pair_terms(first, end, pairs)
+        # pairs hold the turn over SLOT frames, this slot may be longer or shorter
+        turn = pairs.turn * np.float32((end - first) / SLOT)
+        yield from self._iter_motion_terms(first, end, pairs.speed, turn=turn, offset=pairs.offset,
+                                           long_stance=pairs.long_stance, lifted=pairs.lifted)
         middle = (first + end) // 2
         if self.lean_counts[middle] > 0.0:
             weight = np.float32(self.weights.lean * self.lean_counts[middle])
@@ -340,28 +310,6 @@ class PathCosts:
         if self.known is not None and self.known.counts[first]:
             away = self.known.measure_distance(first, self.frames.features[pairs.frame])
             yield "known", np.float32(self.weights.known) * away.astype(np.float32)
-        yield from self._iter_rate_terms(first, pairs)
-
-    def _bound_motion_costs(self, first: int, end: int, pairs: RatePairs, fixed_cost: np.ndarray) -> np.ndarray:
-        """Compute what pairs (K,) cost at least: the terms that cost little to compute; fixed_cost: (N,) of frames."""
-        total = fixed_cost.take(pairs.frame)
-        for name, values in self._iter_pair_terms(first, end, pairs):
-            total += values
-            if name == "turn":  # the terms behind it take longest, and are not computed
-                break
-        for _, values in self._iter_rate_terms(first, pairs):
-            total += values
-        return total
-
-    def _iter_pair_terms(self, first: int, end: int, pairs: RatePairs) -> Iterator[Term]:
-        """Generate the terms of speed, turning and facing of pairs (K,)."""
-        # pairs hold the turn over SLOT frames, this slot may be longer or shorter
-        turn = pairs.turn * np.float32((end - first) / SLOT)
-        yield from self._iter_motion_terms(first, end, pairs.speed, turn=turn, offset=pairs.offset,
-                                           long_stance=pairs.long_stance, lifted=pairs.lifted)
-
-    def _iter_rate_terms(self, first: int, pairs: RatePairs) -> Iterator[Term]:
-        """Generate the terms of the playback rate and the player's lag of pairs (K,)."""
         yield "rate", self._rate_cost.take(pairs.number)
         if self.request.lag_preference is not None:
             yield "variety", self.request.lag_preference.compute_cost(first, pairs.frame)

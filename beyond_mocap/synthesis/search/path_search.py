@@ -43,8 +43,8 @@ class SearchWidth:
         considered: pairs nearest to the requested speed among which these are the cheapest.
     """
 
-    beam_width: int = 64
-    candidates: int = 1500
+    beam_width: int = 80
+    candidates: int = 750
     considered: int = 30000
 
 
@@ -343,18 +343,8 @@ class PathSearch:
 
     def build_transitions(self, before: BeamStates, free: np.ndarray, ends: np.ndarray) -> BeamTransitions:
         """Build the transitions from the states `free` (B,), which end at library frames `ends` (B,)."""
-        seen = self._mark_seen(before.recent[free])
         return BeamTransitions(self.costs, before.clip[free], ends, rate=before.rate[free], cost=before.cost[free],
-                               seen=seen, young=self.costs.compute_young_cut_cost(before.age[free]))
-
-    def _mark_seen(self, recent: np.ndarray) -> np.ndarray:
-        """Return (B, buckets) whether a state has lately shown a bucket of frames or its neighbours; recent (B, M)."""
-        # one bucket more on either side, cut off in the end; -1 (nothing shown) falls into the first of these
-        seen = np.zeros((len(recent), self.index.bucket[-1] + 3), bool)
-        row = np.arange(len(recent))[:, None]
-        for shift in (0, 1, 2):
-            seen[row, np.maximum(recent + shift, 0)] = True
-        return seen[:, 1:-1]
+                               recent=before.recent[free], young=self.costs.compute_young_cut_cost(before.age[free]))
 
     def _continue_pieces(self, slot: int, before: BeamStates, ends: np.ndarray, bound: np.ndarray):
         """Continue the pieces of key moments."""

@@ -19,9 +19,9 @@ def ways(library, order):
     piece = np.where(np.arange(FRAMES) % 50 == 7, 3, -1)
     rates = random.choice([0.875, 1.0, 1.125], (2, FRAMES))
     offered = SlotCandidates(clips[start.astype(int)], start, rates[0], random.uniform(0.0, 1.0, FRAMES), piece)
-    seen = random.uniform(size=(STATES, int(costs.index.bucket[-1]) + 1)) < 0.2
+    recent = random.integers(-1, int(costs.index.bucket[-1]) + 1, (STATES, 15))
     cost = 1000.0 + random.uniform(0.0, 0.5, STATES)
-    return BeamTransitions(costs, clips[end.astype(int)], end, rates[1, :STATES], cost, seen,
+    return BeamTransitions(costs, clips[end.astype(int)], end, rates[1, :STATES], cost, recent,
                            random.uniform(0.0, 0.5, STATES)), offered
 
 
@@ -31,7 +31,7 @@ def test_every_way_costs_its_cut_and_what_follows(ways):
     costs, start = found.costs, offered.start.astype(int)
     cut = sum(values for _, values in costs.iter_cut_terms(found.end, start))
     # a stand may be shown again nearly for nothing
-    shown = found.seen[:, costs.index.bucket[start]]
+    shown = found.seen_buckets[:, costs.index.bucket[start]]
     replay = costs.weights.replay * shown * np.maximum(costs.index.lifted[start], 0.1)
     cut = np.where((found.end[:, None] == start) & (found.clip[:, None] == offered.clip), 0.0,
                    cut + replay + found.young[:, None])
