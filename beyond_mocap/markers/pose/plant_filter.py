@@ -38,8 +38,8 @@ easing in and out, and metres from the held place beyond which a point is not in
 # Ankle and toe in a stance: m/s up to which they stand (a heel that rises over standing toes reaches 1 m/s in sprints),
 # and metres that they may lie off their held place (toe markers of standing feet travel 40 mm in hard pitches).
 _STANCE_LIMITS = ((0.3, 0.012), (0.6, 0.025))
-# Share of a toe's speed in the swing up to which it stands: 0.9 m/s at 9 m/s, where the limit above lets it slide in two
-# fifths of the 0.11 s in which the leg carries load. More would count the landing as a part of the place to hold.
+# Share of a toe's speed in the swing up to which it stands: 0.9 m/s at 9 m/s, where the limit above lets it slide in
+# two fifths of the 0.11 s in which the leg carries load. More would count the landing as a part of the place to hold.
 _SWING_SHARE, _SWING_PERCENTILE = 0.05, 95.0
 _MIN_STANCE_SECONDS = 0.03  # s, a third of a sprinter's stance
 _SPEED_SECONDS = 1.0 / 60.0  # s to either side, over which a point's speed is measured

@@ -59,7 +59,7 @@ def test_networks_alone_follow_what_they_never_saw(action):
         _, made = generate_example(action, seed, number)
         example = build_example("kept back", "", made.motion, made.limb, made.release, made.impact, made.velocity, 30.0)
         wanted = scale_description(build_description(example), model.stature / example.stature)
-        networks = Options(pose_iterations=0, ik=False, blend=False, limits=False)
+        networks = Options(pose_iterations=0, ik=False, blend=False, limits=False, gaze=0.0)
         alone.append(measure_deviations(generate_motion(model, wanted, options=networks).effectors, wanted.effectors))
         whole.append(measure_deviations(generate_motion(model, wanted).effectors, wanted.effectors))
     assert np.mean(alone, axis=0).max() <= 0.03
