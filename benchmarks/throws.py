@@ -15,7 +15,7 @@ from beyond_mocap.throws.network_npz import read_shipped_model
 from beyond_mocap.throws.networks.chains import find_chains
 from beyond_mocap.throws.networks.example import build_description, build_example
 from beyond_mocap.throws.networks.features import count_widths
-from beyond_mocap.throws.networks.generate import Options, generate_motion
+from beyond_mocap.throws.networks.generate import generate_motion
 from beyond_mocap.throws.networks.model import ModelSettings, ThrowModel
 from beyond_mocap.throws.networks.network import PhaseNetwork
 from beyond_mocap.throws.networks.phases import weigh_points_at
@@ -152,8 +152,8 @@ def build_throw_rows(model: ThrowModel, name: str) -> list[str]:
     example = build_example("timed", "", movement.motion, "right_hand", movement.release, (18.0, 1.0, 1.0), None,
                             model.settings.fps, (begin, begin + 3.0))  # fmt: skip
     description, rows = build_description(example), []
-    for what, options in (("nothing corrected", Options(pose_iterations=0, ik=False, blend=False, limits=False)),
-                          ("start pose, inverse kinematics, limits", Options())):  # fmt: skip
+    for what, options in (("nothing corrected", RAW_OPTIONS),
+                          ("start pose, inverse kinematics, limits", FULL_OPTIONS)):  # fmt: skip
         generate_motion(model, description, options=options)
         seconds, result = effort.measure_seconds(lambda options=options: generate_motion(model, description,
                 options=options), _RUNS)

@@ -19,11 +19,12 @@ from beyond_mocap.cli.outputs import ProgressReporter, check_outputs
 from beyond_mocap.cli.throwing import select_subjects
 from beyond_mocap.files.bvh import bvh
 from beyond_mocap.motion.skeleton import Skeleton
+from beyond_mocap.throws.evaluate_throws import RAW_OPTIONS
 from beyond_mocap.throws.network_npz import write_model
 from beyond_mocap.throws.networks.chains import Chains, find_chains
 from beyond_mocap.throws.networks.example import Example, build_description
 from beyond_mocap.throws.networks.features import count_widths
-from beyond_mocap.throws.networks.generate import Options, generate_motion
+from beyond_mocap.throws.networks.generate import generate_motion
 from beyond_mocap.throws.networks.limits import JointLimits, estimate_joint_limits
 from beyond_mocap.throws.networks.model import ThrowModel
 from beyond_mocap.throws.networks.training_set import (
@@ -40,7 +41,6 @@ from .hierarchy import TrainingProblem
 from .networks import RIDGES, to_phase_network
 from .recordings import build_recordings
 
-_RAW = Options(pose_iterations=0, ik=False, blend=False, limits=False)
 _HOLD_OUT_STEP = 4  # every fourth movement of a single subject is held out
 _MAX_TESTED = 8  # movements that are generated for each ridge
 _TOLERANCE = 1.05  # errors up to this multiple of the lowest count as equal; the largest ridge of those is the safest
@@ -277,7 +277,7 @@ def _measure_error(model: ThrowModel, example: Example) -> float:
     """Measure the mean error (m) of the networks over frames, hands and feet; infinite if the body is invalid."""
     try:
         with np.errstate(all="ignore"):
-            generated = generate_motion(model, build_description(example), options=_RAW)
+            generated = generate_motion(model, build_description(example), options=RAW_OPTIONS)
     except InputError:
         return np.inf
     return float(np.mean(generated.network_deviation))

@@ -5,13 +5,14 @@ it (`ball_release`). Both follow from the motion alone, between frames too (`sam
 flight needs another motion. Changes that people make when they aim come first and cost little: the body rotates, the
 ball leaves a few milliseconds earlier or later, the whole movement is a little slower or faster. The rest is a small
 smooth shift of the wrist or ankle about that instant (`limb_shift`), which the arm or leg follows by inverse
-kinematics. Among all changes with which the ball hits, with drag, lift and gravity as in `ball.physics`, the one of
-lowest cost is found by Newton's method with Lagrange multipliers; the release is searched on a grid.
+kinematics. Where an ankle would move far, the foot is pointed first (`foot_tilt`). Among all changes with which the
+ball hits, with drag, lift and gravity as in `ball.physics`, the one of lowest cost is found by Newton's method with
+Lagrange multipliers; the release is searched on a grid.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -21,10 +22,10 @@ from ..base.errors import InputError
 from ..motion import quaternion
 from ..motion.motion import Motion, forward_kinematics, place_motion, sample_frames_cubic
 from .ball_release import AtFoot, InHand, sample_points, sample_points_and_velocities
+from .corrected_motion import CorrectedMotion, Freedom
+from .foot_tilt import TILTS, point_foot
 from .limb_shift import LimitRotations, ShiftedLimb, build_exact_response, solve_shifts
 
-FINE_MISS, SMALL_DISPLACEMENT = 0.02, 0.05
-"""m of miss and of wrist displacement up to which the pace is not changed."""
 HIT_TOLERANCE = 1e-3
 """m from the target at which the correction ends."""
 # Changes that cost as much as a metre of wrist displacement: radians of rotation, share of pace, seconds of release,
@@ -37,70 +38,6 @@ _MIN_STEP = 0.05  # share of a Newton step below which the search ends
 _LARGE_MISS, _LARGE_MISS_ROUNDS = 1.0, 4
 _STEP = 1e-3  # frames, metres, m/s and radians, steps of numerical derivatives
 _MIN_FRAMES = 3  # frames that a motion needs before and after the release
-
-
-@dataclass(frozen=True)
-class Freedom:
-    """What may be changed besides wrist or ankle, each to either side.
-
-    Attributes:
-        rotation: rad, rotation about the start.
-        pace: share of the playback rate.
-        release: s.
-        start_position: the body may begin at another position, so that its foot reaches a ball at a given position.
-    """
-
-    rotation: float = np.radians(15.0)
-    pace: float = 0.15
-    release: float = 0.02
-    start_position: bool = True
-
-    @classmethod
-    def build_anchored(cls) -> Freedom:
-        """Return the freedom of a motion that is joined to others: it keeps its position, heading and frames."""
-        return cls(0.0, 0.0, 0.02, False)
-
-
-@dataclass(frozen=True, eq=False, kw_only=True)
-class CorrectedMotion:
-    """A motion whose ball hits.
-
-    Attributes:
-        motion: the motion.
-        frame: fractional frame at which the ball leaves.
-        position: (3,) m of the ball then.
-        velocity: (3,) m/s of the ball then.
-        spin: (3,) rad/s of the ball then.
-        seconds: s until it is at the target.
-        miss: m between ball and target then.
-        displacement: m, largest displacement of the wrist or ankle.
-        shift: (T, 3) m, displacement of the wrist or ankle in each frame.
-        rotation: rad by which the body was rotated about its start.
-        pace: factor of the playback rate.
-        release_delay: s by which the release was moved, at that pace.
-        start_offset: m by which the start was moved.
-        gap: m between foot and ball, 0 for throws.
-    """
-
-    motion: Motion
-    frame: float
-    position: np.ndarray
-    velocity: np.ndarray
-    spin: np.ndarray
-    seconds: float
-    miss: float
-    displacement: float
-    shift: np.ndarray
-    rotation: float
-    pace: float
-    release_delay: float
-    start_offset: float = 0.0
-    gap: float = 0.0
-
-    @property
-    def total_miss(self) -> float:
-        """Total miss (m): at the target, and between foot and ball."""
-        return self.miss + self.gap
 
 
 def correct_motion(
@@ -128,10 +65,17 @@ def correct_motion(
     if not _MIN_FRAMES <= frame <= len(motion) - 1 - _MIN_FRAMES:
         raise InputError("release", f"frame {frame:.1f} of {len(motion)}",
                          f"at least {_MIN_FRAMES} frames before and after")
-    return _Search(
-        motion, part, float(frame), target=target, ball=ball, freedom=freedom, speed=speed,
-        limit_rotations=limit_rotations,
-    ).run()
+
+    def correct(motion: Motion) -> CorrectedMotion:
+        return _Search(motion, part, float(frame), target=target, ball=ball, freedom=freedom, speed=speed,
+                       limit_rotations=limit_rotations).run()
+
+    tried = [correct(motion)]
+    for tilt in TILTS:
+        if tried[-1].is_small or not isinstance(part, AtFoot):
+            break
+        tried.append(replace(correct(point_foot(motion, part, frame, tilt, limit_rotations)), tilt=float(tilt)))
+    return min(tried, key=lambda found: found.cost)
 
 
 @dataclass(frozen=True, eq=False)
@@ -181,11 +125,11 @@ class _Search:
             start = self.part.find_rest_position(self.motion, self.frame, self.target, self.ball)
             for change, source in self._list_candidates(start)[:_MAX_TRIED]:
                 tried.append(self._solve_hit(change, source, start))
-                if tried[-1].total_miss < FINE_MISS and tried[-1].displacement < SMALL_DISPLACEMENT:
+                if tried[-1].is_small:
                     return tried[-1]
             if not self.freedom.pace:
                 break
-        return min(tried, key=lambda found: found.total_miss + 0.2 * found.displacement)
+        return min(tried, key=lambda found: found.cost)
 
     def _list_candidates(self, start) -> list[tuple[_Change, float]]:
         """List changes of low cost with their releases, the one with the smallest remaining displacement first.

@@ -12,6 +12,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass, field
+from functools import lru_cache
 
 import numpy as np
 
@@ -21,23 +22,25 @@ from ..base.errors import InputError, UserCancelledError
 from ..evaluation.paired_tests import find_inliers
 from ..files.tables import to_plain
 from ..motion import quaternion
-from ..motion.humanoid import identify_joints
+from ..motion.humanoid import compute_heading, identify_joints
 from ..motion.motion import Motion, compute_pose, forward_kinematics, sample_frames_cubic
 from ..synthesis.quality.movement import compute_jerk
 from ..synthetic.throws import find_grip
 from .networks.chains import EFFECTORS, find_chains
 from .networks.description import scale_description
 from .networks.example import Example, build_description
+from .networks.gaze import average_rotations
 from .networks.generate import GeneratedMotion, Options, generate_motion
 from .networks.kinematics import to_matrices
 from .networks.limits import JointLimits
 from .networks.model import ThrowModel
 
-RAW_OPTIONS = Options(pose_iterations=0, ik=False, blend=False, limits=False)
+RAW_OPTIONS = Options(pose_iterations=0, ik=False, blend=False, limits=False, gaze=0.0)
 """Options of tables 8.1 to 8.4: the networks' output is fed back without corrections."""
 FULL_OPTIONS = Options()
 """Options of tables 8.5 to 8.8: pose iterations, inverse kinematics, the blend of section 7.7.3."""
-_OTHERS = ("far_impact", "own_impact", "head", "head_share", "jerk", "bones", "beyond", "seconds", "duration")
+_OTHERS = ("far_impact", "own_impact", "facing", "head", "head_mean", "head_share", "jerk", "bones", "beyond",
+           "seconds", "duration")
 _LIMIT_TOLERANCE = 1e-3  # radians, tolerance of the joint limits
 MAX_VALID_DEVIATION = 0.5
 """m: a motion with a hand or foot further off on average has failed and is excluded from all means."""
@@ -62,7 +65,10 @@ class ThrowFigures:
             8.2), or on the ground before; NaN without a hand that throws.
         far_impact: m, the same at the distance of the target.
         own_impact: m there, from the requested ball to the target: the effect of scaling on the flight.
+        facing: degrees between the headings of the bodies.
         head: degrees between the heads' rotations.
+        head_mean: degrees, as head, if the generated body held its head as the examples do on average; a head that is
+            further off says less than the trunk alone.
         head_share: rotation of the head relative to the chest, divided by the example's.
         jerk: its 99th percentile, divided by the example's.
         bones: m, largest change of a bone's length.
@@ -79,7 +85,9 @@ class ThrowFigures:
     impact: float
     far_impact: float
     own_impact: float
+    facing: float
     head: float
+    head_mean: float
     head_share: float
     jerk: float
     bones: float
@@ -186,10 +194,11 @@ def _measure_example(model: ThrowModel, example: Example, options: Options, rati
         name=example.name, subject=example.subject, deviation=measure_deviations(effectors, description.effectors),
         network=measure_deviations(generated.predicted, description.effectors),
         body=measure_deviations(generated.effectors, description.effectors), impact=near, far_impact=far,
-        own_impact=own, head=head, head_share=share, jerk=_measure_jerk(generated.motion)
-        / max(ratio * _measure_jerk(example.motion), 1e-9), bones=_measure_bones(model, generated),
-        beyond=_measure_limit_excess(model, generated.motion), seconds=generated.seconds,
-        duration=example.motion.duration,
+        own_impact=own, facing=_measure_facing(generated.motion, example.motion), head=head,
+        head_mean=_measure_mean_head(model, generated.motion, example.motion), head_share=share,
+        jerk=_measure_jerk(generated.motion) / max(ratio * _measure_jerk(example.motion), 1e-9),
+        bones=_measure_bones(model, generated), beyond=_measure_limit_excess(model, generated.motion),
+        seconds=generated.seconds, duration=example.motion.duration,
     )  # fmt: skip
 
 
@@ -239,6 +248,30 @@ def _measure_head(motion: Motion, truth: Motion) -> tuple[float, float]:
         relative_rotations.append(_compute_angles(own[:-1], own[1:]).sum())
     return float(np.degrees(_compute_angles(*head_rotations).mean())), float(relative_rotations[0]
                                                                              / max(relative_rotations[1], 1e-9))
+
+
+def _measure_facing(motion: Motion, truth: Motion) -> float:
+    """Measure the mean angle in degrees between the headings of two motions."""
+    return float(np.degrees(np.abs(quaternion.wrap_angle(compute_heading(motion) - compute_heading(truth))).mean()))
+
+
+def _measure_mean_head(model: ThrowModel, motion: Motion, truth: Motion) -> float:
+    """Measure how far (degrees) the true head is from the examples' mean head on a body; NaN without a head."""
+    head = identify_joints(truth.skeleton).head
+    if head is None or not model.examples or identify_joints(model.skeleton).head is None:
+        return np.nan
+    held = quaternion.multiply(quaternion.from_up_angle(compute_heading(motion)), _average_head(model))
+    return float(np.degrees(_compute_angles(held, forward_kinematics(truth)[1][:, head]).mean()))
+
+
+@lru_cache(maxsize=8)
+def _average_head(model: ThrowModel) -> np.ndarray:
+    """Average the heads of a model's examples relative to their headings: a quaternion (1, 4)."""
+    head = identify_joints(model.skeleton).head
+    relative = np.concatenate([quaternion.to_matrix(quaternion.multiply(
+        quaternion.from_up_angle(-compute_heading(example.motion)), forward_kinematics(example.motion)[1][:, head]))
+        for example in model.examples])
+    return average_rotations(relative, np.ones((1, len(relative))))
 
 
 def _compute_angles(a: np.ndarray, b: np.ndarray) -> np.ndarray:

@@ -26,7 +26,8 @@ from ..motion.retargeting.retarget import Retargeter
 from ..motion.skeleton import Skeleton
 from ..synthetic.throws import FASTEST as FASTEST_HAND
 from .ball_release import AtFoot, InHand, compute_launch
-from .correction import FINE_MISS, SMALL_DISPLACEMENT, CorrectedMotion, correct_motion
+from .corrected_motion import CorrectedMotion
+from .correction import correct_motion
 from .example_launches import compute_launches
 from .networks.chains import EFFECTORS
 from .networks.limits import LimbLimits
@@ -85,9 +86,9 @@ def throw_at(
         placed = work.generate_placed(plan)
         report_progress(0.1 + 0.8 * (number + 0.6) / _MAX_PLANS, "Correcting")
         correction = work.correct_motion(placed)
-        if best is None or _compute_cost(correction) < _compute_cost(best[1]):
+        if best is None or correction.cost < best[1].cost:
             best = placed, correction
-        if correction.total_miss < FINE_MISS and correction.displacement < SMALL_DISPLACEMENT:
+        if correction.is_small:
             break
     return work.build_result(*best)
 
@@ -109,10 +110,6 @@ class _PlacedMotion:
     release: float
     network_deviation: float
     limits: LimbLimits
-
-
-def _compute_cost(correction: CorrectedMotion) -> float:
-    return correction.total_miss + 0.2 * correction.displacement
 
 
 class _ThrowGenerator:
@@ -367,7 +364,8 @@ class _ThrowGenerator:
                                                                    correction.seconds + _FOLLOW_THROUGH), launch=launch,
             flight=flight, target=self.target, impact=impact, displacement=correction.displacement,
             shift=correction.shift, rotation=correction.rotation, pace=correction.pace,
-            release_delay=correction.release_delay, start_offset=correction.start_offset, min_speed=self.arcs.slowest,
+            release_delay=correction.release_delay, foot_tilt=correction.tilt,
+            start_offset=correction.start_offset, min_speed=self.arcs.slowest,
             requested_speed=self.request.speed or float(np.linalg.norm(correction.velocity)),
             network_deviation=placed.network_deviation, limit_excess=beyond,
             examples=tuple(zip(placed.plan.names, map(float, placed.plan.weights))), warnings=tuple(self.warnings),

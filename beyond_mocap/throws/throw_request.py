@@ -15,7 +15,7 @@ from ..motion.skeleton import Skeleton
 from ..motion.track.ball_path import BallPath
 from ..synthetic.throws import find_grip
 from .ball_release import AtFoot, InHand, sample_points
-from .correction import Freedom
+from .corrected_motion import Freedom
 from .networks.chains import EFFECTORS
 
 KINDS: dict[str, Ball] = {**BALLS, **THROWN_BALLS}
@@ -104,6 +104,7 @@ class ThrowResult:
         rotation: rad by which the body was rotated (see `CorrectedMotion`).
         pace: playback rate that was applied.
         release_delay: s by which the release was moved.
+        foot_tilt: rad by which a kicking foot was pointed.
         start_offset: m by which the start was moved.
         min_speed: m/s, lowest speed at which a ball reaches the target.
         requested_speed: m/s requested, or the actual speed without a request.
@@ -130,6 +131,7 @@ class ThrowResult:
     rotation: float
     pace: float
     release_delay: float
+    foot_tilt: float
     start_offset: float
     min_speed: float
     requested_speed: float
@@ -166,6 +168,7 @@ class ThrowResult:
             "impact_m": self.impact, "impact_error_m": self.impact_error, "moved_m": self.displacement,
             "corrected_frames": [int(frames[0]), int(frames[-1])] if len(frames) else [],
             "turned_deg": np.degrees(self.rotation), "pace": self.pace, "release_later_s": self.release_delay,
+            "foot_pointed_deg": np.degrees(self.foot_tilt),
             "begins_elsewhere_m": self.start_offset,
             "raw_deviation_m": self.network_deviation, "joint_beyond_deg": np.degrees(self.limit_excess),
             "examples": {name: weight for name, weight in self.examples}, "warnings": list(self.warnings),

@@ -38,7 +38,9 @@ _FIGURES = (
     ("own_impact", 1.0, 2, "m", "from the impact of the requested ball to its target (effect of scaling by height on "
      "the flight)"),
     ("impacts_culled", 1.0, 0, "", "impacts excluded from these means, beyond three standard deviations"),
+    ("facing", 1.0, 1, "°", "between the body's heading and the recorded one"),
     ("head", 1.0, 1, "°", "between the head's rotation and the recorded one"),
+    ("head_mean", 1.0, 1, "°", "the same for the mean head of the examples on the generated body"),
     ("head_share", 1.0, 2, "×", "rotation of the head relative to the chest, divided by the recording's"),
     ("jerk", 1.0, 2, "×", "jerk (99th percentile), divided by the recording's"),
     ("bones", 100.0, 2, "cm", "largest change of a bone's length"),

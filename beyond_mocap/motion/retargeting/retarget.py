@@ -41,8 +41,9 @@ from .anatomy import Anatomy, compute_spine_shares, estimate_anatomy, list_head_
 _SOFT_DISTANCE = 0.01  # m below full length from where a limb eases
 _LIMB_PARTS = ("shoulder", "upper_arm", "lower_arm", "hand", "upper_leg", "lower_leg", "foot", "toe")
 _CARRIERS = {"upper_arm": "shoulder", "lower_arm": "upper_arm", "hand": "lower_arm", "toe": "foot"}
-# two rigs are the same, axes and all, when their bones point the same way in their rest pose within this angle
-_SAME_RIG = np.cos(np.radians(12.0))
+# two rigs are the same, axes and all, when nearly all of their bones' length points the same way in their rest pose
+# within this angle; suits that measure each wearer have a neck or a spine joint elsewhere
+_SAME_RIG, _SAME_SHARE = np.cos(np.radians(12.0)), 0.9
 _TRUNK_ROUNDS = 3  # rounds of rotating the trunk and measuring the remaining error
 _UP = np.array([0.0, 0.0, 1.0])
 _MAP_FORM = '{"source joint": "target joint", ...}'
@@ -89,12 +90,13 @@ class Retargeter:
 
 
 def _is_same_rig(a: Skeleton, b: Skeleton) -> bool:
-    """Whether two skeletons share names, tree and axes, and differ in lengths only."""
+    """Whether two skeletons share names, tree and axes, and differ in little but lengths."""
     if a.names != b.names or a.parents != b.parents:
         return False
-    lengths = np.linalg.norm(a.offsets, axis=1) * np.linalg.norm(b.offsets, axis=1)
-    agree = np.sum(a.offsets * b.offsets, axis=1) >= _SAME_RIG * lengths
-    return bool(np.all(agree | (lengths < 1e-3)))
+    products = np.linalg.norm(a.offsets, axis=1) * np.linalg.norm(b.offsets, axis=1)
+    agree = np.sum(a.offsets * b.offsets, axis=1) >= _SAME_RIG * products
+    lengths = np.sqrt(products)
+    return bool(lengths[agree].sum() >= _SAME_SHARE * lengths.sum())
 
 
 class _Transfer:

@@ -19,6 +19,7 @@ from ...motion.motion import Motion, forward_kinematics
 from .chains import find_chains
 from .description import Description, Windows, build_windows, compute_phases
 from .frame_step import Step, Stepper, blend_window, prepare_stepper
+from .gaze import turn_head
 from .kinematics import Pose, compute_world_transforms, to_matrices, to_motion
 from .model import ThrowModel
 
@@ -45,6 +46,7 @@ class Options:
         blend: networks receive trajectories that begin at the current positions of hands and feet.
         limits: joints stay within the range of the training data, and network inputs near it, so that errors do not
             accumulate (section 9.4).
+        gaze: share of the way by which the head of a kick is turned, at the end, to where heads of the examples are.
     """
 
     pose_iterations: int = 75
@@ -53,11 +55,14 @@ class Options:
     share: float = 0.8
     blend: bool = True
     limits: bool = True
+    gaze: float = 0.5
 
     def __post_init__(self):
-        if not (self.pose_iterations >= 0 and self.tolerance >= 0.0 and 0.0 <= self.share <= 1.0):
-            found = f"{self.pose_iterations} iterations, tolerance {self.tolerance:g} m, share {self.share:g}"
-            raise InputError("options", found, "values of 0 or more, a share of at most 1")
+        shares = (self.share, self.gaze)
+        if not (self.pose_iterations >= 0 and self.tolerance >= 0.0 and all(0.0 <= one <= 1.0 for one in shares)):
+            found = (f"{self.pose_iterations} iterations, tolerance {self.tolerance:g} m, share {self.share:g}, gaze "
+                     f"{self.gaze:g}")
+            raise InputError("options", found, "values of 0 or more, shares of at most 1")
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -82,7 +87,7 @@ class GeneratedMotion:
     over: np.ndarray
     floating: np.ndarray | None
     iterations: int
-    seconds: float
+    seconds: float = 0.0
 
     @property
     def deviation(self) -> np.ndarray:
@@ -120,7 +125,10 @@ def generate_motion(
         steps = [first]
         for frame in range(len(description) - 1):
             steps.append(loop.predict_frame(steps[-1].state, all_windows[frame + 1], frame, frame + 1))
-    return _build_result(model, description, steps, iterations, time.perf_counter() - start_time)
+    result = _build_result(model, description, steps, iterations)
+    limits = prepare_stepper(model).limits if options.limits else None
+    motion = turn_head(model, description, result.motion, options.gaze, limits)
+    return replace(result, motion=motion, seconds=time.perf_counter() - start_time)
 
 
 class _FrameLoop:
@@ -206,8 +214,7 @@ def _check_pose(step: Step, frame: int) -> None:
                          "choose a target like theirs, or train the model longer")  # fmt: skip
 
 
-def _build_result(model, description: Description, steps: list[Step], iterations: int,
-                  seconds: float) -> GeneratedMotion:
+def _build_result(model, description: Description, steps: list[Step], iterations: int) -> GeneratedMotion:
     """Build the result from the predicted frames."""
     root = np.stack([step.pose.root for step in steps])
     local = np.stack([step.pose.local for step in steps])
@@ -218,7 +225,7 @@ def _build_result(model, description: Description, steps: list[Step], iterations
         predicted=np.stack([step.predicted for step in steps]), requested=description.effectors,
         over=np.stack([step.over for step in steps]),
         floating=None if steps[0].floating is None else np.stack([step.floating for step in steps]),
-        iterations=iterations, seconds=seconds,
+        iterations=iterations,
     )
 
 

@@ -294,3 +294,17 @@ def test_footprints_can_be_kept_on_other_legs(run):
         found = Retargeter(run, longer, keeps_travel=keeps).retarget(run)
         travel = [np.linalg.norm(m.root_positions[-1, :2] - m.root_positions[0, :2]) for m in (found, run)]
         assert travel[0] / travel[1] == pytest.approx(ratio, abs=0.01)
+
+
+def test_a_suits_wearers_look_where_they_looked():
+    """Suits measure each wearer: the joint of the head lies elsewhere, and the axes are the same."""
+    walk = build_gait(1.4, 2.0, 60.0)
+    head, rotations = identify_joints(walk.skeleton).head, walk.rotations.copy()
+    rotations[:, head] = quaternion.multiply(rotations[:, head], quaternion.from_axis_angle([0.0, 0.0, 1.0], 0.5))
+    aside = replace(walk, rotations=rotations)
+    offsets = 0.9 * walk.skeleton.offsets
+    offsets[head] = quaternion.rotate(quaternion.from_axis_angle([0.0, 1.0, 0.0], 0.6), offsets[head])
+    found = retarget(aside, replace(walk.skeleton, offsets=offsets))
+    ours, theirs = (forward_kinematics(one)[1][:, head] for one in (found, aside))
+    turns = quaternion.to_rotation_vector(quaternion.multiply(ours, quaternion.inverse(theirs)))
+    assert np.degrees(np.linalg.norm(turns, axis=-1)).mean() < 5.0

@@ -9,8 +9,17 @@ from beyond_mocap.ball.physics import FOOTBALL
 from beyond_mocap.motion.humanoid import identify_joints
 from beyond_mocap.motion.motion import forward_kinematics
 from beyond_mocap.synthetic.gestures import build_strike
-from beyond_mocap.throws.ball_release import SPEED_RATIO, AtFoot, compute_launch, find_rest_positions, strike_ball
-from beyond_mocap.throws.correction import Freedom, correct_motion
+from beyond_mocap.throws.ball_release import (
+    SPEED_RATIO,
+    AtFoot,
+    compute_launch,
+    find_rest_positions,
+    sample_points,
+    strike_ball,
+)
+from beyond_mocap.throws.corrected_motion import Freedom
+from beyond_mocap.throws.correction import correct_motion
+from beyond_mocap.throws.foot_tilt import point_foot
 
 R = FOOTBALL.radius
 
@@ -62,6 +71,21 @@ def test_a_kick_hits_another_target(lies):
     changed = set(np.argwhere(np.any(found.motion.rotations != made.motion.rotations, axis=2))[:, 1])
     assert changed <= {legs.upper_leg, legs.lower_leg, legs.foot}
     assert places[:, legs.toe, 2].min() > -0.02
+
+
+def test_a_pointed_foot_lowers_its_toe_alone_and_only_in_the_swing():
+    made = build_strike("kick low top", fps=30.0)
+    part, frame = AtFoot("right"), made.key * 30.0
+    pointed = point_foot(made.motion, part, frame, np.radians(20.0))
+    before, after = (sample_points(motion, part, np.array([frame]))[0] for motion in (made.motion, pointed))
+    assert np.allclose(before[0], after[0])
+    # about a level axis: the toe stays in the vertical plane of the foot, and the angle is the one asked for
+    lines = np.array([before[1] - before[0], after[1] - after[0]])
+    dips = np.degrees(np.arctan2(-lines[:, 2], np.hypot(*lines[:, :2].T)))
+    assert abs(dips[1] - dips[0] - 20.0) < 1.0 and abs(np.cross(*lines[:, :2])) < 1e-3
+    first, last = part.find_frame_range(made.motion, frame)
+    changed = np.flatnonzero(np.any(pointed.rotations != made.motion.rotations, axis=(1, 2)))
+    assert first <= changed[0] and changed[-1] <= last and np.ptp(changed) <= 0.4 * 30.0
 
 
 @pytest.mark.parametrize("height", [0.0, 0.06, 0.11])

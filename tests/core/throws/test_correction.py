@@ -10,7 +10,8 @@ from beyond_mocap.motion.humanoid import identify_joints
 from beyond_mocap.motion.motion import forward_kinematics
 from beyond_mocap.synthetic.throws import build_throw
 from beyond_mocap.throws.ball_release import InHand, sample_points
-from beyond_mocap.throws.correction import Freedom, correct_motion
+from beyond_mocap.throws.corrected_motion import Freedom
+from beyond_mocap.throws.correction import correct_motion
 from beyond_mocap.throws.limb_shift import solve_shifts
 
 

@@ -27,7 +27,7 @@ class Model:
 
     def __init__(self, example):
         self.skeleton, self.stature = example.motion.skeleton, example.stature
-        self.joint_limits = estimate_joint_limits(example.motion.rotations)
+        self.joint_limits, self.examples = estimate_joint_limits(example.motion.rotations), (example,)
 
 
 @pytest.fixture(scope="module")
@@ -65,6 +65,7 @@ def test_the_truth_is_off_by_nothing(examples, monkeypatch):
     for one in found.motions:
         assert one.deviation == pytest.approx(np.zeros(4), abs=1e-9)
         assert one.impact == pytest.approx(0.0, abs=1e-9) == one.far_impact and one.head == pytest.approx(0.0, abs=1e-6)
+        assert one.facing == pytest.approx(0.0, abs=1e-9) and one.head_mean > 5.0  # a thrower looks about
         assert one.jerk == pytest.approx(1.0) and one.head_share == pytest.approx(1.0) and one.bones == 0.0
         assert one.own_impact < 0.15  # the drag that the planted throw knows nothing of
     assert found.motions[0].beyond == 0.0

@@ -23,7 +23,7 @@ from beyond_mocap.throws.networks.network import PhaseNetwork
 from beyond_mocap.throws.networks.training_set import measure_leg_reach
 from tests.core.linear_throws import build_training_set
 
-PLAIN = Options(pose_iterations=0, ik=False, blend=False, limits=False)
+PLAIN = Options(pose_iterations=0, ik=False, blend=False, limits=False, gaze=0.0)
 
 
 class ByHeart(PhaseNetwork):
@@ -115,7 +115,7 @@ def test_inverse_kinematics_takes_its_share_of_the_way(example):
     told = build_description(example)
     moved = replace(told, effectors=told.effectors + np.array([0.0, 0.02, 0.0]))
     made = generate_motion(model, moved, start=Pose(*(part[0] for part in compute_poses(example))), options=Options(
-        pose_iterations=0, share=0.5, blend=False, limits=False))
+        pose_iterations=0, share=0.5, blend=False, limits=False, gaze=0.0))
     assert np.allclose(np.median(made.network_deviation[1:], axis=0), 0.02, atol=1e-4)
     hands, toes = made.deviation[1:, :2], made.deviation[1:, 2:]
     assert np.allclose(np.median(hands, axis=0), 0.01, atol=1e-4) and made.deviation.max() < 0.021

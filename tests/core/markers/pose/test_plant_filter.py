@@ -78,6 +78,17 @@ def test_a_heel_that_rises_over_standing_toes_is_not_held():
     assert detect_stances(0.1 * rising, low, FPS, 0.3, 0.025) == [(0, 60)]
 
 
+@pytest.mark.parametrize("swing, held", [(8.0, 0.065), (18.0, 0.1)])
+def test_toes_of_a_sprint_stand_as_long_as_the_leg_carries_load(swing, held):
+    """Filtered toes come to rest and leave within a fifth of a stance of 0.11 s each, at up to 1 m/s."""
+    fps, stance = 250.0, 28
+    speed = np.concatenate([np.full(60, swing), np.abs(np.linspace(-1.0, 1.0, stance)), np.full(60, swing)])
+    place = np.outer(np.cumsum(speed) / fps, [1.0, 0.0, 0.0])
+    low = (np.arange(len(place)) >= 60) & (np.arange(len(place)) < 60 + stance)
+    spans = detect_stances(place, low, fps, 0.6, 0.025, swing_share=0.05)
+    assert sum(end - first for first, end in spans) / fps == pytest.approx(held, abs=0.02)
+
+
 def test_a_foot_in_flight_is_not_pulled_to_where_it_will_stand():
     place = np.zeros((100, 3))
     place[:50, 0] = -9.0 * np.arange(50, 0, -1) / FPS  # flies in at 9 m/s, then stands 4 mm off its mean
