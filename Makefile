@@ -55,7 +55,8 @@ OPERATORS = tests/blender/test_every_operator.py
 test test-core test-blender test-rooms test-operators test-oldest: export OPENBLAS_NUM_THREADS = 1
 test test-core test-blender test-rooms test-operators test-oldest: export OMP_NUM_THREADS = 1
 test: venv venv-oldest training
-	@mkdir -p build; status=0; if [ -e .venv-4.5 ]; then export BLENDERS_IN_TURN=1; fi; \
+	@rm -rf build/test-cache; mkdir -p build; status=0; if [ -e .venv-4.5 ]; then export BLENDERS_IN_TURN=1; fi; \
+	export TESTS_CACHE="$$PWD/build/test-cache"; \
 	$(MAKE) -s test-core || status=1; \
 	$(MAKE) -s -k test-training test-oldest test-operators >build/test-beside.txt 2>&1 & second=$$!; \
 	$(MAKE) -s test-rooms || status=1; wait $$second || status=1; cat build/test-beside.txt; exit $$status

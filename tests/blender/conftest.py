@@ -100,8 +100,8 @@ def library_folder(core, tmp_path_factory):
 
 @pytest.fixture(scope="session")
 def sample_cache(core, tmp_path_factory):
-    """The cache of the sample's whole library, with its synthetic clips."""
-    folder = tmp_path_factory.mktemp("sample_cache")
+    """The cache of the sample's whole library, with its synthetic clips; in `make test` the core's tests have made it."""
+    folder = pathlib.Path(os.environ.get("TESTS_CACHE") or tmp_path_factory.mktemp("caches"), "sample_cache")
     assert core("library.build").build_library(SOURCE / "sample_blend" / "library",
                                                cache_dir=folder).with_synthetic_clips.clips
     return folder

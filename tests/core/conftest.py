@@ -69,7 +69,9 @@ def recordings_cache(tmp_path_factory) -> Path:
 
 
 def find_shared_folder(tmp_path_factory) -> Path:
-    """Find the folder of all processes of this run."""
+    """Find the folder of all processes of this run, or of all runs of `make test`."""
+    if "TESTS_CACHE" in os.environ:
+        return Path(os.environ["TESTS_CACHE"])
     base = tmp_path_factory.getbasetemp()
     return base.parent if "PYTEST_XDIST_WORKER" in os.environ else base
 
