@@ -47,10 +47,10 @@ venv-oldest:
 training:
 	@packaging/venv.sh training
 
-# Two processes at any time, so that no core idles and none is shared: the core's tests by two, then Blender's beside
-# training, the older Blender and the matrix of operators, which are shown when they are done. Linear algebra takes no
-# threads of its own: they would wait for the other's. Where there are two Blenders, each tries half of all pairs of an
-# operator and an awkward situation, and the older one leaves out slow tests that reach nothing new (`make left-out`).
+# Two processes at any time, so that no core idles and none is shared: the core's tests by two, then training and
+# Blender's beside the older Blender and the matrix of operators, which are shown when they are done. Linear algebra
+# takes no threads of its own: they would wait for the other's. Where there are two Blenders, each tries half of all
+# pairs of an operator and an awkward situation, and the older one leaves out slow tests that reach nothing new.
 OPERATORS = tests/blender/test_every_operator.py
 test test-core test-blender test-rooms test-operators test-oldest: export OPENBLAS_NUM_THREADS = 1
 test test-core test-blender test-rooms test-operators test-oldest: export OMP_NUM_THREADS = 1
@@ -58,8 +58,8 @@ test: venv venv-oldest training
 	@rm -rf build/test-cache; mkdir -p build; status=0; if [ -e .venv-4.5 ]; then export BLENDERS_IN_TURN=1; fi; \
 	export TESTS_CACHE="$$PWD/build/test-cache"; \
 	$(MAKE) -s test-core || status=1; \
-	$(MAKE) -s -k test-training test-oldest test-operators >build/test-beside.txt 2>&1 & second=$$!; \
-	$(MAKE) -s test-rooms || status=1; wait $$second || status=1; cat build/test-beside.txt; exit $$status
+	$(MAKE) -s -k test-oldest test-operators >build/test-beside.txt 2>&1 & second=$$!; \
+	$(MAKE) -s -k test-training test-rooms || status=1; wait $$second || status=1; cat build/test-beside.txt; exit $$status
 
 lint: venv
 	@packaging/venv.sh lint

@@ -100,7 +100,7 @@ def library_folder(core, tmp_path_factory):
 
 @pytest.fixture(scope="session")
 def sample_cache(core, tmp_path_factory):
-    """The cache of the sample's whole library, with its synthetic clips; in `make test` the core's tests have made it."""
+    """The cache of the sample's whole library, with its synthetic clips; in `make test` the core's tests make it."""
     folder = pathlib.Path(os.environ.get("TESTS_CACHE") or tmp_path_factory.mktemp("caches"), "sample_cache")
     assert core("library.build").build_library(SOURCE / "sample_blend" / "library",
                                                cache_dir=folder).with_synthetic_clips.clips
