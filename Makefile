@@ -7,8 +7,9 @@ REAL_BLENDER ?= ../shared/tools/real-blender
 
 .DEFAULT_GOAL := help
 .NOTPARALLEL:
-.PHONY: help venv venv-oldest training lint quick test test-core test-blender test-oldest test-training demo bench weights experiments tables docs package extension extension-all repository \
-  repository-test pins window-test window-bench fuzz kill-test pictures clean
+.PHONY: help venv venv-oldest training lint quick test test-core test-blender test-rooms test-operators test-oldest test-training left-out \
+  demo bench weights experiments tables docs package extension extension-all repository repository-test pins window-test window-bench \
+  fuzz kill-test pictures clean
 
 help:
 	@echo 'make venv           .venv with Blender as a Python module and all that the tests need'
@@ -16,6 +17,7 @@ help:
 	@echo 'make quick ROOM=... the tests of one package (ROOM=path_editing), in about a minute'
 	@echo 'make lint           ruff over all source, mypy over the core, the workflow by its schema'
 	@echo 'make test           all tests but the window ones: the core, training, then Blender 5.0 (or 5.2) and Blender 4.5'
+	@echo 'make left-out       choose again which tests the older Blender leaves out, by the lines that they reach'
 	@echo 'make fuzz           damaged files for every reader and verb, for 10 minutes on two cores (SECONDS_OF_FUZZ=600)'
 	@echo 'make kill-test      library builds, matches and trainings killed at 100 random moments, and resumed'
 	@echo 'make demo           the sample match, synthesized and rendered into build/demo'
@@ -45,17 +47,19 @@ venv-oldest:
 training:
 	@packaging/venv.sh training
 
-# Two processes at any time, so that no core idles and none is shared: the core's tests by two, then Blender's beside
-# training and the older Blender, which are shown when they are done. Linear algebra takes no threads of its own: they
-# would wait for the other's. Where there are two Blenders, each tries half of all pairs of an operator and an awkward
-# situation, and the older one leaves out cases that are the same to Blender.
-test test-core test-blender test-oldest: export OPENBLAS_NUM_THREADS = 1
-test test-core test-blender test-oldest: export OMP_NUM_THREADS = 1
+# Two processes at any time, so that no core idles and none is shared: the core's tests by two, then training and
+# Blender's beside the older Blender and the matrix of operators, which are shown when they are done. Linear algebra
+# takes no threads of its own: they would wait for the other's. Where there are two Blenders, each tries half of all
+# pairs of an operator and an awkward situation, and the older one leaves out slow tests that reach nothing new.
+OPERATORS = tests/blender/test_every_operator.py
+test test-core test-blender test-rooms test-operators test-oldest: export OPENBLAS_NUM_THREADS = 1
+test test-core test-blender test-rooms test-operators test-oldest: export OMP_NUM_THREADS = 1
 test: venv venv-oldest training
-	@mkdir -p build; status=0; if [ -e .venv-4.5 ]; then export BLENDERS_IN_TURN=1; fi; \
+	@rm -rf build/test-cache; mkdir -p build; status=0; if [ -e .venv-4.5 ]; then export BLENDERS_IN_TURN=1; fi; \
+	export TESTS_CACHE="$$PWD/build/test-cache"; \
 	$(MAKE) -s test-core || status=1; \
-	$(MAKE) -s -k test-training test-oldest >build/test-beside.txt 2>&1 & second=$$!; \
-	$(MAKE) -s test-blender || status=1; wait $$second || status=1; cat build/test-beside.txt; exit $$status
+	$(MAKE) -s -k test-oldest test-operators >build/test-beside.txt 2>&1 & second=$$!; \
+	$(MAKE) -s -k test-training test-rooms || status=1; wait $$second || status=1; cat build/test-beside.txt; exit $$status
 
 lint: venv
 	@packaging/venv.sh lint
@@ -83,11 +87,22 @@ test-core: venv
 test-training: training
 	.venv-training/bin/python $(PYTEST) tests/training
 
-test-blender: venv
-	.venv/bin/python $(PYTEST) tests/blender
+test-blender: test-rooms test-operators
+
+test-rooms: venv
+	.venv/bin/python $(PYTEST) tests/blender --ignore=$(OPERATORS)
+
+test-operators: venv
+	.venv/bin/python $(PYTEST) $(OPERATORS)
 
 test-oldest: venv-oldest
 	@if [ -e .venv-4.5 ]; then set -x; .venv-4.5/bin/python $(PYTEST) tests/blender; fi
+
+# What the older Blender leaves out in `make test`, chosen again by what each test reaches: some 15 minutes.
+left-out: export BLENDERS_IN_TURN = 1
+left-out: venv-oldest
+	.venv-4.5/bin/python -m pip install --quiet --disable-pip-version-check --target build/coverage coverage
+	PYTHONPATH=build/coverage:tests/blender .venv-4.5/bin/python $(PYTEST) -p choose_left_out tests/blender
 
 # Not parts of `make test`: they last, and take other inputs each time. What they find is told with the number that makes it again.
 SECONDS_OF_FUZZ ?= 600

@@ -22,7 +22,7 @@ FUNCTIONS = {
 }  # fmt: skip
 """Module of the core -> its function that takes long."""
 OPERATORS = (
-    "clean_markers", "kick_at_target", "learn_words", "passes_make", "reconstruct_markers", "stream_play",
+    "clean_markers", "kick_at_target", "learn_words", "make_match", "passes_make", "reconstruct_markers", "stream_play",
     "throw_at_target",
 )  # fmt: skip
 """Operators whose work is more than one of these functions, or reads files."""

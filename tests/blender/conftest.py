@@ -17,7 +17,8 @@ from importlib import import_module
 import pytest
 
 EXTENSION = "bl_ext.user_default.beyond_mocap"
-SOURCE = pathlib.Path(__file__).resolve().parents[2]
+HERE = pathlib.Path(__file__).resolve().parent
+SOURCE = HERE.parents[1]
 
 _profile = tempfile.TemporaryDirectory(prefix="beyond-mocap-profile-")
 os.environ["BLENDER_USER_RESOURCES"] = _profile.name  # read once, when bpy is imported
@@ -47,23 +48,15 @@ def find_free_port():
         return one.getsockname()[1]
 
 
-OTHER_CODE_OF_BLENDER = {"body", "ending", "form", "format", "ik", "linked", "mode", "name", "preset", "suffix", "verb",
-                         "who", "wrong"}
-"""Parameters of tests whose values lead through other parts of Blender: formats, modes, links, operators."""
-
-
 def pytest_collection_modifyitems(config, items):
-    """Where `make test` runs two Blenders, the older one leaves out what differs from another case of the same test in
-    our data alone: the newer one has all of them."""
-    if not os.environ.get("BLENDERS_IN_TURN") or bpy.app.version >= (5, 0):
+    """Where `make test` runs two Blenders, the older one leaves out slow tests that reach nothing which others do not
+    reach too (choose_left_out.py): the newer one has all of them."""
+    is_choosing = config.pluginmanager.has_plugin("choose_left_out")
+    if not os.environ.get("BLENDERS_IN_TURN") or bpy.app.version >= (5, 0) or is_choosing:
         return
-    first = {}
-    for item in items:
-        cases = getattr(item, "callspec", None)
-        chosen = {name: repr(cases.params[name]) for name in OTHER_CODE_OF_BLENDER & {*cases.params}} if cases else {}
-        first.setdefault((item.path, item.originalname, *sorted(chosen.items())), item)
-    config.hook.pytest_deselected(items=[item for item in items if item not in {*first.values()}])
-    items[:] = first.values()
+    left_out = {*HERE.joinpath("left_out.txt").read_text("utf-8").splitlines()}
+    config.hook.pytest_deselected(items=[item for item in items if item.nodeid in left_out])
+    items[:] = [item for item in items if item.nodeid not in left_out]
 
 
 @pytest.fixture(scope="session", autouse=True)
@@ -107,8 +100,8 @@ def library_folder(core, tmp_path_factory):
 
 @pytest.fixture(scope="session")
 def sample_cache(core, tmp_path_factory):
-    """The cache of the sample's whole library, with its synthetic clips."""
-    folder = tmp_path_factory.mktemp("sample_cache")
+    """The cache of the sample's whole library, with its synthetic clips; in `make test` the core's tests make it."""
+    folder = pathlib.Path(os.environ.get("TESTS_CACHE") or tmp_path_factory.mktemp("caches"), "sample_cache")
     assert core("library.build").build_library(SOURCE / "sample_blend" / "library",
                                                cache_dir=folder).with_synthetic_clips.clips
     return folder

@@ -215,12 +215,9 @@ def _move_path(value, folder):
     return str(folder / pathlib.Path(value).name) if isinstance(value, str) and "/" in value else value
 
 
-def a_film_s_frame_rate(places, arguments):
+def a_film_s_frame_rate_and_centimetres(places, arguments):
+    """Both at once, because neither keeps an operator from its work."""
     bpy.context.scene.render.fps, bpy.context.scene.render.fps_base = 24, 1.001
-    return arguments
-
-
-def centimetres(places, arguments):
     bpy.context.scene.unit_settings.scale_length = 0.01
     return arguments
 
@@ -268,5 +265,5 @@ def bodies_deleted(places, arguments):
 
 
 FAULTS = (nothing_selected, a_camera_selected, a_linked_armature, a_library_override, a_rig_without_legs, missing_files,
-          nothing_can_be_written, a_film_s_frame_rate, centimetres, edit_mode, pose_mode, everything_hidden,
+          nothing_can_be_written, a_film_s_frame_rate_and_centimetres, edit_mode, pose_mode, everything_hidden,
           an_excluded_collection, bodies_deleted)

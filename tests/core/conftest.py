@@ -10,6 +10,7 @@ import pytest
 
 from beyond_mocap.annotation import Timeline, parse_timeline
 from beyond_mocap.files.bvh import bvh
+from beyond_mocap.library import synthetic_clips
 from beyond_mocap.library.build import build_library
 from beyond_mocap.library.library import Library
 from beyond_mocap.motion import quaternion
@@ -68,7 +69,9 @@ def recordings_cache(tmp_path_factory) -> Path:
 
 
 def find_shared_folder(tmp_path_factory) -> Path:
-    """Find the folder of all processes of this run."""
+    """Find the folder of all processes of this run, or of all runs of `make test`."""
+    if "TESTS_CACHE" in os.environ:
+        return Path(os.environ["TESTS_CACHE"])
     base = tmp_path_factory.getbasetemp()
     return base.parent if "PYTEST_XDIST_WORKER" in os.environ else base
 
@@ -115,6 +118,15 @@ def strikes_library(tmp_path_factory) -> Library:
     """The library of the passing samples."""
     samples = Path(__file__).resolve().parents[2] / "sample_blend" / "passes" / "library"
     return build_library(samples, cache_dir=tmp_path_factory.mktemp("strikes"))
+
+
+@pytest.fixture(scope="module")
+def few_synthetic_runs(request):
+    """Synthetic runs, half of the work of completing a library, end at the module's FASTEST_RUN, m/s: test_made.py has
+    them up to a sprint."""
+    with pytest.MonkeyPatch.context() as monkeypatch:
+        monkeypatch.setattr(synthetic_clips, "MAX_SPEED", request.module.FASTEST_RUN)
+        yield
 
 
 @pytest.fixture(scope="session")

@@ -20,6 +20,8 @@ from tab import (
     window,
 )
 
+SHORT_MATCH = (PICTURES / "short match" / "short.blend").resolve()
+
 
 def get_work():
     """What runs just now."""
@@ -68,9 +70,28 @@ def wait_for_threads():
     yield 0.5
 
 
-def open_sample():
-    """The sample, freshly opened, its library built, with the tab in front."""
-    bpy.ops.wm.open_mainfile(filepath=str(copy_sample() / "quickstart.blend"))
+def write_short_match():
+    """Write a file of two players who move for eight seconds, and one of whom kicks; takes of the sample itself last
+    four times as long."""
+    folder = SHORT_MATCH.parent
+    folder.mkdir()
+    for number, speed in enumerate((2.6, 1.3), 1):
+        rows = [f"{t / 10:.1f},{speed * t / 10:.3f},{0.5 * number * np.sin(t / 10):.3f}" for t in range(81)]
+        (folder / f"player{number}.csv").write_text("\n".join(["time_s,x_m,y_m", *rows]) + "\n")
+    (folder / "player1.txt").write_text("5.2 kick right running low inside\n")
+    bpy.ops.wm.read_homefile(use_empty=True, load_ui=True)
+    yield 1.0
+    get_settings().library_folder = str(copy_sample() / "library")
+    files = [{"name": "player1.csv"}, {"name": "player2.csv"}]
+    run_operator("beyond_mocap.import_tracking", "EXEC_DEFAULT", directory=f"{folder}/", files=files)
+    bpy.ops.wm.save_as_mainfile(filepath=str(SHORT_MATCH))
+
+
+def open_match(path=SHORT_MATCH):
+    """The short match or the sample, freshly opened, its library built, with the tab in front."""
+    if not SHORT_MATCH.exists():
+        yield from write_short_match()
+    bpy.ops.wm.open_mainfile(filepath=str(path))
     yield 1.0
     area = window.find_area("VIEW_3D")
     yield from window.open_tab(area, TAB)
@@ -81,7 +102,7 @@ def open_sample():
 
 
 def check_players_queue_and_each_has_its_own_step():
-    yield from open_sample()
+    yield from open_match()
     get_settings().players[1].use = False
     with WorkHolder() as hold:
         run_operator("beyond_mocap.synthesize")
@@ -114,7 +135,7 @@ def check_players_queue_and_each_has_its_own_step():
 
 
 def check_the_window_is_alive_while_takes_are_made():
-    yield from open_sample()
+    yield from open_match(copy_sample() / "quickstart.blend")  # for as long as a user waits
 
     def ticks(seconds):
         start, count, longest, last = time.monotonic(), 0, 0.0, time.monotonic()
@@ -137,7 +158,7 @@ def check_the_window_is_alive_while_takes_are_made():
 
 
 def check_escape_cancels_and_finish_early_keeps():
-    yield from open_sample()
+    yield from open_match()
     with WorkHolder():
         run_operator("beyond_mocap.synthesize")
         yield 0.5
@@ -161,7 +182,7 @@ def check_escape_cancels_and_finish_early_keeps():
 def check_undo_in_the_middle():
     """The words are changed, a take is begun, the change is undone: what is written was made of the words that are
     there."""
-    yield from open_sample()
+    yield from open_match()
     get_settings().players[1].use = False
     get_settings().alpha = 0.6
     run_operator("ed.undo_push", "EXEC_DEFAULT", message="changed")
@@ -186,7 +207,7 @@ def read_messages():
 
 def check_keys_by_hand_and_what_is_out_of_date():
     """A pose keyed by I is told of within seconds, and is still there when the take was made anew."""
-    yield from open_sample()
+    yield from open_match()
     get_settings().players[1].use = False
     run_operator("beyond_mocap.synthesize")
     yield from wait_until_settled()
@@ -221,7 +242,7 @@ def check_keys_by_hand_and_what_is_out_of_date():
 
 
 def check_variants_and_a_stretch():
-    yield from open_sample()
+    yield from open_match()
     get_settings().players[1].use = False
     run_operator("beyond_mocap.variants", count=3)
     yield from wait_until_settled()
@@ -246,7 +267,7 @@ def check_variants_and_a_stretch():
 
 def check_whatever_happens_in_the_middle():
     """The player renamed or removed, its rig deleted, another scene shown, another file opened."""
-    yield from open_sample()
+    yield from open_match()
     with WorkHolder() as hold:
         run_operator("beyond_mocap.synthesize")
         yield 0.2
@@ -277,7 +298,7 @@ def check_whatever_happens_in_the_middle():
     with WorkHolder() as hold:
         run_operator("beyond_mocap.synthesize")
         yield 0.2
-        bpy.ops.wm.open_mainfile(filepath=str(copy_sample() / "quickstart.blend"))
+        bpy.ops.wm.open_mainfile(filepath=str(SHORT_MATCH))
         yield 0.5
         assert is_idle() and list_states() == ["NONE", "NONE"]
         hold.release_work()
@@ -295,7 +316,7 @@ def read_status_bar(name):
 
 
 def check_disabling_during_synthesis_leaves_nothing():
-    yield from open_sample()
+    yield from open_match()
     yield from window.move_pointer(900, 500)
     yield 1.0
     before = read_status_bar("before")
@@ -312,7 +333,7 @@ def check_disabling_during_synthesis_leaves_nothing():
     assert not left, left
     yield from wait_for_threads()
     run_operator("preferences.addon_enable", "EXEC_DEFAULT", module=EXTENSION)
-    yield from open_sample()
+    yield from open_match()
     assert not get_work().kind and not get_work().waiting
     run_operator("beyond_mocap.synthesize")
     yield from wait_until_settled()

@@ -11,7 +11,7 @@ TOP = Path(__file__).resolve().parents[2]
 STUBS = """
 include real.mk
 venv venv-oldest training: ;
-test-core test-training test-blender test-oldest: ; @echo $@ $$BLENDERS_IN_TURN
+test-core test-training test-rooms test-operators test-oldest: ; @echo $@ $$BLENDERS_IN_TURN
 """
 
 
@@ -26,4 +26,4 @@ def test_two_blenders_take_turns_and_one_tries_all(tmp_path, oldest):
     made = subprocess.run(["make", "-s", "test"], cwd=tmp_path, env=ours, capture_output=True, text=True, check=True)
     told = dict(line.partition(" ")[::2] for line in made.stdout.splitlines() if line.startswith("test-"))
     turn = "1" if oldest else ""
-    assert (told["test-blender"], told["test-oldest"]) == (turn, turn)
+    assert [told[name] for name in ("test-rooms", "test-operators", "test-oldest")] == 3 * [turn]

@@ -20,6 +20,8 @@ from beyond_mocap.motion.retargeting.posture import to_motion
 from beyond_mocap.synthetic.gait import build_gait
 from beyond_mocap.synthetic.steps import build_steps_in_place
 
+pytestmark = pytest.mark.usefixtures("few_synthetic_runs")
+FASTEST_RUN = 2.4  # none
 SECONDS = 17.0  # a little more than is enough
 STAND_SECONDS = 4.0  # as the line asks for
 KINDS = {"stands": STILL_PREFIX, "turns": TURN_PREFIX, "moves": STEP_PREFIX, "sideways": SIDE_PREFIX,

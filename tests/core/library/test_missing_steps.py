@@ -18,6 +18,9 @@ from beyond_mocap.synthesis.plan import Plan
 from beyond_mocap.synthesis.synthesize import synthesize
 from beyond_mocap.synthetic.gait import build_gait
 
+pytestmark = pytest.mark.usefixtures("few_synthetic_runs")
+FASTEST_RUN = 2.4  # none
+
 
 def build(folder, **gaits):
     """A library of walks: name -> arguments of `build_gait` and labels."""
@@ -41,12 +44,18 @@ def list_steps(library):
                                    example, 60.0))
 
 
+@pytest.fixture(scope="module")
+def steps(forward):
+    """What `forward` lacks."""
+    return list_steps(forward)
+
+
 def made(library, begins):
     return [(i, clip) for i, clip in enumerate(library.clips) if clip.path.startswith(SYNTHETIC_FOLDER + begins)]
 
 
-def test_a_library_that_only_walks_ahead_lacks_all_of_them(forward):
-    names = [name for name, *_ in list_steps(forward)]
+def test_a_library_that_only_walks_ahead_lacks_all_of_them(steps):
+    names = [name for name, *_ in steps]
     for prefix, count in ((BACK_PREFIX, 2 * len(coverage.BACK_SPEEDS)), (SIDE_PREFIX, len(coverage.SIDE_WALKS)),
                           (TURN_PREFIX, len(coverage.TURNS)), (STEP_PREFIX, len(coverage.MOVES))):
         assert sum(name.startswith(prefix) for name in names) == count
@@ -67,9 +76,9 @@ def test_without_a_walk_or_a_stand_nothing_is_made_of_it(tmp_path):
     assert list_steps(library) == []
 
 
-def test_a_backward_walk_is_the_recorded_one_and_its_feet_stand(forward):
+def test_a_backward_walk_is_the_recorded_one_and_its_feet_stand(forward, steps):
     body = identify_joints(forward.skeleton)
-    for name, motion, contacts, speed in list_steps(forward):
+    for name, motion, contacts, speed in steps:
         if not name.startswith(BACK_PREFIX):
             continue
         places, _ = forward_kinematics(motion)
@@ -84,13 +93,13 @@ def test_a_backward_walk_is_the_recorded_one_and_its_feet_stand(forward):
         assert np.abs(np.diff(heights, axis=0)).max() * motion.fps < 2.5  # the loop closes without a jump
 
 
-def test_trunk_and_arms_are_those_of_the_recorded_stand(forward):
+def test_trunk_and_arms_are_those_of_the_recorded_stand(forward, steps):
     stand = next(clip.motion for clip in forward.clips if clip.path == "stand.bvh" and not clip.mirrored)
     body = identify_joints(stand.skeleton)
     chains = [(body.left.upper_arm, body.left.lower_arm), (body.right.lower_arm, body.right.hand),
               (body.hips, body.neck_or_chest)]
     recorded, _ = forward_kinematics(stand)
-    for name, motion, _, _ in list_steps(forward):
+    for name, motion, _, _ in steps:
         if name.startswith(STEP_PREFIX):
             places, _ = forward_kinematics(motion)
             for upper, lower in chains:
@@ -99,8 +108,8 @@ def test_trunk_and_arms_are_those_of_the_recorded_stand(forward):
                 assert np.degrees(angle) < 5.0, name
 
 
-def test_the_same_library_gives_the_same_bits(forward):
-    for (name, motion, *_), (again, same, *_) in zip(list_steps(forward), list_steps(forward)):
+def test_the_same_library_gives_the_same_bits(forward, steps):
+    for (name, motion, *_), (again, same, *_) in zip(steps, list_steps(forward), strict=True):
         assert name == again and np.array_equal(motion.rotations, same.rotations)
 
 

@@ -112,11 +112,6 @@ def test_a_ball_that_is_told_of_for_a_part_only_is_unknown_in_the_rest(made, sam
     assert np.array_equal(take.ball.positions[60:150], part.positions) and np.allclose(take.ball.times, ball.times)
 
 
-def test_any_number_of_workers_gives_the_same_bits(made, order_to, tmp_path):
-    synthesize_match(order_to(tmp_path / "two", workers=2))
-    assert read_reproducible_files(tmp_path / "two") == read_reproducible_files(made[0])
-
-
 def command(order):
     """The order as the command has it; windows are what no option tells."""
     return [sys.executable, "-c", f"""
@@ -129,8 +124,9 @@ if __name__ == "__main__":
 """]  # fmt: skip
 
 
-@pytest.mark.parametrize("kind", ["search", MOTION, "crowd"])
-def test_a_run_that_was_killed_is_gone_on_with_to_the_same_bits(made, order_to, tmp_path, kind):
+@pytest.mark.parametrize("kind, workers", [("search", 1), (MOTION, 1), ("crowd", 2)])
+def test_neither_a_kill_nor_the_number_of_workers_changes_a_bit(made, order_to, tmp_path, kind, workers):
+    """Two workers before the kill, one or two after it, and none in `made`."""
     order = order_to(tmp_path / "killed", workers=2)
     process = subprocess.Popen(command(order), start_new_session=True)
     deadline = time.monotonic() + 600.0
@@ -142,7 +138,7 @@ def test_a_run_that_was_killed_is_gone_on_with_to_the_same_bits(made, order_to, 
     assert read_state(order.out)["status"] == "running"
     kept = {path: path.stat().st_mtime_ns for path in (order.out / ".work").rglob("*.npz")
             if path.parent.name != MOTION}  # fmt: skip
-    synthesize_match(replace(order, workers=1))
+    synthesize_match(replace(order, workers=workers))
     assert read_reproducible_files(order.out) == read_reproducible_files(made[0])
     assert kept and all(path.stat().st_mtime_ns == when for path, when in kept.items())
     assert not list((order.out / ".work" / MOTION).iterdir())  # it is stored only while it is needed

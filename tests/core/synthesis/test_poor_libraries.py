@@ -17,6 +17,8 @@ from beyond_mocap.synthesis.quality.playback import playback_from_take
 from beyond_mocap.synthesis.synthesize import synthesize
 from beyond_mocap.synthetic.gait import build_gait
 
+pytestmark = pytest.mark.usefixtures("few_synthetic_runs")
+FASTEST_RUN = 5.5  # a little faster than the tracks
 NOISE = np.random.default_rng(5)
 TIMES = np.arange(0.0, 10.0, 0.04)
 FIGHT = 0.7 + 0.6 * np.sin(2.0 * np.pi * np.arange(240) / 30.0 / 1.5)

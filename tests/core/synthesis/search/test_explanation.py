@@ -124,7 +124,7 @@ def test_what_is_explained_is_what_the_search_paid(library, track_of, timeline_o
 
 
 @pytest.mark.skipif(not (DATA / "mocap" / "cmu10").is_dir(), reason="the recordings in ../shared/data are not here")
-@pytest.mark.parametrize("settings", RESOLVED[1:], ids=lambda settings: " ".join(settings))
+@pytest.mark.parametrize("settings", RESOLVED[3:], ids=lambda settings: " ".join(settings))
 def test_recordings_are_explained_by_what_the_search_paid(recordings, paid, settings):
     scenario = DATA / "tracking" / "scenarios" / "scenario2"
     way, _ = clean_track(read_track_csv(f"{scenario}_track.csv"))
