@@ -9,16 +9,17 @@ Enabling must be quick. While it runs, a module that is imported as a whole from
 a module loads it at once.
 """
 
+import sys
 from contextlib import contextmanager
 from importlib import import_module
+from importlib.machinery import SourceFileLoader
+from importlib.util import spec_from_file_location
 from os import listdir
-from os.path import isfile, join
+from os.path import dirname, isfile, join
 from types import ModuleType
 
 PACKAGES = ("scene", "operators", "panels")
-LAZY = ("beyond_mocap", "scene")
-FULL = {"annotation"}
-"""Packages that are loaded as a whole when they are first used: they import their own modules."""
+LAZY = (f"{__package__}.beyond_mocap", f"{__package__}.scene")
 
 
 def register():
@@ -61,31 +62,46 @@ class _WaitingModule(ModuleType):
 @contextmanager
 def _import_lazily():
     """Let the packages of LAZY give a waiting module for each that is not loaded, until the block ends."""
-    packages = [found for name in LAZY for found in _iter_lazy_packages(f"{__package__}.{name}")]
-    for package, modules in packages:
-        package.__getattr__ = _build_getter(package, modules)
+    finder = _LazyPackages()
+    sys.meta_path.insert(0, finder)
     try:
         yield
     finally:
-        for package, _ in packages:
+        sys.meta_path.remove(finder)
+        for package in finder.loaded:
             del package.__getattr__
 
 
-def _iter_lazy_packages(name):
-    """Import a package and those below it; yield each with its modules."""
-    package = import_module(name)
-    modules = _list_modules(package.__path__[0])
-    yield package, modules
-    for found, is_package in modules.items():
-        if is_package and found not in FULL:
-            yield from _iter_lazy_packages(f"{name}.{found}")
+class _LazyPackages:
+    """Finds the packages of LAZY and those below them, for Python's import; `loaded` are those that were imported."""
+
+    def __init__(self):
+        self.loaded = []
+
+    def find_spec(self, name, path, _target=None):
+        if not name.startswith(LAZY) or not isfile(file := join(path[0], name.rpartition(".")[2], "__init__.py")):
+            return None
+        loader = _PackageLoader(name, file, self.loaded)
+        return spec_from_file_location(name, file, loader=loader, submodule_search_locations=[dirname(file)])
+
+
+class _PackageLoader(SourceFileLoader):
+    """Loads a package, whose modules then wait, and adds it to `loaded`."""
+
+    def __init__(self, name, file, loaded):
+        super().__init__(name, file)
+        self.loaded = loaded
+
+    def exec_module(self, module):
+        super().exec_module(module)
+        module.__getattr__ = _build_getter(module, _list_modules(module.__path__[0]))
+        self.loaded.append(module)
 
 
 def _list_modules(folder):
-    """List a folder's modules -> whether each is a package. With pkgutil's list, enabling takes 8 % longer."""
-    names = [name for name in listdir(folder) if not name.startswith("_")]
-    modules = {name.removesuffix(".py"): False for name in names if name.endswith(".py")}
-    return modules | {name: True for name in names if "." not in name and isfile(join(folder, name, "__init__.py"))}
+    """List the modules and packages of a folder by name. With pkgutil's list, enabling takes 8 % longer."""
+    names = (name.removesuffix(".py") for name in listdir(folder) if not name.startswith("_"))
+    return {name for name in names if "." not in name}
 
 
 def _build_getter(package, modules):

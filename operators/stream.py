@@ -1,7 +1,5 @@
 """Live streams: start and stop receiving, play along, choose targets, keep what was received."""
 
-from __future__ import annotations
-
 from itertools import count
 
 import bpy

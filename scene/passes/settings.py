@@ -1,7 +1,5 @@
 """Properties of the panel "Ball & Passes" and its operators. They are saved with the file and covered by undo."""
 
-from __future__ import annotations
-
 import json
 
 import bpy

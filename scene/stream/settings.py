@@ -1,7 +1,5 @@
 """Settings of the live streams and, for the panel, their status."""
 
-from __future__ import annotations
-
 import bpy
 from bpy.props import BoolProperty, CollectionProperty, IntProperty, PointerProperty, StringProperty
 
