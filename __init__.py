@@ -9,17 +9,15 @@ Enabling must be quick. While it runs, a module that is imported as a whole from
 a module loads it at once.
 """
 
-import sys
 from contextlib import contextmanager
+from functools import cache
 from importlib import import_module
-from importlib.machinery import SourceFileLoader
-from importlib.util import spec_from_file_location
 from os import listdir
-from os.path import dirname, isfile, join
 from types import ModuleType
 
 PACKAGES = ("scene", "operators", "panels")
-LAZY = (f"{__package__}.beyond_mocap", f"{__package__}.scene")
+LAZY = ("beyond_mocap", "scene")
+_lazy: list[ModuleType] = []
 
 
 def register():
@@ -62,52 +60,36 @@ class _WaitingModule(ModuleType):
 @contextmanager
 def _import_lazily():
     """Let the packages of LAZY give a waiting module for each that is not loaded, until the block ends."""
-    finder = _LazyPackages()
-    sys.meta_path.insert(0, finder)
     try:
+        for name in LAZY:
+            _make_lazy(import_module(f".{name}", __package__))
         yield
     finally:
-        sys.meta_path.remove(finder)
-        for package in finder.loaded:
-            del package.__getattr__
+        while _lazy:
+            _lazy.pop().__class__ = ModuleType
 
 
-class _LazyPackages:
-    """Finds the packages of LAZY and those below them, for Python's import; `loaded` are those that were imported."""
-
-    def __init__(self):
-        self.loaded = []
-
-    def find_spec(self, name, path, _target=None):
-        if not name.startswith(LAZY) or not isfile(file := join(path[0], name.rpartition(".")[2], "__init__.py")):
-            return None
-        loader = _PackageLoader(name, file, self.loaded)
-        return spec_from_file_location(name, file, loader=loader, submodule_search_locations=[dirname(file)])
+def _make_lazy(package):
+    package.__class__ = _LazyPackage
+    _lazy.append(package)
 
 
-class _PackageLoader(SourceFileLoader):
-    """Loads a package, whose modules then wait, and adds it to `loaded`."""
+class _LazyPackage(ModuleType):
+    """A package that gives waiting modules; Python sets each package below it here when it has imported it."""
 
-    def __init__(self, name, file, loaded):
-        super().__init__(name, file)
-        self.loaded = loaded
+    def __getattr__(self, name):
+        if name in _list_modules(self.__path__[0]):
+            return _WaitingModule(f"{self.__name__}.{name}")
+        raise AttributeError(f"module {self.__name__!r} has no attribute {name!r}")
 
-    def exec_module(self, module):
-        super().exec_module(module)
-        module.__getattr__ = _build_getter(module, _list_modules(module.__path__[0]))
-        self.loaded.append(module)
+    def __setattr__(self, name, value):
+        super().__setattr__(name, value)
+        if type(value) is ModuleType and hasattr(value, "__path__"):
+            _make_lazy(value)
 
 
+@cache
 def _list_modules(folder):
     """List the modules and packages of a folder by name. With pkgutil's list, enabling takes 8 % longer."""
     names = (name.removesuffix(".py") for name in listdir(folder) if not name.startswith("_"))
     return {name for name in names if "." not in name}
-
-
-def _build_getter(package, modules):
-    def find_module(name):
-        if name in modules:
-            return _WaitingModule(f"{package.__name__}.{name}")
-        raise AttributeError(f"module {package.__name__!r} has no attribute {name!r}")
-
-    return find_module
