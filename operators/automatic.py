@@ -1,7 +1,5 @@
 """Values that are chosen automatically: stored as 0, shown as "Automatic" in the panels."""
 
-from __future__ import annotations
-
 import bpy
 from bpy.props import FloatProperty, StringProperty
 

@@ -2,8 +2,6 @@
 tracking data.
 """
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import bpy

@@ -2,8 +2,6 @@
 or added, and the take follows.
 """
 
-from __future__ import annotations
-
 import bpy
 import numpy as np
 from bpy.props import EnumProperty, FloatProperty, FloatVectorProperty

@@ -1,7 +1,5 @@
 """Operators of notices: apply a fix and run the failed operator again, only run it again, or dismiss the notice."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import bpy

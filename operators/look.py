@@ -1,7 +1,5 @@
 """How characters look: build, hair, skin and gloves of the selected ones."""
 
-from __future__ import annotations
-
 import bpy
 from bpy.props import BoolProperty, EnumProperty
 

@@ -1,7 +1,5 @@
 """Operators of optical markers: import, label, clean, reconstruct a body, find a ball's release."""
 
-from __future__ import annotations
-
 from contextlib import nullcontext
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """Operators of a match: read its files, synthesize and show a stretch of it, its cameras, its export."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import bpy
@@ -36,7 +34,7 @@ class MatchVerb(BackgroundOperator):
         """The first stretch that is shown is framed; one in place of another is not."""
         return not ours.find_armatures(bpy.context.scene)
 
-    def find_library(self, wanted: load.DisplayRequest):
+    def find_library(self, wanted: "load.DisplayRequest"):
         """Find the library if this session has it."""
         return session.find_library(wanted.library, wanted.unit)
 

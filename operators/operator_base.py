@@ -1,8 +1,6 @@
 """Base classes of operators: errors become reports with a cause and a next step; long work may run in the background.
 """
 
-from __future__ import annotations
-
 from contextlib import nullcontext
 from pathlib import Path
 

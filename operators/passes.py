@@ -1,7 +1,5 @@
 """Passing scenes: their lists, their files, and their generation."""
 
-from __future__ import annotations
-
 import math
 
 import bpy

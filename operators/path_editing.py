@@ -1,7 +1,5 @@
 """Path editing: let a motion follow a curve that can be edited, avoid collisions, apply or revert it."""
 
-from __future__ import annotations
-
 from contextlib import suppress
 
 import bpy
@@ -11,8 +9,15 @@ from ..beyond_mocap.base.errors import BeyondMocapError, InputError, format_coun
 from ..scene.core import channels
 from ..scene.core.measure import units_per_metre
 from ..scene.path_editing import collision_avoidance as keep_apart
-from ..scene.path_editing import curve, edited_bodies, live
-from ..scene.path_editing.settings import list_edited_bodies, list_target_bodies, select_object
+from ..scene.path_editing import edited_bodies, live
+from ..scene.path_editing.settings import (
+    KINDS,
+    MOST_DEGREE,
+    SHAPES,
+    list_edited_bodies,
+    list_target_bodies,
+    select_object,
+)
 from .operator_base import NEEDS_NO_EDITING, BaseOperator
 
 
@@ -24,7 +29,7 @@ class EditedBodyVerb(BaseOperator):
 
 COUNT = {"name": "Points", "default": 0, "min": 0, "max": 200,
          "description": "Number of control points of the curve; 0: as many as it needs to stay within 3 cm"}
-DEGREE = {"name": "Degree", "default": 3, "min": 1, "max": curve.MOST_DEGREE,
+DEGREE = {"name": "Degree", "default": 3, "min": 1, "max": MOST_DEGREE,
           "description": "Degree of a NURBS curve: how smooth it is, and how far each control point reaches"}
 
 
@@ -35,7 +40,7 @@ a selected curve"""
     bl_idname = "beyond_mocap.edit_path"
     bl_label = "Edit Path"
     count: IntProperty(**COUNT)
-    kind: EnumProperty(name="Curve", items=curve.KINDS, default="BEZIER", description="Kind of the new curve")
+    kind: EnumProperty(name="Curve", items=KINDS, default="BEZIER", description="Kind of the new curve")
     degree: IntProperty(**DEGREE)
     straight: BoolProperty(name="Straight", description="A straight line as long as the original path")
     needs = (*NEEDS_NO_EDITING, "Select an armature with a motion, and optionally a curve as its new path",
@@ -87,9 +92,9 @@ points"""
 
     bl_idname = "beyond_mocap.path_curve"
     bl_label = "New Curve"
-    shape: EnumProperty(name="Shape", items=curve.SHAPES, default="FITTED", description="Shape of the new curve")
+    shape: EnumProperty(name="Shape", items=SHAPES, default="FITTED", description="Shape of the new curve")
     count: IntProperty(**COUNT)
-    kind: EnumProperty(name="Curve", items=curve.KINDS, default="BEZIER", description="Kind of the new curve")
+    kind: EnumProperty(name="Curve", items=KINDS, default="BEZIER", description="Kind of the new curve")
     degree: IntProperty(**DEGREE)
     needs = (*NEEDS_NO_EDITING, "Select an armature that follows a path, or its curve",
              lambda context: bool(list_target_bodies(context)))

@@ -1,7 +1,5 @@
 """Operators that render a preview movie or a contact sheet in the background."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import bpy
@@ -52,7 +50,7 @@ class PictureOperator(BackgroundOperator, ExportHelper):
             raise InputError(self.bl_label, "no file given", f"a {self.filename_ext} file", "choose where to write it")
         return Path(bpy.path.ensure_ext(bpy.path.abspath(self.filepath), self.filename_ext)).absolute()
 
-    def read_look(self) -> pictures.PictureLook:
+    def read_look(self) -> "pictures.PictureLook":
         """Read how to render."""
         return pictures.PictureLook(engine=filming.find_engine(self.engine), height=self.height, samples=self.samples)
 

@@ -1,7 +1,5 @@
 """Players: import their tracking data, choose, place and remove them."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import bpy
@@ -9,10 +7,10 @@ from bpy.props import EnumProperty, StringProperty
 
 from ..beyond_mocap.base.errors import InputError
 from ..beyond_mocap.base.fixes import Fix
-from ..beyond_mocap.files.tracking.providers import PROVIDERS
 from ..scene.characters import player_character
 from ..scene.core import frame_range, notices
 from ..scene.core.settings import find_active_player, to_absolute_path, to_setting_path
+from ..scene.match.settings import AUTO, PROVIDER_ITEMS
 from ..scene.player import dots, pins, tracks
 from ..scene.result import preview
 from ..scene.timeline import label_checks as word_checks
@@ -38,10 +36,7 @@ a CSV is read as its labels"""
         name="Metadata", subtype="FILE_PATH",
         description="The provider's second file; empty finds one with a matching name beside the tracking file",
     )
-    provider: EnumProperty(name="Provider",
-                           items=[("AUTO", "Automatic", "Detect the provider from the file")]
-                           + [(one.name, one.title, one.files.replace("`", "")) for one in PROVIDERS.values()],
-                           description="Provider whose format the file has")
+    provider: EnumProperty(name="Provider", items=PROVIDER_ITEMS, description="Provider whose format the file has")
 
     def list_paths(self) -> list[str]:
         """List the chosen files, without label files beside a chosen CSV, which are imported with it."""
@@ -69,7 +64,7 @@ a CSV is read as its labels"""
         """Read all files, then add the players."""
         self.offers = []
         settings = context.scene.beyond_mocap
-        provider = "" if self.provider == "AUTO" else self.provider
+        provider = "" if self.provider == AUTO else self.provider
         read = list(self.read_files(provider))
         if not settings.players:
             self.set_clock(settings, [player for _, found, _ in read for player in found])
@@ -146,7 +141,7 @@ a CSV is read as its labels"""
         if scene.frame_end != before:
             self.report({"INFO"}, f"Scene end set to frame {scene.frame_end}, the end of the tracks")
 
-    def add_player(self, settings, path: str, found: tracks.PlayerInFile, provider: str):
+    def add_player(self, settings, path: str, found: "tracks.PlayerInFile", provider: str):
         """Add one player to the list; of a whole match only the first is selected."""
         from ..beyond_mocap.annotation.label_candidates import find_track_labels
 

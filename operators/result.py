@@ -1,7 +1,5 @@
 """Results: apply, revert or preview takes, their error curves, and the momentum of bodies."""
 
-from __future__ import annotations
-
 import bpy
 from bpy.props import BoolProperty, EnumProperty, FloatProperty, IntProperty, StringProperty
 

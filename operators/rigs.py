@@ -1,7 +1,5 @@
 """Rigs: map bones, bake a motion onto a rig, simplify keys, export motions."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import bpy
@@ -219,7 +217,7 @@ def find_source_body(settings) -> bpy.types.Object | None:
     return settings.rig.source or (player.body if player is not None else None)
 
 
-def build_bake_options(settings) -> fit.BakeOptions:
+def build_bake_options(settings) -> "fit.BakeOptions":
     """Build the bake options from the panel's settings."""
     keeps = {"AUTO": None, "KEEP": True, "SCALE": False}[settings.steps]
     return fit.BakeOptions(settings.root, keeps, settings.ik == "BAKE", settings.plants)
@@ -332,11 +330,11 @@ scene stays unchanged"""
     directory: StringProperty(name="Folder", subtype="DIR_PATH", options={"SKIP_SAVE"},
                               description="Folder for the files; those of the same names are replaced")
     filter_folder: BoolProperty(default=True, options={"HIDDEN", "SKIP_SAVE"})
-    preset: EnumProperty(name="For", items=engine_files.PRESET_ITEMS, default="UNREAL",
+    preset: EnumProperty(name="For", items=rig.ENGINE_PRESETS, default="UNREAL",
                          description="Program to deliver to")
-    who: EnumProperty(name="Deliver", items=engine_files.DELIVERED_ITEMS, default="ACTIVE",
+    who: EnumProperty(name="Deliver", items=rig.DELIVERIES, default="ACTIVE",
                       description="What is delivered")
-    root: EnumProperty(name="Root Motion", items=engine_files.ROOT_ITEMS, default="SMOOTH",
+    root: EnumProperty(name="Root Motion", items=rig.ENGINE_ROOTS, default="SMOOTH",
                        description="Motion of the root bone")
     meshes: BoolProperty(name="Meshes", default=True, description="Also deliver the meshes that armatures move")
 

@@ -1,7 +1,5 @@
 """Load Sample: the extension's own sample for each task, from its files to a moving character, by one button."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable
 from dataclasses import dataclass

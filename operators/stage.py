@@ -1,7 +1,5 @@
 """Operators of the stage: pitch, light, and cameras, also those for paths."""
 
-from __future__ import annotations
-
 import bpy
 from bpy.props import BoolProperty, EnumProperty
 

@@ -1,9 +1,5 @@
 """Live streams: start and stop receiving, play along, choose targets, keep what was received."""
 
-from __future__ import annotations
-
-from itertools import count
-
 import bpy
 from bpy.props import EnumProperty, FloatProperty, IntProperty, StringProperty
 
@@ -12,7 +8,7 @@ from ..beyond_mocap.passes.stream import live_hits
 from ..scene.passes import generate as make
 from ..scene.passes.settings import find_armature
 from ..scene.stream import follow, play, streamed_body
-from ..scene.stream.settings import find_stream, list_streams
+from ..scene.stream.settings import add_stream, find_stream, get_key, list_streams
 from .operator_base import BackgroundOperator, BaseOperator
 
 NUMBER = {"name": "Number", "default": 1, "min": 1, "options": {"SKIP_SAVE"}, "description": "Number of the stream"}
@@ -49,10 +45,11 @@ class BEYOND_MOCAP_OT_stream_stop(ListeningVerb, bpy.types.Operator):
     bl_options = {"REGISTER"}
     number: IntProperty(**NUMBER)
 
-    def do(self, _context):
-        require_listener(self.number)
-        follow.stop_listening(self.number)
-        follow.write_status(self.number)
+    def do(self, context):
+        require_listener(context, self.number)
+        key = context.scene.session_uid, self.number
+        follow.stop_listening(key)
+        follow.write_status(key)
 
 
 class BEYOND_MOCAP_OT_stream_list(BaseOperator, bpy.types.Operator):
@@ -72,21 +69,9 @@ class BEYOND_MOCAP_OT_stream_list(BaseOperator, bpy.types.Operator):
         """Change the list."""
         if self.what == "ADD":
             return add_stream(context.scene)
-        require_stream(context, self.number)
+        follow.stop_listening(get_key(require_stream(context, self.number)))
         further = context.scene.beyond_mocap_stream.further
-        follow.stop_listening(self.number)
         further.remove([stream.number for stream in further].index(self.number))
-
-
-def add_stream(scene) -> None:
-    """Add a stream with the lowest number and the lowest port that are free; the rest is as in the first stream."""
-    streams, first = list_streams(scene), scene.beyond_mocap_stream
-    numbers, ports = {stream.number for stream in streams}, {stream.port for stream in streams}
-    stream = first.further.add()
-    stream.number = next(number for number in count(2) if number not in numbers)
-    stream.port = next(port for port in (*range(first.port + 1, 65536), *range(1024, first.port)) if port not in ports)
-    for name in ("protocol", "unit", "part", "side", "threshold", "clip"):
-        setattr(stream, name, getattr(first, name))
 
 
 def require_stream(context, number: int):
@@ -98,9 +83,9 @@ def require_stream(context, number: int):
     return stream
 
 
-def require_listener(number: int):
+def require_listener(context, number: int):
     """Find what receives a stream, or raise an InputError."""
-    listener = follow.find_listener(number)
+    listener = follow.find_listener(context.scene, number)
     if listener is None:
         raise InputError(f"stream {number}", "is not received", "one that is received", "press Start Stream first")
     return listener
@@ -120,6 +105,7 @@ class BEYOND_MOCAP_OT_stream_end(PlayingVerb, bpy.types.Operator):
     bl_options = {"REGISTER"}
 
     def do(self, context):
+        play.write_rest()
         play.stop_rally()
         status = context.window_manager.beyond_mocap_streaming
         status.playing, status.played = False, ""
@@ -136,7 +122,7 @@ class BEYOND_MOCAP_OT_stream_keep(ListeningVerb, bpy.types.Operator):
 
     def do(self, context):
         """Build a motion from the ring buffer and write it to an action."""
-        motion = live_hits.build_recording(require_listener(self.number), self.seconds)
+        motion = live_hits.build_recording(require_listener(context, self.number), self.seconds)
         if motion is None:
             raise InputError("stream", "nothing has arrived yet", "frames", "start the sender")
         streamed_body.keep_recording(context, motion)

@@ -1,7 +1,5 @@
 """Render Study Clips: render every clip of a naturalness study under its neutral name."""
 
-from __future__ import annotations
-
 import shutil
 from pathlib import Path
 

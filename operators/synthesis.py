@@ -1,7 +1,5 @@
 """Operators of Synthesize: new takes, updates, other solutions, and the presets of its settings."""
 
-from __future__ import annotations
-
 import bpy
 from bl_operators.presets import AddPresetBase
 from bpy.props import BoolProperty, FloatProperty, IntProperty, StringProperty

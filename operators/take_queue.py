@@ -5,8 +5,6 @@ processes the queue, later ones only add to it. Each player's result is stored a
 and only if the player's request is still the same.
 """
 
-from __future__ import annotations
-
 import json
 from time import perf_counter
 
@@ -94,7 +92,7 @@ class TakeOperator(BaseOperator):
         players = [settings.players[self.player]] if self.player else plans.list_selected_players(settings)
         return [(player, orders.SynthesisMode(self.kind)) for player in players]
 
-    def build_entries(self, context) -> list[queue.QueueEntry]:
+    def build_entries(self, context) -> "list[queue.QueueEntry]":
         """Build the requests as queue entries."""
         settings = context.scene.beyond_mocap
         found = []
@@ -119,7 +117,7 @@ class TakeOperator(BaseOperator):
         names = ", ".join(player.name for player in players)
         self.report({"INFO"}, f"Generated: {names}{_describe_kept_keys(players)}; press Apply or Revert")
 
-    def process_entries(self, window, entries) -> list[orders.RequestResult]:
+    def process_entries(self, window, entries) -> "list[orders.RequestResult]":
         """Generate the takes of all entries, with the progress at the pointer."""
         results: list[orders.RequestResult] = []
         window.progress_begin(0, 100)
@@ -284,7 +282,7 @@ class TakeOperator(BaseOperator):
         player = player or self.current
         return super().post_failure(error, topic or (_name_topic(player) if player else ""), player)
 
-    def add_failure(self, entry: queue.QueueEntry, error):
+    def add_failure(self, entry: "queue.QueueEntry", error):
         """Post a notice of a failed entry, and store its line for the end."""
         self.failed.append(self.post_failure(error, player=entry.player))
         line = str(describe_error(error))
@@ -341,21 +339,21 @@ def _describe_kept_keys(players) -> str:
     return f", {format_count(count, 'manual key')} kept" if count else ""
 
 
-def _find_library(entry: queue.QueueEntry):
+def _find_library(entry: "queue.QueueEntry"):
     return session.find_library(entry.request.folder, entry.request.unit)
 
 
-def _find_scene(entry: queue.QueueEntry):
+def _find_scene(entry: "queue.QueueEntry"):
     return next((scene for scene in bpy.data.scenes if scene.session_uid == entry.scene), None)
 
 
-def _find_player(scene, entry: queue.QueueEntry):
+def _find_player(scene, entry: "queue.QueueEntry"):
     """Find the player of an entry, under its new name if it was renamed; None where it was removed."""
     players = scene.beyond_mocap.players
     return players[entry.player] if entry.player in players else _find_matching_player(scene, entry)
 
 
-def _find_matching_player(scene, entry: queue.QueueEntry):
+def _find_matching_player(scene, entry: "queue.QueueEntry"):
     """Find the player whose request equals the entry's; None where there is none."""
     players, busy = scene.beyond_mocap.players, queue.list_players()
     named = players.get(entry.player)

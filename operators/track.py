@@ -1,12 +1,10 @@
 """A player's track: drawn as a curve or taken from a moving object, with speeds; pins and heading keys."""
 
-from __future__ import annotations
-
 import bpy
 import numpy as np
 
 from ..beyond_mocap.base.errors import InputError
-from ..beyond_mocap.motion.track import line_track
+from ..beyond_mocap.base.settings.synthesis import MAX_SPEED
 from ..beyond_mocap.synthesis.pin import BALL
 from ..scene.core import channels, window
 from ..scene.core.measure import units_per_metre
@@ -83,7 +81,7 @@ Mode; the player waits at points of speed 0"""
 
     bl_idname = "beyond_mocap.set_speed"
     bl_label = "Set Speed"
-    speed: bpy.props.FloatProperty(name="Speed", default=3.0, min=0.0, max=line_track.MAX_SPEED, precision=2,
+    speed: bpy.props.FloatProperty(name="Speed", default=3.0, min=0.0, max=MAX_SPEED, precision=2,
                                    description="Metres per second; 0 for a stop")
     wait: bpy.props.FloatProperty(name="Wait", default=1.0, min=0.01, max=60.0, precision=2, unit="TIME_ABSOLUTE",
                                   description="Seconds of waiting at a stop")
@@ -92,7 +90,7 @@ Mode; the player waits at points of speed 0"""
     def invoke(self, context, _event):
         points = list_selected_points(context.object)
         if points:
-            self.speed, self.wait = min(points[0].radius, line_track.MAX_SPEED), points[0].weight_softbody
+            self.speed, self.wait = min(points[0].radius, MAX_SPEED), points[0].weight_softbody
         return context.window_manager.invoke_props_dialog(self)
 
     def do(self, context):

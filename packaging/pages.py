@@ -6,7 +6,6 @@ from __future__ import annotations
 
 import re
 import sys
-from itertools import groupby
 from pathlib import Path
 
 TOP = Path(__file__).resolve().parents[1]
@@ -30,15 +29,14 @@ def build_settings_page() -> str:
     Returns:
         The page as text.
     """
-    from beyond_mocap.base.settings import TABLES
+    from beyond_mocap.base.settings import FEATURES, TABLES
 
     parts = [HEAD]
-    tables = [(rows[0].feature, group, rows) for group, rows in TABLES.items()]
-    for feature, groups in groupby(tables, key=lambda table: table[0]):
+    for feature, module in FEATURES.items():
         parts.append(f"\n## {feature}\n")
-        for _, group, rows in groups:
+        for group in module.TABLES:
             parts.append(f"\nGroup `{group}`:\n\n")
-            parts.extend(_format_setting(row) for row in rows)
+            parts.extend(_format_setting(row) for row in TABLES[group])
     return "".join(parts)
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import bpy
 
-from ..scene.stream.settings import find_status, list_streams
+from ..scene.stream.settings import find_status, get_key, list_streams
 from .tab import TabPanel, create_value_column, draw_paragraph, draw_section, draw_table, draw_values, with_progress
 
 STREAM_ICONS = {"receiving": "CHECKMARK", "waiting": "SORTTIME", "stopped": "BLANK1"}
@@ -38,7 +38,7 @@ def draw_streams(layout, context) -> None:
 
 def name_stream(stream) -> str:
     """Name a stream, with its player and its state where there is one."""
-    status = find_status(stream.number)
+    status = find_status(get_key(stream))
     state = status.state if status is not None and status.on else ""
     return ", ".join(text for text in (f"Stream {stream.number}", stream.player, state) if text)
 
@@ -47,7 +47,7 @@ def draw_stream_of_several(layout, context, stream) -> None:
     """Draw one of several streams: whose strikes they are, the rest as of an only one, and the button that removes
     it.
     """
-    status = find_status(stream.number)
+    status = find_status(get_key(stream))
     column = create_value_column(layout)
     column.enabled = status is None or not status.on
     column.prop_search(stream, "player", context.scene.beyond_mocap_passes, "players")
@@ -59,7 +59,7 @@ def draw_stream_of_several(layout, context, stream) -> None:
 
 def draw_stream(layout, stream) -> None:
     """Draw the settings of a stream, its status, and the last strike."""
-    status = find_status(stream.number)
+    status = find_status(get_key(stream))
     is_on = status is not None and status.on
     column = create_value_column(layout)
     chosen = column.column()

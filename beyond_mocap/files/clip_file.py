@@ -12,6 +12,8 @@ if TYPE_CHECKING:
     from .bvh.bvh import BvhClip
 
 CLIP_ENDINGS = (".bvh", ".npz")
+FOREIGN = (".fbx", ".glb", ".gltf", ".usd", ".usda", ".usdc", ".usdz")
+"""Endings of recordings that Blender converts."""
 
 
 def read_clip(path, unit: float | None = None) -> BvhClip:

@@ -17,13 +17,12 @@ from .. import annotation
 from ..base.errors import InputError, format_count
 from ..base.fixes import Fix
 from ..files.atomic import atomic_write
-from ..files.clip_file import CLIP_ENDINGS, is_clip_file
+from ..files.clip_file import CLIP_ENDINGS, FOREIGN, is_clip_file
 
 CACHE_FOLDER = ".beyond_mocap"
 CLASSIFIER_FILE = "learned_words.npz"
 """Name of the learned classifier of labels in the cache's folder."""
 TABLE_NAME = "annotations.csv"
-FOREIGN = (".fbx", ".glb", ".gltf", ".usd", ".usda", ".usdc", ".usdz")
 _TABLE, _FORM = "converted.json", 1  # raised when conversions hold more: Blender then converts again
 
 

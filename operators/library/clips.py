@@ -1,7 +1,5 @@
 """Motion clips in the scene: import them, mirror them, make assets of them."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -11,8 +9,8 @@ import numpy as np
 from bpy.props import BoolProperty, EnumProperty, FloatProperty, StringProperty
 
 from ...beyond_mocap.base.errors import InputError, UserCancelledError, format_count
-from ...beyond_mocap.files.clip_file import CLIP_ENDINGS, read_clip
-from ...beyond_mocap.library.scan import FOREIGN, find_recordings, is_foreign
+from ...beyond_mocap.files.clip_file import CLIP_ENDINGS, FOREIGN, read_clip
+from ...beyond_mocap.library import scan
 from ...beyond_mocap.motion import humanoid, quaternion
 from ...beyond_mocap.motion import mirror as mirroring
 from ...beyond_mocap.motion import motion as motions
@@ -69,9 +67,9 @@ the motion, from the hips up and in metres"""
         window.select_only(context, bodies[-1], *bodies)
         self.report({"INFO"}, f"Clips imported at the scene's frame rate: {len(bodies)}")
 
-    def read_file(self, path: Path) -> list[tuple[str, BvhClip]]:
+    def read_file(self, path: Path) -> "list[tuple[str, BvhClip]]":
         """Read the clips of one file with their names."""
-        if not is_foreign(path):
+        if not scan.is_foreign(path):
             return [(path.stem, read_clip(path, self.unit or None))]
         takes = foreign.read_takes(path)
         alone = len(takes) == 1
@@ -88,7 +86,7 @@ the motion, from the hips up and in metres"""
 
 
 def _list_clips_below(folder: Path) -> list[Path]:
-    found = find_recordings(folder)
+    found = scan.find_recordings(folder)
     if not found:
         raise InputError(folder, "no motion clip in the folder", "BVH, FBX, glTF or USD files", "choose another folder")
     return found
@@ -137,7 +135,7 @@ kicks to the other side; the previous motion stays as an action"""
         action.write_motion(body, mirror_in_place(motion), context.scene, start, f"{name} mirrored")
 
 
-def mirror_in_place(motion: motions.Motion) -> motions.Motion:
+def mirror_in_place(motion: "motions.Motion") -> "motions.Motion":
     """Mirror a motion and place it where the original started, with the same heading."""
     mirrored = mirroring.mirror(motion)
     angle = humanoid.compute_heading(motion)[0] - humanoid.compute_heading(mirrored)[0]
@@ -290,7 +288,7 @@ def _list_playing(context) -> list[bpy.types.Object]:
     return rigs
 
 
-def _build_draft(rig, context) -> assets.AssetDraft:
+def _build_draft(rig, context) -> "assets.AssetDraft":
     """Build a draft of what an armature plays, with the labels of its strips where it has any."""
     motion, item = action.read_motion(rig, context.scene), channels.find_playing_action(rig)[0]
     try:

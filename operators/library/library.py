@@ -1,7 +1,5 @@
 """The library: build it, list its clips, import and remove them, relink a moved folder."""
 
-from __future__ import annotations
-
 import os
 from collections import Counter
 from dataclasses import dataclass

@@ -1,7 +1,5 @@
 """Labels of a library clip: open it for annotation, propose labels, review and save them, learn from them."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """Annotate by keys while the match plays (the window's side of the core's `key_commands`), and the reference video."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import bpy

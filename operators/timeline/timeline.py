@@ -1,7 +1,5 @@
 """The timeline of a player: show it, navigate it, and edit its key moments."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import bpy
@@ -51,7 +49,7 @@ def has_selected_moment(target: bpy.types.Object) -> bool:
     return any(marker.select for _, strip in lanes.iter_strips(target) for marker in strip.action.pose_markers)
 
 
-def find_selected_moment(target: bpy.types.Object) -> lanes.PlacedMoment:
+def find_selected_moment(target: bpy.types.Object) -> "lanes.PlacedMoment":
     """Find the selected key moment. Raises InputError if there is none."""
     found = next((moment for moment in lanes.list_moments(target) if moment.is_selected), None)
     if found is None:
@@ -60,7 +58,7 @@ def find_selected_moment(target: bpy.types.Object) -> lanes.PlacedMoment:
     return found
 
 
-def list_selected_spans(target: bpy.types.Object) -> list[lanes.PlacedSpan]:
+def list_selected_spans(target: bpy.types.Object) -> "list[lanes.PlacedSpan]":
     """List the spans whose strips are selected, by start."""
     return [span for span in lanes.list_spans(target) if span.is_selected]
 

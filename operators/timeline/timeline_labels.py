@@ -1,7 +1,5 @@
 """Labels on the timeline: spans, sides, and the text form of annotations."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import bpy

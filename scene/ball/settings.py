@@ -2,8 +2,6 @@
 selected.
 """
 
-from __future__ import annotations
-
 import bpy
 from bpy.props import BoolProperty, FloatProperty, FloatVectorProperty, IntProperty, PointerProperty, StringProperty
 

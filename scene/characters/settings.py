@@ -1,7 +1,5 @@
 """Settings of a character: which of its materials are the kit; and how a player or a team names its character."""
 
-from __future__ import annotations
-
 import bpy
 from bpy.props import PointerProperty
 

@@ -4,8 +4,6 @@ The rows are on the window manager: neither saved with a file nor undone. Panels
 them.
 """
 
-from __future__ import annotations
-
 import json
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field

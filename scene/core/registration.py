@@ -6,6 +6,9 @@ modules have nothing, names those that do in `REGISTERED`; a test finds what is 
 A class is registered because it is a Blender class that a module defines; one that is attached to Blender's own data
 says so in `attached_to` ("Scene.beyond_mocap"). A module that needs more has a function `register()`, `unregister()` or
 both. A package with `register()` in its `__init__` handles its own modules.
+
+A module whose classes have properties does without `from __future__ import annotations`: Blender would compile the text
+of each property again at every start. A type that is only loaded for the checker is quoted there.
 """
 
 from __future__ import annotations
@@ -110,18 +113,10 @@ def _list_classes(module: ModuleType) -> list[type]:
 def _list_requirements(cls: type, by_name: dict[str, type]) -> list[type]:
     """List the classes that must be registered before this one: targets of its properties, or a panel's parent."""
     if issubclass(cls, bpy.types.PropertyGroup):
-        targets = (getattr(hint, "keywords", {}).get("type") for hint in _evaluate_annotations(cls).values())
+        targets = (getattr(hint, "keywords", {}).get("type") for hint in get_annotations(cls).values())
         return [target for target in targets if target in by_name.values()]
     parent = by_name.get(getattr(cls, "bl_parent_id", None))
     return [parent] if parent is not None else []
-
-
-def _evaluate_annotations(cls: type) -> dict[str, object]:
-    """Evaluate a class's annotations in place, once: Blender evaluates texts among them again and again."""
-    own = get_annotations(cls)
-    if any(isinstance(value, str) for value in own.values()):
-        cls.__annotations__ = own = get_annotations(cls, eval_str=True)
-    return own
 
 
 def _attach_property(owner: type, name: str, cls: type) -> None:
@@ -130,7 +125,7 @@ def _attach_property(owner: type, name: str, cls: type) -> None:
 
 def _add_old_name(cls: type) -> None:
     """Let scripts of version 0.1 read the status property `messages` by its name of then, for one version."""
-    if "messages" in cls.__dict__.get("__annotations__", {}):
+    if "messages" in get_annotations(cls):
         cls.told = property(lambda self: self.messages)
 
 

@@ -4,8 +4,6 @@ Paths may be relative to the file. What is too large for a file's properties (a 
 `session` under the names kept here.
 """
 
-from __future__ import annotations
-
 import bpy
 from bpy.props import (
     BoolProperty,

@@ -8,8 +8,6 @@ folder is only listed (names, sizes, times). A missing folder is searched beside
 as a whole still finds its library.
 """
 
-from __future__ import annotations
-
 import math
 import os
 import threading
@@ -43,8 +41,12 @@ _scan_state: dict = {}  # the scanning thread and its result
 class _Listing:
     """The last listing: the clips, and the files at that time (`list_files`)."""
 
-    clips: tuple["ListedClip", ...] = ()
+    clips: "tuple[ListedClip, ...]" = ()
     files: dict[str, tuple[int, int]] = field(default_factory=dict)
+
+
+def _on_filter_change(_self, context):
+    update_list(context.window_manager)
 
 
 class BeyondMocapClip(bpy.types.PropertyGroup):
@@ -216,10 +218,6 @@ def relink_library(scene: bpy.types.Scene) -> str:
     return found
 
 
-def _on_filter_change(_self, context):
-    update_list(context.window_manager)
-
-
 def _matches(clip: "ListedClip", term: str) -> bool:
     return term in clip.path.lower() or any(word.startswith(term) for word in clip.labels)
 
@@ -240,9 +238,9 @@ def _is_label_file(name: str) -> bool:
 
 def _iter_files(folder: str):
     """Iterate over the paths of all recordings and label files below a folder; links are followed, each folder once."""
-    from ...beyond_mocap.files.clip_file import CLIP_ENDINGS, is_clip_file
+    from ...beyond_mocap.files.clip_file import CLIP_ENDINGS, FOREIGN, is_clip_file
     from ...beyond_mocap.library.recorded_ball.ball_table import ENDING
-    from ...beyond_mocap.library.scan import CACHE_FOLDER, FOREIGN, TABLE_NAME
+    from ...beyond_mocap.library.scan import CACHE_FOLDER, TABLE_NAME
 
     wanted, seen = (*CLIP_ENDINGS, ".txt", TABLE_NAME, ENDING, *FOREIGN), set()
     for here, folders, files in os.walk(folder, followlinks=True):

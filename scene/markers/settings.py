@@ -1,7 +1,5 @@
 """The properties of a marker cloud and the scene's marker settings, saved with the file and known to undo."""
 
-from __future__ import annotations
-
 import bpy
 from bpy.props import (
     BoolProperty,

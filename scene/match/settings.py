@@ -2,8 +2,6 @@
 undo.
 """
 
-from __future__ import annotations
-
 import bpy
 import numpy as np
 from bpy.props import (

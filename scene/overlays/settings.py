@@ -1,7 +1,5 @@
 """Which overlays are drawn over the 3D view, per scene."""
 
-from __future__ import annotations
-
 import bpy
 from bpy.props import BoolProperty, StringProperty
 

@@ -1,8 +1,7 @@
 """Properties of the panel "Ball & Passes" and its operators. They are saved with the file and covered by undo."""
 
-from __future__ import annotations
-
 import json
+from collections.abc import Callable
 
 import bpy
 from bpy.props import (
@@ -36,8 +35,12 @@ def mark_edited(_settings, _context) -> None:
     live.mark_watcher("Passing scene")
 
 
+rename_calls: list[Callable[[bpy.types.Scene, str, str], None]] = []
+"""Called with a scene and the old and the new name of one of its players, by whom else stores players by name."""
+
+
 def update_name(player, context) -> None:
-    """Write a player's new name to all passes and streams; a name that another player has is refused."""
+    """Write a player's new name wherever it is stored; a name that another player has is refused."""
     if player.known and any(
         row != player and row.name == player.name for row in player.id_data.beyond_mocap_passes.players
     ):
@@ -49,9 +52,8 @@ def update_name(player, context) -> None:
             one.who = player.name if one.who == player.known else one.who
             one.to = player.name if one.to == player.known else one.to
         settings.serve = player.name if settings.serve == player.known else settings.serve
-        first = player.id_data.beyond_mocap_stream
-        for stream in (first, *first.further):
-            stream.player = player.name if stream.player == player.known else stream.player
+        for call in rename_calls:
+            call(player.id_data, player.known, player.name)
     player.known = player.name
     mark_edited(player, context)
 

@@ -16,17 +16,13 @@ from ...beyond_mocap.base.errors import InputError
 from ...beyond_mocap.base.vectors import unit_vectors
 from ..core.measure import units_per_metre
 from ..player.drawn_track import list_points
+from .settings import MOST_DEGREE
 
 if TYPE_CHECKING:
     from ...beyond_mocap.motion.path.path import Path
 
-KINDS = (("BEZIER", "Bezier", "Points on the path, with handles"),
-         ("NURBS", "NURBS", "Control points beside the path: a B-spline, smoother, with fewer points"))
-SHAPES = (("FITTED", "Original", "Along the original path"),
-          ("STRAIGHT", "Straight", "A straight line, as long as the original path, toward its end"),
-          ("PRESENT", "As It Is", "Along the current path, with other points"))
 MARK = "beyond_mocap_path"  # on curve objects that the extension created
-MOST_ORDER, MOST_DEGREE = 6, 20  # highest order that Blender draws, and highest degree that a motion follows
+MOST_ORDER = 6  # highest order that Blender draws
 DEGREE = "beyond_mocap_degree"  # on curve data whose degree is higher than Blender draws
 _STEP, _PIECES = 0.04, (8, 600)  # metres between samples of a Bezier segment; limits of their number
 _NURBS_PIECES = 48

@@ -233,7 +233,7 @@ def create_new_curve(
     Args:
         context: for scene and view layer.
         body: the edited armature.
-        shape: one of `curve.SHAPES`.
+        shape: one of `settings.SHAPES`.
         count, kind, degree: of the new curve, see `curve.create_curve`.
     Returns:
         The new curve object.

@@ -1,7 +1,5 @@
 """The stored state of a path edit: an armature whose motion follows a curve. Saved with the file, and part of undo."""
 
-from __future__ import annotations
-
 import json
 
 import bpy
@@ -9,6 +7,14 @@ from bpy.props import BoolProperty, FloatProperty, PointerProperty, StringProper
 
 from ..core.properties import read_property_values, with_settings
 from ..result.result import BeyondMocapBefore
+
+KINDS = (("BEZIER", "Bezier", "Points on the path, with handles"),
+         ("NURBS", "NURBS", "Control points beside the path: a B-spline, smoother, with fewer points"))
+SHAPES = (("FITTED", "Original", "Along the original path"),
+          ("STRAIGHT", "Straight", "A straight line, as long as the original path, toward its end"),
+          ("PRESENT", "As It Is", "Along the current path, with other points"))
+MOST_DEGREE = 20
+"""Highest degree of a B-spline that a motion follows."""
 
 
 def activate_curve(edit, context: bpy.types.Context) -> None:

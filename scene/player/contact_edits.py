@@ -2,17 +2,15 @@
 the newest take they belong to.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import bpy
 import numpy as np
 from bpy.props import EnumProperty, FloatProperty, FloatVectorProperty
 
+from ...beyond_mocap.base import time_series
 from ...beyond_mocap.base.errors import InputError
 from ...beyond_mocap.base.fixes import Fix
-from ...beyond_mocap.base.time_series import find_runs
 from ...beyond_mocap.synthesis import contact_edit
 from ..core import session
 
@@ -61,7 +59,7 @@ class Contact:
         return 0.5 * (self.start + self.end)
 
 
-def read_contact_edits(player) -> tuple[contact_edit.ContactEdit, ...]:
+def read_contact_edits(player) -> "tuple[contact_edit.ContactEdit, ...]":
     """Read a player's contact edits."""
     return tuple(contact_edit.ContactEdit(round(edit.time, 6), edit.foot, edit.kind, round(edit.start, 6),
                                           end=round(edit.end, 6),
@@ -69,7 +67,7 @@ def read_contact_edits(player) -> tuple[contact_edit.ContactEdit, ...]:
                  for edit in player.contact_edits)
 
 
-def write_contact_edits(player, edits: tuple[contact_edit.ContactEdit, ...]) -> None:
+def write_contact_edits(player, edits: "tuple[contact_edit.ContactEdit, ...]") -> None:
     """Replace a player's contact edits."""
     player.contact_edits.clear()
     for edit in edits:
@@ -103,7 +101,7 @@ def list_contacts(take) -> list[Contact]:
     body, places = identify_joints(take.motion.skeleton), forward_kinematics(take.motion)[0]
     times, found = take.start_time + np.arange(len(take.motion)) / take.motion.fps, []
     for side, limb in enumerate((body.left, body.right)):
-        for first, end in find_runs(take.contacts[:, side]):
+        for first, end in time_series.find_runs(take.contacts[:, side]):
             heel, toe = (places[first:end, joint, :2].mean(axis=0) for joint in (limb.foot, limb.toe_or_foot))
             found.append(Contact(contact_edit.FEET[side], float(times[first]), float(times[end - 1]), heel, toe))
     return found

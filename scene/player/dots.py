@@ -3,8 +3,6 @@
 A player's dot carries the strips of its timeline, and the data to add its player to the list in another file.
 """
 
-from __future__ import annotations
-
 from typing import TYPE_CHECKING
 
 import bpy
@@ -149,7 +147,7 @@ def find_key_range(dot: bpy.types.Object) -> tuple[float, float] | None:
     return (min(low for low, _ in ends), max(high for _, high in ends)) if ends else None
 
 
-def _create_ball_dot(scene: bpy.types.Scene, track: Track, collection: bpy.types.Collection, clock: Clock) -> None:
+def _create_ball_dot(scene: bpy.types.Scene, track: "Track", collection: bpy.types.Collection, clock: Clock) -> None:
     places = np.where(np.isnan(track.ball), [np.nan, np.nan, BALL_SIZE], track.ball)
     seconds, places = _select_measured(track.times, places)
     if len(seconds):

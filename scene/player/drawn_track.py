@@ -12,11 +12,9 @@ import bpy
 import numpy as np
 from bpy_extras.view3d_utils import location_3d_to_region_2d
 
+from ...beyond_mocap.base import time_series, vectors
 from ...beyond_mocap.base.errors import InputError
-from ...beyond_mocap.base.time_series import interpolate_columns
-from ...beyond_mocap.base.vectors import distances_along
 from ...beyond_mocap.motion import humanoid, track
-from ...beyond_mocap.motion.track import line_track
 from ..core import channels
 from ..core.live import Watcher
 from ..core.measure import build_scene_clock, units_per_metre
@@ -67,10 +65,12 @@ def read_drawn_track(scene: bpy.types.Scene, drawn: bpy.types.Object, start: flo
     Raises:
         InputError: if the object is no track.
     """
+    from ...beyond_mocap.motion.track import line_track
+
     if drawn.type == "CURVE":
         line = build_line(scene, drawn)
         level = line.line[:, :2]
-        distances = distances_along(level)
+        distances = vectors.distances_along(level)
         return line_track.build_line_track(level, distances[line.point_indices], line.speeds, waits=line.waits,
                                            start=start, name=f"curve {drawn.name}")
     if drawn.type == "CURVES":
@@ -93,7 +93,7 @@ def sample_object(scene: bpy.types.Scene, target: bpy.types.Object, times: np.nd
         place = np.array(target.matrix_world.translation, dtype=float)[:2] / units_per_metre(scene)
         return np.tile(place, (len(times), 1))
     seconds, places = _read_timed_places(scene, target, still)
-    return interpolate_columns(times, seconds, places)
+    return time_series.interpolate_columns(times, seconds, places)
 
 
 def build_line(scene: bpy.types.Scene, drawn: bpy.types.Object) -> DrawnLine:
@@ -111,8 +111,10 @@ def build_line(scene: bpy.types.Scene, drawn: bpy.types.Object) -> DrawnLine:
     elif spline.type == "POLY":
         local, at = _read_values(points, "co", 4)[:, :3], np.arange(len(points))
     else:
+        from ...beyond_mocap.motion.track.line_track import sample_nurbs
+
         places, weights = _read_values(points, "co", 4)[:, :3], _read_values(points, "weight", 1)
-        local, at = line_track.sample_nurbs(places, weights, spline.order_u, spline.use_endpoint_u, BEZIER_PIECES)
+        local, at = sample_nurbs(places, weights, spline.order_u, spline.use_endpoint_u, BEZIER_PIECES)
     world = np.array(drawn.matrix_world)
     line = (local @ world[:3, :3].T + world[:3, 3]) / units_per_metre(scene)
     return DrawnLine(line, at, _read_values(points, "radius", 1), _read_values(points, "weight_softbody", 1))

@@ -1,7 +1,5 @@
 """Heading keys in the scene: a direction or an object that a player's body has to face, with its time and hold."""
 
-from __future__ import annotations
-
 import math
 
 import bpy

@@ -1,7 +1,5 @@
 """Pins in the scene: an Empty for each place where a hand, a foot, the gaze or the ball has to be, with its time."""
 
-from __future__ import annotations
-
 import bpy
 import numpy as np
 from bpy.props import EnumProperty, FloatProperty, PointerProperty

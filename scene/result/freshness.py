@@ -9,8 +9,6 @@ comparison decides whether an edit matters, so that neither the preview itself n
 a quick take, and when nothing has changed for a while a full one in its place.
 """
 
-from __future__ import annotations
-
 import hashlib
 import json
 import os
@@ -92,7 +90,7 @@ def _feed_digest(digest, value: Any) -> None:
         digest.update(f"{value!r};".encode())
 
 
-def compute_parts(plan: Plan, folder: str, library: str = "") -> dict[str, str]:
+def compute_parts(plan: "Plan", folder: str, library: str = "") -> dict[str, str]:
     """Compute the fingerprints of a take's inputs: track, labels, other settings, and the library on disk.
 
     Args:
@@ -105,7 +103,7 @@ def compute_parts(plan: Plan, folder: str, library: str = "") -> dict[str, str]:
     return {**compute_plan_parts(plan), "library": library or compute_library_stamp(folder)}
 
 
-def compute_plan_parts(plan: Plan) -> dict[str, str]:
+def compute_plan_parts(plan: "Plan") -> dict[str, str]:
     """Compute the same without the library, which needs a walk over the disk."""
     rest = replace(plan, track=None, timeline=annotation.Timeline(), library="")
     return {"track": compute_fingerprint(plan.track), "words": compute_fingerprint(plan.timeline),
@@ -116,8 +114,7 @@ def compute_library_stamp(folder: str) -> str:
     """Compute a fingerprint of the clips and labels of a folder: number, size and time of the files, without reading
     them.
     """
-    from ...beyond_mocap.files.clip_file import CLIP_ENDINGS
-    from ...beyond_mocap.library.scan import FOREIGN
+    from ...beyond_mocap.files.clip_file import CLIP_ENDINGS, FOREIGN
 
     found, watched = [], (*CLIP_ENDINGS, *FOREIGN, ".txt", ".csv")
     for place, folders, names in os.walk(folder, followlinks=True):

@@ -1,7 +1,5 @@
 """A player's present result, and what its preview replaced: saved with the file, and part of undo."""
 
-from __future__ import annotations
-
 import bpy
 from bpy.props import BoolProperty, CollectionProperty, EnumProperty, IntProperty, PointerProperty, StringProperty
 

@@ -17,7 +17,6 @@ from ..characters import player_character
 from ..core.settings import find_active_player
 from ..match import match_objects
 from . import export, exporters
-from .rig import ROOTS
 
 
 @dataclass(frozen=True)
@@ -45,19 +44,7 @@ PRESETS = {
     "USD": EnginePreset("USD", "BLENDER"),
     "ALEMBIC": EnginePreset("ABC", "BLENDER"),
 }
-PRESET_ITEMS = (
-    ("UNREAL", "Unreal Engine", "FBX in centimetres, Z up, the root bone as the skeleton's root"),
-    ("UNITY", "Unity", "FBX with its scale as units, Y up"),
-    ("GODOT", "Godot", "glTF binary, metres, Y up"),
-    ("USD", "USD", "Universal Scene Description with meshes and skeletons"),
-    ("ALEMBIC", "Alembic", "Meshes that move point by point, for any renderer"),
-)
-ROOT_ITEMS = tuple(item for item in ROOTS if item[0] != "STRAIGHT")
 SCENE_FORMATS = ("USD", "ABC", "GLB")
-DELIVERED_ITEMS = (("ACTIVE", "Active Player", "The active player; without players the active armature"),
-       ("PLAYERS", "Selected Players", "Every selected player of the list, one file for each"),
-       ("MATCH", "Match", "Every player of the displayed match, one file for each"),
-       ("SCENE", "Whole Scene", "Everything visible, in one file of USD, Alembic or glTF"))
 
 
 def list_delivered_rigs(context: bpy.types.Context, who: str) -> list[bpy.types.Object]:

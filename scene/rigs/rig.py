@@ -1,7 +1,5 @@
 """The settings of the panel "Rig & Export": the rig, its bone map, baking and export; saved with the scene."""
 
-from __future__ import annotations
-
 import bpy
 from bpy.props import (
     BoolProperty,
@@ -45,6 +43,18 @@ KEEP_ROOT = ("Add the joints that the library's recordings have above the hips, 
 EXPORT_CHOICES = (("ACTIVE", "Active", "The active player's rig or body; without players the active armature"),
                   ("SELECTED", "Selected", "All selected armatures"),
                   ("PLAYERS", "All Players", "The rig or body of every selected player"))
+ENGINE_PRESETS = (
+    ("UNREAL", "Unreal Engine", "FBX in centimetres, Z up, the root bone as the skeleton's root"),
+    ("UNITY", "Unity", "FBX with its scale as units, Y up"),
+    ("GODOT", "Godot", "glTF binary, metres, Y up"),
+    ("USD", "USD", "Universal Scene Description with meshes and skeletons"),
+    ("ALEMBIC", "Alembic", "Meshes that move point by point, for any renderer"),
+)
+ENGINE_ROOTS = tuple(item for item in ROOTS if item[0] != "STRAIGHT")
+DELIVERIES = (("ACTIVE", "Active Player", "The active player; without players the active armature"),
+              ("PLAYERS", "Selected Players", "Every selected player of the list, one file for each"),
+              ("MATCH", "Match", "Every player of the displayed match, one file for each"),
+              ("SCENE", "Whole Scene", "Everything visible, in one file of USD, Alembic or glTF"))
 
 
 class BeyondMocapRigBone(bpy.types.PropertyGroup):

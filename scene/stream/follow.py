@@ -22,7 +22,7 @@ from ...beyond_mocap.passes.stream import listener as listening
 from ..core import window
 from ..core.live import Watcher, call_or_describe
 from . import streamed_body
-from .settings import find_status, find_stream, list_statuses, list_streams
+from .settings import find_status, find_stream, get_key, list_statuses, list_streams
 
 if TYPE_CHECKING:
     from ...beyond_mocap.passes.hits import HitMotion
@@ -38,7 +38,7 @@ class ReceivedStream:
     """A stream that is received.
 
     Attributes:
-        number: the stream's number in its scene.
+        key: the stream's scene and number, as `settings.get_key`.
         listener: receives its frames.
         hits: detects strikes in them.
         seen: number of the last frame that was shown.
@@ -48,7 +48,7 @@ class ReceivedStream:
         latencies: s from sender to pose, of the last frames.
     """
 
-    number: int
+    key: tuple[int, int]
     listener: listening.Listener
     hits: live_hits.LiveHits
     seen: int = 0
@@ -58,7 +58,7 @@ class ReceivedStream:
     latencies: deque[float] = field(default_factory=lambda: deque(maxlen=60))
 
 
-_streams: dict[int, ReceivedStream] = {}
+_streams: dict[tuple[int, int], ReceivedStream] = {}
 _on_hit: list = []
 _on_update: list = []
 
@@ -93,15 +93,16 @@ def start_listening(stream: StreamSettings) -> listening.Listener:
     one = listening.Listener(stream.port, stream.protocol, hierarchy, stream.unit or None).start()
     hits = live_hits.LiveHits(one, stream.part, "" if stream.side == "either" else stream.side,
                               stream.threshold or None)
-    _streams[stream.number] = ReceivedStream(number=stream.number, listener=one, hits=hits)
-    write_status(stream.number)
+    key = get_key(stream)
+    _streams[key] = ReceivedStream(key=key, listener=one, hits=hits)
+    write_status(key)
     return one
 
 
 def _check_can_start(stream: StreamSettings) -> None:
     """Raise an InputError if a stream is received already, or shares player, armature or port with one that is."""
     where = f"stream {stream.number}"
-    if stream.number in _streams:
+    if get_key(stream) in _streams:
         raise InputError(where, "is already received", "one that is stopped", "press Stop Stream")
     for other in list_received(stream.id_data):
         if stream.player and other.player == stream.player:
@@ -110,29 +111,29 @@ def _check_can_start(stream: StreamSettings) -> None:
         if stream.body is not None and other.body == stream.body:
             raise InputError(where, f"armature {stream.body.name} follows stream {other.number}",
                              "an armature of its own", "choose another one under Streamed Body, or none")
-    for received in _streams.values():
+    for (scene, number), received in _streams.items():
         listener = received.listener
         if listener.port == stream.port and (listener.protocol == "udp") == (stream.protocol == "udp"):
-            raise InputError(where, f"stream {received.number} receives on port {stream.port}", "a port of its own",
+            other = f"stream {number}" + " of another scene" * (scene != stream.id_data.session_uid)
+            raise InputError(where, f"{other} receives on port {stream.port}", "a port of its own",
                              "choose another port, here and in the sender")
 
 
-def stop_listening(number: int | None = None) -> None:
+def stop_listening(key: tuple[int, int] | None = None) -> None:
     """Stop receiving a stream; None: all."""
-    for received in [_streams[one] for one in list(_streams) if number in (None, one)]:
-        del _streams[received.number]
-        received.listener.stop()
+    for one in [one for one in _streams if key in (None, one)]:
+        _streams.pop(one).listener.stop()
 
 
-def find_listener(number: int = 1) -> listening.Listener | None:
+def find_listener(scene: bpy.types.Scene, number: int = 1) -> listening.Listener | None:
     """Find what receives a stream; None if it is not received."""
-    received = _streams.get(number)
+    received = _streams.get((scene.session_uid, number))
     return None if received is None else received.listener
 
 
 def list_received(scene: bpy.types.Scene) -> list[StreamSettings]:
     """List the streams of a scene that are received."""
-    return [stream for stream in list_streams(scene) if stream.number in _streams]
+    return [stream for stream in list_streams(scene) if get_key(stream) in _streams]
 
 
 def update_streams(scene: bpy.types.Scene) -> list[HitMotion]:
@@ -141,10 +142,10 @@ def update_streams(scene: bpy.types.Scene) -> list[HitMotion]:
     A stream in which something goes wrong is stopped with a message; the others go on.
     """
     hits = []
-    for received in list(_streams.values()):
+    for key, received in list(_streams.items()):
         hit = call_or_describe(lambda one=received: _update_stream(scene, one),
-                               lambda reason, one=received: _give_up(one.number, reason),
-                               f"Stream {received.number} has stopped because of an error")
+                               lambda reason, key=key: _give_up(key, reason),
+                               f"Stream {key[1]} has stopped because of an error")
         hits += [] if hit is None else [hit]
     for call in list(_on_update):
         call(scene)
@@ -153,8 +154,9 @@ def update_streams(scene: bpy.types.Scene) -> list[HitMotion]:
 
 def _update_stream(scene: bpy.types.Scene, received: ReceivedStream) -> HitMotion | None:
     """Pose a stream's character by the latest frame, detect hits, and update the status."""
-    stream, now = find_stream(scene, received.number), time.monotonic()
-    if stream is None:  # of another scene
+    (of, number), now = received.key, time.monotonic()
+    stream = find_stream(scene, number) if of == scene.session_uid else None
+    if stream is None:
         return None
     latest = received.listener.latest_frame()
     if latest is not None and latest.number != received.seen:
@@ -164,10 +166,10 @@ def _update_stream(scene: bpy.types.Scene, received: ReceivedStream) -> HitMotio
     found = None
     if now - received.looked >= DETECT_SECONDS:
         received.looked = now
-        found = _detect_hit(scene, find_stream(scene, received.number), received)
+        found = _detect_hit(scene, find_stream(scene, number), received)
     if int(now / STATUS_SECONDS) != received.written:
         received.written = int(now / STATUS_SECONDS)
-        write_status(received.number)
+        write_status(received.key)
     return found
 
 
@@ -190,7 +192,7 @@ def _show_frame(scene, stream: StreamSettings, received: ReceivedStream, latest)
         # one undo step, so that undo does not remove the new character silently
         if not bpy.app.background:
             bpy.ops.ed.undo_push(message="Streamed Character")
-            stream = find_stream(scene, received.number)
+            stream = find_stream(scene, received.key[1])
     streamed_body.pose_body(stream.body, scene, skeleton, root[0], rotations[0])
     return can_show
 
@@ -200,21 +202,21 @@ def _detect_hit(scene, stream: StreamSettings, received: ReceivedStream) -> HitM
     try:
         found = received.hits.find_new_hit()
     except BeyondMocapError as error:
-        find_status(received.number).hit = str(error)
+        find_status(received.key).hit = str(error)
         return None
     if found is None:
         return None
     hit, seconds = found
     side = f"{hit.side} " if hit.side else ""
-    find_status(received.number).hit = f"{side}{hit.part}, {hit.max_speed:.1f} m/s"
+    find_status(received.key).hit = f"{side}{hit.part}, {hit.max_speed:.1f} m/s"
     for call in list(_on_hit):
         call(scene, stream, hit, seconds)
     return hit
 
 
-def write_status(number: int = 1) -> None:
+def write_status(key: tuple[int, int]) -> None:
     """Write the status of a stream for the panel."""
-    status, received = _find_or_create_status(number), _streams.get(number)
+    status, received = _find_or_create_status(key), _streams.get(key)
     if received is None:
         status.on, status.state, status.line, status.figures = False, "stopped", "", ""
         return
@@ -231,27 +233,28 @@ def write_status(number: int = 1) -> None:
 
 def write_stopped() -> None:
     """Write the status of streams that have been stopped without it, as by opening a file."""
-    stopped = [status.number for status in list_statuses() if status.on and status.number not in _streams]
-    for number in stopped:
-        write_status(number)
+    keys = [(status.scene, status.number) for status in list_statuses() if status.on]
+    stopped = [key for key in keys if key not in _streams]
+    for key in stopped:
+        write_status(key)
     if stopped:
         window.redraw_editors()
 
 
-def _find_or_create_status(number: int) -> StreamStatus:
-    """Find the status of a stream, or create it."""
-    status = find_status(number)
+def _find_or_create_status(key: tuple[int, int]) -> StreamStatus:
+    """Find the status of a stream, or create it; that of the first one is used where none is received by it."""
+    status, first = find_status(key), bpy.context.window_manager.beyond_mocap_streaming
     if status is None:
-        status = bpy.context.window_manager.beyond_mocap_streaming.further.add()
-        status.number = number
+        status = first if key[1] == 1 and not first.on else first.further.add()
+        status.scene, status.number = key
     return status
 
 
-def _give_up(number: int, reason: str) -> None:
+def _give_up(key: tuple[int, int], reason: str) -> None:
     """Stop a stream because of an error; its message stays."""
-    stop_listening(number)
-    write_status(number)
-    status = find_status(number)
+    stop_listening(key)
+    write_status(key)
+    status = find_status(key)
     status.state, status.line = "failed", reason
 
 
@@ -278,9 +281,9 @@ def _collect_texts() -> list[str]:
 
 def _stop_removed() -> None:
     """Stop the streams that no scene has any more, after an undo."""
-    for number in list(_streams):
-        if all(find_stream(scene, number) is None for scene in bpy.data.scenes):
-            stop_listening(number)
+    there = {get_key(stream) for scene in bpy.data.scenes for stream in list_streams(scene)}
+    for key in _streams.keys() - there:
+        stop_listening(key)
 
 
 def _end_session() -> None:

@@ -9,6 +9,7 @@ and the ball are those of the passing scene.
 from __future__ import annotations
 
 import time
+from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from types import SimpleNamespace
 from typing import TYPE_CHECKING
@@ -29,12 +30,12 @@ if TYPE_CHECKING:
     from ...beyond_mocap.library.library import Library
     from ...beyond_mocap.passes.answers_ahead import AnswerRequest
     from ...beyond_mocap.passes.hits import HitMotion
-    from ...beyond_mocap.passes.live_passes import LivePass, Rally
+    from ...beyond_mocap.passes.live_passes import LivePass, PlayerTimeline, Rally
     from ...beyond_mocap.passes.strike_means import StrikeMeans
     from .settings import StreamSettings
 
-FIRST_SECONDS = 3.0
-"""Seconds of standing that are written with a pass; the rest follows when its players stand."""
+FIRST_SECONDS = (1.0, 3.0)
+"""Seconds before a pass and of standing after it that are written with it; the rest follows when its players stand."""
 
 _session: dict[str, object] = {}
 
@@ -76,7 +77,7 @@ def apply_rally(scene: bpy.types.Scene, new_rally: NewRally) -> None:
     """Apply a rally to characters and ball, and answer the user's strikes from now on."""
     stop_rally()
     make.session.store_library(new_rally.library, new_rally.order.unit)
-    _session.update(scene=scene.session_uid, means=new_rally.means, seen=None, latest={})
+    _session.update(scene=scene.session_uid, means=new_rally.means, seen=None, latest={}, unwritten=set())
     _wait_for_strike(scene, new_rally.rally)
     for name in ("strikes", "figures", "messages"):
         scene.beyond_mocap_passes.property_unset(name)
@@ -93,6 +94,13 @@ def stop_rally() -> None:
     follow.remove_call(receive_strike)
     follow.remove_call(_update_or_end)
     _session.clear()
+
+
+def write_rest() -> None:
+    """Write what was not written with the last passes, so that nothing waits for their players to stand."""
+    for scene in bpy.data.scenes:
+        if _session.get("unwritten") and scene.session_uid == _session["scene"]:
+            _write_rest(scene)
 
 
 def get_current_rally() -> Rally | None:
@@ -186,7 +194,6 @@ def update_rally(scene: bpy.types.Scene) -> None:
         _end_rally("The scene has been updated or cleared: press Play Live to continue")
         return
     _update_target(scene)
-    _write_rest(scene)
     _collect_answer()
     try:
         target = find_target(scene)
@@ -196,6 +203,9 @@ def update_rally(scene: bpy.types.Scene) -> None:
         _answer_strike(scene, target)
     elif "job" not in _session:
         _plan_ahead(scene, target)
+    # a moment's halt is not seen when they stand
+    if _session["unwritten"] and compute_rally_seconds(scene) >= get_current_rally().ready_time:
+        _write_rest(scene)
 
 
 def answer_now(scene: bpy.types.Scene, hit: HitMotion) -> LivePass:
@@ -205,6 +215,7 @@ def answer_now(scene: bpy.types.Scene, hit: HitMotion) -> LivePass:
                          fixes=(Fix("press", "beyond_mocap.stream_play"),))
     piece = _build_answer(*_collect_order(_build_request(scene, hit, find_target(scene))), None, None)
     _apply_pass(scene, piece)
+    _write_rest(scene)
     return piece
 
 
@@ -260,9 +271,6 @@ def _answer_strike(scene, target: str) -> None:
     except BeyondMocapError as error:
         _session["pending"] = None
         bpy.context.window_manager.beyond_mocap_streaming.played = str(error)
-        return
-    if not bpy.app.background:
-        bpy.ops.ed.undo_push(message="Live Pass")
 
 
 def _plan_ahead(scene, target: str) -> None:
@@ -282,20 +290,23 @@ def _plan_ahead(scene, target: str) -> None:
 
 def _apply_pass(scene, piece: LivePass, hit: HitMotion | None = None, seconds: float = 0.0) -> None:
     """Insert a pass that answers a hit into the scene from now on."""
-    next_rally = get_current_rally().add_pass(piece, max(compute_rally_seconds(scene), get_current_rally().ready_time))
-    _apply_players(scene, next_rally, list(piece.motions), next_rally.ready_time + FIRST_SECONDS)
+    background.cancel_jobs("live")  # planning in a thread would slow down the writing
+    begin = max(compute_rally_seconds(scene), get_current_rally().ready_time)
+    next_rally, (before, after) = get_current_rally().add_pass(piece, begin), FIRST_SECONDS
+    _apply_players(scene, next_rally, piece.motions, begin - before, next_rally.ready_time + after)
     _session["latest"][find_main_stream(scene, piece.giver).number] = hit
     _wait_for_strike(scene, next_rally)
-    _session["unwritten"] = list(piece.motions)
+    _session["unwritten"] |= {*piece.motions}
     scene.beyond_mocap_stream.target = ""
     _write_status(piece, time.monotonic() - seconds if seconds else None)
 
 
 def _write_rest(scene) -> None:
-    """Write the standing that follows a pass, once its players stand: a moment's halt is not seen then."""
-    if _session["unwritten"] and compute_rally_seconds(scene) >= get_current_rally().ready_time:
-        _apply_players(scene, get_current_rally(), _session["unwritten"])
-        _session["unwritten"] = []
+    """Write what came before the last passes and the standing that follows; it is one step of undo with them."""
+    _apply_players(scene, get_current_rally(), sorted(_session["unwritten"]))
+    _session["unwritten"] = set()
+    if not bpy.app.background:
+        bpy.ops.ed.undo_push(message="Live Pass")
 
 
 def _wait_for_strike(scene, rally: Rally) -> None:
@@ -303,13 +314,12 @@ def _wait_for_strike(scene, rally: Rally) -> None:
     from ...beyond_mocap.passes.answers_ahead import AnswersAhead
 
     latest = _session["latest"].get(find_main_stream(scene, rally.holder).number)
-    _session.update(rally=rally, ahead=AnswersAhead(_session["means"], rally, latest), pending=None,
-                    unwritten=[])
+    _session.update(rally=rally, ahead=AnswersAhead(_session["means"], rally, latest), pending=None)
     _session.pop("job", None)
 
 
-def _apply_players(scene, one: Rally, names: list[str], until: float = np.inf) -> None:
-    """Apply a rally's motions, up to `until` s, and its ball to the named players."""
+def _apply_players(scene, one: Rally, names: Iterable[str], since: float = -np.inf, until: float = np.inf) -> None:
+    """Apply a rally's motions and its ball to the named players, from `since` to `until` s."""
     from ...beyond_mocap.passes.passes import build_ball
 
     # players may have been renamed or removed since the rally started
@@ -319,15 +329,19 @@ def _apply_players(scene, one: Rally, names: list[str], until: float = np.inf) -
     channels.check_local(*(rows[name].body for name in names), scene.beyond_mocap_passes.rally)
     start = float(scene.beyond_mocap_passes.start_frame)
     for name in names:
-        played = one.players[name]
-        count = int(np.clip((until - played.start) * played.motion.fps, 2, len(played.motion)))
-        shown = SimpleNamespace(motion=played.motion.frames(0, count), start_time=played.start)
-        make.apply_motion(scene, rows[name], shown, start)
-    path, count = one.ball, max(int(np.searchsorted(one.ball.times, until)), 2)
-    path = replace(path, times=path.times[:count], positions=path.positions[:count], measured=path.measured[:count],
-                   rotations=path.rotations[:count])
+        make.apply_motion(scene, rows[name], _cut_motion(one.players[name], since, until), start)
+    path, part = one.ball, slice(*np.searchsorted(one.ball.times, (since, until)))
+    path = replace(path, times=path.times[part], positions=path.positions[part], measured=path.measured[part],
+                   rotations=path.rotations[part])
     make.apply_ball(scene, SimpleNamespace(ball=path, kind=build_ball(one.scene)), start)
     frame_range.extend_range(scene, start + float(one.ball.times[-1]) * frames_per_second(scene))
+
+
+def _cut_motion(played: PlayerTimeline, since: float, until: float) -> SimpleNamespace:
+    """Cut a player's motion from `since` to `until` s, as `generate.apply_motion` takes it."""
+    motion = played.motion
+    first, end = (int(np.clip((seconds - played.start) * motion.fps, 0, len(motion))) for seconds in (since, until))
+    return SimpleNamespace(motion=motion.frames(first, end), start_time=played.start + first / motion.fps)
 
 
 def _update_target(scene) -> None:
@@ -369,4 +383,4 @@ def _after_undo() -> None:
         _end_rally("Undo has ended Play Live: press it to start again")
 
 
-WATCHER = Watcher(name="Play Live", restored=_after_undo, closing=stop_rally, ends=stop_rally)
+WATCHER = Watcher(name="Play Live", restored=_after_undo, saving=write_rest, closing=stop_rally, ends=stop_rally)

@@ -1,11 +1,16 @@
 """Settings of the live streams and, for the panel, their status."""
 
-from __future__ import annotations
+from inspect import get_annotations
+from itertools import count
 
 import bpy
 from bpy.props import BoolProperty, CollectionProperty, IntProperty, PointerProperty, StringProperty
 
 from ..core.properties import with_settings
+from ..passes.settings import rename_calls
+
+OWN = {"number", "port", "body", "player"}
+"""Settings in which the streams of a scene differ from each other."""
 
 
 @with_settings("stream")
@@ -44,7 +49,8 @@ class BeyondMocapStream(StreamSettings, bpy.types.PropertyGroup):
 class StreamStatus:
     """How one stream does."""
 
-    number: IntProperty(default=1, description="Number of the stream")
+    scene: IntProperty(description="The stream's scene, by its number in this session")
+    number: IntProperty(default=1, description="Number of the stream in its scene")
     on: BoolProperty(description="Whether a stream is being received")
     state: StringProperty(description="Waiting, receiving, stalled, ended, failed or stopped")
     line: StringProperty(description="State of the stream in a sentence")
@@ -76,6 +82,31 @@ def find_stream(scene: bpy.types.Scene, number: int) -> StreamSettings | None:
     return next((stream for stream in list_streams(scene) if stream.number == number), None)
 
 
+def get_key(stream: StreamSettings) -> tuple[int, int]:
+    """What tells a stream from all others in this session: its scene and its number there."""
+    return stream.id_data.session_uid, stream.number
+
+
+def add_stream(scene: bpy.types.Scene) -> None:
+    """Add a stream with the lowest number and the lowest port that are free; the rest is as in the first stream."""
+    streams, first = list_streams(scene), scene.beyond_mocap_stream
+    numbers, ports = {stream.number for stream in streams}, {stream.port for stream in streams}
+    stream = first.further.add()
+    stream.number = next(number for number in count(2) if number not in numbers)
+    stream.port = next(port for port in (*range(first.port + 1, 65536), *range(1024, first.port)) if port not in ports)
+    for name in get_annotations(StreamSettings).keys() - OWN:
+        setattr(stream, name, getattr(first, name))
+
+
+def rename_player(scene: bpy.types.Scene, before: str, after: str) -> None:
+    """Let the streams of a player follow their new name."""
+    for stream in list_streams(scene):
+        stream.player = after if stream.player == before else stream.player
+
+
+rename_calls.append(rename_player)
+
+
 def can_follow(stream: StreamSettings, thing: bpy.types.Object) -> bool:
     """Whether an object can be chosen as a stream's body: an armature that is no other stream's."""
     others = (one for one in list_streams(stream.id_data) if one.number != stream.number)
@@ -88,6 +119,6 @@ def list_statuses() -> list[StreamStatus]:
     return [streaming, *streaming.further]
 
 
-def find_status(number: int) -> StreamStatus | None:
-    """Find the status of a stream; None if it has not been started in this session."""
-    return next((status for status in list_statuses() if status.number == number), None)
+def find_status(key: tuple[int, int]) -> StreamStatus | None:
+    """Find the status of a stream by its key; None if it has not been started in this session."""
+    return next((status for status in list_statuses() if (status.scene, status.number) == key), None)

@@ -1,7 +1,5 @@
 """Settings in the panel "Throws & Kicks", and the throw that an armature stores; saved with the file."""
 
-from __future__ import annotations
-
 import bpy
 from bpy.props import BoolProperty, FloatProperty, IntProperty, PointerProperty, StringProperty
 

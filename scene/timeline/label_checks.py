@@ -1,7 +1,5 @@
 """Problems of a timeline's labels, as lines for the panel and the dialog, before anything is synthesized."""
 
-from __future__ import annotations
-
 from functools import lru_cache
 
 import bpy
@@ -38,7 +36,7 @@ def find_built_library(scene: bpy.types.Scene):
     return session.find_library(folder, settings.library_unit or None) if folder else None
 
 
-def describe_problems(scene: bpy.types.Scene, item: annotation.Span | annotation.KeyMoment,
+def describe_problems(scene: bpy.types.Scene, item: "annotation.Span | annotation.KeyMoment",
                       for_player: bool = True) -> list[str]:
     """Describe what is wrong with one span or key moment.
 
@@ -94,7 +92,7 @@ def update_problems(context: bpy.types.Context) -> None:
 
 
 @lru_cache(maxsize=CACHE_SIZE)
-def _list_unknown_words(item: annotation.Span | annotation.KeyMoment, words: frozenset[str]) -> tuple[str, ...]:
+def _list_unknown_words(item: "annotation.Span | annotation.KeyMoment", words: frozenset[str]) -> tuple[str, ...]:
     """List the words that are not in the vocabulary; words: the library's own."""
     timeline = annotation.Timeline((item,)) if isinstance(item, annotation.Span) else annotation.Timeline((), (item,))
     return tuple(str(error).removeprefix(f"{error.where}: ") for error in annotation.find_problems(timeline, words))
@@ -138,7 +136,7 @@ def _list_conflicts(target: bpy.types.Object, items: list) -> list[tuple[int, st
     return found
 
 
-def _describe_missing(scene: bpy.types.Scene, timeline: annotation.Timeline, library) -> list[str]:
+def _describe_missing(scene: bpy.types.Scene, timeline: "annotation.Timeline", library) -> list[str]:
     """Find the nearest labels of the library for key moments that it lacks."""
     from ...beyond_mocap.library.missing_actions import list_action_labels
 

@@ -5,8 +5,6 @@ own). Whatever Blender's own tools do to them can be read as it is: see `strip_l
 which its frames were written, so that another frame rate of the scene does not change them.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from dataclasses import dataclass
 
@@ -43,7 +41,7 @@ class PlacedSpan:
         is_selected: whether the strip is selected.
     """
 
-    span: annotation.Span
+    span: "annotation.Span"
     track: str
     strip: str
     first: int
@@ -66,7 +64,7 @@ class PlacedMoment:
         is_selected: whether the marker is selected.
     """
 
-    key: annotation.KeyMoment
+    key: "annotation.KeyMoment"
     strip: str
     index: int
     frame: int
@@ -94,7 +92,7 @@ def read_clock(target: bpy.types.Object) -> Clock | None:
     return Clock.from_text(target.beyond_mocap_lanes.clock)
 
 
-def read_timeline(target: bpy.types.Object, where: str = "") -> annotation.Timeline | None:
+def read_timeline(target: bpy.types.Object, where: str = "") -> "annotation.Timeline | None":
     """Read the timeline of an object's strips.
 
     Args:

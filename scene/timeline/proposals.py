@@ -4,8 +4,6 @@ Each is listed with its confidence and reason. An accepted proposal becomes an o
 stores its source, which is written with the labels while they stay unchanged.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterable
 from typing import TYPE_CHECKING
 
@@ -58,7 +56,7 @@ class BeyondMocapProposals(bpy.types.PropertyGroup):
     active: IntProperty(name="Proposal", min=0, update=_go_to_proposal, description="The proposal under review")
 
 
-def store_proposals(target: bpy.types.Object, found: Iterable["Proposal"], state: str = "OPEN",
+def store_proposals(target: bpy.types.Object, found: "Iterable[Proposal]", state: str = "OPEN",
                     keep_accepted: bool = True) -> None:
     """List proposals in place of the previous ones, and activate the first.
 
@@ -78,7 +76,7 @@ def store_proposals(target: bpy.types.Object, found: Iterable["Proposal"], state
     group.active = first if first < len(group.listed) else 0
 
 
-def add_proposal(target: bpy.types.Object, row: annotation.ClipAnnotation, source: str, confidence: float, state: str,
+def add_proposal(target: bpy.types.Object, row: "annotation.ClipAnnotation", source: str, confidence: float, state: str,
                  why: str = "") -> None:
     """Add one proposal to the list."""
     one = target.beyond_mocap_proposals.listed.add()
@@ -87,7 +85,7 @@ def add_proposal(target: bpy.types.Object, row: annotation.ClipAnnotation, sourc
     one.confidence, one.state = confidence, state
 
 
-def has_labels(timeline: annotation.Timeline, row: annotation.ClipAnnotation, fps: float) -> bool:
+def has_labels(timeline: "annotation.Timeline", row: "annotation.ClipAnnotation", fps: float) -> bool:
     """Return whether a timeline already has the labels of a row.
 
     That is a key moment with the same first label within SAME_SECONDS seconds of the row's key, or a span with the same
@@ -107,7 +105,7 @@ def find_active(target: bpy.types.Object) -> BeyondMocapProposal | None:
     return group.listed[group.active] if 0 <= group.active < len(group.listed) else None
 
 
-def to_row(one: BeyondMocapProposal) -> annotation.ClipAnnotation:
+def to_row(one: BeyondMocapProposal) -> "annotation.ClipAnnotation":
     """Convert a proposal to a row of annotation."""
     return annotation.ClipAnnotation(one.start, one.end, None if one.key < 0 else one.key, tuple(one.name.split()))
 
@@ -171,7 +169,7 @@ def _find_proposal(target: bpy.types.Object, index: int) -> BeyondMocapProposal:
     return listed[index]
 
 
-def _remove_labels(target: bpy.types.Object, row: annotation.ClipAnnotation) -> None:
+def _remove_labels(target: bpy.types.Object, row: "annotation.ClipAnnotation") -> None:
     """Remove the strips and markers with the labels and times of a row."""
     fps = target[recordings.RATE]
     if row.key is not None:

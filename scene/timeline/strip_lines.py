@@ -5,8 +5,6 @@ The name of a strip or marker is its labels. The line itself is stored in a reco
 of the frame; while the name is the stored one, the line's labels count, else those of the name.
 """
 
-from __future__ import annotations
-
 import re
 from dataclasses import replace
 from functools import lru_cache
@@ -38,25 +36,25 @@ class BeyondMocapLine(bpy.types.PropertyGroup):
     shown: StringProperty(name="Shown", description="Its name when it was written; another name means new labels")
 
 
-def compute_frames(span: annotation.Span, clock: Clock) -> tuple[int, int]:
+def compute_frames(span: "annotation.Span", clock: Clock) -> tuple[int, int]:
     """Compute the first and last whole frame of a span's strip; at least one frame long, so that it is visible."""
     first = clock.to_whole_frame(span.start)
     return first, max(first + 1, clock.to_whole_frame(span.end))
 
 
 @lru_cache(maxsize=CACHE_SIZE)
-def format_line(item: annotation.Span | annotation.KeyMoment) -> str:
+def format_line(item: "annotation.Span | annotation.KeyMoment") -> str:
     """Format a span or key moment as a line of the text form, exactly."""
     timeline = annotation.Timeline((item,)) if isinstance(item, annotation.Span) else annotation.Timeline((), (item,))
     return annotation.format_timeline(timeline).strip()
 
 
-def format_labels(item: annotation.Span | annotation.KeyMoment) -> str:
+def format_labels(item: "annotation.Span | annotation.KeyMoment") -> str:
     """Format the labels of a span or key moment: the name of its strip or marker."""
     return " ".join(format_line(item).split()[2 if isinstance(item, annotation.Span) else 1 :]) or NO_LABELS
 
 
-def read_span(strip: bpy.types.NlaStrip, clock: Clock, where: str) -> annotation.Span:
+def read_span(strip: bpy.types.NlaStrip, clock: Clock, where: str) -> "annotation.Span":
     """Read the span of a strip in its present state. Raises InputError if its name cannot be parsed."""
     record = strip.action.beyond_mocap
     first = round_frame(strip.frame_start)
@@ -74,7 +72,7 @@ def read_span(strip: bpy.types.NlaStrip, clock: Clock, where: str) -> annotation
     return replace(recorded, start=start, end=end, line=None)
 
 
-def read_key_moment(marker: bpy.types.TimelineMarker, frame: int, clock: Clock, where: str) -> annotation.KeyMoment:
+def read_key_moment(marker: bpy.types.TimelineMarker, frame: int, clock: Clock, where: str) -> "annotation.KeyMoment":
     """Read the key moment of a marker on scene frame `frame`. Raises InputError if its name cannot be parsed."""
     record, recorded = marker.beyond_mocap, None
     if record.line:
@@ -90,7 +88,7 @@ def read_key_moment(marker: bpy.types.TimelineMarker, frame: int, clock: Clock, 
 
 
 def parse_labels(text: str, start: float, end: float | None = None,
-                 where: str = "labels") -> annotation.Span | annotation.KeyMoment:
+                 where: str = "labels") -> "annotation.Span | annotation.KeyMoment":
     """Parse typed labels to a span, or without an end to a key moment.
 
     Args:
@@ -108,13 +106,13 @@ def parse_labels(text: str, start: float, end: float | None = None,
     return replace(_parse_name("0 1", text, where).spans[0], start=start, end=end, line=None)
 
 
-def read_recorded_span(action: bpy.types.Action) -> annotation.Span | None:
+def read_recorded_span(action: bpy.types.Action) -> "annotation.Span | None":
     """Read the span for which an action was written; None if the extension did not write it."""
     line = action.beyond_mocap.line
     return _parse_line(line) if line else None
 
 
-def store_span(strip: bpy.types.NlaStrip, span: annotation.Span, kind: str) -> None:
+def store_span(strip: bpy.types.NlaStrip, span: "annotation.Span", kind: str) -> None:
     """Name a strip by its labels and store the exact line with its action."""
     labels = format_labels(span)
     for blanks in range(_MOST_BLANKS):  # invisible, and keeps Blender from adding a number to the name
@@ -125,7 +123,7 @@ def store_span(strip: bpy.types.NlaStrip, span: annotation.Span, kind: str) -> N
     record.kind, record.line, record.shown = kind, format_line(span), strip.name
 
 
-def store_key_moment(marker: bpy.types.TimelineMarker, key: annotation.KeyMoment, frame: int) -> None:
+def store_key_moment(marker: bpy.types.TimelineMarker, key: "annotation.KeyMoment", frame: int) -> None:
     """Write a key moment to a marker; frame: on its own action."""
     marker.name, marker.frame = format_labels(key), frame
     record = marker.beyond_mocap
@@ -138,13 +136,13 @@ def remove_name_suffix(name: str) -> str:
 
 
 @lru_cache(maxsize=CACHE_SIZE)
-def _parse_line(line: str) -> annotation.Span | annotation.KeyMoment:
+def _parse_line(line: str) -> "annotation.Span | annotation.KeyMoment":
     """Parse a stored line."""
     found = annotation.parse_timeline(line)
     return replace((*found.spans, *found.keys)[0], line=None)
 
 
-def _parse_name(times: str, name: str, place: str) -> annotation.Timeline:
+def _parse_name(times: str, name: str, place: str) -> "annotation.Timeline":
     """Parse a name at one time or two. Raises InputError if the text form would read it as something else."""
     labels = remove_name_suffix(name)
     try:

@@ -6,8 +6,6 @@ plays in every clip editor, is not rendered, and works in a file without the ext
 would be rendered in the scene's place, and one created by a script also plays frame for frame.)
 """
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import bpy

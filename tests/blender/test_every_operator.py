@@ -270,7 +270,7 @@ def listen():
     """A stream is listened to, and a few frames have arrived."""
     scene = importlib.import_module(f"{EXTENSION}.scene.stream.follow")
     bpy.ops.beyond_mocap.stream_start()
-    listener, text = scene.find_listener(), (worlds.SAMPLE / "walking_1_2.bvh").read_text()
+    listener, text = scene.find_listener(bpy.context.scene), (worlds.SAMPLE / "walking_1_2.bvh").read_text()
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as out:
         for piece in (text.split("MOTION")[0], *text.strip().split("\n")[-40:]):
             out.sendto(piece.encode(), ("127.0.0.1", listener.port))

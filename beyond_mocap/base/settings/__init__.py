@@ -7,7 +7,6 @@ writes, lists, and values that a panel only stores.
 
 from __future__ import annotations
 
-from dataclasses import replace
 from typing import Any
 
 from . import aim, library, markers, match, passes, path_editing, stream, study, synthesis, throws, view
@@ -19,8 +18,7 @@ FEATURES = {
     "Study": study, "Overlays": view,
 }
 TABLES: dict[str, tuple[Setting, ...]] = {
-    group: tuple(replace(row, feature=feature) for row in rows)
-    for feature, module in FEATURES.items() for group, rows in module.TABLES.items()
+    group: tuple(rows) for module in FEATURES.values() for group, rows in module.TABLES.items()
 }
 """Group -> its settings. A group is the set of settings that one verb or one property class uses together."""
 

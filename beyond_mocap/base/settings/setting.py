@@ -62,7 +62,6 @@ class Setting:
         tuning: the methods under whose Fine Tuning the panel lists it, with blanks; "any": under each; "" for none.
         blank: the choice that is "" in code.
         convert: converts the user's value to the value that code reads.
-        feature: set by the table.
     """
 
     name: str
@@ -86,7 +85,6 @@ class Setting:
     tuning: str = ""
     blank: str | None = None
     convert: Callable | None = None
-    feature: str = ""
 
     def __post_init__(self):
         object.__setattr__(self, "kind", self.kind or type(self.default))

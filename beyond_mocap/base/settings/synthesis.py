@@ -6,6 +6,8 @@ from collections.abc import Iterable
 from ..errors import InputError
 from .setting import BETWEEN, Setting
 
+MAX_SPEED = 12.0
+"""m/s; no player runs faster, so a sample that would need it is wrong."""
 METHODS = (
     ("path", "Path Following", "Place the body on the track and keep the sway of the clips"),
     ("distance", "Distance", "Match the travelled distance by adding or removing steps, then by warping time"),

@@ -12,12 +12,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from ...base.errors import InputError, TimedMessage, format_count, format_seconds
+from ...base.settings.synthesis import MAX_SPEED
 from ...base.time_series import find_runs
 from .data import Track, is_ball_sentinel
 from .sampling import GAP_INTERVALS, LONG_GAP
-
-MAX_SPEED = 12.0
-"""m/s; no player runs faster, so a sample that would need it is wrong."""
 
 _USUAL_SPEEDS = (0.2, 7.0)  # m/s; the median of a player's speed lies between them
 _MAX_ACCELERATION = 12.0  # m/s^2, hardest acceleration of a player

@@ -11,12 +11,11 @@ from collections.abc import Sequence
 import numpy as np
 
 from ...base.errors import InputError
+from ...base.settings.synthesis import MAX_SPEED
 from ...base.time_series import interpolate_columns
 from .data import Track
 
 SAMPLE_RATE = 25.0  # samples a second of a track from a drawn line
-MAX_SPEED = 12.0
-"""m/s; no player runs faster."""
 
 MIN_LENGTH = 0.2
 """Minimum length of a drawn line, metres."""

@@ -40,7 +40,7 @@ def follow(room, thread, seconds=20.0):
     shown, rest = None, end
     while time.monotonic() < min(end, rest):
         found.extend(stream.update_streams(bpy.context.scene))
-        latest = (listener := stream.find_listener()) and listener.latest_frame()
+        latest = (listener := stream.find_listener(bpy.context.scene)) and listener.latest_frame()
         if thread.is_alive() or (latest and latest.number != shown):
             shown, rest = latest and latest.number, time.monotonic() + 0.4
         time.sleep(0.01)
@@ -138,7 +138,7 @@ def test_a_stream_that_stops_is_told_and_the_pose_stays(room, core, port, monkey
     monkeypatch.setattr(core("passes.stream.listener"), "STALL_SECONDS", 0.1)
     OPS.stream_start()
     follow(room, send(core, port, 600.0))
-    room("stream.follow").write_status()
+    room("stream.follow").write_status((bpy.context.scene.session_uid, 1))
     assert told().state == "stalled" and "no frame" in told().line
     before = [tuple(bone.rotation_quaternion) for bone in bpy.context.scene.beyond_mocap_stream.body.pose.bones]
     room("stream.follow").update_streams(bpy.context.scene)
@@ -148,9 +148,9 @@ def test_a_stream_that_stops_is_told_and_the_pose_stays(room, core, port, monkey
 def test_a_file_that_is_loaded_ends_the_stream(room, core, port, tmp_path):
     bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "a.blend"))
     OPS.stream_start()
-    listener = room("stream.follow").find_listener()
+    listener = room("stream.follow").find_listener(bpy.context.scene)
     bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "a.blend"))
-    assert room("stream.follow").find_listener() is None and not listener.is_running
+    assert room("stream.follow").find_listener(bpy.context.scene) is None and not listener.is_running
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as again:
         again.bind(("127.0.0.1", port))
 
@@ -177,7 +177,7 @@ def test_a_suits_file_that_is_none(room, port, tmp_path):
     bpy.context.scene.beyond_mocap_stream.clip = str(tmp_path / "none.bvh")
     with pytest.raises(RuntimeError, match="no such file"):
         press_operator(OPS.stream_start)
-    assert room("stream.follow").find_listener() is None
+    assert room("stream.follow").find_listener(bpy.context.scene) is None
 
 
 def test_a_body_that_was_removed_is_made_anew(room, core, port):
@@ -194,7 +194,8 @@ def test_a_stream_that_is_given_up_says_why(room, core, port, monkeypatch):
     follow(room, send(core, port, 600.0))
     told = bpy.context.window_manager.beyond_mocap_streaming
     assert not told.on and told.state == "failed" and "skeleton has changed" in told.line
-    assert room("stream.follow").find_listener() is None and bpy.context.scene.beyond_mocap_stream.body is None
+    scene = bpy.context.scene
+    assert room("stream.follow").find_listener(scene) is None and scene.beyond_mocap_stream.body is None
 
 
 def test_a_chosen_armature_is_used(room, core, port):

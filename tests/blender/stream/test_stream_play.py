@@ -106,9 +106,13 @@ def test_a_strike_is_answered_from_now_on(playing, room, core):
     )
 
 
-def test_an_answer_that_is_planned_ahead_begins_at_once(playing, room, core):
-    """Within the update in which the strike is noticed, and the same pass as when it is planned then."""
+@pytest.mark.parametrize("ending", ["standing", "saving"])
+def test_an_answer_that_is_planned_ahead_begins_at_once(playing, room, core, ending):
+    """Within the update in which the strike is noticed, and the same pass as when it is planned then. The keys before
+    it and long after it are written when the players stand, or the file is saved.
+    """
     play = room("stream.play")
+    playing.frame_set(5 + 48)
     ahead, end = play._session["ahead"], time.monotonic() + 120.0
     while ahead.find(ahead.request_for(kick(core), "Ben", 0)) is None and time.monotonic() < end:
         play.update_rally(playing)
@@ -118,10 +122,15 @@ def test_an_answer_that_is_planned_ahead_begins_at_once(playing, room, core):
     assert play.get_current_rally().passes == 1 and "The answer began 0." in told().played
     assert play._session["ahead"] is not ahead and play._session["pending"] is None
     body = playing.beyond_mocap_passes.players[0].body
-    assert body.animation_data.action.frame_range[1] < 5 + 20 * 24
-    playing.frame_set(int(5 + 24 * play.get_current_rally().ready_time) + 1)
-    play.update_rally(playing)
-    assert body.animation_data.action.frame_range[1] > 5 + 60 * 24
+    first, last = body.animation_data.action.frame_range
+    assert first == 5 + 24 and last < 5 + 20 * 24
+    if ending == "standing":
+        playing.frame_set(int(5 + 24 * play.get_current_rally().ready_time) + 1)
+        play.update_rally(playing)
+    else:
+        play.WATCHER.saving()
+    first, last = body.animation_data.action.frame_range
+    assert first == 5 and last > 5 + 60 * 24
 
 
 def test_whom_the_user_chooses_gets_it(playing, room, core):

@@ -39,6 +39,11 @@ def get_status(number):
     return next(one for one in (manager, *manager.further) if one.number == number)
 
 
+def find_listener(room, number):
+    """What receives a stream of this scene."""
+    return room("stream.follow").find_listener(bpy.context.scene, number)
+
+
 def start_both():
     for number in (1, 2):
         assert press_operator(OPS.stream_start, number=number) == {"FINISHED"}
@@ -57,7 +62,7 @@ def send_all(room, core, *sent, form="bvh"):
     """Send clips at once, each to the port of a stream, and follow until all of their frames are shown."""
     senders = [core("passes.stream.sender").Sender(path, stream.port, "tcp", form=form, rate=600.0)
                for stream, path in sent]
-    shown = room("stream.follow")._streams
+    shown = {number: received for (_, number), received in room("stream.follow")._streams.items()}
     wanted = {stream.number: shown[stream.number].listener.measure_status().frames + len(sender.rows)
               for (stream, _), sender in zip(sent, senders)}
     threads = [threading.Thread(target=sender.send_file, args=(lambda: False,)) for sender in senders]
@@ -92,7 +97,7 @@ def test_each_character_follows_its_own_and_one_goes_on_alone(room, core, stream
     send_all(room, core, (second, CLIP))
     assert (get_status(1).on, get_status(2).on) == (False, True)
     assert_shows_the_end(core, first, CLIP)
-    assert room("stream.follow").find_listener(1) is None
+    assert find_listener(room, 1) is None
 
 
 def test_a_deleted_character_is_made_anew_and_the_other_stays(room, core, streams):
@@ -130,7 +135,7 @@ def test_port_player_and_armature_are_of_one_stream_only(room, streams, change, 
     with pytest.raises(RuntimeError, match=says) as told:
         press_operator(OPS.stream_start, number=2)
     assert len(str(told.value).strip().splitlines()) == 1
-    assert room("stream.follow").find_listener(1).is_running and room("stream.follow").find_listener(2) is None
+    assert find_listener(room, 1).is_running and find_listener(room, 2) is None
 
 
 @pytest.mark.parametrize("online", [False, True])
@@ -140,7 +145,7 @@ def test_both_listen_to_this_machine_only(room, streams, online):
     system.use_online_access = online
     try:
         start_both()
-        sockets = [room("stream.follow").find_listener(number)._server for number in (1, 2)]
+        sockets = [find_listener(room, number)._server for number in (1, 2)]
         assert {one.getsockname()[0] for one in sockets} == {"127.0.0.1"}
     finally:
         system.use_online_access = False
@@ -153,7 +158,7 @@ def test_a_saved_file_goes_on_with_both_and_closing_ends_both(room, core, stream
     send_all(room, core, (streams[0], CLIP), (streams[1], OTHER))
     ports = [stream.port for stream in streams]
     bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "two.blend"))
-    listeners = [room("stream.follow").find_listener(number) for number in (1, 2)]
+    listeners = [find_listener(room, number) for number in (1, 2)]
     assert all(one.is_running for one in listeners)
     bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "two.blend"))
     assert not any(one.is_running for one in listeners)
@@ -177,12 +182,36 @@ def test_undo_of_adding_a_stream_ends_it_and_not_the_other(room):
     bpy.ops.ed.undo()
     room("stream.follow").update_streams(bpy.context.scene)
     assert not len(bpy.context.scene.beyond_mocap_stream.further)
-    assert room("stream.follow").find_listener(1).is_running and room("stream.follow").find_listener(2) is None
+    assert find_listener(room, 1).is_running and find_listener(room, 2) is None
+
+
+def test_streams_of_two_scenes_are_their_own(room, streams):
+    """The same numbers in another scene: none stands for, stops or shows the state of one in this scene."""
+    start_both()
+    here, follow = bpy.context.scene, room("stream.follow")
+    there = bpy.data.scenes.new("Other")
+    try:
+        with bpy.context.temp_override(scene=there):
+            press_operator(OPS.stream_list, what="ADD")
+            with pytest.raises(RuntimeError, match="No stream is received"):
+                press_operator(OPS.stream_stop, number=2)
+            second = there.beyond_mocap_stream.further[0]
+            second.port = here.beyond_mocap_stream.port
+            with pytest.raises(RuntimeError, match="stream 1 of another scene receives on port"):
+                press_operator(OPS.stream_start, number=2)
+            second.port = find_free_port()
+            press_operator(OPS.stream_start, number=2)
+            assert follow.find_listener(there, 2).is_running
+            press_operator(OPS.stream_list, what="REMOVE", number=2)
+        assert follow.find_listener(there, 2) is None and follow.find_listener(here, 2).is_running
+        assert get_status(2).on
+    finally:
+        bpy.data.scenes.remove(there)
 
 
 def test_removing_a_stream_ends_it(room, streams):
     start_both()
     press_operator(OPS.stream_list, what="REMOVE", number=2)
-    assert room("stream.follow").find_listener(2) is None and room("stream.follow").find_listener(1).is_running
+    assert find_listener(room, 2) is None and find_listener(room, 1).is_running
     with pytest.raises(RuntimeError, match="stream 2: is not received"):
         press_operator(OPS.stream_stop, number=2)

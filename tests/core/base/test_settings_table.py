@@ -107,7 +107,7 @@ def test_every_row_makes_sense():
         assert len({row.name for row in rows}) == len(rows), group
     for group, row in ((group, row) for group, rows in TABLES.items() for row in rows):
         where = f"{group} {row.name}"
-        assert row.feature and (row.option or row.tooltip or row.help), where
+        assert row.option or row.tooltip or row.help, where
         assert not row.option.startswith("--no-") or row.default is True, where
         assert not row.choices or row.default in (None, *row.choice_names), where
         if row.least is not None and row.most is not None:
