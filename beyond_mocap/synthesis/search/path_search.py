@@ -43,8 +43,8 @@ class SearchWidth:
         considered: pairs nearest to the requested speed among which these are the cheapest.
     """
 
-    beam_width: int = 80
-    candidates: int = 750
+    beam_width: int = 64
+    candidates: int = 1500
     considered: int = 30000
 
 
