@@ -48,9 +48,16 @@ def read_joints(path) -> JointFeed:
     if not path.is_file():
         raise build_read_error(path, "a file of skeletal tracking")
     read = _find_reader(path)
-    try:
+    with _name_damaged_file(path):
         return read(path)
-    except (KeyError, TypeError, AttributeError, IndexError, ValueError) as error:
+
+
+@contextmanager
+def _name_damaged_file(path: Path) -> Iterator[None]:
+    """Context manager: errors of values that are not where they are expected become one line that names the file."""
+    try:
+        yield
+    except (LookupError, TypeError, AttributeError, ValueError, ArithmeticError) as error:
         found = f"values in other places than expected ({type(error).__name__}: {error})"
         raise InputError(path, found[:200], _FORMS, "export it again") from None
 
