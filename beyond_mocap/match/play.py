@@ -14,9 +14,7 @@ from ..synthesis.heading_plan import HeadingKey, Play
 NEAR_OPPONENT = 15.0
 """Metres within which a player faces the nearest opponent rather than the goal."""
 
-KEY_SECONDS = 0.5
-"""Seconds from one measured heading to the next that the plan follows."""
-
+_KEY_SECONDS = 0.5  # from one measured heading to the next that the plan follows
 _RATE = 5.0  # samples per second
 _KEEPER = "goalkeeper"  # `MatchPlayer.position`
 
@@ -44,15 +42,15 @@ def build_plays(match: Match) -> dict[str, Play]:
 
 
 def _build_heading_keys(match: Match, number: int) -> tuple[HeadingKey, ...]:
-    """Build a key for each KEY_SECONDS in most of which the feed has measured where a player's body faces."""
+    """Build a key for each _KEY_SECONDS in most of which the feed has measured where a player's body faces."""
     if match.headings is None:
         return ()
-    step = max(1, round(KEY_SECONDS * match.fps))
+    step = max(1, round(_KEY_SECONDS * match.fps))
     shape = len(match.times) // step, step
     times, headings = (values[: shape[0] * step].reshape(shape) for values in (match.times, match.headings[number]))
     is_known = np.isfinite(headings)
     along, across = (np.where(is_known, turn, 0.0).sum(axis=1) for turn in (np.cos(headings), np.sin(headings)))
-    used = (is_known.mean(axis=1) > 0.5) & (np.ptp(times, axis=1) < 2.0 * KEY_SECONDS)  # no break within
+    used = (is_known.mean(axis=1) > 0.5) & (np.ptp(times, axis=1) < 2.0 * _KEY_SECONDS)  # no break within
     return tuple(HeadingKey(time, heading) for time, heading in zip(
         times.mean(axis=1)[used].tolist(), arctan2(across, along)[used].tolist()))
 

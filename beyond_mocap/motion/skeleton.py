@@ -12,7 +12,7 @@ from ..base.errors import InputError
 
 
 def freeze_array(values, dtype=float) -> np.ndarray:
-    """Copy values into a read-only array; one that nobody can write any more is returned as it is."""
+    """Copy values into a read-only array; one that is read-only and owned by no writable array is returned as it is."""
     if isinstance(values, np.ndarray) and values.dtype == dtype and _is_frozen(values):
         return values
     out = np.array(values, dtype=dtype)
@@ -21,7 +21,7 @@ def freeze_array(values, dtype=float) -> np.ndarray:
 
 
 def _is_frozen(values: np.ndarray) -> bool:
-    """Return whether nobody can write an array any more, and it keeps no greater one alive as a part of it."""
+    """Return whether an array and all its owners are read-only, and it keeps no larger one alive as a part of it."""
     owner = values
     while isinstance(owner, np.ndarray) and not owner.flags.writeable:
         if owner.base is None:

@@ -8,6 +8,8 @@ from functools import cached_property
 
 import numpy as np
 
+from ..base.errors import InputError
+from ..base.vectors import arctan2
 from ..library.features import HORIZON, sample_positions
 from ..library.library import Library
 from ..motion import quaternion
@@ -18,15 +20,15 @@ RATE = 30.0
 """Frames per second of examples."""
 CONTEXT = 0.2
 """Seconds over which velocities are measured."""
-COMPARED = tuple(f"{side}_{part}" for part in ("hip", "shoulder", "knee", "ankle", "elbow", "wrist")
-                 for side in ("left", "right"))
+_PARTS = {"hip": "upper_leg", "shoulder": "upper_arm", "knee": "lower_leg", "ankle": "foot", "elbow": "lower_arm",
+          "wrist": "hand"}  # joints of `Limb`
+COMPARED = tuple(f"{side}_{part}" for part in _PARTS for side in ("left", "right"))
 """Joints by which people are compared: the first columns of examples, of the left and the right in turn."""
 TRUNK = [0, 1, 2, 3]
 """Columns of hips and shoulders."""
 
 _LEG = [[0, 1], [4, 5], [6, 7]]  # columns of hips, knees and ankles
 _LEFT, _RIGHT = [0, 2], [1, 3]  # of hips and shoulders
-_ROLES = ("upper_leg", "upper_arm", "lower_leg", "foot", "lower_arm", "hand", "toe_or_foot")
 _MOST_FRAMES = 60_000  # of a library; of a larger one every second, third... recording
 
 
@@ -35,8 +37,7 @@ class JointExamples:
     """Recordings at RATE, one after the other.
 
     Attributes:
-        joints: (N, K, 3) m, world, of people whose legs are ADULT_LEG long: the first K of COMPARED, or
-            those of a library, behind them the toes.
+        joints: (N, K, 3) m, world, of people whose legs are ADULT_LEG long: the first K of COMPARED.
         first, last: (N,) the first and the last frame of the same recording.
     """
 
@@ -45,8 +46,8 @@ class JointExamples:
     last: np.ndarray
 
     def select(self, count: int) -> JointExamples:
-        """Select the first columns."""
-        return replace(self, joints=self.joints[:, :count])
+        """Select the first columns; all of them with what is computed of them so far."""
+        return self if count == self.joints.shape[1] else replace(self, joints=self.joints[:, :count])
 
     @cached_property
     def root(self) -> np.ndarray:
@@ -94,7 +95,7 @@ def find_root(joints: np.ndarray) -> np.ndarray:
 def measure_heading(joints: np.ndarray) -> np.ndarray:
     """Measure the heading (T,) rad of joints (T, K, 3), square to hips and shoulders."""
     across = (joints[:, _LEFT, :2] - joints[:, _RIGHT, :2]).sum(axis=1)
-    return np.arctan2(-across[:, 0], across[:, 1])
+    return arctan2(-across[:, 0], across[:, 1])
 
 
 def measure_size(joints: np.ndarray) -> float:
@@ -112,11 +113,14 @@ def build_examples(recordings: Iterable[np.ndarray]) -> JointExamples:
 
 
 def read_examples(library: Library) -> JointExamples:
-    """Read the examples of a library: its recordings and their mirrored twins."""
+    """Read the examples of a library, its recordings and their mirrored twins; InputError for one without arms."""
     body = identify_joints(library.skeleton)
-    joints = [getattr(limb, role) for role in _ROLES for limb in (body.left, body.right)]
+    joints = [getattr(limb, role) for role in _PARTS.values() for limb in (body.left, body.right)]
+    if None in joints:
+        raise InputError(library.folder, "a skeleton without arms", "clips of whole bodies", "choose another library")
     step = int(np.ceil(len(library.frames) / _MOST_FRAMES))
-    places = (sample_positions(clip.motion, RATE)[1][:, joints] for clip in library.clips[::step])
+    clips = (clip for number, clip in enumerate(library.clips) if number // 2 % step == 0)  # each twin follows its own
+    places = (sample_positions(clip.motion, RATE)[1][:, joints] for clip in clips)
     return build_examples(one for one in places if len(one) >= 2)
 
 

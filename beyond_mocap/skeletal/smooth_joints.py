@@ -13,6 +13,7 @@ import numpy as np
 from scipy.linalg import solveh_banded
 
 from ..base.time_series import find_runs
+from ..base.vectors import arctan2
 from ..motion import quaternion
 
 LONGEST_GAP = 1.0
@@ -74,7 +75,7 @@ def _measure_heading(landmarks: tuple[str, ...], positions: np.ndarray) -> np.nd
         if f"left_{part}" in landmarks and f"right_{part}" in landmarks:
             left, right = (positions[:, landmarks.index(f"{side}_{part}"), :2] for side in ("left", "right"))
             across = np.where(np.isfinite(left - right).all(axis=1)[:, None], left - right, across)
-    return np.arctan2(-across[:, 0], across[:, 1])
+    return arctan2(-across[:, 0], across[:, 1])
 
 
 def _predict(others: np.ndarray, own: np.ndarray, rows: np.ndarray) -> np.ndarray:

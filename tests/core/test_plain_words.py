@@ -1,8 +1,9 @@
 """The program speaks the terms of the field (docs/glossary.md): no forbidden words, functions named by verb and
-object."""
+object; and examples in documents import what is there."""
 
 import ast
 import re
+from importlib import import_module
 from pathlib import Path
 
 import pytest
@@ -67,6 +68,15 @@ def test_product_and_documents_avoid_the_words_that_readers_do_not_search_for(wo
     found = {path.relative_to(TOP).as_posix(): count_words(path.read_text("utf-8"), word) for path in paths}
     found = {path: count for path, count in found.items() if count}
     assert sum(found.values()) <= FORBIDDEN[word][1], found
+
+
+def test_what_documents_import_is_there():
+    """A name that moved to another module leaves no example behind."""
+    form = re.compile(r"^ *from (beyond_mocap[\w.]*) import ([\w, ]+)$", re.M)
+    found = {one for path in list_documents() for one in form.findall(path.read_text("utf-8"))}
+    missing = [(module, name) for module, names in sorted(found) for name in names.split(", ")
+               if not hasattr(import_module(module), name)]
+    assert len(found) > 20 and not missing
 
 
 def test_at_most_three_in_ten_functions_of_the_core_have_one_word_and_none_anywhere_is_a_bare_participle():

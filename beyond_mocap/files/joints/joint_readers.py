@@ -6,6 +6,8 @@ The content shows whose form a file has; joints are known by `landmarks.identify
 from __future__ import annotations
 
 import re
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 import numpy as np
@@ -48,9 +50,16 @@ def read_joints(path) -> JointFeed:
     if not path.is_file():
         raise build_read_error(path, "a file of skeletal tracking")
     read = _find_reader(path)
-    try:
+    with _name_damaged_file(path):
         return read(path)
-    except (KeyError, TypeError, AttributeError, IndexError, ValueError) as error:
+
+
+@contextmanager
+def _name_damaged_file(path: Path) -> Iterator[None]:
+    """Context manager: errors of values that are not where they are expected become one line that names the file."""
+    try:
+        yield
+    except (LookupError, TypeError, AttributeError, ValueError, ArithmeticError) as error:
         found = f"values in other places than expected ({type(error).__name__}: {error})"
         raise InputError(path, found[:200], _FORMS, "export it again") from None
 
@@ -110,27 +119,15 @@ def _read_cdf(path: Path) -> JointFeed:
 def _read_hawkeye(path: Path) -> JointFeed:
     """Read Hawk-Eye's joints, and the ball: files for each minute, their times from its start."""
     found, files = JointCollector(path), _list_minutes(path)
-    begin = None
-    for file in files:
-        start, content = _read_minute(file)
-        begin = begin or start
-        offset = (start - begin).total_seconds()
-        homes = {str(team["id"]): team.get("home") for team in (content.get("details") or {}).get("teams") or ()}
-        for person in content["samples"]["people"]:
-            ids = person["personId"]
-            key = str(ids.get("fifaId") or ids.get("uefaId") or ids.get("heId"))
-            home = homes.get(str(person.get("teamId")))
-            found.set_team(key, "" if home is None else "home" if home else "away")
-            for sample in person["joints"]:
-                seconds = round(offset + float(sample["time"]), 4)
-                for name, place in sample.items():
-                    if isinstance(place, list):
-                        _add(found, key, seconds, name, place)
     balls = [ball for file in files for ball in _find_balls(file)]
-    for file in balls:
-        start, content = _read_minute(file)
-        for sample in content["samples"]["ball"]:
-            found.add_ball(round((start - begin).total_seconds() + float(sample["time"]), 4), sample["pos"])
+    begin = None
+    for file in (*files, *balls):
+        content = read_json(file)
+        with _name_damaged_file(file):
+            start = parse_time(content["time"]["startUTC"], str(file))
+            begin = begin or start
+            add = _add_balls if file in balls else _add_people
+            add(found, content, (start - begin).total_seconds())
     if len(files) > 1:
         found.notes.append(f"{format_count(len(files), 'file')} of one half are read, {files[0].name} first")
     if balls:
@@ -138,10 +135,26 @@ def _read_hawkeye(path: Path) -> JointFeed:
     return found.build()
 
 
-def _read_minute(file: Path):
-    """Read a file of Hawk-Eye: when it starts, and its content."""
-    content = read_json(file)
-    return parse_time(content["time"]["startUTC"], str(file)), content
+def _add_people(found: JointCollector, content: dict, offset: float) -> None:
+    """Add the people of a minute of Hawk-Eye that begins at `offset` s."""
+    homes = {str(team["id"]): team.get("home") for team in (content.get("details") or {}).get("teams") or ()}
+    for person in content["samples"]["people"]:
+        ids = person["personId"]
+        key = str(ids.get("fifaId") or ids.get("uefaId") or ids.get("heId"))
+        home = homes.get(str(person.get("teamId")))
+        found.set_team(key, "" if home is None else "home" if home else "away")
+        for sample in person["joints"]:
+            seconds = round(offset + float(sample["time"]), 4)
+            for name, place in sample.items():
+                if isinstance(place, list):
+                    _add(found, key, seconds, name, place)
+
+
+def _add_balls(found: JointCollector, content: dict, offset: float) -> None:
+    """Add where the ball is seen in a minute of Hawk-Eye that begins at `offset` s."""
+    for sample in content["samples"]["ball"]:
+        if isinstance(place := sample.get("pos"), list):
+            found.add_ball(round(offset + float(sample["time"]), 4), place)
 
 
 def list_joint_files(path: Path) -> list[Path]:

@@ -77,8 +77,8 @@ def test_the_ball_beside_hawkeyes_joints_is_that_of_the_match(tmp_path):
     ball = np.column_stack([5.0 + 3.0 * times, -times, 0.11 + 0.0 * times])
     is_seen = (times < 1.2) | (times > 1.7)
     for minute, begin, end in ((1, 0.0, 1.0), (2, 1.0, 3.0)):
-        rows = [{"time": times[frame] - begin, "pos": (100.0 * ball[frame]).tolist()}
-                for frame in np.flatnonzero(is_seen & (times >= begin) & (times < end))]  # fmt: skip
+        rows = [{"time": times[frame] - begin, "pos": (100.0 * ball[frame]).tolist() if is_seen[frame] else None}
+                for frame in np.flatnonzero((times >= begin) & (times < end))]  # fmt: skip
         content = {"time": {"startUTC": f"2024-09-22T21:00:{10 + minute:02d}.000Z"}, "samples": {"ball": rows}}
         path.with_name(f"match_1_{minute}.football.samples.ball").write_text(json.dumps(content))
     match, _ = read_joint_match(path)
@@ -87,6 +87,9 @@ def test_the_ball_beside_hawkeyes_joints_is_that_of_the_match(tmp_path):
     assert np.abs(match.ball[known] - ball[known]).max() < 1e-3
     assert "the ball is read from 2 files" in " ".join(match.notes)
     assert len(list_joint_files(path)) == 4  # whose content makes a stored match out of date
+    path.with_name("match_1_2.football.samples.ball").write_text("{}")
+    with pytest.raises(InputError, match="match_1_2.football.samples.ball: values in other places"):
+        read_joint_match(path)
 
 
 def test_the_report_names_what_was_seen(seen_match):

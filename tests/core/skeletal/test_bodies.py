@@ -2,10 +2,12 @@
 
 import json
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
+from beyond_mocap.base.errors import InputError
 from beyond_mocap.cli.main import main
 from beyond_mocap.files.bvh.bvh import read_bvh
 from beyond_mocap.files.joints.joint_feed import JointFeed, PlayerJoints
@@ -14,9 +16,11 @@ from beyond_mocap.library.build import build_library
 from beyond_mocap.motion import quaternion
 from beyond_mocap.motion.humanoid import identify_joints
 from beyond_mocap.motion.motion import forward_kinematics
+from beyond_mocap.motion.skeleton import Skeleton
+from beyond_mocap.skeletal import joint_examples
 from beyond_mocap.skeletal.body_figures import list_fitted
 from beyond_mocap.skeletal.bridge_gaps import bridge_gaps
-from beyond_mocap.skeletal.joint_examples import COMPARED, find_root, read_examples
+from beyond_mocap.skeletal.joint_examples import COMPARED, find_root, mirror_joints, read_examples
 from beyond_mocap.skeletal.reconstruct_bodies import KnownElsewhere, reconstruct_bodies
 from beyond_mocap.skeletal.repair_joints import repair_identities, repair_sides, spread_landmarks
 from beyond_mocap.skeletal.smooth_joints import fill_gaps, smooth_joints
@@ -91,6 +95,20 @@ def test_a_gap_without_any_joint_is_bridged_as_others_move(clip, most, sample_ca
     assert measure_error(body, truth, gap).mean() < most
     (again,), _ = reconstruct_bodies(build_feed([seen], 50.0), known=known)
     assert again.motion.rotations.tobytes() == body.motion.rotations.tobytes()
+
+
+def test_a_part_of_a_large_library_has_both_twins_and_one_without_arms_is_refused(sample_cache, monkeypatch):
+    library = build_library(SAMPLE, cache_dir=sample_cache)
+    monkeypatch.setattr(joint_examples, "_MOST_FRAMES", len(library.frames) // 2)
+    examples = read_examples(library)
+    twins = np.split(examples.joints, np.unique(examples.first)[1:])
+    assert 0.4 < len(examples.joints) / len(library.frames) < 0.6
+    for own, twin in zip(twins[::2], twins[1::2], strict=True):
+        assert np.allclose(mirror_joints(own), twin, atol=1e-4)
+    legs = Skeleton(("hips", "lthigh", "lshin", "lfoot", "rthigh", "rshin", "rfoot"), (-1, 0, 1, 2, 0, 4, 5),
+                    [(0, 0, 0.9), *(each for y in (0.1, -0.1) for each in ((0, y, 0), (0, 0, -0.4), (0, 0, -0.4)))])
+    with pytest.raises(InputError, match="a skeleton without arms"):
+        read_examples(SimpleNamespace(skeleton=legs, folder=SAMPLE))
 
 
 @pytest.mark.parametrize("part", ["wrist", "elbow"])

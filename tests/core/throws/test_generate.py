@@ -10,6 +10,7 @@ from beyond_mocap.base.errors import InputError
 from beyond_mocap.motion.motion import forward_kinematics
 from beyond_mocap.motion.retargeting.adult import build_adult_skeleton
 from beyond_mocap.synthetic.throws import build_throw
+from beyond_mocap.throws.evaluate_throws import RAW_OPTIONS
 from beyond_mocap.throws.networks.chains import find_chains
 from beyond_mocap.throws.networks.description import build_windows
 from beyond_mocap.throws.networks.example import build_description, build_example, compute_poses
@@ -22,8 +23,6 @@ from beyond_mocap.throws.networks.model import ModelSettings, ThrowModel
 from beyond_mocap.throws.networks.network import PhaseNetwork
 from beyond_mocap.throws.networks.training_set import measure_leg_reach
 from tests.core.linear_throws import build_training_set
-
-PLAIN = Options(pose_iterations=0, ik=False, blend=False, limits=False, gaze=0.0)
 
 
 class ByHeart(PhaseNetwork):
@@ -79,7 +78,7 @@ def model(example):
 @pytest.mark.parametrize("settings", [
     {}, {"wrist": "inferred"}, {"frame": "static"}, {"kind": "single"}, {"kind": "single", "frame": "static"},
 ])
-@pytest.mark.parametrize("options", [PLAIN, Options()])
+@pytest.mark.parametrize("options", [RAW_OPTIONS, Options()])
 def test_networks_that_know_the_truth_give_the_motion_back(example, settings, options):
     model = knowing([example], **settings)
     made = generate_motion(model, build_description(example), options=options)
@@ -95,7 +94,7 @@ def test_the_start_is_the_frame_that_fits_wherever_and_whichever_way_it_stands(e
     others = [replace(thrown(2.0), name="other"), example, thrown(-3.0, arm="left")]
     model = knowing(others)
     for one in others:
-        made = generate_motion(model, build_description(one), options=PLAIN)
+        made = generate_motion(model, build_description(one), options=RAW_OPTIONS)
         assert np.allclose(made.motion.root_positions[0], one.motion.root_positions[0], atol=1e-6), one.name
 
 
@@ -170,7 +169,7 @@ def test_networks_are_asked_only_for_what_is_near_what_they_know(example, model)
     for limits, most in ((True, 160.0), (False, 5000.0)):
         for network in near.values():
             network.asked.clear()
-        generate_motion(replace(model, networks=near), moved, options=replace(PLAIN, limits=limits))
+        generate_motion(replace(model, networks=near), moved, options=replace(RAW_OPTIONS, limits=limits))
         assert most - 20.0 < max(near["hip"].asked) <= most + 1e-3
 
 
@@ -179,7 +178,7 @@ def test_networks_that_lose_the_body_are_told_in_a_line(example, model, answer):
     lost = {name: by_heart(rows) for name, rows in build_training_set([example], model.settings).items()}
     object.__setattr__(lost["hip"], "said", np.full_like(lost["hip"].said, answer))
     with pytest.raises(InputError, match="an invalid pose in frame 1"):
-        generate_motion(replace(model, networks=lost), build_description(example), options=PLAIN)
+        generate_motion(replace(model, networks=lost), build_description(example), options=RAW_OPTIONS)
 
 
 def test_what_does_not_fit_the_model_is_told(example, model):

@@ -9,11 +9,11 @@ from beyond_mocap.base.errors import InputError
 from beyond_mocap.motion.motion import forward_kinematics
 from beyond_mocap.motion.retargeting.adult import build_adult_skeleton
 from beyond_mocap.synthetic.performers import build_thrower
-from beyond_mocap.throws.evaluate_throws import measure_deviations
+from beyond_mocap.throws.evaluate_throws import FULL_OPTIONS, RAW_OPTIONS, measure_deviations
 from beyond_mocap.throws.network_npz import RECORDED, WEIGHTS, read_chosen_model, read_shipped_model
 from beyond_mocap.throws.networks.description import scale_description
 from beyond_mocap.throws.networks.example import build_description, build_example
-from beyond_mocap.throws.networks.generate import Options, generate_motion
+from beyond_mocap.throws.networks.generate import generate_motion
 from beyond_mocap.throws.networks.kinematics import to_matrices
 from beyond_mocap.throws.networks.limits import JointLimits
 from beyond_mocap.throws.synthetic_examples import generate_example
@@ -59,9 +59,9 @@ def test_networks_alone_follow_what_they_never_saw(action):
         _, made = generate_example(action, seed, number)
         example = build_example("kept back", "", made.motion, made.limb, made.release, made.impact, made.velocity, 30.0)
         wanted = scale_description(build_description(example), model.stature / example.stature)
-        networks = Options(pose_iterations=0, ik=False, blend=False, limits=False, gaze=0.0)
-        alone.append(measure_deviations(generate_motion(model, wanted, options=networks).effectors, wanted.effectors))
-        whole.append(measure_deviations(generate_motion(model, wanted).effectors, wanted.effectors))
+        for found, options in ((alone, RAW_OPTIONS), (whole, FULL_OPTIONS)):
+            generated = generate_motion(model, wanted, options=options)
+            found.append(measure_deviations(generated.effectors, wanted.effectors))
     assert np.mean(alone, axis=0).max() <= 0.03
     assert np.mean(whole, axis=0).max() <= 0.01
 

@@ -70,10 +70,10 @@ def _find_moment(frame: dict, place: str) -> tuple[int, float]:
     return int(period[2]) + 2 * (period[1] == "extra"), round(passed, 3)
 
 
-def _choose_angle(player: dict) -> object:
-    """Return the angle of the hips, else that of the shoulders."""
-    return next((angle for part in ("hips", "shoulders") if isinstance(angle := player.get(f"{part}_angle"), float)
-                 and math.isfinite(angle)), None)
+def _choose_angle(player: dict) -> float | None:
+    """Return the angle of the hips, else that of the shoulders, rad; None where neither is a number."""
+    angles = (player.get(f"{part}_angle") for part in ("hips", "shoulders"))
+    return next((angle for angle in angles if isinstance(angle, (int, float)) and math.isfinite(angle)), None)
 
 
 def _name_position(player: dict) -> str:

@@ -87,10 +87,9 @@ class SampleCollector:
             if len(self._samples) > 4 * _MOST_SAMPLES:
                 raise InputError(self._path, f"more than {_MOST_SAMPLES:,} samples", "one match", "divide the file")
 
-    def add_angle(self, moment: tuple[int, float], key: str, angle: object) -> None:
-        """Add where the body of a person with a sample at this moment faces, rad; anything but a number is not known.
-        """
-        if isinstance(angle, (int, float)) and math.isfinite(angle) and key in self._who and moment in self._moments:
+    def add_angle(self, moment: tuple[int, float], key: str, angle: float | None) -> None:
+        """Add where the body of a person with a sample at this moment faces, rad; None: not known."""
+        if angle is not None and key in self._who and moment in self._moments:
             self._angles.extend((self._moments[moment], self._who[key], angle))
 
     def add_track(self, period: int, key: str, times: np.ndarray, places: np.ndarray, step: float) -> None:
@@ -148,9 +147,10 @@ class SampleCollector:
         positions = np.full((len(self._who), len(order), 2), np.nan)
         samples = np.frombuffer(self._samples).reshape(-1, 4)
         positions[samples[:, 1].astype(int), rows[samples[:, 0].astype(int)]] = samples[:, 2:]
-        angles = np.full((len(self._who), len(order)), np.nan)
-        turned = np.frombuffer(self._angles).reshape(-1, 3) if self._angles else np.zeros((0, 3))
-        angles[turned[:, 1].astype(int), rows[turned[:, 0].astype(int)]] = turned[:, 2]
+        angles = None
+        if self._angles:
+            turned, angles = np.frombuffer(self._angles).reshape(-1, 3), np.full(positions.shape[:2], np.nan)
+            angles[turned[:, 1].astype(int), rows[turned[:, 0].astype(int)]] = turned[:, 2]
         ball = np.full((len(order), 3), np.nan)
         found = np.frombuffer(self._ball).reshape(-1, 4) if self._ball else np.zeros((0, 4))
         ball[rows[found[:, 0].astype(int)]] = found[:, 1:]
@@ -166,7 +166,7 @@ class SampleCollector:
         return MatchSamples(times=times, periods=periods, people=people, positions=positions, ball=ball,
                             fps=fps or round(1.0 / step, 3), size=size,
                             teams=[(ground, name, "") for ground, name in zip(("home", "away"), team_names)],
-                            lines=[*self.lines, *lines], angles=angles if self._angles else None)
+                            lines=[*self.lines, *lines], angles=angles)
 
     def _find_moment(self, moment: tuple[int, float]) -> int:
         return self._moments.setdefault(moment, len(self._moments))
