@@ -49,6 +49,9 @@ def run_bodies(options, reporter: ProgressReporter, writers: Mapping[str, Writer
     from ..skeletal.reconstruct_bodies import KnownElsewhere, reconstruct_bodies
 
     check_new_folder(options.out)
+    for option in ("cache", "skeleton", "unit"):
+        if getattr(options, option) is not None and options.library is None:
+            raise InputError(f"--{option}", "set without --library", "a folder of clips", "add --library")
     feed = read_joints(options.joints)
     examples = read_examples(open_library(options, reporter)) if options.library else None
     bodies, notes = reconstruct_bodies(feed, reporter.show_progress, reporter.is_cancelled,

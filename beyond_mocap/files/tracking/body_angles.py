@@ -19,14 +19,15 @@ _READINGS = [(sign, 0.5 * np.pi * quarter) for sign in (1.0, -1.0) for quarter i
 
 
 def find_headings(times: np.ndarray, positions: np.ndarray, angles: np.ndarray,
-                  periods: list[tuple[float, float]]) -> tuple[np.ndarray, list[str]]:
+                  periods: list[tuple[float, float, int, float]]) -> tuple[np.ndarray, list[str]]:
     """Find where bodies face.
 
     Args:
         times: (N,) s.
         positions: (P, N, 2) m, NaN where absent.
         angles: (P, N) rad of the feed, NaN where not known.
-        periods: (start, end) s of each period, each of which has a reading of its own: halves may have been turned.
+        periods: start and end s, number and seconds before (`match_arrays.build_clock`) of each period, which has a
+            reading of its own: halves may have been turned.
     Returns:
         (P, N) rad from +x to the left, NaN where not known; and lines for people.
     """
@@ -34,7 +35,7 @@ def find_headings(times: np.ndarray, positions: np.ndarray, angles: np.ndarray,
     velocity = np.gradient(positions, times, axis=1)
     is_running = (np.linalg.norm(velocity, axis=2) > _RUNNING) & np.isfinite(angles)
     travel = arctan2(velocity[..., 1], velocity[..., 0])
-    for number, (start, end) in enumerate(periods, 1):
+    for start, end, number, _ in periods:
         part = slice(*np.searchsorted(times, [start - 1e-6, end + 1e-6]))
         shown = is_running[:, part]
         reading = _find_reading(angles[:, part][shown], travel[:, part][shown])

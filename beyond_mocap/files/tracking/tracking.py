@@ -196,7 +196,7 @@ def _build_arrays(match: MatchSamples, pitch: tuple[float, float] | None) -> dic
     positions, ball, side_messages = repair_sides(times, positions, ball, spans, teams)
     headings, heading_lines = np.zeros((0, 0)), []
     if match.angles is not None:
-        headings, heading_lines = find_headings(times, positions, match.angles, spans)
+        headings, heading_lines = find_headings(times, positions, match.angles, periods)
     side_messages += check_side_names(times, positions, spans, teams, [one[4] for one in people])
     return {
         "times": times, "positions": positions, "ball": ball,

@@ -209,3 +209,4 @@ def test_the_command_writes_a_body_for_each_person(tmp_path, capsys):
     assert main(["bodies", "--joints", str(path), "--out", str(again)]) == 0
     assert (again / "7.bvh").read_bytes() == (tmp_path / "out" / "7.bvh").read_bytes()
     assert main(["bodies", "--joints", str(path), "--out", str(again)]) == 2  # not over other files
+    assert main(["bodies", "--joints", str(path), "--out", str(tmp_path / "new"), "--unit", "1"]) == 2  # of no library
