@@ -18,6 +18,8 @@ if TYPE_CHECKING:
     from ..library.library import Library
     from ..synthesis.plan import Plan
 
+_FARTHEST = 1e5  # m
+
 
 def add_throw(verbs):
     """Add the verb `throw`.
@@ -161,8 +163,9 @@ def _parse_point(text: str, count: int = 3) -> tuple[float, ...]:
         values = tuple(float(part) for part in text.split(","))
     except ValueError:
         values = ()
-    if len(values) != count or not all(abs(value) < 1e5 for value in values):
-        raise argparse.ArgumentTypeError(f"{text!r} is not {'X,Y,Z' if count == 3 else 'X,Y'} in metres")
+    if len(values) != count or not all(abs(value) < _FARTHEST for value in values):
+        raise argparse.ArgumentTypeError(f"{text!r} is not {'X,Y,Z' if count == 3 else 'X,Y'} in metres, each "
+                                         f"of less than {_FARTHEST / 1000.0:g} km")
     return values
 
 

@@ -83,13 +83,8 @@ def read_freeze_frames(frames: Path, events: Path) -> list[FreezeFrame]:
     """
     pictures, rows = _read_list(frames, "freeze_frame"), _read_list(events, "type")
     by_event = {str(picture.get("event_uuid")): picture for picture in pictures}
-    try:
-        found = [_build_frame(row, by_event[row["id"]]) for row in rows
-                 if row.get("id") in by_event and row.get("location") and by_event[row["id"]]["freeze_frame"]]
-    except (LookupError, TypeError, AttributeError, ValueError, ArithmeticError) as error:
-        found_instead = f"values in other places than StatsBomb has them ({type(error).__name__}: {error})"
-        raise InputError(f"{frames.name} and {events.name}", found_instead[:200], "its 360 data and events",
-                         "export them again") from None
+    found = [_read_frame(row, by_event[event], f"{frames.name} and {events.name}: event {event[:40]}") for row in rows
+             if (event := str(row.get("id"))) in by_event and row.get("location") and by_event[event]["freeze_frame"]]
     if not found:
         raise InputError(frames, f"no event of {events.name} has a freeze frame", "the events of the same match",
                          "choose the file with its number")
@@ -101,6 +96,15 @@ def _read_list(path: Path, key: str) -> list[dict]:
     if not isinstance(value, list) or not value or not all(isinstance(one, dict) and key in one for one in value):
         raise InputError(path, f"no list of objects with {key!r}", "a JSON file of StatsBomb", "choose the right file")
     return value
+
+
+def _read_frame(event: dict, picture: dict, where: str) -> FreezeFrame:
+    """Build a frame; InputError for values that StatsBomb does not have."""
+    try:
+        return _build_frame(event, picture)
+    except (LookupError, TypeError, AttributeError, ValueError, ArithmeticError) as error:
+        found = f"no {error}" if isinstance(error, KeyError) else "values of another kind or size"
+        raise InputError(where, found, "StatsBomb's 360 data and events", "export them again") from None
 
 
 def _build_frame(event: dict, picture: dict) -> FreezeFrame:
@@ -135,7 +139,7 @@ def _to_places(rows: list, counts: Collection[int] = (2,)) -> np.ndarray:
     """Return locations of as many numbers as one of `counts`; ValueError for others."""
     places = np.array(rows, dtype=float)
     if places.ndim != 2 or places.shape[1] not in counts or not np.all(np.abs(places) < 10.0 * _FIELD[0]):
-        raise ValueError(f"location {rows[0]}")
+        raise ValueError("locations of another size")
     return places
 
 

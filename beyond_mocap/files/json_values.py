@@ -25,8 +25,10 @@ def parse_json(text: str, name: str, page: str):
     except json.JSONDecodeError as error:
         place = f"{name}:{error.lineno}:{error.colno}"
         raise InputError(place, "not JSON from here on", "JSON", f"see {page}") from None
-    except (ValueError, RecursionError) as error:
-        raise InputError(name, str(error) or "nested too deeply", "JSON", f"see {page}") from None
+    except RecursionError:
+        raise InputError(name, "nested too deeply", "JSON", f"see {page}") from None
+    except ValueError as error:
+        raise InputError(name, str(error), "JSON", f"see {page}") from None
 
 
 def _build_unique_object(pairs) -> dict:

@@ -17,6 +17,7 @@ import re
 import shutil
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
+from io import FileIO
 from pathlib import Path
 
 from ..base.content import read_bytes
@@ -109,12 +110,13 @@ def open_folder(path: Path, identity: Mapping[str, object]) -> Iterator[MatchFol
     except OSError as error:
         found = f"cannot be written to ({error.strerror or error})"
         raise InputError(path, found, "a writable folder", "choose another folder") from None
-    with _hold_lock(path / _WORK / _LOCK, path):
-        before, notes = _read_previous_state(path, identity)
-        _check_identity(path, before, identity)
-        _remove_parts(path)
-        atomic_write(path / _WORK / _ORDER, compute_digest(identity))
+    with _hold_lock(path / _WORK / _LOCK, path) as lock:
         try:
+            _write_owner(lock, path)
+            before, notes = _read_previous_state(path, identity)
+            _check_identity(path, before, identity)
+            _remove_parts(path)
+            atomic_write(path / _WORK / _ORDER, compute_digest(identity))
             yield MatchFolder(path, compute_digest(identity), before, notes)
         finally:
             if not (path / STATE).exists() and not had_work:  # no work has started
@@ -235,9 +237,9 @@ _FIELD_NAMES = {
 
 
 @contextlib.contextmanager
-def _hold_lock(lock: Path, folder: Path) -> Iterator[None]:
-    """Hold the lock; InputError if another process has it."""
-    with open(lock, "a+b") as file:
+def _hold_lock(lock: Path, folder: Path) -> Iterator[FileIO]:
+    """Hold the lock and give its open file; InputError if another process has it."""
+    with open(lock, "a+b", buffering=0) as file:  # closing would write again what found no room
         try:
             _acquire_lock(file)
         except OSError:
@@ -245,19 +247,17 @@ def _hold_lock(lock: Path, folder: Path) -> Iterator[None]:
             process = file.read(20).decode("ascii", "replace").strip()
             found = f"another run (process {process}) uses it" if process else "another run uses it"
             raise InputError(folder, found, "one run at a time", "wait for it, or choose another folder") from None
-        _write_owner(file, lock)
-        yield
+        yield file
 
 
-def _write_owner(file, lock: Path) -> None:
+def _write_owner(file: FileIO, folder: Path) -> None:
     """Write this process's number into the lock; InputError where the disk is full."""
     try:
         file.truncate(0)
         file.write(str(os.getpid()).encode())
-        file.flush()
     except OSError as error:
         found = f"cannot be written ({error.strerror or error})"
-        raise InputError(lock, found, "a writable folder", "choose another folder") from None
+        raise InputError(folder, found, "a writable folder", "choose another folder") from None
 
 
 def _acquire_lock(file) -> None:

@@ -4,7 +4,7 @@ player.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache, partial
 from pathlib import Path
@@ -36,12 +36,14 @@ class PlayerPlans:
         file: base name of the player's files.
         plans: one per stretch, as stored in files; () if the player cannot be synthesized (`role.reason`).
         unused: the user's labels for times at which the player is absent.
+        overruled: the user's labels for times at which joints show the player.
     """
 
     role: Role
     file: str
     plans: tuple[Plan, ...] = ()
     unused: tuple[Moment, ...] = ()
+    overruled: tuple[Moment, ...] = ()
 
 
 def build_player_plans(
@@ -82,8 +84,10 @@ def build_player_plans(
             plans = tuple(_plan_heading(_add_bodies(_build_plan(role, number, moments, request, build_course),
                                                     seen.get(role.player.id)), library,
                                         plays.get(role.player.id)) for number in range(len(role.target_tracks)))
-            unused = tuple(one for one in moments if one.source == USER and not _is_used(one, role))
-            out.append(PlayerPlans(role, file, () if role.reason else plans, unused))
+            typed = [one for one in moments if one.source == USER]
+            unused = tuple(one for one in typed if not _overlaps(one, _list_present_times(role)))
+            overruled = tuple(one for one in typed if _overlaps(one, _list_shown_times(plans)))
+            out.append(PlayerPlans(role, file, () if role.reason else plans, unused, overruled))
         except InputError as error:
             out.append(PlayerPlans(replace(role, reason=str(error)), file))
     return out
@@ -125,17 +129,40 @@ def list_unused_labels(parts: Iterable[PlayerPlans], request: MatchRequest, file
     for part in parts:
         if part.unused:
             first = format_timeline(build_timeline(part.unused[:1])).strip()
-            edges = [(track.times[0], track.times[-1]) for track in part.role.target_tracks]
-            times = ", ".join(f"{format_seconds(start)} to {format_seconds(end)} s" for start, end in edges)
-            count = len(part.unused)
-            found = f"{count} of your lines {'is' if count == 1 else 'are'} ignored ({first}{' ...' * (count > 1)})"
-            out.append(f"{part.file}.txt: {found}, because {part.role.player.id} is present from {times}")
+            found = f"{_count_lines(part.unused)} ignored ({first}{' ...' * (len(part.unused) > 1)})"
+            out.append(f"{part.file}.txt: {found}, because {part.role.player.id} is present from "
+                       f"{_format_times(_list_present_times(part.role))}")
     return out
 
 
-def _is_used(moment: Moment, role: Role) -> bool:
-    """Say whether any of the player's stretches contains the moment, or a part of it."""
-    cut = (build_timeline([moment], float(track.times[0]), float(track.times[-1])) for track in role.target_tracks)
+def list_overruled_labels(parts: Iterable[PlayerPlans]) -> list[str]:
+    """List a message for each player with labels for times at which joints say what the body does."""
+    return [f"{part.file}.txt: {_count_lines(part.overruled)} shown as the joints have it, not as the label says: "
+            f"joints show the player from {_format_times(_list_shown_times(part.plans))}"
+            for part in parts if part.overruled]
+
+
+def _count_lines(moments: Sequence[Moment]) -> str:
+    return f"{len(moments)} of your lines {'is' if len(moments) == 1 else 'are'}"
+
+
+def _format_times(edges: Iterable[tuple[float, float]]) -> str:
+    return ", ".join(f"{format_seconds(start)} to {format_seconds(end)} s" for start, end in edges)
+
+
+def _list_present_times(role: Role) -> list[tuple[float, float]]:
+    """List first and last seconds of a player's stretches."""
+    return [(float(track.times[0]), float(track.times[-1])) for track in role.target_tracks]
+
+
+def _list_shown_times(plans: Iterable[Plan]) -> list[tuple[float, float]]:
+    """List first and last seconds, to the hundredth, of the bodies of some plans."""
+    return [(round(body.start, 2), round(body.end, 2)) for plan in plans for body in plan.bodies]
+
+
+def _overlaps(moment: Moment, edges: Iterable[tuple[float, float]]) -> bool:
+    """Say whether any time between edges contains the moment, or a part of it."""
+    cut = (build_timeline([moment], start, end) for start, end in edges)
     return any(one.spans or one.keys for one in cut)
 
 

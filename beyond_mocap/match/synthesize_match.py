@@ -39,7 +39,13 @@ from .pieces.job import Job
 from .pieces.pool import WorkerConfig, check_workers, stop_workers
 from .pieces.tasks import LibrarySource, set_library
 from .play import build_plays, find_kept_lines
-from .player_plans import build_player_plans, check_label_folder, list_unknown_texts, list_unused_labels
+from .player_plans import (
+    build_player_plans,
+    check_label_folder,
+    list_overruled_labels,
+    list_unknown_texts,
+    list_unused_labels,
+)
 from .report.pictures import build_thumbnail_renderer
 from .request import MatchRequest, build_identity
 from .roles import build_roles, list_absent_players, resolve_span, separate_roles
@@ -195,7 +201,7 @@ def _run_stages(
         if player in state.players:
             state.players[player]["bodies"] = one.rows
     state.report["notes"] += list_unknown_texts(job.request.annotations, names.values())
-    state.report["notes"] += list_unused_labels(parts, job.request, names)
+    state.report["notes"] += list_unused_labels(parts, job.request, names) + list_overruled_labels(parts)
     state.record_stage("words", clock)
     state.write_state()
     clock = read_clocks()

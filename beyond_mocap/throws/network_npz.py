@@ -85,6 +85,9 @@ def read_chosen_model(choice: str | os.PathLike | None, action: str) -> ThrowMod
     """
     if not choice or str(choice) == RECORDED:
         return read_shipped_model(f"{action}_{RECORDED}" if choice else action)
+    if not os.path.exists(choice):
+        raise InputError(choice, "no such file", f"a file of weights, or {RECORDED!r} for the project's of recordings",
+                         "check the path")
     return read_model(choice)
 
 

@@ -131,9 +131,8 @@ def _describe_missing(folder: Path, action: str, clips: list[Path], annotations:
         count = sum(is_known(path, its, annotations, rows.get(path.relative_to(folder).as_posix())) for path in clips)
         if other != action and count:
             found = f"{len(clips)} BVH files, none with a {action}, {count} with a {other}"
-            return InputError(
-                folder, found, f"recordings of a {action}", f"choose another folder, or the action {other}"
-            )
+            return InputError(folder, found, f"recordings of a {action}",
+                              f"choose another folder, or the action or the model for a {other}")
     label_names = " or ".join(sorted(ACTIONS[action].labels))
     return InputError(
         folder, f"{len(clips)} BVH files, none with a {action}", f"a key moment with the label {label_names}",

@@ -37,7 +37,7 @@ class PlayerResult:
     Attributes:
         id: in the feed.
         name: of the player.
-        number: on the shirt.
+        number: on the shirt, "" where it is unknown.
         team: name of the team.
         status: "done", or how far the player got.
         reason: why the player got no further, "" if unknown.
@@ -169,9 +169,10 @@ def _parse_player(folder: Path, row: Mapping, teams: Mapping[str, TeamResult]) -
     if problem and status == DONE_STATUS:
         status = "no report"
     ground = _to_text(row.get("team") or report.get("team"))
+    number = _to_text(row.get("number") or report.get("number"))
     start, per_second = _parse_per_second(report.get("per_second"))
     return PlayerResult(id=name, name=_to_text(row.get("name") or report.get("name")),
-                        number=_to_text(row.get("number") or report.get("number")), team=teams[ground].name
+                        number="" if number == "-1" else number, team=teams[ground].name
                         if ground in teams else ground, status=status.strip() or "unknown", reason=problem
                         or _to_text(row.get("reason")) or reason.strip(), data=_collect_messages(row), report=report,
                         start=start, per_second=per_second)  # fmt: skip

@@ -193,6 +193,7 @@ def test_a_table_with_times_of_another_unit_is_refused(write_time, line, tmp_pat
     (lambda x, y: (x - 50, y + 32), ""), (lambda x, y: (x - 50, y - 32), ""),
     (lambda x, y: (y, x), "exchange x and y"), (lambda x, y: (y + 32, x + 50), "exchange x and y"),
     (lambda x, y: (x + 400, y), "move the origin"),
+    (lambda x, y: (x / 0.3048, y / 0.3048), "convert x and y to metres"),
 ])  # fmt: skip
 def test_origin_and_axes_of_a_table_are_found_or_told(place, line, tmp_path):
     """One player runs along the pitch, one across it."""
@@ -251,6 +252,14 @@ def test_rows_that_a_table_has_twice_and_metadata_that_it_has_not_are_told(tmp_p
     match = read_match(path, tmp_path / "other.json", cache_dir=tmp_path / "cache")
     told = " ".join(match.report)
     assert "1 row of a player and moment" in told and "other.json is not used" in told
+
+
+@pytest.mark.parametrize("place", [(5_000_000, 500_000), (52, 1e9)])
+def test_gps_on_a_map_or_beyond_the_earth_is_refused(place, tmp_path):
+    rows = [f"{second},{place[0] + second},{place[1]}\n" for second in range(9)]
+    (tmp_path / "run.csv").write_text("time,latitude,longitude\n" + "".join(rows))
+    with pytest.raises(InputError, match=r"run.csv: latitude .* degrees, -90 to 90 and -180 to 180"):
+        read_match(tmp_path / "run.csv", cache_dir=tmp_path / "cache")
 
 
 def test_two_halves_follow_each_other(tmp_path):

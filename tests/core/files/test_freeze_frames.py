@@ -90,9 +90,11 @@ def test_each_person_has_a_name_of_their_own(write, tmp_path):
     ({}, ["--pitch", "100x60"], "without --event"), ({"pictures": "{"}, [], "not JSON"),
     ({"pictures": [{"a": 1}]}, [], "no list of objects"),
     ({"pictures": [{"event_uuid": "zz", "freeze_frame": PEOPLE}]}, [], "the same match"),
-    ({"pictures": [{"event_uuid": "aa-1", "freeze_frame": [{"location": [1e300, "x"]}]}]}, [], "other places"),
+    ({"pictures": [{"event_uuid": "aa-1", "freeze_frame": [{"location": [1e300, "x"]}]}]}, [],
+     "event aa-1: values of another kind"), ({"pictures": "[" * 100_000}, [], "nested too deeply"),
+    ({"events": ({key: value for key, value in PASS.items() if key != "minute"},)}, [], "event aa-1: no 'minute'"),
     ({"pictures": [{"event_uuid": "aa-1", "freeze_frame": [{"location": [60.0, 40.0, 1.0]}]}]}, ["--event", "aa-1"],
-     "other places"),
+     "another kind or size"),
     ({"pictures": [{"event_uuid": "aa-1", "freeze_frame": PEOPLE * 40}]}, ["--event", "aa-1"], "at most 60"),
 ])  # fmt: skip
 def test_bad_input_ends_with_one_line(change, more, line, write, tmp_path, capsys):

@@ -137,6 +137,19 @@ with open_folder(Path({str(order.out)!r}), {known!r}):
         assert folder.previous_state == {}
 
 
+def test_a_full_disk_is_told_with_the_folder_and_leaves_nothing(order):
+    resource = pytest.importorskip("resource")
+    before = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (0, before[1]))  # no file has room for a byte
+    try:
+        with pytest.raises(InputError, match="out: cannot be written"):
+            with open_folder(order.out, build_identity(order, "key")):
+                pass
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, before)
+    assert not order.out.exists()
+
+
 def test_folders_that_are_none_of_a_match_are_told(order, tmp_path):
     known = build_identity(order, "key")
     (tmp_path / "file").write_text("x")

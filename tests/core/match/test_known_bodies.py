@@ -124,12 +124,16 @@ def test_beside_dots_only_what_is_seen_comes_from_joints(tmp_path):
     hips = joints[:, [NAMES.index("left_hip"), NAMES.index("right_hip")], :2].mean(axis=1)
     joints[..., :2] += (path[: len(joints)] - hips)[:, None]
     table = write_table(tmp_path / "joints.csv", {"7": joints}, FPS)
+    (tmp_path / "home_10.txt").write_text("3.5 kick right low\n5 kick right low\n")
     status = main(["match", "--tracking", str(SMALL / "small.dat"), "--joints", str(table), "--library", str(LIBRARY),
                    "--out", str(tmp_path / "out"), "--from", "3", "--to", "8", "--players", "home_10", "home_7",
-                   "--no-figures", "--workers", "1"])  # fmt: skip
+                   "--no-figures", "--workers", "1", "--annotations", str(tmp_path)])  # fmt: skip
     state = json.loads((tmp_path / "out" / "match.json").read_text())
     rows = {row["id"]: row for row in state["players"]}
     assert status == 0 and "bodies" not in rows["home_7"] and "joints" in state["identity"]
     (body,) = rows["home_10"]["bodies"]
     assert [body["from_s"], body["to_s"]] == pytest.approx([4.0, 4.0 + (len(joints) - 1) / FPS], abs=0.06)
     assert body["joint_error_m"]["mean"] < 0.03 and any("clock is 4.0" in note for note in state["notes"])
+    (told,) = [note for note in state["notes"] if note.startswith("home_10.txt")]
+    assert told.startswith("home_10.txt: 1 of your lines is shown as the joints have it, not as the label says: joints "
+                           "show the player from 4 to 6.9")

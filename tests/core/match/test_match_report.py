@@ -153,6 +153,8 @@ def test_a_player_who_comes_late_and_unknown_values(tmp_path):
     found = find_worst_seconds(read_match_results(written(tmp_path, {"a": one})).players)
     assert [(second.time, second.value) for second in found] == [(152.0, 0.09)]
     assert "152 s" in build_match_page(tmp_path)
+    nobody = {"id": "b", "number": -1, "status": "failed: no track"}
+    assert ">b<" in build_match_page(written(tmp_path, {"a": one}, players=[nobody]))
 
 
 @pytest.mark.parametrize("changed", [{"to_s": 1e12}, {"to_s": 10**400}, {"from_s": -1e300}])

@@ -204,7 +204,7 @@ Frame Time: 0.0333
 
 
 @pytest.mark.parametrize("extra, says", [
-    (["--target", "12,3"], "X,Y,Z in metres"),
+    (["--target", "12,3"], "X,Y,Z in metres"), (["--target", "1e9,0,0"], "less than 100 km"),
     (["--target", "320,0,1"], "the human limit"),
     (["--target", "12,3,1", "--model", "none.npz"], "none.npz"),
     (["--target", "12,3,1", "--out", "x.obj"], "x.obj"),

@@ -46,7 +46,8 @@ def test_the_same_figures_twice(place):
 
 
 @pytest.mark.parametrize("more, words", [
-    ({"folder": "nowhere"}, "nowhere"), ({"model": "throws/throws.csv"}, "throws.csv"),
+    ({"folder": "nowhere"}, "nowhere"), ({"model": "recordet"}, "'recorded'"),
+    ({"model": "throws/throws.csv"}, "throws.csv"),
     ({"more": ("--subject", "nobody")}, "nobody"), ({"more": ("--html", "THERE/no/r.html")}, "r.html"),
     ({"more": ("--html", "THERE/throws/throws.csv")}, "another file"),
 ])

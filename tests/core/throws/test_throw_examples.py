@@ -185,7 +185,7 @@ def test_annotations_of_what_is_not_there_are_told(own):
 
 
 def test_folders_without_examples(own, tmp_path):
-    with pytest.raises(InputError, match="none with a kick, 2 with a throw"):
+    with pytest.raises(InputError, match="none with a kick, 2 with a throw.*the model for a throw"):
         read_examples(own, "kick")
     for order in (1, 2):
         clip(own, f"subject{order + 2:02d}").write_text("HIERARCHY")

@@ -86,9 +86,13 @@ def _read_receiver(path: Path) -> _Receiver:
     """Read one player's file, sorted by time, without samples where the receiver had no fix."""
     name, times, degrees = _read_gpx(path) if path.suffix.lower() == ".gpx" else _read_table(path)
     times, degrees = np.array(times, dtype=float), np.array(degrees, dtype=float).reshape(-1, 2)
-    good = np.isfinite(times) & np.isfinite(degrees).all(axis=1) & np.any(degrees != 0.0, axis=1)
-    good &= (np.abs(degrees) <= _MOST_DEGREES).all(axis=1)
+    fixed = np.isfinite(times) & np.isfinite(degrees).all(axis=1) & np.any(degrees != 0.0, axis=1)
+    good = fixed & (np.abs(degrees) <= _MOST_DEGREES).all(axis=1)
     times, order = np.unique(times[good], return_index=True)
+    if len(times) < 2 and (fixed & ~good).any():
+        latitude, longitude = degrees[fixed & ~good][0]
+        raise InputError(path, f"latitude {latitude:.7g}, longitude {longitude:.7g}",
+                         "degrees, -90 to 90 and -180 to 180", "export it in degrees, not in metres of a map")
     if len(times) < 2:
         raise InputError(path, format_count(len(times), "sample"), "at least two with a time and a place",
                          "export it again")

@@ -135,7 +135,7 @@ def _find_origin(path: Path, tracks, pitch: tuple[float, float], found: SampleCo
         raise InputError(path, f"players from {low[0]:.4g} to {high[0]:.4g} m in x and {low[1]:.4g} to {high[1]:.4g} m "
                          "in y", f"x along and y across a pitch of {pitch[0]:g} x {pitch[1]:g} m, from its centre or a "
                          "corner", "exchange x and y" if are_exchanged else
-                         "move the origin there, or give the size of the pitch")
+                         "move the origin there, give the size of the pitch, or convert x and y to metres")
     if origin.any():
         found.lines.append("the origin is taken as a corner of the pitch")
     return origin
