@@ -63,8 +63,7 @@ def align_joints(feed: JointFeed, match: Match, path: Path | str = "joints") -> 
     if problem is not None and not any(aligned.values()):
         raise problem
     people = [_join_person(parts) for parts in aligned.values() if parts]
-    # the match has a ball of its own
-    return replace(feed, people=tuple(people), ball=feed.ball[:0], notes=(*feed.notes, *dict.fromkeys(notes)))
+    return replace(feed, people=tuple(people), notes=(*feed.notes, *dict.fromkeys(notes)))
 
 
 def name_people(feed: JointFeed, match: Match) -> dict[str, str]:
