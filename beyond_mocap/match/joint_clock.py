@@ -63,8 +63,7 @@ def align_joints(feed: JointFeed, match: Match, path: Path | str = "joints") -> 
     if problem is not None and not any(aligned.values()):
         raise problem
     people = [_join_person(parts) for parts in aligned.values() if parts]
-    # the match has a ball of its own
-    return replace(feed, people=tuple(people), ball=feed.ball[:0], notes=(*feed.notes, *dict.fromkeys(notes)))
+    return replace(feed, people=tuple(people), notes=(*feed.notes, *dict.fromkeys(notes)))
 
 
 def name_people(feed: JointFeed, match: Match) -> dict[str, str]:
@@ -101,9 +100,18 @@ def _iter_pairs(feed: JointFeed, match: Match, paths, dots):
 
 
 def find_pelvis(person: PlayerJoints) -> np.ndarray:
-    """Find the middle (T, 3) m between the hips, NaN where they are not seen."""
-    hips = [person.landmarks.index(f"{side}_hip") for side in ("left", "right") if f"{side}_hip" in person.landmarks]
-    return person.positions[:, hips].mean(axis=1) if hips else np.full((len(person.times), 3), np.nan)
+    """Find the middle (T, 3) m between the hips, NaN where one is not seen for longer than moments."""
+    hips = [_bridge_moments(person.times, person.positions[:, person.landmarks.index(name)])
+            for name in ("left_hip", "right_hip") if name in person.landmarks]
+    return np.mean(hips, axis=0) if hips else np.full((len(person.times), 3), np.nan)
+
+
+def _bridge_moments(times: np.ndarray, path: np.ndarray) -> np.ndarray:
+    """Let a point (T, 3) m that is not seen for a moment be between the places before and after it."""
+    seen = np.isfinite(path[:, 0])
+    if seen.all() or seen.sum() < 2:
+        return path
+    return np.where(seen[:, None], path, sample_path(times[seen], path[seen], times))
 
 
 def _find_blocks(feed: JointFeed) -> list[tuple[float, float]]:
@@ -176,8 +184,9 @@ def _find_clock(people: list[PlayerJoints], match: Match, expected: float, rate:
     if best > _WELL:
         _check_rate(people, match, rate, best, where)
     if best > MOST_APART:
-        raise InputError(where, f"the nearest body is {best:.1f} m from any player",
-                         f"{MOST_APART:g} m or less", "give joints of this match and pitch")
+        raise InputError(where, f"the nearest body is {_describe_distance(best)} from any player",
+                         f"{MOST_APART:g} m or less, for {_FEWEST / _RATE:g} s or longer",
+                         "give joints of this match, with the pitch's centre as the origin")
     fits = costs <= max(best + _SAME, best * _SAME_SHARE)
     if fits[0, np.abs(offsets - expected) < 1e-6].any():
         return _refine_clock(people, match, expected, 1.0, is_expected=True), False
@@ -186,6 +195,11 @@ def _find_clock(people: list[PlayerJoints], match: Match, expected: float, rate:
         raise InputError(where, "the joints fit the tracking at several times, and not as they are",
                          "joints on the tracking's clock", "give joints of more players or of a longer time")
     return _refine_clock(people, match, float(offsets[place]), -1.0 if turned else 1.0), bool(turned)
+
+
+def _describe_distance(apart: float) -> str:
+    """Describe a mean distance, m, which counts up to _CAP."""
+    return f"{apart:.1f} m" if apart < _CAP else f"{_CAP:g} m or more"
 
 
 def _measure_clocks(people: list[PlayerJoints], match: Match, expected: float) -> tuple[np.ndarray, np.ndarray]:
@@ -211,7 +225,8 @@ def _check_rate(people: list[PlayerJoints], match: Match, rate: float, best: flo
         if abs(rate - other) > 0.01 * other:
             timed = [replace(one, times=begin + (one.times - begin) * rate / other) for one in people]
             if _measure_clocks(timed, match, 0.0)[1].min() < _OTHER_RATE * best:
-                raise InputError(where, f"{rate:g} frames per second, at which they are {best:.1f} m from the players",
+                raise InputError(where, f"{rate:g} frames per second, at which they are {_describe_distance(best)} "
+                                 "from the players",
                                  f"{other:g}, at which they fit", "correct the frame rate or the times")
 
 

@@ -15,6 +15,7 @@ from ..base.settings import find_setting
 from ..files.joints.joint_feed import JointFeed
 from ..files.joints.joint_readers import read_joints
 from ..files.tracking.match_arrays import USUAL_PITCH, check_clock
+from ..files.tracking.match_repairs import repair_ball
 from ..files.tracking.tracking import read_match
 from ..library.library import Library
 from ..motion.contacts import detect_heel_toe_contacts
@@ -89,7 +90,7 @@ def read_joint_match(path: Path | str, pitch: tuple[float, float] | None = None)
     Raises:
         InputError: if the file cannot be read, or has times of more than a day.
     """
-    feed = _begin_at_zero(read_joints(path))
+    feed = _begin_at_zero(read_joints(path, with_ball=True))
     check_clock(path, np.concatenate([person.times for person in feed.people]))
     return build_match(feed, pitch or USUAL_PITCH), feed
 
@@ -114,10 +115,18 @@ def build_match(feed: JointFeed, pitch: tuple[float, float] = USUAL_PITCH) -> Ma
                     for person in feed.people)
     times = np.arange(count) / feed.fps
     notes = () if knows_teams else ("no teams in the joints: all people are taken for one team",)
-    ball = sample_path(feed.ball[:, 0], feed.ball[:, 1:], times) if len(feed.ball) > 1 else np.full((count, 3), np.nan)
+    ball, repairs = _sample_ball(feed, times, pitch)
     return Match(times=times, players=players, positions=positions, ball=ball, length=pitch[0],
                  width=pitch[1], fps=feed.fps, provider="joints", periods=((0.0, float(times[-1])),),
-                 notes=(*feed.notes, *notes), teams=(Team("home"), Team("away")))
+                 notes=(*feed.notes, *notes), teams=(Team("home"), Team("away")), report=tuple(repairs))
+
+
+def _sample_ball(feed: JointFeed, times: np.ndarray, pitch: tuple[float, float]) -> tuple[np.ndarray, list[str]]:
+    """Sample a feed's ball (T, 3) m, repaired, at times (T,) s, and list what was repaired."""
+    if len(feed.ball) < 2:
+        return np.full((len(times), 3), np.nan), []
+    places, lines = repair_ball(feed.ball[:, 1:], *pitch)
+    return sample_path(feed.ball[:, 0], places, times), lines
 
 
 def _begin_at_zero(feed: JointFeed) -> JointFeed:

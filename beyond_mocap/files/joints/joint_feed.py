@@ -57,7 +57,7 @@ class JointFeed:
         people: in the order of the file.
         fps: frames per second.
         notes: what was assumed or repaired, one line each.
-        ball: (N, 4) seconds, ascending, and the ball's centre in m; (0, 4) where the feed has no ball.
+        ball: (N, 4) seconds, ascending, and the ball's centre in m, as tracked; (0, 4) where none is read.
     """
 
     people: tuple[PlayerJoints, ...]
@@ -188,7 +188,7 @@ def normalize_feed(feed: JointFeed, path: Path) -> JointFeed:
     if wild:
         notes.append(f"{format_count(wild, 'point')} farther than {_FARTHEST_POINT:g} m from their body left out")
     ball = np.column_stack([feed.ball[:, 0], feed.ball[:, 1:] @ turn.T * unit])
-    return JointFeed(tuple(cleaned), feed.fps, tuple(notes), ball[(np.abs(ball[:, 1:]) <= _MOST_METRES).all(axis=1)])
+    return JointFeed(tuple(cleaned), feed.fps, tuple(notes), ball)
 
 
 def _measure_bodies(feed: JointFeed, path: Path) -> tuple[float, np.ndarray]:

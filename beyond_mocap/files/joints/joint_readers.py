@@ -8,11 +8,12 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator
 from contextlib import contextmanager
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 
-from ...base.errors import InputError, build_read_error, format_count
+from ...base.errors import InputError, build_read_error, format_count, format_seconds
 from ..plain_npz import list_arrays, read_named_arrays
 from ..smpl.smpl import is_smpl_file
 from ..tables import parse_number, read_rows
@@ -36,11 +37,12 @@ _MAX_BYTES = 4 << 30
 _CSV_NAMES = {"time": "time_s", "x_m": "x", "y_m": "y", "z_m": "z", "landmark": "joint", "id": "player"}
 
 
-def read_joints(path) -> JointFeed:
+def read_joints(path, with_ball: bool = False) -> JointFeed:
     """Read a file of skeletal tracking.
 
     Args:
         path: the file; of Hawk-Eye, one of a half: all of that half beside it are read.
+        with_ball: read the ball too, which Hawk-Eye has in files beside its joints.
     Returns:
         The feed in metres, Z up.
     Raises:
@@ -51,7 +53,7 @@ def read_joints(path) -> JointFeed:
         raise build_read_error(path, "a file of skeletal tracking")
     read = _find_reader(path)
     with _name_damaged_file(path):
-        return read(path)
+        return read(path, with_ball) if read is _read_hawkeye else read(path)
 
 
 @contextmanager
@@ -116,10 +118,10 @@ def _read_cdf(path: Path) -> JointFeed:
     return found.build()
 
 
-def _read_hawkeye(path: Path) -> JointFeed:
+def _read_hawkeye(path: Path, with_ball: bool) -> JointFeed:
     """Read Hawk-Eye's joints, and the ball: files for each minute, their times from its start."""
     found, files = JointCollector(path), _list_minutes(path)
-    balls = [ball for file in files for ball in _find_balls(file)]
+    balls = [ball for file in files for ball in _find_balls(file)] if with_ball else []
     begin = None
     for file in (*files, *balls):
         content = read_json(file)
@@ -130,9 +132,18 @@ def _read_hawkeye(path: Path) -> JointFeed:
             add(found, content, (start - begin).total_seconds())
     if len(files) > 1:
         found.notes.append(f"{format_count(len(files), 'file')} of one half are read, {files[0].name} first")
-    if balls:
-        found.notes.append(f"the ball is read from {format_count(len(balls), 'file')}, {balls[0].name} first")
-    return found.build()
+    return _describe_ball(found.build(), balls) if balls else found.build()
+
+
+def _describe_ball(feed: JointFeed, files: list[Path]) -> JointFeed:
+    """Note the files of a feed's ball; one at other times than the people's is left out."""
+    times, told = feed.ball[:, 0], f"{format_count(len(files), 'file')}, {files[0].name} first"
+    begin, end = min(person.times[0] for person in feed.people), max(person.times[-1] for person in feed.people)
+    if not len(times) or ((times >= begin) & (times <= end)).any():
+        return replace(feed, notes=(*feed.notes, f"the ball is read from {told}"))
+    line = (f"the ball is left out: its times in {told}, {format_seconds(times[0])} to {format_seconds(times[-1])} s, "
+            f"do not overlap the joints', {format_seconds(begin)} to {format_seconds(end)} s")
+    return replace(feed, ball=feed.ball[:0], notes=(*feed.notes, line))
 
 
 def _add_people(found: JointCollector, content: dict, offset: float) -> None:

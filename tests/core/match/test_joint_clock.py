@@ -9,7 +9,7 @@ import pytest
 from beyond_mocap.base.errors import InputError
 from beyond_mocap.cli.main import main
 from beyond_mocap.files.joints.joint_feed import JointFeed, PlayerJoints
-from beyond_mocap.match.joint_clock import align_joints, name_people
+from beyond_mocap.match.joint_clock import align_joints, find_pelvis, name_people
 from beyond_mocap.motion.track.match_data import Match, MatchPlayer
 from tests.core.joint_feeds import sample_joints, write_table
 from tests.core.match.small_match import LIBRARY, SMALL
@@ -75,9 +75,26 @@ def test_pieces_of_a_player_are_one_player_and_strangers_none():
     assert name_people(feed, build_match(paths[:4])) == {"X0": "home_2", "X1": "home_2", "X3": "home_0"}
 
 
+@pytest.mark.parametrize("lost", ["every other", "30 %"])
+def test_hips_that_flicker_are_a_pelvis(lost):
+    paths = build_paths(3)
+    (whole,) = build_feed(paths, [(1, 40.0, 55.0)], -250.0).people
+    odd = np.arange(len(whole.times)) % 2 == 1
+    is_lost = {"every other": np.stack([odd, ~odd], axis=1),
+               "30 %": np.random.default_rng(4).random((len(odd), 2)) < 0.3}[lost]
+    flickering = replace(whole, positions=np.where(is_lost[..., None], np.nan, whole.positions))
+    feed = align_joints(JointFeed((flickering,), FPS, ()), build_match(paths))
+    assert feed.people[0].times[0] == pytest.approx(40.0, abs=0.021)
+    assert name_people(feed, build_match(paths)) == {"X0": "home_1"}
+    apart = np.linalg.norm(find_pelvis(flickering) - find_pelvis(whole), axis=1)[1:-1]
+    assert apart.max() < 0.15 and find_pelvis(whole).tobytes() == whole.positions.mean(axis=1).tobytes()
+    flickering.positions[100:115] = np.nan
+    assert np.isnan(find_pelvis(flickering)[102:113]).all()  # 0.6 s are no moment
+
+
 def test_joints_of_another_match_and_of_several_times_are_refused():
     paths = build_paths(5)
-    with pytest.raises(InputError, match="from any player"):
+    with pytest.raises(InputError, match="10 m or more from any player"):
         align_joints(build_feed(paths + 60.0, [(0, 10.0, 50.0)]), build_match(paths))
     paths[2, TIMES > 20.0] = paths[2, np.searchsorted(TIMES, 20.0)]
     with pytest.raises(InputError, match="several times"):

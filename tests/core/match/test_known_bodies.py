@@ -8,7 +8,7 @@ import pytest
 
 from beyond_mocap.base.errors import InputError
 from beyond_mocap.cli.main import main
-from beyond_mocap.files.joints.joint_readers import list_joint_files
+from beyond_mocap.files.joints.joint_readers import list_joint_files, read_joints
 from beyond_mocap.files.tracking.tracking import read_match
 from beyond_mocap.library.build import build_library
 from beyond_mocap.match.known_bodies import read_joint_match
@@ -69,27 +69,42 @@ def test_seen_joints_are_shown_and_gaps_are_synthesized(seen_match):
     assert jerk.max() < max(2.0 * inner, 4000.0)
 
 
+def write_balls(path, ball, is_seen, day=22):
+    """Two files of a half beside Hawk-Eye's joints, of a ball (T, 3) in their unit."""
+    times = np.arange(len(ball)) / FPS
+    for minute, begin, end in ((1, 0.0, 1.0), (2, 1.0, 3.0)):
+        rows = [{"time": times[frame] - begin, "pos": ball[frame].tolist() if is_seen[frame] else None}
+                for frame in np.flatnonzero((times >= begin) & (times < end))]  # fmt: skip
+        content = {"time": {"startUTC": f"2024-09-{day}T21:00:{10 + minute:02d}.000Z"}, "samples": {"ball": rows}}
+        path.with_name(f"match_1_{minute}.football.samples.ball").write_text(json.dumps(content))
+
+
 def test_the_ball_beside_hawkeyes_joints_is_that_of_the_match(tmp_path):
-    """In centimetres and in two files, as the joints are, with half a second in which it is not seen."""
+    """In centimetres and in two files, as the joints are, with half a second in which it is not seen; and wild."""
     joints = sample_joints("walking_1_2", FPS)[:150]
     path = write_hawkeye(tmp_path, {"7": 100.0 * joints}, FPS)
     times = np.arange(150) / FPS
     ball = np.column_stack([5.0 + 3.0 * times, -times, 0.11 + 0.0 * times])
     is_seen = (times < 1.2) | (times > 1.7)
-    for minute, begin, end in ((1, 0.0, 1.0), (2, 1.0, 3.0)):
-        rows = [{"time": times[frame] - begin, "pos": (100.0 * ball[frame]).tolist() if is_seen[frame] else None}
-                for frame in np.flatnonzero((times >= begin) & (times < end))]  # fmt: skip
-        content = {"time": {"startUTC": f"2024-09-22T21:00:{10 + minute:02d}.000Z"}, "samples": {"ball": rows}}
-        path.with_name(f"match_1_{minute}.football.samples.ball").write_text(json.dumps(content))
+    tracked = ball.copy()
+    tracked[20], tracked[30, 2] = (300.0, 300.0, 1.0), 90.0
+    write_balls(path, 100.0 * tracked, is_seen)
     match, _ = read_joint_match(path)
     known = np.isfinite(match.ball[:, 0])
     assert known[is_seen].mean() > 0.95 and not known[~is_seen].any()
-    assert np.abs(match.ball[known] - ball[known]).max() < 1e-3
+    assert not known[20] and known[30] and np.isnan(match.ball[30, 2])
+    assert np.nanmax(np.abs(match.ball[known] - ball[known])) < 1e-3
     assert "the ball is read from 2 files" in " ".join(match.notes)
+    assert "1 sample with an impossible" in match.report[0] and "1 height of the ball above 60 m" in match.report[1]
     assert len(list_joint_files(path)) == 4  # whose content makes a stored match out of date
     path.with_name("match_1_2.football.samples.ball").write_text("{}")
     with pytest.raises(InputError, match="match_1_2.football.samples.ball: values in other places"):
         read_joint_match(path)
+    assert "the ball" not in " ".join(read_joints(path).notes)  # not opened where only bodies are wanted
+    write_balls(path, ball, is_seen, day=23)
+    match, _ = read_joint_match(path)
+    (line,) = [line for line in (*match.notes, *match.report) if "the ball" in line]
+    assert "86400 to 86402.98 s, do not overlap the joints', 0 to 2.98 s" in line
 
 
 def test_the_report_names_what_was_seen(seen_match):
