@@ -168,7 +168,7 @@ def fit_planted_body(joints: dict[str, np.ndarray], fps: float, stance: NeutralS
 
     Args:
         joints: as for `fit_body`.
-        fps: frames per second; below PLANTED_RATE contacts cannot be told, and feet are not planted.
+        fps: frames per second; below PLANTED_RATE contacts cannot be found, and feet are not planted.
         stance: of the skeleton.
     Returns:
         The motion.

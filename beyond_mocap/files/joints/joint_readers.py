@@ -137,11 +137,11 @@ def _read_hawkeye(path: Path, with_ball: bool) -> JointFeed:
 
 def _describe_ball(feed: JointFeed, files: list[Path]) -> JointFeed:
     """Note the files of a feed's ball; one at other times than the people's is left out."""
-    times, told = feed.ball[:, 0], f"{format_count(len(files), 'file')}, {files[0].name} first"
+    times, where = feed.ball[:, 0], f"{format_count(len(files), 'file')}, {files[0].name} first"
     begin, end = min(person.times[0] for person in feed.people), max(person.times[-1] for person in feed.people)
     if not len(times) or ((times >= begin) & (times <= end)).any():
-        return replace(feed, notes=(*feed.notes, f"the ball is read from {told}"))
-    line = (f"the ball is left out: its times in {told}, {format_seconds(times[0])} to {format_seconds(times[-1])} s, "
+        return replace(feed, notes=(*feed.notes, f"the ball is read from {where}"))
+    line = (f"the ball is left out: its times in {where}, {format_seconds(times[0])} to {format_seconds(times[-1])} s, "
             f"do not overlap the joints', {format_seconds(begin)} to {format_seconds(end)} s")
     return replace(feed, ball=feed.ball[:0], notes=(*feed.notes, line))
 
