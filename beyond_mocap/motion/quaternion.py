@@ -229,6 +229,19 @@ def match_signs(q: np.ndarray, reference: np.ndarray) -> np.ndarray:
     return np.where(dot_products(q, reference)[..., None] < 0.0, -q, q)
 
 
+def average(q: np.ndarray, weight: np.ndarray) -> np.ndarray:
+    """Average rotations by weight: the eigenvector of sum w q q^T (Markley et al. 2007).
+
+    Args:
+        q: (N, 4).
+        weight: (..., N).
+    Returns:
+        (..., 4), with w of 0 or more.
+    """
+    out = np.linalg.eigh(np.einsum("...n,ni,nj->...ij", weight, q, q))[1][..., -1]
+    return np.where(out[..., :1] >= 0.0, out, -out)
+
+
 def slerp(a: np.ndarray, b: np.ndarray, weight: float | np.ndarray) -> np.ndarray:
     """Interpolate rotations on the sphere along the shorter arc.
 

@@ -29,7 +29,6 @@ from ..synthetic.throws import find_grip
 from .networks.chains import EFFECTORS, find_chains
 from .networks.description import scale_description
 from .networks.example import Example, build_description
-from .networks.gaze import average_rotations
 from .networks.generate import GeneratedMotion, Options, generate_motion
 from .networks.kinematics import to_matrices
 from .networks.limits import JointLimits
@@ -268,10 +267,10 @@ def _measure_mean_head(model: ThrowModel, motion: Motion, truth: Motion) -> floa
 def _average_head(model: ThrowModel) -> np.ndarray:
     """Average the heads of a model's examples relative to their headings: a quaternion (1, 4)."""
     head = identify_joints(model.skeleton).head
-    relative = np.concatenate([quaternion.to_matrix(quaternion.multiply(
-        quaternion.from_up_angle(-compute_heading(example.motion)), forward_kinematics(example.motion)[1][:, head]))
+    relative = np.concatenate([quaternion.multiply(
+        quaternion.from_up_angle(-compute_heading(example.motion)), forward_kinematics(example.motion)[1][:, head])
         for example in model.examples])
-    return average_rotations(relative, np.ones((1, len(relative))))
+    return quaternion.average(relative, np.ones((1, len(relative))))
 
 
 def _compute_angles(a: np.ndarray, b: np.ndarray) -> np.ndarray:

@@ -171,7 +171,7 @@ class _AnatomyEstimator:
     def set_axes_like(self, joint: int, segment: np.ndarray) -> None:
         """Set F of a joint so that its segment rotates like `segment` (T, 4) on average."""
         seen = quaternion.multiply(quaternion.inverse(self.world[:, joint]), segment)
-        self.axes[joint] = _average_rotations(seen, self.weight)
+        self.axes[joint] = quaternion.average(seen, self.weight)
         self.known_joints.add(joint)
 
     def build_anatomy(self) -> Anatomy:
@@ -182,7 +182,7 @@ class _AnatomyEstimator:
             self._estimate_foot(limb)
             if limb.upper_arm is not None:
                 self._estimate_arm(limb)
-        still = np.stack([_average_rotations(self.local[:, joint], self.weight) for joint in range(len(self.skeleton))])
+        still = np.stack([quaternion.average(self.local[:, joint], self.weight) for joint in range(len(self.skeleton))])
         return Anatomy(skeleton=self.skeleton, body=self.body, axes=freeze_array(self.axes),
                        known_joints=frozenset(self.known_joints), mean_rotations=freeze_array(still),
                        leg=self._measure_leg_length(), ankle=self._measure_ankle_height(), ball=_BALL
@@ -312,7 +312,7 @@ class _AnatomyEstimator:
             return
         seen = quaternion.multiply(quaternion.inverse(self.world[:, limb.toe]),
                                    self.compute_segment_rotation(limb.foot))
-        self.axes[limb.toe] = _average_rotations(seen, level)
+        self.axes[limb.toe] = quaternion.average(seen, level)
         self.known_joints.add(limb.toe)
 
     def _measure_leg_length(self) -> float:
@@ -346,12 +346,6 @@ def _find_finger_direction(skeleton: Skeleton, hand: int) -> np.ndarray | None:
     offsets = skeleton.offsets[list(skeleton.children(hand))].reshape(-1, 3)
     mean = offsets.mean(axis=0) if len(offsets) else np.zeros(3)
     return mean if np.linalg.norm(mean) > 1e-3 else _find_tip(skeleton, hand)
-
-
-def _average_rotations(rotations: np.ndarray, weight: np.ndarray) -> np.ndarray:
-    """Average rotations (T, 4) by weight: the eigenvector (4,) of sum w q q^T (Markley et al. 2007)."""
-    q = np.linalg.eigh(np.einsum("t,ti,tj->ij", weight, rotations, rotations))[1][:, -1]
-    return q if q[0] >= 0.0 else -q
 
 
 def _find_normal(direction: np.ndarray) -> np.ndarray:

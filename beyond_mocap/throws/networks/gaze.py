@@ -44,7 +44,7 @@ def turn_head(model: ThrowModel, description: Description, motion: Motion, share
     approach = quaternion.from_up_angle(_measure_approach(description))
     known, heads = _collect_heads(model, description.limb)
     away = (known - np.clip(seconds, known.min(), known.max())[:, None]) / _SECONDS
-    wanted = quaternion.multiply(approach, average_rotations(heads, np.exp(-0.5 * away**2)))
+    wanted = quaternion.multiply(approach, quaternion.average(heads, np.exp(-0.5 * away**2)))
     world, turned = forward_kinematics(motion)[1], motion
     own = world[:, body.head]
     for joint, part in ((body.neck, _NECK_SHARE * share), (body.head, share)):
@@ -82,7 +82,7 @@ def _collect_heads(model: ThrowModel, limb: int) -> tuple[np.ndarray, np.ndarray
     """Collect the heads of all examples, mirrored where the other foot kicks.
 
     Returns:
-        Seconds (N,) from the contact, and rotations (N, 3, 3) relative to the approach.
+        Seconds (N,) from the contact, and rotations (N, 4) relative to the approach.
     """
     seconds, rotations = [], []
     for example in model.examples:
@@ -90,12 +90,5 @@ def _collect_heads(model: ThrowModel, limb: int) -> tuple[np.ndarray, np.ndarray
         head = identify_joints(own.motion.skeleton).head
         back = quaternion.from_up_angle(-_measure_approach(build_description(own)))
         seconds.append((np.arange(len(own.motion)) - own.release) / own.motion.fps)
-        rotations.append(quaternion.to_matrix(quaternion.multiply(back, forward_kinematics(own.motion)[1][:, head])))
+        rotations.append(quaternion.multiply(back, forward_kinematics(own.motion)[1][:, head]))
     return np.concatenate(seconds), np.concatenate(rotations)
-
-
-def average_rotations(rotations: np.ndarray, weights: np.ndarray) -> np.ndarray:
-    """Average rotations (N, 3, 3) with each of T rows of weights (T, N): quaternions (T, 4)."""
-    left, _, right = np.linalg.svd(np.einsum("tn,nij->tij", weights, rotations))
-    left[..., -1] *= np.linalg.det(left @ right)[..., None]
-    return quaternion.unify_signs(quaternion.from_matrix(left @ right))
