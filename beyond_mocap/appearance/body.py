@@ -18,12 +18,13 @@ from ..motion.skeleton import Skeleton, freeze_array
 from .fit import fit_template
 from .landmarks import SEGMENTS
 from .look import BUILDS, HAIR_STYLES, Look
-from .mesh import GLOVES, SKIN, BodyMesh, blend_joints
+from .mesh import GLOVES, SHIRT, SKIN, BodyMesh, blend_joints
 from .stance import build_lifted_stance
 from .template import Template, read_template
 
 _MOST_JOINTS = 4  # that a vertex follows
 _LEAST_ALIKE = np.cos(np.radians(55.0))  # half of the largest angle between rest poses of joints that share a vertex
+_HELD_BY_TRUNK = 0.2  # share of the trunk from which parted cloth stays with it: .5 still bares slits above the hem
 
 
 def build_body(skeleton: Skeleton, height: float | None = None, example: Motion | None = None,
@@ -84,7 +85,7 @@ def _distribute_weights(template: Template, used: np.ndarray, stance: NeutralSta
     """
     body = identify_joints(stance.skeleton)
     dense = np.zeros((len(used), len(stance.skeleton)))
-    segments, shares = template.segments[used], template.shares[used]
+    segments, shares = _keep_hem_whole(template, stance, body)[used], template.shares[used]
     for index, name in enumerate(SEGMENTS):
         share = np.sum(np.where(segments == index, shares, 0.0), axis=1)
         if name == "trunk":
@@ -97,6 +98,22 @@ def _distribute_weights(template: Template, used: np.ndarray, stance: NeutralSta
     order = np.argsort(-dense, axis=1, kind="stable")[:, :_MOST_JOINTS]
     largest = np.take_along_axis(dense, order, axis=1)
     return order, largest / largest.sum(axis=1, keepdims=True)
+
+
+def _keep_hem_whole(template: Template, stance: NeutralStance, body: Humanoid) -> np.ndarray:
+    """Return the template's segments with the trunk for the thighs on the shirt, and where the trunk has a good share.
+
+    Only for skeletons whose thighs rest opposite to the hips: their vertices are parted (`_part_opposed_joints`), and a
+    shirt parted along the groin tears with each long step. Thighs come forth before its hem instead.
+    """
+    if _measure_likeness(stance, np.array([body.left.upper_leg, body.right.upper_leg]), body.hips).min() > _LEAST_ALIKE:
+        return template.segments
+    thighs = np.isin(template.segments, [SEGMENTS.index(f"upper_leg_{side}") for side in ("left", "right")])
+    trunk = template.segments == SEGMENTS.index("trunk")
+    shared = np.sum(np.where(trunk, template.shares, 0.0), axis=1) > _HELD_BY_TRUNK
+    shirt = template.faces[template.materials == SHIRT]
+    shared[shirt[shirt >= 0]] = True
+    return np.where(shared[:, None] & thighs, SEGMENTS.index("trunk"), template.segments)
 
 
 def _find_joint(body: Humanoid, segment: str) -> int:
@@ -148,9 +165,13 @@ def _part_opposed_joints(stance: NeutralStance, joints: np.ndarray, weights: np.
 
     Blends of joints that rest almost opposite to how they stand would flip while they bend.
     """
-    alike = np.abs(np.sum(stance.rotations[joints] * stance.rotations[joints[:, :1]], axis=-1))
-    kept = np.where(alike > _LEAST_ALIKE, weights, 0.0)
+    kept = np.where(_measure_likeness(stance, joints, joints[:, :1]) > _LEAST_ALIKE, weights, 0.0)
     return kept / kept.sum(axis=1, keepdims=True)
+
+
+def _measure_likeness(stance: NeutralStance, joints: np.ndarray, others: np.ndarray | int) -> np.ndarray:
+    """Measure how alike joints (...,) rest as others: the cosine of half the angle between their rotations."""
+    return np.abs(np.sum(stance.rotations[joints] * stance.rotations[others], axis=-1))
 
 
 def _move_to_rest(stance: NeutralStance, vertices: np.ndarray, joints: np.ndarray, weights: np.ndarray) -> np.ndarray:

@@ -44,9 +44,9 @@ def _share_leg(shares, side: str, points: np.ndarray) -> np.ndarray:
     """Share points between the parts of a leg, and return what the leg has (N,)."""
     x, y, z = points.T
     crease = 0.865 + 0.85 * np.clip(np.abs(y), 0.0, 0.13) - 0.035 * smoothstep(x, 0.0, -0.10)
-    width = 0.004 + 0.030 * smoothstep(z, 0.81, 0.90)
+    width = 0.004 + 0.116 * smoothstep(z, 0.78, 0.90)  # narrow between the legs; a shirt is one cloth
     own = smoothstep(y, -width, width)
-    leg = smoothstep(crease - z, -0.075, 0.095) * own * smoothstep(y, 0.55, 0.35)
+    leg = smoothstep(crease - z, -0.110, 0.130) * own * smoothstep(y, 0.55, 0.35)
     lower = smoothstep(z, KNEE + 0.06, KNEE - 0.06)
     foot = smoothstep(z, ANKLE + 0.055, ANKLE - 0.005)
     toe = smoothstep(x, 0.105, 0.160) * foot
