@@ -20,7 +20,7 @@ import numpy as np
 sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
 from beyond_mocap.appearance.body import build_body  # noqa: E402
 from beyond_mocap.appearance.mesh import MATERIALS, deform_body  # noqa: E402
-from beyond_mocap.appearance.picture import COLOURS as PART_COLOURS  # noqa: E402
+from beyond_mocap.appearance.picture import COLOURS as PART_COLOURS, fill_faces  # noqa: E402
 from beyond_mocap.base.errors import InputError  # noqa: E402
 from beyond_mocap.base.vectors import unit_vectors  # noqa: E402
 from beyond_mocap.files.bvh import bvh  # noqa: E402
@@ -74,38 +74,31 @@ def draw_picture(view: View, skins, body, balls):
     from PIL import Image, ImageDraw
 
     image = Image.new("RGB", (view.size, view.size), GRASS)
-    draw = ImageDraw.Draw(image)
-    _draw_grid(draw, view)
+    _draw_grid(ImageDraw.Draw(image), view)
     balls = np.asarray(balls, dtype=float).reshape(-1, 3)
     balls = balls[np.isfinite(balls).all(axis=1)]
     quads = np.array([face if len(face) == 4 else (*face, face[-1]) for face in body.faces])
+    canvas = np.array(image)
     for skin in skins:
-        flat, _ = view(_cast_shadow(skin))
-        for corners in flat[quads]:
-            draw.polygon(list(map(tuple, corners)), fill=SHADOW)
-    for centre in balls:
-        _draw_disc(draw, view, _cast_shadow(centre), SHADOW, 0.4)
-    for skin in sorted(skins, key=lambda skin: -np.linalg.norm(skin.mean(axis=0) - view.eye)):
-        _draw_body(draw, view, skin, quads, body.material, balls)
-    return image
+        flat = view(_cast_shadow(skin))[0][quads]
+        fill_faces(canvas, np.full(canvas.shape[:2], -np.inf), flat, np.zeros(quads.shape),
+                   np.tile(SHADOW, (len(quads), 1)))
+    _draw_discs(canvas, np.full(canvas.shape[:2], -np.inf), view, _cast_shadow(balls), colour=SHADOW, flat=0.4)
+    drawn = np.full(canvas.shape[:2], -np.inf)
+    for skin in skins:
+        flat, depth = view(skin)
+        fill_faces(canvas, drawn, flat[quads], 1.0 / np.maximum(depth, 0.05)[quads], _light(skin[quads], body.material))
+    _draw_discs(canvas, drawn, view, balls, colour=BALL, flat=1.0)
+    return Image.fromarray(canvas)
 
 
-def _draw_body(draw, view: View, skin, quads, material, balls) -> None:
-    """Draw the faces of one character and the balls (N, 3) m, the far ones first."""
-    flat, depth = view(skin)
-    corners = skin[quads]
+def _light(corners, material) -> np.ndarray:
+    """Return the colours (F, 3) of faces with corners (F, 4, 3) m in the sun."""
     normal = np.cross(corners[:, 2] - corners[:, 0], corners[:, 3] - corners[:, 1])
-    normal = unit_vectors(normal, min_length=1e-12)
-    light = 0.5 + 0.5 * np.clip(normal @ SUN, -0.4, 1.0)
+    light = 0.5 + 0.5 * np.clip(unit_vectors(normal, min_length=1e-12) @ SUN, -0.4, 1.0)
     colour = (COLOURS[material] * light[:, None]).astype(int)
     colour[corners[..., 2].mean(axis=1) < -0.01] = BELOW
-    seen = np.flatnonzero(np.sum(normal * (view.eye - corners[:, 0]), axis=1) > 0)
-    far = np.concatenate([depth[quads[seen]].mean(axis=1), view(balls)[1]])
-    for item in np.argsort(-far):
-        if item < len(seen):
-            draw.polygon(list(map(tuple, flat[quads[seen[item]]])), fill=tuple(colour[seen[item]]))
-        else:
-            _draw_disc(draw, view, balls[item - len(seen)], BALL, 1.0)
+    return colour
 
 
 def _cast_shadow(points: np.ndarray) -> np.ndarray:
@@ -113,12 +106,18 @@ def _cast_shadow(points: np.ndarray) -> np.ndarray:
     return points - np.maximum(points[..., 2:], 0.0) * SUN / SUN[2] * [1.0, 1.0, 1.0]
 
 
-def _draw_disc(draw, view: View, centre, colour, flat: float) -> None:
-    """Draw a ball or its shadow."""
-    (x, y), depth = view(centre)
-    if depth > 0.1:
-        r = view.size * BALL_RADIUS / depth * np.linalg.norm(view.at - view.eye) / view.wide
-        draw.ellipse([x - r, y - flat * r, x + r, y + flat * r], fill=colour, outline=(90, 90, 90))
+def _draw_discs(canvas, drawn, view: View, centres, *, colour, flat: float) -> None:
+    """Draw balls or their shadows, where they are nearer than what is drawn: an edge, and within it the colour."""
+    around = np.radians(np.arange(0.0, 360.0, 15.0))
+    for (x, y), depth in zip(*view(np.reshape(centres, (-1, 3)))):
+        if depth <= 0.1:
+            continue
+        radius = view.size * BALL_RADIUS / depth * np.linalg.norm(view.at - view.eye) / view.wide
+        for size, tone in ((radius, (90, 90, 90) if flat == 1.0 else colour), (radius - 1.5, colour)):
+            rim = np.stack([x + size * np.cos(around), y + flat * size * np.sin(around)], axis=1)
+            fans = np.stack([np.broadcast_to([x, y], rim.shape), rim, np.roll(rim, -1, axis=0)], axis=1)
+            near = np.full((len(fans), 4), (1.0 if size == radius else 1.0 + 1e-6) / depth)
+            fill_faces(canvas, drawn, fans[:, [0, 1, 2, 2]], near, np.tile(tone, (len(fans), 1)))
 
 
 def _draw_grid(draw, view: View, step: float = 0.5) -> None:

@@ -1,7 +1,7 @@
 """A small picture of one pose: the light body on a transparent background, drawn with numpy alone.
 
-Faces are filled from far to near at twice the size and averaged down. This needs no graphics card and gives the same
-pixels on every machine. Also pictures in a grid, and PNG files.
+Faces are filled at twice the size, each pixel by what is nearest there, and averaged down. This needs no graphics card
+and gives the same pixels on every machine. Also pictures in a grid, and PNG files.
 """
 
 from __future__ import annotations
@@ -104,9 +104,9 @@ def _build_camera() -> tuple[np.ndarray, np.ndarray, np.ndarray]:
 
 
 def _draw_faces(canvas, skin, pixels, quads, material, to_camera) -> None:
-    """Draw the shadow of the faces towards the sun, then the faces towards the camera, the farthest first.
+    """Draw the shadow of the faces towards the sun, then the faces towards the camera.
 
-    flat: (2 V, 2) pixels of the V vertices, then of their shadows.
+    pixels: (2 V, 2) of the V vertices, then of their shadows.
     """
     corners = skin[quads]
     normal = np.cross(corners[:, 2] - corners[:, 0], corners[:, 3] - corners[:, 1])
@@ -116,25 +116,67 @@ def _draw_faces(canvas, skin, pixels, quads, material, to_camera) -> None:
         np.array([COLOURS[part] for part in MATERIALS])[material] * (0.55 + 0.45 * np.maximum(light, -0.5))[:, None]
     )
     lit = quads[light > 0.0] + len(skin)
-    _fill_polygons(canvas, pixels[lit], np.tile(_SHADOW, (len(lit), 1)))
-    visible = np.flatnonzero(normal @ to_camera > 0.0)
-    visible = visible[np.argsort((corners[visible] @ to_camera).mean(axis=1))]
-    _fill_polygons(canvas, pixels[quads[visible]], np.pad(colour[visible], ((0, 0), (0, 1)), constant_values=1.0))
+    fill_faces(canvas, np.full(canvas.shape[:2], -np.inf), pixels[lit], np.zeros(lit.shape), np.tile(_SHADOW, (len(lit), 1)))
+    fill_faces(canvas, np.full(canvas.shape[:2], -np.inf), pixels[quads], corners @ to_camera,
+               np.pad(colour, ((0, 0), (0, 1)), constant_values=1.0))
 
 
-def _fill_polygons(canvas: np.ndarray, corners: np.ndarray, colours: np.ndarray) -> None:
-    """Fill convex polygons (F, 4, 2) pixels one after the other with colours (F, 4), which replace the pixels below."""
-    low = np.clip(np.floor(corners.min(axis=1)).astype(int), 0, len(canvas))
-    high = np.clip(np.ceil(corners.max(axis=1)).astype(int) + 1, 0, len(canvas))
-    edges_along = np.roll(corners, -1, axis=1) - corners
-    area = np.sum(corners[..., 0] * edges_along[..., 1] - corners[..., 1] * edges_along[..., 0], axis=1)
+def fill_faces(canvas: np.ndarray, drawn: np.ndarray, corners: np.ndarray, nearness: np.ndarray,
+               colours: np.ndarray) -> None:
+    """Fill convex faces, where they are nearer than what is drawn.
+
+    Args:
+        canvas: (H, W, C) colours, changed in place.
+        drawn: (H, W) nearness of what is drawn there, -inf for nothing; changed in place.
+        corners: (F, 4, 2) pixels, x before y.
+        nearness: (F, 4) of the corners: any measure that grows towards the camera and is linear across a flat face in
+            the picture (minus the distance of a parallel projection, one over the distance of a perspective).
+        colours: (F, C).
+    """
+    size = np.array(canvas.shape[1::-1])
+    low = np.clip(np.floor(corners.min(axis=1)).astype(int), 0, size)
+    wide = (np.clip(np.ceil(corners.max(axis=1)).astype(int) + 1, 0, size) - low).max(axis=1)
+    found = []
+    for edge in np.unique(2 ** np.ceil(np.log2(np.maximum(wide, 1))).astype(int)):
+        faces = np.flatnonzero((wide <= edge) & (2 * wide > edge))
+        found.append(_list_pixels(faces, low[faces], int(edge), corners[faces], nearness[faces], size))
+    if not found:
+        return
+    place, near, face = (np.concatenate(part) for part in zip(*found))
+    ahead = near > drawn.reshape(-1)[place]
+    order = np.flatnonzero(ahead)[np.argsort(near[ahead], kind="stable")]  # of several values at a place the last stays
+    drawn.reshape(-1)[place[order]] = near[order]
+    canvas.reshape(-1, canvas.shape[2])[place[order]] = colours[face[order]]
+
+
+def _list_pixels(faces, low, edge: int, corners, nearness, size) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """List the pixels of faces within squares of `edge` pixels from `low` on: place in the picture, nearness, face."""
+    x, y = (low[:, axis, None] + np.arange(edge) for axis in (0, 1))
+    along = np.roll(corners, -1, axis=1) - corners
+    area = np.sum(corners[..., 0] * along[..., 1] - corners[..., 1] * along[..., 0], axis=1)
     # Orient all polygons the same way: a pixel is inside if it is on the inner side of every edge.
-    edges_along = edges_along * np.where(area < 0.0, -1.0, 1.0)[:, None, None]
-    ahead = edges_along[..., 0] * corners[..., 1] - edges_along[..., 1] * corners[..., 0]
-    pixel = np.arange(len(canvas)) + 0.5
-    for (x, y), (right, top), edges, offset, colour in zip(low.tolist(), high.tolist(), edges_along, ahead, colours):
-        side = edges[:, :1, None] * pixel[None, y:top, None] - edges[:, 1:, None] * pixel[None, None, x:right]
-        canvas[y:top, x:right][(side >= offset[:, None, None] - 1e-9).all(axis=0)] = colour
+    along = along * np.where(area < 0.0, -1.0, 1.0)[:, None, None]
+    inside = ((x < size[0])[:, None, :] & (y < size[1])[:, :, None])
+    for i in range(4):
+        start, way = corners[:, i], along[:, i]
+        right, up = (x + 0.5 - start[:, :1]) * way[:, 1:], (y + 0.5 - start[:, 1:]) * way[:, :1]
+        inside &= up[:, :, None] - right[:, None, :] >= -1e-9
+    face, row, column = np.nonzero(inside)
+    slope, middle = _measure_slopes(corners, nearness), corners.mean(axis=1)
+    x, y = x[face, column], y[face, row]
+    near = nearness.mean(axis=1)[face] + slope[face, 0] * (x + 0.5 - middle[face, 0]) + slope[face, 1] * (
+        y + 0.5 - middle[face, 1])
+    return y * size[0] + x, np.clip(near, nearness.min(axis=1)[face], nearness.max(axis=1)[face]), faces[face]
+
+
+def _measure_slopes(corners: np.ndarray, nearness: np.ndarray) -> np.ndarray:
+    """Measure how nearness (F, 4) changes per pixel across faces of corners (F, 4, 2), from their diagonals (F, 2)."""
+    diagonal, rise = corners[:, 2:] - corners[:, :2], nearness[:, 2:] - nearness[:, :2]
+    area = diagonal[:, 0, 0] * diagonal[:, 1, 1] - diagonal[:, 0, 1] * diagonal[:, 1, 0]
+    along = rise[:, 0] * diagonal[:, 1, 1] - rise[:, 1] * diagonal[:, 0, 1]
+    aside = rise[:, 1] * diagonal[:, 0, 0] - rise[:, 0] * diagonal[:, 1, 0]
+    flat = np.abs(area) < 1e-6  # seen from the edge
+    return np.where(flat[:, None], 0.0, np.stack([along, aside], axis=1) / np.where(flat, 1.0, area)[:, None])
 
 
 def _downsample(canvas: np.ndarray, size: int) -> np.ndarray:
