@@ -20,7 +20,8 @@ import numpy as np
 sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
 from beyond_mocap.appearance.body import build_body  # noqa: E402
 from beyond_mocap.appearance.mesh import MATERIALS, deform_body  # noqa: E402
-from beyond_mocap.appearance.picture import COLOURS as PART_COLOURS, fill_faces  # noqa: E402
+from beyond_mocap.appearance.picture import COLOURS as PART_COLOURS  # noqa: E402
+from beyond_mocap.appearance.picture import fill_faces  # noqa: E402
 from beyond_mocap.base.errors import InputError  # noqa: E402
 from beyond_mocap.base.vectors import unit_vectors  # noqa: E402
 from beyond_mocap.files.bvh import bvh  # noqa: E402

@@ -116,9 +116,9 @@ def _draw_faces(canvas, skin, pixels, quads, material, to_camera) -> None:
         np.array([COLOURS[part] for part in MATERIALS])[material] * (0.55 + 0.45 * np.maximum(light, -0.5))[:, None]
     )
     lit = quads[light > 0.0] + len(skin)
-    fill_faces(canvas, np.full(canvas.shape[:2], -np.inf), pixels[lit], np.zeros(lit.shape), np.tile(_SHADOW, (len(lit), 1)))
-    fill_faces(canvas, np.full(canvas.shape[:2], -np.inf), pixels[quads], corners @ to_camera,
-               np.pad(colour, ((0, 0), (0, 1)), constant_values=1.0))
+    nothing = np.full(canvas.shape[:2], -np.inf)
+    fill_faces(canvas, nothing.copy(), pixels[lit], np.zeros(lit.shape), np.tile(_SHADOW, (len(lit), 1)))
+    fill_faces(canvas, nothing, pixels[quads], corners @ to_camera, np.pad(colour, ((0, 0), (0, 1)), constant_values=1.0))
 
 
 def fill_faces(canvas: np.ndarray, drawn: np.ndarray, corners: np.ndarray, nearness: np.ndarray,
