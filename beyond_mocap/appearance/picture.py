@@ -118,7 +118,8 @@ def _draw_faces(canvas, skin, pixels, quads, material, to_camera) -> None:
     lit = quads[light > 0.0] + len(skin)
     nothing = np.full(canvas.shape[:2], -np.inf)
     fill_faces(canvas, nothing.copy(), pixels[lit], np.zeros(lit.shape), np.tile(_SHADOW, (len(lit), 1)))
-    fill_faces(canvas, nothing, pixels[quads], corners @ to_camera, np.pad(colour, ((0, 0), (0, 1)), constant_values=1.0))
+    opaque = np.pad(colour, ((0, 0), (0, 1)), constant_values=1.0)
+    fill_faces(canvas, nothing, pixels[quads], corners @ to_camera, opaque)
 
 
 def fill_faces(canvas: np.ndarray, drawn: np.ndarray, corners: np.ndarray, nearness: np.ndarray,
