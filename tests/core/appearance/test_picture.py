@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from beyond_mocap.appearance.picture import COLOURS, render_pose
+from beyond_mocap.appearance.picture import COLOURS, fill_faces, render_pose
 from beyond_mocap.files.bvh import bvh
 from beyond_mocap.motion.motion import place_motion
 
@@ -38,3 +38,12 @@ def test_it_is_the_same_wherever_the_body_is(motion):
 
 def test_any_size(motion):
     assert render_pose(motion, 0, 64).shape == (64, 64, 4)
+
+
+def test_each_pixel_shows_what_is_nearest():
+    square = np.tile([[[0.0, 0.0], [8.0, 0.0], [8.0, 8.0], [0.0, 8.0]]], (2, 1, 1))
+    rising, colours = np.array([[0.0, 1.0, 1.0, 0.0], [1.0, 0.0, 0.0, 1.0]]), np.array([[1.0], [2.0]])
+    for order in ([0, 1], [1, 0]):
+        canvas = np.zeros((8, 8, 1))
+        fill_faces(canvas, np.full((8, 8), -np.inf), square, rising[order], colours[order])
+        assert (canvas[:, :4] == 2.0).all() and (canvas[:, 4:] == 1.0).all()
