@@ -26,6 +26,7 @@ from .tracking.match_arrays import USUAL_PITCH
 
 COLUMNS = ("time_s", "player", "x_m", "y_m", "z_m", "team", "position")
 _FIELD = np.array([120.0, 80.0])  # StatsBomb's units, which stretch to the pitch; y grows to the right of the attack
+_BESIDE, _MOST_OUTSIDE = 10.0, 0.05  # units beside the pitch, and the share of places that may be farther
 _YARD = 0.9144  # metres, of heights
 _RATE, _SECONDS, EVENT_TIME = 25.0, 4.0, 2.0
 _STEP = 0.45  # metres from a standing player to the ball
@@ -85,10 +86,22 @@ def read_freeze_frames(frames: Path, events: Path) -> list[FreezeFrame]:
     by_event = {str(picture.get("event_uuid")): picture for picture in pictures}
     found = [_read_frame(row, by_event[event], f"{frames.name} and {events.name}: event {event[:40]}") for row in rows
              if (event := str(row.get("id"))) in by_event and row.get("location") and by_event[event]["freeze_frame"]]
+    _check_places(frames, [frame.places for frame in found])
+    _check_places(events, [frame.ball[None] for frame in found])
     if not found:
         raise InputError(frames, f"no event of {events.name} has a freeze frame", "the events of the same match",
                          "choose the file with its number")
     return found
+
+
+def _check_places(path: Path, places: list[np.ndarray]) -> None:
+    """Check that places are in StatsBomb's units, from a corner of the pitch; some may be beside it."""
+    rows = np.concatenate([np.zeros((0, 2)), *places])
+    if np.any((rows < -_BESIDE) | (rows > _FIELD + _BESIDE), axis=1).sum() > _MOST_OUTSIDE * len(rows):
+        low, high = rows.min(axis=0), rows.max(axis=0)
+        raise InputError(path, f"places from {low[0]:.4g} to {high[0]:.4g} along and {low[1]:.4g} to {high[1]:.4g} "
+                         "across the pitch", f"StatsBomb's 0 to {_FIELD[0]:g} and 0 to {_FIELD[1]:g}, from a corner",
+                         "convert the places")
 
 
 def _read_list(path: Path, key: str) -> list[dict]:

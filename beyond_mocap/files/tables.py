@@ -16,7 +16,7 @@ from types import MappingProxyType
 
 import numpy as np
 
-from ..base.content import read_bytes
+from ..base.content import decode_text, read_bytes
 from ..base.errors import InputError
 from ..motion.skeleton import freeze_array
 from ..motion.track.ball_path import BallPath
@@ -182,9 +182,10 @@ def _read_text(path: str | os.PathLike) -> str:
     if not data.strip():
         raise InputError(path, "the file is empty", "a CSV file with a header", "export it again")
     try:
-        if b"\0" in data:
+        text = decode_text(data)
+        if "\0" in text:
             raise ValueError
-        return data.decode("utf-8-sig")
+        return text
     except ValueError:
         raise InputError(path, "binary content", "a CSV file", "export it as UTF-8 text") from None
 

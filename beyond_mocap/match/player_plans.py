@@ -11,7 +11,7 @@ from pathlib import Path
 
 from ..annotation import Timeline, format_timeline
 from ..ball.tracked.solve import SolvedBall
-from ..base.errors import InputError, format_seconds
+from ..base.errors import InputError, describe_no_folder, format_seconds
 from ..library.library import Library
 from ..synthesis.heading_plan import HeadingKey, Play
 from ..synthesis.known_body import cut_bodies
@@ -96,8 +96,8 @@ def build_player_plans(
 def check_label_folder(annotations: Path | None) -> None:
     """Check that the folder with the user's labels exists, if one is named; InputError otherwise."""
     if annotations is not None and not annotations.is_dir():
-        found = "is a file" if annotations.exists() else "no such folder"
-        raise InputError(annotations, found, "a folder with a text ID.txt for players", "check the path")
+        raise InputError(annotations, describe_no_folder(annotations), "a folder with a text ID.txt for players",
+                         "check the path")
 
 
 def list_unknown_texts(annotations: Path | None, files: Iterable[str]) -> list[str]:

@@ -14,6 +14,7 @@ from pathlib import Path
 from typing import Any, TypeVar
 from xml.parsers import expat
 
+from ...base.content import decode_text
 from ...base.errors import InputError, build_read_error
 from ...base.optional_packages import import_optional
 
@@ -122,12 +123,13 @@ def read_head(path: Path) -> bytes:
     Args:
         path: the file.
     Returns:
-        Up to 8 kB; nothing for a folder.
+        Up to 8 kB, of UTF-16 as UTF-8; nothing for a folder.
     """
     if not path.is_file():
         return b""
     with open(path, "rb") as file:
-        return file.read(_HEAD_BYTES).removeprefix(b"\xef\xbb\xbf")
+        head = file.read(_HEAD_BYTES)
+    return decode_text(head, "surrogateescape").encode("utf-8", "surrogateescape")
 
 
 def is_track_csv(path: Path) -> bool:

@@ -262,6 +262,13 @@ def test_gps_on_a_map_or_beyond_the_earth_is_refused(place, tmp_path):
         read_match(tmp_path / "run.csv", cache_dir=tmp_path / "cache")
 
 
+def test_a_receiver_whose_clock_stood_still_says_so(tmp_path):
+    rows = [f"{1.7e9 + 1e-4 * (second > 4)},{52 + 1e-5 * second},5\n" for second in range(9)]
+    (tmp_path / "run.csv").write_text("time,latitude,longitude\n" + "".join(rows))
+    with pytest.raises(InputError, match=r"run.csv: .* per second, 9 samples at 2 different times; .*the time of each"):
+        read_match(tmp_path / "run.csv", cache_dir=tmp_path / "cache")
+
+
 def test_two_halves_follow_each_other(tmp_path):
     path = write_cdf(tmp_path)
     rows = [json.loads(line) for line in path.read_text().splitlines()]

@@ -191,7 +191,7 @@ def iter_json_lines(path: Path) -> Iterator[tuple[int, dict]]:
                 if line.strip():
                     yield number, _parse_line(path, number, line)
     except UnicodeDecodeError:
-        raise InputError(path, "is not UTF-8 text", "JSON, one object a line", "export it again") from None
+        raise InputError(path, "is not UTF-8 text", "JSON, one object a line", "save it as UTF-8") from None
 
 
 def _parse_line(path: Path, number: int, line: str) -> dict:
