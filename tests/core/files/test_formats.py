@@ -242,7 +242,7 @@ def test_angles_of_bodies_are_headings_whatever_they_are_measured_from(sign, zer
     again = read_match(tmp_path / "game.jsonl", cache_dir=tmp_path / "cache", pitch=SIZE)
     assert np.array_equal(again.headings, match.headings)
     (play,) = build_plays(match).values()
-    assert len(play.keys) == 80 and play.keys[-1].heading == pytest.approx(-0.5 * np.pi, abs=0.1)
+    assert len(play.keys) == 200 and play.keys[-1].heading == pytest.approx(-0.5 * np.pi, abs=0.1)
 
 
 def test_rows_that_a_table_has_twice_and_metadata_that_it_has_not_are_told(tmp_path):
