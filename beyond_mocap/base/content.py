@@ -140,16 +140,19 @@ def read_utf8(path: str | os.PathLike, kind: str, max_bytes: int | None = None) 
         raise InputError(path, "is not UTF-8 text", kind, "choose another file, or save it as UTF-8") from None
 
 
-def decode_text(data: bytes, errors: str = "strict") -> str:
-    """Decode UTF-8, or UTF-16 where a byte order mark says so, as some table programs write it; without the mark.
+def decode_text(data: bytes) -> str:
+    """Decode UTF-8, or UTF-16 where a byte order mark says so, without the mark.
 
     Args:
         data: the bytes.
-        errors: what to do with bytes that are neither, as for the decode of bytes.
     Returns:
         The text.
     Raises:
         UnicodeDecodeError: if it is neither.
     """
-    is_wide = data.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE))
-    return data.decode("utf-16" if is_wide else "utf-8-sig", errors)
+    return data.decode("utf-16" if is_utf16(data) else "utf-8-sig")
+
+
+def is_utf16(data: bytes) -> bool:
+    """Return whether a text begins with a byte order mark of UTF-16, which some table programs write."""
+    return data.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE))

@@ -82,7 +82,7 @@ def read_freeze_frames(frames: Path, events: Path) -> list[FreezeFrame]:
     Raises:
         InputError: if one is another file, or they are of two matches.
     """
-    pictures, rows = _read_list(frames, "freeze_frame"), _read_list(events, "type")
+    pictures, rows = _read_list(frames, "freeze_frame", "360 data"), _read_list(events, "type", "events")
     by_event = {str(picture.get("event_uuid")): picture for picture in pictures}
     found = [_read_frame(row, by_event[event], f"{frames.name} and {events.name}: event {event[:40]}") for row in rows
              if (event := str(row.get("id"))) in by_event and row.get("location") and by_event[event]["freeze_frame"]]
@@ -104,10 +104,11 @@ def _check_places(path: Path, places: list[np.ndarray]) -> None:
                          "convert the places")
 
 
-def _read_list(path: Path, key: str) -> list[dict]:
+def _read_list(path: Path, key: str, kind: str) -> list[dict]:
     value = parse_json(read_utf8(path, "a JSON file of StatsBomb"), str(path), "docs/reference/match-input.md")
     if not isinstance(value, list) or not value or not all(isinstance(one, dict) and key in one for one in value):
-        raise InputError(path, f"no list of objects with {key!r}", "a JSON file of StatsBomb", "choose the right file")
+        raise InputError(path, f"no list of objects with {key!r}", f"StatsBomb's {kind} as JSON",
+                         "choose that file, or exchange 360 data and events")
     return value
 
 
@@ -167,14 +168,15 @@ def find_freeze_frame(frames: Sequence[FreezeFrame], wanted: str,
 
     Args:
         frames: all frames.
-        wanted: an event's id, or the beginning of one that no other has, or "MM:SS".
+        wanted: an event's id, or the beginning of one that no other has, or "MM:SS", also "M:SS".
         path: their file, for errors.
     Returns:
         The frame, of several in one second the first whose player does something; and those others.
     Raises:
         InputError: if there is none, or several ids begin so.
     """
-    at_time = sorted((frame for frame in frames if frame.clock == wanted), key=lambda frame: not frame.labels)
+    clock = wanted.zfill(len("MM:SS"))
+    at_time = sorted((frame for frame in frames if frame.clock == clock), key=lambda frame: not frame.labels)
     found = at_time[:1] or [frame for frame in frames if wanted and frame.id.startswith(wanted)]
     if len(found) != 1:
         what = f"{len(found)} events whose ids begin with" if found else "no freeze frame of event"

@@ -183,11 +183,12 @@ def _read_text(path: str | os.PathLike) -> str:
         raise InputError(path, "the file is empty", "a CSV file with a header", "export it again")
     try:
         text = decode_text(data)
-        if "\0" in text:
-            raise ValueError
-        return text
+        found = "binary content" if "\0" in text else ""
     except ValueError:
-        raise InputError(path, "binary content", "a CSV file", "export it as UTF-8 text") from None
+        found = "binary content" if b"\0" in data else "is not UTF-8 text"
+    if found:
+        raise InputError(path, found, "a CSV file", "export it as UTF-8 text")
+    return text
 
 
 def _parse_header(text: str, separator: str, others: Mapping[str, str]) -> list[str]:

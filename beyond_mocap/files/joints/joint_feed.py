@@ -118,7 +118,7 @@ class JointCollector:
         rate = fps or _find_rate(np.concatenate([np.diff(person.times) for person in people]))
         if not _RATES[0] <= rate <= _RATES[1]:
             raise InputError(self._path, f"{rate:g} frames per second", f"{_RATES[0]:g} to {_RATES[1]:g}",
-                             "check that times are seconds")
+                             _explain_rate(rate))
         if self.unknown:
             self.notes.append(f"{format_count(len(self.unknown), 'point')} not used: {self._list_unknown()}")
         return normalize_feed(JointFeed(tuple(people), rate, tuple(self.notes), self._build_ball()), self._path)
@@ -132,8 +132,9 @@ class JointCollector:
                              "names such as left_hip, left_knee, left_ankle and nose", "rename the joints")
         if not any(len(person.times) >= 2 for person in people):
             moments = {time for person in people for time in person.times.tolist()}
-            raise InputError(self._path, f"joints in {format_count(len(moments), 'frame')}, no person in two",
-                             "people over time", "export a longer part of the match")
+            frames = f"joints in {format_count(len(moments), 'frame')}, no person in two"
+            raise InputError(self._path, frames if moments else "no person is seen", "people over time",
+                             "export a longer part of the match")
         missing = sorted(([name for name in leg if name not in seen] for leg in _LEGS), key=len)
         if missing[0]:
             raise InputError(self._path, f"no {' and no '.join(missing[0])}{others}",
@@ -170,6 +171,15 @@ def _find_rate(steps: np.ndarray) -> float:
     usual = float(np.median(steps))
     rate = 1.0 / float(np.mean(steps[steps < 1.5 * usual]))
     return float(round(rate)) if abs(rate - round(rate)) < 0.01 * rate else round(rate, 3)
+
+
+def _explain_rate(rate: float) -> str:
+    """Return what to do about times at a rate that no camera has."""
+    if _RATES[0] <= 1000.0 * rate <= _RATES[1]:
+        return "the times look like milliseconds: divide them by 1000"
+    if rate == 1.0:
+        return "the times look like frame numbers: divide them by the frames per second"
+    return "check that times are seconds"
 
 
 def normalize_feed(feed: JointFeed, path: Path) -> JointFeed:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import codecs
 import contextlib
 import json
 import logging
@@ -14,7 +15,7 @@ from pathlib import Path
 from typing import Any, TypeVar
 from xml.parsers import expat
 
-from ...base.content import decode_text
+from ...base.content import is_utf16
 from ...base.errors import InputError, build_read_error
 from ...base.optional_packages import import_optional
 
@@ -129,7 +130,9 @@ def read_head(path: Path) -> bytes:
         return b""
     with open(path, "rb") as file:
         head = file.read(_HEAD_BYTES)
-    return decode_text(head, "surrogateescape").encode("utf-8", "surrogateescape")
+    if is_utf16(head):
+        return head.decode("utf-16", "ignore").encode()
+    return head.removeprefix(codecs.BOM_UTF8)
 
 
 def is_track_csv(path: Path) -> bool:

@@ -211,6 +211,7 @@ def test_origin_and_axes_of_a_table_are_found_or_told(place, line, tmp_path):
 
 
 @pytest.mark.parametrize(("rows", "line"), [("0,ball,1,2\n1,ball,3,4\n", "no position of a player"),
+                                            ("0,a,1,2\n", "rows of 1 moment"),
                                             ("0,a,1,2\n1,b,10,4\n2,c,20,6\n", "moments of their own")])
 def test_a_table_without_motion_of_players_is_refused(rows, line, tmp_path):
     (tmp_path / "game.csv").write_text("time_s,player,x_m,y_m\n" + rows)

@@ -104,6 +104,13 @@ def test_joints_of_no_body_are_told(factor, frames, knee, line, people, tmp_path
         read_joints(path)
 
 
+@pytest.mark.parametrize(("rate", "line"), [(FPS / 1000.0, "milliseconds: divide them by 1000"), (1.0, "frame numbers"),
+                                            (4000.0, "check that times are seconds")])
+def test_times_of_another_unit_are_told(rate, line, people, tmp_path):
+    with pytest.raises(InputError, match=f"frames per second; expected 5 to 400; .*{line}"):
+        read_joints(write_table(tmp_path / "a.csv", {"7": people["7"]}, rate))
+
+
 def test_common_data_without_times_says_which_version_is_read(people, tmp_path):
     path = write_cdf(tmp_path / "skeletal.jsonl", people, FPS)
     path.write_text(path.read_text().replace('"timestamp"', '"stamp"'))
