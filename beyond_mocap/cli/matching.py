@@ -111,7 +111,7 @@ def run_match(options, reporter: ProgressReporter, writers: Mapping[str, Writer]
     for player in result.failed:
         reporter.show_note(f"player {player.id} was skipped: {player.reason}")
     if not result.finished:
-        lacks_labels = all(player.exit_status == NotInLibraryError.exit_status for player in result.failed)
+        lacks_labels = {player.exit_status for player in result.failed} == {NotInLibraryError.exit_status}
         error = NotInLibraryError if lacks_labels else BeyondMocapError
         raise error(f"{options.out}: no player could be synthesized; see match.json there for the reasons")
     if write is not None:
