@@ -155,8 +155,8 @@ class HeadingRequest:
         return self.play is not None and self.play.is_keeper
 
     @property
-    def measured(self) -> tuple[HeadingKey, ...]:
-        """Headings that the feed has measured: nobody asks for them, and real bodies turn fast."""
+    def measured_keys(self) -> tuple[HeadingKey, ...]:
+        """Headings that the feed has measured, which the body turns to as fast as bodies do."""
         return () if self.play is None else self.play.keys
 
 
@@ -258,7 +258,7 @@ def _weigh_headings(track: SampledTrack, request: HeadingRequest) -> _WeighedHea
     costs, steps, is_asked = plain, plain_steps, _find_asked(bearings, request)
     if is_asked.any():
         asked_costs = _compute_asked_costs(bearings, request)
-        costs = costs + asked_costs + _measure_key_costs(bearings, request.measured) * bearings.seconds[:, None]
+        costs = costs + asked_costs + _measure_key_costs(bearings, request.measured_keys) * bearings.seconds[:, None]
         steps = _limit_turns(bearings, request, steps, asked_costs)
     return _WeighedHeadings(times=bearings.times, plain=plain, plain_steps=plain_steps, costs=costs, steps=steps,
                             is_asked=is_asked)
@@ -345,7 +345,7 @@ def _compute_slowness(speed: np.ndarray) -> np.ndarray:
 def _find_asked(bearings: _Bearings, request: HeadingRequest) -> np.ndarray:
     """Find the decisions (D,) bool that what is asked changes; all others stay as they are without it."""
     spans = [span for span in request.spans if _find_quarter(span) is not None or _find_turning_side(span) is not None]
-    held = [(pin.time, pin.end) for pin in (*request.keys, *request.measured, *request.gazes)]
+    held = [(pin.time, pin.end) for pin in (*request.keys, *request.measured_keys, *request.gazes)]
     starts, ends = np.array([*held, *((span.start, span.end) for span in spans)]).reshape(-1, 2).T
     begun = np.searchsorted(np.sort(starts - ASKED_SECONDS), bearings.times, side="right")
     return begun > np.searchsorted(np.sort(ends + ASKED_SECONDS), bearings.times, side="left")
