@@ -16,7 +16,7 @@ import numpy as np
 from ..annotation.event_labels import read_event_labels
 from ..annotation.vocabulary import SIDES
 from ..base.content import read_utf8
-from ..base.errors import InputError, format_count
+from ..base.errors import InputError, describe_damage, format_count
 from ..motion.track import BALL_RADIUS
 from .atomic import atomic_folder
 from .file_names import build_file_names
@@ -117,8 +117,8 @@ def _read_frame(event: dict, picture: dict, where: str) -> FreezeFrame:
     try:
         return _build_frame(event, picture)
     except (LookupError, TypeError, AttributeError, ValueError, ArithmeticError) as error:
-        found = f"no {error}" if isinstance(error, KeyError) else "values of another kind or size"
-        raise InputError(where, found, "StatsBomb's 360 data and events", "export them again") from None
+        raise InputError(where, describe_damage(error), "StatsBomb's 360 data and events",
+                         "export them again") from None
 
 
 def _build_frame(event: dict, picture: dict) -> FreezeFrame:

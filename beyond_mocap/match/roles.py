@@ -85,7 +85,8 @@ def build_roles(match: Match, request: MatchRequest, span: tuple[float, float]) 
     roles = [replace(role, lag=float(lags[role.number])) for role in found if role is not None]
     if not roles:
         found = f"no player is seen for {MIN_SECONDS:g} s on end {_describe_span(span)}"
-        raise InputError(request.tracking, found, "a time of play", "choose other times, or a longer file")
+        found += "".join([f" ({line})" for line in match.report if line.endswith("set to absent")][:1])
+        raise InputError(request.tracking, found, "a time of play", "choose other times or a longer file")
     return tuple(roles)
 
 

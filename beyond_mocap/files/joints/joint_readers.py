@@ -14,7 +14,7 @@ from pathlib import Path
 
 import numpy as np
 
-from ...base.errors import InputError, build_read_error, format_count, format_seconds
+from ...base.errors import InputError, build_read_error, describe_damage, format_count, format_seconds
 from ..plain_npz import list_arrays, read_named_arrays
 from ..smpl.smpl import is_smpl_file
 from ..tables import parse_number, read_rows
@@ -76,8 +76,7 @@ def _name_damaged_file(path: Path) -> Iterator[None]:
     try:
         yield
     except (LookupError, TypeError, AttributeError, ValueError, ArithmeticError) as error:
-        found = f"values in other places than expected ({type(error).__name__}: {error})"
-        raise InputError(path, found[:200], _FORMS, "export it again") from None
+        raise InputError(path, describe_damage(error), _FORMS, "export it again") from None
 
 
 def is_joint_file(path) -> bool:

@@ -11,6 +11,7 @@ from beyond_mocap.base.errors import InputError
 from beyond_mocap.files.tracking.providers import PROVIDERS
 from beyond_mocap.files.tracking.tracking import read_match
 from beyond_mocap.match.play import build_plays
+from beyond_mocap.motion import quaternion
 
 OTHER = pathlib.Path(__file__).resolve().parents[3] / ".." / "shared" / "data" / "tracking" / "other"
 RATE, COUNT, SIZE = 10, 60, (100.0, 64.0)
@@ -219,8 +220,9 @@ def test_a_table_without_motion_of_players_is_refused(rows, line, tmp_path):
         read_match(tmp_path / "game.csv", cache_dir=tmp_path / "cache")
 
 
-@pytest.mark.parametrize(("sign", "zero"), [(1.0, 0.0), (1.0, np.pi), (-1.0, 0.5 * np.pi), (None, 0.0)])
-def test_angles_of_bodies_are_headings_whatever_they_are_measured_from(sign, zero, tmp_path):
+@pytest.mark.parametrize(("sign", "zero", "unit"), [(1.0, 0.0, 1.0), (1.0, np.pi, np.radians(1.0)),
+                                                    (-1.0, 0.5 * np.pi, 1.0), (None, 0.0, 1.0)])
+def test_angles_of_bodies_are_headings_whatever_they_are_measured_from(sign, zero, unit, tmp_path):
     """A player runs in a circle, then stands and looks along -y; random angles are not used, with a line."""
     moments = np.arange(400) / RATE
     running = moments < 30.0
@@ -231,10 +233,11 @@ def test_angles_of_bodies_are_headings_whatever_they_are_measured_from(sign, zer
         faces - zero + 0.1 * random.normal(size=len(faces)))
     rows = [{"frame_id": row, "time": f"00:{time:09.6f}", "period": "half_1", "pitch_side": {"left": "A", "right": "B"},
              "players": [{"person_id": 1, "team_name": "A", "x": 50 + 10 * np.cos(place), "y": 32 + 10 * np.sin(place),
-                          "head_angle": 0.0, "shoulders_angle": 0.0, "hips_angle": (angle + 9) % (2 * np.pi) - np.pi}]}
-            for row, (time, place, angle) in enumerate(zip(moments, around, angles + np.pi - 9))]
+                          "head_angle": 0.0, "shoulders_angle": 0.0, "hips_angle": angle / unit}]}
+            for row, (time, place, angle) in enumerate(zip(moments, around, quaternion.wrap_angle(angles)))]
     match = read_match(write_lines(tmp_path / "game.jsonl", rows), cache_dir=tmp_path / "cache", pitch=SIZE)
     told = " ".join(match.report)
+    assert ("taken as degrees" in told) == (unit != 1.0)
     if sign is None:
         assert "angles of bodies are not used" in told and not np.isfinite(match.headings).any()
         return
