@@ -19,7 +19,7 @@ help:
 	@echo 'make test           all tests but the window ones: the core, training, then Blender 5.0 (or 5.2) and Blender 4.5'
 	@echo 'make left-out       choose again which tests the older Blender leaves out, by the lines that they reach'
 	@echo 'make fuzz           damaged files for every reader and verb, for 10 minutes on two cores (SECONDS_OF_FUZZ=600)'
-	@echo 'make kill-test      library builds, matches and trainings killed at 100 random moments, and resumed'
+	@echo 'make kill-test      library builds, matches, bodies and trainings killed at 100 random moments, and resumed'
 	@echo 'make demo           the sample match, synthesized and rendered into build/demo'
 	@echo 'make bench          time and quality on recordings'
 	@echo 'make weights        fit the shipped linear starts again to synthetic throws and kicks; some minutes'

@@ -4,6 +4,7 @@ written raise the same InputErrors.
 
 from __future__ import annotations
 
+import codecs
 import contextlib
 import io
 import os
@@ -16,7 +17,9 @@ from typing import BinaryIO
 from .errors import InputError, build_read_error
 
 MAX_STREAM_BYTES = 1_000_000_000
-"""Largest content of a pipe or a device, which does not say its size and may have no end."""
+"""Largest content of a pipe, which does not say its size and may have no end."""
+MAX_DEVICE_BYTES = 1 << 24
+"""Largest content of a device such as a terminal."""
 _BLOCK = 1 << 20
 PIPE_SECONDS = 5.0
 """Seconds until a pipe that no program writes to is refused; opening it like a file would wait for ever."""
@@ -33,13 +36,16 @@ def open_file(path: str | os.PathLike, kind: str, max_bytes: int | None = None) 
     Returns:
         The open file.
     Raises:
-        InputError: if it cannot be opened or is too large, or is a pipe to which no program writes.
+        InputError: if it cannot be opened or is too large, or is a disk, or a pipe to which no program writes.
     """
     handle: BinaryIO
     try:
         mode = os.stat(path).st_mode
+        if stat.S_ISBLK(mode):
+            raise InputError(path, "is a disk", kind, "name a file")
         if stat.S_ISFIFO(mode) or stat.S_ISCHR(mode):
-            most = min(max_bytes or MAX_STREAM_BYTES, MAX_STREAM_BYTES)
+            limit = MAX_STREAM_BYTES if stat.S_ISFIFO(mode) else MAX_DEVICE_BYTES
+            most = min(max_bytes or limit, limit)
             content = (_read_pipe if stat.S_ISFIFO(mode) else _read_device)(path, kind, most + 1)
             if len(content) > most:
                 raise InputError(path, f"has no end within {most} bytes", f"{kind}, which is shorter", "name a file")
@@ -119,7 +125,7 @@ def read_bytes(path: str | os.PathLike, kind: str, max_bytes: int | None = None)
 
 
 def read_utf8(path: str | os.PathLike, kind: str, max_bytes: int | None = None) -> str:
-    """Read all text of a UTF-8 file, without a byte order mark.
+    """Read all text of a UTF-8 file, or of a UTF-16 one with a byte order mark, without the mark.
 
     Args:
         path, kind, max_bytes: see `open_file`.
@@ -129,6 +135,24 @@ def read_utf8(path: str | os.PathLike, kind: str, max_bytes: int | None = None) 
         InputError: if it cannot be read, is too large or is not UTF-8.
     """
     try:
-        return read_bytes(path, kind, max_bytes).decode("utf-8-sig")
+        return decode_text(read_bytes(path, kind, max_bytes))
     except UnicodeDecodeError:
         raise InputError(path, "is not UTF-8 text", kind, "choose another file, or save it as UTF-8") from None
+
+
+def decode_text(data: bytes) -> str:
+    """Decode UTF-8, or UTF-16 where a byte order mark says so, without the mark.
+
+    Args:
+        data: the bytes.
+    Returns:
+        The text.
+    Raises:
+        UnicodeDecodeError: if it is neither.
+    """
+    return data.decode("utf-16" if is_utf16(data) else "utf-8-sig")
+
+
+def is_utf16(data: bytes) -> bool:
+    """Return whether a text begins with a byte order mark of UTF-16, which some table programs write."""
+    return data.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE))

@@ -164,6 +164,20 @@ def build_read_error(path: str | os.PathLike, kind: str, error: Exception | None
     return InputError(path, f"cannot be read ({reason})", f"{kind} that is readable")
 
 
+def describe_damage(error: Exception) -> str:
+    """Describe what is wrong with a file's values by the error that reading them raised."""
+    if isinstance(error, KeyError):
+        return f"no {str(error)[:60]}"
+    return f"values in other places, or of another kind, than expected ({type(error).__name__}: {error})"[:200]
+
+
+def describe_no_folder(path: str | os.PathLike) -> str:
+    """Describe what a path is that should be a folder and is none: a file, a device or a pipe, or nothing."""
+    if os.path.isfile(path):
+        return "is a file"
+    return "is a device or a pipe" if os.path.exists(path) else "no such folder"
+
+
 def format_seconds(seconds: float) -> str:
     """Format seconds for a message: to the microsecond, without trailing zeros.
 

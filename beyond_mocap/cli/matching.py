@@ -12,9 +12,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from .. import __version__
-from ..base.errors import BeyondMocapError, InputError, format_count, format_seconds
+from ..base.errors import BeyondMocapError, InputError, NotInLibraryError, format_count, format_seconds
 from ..base.settings.options import add_options, option_values, parse_path
-from .outputs import ProgressReporter, Writer, check_outputs
+from .outputs import ProgressReporter, Writer, check_outputs, locate_errors
 
 if TYPE_CHECKING:
     import numpy as np
@@ -111,7 +111,9 @@ def run_match(options, reporter: ProgressReporter, writers: Mapping[str, Writer]
     for player in result.failed:
         reporter.show_note(f"player {player.id} was skipped: {player.reason}")
     if not result.finished:
-        raise BeyondMocapError(f"{options.out}: no player could be synthesized; see match.json there for the reasons")
+        lacks_labels = {player.exit_status for player in result.failed} == {NotInLibraryError.exit_status}
+        error = NotInLibraryError if lacks_labels else BeyondMocapError
+        raise error(f"{options.out}: no player could be synthesized; see match.json there for the reasons")
     if write is not None:
         for line in write(result, options.scene) or ():
             reporter.show_note(line)
@@ -227,7 +229,8 @@ def run_touches(options, reporter: ProgressReporter, writers: Mapping[str, Write
                          f"later than --from {format_seconds(options.start)} s", "choose a later end")
     source = _read_tracking(options)
     loaded = time.perf_counter()
-    solved = solve_ball(source, reporter.show_progress, reporter.is_cancelled, options.start, options.end)
+    with locate_errors(options.input):
+        solved = solve_ball(source, reporter.show_progress, reporter.is_cancelled, options.start, options.end)
     done = time.perf_counter()
     write_touches(options.out, solved.touches)
     if options.ball:

@@ -8,7 +8,7 @@ from collections.abc import Mapping
 from pathlib import Path
 
 from .. import __version__
-from ..base.errors import InputError, format_count
+from ..base.errors import InputError, describe_no_folder, format_count
 from ..base.settings.options import add_options, parse_path
 from ..files.file_names import avoid_reserved_name
 from .outputs import ProgressReporter, Writer, locate_errors
@@ -75,7 +75,7 @@ def run_passes(options, reporter: ProgressReporter, writers: Mapping[str, Writer
 def _check_folder(folder: Path) -> None:
     """Check before the work that the folder exists or can be created."""
     if folder.exists() and not folder.is_dir():
-        raise InputError(folder, "is a file", "a folder", "choose another name")
+        raise InputError(folder, describe_no_folder(folder), "a folder", "choose another name")
     place = folder if folder.is_dir() else folder.absolute().parent
     if not place.is_dir():
         raise InputError(folder, "the folder above it does not exist", "an existing folder", "create that folder first")

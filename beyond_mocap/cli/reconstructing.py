@@ -16,7 +16,7 @@ from functools import partial
 from pathlib import Path
 
 from .. import __version__
-from ..base.errors import InputError, format_count
+from ..base.errors import InputError, describe_no_folder, format_count
 from ..base.optional_packages import import_optional
 from ..base.settings.options import add_options, option_values, parse_path
 from .outputs import ProgressReporter, Writer, build_take, check_outputs, choose_writer
@@ -184,7 +184,7 @@ def _reconstruct_folder(options, reporter: ProgressReporter) -> None:
 
 def _check_folder(out: Path, trials: Path) -> None:
     if out.exists() and not out.is_dir():
-        raise InputError(out, "is a file", "a folder, because the input is one", "choose another name")
+        raise InputError(out, describe_no_folder(out), "a folder, because the input is one", "choose another name")
     if out.resolve() == trials.resolve():
         raise InputError(out, "is the folder of the trials", "another folder", "choose another folder")
     if not out.exists():

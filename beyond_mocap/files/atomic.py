@@ -12,11 +12,12 @@ import time
 from collections.abc import Iterator
 from pathlib import Path
 
-from ..base.errors import InputError
+from ..base.errors import InputError, describe_no_folder
 
 ABANDONED_SECONDS = 3600.0
 """Age, in seconds, from which on no running process writes what is temporary."""
 _TEMPORARY = re.compile(r"\..+\.\d+\.\d+\.part")  # names that `atomic_path` gives
+_TEMPORARY_FOLDER = re.compile(r"\.\d+\.\d+\.part")  # names that `atomic_folder` gives
 _LEAST_FREE = 65536  # bytes on a disk below which a file written by another program may be cut off
 
 
@@ -74,24 +75,29 @@ def check_disk(path: Path) -> None:
 
 
 def check_new_folder(path: Path) -> None:
-    """Check that a folder is new or empty.
+    """Check that a folder is new or empty, but for what killed processes left.
 
     Raises:
         InputError: if it is not.
     """
     if path.exists() and not path.is_dir():
-        raise InputError(path, "is a file" if path.is_file() else "is a device or a pipe", "a new or empty folder",
+        raise InputError(path, describe_no_folder(path), "a new or empty folder", "choose another place")
+    found = sorted(one.name for one in path.iterdir() if not _is_temporary_folder(one)) if path.is_dir() else []
+    if found:
+        raise InputError(path, f"the folder is not empty ({found[0]})", "a new or empty folder",
                          "choose another place")
-    if path.is_dir() and (found := next(path.iterdir(), None)):
-        raise InputError(path, f"the folder is not empty ({found.name})", "a new or empty folder",
-                         "choose another place")
+
+
+def _is_temporary_folder(path: Path) -> bool:
+    return bool(_TEMPORARY_FOLDER.fullmatch(path.name)) and path.is_dir()
 
 
 @contextlib.contextmanager
 def atomic_folder(path: str | os.PathLike) -> Iterator[Path]:
     """Context manager: a hidden folder in `path` to write to; its content moves up into `path` if the block succeeds.
 
-    If the block fails, the content is removed, and `path` too if it was new. Parent folders are created.
+    If the block fails, the content is removed, and `path` too if it was new. Parent folders are created. Of two that
+    write to one folder the first to end does; what killed ones left there is removed then.
 
     Args:
         path: a new or empty folder.
@@ -104,8 +110,11 @@ def atomic_folder(path: str | os.PathLike) -> Iterator[Path]:
     try:
         temporary.mkdir(parents=True)
         yield temporary
+        check_new_folder(path)
         for one in sorted(temporary.iterdir()):
             os.replace(one, path / one.name)
+        for left in filter(_is_temporary_folder, list(path.iterdir())):
+            shutil.rmtree(left, ignore_errors=True)
     except OSError as error:
         problem = f"cannot be written ({error.strerror or error})"
         raise InputError(path, problem, "a writable folder", "choose another place") from None

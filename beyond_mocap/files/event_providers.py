@@ -68,7 +68,8 @@ def detect_event_provider(path: Path) -> EventProvider:
     found = find_provider(path, EVENT_PROVIDERS)
     if found is None:
         problem = "unknown format" if read_head(path).strip() else "the file is empty"
-        raise InputError(path, problem, f"events of one of {', '.join(EVENT_PROVIDERS)}", "choose the provider")
+        titles = ", ".join(one.title for one in EVENT_PROVIDERS.values())
+        raise InputError(path, problem, f"events of one of {titles}", "choose the provider")
     return found
 
 
@@ -101,7 +102,7 @@ def find_second_file(path: Path, provider: EventProvider, meta: str | os.PathLik
     if len(matching) == 1:
         return matching[0]
     expected = f"a file such as {names[0]}" if names[0] != path.name else "the provider's lineups or metadata"
-    raise InputError(path, f"the second file for {provider.name} is missing", expected, "add it, or choose it")
+    raise InputError(path, f"the second file of {provider.title} is missing", expected, "add it, or choose it")
 
 
 def load_events(path: Path, provider: EventProvider, meta: Path | None):
@@ -120,7 +121,7 @@ def load_events(path: Path, provider: EventProvider, meta: Path | None):
     arguments = {key: files[name] for key, name in provider.arguments.items()}
     others = f" and their {meta.name}" if meta else ""
     return load_with_kloppy(path, provider.name, provider.loader, arguments=arguments,
-                            expected=f"{provider.name} events", others=others)
+                            expected=f"events of {provider.title}", others=others)
 
 
 def find_pitch_size(match: Match | None) -> tuple[float, float]:

@@ -82,7 +82,7 @@ def read_events(
         raise InputError(path, "has no events", "at least one event", "export it again")
     events, notes = _assign_players(path, rows, match)
     file_notes = [f"{second.name} is used as its second file"] if second and meta is None else []
-    file_notes += [f"{meta}: not used, because events of {record.name} are in one file"] if meta and not second else []
+    file_notes += [f"{meta}: not used, because events of {record.title} are in one file"] if meta and not second else []
     return MatchEvents(tuple(events), record.name, str(path), tuple([*file_notes, *notes]))
 
 

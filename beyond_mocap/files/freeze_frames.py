@@ -16,7 +16,7 @@ import numpy as np
 from ..annotation.event_labels import read_event_labels
 from ..annotation.vocabulary import SIDES
 from ..base.content import read_utf8
-from ..base.errors import InputError, format_count
+from ..base.errors import InputError, describe_damage, format_count
 from ..motion.track import BALL_RADIUS
 from .atomic import atomic_folder
 from .file_names import build_file_names
@@ -26,6 +26,7 @@ from .tracking.match_arrays import USUAL_PITCH
 
 COLUMNS = ("time_s", "player", "x_m", "y_m", "z_m", "team", "position")
 _FIELD = np.array([120.0, 80.0])  # StatsBomb's units, which stretch to the pitch; y grows to the right of the attack
+_BESIDE, _MOST_OUTSIDE = 10.0, 0.05  # units beside the pitch, and the share of places that may be farther
 _YARD = 0.9144  # metres, of heights
 _RATE, _SECONDS, EVENT_TIME = 25.0, 4.0, 2.0
 _STEP = 0.45  # metres from a standing player to the ball
@@ -81,20 +82,33 @@ def read_freeze_frames(frames: Path, events: Path) -> list[FreezeFrame]:
     Raises:
         InputError: if one is another file, or they are of two matches.
     """
-    pictures, rows = _read_list(frames, "freeze_frame"), _read_list(events, "type")
+    pictures, rows = _read_list(frames, "freeze_frame", "360 data"), _read_list(events, "type", "events")
     by_event = {str(picture.get("event_uuid")): picture for picture in pictures}
     found = [_read_frame(row, by_event[event], f"{frames.name} and {events.name}: event {event[:40]}") for row in rows
              if (event := str(row.get("id"))) in by_event and row.get("location") and by_event[event]["freeze_frame"]]
+    _check_places(frames, [frame.places for frame in found])
+    _check_places(events, [frame.ball[None] for frame in found])
     if not found:
         raise InputError(frames, f"no event of {events.name} has a freeze frame", "the events of the same match",
                          "choose the file with its number")
     return found
 
 
-def _read_list(path: Path, key: str) -> list[dict]:
+def _check_places(path: Path, places: list[np.ndarray]) -> None:
+    """Check that places are in StatsBomb's units, from a corner of the pitch; some may be beside it."""
+    rows = np.concatenate([np.zeros((0, 2)), *places])
+    if np.any((rows < -_BESIDE) | (rows > _FIELD + _BESIDE), axis=1).sum() > _MOST_OUTSIDE * len(rows):
+        low, high = rows.min(axis=0), rows.max(axis=0)
+        raise InputError(path, f"places from {low[0]:.4g} to {high[0]:.4g} along and {low[1]:.4g} to {high[1]:.4g} "
+                         "across the pitch", f"StatsBomb's 0 to {_FIELD[0]:g} and 0 to {_FIELD[1]:g}, from a corner",
+                         "convert the places")
+
+
+def _read_list(path: Path, key: str, kind: str) -> list[dict]:
     value = parse_json(read_utf8(path, "a JSON file of StatsBomb"), str(path), "docs/reference/match-input.md")
     if not isinstance(value, list) or not value or not all(isinstance(one, dict) and key in one for one in value):
-        raise InputError(path, f"no list of objects with {key!r}", "a JSON file of StatsBomb", "choose the right file")
+        raise InputError(path, f"no list of objects with {key!r}", f"StatsBomb's {kind} as JSON",
+                         "choose that file, or exchange 360 data and events")
     return value
 
 
@@ -103,8 +117,8 @@ def _read_frame(event: dict, picture: dict, where: str) -> FreezeFrame:
     try:
         return _build_frame(event, picture)
     except (LookupError, TypeError, AttributeError, ValueError, ArithmeticError) as error:
-        found = f"no {error}" if isinstance(error, KeyError) else "values of another kind or size"
-        raise InputError(where, found, "StatsBomb's 360 data and events", "export them again") from None
+        raise InputError(where, describe_damage(error), "StatsBomb's 360 data and events",
+                         "export them again") from None
 
 
 def _build_frame(event: dict, picture: dict) -> FreezeFrame:
@@ -154,14 +168,15 @@ def find_freeze_frame(frames: Sequence[FreezeFrame], wanted: str,
 
     Args:
         frames: all frames.
-        wanted: an event's id, or the beginning of one that no other has, or "MM:SS".
+        wanted: an event's id, or the beginning of one that no other has, or "MM:SS", also "M:SS".
         path: their file, for errors.
     Returns:
         The frame, of several in one second the first whose player does something; and those others.
     Raises:
         InputError: if there is none, or several ids begin so.
     """
-    at_time = sorted((frame for frame in frames if frame.clock == wanted), key=lambda frame: not frame.labels)
+    clock = wanted.zfill(len("MM:SS"))
+    at_time = sorted((frame for frame in frames if frame.clock == clock), key=lambda frame: not frame.labels)
     found = at_time[:1] or [frame for frame in frames if wanted and frame.id.startswith(wanted)]
     if len(found) != 1:
         what = f"{len(found)} events whose ids begin with" if found else "no freeze frame of event"

@@ -20,6 +20,8 @@ def parse_json(text: str, name: str, page: str):
     Raises:
         InputError: with line and column, if the text is invalid.
     """
+    if not text.strip():
+        raise InputError(name, "the file is empty", "JSON", f"see {page}")
     try:
         return json.loads(text, object_pairs_hook=_build_unique_object, parse_constant=_reject_constant)
     except json.JSONDecodeError as error:
@@ -28,7 +30,8 @@ def parse_json(text: str, name: str, page: str):
     except RecursionError:
         raise InputError(name, "nested too deeply", "JSON", f"see {page}") from None
     except ValueError as error:
-        raise InputError(name, str(error), "JSON", f"see {page}") from None
+        found = "a number of thousands of digits" if "set_int_max_str_digits" in str(error) else str(error)
+        raise InputError(name, found, "JSON", f"see {page}") from None
 
 
 def _build_unique_object(pairs) -> dict:

@@ -16,7 +16,7 @@ from types import MappingProxyType
 
 import numpy as np
 
-from ..base.content import read_bytes
+from ..base.content import decode_text, read_bytes
 from ..base.errors import InputError
 from ..motion.skeleton import freeze_array
 from ..motion.track.ball_path import BallPath
@@ -182,11 +182,13 @@ def _read_text(path: str | os.PathLike) -> str:
     if not data.strip():
         raise InputError(path, "the file is empty", "a CSV file with a header", "export it again")
     try:
-        if b"\0" in data:
-            raise ValueError
-        return data.decode("utf-8-sig")
+        text = decode_text(data)
+        found = "binary content" if "\0" in text else ""
     except ValueError:
-        raise InputError(path, "binary content", "a CSV file", "export it as UTF-8 text") from None
+        found = "binary content" if b"\0" in data else "is not UTF-8 text"
+    if found:
+        raise InputError(path, found, "a CSV file", "export it as UTF-8 text")
+    return text
 
 
 def _parse_header(text: str, separator: str, others: Mapping[str, str]) -> list[str]:

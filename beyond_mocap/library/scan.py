@@ -14,7 +14,7 @@ from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 
 from .. import annotation
-from ..base.errors import InputError, format_count
+from ..base.errors import InputError, describe_no_folder, format_count
 from ..base.fixes import Fix
 from ..files.atomic import atomic_write
 from ..files.clip_file import CLIP_ENDINGS, FOREIGN, is_clip_file
@@ -48,9 +48,8 @@ def find_recordings(folder: str | Path, endings: tuple[str, ...] = (*CLIP_ENDING
     """
     folder = Path(folder)
     if not folder.is_dir():
-        what = "a file, not a folder" if folder.is_file() else "no such folder"
-        raise InputError(folder, what, "a folder with BVH files", "choose the folder of your library",
-                         fixes=(Fix("relink_library"),))
+        raise InputError(folder, describe_no_folder(folder), "a folder with BVH files",
+                         "choose the folder of your library", fixes=(Fix("relink_library"),))
     found: list[Path] = []
     seen: set[tuple[int, int]] = set()
     for parent, folders, files in os.walk(folder, followlinks=True):

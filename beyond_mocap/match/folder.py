@@ -21,7 +21,7 @@ from io import FileIO
 from pathlib import Path
 
 from ..base.content import read_bytes
-from ..base.errors import InputError
+from ..base.errors import InputError, describe_no_folder
 from ..files.atomic import atomic_write
 from ..files.tables import to_plain
 from .request import compute_digest
@@ -201,7 +201,7 @@ def read_state(folder: str | os.PathLike) -> dict:
 def check_folder(path: Path) -> None:
     """Check before work starts that the folder is a match's, empty, or can be created; InputError otherwise."""
     if path.exists() and not path.is_dir():
-        raise InputError(path, "is a file", "a folder", "choose another name")
+        raise InputError(path, describe_no_folder(path), "a folder", "choose another name")
     if not path.exists() and not path.absolute().parent.is_dir():
         raise InputError(path, "the folder above it does not exist", "an existing folder", "create that folder first")
     place = path if path.is_dir() else path.absolute().parent

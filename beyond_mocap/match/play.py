@@ -14,7 +14,7 @@ from ..synthesis.heading_plan import HeadingKey, Play
 NEAR_OPPONENT = 15.0
 """Metres within which a player faces the nearest opponent rather than the goal."""
 
-_KEY_SECONDS = 0.5  # from one measured heading to the next that the plan follows
+_KEY_SECONDS = 0.25  # from one measured heading to the next that the plan follows
 _RATE = 5.0  # samples per second
 _KEEPER = "goalkeeper"  # `MatchPlayer.position`
 

@@ -11,7 +11,7 @@ from pathlib import Path
 
 from ..annotation import Timeline, format_timeline
 from ..ball.tracked.solve import SolvedBall
-from ..base.errors import InputError, format_seconds
+from ..base.errors import InputError, describe_no_folder, format_seconds
 from ..library.library import Library
 from ..synthesis.heading_plan import HeadingKey, Play
 from ..synthesis.known_body import cut_bodies
@@ -96,8 +96,8 @@ def build_player_plans(
 def check_label_folder(annotations: Path | None) -> None:
     """Check that the folder with the user's labels exists, if one is named; InputError otherwise."""
     if annotations is not None and not annotations.is_dir():
-        found = "is a file" if annotations.exists() else "no such folder"
-        raise InputError(annotations, found, "a folder with a text ID.txt for players", "check the path")
+        raise InputError(annotations, describe_no_folder(annotations), "a folder with a text ID.txt for players",
+                         "check the path")
 
 
 def list_unknown_texts(annotations: Path | None, files: Iterable[str]) -> list[str]:
@@ -215,8 +215,11 @@ def _plan_heading(plan: Plan, library: Library, play: Play | None) -> Plan:
     """Plan the heading over a whole stretch, so that all windows that are cut out of it agree."""
     keys = [HeadingKey(time, heading=float(heading), target=None, hold=0.0) for body in plan.bodies
             for time, heading in zip((body.start, body.end), body.compute_heading(library.skeleton)[[0, -1]])]
-    keys += [key for key in (play.keys if play else ())
-             if not any(body.start <= key.time <= body.end for body in plan.bodies)]
-    keys = [key for key in keys if plan.track.times[0] <= key.time <= plan.track.times[-1]]
+    begin, end = plan.track.times[[0, -1]]
+    keys = [key for key in keys if key.is_within(begin, end)]
+    if play is not None:
+        measured = [key for key in play.keys if key.is_within(begin, end)
+                    and not any(key.is_within(body.start, body.end) for body in plan.bodies)]
+        play = replace(play, keys=tuple(measured))
     resolved = resolve_plan(replace(plan, heading_keys=tuple(keys)), library, are_touches_resolved=True)
     return replace(plan, heading_path=resolved.plan_heading(play))

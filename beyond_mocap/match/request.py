@@ -122,13 +122,16 @@ class MatchRequest:
         """Find the skeletal tracking: the file of joints, or the tracking itself where that is skeletal.
 
         Raises:
-            InputError: if both are skeletal.
+            InputError: if both are skeletal, or there is no such file.
         """
         is_skeletal = not self.provider and is_joint_file(self.tracking)
+        if self.joints is not None and not self.joints.is_file():
+            raise build_read_error(self.joints, "a file of skeletal tracking")
         if is_skeletal and self.joints is not None:
             raise InputError(self.tracking, "skeletal tracking, beside which no joints can be given",
                              f"positions of the players for the joints in {self.joints.name}",
-                             "leave the joints out: the tracking has its own")
+                             "leave the joints out: the tracking has its own" if is_joint_file(self.joints)
+                             else "exchange tracking and joints")
         return self.tracking if is_skeletal else self.joints
 
     def to_plain(self) -> dict:

@@ -84,8 +84,9 @@ def build_roles(match: Match, request: MatchRequest, span: tuple[float, float]) 
              if not request.players or player.id in request.players]  # fmt: skip
     roles = [replace(role, lag=float(lags[role.number])) for role in found if role is not None]
     if not roles:
-        found = f"no player is present {_describe_span(span)}"
-        raise InputError("time range", found, "a time of play", "choose other times")
+        found = f"no player is seen for {MIN_SECONDS:g} s on end {_describe_span(span)}"
+        found += "".join([f" ({line})" for line in match.report if line.endswith("set to absent")][:1])
+        raise InputError(request.tracking, found, "a time of play", "choose other times or a longer file")
     return tuple(roles)
 
 

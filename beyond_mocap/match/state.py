@@ -11,7 +11,7 @@ from dataclasses import dataclass, field
 from .. import __version__
 from ..motion.track.match_data import Match
 from .folder import MatchFolder
-from .pieces.pool import TaskResult, measure_peak_memory
+from .pieces.pool import TaskFailure, TaskResult, measure_peak_memory
 from .player_plans import PlayerPlans
 from .request import MatchRequest
 
@@ -46,6 +46,10 @@ class MatchState:
         """Update a player's row and write the state."""
         self.players[player].update(values)
         self.write_state()
+
+    def mark_failed(self, player: str, failure: TaskFailure) -> None:
+        """Record why a player failed."""
+        self.update_player(player, status="failed", reason=failure.reason, exit_status=failure.exit_status)
 
     def record_window(self, player: str) -> None:
         """Count one more searched window of a player."""

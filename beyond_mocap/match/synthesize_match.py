@@ -71,10 +71,12 @@ class PlayerStatus:
     Attributes:
         id: of the player.
         reason: why they could not be synthesized, "" if they were.
+        exit_status: of a command that fails so.
     """
 
     id: str
     reason: str = ""
+    exit_status: int = BeyondMocapError.exit_status
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -309,8 +311,8 @@ def read_result(request: MatchRequest) -> MatchResult:
         InputError: as for `folder.read_state`.
     """
     state = read_state(request.out)
-    players = {status: tuple(PlayerStatus(row["id"], row.get("reason", "")) for row in state["players"]
-                             if row["status"] == status) for status in ("done", "failed")}  # fmt: skip
+    players = {status: tuple(PlayerStatus(row["id"], row.get("reason", ""), row.get("exit_status", 2))
+                             for row in state["players"] if row["status"] == status) for status in ("done", "failed")}
     notes = tuple(dict.fromkeys((*state["data"], *state["notes"])))
     return MatchResult(request=request, span=(state["from_s"], state["to_s"]), finished=players["done"],
                        failed=players["failed"], notes=notes)

@@ -154,6 +154,11 @@ class HeadingRequest:
         """Whether it is a goalkeeper's."""
         return self.play is not None and self.play.is_keeper
 
+    @property
+    def measured_keys(self) -> tuple[HeadingKey, ...]:
+        """Headings that the feed has measured, which the body turns to as fast as bodies do."""
+        return () if self.play is None else self.play.keys
+
 
 def plan_track(track: SampledTrack, keys: Sequence[HeadingKey] = (), rests: bool = True) -> SampledTrack:
     """Plan where the body of a track rests and where it faces.
@@ -253,7 +258,8 @@ def _weigh_headings(track: SampledTrack, request: HeadingRequest) -> _WeighedHea
     costs, steps, is_asked = plain, plain_steps, _find_asked(bearings, request)
     if is_asked.any():
         asked_costs = _compute_asked_costs(bearings, request)
-        costs, steps = costs + asked_costs, _limit_turns(bearings, request, steps, asked_costs)
+        costs = costs + asked_costs + _measure_key_costs(bearings, request.measured_keys) * bearings.seconds[:, None]
+        steps = _limit_turns(bearings, request, steps, asked_costs)
     return _WeighedHeadings(times=bearings.times, plain=plain, plain_steps=plain_steps, costs=costs, steps=steps,
                             is_asked=is_asked)
 
@@ -339,7 +345,7 @@ def _compute_slowness(speed: np.ndarray) -> np.ndarray:
 def _find_asked(bearings: _Bearings, request: HeadingRequest) -> np.ndarray:
     """Find the decisions (D,) bool that what is asked changes; all others stay as they are without it."""
     spans = [span for span in request.spans if _find_quarter(span) is not None or _find_turning_side(span) is not None]
-    held = [(pin.time, pin.end) for pin in (*request.keys, *request.gazes)]
+    held = [(pin.time, pin.end) for pin in (*request.keys, *request.measured_keys, *request.gazes)]
     starts, ends = np.array([*held, *((span.start, span.end) for span in spans)]).reshape(-1, 2).T
     begun = np.searchsorted(np.sort(starts - ASKED_SECONDS), bearings.times, side="right")
     return begun > np.searchsorted(np.sort(ends + ASKED_SECONDS), bearings.times, side="left")
@@ -355,14 +361,19 @@ def _compute_asked_costs(bearings: _Bearings, request: HeadingRequest) -> np.nda
         cost[at] += GAZE_COST * slow[at] * np.maximum(_measure_angles(gaze) - GAZE_REACH, 0.0)
     asked = _compute_asked_heading(bearings, request.spans)
     cost += DIRECTION_COST * np.maximum(_measure_angles(asked) - DEAD_ZONE, 0.0)
-    if request.keys:
-        given = _Given(request.keys)
-        key = given.find_keys(bearings.times + 0.5 * _DECISION_SECONDS)
-        heading = given.compute_heading(key, bearings.positions)
-        is_held = bearings.times <= given.ends[key] + 0.5 * _DECISION_SECONDS
-        is_held &= bearings.times >= given.starts[key] - 0.5 * _DECISION_SECONDS
-        cost += GIVEN_COST * _measure_angles(np.where(is_held, heading, np.nan))
-    return cost * bearings.seconds[:, None]
+    return (cost + _measure_key_costs(bearings, request.keys)) * bearings.seconds[:, None]
+
+
+def _measure_key_costs(bearings: _Bearings, keys: Sequence[HeadingKey]) -> np.ndarray:
+    """Measure the cost per second (D, BINS) that given headings add to every heading at every decision."""
+    if not keys:
+        return np.zeros((len(bearings.times), BINS))
+    given = _Given(keys)
+    key = given.find_keys(bearings.times + 0.5 * _DECISION_SECONDS)
+    heading = given.compute_heading(key, bearings.positions)
+    is_held = bearings.times <= given.ends[key] + 0.5 * _DECISION_SECONDS
+    is_held &= bearings.times >= given.starts[key] - 0.5 * _DECISION_SECONDS
+    return GIVEN_COST * _measure_angles(np.where(is_held, heading, np.nan))
 
 
 def _measure_angles(bearing: np.ndarray) -> np.ndarray:

@@ -8,6 +8,7 @@ import os
 
 from ..annotation import read_text
 from ..base.errors import InputError
+from ..files.tables import parse_number
 from .pin import Pin
 
 COLUMNS = ("time_s", "part", "x_m", "y_m", "z_m", "hold_s")
@@ -50,7 +51,4 @@ def _build_pin(row: dict, place: str) -> Pin:
 def _parse_number(row: dict, name: str, place: str) -> float:
     """Parse a number of a row; a blank hold is 0."""
     text = (row.get(name) or "").strip()
-    try:
-        return float(text) if text or name != "hold_s" else 0.0
-    except ValueError:
-        raise InputError(place, f"{name} {text!r}", "a number", "correct the cell") from None
+    return parse_number(text, name, place) if text or name != "hold_s" else 0.0

@@ -6,7 +6,7 @@ import bmesh
 import bpy
 import numpy as np
 
-from ...beyond_mocap.appearance.sports import SportBall
+from ...beyond_mocap.appearance.sports import FOOTBALL, SportBall
 from ...beyond_mocap.base.time_series import interpolate_columns
 from ...beyond_mocap.motion import quaternion
 from ...beyond_mocap.motion.track.ball_path import BallPath
@@ -20,6 +20,7 @@ MATERIAL = "Ball white"
 ROLLING_RADIUS = "beyond_mocap_rolling_radius"  # custom property of a ball: metres, 0 for a disc, which slides
 ROLLS = "beyond_mocap_rolls"  # custom property of an action whose rotations are the ball's roll
 SPORT = "beyond_mocap_sport"  # custom property of a mesh: the sport whose ball it is, which changes with the stage's
+_SAME_RADIUS = 0.002  # metres
 _ABOVE_GROUND = 0.05  # metres between a ball and the ground up to which it rolls
 
 
@@ -85,13 +86,21 @@ def update_sport_balls(scene: bpy.types.Scene) -> None:
     sport = find_sport(scene)
     for ball in scene.objects:
         mesh = ball.data if is_ball(ball) and ball.library is None else None
-        if mesh is None or mesh.get(SPORT, sport.name) == sport.name:
+        if mesh is None or _find_ball_sport(ball, scene) in (None, sport.name):
             continue
         ball.data = _build_mesh(mesh.name, scene, sport.ball, sport.name)
         ball.data[SPORT], ball[ROLLING_RADIUS] = sport.name, _find_rolling_radius(sport.ball)
         if not mesh.users:
             bpy.data.meshes.remove(mesh)
         _write_roll(ball, scene)
+
+
+def _find_ball_sport(ball: bpy.types.Object, scene: bpy.types.Scene) -> str | None:
+    """Find the sport whose ball an object is; None for a size of its own. Earlier versions had footballs, unmarked."""
+    is_marked = SPORT in ball.data or ROLLING_RADIUS in ball
+    if not is_marked and abs(find_rolling_radius(ball, scene) - RADIUS) < _SAME_RADIUS:
+        return FOOTBALL
+    return ball.data.get(SPORT)
 
 
 def _write_roll(ball: bpy.types.Object, scene: bpy.types.Scene) -> None:

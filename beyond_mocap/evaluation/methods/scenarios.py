@@ -11,7 +11,7 @@ from pathlib import Path
 
 from ...annotation import Timeline, check_timeline, read_timeline
 from ...annotation.label_candidates import find_track_labels
-from ...base.errors import InputError
+from ...base.errors import InputError, describe_no_folder
 from ...files.tracking.tracking import read_track_csv
 from ...motion.track import Track, clean_track
 from .thesis import THESIS, ThesisFigures
@@ -51,8 +51,8 @@ def read_scenarios(folder: Path, fps: float) -> tuple[list[Scenario], list[str]]
         InputError: for a folder without tracks, and for tracks and labels that cannot be read.
     """
     if not folder.is_dir():
-        found = "is a file" if folder.exists() else "no such folder"
-        raise InputError(folder, found, f"a folder of tracks: {_FORM}", "name the folder that has them")
+        raise InputError(folder, describe_no_folder(folder), f"a folder of tracks: {_FORM}",
+                         "name the folder that has them")
     tables = sorted(path for path in folder.iterdir() if path.suffix.lower() == ".csv" and path.is_file())
     tracks = [path for path in tables if _is_track(path)]
     if not tracks:

@@ -14,6 +14,7 @@ from .landmarks import LANDMARKS
 
 _FAR = 1e9  # farther than any stadium in any unit: damaged numbers stay outliers, and their squares are finite
 _MOST_POINTS = 60_000_000
+_LEGS = tuple(tuple(f"{side}_{part}" for part in ("hip", "knee", "ankle")) for side in ("left", "right"))
 _MOST_NAMES = 30  # that are listed in one line
 _UNITS = {"metres": 1.0, "centimetres": 0.01, "millimetres": 0.001, "feet": 0.3048, "decimetres": 0.1}
 _LEG = 0.87  # metres, thigh and shank of an adult
@@ -109,22 +110,35 @@ class JointCollector:
         Returns:
             The feed.
         Raises:
-            InputError: if no person is seen, or in a unit that no body fits.
+            InputError: if no person is seen, or without legs, or in a unit that no body fits.
         """
         people = [self._build_person(person, points) for person, points in self._points.items()]
+        self._check_people(people)
         people = [person for person in people if len(person.times) >= 2]
-        if not people and self.unknown:
-            raise InputError(self._path, f"no known joint in two frames, but {self._list_unknown()}",
-                             "names such as left_hip, left_knee, left_ankle and nose", "rename the joints")
-        if not people:
-            raise InputError(self._path, "no person with joints in two frames", "skeletal tracking", "export it again")
         rate = fps or _find_rate(np.concatenate([np.diff(person.times) for person in people]))
         if not _RATES[0] <= rate <= _RATES[1]:
             raise InputError(self._path, f"{rate:g} frames per second", f"{_RATES[0]:g} to {_RATES[1]:g}",
-                             "check that times are seconds")
+                             _explain_rate(rate))
         if self.unknown:
             self.notes.append(f"{format_count(len(self.unknown), 'point')} not used: {self._list_unknown()}")
         return normalize_feed(JointFeed(tuple(people), rate, tuple(self.notes), self._build_ball()), self._path)
+
+    def _check_people(self, people: list[PlayerJoints]) -> None:
+        """Check that some person is seen in two frames, and that there are legs, which unit and axes are found by."""
+        seen = {name for person in people for name in person.landmarks}
+        others = f", but {self._list_unknown()}" * bool(self.unknown)
+        if not seen and self.unknown:
+            raise InputError(self._path, f"no known joint{others}",
+                             "names such as left_hip, left_knee, left_ankle and nose", "rename the joints")
+        if not any(len(person.times) >= 2 for person in people):
+            moments = {time for person in people for time in person.times.tolist()}
+            frames = f"joints in {format_count(len(moments), 'frame')}, no person in two"
+            raise InputError(self._path, frames if moments else "no person is seen", "people over time",
+                             "export a longer part of the match")
+        missing = sorted(([name for name in leg if name not in seen] for leg in _LEGS), key=len)
+        if missing[0]:
+            raise InputError(self._path, f"no {' and no '.join(missing[0])}{others}",
+                             "hip, knee and ankle of a leg", "export these joints, or rename them")
 
     def _build_ball(self) -> np.ndarray:
         rows = np.frombuffer(self._ball).reshape(-1, 4) if self._ball else np.zeros((0, 4))
@@ -157,6 +171,15 @@ def _find_rate(steps: np.ndarray) -> float:
     usual = float(np.median(steps))
     rate = 1.0 / float(np.mean(steps[steps < 1.5 * usual]))
     return float(round(rate)) if abs(rate - round(rate)) < 0.01 * rate else round(rate, 3)
+
+
+def _explain_rate(rate: float) -> str:
+    """Return what to do about times at a rate that no camera has."""
+    if _RATES[0] <= 1000.0 * rate <= _RATES[1]:
+        return "the times look like milliseconds: divide them by 1000"
+    if rate == 1.0:
+        return "the times look like frame numbers: divide them by the frames per second"
+    return "check that times are seconds"
 
 
 def normalize_feed(feed: JointFeed, path: Path) -> JointFeed:
@@ -196,17 +219,19 @@ def _measure_bodies(feed: JointFeed, path: Path) -> tuple[float, np.ndarray]:
     lengths, ups = [], []
     for person in feed.people:
         step = max(1, len(person.times) // _SAMPLES)
-        for side in ("left", "right"):
-            names = [f"{side}_{part}" for part in ("hip", "knee", "ankle")]
-            if all(name in person.landmarks for name in names):
-                hip, knee, ankle = (person.positions[::step, person.landmarks.index(name)] for name in names)
+        for leg in _LEGS:
+            if all(name in person.landmarks for name in leg):
+                hip, knee, ankle = (person.positions[::step, person.landmarks.index(name)] for name in leg)
                 lengths.append(np.linalg.norm(hip - knee, axis=1) + np.linalg.norm(knee - ankle, axis=1))
                 ups.append(hip - ankle)
     found = np.concatenate(lengths) if lengths else np.zeros(0)
     if not np.isfinite(found).any():
-        raise InputError(path, "no person with hip, knee and ankle", "joints of bodies", "export all joints")
+        raise InputError(path, "no person whose hip, knee and ankle of a leg are seen in one frame",
+                         "joints of bodies", "export all joints")
     if not np.nanmedian(found) > 0.0:
-        raise InputError(path, "hip, knee and ankle at one place", "joints of bodies", "export them again")
+        is_far = any((np.abs(person.positions) >= _FAR).any() for person in feed.people)
+        where = f"numbers of {_FAR:g} and more" if is_far else "hip, knee and ankle at one place"
+        raise InputError(path, where, "joints of bodies in metres", "export them again")
     directions = np.concatenate(ups)
     directions = directions[np.isfinite(directions).all(axis=1)]
     return float(np.nanmedian(found)), np.median(directions / np.linalg.norm(directions, axis=1)[:, None], axis=0)

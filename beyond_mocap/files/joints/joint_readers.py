@@ -6,14 +6,15 @@ The content shows whose form a file has; joints are known by `landmarks.identify
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from dataclasses import replace
+from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 
 import numpy as np
 
-from ...base.errors import InputError, build_read_error, format_count, format_seconds
+from ...base.errors import InputError, build_read_error, describe_damage, format_count, format_seconds
 from ..plain_npz import list_arrays, read_named_arrays
 from ..smpl.smpl import is_smpl_file
 from ..tables import parse_number, read_rows
@@ -37,6 +38,19 @@ _MAX_BYTES = 4 << 30
 _CSV_NAMES = {"time": "time_s", "x_m": "x", "y_m": "y", "z_m": "z", "landmark": "joint", "id": "player"}
 
 
+@dataclass(frozen=True)
+class _Reader:
+    """How a form of file is read.
+
+    Attributes:
+        read: file -> feed.
+        read_with_ball: the same with the ball; None: the form has none.
+    """
+
+    read: Callable[[Path], JointFeed]
+    read_with_ball: Callable[[Path], JointFeed] | None = None
+
+
 def read_joints(path, with_ball: bool = False) -> JointFeed:
     """Read a file of skeletal tracking.
 
@@ -51,9 +65,9 @@ def read_joints(path, with_ball: bool = False) -> JointFeed:
     path = Path(path)
     if not path.is_file():
         raise build_read_error(path, "a file of skeletal tracking")
-    read = _find_reader(path)
+    reader = _find_reader(path)
     with _name_damaged_file(path):
-        return read(path, with_ball) if read is _read_hawkeye else read(path)
+        return ((with_ball and reader.read_with_ball) or reader.read)(path)
 
 
 @contextmanager
@@ -62,8 +76,7 @@ def _name_damaged_file(path: Path) -> Iterator[None]:
     try:
         yield
     except (LookupError, TypeError, AttributeError, ValueError, ArithmeticError) as error:
-        found = f"values in other places than expected ({type(error).__name__}: {error})"
-        raise InputError(path, found[:200], _FORMS, "export it again") from None
+        raise InputError(path, describe_damage(error), _FORMS, "export it again") from None
 
 
 def is_joint_file(path) -> bool:
@@ -74,15 +87,15 @@ def is_joint_file(path) -> bool:
     return _find_text_reader(path) is not None
 
 
-def _find_reader(path: Path):
-    """Find the function that reads a file, by its content."""
+def _find_reader(path: Path) -> _Reader:
+    """Find how a file is read, by its content."""
     if path.suffix.lower() == ".npz":
         if is_people_file(path):
-            return read_smpl_people
+            return _Reader(read_smpl_people)
         if is_smpl_file(path) and list_arrays(path) & {"trans", "transl"}:
             raise InputError(path, "one person's motion of SMPL", "the joints of people",
                              "put it into a library of clips, or retarget it")
-        return _read_fifa
+        return _Reader(_read_fifa)
     found = _find_text_reader(path)
     if found is None:
         what = "unknown form" if read_head(path).strip() else "the file is empty"
@@ -90,21 +103,24 @@ def _find_reader(path: Path):
     return found
 
 
-def _find_text_reader(path: Path):
-    """Find the function that reads a file that is no .npz; None if it is no skeletal tracking."""
+def _find_text_reader(path: Path) -> _Reader | None:
+    """Find how a file that is no .npz is read; None if it is no skeletal tracking."""
     head = read_head(path)
     if re.match(rb'(?s)\s*\{.{0,4000}"landmarks"', head):
-        return _read_cdf
+        return _Reader(_read_cdf)
     if re.match(rb"(?s)\s*\{", head) and path.name.lower().endswith(_JOINTS):
-        return _read_hawkeye
+        return _Reader(partial(_read_hawkeye, with_ball=False), partial(_read_hawkeye, with_ball=True))
     columns = re.findall(rb"[a-z_]+", head.partition(b"\n")[0].lower())
-    return _read_table if b"joint" in columns or b"landmark" in columns else None
+    return _Reader(_read_table) if b"joint" in columns or b"landmark" in columns else None
 
 
 def _read_cdf(path: Path) -> JointFeed:
     """Read the Common Data Format's skeletal data; points that are not visible count as not seen."""
     found, begin = JointCollector(path), None
     for line, frame in iter_json_lines(path):
+        if "timestamp" not in frame:
+            raise InputError(f"{path}:{line}", "no 'timestamp'", "Common Data Format 0.2.3 (0.2.0 has no times)",
+                             "export it in 0.2.3, or add the times")
         stamp = parse_time(frame["timestamp"], f"{path}:{line}")
         begin = begin or stamp
         seconds = round((stamp - begin).total_seconds(), 4)

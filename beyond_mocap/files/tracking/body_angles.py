@@ -14,6 +14,7 @@ from ...motion import quaternion
 _RUNNING = 2.5  # m/s from which on players face where they go
 _FEWEST = 100  # samples of players who run
 _AGREEMENT = 0.8  # least mean cosine between heading and travel
+_MOST_RADIANS = 2.0 * np.pi  # of the median; larger ones are degrees
 _MARGIN = 0.1  # by which the next best reading agrees less
 _READINGS = [(sign, 0.5 * np.pi * quarter) for sign in (1.0, -1.0) for quarter in range(4)]
 
@@ -25,13 +26,17 @@ def find_headings(times: np.ndarray, positions: np.ndarray, angles: np.ndarray,
     Args:
         times: (N,) s.
         positions: (P, N, 2) m, NaN where absent.
-        angles: (P, N) rad of the feed, NaN where not known.
+        angles: (P, N) of the feed, rad or degrees, NaN where not known.
         periods: start and end s, number and seconds before (`match_arrays.build_clock`) of each period, which has a
             reading of its own: halves may have been turned.
     Returns:
         (P, N) rad from +x to the left, NaN where not known; and lines for people.
     """
     headings, lines = np.full(angles.shape, np.nan), []
+    is_known = np.isfinite(angles)
+    if is_known.any() and np.median(np.abs(angles[is_known])) > _MOST_RADIANS:
+        angles = np.radians(angles)
+        lines.append("angles of bodies are taken as degrees")
     velocity = np.gradient(positions, times, axis=1)
     is_running = (np.linalg.norm(velocity, axis=2) > _RUNNING) & np.isfinite(angles)
     travel = arctan2(velocity[..., 1], velocity[..., 0])

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import codecs
 import contextlib
 import json
 import logging
@@ -14,6 +15,7 @@ from pathlib import Path
 from typing import Any, TypeVar
 from xml.parsers import expat
 
+from ...base.content import is_utf16
 from ...base.errors import InputError, build_read_error
 from ...base.optional_packages import import_optional
 
@@ -122,12 +124,15 @@ def read_head(path: Path) -> bytes:
     Args:
         path: the file.
     Returns:
-        Up to 8 kB; nothing for a folder.
+        Up to 8 kB, of UTF-16 as UTF-8; nothing for a folder.
     """
     if not path.is_file():
         return b""
     with open(path, "rb") as file:
-        return file.read(_HEAD_BYTES).removeprefix(b"\xef\xbb\xbf")
+        head = file.read(_HEAD_BYTES)
+    if is_utf16(head):
+        return head.decode("utf-16", "ignore").encode()
+    return head.removeprefix(codecs.BOM_UTF8)
 
 
 def is_track_csv(path: Path) -> bool:

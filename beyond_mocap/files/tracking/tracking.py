@@ -16,7 +16,7 @@ from pathlib import Path
 
 import numpy as np
 
-from ...base.errors import InputError, format_count
+from ...base.errors import InputError, describe_damage, format_count
 from ...base.user_folders import find_user_cache
 from ...motion.skeleton import freeze_array
 from ...motion.track import Track
@@ -45,7 +45,7 @@ RATES = (5.0, 100.0)
 """Smallest and largest sampling rate of a track, samples per second."""
 
 _BALL = ("ball_x_m", "ball_y_m", "ball_z_m")
-_CACHE_VERSION = 4
+_CACHE_VERSION = 5
 _CACHE_BYTES = 4_000_000_000  # of all matches in the cache, some 40
 _CACHE_NAME = re.compile(r"[0-9a-f]{40}\.npz")
 _ARRAY_NAMES = ("times", "positions", "ball", "players", "pitch", "periods", "teams", "lines", "headings")
@@ -160,8 +160,8 @@ def _read_samples(feed: Feed, pitch: tuple[float, float] | None, whose: Feed | N
         gc.collect()  # kloppy's frames refer to each other in circles: 1.3 GB of a match
         return samples
     except (LookupError, TypeError, AttributeError, ValueError, ArithmeticError) as error:
-        found = f"values in other places than {feed.provider.title} has them ({type(error).__name__}: {error})"
-        raise InputError(feed.path, found[:200], f"{feed.provider.title} tracking", "export it again") from None
+        raise InputError(feed.path, describe_damage(error), f"{feed.provider.title} tracking",
+                         "export it again") from None
 
 
 def _convert_dataset(dataset, feed: Feed, pitch: tuple[float, float] | None) -> MatchSamples:

@@ -81,7 +81,7 @@ class ConstructedMotion:
         has_failed = False
         for done, ((player, files), result) in enumerate(run_stage(job, tasks, construct_block, MOTION), 1):
             if isinstance(result, TaskFailure):
-                has_failed |= self._drop_player(player, result.reason)
+                has_failed |= self._drop_player(player, result)
                 continue
             for file, content in zip(files, result, strict=True):
                 atomic_write(file, content)
@@ -137,11 +137,11 @@ class ConstructedMotion:
                 return False
         return file in self._ready
 
-    def _drop_player(self, player: str, reason: str) -> bool:
+    def _drop_player(self, player: str, failure: TaskFailure) -> bool:
         """Record that a player failed; whether this is new."""
         if self.edits.pop(player, None) is None:
             return False
-        self._job.state.update_player(player, status="failed", reason=reason)
+        self._job.state.mark_failed(player, failure)
         return True
 
 

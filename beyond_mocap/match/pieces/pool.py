@@ -54,9 +54,11 @@ class TaskFailure:
 
     Attributes:
         reason: why, in one line.
+        exit_status: of a command that fails so.
     """
 
     reason: str
+    exit_status: int = BeyondMocapError.exit_status
 
 
 @dataclass(frozen=True, eq=False)
@@ -153,7 +155,7 @@ def run_task(work: Work, arguments: tuple) -> TaskResult:
     except UserCancelledError:
         raise
     except BeyondMocapError as error:
-        result = TaskFailure(str(error))
+        result = TaskFailure(str(error), error.exit_status)
     except Exception as error:  # an error of one piece must not stop the others
         result = TaskFailure(" ".join(f"{type(error).__name__}: {error}".split()))
     return TaskResult(result, measure_peak_memory(), time.process_time() - started)

@@ -67,7 +67,7 @@ class _PlayerSearch:
         job = self._job
         for (player, name), result in run_stage(job, self._iter_missing(), search_unit, SEARCH):
             if isinstance(result, TaskFailure):
-                self._mark_failed(player, result.reason)
+                self._mark_failed(player, result)
                 continue
             path = job.folder.piece_path(SEARCH, name)
             save_piece(path, result)
@@ -104,7 +104,7 @@ class _PlayerSearch:
             try:
                 edit, joints = join_pieces(job.library, self._parts[player].plans, pieces)
             except BeyondMocapError as error:
-                return self._mark_failed(player, str(error))
+                return self._mark_failed(player, TaskFailure(str(error), error.exit_status))
             self._edits[player] = edit
             file = job.folder.player_path(self._parts[player].file, "take.npz")
             write_player(file, edit)
@@ -112,9 +112,9 @@ class _PlayerSearch:
             job.state.update_player(player, status="searched", take=file.name, joints=[len(joints), agreed],
                                     search_s=round(sum(piece.seconds for piece in pieces), 3))  # fmt: skip
 
-    def _mark_failed(self, player: str, reason: str) -> None:
+    def _mark_failed(self, player: str, failure: TaskFailure) -> None:
         if not self._is_failed(player):
-            self._job.state.update_player(player, status="failed", reason=reason)
+            self._job.state.mark_failed(player, failure)
 
     def _is_failed(self, player: str) -> bool:
         return self._job.state.players[player]["status"] == "failed"
@@ -209,7 +209,7 @@ def finish_players(
     done = len(parts_by_id) - len(missing)
     for player, result in run_stage(job, tasks, finish_player, "figures"):
         if isinstance(result, TaskFailure):
-            job.state.update_player(player, status="failed", reason=result.reason)
+            job.state.mark_failed(player, result)
             continue
         files = _write_files(job, parts_by_id[player], result, names[player])
         done += 1

@@ -128,6 +128,9 @@ def test_balls_become_those_of_the_sport_and_roll_by_their_own_radius(core):
     path = core("motion.track.ball_path").BallPath(x, np.column_stack([x, 0 * x, 0 * x + 0.1]), np.ones(25, bool))
     ball = balls.create_ball(bpy.context, "Ball", scene.collection)
     small = balls.create_ball(bpy.context, "Small", scene.collection, 0.03)
+    old = balls.create_ball(bpy.context, "Old", scene.collection)  # as earlier versions saved it
+    del old.data[balls.SPORT], old[balls.ROLLING_RADIUS]
+    bpy.context.view_layer.update()
     for thing in (ball, small):
         balls.write_trajectory(thing, path, scene, 1.0)
 
@@ -143,6 +146,7 @@ def test_balls_become_those_of_the_sport_and_roll_by_their_own_radius(core):
     assert measure(ball) == (pytest.approx(0.5 / radius, rel=0.02), pytest.approx(2 * radius, rel=0.02),
                              "Ball white basketball")
     assert measure(small)[1] == pytest.approx(0.06, rel=0.02)
+    assert max(old.dimensions) == pytest.approx(2 * radius, rel=0.02)
     scene.beyond_mocap_stage.sport = "ice_hockey"  # a puck slides
     assert measure(ball)[0] == 0.0
     scene.beyond_mocap_stage.sport = "football"

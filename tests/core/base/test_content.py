@@ -51,8 +51,9 @@ def test_what_is_too_large_is_not_read(tmp_path):
         read_bytes(tmp_path / "a", "a thing", 4)
 
 
-def test_text_is_utf8_and_loses_the_mark_at_its_start(tmp_path):
-    (tmp_path / "a").write_bytes("\ufeffJörg\r\n".encode())
+@pytest.mark.parametrize("encoding", ["utf-8", "utf-16-le", "utf-16-be"])
+def test_text_is_unicode_and_loses_the_mark_at_its_start(encoding, tmp_path):
+    (tmp_path / "a").write_bytes("\ufeffJörg\r\n".encode(encoding))
     assert read_utf8(tmp_path / "a", "a thing") == "Jörg\r\n"
     (tmp_path / "b").write_bytes("Jörg".encode("cp1252"))
     with pytest.raises(

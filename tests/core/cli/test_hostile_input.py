@@ -67,10 +67,23 @@ def estimate_legs(motion):
 
 
 @POSIX
-def test_a_device_without_an_end_is_refused(run_line, tmp_path, monkeypatch):
-    monkeypatch.setattr(content, "MAX_STREAM_BYTES", 1 << 16)
-    status, line = run_line("mirror", "/dev/zero", tmp_path / "out.bvh")
+@pytest.mark.parametrize("command", ["mirror {} {out}.bvh", "freeze-frame {} --events {}",
+                                     "throw synthesize --model {} --target 8,1,1 --out {out}.bvh"])
+def test_a_device_without_an_end_is_refused_soon(command, run_line, tmp_path):
+    """Before it has filled the memory: after 16 MB, not the gigabyte that a pipe may have."""
+    assert content.MAX_DEVICE_BYTES < 1 << 25
+    status, line = run_line(*command.format("/dev/zero", "/dev/zero", out=tmp_path / "out").split())
     assert status == 2 and "/dev/zero: has no end within" in line
+
+
+@POSIX
+@pytest.mark.parametrize("command", ["match --tracking {clip} --library {clip} --out {pipe}",
+                                     "library {pipe}", "bodies --joints {clip} --out {pipe}",
+                                     "compare --library {clip} --scenarios {pipe} --out {out}.md"])
+def test_what_is_no_folder_is_named(command, run_line, tmp_path):
+    os.mkfifo(tmp_path / "pipe")
+    status, line = run_line(*command.format(clip=WALK, pipe=tmp_path / "pipe", out=tmp_path / "out").split())
+    assert status == 2 and "pipe: is a device or a pipe; expected a " in line
 
 
 def test_too_little_memory_is_one_line(run_line, tmp_path, monkeypatch):

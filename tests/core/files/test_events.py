@@ -72,7 +72,7 @@ def test_a_provider_s_feet_hands_and_heads_are_kept():
 
 def test_a_second_file_that_is_missing_is_asked_for(tmp_path):
     (tmp_path / "g_f24.xml").write_bytes((files() / "opta_f24.xml").read_bytes())
-    with pytest.raises(InputError, match="the second file for opta is missing; expected a file such as g_f7.xml"):
+    with pytest.raises(InputError, match="the second file of Opta is missing; expected a file such as g_f7.xml"):
         read_events(tmp_path / "g_f24.xml")
 
 

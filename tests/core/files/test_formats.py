@@ -11,6 +11,7 @@ from beyond_mocap.base.errors import InputError
 from beyond_mocap.files.tracking.providers import PROVIDERS
 from beyond_mocap.files.tracking.tracking import read_match
 from beyond_mocap.match.play import build_plays
+from beyond_mocap.motion import quaternion
 
 OTHER = pathlib.Path(__file__).resolve().parents[3] / ".." / "shared" / "data" / "tracking" / "other"
 RATE, COUNT, SIZE = 10, 60, (100.0, 64.0)
@@ -211,6 +212,7 @@ def test_origin_and_axes_of_a_table_are_found_or_told(place, line, tmp_path):
 
 
 @pytest.mark.parametrize(("rows", "line"), [("0,ball,1,2\n1,ball,3,4\n", "no position of a player"),
+                                            ("0,a,1,2\n", "rows of 1 moment"),
                                             ("0,a,1,2\n1,b,10,4\n2,c,20,6\n", "moments of their own")])
 def test_a_table_without_motion_of_players_is_refused(rows, line, tmp_path):
     (tmp_path / "game.csv").write_text("time_s,player,x_m,y_m\n" + rows)
@@ -218,8 +220,9 @@ def test_a_table_without_motion_of_players_is_refused(rows, line, tmp_path):
         read_match(tmp_path / "game.csv", cache_dir=tmp_path / "cache")
 
 
-@pytest.mark.parametrize(("sign", "zero"), [(1.0, 0.0), (1.0, np.pi), (-1.0, 0.5 * np.pi), (None, 0.0)])
-def test_angles_of_bodies_are_headings_whatever_they_are_measured_from(sign, zero, tmp_path):
+@pytest.mark.parametrize(("sign", "zero", "unit"), [(1.0, 0.0, 1.0), (1.0, np.pi, np.radians(1.0)),
+                                                    (-1.0, 0.5 * np.pi, 1.0), (None, 0.0, 1.0)])
+def test_angles_of_bodies_are_headings_whatever_they_are_measured_from(sign, zero, unit, tmp_path):
     """A player runs in a circle, then stands and looks along -y; random angles are not used, with a line."""
     moments = np.arange(400) / RATE
     running = moments < 30.0
@@ -230,10 +233,11 @@ def test_angles_of_bodies_are_headings_whatever_they_are_measured_from(sign, zer
         faces - zero + 0.1 * random.normal(size=len(faces)))
     rows = [{"frame_id": row, "time": f"00:{time:09.6f}", "period": "half_1", "pitch_side": {"left": "A", "right": "B"},
              "players": [{"person_id": 1, "team_name": "A", "x": 50 + 10 * np.cos(place), "y": 32 + 10 * np.sin(place),
-                          "head_angle": 0.0, "shoulders_angle": 0.0, "hips_angle": (angle + 9) % (2 * np.pi) - np.pi}]}
-            for row, (time, place, angle) in enumerate(zip(moments, around, angles + np.pi - 9))]
+                          "head_angle": 0.0, "shoulders_angle": 0.0, "hips_angle": angle / unit}]}
+            for row, (time, place, angle) in enumerate(zip(moments, around, quaternion.wrap_angle(angles)))]
     match = read_match(write_lines(tmp_path / "game.jsonl", rows), cache_dir=tmp_path / "cache", pitch=SIZE)
     told = " ".join(match.report)
+    assert ("taken as degrees" in told) == (unit != 1.0)
     if sign is None:
         assert "angles of bodies are not used" in told and not np.isfinite(match.headings).any()
         return
@@ -242,7 +246,7 @@ def test_angles_of_bodies_are_headings_whatever_they_are_measured_from(sign, zer
     again = read_match(tmp_path / "game.jsonl", cache_dir=tmp_path / "cache", pitch=SIZE)
     assert np.array_equal(again.headings, match.headings)
     (play,) = build_plays(match).values()
-    assert len(play.keys) == 80 and play.keys[-1].heading == pytest.approx(-0.5 * np.pi, abs=0.1)
+    assert len(play.keys) == 200 and play.keys[-1].heading == pytest.approx(-0.5 * np.pi, abs=0.1)
 
 
 def test_rows_that_a_table_has_twice_and_metadata_that_it_has_not_are_told(tmp_path):
@@ -259,6 +263,13 @@ def test_gps_on_a_map_or_beyond_the_earth_is_refused(place, tmp_path):
     rows = [f"{second},{place[0] + second},{place[1]}\n" for second in range(9)]
     (tmp_path / "run.csv").write_text("time,latitude,longitude\n" + "".join(rows))
     with pytest.raises(InputError, match=r"run.csv: latitude .* degrees, -90 to 90 and -180 to 180"):
+        read_match(tmp_path / "run.csv", cache_dir=tmp_path / "cache")
+
+
+def test_a_receiver_whose_clock_stood_still_says_so(tmp_path):
+    rows = [f"{1.7e9 + 1e-4 * (second > 4)},{52 + 1e-5 * second},5\n" for second in range(9)]
+    (tmp_path / "run.csv").write_text("time,latitude,longitude\n" + "".join(rows))
+    with pytest.raises(InputError, match=r"run.csv: .* per second, 9 samples at 2 different times; .*the time of each"):
         read_match(tmp_path / "run.csv", cache_dir=tmp_path / "cache")
 
 

@@ -68,7 +68,7 @@ def test_headers_fly_and_all_moments_are_listed(write, tmp_path, capsys):
     assert main(order) == 0
     listed = capsys.readouterr().out.splitlines()
     assert listed == ["aa-1  03:07  Pass, Ada Öst (Reds)", "aa-2  03:09  Shot, Ada Öst (Reds)"]
-    assert main([*order, "--event", "aa-2", "--out", str(tmp_path / "still")]) == 0
+    assert main([*order, "--event", "3:09", "--out", str(tmp_path / "still")]) == 0
     match = read_match(tmp_path / "still" / "moment.csv", cache_dir=tmp_path / "cache")
     assert match.ball[-1] == pytest.approx((52.5, 1.7, 2 * 0.9144), abs=1e-3)
     assert [path.read_text() for path in (tmp_path / "still" / "labels").iterdir()] == ["2 header standing\n"]
@@ -88,13 +88,17 @@ def test_each_person_has_a_name_of_their_own(write, tmp_path):
     ({}, ["--event", "99:99"], "no freeze frame of event"),
     ({}, ["--event", "aa-1", "--out", ""], "no file or folder"), ({}, ["--event", "aa-1"], "one without the other"),
     ({}, ["--pitch", "100x60"], "without --event"), ({"pictures": "{"}, [], "not JSON"),
-    ({"pictures": [{"a": 1}]}, [], "no list of objects"),
+    ({"pictures": [{"a": 1}]}, [], "no list of objects"), ({"pictures": [PASS]}, [], "exchange 360 data and events"),
     ({"pictures": [{"event_uuid": "zz", "freeze_frame": PEOPLE}]}, [], "the same match"),
     ({"pictures": [{"event_uuid": "aa-1", "freeze_frame": [{"location": [1e300, "x"]}]}]}, [],
-     "event aa-1: values of another kind"), ({"pictures": "[" * 100_000}, [], "nested too deeply"),
+     "event aa-1: values in other places, or of another kind"), ({"pictures": "[" * 100_000}, [], "nested too deeply"),
+    ({"pictures": f"[{'1' * 5000}]"}, [], "a number of thousands of digits"), ({"pictures": ""}, [], "is empty"),
+    ({"pictures": [{"event_uuid": "aa-1", "freeze_frame": [{**one, "location": [one["location"][0] - 100.0, 4.0]}
+                                                           for one in PEOPLE]}]}, [], "from -40 to 18 along"),
+    ({"events": ({**PASS, "location": [-50.0, -20.0]},)}, [], "events.json: places from -50"),
     ({"events": ({key: value for key, value in PASS.items() if key != "minute"},)}, [], "event aa-1: no 'minute'"),
     ({"pictures": [{"event_uuid": "aa-1", "freeze_frame": [{"location": [60.0, 40.0, 1.0]}]}]}, ["--event", "aa-1"],
-     "another kind or size"),
+     "locations of another size"),
     ({"pictures": [{"event_uuid": "aa-1", "freeze_frame": PEOPLE * 40}]}, ["--event", "aa-1"], "at most 60"),
 ])  # fmt: skip
 def test_bad_input_ends_with_one_line(change, more, line, write, tmp_path, capsys):

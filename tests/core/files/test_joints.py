@@ -92,9 +92,37 @@ def test_the_joints_of_one_person_of_smpl_are_a_clip(tmp_path):
         read_joints(tmp_path / "walk.npz")
 
 
-def test_joints_at_one_place_are_no_body(people, tmp_path):
-    with pytest.raises(InputError, match="at one place"):
-        read_joints(write_table(tmp_path / "a.csv", {"7": np.zeros_like(people["7"])}, FPS))
+@pytest.mark.parametrize(("factor", "frames", "knee", "line"), [
+    (0.0, 100, "knee", "at one place"), (1e200, 100, "knee", "numbers of 1e.09 and more; expected .* metres"),
+    (1.0, 1, "knee", "joints in 1 frame, no person in two; expected .*; export a longer part"),
+    (1.0, 100, "patella", "no left_knee, but left_patella, right_patella; .* rename them"),
+])  # fmt: skip
+def test_joints_of_no_body_are_told(factor, frames, knee, line, people, tmp_path):
+    path = write_table(tmp_path / "a.csv", {"7": factor * people["7"][:frames]}, FPS)
+    path.write_text(path.read_text().replace("knee", knee))
+    with pytest.raises(InputError, match=line):
+        read_joints(path)
+
+
+@pytest.mark.parametrize(("rate", "line"), [(FPS / 1000.0, "milliseconds: divide them by 1000"), (1.0, "frame numbers"),
+                                            (4000.0, "check that times are seconds")])
+def test_times_of_another_unit_are_told(rate, line, people, tmp_path):
+    with pytest.raises(InputError, match=f"frames per second; expected 5 to 400; .*{line}"):
+        read_joints(write_table(tmp_path / "a.csv", {"7": people["7"]}, rate))
+
+
+def test_common_data_without_times_says_which_version_is_read(people, tmp_path):
+    path = write_cdf(tmp_path / "skeletal.jsonl", people, FPS)
+    path.write_text(path.read_text().replace('"timestamp"', '"stamp"'))
+    with pytest.raises(InputError, match="jsonl:1: no 'timestamp'; expected Common Data Format 0.2.3"):
+        read_joints(path)
+
+
+@pytest.mark.parametrize("encoding", ["utf-8-sig", "utf-16"])
+def test_tables_of_table_programs_are_read(encoding, people, tmp_path):
+    path = write_table(tmp_path / "a.csv", {"Jörg": people["7"]}, FPS)
+    path.write_text(path.read_text(), encoding)
+    assert [person.id for person in read_joints(path).people] == ["Jörg"]
 
 
 @pytest.mark.parametrize(("unit", "turn", "said"), [
@@ -153,7 +181,7 @@ def test_names_that_are_not_known_are_named_where_none_is(people, tmp_path):
     for name in NAMES:
         rows = rows.replace(f",{name},", f",x_{name},")
     path.write_text(f"{header}\n{rows}")
-    with pytest.raises(InputError, match="no known joint in two frames, but .*x_left_knee.*; rename"):
+    with pytest.raises(InputError, match="no known joint, but .*x_left_knee.*; rename"):
         read_joints(path)
 
 

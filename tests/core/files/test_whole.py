@@ -7,7 +7,7 @@ import pytest
 
 from beyond_mocap.base.errors import InputError
 from beyond_mocap.cli.main import main
-from beyond_mocap.files.atomic import atomic_write
+from beyond_mocap.files.atomic import atomic_folder, atomic_write
 
 
 def test_a_link_stays_one_and_its_file_is_written(tmp_path):
@@ -28,6 +28,22 @@ def test_a_pipe_is_left_as_it_is(tmp_path, clip_file, capsys):
     assert "a device or a pipe" in capsys.readouterr().err
     assert stat.S_ISFIFO((tmp_path / "pipe.bvh").stat().st_mode)
     assert sorted(one.name for one in tmp_path.iterdir()) == ["clip.bvh", "clip.txt", "pipe.bvh"]
+
+
+def test_what_a_killed_process_left_in_a_folder_is_in_nobodys_way(tmp_path):
+    out = tmp_path / "out"
+    (out / ".1.2.part").mkdir(parents=True)
+    with atomic_folder(out) as inside:
+        (inside / "a").write_text("1")
+    assert [(one.name, one.read_text()) for one in out.iterdir()] == [("a", "1")]
+
+
+def test_of_two_that_write_to_one_folder_the_first_to_end_does(tmp_path):
+    out = tmp_path / "out"
+    with pytest.raises(InputError, match="not empty .a."), atomic_folder(out) as inside:
+        (inside / "a").write_text("2")
+        (out / "a").write_text("1")  # by the other process
+    assert [(one.name, one.read_text()) for one in out.iterdir()] == [("a", "1")]
 
 
 def test_mirror_and_retarget_write_bvh_only(tmp_path, clip_file, capsys):

@@ -84,7 +84,7 @@ def test_the_cache_is_not_searched(folder):
 @pytest.mark.parametrize("make", [lambda p: None, lambda p: p.mkdir(), lambda p: p.write_text("a file")])
 def test_a_missing_or_empty_folder_is_told(tmp_path, make):
     make(tmp_path / "nothing")
-    with pytest.raises(InputError, match="nothing: (no |a file).*; expected .*; .") as told:
+    with pytest.raises(InputError, match="nothing: (no |is a file).*; expected .*; .") as told:
         find_clips(tmp_path / "nothing")
     assert "\n" not in str(told.value)
 

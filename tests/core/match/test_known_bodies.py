@@ -98,7 +98,7 @@ def test_the_ball_beside_hawkeyes_joints_is_that_of_the_match(tmp_path):
     assert "1 sample with an impossible" in match.report[0] and "1 height of the ball above 60 m" in match.report[1]
     assert len(list_joint_files(path)) == 4  # whose content makes a stored match out of date
     path.with_name("match_1_2.football.samples.ball").write_text("{}")
-    with pytest.raises(InputError, match="match_1_2.football.samples.ball: values in other places"):
+    with pytest.raises(InputError, match="match_1_2.football.samples.ball: no 'time'"):
         read_joint_match(path)
     assert "the ball" not in " ".join(read_joints(path).notes)  # not opened where only bodies are wanted
     write_balls(path, ball, is_seen, day=23)

@@ -62,7 +62,7 @@ def test_a_player_whose_words_the_library_lacks_fails_where_that_is_asked(match,
     (tmp_path / "words").mkdir()
     (tmp_path / "words" / "home_7.txt").write_text("5 header subtle\n")
     status, _, error = match("--exact", "--no-figures", annotations=tmp_path / "words")
-    assert status == 2 and "no player could be synthesized" in error[-1]
+    assert status == 3 and "no player could be synthesized" in error[-1]
     assert any("home_7" in line and "header subtle" in line for line in error)
     assert read_state(tmp_path / "out")["status"] == "failed"
 
@@ -89,6 +89,8 @@ def test_joints_beside_tracking_that_is_skeletal_are_refused(match, tmp_path):
     (tmp_path / "joints.csv").write_text("time_s,player,joint,x,y,z\n")
     status, _, error = match(tracking=tmp_path / "joints.csv", joints=tmp_path / "joints.csv")
     assert status == 2 and "joints.csv: skeletal tracking, beside which no joints can be given" in error[0]
+    status, _, error = match(tracking=tmp_path / "joints.csv", joints=SMALL / "small.dat")
+    assert status == 2 and "for the joints in small.dat; exchange tracking and joints" in error[0]
 
 
 def test_a_match_without_a_ball_on_the_pitch_of_another_sport_says_both(match, tmp_path):
@@ -147,7 +149,7 @@ def test_the_events_second_file_and_provider_may_be_named(match, tmp_path):
     """One that needs no second file says so; two files that lie apart are read, and are of another match."""
     named = {"events": SMALL / "small_events.csv", "events-meta": SMALL / "small_meta.xml", "events-provider": "csv"}
     status, _, error = match("--no-figures", **named)
-    assert status == 0 and any("small_meta.xml: not used, because events of csv are in one file" in one
+    assert status == 0 and any("small_meta.xml: not used, because events of CSV are in one file" in one
                                for one in error)
     kloppy = pytest.importorskip("kloppy")
     folder = Path(kloppy.__file__).parent / "tests" / "files"
@@ -156,7 +158,7 @@ def test_the_events_second_file_and_provider_may_be_named(match, tmp_path):
     (tmp_path / "events").mkdir()
     apart = shutil.copy(folder / "opta_f24.xml", tmp_path / "events" / "monday.xml")
     status, _, error = match(events=apart, out=tmp_path / "new")
-    assert status == 2 and "the second file for opta is missing" in error[-1]
+    assert status == 2 and "the second file of Opta is missing" in error[-1]
     named = {"events-meta": folder / "opta_f7.xml", "events-provider": "OPTA"}
     status, _, error = match(events=apart, out=tmp_path / "new", **named)
     assert status == 2 and "players" in error[-1] and "are not in the tracking" in error[-1]
@@ -175,13 +177,13 @@ def test_an_option_is_taken_out_however_it_is_written(written):
     ({"from": 6, "to": 5}, 2, "end time: 5 s; expected later than the start, 6 s; choose a later end"),
     ({"from": 100, "to": 200}, 2, "time range: 100 to 200 s; expected a second or more within 0 to 24 s"),
     ({"players": "home_99"}, 2, "players: 'home_99'; expected some of"),
-    ({"players": "away_9", "from": 15, "to": 20}, 2, "no player is present from 15 to 20 s"),
+    ({"players": "away_9", "from": 15, "to": 20}, 2, "small.dat: no player is seen for 1 s on end from 15 to 20 s"),
     ({"provider": "nobody"}, 2, "provider: 'nobody'"),
     ({"events": "no.csv"}, 2, "no.csv"),
     ({"meta": "no.xml"}, 2, "no.xml"),
     ({"events": str(SMALL / "small_events.csv"), "events-meta": "no.xml"}, 2, "no.xml"),
     ({"events": str(SMALL / "small_events.csv"), "events-provider": "x"}, 2, "events provider: 'x'; expected one of"),
-    ({"events": str(SMALL / "small_events.csv"), "events-provider": "opta"}, 2, "the second file for opta is missing"),
+    ({"events": str(SMALL / "small_events.csv"), "events-provider": "opta"}, 2, "the second file of Opta is missing"),
     ({"events-meta": "no.xml"}, 2, "events metadata: no.xml, without an events file"),
     ({"events-provider": "opta"}, 2, "events provider: opta, without an events file"),
     ({"workers": 0}, 2, "'0' is not 1 to 256"),

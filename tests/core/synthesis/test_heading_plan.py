@@ -305,3 +305,16 @@ def test_an_update_keeps_every_heading_far_from_a_change(seed):
     asked = update_heading_path(path, old, faced, old, HeadingRequest())
     inside = (path.times > 30.2) & (path.times < 31.8)
     assert np.all(asked.bins[inside] % 36 == 18) and np.array_equal(asked.bins[far] % 36, path.bins[far] % 36)
+
+
+def test_measured_headings_turn_as_fast_as_bodies_do_and_asked_ones_calmly():
+    """A standing player turns once around in 2.4 s, measured with 10 degrees of noise; what is asked is calmer."""
+    track = going(constant(0.0, 0.0), constant(-20.0, 0.0))
+    truth = np.interp(track.times, [3.0, 5.4], [0.0, 2.0 * np.pi])
+    noise = np.random.default_rng(2).normal(0.0, np.radians(10.0) / 2.5, len(track))  # of the mean of six samples
+    keys = tuple(HeadingKey(track.times[at], truth[at] + noise[at]) for at in range(4, len(track), 8))
+    seen = Play(track.times, np.full((len(track), 2), np.nan), keys=keys)
+    measured, asked = planned(track, play=seen), planned(track, keys=keys)
+    assert degrees_from(measured, np.degrees(truth)).max() < 25.0 < degrees_from(asked, np.degrees(truth)).max()
+    still = (track.times > 0.5) & (track.times < 2.5)
+    assert np.ptp(measured[still]) < np.radians(15.0)

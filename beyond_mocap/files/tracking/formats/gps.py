@@ -38,11 +38,14 @@ _RATE_RANGE = (0.5, 100.0)
 
 @dataclass(frozen=True, eq=False)
 class _Receiver:
-    """One player's samples: name, times (N,) s, and latitude and longitude (N, 2) in degrees."""
+    """One player's samples: name, times (N,) s, latitude and longitude (N, 2) in degrees, and how many the file has,
+    of which those at a moment of another are left out.
+    """
 
     name: str
     times: np.ndarray
     degrees: np.ndarray
+    count: int
 
 
 def read_gps(feed: Feed, pitch: tuple[float, float] | None) -> MatchSamples:
@@ -96,7 +99,7 @@ def _read_receiver(path: Path) -> _Receiver:
     if len(times) < 2:
         raise InputError(path, format_count(len(times), "sample"), "at least two with a time and a place",
                          "export it again")
-    return _Receiver(name, times, degrees[good][order])
+    return _Receiver(name, times, degrees[good][order], int(good.sum()))
 
 
 def _read_table(path: Path) -> tuple[str, list[float], list[tuple[float, float]]]:
@@ -174,8 +177,10 @@ def _overlap(one: _Receiver, other: _Receiver) -> bool:
 def _find_rate(path: Path, receiver: _Receiver) -> float:
     rate = round(1.0 / float(np.median(np.diff(receiver.times))), 2)
     if not _RATE_RANGE[0] <= rate <= _RATE_RANGE[1]:
-        raise InputError(path, f"{rate:g} samples per second", f"{_RATE_RANGE[0]:g} to {_RATE_RANGE[1]:g}",
-                         "export at the receiver's own rate")
+        moments = f", {receiver.count} samples at {len(receiver.times)} different times"
+        found = f"{rate:g} samples per second" + moments * (receiver.count > len(receiver.times))
+        raise InputError(path, found, f"{_RATE_RANGE[0]:g} to {_RATE_RANGE[1]:g}",
+                         "export at the receiver's own rate, with the time of each sample")
     return rate
 
 

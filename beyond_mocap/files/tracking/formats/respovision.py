@@ -71,7 +71,7 @@ def _find_moment(frame: dict, place: str) -> tuple[int, float]:
 
 
 def _choose_angle(player: dict) -> float | None:
-    """Return the angle of the hips, else that of the shoulders, rad; None where neither is a number."""
+    """Return the angle of the hips, else that of the shoulders; None where neither is a number."""
     angles = (player.get(f"{part}_angle") for part in ("hips", "shoulders"))
     return next((angle for angle in angles if isinstance(angle, (int, float)) and math.isfinite(angle)), None)
 

@@ -38,7 +38,8 @@ class MatchSamples:
         size: length and width of the pitch in metres; None where the feed does not say.
         teams: ground, name and colour of home and away.
         lines: what was left out or assumed.
-        angles: (P, N) rad of bodies as the feed measures them, NaN where not known; None for a feed without.
+        angles: (P, N) of bodies, rad or degrees as the feed measures them, NaN where not known; None for a feed
+            without.
     """
 
     times: np.ndarray
@@ -88,7 +89,7 @@ class SampleCollector:
                 raise InputError(self._path, f"more than {_MOST_SAMPLES:,} samples", "one match", "divide the file")
 
     def add_angle(self, moment: tuple[int, float], key: str, angle: float | None) -> None:
-        """Add where the body of a person with a sample at this moment faces, rad; None: not known."""
+        """Add where the body of a person with a sample at this moment faces, as the feed has it; None: not known."""
         if angle is not None and key in self._who and moment in self._moments:
             self._angles.extend((self._moments[moment], self._who[key], angle))
 
@@ -136,8 +137,8 @@ class SampleCollector:
             InputError: for fewer than two moments or too many people.
         """
         if len(self._moments) < 2 or not self._who:
-            raise InputError(self._path, f"{format_count(len(self._moments), 'frame')} with players", "at least two",
-                             "export it again")
+            found = f"{format_count(len(self._moments), 'frame')}, {format_count(len(self._who), 'player')} in them"
+            raise InputError(self._path, found, "players in at least two frames", "export it again")
         if len(self._who) > MAX_PLAYERS:
             raise InputError(self._path, f"{len(self._who)} players", f"at most {MAX_PLAYERS} in one match",
                              "reduce the file to one match")
@@ -191,7 +192,7 @@ def iter_json_lines(path: Path) -> Iterator[tuple[int, dict]]:
                 if line.strip():
                     yield number, _parse_line(path, number, line)
     except UnicodeDecodeError:
-        raise InputError(path, "is not UTF-8 text", "JSON, one object a line", "export it again") from None
+        raise InputError(path, "is not UTF-8 text", "JSON, one object a line", "save it as UTF-8") from None
 
 
 def _parse_line(path: Path, number: int, line: str) -> dict:

@@ -81,8 +81,10 @@ def _read_tracks(path: Path, found: SampleCollector) -> tuple[_Tracks, bool]:
                              row.get("number", ""), row.get("position", ""))
         tracks[key].append((int(period), round(parse_clock(row["time_s"], place), 4), x, y, z))
         has_whole_times = has_whole_times and row["time_s"].isdigit()
-    if not tracks:
-        raise InputError(path, "no rows", "a row for each player and moment", "export it again")
+    moments = {row[:2] for rows in tracks.values() for row in rows}
+    if len(moments) < 2:
+        raise InputError(path, f"rows of {format_count(len(moments), 'moment')}", "a row for each player and moment",
+                         "export a longer part of the match")
     return tracks, has_whole_times
 
 
