@@ -8,7 +8,9 @@ import pytest
 
 from beyond_mocap.base.errors import InputError
 from beyond_mocap.files.bvh import bvh
+from beyond_mocap.motion.humanoid import compute_heading
 from beyond_mocap.motion.motion import forward_kinematics
+from beyond_mocap.motion.quaternion import wrap_angle
 from beyond_mocap.passes.answers_ahead import MOST_ANSWERS, AnswersAhead
 from beyond_mocap.passes.hits import detect_hit_under_way, detect_hits
 from beyond_mocap.passes.live_passes import BLEND_SECONDS, build_answer, collect_means, start_rally
@@ -47,6 +49,9 @@ def test_they_stand_where_the_scene_says_and_the_ball_lies(rally):
         assert len(played.motion) / played.motion.fps > 60.0
         moved = np.linalg.norm(played.motion.root_positions[:, :2] - player.place, axis=1)
         assert moved.max() < 0.25
+        x, y = rally.ball.positions[0, :2] - player.place
+        off = wrap_angle(compute_heading(played.motion)[90:] - np.arctan2(y, x))
+        assert np.abs(off).max() < 0.2, "they face the ball, also the one at whose feet it lies"
     assert np.ptp(rally.ball.positions, axis=0).max() == 0.0
 
 
