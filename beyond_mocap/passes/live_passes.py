@@ -58,6 +58,11 @@ class PlayerTimeline:
     start: float
     motion: Motion
 
+    @property
+    def end(self) -> float:
+        """s on the scene's clock of the motion's last frame."""
+        return self.start + self.motion.duration
+
     def stance_at(self, seconds: float) -> Stance:
         """Compute where the player stands at `seconds` on the scene's clock."""
         frame = int(np.clip(round((seconds - self.start) * self.motion.fps), 0, len(self.motion) - 1))
@@ -93,6 +98,17 @@ class Rally:
     def stances(self) -> dict[str, Stance]:
         """Where each player stands once they have come to rest after the last pass."""
         return {name: played.stance_at(self.ready_time + _SETTLING_SECONDS) for name, played in self.players.items()}
+
+    @property
+    def end(self) -> float:
+        """s on the scene's clock until which all players and the ball go on."""
+        return min(float(self.ball.times[-1]), *(played.end for played in self.players.values()))
+
+    def keep_standing(self) -> Rally:
+        """Build the rally in which all go on for STANDING_SECONDS longer, standing, and the ball lies."""
+        players = {name: PlayerTimeline(played.start, _extend_standing(played.motion, _SWAY, self.rate))
+                   for name, played in self.players.items()}
+        return replace(self, players=players, ball=_extend_lying(self.ball))
 
     def find_frame(self, at: float) -> float:
         """Find the time in s of the first frame from `at` s on."""
@@ -310,15 +326,11 @@ def _continue_ball(before: BallPath | None, path: BallPath, at: float, blend: fl
     """Join the ball's path so far with `path` from `at` s on, blended in over `blend` s; then let it lie for
     STANDING_SECONDS.
     """
-    step = path.times[1] - path.times[0]
-    added = int(round(STANDING_SECONDS / step))
-    times = np.concatenate([path.times, path.times[-1] + step * np.arange(1, added + 1)]) + at
-    places = np.concatenate([path.positions, np.repeat(path.positions[-1:], added, axis=0)])
-    rotations = path.rotations if path.rotations is not None else quaternion.identity(len(path.times))
-    rotations = np.concatenate([rotations, np.repeat(rotations[-1:], added, axis=0)])
+    path = _extend_lying(path)
+    times, places, rotations = path.times + at, path.positions, path.rotations
     if before is None:
-        return BallPath(times, places, np.ones(len(times), bool), rotations)
-    is_before = before.times < at - 0.5 * step
+        return replace(path, times=times)
+    is_before = before.times < at - 0.5 * (times[1] - times[0])
     # it may still roll out from the pass before
     weight = 1.0 - smoothstep((times - at) / max(blend, 1e-6))[:, None]
     places = places + weight * (interpolate_columns(times, before.times, before.positions) - places)
@@ -328,3 +340,13 @@ def _continue_ball(before: BallPath | None, path: BallPath, at: float, blend: fl
                     np.concatenate([before.positions[is_before], places]),
                     np.ones(int(is_before.sum()) + len(times), bool),
                     np.concatenate([before.rotations[is_before], rotations]))
+
+
+def _extend_lying(path: BallPath) -> BallPath:
+    """Let the ball of a path lie at its end for STANDING_SECONDS."""
+    step = path.times[1] - path.times[0]
+    added = int(round(STANDING_SECONDS / step))
+    times = np.concatenate([path.times, path.times[-1] + step * np.arange(1, added + 1)])
+    rotations = path.rotations if path.rotations is not None else quaternion.identity(len(path.times))
+    return BallPath(times, np.concatenate([path.positions, np.repeat(path.positions[-1:], added, axis=0)]),
+                    np.ones(len(times), bool), np.concatenate([rotations, np.repeat(rotations[-1:], added, axis=0)]))

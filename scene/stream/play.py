@@ -33,6 +33,9 @@ if TYPE_CHECKING:
     from ...beyond_mocap.passes.strike_means import StrikeMeans
     from .settings import StreamSettings
 
+LEFT_SECONDS = 20.0
+"""Seconds before somebody's standing ends at which it is continued."""
+
 _session: dict[str, object] = {}
 
 
@@ -220,8 +223,11 @@ def update_rally(scene: bpy.types.Scene) -> None:
         _answer_strike(scene, target)
     elif "job" not in _session:
         _plan_ahead(scene, target)
+    if get_current_rally().end - _session["drawn"] < LEFT_SECONDS:
+        _session["rally"] = get_current_rally().keep_standing()
+        _session["unwritten"] |= {*get_current_rally().players}
     # a moment's halt is not seen when they stand
-    if _session["unwritten"] and compute_rally_seconds(scene) >= get_current_rally().ready_time:
+    if _session["unwritten"] and _session["drawn"] >= get_current_rally().ready_time:
         _write_rest(scene)
 
 

@@ -123,9 +123,9 @@ def plan_ahead(play, core, scene):
 
 @pytest.mark.parametrize("ending", ["standing", "saving"])
 def test_an_answer_that_is_planned_ahead_begins_at_once(playing, room, core, ending):
-    """Within the update in which the strike is noticed, and the same pass as when it is planned then. It is written into
-    the keys that are there, so that no step of undo lacks those before it; the long standing after it is written when
-    the players stand, or the file is saved.
+    """Within the update in which the strike is noticed, and the same pass as when it is planned then. It is written
+    into the keys that are there, so that no step of undo lacks those before it; the long standing after it is written
+    when the players stand, or the file is saved.
     """
     play, body = room("stream.play"), playing.beyond_mocap_passes.players[0].body
     playing.frame_set(5 + 48)

@@ -92,6 +92,19 @@ def test_what_was_done_goes_over_into_the_pass(rally, passed):
     assert after.players["Ben"] is rally.players["Ben"]
 
 
+def test_who_waits_goes_on_standing(passed):
+    """Also when the user lets them wait for minutes: they go on to sway, without a jump, where they stand."""
+    _, _, _, end = passed
+    longer = end.keep_standing().keep_standing()
+    assert longer.end > end.end + 119.0 and longer.ball.times[-1] > end.ball.times[-1] + 119.0
+    for name, played in longer.players.items():
+        old, motion = end.players[name].motion, played.motion
+        assert motion.rotations[: len(old)].tobytes() == old.rotations.tobytes()
+        steps = np.linalg.norm(np.diff(forward_kinematics(motion)[0], axis=0), axis=2)
+        waits = steps[len(old) - 30 :]
+        assert 0.0 < waits.max() * motion.fps < 0.6 and np.ptp(motion.root_positions[len(old) :, 0]) < 0.1
+
+
 def test_what_is_planned_ahead_is_what_is_planned_after_the_strike(library, rally):
     """The same bits, for the user's whole strike and for the little of it that is known as it is done."""
     ahead = AnswersAhead(collect_means(library, rally.scene), rally)
