@@ -132,7 +132,7 @@ def compute_heading_offset(track: SampledTrack) -> np.ndarray:
     if track.heading is not None:
         return quaternion.wrap_angle(track.heading - track.direction)
     to_ball, share = _compute_ball_direction(track)
-    offset = np.where(share > 0.0, quaternion.wrap_angle(to_ball - track.direction), 0.0) * share
+    offset = np.where(np.isfinite(to_ball), quaternion.wrap_angle(to_ball - track.direction), 0.0) * share
     limit = np.interp(track.speed, _SPEEDS, _MAX_OFFSETS)
     offset = np.clip(offset, -limit, limit)
     smoothed = smooth_zero_phase_hann(np.stack([np.cos(offset), np.sin(offset)], axis=1), track.fps, _WINDOW)

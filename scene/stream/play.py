@@ -22,8 +22,7 @@ from ..core.live import Watcher, call_or_describe, is_playing
 from ..core.measure import frames_per_second
 from ..passes import generate as make
 from ..passes.settings import PLAYED
-from . import follow
-from .rally_keys import RallyKeys
+from . import follow, rally_keys
 
 if TYPE_CHECKING:
     from ...beyond_mocap.library.library import Library
@@ -78,7 +77,7 @@ def apply_rally(scene: bpy.types.Scene, new_rally: NewRally) -> None:
     stop_rally()
     make.session.store_library(new_rally.library, new_rally.order.unit)
     _session.update(scene=scene.session_uid, means=new_rally.means, seen=None, latest={}, unwritten=set(),
-                    keys=RallyKeys(), drawn=compute_rally_seconds(scene))
+                    keys=rally_keys.RallyKeys(), drawn=compute_rally_seconds(scene))
     _wait_for_strike(scene, new_rally.rally)
     for name in ("strikes", "figures", "messages"):
         scene.beyond_mocap_passes.property_unset(name)
@@ -327,7 +326,7 @@ def _apply_pass(scene, piece: LivePass, hit: HitMotion | None = None, seconds: f
     _wait_for_strike(scene, next_rally)
     _session["unwritten"] |= {*piece.motions}
     scene.beyond_mocap_stream.target = ""
-    _write_status(piece, delay if seconds else None)
+    _write_status(piece, (delay, time.monotonic() - seconds) if seconds else None)
 
 
 def _find_beginning(scene, seconds: float) -> tuple[float, float]:
@@ -384,14 +383,17 @@ def _end_rally(reason: str) -> None:
     status_texts.playing, status_texts.played = False, reason
 
 
-def _write_status(piece: LivePass | None = None, delay: float | None = None) -> None:
-    """Write the state of the rally for the panel; `delay`: s from the strike to the beginning of its answer."""
+def _write_status(piece: LivePass | None = None, delays: tuple[float, float] | None = None) -> None:
+    """Write the state of the rally for the panel; `delays`: s from the strike to the beginning of its answer in the
+    scene's time, and to its writing by the clock.
+    """
     status_texts, one = bpy.context.window_manager.beyond_mocap_streaming, get_current_rally()
     status_texts.playing = True
     lines = [f"{one.holder} has the ball, passes so far: {one.passes}"]
     if piece is not None:
         lines.append(f"{piece.giver} played {piece.clip} to {piece.receiver}")
-        lines += [] if delay is None else [f"The answer began {delay:.2f} s after the strike"]
+        if delays is not None:
+            lines.append("The answer began {:.2f} s after the strike, by the clock {:.2f} s".format(*delays))
         lines += piece.warnings[:2]
     status_texts.played = "\n".join(lines)
 

@@ -87,6 +87,10 @@ def test_all_stand_and_the_ball_lies(playing, room):
     assert all(row.body is not None for row in playing.beyond_mocap_passes.players)
     assert playing.frame_end >= 5 + 60 * 24
     assert np.ptp(places(playing, (5, 100, 900)), axis=0).max() < 1e-6
+    playing.frame_set(5 + 60 * 24)  # and they go on to stand, however long the user waits
+    room("stream.play").update_rally(playing)
+    assert playing.frame_end > 120 * 24
+    assert all(row.body.animation_data.action.frame_range[1] > 120 * 24 for row in playing.beyond_mocap_passes.players)
 
 
 def test_a_strike_is_answered_from_now_on(playing, room, core):
