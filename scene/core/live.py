@@ -31,8 +31,8 @@ BUSY_TICK, BUSY_SECONDS = 0.01, 0.5
 PAUSE_SHARE = 0.3  # share of the time taken by an update that is left to the window before the next poll
 EVENTS = {  # Blender's handler -> the watcher's callback, and how many of Blender's arguments it gets
     "depsgraph_update_post": ("changed", 2), "frame_change_pre": ("framing", 1), "frame_change_post": ("framed", 1),
-    "undo_post": ("restored", 0),
-    "redo_post": ("restored", 0), "load_post": ("loaded", 0), "load_pre": ("closing", 0), "save_pre": ("saving", 0),
+    "undo_post": ("restored", 0), "redo_post": ("restored", 0), "load_post": ("loaded", 0), "load_pre": ("closing", 0),
+    "save_pre": ("saving", 0),
 }
 WINDOW_EVENTS = {"changed", "framing", "framed"}
 STATE_EVENTS = {"restored", "loaded"}

@@ -148,13 +148,17 @@ def update_streams(scene: bpy.types.Scene) -> list[HitMotion]:
     """
     hits = []
     for key, received in list(_streams.items()):
-        hit = call_or_describe(lambda one=received: _update_stream(scene, one),
-                               lambda reason, key=key: _give_up(key, reason),
-                               f"Stream {key[1]} has stopped because of an error")
+        hit = _call_or_stop(key, lambda one=received: _update_stream(scene, one))
         hits += [] if hit is None else [hit]
     for call in list(_on_update):
         call(scene)
     return hits
+
+
+def _call_or_stop(key: tuple[int, int], action):
+    """Call an action for a stream; an error stops the stream."""
+    return call_or_describe(action, lambda reason: _give_up(key, reason),
+                            f"Stream {key[1]} has stopped because of an error")
 
 
 def _update_stream(scene: bpy.types.Scene, received: ReceivedStream) -> HitMotion | None:
@@ -221,7 +225,8 @@ def take_strikes(scene: bpy.types.Scene) -> None:
     if not _on_frame or bpy.app.is_job_running("RENDER"):
         return
     for stream in list_received(scene):
-        _take_hit(scene, stream, _streams[get_key(stream)])
+        key = get_key(stream)
+        _call_or_stop(key, lambda stream=stream, key=key: _take_hit(scene, stream, _streams[key]))
     for call in list(_on_frame):
         call(scene)
 

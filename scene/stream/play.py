@@ -316,6 +316,7 @@ def _apply_pass(scene, piece: LivePass, hit: HitMotion | None = None, seconds: f
     the update that follows does it.
     """
     background.cancel_jobs("live")  # planning in a thread would slow down the writing
+    _session.pop("job", None)
     begin, delay = _find_beginning(scene, seconds)
     next_rally = get_current_rally().add_pass(piece, begin)
     if not _session["keys"].replace_pass(scene, next_rally, piece.motions, begin):
