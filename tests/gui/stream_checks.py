@@ -218,6 +218,12 @@ def find_changed_frame(before, after):
     return before[0] + int(np.argmin(same))
 
 
+def players_stand():
+    """Whether the last pass is over and all of it is in the keys."""
+    play = import_module("scene.stream.play")
+    return play.compute_rally_seconds(get_scene()) > get_rally().ready_time and not play._session["unwritten"]
+
+
 def measure_answer(port, label):
     """Stream a clip with a strike to a port; say when its answer begins. In the scene that is the same however slowly
     the view is drawn."""
@@ -225,8 +231,7 @@ def measure_answer(port, label):
     target = import_module("scene.stream.play").find_target(get_scene())
     request = ahead.request_for(find_streamed_hit(), target, 0)
     yield from wait_until(lambda: ahead.find(request) is not None, what="the answer is planned ahead")
-    yield from wait_until(lambda: import_module("scene.stream.play").compute_rally_seconds(get_scene())
-                          > get_rally().ready_time and not import_module("scene.stream.play")._session["unwritten"])
+    yield from wait_until(players_stand)
     names = get_rally().holder, target
     before = [read_keys(name) for name in names]
     with AnswerTimes(port) as noted:
@@ -298,18 +303,21 @@ def show_small_wireframe():
 
 
 def select_within_a_pass():
-    """While a pass is played, select all with a key: the step of undo that it makes has the players' whole motion."""
+    """While a pass is played, select all: the step of undo that it makes has the players' whole motion."""
+    yield from wait_until(players_stand)
+    bpy.ops.screen.animation_cancel(restore_frame=False)  # else a slow machine may be past the pass already
     passes, names = get_rally().passes, [row.name for row in get_scene().beyond_mocap_passes.players]
     end = start_sending(KICK, False)
     try:
         yield from wait_until(lambda: get_rally().passes > passes, 60.0)
     finally:
         end()
-    assert import_module("scene.stream.play")._session["unwritten"]
+    assert not players_stand()
     before = {name: read_keys(name) for name in names}
     assert {first for first, _ in before.values()} == {get_scene().beyond_mocap_passes.start_frame}
     run_operator("object.select_all", action="SELECT")
-    yield from wait_until(lambda: not import_module("scene.stream.play")._session["unwritten"], 60.0)
+    bpy.ops.screen.animation_play()
+    yield from wait_until(players_stand, 60.0)
     run_operator("ed.undo")  # what was written then
     yield 0.5
     for name in names:
