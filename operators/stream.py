@@ -5,6 +5,7 @@ from bpy.props import EnumProperty, FloatProperty, IntProperty, StringProperty
 
 from ..beyond_mocap.base.errors import InputError
 from ..beyond_mocap.passes.stream import live_hits
+from ..scene.core.measure import frames_per_second
 from ..scene.passes import generate as make
 from ..scene.passes.settings import find_armature
 from ..scene.stream import follow, play, streamed_body
@@ -144,8 +145,8 @@ motion of the library, to the player chosen with keys 1 to 9 or a click"""
         """Collect the order of the scene, the holder of the ball and the rally's time."""
         holder = self.holder or context.scene.beyond_mocap_passes.players[0].name
         play.check_players(context.scene)
-        return (make.build_order(context.scene), holder, play.compute_rally_seconds(context.scene),
-                play.find_main_stream(context.scene, holder).part)
+        clock = play.compute_rally_seconds(context.scene), frames_per_second(context.scene)
+        return make.build_order(context.scene), holder, clock, play.find_main_stream(context.scene, holder).part
 
     @staticmethod
     def run_job(order, progress, cancelled, _hurry):

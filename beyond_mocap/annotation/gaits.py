@@ -131,17 +131,38 @@ def compute_heading_offset(track: SampledTrack) -> np.ndarray:
     """
     if track.heading is not None:
         return quaternion.wrap_angle(track.heading - track.direction)
+    to_ball, share = _compute_ball_direction(track)
+    offset = np.where(np.isfinite(to_ball), quaternion.wrap_angle(to_ball - track.direction), 0.0) * share
+    limit = np.interp(track.speed, _SPEEDS, _MAX_OFFSETS)
+    offset = np.clip(offset, -limit, limit)
+    smoothed = smooth_zero_phase_hann(np.stack([np.cos(offset), np.sin(offset)], axis=1), track.fps, _WINDOW)
+    return arctan2(smoothed[:, 1], smoothed[:, 0])
+
+
+def compute_standing_heading(track: SampledTrack) -> tuple[np.ndarray, np.ndarray]:
+    """Compute the heading of one who stands and watches the ball, and how much they turn to it: not at all where it is
+    unknown or at their feet.
+
+    Args:
+        track: the player's track with the ball, T frames.
+    Returns:
+        (T,) radians, world, and (T,) shares from 0 to 1.
+    """
+    to_ball, share = _compute_ball_direction(track)
+    to_ball = np.where(share > 0.0, to_ball, 0.0)
+    x, y = smooth_zero_phase_hann(share[:, None] * np.stack([np.cos(to_ball), np.sin(to_ball)], axis=1), track.fps,
+                                  _WINDOW).T
+    return arctan2(y, x), np.hypot(x, y)
+
+
+def _compute_ball_direction(track: SampledTrack) -> tuple[np.ndarray, np.ndarray]:
+    """Compute the direction (T,) rad from a player to the ball, and the share (T,) of it that the body turns to."""
     ball_offset = track.ball[:, :2] - track.positions
     known = np.isfinite(ball_offset).all(axis=1)
     distance = np.linalg.norm(np.where(known[:, None], ball_offset, 1.0), axis=1)
     share = np.where(known, np.clip((distance - _FACING_DISTANCES[0]) / (_FACING_DISTANCES[1] - _FACING_DISTANCES[0]),
                                     0.0, 1.0), 0.0)
-    to_ball = arctan2(ball_offset[:, 1], ball_offset[:, 0])
-    offset = np.where(known, quaternion.wrap_angle(to_ball - track.direction), 0.0) * share
-    limit = np.interp(track.speed, _SPEEDS, _MAX_OFFSETS)
-    offset = np.clip(offset, -limit, limit)
-    smoothed = smooth_zero_phase_hann(np.stack([np.cos(offset), np.sin(offset)], axis=1), track.fps, _WINDOW)
-    return arctan2(smoothed[:, 1], smoothed[:, 0])
+    return arctan2(ball_offset[:, 1], ball_offset[:, 0]), share
 
 
 def choose_directions(offset: np.ndarray, fps: float) -> list[str]:

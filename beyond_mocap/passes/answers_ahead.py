@@ -18,7 +18,7 @@ from .live_passes import LivePass, Rally
 from .strike_means import StrikeMeans
 
 MOST_ANSWERS = 24
-"""Most answers that are planned ahead for one state of a rally, about a quarter of a megabyte each."""
+"""Most answers that are planned ahead for one state of a rally, about three megabytes each."""
 _STRIKES_IN_TURN = 4  # likeliest strikes that are planned for each receiver before others are
 
 

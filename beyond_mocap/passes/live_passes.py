@@ -22,7 +22,7 @@ from ..base.time_series import interpolate_columns
 from ..library.library import Library
 from ..motion import quaternion
 from ..motion.humanoid import compute_heading
-from ..motion.motion import Motion
+from ..motion.motion import Motion, resample
 from ..motion.track.ball_path import BallPath
 from .hit_library import classify_hit
 from .hits import HitMotion
@@ -58,6 +58,11 @@ class PlayerTimeline:
     start: float
     motion: Motion
 
+    @property
+    def end(self) -> float:
+        """s on the scene's clock of the motion's last frame."""
+        return self.start + self.motion.duration
+
     def stance_at(self, seconds: float) -> Stance:
         """Compute where the player stands at `seconds` on the scene's clock."""
         frame = int(np.clip(round((seconds - self.start) * self.motion.fps), 0, len(self.motion) - 1))
@@ -74,6 +79,7 @@ class Rally:
         holder: name of the player who has the ball.
         players: name -> motion up to now and from now on.
         ball: its path on the scene's clock.
+        rate: frames per second of the motions; a pass begins on one of these frames.
         start: s at which the rally began.
         ready_time: s from which on the holder can act.
         passes: number of passes played.
@@ -83,6 +89,7 @@ class Rally:
     holder: str
     players: dict[str, PlayerTimeline]
     ball: BallPath
+    rate: float
     start: float
     ready_time: float
     passes: int = 0
@@ -92,8 +99,23 @@ class Rally:
         """Where each player stands once they have come to rest after the last pass."""
         return {name: played.stance_at(self.ready_time + _SETTLING_SECONDS) for name, played in self.players.items()}
 
+    @property
+    def end(self) -> float:
+        """s on the scene's clock until which all players and the ball go on."""
+        return min(float(self.ball.times[-1]), *(played.end for played in self.players.values()))
+
+    def keep_standing(self) -> Rally:
+        """Build the rally in which all go on for STANDING_SECONDS longer, standing, and the ball lies."""
+        players = {name: PlayerTimeline(played.start, _extend_standing(played.motion, _SWAY, self.rate))
+                   for name, played in self.players.items()}
+        return replace(self, players=players, ball=_extend_lying(self.ball))
+
+    def find_frame(self, at: float) -> float:
+        """Find the time in s of the first frame from `at` s on."""
+        return float(self.start + np.ceil((at - self.start) * self.rate - 1e-6) / self.rate)
+
     def add_pass(self, live_pass: LivePass, at: float) -> Rally:
-        """Build the rally with a pass that begins on the next frame after `at` s.
+        """Build the rally with a pass that begins on the first frame from `at` s on.
 
         Args:
             live_pass: the pass.
@@ -101,10 +123,10 @@ class Rally:
         Returns:
             The rally: both players' motions blend into the pass, everything before it stays.
         """
-        at = self.start + np.ceil((at - self.start) * self.scene.fps - 1e-6) / self.scene.fps
+        at = self.find_frame(at)
         players = dict(self.players)
         for name, motion in live_pass.motions.items():
-            players[name] = _continue_motion(self.players[name], _extend_standing(motion, _SWAY), at)
+            players[name] = _continue_motion(self.players[name], motion, at)
         ball = _continue_ball(self.ball, live_pass.ball, at, min(BLEND_SECONDS, live_pass.strike))
         return replace(self, holder=live_pass.receiver, players=players, ball=ball, ready_time=at + live_pass.seconds,
                        passes=self.passes + 1)
@@ -117,7 +139,7 @@ class LivePass:
     Attributes:
         giver: name of the player who passes.
         receiver: name.
-        motions: name -> motion, of passer and receiver; each ends standing.
+        motions: name -> motion, of passer and receiver, at the rally's rate; each ends standing for STANDING_SECONDS.
         ball: its path.
         strike: s of the passer's strike.
         seconds: s until the receiver can act.
@@ -135,8 +157,8 @@ class LivePass:
     warnings: tuple[str, ...]
 
 
-def start_rally(library: Library, scene: PassScene, holder: str, start: float = 0.0, progress=None,
-                cancelled=None) -> Rally:
+def start_rally(library: Library, scene: PassScene, holder: str, start: float = 0.0, rate: float | None = None,
+                *, progress=None, cancelled=None) -> Rally:
     """Start a rally: all players stand where the scene says, the ball is in front of the holder.
 
     Args:
@@ -144,6 +166,7 @@ def start_rally(library: Library, scene: PassScene, holder: str, start: float = 
         scene: the passing scene.
         holder: name of the player who has the ball.
         start: s on the scene's clock.
+        rate: frames per second of the motions; None: the scene's.
         progress: receives the share of the work done and a short text.
         cancelled: whether to stop.
     Returns:
@@ -159,16 +182,16 @@ def start_rally(library: Library, scene: PassScene, holder: str, start: float = 
                            radius])
     times = np.arange(int(_START_TAIL * scene.fps) + 1) / scene.fps
     ball = BallPath(times, np.tile(ball_place, (len(times), 1)), np.ones(len(times), bool))
-    players = {}
+    players, rate = {}, rate or scene.fps
     for number, player in enumerate(scene.players):
         if progress:
             progress(number / len(names), f"{player.name} standing")
         stance = Stance(player.place, scene.find_facing(player.name))
         player_motion = build_player_motion(library, stance, (), ball=ball, ball_radius=radius, fps=scene.fps,
                                             settings=_build_settings(scene), cancelled=cancelled)
-        players[player.name] = PlayerTimeline(start, _extend_standing(player_motion.take.motion, _START_SWAY))
-    return Rally(scene=scene, holder=holder, players=players, ball=_continue_ball(None, ball, start, 0.0), start=start,
-                 ready_time=start)
+        players[player.name] = PlayerTimeline(start, _extend_standing(player_motion.take.motion, _START_SWAY, rate))
+    return Rally(scene=scene, holder=holder, players=players, ball=_continue_ball(None, ball, start, 0.0), rate=rate,
+                 start=start, ready_time=start)
 
 
 def collect_means(library: Library, scene: PassScene) -> StrikeMeans:
@@ -219,7 +242,7 @@ def build_answer(library: Library, rally: Rally, hit: HitMotion, target: str, bo
         player_motion = build_player_motion(library, stances[name], plan.list_orders(name), ball=path,
                                             ball_radius=build_ball(scene).radius, fps=scene.fps,
                                             settings=_build_settings(scene), cancelled=cancelled)
-        motions[name] = player_motion.take.motion
+        motions[name] = _extend_standing(player_motion.take.motion, _SWAY, rally.rate)
     strikes = plan.strikes
     clip = library.clips[strikes[0].order.clip].path
     seconds = strikes[-1].order.time + _READY_SECONDS
@@ -264,8 +287,11 @@ def _roll_ball(path: BallPath, ball_place: np.ndarray, strike: float) -> np.ndar
     return path.positions + (1.0 - smoothstep(path.times / max(strike, 1e-6)))[:, None] * offset
 
 
-def _extend_standing(motion: Motion, sway_seconds: float) -> Motion:
-    """Extend a motion that ends standing by STANDING_SECONDS, playing its last `sway_seconds` forward and backward."""
+def _extend_standing(motion: Motion, sway_seconds: float, rate: float) -> Motion:
+    """Extend a motion that ends standing by STANDING_SECONDS at `rate` frames per second, playing its last
+    `sway_seconds` forward and backward.
+    """
+    motion = resample(motion, rate)
     count = len(motion)
     sway = min(int(sway_seconds * motion.fps), count - 1)
     # a triangle wave over the last `sway` frames
@@ -300,15 +326,11 @@ def _continue_ball(before: BallPath | None, path: BallPath, at: float, blend: fl
     """Join the ball's path so far with `path` from `at` s on, blended in over `blend` s; then let it lie for
     STANDING_SECONDS.
     """
-    step = path.times[1] - path.times[0]
-    added = int(round(STANDING_SECONDS / step))
-    times = np.concatenate([path.times, path.times[-1] + step * np.arange(1, added + 1)]) + at
-    places = np.concatenate([path.positions, np.repeat(path.positions[-1:], added, axis=0)])
-    rotations = path.rotations if path.rotations is not None else quaternion.identity(len(path.times))
-    rotations = np.concatenate([rotations, np.repeat(rotations[-1:], added, axis=0)])
+    path = _extend_lying(path)
+    times, places, rotations = path.times + at, path.positions, path.rotations
     if before is None:
-        return BallPath(times, places, np.ones(len(times), bool), rotations)
-    is_before = before.times < at - 0.5 * step
+        return replace(path, times=times)
+    is_before = before.times < at - 0.5 * (times[1] - times[0])
     # it may still roll out from the pass before
     weight = 1.0 - smoothstep((times - at) / max(blend, 1e-6))[:, None]
     places = places + weight * (interpolate_columns(times, before.times, before.positions) - places)
@@ -318,3 +340,13 @@ def _continue_ball(before: BallPath | None, path: BallPath, at: float, blend: fl
                     np.concatenate([before.positions[is_before], places]),
                     np.ones(int(is_before.sum()) + len(times), bool),
                     np.concatenate([before.rotations[is_before], rotations]))
+
+
+def _extend_lying(path: BallPath) -> BallPath:
+    """Let the ball of a path lie at its end for STANDING_SECONDS."""
+    step = path.times[1] - path.times[0]
+    added = int(round(STANDING_SECONDS / step))
+    times = np.concatenate([path.times, path.times[-1] + step * np.arange(1, added + 1)])
+    rotations = path.rotations if path.rotations is not None else quaternion.identity(len(path.times))
+    return BallPath(times, np.concatenate([path.positions, np.repeat(path.positions[-1:], added, axis=0)]),
+                    np.ones(len(times), bool), np.concatenate([rotations, np.repeat(rotations[-1:], added, axis=0)]))

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..annotation import Timeline, choose_gaits
-from ..annotation.gaits import STANDING, compute_heading_offset
+from ..annotation.gaits import STANDING, compute_standing_heading
 from ..annotation.striking import BODY_PARTS
 from ..annotation.timeline import KeyMoment
 from ..ball.contact import find_striking_surface
@@ -282,8 +282,8 @@ class _PlayerBuilder:
                   for speed in (track.speed, own_speed)]
         moving_weight = moving[0] ** 2 * moving[1] ** 2
         travel = track.direction - arctan2(source.velocity[:, 1], source.velocity[:, 0])
-        watch = track.direction + compute_heading_offset(track)
-        weights = np.stack([moving_weight, _WATCH_WEIGHT * np.clip(1.0 - track.speed, 0.0, 1.0) ** 2])
+        watch, share = compute_standing_heading(track)
+        weights = np.stack([moving_weight, _WATCH_WEIGHT * share * np.clip(1.0 - track.speed, 0.0, 1.0) ** 2])
         # both goals as the nearest angle to the rough heading, so that no weighted mean turns past half a turn
         goals = rough + quaternion.wrap_angle(np.stack([travel, watch]) - rough)
         trust = weights.sum(axis=0) + 1e-6

@@ -6,6 +6,8 @@ B^-1. Where the armature object is rotated by O in the scene, the root includes 
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import bpy
 import numpy as np
 
@@ -20,6 +22,48 @@ from .measure import frames_per_second, whole_frames
 PLACEMENT = "beyond_mocap_placement"
 """Custom property of an action: the 16 numbers of the armature's matrix when the motion was written, so that overlays
 follow the body when it is moved."""
+
+
+@dataclass(frozen=True, eq=False)
+class RestPose:
+    """What turns a motion into the keys of an armature; once it is read, no bpy is needed.
+
+    Attributes:
+        names: joints, the root first.
+        paths: data path of the root's location, then of each joint's rotation.
+        placement: of the armature in the scene.
+        rotations: (J, 4) at rest, in the armature's space.
+        head: (3,) of the root's bone, in the armature's space.
+    """
+
+    names: tuple[str, ...]
+    paths: tuple[str, ...]
+    placement: armature.Placement
+    rotations: np.ndarray
+    head: np.ndarray
+
+    @staticmethod
+    def from_body(body: bpy.types.Object, names: tuple[str, ...], placement: armature.Placement) -> RestPose:
+        """Read the rest pose of an armature that has a bone for every name."""
+        paths = (_build_path(names[0], "location"), *(_build_path(name, "rotation_quaternion") for name in names))
+        return RestPose(names, paths, placement, armature.compute_rest_rotations(body, names),
+                        np.array(body.data.bones[names[0]].head_local))
+
+    def build_curves(self, root: np.ndarray, rotations: np.ndarray) -> dict[str, tuple[str, np.ndarray]]:
+        """Build the values of every curve, as `channels.create_action` takes them.
+
+        Args:
+            root: (F, 3) m, world.
+            rotations: (F, J, 4) local rotations.
+        Returns:
+            Data path -> (bone, values (F, n)).
+        """
+        rest, local = self.rotations, rotations.copy()
+        local[:, 0] = quaternion.multiply(quaternion.inverse(self.placement.rotation), local[:, 0])
+        pose = quaternion.unify_signs(quaternion.multiply(quaternion.inverse(rest), quaternion.multiply(local, rest)))
+        location = quaternion.rotate(quaternion.inverse(rest[0]), self.placement.to_armature(root) - self.head)
+        values = (location, *np.moveaxis(pose, 1, 0))
+        return dict(zip(self.paths, zip((self.names[0], *self.names), values)))
 
 
 def write_motion(body: bpy.types.Object, motion: Motion, scene: bpy.types.Scene, start: float | None = None,
@@ -64,18 +108,10 @@ def build_keys(body: bpy.types.Object, motion: Motion, scene: bpy.types.Scene, s
     start = float(scene.frame_start) if start is None else start
     frames = whole_frames(start, motion.duration, fps)
     root, rotations = sample_frames(motion, (frames - start) * (motion.fps / fps))
-    placement, rest = armature.find_placement(body, scene), armature.compute_rest_rotations(body, motion.skeleton.names)
-    rotations[:, 0] = quaternion.multiply(quaternion.inverse(placement.rotation), rotations[:, 0])
-    pose = quaternion.multiply(quaternion.inverse(rest), quaternion.multiply(rotations, rest))
-    pose = quaternion.unify_signs(pose)
-    root_bone = body.data.bones[motion.skeleton.names[0]]
-    shift = placement.to_armature(root) - np.array(root_bone.head_local)
-    location = quaternion.rotate(quaternion.inverse(rest[0]), shift)
-    curves = {_build_path(root_bone.name, "location"): (root_bone.name, location)}
-    for joint, bone in enumerate(motion.skeleton.names):
+    rest = RestPose.from_body(body, motion.skeleton.names, armature.find_placement(body, scene))
+    for bone in motion.skeleton.names:
         body.pose.bones[bone].rotation_mode = "QUATERNION"
-        curves[_build_path(bone, "rotation_quaternion")] = (bone, pose[:, joint])
-    return frames, curves
+    return frames, rest.build_curves(root, rotations)
 
 
 def read_motion(body: bpy.types.Object, scene: bpy.types.Scene, action: bpy.types.Action | None = None,

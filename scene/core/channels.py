@@ -84,6 +84,59 @@ def replace_keys(target: bpy.types.Object, frames: np.ndarray, channels: dict[st
             curve.update()
 
 
+class WrittenKeys:
+    """The keys that an action has on every frame, kept so that those from some frame on can be replaced quickly.
+
+    Nothing is read then, and neither action nor slot change, after which Blender sorts out anew what depends on what.
+
+    Args:
+        target: the object that plays the action; all curves have keys on the same frames.
+    """
+
+    def __init__(self, target: bpy.types.Object):
+        action, slot = find_playing_action(target)
+        self._action = action.session_uid
+        self._places: dict[tuple[str, int], np.ndarray] = {}
+        for key, curve in collect_curves(action, slot).items():
+            self._places[key] = np.empty(2 * len(curve.keyframe_points), np.float32)
+            curve.keyframe_points.foreach_get("co", self._places[key])
+        self._frames = next(iter(self._places.values()))[::2].copy()
+
+    def replace(self, target: bpy.types.Object, first: float, channels: dict[str, tuple[str, np.ndarray]]) -> bool:
+        """Replace the keys from a frame on; after the last value they hold it. Handles are left as they are.
+
+        Args:
+            target: the object.
+            first: the frame.
+            channels: as `create_action`, all of the action's curves, values (F, n) for F frames.
+        Returns:
+            Whether it was possible: not after the keys have been changed by others, nor without a key on each frame.
+        """
+        action, slot = find_playing_action(target)
+        if action is None or action.session_uid != self._action:
+            return False
+        found, column = collect_curves(action, slot), int(np.searchsorted(self._frames, first - 1e-3))
+        count = len(next(iter(channels.values()))[1])
+        if column + count > len(self._frames) or abs(self._frames[column] - first) > 1e-3:
+            return False
+        if found.keys() != self._places.keys() or any(2 * len(curve.keyframe_points) != len(self._places[key])
+                                                      for key, curve in found.items()):
+            return False
+        for path, (_, values) in channels.items():
+            self._set_values(path, column, values)
+        for key, curve in found.items():
+            curve.keyframe_points.foreach_set("co", self._places[key])
+        curve.update()  # one of them tells Blender
+        return True
+
+    def _set_values(self, path: str, column: int, values: np.ndarray) -> None:
+        """Set the values (F, n) of a property from a column on; rotations get the sign that is near the key there."""
+        rows = [self._places[path, index][2 * column + 1 :: 2] for index in range(values.shape[1])]
+        away = path.endswith("rotation_quaternion") and np.dot([row[0] for row in rows], values[0]) < 0.0
+        for row, new in zip(rows, -values.T if away else values.T):
+            row[: len(new)], row[len(new) :] = new, new[-1]
+
+
 def check_editable(target: bpy.types.ID) -> None:
     """Raise InputError while an NLA strip is in tweak mode: Blender does not allow a change of the action then."""
     data = target.animation_data

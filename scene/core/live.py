@@ -30,10 +30,11 @@ DRAG_OPERATORS = ("TRANSFORM_OT", "CURVE_OT", "VIEW3D_OT_cursor3d")  # operators
 BUSY_TICK, BUSY_SECONDS = 0.01, 0.5
 PAUSE_SHARE = 0.3  # share of the time taken by an update that is left to the window before the next poll
 EVENTS = {  # Blender's handler -> the watcher's callback, and how many of Blender's arguments it gets
-    "depsgraph_update_post": ("changed", 2), "frame_change_post": ("framed", 1), "undo_post": ("restored", 0),
-    "redo_post": ("restored", 0), "load_post": ("loaded", 0), "load_pre": ("closing", 0), "save_pre": ("saving", 0),
+    "depsgraph_update_post": ("changed", 2), "frame_change_pre": ("framing", 1), "frame_change_post": ("framed", 1),
+    "undo_post": ("restored", 0), "redo_post": ("restored", 0), "load_post": ("loaded", 0), "load_pre": ("closing", 0),
+    "save_pre": ("saving", 0),
 }
-WINDOW_EVENTS = {"changed", "framed"}
+WINDOW_EVENTS = {"changed", "framing", "framed"}
 STATE_EVENTS = {"restored", "loaded"}
 
 _watchers: list[Watcher] = []
@@ -52,6 +53,7 @@ class Watcher:
         name: shown to the user if it fails.
         watched_types: types of data; a change of such data marks the watcher.
         changed: (scene, depsgraph), after each change; only with a window.
+        framing: (scene), after each change of frame and before it is evaluated; only with a window.
         framed: (scene), after each change of frame; only with a window.
         restored: after undo or redo, which also marks the watcher, as does opening a file.
         loaded: after a file was opened.
@@ -71,6 +73,7 @@ class Watcher:
     name: str
     watched_types: tuple[type, ...] = ()
     changed: Callable[[bpy.types.Scene, bpy.types.Depsgraph], None] | None = None
+    framing: Callable[[bpy.types.Scene], None] | None = None
     framed: Callable[[bpy.types.Scene], None] | None = None
     restored: Callable[[], None] | None = None
     loaded: Callable[[], None] | None = None

@@ -134,18 +134,26 @@ def write_trajectory(ball: bpy.types.Object, path: BallPath, scene: bpy.types.Sc
     Returns:
         The action.
     """
+    action = channels.create_action(ball, f"{ball.name} path", *build_keys(ball, path, scene, start))
+    action[ROLLS] = path.rotations is None
+    return action
+
+
+def build_keys(ball: bpy.types.Object, path: BallPath, scene: bpy.types.Scene, start: float):
+    """Build the keys that `write_trajectory` writes, as `channels.create_action` takes them.
+
+    Returns:
+        Whole scene frames (F,), and the values of every curve.
+    """
     fps = frames_per_second(scene)
     seconds = path.times - path.times[0]
     frames = whole_frames(start, float(seconds[-1]), fps)
     at = (frames - start) / fps
     places = interpolate_columns(at, *_hold_unknown(seconds, path.positions))
     group = "Object Transforms"
-    curves = {"location": (group, places * units_per_metre(scene)),
-              "rotation_quaternion": (group, compute_roll(places, find_rolling_radius(ball, scene))
-                                      if path.rotations is None else _sample_rotations(path, at))}
-    action = channels.create_action(ball, f"{ball.name} path", frames, curves)
-    action[ROLLS] = path.rotations is None
-    return action
+    return frames, {"location": (group, places * units_per_metre(scene)),
+                    "rotation_quaternion": (group, compute_roll(places, find_rolling_radius(ball, scene))
+                                            if path.rotations is None else _sample_rotations(path, at))}
 
 
 def find_rolling_radius(ball: bpy.types.Object, scene: bpy.types.Scene) -> float:

@@ -1,6 +1,7 @@
 """The streams that are received, and the armatures that follow their users.
 
-A timer updates them where there is a window; scripts call `update_streams`. What arrives changes nothing but the pose
+A timer updates them where there is a window; scripts call `update_streams`. Strikes are detected in a thread for each
+stream, and also taken before each frame of a playback is evaluated. What arrives changes nothing but the pose
 of each stream's character, which is created with the first frame. The user starts and stops each stream; all stop when
 a file is loaded or the extension is disabled, and one that an undo has removed stops as well.
 """
@@ -29,7 +30,7 @@ if TYPE_CHECKING:
     from .settings import StreamSettings, StreamStatus
 
 TICK, IDLE = 1.0 / 60.0, 0.25  # s between two timer calls, with and without a stream
-STATUS_SECONDS, DETECT_SECONDS = 0.25, 0.05  # s between two status updates, and two hit detections
+STATUS_SECONDS = 0.25  # s between two status updates
 MOST_BODIES = 20  # characters created in one stream: a sender that keeps changing its skeleton is stopped
 
 
@@ -42,7 +43,6 @@ class ReceivedStream:
         listener: receives its frames.
         hits: detects strikes in them.
         seen: number of the last frame that was shown.
-        looked: s of the last hit detection, monotonic clock.
         written: number of the quarter second of the last status update, so that all streams share one redraw.
         bodies: characters created.
         latencies: s from sender to pose, of the last frames.
@@ -52,7 +52,6 @@ class ReceivedStream:
     listener: listening.Listener
     hits: live_hits.LiveHits
     seen: int = 0
-    looked: float = 0.0
     written: int = 0
     bodies: int = 0
     latencies: deque[float] = field(default_factory=lambda: deque(maxlen=60))
@@ -61,6 +60,7 @@ class ReceivedStream:
 _streams: dict[tuple[int, int], ReceivedStream] = {}
 _on_hit: list = []
 _on_update: list = []
+_on_frame: list = []
 
 
 def add_hit_call(call) -> None:
@@ -73,9 +73,14 @@ def add_update_call(call) -> None:
     _on_update.append(call)
 
 
+def add_frame_call(call) -> None:
+    """Call `call(scene)` after each change of frame, before it is evaluated, until `remove_call`."""
+    _on_frame.append(call)
+
+
 def remove_call(call) -> None:
     """Stop calling `call`."""
-    for calls in (_on_hit, _on_update):
+    for calls in (_on_hit, _on_update, _on_frame):
         if call in calls:
             calls.remove(call)
 
@@ -94,7 +99,7 @@ def start_listening(stream: StreamSettings) -> listening.Listener:
     hits = live_hits.LiveHits(one, stream.part, "" if stream.side == "either" else stream.side,
                               stream.threshold or None)
     key = get_key(stream)
-    _streams[key] = ReceivedStream(key=key, listener=one, hits=hits)
+    _streams[key] = ReceivedStream(key=key, listener=one, hits=hits.start())
     write_status(key)
     return one
 
@@ -143,13 +148,17 @@ def update_streams(scene: bpy.types.Scene) -> list[HitMotion]:
     """
     hits = []
     for key, received in list(_streams.items()):
-        hit = call_or_describe(lambda one=received: _update_stream(scene, one),
-                               lambda reason, key=key: _give_up(key, reason),
-                               f"Stream {key[1]} has stopped because of an error")
+        hit = _call_or_stop(key, lambda one=received: _update_stream(scene, one))
         hits += [] if hit is None else [hit]
     for call in list(_on_update):
         call(scene)
     return hits
+
+
+def _call_or_stop(key: tuple[int, int], action):
+    """Call an action for a stream; an error stops the stream."""
+    return call_or_describe(action, lambda reason: _give_up(key, reason),
+                            f"Stream {key[1]} has stopped because of an error")
 
 
 def _update_stream(scene: bpy.types.Scene, received: ReceivedStream) -> HitMotion | None:
@@ -163,10 +172,7 @@ def _update_stream(scene: bpy.types.Scene, received: ReceivedStream) -> HitMotio
         received.seen = latest.number
         if _show_frame(scene, stream, received, latest):
             received.latencies.append(time.monotonic() - (latest.time if latest.sent is None else latest.sent))
-    found = None
-    if now - received.looked >= DETECT_SECONDS:
-        received.looked = now
-        found = _detect_hit(scene, find_stream(scene, number), received)
+    found = _take_hit(scene, find_stream(scene, number), received)
     if int(now / STATUS_SECONDS) != received.written:
         received.written = int(now / STATUS_SECONDS)
         write_status(received.key)
@@ -197,10 +203,10 @@ def _show_frame(scene, stream: StreamSettings, received: ReceivedStream, latest)
     return can_show
 
 
-def _detect_hit(scene, stream: StreamSettings, received: ReceivedStream) -> HitMotion | None:
-    """Detect a strike, show it in the panel and pass it on."""
+def _take_hit(scene, stream: StreamSettings, received: ReceivedStream) -> HitMotion | None:
+    """Take a strike that has been detected, show it in the panel and pass it on."""
     try:
-        found = received.hits.find_new_hit()
+        found = received.hits.take_hit()
     except BeyondMocapError as error:
         find_status(received.key).hit = str(error)
         return None
@@ -212,6 +218,17 @@ def _detect_hit(scene, stream: StreamSettings, received: ReceivedStream) -> HitM
     for call in list(_on_hit):
         call(scene, stream, hit, seconds)
     return hit
+
+
+def take_strikes(scene: bpy.types.Scene) -> None:
+    """Pass on the strikes that have been detected, before a frame is evaluated: it already shows what answers them."""
+    if not _on_frame or bpy.app.is_job_running("RENDER"):
+        return
+    for stream in list_received(scene):
+        key = get_key(stream)
+        _call_or_stop(key, lambda stream=stream, key=key: _take_hit(scene, stream, _streams[key]))
+    for call in list(_on_frame):
+        call(scene)
 
 
 def write_status(key: tuple[int, int]) -> None:
@@ -290,6 +307,8 @@ def _end_session() -> None:
     stop_listening()
     _on_hit.clear()
     _on_update.clear()
+    _on_frame.clear()
 
 
-WATCHER = Watcher(name="Stream", look=_run_timer, restored=_stop_removed, closing=stop_listening, ends=_end_session)
+WATCHER = Watcher(name="Stream", look=_run_timer, framing=take_strikes, restored=_stop_removed, closing=stop_listening,
+                  ends=_end_session)

@@ -8,34 +8,32 @@ and the ball are those of the passing scene.
 
 from __future__ import annotations
 
+import math
 import time
-from collections.abc import Iterable
-from dataclasses import dataclass, replace
-from types import SimpleNamespace
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import bpy
-import numpy as np
 
 from ...beyond_mocap.base.errors import BeyondMocapError, InputError, UserCancelledError
 from ...beyond_mocap.base.fixes import Fix
-from ..core import action, background, channels, frame_range
-from ..core.live import Watcher, call_or_describe
+from ..core import action, background
+from ..core.live import Watcher, call_or_describe, is_playing
 from ..core.measure import frames_per_second
 from ..passes import generate as make
 from ..passes.settings import PLAYED
-from . import follow
+from . import follow, rally_keys
 
 if TYPE_CHECKING:
     from ...beyond_mocap.library.library import Library
     from ...beyond_mocap.passes.answers_ahead import AnswerRequest
     from ...beyond_mocap.passes.hits import HitMotion
-    from ...beyond_mocap.passes.live_passes import LivePass, PlayerTimeline, Rally
+    from ...beyond_mocap.passes.live_passes import LivePass, Rally
     from ...beyond_mocap.passes.strike_means import StrikeMeans
     from .settings import StreamSettings
 
-FIRST_SECONDS = (1.0, 3.0)
-"""Seconds before a pass and of standing after it that are written with it; the rest follows when its players stand."""
+LEFT_SECONDS = 20.0
+"""Seconds before somebody's standing ends at which it is continued."""
 
 _session: dict[str, object] = {}
 
@@ -57,9 +55,10 @@ class NewRally:
     rally: Rally
 
 
-def start_rally(order: make.Order, holder: str, start: float, part: str, progress, cancelled) -> NewRally:
-    """Build the library if it is not loaded, find its strikes with `part`, and start a rally with all players standing.
-    Does not use bpy.
+def start_rally(order: make.Order, holder: str, clock: tuple[float, float], part: str, progress,
+                cancelled) -> NewRally:
+    """Build the library if it is not loaded, find its strikes with `part`, and start a rally with all players standing,
+    on a `clock` of seconds now and frames per second. Does not use bpy.
     """
     from ...beyond_mocap.library.build import build_library
     from ...beyond_mocap.passes import live_passes
@@ -67,7 +66,7 @@ def start_rally(order: make.Order, holder: str, start: float, part: str, progres
     library = order.library
     if library is None:
         library = build_library(order.folder, unit=order.unit, **order.build, progress=progress, cancelled=cancelled)
-    rally = live_passes.start_rally(library, order.scene, holder, start=start, progress=progress, cancelled=cancelled)
+    rally = live_passes.start_rally(library, order.scene, holder, *clock, progress=progress, cancelled=cancelled)
     means = live_passes.collect_means(library, order.scene)
     means.list_likely(holder, part, "", None)
     return NewRally(order, library, means, rally)
@@ -77,14 +76,16 @@ def apply_rally(scene: bpy.types.Scene, new_rally: NewRally) -> None:
     """Apply a rally to characters and ball, and answer the user's strikes from now on."""
     stop_rally()
     make.session.store_library(new_rally.library, new_rally.order.unit)
-    _session.update(scene=scene.session_uid, means=new_rally.means, seen=None, latest={}, unwritten=set())
+    _session.update(scene=scene.session_uid, means=new_rally.means, seen=None, latest={}, unwritten=set(),
+                    keys=rally_keys.RallyKeys(), drawn=compute_rally_seconds(scene))
     _wait_for_strike(scene, new_rally.rally)
     for name in ("strikes", "figures", "messages"):
         scene.beyond_mocap_passes.property_unset(name)
     scene.beyond_mocap_passes.made_of = PLAYED
-    _apply_players(scene, new_rally.rally, [player.name for player in new_rally.rally.scene.players])
+    _session["keys"].write_all(scene, new_rally.rally, [player.name for player in new_rally.rally.scene.players])
     follow.add_hit_call(receive_strike)
     follow.add_update_call(_update_or_end)
+    follow.add_frame_call(_answer_or_end)
     _write_status()
 
 
@@ -93,6 +94,7 @@ def stop_rally() -> None:
     background.cancel_jobs("live")
     follow.remove_call(receive_strike)
     follow.remove_call(_update_or_end)
+    follow.remove_call(_answer_or_end)
     _session.clear()
 
 
@@ -109,8 +111,9 @@ def get_current_rally() -> Rally | None:
 
 
 def compute_rally_seconds(scene: bpy.types.Scene) -> float:
-    """Compute the scene's time on the rally's clock."""
-    return (scene.frame_current_final - scene.beyond_mocap_passes.start_frame) / frames_per_second(scene)
+    """Compute the time of the scene's frame on the rally's clock."""
+    frame = math.floor(scene.frame_current_final + 1e-4) - scene.beyond_mocap_passes.start_frame
+    return frame / frames_per_second(scene)
 
 
 def check_players(scene: bpy.types.Scene) -> None:
@@ -186,6 +189,21 @@ def _update_or_end(scene: bpy.types.Scene) -> None:
     call_or_describe(lambda: update_rally(scene), _end_rally, "Play Live has stopped because of an error")
 
 
+def _answer_or_end(scene: bpy.types.Scene) -> None:
+    """Answer a strike in the playback; an error ends the rally."""
+    call_or_describe(lambda: answer_in_playback(scene), _end_rally, "Play Live has stopped because of an error")
+
+
+def answer_in_playback(scene: bpy.types.Scene) -> None:
+    """Insert the answer to the user's strike, if it is planned, before a frame of the playback is evaluated."""
+    if scene.session_uid != _session.get("scene") or scene.beyond_mocap_passes.made_of != PLAYED:
+        return
+    if _session["pending"] is not None and is_playing():
+        _collect_answer()
+        _answer_strike(scene, find_target(scene), before_frame=True)
+    _session["drawn"] = compute_rally_seconds(scene)
+
+
 def update_rally(scene: bpy.types.Scene) -> None:
     """Insert the answer to the user's strike as soon as it is planned; while they have not struck, plan ahead."""
     if get_current_rally() is None or scene.session_uid != _session["scene"]:
@@ -193,6 +211,7 @@ def update_rally(scene: bpy.types.Scene) -> None:
     if scene.beyond_mocap_passes.made_of != PLAYED:
         _end_rally("The scene has been updated or cleared: press Play Live to continue")
         return
+    _session["drawn"] = compute_rally_seconds(scene)
     _update_target(scene)
     _collect_answer()
     try:
@@ -203,8 +222,11 @@ def update_rally(scene: bpy.types.Scene) -> None:
         _answer_strike(scene, target)
     elif "job" not in _session:
         _plan_ahead(scene, target)
+    if get_current_rally().end - _session["drawn"] < LEFT_SECONDS:
+        _session["rally"] = get_current_rally().keep_standing()
+        _session["unwritten"] |= {*get_current_rally().players}
     # a moment's halt is not seen when they stand
-    if _session["unwritten"] and compute_rally_seconds(scene) >= get_current_rally().ready_time:
+    if _session["unwritten"] and _session["drawn"] >= get_current_rally().ready_time:
         _write_rest(scene)
 
 
@@ -255,7 +277,7 @@ def _collect_answer() -> None:
         raise job.error
 
 
-def _answer_strike(scene, target: str) -> None:
+def _answer_strike(scene, target: str, before_frame: bool = False) -> None:
     """Plan the answer to the user's strike if it is not planned yet; insert it as soon as the holder can act."""
     hit, seconds = _session["pending"]
     try:
@@ -267,7 +289,7 @@ def _answer_strike(scene, target: str) -> None:
             _start_planning(request)
         if answer is None or compute_rally_seconds(scene) < get_current_rally().ready_time:
             return
-        _apply_pass(scene, answer, hit, seconds)
+        _apply_pass(scene, answer, hit, seconds, before_frame)
     except BeyondMocapError as error:
         _session["pending"] = None
         bpy.context.window_manager.beyond_mocap_streaming.played = str(error)
@@ -288,22 +310,45 @@ def _plan_ahead(scene, target: str) -> None:
         _start_planning(request)
 
 
-def _apply_pass(scene, piece: LivePass, hit: HitMotion | None = None, seconds: float = 0.0) -> None:
-    """Insert a pass that answers a hit into the scene from now on."""
+def _apply_pass(scene, piece: LivePass, hit: HitMotion | None = None, seconds: float = 0.0,
+                before_frame: bool = False) -> None:
+    """Insert a pass that answers a hit of `seconds` on the monotonic clock; what takes long is left out before a frame:
+    the update that follows does it.
+    """
     background.cancel_jobs("live")  # planning in a thread would slow down the writing
-    begin = max(compute_rally_seconds(scene), get_current_rally().ready_time)
-    next_rally, (before, after) = get_current_rally().add_pass(piece, begin), FIRST_SECONDS
-    _apply_players(scene, next_rally, piece.motions, begin - before, next_rally.ready_time + after)
+    _session.pop("job", None)
+    begin, delay = _find_beginning(scene, seconds)
+    next_rally = get_current_rally().add_pass(piece, begin)
+    if not _session["keys"].replace_pass(scene, next_rally, piece.motions, begin):
+        if before_frame:
+            return
+        _session["keys"].write_all(scene, next_rally, piece.motions)
     _session["latest"][find_main_stream(scene, piece.giver).number] = hit
     _wait_for_strike(scene, next_rally)
     _session["unwritten"] |= {*piece.motions}
     scene.beyond_mocap_stream.target = ""
-    _write_status(piece, time.monotonic() - seconds if seconds else None)
+    _write_status(piece, (delay, time.monotonic() - seconds) if seconds else None)
+
+
+def _find_beginning(scene, seconds: float) -> tuple[float, float]:
+    """Find when the answer to a strike begins: with the frame that was drawn last, since frames that a slow playback
+    drops can still change; but not before the strike, nor before the holder can act.
+
+    Args:
+        scene: the scene.
+        seconds: s of the strike on the monotonic clock; 0: unknown.
+    Returns:
+        s on the rally's clock, and s since the strike in the scene's time.
+    """
+    rally, now = get_current_rally(), compute_rally_seconds(scene)
+    struck = now - (time.monotonic() - seconds) if seconds else now
+    begin = rally.find_frame(max(rally.ready_time, min(now, max(struck, _session["drawn"]))))
+    return begin, begin - struck
 
 
 def _write_rest(scene) -> None:
-    """Write what came before the last passes and the standing that follows; it is one step of undo with them."""
-    _apply_players(scene, get_current_rally(), sorted(_session["unwritten"]))
+    """Write the standing that follows the last passes; it is one step of undo with them."""
+    _session["keys"].write_all(scene, get_current_rally(), sorted(_session["unwritten"]))
     _session["unwritten"] = set()
     if not bpy.app.background:
         bpy.ops.ed.undo_push(message="Live Pass")
@@ -316,32 +361,6 @@ def _wait_for_strike(scene, rally: Rally) -> None:
     latest = _session["latest"].get(find_main_stream(scene, rally.holder).number)
     _session.update(rally=rally, ahead=AnswersAhead(_session["means"], rally, latest), pending=None)
     _session.pop("job", None)
-
-
-def _apply_players(scene, one: Rally, names: Iterable[str], since: float = -np.inf, until: float = np.inf) -> None:
-    """Apply a rally's motions and its ball to the named players, from `since` to `until` s."""
-    from ...beyond_mocap.passes.passes import build_ball
-
-    # players may have been renamed or removed since the rally started
-    rows = {row.name: row for row in scene.beyond_mocap_passes.players}
-    if missing := [name for name in names if name not in rows]:
-        raise InputError("players", f"{missing[0]} is not in the list now", "the same players", "press Play Live again")
-    channels.check_local(*(rows[name].body for name in names), scene.beyond_mocap_passes.rally)
-    start = float(scene.beyond_mocap_passes.start_frame)
-    for name in names:
-        make.apply_motion(scene, rows[name], _cut_motion(one.players[name], since, until), start)
-    path, part = one.ball, slice(*np.searchsorted(one.ball.times, (since, until)))
-    path = replace(path, times=path.times[part], positions=path.positions[part], measured=path.measured[part],
-                   rotations=path.rotations[part])
-    make.apply_ball(scene, SimpleNamespace(ball=path, kind=build_ball(one.scene)), start)
-    frame_range.extend_range(scene, start + float(one.ball.times[-1]) * frames_per_second(scene))
-
-
-def _cut_motion(played: PlayerTimeline, since: float, until: float) -> SimpleNamespace:
-    """Cut a player's motion from `since` to `until` s, as `generate.apply_motion` takes it."""
-    motion = played.motion
-    first, end = (int(np.clip((seconds - played.start) * motion.fps, 0, len(motion))) for seconds in (since, until))
-    return SimpleNamespace(motion=motion.frames(first, end), start_time=played.start + first / motion.fps)
 
 
 def _update_target(scene) -> None:
@@ -365,14 +384,17 @@ def _end_rally(reason: str) -> None:
     status_texts.playing, status_texts.played = False, reason
 
 
-def _write_status(piece: LivePass | None = None, delay: float | None = None) -> None:
-    """Write the state of the rally for the panel; `delay`: s from the strike to the beginning of its answer."""
+def _write_status(piece: LivePass | None = None, delays: tuple[float, float] | None = None) -> None:
+    """Write the state of the rally for the panel; `delays`: s from the strike to the beginning of its answer in the
+    scene's time, and to its writing by the clock.
+    """
     status_texts, one = bpy.context.window_manager.beyond_mocap_streaming, get_current_rally()
     status_texts.playing = True
     lines = [f"{one.holder} has the ball, passes so far: {one.passes}"]
     if piece is not None:
         lines.append(f"{piece.giver} played {piece.clip} to {piece.receiver}")
-        lines += [] if delay is None else [f"The answer began {delay:.2f} s after the strike"]
+        if delays is not None:
+            lines.append("The answer began {:.2f} s after the strike, by the clock {:.2f} s".format(*delays))
         lines += piece.warnings[:2]
     status_texts.played = "\n".join(lines)
 

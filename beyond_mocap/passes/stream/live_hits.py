@@ -8,6 +8,10 @@ that rises late, is reported when it is over.
 
 from __future__ import annotations
 
+import queue
+import threading
+import time
+
 import numpy as np
 
 from ...ball.contact import Tool
@@ -20,11 +24,13 @@ WINDOW = 4.0
 _RATE = 60.0  # Hz: most frames per second that are analysed
 _LEAST_SECONDS = 0.5  # s of frames without which nothing is analysed
 _SETTLE_SECONDS = 0.05  # s by which a hit motion has to be over
+_PAUSE_SECONDS = 0.04  # s between two looks of the thread
 _LOOK_SECONDS = 0.1  # s between two moments that are analysed at most: a strike shows for some 0.2 s while under way
 
 
 class LiveHits:
-    """Detects hits of a part in the frames of a listener.
+    """Detects hits of a part in the frames of a listener; once it is started in a thread of its own, so that a strike
+    is noticed while the program draws.
 
     Args:
         listener: the listener.
@@ -41,6 +47,34 @@ class LiveHits:
         self.sides = ((side,) if side else ("left", "right")) if sided else ("",)
         self._after = self._seen_until = float("-inf")
         self._last_number = 0
+        self._found: queue.SimpleQueue[tuple[HitMotion, float] | Exception] = queue.SimpleQueue()
+
+    def start(self) -> LiveHits:
+        """Start the thread; it ends with the listener."""
+        threading.Thread(target=self._watch, name="beyond_mocap strikes", daemon=True).start()
+        return self
+
+    def take_hit(self) -> tuple[HitMotion, float] | None:
+        """Take what the thread has found: as `find_new_hit`, which it also raises."""
+        if self._found.empty():
+            return None
+        found = self._found.get()
+        if isinstance(found, Exception):
+            raise found
+        return found
+
+    def _watch(self) -> None:
+        """Look for new hits until the listener stops; an error is found once."""
+        told = ""
+        while self.listener.is_running:
+            try:
+                if (found := self.find_new_hit()) is not None:
+                    self._found.put(found)
+            except Exception as error:  # raised where it is taken
+                if str(error) != told:
+                    self._found.put(error)
+                told = str(error)
+            time.sleep(_PAUSE_SECONDS)
 
     def find_new_hit(self) -> tuple[HitMotion, float] | None:
         """Find the strongest hit motion whose strike has been since the last one that was found.

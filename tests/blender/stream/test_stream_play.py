@@ -5,6 +5,7 @@ import threading
 import time
 from contextlib import contextmanager
 from dataclasses import replace
+from types import SimpleNamespace
 
 import bpy
 import numpy as np
@@ -86,6 +87,10 @@ def test_all_stand_and_the_ball_lies(playing, room):
     assert all(row.body is not None for row in playing.beyond_mocap_passes.players)
     assert playing.frame_end >= 5 + 60 * 24
     assert np.ptp(places(playing, (5, 100, 900)), axis=0).max() < 1e-6
+    playing.frame_set(5 + 60 * 24)  # and they go on to stand, however long the user waits
+    room("stream.play").update_rally(playing)
+    assert playing.frame_end > 120 * 24
+    assert all(row.body.animation_data.action.frame_range[1] > 120 * 24 for row in playing.beyond_mocap_passes.players)
 
 
 def test_a_strike_is_answered_from_now_on(playing, room, core):
@@ -106,31 +111,85 @@ def test_a_strike_is_answered_from_now_on(playing, room, core):
     )
 
 
-@pytest.mark.parametrize("ending", ["standing", "saving"])
-def test_an_answer_that_is_planned_ahead_begins_at_once(playing, room, core, ending):
-    """Within the update in which the strike is noticed, and the same pass as when it is planned then. The keys before
-    it and long after it are written when the players stand, or the file is saved.
-    """
-    play = room("stream.play")
-    playing.frame_set(5 + 48)
+def read_keys(room, scene, name):
+    """A player's first frame, and rotations (F, J, 4)."""
+    body = scene.beyond_mocap_passes.players[name].body
+    return room("core.action").find_first_frame(body), room("core.action").read_motion(body, scene).rotations
+
+
+def plan_ahead(play, core, scene):
+    """Update until the answer to the kick is planned."""
     ahead, end = play._session["ahead"], time.monotonic() + 120.0
     while ahead.find(ahead.request_for(kick(core), "Ben", 0)) is None and time.monotonic() < end:
-        play.update_rally(playing)
+        play.update_rally(scene)
         time.sleep(0.01)
+
+
+@pytest.mark.parametrize("ending", ["standing", "saving"])
+def test_an_answer_that_is_planned_ahead_begins_at_once(playing, room, core, ending):
+    """Within the update in which the strike is noticed, and the same pass as when it is planned then. It is written
+    into the keys that are there, so that no step of undo lacks those before it; the long standing after it is written
+    when the players stand, or the file is saved.
+    """
+    play, body = room("stream.play"), playing.beyond_mocap_passes.players[0].body
+    playing.frame_set(5 + 48)
+    action, (start, before) = body.animation_data.action, read_keys(room, playing, "Ann")
+    plan_ahead(play, core, playing)
     play.store_strike(kick(core), time.monotonic())
     play.update_rally(playing)
     assert play.get_current_rally().passes == 1 and "The answer began 0." in told().played
-    assert play._session["ahead"] is not ahead and play._session["pending"] is None
-    body = playing.beyond_mocap_passes.players[0].body
-    first, last = body.animation_data.action.frame_range
-    assert first == 5 + 24 and last < 5 + 20 * 24
+    assert play._session["pending"] is None
+    first, within = read_keys(room, playing, "Ann")
+    assert body.animation_data.action == action and first == start == 5 and len(within) == len(before)
+    np.testing.assert_allclose(within[:48], before[:48], atol=1e-6)
+    assert np.abs(within[48 + 24] - before[48 + 24]).max() > 0.01 and np.abs(within[-1] - within[-2]).max() < 1e-6
     if ending == "standing":
         playing.frame_set(int(5 + 24 * play.get_current_rally().ready_time) + 1)
         play.update_rally(playing)
     else:
         play.WATCHER.saving()
-    first, last = body.animation_data.action.frame_range
-    assert first == 5 and last > 5 + 60 * 24
+    first, whole = read_keys(room, playing, "Ann")
+    shown = round((play.get_current_rally().ready_time + 3.0) * 24)
+    assert first == 5 and len(whole) > 60 * 24 and np.abs(whole[-1] - whole[-25]).max() > 1e-4, "they stand, and sway"
+    np.testing.assert_allclose(np.abs((whole[:shown] * within[:shown]).sum(axis=-1)), 1.0, atol=1e-5)
+
+
+def test_a_slow_playback_shows_the_answer_on_time(playing, room, core, monkeypatch):
+    """Frames that it has dropped since the strike belong to the answer; what was drawn, and what was before the strike,
+    stays.
+    """
+    play = room("stream.play")
+    monkeypatch.setattr(play, "is_playing", lambda: True)
+    plan_ahead(play, core, playing)
+    for drawn, frame, ago, begins in ((40, 64, 0.25, 58), (62, 64, 0.25, 62)):
+        stand = play.get_current_rally(), play._session["ahead"], read_keys(room, playing, "Ann")[1]
+        playing.frame_set(drawn)
+        play.answer_in_playback(playing)
+        monkeypatch.setattr(play, "time", SimpleNamespace(monotonic=lambda: 100.0))
+        play.store_strike(kick(core), 100.0 - ago)
+        playing.frame_set(frame)
+        play.answer_in_playback(playing)
+        changed = np.abs(read_keys(room, playing, "Ann")[1] - stand[2]).max(axis=(1, 2)) > 1e-5
+        assert 5 + np.argmax(changed) == begins + 1, "where it blends in, the first frame is the old one"
+        play._session.update(rally=stand[0], ahead=stand[1])
+        play._session["keys"].write_all(playing, stand[0], stand[0].players)
+
+
+def test_keys_that_the_user_has_changed_are_written_anew(playing, room, core, monkeypatch):
+    """By the update after the frame, and the strike is not lost."""
+    play, body = room("stream.play"), playing.beyond_mocap_passes.players[0].body
+    monkeypatch.setattr(play, "is_playing", lambda: True)
+    plan_ahead(play, core, playing)
+    curves = room("core.channels").collect_curves(*room("core.channels").find_playing_action(body))
+    points = next(iter(curves.values())).keyframe_points
+    points.remove(points[10])
+    play.store_strike(kick(core), time.monotonic())
+    play.answer_in_playback(playing)
+    assert play.get_current_rally().passes == 0
+    play.update_rally(playing)
+    assert play.get_current_rally().passes == 1
+    assert {len(curve.keyframe_points) for curve in room("core.channels").collect_curves(
+        *room("core.channels").find_playing_action(body)).values()} == {len(read_keys(room, playing, "Ann")[1])}
 
 
 def test_whom_the_user_chooses_gets_it(playing, room, core):

@@ -8,7 +8,9 @@ import pytest
 
 from beyond_mocap.base.errors import InputError
 from beyond_mocap.files.bvh import bvh
+from beyond_mocap.motion.humanoid import compute_heading
 from beyond_mocap.motion.motion import forward_kinematics
+from beyond_mocap.motion.quaternion import wrap_angle
 from beyond_mocap.passes.answers_ahead import MOST_ANSWERS, AnswersAhead
 from beyond_mocap.passes.hits import detect_hit_under_way, detect_hits
 from beyond_mocap.passes.live_passes import BLEND_SECONDS, build_answer, collect_means, start_rally
@@ -47,6 +49,9 @@ def test_they_stand_where_the_scene_says_and_the_ball_lies(rally):
         assert len(played.motion) / played.motion.fps > 60.0
         moved = np.linalg.norm(played.motion.root_positions[:, :2] - player.place, axis=1)
         assert moved.max() < 0.25
+        x, y = rally.ball.positions[0, :2] - player.place
+        off = wrap_angle(compute_heading(played.motion)[90:] - np.arctan2(y, x))
+        assert np.abs(off).max() < 0.2, "they face the ball, also the one at whose feet it lies"
     assert np.ptp(rally.ball.positions, axis=0).max() == 0.0
 
 
@@ -85,6 +90,19 @@ def test_what_was_done_goes_over_into_the_pass(rally, passed):
     piece = first.motions["Ann"]
     np.testing.assert_allclose(new.root_positions[60 + later : 60 + len(piece)], piece.root_positions[later:])
     assert after.players["Ben"] is rally.players["Ben"]
+
+
+def test_who_waits_goes_on_standing(passed):
+    """Also when the user lets them wait for minutes: they go on to sway, without a jump, where they stand."""
+    _, _, _, end = passed
+    longer = end.keep_standing().keep_standing()
+    assert longer.end > end.end + 119.0 and longer.ball.times[-1] > end.ball.times[-1] + 119.0
+    for name, played in longer.players.items():
+        old, motion = end.players[name].motion, played.motion
+        assert motion.rotations[: len(old)].tobytes() == old.rotations.tobytes()
+        steps = np.linalg.norm(np.diff(forward_kinematics(motion)[0], axis=0), axis=2)
+        waits = steps[len(old) - 30 :]
+        assert 0.0 < waits.max() * motion.fps < 0.6 and np.ptp(motion.root_positions[len(old) :, 0]) < 0.1
 
 
 def test_what_is_planned_ahead_is_what_is_planned_after_the_strike(library, rally):

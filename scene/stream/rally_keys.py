@@ -1,0 +1,95 @@
+"""The keys of a rally's players and ball.
+
+A pass replaces the keys from its beginning on, in the actions that are there: those before it stay, so that a step of
+undo that is made meanwhile has them all. Its players' long standing follows with `write_all`, when there is time.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import replace
+from types import SimpleNamespace
+from typing import TYPE_CHECKING
+
+import bpy
+import numpy as np
+
+from ...beyond_mocap.base.errors import InputError
+from ..core import channels, frame_range
+from ..core.action import RestPose
+from ..core.measure import frames_per_second
+from ..passes import generate as make
+from ..rigs import armature
+from ..stage import ball as balls
+
+if TYPE_CHECKING:
+    from ...beyond_mocap.motion.track.ball_path import BallPath
+    from ...beyond_mocap.passes.live_passes import Rally
+
+AT_ONCE = 3.0
+"""Seconds of standing after a pass that are written with it."""
+
+
+class RallyKeys:
+    """The keys of a rally, as they stand in the actions."""
+
+    def __init__(self) -> None:
+        self._players: dict[str, channels.WrittenKeys] = {}
+        self._ball: channels.WrittenKeys | None = None
+
+    def write_all(self, scene: bpy.types.Scene, rally: Rally, names: Iterable[str]) -> None:
+        """Write the whole motions of the named players and the ball's path as new actions."""
+        from ...beyond_mocap.passes.passes import build_ball
+
+        rows, start = _find_rows(scene, names), float(scene.beyond_mocap_passes.start_frame)
+        for name, row in rows.items():
+            played = rally.players[name]
+            make.apply_motion(scene, row, SimpleNamespace(motion=played.motion, start_time=played.start), start)
+            self._players[name] = channels.WrittenKeys(row.body)
+        make.apply_ball(scene, SimpleNamespace(ball=rally.ball, kind=build_ball(rally.scene)), start)
+        ball = scene.beyond_mocap_passes.rally
+        self._ball = None if ball.beyond_mocap_ball.before.kept else channels.WrittenKeys(ball)
+        frame_range.extend_range(scene, start + float(rally.ball.times[-1]) * frames_per_second(scene))
+
+    def replace_pass(self, scene: bpy.types.Scene, rally: Rally, names: Iterable[str], begin: float) -> bool:
+        """Replace the keys of the named players and the ball by the pass that has just been added to a rally, from
+        `begin` s until they have stood for a while.
+
+        Returns:
+            Whether it was possible; otherwise `write_all` is needed, since the keys have been changed by others or end
+            before that.
+        """
+        until, fps = rally.ready_time + AT_ONCE, frames_per_second(scene)
+        first, ball = scene.beyond_mocap_passes.start_frame + begin * fps, scene.beyond_mocap_passes.rally
+        if self._ball is None or ball is None or rally.rate != fps:
+            return False
+        for name, row in _find_rows(scene, names).items():
+            if row.body is None or not self._players[name].replace(row.body, first, _build_curves(scene, rally, row,
+                                                                                                  (begin, until))):
+                return False
+        return self._ball.replace(ball, first, balls.build_keys(ball, _cut_path(rally.ball, begin, until), scene,
+                                                                first)[1])
+
+
+def _find_rows(scene, names: Iterable[str]) -> dict:
+    """Find the named players in the list: they may have been renamed or removed since the rally started."""
+    rows = {row.name: row for row in scene.beyond_mocap_passes.players}
+    if missing := [name for name in names if name not in rows]:
+        raise InputError("players", f"{missing[0]} is not in the list now", "the same players", "press Play Live again")
+    channels.check_local(*(rows[name].body for name in names), scene.beyond_mocap_passes.rally)
+    return {name: rows[name] for name in names}
+
+
+def _build_curves(scene, rally: Rally, row, span: tuple[float, float]) -> dict:
+    """Build the curves of a player's motion over a span in s, where the armature stands now."""
+    played = rally.players[row.name]
+    first, end = (round((seconds - played.start) * rally.rate) for seconds in span)
+    rest = RestPose.from_body(row.body, played.motion.skeleton.names, armature.find_current_placement(row.body, scene))
+    return rest.build_curves(played.motion.root_positions[first:end], played.motion.rotations[first:end])
+
+
+def _cut_path(path: BallPath, begin: float, until: float) -> BallPath:
+    """Cut the ball's path to what is from `begin` s on and before `until` s."""
+    part = slice(*np.searchsorted(path.times, (begin - 1e-6, until)))
+    return replace(path, times=path.times[part], positions=path.positions[part], measured=path.measured[part],
+                   rotations=path.rotations[part])
