@@ -46,6 +46,8 @@ SECTIONS = {  # name -> heading, (subheading, module, function) of each part
                             ("Margins of releases", "release_margins", "margin_table"),
                             ("Recordings that show no throw", "release_margins", "refusal_table"),
                             ("Pitches against the radar", "markers_real", "radar_table"))),
+    "joints": ("Bodies from joints", (("Gaps", "joint_gaps", "section"),
+                                        ("Feet without toes", "joint_feet", "section"))),
     "playback": ("Playback in Blender", (("", "playback", "section"),)),
     "scale": ("Large libraries and long tracks", (("", "scale", "section"),)),
     "throws": ("Throws and kicks", (("", "throws", "section"), ("The thrower's body", "pitching", "body_table"))),

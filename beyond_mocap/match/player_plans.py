@@ -137,8 +137,8 @@ def list_unused_labels(parts: Iterable[PlayerPlans], request: MatchRequest, file
 
 def list_overruled_labels(parts: Iterable[PlayerPlans]) -> list[str]:
     """List a message for each player with labels for times at which joints say what the body does."""
-    return [f"{part.file}.txt: {_count_lines(part.overruled)} shown as the joints have it, not as the label says: "
-            f"joints show the player from {_format_times(_list_shown_times(part.plans))}"
+    return [f"{part.file}.txt: {_count_lines(part.overruled)} shown as the joints have it, not as the label says, "
+            f"where joints show the player: from {_format_times(_list_shown_times(part.plans))}"
             for part in parts if part.overruled]
 
 

@@ -164,7 +164,8 @@ def build_identity(request: MatchRequest, library_key: str) -> dict[str, object]
         path = getattr(request, name)
         out[name] = None if path is None else _compute_input_digest(path)
     if (joints := request.find_joint_file()) is not None:
-        out["joints"] = [_compute_input_digest(path) for path in list_joint_files(joints)]
+        files = list_joint_files(joints, with_ball=request.joints is None)
+        out["joints"] = [_compute_input_digest(path) for path in files]
     out["library"] = library_key
     return out
 

@@ -3,8 +3,9 @@
 What people do between two poses in less than a second is much alike. Stretches of examples that begin and end most like
 a gap are found, faster and slower ones too. How they move between is regressed on how they begin and end: a local
 linear model of nearest neighbours (Chai and Hodgins 2005, "Performance animation from low-dimensional control
-signals"). What lacks at the ends fades over the gap. Poses are compared in the heading frame of their own end; place
-and turn between both ends count less.
+signals"). What it lacks at the ends, a body's build and noise among it, is soon forgotten between them (a Gaussian
+process: Rasmussen and Williams 2006, "Gaussian processes for machine learning", eq. 2.25). Poses are compared in the
+heading frame of their own end; place and turn between both ends count less.
 """
 
 from __future__ import annotations
@@ -15,12 +16,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..base.time_series import find_runs
-from ..library.features import HORIZON
 from ..motion import quaternion
 from .joint_examples import (
     CONTEXT,
     RATE,
-    TRUNK,
     JointExamples,
     build_examples,
     describe_end,
@@ -39,6 +38,7 @@ _RATES = (0.8, 0.9, 1.0, 1.1, 1.25)  # at which examples are played
 _NEIGHBOURS = 60
 _FEWEST = 10  # neighbours of which a model can be made
 _NOISE = 0.05  # m in what is compared that the regression expects
+_REST_STAYS, _REST_SECONDS, _REST_NOISE = 0.3, 0.15, 0.3  # of what the model lacks at an end: shares and s
 _GROWTH, _PATH_NOISE = 0.1, 0.06  # m, usual errors: of a bridge's place, for each second; of a path's shape
 _WAVES = 3  # half waves within a gap, up to which a path is followed: faster ones are its noise
 _PLACE, _TURN = 0.3, 0.3  # weights of m between the ends, and of rad of turning
@@ -147,7 +147,7 @@ def _bridge(joints: np.ndarray, gap: tuple[int, int], last: int, banks: Sequence
         return joints[first:end]
     motion, ends = _regress(found, known.ends)
     line = _interpolate_frames(before[-1], after[0], known.share)
-    return _place(motion + _fade_rest(known, ends), *line)
+    return _place(motion + _predict_rest(known, ends), *line)
 
 
 def _describe_gap(before: np.ndarray, after: np.ndarray, seconds: float, share: np.ndarray, fps: float) -> _Gap:
@@ -220,18 +220,20 @@ def _regress(found: _Neighbours, ends: np.ndarray) -> tuple[np.ndarray, np.ndarr
     return out[: found.motion[0].size].reshape(found.motion.shape[1:]), out[found.motion[0].size :]
 
 
-def _fade_rest(gap: _Gap, ends: np.ndarray) -> np.ndarray:
-    """Compute what brings a motion that has `ends` (D,) to those of the gap: (T, J, 3), poses by a cubic, velocities as
-    far as the trunk has them.
+def _predict_rest(gap: _Gap, ends: np.ndarray) -> np.ndarray:
+    """Predict what a motion that has `ends` (D,) lacks of the gap's own (T, J, 3), from what its poses lack at either
+    end: Gaussian process regression.
     """
     half = (len(ends) - 3) // 2
-    rest = np.stack([(gap.ends - ends)[:half], (gap.ends - ends)[half : 2 * half]]).reshape(2, -1, 6)
-    rest *= np.sqrt(rest.shape[1])
-    pose, velocity = rest[..., :3], rest[:, TRUNK, 3:].mean(axis=1) / HORIZON
-    share = gap.share[:, None, None]
-    closes = share**2 * (3.0 - 2.0 * share)
-    goes = gap.seconds * share * (1.0 - share) * ((1.0 - share) * velocity[0] - share * velocity[1])
-    return (1.0 - closes) * pose[0] + closes * pose[1] + goes
+    lacks = (gap.ends - ends)[: 2 * half].reshape(2, -1, 6)[..., :3] * np.sqrt(half // 6)
+    at = gap.seconds * np.stack([gap.share, 1.0 - gap.share], axis=1)
+    known = _compute_covariance(gap.seconds * np.eye(2)[::-1]) + _REST_NOISE * np.eye(2)
+    return np.einsum("te,ejc->tjc", _compute_covariance(at) @ np.linalg.inv(known), lacks)
+
+
+def _compute_covariance(seconds: np.ndarray) -> np.ndarray:
+    """Compute how alike what a motion lacks is after some time, 1 at once: its build stays, the rest is forgotten."""
+    return _REST_STAYS + (1.0 - _REST_STAYS) * np.exp(-0.5 * (seconds / _REST_SECONDS) ** 2)
 
 
 def _interpolate_frames(before: np.ndarray, after: np.ndarray, share: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -20,6 +20,7 @@ NEEDED = tuple(f"{side}_{part}" for part in ("shoulder", "hip", "knee", "ankle")
 _TOES = ("big_toe", "small_toe", "foot")
 _USUAL_BEND = 0.02  # metres by which an elbow or knee that is straight points the way it bends
 _MOST_RAISED = np.radians(45.0)  # of a collar bone out of its rest (Inman et al. 1944: 40 in a raised arm)
+_MOST_BENT = np.radians(40.0)  # of a foot up against its shank
 _SOFT = 0.003  # metres below full length from where a limb eases
 _UP = np.array([0.0, 0.0, 1.0])
 _LEFT = np.array([0.0, 1.0, 0.0])
@@ -122,7 +123,9 @@ class _BodyFit:
             self.turns[self.body.neck] = quaternion.slerp(self.turns[self.body.chest], turn, 0.45)
 
     def bend_leg(self, side: str, joints_of: Limb) -> None:
-        """Bend a leg so that its ankle is where it is seen, and lay its foot along the toes."""
+        """Bend a leg so that its ankle is where it is seen, and lay its foot along the toes; where these are not seen,
+        along the shank.
+        """
         pelvis = self.turns[self.body.hips]
         chain = (joints_of.upper_leg, joints_of.lower_leg, joints_of.foot)
         hinge, thigh, shank = self._bend((f"{side}_knee", f"{side}_ankle"), chain, self.places[:, chain[0]],
@@ -134,6 +137,20 @@ class _BodyFit:
             own = self.neutral.positions[joints_of.toe] - self.neutral.positions[joints_of.foot]
             self.turns[joints_of.foot] = quaternion.multiply(
                 build_foot_frame(ahead, -hinge), quaternion.inverse(build_foot_frame(own[None], _LEFT[None])))
+        elif joints_of.toe is not None:
+            self._raise_ball(joints_of, self.joints[f"{side}_ankle"][:, 2])
+
+    def _raise_ball(self, joints_of: Limb, ankle: np.ndarray) -> None:
+        """Turn a foot up against its shank where its ball would be in the ground, by the height of its ankle (T,): so
+        its heel rises before the push-off.
+        """
+        rest, foot = self.neutral.positions, self.turns[joints_of.lower_leg]
+        own = rest[joints_of.toe] - rest[joints_of.foot]
+        ball = unit_vectors(quaternion.rotate(foot, own[None]), _FORWARD)[:, 2]
+        lowest = (rest[joints_of.toe, 2] - ankle) / np.linalg.norm(own)
+        up = np.arcsin(np.clip(lowest, -1.0, 1.0)) - np.arcsin(np.clip(ball, -1.0, 1.0))
+        turn = quaternion.from_axis_angle(_LEFT, -np.clip(up, 0.0, _MOST_BENT))
+        self.turns[joints_of.foot] = quaternion.multiply(foot, turn)
 
     def bend_arm(self, side: str, joints_of: Limb) -> None:
         """Bend an arm so that its wrist is where it is seen; one whose wrist or elbow is not seen hangs."""

@@ -18,14 +18,12 @@ from ..motion.retargeting.adult import ADULT_LEG
 
 RATE = 30.0
 """Frames per second of examples."""
-CONTEXT = 0.2
+CONTEXT = 0.12
 """Seconds over which velocities are measured."""
 _PARTS = {"hip": "upper_leg", "shoulder": "upper_arm", "knee": "lower_leg", "ankle": "foot", "elbow": "lower_arm",
           "wrist": "hand"}  # joints of `Limb`
 COMPARED = tuple(f"{side}_{part}" for part in _PARTS for side in ("left", "right"))
 """Joints by which people are compared: the first columns of examples, of the left and the right in turn."""
-TRUNK = [0, 1, 2, 3]
-"""Columns of hips and shoulders."""
 
 _LEG = [[0, 1], [4, 5], [6, 7]]  # columns of hips, knees and ankles
 _LEFT, _RIGHT = [0, 2], [1, 3]  # of hips and shoulders

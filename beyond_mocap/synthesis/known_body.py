@@ -37,6 +37,7 @@ LONGEST_FADE = 1.2
 LEAD_SECONDS = 0.6
 """Seconds within a known body, from either end, in which the search follows it."""
 
+_JOINTS_SECONDS = 0.3  # s in which a lead of joints fades: a swing. Longer, it adds up with the next one
 _VELOCITY_SECONDS = 0.05  # s over which the difference in velocity at an end goes on
 _FIXED_SECONDS = 0.15  # s at either end of a fade in which feet stay where they are (`edit_blending.step_over`)
 _RAISED = 0.03  # m by which a foot that was in contact is off the ground
@@ -284,18 +285,20 @@ def _find_raised(skeleton: Skeleton, poses: Sequence[Pose]) -> np.ndarray:
 
 def _fade_leads(pose: Pose, planted: PlantResult, run: tuple[int, int], sides: Sequence[int], *, reach: int,
                 fps: float) -> Pose:
-    """Add the leads of the known bodies at `sides` to a run of frames; each fades over `reach` frames, so that in a
-    short run the one passes into the other.
+    """Add the leads of the known bodies at `sides` to a run of frames. Each fades over `reach` frames, that of joints
+    over _JOINTS_SECONDS, so that in a short run the one passes into the other.
     """
     at = np.arange(*run)
     move, turns = np.zeros((len(at), 3)), np.zeros((len(at), pose[1].shape[1], 3))
     for edge in sides:
         away = np.abs(at - edge)
-        share = quintic_step_by_powers(np.clip(1.0 - away / (reach + 1.0), 0.0, 1.0))
+        share, own = (quintic_step_by_powers(np.clip(1.0 - away / (frames + 1.0), 0.0, 1.0))[:, None]
+                      for frames in (reach, min(reach, _JOINTS_SECONDS * fps)))
+        shares = np.where(np.arange(turns.shape[1]) == 0, share, own)
         lead = _measure_lead(pose, planted, edge, inner=edge - 1 if edge < run[0] else edge + 1)
         gone = _VELOCITY_SECONDS * fps * (1.0 - np.exp(-away / (_VELOCITY_SECONDS * fps)))
-        move += share[:, None] * (lead[0] + gone[:, None] * lead[1])
-        turns += share[:, None, None] * (lead[2] + gone[:, None, None] * lead[3])
+        move += share * (lead[0] + gone[:, None] * lead[1])
+        turns += shares[:, :, None] * (lead[2] + gone[:, None, None] * lead[3])
     out = pose[0].copy(), pose[1].copy()
     out[0][run[0] : run[1]] = planted.root[at] + move
     out[1][run[0] : run[1]] = quaternion.multiply(planted.rotations[at], quaternion.from_rotation_vector(turns))

@@ -184,10 +184,10 @@ def _add_balls(found: JointCollector, content: dict, offset: float) -> None:
             found.add_ball(round(offset + float(sample["time"]), 4), place)
 
 
-def list_joint_files(path: Path) -> list[Path]:
-    """List the files that `read_joints` reads: of Hawk-Eye all of the same half from `path` on, and their balls."""
+def list_joint_files(path: Path, with_ball: bool) -> list[Path]:
+    """List the files that `read_joints` reads: of Hawk-Eye all of the same half from `path` on, with balls or not."""
     files = _list_minutes(path)
-    return [*files, *(ball for file in files for ball in _find_balls(file))]
+    return [*files, *(ball for file in files if with_ball for ball in _find_balls(file))]
 
 
 def _find_balls(file: Path) -> list[Path]:

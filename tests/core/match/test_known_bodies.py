@@ -96,7 +96,8 @@ def test_the_ball_beside_hawkeyes_joints_is_that_of_the_match(tmp_path):
     assert np.nanmax(np.abs(match.ball[known] - ball[known])) < 1e-3
     assert "the ball is read from 2 files" in " ".join(match.notes)
     assert "1 sample with an impossible" in match.report[0] and "1 height of the ball above 60 m" in match.report[1]
-    assert len(list_joint_files(path)) == 4  # whose content makes a stored match out of date
+    both, alone = (list_joint_files(path, with_ball) for with_ball in (True, False))
+    assert (len(both), len(alone)) == (4, 2)  # whose content makes a stored match out of date
     path.with_name("match_1_2.football.samples.ball").write_text("{}")
     with pytest.raises(InputError, match="match_1_2.football.samples.ball: no 'time'"):
         read_joint_match(path)
@@ -150,5 +151,5 @@ def test_beside_dots_only_what_is_seen_comes_from_joints(tmp_path):
     assert [body["from_s"], body["to_s"]] == pytest.approx([4.0, 4.0 + (len(joints) - 1) / FPS], abs=0.06)
     assert body["joint_error_m"]["mean"] < 0.03 and any("clock is 4.0" in note for note in state["notes"])
     (told,) = [note for note in state["notes"] if note.startswith("home_10.txt")]
-    assert told.startswith("home_10.txt: 1 of your lines is shown as the joints have it, not as the label says: joints "
-                           "show the player from 4 to 6.9")
+    assert told.startswith("home_10.txt: 1 of your lines is shown as the joints have it, not as the label says, where "
+                           "joints show the player: from 4 to 6.9")
