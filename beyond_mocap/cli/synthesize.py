@@ -142,15 +142,14 @@ def _choose_window(options, track) -> float:
             free.
     """
     seconds, window = float(track.times[-1] - track.times[0]), options.window
-    can_be_cut = options.method == "path" and options.out.suffix.lower() == ".bvh" and not options.recorded_ball
+    can_be_cut = options.method == "path" and options.out.suffix.lower() == ".bvh"
     if window and not can_be_cut:
-        found = f"method {options.method} to {options.out.suffix}" + " with --recorded-ball" * options.recorded_ball
-        raise InputError("--window", found, "method path to .bvh, without --recorded-ball", "leave it out")
+        raise InputError("--window", f"method {options.method} to {options.out.suffix}", "method path to .bvh",
+                         "leave it out")
     if window is None:
         window = WINDOW if can_be_cut and seconds > LONG_TRACK else 0.0
     if not window:
-        next_step = ("use --window" if can_be_cut else "leave out --recorded-ball" if options.recorded_ball
-                     else "use a shorter track")
+        next_step = "use --window" if can_be_cut else "use a shorter track"
         check_memory(options.track, _BASE_BYTES + _FRAME_BYTES * seconds * options.fps, next_step)
     return window
 
@@ -192,7 +191,7 @@ def _synthesize_in_windows(options, reporter: ProgressReporter, library, plan, *
     started, report = time.perf_counter(), (reporter.show_progress, reporter.is_cancelled)
     edit = search_long_player(library, plan, window, *report)
     seconds["search"], plan = time.perf_counter() - started, edit.stretches[0].plan
-    files = LongTakeFiles(library, plan.track, bool(options.report))
+    files = LongTakeFiles(library, plan, bool(options.report))
     parts = iter_parts(library, edit, *report)
     files.write_motion(options.out, parts, count_frames(plan, plan.fps), BvhForm(above=above))
     files.write_tables(options.provenance, options.ball)

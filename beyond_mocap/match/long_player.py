@@ -18,8 +18,8 @@ from ..files.bvh.bvh import write_bvh_parts
 from ..files.bvh.bvh_write import BvhForm
 from ..files.tables import write_ball
 from ..library.library import Library
-from ..motion.track import Track
 from ..motion.track.ball_path import BallPath
+from ..synthesis.construct.ball_touch.carry_ball import report_recorded_ball
 from ..synthesis.plan import Plan
 from ..synthesis.provenance import build_provenance, join_provenance, write_provenance
 from ..synthesis.resolve_plan import resolve_plan
@@ -28,7 +28,7 @@ from .pieces.tasks import merge_reports
 from .pieces.units import build_units, count_frames, cut_track
 from .pieces.windows import join_pieces, search_window
 from .player_edit import PlayerEdit, to_stored_plan
-from .player_motion import construct_player
+from .player_motion import construct_player, join_balls
 
 CONSTRUCTION_WINDOW = 60.0
 """s of the windows in which the motion is constructed, each with some seconds around it."""
@@ -99,36 +99,37 @@ class LongTakeFiles:
         warnings: of all parts.
     """
 
-    def __init__(self, library: Library, track: Track, has_report: bool):
-        """Begin. track: as measured."""
+    def __init__(self, library: Library, plan: Plan, has_report: bool):
+        """Begin. plan: of the whole take."""
         self.frames = 0
         self.warnings: tuple[str, ...] = ()
-        self._library, self._track, self._has_report = library, track, has_report
-        self._tables, self._balls, self._reports, self._weights = [], [], [], []  # type: ignore[var-annotated]
+        self._library, self._plan, self._has_report = library, plan, has_report
+        self._tables, self._balls, self._reports, self._counts = [], [], [], []  # type: ignore[var-annotated]
+        self._seams: list[int] = []
 
     def write_motion(self, path: Path, parts: Iterable[Take], count: int, form: BvhForm) -> None:
         """Write the motion of `count` frames in a form, and keep what the other files need."""
         write_bvh_parts(path, (self._note(part).motion for part in parts), count, form)
+        self.warnings += tuple(report_recorded_ball(self._plan, self.ball, self._seams))
 
     def _note(self, part: Take) -> Take:
         """Keep of a part what the tables and the report need."""
+        self._seams += (part.seams + self.frames).tolist()
         self.frames += len(part.motion)
         self.warnings = tuple(dict.fromkeys((*self.warnings, *part.warnings)))
         self._tables.append(build_provenance(part))
         self._balls.append(part.ball)
+        self._counts.append(len(part.motion))
         if self._has_report:
             end = part.start_time + part.motion.duration
-            self._reports.append(evaluate(part, cut_track(self._track, part.start_time, end), self._library))
-            self._weights.append(len(part.motion))
+            self._reports.append(evaluate(part, cut_track(self._plan.track, part.start_time, end), self._library))
         return part
 
     @property
     def ball(self) -> BallPath | None:
-        """The ball's trajectory, None where the track has none."""
-        if any(ball is None for ball in self._balls):
-            return None
-        columns = ([getattr(ball, name) for ball in self._balls] for name in ("times", "positions", "measured"))
-        return BallPath(*(np.concatenate(column) for column in columns))
+        """The ball's trajectory, None without one."""
+        times = float(self._plan.track.times[0]) + np.arange(self.frames) / self._plan.fps
+        return join_balls(self._balls, self._counts, times)
 
     def write_tables(self, provenance: Path | None, ball: Path | None) -> None:
         """Write provenance and ball, where they are asked for."""
@@ -139,4 +140,4 @@ class LongTakeFiles:
 
     def build_report(self) -> dict:
         """Merge the reports of all parts."""
-        return merge_reports(self._reports, self._weights)
+        return merge_reports(self._reports, self._counts)

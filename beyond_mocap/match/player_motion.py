@@ -329,7 +329,8 @@ def join_takes(takes: Sequence[Take], plan: Plan) -> Take:
             DribbleTouch(one.first + int(first), one.last + int(first), one.side)
             for take, first in zip(takes, firsts) for one in take.dribble_touches
         ),
-        ball=_join_balls(takes, begin + np.arange(firsts[-1]) / fps),
+        ball=join_balls([take.ball for take in takes], [len(take.motion) for take in takes],
+                        begin + np.arange(firsts[-1]) / fps),
         warnings=tuple(dict.fromkeys(line for take in takes for line in take.warnings)),
         seconds={name: sum(take.seconds.get(name, 0.0) for take in takes) for name in takes[0].seconds},
         plan=plan, solved=plan.solved,
@@ -349,12 +350,19 @@ def _join_timelines(timelines: Sequence[Timeline]) -> Timeline:
     return Timeline(tuple(spans), tuple(key for each in timelines for key in each.keys))
 
 
-def _join_balls(takes: Sequence[Take], times: np.ndarray) -> BallPath | None:
-    """Join the balls of all takes at times (T,) s; unknown where a take has none, None if no take has one."""
-    if all(take.ball is None for take in takes):
+def join_balls(balls: Sequence[BallPath | None], counts: Sequence[int], times: np.ndarray) -> BallPath | None:
+    """Join the balls of takes that follow each other.
+
+    Args:
+        balls: of each take.
+        counts: frames of each take.
+        times: (T,) s of all frames.
+    Returns:
+        The ball, unknown where a take has none; None if no take has one.
+    """
+    if all(ball is None for ball in balls):
         return None
-    empty = [(np.full((len(take.motion), 3), np.nan), np.zeros(len(take.motion), bool)) for take in takes]
-    pairs = [none if take.ball is None else (take.ball.positions, take.ball.measured)
-             for take, none in zip(takes, empty)]  # fmt: skip
+    pairs = [(np.full((count, 3), np.nan), np.zeros(count, bool)) if ball is None else (ball.positions, ball.measured)
+             for ball, count in zip(balls, counts, strict=True)]
     places, measured = (np.concatenate(column) for column in zip(*pairs))
     return BallPath(times, places, measured)

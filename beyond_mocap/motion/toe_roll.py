@@ -30,25 +30,50 @@ def roll_toes(neutral: NeutralStance, root: np.ndarray, rotations: np.ndarray) -
     Returns:
         (T, J, 4) local rotations; those that need no bend are unchanged.
     """
-    skeleton = neutral.skeleton
-    places, world = pose_legs(skeleton, root, rotations)
-    body, out = identify_joints(skeleton), rotations.copy()
+    places, world = pose_legs(neutral.skeleton, root, rotations)
+    body, out = identify_joints(neutral.skeleton), rotations
     for limb in (body.left, body.right):
         joint = limb.toe_or_foot
-        bend = _measure_bend(neutral, limb, places[:, joint], world[:, joint])
-        below = np.flatnonzero(bend > 0.0)
-        if len(below):
-            ahead = _point_ahead(neutral, joint, world[below, joint])
-            left = unit_vectors(np.cross(np.array([0.0, 0.0, 1.0]), ahead), np.array([0.0, 1.0, 0.0]))
-            turned = quaternion.multiply(quaternion.from_axis_angle(left, -bend[below]), world[below, joint])
-            parent = world[below, skeleton.parents[joint]]
-            local = quaternion.multiply(quaternion.inverse(parent), turned)
-            out[below, joint] = quaternion.match_signs(local, rotations[below, joint])
+        bends = measure_toe_bends(neutral, limb, places[:, joint], world[:, joint])
+        out = bend_toe(neutral, limb, bends, rotations=out, world=world)
     return out
 
 
-def _measure_bend(neutral: NeutralStance, limb: Limb, place: np.ndarray, world: np.ndarray) -> np.ndarray:
-    """Measure by how many radians (T,) a tip has to turn up; place (T, 3) m and rotation (T, 4) of its joint."""
+def bend_toe(neutral: NeutralStance, limb: Limb, bends: np.ndarray, *, rotations: np.ndarray,
+             world: np.ndarray) -> np.ndarray:
+    """Bend one toe up, or the foot without a toe joint.
+
+    Args:
+        neutral: the skeleton in its neutral stance.
+        limb: the side.
+        bends: (T,) rad.
+        rotations: (T, J, 4) local rotations.
+        world: (T, J, 4) world rotations, of the legs at least.
+    Returns:
+        (T, J, 4) local rotations; those with a bend of 0 are unchanged.
+    """
+    joint, below, out = limb.toe_or_foot, np.flatnonzero(bends > 0.0), rotations.copy()
+    if len(below):
+        ahead = _point_ahead(neutral, joint, world[below, joint])
+        left = unit_vectors(np.cross(np.array([0.0, 0.0, 1.0]), ahead), np.array([0.0, 1.0, 0.0]))
+        turned = quaternion.multiply(quaternion.from_axis_angle(left, -bends[below]), world[below, joint])
+        parent = world[below, neutral.skeleton.parents[joint]]
+        local = quaternion.multiply(quaternion.inverse(parent), turned)
+        out[below, joint] = quaternion.match_signs(local, rotations[below, joint])
+    return out
+
+
+def measure_toe_bends(neutral: NeutralStance, limb: Limb, place: np.ndarray, world: np.ndarray) -> np.ndarray:
+    """Measure how far a tip has to turn up so that it is not below the ground, z = 0.
+
+    Args:
+        neutral: the skeleton in its neutral stance.
+        limb: the side.
+        place: (T, 3) m, of the toe joint, or of the foot without one.
+        world: (T, 4) its world rotation.
+    Returns:
+        (T,) rad.
+    """
     joint = limb.toe_or_foot
     length = neutral.tip if limb.toe is not None else neutral.ball[0, 0] + neutral.tip
     sole = neutral.positions[joint, 2] - _TIP_THICKNESS * neutral.leg

@@ -246,7 +246,7 @@ def finish_take(
         request: the request.
         hurried_from: frame at the library's rate from which on the search was cut short, None if it was not.
         before: the finished take that it is an edit of.
-        report_unmet: whether unmet constraints are reported.
+        report_unmet: whether unmet constraints and the time of recorded balls are reported, as of a whole take.
         notes: what was left out of the search, one line each.
     """
     take = add_pins(to_player_size(take, plan.size, plan.requested, before), recordings)
@@ -300,7 +300,7 @@ def add_warnings(
         request: the request.
         hurried_from: frame at the library's rate from which on the search was cut short, or None.
         more: further lines.
-        report_unmet: whether unmet constraints are reported.
+        report_unmet: as for `finish_take`.
     """
     messages = [*recordings.notes, *recordings.proposal_notes, *request.warnings, *more]
     messages += _report_crowded_keys(request, take.edit)
@@ -310,8 +310,11 @@ def add_warnings(
         since = take.start_time + hurried_from / recordings.fps
         messages.append(TimedMessage(f"{since:.1f} s: the search was cut short from here on", (since, since)))
     messages += [*_report_avoided_labels(take), *_report_missed_pins(take), *_report_ignored_heading_keys(take.plan),
-                 *_report_ignored_contact_edits(take), *report_recorded_ball(take)]
-    unmet = _report_unmet(recordings, take.plan, take) if report_unmet else ()
+                 *_report_ignored_contact_edits(take)]
+    unmet: Sequence[str] = ()
+    if report_unmet:
+        unmet = (*report_recorded_ball(take.plan, take.ball, take.seams.tolist()),
+                 *_report_unmet(recordings, take.plan, take))
     return replace(take, is_cut_short=hurried_from is not None, warnings=(*messages, *unmet))
 
 

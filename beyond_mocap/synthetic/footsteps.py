@@ -20,6 +20,9 @@ from . import gait_tables as tables
 TOE_LIFT_PITCH = np.radians(42.0)
 # rad of pitch around it over which a sprinter's toes begin to lift
 _SPRINT_SOFT = np.radians(6.0)
+# shares of a swing over which the speed of a foot's pitch at its landing is corrected: of a walk or jog, and of a
+# sprint, whose toes stay up until just before they land
+_PITCH_REACH = (1.0 / 3.0, 1.0 / 12.0)
 # m for an adult: a step this long is a full one; shorter ones roll and lift less
 _FULL_STEP = 0.55
 
@@ -195,6 +198,8 @@ class _Swings:
                                          self.size * 0.05 * scale)
         speed = 0.5 * (steps.speed[swings] + steps.speed[swings + 1])
         direction = steps.direction[swings + 1]
+        jog, sprint = _PITCH_REACH
+        self.pitch_reach = (jog + (sprint - jog) * tables.compute_sprint_share(speed))[of]
         step = self.step = 0.01
 
         def publish(at, share_at, rows=slice(None)):
@@ -223,7 +228,8 @@ class _Swings:
         free_land = (at_land - hang(self.before_land)) / span
         full = hang(self.now) + _bridge_ends(
             share, self.length[of], (self.wanted_leave - at_leave)[of], offset1=(self.wanted_land - at_land)[of],
-            speed0=(self.leave_speed - free_leave)[of], speed1=(self.land_speed - free_land)[of])
+            speed0=(self.leave_speed - free_leave)[of], speed1=(self.land_speed - free_land)[of],
+            pitch_reach=self.pitch_reach)
         size, neutral = self.size, self.neutral
         mixed = full * size[:, None] + self.small * (1.0 - size[:, None])
         yaw = self.leave.yaw[of] + (self.land.yaw - self.leave.yaw)[of] * quintic_step(share)
@@ -264,18 +270,20 @@ def _compute_leg_swing(share, speed, direction, thigh_shank) -> tuple[np.ndarray
     )
 
 
-def _bridge_ends(share, length, offset0, offset1, speed0, speed1) -> np.ndarray:
-    """Compute what to add (N, C) along a swing so that both ends move by the offsets and their speeds change as
+def _bridge_ends(share, length, offset0, offset1, speed0, speed1, pitch_reach) -> np.ndarray:
+    """Compute what to add (N, 4) along a swing so that both ends move by the offsets and their speeds change as
     requested.
 
-    Offsets are spread over the whole swing; speeds are corrected within its first and last third.
+    Offsets are spread over the whole swing; speeds are corrected within its first and last third, that of the pitch
+    within the last `pitch_reach` (N,).
     """
-    reach = 1.0 / 3.0
+    third = np.full((len(share), 4), 1.0 / 3.0)
+    landing = np.column_stack([third[:, :3], pitch_reach])
     blend = quintic_step(share)[:, None]
     out = offset0 * (1.0 - blend) + offset1 * blend
-    for s, speed, sign in ((share, speed0, 1.0), (1.0 - share, speed1, -1.0)):
-        inside = np.clip(s / reach, 0.0, 1.0)
-        out = out + sign * speed * (length * s * (1.0 - inside) ** 2)[:, None]
+    for s, speed, reach, sign in ((share, speed0, third, 1.0), (1.0 - share, speed1, landing, -1.0)):
+        inside = np.clip(s[:, None] / reach, 0.0, 1.0)
+        out = out + sign * speed * ((length * s)[:, None] * (1.0 - inside) ** 2)
     return out
 
 

@@ -23,7 +23,7 @@ from ..motion import quaternion
 from ..motion.motion import Motion, forward_kinematics, place_motion, sample_frames_cubic
 from .ball_release import AtFoot, InHand, sample_points, sample_points_and_velocities
 from .corrected_motion import CorrectedMotion, Freedom
-from .foot_tilt import TILTS, point_foot
+from .foot_tilt import TILTS, is_above_ground, lift_toe_tip, point_foot
 from .limb_shift import LimitRotations, ShiftedLimb, build_exact_response, solve_shifts
 
 HIT_TOLERANCE = 1e-3
@@ -70,12 +70,17 @@ def correct_motion(
         return _Search(motion, part, float(frame), target=target, ball=ball, freedom=freedom, speed=speed,
                        limit_rotations=limit_rotations).run()
 
+    if not isinstance(part, AtFoot):
+        return correct(motion)
     tried = [correct(motion)]
     for tilt in TILTS:
-        if tried[-1].is_small or not isinstance(part, AtFoot):
+        if tried[-1].is_small:
             break
-        tried.append(replace(correct(point_foot(motion, part, frame, tilt, limit_rotations)), tilt=float(tilt)))
-    return min(tried, key=lambda found: found.cost)
+        pointed = correct(point_foot(motion, part, frame, tilt, limit_rotations))
+        if is_above_ground(pointed.motion, part, pointed.frame):
+            tried.append(replace(pointed, tilt=float(tilt)))
+    best = min(tried, key=lambda found: found.cost)
+    return replace(best, motion=lift_toe_tip(best.motion, part, best.frame))
 
 
 @dataclass(frozen=True, eq=False)

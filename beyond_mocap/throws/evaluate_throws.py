@@ -28,7 +28,7 @@ from ..synthesis.quality.movement import compute_jerk
 from ..synthetic.throws import find_grip
 from .networks.chains import EFFECTORS, find_chains
 from .networks.description import scale_description
-from .networks.example import Example, build_description
+from .networks.example import Example, build_description, orient_example
 from .networks.generate import GeneratedMotion, Options, generate_motion
 from .networks.kinematics import to_matrices
 from .networks.limits import JointLimits
@@ -194,7 +194,7 @@ def _measure_example(model: ThrowModel, example: Example, options: Options, rati
         network=measure_deviations(generated.predicted, description.effectors),
         body=measure_deviations(generated.effectors, description.effectors), impact=near, far_impact=far,
         own_impact=own, facing=_measure_facing(generated.motion, example.motion), head=head,
-        head_mean=_measure_mean_head(model, generated.motion, example.motion), head_share=share,
+        head_mean=_measure_mean_head(model, generated.motion, example), head_share=share,
         jerk=_measure_jerk(generated.motion) / max(ratio * _measure_jerk(example.motion), 1e-9),
         bones=_measure_bones(model, generated), beyond=_measure_limit_excess(model, generated.motion),
         seconds=generated.seconds, duration=example.motion.duration,
@@ -254,22 +254,27 @@ def _measure_facing(motion: Motion, truth: Motion) -> float:
     return float(np.degrees(np.abs(quaternion.wrap_angle(compute_heading(motion) - compute_heading(truth))).mean()))
 
 
-def _measure_mean_head(model: ThrowModel, motion: Motion, truth: Motion) -> float:
+def _measure_mean_head(model: ThrowModel, motion: Motion, example: Example) -> float:
     """Measure how far (degrees) the true head is from the examples' mean head on a body; NaN without a head."""
+    truth = example.motion
     head = identify_joints(truth.skeleton).head
     if head is None or not model.examples or identify_joints(model.skeleton).head is None:
         return np.nan
-    held = quaternion.multiply(quaternion.from_up_angle(compute_heading(motion)), _average_head(model))
+    held = quaternion.multiply(quaternion.from_up_angle(compute_heading(motion)),
+                               _average_head(model, example.limb))
     return float(np.degrees(_compute_angles(held, forward_kinematics(truth)[1][:, head]).mean()))
 
 
 @lru_cache(maxsize=8)
-def _average_head(model: ThrowModel) -> np.ndarray:
-    """Average the heads of a model's examples relative to their headings: a quaternion (1, 4)."""
+def _average_head(model: ThrowModel, limb: int) -> np.ndarray:
+    """Average the heads of a model's examples relative to their headings, a quaternion (1, 4); those of the other limb
+    are mirrored.
+    """
     head = identify_joints(model.skeleton).head
+    motions = [orient_example(example, limb).motion for example in model.examples]
     relative = np.concatenate([quaternion.multiply(
-        quaternion.from_up_angle(-compute_heading(example.motion)), forward_kinematics(example.motion)[1][:, head])
-        for example in model.examples])
+        quaternion.from_up_angle(-compute_heading(motion)), forward_kinematics(motion)[1][:, head])
+        for motion in motions])
     return quaternion.average(relative, np.ones((1, len(relative))))
 
 

@@ -154,6 +154,11 @@ def compute_poses(example: Example) -> Pose:
     return pose._replace(moved=np.diff(pose.positions, axis=0, prepend=pose.positions[:1]))
 
 
+def orient_example(example: Example, limb: int) -> Example:
+    """Return an example of a limb's side: itself, or mirrored where the other arm throws or the other foot kicks."""
+    return example if example.limb == limb else mirror_example(example)
+
+
 def mirror_example(example: Example) -> Example:
     """Mirror an example: the same throw with the other arm, or kick with the other leg."""
     def mirror_effectors(effectors):

@@ -1,8 +1,9 @@
 """Where a kicker looks: heads hold still in space while the trunk winds up, which hands and feet do not show.
 
 In recorded kicks the head stays within some 7 degrees of its mean in the second before contact, and the chest within
-15. Networks turn the head with the trunk. So the head is turned part of the way to where the heads of the examples are
-at that time before or after the contact, as seen from the line along which the kicker comes to the ball.
+15. Networks turn the head with the trunk. So the head moves part of the way as the heads of the examples do at that
+time before or after the contact, as seen from the line along which the kicker comes to the ball. Where it points on
+average stays as the networks have it: in examples that is as much the suit's as the person's.
 """
 
 from __future__ import annotations
@@ -16,7 +17,7 @@ from ...motion import quaternion
 from ...motion.humanoid import identify_joints
 from ...motion.motion import Motion, forward_kinematics
 from .description import Description, interpolate_positions
-from .example import build_description, mirror_example
+from .example import build_description, orient_example
 from .limits import JointLimits
 from .model import ThrowModel
 
@@ -26,7 +27,7 @@ _NECK_SHARE = 0.5  # of the turn of the head that the neck makes
 
 def turn_head(model: ThrowModel, description: Description, motion: Motion, share: float,
               limits: JointLimits | None = None) -> Motion:
-    """Turn the head of a kick part of the way to where the heads of the examples are.
+    """Let the head of a kick move part of the way as the heads of the examples do, about the mean that it has.
 
     Args:
         model: model with examples.
@@ -47,6 +48,8 @@ def turn_head(model: ThrowModel, description: Description, motion: Motion, share
     wanted = quaternion.multiply(approach, quaternion.average(heads, np.exp(-0.5 * away**2)))
     world, turned = forward_kinematics(motion)[1], motion
     own = world[:, body.head]
+    held = quaternion.multiply(quaternion.inverse(wanted), own)
+    wanted = quaternion.multiply(wanted, quaternion.average(held, np.ones((1, len(held)))))
     for joint, part in ((body.neck, _NECK_SHARE * share), (body.head, share)):
         if joint is not None:
             aim = quaternion.slerp(own, quaternion.match_signs(wanted, own), part)
@@ -86,7 +89,7 @@ def _collect_heads(model: ThrowModel, limb: int) -> tuple[np.ndarray, np.ndarray
     """
     seconds, rotations = [], []
     for example in model.examples:
-        own = example if example.limb == limb else mirror_example(example)
+        own = orient_example(example, limb)
         head = identify_joints(own.motion.skeleton).head
         back = quaternion.from_up_angle(-_measure_approach(build_description(own)))
         seconds.append((np.arange(len(own.motion)) - own.release) / own.motion.fps)

@@ -46,7 +46,7 @@ class Options:
         blend: networks receive trajectories that begin at the current positions of hands and feet.
         limits: joints stay within the range of the training data, and network inputs near it, so that errors do not
             accumulate (section 9.4).
-        gaze: share of the way by which the head of a kick is turned, at the end, to where heads of the examples are.
+        gaze: share of the way by which the head of a kick moves, in the end, as heads of the examples do.
     """
 
     pose_iterations: int = 75

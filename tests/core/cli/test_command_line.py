@@ -273,14 +273,13 @@ def test_a_root_above_the_hips_and_a_ball_come_back_where_they_are_asked_for(run
     assert status == 0 and any("--recorded-ball takes that of the recordings" in line for line in error)
     assert not (tmp_path / "ball.csv").exists()
     for more in ((), ("--window", "25")):
-        asked = ("--recorded-ball",) if not more else ()
-        status, _, error = run(*order, *more, *asked, "--keep-root", "--out", tmp_path / "rooted.bvh")
+        status, _, error = run(*order, *more, "--recorded-ball", "--keep-root", "--out", tmp_path / "rooted.bvh")
         assert status == 0, error
         plain, rooted = (bvh.read_bvh(tmp_path / f"{name}.bvh") for name in ("plain", "rooted"))
         assert [joint.name for joint in rooted.form.above] == ["World"] and plain.form.above == ()
         assert np.allclose(rooted.form.above[0].position, still.position, atol=1e-6)
-    assert np.isfinite(read_ball(tmp_path / "ball.csv").positions).sum() > 60
-    assert_told(run(*order, "--recorded-ball", "--window", "25", "--out", tmp_path / "a.bvh"), 2, "--recorded-ball")
+        assert np.isfinite(read_ball(tmp_path / "ball.csv").positions).sum() > 60
+        (tmp_path / "ball.csv").unlink()
     told = synthesize("--keep-root")
     assert told[0] == 0 and any("--keep-root adds none" in line for line in told[2])
 

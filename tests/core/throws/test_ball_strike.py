@@ -69,7 +69,7 @@ def test_a_kick_hits_another_target(lies):
     assert gaps[: int(found.frame)].min() > -0.01
     legs = identify_joints(found.motion.skeleton).right
     changed = set(np.argwhere(np.any(found.motion.rotations != made.motion.rotations, axis=2))[:, 1])
-    assert changed <= {legs.upper_leg, legs.lower_leg, legs.foot}
+    assert changed <= {legs.upper_leg, legs.lower_leg, legs.foot, legs.toe}
     assert places[:, legs.toe, 2].min() > -0.02
 
 

@@ -16,7 +16,7 @@ from beyond_mocap.synthetic.throws import build_throw
 from beyond_mocap.throws import evaluate_throws as recipe
 from beyond_mocap.throws.evaluate_throws import FULL_OPTIONS, RAW_OPTIONS, evaluate_throws, select_of_each
 from beyond_mocap.throws.networks.chains import find_chains
-from beyond_mocap.throws.networks.example import build_example
+from beyond_mocap.throws.networks.example import build_example, mirror_example
 from beyond_mocap.throws.networks.generate import GeneratedMotion
 from beyond_mocap.throws.networks.limits import estimate_joint_limits
 from beyond_mocap.throws.throws_page import build_throws_page, draw_strip
@@ -59,7 +59,7 @@ def generating(monkeypatch, by):
 
 
 def test_the_truth_is_off_by_nothing(examples, monkeypatch):
-    own = examples[:2]
+    own = [*examples[:2], mirror_example(examples[0])]
     generating(monkeypatch, [(example.motion, 0.0) for example in own])
     found = evaluate_throws(Model(own[0]), own)
     for one in found.motions:
@@ -69,6 +69,8 @@ def test_the_truth_is_off_by_nothing(examples, monkeypatch):
         assert one.jerk == pytest.approx(1.0) and one.head_share == pytest.approx(1.0) and one.bones == 0.0
         assert one.own_impact < 0.15  # the drag that the planted throw knows nothing of
     assert found.motions[0].beyond == 0.0
+    left, right = found.motions[2], found.motions[0]  # of those who use the other side the mean head is mirrored
+    assert left.head_mean == pytest.approx(right.head_mean, abs=1e-6)
 
 
 def test_what_is_planted_comes_out(examples, monkeypatch):

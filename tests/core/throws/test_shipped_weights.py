@@ -6,7 +6,9 @@ import numpy as np
 import pytest
 
 from beyond_mocap.base.errors import InputError
-from beyond_mocap.motion.motion import forward_kinematics
+from beyond_mocap.motion import quaternion
+from beyond_mocap.motion.humanoid import identify_joints
+from beyond_mocap.motion.motion import compute_pose, forward_kinematics, sample_frames_cubic
 from beyond_mocap.motion.retargeting.adult import build_adult_skeleton
 from beyond_mocap.synthetic.performers import build_thrower
 from beyond_mocap.throws.evaluate_throws import FULL_OPTIONS, RAW_OPTIONS, measure_deviations
@@ -24,6 +26,14 @@ ACTIONS = ("throw", "kick")
 TARGETS = {"throw": ((8.0, 0.0, 1.0), (15.0, 4.0, 1.5)), "kick": ((11.0, 0.0, 1.0), (20.0, -3.0, 1.8))}
 LIMBS = {"throw": "left_hand", "kick": "left_foot"}
 _LARGEST = 3_000_000
+
+
+def trace_toe_tip(kick):
+    """Places (N, 3) m of the right toe's tip around the contact, between frames too."""
+    motion, toe = kick.motion, identify_joints(kick.motion.skeleton).right.toe
+    frames = kick.release * motion.fps + np.arange(-8.0, 8.0, 0.1)
+    places, world = compute_pose(motion.skeleton, *sample_frames_cubic(motion, frames))
+    return places[:, toe] + quaternion.rotate(world[:, toe], motion.skeleton.tip_offset(toe))
 
 
 @pytest.mark.parametrize("action", ACTIONS)
@@ -46,6 +56,7 @@ def test_the_recorded_kicks_hit_and_throws_of_people_are_not_there():
         thrown = throw_at(model, ThrowRequest(target))
         assert thrown.impact_error <= 0.02 and thrown.displacement <= 0.05 and thrown.limit_excess < 1e-6
         assert (thrown.foot_tilt > 0.0) == points and forward_kinematics(thrown.motion)[0][..., 2].min() > 0.01
+        assert trace_toe_tip(thrown)[:, 2].min() > -0.012  # 3.6 cm in the ground if toes did not bend
     with pytest.raises(InputError, match="throw_recorded"):
         read_chosen_model(RECORDED, "throw")
 

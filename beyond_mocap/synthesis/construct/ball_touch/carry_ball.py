@@ -25,7 +25,6 @@ from ....motion.track import BALL_RADIUS, SampledTrack
 from ....motion.track.ball_path import BallPath
 from ...plan import Plan
 from ...search.source_frames import SourceFrames
-from ...take import Take
 
 _JUMP = 1.0  # m between two clips' balls from which on they are not joined
 _TOUCH, _NEAR = 0.03, 0.15  # m between part and ball: always a touch; a touch where it is nearest
@@ -91,19 +90,26 @@ def build_ball_path(library: Library, plan: Plan, track: SampledTrack, *, source
     return BallPath(track.times, carried, np.zeros(len(carried), bool)) if np.isfinite(carried).any() else None
 
 
-def report_recorded_ball(take: Take) -> list[str]:
-    """Report for how long a recorded ball is shown, and where it changes its place from clip to clip."""
-    if not take.plan.recorded_ball or np.isfinite(take.plan.track.ball).any():
+def report_recorded_ball(plan: Plan, ball: BallPath | None, seams: Sequence[int]) -> list[str]:
+    """Report for how long a recorded ball is shown, and where it changes its place from clip to clip.
+
+    Args:
+        plan: of a whole take.
+        ball: of the take, T frames; None without any.
+        seams: frames at which another clip begins.
+    Returns:
+        Lines for the user; none where the track has a ball or the plan asks for none.
+    """
+    if not plan.recorded_ball or np.isfinite(plan.track.ball).any():
         return []
-    if take.ball is None:
+    if ball is None:
         return ["no clip that is shown has a recorded ball"]
-    times = take.ball.times
-    known = np.isfinite(take.ball.positions).all(axis=1)
-    shown = f"{known.sum() / take.motion.fps:.1f} of {len(known) / take.motion.fps:.1f} s"
+    known = np.isfinite(ball.positions).all(axis=1)
+    shown = f"{known.sum() / plan.fps:.1f} of {len(known) / plan.fps:.1f} s"
     messages = [] if known.all() else [f"a recorded ball is shown for {shown}: the other clips have none"]
-    return [*messages, *(TimedMessage(f"{times[edge]:.1f} s: the recorded ball jumps from one clip to the next",
-                                      (times[edge], times[edge]))
-                         for edge in _find_jumps(take.ball.positions, take.seams.tolist()))]
+    return [*messages, *(TimedMessage(f"{ball.times[edge]:.1f} s: the recorded ball jumps from one clip to the next",
+                                      (ball.times[edge], ball.times[edge]))
+                         for edge in _find_jumps(ball.positions, seams))]
 
 
 def _find_jumps(ball: np.ndarray, transitions: Sequence[int]) -> list[int]:

@@ -11,6 +11,7 @@ from beyond_mocap.base.time_series import find_runs
 from beyond_mocap.files.bvh import bvh
 from beyond_mocap.files.tables import write_ball
 from beyond_mocap.library.build import build_library
+from beyond_mocap.match.long_player import iter_parts, search_long_player
 from beyond_mocap.motion.motion import forward_kinematics
 from beyond_mocap.motion.track import BALL_RADIUS
 from beyond_mocap.motion.track.ball_path import BallPath
@@ -96,6 +97,18 @@ def test_an_update_carries_the_ball_too(take, dribbles, track_of, timeline_of):
     assert 2 * FPS < shown.sum() < show_dribble(take).sum()
     assert np.isfinite(again.ball.positions[shown]).all()
     assert np.median(measure_touch_gaps(again)) < 0.05
+
+
+def test_the_ball_rides_along_across_windows(take, dribbles):
+    edit = search_long_player(dribbles, take.plan, 24.0, lambda *told: None, lambda: False)
+    (whole,) = iter_parts(dribbles, replace(edit, window=2.0), lambda *told: None, lambda: False)
+    known, shown = np.isfinite(whole.ball.positions).all(axis=1), show_dribble(whole)
+    first, end = max(find_runs(shown), key=lambda run: run[1] - run[0])
+    assert end - first > 4 * FPS and known[shown].all() and (known & ~shown).sum() < 2 * STEP
+    assert np.linalg.norm(np.diff(whole.ball.positions[first:end], axis=0), axis=1).max() * FPS < 8.0
+    gaps = measure_touch_gaps(whole)
+    assert len(gaps) >= 4 and np.median(gaps) < 0.05 and gaps.max() < 0.15, gaps
+    assert not any("a recorded ball is shown for" in line for line in whole.warnings), "that is told of the whole"
 
 
 def test_without_the_setting_and_with_a_ball_in_the_track_nothing_rides_along(dribbles, track_of, timeline_of, take):
