@@ -208,8 +208,9 @@ def measure_stretch(library: Library, take: Take, track: Track, overlap: np.ndar
     Raises:
         InputError: if the take has another skeleton than the library.
     """
-    return StretchFigures(evaluate(take, track, library), len(take.motion),
-                          measure_per_second(playback_from_take(take), track, overlap, ball))
+    played = playback_from_take(take)
+    return StretchFigures(evaluate(take, track, library, played), len(take.motion),
+                          measure_per_second(played, track, overlap, ball))
 
 
 def build_player_report(stretches: Sequence[StretchFigures]) -> dict:
