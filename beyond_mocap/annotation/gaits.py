@@ -207,28 +207,18 @@ def remove_short_runs(gaits: np.ndarray, min_length: int) -> np.ndarray:
     """
     if not len(gaits):
         return gaits
-    runs = [[stop - start, int(gaits[start])] for start, stop in find_equal_runs(gaits)]
-    while len(runs) > 1:
-        short = min(range(len(runs)), key=lambda i: runs[i][0])
-        if runs[short][0] >= min_length:
-            break
-        runs[short][1] = _choose_neighbour_gait(runs, short)
-        runs = _merge_equal_runs(runs)
-    return np.repeat([gait for _, gait in runs], [length for length, _ in runs])
+    runs = find_equal_runs(gaits)
+    lengths, values = [stop - start for start, stop in runs], [int(gaits[start]) for start, _ in runs]
+    while len(lengths) > 1 and (shortest := min(lengths)) < min_length:
+        _join_run(lengths, values, lengths.index(shortest))
+    return np.repeat(values, lengths)
 
 
-def _choose_neighbour_gait(runs: list[list[int]], index: int) -> int:
-    """Choose the gait of the neighbouring run that is more similar, then longer."""
-    neighbours = runs[max(index - 1, 0) : index] + runs[index + 1 : index + 2]
-    return min(neighbours, key=lambda run: (abs(run[1] - runs[index][1]), -run[0]))[1]
-
-
-def _merge_equal_runs(runs: list[list[int]]) -> list[list[int]]:
-    """Merge neighbouring runs of the same gait."""
-    out: list[list[int]] = []
-    for length, gait in runs:
-        if out and out[-1][1] == gait:
-            out[-1][0] += length
-        else:
-            out.append([length, gait])
-    return out
+def _join_run(lengths: list[int], values: list[int], index: int) -> None:
+    """Join a run to the neighbour whose value is more similar, then the longer one, and to the other if that is equal.
+    """
+    neighbours = [at for at in (index - 1, index + 1) if 0 <= at < len(lengths)]
+    value = values[min(neighbours, key=lambda at: (abs(values[at] - values[index]), -lengths[at]))]
+    joined = [index, *(at for at in neighbours if values[at] == value)]
+    part = slice(min(joined), max(joined) + 1)
+    lengths[part], values[part] = [sum(lengths[part])], [value]

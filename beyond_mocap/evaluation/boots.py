@@ -13,6 +13,7 @@ from ..motion import quaternion
 from ..motion.motion import Motion
 from .naturalness import FPS
 
+_ROWS_AT_ONCE = 1024  # frames at once, to limit memory
 DEEP = 0.02  # m below the ground from which a boot counts: grass and soles hide less
 
 
@@ -29,7 +30,9 @@ def measure_boot_heights(boots: BodyMesh, motion: Motion, positions: np.ndarray,
     """
     count = int((len(motion) - 1) / motion.fps * FPS + 1e-6) + 1
     rows = np.minimum(np.rint(np.arange(count) * motion.fps / FPS).astype(int), len(motion) - 1)
-    return measure_lowest_point(boots, motion.skeleton.rest_positions, positions[rows], rotations[rows])
+    parts = (rows[first : first + _ROWS_AT_ONCE] for first in range(0, count, _ROWS_AT_ONCE))
+    return np.concatenate([measure_lowest_point(boots, motion.skeleton.rest_positions, positions[part], rotations[part])
+                           for part in parts])
 
 
 def measure_lowest_point(skin: BodyMesh, rest: np.ndarray, positions: np.ndarray, rotations: np.ndarray) -> np.ndarray:

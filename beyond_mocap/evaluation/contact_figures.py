@@ -64,7 +64,7 @@ def find_reachable(view: View, moment: KeyMomentResult) -> bool | None:
     """
     labels = list_contact_labels(moment)
     part = find_striking_part(labels)
-    if part is None or view.track is None or not np.isfinite(view.track.ball[:, :2]).all(axis=1).any():
+    if part is None or view.track is None or not len(view.track.known_ball[0]):
         return None
     sampled, time = view.sampled_track, view.played.times[moment.frame]
     at = int(np.argmin(np.abs(sampled.times - time)))

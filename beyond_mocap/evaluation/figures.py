@@ -10,6 +10,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
+from functools import lru_cache
 
 import numpy as np
 
@@ -47,15 +48,14 @@ def measure_path_errors(view: View) -> dict:
     Returns:
         The report's groups.
     """
-    pelvis, fps = view.played.pelvis, view.fps
+    fps = view.fps
     source_sway = _finite_mean(view.source_values("sway"))
     out: dict = {"root_error_m": dict.fromkeys(("mean", "p95", "max")),
            "slow_root_error_m": dict.fromkeys(("mean", "p95", "max")),
            "pelvis_error_m": {"mean": None, "own": source_sway, "keys": None, "own_frames": len(view.used_rows)},
            "speed_coverage": {"above": None, "below": None}}  # fmt: skip
     if view.target is not None:
-        error, unsmoothed = movement.measure_root_error(pelvis, view.target, fps), movement.measure_pelvis_error(pelvis,
-                view.target)
+        error, unsmoothed = view.root_error, view.pelvis_error
         # a slow body may rest where its track creeps
         is_slow = movement.measure_travel_speed(view.target, fps) < movement.SPEED_EDGES[0]
         out["root_error_m"] = _compute_measures(error[~is_slow], ("mean", "p95", "max"))
@@ -105,11 +105,9 @@ def _measure_key_moment(view: View, moment: KeyMomentResult) -> dict:
     errors: dict[str, float | None] = {"position_error_m": None, "pelvis_error_m": None, "ball_shift_m": None}
     contact_time, contact_gap = measure_contact(played, moment)
     if view.target is not None:
-        error = movement.measure_root_error(played.pelvis, view.target, view.fps)
         frame = int(round((contact_time - played.start_time) * view.fps)) if np.isfinite(contact_time) else moment.frame
-        errors["position_error_m"] = float(np.interp(time, played.times, error))
-        unsmoothed = movement.measure_pelvis_error(played.pelvis, view.target)
-        errors["pelvis_error_m"] = float(np.interp(time, played.times, unsmoothed))
+        errors["position_error_m"] = float(np.interp(time, played.times, view.root_error))
+        errors["pelvis_error_m"] = float(np.interp(time, played.times, view.pelvis_error))
         errors["ball_shift_m"] = measure_ball_shift(played, frame, view.track)
     return {
         "time_s": moment.requested.time, "solved_time_s": moment.requested.solved,
@@ -133,7 +131,7 @@ def measure_feet(view: View) -> dict:
     planted = played.feet
     travel = movement.measure_stance_travel(planted[:, :, 1], movement.list_stances(played.contacts))
     source_travel = np.zeros(0) if view.reference is None else view.reference.select_used_travel(view.used)
-    skating = movement.find_skating_steps(planted[:, :, 1], measure_floor_height(played.motion), fps)
+    skating = movement.find_skating_steps(planted[:, :, 1], measure_floor_height(played.motion, played.positions), fps)
     known = view.reference is not None
     heel_rest = view.reference.heel_rest if known else movement.measure_heel_rest(planted, played.contacts)
     support = movement.measure_support_height(planted, played.contacts, heel_rest)
@@ -244,24 +242,24 @@ def measure_poses(view: View) -> dict:
         The report's groups.
     """
     played = view.played
-    features = realism.build_pose_features(played.motion.skeleton, played.positions, view.fps, played.body.hips)
     curve = realism.measure_smoothness(played.motion.skeleton, played.positions, view.fps)
     source_smoothness = _compute_measures(view.source_values("smoothness"), ("mean", "p95", "max"))
     smoothness = {**_compute_measures(curve, ("mean", "p95", "max")),
                   **{f"source_{name}": value for name, value in source_smoothness.items()}}
     smoothness["source_frames"] = len(view.used_rows)
     out = {"pose_realism": None, "smoothness_m": smoothness}
-    return out if view.reference is None else {**out, **_measure_pose_realism(view, features)}
+    return out if view.reference is None else {**out, **_measure_pose_realism(view)}
 
 
-def _measure_pose_realism(view: View, features: np.ndarray) -> dict:
+def _measure_pose_realism(view: View) -> dict:
     """Measure pose realism, over all frames of speeds that enough recordings have, and by speed class."""
     reference, classes = view.reference, movement.classify_speed(view.speed)
     if not np.isfinite(reference.pose_p95).any():
         unreal = np.full(view.count, np.nan)
     else:
         limit = np.nan_to_num(reference.pose_p95[classes], nan=np.inf)
-        distance = realism.bound_nearest_distance(features / view.scale, reference.poses, limit)
+        distance = realism.bound_pose_distance(view.played.motion, view.played.positions, reference.poses, limit,
+                                               view.scale)
         unreal = realism.find_unreal_frames(distance, view.speed, reference.pose_p95)
     by_speed = {
         name: {"share": _finite_mean(unreal[classes == k]), "frames": int(np.sum(classes == k)),
@@ -335,7 +333,10 @@ def measure_annotation_similarity(view: View) -> dict:
     requested = list_requested_labels(fill_automatic_spans(view), played.times, view.moments)
     key_requested, key_played = [m.requested.words for m in view.moments], [m.words for m in view.moments]
     library = extend_with_synthetic(view.library, played)
-    had = [] if library is None else [_select_had_labels(library.keys, moment) for moment in view.moments]
+    keys = () if library is None else library.keys
+    select_nearest = lru_cache(None)(lambda words: select_nearest_keys(keys, words))  # moments repeat their labels
+    had = [] if library is None else [_select_had_labels(select_nearest(moment.requested.words), moment)
+                                      for moment in view.moments]
     return {  # means over the frames that count, as in Faustino Table 2
         "all": _finite_mean(measure_similarity(requested, played.words)),
         "keys": _finite_mean(measure_similarity(key_requested, key_played)),
@@ -346,14 +347,14 @@ def measure_annotation_similarity(view: View) -> dict:
     }
 
 
-def _select_had_labels(keys: tuple[Key, ...], moment: KeyMomentResult) -> frozenset[str] | None:
-    """Select the requested labels of a key moment that one key of the library carries; None without any.
+def _select_had_labels(nearest: tuple[Key, ...], moment: KeyMomentResult) -> frozenset[str] | None:
+    """Select the requested labels of a key moment that one of the library's nearest keys carries; None without any.
 
     Of a key moment that no key serves whole, these are the labels of the nearest ones, so that a substitute counts by
     what it could have shown; of several equally near ones, those that are shown best.
     """
     requested, shown = frozenset(moment.requested.words), frozenset(moment.words)
-    carried = {requested & key.labels for key in select_nearest_keys(keys, moment.requested.words)}
+    carried = {requested & key.labels for key in nearest}
     best = max(carried, key=lambda labels: (len(labels & shown), sorted(labels)), default=frozenset())
     return best or None
 
@@ -419,10 +420,9 @@ def measure_similarity(
     """
     known: dict[tuple, float] = {}
     out = np.full(len(played), np.nan)
-    for frame, (requested_here, played_here) in enumerate(zip(requested, played)):
-        if requested_here is None:
+    for frame, pair in enumerate(zip(requested, played)):
+        if pair[0] is None:
             continue
-        pair = (tuple(requested_here), tuple(played_here))
         if pair not in known:
             known[pair] = measure(*pair)
         out[frame] = known[pair]

@@ -141,12 +141,12 @@ def _measure_plan_figures(view: View, planned: np.ndarray) -> dict:
 def _measure_off_travel_aside(view: View) -> dict:
     """Measure the 90th percentile of the angle between heading and travel where the ball lies aside of the travel."""
     course, track = view.course, view.track
-    known = np.isfinite(track.ball[:, :2]).all(axis=1)
-    if not known.any():
+    ball_times, ball = track.known_ball
+    if not len(ball_times):
         return {"aside_frames": 0, "off_travel_aside_deg_p90": None}
     times = view.played.start_time + course.times
     body = interpolate_columns(times, view.played.times, view.played.pelvis)
-    to_ball = interpolate_columns(times, track.times[known], track.ball[known, :2]) - body
+    to_ball = interpolate_columns(times, ball_times, ball) - body
     bearing = arctan2(to_ball[:, 1], to_ball[:, 0])
     off = np.degrees(measure_facing_off_travel(course)[np.abs(quaternion.wrap_angle(bearing - course.travel)) > ASIDE])
     off = off[np.isfinite(off)]

@@ -104,13 +104,13 @@ def measure_per_frame(view: View) -> PerFrame:
     corrected = np.full((count, 2), np.nan) if played.correction is None else np.asarray(played.correction, float)
     jerk = unknown.copy()
     if view.reference is not None and count > movement.TRANSITION_TO_JERK + 1:
-        values = movement.compute_jerk(played.positions, view.fps)
+        values = view.jerk
         jerk[movement.TRANSITION_TO_JERK :][: len(values)] = movement.compute_jerk_ratios(values, view.speed,
                 view.reference.jerk_p95)
     return PerFrame(
         times=played.times, track=wanted, slide=slides, correction=corrected, jerk=jerk, speed=view.speed,
-        root_error=movement.measure_root_error(played.pelvis, wanted, view.fps) if known else unknown,
-        pelvis_error=movement.measure_pelvis_error(played.pelvis, wanted) if known else unknown,
+        root_error=view.root_error if known else unknown,
+        pelvis_error=view.pelvis_error if known else unknown,
         requested_speed=movement.measure_travel_speed(wanted, view.fps) if known else unknown,
     )  # fmt: skip
 

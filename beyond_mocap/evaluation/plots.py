@@ -215,7 +215,8 @@ def _draw_root(ax, view: View) -> None:
 
 
 def _draw_feet(ax, view: View) -> None:
-    times, toes = view.played.times, view.played.feet[:, :, 1, 2] - measure_floor_height(view.played.motion)
+    played = view.played
+    times, toes = played.times, played.feet[:, :, 1, 2] - measure_floor_height(played.motion, played.positions)
     for side, (name, colour) in enumerate(_SIDES.items()):
         ax.plot(times, 100 * toes[:, side], color=colour, lw=1, label=f"{name} toe")
         in_contact = view.played.contacts[:, side]

@@ -6,12 +6,15 @@ ground below the hips (as in the search); distances are root mean squares over j
 
 from __future__ import annotations
 
+from collections.abc import Iterator, Sequence
+
 import numpy as np
 
 from ..base.time_series import time_derivative
 from ..library.features import compute_raw_features, select_feature_joints
 from ..motion import quaternion
-from ..motion.humanoid import Humanoid, compute_heading_from_positions
+from ..motion.humanoid import Humanoid, compute_heading_from_positions, identify_joints
+from ..motion.motion import Motion
 from ..motion.skeleton import Skeleton
 from ..synthesis.quality import movement
 from ..synthesis.quality.movement import classify_speed
@@ -20,7 +23,8 @@ VELOCITY_SECONDS = 0.12  # weight of m/s against metres, like `library.features.
 FEWEST_RECORDINGS = 3
 """Recordings that a speed class needs, so that with one's own left out two others show how far apart people are."""
 _ROWS_AT_ONCE = 512  # rows of distances at once, to limit memory
-_PARTS, _ROUNDING = 16, 2e-3  # of a library that are searched in turn; m that a distance in float32 may be off
+_FRAMES_AT_ONCE = 1024  # frames of a motion at once, to limit memory: what is computed of them stays in the cache
+_PARTS, _ROUNDING = 32, 2e-3  # of a library that are searched in turn; m that a distance in float32 may be off
 
 
 def compute_local_positions(skeleton: Skeleton, positions: np.ndarray, hips: int) -> np.ndarray:
@@ -122,26 +126,56 @@ def measure_nearest_distance(
     return np.sqrt(np.maximum(out, 0.0))
 
 
-def bound_nearest_distance(features: np.ndarray, library: np.ndarray, enough: np.ndarray) -> np.ndarray:
+def split_library(library: np.ndarray) -> list[np.ndarray]:
+    """Split a library (N, D) m into parts that are searched in turn, each with every _PARTS-th pose of it."""
+    return [np.ascontiguousarray(library[part::_PARTS]) for part in range(min(_PARTS, len(library)))]
+
+
+def bound_nearest_distance(features: np.ndarray, parts: Sequence[np.ndarray], enough: np.ndarray) -> np.ndarray:
     """Measure the distance from each row of features to the nearest row of a library, as far as it matters.
 
-    The library is searched in parts, each with every _PARTS-th pose of it. A row that is near enough to one of them is
-    not compared with the others.
+    A row that is near enough to a pose of one part is not compared with the others.
 
     Args:
         features: (T, D) m.
-        library: (N, D) m.
+        parts: of a library, from `split_library`.
         enough: (T,) m, a distance of which nothing is known but that the nearest row is no farther.
     Returns:
         (T,) m, that of `measure_nearest_distance` or less than `enough`.
     """
     out, left = np.full(len(features), np.inf), np.arange(len(features))
-    for part in range(_PARTS):
+    for part in parts:
         left = left[out[left] >= enough[left] - _ROUNDING]
-        if len(left) and part < len(library):
-            found = measure_nearest_distance(features[left], np.ascontiguousarray(library[part::_PARTS]))
-            out[left] = np.minimum(out[left], found)
+        if len(left):
+            out[left] = np.minimum(out[left], measure_nearest_distance(features[left], part))
     return out
+
+
+def bound_pose_distance(motion: Motion, positions: np.ndarray, library: np.ndarray, enough: np.ndarray,
+                        scale: float) -> np.ndarray:
+    """Measure the distance from each pose of a motion to the nearest one of a library, as far as it matters.
+
+    Args:
+        motion: T frames on a skeleton of J joints.
+        positions: (T, J, 3) m, its joints, world frame.
+        library: (N, 6 J) m.
+        enough: (T,) m, as for `bound_nearest_distance`.
+        scale: stature relative to the library's skeleton.
+    Returns:
+        (T,) m.
+    """
+    parts, out, hips = split_library(library), np.empty(len(positions)), identify_joints(motion.skeleton).hips
+    for first, end in _iter_spans(len(positions)):
+        low, high = max(first - 1, 0), min(end + 1, len(positions))  # velocities need the frames beside
+        features = build_pose_features(motion.skeleton, positions[low:high], motion.fps, hips)
+        rows = features[first - low : end - low] / scale
+        out[first:end] = bound_nearest_distance(rows, parts, enough[first:end])
+    return out
+
+
+def _iter_spans(count: int) -> Iterator[tuple[int, int]]:
+    """Iterate over spans (first, end) of _FRAMES_AT_ONCE of so many frames."""
+    return ((first, min(first + _FRAMES_AT_ONCE, count)) for first in range(0, count, _FRAMES_AT_ONCE))
 
 
 def compute_class_p95(values: np.ndarray, speed: np.ndarray) -> np.ndarray:
@@ -221,4 +255,9 @@ def measure_smoothness(skeleton: Skeleton, positions: np.ndarray, fps: float) ->
     """
     joints = select_feature_joints(skeleton)
     heading = np.unwrap(compute_heading_from_positions(skeleton, positions))
-    return np.linalg.norm(np.diff(compute_raw_features(positions[:, joints], heading, fps), axis=0), axis=-1)
+    out = np.empty(max(len(positions) - 1, 0))
+    for first, end in _iter_spans(len(out)):
+        low, high = max(first - 2, 0), min(end + 3, len(positions))  # accelerations need two frames beside
+        features = compute_raw_features(positions[low:high, joints], heading[low:high], fps)
+        out[first:end] = np.linalg.norm(np.diff(features[first - low : end + 1 - low], axis=0), axis=-1)
+    return out

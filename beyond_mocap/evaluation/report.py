@@ -35,18 +35,20 @@ FRAMES_KEYS = {**naturalness_figures.FRAMES_KEYS, **touch_figures.FRAMES_KEYS, *
 SECONDS = ("load", "library", "search", "construct", "polish", "total")
 
 
-def evaluate(take: Take, track: Track | None, library: Library | None) -> dict:
+def evaluate(take: Take, track: Track | None, library: Library | None, played: Playback | None = None) -> dict:
     """Build the report of a take in memory.
 
     Args:
         take: the take.
         track: the player's samples as measured, seconds and metres, or None.
         library: the library it was synthesized from; without it there are no scores of the recordings.
+        played: the take's playback, where there is one already.
     Returns:
         The report as plain values for JSON, None where a value is unknown.
     """
+    played = played or playback_from_take(take)
     report = evaluate_played(
-        playback_from_take(take), track=track, timeline=take.timeline, library=library, ik_miss=take.ik_miss,
+        played, track=track, timeline=take.timeline, library=library, ik_miss=take.ik_miss,
         requested=take.plan.timeline if take.plan else Timeline(),
     )
     seconds = {name: take.seconds.get(name) for name in (*SECONDS, *(s for s in take.seconds if s not in SECONDS))}
@@ -57,7 +59,7 @@ def evaluate(take: Take, track: Track | None, library: Library | None) -> dict:
     if pins:
         out["pins"] = round_values(pins)
     if take.solved is not None:
-        out["dribbles"] = round_values(measure_dribble_touches(playback_from_take(take), take.dribble_touches, track))
+        out["dribbles"] = round_values(measure_dribble_touches(played, take.dribble_touches, track))
     return out
 
 

@@ -7,6 +7,7 @@ and shoulders; speeds and lengths of the body are brought to a leg of 0.86 m. Sp
 from __future__ import annotations
 
 import math
+from bisect import bisect_left
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, fields
 from functools import cached_property
@@ -68,7 +69,22 @@ class LegCourse:
         """(T, 2, 3) m/s of the ankles relative to the pelvis."""
         return time_derivative(self.ankles - self.pelvis[:, None], FPS)
 
-    @property
+    @cached_property
+    def relative_speed(self) -> np.ndarray:
+        """(T, 2) m/s, size of `relative_velocity`."""
+        return np.linalg.norm(self.relative_velocity, axis=-1)
+
+    @cached_property
+    def toe_speed(self) -> np.ndarray:
+        """(T, 2) m/s of the toes over the ground, of the body as it is."""
+        return np.linalg.norm(time_derivative(self.toes, FPS), axis=-1) / self.scale
+
+    @cached_property
+    def stances(self) -> tuple[list[tuple[int, int]], ...]:
+        """(first frame, end) of each foot's stances."""
+        return tuple(find_runs(self.planted[:, side]) for side in (0, 1))
+
+    @cached_property
     def ahead(self) -> np.ndarray:
         """(T, 2) unit vectors in which the body faces."""
         return np.stack([np.cos(self.heading), np.sin(self.heading)], axis=-1)
@@ -189,16 +205,15 @@ def measure_kick(legs: LegCourse, second: float, side: int | None, ball_speed: f
         side: of the kicking foot, 0 left, 1 right; None takes the faster one.
         ball_speed: m/s just after it.
     """
-    speeds = np.linalg.norm(legs.relative_velocity, axis=-1)
+    speeds = legs.relative_speed
     frame = int(np.clip(np.rint(second * FPS), 0, len(speeds) - 1))
     side = int(np.argmax(speeds[frame])) if side is None else side
-    toe_speeds = np.linalg.norm(time_derivative(legs.toes[:, side], FPS), axis=-1) / legs.scale
     times = np.arange(len(speeds)) / FPS
     beside, ahead = _measure_plant(legs, frame, side)
     run_up = legs.speed[max(frame - int(_RUN_UP_SECONDS * FPS), 0) : frame + 1]
     return Kick(ankle_speed=float(np.interp(second, times, speeds[:, side])),
-                foot_speed=float(np.interp(second, times, toe_speeds)), plant_beside=beside, plant_ahead=ahead,
-                stride_ratio=_measure_stride_ratio(legs, frame, side), run_up=float(run_up.mean()),
+                foot_speed=float(np.interp(second, times, legs.toe_speed[:, side])), plant_beside=beside,
+                plant_ahead=ahead, stride_ratio=_measure_stride_ratio(legs, frame, side), run_up=float(run_up.mean()),
                 ball_speed=ball_speed)  # fmt: skip
 
 
@@ -227,8 +242,8 @@ def _measure_stride_ratio(legs: LegCourse, frame: int, side: int) -> float:
 
 def _find_stance(legs: LegCourse, side: int, before: int) -> tuple[int, int] | None:
     """Find the last stance (first frame, end) of a foot that begins before a frame."""
-    stances = [stance for stance in find_runs(legs.planted[:, side]) if stance[0] < before]
-    return stances[-1] if stances else None
+    count = bisect_left(legs.stances[side], (before, 0))
+    return legs.stances[side][count - 1] if count else None
 
 
 def find_strikes(legs: LegCourse) -> list[tuple[float, int]]:
@@ -237,8 +252,7 @@ def find_strikes(legs: LegCourse) -> list[tuple[float, int]]:
     The ankle whips forward at its fastest, faster than STRIKE_SPEED relative to the pelvis and than a runner's at that
     speed.
     """
-    velocity = legs.relative_velocity
-    speeds, forward = np.linalg.norm(velocity, axis=-1), np.einsum("tsk,tk->ts", velocity[..., :2], legs.ahead)
+    speeds, forward = legs.relative_speed, np.einsum("tsk,tk->ts", legs.relative_velocity[..., :2], legs.ahead)
     least = np.maximum(STRIKE_SPEED, STRIKE_FACTOR * legs.speed + STRIKE_MARGIN)[:, None]
     is_strike = (speeds > least) & (forward > 0.0)
     found = [(frame / FPS, side) for side in (0, 1) for frame in _list_peaks(speeds[:, side], is_strike[:, side])]

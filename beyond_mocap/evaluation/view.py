@@ -61,6 +61,16 @@ class View:
         return bool(np.any(self.played.clip >= 0))
 
     @cached_property
+    def root_error(self) -> np.ndarray:
+        """(T,) m, of `movement.measure_root_error`; the track has to be known."""
+        return movement.measure_root_error(self.played.pelvis, self.target, self.fps)
+
+    @cached_property
+    def pelvis_error(self) -> np.ndarray:
+        """(T,) m, of `movement.measure_pelvis_error`; the track has to be known."""
+        return movement.measure_pelvis_error(self.played.pelvis, self.target)
+
+    @cached_property
     def jerk(self) -> np.ndarray:
         """(T-3,) m/s^3, of `movement.compute_jerk`."""
         return movement.compute_jerk(self.played.positions, self.fps)

@@ -50,7 +50,7 @@ _SPEED_ROOM, _SPEED_SLACK = 1.2, 0.3  # factor and m/s by which a player may be 
 _OWN_KICK_SPEED = 2.0  # m/s of players from which on a library's own kicker has kicks of any strength
 _GAITS = frozenset(list_gaits())
 _SIDE = "right"  # of clips that are not mirrored
-_KEPT, _KEPT_CLIPS = 4, 400  # extended libraries and clips that are kept for each library; a clip has some 0.3 MB
+_KEPT, _KEPT_CLIPS = 2, 400  # extended libraries, some 40 MB each, and clips, some 0.3 MB, kept for each library
 
 _clips: WeakKeyDictionary[Library, dict[str, tuple[Clip, Clip]]] = WeakKeyDictionary()
 _settings: WeakKeyDictionary[Library, ActionSetting] = WeakKeyDictionary()

@@ -83,11 +83,16 @@ def sample_ball(plan: Plan, times: np.ndarray) -> BallPath:
     return BallPath(times, np.where(np.isfinite(solved), solved, place), measured)
 
 
-def find_led_ball(take: Take) -> tuple[np.ndarray, np.ndarray]:
-    """Find the frames (K,) of the match's clock at which a player moves the ball, and the offsets (K, 3) m."""
-    if take.ball is None:
+def find_led_ball(take: Take, ball: BallPath | None) -> tuple[np.ndarray, np.ndarray]:
+    """Find the frames (K,) of the match's clock at which a player moves the ball, and the offsets (K, 3) m.
+
+    Args:
+        take: of the player.
+        ball: before any player moves it (`sample_ball` at the take's times), None without one.
+    """
+    if ball is None or take.ball is None:
         return np.zeros(0, int), np.zeros((0, 3))
-    offset = take.ball.positions - sample_ball(take.plan, take.ball.times).positions
+    offset = take.ball.positions - ball.positions
     return _list_moved(offset, round(take.start_time * take.motion.fps))
 
 
@@ -122,7 +127,7 @@ def apply_led_ball(ball: BallPath, first: int, led: Iterable[tuple[np.ndarray, n
 
 def lead_ball_between_players(
     takes: Sequence[Take], motions: Sequence[Motion], firsts: Sequence[int],
-    led: Sequence[tuple[np.ndarray, np.ndarray]],
+    led: Sequence[tuple[np.ndarray, np.ndarray]], balls: Sequence[BallPath | None],
 ) -> list[tuple[np.ndarray, np.ndarray]]:
     """Lead the ball from one player's touch to the next one's, and around the bodies of all.
 
@@ -133,6 +138,7 @@ def lead_ball_between_players(
         motions: the same after collision avoidance.
         firsts: frame of the match's clock of each one's first frame.
         led: what each moves the ball by (`find_led_ball`).
+        balls: as for `find_led_ball`.
     Returns:
         The same, faded out where another player meets the ball, with the moves around each body added to that player's.
     """
@@ -141,10 +147,10 @@ def lead_ball_between_players(
     for (frames, offset), own, take in zip(led, met, takes):
         share = _compute_led_share(frames, own, np.setdiff1d(touched, own), BALL_SECONDS * take.motion.fps)
         out.append((frames, share[:, None] * offset))
-    for number, (take, motion, first) in enumerate(zip(takes, motions, firsts)):
-        if take.ball is None:
+    for number, (motion, first, sampled) in enumerate(zip(motions, firsts, balls)):
+        if sampled is None:
             continue
-        ball = apply_led_ball(sample_ball(take.plan, take.ball.times), first, out).positions
+        ball = apply_led_ball(sampled, first, out).positions
         held = [(at, at) for at in touched - first if 0 <= at < len(ball)]
         around = lead_ball_around_body(motion.skeleton, motion.root_positions, motion.rotations, ball, held=held,
                                        fps=motion.fps)

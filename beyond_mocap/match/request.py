@@ -7,8 +7,9 @@ from __future__ import annotations
 import hashlib
 import math
 import os
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, fields, is_dataclass
+from functools import lru_cache
 from pathlib import Path
 
 import numpy as np
@@ -203,10 +204,13 @@ def _add_to_hash(hashed, value: object) -> None:
     """Add a value to a hash. It starts with its kind and ends with a zero, so that different contents give different
     bytes.
     """
-    if isinstance(value, np.ndarray):
+    kind = type(value)
+    if kind in _PLAIN:  # nearly all of them
+        hashed.update(f"{kind.__name__} {value!r}\0".encode())
+    elif isinstance(value, np.ndarray):
         hashed.update(f"array {value.dtype.str} {value.shape}\0".encode())
         hashed.update(np.ascontiguousarray(value).tobytes())
-    elif value is None or isinstance(value, (bool, int, float, str, bytes, np.generic)):
+    elif isinstance(value, (int, float, str, bytes, np.generic)):
         value = value.item() if isinstance(value, np.generic) else value
         hashed.update(f"{type(value).__name__} {value!r}\0".encode())
     elif isinstance(value, Path):
@@ -215,22 +219,27 @@ def _add_to_hash(hashed, value: object) -> None:
         _add_parts_to_hash(hashed, value)
 
 
-def _is_absent_part(field, content) -> bool:
-    """Say whether a field is a part that was added later and is not there (`LATER_PART`)."""
-    return bool(field.metadata.get("is_part")) and not content
+_PLAIN = frozenset((type(None), bool, int, float, str, bytes))
+
+
+@lru_cache
+def _list_fields(kind: type) -> tuple[tuple[str, bool], ...]:
+    """List the fields of a dataclass, and whether each is a part that was added later (`LATER_PART`)."""
+    return tuple((field.name, bool(field.metadata.get("is_part"))) for field in fields(kind))
 
 
 def _add_parts_to_hash(hashed, value: object) -> None:
-    if is_dataclass(value) and not isinstance(value, type):
-        parts = [(field.name, content) for field in fields(value)
-                 if not _is_absent_part(field, content := getattr(value, field.name))]
+    parts: Sequence
+    if isinstance(value, (tuple, list)):
+        parts, kind = value, "row"
+    elif is_dataclass(value) and not isinstance(value, type):
+        rows = ((name, getattr(value, name), is_later) for name, is_later in _list_fields(type(value)))
+        parts = [(name, content) for name, content, is_later in rows if not is_later or content]
         kind = type(value).__name__
     elif isinstance(value, Mapping):
         parts, kind = sorted(value.items()), "mapping"
     elif isinstance(value, (set, frozenset)):
         parts, kind = sorted(value), "set"
-    elif isinstance(value, (tuple, list)):
-        parts, kind = value, "row"
     else:
         raise TypeError(f"{type(value).__name__} has no content to hash")
     hashed.update(f"{kind} {len(parts)}\0".encode())

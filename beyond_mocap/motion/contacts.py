@@ -31,17 +31,18 @@ _SHORTEST_GAP = 0.05  # seconds; shorter gaps within a stance are closed
 _ZERO_FLOOR_RANGE = (-0.02, 0.065)  # metres that toe joints may be over a floor at height 0
 
 
-def measure_floor_height(motion: Motion) -> float:
+def measure_floor_height(motion: Motion, positions: np.ndarray | None = None) -> float:
     """Measure the clip's floor: the 2nd percentile of its toes' heights, of the ankles' where it has no toes.
 
     Args:
         motion: T frames, world, Z up.
+        positions: (T, J, 3) m, its joints, where they are known.
     Returns:
         Height of the lowest foot joint, metres.
     """
     body = identify_joints(motion.skeleton)
-    positions, _ = forward_kinematics(motion)
-    return float(np.percentile(positions[:, [body.left.toe_or_foot, body.right.toe_or_foot], 2], 2))
+    places = forward_kinematics(motion)[0] if positions is None else positions
+    return float(np.percentile(places[:, [body.left.toe_or_foot, body.right.toe_or_foot], 2], 2))
 
 
 def measure_sole_height(skeleton: Skeleton) -> float:

@@ -39,7 +39,8 @@ class Motion:
 
     def __post_init__(self):
         root = freeze_array(self.root_positions)
-        rotations = freeze_array(quaternion.unify_signs(_normalize_rotations(self.rotations)))
+        rotations = quaternion.unify_signs(_normalize_rotations(self.rotations))
+        rotations.setflags(write=False)
         if root.ndim != 2 or root.shape[1] != 3 or rotations.shape != (len(root), len(self.skeleton), 4):
             raise InputError(
                 "motion", f"root {root.shape}, rotations {rotations.shape}", f"(T, 3) and (T, {len(self.skeleton)}, 4)"
@@ -77,15 +78,20 @@ class Motion:
 
     def frames(self, start: int, stop: int) -> "Motion":
         """Return frames start .. stop-1 as a motion."""
-        return replace(self, root_positions=self.root_positions[start:stop], rotations=self.rotations[start:stop])
+        root, rotations = (freeze_array(values[start:stop]) for values in (self.root_positions, self.rotations))
+        return Motion.from_stored(self.skeleton, root, rotations, self.fps)  # a part of what is in order is in order
 
 
 def _normalize_rotations(q: np.ndarray) -> np.ndarray:
     """Normalize quaternions, but leave each unit one as it is: dividing again would change its last bits at every copy.
     """
     q = np.asarray(q, dtype=float)
-    is_unit = np.abs(dot_products(q, q)[..., None] - 1.0) < 1e-12
-    return q if np.all(is_unit) else np.where(is_unit, q, quaternion.normalize(q))
+    is_other = ~(np.abs(dot_products(q, q) - 1.0) < 1e-12)
+    if not is_other.any():
+        return q
+    out = q.copy()
+    out[is_other] = quaternion.normalize(q[is_other])
+    return out
 
 
 def forward_kinematics(motion: Motion) -> tuple[np.ndarray, np.ndarray]:
@@ -263,10 +269,16 @@ def place_motion(motion: Motion, angle: float | np.ndarray = 0.0, offset=(0.0, 0
 
 
 def concatenate_motions(motions: list[Motion]) -> Motion:
-    """Concatenate motions of one skeleton and rate; nothing is aligned or blended."""
-    first = motions[0]
-    return replace(
-        first,
-        root_positions=np.concatenate([m.root_positions for m in motions]),
-        rotations=np.concatenate([m.rotations for m in motions]),
-    )
+    """Concatenate motions of one skeleton and rate, of a frame or more each; nothing is aligned or blended."""
+    first, start = motions[0], 0
+    rotations = np.concatenate([motion.rotations for motion in motions])
+    is_flipped = np.zeros(len(first.skeleton), bool)
+    for before, motion in zip(motions, motions[1:]):  # each by itself is continuous
+        start += len(before)
+        is_flipped ^= dot_products(motion.rotations[0], before.rotations[-1]) < 0.0
+        if is_flipped.any():
+            rotations[start : start + len(motion), is_flipped] *= -1.0
+    root = np.concatenate([motion.root_positions for motion in motions])
+    for values in (root, rotations):
+        values.setflags(write=False)
+    return Motion.from_stored(first.skeleton, root, rotations, first.fps)

@@ -214,13 +214,10 @@ def rotation_between(a: np.ndarray, b: np.ndarray) -> np.ndarray:
 
 def unify_signs(q: np.ndarray) -> np.ndarray:
     """Choose the signs of rotations (T, ..., 4) so that neighbours in time are close (q and -q rotate alike)."""
-    q = np.asarray(q, dtype=float)
-    if len(q) < 2:
-        return q.copy()
-    flips = dot_products(q[1:], q[:-1]) < 0.0
-    sign = np.where(np.cumsum(flips, axis=0) % 2 == 1, -1.0, 1.0)
-    out = q.copy()
-    out[1:] *= sign[..., None]
+    out = np.array(q, dtype=float)
+    flips = dot_products(out[1:], out[:-1]) < 0.0
+    if flips.any():
+        out[1:] *= np.where(np.cumsum(flips, axis=0) % 2 == 1, -1.0, 1.0)[..., None]
     return out
 
 

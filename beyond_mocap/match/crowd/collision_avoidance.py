@@ -35,7 +35,7 @@ REPEAT_DEPTH = 0.015
 
 def resolve_collisions(
     motions: Sequence[Motion], contacts: Sequence[np.ndarray], first_frames: Sequence[int], fps: float,
-    firmness: Sequence[np.ndarray] | None = None,
+    firmness: Sequence[np.ndarray] | None = None, lines: Sequence[np.ndarray] | None = None,
 ) -> tuple[Correction, ...]:  # fmt: skip
     """Compute corrections with which no two motions overlap.
 
@@ -46,11 +46,12 @@ def resolve_collisions(
         fps: frames per second.
         firmness: (T,) each, how firmly it keeps its path against others (`spacing.compute_firmness` around ball
             touches); 1 by default.
+        lines: of each motion's capsules (`capsules.compute_capsule_lines`), where they are known.
     Returns:
         One correction per motion. At the ends of a motion it is cut off: pass some seconds more than are used
         (`correction.join_corrections`).
     """
-    bodies, start = _align_bodies(motions, contacts, first_frames, firmness)
+    bodies, start = _align_bodies(motions, contacts, first_frames, firmness, lines)
     curves = [np.zeros((len(body.lines), CURVES)) for body in bodies]
     corrections = [Correction.build_empty(fps)] * len(bodies)
     past_spans: list[Span] = []
@@ -72,39 +73,50 @@ def resolve_collisions(
     return tuple(corrections)
 
 
-def measure_overlap_depths(motions: Sequence[Motion], first_frames: Sequence[int]) -> list[np.ndarray]:
+def measure_overlap_depths(motions: Sequence[Motion], first_frames: Sequence[int],
+                           lines: Sequence[np.ndarray] | None = None) -> list[np.ndarray]:
     """Measure how deep each motion overlaps any other, at each of its frames.
 
     Args:
         motions: placed on the pitch.
         first_frames: the frame of a common clock at which each starts.
+        lines: as for `resolve_collisions`.
     Returns:
         (T,) m for each motion, 0 where it overlaps none.
     """
-    bodies, start = _align_bodies(motions, [np.zeros((len(motion), 2), bool) for motion in motions], first_frames, None)
-    deepest = [np.zeros(len(body.lines)) for body in bodies]
-    for one, other, frames in _find_near_pairs([body.lines for body in bodies]):
-        mine, its = bodies[one], bodies[other]
-        found = find_capsule_contacts(mine.lines[frames], its.lines[frames], (mine.radii, its.radii))
+    aligned, start = _align_lines(motions, first_frames, lines)
+    radii = [np.array([part.radius for part in build_capsules(motion.skeleton)]) for motion in motions]
+    deepest = [np.zeros(len(ends)) for ends in aligned]
+    for one, other, frames in _find_near_pairs(aligned):
+        found = find_capsule_contacts(aligned[one][frames], aligned[other][frames], (radii[one], radii[other]))
         for number in (one, other):
             np.maximum.at(deepest[number], frames[found.frame], found.depth)
     return [own[first - start :][: len(motion)] for own, first, motion in zip(deepest, first_frames, motions)]
 
 
-def _align_bodies(motions, contacts, first_frames, firm_frames) -> tuple[list[CrowdBody], int]:
-    """Align the motions as bodies over the frames any of them has; return them and the first frame."""
+def _align_lines(motions, first_frames, lines) -> tuple[list[np.ndarray], int]:
+    """Align capsule lines over the frames any motion has, NaN where it has none; return them and the first frame."""
     start = min(first_frames, default=0)
     count = max((first + len(motion) for first, motion in zip(first_frames, motions)), default=start) - start
+    aligned = []
+    for motion, first, own in zip(motions, first_frames, lines or map(compute_capsule_lines, motions)):
+        ends = np.full((count, *own.shape[1:]), np.nan)
+        ends[first - start : first - start + len(motion)] = own
+        aligned.append(ends)
+    return aligned, start
+
+
+def _align_bodies(motions, contacts, first_frames, firm_frames, lines) -> tuple[list[CrowdBody], int]:
+    """Align the motions as bodies over the frames any of them has; return them and the first frame."""
+    aligned, start = _align_lines(motions, first_frames, lines)
     bodies = []
-    for number, (motion, foot_contacts, first) in enumerate(zip(motions, contacts, first_frames)):
+    for number, (motion, foot_contacts, first, ends) in enumerate(zip(motions, contacts, first_frames, aligned)):
         here = slice(first - start, first - start + len(motion))
-        parts = build_capsules(motion.skeleton)
-        ends, firmness = np.full((count, len(parts), 2, 3), np.nan), np.ones(count)
-        in_contact = np.zeros((count, 2), bool)
-        ends[here], in_contact[here] = compute_capsule_lines(motion), foot_contacts
+        firmness, in_contact = np.ones(len(ends)), np.zeros((len(ends), 2), bool)
+        in_contact[here] = foot_contacts
         if firm_frames is not None:
             firmness[here] = firm_frames[number]
-        bodies.append(CrowdBody(parts, ends, np.zeros(ends.shape), in_contact, firmness))
+        bodies.append(CrowdBody(build_capsules(motion.skeleton), ends, np.zeros(ends.shape), in_contact, firmness))
     return bodies, start
 
 
@@ -140,7 +152,7 @@ def _separate_episode(episode: Episode, bodies: list[CrowdBody], curves: list[np
     """Separate the bodies of one episode, changing their `curves` in place."""
     low, high = episode.first, episode.end
     number = {body: row for row, body in enumerate(episode.bodies)}
-    mine = [bodies[body].select_frames(low, high) for body in episode.bodies]
+    mine = [bodies[body].select_frames(slice(low, high)) for body in episode.bodies]
     whole = [bodies[body].present_span for body in episode.bodies]
     # Curves are held at an episode's ends unless the body itself starts or ends there.
     held_ends = [(low + body.present_span[0] > there[0], low + body.present_span[1] < there[1]) for body,
@@ -155,10 +167,13 @@ def _separate_episode(episode: Episode, bodies: list[CrowdBody], curves: list[np
 
 def _update_bend(body: CrowdBody, motion: Motion, curves: np.ndarray, first: int, start: int) -> CrowdBody:
     """Update how far a body's limbs are from where the curves (T, 12) alone would put them."""
-    here = slice(first - start, first - start + len(motion))
-    if not curves[here].any():
-        return replace(body, bend_offset=np.zeros(body.lines.shape))
-    offset = np.zeros(body.lines.shape)
-    plain = move_capsules(replace(body, bend_offset=offset), curves)
-    offset[here] = compute_capsule_lines(apply_curves(motion, curves[here])) - plain[here]
-    return replace(body, bend_offset=offset)
+    plain = replace(body, bend_offset=np.zeros(body.lines.shape))
+    at = np.flatnonzero(curves.any(axis=1))
+    at = at[(at >= first - start) & (at < first - start + len(motion))]
+    if not len(at):
+        return plain
+    rows = at - (first - start)
+    here = replace(motion, root_positions=motion.root_positions[rows], rotations=motion.rotations[rows])
+    plain.bend_offset[at] = (compute_capsule_lines(apply_curves(here, curves[at]))
+                             - move_capsules(plain.select_frames(at), curves[at]))
+    return plain

@@ -9,6 +9,7 @@ root's, and a foot's speed while it is in contact.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -66,10 +67,10 @@ class CrowdBody:
         known = np.flatnonzero(np.isfinite(self.lines[:, 0, 0, 0]))
         return (int(known[0]), int(known[-1]) + 1) if len(known) else (0, 0)
 
-    def select_frames(self, low: int, high: int) -> CrowdBody:
-        """Select the frames low .. high."""
-        rows = (values[low:high] for values in (self.lines, self.bend_offset, self.foot_contacts, self.firmness))
-        return CrowdBody(self.parts, *rows)
+    def select_frames(self, rows: slice | np.ndarray) -> CrowdBody:
+        """Select some of the frames."""
+        values = (self.lines, self.bend_offset, self.foot_contacts, self.firmness)
+        return CrowdBody(self.parts, *(each[rows] for each in values))
 
 
 @dataclass(frozen=True, eq=False)
@@ -104,17 +105,25 @@ def move_capsules(body: CrowdBody, curves: np.ndarray) -> np.ndarray:
     Returns:
         (T, C, 2, 3) m, ends of the capsules' lines.
     """
-    out = np.array(body.lines)
-    feet, arms = curves[:, FEET].reshape(-1, 2, 2), curves[:, ARMS].reshape(-1, 2, 3)
-    pivot: dict[int, np.ndarray] = {}
-    for number, part in enumerate(body.parts):
-        if part.limb == "arm":
-            centre = pivot.setdefault(part.side, body.lines[:, number, 0])
-            rotation = quaternion.from_rotation_vector(arms[:, part.side])[:, None]
-            out[:, number] = centre[:, None] + quaternion.rotate(rotation, body.lines[:, number] - centre[:, None])
-        share = np.array(part.along)[:, None] if part.limb == "leg" else np.zeros((2, 1))
-        out[:, number, :, :2] += (1.0 - share) * curves[:, None, ROOT] + share * feet[:, None, part.side]
+    out, moved = np.array(body.lines), np.flatnonzero(curves.any(axis=1))
+    if len(moved):
+        out[moved] = _move_lines(body.parts, body.lines[moved], curves[moved])
     return out + body.bend_offset
+
+
+def _move_lines(parts: Sequence[Capsule], lines: np.ndarray, curves: np.ndarray) -> np.ndarray:
+    """Move the lines (T, C, 2, 3) m of a body's capsules by curves (T, 12) m and rad."""
+    out, sides = np.array(lines), [part.side for part in parts]
+    feet, arms = curves[:, FEET].reshape(-1, 2, 2), curves[:, ARMS].reshape(-1, 2, 3)
+    for side in (0, 1):
+        arm = [number for number, part in enumerate(parts) if part.limb == "arm" and part.side == side]
+        if arm:
+            shoulder = lines[:, arm[:1], :1]
+            rotation = quaternion.from_rotation_vector(arms[:, side])[:, None, None]
+            out[:, arm] = shoulder + quaternion.rotate(rotation, lines[:, arm] - shoulder)
+    share = np.array([part.along for part in parts])[:, :, None]  # 0 but for legs
+    out[..., :2] += (1.0 - share) * curves[:, None, None, ROOT] + share * feet[:, sides, None]
+    return out
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -149,7 +158,8 @@ class SmoothnessTerms:
             The terms.
         """
         low, high = body.present_span
-        root_and_feet = _build_root_and_feet_smoothness(body.select_frames(low, high), curves[low:high], held_ends, fps)
+        present = slice(low, high)
+        root_and_feet = _build_root_and_feet_smoothness(body.select_frames(present), curves[present], held_ends, fps)
         arms = []
         for side in (0, 1):
             arms.append(BandedLeastSquares(high - low, 3))

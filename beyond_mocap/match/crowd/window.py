@@ -13,12 +13,14 @@ import numpy as np
 from ...annotation.ball_contact import build_surfaces
 from ...library.features import FPS
 from ...motion.motion import Motion
+from ...motion.track.ball_path import BallPath
 from ...synthesis.take import Take
 from ..match_ball import apply_led_ball, find_led_ball, lead_ball_between_players, restore_ball_contact, sample_ball
 from ..piece_file import read_piece_file, write_piece_file
 from ..pieces.named_edit import cut_named_edit
 from ..pieces.units import cut_plan
 from ..player_edit import PlayerEdit, Stretch
+from .capsules import compute_capsule_lines
 from .collision_avoidance import measure_overlap_depths, resolve_collisions
 from .correction import CURVES, Correction, apply_correction, join_corrections
 from .spacing import compute_firmness
@@ -99,14 +101,18 @@ def resolve_window(takes: Sequence[Sequence[Take]], start: float, end: float) ->
         fps = flat[0].motion.fps if flat else 1.0
         firsts = [round(take.start_time * fps) for take in flat]
         motions_before, contacts = [take.motion for take in flat], [take.contacts for take in flat]
+        lines = list(map(compute_capsule_lines, motions_before))
         corrections = resolve_collisions(motions_before, contacts, firsts, fps,
-                                         [_compute_firmness(take) for take in flat])
+                                         [_compute_firmness(take) for take in flat], lines)
         motions = [apply_correction(motion, *player_takes) for motion,
                    player_takes in zip(motions_before, zip(corrections, firsts))]
-        led = lead_ball_between_players(flat, motions, firsts, [find_led_ball(take) for take in flat])
-        motions = [_restore_ball_contact(*player_takes, led) for player_takes in zip(flat, motions, firsts)]
-        before = measure_overlap_depths(motions_before, firsts)
-        after = measure_overlap_depths(motions, firsts)
+        balls = [None if take.ball is None else sample_ball(take.plan, take.ball.times) for take in flat]
+        led = lead_ball_between_players(flat, motions, firsts, list(map(find_led_ball, flat, balls)), balls)
+        motions = [_restore_ball_contact(*player_takes, led) for player_takes in zip(flat, motions, firsts, balls)]
+        before = measure_overlap_depths(motions_before, firsts, lines)
+        lines = [old if motion is known else compute_capsule_lines(motion)
+                 for motion, known, old in zip(motions, motions_before, lines)]
+        after = measure_overlap_depths(motions, firsts, lines)
     inside = round(start * fps), round(end * fps)
     rows = iter(zip(corrections, firsts, before, after, led))
     return tuple(_build_part([next(rows) for _ in player_takes], inside, fps) for player_takes in takes)
@@ -166,12 +172,12 @@ def _compute_firmness(take: Take) -> np.ndarray:
     return compute_firmness(len(take.motion), np.array(touch_frames), take.motion.fps)
 
 
-def _restore_ball_contact(take: Take, motion: Motion, first: int,
+def _restore_ball_contact(take: Take, motion: Motion, first: int, ball: BallPath | None,
                           led: Sequence[tuple[np.ndarray, np.ndarray]]) -> Motion:
-    """Restore the ball contacts of a player's corrected motion, with the ball that all players have `led`."""
-    if take.ball is None:
+    """Restore the ball contacts of a player's corrected motion, with their `ball`, which all players have `led`."""
+    if ball is None:
         return motion
-    ball = apply_led_ball(sample_ball(take.plan, take.ball.times), first, led)
+    ball = apply_led_ball(ball, first, led)
     return restore_ball_contact(replace(take, motion=motion), ball.positions).motion
 
 

@@ -9,8 +9,10 @@ from __future__ import annotations
 
 import io
 import json
+import math
 from dataclasses import asdict, dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -93,7 +95,10 @@ class MotionSpan:
 
 
 def pack_part(take: Take) -> bytes:
-    """Pack the take of a window (`player_motion.cut_take`): all that figures need. A match requests no pins."""
+    """Pack the take of a window (`player_motion.cut_take`): all that figures need. A match requests no pins.
+
+    Arrays of one type are stored as one: to open an array of a file takes longer than to read it.
+    """
     table = {words: number for number, words in enumerate(dict.fromkeys(take.words))}
     arrays = {name: getattr(take, name) for name in _ARRAYS}
     arrays |= {"root": take.motion.root_positions, "rotations": take.motion.rotations,
@@ -104,9 +109,12 @@ def pack_part(take: Take) -> bytes:
                "warnings": [[str(line), line_spans(line)] for line in take.warnings]}
     if take.ball is not None:
         arrays |= {f"ball.{name}": getattr(take.ball, name) for name in _BALL}
-    arrays["header"] = np.frombuffer(json.dumps(header).encode(), np.uint8)
+    arrays = {name: values for name, values in arrays.items() if values is not None}
+    header["arrays"] = [[name, values.dtype.str, values.shape] for name, values in arrays.items()]
+    stored = {kind: np.concatenate([values.ravel() for values in arrays.values() if values.dtype.str == kind])
+              for kind in dict.fromkeys(values.dtype.str for values in arrays.values())}
     out = io.BytesIO()
-    np.savez(out, allow_pickle=False, **{name: values for name, values in arrays.items() if values is not None})
+    np.savez(out, allow_pickle=False, header=np.frombuffer(json.dumps(header).encode(), np.uint8), **stored)
     return out.getvalue()
 
 
@@ -120,12 +128,13 @@ def load_part(content: Content, skeleton: Skeleton) -> Take:
         The take, without a plan.
     """
     with np.load(io.BytesIO(content) if isinstance(content, bytes) else content, allow_pickle=False) as file:
-        arrays = {name: file[name] for name in file.files}
-    header = json.loads(arrays["header"].tobytes())
+        stored = {name: file[name] for name in file.files}
+    header = json.loads(stored.pop("header").tobytes())
+    arrays = _split_arrays(header["arrays"], stored)
     words = [tuple(one) for one in header["words"]]
     ball = [arrays.get(f"ball.{name}") for name in _BALL]
     return Take(
-        motion=Motion(skeleton, arrays["root"], arrays["rotations"], header["fps"]),
+        motion=Motion.from_stored(skeleton, arrays["root"], arrays["rotations"], header["fps"]),
         words=tuple(words[number] for number in arrays["words"]), timeline=_parse_timeline(header["timeline"]),
         keys=tuple(_parse_key(key) for key in header["keys"]), ball=None if ball[0] is None else BallPath(*ball),
         warnings=tuple(TimedMessage(text, *spans) for text, spans in header["warnings"]),
@@ -133,6 +142,19 @@ def load_part(content: Content, skeleton: Skeleton) -> Take:
         **{name: arrays.get(name) for name in _ARRAYS},
         **{**{name: header[name] for name in _PLAIN}, "clips": tuple(header["clips"])},
     )  # fmt: skip
+
+
+def _split_arrays(rows: list, stored: dict[str, np.ndarray]) -> dict[str, Any]:
+    """Split what is stored by type into read-only arrays by name; rows: (name, type, shape) in their order."""
+    arrays: dict[str, Any] = {}
+    place = dict.fromkeys(stored, 0)
+    for values in stored.values():
+        values.setflags(write=False)
+    for name, kind, shape in rows:
+        count = math.prod(shape)
+        arrays[name] = stored[kind][place[kind] : place[kind] + count].reshape(shape)
+        place[kind] += count
+    return arrays
 
 
 def _parse_timeline(value: dict) -> Timeline:

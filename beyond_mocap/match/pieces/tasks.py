@@ -164,15 +164,20 @@ def finish_player(source: LibrarySource, request: FinishRequest) -> PlayerFiles:
     library = load_library(source)
     files: dict[str, bytes] = {}
     stretches, tables = [], []
+
+    def finish_stretch(number: int) -> None:  # what it holds is gone when it returns: one is in memory at a time
+        take = display_take(request.motion[number].load_take(library.skeleton), request.correction, request.ball)
+        if request.figures:
+            overlap = _build_overlap(take, request)
+            stretches.append(measure_stretch(library, take, request.measured[number], overlap, request.ball))
+            tables.append(build_provenance(take))
+        if request.bvh:
+            ending = f"{number + 1}.bvh" if number else "bvh"
+            files[ending] = _write_to_bytes(lambda path: bvh.write_bvh(path, take.motion))
+
     with threadpool_limits(limits=1):
-        for number, (span, track) in enumerate(zip(request.motion, request.measured), 1):  # one is in memory at a time
-            take = display_take(span.load_take(library.skeleton), request.correction, request.ball)
-            if request.figures:
-                stretches.append(measure_stretch(library, take, track, _build_overlap(take, request), request.ball))
-                tables.append(build_provenance(take))
-            if request.bvh:
-                ending = "bvh" if number == 1 else f"{number}.bvh"
-                files[ending] = _write_to_bytes(lambda path, take=take: bvh.write_bvh(path, take.motion))
+        for number in range(len(request.motion)):
+            finish_stretch(number)
         if request.figures:
             table = join_provenance(tables)
             files["provenance.csv"] = _write_to_bytes(lambda path: write_provenance(path, table))
@@ -208,8 +213,9 @@ def measure_stretch(library: Library, take: Take, track: Track, overlap: np.ndar
     Raises:
         InputError: if the take has another skeleton than the library.
     """
-    return StretchFigures(evaluate(take, track, library), len(take.motion),
-                          measure_per_second(playback_from_take(take), track, overlap, ball))
+    played = playback_from_take(take)
+    return StretchFigures(evaluate(take, track, library, played), len(take.motion),
+                          measure_per_second(played, track, overlap, ball))
 
 
 def build_player_report(stretches: Sequence[StretchFigures]) -> dict:

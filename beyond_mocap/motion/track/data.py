@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, fields
+from functools import cached_property
 
 import numpy as np
 
@@ -68,6 +69,12 @@ class Track:
     def is_measured(self) -> np.ndarray:
         """(N,) bool: valid positions that the feed itself has."""
         return ~(self.filled | self.outlier) & np.isfinite(self.positions).all(axis=1)
+
+    @cached_property
+    def known_ball(self) -> tuple[np.ndarray, np.ndarray]:
+        """Seconds (K,) at which the ball is known on the ground, and its places (K, 2) m there."""
+        known = np.isfinite(self.ball[:, :2]).all(axis=1)
+        return self.times[known], self.ball[known, :2]
 
     @property
     def interval(self) -> float:

@@ -230,9 +230,8 @@ def measure_ball_shift(played: Playback, frame: int, track: Track) -> float:
     Returns:
         m, NaN where either is missing.
     """
-    known = np.isfinite(track.ball[:, :2]).all(axis=1)
-    if played.ball is None or not known.any():
+    times, places = track.known_ball
+    if played.ball is None or not len(times):
         return np.nan
-    time = played.times[frame]
-    measured = [np.interp(time, track.times[known], track.ball[known, axis]) for axis in (0, 1)]
+    measured = [np.interp(played.times[frame], times, places[:, axis]) for axis in (0, 1)]
     return float(np.linalg.norm(find_written_ball(played, frame)[:2] - measured))

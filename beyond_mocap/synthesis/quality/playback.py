@@ -59,7 +59,7 @@ class Playback:
     keys: tuple[KeyResult, ...] = ()
     planned_heading: np.ndarray | None = None
 
-    @property
+    @cached_property
     def times(self) -> np.ndarray:
         """(T,) s on the track's clock."""
         return self.start_time + np.arange(len(self.motion)) / self.motion.fps

@@ -11,6 +11,7 @@ the evaluation.
 from __future__ import annotations
 
 from collections import Counter
+from functools import lru_cache
 
 import numpy as np
 
@@ -371,8 +372,8 @@ def _report_missing_labels(
     wanted = [words or frozenset() for words in labels_per_frame(timeline, played.times)]
     is_recorded = library.labels.issuperset(frozenset().union(*wanted))
     known = library.labels.union(*(list_action_labels(is_span=True) if has_actions and not is_recorded else ()))
-    available = [words & known for words in wanted]
-    missing = [want.difference(labels_shown) for want, labels_shown in zip(available, played.words)]
+    find_missing = lru_cache(None)(lambda words, shown: (words & known).difference(shown))  # frames repeat their labels
+    missing = list(map(find_missing, wanted, played.words))
     for moment in keys:
         missing[moment.entry : moment.exit + 1] = [frozenset()] * (moment.exit + 1 - moment.entry)
     # runs of frames with and without missing labels

@@ -61,7 +61,7 @@ def test_nearest_distance_is_the_smallest_of_all(seed):
     every = np.linalg.norm(a[:, None] - b, axis=-1)
     nearest, enough = every.min(axis=1), random.uniform(1.0, 5.0, 7)
     np.testing.assert_allclose(realism.measure_nearest_distance(a, b), nearest, atol=1e-3)
-    bound = realism.bound_nearest_distance(a, b, enough)
+    bound = realism.bound_nearest_distance(a, realism.split_library(b), enough)
     np.testing.assert_array_equal(bound > enough, nearest > enough)
     np.testing.assert_allclose(bound[nearest > enough], nearest[nearest > enough], atol=1e-3)
     every[mine[:, None] == owner] = np.inf

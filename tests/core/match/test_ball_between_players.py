@@ -36,17 +36,21 @@ def stand_at(take, place, frame):
                    dribble_touches=(), ball=ball)
 
 
+def list_led(take):
+    return find_led_ball(take, sample_ball(take.plan, take.ball.times))
+
+
 def lead(takes, led):
     first = round(takes[0].start_time * takes[0].motion.fps)
-    out = lead_ball_between_players(takes, [take.motion for take in takes], [first] * len(takes), led)
-    base = sample_ball(takes[0].plan, takes[0].ball.times)
-    return [apply_led_ball(base, first, each).positions for each in (led, out)], out, first
+    balls = [sample_ball(take.plan, take.ball.times) for take in takes]
+    out = lead_ball_between_players(takes, [take.motion for take in takes], [first] * len(takes), led, balls)
+    return [apply_led_ball(balls[0], first, each).positions for each in (led, out)], out, first
 
 
 def test_a_ball_goes_round_a_player_who_stands_in_its_way(kicker):
     take, kicked = kicker
     other = stand_at(take, take.ball.positions[kicked + 4], kicked)
-    (before, after), *_ = lead([take, other], [find_led_ball(take), find_led_ball(other)])
+    (before, after), *_ = lead([take, other], [list_led(take), list_led(other)])
     solid = BodySolid.from_pose(build_solid_surfaces(other.motion.skeleton), *forward_kinematics(other.motion))
     known = np.flatnonzero(np.isfinite(before).all(axis=1))
     assert solid.measure_gaps(before[known], known).min() < -0.05
@@ -58,7 +62,7 @@ def test_nobody_moves_the_ball_where_another_player_meets_it(kicker):
     take, kicked = kicker
     other, count = stand_at(take, take.ball.positions[kicked] + [20.0, 0.0, 0.0], kicked), len(take.motion)
     first = round(take.start_time * take.motion.fps)
-    led = [find_led_ball(take), (first + np.arange(count), np.tile([0.0, 0.2, 0.0], (count, 1)))]
+    led = [list_led(take), (first + np.arange(count), np.tile([0.0, 0.2, 0.0], (count, 1)))]
     _, out, _ = lead([take, other], led)
     moved = out[1][1][:count, 1]
     alone = np.abs(moved - 0.2) < 1e-12
