@@ -90,8 +90,8 @@ def test_it_can_be_put_aside(room, core, port):
 
 
 def test_a_kick_is_recognised_and_told(room, port, monkeypatch):
-    """Each frame arrives at its time in the recording by a clock of the test: a busy machine delivers frames late and in
-    bunches, which are other speeds."""
+    """Each frame arrives at its time in the recording, by a clock of the test: a busy machine delivers frames late and
+    in bunches, which are other speeds."""
     OPS.stream_start()
     stream, now, hits = room("stream.follow"), time.monotonic(), []
     monkeypatch.setattr(time, "monotonic", lambda: now)
