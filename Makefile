@@ -101,7 +101,8 @@ test-oldest: venv-oldest
 # What the older Blender leaves out in `make test`, chosen again by what each test reaches: some 15 minutes.
 left-out: export BLENDERS_IN_TURN = 1
 left-out: venv-oldest
-	.venv-4.5/bin/python -m pip install --quiet --disable-pip-version-check --target build/coverage coverage
+	.venv-4.5/bin/python -m pip install --quiet --disable-pip-version-check --target build/coverage \
+	  -r packaging/requirements/coverage.txt
 	PYTHONPATH=build/coverage:tests/blender .venv-4.5/bin/python $(PYTEST) -p choose_left_out tests/blender
 
 # Not parts of `make test`: they last, and take other inputs each time. What they find is told with the number that makes it again.

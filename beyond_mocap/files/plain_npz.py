@@ -16,6 +16,7 @@ import numpy as np
 
 from ..base.content import open_file
 from ..base.errors import InputError
+from .json_values import describe_value, parse_json
 
 HEADER = "header"
 """Name of the array that holds a text as UTF-8 bytes."""
@@ -120,17 +121,32 @@ def _read_array(data: bytes, name: str, types: tuple[np.dtype, ...], is_finite: 
     return array
 
 
-def take_header_text(arrays: dict[str, np.ndarray], page: str) -> str:
-    """Take the text of a file out of its arrays.
+def take_header(arrays: dict[str, np.ndarray], *, form: str, version: int, kind: str, page: str,
+                remedy: str) -> dict:
+    """Take the JSON object of a file out of its arrays.
 
     Args:
         arrays: from `read_plain_arrays`; HEADER is removed.
+        form: "Beyond Mocap ...", its "format".
+        version: its "version".
+        kind: what the file should be, for messages.
         page: page of the docs that describes the file.
+        remedy: what to do with a file of another version.
     Returns:
-        The text.
+        The object.
     Raises:
-        InputError: if it is not a text.
+        InputError: if it is no object of that format and version.
     """
+    header = parse_json(_take_text(arrays, page), HEADER, page)
+    if not isinstance(header, dict) or header.get("format") != form:
+        raise InputError(HEADER, f"not a {form.removeprefix('Beyond Mocap ')}", kind, "choose another file")
+    if header.get("version") != version:
+        raise InputError("version", describe_value(header.get("version")), str(version), remedy)
+    return header
+
+
+def _take_text(arrays: dict[str, np.ndarray], page: str) -> str:
+    """Take the text of a file, which `page` of the docs describes, out of its arrays; InputError if it is none."""
     header = arrays.pop(HEADER)
     if header.dtype != np.uint8:
         raise InputError("the file", "an .npz with other content", f"a text under {HEADER!r}", f"see {page}")

@@ -136,24 +136,33 @@ class Library:
 
     @cached_property
     def normal_postures(self) -> NormalPostures:
-        """How people of this library stand, walk, jog and run."""
-        return fit_normal_postures(self.frames, self._is_recorded, self.fps)
+        """How people of this library stand, walk, jog and run; cached, because every take asks for it."""
+        return NormalPostures.from_arrays(self._find_stored(
+            "postures", lambda: fit_normal_postures(self.frames, self._is_recorded, self.fps).to_arrays()))
 
     @cached_property
     def neutral_stance(self) -> NeutralStance:
         """How people of this library stand; cached, because it is measured on all recordings."""
-        place = self.index_place and (*self.index_place[:2], "stance")
-        stored = cache.load_arrays(*place) if place else None
-        if stored is not None and set(stored) == set(_STANCE_NUMBERS):
-            known: dict[str, Any] = {name: one if one.ndim else float(one) for name, one in stored.items()}
-            return NeutralStance(skeleton=self.skeleton, **known)
+        stored = self._find_stored("stance", self._measure_stance)
+        known: dict[str, Any] = {name: one if one.ndim else float(one) for name, one in stored.items()}
+        return NeutralStance(skeleton=self.skeleton, **known)
+
+    def _measure_stance(self) -> dict[str, np.ndarray]:
         from .synthetic_clips import sample_upright_example
 
         recordings = [clip for clip in self.clips if not clip.is_synthetic] or self.clips
         stance = build_neutral_stance(self.skeleton, sample_upright_example(recordings))
-        if place:
-            cache.save_arrays(*place, {name: np.asarray(getattr(stance, name)) for name in _STANCE_NUMBERS})
-        return stance
+        return {name: np.asarray(getattr(stance, name)) for name in _STANCE_NUMBERS}
+
+    def _find_stored(self, name: str, compute: Callable[[], dict[str, np.ndarray]]) -> dict[str, np.ndarray]:
+        """Find arrays of the recordings in the cache, or compute and store them."""
+        place = self.index_place and (*self.index_place[:2], name)
+        stored = cache.load_arrays(*place) if place else None
+        if stored is None:
+            stored = compute()
+            if place:
+                cache.save_arrays(*place, stored)
+        return stored
 
     @cached_property
     def coverage(self) -> Coverage:

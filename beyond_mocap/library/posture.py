@@ -111,6 +111,18 @@ class NormalPostures:
 
     regions: Mapping[int, tuple[np.ndarray, np.ndarray, float]]
 
+    @classmethod
+    def from_arrays(cls, arrays: Mapping[str, np.ndarray]) -> "NormalPostures":
+        """Build from what `to_arrays` returned."""
+        rows = zip(*(arrays[name] for name in ("kinds", "middles", "inverses", "radii")))
+        return cls({int(kind): (middle, inverse, float(radius)) for kind, middle, inverse, radius in rows})
+
+    def to_arrays(self) -> dict[str, np.ndarray]:
+        """Convert to arrays by name."""
+        middles, inverses, radii = ([one[column] for one in self.regions.values()] for column in range(3))
+        return {"kinds": np.array(list(self.regions), int), "middles": np.array(middles),
+                "inverses": np.array(inverses), "radii": np.array(radii)}
+
     def measure_strangeness(self, posture: np.ndarray, speed: np.ndarray) -> np.ndarray:
         """Measure how far postures lie from normal locomotion at their speed.
 

@@ -28,9 +28,8 @@ from ..files.json_values import (
     check_texts,
     check_whole_number,
     describe_value,
-    parse_json,
 )
-from ..files.plain_npz import HEADER, read_plain_arrays, take_header_text
+from ..files.plain_npz import HEADER, read_plain_arrays, take_header
 from ..motion.track import Track
 from ..synthesis.heading_path import HeadingPath
 from ..synthesis.heading_plan import HeadingKey
@@ -179,12 +178,8 @@ def _build_stretch_arrays(stretch: Stretch) -> dict[str, np.ndarray]:
 
 def _parse_player(arrays: dict[str, np.ndarray]) -> PlayerEdit:
     """Parse a player from arrays; every array is used once and none is left over."""
-    header = parse_json(take_header_text(arrays, _PAGE), HEADER, _PAGE)
-    if not isinstance(header, dict) or header.get("format") != FORMAT:
-        raise InputError(HEADER, "not a player of a match", _KIND, "choose another file")
-    if header.get("version") != VERSION:
-        raise InputError("version", describe_value(header.get("version")), str(VERSION),
-                         "run the match again with this version")
+    header = take_header(arrays, form=FORMAT, version=VERSION, kind=_KIND, page=_PAGE,
+                         remedy="run the match again with this version")
     rows = ("format", "version", "player", "window", "stretches", "correction")
     check_names(header, HEADER, rows, rows)
     stretches = [_parse_stretch(row, index, arrays) for index,

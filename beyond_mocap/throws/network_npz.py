@@ -25,9 +25,8 @@ from ..files.json_values import (
     check_text,
     check_whole_number,
     describe_value,
-    parse_json,
 )
-from ..files.plain_npz import HEADER, read_plain_arrays, take_header_text
+from ..files.plain_npz import HEADER, read_plain_arrays, take_header
 from ..motion.motion import Motion
 from ..motion.skeleton import Skeleton
 from .networks.chains import EFFECTORS
@@ -178,12 +177,8 @@ def _reduce_precision(name: str, values: np.ndarray) -> np.ndarray:
 
 def _build_model(arrays: dict[str, np.ndarray]) -> ThrowModel:
     """Build the model from arrays; every array is used once, none is left over."""
-    header = parse_json(take_header_text(arrays, _PAGE), HEADER, _PAGE)
-    if not isinstance(header, dict) or header.get("format") != FORMAT:
-        raise InputError(HEADER, "not a throw model", _KIND, "choose another file")
-    if header.get("version") != VERSION:
-        raise InputError("version", describe_value(header.get("version")), str(VERSION),
-                         "use the Beyond Mocap version that wrote it")  # fmt: skip
+    header = take_header(arrays, form=FORMAT, version=VERSION, kind=_KIND, page=_PAGE,
+                         remedy="use the Beyond Mocap version that wrote it")
     check_names(header, HEADER, _HEADER_KEYS, _HEADER_KEYS)
     names = [field.name for field in fields(ModelSettings)]
     check_names(header["settings"], "settings", names, [name for name in names if name not in ("guided", "carried")])

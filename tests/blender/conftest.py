@@ -8,6 +8,7 @@ name `beyond_mocap` is blocked, because the same class under two names fails `is
 import atexit
 import os
 import pathlib
+import shutil
 import socket
 import subprocess
 import sys
@@ -19,6 +20,8 @@ import pytest
 EXTENSION = "bl_ext.user_default.beyond_mocap"
 HERE = pathlib.Path(__file__).resolve().parent
 SOURCE = HERE.parents[1]
+COLLECTED = pytest.StashKey()
+"""Names of all tests of the files that this run was given."""
 
 _profile = tempfile.TemporaryDirectory(prefix="beyond-mocap-profile-")
 os.environ["BLENDER_USER_RESOURCES"] = _profile.name  # read once, when bpy is imported
@@ -51,12 +54,18 @@ def find_free_port():
 def pytest_collection_modifyitems(config, items):
     """Where `make test` runs two Blenders, the older one leaves out slow tests that reach nothing which others do not
     reach too (choose_left_out.py): the newer one has all of them."""
+    config.stash[COLLECTED] = {item.nodeid for item in items}
     is_choosing = config.pluginmanager.has_plugin("choose_left_out")
     if not os.environ.get("BLENDERS_IN_TURN") or bpy.app.version >= (5, 0) or is_choosing:
         return
-    left_out = {*HERE.joinpath("left_out.txt").read_text("utf-8").splitlines()}
+    left_out = read_left_out()
     config.hook.pytest_deselected(items=[item for item in items if item.nodeid in left_out])
     items[:] = [item for item in items if item.nodeid not in left_out]
+
+
+def read_left_out():
+    """Names of the tests that the older Blender leaves out."""
+    return {*HERE.joinpath("left_out.txt").read_text("utf-8").splitlines()}
 
 
 @pytest.fixture(scope="session", autouse=True)
@@ -77,6 +86,24 @@ def work_cache(extension):
         yield cached_work.cache_functions(monkeypatch, f"{EXTENSION}.beyond_mocap")
 
 
+@pytest.fixture(scope="session", autouse=True)
+def light_bodies(core):
+    """Players have the light body, whose 2,000 faces are made, saved and undone sooner than 14,000; the module that
+    looks at the full one takes it back (`full_bodies`)."""
+    read = core("appearance.template").read_template
+    with pytest.MonkeyPatch.context() as monkeypatch:
+        monkeypatch.setattr(core("appearance.body"), "read_template", lambda light: read(True))
+        yield
+
+
+@pytest.fixture(scope="module")
+def full_bodies(core):
+    """Players have the body that users see."""
+    with pytest.MonkeyPatch.context() as monkeypatch:
+        monkeypatch.setattr(core("appearance.body"), "read_template", core("appearance.template").read_template)
+        yield
+
+
 @pytest.fixture(autouse=True)
 def empty_scene(extension):
     """An empty file before each test; keeps the extension on (a factory reset would not)."""
@@ -85,23 +112,30 @@ def empty_scene(extension):
 
 @pytest.fixture(scope="session")
 def library_folder(core, tmp_path_factory):
-    """A few clips of the sample, their library built and its synthetic clips made: seconds of work, done once.
+    """A few clips of the sample, their library built and its synthetic clips made: seconds of work, done once, in
+    `make test` for all its runs.
 
     Here, because a fixture that test files import from each other is set up again in each of them."""
     import worlds
 
-    folder = tmp_path_factory.mktemp("library")
+    folder, cache = tmp_path_factory.mktemp("library"), find_shared_folder(tmp_path_factory) / "few_clips"
     for name in worlds.CLIPS:
         for suffix in (".bvh", ".txt"):
             (folder / f"{name}{suffix}").symlink_to(worlds.SAMPLE / f"{name}{suffix}")
-    assert core("library.build").build_library(folder).with_synthetic_clips.clips
+    assert core("library.build").build_library(folder, cache_dir=cache).with_synthetic_clips.clips
+    shutil.copytree(cache, folder / ".beyond_mocap")
     return folder
+
+
+def find_shared_folder(tmp_path_factory):
+    """Find the folder that all runs of `make test` share, or one of this run."""
+    return pathlib.Path(os.environ.get("TESTS_CACHE") or tmp_path_factory.mktemp("caches"))
 
 
 @pytest.fixture(scope="session")
 def sample_cache(core, tmp_path_factory):
     """The cache of the sample's whole library, with its synthetic clips; in `make test` the core's tests make it."""
-    folder = pathlib.Path(os.environ.get("TESTS_CACHE") or tmp_path_factory.mktemp("caches"), "sample_cache")
+    folder = find_shared_folder(tmp_path_factory) / "sample_cache"
     assert core("library.build").build_library(SOURCE / "sample_blend" / "library",
                                                cache_dir=folder).with_synthetic_clips.clips
     return folder

@@ -18,6 +18,14 @@ def import_module(name):
     return importlib.import_module(f"{EXTENSION}.{name}")
 
 
+@pytest.fixture(scope="module", autouse=True)
+def used_library(sample_cache):
+    """The sample's library has been used before; that of its passes, whose cache is below the same folder, has not."""
+    library = import_module("scene.core.sample").FOLDER / "library"
+    cache = import_module("scene.core.preferences").find_cache_folder(str(library))
+    shutil.copytree(sample_cache, cache, dirs_exist_ok=True)
+
+
 @pytest.fixture(autouse=True)
 def fresh_file():
     """The file that Blender starts with, which has a cube, a light and a camera."""

@@ -1,6 +1,7 @@
 """Models of throws and kicks for tests: linear networks, quickly made, by a Python beside Blender's own core."""
 
 import functools
+import os
 import pathlib
 import subprocess
 import sys
@@ -19,8 +20,11 @@ write_model(build_linear_model(build_{action_name}_examples(), {action!r}), {out
 
 @functools.cache
 def write_model_file(action="throw"):
-    """Path of a model of "throw" or "kick"."""
-    out = str(pathlib.Path(_folder.name) / f"{action}.npz")
-    script = SCRIPT.format(core=str(TOP / "tests" / "core"), top=str(TOP), out=out, action_name=action, action=action)
-    subprocess.run([sys.executable, "-c", script], check=True)
-    return out
+    """Path of a model of "throw" or "kick"; the runs of `make test` share it."""
+    out = pathlib.Path(os.environ.get("TESTS_CACHE") or _folder.name) / f"{action}.npz"
+    if not out.exists():
+        out.parent.mkdir(parents=True, exist_ok=True)
+        script = SCRIPT.format(core=str(TOP / "tests" / "core"), top=str(TOP), out=str(out), action_name=action,
+                               action=action)
+        subprocess.run([sys.executable, "-c", script], check=True)
+    return str(out)

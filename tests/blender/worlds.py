@@ -1,6 +1,7 @@
 """Files in which every operator can be tried: how far a user has come, and what can then be wrong with the scene."""
 
 import importlib
+import os
 import pathlib
 import shutil
 import tempfile
@@ -16,7 +17,7 @@ CLIPS = ("standing_1", "walking_1_2", "walk_jog_walk", "jogging_2_9", "jogging_t
          "kick_low_inside",
          "receive_foot", "dribble_jogging")
 _markers = tempfile.TemporaryDirectory(prefix="beyond-mocap-markers-")
-MARKERS = pathlib.Path(_markers.name)
+MARKERS = pathlib.Path(os.environ.get("TESTS_CACHE") or _markers.name, "markers")
 PICTURE = "video_0001.png"
 FOREIGN = "foreign.blend"
 
@@ -55,10 +56,11 @@ def make_places(top):
 
 
 def write_synthetic_markers():
-    """walk.trc, static.trc and throw.trc below MARKERS: markers on a made walk of half a second, on the same body
-    standing, and around the release of a throw."""
+    """walk.trc, throw.trc and, last, static.trc below MARKERS, which the runs of `make test` share: markers on a made
+    walk of half a second, around the release of a throw, and on the walker standing."""
     if (MARKERS / "static.trc").exists():
         return
+    MARKERS.mkdir(parents=True, exist_ok=True)
     core = f"{EXTENSION}.beyond_mocap"
     gait = importlib.import_module(f"{core}.synthetic.gait").build_gait(1.4, 0.6, fps=100.0)
     known = importlib.import_module(f"{core}.synthetic.ground_truth.synthetic_markers").build_trial(

@@ -7,6 +7,8 @@ import numpy as np
 import pytest
 import synthetic_motion
 
+pytestmark = pytest.mark.usefixtures("full_bodies")
+
 
 @pytest.fixture
 def character(extension, core):

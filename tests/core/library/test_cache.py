@@ -79,11 +79,15 @@ def test_from_the_cache_come_the_same_bits(clips_folder, library):
     assert_same(library, again)
 
 
-def test_the_stance_of_all_recordings_is_measured_once(folder, monkeypatch):
-    first = build_library(folder).neutral_stance
+def test_the_stance_and_postures_of_all_recordings_are_measured_once(clips_folder, library, monkeypatch):
+    stance, postures = library.neutral_stance, library.normal_postures.to_arrays()
     monkeypatch.setattr(synthetic_clips, "sample_upright_example", None)
-    again = build_library(folder).neutral_stance
-    assert all(np.array_equal(getattr(first, name), getattr(again, name)) for name in library_module._STANCE_NUMBERS)
+    monkeypatch.setattr(library_module, "fit_normal_postures", None)
+    again = build_library(clips_folder)
+    assert all(np.array_equal(getattr(stance, name), getattr(again.neutral_stance, name))
+               for name in library_module._STANCE_NUMBERS)
+    assert len(postures["kinds"]) and np.array_equal(library.strangeness, again.strangeness)
+    assert all(np.array_equal(values, again.normal_postures.to_arrays()[name]) for name, values in postures.items())
 
 
 def test_built_twice_gives_the_same_bits(clips_folder, library, tmp_path):

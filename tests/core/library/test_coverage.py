@@ -1,5 +1,7 @@
 """What a library lacks is told, and exactly that is made: one definition for lines and for synthetic clips."""
 
+from functools import cache
+
 import numpy as np
 import pytest
 
@@ -48,8 +50,13 @@ def list_motions(kind):
             for i, (speed, degrees) in enumerate(walks)}
 
 
-def build(folder, kinds, speed=1.1):
-    """A library of two steady gaits of a speed and of the motions in `kinds`."""
+@pytest.fixture(scope="module")
+def build(tmp_path_factory):
+    """build(kinds, speed=1.1): a library of two steady gaits of a speed and of the motions in `kinds`, built once."""
+    return cache(lambda kinds, speed=1.1: build_gaits(tmp_path_factory.mktemp("gaits"), kinds, speed))
+
+
+def build_gaits(folder, kinds, speed):
     motions = {name: ("walking", build_gait(pace, 6.0, 30.0)) for name, pace in (("one", speed), ("two", 1.04 * speed))}
     for kind in kinds:
         motions |= list_motions(kind)
@@ -66,16 +73,17 @@ def list_made(library):
     return {kind for kind, prefix in KINDS.items() if any(name.startswith(prefix) for name in names)}
 
 
-def test_a_library_with_all_of_it_lacks_nothing_and_nothing_of_it_is_made(tmp_path):
-    library = build(tmp_path, KINDS)
+def test_a_library_with_all_of_it_lacks_nothing_and_nothing_of_it_is_made(build):
+    library = build(tuple(KINDS))
     assert not set(library.coverage.lines) & {*KINDS, "belonging"}
     assert list_made(library) == set()
 
 
-@pytest.mark.parametrize("recorded", [(), ("stands", "turns"), ("stands", "moves", "sideways", "backward")])
-def test_what_is_not_recorded_is_told_and_made(tmp_path, recorded):
+@pytest.mark.parametrize("recorded, speed", [((), 3.0), (("stands", "turns"), 1.3),
+                                             (("stands", "moves", "sideways", "backward"), 1.1)])
+def test_what_is_not_recorded_is_told_and_made(build, recorded, speed):
     """Each kind is recorded in one of these libraries and lacks in another; moves begin and end with stands."""
-    library = build(tmp_path, recorded)
+    library = build(recorded, speed)
     lines = library.coverage.lines
     assert set(KINDS) & set(lines) == set(KINDS) - set(recorded)
     assert list_made(library) == {kind for kind in KINDS if "synthetic" in lines.get(kind, "")
@@ -87,12 +95,12 @@ def test_too_little_of_it_counts_as_none(tmp_path):
     motion = build_gait(0.8, 10.0, 30.0, direction=np.pi)
     bvh.write_bvh(tmp_path / "back.bvh", motion)
     (tmp_path / "back.txt").write_text("0 10 walking back\n")
-    library = build(tmp_path, ["stands"])
+    library = build_library(tmp_path)
     assert 0.8 in library.coverage.back_speeds and "backward" in library.coverage.lines
 
 
-def test_the_speeds_that_are_not_reached_are_named(tmp_path):
-    line = build(tmp_path, ["stands"], speed=3.0).coverage.lines["speeds"]
+def test_the_speeds_that_are_not_reached_are_named(build):
+    line = build((), 3.0).coverage.lines["speeds"]
     assert line.startswith("hardly any locomotion at 0.6 to 2.6 and 3.5 to 9.4 m/s: add some")
 
 
@@ -103,16 +111,16 @@ def test_without_steady_travel_nothing_is_known_to_belong(tmp_path):
     assert "nothing recorded surely belongs" in build_library(tmp_path).coverage.lines["belonging"]
 
 
-def test_a_library_of_runs_gets_synthetic_walks_and_a_stand(tmp_path):
-    library = build(tmp_path, [], speed=3.0)
+def test_a_library_of_runs_gets_synthetic_walks_and_a_stand(build):
+    library = build((), 3.0)
     made = {clip.path.removeprefix(SYNTHETIC_FOLDER): clip for clip in library.with_synthetic_clips.clips
             if clip.is_synthetic}
     assert any(name.startswith(WALK_PREFIX) for name in made) and any(name.startswith(STILL_PREFIX) for name in made)
     assert [gait.label for gait in library.with_synthetic_clips.gaits][:2] == ["standing", "walking"]
 
 
-def test_a_library_that_stands_and_walks_gets_neither(tmp_path):
-    library = build(tmp_path, ["stands"], speed=1.3)
+def test_a_library_that_stands_and_walks_gets_neither(build):
+    library = build(("stands", "turns"), 1.3)
     made = [clip for clip in library.with_synthetic_clips.clips if clip.is_synthetic]
     assert made and not any(clip.path.startswith(SYNTHETIC_FOLDER + STILL_PREFIX) for clip in made)
     slowest = min(library.with_synthetic_clips.frames.speed[library.with_synthetic_clips.frames.clip == number].mean()
