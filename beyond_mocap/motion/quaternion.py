@@ -207,8 +207,9 @@ def rotation_between(a: np.ndarray, b: np.ndarray) -> np.ndarray:
     b = unit_vectors(b, min_length=1e-12)
     dot = dot_products(a, b)[..., None]
     axis = cross_product(a, b)
-    other = np.where(np.abs(a[..., :1]) < 0.9, np.array([1.0, 0.0, 0.0]), np.array([0.0, 1.0, 0.0]))
-    axis = np.where(dot < -1.0 + 1e-9, cross_product(a, other), axis)
+    if np.any(is_opposite := dot < -1.0 + 1e-9):
+        other = np.where(np.abs(a[..., :1]) < 0.9, np.array([1.0, 0.0, 0.0]), np.array([0.0, 1.0, 0.0]))
+        axis = np.where(is_opposite, cross_product(a, other), axis)
     return normalize(np.concatenate([np.maximum(1.0 + dot, 0.0), axis], axis=-1))
 
 
@@ -218,6 +219,8 @@ def unify_signs(q: np.ndarray) -> np.ndarray:
     if len(q) < 2:
         return q.copy()
     flips = dot_products(q[1:], q[:-1]) < 0.0
+    if not flips.any():
+        return q.copy()
     sign = np.where(np.cumsum(flips, axis=0) % 2 == 1, -1.0, 1.0)
     out = q.copy()
     out[1:] *= sign[..., None]
