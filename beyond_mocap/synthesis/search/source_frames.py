@@ -199,9 +199,9 @@ def _fetch_poses(library: Library, clip: np.ndarray, frame: np.ndarray):
     count, joints = len(clip), len(library.skeleton)
     pose, root = np.empty((count, joints, 4)), np.empty((count, 3))
     own = _to_clip_frames(library, clip, frame)
-    for number in np.unique(clip):
-        at = np.flatnonzero(clip == number)
-        root[at], pose[at] = sample_frames(library.clips[number].motion, own[at])
+    order = np.argsort(clip, kind="stable")
+    for at in np.split(order, np.flatnonzero(np.diff(clip[order])) + 1) if count else ():
+        root[at], pose[at] = sample_frames(library.clips[clip[at[0]]].motion, own[at])
     heading = _interpolate_in_clips(library, clip, frame, library.frames.heading)
     path = _interpolate_in_clips(library, clip, frame, library.frames.path)
     back = quaternion.from_up_angle(-heading)
