@@ -175,8 +175,7 @@ def plant_feet(
     out = rotations
     for side, (foot, (target, foot_rotation)) in enumerate(zip(feet, goals)):
         target = limit_to_reach(foot, target, drop)
-        chain = (foot.limb.upper_leg, foot.limb.lower_leg, foot.limb.foot)
-        reached = solve_two_bone(skeleton, root, out, chain, target, end_rotation=foot_rotation,
+        reached = solve_two_bone(skeleton, root, out, foot.limb.leg, target, end_rotation=foot_rotation,
                                  soft=foot.ease_distance)
         out, miss[:, side] = reached.rotations, reached.miss
         correction[:, side] = measure_lengths(target - places[:, foot.limb.foot])

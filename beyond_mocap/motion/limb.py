@@ -176,33 +176,73 @@ def solve_posed_limb(
     Returns:
         The new local rotations (T, 4) by joint, and the miss (T,) in metres.
     """
-    upper, middle, end = joints
-    # vectors lie in memory by component, as those of a pose do: rows of three take twice as long
-    target = np.asarray(target, dtype=float, order="F")
-    top, knee, ankle = places[:, upper], places[:, middle], places[:, end]
-    bones = knee - top, ankle - knee
-    lengths = (measure_lengths(bones[0]), measure_lengths(bones[1]))
-    line = unit_vectors(ankle - top, np.array([0.0, 0.0, -1.0]))
-    old_pole = _estimate_pole(line, bones[0], lengths[0] + lengths[1], world[:, upper], min_bend)
-    swing = quaternion.rotation_between(ankle - top, target - top)
-    new_pole = np.asarray(quaternion.rotate(swing, old_pole) if pole is None else pole, dtype=float, order="F")
-    new_knee, new_ankle, new_hinge = solve_limb_bend(top, target, *lengths, new_pole, soft)
-    new_hinge, old_hinge = np.asarray(new_hinge, order="F"), np.asarray(cross_product(line, old_pole), order="F")
+    bend = _bend_limb(places, world, joints, target, pole=pole, soft=soft, min_bend=min_bend)
     # how much each bone rotates: its new frame (direction, hinge) times the inverse of its old one
     bone_rotations = [
-        quaternion.multiply(_build_frame_for_bone(new, new_hinge),
-                            quaternion.inverse(_build_frame_for_bone(old, old_hinge)))
-        for new, old in zip((new_knee - top, new_ankle - new_knee), bones)
+        quaternion.multiply(_build_frame_for_bone(new, bend.hinge),
+                            quaternion.inverse(_build_frame_for_bone(old, bend.old_hinge)))
+        for new, old in zip((bend.middle - places[:, joints[0]], bend.end - bend.middle), bend.old_bones)
     ]
     new_world = {joint: quaternion.multiply(rotation, world[:, joint])
                  for rotation, high, low in zip(bone_rotations, joints, joints[1:])
                  for joint in (high, *list_between(skeleton.parents, high, low))}
+    end = joints[2]
     if end_rotation is not None:
         new_world[end] = end_rotation
     else:
         new_world[end] = world[:, end] if keep_end_rotation else quaternion.multiply(bone_rotations[1], world[:, end])
     local = {joint: _compute_local_rotation(skeleton, new_world, world, joint) for joint in new_world}
-    return local, measure_lengths(new_ankle - target)
+    return local, measure_lengths(bend.end - target)
+
+
+def place_limb(
+    places: np.ndarray, world: np.ndarray, joints: tuple[int, int, int], target: np.ndarray, *,
+    soft: float | np.ndarray = 0.01,
+) -> tuple[np.ndarray, np.ndarray]:
+    """Compute where `solve_posed_limb` brings the middle and the end joint, for half of its time.
+
+    Args:
+        places, world, joints, target, soft: as for `solve_posed_limb`.
+    Returns:
+        Positions of the middle and of the end joint, (T, 3) m each, world.
+    """
+    bend = _bend_limb(places, world, joints, target, pole=None, soft=soft, min_bend=MIN_BEND)
+    return bend.middle, bend.end
+
+
+@dataclass(frozen=True, eq=False)
+class _Bend:
+    """How a limb bends to reach a target.
+
+    Attributes:
+        middle, end: (T, 3) m, positions of the joints, world.
+        hinge: (T, 3) unit axis about which the middle joint bends.
+        old_bones: (T, 3) m, upper and lower bone before.
+        old_hinge: (T, 3) unit axis before.
+    """
+
+    middle: np.ndarray
+    end: np.ndarray
+    hinge: np.ndarray
+    old_bones: tuple[np.ndarray, np.ndarray]
+    old_hinge: np.ndarray
+
+
+def _bend_limb(places: np.ndarray, world: np.ndarray, joints: tuple[int, int, int], target: np.ndarray, *, pole, soft,
+               min_bend) -> _Bend:
+    """Bend a limb so that its end reaches a target; arguments as for `solve_posed_limb`."""
+    # vectors lie in memory by component, as those of a pose do: rows of three take twice as long
+    target = np.asarray(target, dtype=float, order="F")
+    top, knee, ankle = (places[:, joint] for joint in joints)
+    bones = knee - top, ankle - knee
+    lengths = (measure_lengths(bones[0]), measure_lengths(bones[1]))
+    line = unit_vectors(ankle - top, np.array([0.0, 0.0, -1.0]))
+    old_pole = _estimate_pole(line, bones[0], lengths[0] + lengths[1], world[:, joints[0]], min_bend)
+    swing = quaternion.rotation_between(ankle - top, target - top)
+    new_pole = np.asarray(quaternion.rotate(swing, old_pole) if pole is None else pole, dtype=float, order="F")
+    middle, end, hinge = solve_limb_bend(top, target, *lengths, new_pole, soft)
+    return _Bend(middle, end, np.asarray(hinge, order="F"), bones,
+                 np.asarray(cross_product(line, old_pole), order="F"))
 
 
 def _normalize_across(v: np.ndarray, direction: np.ndarray) -> np.ndarray:

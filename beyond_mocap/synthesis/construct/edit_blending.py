@@ -22,7 +22,7 @@ from ...motion.skeleton import Skeleton
 from ...motion.track import SampledTrack
 from ...motion.track.sampling import MOVING_SPEED
 from .extra_steps import add_steps
-from .move_body_part import Body, LimbReference, leg_chain, move_limb
+from .move_body_part import Body, LimbReference, move_limb
 from .track_following import pull_to_track
 
 Pose = tuple[np.ndarray, np.ndarray]
@@ -166,7 +166,7 @@ def blend_with_old(skeleton: Skeleton, new: Pose, old: Pose, share: np.ndarray, 
         carries = heel_toe_contacts[:, side].any(axis=1).astype(float)[:, None]
         moved, turned = _solve_foot_offsets([values[:, limb.foot] for values in (*new_joints, *old_joints)],
                                             share > least, carries, fps)
-        chain, foot = leg_chain(limb), quaternion.multiply(turned, new_joints[1][:, limb.foot])
+        chain, foot = limb.leg, quaternion.multiply(turned, new_joints[1][:, limb.foot])
         place = new_joints[0][:, limb.foot] + moved
         place[:, 2] += _measure_sinking(skeleton, limb, place, foot=foot, motions=[new_joints[0], old_joints[0]],
                                         share=share)

@@ -75,11 +75,6 @@ class Body:
         return surface.compute_line(self.places[at], self.world[at])
 
 
-def leg_chain(limb: Limb) -> tuple[int, int, int]:
-    """Return the joints of a leg: hip, knee, ankle."""
-    return limb.upper_leg, limb.lower_leg, limb.foot
-
-
 def arm_chain(limb: Limb) -> tuple[int, int, int]:
     """Return the joints of an arm: shoulder, elbow, wrist."""
     return limb.upper_arm, limb.lower_arm, limb.hand
@@ -93,7 +88,7 @@ def limb_chain(skeleton: Skeleton, part: Surface) -> tuple[int, int, int]:
         part: a striking surface on a limb.
     """
     limb = getattr(identify_joints(skeleton), part.side)
-    return leg_chain(limb) if part.part == "foot" else arm_chain(limb)
+    return limb.leg if part.part == "foot" else arm_chain(limb)
 
 
 @dataclass(frozen=True, eq=False)
@@ -241,7 +236,7 @@ def hold_foot(body: Body, limb: Limb, root: np.ndarray, rotations: np.ndarray) -
     Returns:
         (W, J, 4) local rotations.
     """
-    return move_limb(body, LimbReference.from_body(body, leg_chain(limb), soft=1e-3), np.zeros_like(body.root), root,
+    return move_limb(body, LimbReference.from_body(body, limb.leg, soft=1e-3), np.zeros_like(body.root), root,
                      rotations)
 
 
