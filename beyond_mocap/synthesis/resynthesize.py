@@ -21,6 +21,7 @@ from typing import Any
 import numpy as np
 
 from ..base.errors import InputError, format_seconds
+from ..base.one_thread import limit_to_one_thread
 from ..library.library import Library
 from ..motion.motion import Motion
 from ..motion.track import SampledTrack
@@ -100,13 +101,11 @@ def resynthesize(
         InputError: where that stretch lies outside the take, or for another method than "path".
         NotInLibraryError, UserCancelledError: as for `synthesize`.
     """
-    from threadpoolctl import threadpool_limits
-
     report = progress or (lambda fraction, text: None)
     if variant is not None:
         _check_stretch(plan, before, variant)
     options: dict[str, Any] = {"cancelled": cancelled, "hurry": hurry}
-    with threadpool_limits(limits=1):
+    with limit_to_one_thread():
         is_comparable = _is_comparable(plan, before)
         updated = _update_take(library, plan, before, report, **options, variant=variant) if is_comparable else None
     used = variant.used if variant is not None else ()

@@ -19,6 +19,7 @@ import numpy as np
 
 from ..annotation import avoided_labels_per_frame
 from ..base.errors import InputError, TimedMessage, UserCancelledError, format_count, format_seconds
+from ..base.one_thread import limit_to_one_thread
 from ..base.settings import find_setting
 from ..base.time_series import find_runs
 from ..library.library import Library
@@ -125,9 +126,7 @@ def synthesize(
     """
     if plan.method not in METHODS:
         raise InputError("method", plan.method, f"one of {', '.join(METHODS)}")
-    from threadpoolctl import threadpool_limits
-
-    with threadpool_limits(limits=1):
+    with limit_to_one_thread():
         options = {"cancelled": cancelled, "hurry": hurry, "used": used, "narrow": narrow}
         return _synthesize_plan(library, plan, progress or (lambda fraction, text: None), **options)
 
@@ -159,9 +158,7 @@ def construct_take(library: Library, plan: ResolvedPlan, edit: EditList, progres
         edit: at the library's rate, from the track's first time on.
         progress: called as progress(fraction, text).
     """
-    from threadpoolctl import threadpool_limits
-
-    with threadpool_limits(limits=1):
+    with limit_to_one_thread():
         request = build_request(library, plan)
         take, seconds = _construct_motion(library, plan, request, SearchResult(edit),
                                           progress or (lambda fraction, text: None))

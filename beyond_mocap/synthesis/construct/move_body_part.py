@@ -8,6 +8,7 @@ new place and reaching for the old one, so a shift of zero changes nothing, howe
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -16,8 +17,9 @@ from ...annotation.striking import Surface
 from ...base.vectors import skew_matrix
 from ...motion import quaternion
 from ...motion.humanoid import Limb, identify_joints
-from ...motion.limb import compute_inner_angle, solve_two_bone
+from ...motion.limb import compute_inner_angle, solve_posed_limb
 from ...motion.motion import compute_pose
+from ...motion.retargeting.structure import list_ancestors
 from ...motion.skeleton import Skeleton
 
 MAX_BEND = {"head": 0.6, "chest": 0.35}  # rad, largest bend of the whole spine, by the part that is moved
@@ -117,7 +119,7 @@ class LimbReference:
             soft: m below full length from which on the limb extends softly.
         """
         end = body.places[:, chain[2]]
-        still = solve_two_bone(body.skeleton, body.root, body.rotations, chain, end, soft=soft).rotations
+        still, _ = solve_posed_limb(body.skeleton, body.places, body.world, chain, end, soft=soft)
         return cls(chain, soft, _limb_world_rotations(body, still, chain))
 
 
@@ -211,8 +213,11 @@ def move_limb(
     """
     skeleton, chain = body.skeleton, limb.chain
     target = body.places[:, chain[2]] + shift
-    moved = solve_two_bone(skeleton, body.root if root is None else root, body.rotations, chain, target, soft=limb.soft)
-    after = _limb_world_rotations(body, moved.rotations, chain)
+    places = body.places
+    if root is not None:
+        places, _ = compute_pose(skeleton, root, body.rotations, list_ancestors(skeleton.parents, chain[2]))
+    moved, _ = solve_posed_limb(skeleton, places, body.world, chain, target, soft=limb.soft)
+    after = _limb_world_rotations(body, moved, chain)
     out = (body.rotations if rotations is None else rotations).copy()
     above = body.world[:, skeleton.parents[chain[0]]]
     for joint, turned in after.items():
@@ -348,9 +353,10 @@ def list_joint_chain(skeleton: Skeleton, high: int, low: int) -> list[int]:
     return chain[::-1]
 
 
-def _limb_world_rotations(body: Body, rotations: np.ndarray, chain: tuple[int, int, int]) -> dict[int, np.ndarray]:
+def _limb_world_rotations(body: Body, local: Mapping[int, np.ndarray], chain: tuple[int, int, int]
+                          ) -> dict[int, np.ndarray]:
     """Compute world rotations (W, 4) of a limb's joints for other local ones; above the limb all is as in `body`."""
     world, above = {}, body.world[:, body.skeleton.parents[chain[0]]]
     for joint in list_joint_chain(body.skeleton, chain[0], chain[2]):
-        above = world[joint] = quaternion.multiply(above, rotations[:, joint])
+        above = world[joint] = quaternion.multiply(above, local[joint])
     return world
