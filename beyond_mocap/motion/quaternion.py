@@ -257,13 +257,16 @@ def slerp(a: np.ndarray, b: np.ndarray, weight: float | np.ndarray) -> np.ndarra
     a, b = np.asarray(a, dtype=float), np.asarray(b, dtype=float)
     weight = np.asarray(weight, dtype=float)
     dot = dot_products(a, b)
-    b = np.where(dot[..., None] < 0.0, -b, b)
     theta = np.arccos(np.clip(np.abs(dot), 0.0, 1.0))
     small = theta < 1e-4
     sine = np.where(small, 1.0, np.sin(theta))
     wa = np.where(small, 1.0 - weight, np.sin((1.0 - weight) * theta) / sine)
     wb = np.where(small, weight, np.sin(weight * theta) / sine)
-    return normalize(wa[..., None] * a + wb[..., None] * b)
+    wb = np.where(dot < 0.0, -wb, wb)
+    mixed = np.empty((4, *wa.shape))
+    for component in range(4):
+        mixed[component] = wa * a[..., component] + wb * b[..., component]
+    return np.ascontiguousarray(normalize(np.moveaxis(mixed, 0, -1)))
 
 
 def to_yaw(q: np.ndarray) -> np.ndarray:
