@@ -15,7 +15,6 @@ from functools import cached_property
 
 import numpy as np
 
-from ..base.one_thread import limit_to_one_thread
 from ..base.time_series import time_derivative
 from ..motion import quaternion
 from ..motion.humanoid import compute_heading_from_positions, identify_joints
@@ -159,7 +158,9 @@ def build_frames(clips, reference: Frames | None = None, on_clip: Callable[[int]
     Returns:
         The frames.
     """
-    with limit_to_one_thread():  # with more threads, sums of products have another order and other bits
+    from threadpoolctl import threadpool_limits
+
+    with threadpool_limits(limits=1):  # with more threads, sums of products have another order and other bits
         return _build_frames(clips, reference, on_clip or (lambda index: None))
 
 

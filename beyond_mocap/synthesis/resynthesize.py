@@ -21,7 +21,6 @@ from typing import Any
 import numpy as np
 
 from ..base.errors import InputError, format_seconds
-from ..base.one_thread import limit_to_one_thread
 from ..library.library import Library
 from ..motion.motion import Motion
 from ..motion.track import SampledTrack
@@ -31,6 +30,7 @@ from .construct.construction import Construction, build_key_results, find_touche
 from .construct.edit_blending import OldMotion, blend_with_old, compute_old_share
 from .construct.transitions import compute_spread_reaches
 from .edited_contacts import find_edited_frames
+from .one_thread import limit_to_one_thread
 from .plan import Plan, ResolvedPlan
 from .provenance import list_labels_shown, list_sources
 from .resolve_plan import resolve_plan

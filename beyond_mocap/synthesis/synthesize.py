@@ -19,7 +19,6 @@ import numpy as np
 
 from ..annotation import avoided_labels_per_frame
 from ..base.errors import InputError, TimedMessage, UserCancelledError, format_count, format_seconds
-from ..base.one_thread import limit_to_one_thread
 from ..base.settings import find_setting
 from ..base.time_series import find_runs
 from ..library.library import Library
@@ -36,6 +35,7 @@ from .construct.pins import apply_pins
 from .construct.thesis_methods import construct_blocks
 from .contact_edit import FEET
 from .known_body import name_known_frames
+from .one_thread import limit_to_one_thread
 from .pin import BALL, Pin
 from .plan import METHODS, Plan, ResolvedPlan
 from .provenance import build_provenance_fields
