@@ -8,6 +8,7 @@ import numpy as np
 
 # Order of a finite difference -> its coefficients.
 _DIFFERENCES = {1: (-1.0, 1.0), 2: (1.0, -2.0, 1.0), 3: (-1.0, 3.0, -3.0, 1.0)}
+_DENSE = 20  # elements that are summed as fast as one entry is sorted
 
 
 class BandedLeastSquares:
@@ -110,10 +111,10 @@ class BandedLeastSquares:
             sums += np.bincount(index.ravel(), (weighted_values * column[:, None]).ravel(), size)
         for a in range(index.shape[1]):
             # Keep the pairs on or below the diagonal. Diagonal d and column c of the band are element d * size + c of
-            # the flat band. One bincount sums repeated entries, over those that occur: the band is many times longer.
+            # the flat band. One bincount sums repeated entries.
             lower = index[:, a, None] >= index
             entries = ((index[:, a, None] - index) * size + index)[lower]
-            found, number = np.unique(entries, return_inverse=True)
+            found, number = _find_entries(entries)
             self.band.reshape(-1)[found] += np.bincount(number, (weighted_values[:, a, None] * values)[lower])
 
     def copy(self) -> BandedLeastSquares:
@@ -135,3 +136,9 @@ class BandedLeastSquares:
         from scipy.linalg import solveh_banded
 
         return solveh_banded(self.band, self.right, lower=True).reshape(self.count, -1)
+
+
+def _find_entries(entries: np.ndarray) -> tuple[np.ndarray | slice, np.ndarray]:
+    """Find which entries occur, and the number of each among them; all up to the last one where they are many."""
+    end = int(entries.max(initial=-1)) + 1
+    return (slice(end), entries) if end <= _DENSE * len(entries) else np.unique(entries, return_inverse=True)

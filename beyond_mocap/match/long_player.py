@@ -30,9 +30,6 @@ from .pieces.windows import join_pieces, search_window
 from .player_edit import PlayerEdit, to_stored_plan
 from .player_motion import construct_player, join_balls
 
-CONSTRUCTION_WINDOW = 60.0
-"""s of the windows in which the motion is constructed, each with some seconds around it."""
-
 PART_WINDOWS = 10
 """Windows that a part of the motion has: the one before each part is constructed twice."""
 
@@ -60,7 +57,7 @@ def search_long_player(library: Library, plan: Plan, window: float, progress: Pr
     for unit in units:
         progress(0.6 * unit.number / len(units), "Searching")
         pieces.append(search_window(library, unit, cancelled))
-    return join_pieces(library, [plan], pieces, CONSTRUCTION_WINDOW)[0]
+    return join_pieces(library, [plan], pieces)[0]
 
 
 def iter_parts(library: Library, edit: PlayerEdit, progress: Progress,

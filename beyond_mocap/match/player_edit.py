@@ -18,8 +18,8 @@ BALL_STEP = 0.02
 """s between the stored points of the ball's trajectory; gravity bends it by half a millimetre in between, and a bounce
 is cut off by some centimetres."""
 
-WINDOW_SECONDS = 30.0
-"""s of the windows in which a player is constructed."""
+WINDOW_SECONDS = 60.0
+"""s of the windows in which a player is constructed, each with some seconds around it."""
 
 _MAX_STEPS = 10_000_000
 

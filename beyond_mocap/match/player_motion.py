@@ -27,7 +27,7 @@ from ..synthesis.construct.edit_blending import blend_with_old
 from ..synthesis.plan import Plan
 from ..synthesis.resolve_plan import resolve_plan
 from ..synthesis.search.edit_list import EditList, sample_edit
-from ..synthesis.search.source_frames import look_up_frames
+from ..synthesis.search.source_frames import look_up_contacts, look_up_frames
 from ..synthesis.synthesize import construct_take
 from ..synthesis.take import DribbleTouch, Take
 from .pieces.named_edit import cut_named_edit, to_library_edit
@@ -207,10 +207,8 @@ class StretchConstructor:
     def _find_foot_contacts(self, edit: EditList, take: Take) -> np.ndarray:
         """Find the feet (T, 2) bool whose heel or toe is in contact."""
         index = np.minimum(np.arange(len(take.motion)) * (FPS / self.grid.fps), len(edit) - 1)
-        what = look_up_frames(self.library, edit, index)
-        frame, clips = np.round(what.clip_frame).astype(int), self.library.clips
-        stands = np.array([clips[clip].heel_toe_contacts[at].any(axis=1) for clip, at in zip(what.clip, frame)])
-        return stands & ~take.stepped
+        contacts = look_up_contacts(self.library, look_up_frames(self.library, edit, index))
+        return contacts.any(axis=2) & ~take.stepped
 
 
 def _blend_window_start(before: _Window, window: _Window, settle_frames: int) -> Take:

@@ -155,24 +155,27 @@ def plant_feet(
     lifts = [lift_to_ground(foot, measure_sole_height(skeleton), scale) if level_feet else np.zeros(len(root))
              for foot in feet]
     weights = [foot.weight for foot in feet]
+    goals, is_new = [(foot.heel, foot.rotation) for foot in feet], [True, True]
     # solve with full weights first; stances that the legs cannot reach are relaxed and solved again
     for attempt in range(_RELAX_ROUNDS + 1):
         goals = [
-            _compute_ankle_goal(foot, weight, lift, tilt=tilt, scale=scale, spread=spread)
-            for foot, weight, lift, tilt in zip(feet, weights, lifts, np.moveaxis(foot_moves[..., 3], 1, 0))
+            _compute_ankle_goal(foot, weight, lift, tilt=tilt, scale=scale, spread=spread) if new else goal
+            for foot, weight, lift, tilt, new, goal in zip(feet, weights, lifts, np.moveaxis(foot_moves[..., 3], 1, 0),
+                                                           is_new, goals)
         ]
         drop = compute_pelvis_drop(feet, [goal for goal, _ in goals], spread, max_drop)
         short = [measure_shortfall(foot, goal, drop) for foot, (goal, _) in zip(feet, goals)]
         if attempt == _RELAX_ROUNDS or max(s.max(initial=0.0) for s in short) <= _SLIDE_TOLERANCE:
             break
-        weights = [relax_contact_weights(weight, s) for weight, s in zip(weights, short)]
+        relaxed = [relax_contact_weights(weight, s) for weight, s in zip(weights, short)]
+        is_new = [not np.array_equal(weight, before) for weight, before in zip(relaxed, weights)]
+        weights = relaxed
     root = root - drop[:, None] * [0.0, 0.0, 1.0]
     correction, miss = np.zeros((len(root), 2)), np.zeros((len(root), 2))
     out = rotations
     for side, (foot, (target, foot_rotation)) in enumerate(zip(feet, goals)):
         target = limit_to_reach(foot, target, drop)
-        chain = (foot.limb.upper_leg, foot.limb.lower_leg, foot.limb.foot)
-        reached = solve_two_bone(skeleton, root, out, chain, target, end_rotation=foot_rotation,
+        reached = solve_two_bone(skeleton, root, out, foot.limb.leg, target, end_rotation=foot_rotation,
                                  soft=foot.ease_distance)
         out, miss[:, side] = reached.rotations, reached.miss
         correction[:, side] = measure_lengths(target - places[:, foot.limb.foot])

@@ -62,6 +62,11 @@ class Limb:
     toe: int | None
 
     @property
+    def leg(self) -> tuple[int, int, int]:
+        """Hip, knee and ankle."""
+        return self.upper_leg, self.lower_leg, self.foot
+
+    @property
     def toe_or_foot(self) -> int:
         """The foremost joint of the foot."""
         return self.foot if self.toe is None else self.toe

@@ -9,6 +9,7 @@ Source: Tolani, Goswami and Badler 2000, "Real-time inverse kinematics technique
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -102,8 +103,10 @@ def build_bone_frame(direction: np.ndarray, hinge: np.ndarray) -> np.ndarray:
     """
     left = -(hinge - dot_products(hinge, direction)[..., None] * direction)
     left = _normalize_across(left, direction)
-    forward = cross_product(left, -direction)
-    return quaternion.from_matrix(np.stack([forward, left, -direction], axis=-1))
+    axes = np.empty((3, 3, *left.shape[:-1]))  # by component, as it is read
+    for column, axis in enumerate((cross_product(left, -direction), left, -direction)):
+        axes[:, column] = np.moveaxis(axis, -1, 0)
+    return quaternion.from_matrix(np.moveaxis(axes, (0, 1), (-2, -1)))
 
 
 @dataclass(frozen=True, eq=False)
@@ -173,31 +176,73 @@ def solve_posed_limb(
     Returns:
         The new local rotations (T, 4) by joint, and the miss (T,) in metres.
     """
-    upper, middle, end = joints
-    target = np.asarray(target, dtype=float)
-    top, knee, ankle = places[:, upper], places[:, middle], places[:, end]
-    lengths = (measure_lengths(knee - top), measure_lengths(ankle - knee))
-    old_pole = _estimate_pole(top, knee, ankle, world[:, upper], min_bend)
-    swing = quaternion.rotation_between(ankle - top, target - top)
-    new_pole = quaternion.rotate(swing, old_pole) if pole is None else np.asarray(pole, dtype=float)
-    new_knee, new_ankle, new_hinge = solve_limb_bend(top, target, *lengths, new_pole, soft)
-    old_hinge = cross_product(unit_vectors(ankle - top, np.array([0.0, 0.0, -1.0])), old_pole)
+    bend = _bend_limb(places, world, joints, target, pole=pole, soft=soft, min_bend=min_bend)
     # how much each bone rotates: its new frame (direction, hinge) times the inverse of its old one
     bone_rotations = [
-        quaternion.multiply(_build_frame_for_bone(b - a, new_hinge),
-                            quaternion.inverse(_build_frame_for_bone(d - c, old_hinge))) for a, b, c,
-        d in ((top, new_knee, top, knee), (new_knee, new_ankle, knee, ankle))
+        quaternion.multiply(_build_frame_for_bone(new, bend.hinge),
+                            quaternion.inverse(_build_frame_for_bone(old, bend.old_hinge)))
+        for new, old in zip((bend.middle - places[:, joints[0]], bend.end - bend.middle), bend.old_bones)
     ]
-    new_world = world.copy()
-    _rotate_chain(skeleton, new_world, upper, middle, bone_rotations[0])
-    _rotate_chain(skeleton, new_world, middle, end, bone_rotations[1])
+    new_world = {joint: quaternion.multiply(rotation, world[:, joint])
+                 for rotation, high, low in zip(bone_rotations, joints, joints[1:])
+                 for joint in (high, *list_between(skeleton.parents, high, low))}
+    end = joints[2]
     if end_rotation is not None:
-        new_world[:, end] = end_rotation
-    elif not keep_end_rotation:
-        new_world[:, end] = quaternion.multiply(bone_rotations[1], world[:, end])
-    changed = [upper, *list_between(skeleton.parents, upper, end), end]
-    local = {joint: _compute_local_rotation(skeleton, new_world, joint) for joint in changed}
-    return local, measure_lengths(new_ankle - target)
+        new_world[end] = end_rotation
+    else:
+        new_world[end] = world[:, end] if keep_end_rotation else quaternion.multiply(bone_rotations[1], world[:, end])
+    local = {joint: _compute_local_rotation(skeleton, new_world, world, joint) for joint in new_world}
+    return local, measure_lengths(bend.end - target)
+
+
+def place_limb(
+    places: np.ndarray, world: np.ndarray, joints: tuple[int, int, int], target: np.ndarray, *,
+    soft: float | np.ndarray = 0.01,
+) -> tuple[np.ndarray, np.ndarray]:
+    """Compute where `solve_posed_limb` brings the middle and the end joint, for half of its time.
+
+    Args:
+        places, world, joints, target, soft: as for `solve_posed_limb`.
+    Returns:
+        Positions of the middle and of the end joint, (T, 3) m each, world.
+    """
+    bend = _bend_limb(places, world, joints, target, pole=None, soft=soft, min_bend=MIN_BEND)
+    return bend.middle, bend.end
+
+
+@dataclass(frozen=True, eq=False)
+class _Bend:
+    """How a limb bends to reach a target.
+
+    Attributes:
+        middle, end: (T, 3) m, positions of the joints, world.
+        hinge: (T, 3) unit axis about which the middle joint bends.
+        old_bones: (T, 3) m, upper and lower bone before.
+        old_hinge: (T, 3) unit axis before.
+    """
+
+    middle: np.ndarray
+    end: np.ndarray
+    hinge: np.ndarray
+    old_bones: tuple[np.ndarray, np.ndarray]
+    old_hinge: np.ndarray
+
+
+def _bend_limb(places: np.ndarray, world: np.ndarray, joints: tuple[int, int, int], target: np.ndarray, *, pole, soft,
+               min_bend) -> _Bend:
+    """Bend a limb so that its end reaches a target; arguments as for `solve_posed_limb`."""
+    # vectors lie in memory by component, as those of a pose do: rows of three take twice as long
+    target = np.asarray(target, dtype=float, order="F")
+    top, knee, ankle = (places[:, joint] for joint in joints)
+    bones = knee - top, ankle - knee
+    lengths = (measure_lengths(bones[0]), measure_lengths(bones[1]))
+    line = unit_vectors(ankle - top, np.array([0.0, 0.0, -1.0]))
+    old_pole = _estimate_pole(line, bones[0], lengths[0] + lengths[1], world[:, joints[0]], min_bend)
+    swing = quaternion.rotation_between(ankle - top, target - top)
+    new_pole = np.asarray(quaternion.rotate(swing, old_pole) if pole is None else pole, dtype=float, order="F")
+    middle, end, hinge = solve_limb_bend(top, target, *lengths, new_pole, soft)
+    return _Bend(middle, end, np.asarray(hinge, order="F"), bones,
+                 np.asarray(cross_product(line, old_pole), order="F"))
 
 
 def _normalize_across(v: np.ndarray, direction: np.ndarray) -> np.ndarray:
@@ -220,16 +265,16 @@ def _check_chain(skeleton: Skeleton, joints: tuple[int, int, int]) -> None:
             raise InputError("limb", f"{skeleton.names[low]} does not hang below {skeleton.names[high]}", "a chain")
 
 
-def _rotate_chain(skeleton: Skeleton, world: np.ndarray, high: int, low: int, rotation: np.ndarray) -> None:
-    """Rotate all joints from `high` (included) down to `low` (not included) in `world` (T, J, 4)."""
-    for joint in (high, *list_between(skeleton.parents, high, low)):
-        world[:, joint] = quaternion.multiply(rotation, world[:, joint])
-
-
-def _compute_local_rotation(skeleton: Skeleton, world: np.ndarray, joint: int) -> np.ndarray:
-    """Return the local rotation (T, 4) of a joint from world rotations (T, J, 4)."""
+def _compute_local_rotation(skeleton: Skeleton, new_world: Mapping[int, np.ndarray], world: np.ndarray,
+                            joint: int) -> np.ndarray:
+    """Compute the local rotation (T, 4) of a joint from new world rotations (T, 4) of some, and `world` (T, J, 4) of
+    the others.
+    """
     parent = skeleton.parents[joint]
-    return world[:, joint] if parent < 0 else quaternion.multiply(quaternion.inverse(world[:, parent]), world[:, joint])
+    if parent < 0:
+        return new_world[joint]
+    above = new_world[parent] if parent in new_world else world[:, parent]
+    return quaternion.multiply(quaternion.inverse(above), new_world[joint])
 
 
 def _build_frame_for_bone(direction: np.ndarray, hinge: np.ndarray) -> np.ndarray:
@@ -238,27 +283,26 @@ def _build_frame_for_bone(direction: np.ndarray, hinge: np.ndarray) -> np.ndarra
 
 
 def _estimate_pole(
-    top: np.ndarray, knee: np.ndarray, ankle: np.ndarray, upper_world: np.ndarray, min_bend: float | np.ndarray
+    line: np.ndarray, bone: np.ndarray, length: np.ndarray, upper_world: np.ndarray, min_bend: float | np.ndarray
 ) -> np.ndarray:
-    """Estimate the direction (T, 3) in which the middle joint points in the given pose, unit, square to the line top-
-    ankle.
+    """Estimate the direction (T, 3) in which the middle joint points in the given pose, unit, square to the line from
+    the first to the last joint, which are (T, 3) unit vectors; bone: (T, 3) m, the upper one; length: (T,) m of both.
 
     A nearly straight limb shows little. There the direction is mixed with the mean one of all frames, carried by the
     upper bone (a knee is a hinge), weighted by how clearly each frame shows it.
     """
-    line = unit_vectors(ankle - top, np.array([0.0, 0.0, -1.0]))
-    off = knee - top - dot_products(knee - top, line)[..., None] * line
-    length = measure_lengths(knee - top) + measure_lengths(ankle - knee)
+    off = bone - dot_products(bone, line)[..., None] * line
     bent = (measure_lengths(off) / np.maximum(length, 1e-9))[:, None]
     in_bone = quaternion.rotate(quaternion.inverse(upper_world), off)
     mean = np.sum(in_bone * bent, axis=0)
     if np.linalg.norm(mean) < 1e-9:
         across = unit_vectors(np.array([1.0, 0.0, 0.0]) - line[..., :1] * line, np.array([0.0, 0.0, 1.0]))
         return unit_vectors(off, across)
-    steady = quaternion.rotate(upper_world, mean / np.linalg.norm(mean))
+    steady = np.asarray(quaternion.rotate(upper_world, mean / np.linalg.norm(mean)), order="F")
     steady = unit_vectors(steady - dot_products(steady, line)[..., None] * line, off)
     # a frame that bends the other way, as blended poses may, gets no weight: its knee would flip
-    agreement = dot_products(unit_vectors(off, steady), steady)[..., None]
+    shown = unit_vectors(off, steady)
+    agreement = dot_products(shown, steady)[..., None]
     weight = np.clip(bent / np.reshape(min_bend, (-1, 1)), 0.0, 1.0) ** 2 * np.clip(2.0 * agreement, 0.0, 1.0)
-    mixed = weight * unit_vectors(off, steady) + (1.0 - weight) * steady
+    mixed = weight * shown + (1.0 - weight) * steady
     return unit_vectors(mixed, steady)

@@ -113,11 +113,11 @@ class MomentumPlanner:
 
     @cached_property
     def _motion_up(self) -> BandedLeastSquares:
-        return self._build_motion(1, -GRAVITY, _SMOOTH_UP)
+        return self._build_motion(self._law.right, _SMOOTH_UP)
 
     @cached_property
     def _motion_level(self) -> BandedLeastSquares:
-        return self._build_motion(2, 0.0, _SMOOTH_LEVEL)
+        return self._build_motion(np.zeros((self._law.count, 2)), _SMOOTH_LEVEL)
 
     @cached_property
     def _flights(self) -> np.ndarray:
@@ -144,15 +144,23 @@ class MomentumPlanner:
             loose[at] = np.maximum(loose[at], ((stop - start) / self.fps / _STEP_FLIGHT) ** (2.0 * near))
         return loose
 
-    def _build_motion(self, columns: int, gravity: float, smooth: float) -> BandedLeastSquares:
-        """Build the terms of Newton's law and of smooth forces."""
-        law, forces = self._law_rows, self._force_rows
-        reach = max(int(np.ptp(index, axis=1).max(initial=1)) for index in (law[0], forces[0], self._block_index))
-        squares = BandedLeastSquares(len(self._frame_index) + len(self._knot_index), reach=reach, columns=columns)
-        squares.add_rows(*law, self._weight[1:-1] / _EXACT**2, gravity)
+    @cached_property
+    def _law(self) -> BandedLeastSquares:
+        """Newton's law, upward; level only its goal differs, which is 0."""
+        law = self._law_rows
+        reach = max(int(np.ptp(index, axis=1).max(initial=1))
+                    for index in (law[0], self._force_rows[0], self._block_index))
+        squares = BandedLeastSquares(len(self._frame_index) + len(self._knot_index), reach=reach, columns=1)
+        squares.add_rows(*law, self._weight[1:-1] / _EXACT**2, -GRAVITY)
+        return squares
+
+    def _build_motion(self, right: np.ndarray, smooth: float) -> BandedLeastSquares:
+        """Build the terms of Newton's law, with its right-hand side (count, columns), and of smooth forces."""
+        squares, forces = self._law.copy(), self._force_rows
+        squares.right = right.copy()
         # sums over frames grow with the rate, and third differences shrink with its third power
         squares.add_rows(*forces, np.full(len(forces[0]), (self.fps / _RATE) ** 6 / smooth**2))
-        self._hold_forces(squares, np.full(len(self._knots), _REST), np.zeros((len(self._knots), columns)))
+        self._hold_forces(squares, np.full(len(self._knots), _REST), np.zeros((len(self._knots), right.shape[1])))
         return squares
 
     @cached_property

@@ -21,7 +21,7 @@ from . import quaternion
 from .foot_plant import AIR_RESERVE, Foot, build_foot, solve_heel_rise, spread_peaks
 from .humanoid import Humanoid, identify_joints
 from .lean import choose_angles, choose_shifts, compute_footprint_shifts, measure_lean, tilt_body
-from .limb import solve_posed_limb
+from .limb import place_limb, solve_posed_limb
 from .mass import SEGMENT_MASSES, SegmentMasses, compute_centre_of_mass
 from .momentum import STRENGTH, MomentumPlanner
 from .motion import compute_pose
@@ -125,9 +125,7 @@ class _Legs:
     def follow(self, planner: MomentumPlanner, root, rotations) -> tuple[np.ndarray, np.ndarray]:
         """Move the root so that the centre of mass follows its plan; feet stay where they stand."""
         places, world = compute_pose(self.skeleton, root, rotations)
-        still = np.zeros_like(root)
-        posed = self._solve_legs(places, world, rotations, still)
-        centre = self._measure_centre(root, posed)
+        centre = self._measure_centre(places, world, np.zeros_like(root))
         goal, firmness = centre[:, 2].copy(), np.ones(len(root))
         for _ in range(_REACH_ROUNDS):
             height, force = planner.plan_height(goal, firmness)
@@ -139,23 +137,27 @@ class _Legs:
             lacks = spread_peaks(lacks, self.spread)
             goal = np.maximum(goal - planner.share * lacks, centre[:, 2] - _MOST_LOWERED)
             firmness = np.where(lacks > 0.0, _FIRMNESS, firmness)
-        posed = self._solve_legs(places, world, rotations, move)
-        move = move + plan - self._measure_centre(root + move, posed)
+        move = move + plan - self._measure_centre(places, world, move)
         return root + move, self._solve_legs(places, world, rotations, move)
 
-    def _measure_centre(self, root, rotations) -> np.ndarray:
-        """Measure the centre of mass (T, 3) m of a pose."""
-        return compute_centre_of_mass(self.body, compute_pose(self.skeleton, root, rotations)[0], self.masses)
+    def _measure_centre(self, places, world, move) -> np.ndarray:
+        """Measure the centre of mass (T, 3) m with the root moved by (T, 3) m and both legs reaching their feet."""
+        moved = _move_places(places, move)
+        for foot, goal, _ in self._aim_legs(places, move):
+            knee, ankle = place_limb(moved, world, foot.limb.leg, goal, soft=foot.ease_distance)
+            moved[:, foot.limb.lower_leg], moved[:, foot.limb.foot] = knee, ankle
+        return compute_centre_of_mass(self.body, moved, self.masses)
 
-    def _aim_feet(self, places, move):
-        """Yield each foot, its hip and ankle goal (T, 3) m, its rotation (T, 4) and standing (T,), the root moved."""
+    def _aim_legs(self, places, move):
+        """Yield each foot, its ankle's goal (T, 3) m and its rotation (T, 4), the root moved by (T, 3) m."""
         for foot, standing in zip(self.feet, self.standing):
             hip = places[:, foot.limb.upper_leg] + move
             carried = (1.0 - standing)[:, None] * move
             rise = spread_peaks(solve_heel_rise(replace(foot, hip=hip), carried) * standing, self.spread)
             roll = quaternion.from_axis_angle(foot.left, rise)
             ankle = foot.toe + carried + quaternion.rotate(roll, foot.heel - foot.toe)
-            yield foot, hip, ankle, quaternion.multiply(roll, foot.rotation), standing
+            goal = ankle - _measure_excess(foot, ankle - hip, standing)[:, None] * (ankle - hip)
+            yield foot, goal, quaternion.multiply(roll, foot.rotation)
 
     def _measure_shortfall(self, places, move) -> np.ndarray:
         """Measure the metres (T,) that standing legs lack for a root moved by (T, 3) m, beyond what a heel may rise."""
@@ -167,11 +169,9 @@ class _Legs:
 
     def _solve_legs(self, places, world, rotations, move) -> np.ndarray:
         """Solve the rotations (T, J, 4) with which both legs reach their feet from a root moved by (T, 3) m."""
-        out, moved = rotations.copy(), places + move[:, None]
-        for foot, hip, ankle, turned, standing in self._aim_feet(places, move):
-            goal = ankle - _measure_excess(foot, ankle - hip, standing)[:, None] * (ankle - hip)
-            chain = (foot.limb.upper_leg, foot.limb.lower_leg, foot.limb.foot)
-            local, _ = solve_posed_limb(self.skeleton, moved, world, chain, goal, end_rotation=turned,
+        out, moved = rotations.copy(), _move_places(places, move)
+        for foot, goal, turned in self._aim_legs(places, move):
+            local, _ = solve_posed_limb(self.skeleton, moved, world, foot.limb.leg, goal, end_rotation=turned,
                                         soft=foot.ease_distance)
             for joint, rotation in local.items():
                 out[:, joint] = rotation
@@ -183,6 +183,11 @@ def _measure_excess(foot: Foot, reach: np.ndarray, standing: np.ndarray) -> np.n
     far = measure_lengths(reach)
     longest = foot.length - np.minimum(AIR_RESERVE, foot.recorded_slack)
     return np.maximum(far - longest, 0.0) / far * (1.0 - standing)
+
+
+def _move_places(places: np.ndarray, move: np.ndarray) -> np.ndarray:
+    """Move joint positions (T, J, 3) m by (T, 3) m; they stay by component in memory."""
+    return np.add(places, move[:, None], out=np.empty_like(places))
 
 
 def _limit_moves(moves: np.ndarray) -> np.ndarray:

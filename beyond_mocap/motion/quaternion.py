@@ -179,23 +179,22 @@ def to_matrix(q: np.ndarray) -> np.ndarray:
 
 def from_matrix(m: np.ndarray) -> np.ndarray:
     """Convert rotation matrices (..., 3, 3) to unit quaternions (..., 4) with w >= 0."""
-    m = np.asarray(m, dtype=float)
-    trace = m[..., 0, 0] + m[..., 1, 1] + m[..., 2, 2]
+    (xx, xy, xz), (yx, yy, yz), (zx, zy, zz) = np.moveaxis(np.asarray(m, dtype=float), (-2, -1), (0, 1))
+    trace = xx + yy + zz
     # four ways to solve, each safe where its own component is the largest (Shepperd 1978)
-    squares = np.stack([trace] + [2.0 * m[..., i, i] - trace for i in range(3)], axis=-1)
-    a = [m[..., 2, 1] - m[..., 1, 2], m[..., 0, 2] - m[..., 2, 0], m[..., 1, 0] - m[..., 0, 1]]
-    s = {(i, j): m[..., i, j] + m[..., j, i] for i, j in ((0, 1), (0, 2), (1, 2))}
-    one = 1.0 + squares
-    candidates = (
-        (one[..., 0], a[0], a[1], a[2]),
-        (a[0], one[..., 1], s[0, 1], s[0, 2]),
-        (a[1], s[0, 1], one[..., 2], s[1, 2]),
-        (a[2], s[0, 2], s[1, 2], one[..., 3]),
-    )
-    best = np.argmax(squares, axis=-1)
-    q = np.stack([np.choose(best, component) for component in zip(*candidates)], axis=-1)
-    q = normalize(q)
-    return np.where(q[..., :1] < 0.0, -q, q)
+    squares = (trace, 2.0 * xx - trace, 2.0 * yy - trace, 2.0 * zz - trace)
+    a, s = (zy - yz, xz - zx, yx - xy), (xy + yx, xz + zx, yz + zy)
+    rows = ((a[0], 1.0 + squares[1], s[0], s[1]), (a[1], s[0], 1.0 + squares[2], s[2]),
+            (a[2], s[1], s[2], 1.0 + squares[3]))
+    q, largest = np.empty((4, *trace.shape)), trace
+    q[0], (q[1], q[2], q[3]) = 1.0 + trace, a
+    for square, row in zip(squares[1:], rows):
+        if np.any(is_larger := square > largest):
+            for component, values in enumerate(row):
+                np.copyto(q[component, ...], values, where=is_larger)
+            largest = np.maximum(square, largest)
+    np.negative(q, out=q, where=q[0] < 0.0)
+    return np.ascontiguousarray(normalize(np.moveaxis(q, 0, -1)))
 
 
 def rotation_between(a: np.ndarray, b: np.ndarray) -> np.ndarray:
@@ -207,8 +206,9 @@ def rotation_between(a: np.ndarray, b: np.ndarray) -> np.ndarray:
     b = unit_vectors(b, min_length=1e-12)
     dot = dot_products(a, b)[..., None]
     axis = cross_product(a, b)
-    other = np.where(np.abs(a[..., :1]) < 0.9, np.array([1.0, 0.0, 0.0]), np.array([0.0, 1.0, 0.0]))
-    axis = np.where(dot < -1.0 + 1e-9, cross_product(a, other), axis)
+    if np.any(is_opposite := dot < -1.0 + 1e-9):
+        other = np.where(np.abs(a[..., :1]) < 0.9, np.array([1.0, 0.0, 0.0]), np.array([0.0, 1.0, 0.0]))
+        axis = np.where(is_opposite, cross_product(a, other), axis)
     return normalize(np.concatenate([np.maximum(1.0 + dot, 0.0), axis], axis=-1))
 
 
@@ -252,13 +252,16 @@ def slerp(a: np.ndarray, b: np.ndarray, weight: float | np.ndarray) -> np.ndarra
     a, b = np.asarray(a, dtype=float), np.asarray(b, dtype=float)
     weight = np.asarray(weight, dtype=float)
     dot = dot_products(a, b)
-    b = np.where(dot[..., None] < 0.0, -b, b)
     theta = np.arccos(np.clip(np.abs(dot), 0.0, 1.0))
     small = theta < 1e-4
     sine = np.where(small, 1.0, np.sin(theta))
     wa = np.where(small, 1.0 - weight, np.sin((1.0 - weight) * theta) / sine)
     wb = np.where(small, weight, np.sin(weight * theta) / sine)
-    return normalize(wa[..., None] * a + wb[..., None] * b)
+    wb = np.where(dot < 0.0, -wb, wb)
+    mixed = np.empty((4, *wa.shape))
+    for component in range(4):
+        mixed[component] = wa * a[..., component] + wb * b[..., component]
+    return np.ascontiguousarray(normalize(np.moveaxis(mixed, 0, -1)))
 
 
 def to_yaw(q: np.ndarray) -> np.ndarray:

@@ -30,6 +30,7 @@ from .construct.construction import Construction, build_key_results, find_touche
 from .construct.edit_blending import OldMotion, blend_with_old, compute_old_share
 from .construct.transitions import compute_spread_reaches
 from .edited_contacts import find_edited_frames
+from .one_thread import limit_to_one_thread
 from .plan import Plan, ResolvedPlan
 from .provenance import list_labels_shown, list_sources
 from .resolve_plan import resolve_plan
@@ -100,13 +101,11 @@ def resynthesize(
         InputError: where that stretch lies outside the take, or for another method than "path".
         NotInLibraryError, UserCancelledError: as for `synthesize`.
     """
-    from threadpoolctl import threadpool_limits
-
     report = progress or (lambda fraction, text: None)
     if variant is not None:
         _check_stretch(plan, before, variant)
     options: dict[str, Any] = {"cancelled": cancelled, "hurry": hurry}
-    with threadpool_limits(limits=1):
+    with limit_to_one_thread():
         is_comparable = _is_comparable(plan, before)
         updated = _update_take(library, plan, before, report, **options, variant=variant) if is_comparable else None
     used = variant.used if variant is not None else ()

@@ -35,6 +35,7 @@ from .construct.pins import apply_pins
 from .construct.thesis_methods import construct_blocks
 from .contact_edit import FEET
 from .known_body import name_known_frames
+from .one_thread import limit_to_one_thread
 from .pin import BALL, Pin
 from .plan import METHODS, Plan, ResolvedPlan
 from .provenance import build_provenance_fields
@@ -125,9 +126,7 @@ def synthesize(
     """
     if plan.method not in METHODS:
         raise InputError("method", plan.method, f"one of {', '.join(METHODS)}")
-    from threadpoolctl import threadpool_limits
-
-    with threadpool_limits(limits=1):
+    with limit_to_one_thread():
         options = {"cancelled": cancelled, "hurry": hurry, "used": used, "narrow": narrow}
         return _synthesize_plan(library, plan, progress or (lambda fraction, text: None), **options)
 
@@ -159,9 +158,7 @@ def construct_take(library: Library, plan: ResolvedPlan, edit: EditList, progres
         edit: at the library's rate, from the track's first time on.
         progress: called as progress(fraction, text).
     """
-    from threadpoolctl import threadpool_limits
-
-    with threadpool_limits(limits=1):
+    with limit_to_one_thread():
         request = build_request(library, plan)
         take, seconds = _construct_motion(library, plan, request, SearchResult(edit),
                                           progress or (lambda fraction, text: None))

@@ -23,7 +23,7 @@ from ..base.errors import InputError
 from ..motion import quaternion
 from ..motion.humanoid import identify_joints
 from ..motion.motion import Motion, compute_pose, forward_kinematics, sample_frames_cubic
-from ..synthesis.construct.move_body_part import arm_chain, leg_chain
+from ..synthesis.construct.move_body_part import arm_chain
 
 BEFORE, AFTER = 0.4, 0.4
 """Seconds before and after the release within which a wrist or ankle may be moved."""
@@ -97,7 +97,7 @@ class AtFoot:
 
     def list_joints(self, motion: Motion) -> tuple[int, int, int]:
         """Return hip, knee and ankle joint."""
-        return leg_chain(getattr(identify_joints(motion.skeleton), self.side))
+        return getattr(identify_joints(motion.skeleton), self.side).leg
 
     def find_surface(self, motion: Motion):
         """Return the striking surface of the foot."""

@@ -31,7 +31,7 @@ from ..motion.retargeting.neutral import build_neutral_stance
 from ..motion.skeleton import Skeleton
 from ..synthesis.construct.contact_geometry import ease_in_out
 from ..synthesis.construct.edit_blending import step_over
-from ..synthesis.construct.move_body_part import Body, LimbReference, leg_chain, move_limb
+from ..synthesis.construct.move_body_part import Body, LimbReference, move_limb
 from ..synthesis.quality.movement import collect_uncut_windows, compute_jerk, compute_window_maxima
 
 FADE = 0.5
@@ -175,7 +175,7 @@ def blend_bodies(skeleton: Skeleton, new, old, share: np.ndarray) -> tuple[np.nd
     for limb in (legs.left, legs.right):
         place, there = new_transforms[0][:, limb.foot], old_transforms[0][:, limb.foot]
         displacement = place + share[:, None] * (there - place) - body.places[:, limb.foot]
-        rotations = move_limb(body, LimbReference.from_body(body, leg_chain(limb)), displacement, rotations=rotations)
+        rotations = move_limb(body, LimbReference.from_body(body, limb.leg), displacement, rotations=rotations)
         turned = quaternion.slerp(new_transforms[1][:, limb.foot], old_transforms[1][:, limb.foot], share)
         above = quaternion.inverse(compute_world_rotation(skeleton, rotations, skeleton.parents[limb.foot]))
         rotations[:, limb.foot] = quaternion.multiply(above, turned)

@@ -28,7 +28,7 @@ from ...synthesis.take import DribbleTouch, KeyResult, Take
 from ..player_edit import PlayerEdit, Stretch
 from ..player_motion import StretchConstructor, StretchWindows, cut_take, join_takes
 
-BLOCK_WINDOWS = 30
+BLOCK_WINDOWS = 24
 """Windows that one piece of work constructs: the one before them is constructed too, so fewer cost more."""
 
 _ARRAYS = ("clip", "clip_frame", "mirrored", "contacts", "seams", "correction", "ik_miss", "stepped", "planned_heading")

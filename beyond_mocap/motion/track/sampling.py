@@ -98,8 +98,16 @@ def smooth_zero_phase_hann(values: np.ndarray, fps: float, seconds: float) -> np
     if half == 0 or len(values) < 2:
         return values.copy()
     window = 0.5 + 0.5 * np.cos(2.0 * np.pi * np.arange(-half, half + 1) / (fps * seconds))
-    padded = np.pad(values, ((half, half), (0, 0)), mode="reflect", reflect_type="odd")
+    padded = _continue_ends(values, half)
     return np.stack([np.convolve(column, window / window.sum(), "valid") for column in padded.T], axis=1)
+
+
+def _continue_ends(values: np.ndarray, count: int) -> np.ndarray:
+    """Continue values (T, k) by `count` rows at both ends, point-reflected."""
+    if count >= len(values):
+        return np.pad(values, ((count, count), (0, 0)), mode="reflect", reflect_type="odd")
+    before, behind = values[count:0:-1], values[-2 : -count - 2 : -1]
+    return np.concatenate([2.0 * values[:1] - before, values, 2.0 * values[-1:] - behind])
 
 
 def compute_travel_direction(velocity: np.ndarray, fps: float) -> np.ndarray:

@@ -16,13 +16,13 @@ import numpy as np
 from ...base.easing import quintic_step_by_powers
 from ...motion import quaternion
 from ...motion.foot_plant import plant_feet, solve_shift
-from ...motion.humanoid import Limb, identify_joints
-from ...motion.motion import compute_pose, compute_world_rotation
+from ...motion.humanoid import Limb, identify_joints, pose_legs
+from ...motion.motion import compute_world_rotation
 from ...motion.skeleton import Skeleton
 from ...motion.track import SampledTrack
 from ...motion.track.sampling import MOVING_SPEED
 from .extra_steps import add_steps
-from .move_body_part import Body, LimbReference, leg_chain, move_limb
+from .move_body_part import Body, LimbReference, move_limb
 from .track_following import pull_to_track
 
 Pose = tuple[np.ndarray, np.ndarray]
@@ -160,13 +160,13 @@ def blend_with_old(skeleton: Skeleton, new: Pose, old: Pose, share: np.ndarray, 
     root = new[0] + share[:, None] * (old[0] - new[0])
     rotations = quaternion.slerp(_match_signs(new[1], old[1], share), old[1], share[:, None])
     body = Body.from_pose(skeleton, root, rotations)
-    new_joints, old_joints = compute_pose(skeleton, *new), compute_pose(skeleton, *old)
+    new_joints, old_joints = pose_legs(skeleton, *new), pose_legs(skeleton, *old)
     legs = identify_joints(skeleton)
     for side, limb in enumerate((legs.left, legs.right)):
         carries = heel_toe_contacts[:, side].any(axis=1).astype(float)[:, None]
         moved, turned = _solve_foot_offsets([values[:, limb.foot] for values in (*new_joints, *old_joints)],
                                             share > least, carries, fps)
-        chain, foot = leg_chain(limb), quaternion.multiply(turned, new_joints[1][:, limb.foot])
+        chain, foot = limb.leg, quaternion.multiply(turned, new_joints[1][:, limb.foot])
         place = new_joints[0][:, limb.foot] + moved
         place[:, 2] += _measure_sinking(skeleton, limb, place, foot=foot, motions=[new_joints[0], old_joints[0]],
                                         share=share)

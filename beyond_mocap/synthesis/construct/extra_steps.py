@@ -23,7 +23,6 @@ from ...motion.humanoid import Limb, identify_joints, pose_legs
 from ...motion.limb import solve_two_bone
 from ...motion.skeleton import Skeleton
 from ...motion.track import smooth_zero_phase_hann
-from .move_body_part import leg_chain
 
 SPEED = np.array([0.05, 0.3, 0.8, 1.5])
 STRIDE = np.array([0.12, 0.25, 0.30, 0.34])
@@ -229,7 +228,7 @@ class _Foot:
                 for edge in (self.before[at], self.behind[at])]
         turned = quaternion.slerp(turn[0], turn[1], self.through[at])
         out = rotations.copy()
-        out[at] = solve_two_bone(skeleton, root[at], rotations[at], leg_chain(self.limb), target,
+        out[at] = solve_two_bone(skeleton, root[at], rotations[at], self.limb.leg, target,
                                  end_rotation=turned).rotations
         return quaternion.unify_signs(out)
 

@@ -8,6 +8,7 @@ new place and reaching for the old one, so a shift of zero changes nothing, howe
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -16,8 +17,9 @@ from ...annotation.striking import Surface
 from ...base.vectors import skew_matrix
 from ...motion import quaternion
 from ...motion.humanoid import Limb, identify_joints
-from ...motion.limb import compute_inner_angle, solve_two_bone
+from ...motion.limb import compute_inner_angle, solve_posed_limb
 from ...motion.motion import compute_pose
+from ...motion.retargeting.structure import list_ancestors
 from ...motion.skeleton import Skeleton
 
 MAX_BEND = {"head": 0.6, "chest": 0.35}  # rad, largest bend of the whole spine, by the part that is moved
@@ -75,11 +77,6 @@ class Body:
         return surface.compute_line(self.places[at], self.world[at])
 
 
-def leg_chain(limb: Limb) -> tuple[int, int, int]:
-    """Return the joints of a leg: hip, knee, ankle."""
-    return limb.upper_leg, limb.lower_leg, limb.foot
-
-
 def arm_chain(limb: Limb) -> tuple[int, int, int]:
     """Return the joints of an arm: shoulder, elbow, wrist."""
     return limb.upper_arm, limb.lower_arm, limb.hand
@@ -93,7 +90,7 @@ def limb_chain(skeleton: Skeleton, part: Surface) -> tuple[int, int, int]:
         part: a striking surface on a limb.
     """
     limb = getattr(identify_joints(skeleton), part.side)
-    return leg_chain(limb) if part.part == "foot" else arm_chain(limb)
+    return limb.leg if part.part == "foot" else arm_chain(limb)
 
 
 @dataclass(frozen=True, eq=False)
@@ -122,7 +119,7 @@ class LimbReference:
             soft: m below full length from which on the limb extends softly.
         """
         end = body.places[:, chain[2]]
-        still = solve_two_bone(body.skeleton, body.root, body.rotations, chain, end, soft=soft).rotations
+        still, _ = solve_posed_limb(body.skeleton, body.places, body.world, chain, end, soft=soft)
         return cls(chain, soft, _limb_world_rotations(body, still, chain))
 
 
@@ -216,8 +213,11 @@ def move_limb(
     """
     skeleton, chain = body.skeleton, limb.chain
     target = body.places[:, chain[2]] + shift
-    moved = solve_two_bone(skeleton, body.root if root is None else root, body.rotations, chain, target, soft=limb.soft)
-    after = _limb_world_rotations(body, moved.rotations, chain)
+    places = body.places
+    if root is not None:
+        places, _ = compute_pose(skeleton, root, body.rotations, list_ancestors(skeleton.parents, chain[2]))
+    moved, _ = solve_posed_limb(skeleton, places, body.world, chain, target, soft=limb.soft)
+    after = _limb_world_rotations(body, moved, chain)
     out = (body.rotations if rotations is None else rotations).copy()
     above = body.world[:, skeleton.parents[chain[0]]]
     for joint, turned in after.items():
@@ -241,7 +241,7 @@ def hold_foot(body: Body, limb: Limb, root: np.ndarray, rotations: np.ndarray) -
     Returns:
         (W, J, 4) local rotations.
     """
-    return move_limb(body, LimbReference.from_body(body, leg_chain(limb), soft=1e-3), np.zeros_like(body.root), root,
+    return move_limb(body, LimbReference.from_body(body, limb.leg, soft=1e-3), np.zeros_like(body.root), root,
                      rotations)
 
 
@@ -353,9 +353,10 @@ def list_joint_chain(skeleton: Skeleton, high: int, low: int) -> list[int]:
     return chain[::-1]
 
 
-def _limb_world_rotations(body: Body, rotations: np.ndarray, chain: tuple[int, int, int]) -> dict[int, np.ndarray]:
+def _limb_world_rotations(body: Body, local: Mapping[int, np.ndarray], chain: tuple[int, int, int]
+                          ) -> dict[int, np.ndarray]:
     """Compute world rotations (W, 4) of a limb's joints for other local ones; above the limb all is as in `body`."""
     world, above = {}, body.world[:, body.skeleton.parents[chain[0]]]
     for joint in list_joint_chain(body.skeleton, chain[0], chain[2]):
-        above = world[joint] = quaternion.multiply(above, rotations[:, joint])
+        above = world[joint] = quaternion.multiply(above, local[joint])
     return world

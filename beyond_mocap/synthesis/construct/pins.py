@@ -22,7 +22,7 @@ from ...motion.humanoid import Humanoid, compute_heading_from_positions, identif
 from ...motion.limb import solve_two_bone
 from ...motion.motion import Motion, compute_pose
 from ...motion.skeleton import Skeleton
-from .move_body_part import arm_chain, leg_chain, list_joint_chain
+from .move_body_part import arm_chain, list_joint_chain
 
 FADE = 0.3  # s before and after a pin in which the body comes to it and leaves it
 MAX_BEND, MAX_SHIFT = 0.6, 0.25  # largest rad of the spine and m of the pelvis for a pin out of reach
@@ -249,7 +249,7 @@ class _PinSolver:
 
 def _limb_chains(body: Humanoid) -> dict[str, tuple]:
     """Return the joints of the limb of each part."""
-    return {"left_foot": leg_chain(body.left), "right_foot": leg_chain(body.right),
+    return {"left_foot": body.left.leg, "right_foot": body.right.leg,
             "left_hand": arm_chain(body.left), "right_hand": arm_chain(body.right)}
 
 

@@ -19,7 +19,7 @@ from ...motion.humanoid import compute_heading_from_positions, identify_joints
 from ...motion.plant_place import compute_plant_shift, measure_plant_place
 from ...motion.skeleton import Skeleton
 from .ball_touch.touch_frames import Touch, find_nearest_frame
-from .move_body_part import Body, LimbReference, leg_chain, move_limb
+from .move_body_part import Body, LimbReference, move_limb
 from .strike import StrikeResult
 
 MAX_PLANT_SHIFT = 0.12
@@ -114,7 +114,7 @@ def place_plant_foot(body: Body, shift: np.ndarray, side: str, at: int, is_stand
     if share is None or not shift.any():
         return body
     human = identify_joints(body.skeleton)
-    limb = LimbReference.from_body(body, leg_chain(human.right if side == "left" else human.left), soft=1e-3)
+    limb = LimbReference.from_body(body, (human.right if side == "left" else human.left).leg, soft=1e-3)
     for part in _SHARES:
         moves = part * share[:, None] * shift
         moved = Body.from_pose(body.skeleton, body.root, move_limb(body, limb, moves))

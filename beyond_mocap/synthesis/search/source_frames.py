@@ -119,7 +119,7 @@ def fetch_motion(library: Library, edit: EditList, index: np.ndarray, fps: float
     ahead = _fetch_poses(library, clip[before], ahead_frame)
     return SourceMotion(
         clip, frame, frames.clip_frame, frames.piece, pose, height, sway, velocity, turn,
-        _look_up_contacts(library, clip, frame), *ahead[:3],
+        look_up_contacts(library, frames), *ahead[:3],
     )
 
 
@@ -199,9 +199,9 @@ def _fetch_poses(library: Library, clip: np.ndarray, frame: np.ndarray):
     count, joints = len(clip), len(library.skeleton)
     pose, root = np.empty((count, joints, 4)), np.empty((count, 3))
     own = _to_clip_frames(library, clip, frame)
-    for number in np.unique(clip):
-        at = np.flatnonzero(clip == number)
-        root[at], pose[at] = sample_frames(library.clips[number].motion, own[at])
+    order = np.argsort(clip, kind="stable")
+    for at in np.split(order, np.flatnonzero(np.diff(clip[order])) + 1) if count else ():
+        root[at], pose[at] = sample_frames(library.clips[clip[at[0]]].motion, own[at])
     heading = _interpolate_in_clips(library, clip, frame, library.frames.heading)
     path = _interpolate_in_clips(library, clip, frame, library.frames.path)
     back = quaternion.from_up_angle(-heading)
@@ -220,11 +220,11 @@ def _interpolate_in_clips(library: Library, clip: np.ndarray, frame: np.ndarray,
     return values[low] * (1.0 - weight) + values[high] * weight
 
 
-def _look_up_contacts(library: Library, clip: np.ndarray, frame: np.ndarray) -> np.ndarray:
-    """Look up heel and toe contacts (T, 2, 2) at the nearest frame of each clip."""
-    own = np.round(_to_clip_frames(library, clip, frame)).astype(int)
-    out = np.zeros((len(clip), 2, 2), bool)
-    for number in np.unique(clip):
-        at = clip == number
+def look_up_contacts(library: Library, frames: SourceFrames) -> np.ndarray:
+    """Look up heel and toe contacts (T, 2, 2) bool at the nearest frame of each clip."""
+    own = np.round(frames.clip_frame).astype(int)
+    out = np.zeros((len(own), 2, 2), bool)
+    for number in np.unique(frames.clip):
+        at = frames.clip == number
         out[at] = library.clips[number].heel_toe_contacts[own[at]]
     return out

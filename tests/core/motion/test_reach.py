@@ -6,7 +6,7 @@ import pytest
 from beyond_mocap.base.errors import InputError
 from beyond_mocap.motion import quaternion
 from beyond_mocap.motion.humanoid import identify_joints
-from beyond_mocap.motion.limb import MIN_BEND, solve_posed_limb, solve_two_bone
+from beyond_mocap.motion.limb import MIN_BEND, place_limb, solve_posed_limb, solve_two_bone
 from beyond_mocap.motion.motion import compute_pose
 from beyond_mocap.synthetic.gait import build_gait
 
@@ -176,3 +176,13 @@ def test_a_leg_that_bends_more_than_it_did_keeps_its_knee_steady():
         swings.append(np.ptp(quaternion.rotate(thigh, np.tile(bone, (count, 1)))[:, 1]))
         assert miss.max() < 1e-3
     assert swings[1] < 0.5 * swings[0]
+
+
+def test_a_limb_is_placed_where_its_rotations_bring_it():
+    motion = build_gait(3.0, 2.0, 60.0)
+    places, world = kinematics(motion, motion.rotations)
+    chain, target = leg(motion), places[:, leg(motion)[2]] + [0.05, 0.02, 0.04]
+    solved = solve_two_bone(motion.skeleton, motion.root_positions, motion.rotations, chain, target)
+    there = kinematics(motion, solved.rotations)[0]
+    for place, joint in zip(place_limb(places, world, chain, target), chain[1:]):
+        assert np.abs(place - there[:, joint]).max() < 1e-9

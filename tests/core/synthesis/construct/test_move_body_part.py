@@ -11,7 +11,6 @@ from beyond_mocap.synthesis.construct.move_body_part import (
     Body,
     LimbReference,
     compute_swing_shift,
-    leg_chain,
     move_limb,
     solve_swing,
 )
@@ -28,7 +27,7 @@ def body():
 
 
 def carried(body, place, share):
-    chain = leg_chain(identify_joints(body.skeleton).right)
+    chain = identify_joints(body.skeleton).right.leg
     moves = compute_swing_shift(body, chain, solve_swing(body, chain, AT, place, MOST), share)
     rotations = move_limb(body, LimbReference.from_body(body, chain), moves)
     return Body.from_pose(body.skeleton, body.root, rotations), chain
@@ -42,7 +41,7 @@ def angle(body, chain):
 
 @pytest.mark.parametrize("move", [(0.1, 0.1, 0.1), (-0.15, 0.0, 0.1), (0.0, -0.2, 0.15)])
 def test_a_place_in_reach_is_met(body, move):
-    chain = leg_chain(identify_joints(body.skeleton).right)
+    chain = identify_joints(body.skeleton).right.leg
     place = body.places[AT, chain[2]] + move
     after, _ = carried(body, place, (np.arange(len(body.root)) == AT).astype(float))
     assert after.places[AT, chain[2]] == pytest.approx(place, abs=0.002)
@@ -52,7 +51,7 @@ def test_a_place_in_reach_is_met(body, move):
 
 @pytest.mark.parametrize("move", [(1.5, 0.0, 0.0), (0.0, 0.0, -0.5), (0.2, 0.0, 0.7)])
 def test_no_knee_passes_its_limits_at_any_frame(body, move):
-    chain = leg_chain(identify_joints(body.skeleton).right)
+    chain = identify_joints(body.skeleton).right.leg
     after, _ = carried(body, body.places[AT, chain[2]] + move, np.ones(len(body.root)))
     own, made = angle(body, chain), angle(after, chain)
     slack = np.radians(1.5)
