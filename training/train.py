@@ -72,7 +72,7 @@ def train(
     """
     _check_rates(examples, config)
     _check_start(config)
-    chains = find_shared_chains(examples)
+    chains = find_shared_chains(examples, config.settings.shoulder)
     config, notes = widen_units(config, chains)
     settings = config.settings
     training_examples = add_mirror_images(examples) if config.mirrored else list(examples)

@@ -181,7 +181,7 @@ def _build_model(arrays: dict[str, np.ndarray]) -> ThrowModel:
                          remedy="use the Beyond Mocap version that wrote it")
     check_names(header, HEADER, _HEADER_KEYS, _HEADER_KEYS)
     names = [field.name for field in fields(ModelSettings)]
-    check_names(header["settings"], "settings", names, [name for name in names if name not in ("guided", "carried")])
+    check_names(header["settings"], "settings", names, [name for name in names if name not in ("guided", "carried", "shoulder")])
     settings = ModelSettings(**header["settings"])
     skeleton = _build_skeleton(header["skeleton"], arrays)
     networks = {name: _build_network(name, settings.layers + 1, arrays) for name in settings.networks}

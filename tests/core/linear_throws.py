@@ -58,7 +58,7 @@ def build_training_set(examples: Iterable[Example], settings: ModelSettings, mir
     All examples have the same skeleton. InputError where there is none or they differ.
     """
     examples = add_mirror_images(examples) if mirrors else list(examples)
-    chains = find_shared_chains(examples)
+    chains = find_shared_chains(examples, settings.shoulder)
     reference = build_reference_curve(examples) if settings.phase == "warped" else None
     reach, whole = measure_leg_reach(examples), join_steps([build_steps(example, reference) for example in examples])
     return {

@@ -3,7 +3,9 @@
 The thesis has 25 joints: the hips, ten of the body (spine, thorax, neck, head, both scapulae), three of each arm and
 four of each leg. Here the body chain contains all joints between the hips, the head and both upper arms, an arm runs
 from the upper arm to the hand and a leg from the upper leg to the toe, including joints between them. All other
-joints (fingers, twist bones, props, joints between the hips and an upper leg) keep their local rotation.
+joints (fingers, twist bones, props, joints between the hips and an upper leg) keep their local rotation. With
+`shoulder` "arm" an arm begins with the shoulder (clavicle or scapula), as section 9.3 suggests: the range of the
+arm depends on it.
 """
 
 from __future__ import annotations
@@ -35,7 +37,7 @@ class Chains:
         references: chain -> the joint that it hangs on (-1 for the hip).
         known: chain -> all joints whose position is known once this chain is.
         effectors: joints of both hands and both toes.
-        sockets: first joints of both arms and both legs.
+        sockets: both upper arms and both upper legs.
         middles: elbows and knees.
         ankles: both feet.
         chest: chest joint, or the next joint below.
@@ -74,6 +76,11 @@ class Chains:
         return (*self.middles, *self.effectors[:2], *self.ankles)
 
     @cached_property
+    def tops(self) -> tuple[int, ...]:
+        """First joints of the chains of both arms and both legs, where the chains before them place them."""
+        return tuple(self.members[name][0] for name in LIMB_OF)
+
+    @cached_property
     def trunk(self) -> tuple[int, ...]:
         """Hips and body."""
         return (self.hips, *self.members["body"])
@@ -91,26 +98,30 @@ class Chains:
         return tuple(dict.fromkeys((self.members["body"][0], self.chest, *carriers, self.neck, self.head)))
 
 
-def find_chains(skeleton: Skeleton) -> Chains:
+def find_chains(skeleton: Skeleton, shoulder: str = "body") -> Chains:
     """Find the chains of a humanoid skeleton.
 
+    Args:
+        skeleton: the skeleton.
+        shoulder: "body" or "arm", the chain that moves the shoulders.
     Raises:
-        InputError: if the skeleton lacks hands, legs or a trunk between hips and arms.
+        InputError: if the skeleton lacks hands, legs or a trunk between hips and arms, or shoulders of their own.
     """
     body = identify_joints(skeleton)
-    _check_limbs(body.left, body.right)
+    _check_limbs(body.left, body.right, shoulder)
     parents = skeleton.parents
-    arms = [_list_joints_between(skeleton, limb.upper_arm, limb.hand) for limb in (body.left, body.right)]
+    arms = [_list_joints_between(skeleton, limb.upper_arm if shoulder == "body" else limb.shoulder, limb.hand)
+            for limb in (body.left, body.right)]
     legs = [_list_joints_between(skeleton, limb.upper_leg, limb.toe_or_foot) for limb in (body.left, body.right)]
     sockets = (body.left.upper_arm, body.right.upper_arm, body.left.upper_leg, body.right.upper_leg)
     top = body.neck if body.head is None else body.head
     trunk: set[int] = set()
-    for joint in (*(parents[arm] for arm in sockets[:2]), *([] if top is None else [top])):
+    for joint in (*(parents[arm[0]] for arm in arms), *([] if top is None else [top])):
         trunk |= set(_list_joints_between(skeleton, body.hips, joint)) - {body.hips}
     if not trunk:
         raise InputError("skeleton", "no joint between the hips and the arms", "a spine")
     members = dict(zip(HIERARCHY, [(body.hips,), tuple(sorted(trunk)), *arms, *legs]))
-    references = dict(zip(HIERARCHY, [-1, body.hips, *(parents[joint] for joint in sockets)]))
+    references = dict(zip(HIERARCHY, [-1, body.hips, *(parents[limb[0]] for limb in (*arms, *legs))]))
     chest = structure.find_common_ancestor(parents, [parents[arm] for arm in sockets[:2]])
     head = chest if top is None else top
     return Chains(
@@ -123,9 +134,10 @@ def find_chains(skeleton: Skeleton) -> Chains:
     )
 
 
-def _check_limbs(left: Limb, right: Limb) -> None:
+def _check_limbs(left: Limb, right: Limb, shoulder: str) -> None:
     """Raise InputError if an arm or leg lacks a joint."""
-    required = ("upper_arm", "lower_arm", "hand", "upper_leg", "lower_leg", "foot")
+    required = (*(("shoulder",) if shoulder == "arm" else ()), "upper_arm", "lower_arm", "hand", "upper_leg", "lower_leg",
+                "foot")
     missing = [
         f"{side} {part.replace('_', ' ')}"
         for side, limb in (("left", left), ("right", right))

@@ -213,7 +213,7 @@ def build_leg_input(number: int, chains: Chains, pose: Pose, after: Pose, window
     """
     name = LIMB_OF[number]
     frame = _ReferenceFrame(chains.references[name], pose, after, xp)
-    others = (chains.head, *chains.sockets[:2])
+    others = (chains.head, *chains.tops[:2])
     return xp.concatenate([
         _build_trajectory(frame, window, number),
         frame.to_local_position(window.next[..., number, :]),
@@ -352,7 +352,7 @@ def measure_limb_distance(number: int, chains: Chains, after: Pose, window: Wind
         window: network inputs of frame n.
         xp: numpy or jax.numpy.
     """
-    to_target = window.next[..., number, :] - after.positions[..., chains.sockets[number], :]
+    to_target = window.next[..., number, :] - after.positions[..., chains.tops[number], :]
     return xp.sqrt(xp.sum(to_target * to_target, axis=-1, keepdims=True))
 
 

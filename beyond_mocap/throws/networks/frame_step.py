@@ -60,7 +60,7 @@ class Stepper:
     def __init__(self, model: ThrowModel):
         """Prepare the model; InputError if the networks' inputs and outputs do not match its settings."""
         self.model = model
-        self.chains = find_chains(model.skeleton)
+        self.chains = find_chains(model.skeleton, model.settings.shoulder)
         _check_widths(model, self.chains)
         self.limits = JointLimits(model.skeleton, _choose_limits(model))
         self.effectors = list(self.chains.effectors)
@@ -212,7 +212,7 @@ class HierarchyPredictor:
         self.limb_joints = [joint for said in self.predicted_joints[2:] for joint in said]
         self.hip_inputs, self.body_inputs = list(chains.hip_inputs), list(chains.body_inputs)
         self.references = [chains.references[name] for name in LIMB_OF]
-        self.sockets, self.trunk = list(chains.sockets), list(chains.trunk)
+        self.tops, self.trunk = list(chains.tops), list(chains.trunk)
         self.arm_inputs = [[self.trunk.index(joint) for joint in seen] for seen in chains.arm_inputs]
         self.leg_inputs = list(chains.leg_inputs)
         self.guide = LimbReach(chains, None, True) if settings.guided else None
@@ -290,10 +290,10 @@ class HierarchyPredictor:
         trajectories = np.concatenate([window.points - origins, window.deltas, window.next[:, None] - origins],
                                       axis=1) @ axes
         turned = _to_six(pose.turns[self.references].swapaxes(1, 2) @ axes) - _IDENTITY_SIX
-        sockets = after.positions[self.sockets]
-        stretch = np.sqrt(((window.next - sockets) ** 2).sum(-1))
+        tops = after.positions[self.tops]
+        stretch = np.sqrt(((window.next - tops) ** 2).sum(-1))
         trunk = (after.positions[self.trunk] - origins[:2]) @ axes[:2]
-        above = np.concatenate([after.positions[self.chains.head][None], sockets[:2]])
+        above = np.concatenate([after.positions[self.chains.head][None], tops[:2]])
         others = *(trunk[arm, self.arm_inputs[arm]] for arm in (0, 1)), *((above - origins[2:]) @ axes[2:])
         turns = *_to_six(back[:2, None] @ after.turns[self.trunk]), *_to_six(back[2:, None]
                                                                              @ after.turns[self.leg_inputs])

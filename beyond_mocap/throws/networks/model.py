@@ -24,7 +24,7 @@ SINGLE = "single"
 """The one network of the monolithic model (section 7.2)."""
 _CHOICES = {
     "kind": ("hierarchy", "single"), "wrist": ("given", "inferred"), "frame": ("hip", "static"),
-    "phase": ("distance", "warped"), "action": ("throw", "kick"),
+    "phase": ("distance", "warped"), "action": ("throw", "kick"), "shoulder": ("body", "arm"),
 }  # fmt: skip
 _RANGES = {"points": (1, 16), "layers": (1, 16), "units": (1, 4096)}
 MIN_FPS, MAX_FPS = 10.0, 500.0
@@ -48,6 +48,7 @@ class ModelSettings:
         conditioned: child networks were trained on the output of their parents (section 9.4).
         guided: limb networks also receive the inverse-kinematics solution (`features.compute_reach_guide`).
         carried: the hip network also receives the hips as hands and feet carry them (`features.carry_hips`).
+        shoulder: body, or arm (an arm's network also moves its shoulder, section 9.3).
         fps: frames per second.
         action: throw or kick.
     """
@@ -63,6 +64,7 @@ class ModelSettings:
     conditioned: bool = False
     guided: bool = False
     carried: bool = False
+    shoulder: str = "body"
     fps: float = 30.0
     action: str = "throw"
 

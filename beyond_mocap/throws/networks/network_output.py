@@ -87,7 +87,7 @@ def compute_end_positions(name: str, chains: Chains, settings: ModelSettings, y,
     joints = list_predicted_joints(name, chains, settings)
     turns = from_six(y.reshape(*y.shape[:-1], len(joints), 6), xp)
     if name == "body":
-        goals = (*chains.sockets[:2], chains.head)
+        goals = (*chains.tops[:2], chains.head)
     else:
         goals = (chains.effectors[LIMB_OF.index(name)],)
     return xp.stack([_compute_position(

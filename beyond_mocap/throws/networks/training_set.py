@@ -53,8 +53,8 @@ def add_mirror_images(examples: Iterable[Example]) -> list[Example]:
     return [variant for example in examples for variant in (example, mirror_example(example))]
 
 
-def find_shared_chains(examples: Sequence[Example]) -> Chains:
-    """Find the chains of the skeleton that all examples share.
+def find_shared_chains(examples: Sequence[Example], shoulder: str = "body") -> Chains:
+    """Find the chains of the skeleton that all examples share; `shoulder` as for `find_chains`.
 
     Raises:
         InputError: if there is no example, or the skeletons differ.
@@ -66,7 +66,7 @@ def find_shared_chains(examples: Sequence[Example]) -> Chains:
         if not example.motion.skeleton.has_same_bones(first):
             raise InputError(f"example {example.name}", "a different skeleton", "the skeleton of the other examples",
                              "retarget them first")  # fmt: skip
-    return find_chains(first)
+    return find_chains(first, shoulder)
 
 
 def measure_leg_reach(examples: Sequence[Example]) -> dict[str, tuple[float, float]]:

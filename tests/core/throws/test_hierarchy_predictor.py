@@ -54,7 +54,7 @@ def random_model(example, settings, seed=0):
     """Networks of random weights that answer near the example's mean pose."""
     random, rows = np.random.default_rng(seed), build_training_set([example], settings)
     networks = {}
-    for name, (inputs, outputs) in count_widths(find_chains(example.motion.skeleton), settings).items():
+    for name, (inputs, outputs) in count_widths(find_chains(example.motion.skeleton, settings.shoulder), settings).items():
         sizes = [inputs, *[settings.units] * settings.layers, outputs]
         pairs = list(zip(sizes, sizes[1:]))
         networks[name] = PhaseNetwork(
@@ -96,12 +96,12 @@ def test_one_pose_at_once_is_the_same_kinematics(plain_and_dressed, which):
     {}, {"wrist": "inferred"}, {"frame": "static"}, {"points": 1},
     {"wrist": "inferred", "frame": "static", "points": 5},
     {"guided": True}, {"guided": True, "wrist": "inferred"},
-    {"carried": True}, {"carried": True, "frame": "static"},
+    {"carried": True}, {"carried": True, "frame": "static"}, {"shoulder": "arm", "guided": True},
 ])
 def test_it_says_what_the_plain_functions_say(plain_and_dressed, which, settings):
     example = plain_and_dressed[which]
     model = random_model(example, ModelSettings(layers=2, units=8, **settings))
-    chains = find_chains(example.motion.skeleton)
+    chains = find_chains(example.motion.skeleton, model.settings.shoulder)
     fast, states, seen = HierarchyPredictor(model,
                                             chains), compute_poses(example), build_windows(build_description(example))
     for frame in (0, 20, len(example.motion) - 2):
