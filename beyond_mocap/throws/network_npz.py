@@ -52,6 +52,7 @@ _SCALES = ("input_mean", "input_scale", "output_mean", "output_scale")
 _CONTEXT_NAMES = ("before", "after")
 _OTHER_KINDS = {"told": "the checkpoint of a training"}  # array that identifies another kind of file
 _FLOATS = tuple(np.dtype(name) for name in ("<f2", "<f4", "<f8"))
+_NEWER_SETTINGS = ("guided", "carried", "shoulder")  # older files lack them
 _HEADER_KEYS = ("format", "version", "settings", "skeleton", "stature", "leg_reach", "trained_on", "notes", "examples")
 _EXAMPLE_KEYS = ("name", "subject", "limb", "release", "impact", "launch", "stature")
 
@@ -181,7 +182,7 @@ def _build_model(arrays: dict[str, np.ndarray]) -> ThrowModel:
                          remedy="use the Beyond Mocap version that wrote it")
     check_names(header, HEADER, _HEADER_KEYS, _HEADER_KEYS)
     names = [field.name for field in fields(ModelSettings)]
-    check_names(header["settings"], "settings", names, [name for name in names if name not in ("guided", "carried", "shoulder")])
+    check_names(header["settings"], "settings", names, [name for name in names if name not in _NEWER_SETTINGS])
     settings = ModelSettings(**header["settings"])
     skeleton = _build_skeleton(header["skeleton"], arrays)
     networks = {name: _build_network(name, settings.layers + 1, arrays) for name in settings.networks}

@@ -14,7 +14,8 @@ from beyond_mocap.throws.networks.network_output import apply_output, build_outp
 from beyond_mocap.throws.networks.training_set import build_steps, measure_leg_reach
 
 TARGET = (12.0, 3.0, 1.2)
-CASES = [ModelSettings(guided=True, carried=True, shoulder="arm"), ModelSettings(kind="single", wrist="inferred", frame="static")]
+CASES = [ModelSettings(guided=True, carried=True, shoulder="arm"),
+         ModelSettings(kind="single", wrist="inferred", frame="static")]
 
 
 @pytest.fixture(scope="module")

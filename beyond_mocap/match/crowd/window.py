@@ -103,7 +103,7 @@ def resolve_window(takes: Sequence[Sequence[Take]], start: float, end: float) ->
         motions_before, contacts = [take.motion for take in flat], [take.contacts for take in flat]
         lines = list(map(compute_capsule_lines, motions_before))
         corrections = resolve_collisions(motions_before, contacts, firsts, fps,
-                                         [_compute_firmness(take) for take in flat], lines)
+                                         firmness=[_compute_firmness(take) for take in flat], lines=lines)
         motions = [apply_correction(motion, *player_takes) for motion,
                    player_takes in zip(motions_before, zip(corrections, firsts))]
         balls = [None if take.ball is None else sample_ball(take.plan, take.ball.times) for take in flat]

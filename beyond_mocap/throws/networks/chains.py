@@ -136,8 +136,8 @@ def find_chains(skeleton: Skeleton, shoulder: str = "body") -> Chains:
 
 def _check_limbs(left: Limb, right: Limb, shoulder: str) -> None:
     """Raise InputError if an arm or leg lacks a joint."""
-    required = (*(("shoulder",) if shoulder == "arm" else ()), "upper_arm", "lower_arm", "hand", "upper_leg", "lower_leg",
-                "foot")
+    own = ("shoulder",) if shoulder == "arm" else ()
+    required = (*own, "upper_arm", "lower_arm", "hand", "upper_leg", "lower_leg", "foot")
     missing = [
         f"{side} {part.replace('_', ' ')}"
         for side, limb in (("left", left), ("right", right))

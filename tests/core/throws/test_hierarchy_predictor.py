@@ -53,8 +53,8 @@ def plain_and_dressed():
 def random_model(example, settings, seed=0):
     """Networks of random weights that answer near the example's mean pose."""
     random, rows = np.random.default_rng(seed), build_training_set([example], settings)
-    networks = {}
-    for name, (inputs, outputs) in count_widths(find_chains(example.motion.skeleton, settings.shoulder), settings).items():
+    networks, chains = {}, find_chains(example.motion.skeleton, settings.shoulder)
+    for name, (inputs, outputs) in count_widths(chains, settings).items():
         sizes = [inputs, *[settings.units] * settings.layers, outputs]
         pairs = list(zip(sizes, sizes[1:]))
         networks[name] = PhaseNetwork(

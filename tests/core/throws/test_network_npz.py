@@ -290,6 +290,7 @@ def test_a_damaged_array_with_a_right_checksum_is_told_or_read(tmp_path_factory,
 
 
 def test_a_file_from_before_the_guides_is_read(tmp_path):
-    path = with_header(tmp_path, lambda header: [header["settings"].pop(name) for name in ("guided", "carried")])
+    newer = ("guided", "carried", "shoulder")
+    path = with_header(tmp_path, lambda header: [header["settings"].pop(name) for name in newer])
     told = read_model(path).settings
-    assert (told.guided, told.carried) == (False, False)
+    assert (told.guided, told.carried, told.shoulder) == (False, False, "body")
