@@ -183,7 +183,9 @@ class BEYOND_MOCAP_OT_stream_act(BaseOperator, bpy.types.Operator):
 
     def do(self, context):
         """Find the strike; in a window the answer appears as soon as it is ready."""
-        hit = play.find_shown_strike(context.scene, find_armature(context))
+        from ..scene.stream.shown_strike import find_shown_strike
+
+        hit = find_shown_strike(context.scene, find_armature(context))
         if bpy.app.background:
             play.answer_now(context.scene, hit)
         else:

@@ -114,11 +114,12 @@ def _draw_discs(canvas, drawn, view: View, centres, *, colour, flat: float) -> N
         if depth <= 0.1:
             continue
         radius = view.size * BALL_RADIUS / depth * np.linalg.norm(view.at - view.eye) / view.wide
-        for size, tone in ((radius, (90, 90, 90) if flat == 1.0 else colour), (radius - 1.5, colour)):
+        edge = (90, 90, 90) if flat == 1.0 else colour
+        for size, tone, nearer in ((radius, edge, 1.0), (max(radius - 1.5, 0.5 * radius), colour, 1.0 + 1e-6)):
             rim = np.stack([x + size * np.cos(around), y + flat * size * np.sin(around)], axis=1)
             fans = np.stack([np.broadcast_to([x, y], rim.shape), rim, np.roll(rim, -1, axis=0)], axis=1)
-            near = np.full((len(fans), 4), (1.0 if size == radius else 1.0 + 1e-6) / depth)
-            fill_faces(canvas, drawn, fans[:, [0, 1, 2, 2]], near, np.tile(tone, (len(fans), 1)))
+            fill_faces(canvas, drawn, fans[:, [0, 1, 2, 2]], np.full((len(fans), 4), nearer / depth),
+                       np.tile(tone, (len(fans), 1)))
 
 
 def _draw_grid(draw, view: View, step: float = 0.5) -> None:

@@ -104,7 +104,7 @@ def _keep_hem_whole(template: Template, stance: NeutralStance, body: Humanoid) -
     """Return the template's segments with the trunk for the thighs on the shirt, and where the trunk has a good share.
 
     Only for skeletons whose thighs rest opposite to the hips: their vertices are parted (`_part_opposed_joints`), and a
-    shirt parted along the groin tears with each long step. Thighs come forth before its hem instead.
+    shirt parted along the groin tears with each long step. Thighs show in front of its hem instead.
     """
     if _measure_likeness(stance, np.array([body.left.upper_leg, body.right.upper_leg]), body.hips).min() > _LEAST_ALIKE:
         return template.segments

@@ -158,10 +158,10 @@ def _list_pixels(faces, low, *, edge: int, corners, nearness, size) -> tuple[np.
     area = np.sum(corners[..., 0] * along[..., 1] - corners[..., 1] * along[..., 0], axis=1)
     # Orient all polygons the same way: a pixel is inside if it is on the inner side of every edge.
     along = along * np.where(area < 0.0, -1.0, 1.0)[:, None, None]
-    inside = ((x < size[0])[:, None, :] & (y < size[1])[:, :, None])
+    inside = (x < size[0])[:, None, :] & (y < size[1])[:, :, None]
     for i in range(4):
-        start, way = corners[:, i], along[:, i]
-        right, up = (x + 0.5 - start[:, :1]) * way[:, 1:], (y + 0.5 - start[:, 1:]) * way[:, :1]
+        start, side = corners[:, i], along[:, i]
+        right, up = (x + 0.5 - start[:, :1]) * side[:, 1:], (y + 0.5 - start[:, 1:]) * side[:, :1]
         inside &= up[:, :, None] - right[:, None, :] >= -1e-9
     face, row, column = np.nonzero(inside)
     slope, middle = _measure_slopes(corners, nearness), corners.mean(axis=1)

@@ -18,6 +18,7 @@ from .. import __version__
 from ..base.errors import InputError, UserCancelledError
 from ..base.settings import collect_defaults, find_setting
 from ..motion.motion import Motion
+from ..synthesis.one_thread import limit_to_one_thread
 from .cleaning.clean import CleaningResult, clean_trial
 from .model.model import MarkerModel
 from .pose.pose import HeldBall, PoseSettings, PoseSolution, solve_poses
@@ -150,9 +151,7 @@ def reconstruct(trial: MarkerTrial, static: MarkerTrial | None = None, model: Ma
             markers are mirrored, or too few markers are visible.
         UserCancelledError: if the user stops the job.
     """
-    from threadpoolctl import threadpool_limits
-
-    with threadpool_limits(limits=1):  # same bits on every machine; several threads slow small systems down
+    with limit_to_one_thread():  # several threads also slow small systems down
         return _reconstruct_on_one_thread(trial, static, model, settings=settings,
                                           monitor=_RunMonitor(progress, cancelled), cancelled=cancelled)
 

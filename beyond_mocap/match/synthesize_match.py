@@ -28,6 +28,7 @@ from ..library.build import build_library
 from ..library.library import Library
 from ..motion.track.ball_path import BallPath
 from ..motion.track.match_data import Match
+from ..synthesis.one_thread import limit_to_one_thread
 from .folder import check_folder, open_folder, read_state
 from .goalkeeping.positions import fill_keepers
 from .known_bodies import build_known_bodies, follow_bodies, read_tracked
@@ -116,8 +117,6 @@ def synthesize_match(
         InputError: if the request, its files or its cluster are wrong.
         UserCancelledError: if `cancelled` returns True.
     """
-    from threadpoolctl import threadpool_limits
-
     report = progress or (lambda fraction, text: None)
     check_folder(request.out)
     check_label_folder(request.annotations)
@@ -140,7 +139,7 @@ def synthesize_match(
         job = Job(request=request, folder=folder, state=state, source=source, library=library, workers=place,
                          report=report, cancelled=cancelled)
         try:
-            with threadpool_limits(limits=1):  # more threads would change the order of sums
+            with limit_to_one_thread():
                 _run_stages(job, (match, feed), events, span, report)
         except BeyondMocapError as error:
             if state.players:  # otherwise no work has started
@@ -311,11 +310,15 @@ def read_result(request: MatchRequest) -> MatchResult:
         InputError: as for `folder.read_state`.
     """
     state = read_state(request.out)
-    players = {status: tuple(PlayerStatus(row["id"], row.get("reason", ""), row.get("exit_status", 2))
-                             for row in state["players"] if row["status"] == status) for status in ("done", "failed")}
+    players = {status: tuple(_read_status(row) for row in state["players"] if row["status"] == status)
+               for status in ("done", "failed")}
     notes = tuple(dict.fromkeys((*state["data"], *state["notes"])))
     return MatchResult(request=request, span=(state["from_s"], state["to_s"]), finished=players["done"],
                        failed=players["failed"], notes=notes)
+
+
+def _read_status(row: Mapping) -> PlayerStatus:
+    return PlayerStatus(**{name: row[name] for name in ("id", "reason", "exit_status") if name in row})
 
 
 def _scale_progress(report: Progress, stage: str) -> Progress:

@@ -32,6 +32,7 @@ from ..synthesis.construct.ball_touch.touch_frames import Touch
 from ..synthesis.construct.construction import Construction
 from ..synthesis.construct.strike_fixed_ball import FixedStrike, FixedStrikeResult, strike_fixed_ball
 from ..synthesis.construct.track_following import IN_PLACE_SPEED, follow_turning
+from ..synthesis.one_thread import limit_to_one_thread
 from ..synthesis.plan import Plan
 from ..synthesis.provenance import build_provenance_fields
 from ..synthesis.resolve_plan import resolve_plan
@@ -111,11 +112,9 @@ def build_player_motion(library: Library, stance: Stance, orders: Sequence[HitOr
         InputError: for orders outside the scene, or two at one time.
         UserCancelledError: if `cancelled` returns True.
     """
-    from threadpoolctl import threadpool_limits
-
     orders = sorted(orders, key=lambda order: order.time)
     _check_orders(orders, ball.times, fps)
-    with threadpool_limits(limits=1):
+    with limit_to_one_thread():
         return _PlayerBuilder(library, stance, orders, ball=ball, ball_radius=ball_radius, count=len(ball.times),
                               fps=fps, settings=settings).build(progress, cancelled)
 

@@ -28,6 +28,7 @@ from ..motion.retargeting.retarget import Retargeter
 from ..motion.track import SampledTrack, Track, smooth_zero_phase_hann
 from ..synthesis.construct.construction import Construction, build_key_results, find_touches
 from ..synthesis.heading_plan import HeadingKey
+from ..synthesis.one_thread import limit_to_one_thread
 from ..synthesis.plan import Plan, ResolvedPlan
 from ..synthesis.resolve_plan import resolve_plan
 from ..synthesis.resolved_touches import resolve_touches
@@ -96,10 +97,8 @@ def construct_run_up(
     Raises:
         InputError: if the throw lies outside the track.
     """
-    from threadpoolctl import threadpool_limits
-
     _check_times(plan, throw, at - release)
-    with threadpool_limits(limits=1):
+    with limit_to_one_thread():
         resolved_plan = resolve_touches(plan)
     plan_with_throw, warnings = _insert_in_plan(resolved_plan, throw, release, at, action)
     plan_with_throw, left_out = _insert_headings(plan_with_throw, throw, at - release, between)
@@ -111,7 +110,7 @@ def construct_run_up(
     throw_clip = Motion(library.skeleton, throw_clip.root_positions / size, throw_clip.rotations, throw_clip.fps)
     report = progress or (lambda done, text: None)
     library_with_throw = add_throw_clip(extend_library(library, resolved, report), throw_clip, release, action)
-    with threadpool_limits(limits=1):
+    with limit_to_one_thread():
         order = _build_search_request(library_with_throw, resolved)
         search = PathSearch(library_with_throw, order, balance_weights(plan.alpha), lambda done,
                             text: report(0.8 * done, text), cancelled)

@@ -87,7 +87,7 @@ def replace_keys(target: bpy.types.Object, frames: np.ndarray, channels: dict[st
 class WrittenKeys:
     """The keys that an action has on every frame, kept so that those from some frame on can be replaced quickly.
 
-    Nothing is read then, and neither action nor slot change, after which Blender sorts out anew what depends on what.
+    No value is read then, and neither action nor slot change: after that Blender builds its dependency graph again.
 
     Args:
         target: the object that plays the action; all curves have keys on the same frames.
@@ -102,32 +102,36 @@ class WrittenKeys:
             curve.keyframe_points.foreach_get("co", self._places[key])
         self._frames = next(iter(self._places.values()))[::2].copy()
 
-    def replace(self, target: bpy.types.Object, first: float, channels: dict[str, tuple[str, np.ndarray]]) -> bool:
-        """Replace the keys from a frame on; after the last value they hold it. Handles are left as they are.
-
-        Args:
-            target: the object.
-            first: the frame.
-            channels: as `create_action`, all of the action's curves, values (F, n) for F frames.
-        Returns:
-            Whether it was possible: not after the keys have been changed by others, nor without a key on each frame.
+    def can_replace(self, target: bpy.types.Object, first: float, channels: dict[str, tuple[str, np.ndarray]]) -> bool:
+        """Whether `replace` is possible: not after others have added or removed keys, nor without a key on each frame.
         """
         action, slot = find_playing_action(target)
         if action is None or action.session_uid != self._action:
             return False
-        found, column = collect_curves(action, slot), int(np.searchsorted(self._frames, first - 1e-3))
-        count = len(next(iter(channels.values()))[1])
+        column, count = self._find_column(first), len(next(iter(channels.values()))[1])
         if column + count > len(self._frames) or abs(self._frames[column] - first) > 1e-3:
             return False
-        if found.keys() != self._places.keys() or any(2 * len(curve.keyframe_points) != len(self._places[key])
-                                                      for key, curve in found.items()):
-            return False
+        sizes = {key: 2 * len(curve.keyframe_points) for key, curve in collect_curves(action, slot).items()}
+        return sizes == {key: len(places) for key, places in self._places.items()}
+
+    def replace(self, target: bpy.types.Object, first: float, channels: dict[str, tuple[str, np.ndarray]]) -> None:
+        """Replace the keys from a frame on; after the last value they hold it. Handles are left as they are.
+
+        Args:
+            target: the object, of which `can_replace` holds.
+            first: the frame.
+            channels: as `create_action`, all of the action's curves, values (F, n) for F frames.
+        """
+        found, column = collect_curves(*find_playing_action(target)), self._find_column(first)
         for path, (_, values) in channels.items():
             self._set_values(path, column, values)
         for key, curve in found.items():
             curve.keyframe_points.foreach_set("co", self._places[key])
         curve.update()  # one of them tells Blender
-        return True
+
+    def _find_column(self, frame: float) -> int:
+        """Find the number of the first key from a frame on."""
+        return int(np.searchsorted(self._frames, frame - 1e-3))
 
     def _set_values(self, path: str, column: int, values: np.ndarray) -> None:
         """Set the values (F, n) of a property from a column on; rotations get the sign that is near the key there."""

@@ -3,7 +3,7 @@
 - `settings`: where each stream is received, what is detected, and the status for the panel
 - `follow`: the streams that are received in this session
 - `streamed_body`: the armature that follows a user
-- `play`: a passing scene that answers the users' strikes
+- `play`: a passing scene that answers the users' strikes, `rally_keys`: its keys, `shown_strike`: without a stream
 """
 
 REGISTERED = ("follow", "play", "settings")

@@ -17,7 +17,7 @@ import bpy
 
 from ...beyond_mocap.base.errors import BeyondMocapError, InputError, UserCancelledError
 from ...beyond_mocap.base.fixes import Fix
-from ..core import action, background
+from ..core import background
 from ..core.live import Watcher, call_or_describe, is_playing
 from ..core.measure import frames_per_second
 from ..passes import generate as make
@@ -162,26 +162,6 @@ def receive_strike(scene: bpy.types.Scene, stream: StreamSettings, hit: HitMotio
 def store_strike(hit: HitMotion, seconds: float) -> None:
     """Store a user's strike of `seconds` on the monotonic clock; only the latest one counts."""
     _session["pending"] = hit, seconds
-
-
-def find_shown_strike(scene: bpy.types.Scene, body: bpy.types.Object) -> HitMotion:
-    """Find the strike of an armature's own motion that is nearest to the current frame.
-
-    Raises:
-        InputError: if it has none.
-    """
-    from ...beyond_mocap.passes.hits import detect_hits
-
-    settings, motion = scene.beyond_mocap_stream, action.read_motion(body, scene)
-    sided = settings.part in ("foot", "hand", "tool")
-    sides = (("left", "right") if settings.side == "either" else (settings.side,)) if sided else ("",)
-    hits = [hit for side in sides for hit in detect_hits(motion, settings.part, side, settings.threshold
-                                                         or None).motions]
-    if not hits:
-        raise InputError(f"armature {body.name}", f"no strike with the {settings.part}", "at least one",
-                         "choose the part under Live Stream")
-    now = scene.frame_current - (action.find_first_frame(body) or 0)
-    return min(hits, key=lambda hit: (abs(hit.key - now), -hit.max_speed))
 
 
 def _update_or_end(scene: bpy.types.Scene) -> None:

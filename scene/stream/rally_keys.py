@@ -61,14 +61,17 @@ class RallyKeys:
         """
         until, fps = rally.ready_time + AT_ONCE, frames_per_second(scene)
         first, ball = scene.beyond_mocap_passes.start_frame + begin * fps, scene.beyond_mocap_passes.rally
-        if self._ball is None or ball is None or rally.rate != fps:
+        rows = _find_rows(scene, names)
+        if self._ball is None or ball is None or rally.rate != fps or any(row.body is None for row in rows.values()):
             return False
-        for name, row in _find_rows(scene, names).items():
-            if row.body is None or not self._players[name].replace(row.body, first, _build_curves(scene, rally, row,
-                                                                                                  (begin, until))):
-                return False
-        return self._ball.replace(ball, first, balls.build_keys(ball, _cut_path(rally.ball, begin, until), scene,
-                                                                first)[1])
+        changes = [(self._players[name], row.body, first, _build_curves(scene, rally, row, (begin, until)))
+                   for name, row in rows.items()]
+        changes.append((self._ball, ball, first, balls.build_keys(ball, _cut_path(rally.ball, begin, until), scene,
+                                                                  first)[1]))
+        is_possible = all(keys.can_replace(*change) for keys, *change in changes)
+        for keys, *change in changes if is_possible else ():  # of all or of none
+            keys.replace(*change)
+        return is_possible
 
 
 def _find_rows(scene, names: Iterable[str]) -> dict:

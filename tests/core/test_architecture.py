@@ -36,12 +36,10 @@ LAZY = {
     "files": ["kloppy"],
     "library": ["joblib", "sklearn", "threadpoolctl"],
     "synthesis": ["threadpoolctl"],
-    "evaluation": ["matplotlib", "sklearn", "threadpoolctl"],
-    "markers": ["c3d", "matplotlib", "threadpoolctl"],
-    "passes": ["threadpoolctl"],
-    "throws": ["threadpoolctl"],
+    "evaluation": ["matplotlib", "sklearn"],
+    "markers": ["c3d", "matplotlib"],
     "study": ["matplotlib"],
-    "match": ["distributed", "joblib", "threadpoolctl"],
+    "match": ["distributed", "joblib"],
     "cli": ["jax", "optax", "training"],
 }
 SETTINGS = re.compile(r"scene\.\w+\.settings(\.|$)")

@@ -38,7 +38,7 @@ def find_headings(times: np.ndarray, positions: np.ndarray, angles: np.ndarray,
         angles = np.radians(angles)
         lines.append("angles of bodies are taken as degrees")
     velocity = np.gradient(positions, times, axis=1)
-    is_running = (np.linalg.norm(velocity, axis=2) > _RUNNING) & np.isfinite(angles)
+    is_running = (np.linalg.norm(velocity, axis=2) > _RUNNING) & is_known
     travel = arctan2(velocity[..., 1], velocity[..., 0])
     for start, end, number, _ in periods:
         part = slice(*np.searchsorted(times, [start - 1e-6, end + 1e-6]))

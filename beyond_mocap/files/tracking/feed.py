@@ -15,7 +15,6 @@ from pathlib import Path
 from typing import Any, TypeVar
 from xml.parsers import expat
 
-from ...base.content import is_utf16
 from ...base.errors import InputError, build_read_error
 from ...base.optional_packages import import_optional
 
@@ -126,6 +125,8 @@ def read_head(path: Path) -> bytes:
     Returns:
         Up to 8 kB, of UTF-16 as UTF-8; nothing for a folder.
     """
+    from ...base.content import is_utf16
+
     if not path.is_file():
         return b""
     with open(path, "rb") as file:

@@ -14,6 +14,7 @@ from ...annotation.ball_contact import build_surfaces
 from ...library.features import FPS
 from ...motion.motion import Motion
 from ...motion.track.ball_path import BallPath
+from ...synthesis.one_thread import limit_to_one_thread
 from ...synthesis.take import Take
 from ..match_ball import apply_led_ball, find_led_ball, lead_ball_between_players, restore_ball_contact, sample_ball
 from ..piece_file import read_piece_file, write_piece_file
@@ -94,9 +95,7 @@ def resolve_window(takes: Sequence[Sequence[Take]], start: float, end: float) ->
     Returns:
         One result per player.
     """
-    from threadpoolctl import threadpool_limits
-
-    with threadpool_limits(limits=1):
+    with limit_to_one_thread():
         flat = [take for player_takes in takes for take in player_takes]
         fps = flat[0].motion.fps if flat else 1.0
         firsts = [round(take.start_time * fps) for take in flat]

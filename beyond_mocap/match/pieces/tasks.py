@@ -23,6 +23,7 @@ from ...library.build import build_library
 from ...library.library import Library
 from ...motion.track import Track
 from ...motion.track.ball_path import BallPath
+from ...synthesis.one_thread import limit_to_one_thread
 from ...synthesis.provenance import build_provenance, join_provenance, write_provenance
 from ...synthesis.quality import movement
 from ...synthesis.quality.playback import Playback, playback_from_take
@@ -159,8 +160,6 @@ def finish_player(source: LibrarySource, request: FinishRequest) -> PlayerFiles:
     Returns:
         The files.
     """
-    from threadpoolctl import threadpool_limits
-
     library = load_library(source)
     files: dict[str, bytes] = {}
     stretches, tables = [], []
@@ -175,7 +174,7 @@ def finish_player(source: LibrarySource, request: FinishRequest) -> PlayerFiles:
             ending = f"{number + 1}.bvh" if number else "bvh"
             files[ending] = _write_to_bytes(lambda path: bvh.write_bvh(path, take.motion))
 
-    with threadpool_limits(limits=1):
+    with limit_to_one_thread():
         for number in range(len(request.motion)):
             finish_stretch(number)
         if request.figures:

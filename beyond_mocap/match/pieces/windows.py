@@ -19,6 +19,7 @@ from ...library.automatic_locomotion import apply_chosen_gaits
 from ...library.features import FPS
 from ...library.library import Library
 from ...library.missing_actions import add_actions
+from ...synthesis.one_thread import limit_to_one_thread
 from ...synthesis.plan import Plan, ResolvedPlan
 from ...synthesis.resolve_plan import resolve_plan
 from ...synthesis.search.distance import align_keys
@@ -94,10 +95,8 @@ def search_window(library: Library, unit: Unit, cancelled: Callable[[], bool] | 
         InputError: as for `synthesize`.
         UserCancelledError: if `cancelled` returns True.
     """
-    from threadpoolctl import threadpool_limits
-
     started = time.process_time()
-    with threadpool_limits(limits=1):
+    with limit_to_one_thread():
         plan = resolve_plan(unit.plan, library, are_touches_resolved=True)
         library = build_search_library(library, plan)
         order = build_request(library, plan)

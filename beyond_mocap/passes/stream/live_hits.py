@@ -65,15 +65,15 @@ class LiveHits:
 
     def _watch(self) -> None:
         """Look for new hits until the listener stops; an error is found once."""
-        told = ""
+        reported = ""
         while self.listener.is_running:
             try:
                 if (found := self.find_new_hit()) is not None:
                     self._found.put(found)
             except Exception as error:  # raised where it is taken
-                if str(error) != told:
+                if str(error) != reported:
                     self._found.put(error)
-                told = str(error)
+                reported = str(error)
             time.sleep(_PAUSE_SECONDS)
 
     def find_new_hit(self) -> tuple[HitMotion, float] | None:

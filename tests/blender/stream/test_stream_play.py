@@ -175,21 +175,23 @@ def test_a_slow_playback_shows_the_answer_on_time(playing, room, core, monkeypat
         play._session["keys"].write_all(playing, stand[0], stand[0].players)
 
 
-def test_keys_that_the_user_has_changed_are_written_anew(playing, room, core, monkeypatch):
-    """By the update after the frame, and the strike is not lost."""
-    play, body = room("stream.play"), playing.beyond_mocap_passes.players[0].body
+@pytest.mark.parametrize("name", ["Ann", "Ben"])
+def test_keys_that_the_user_has_changed_are_written_again(playing, room, core, monkeypatch, name):
+    """By the update after the frame, which shows no part of the pass; and the strike is not lost."""
+    play, body = room("stream.play"), playing.beyond_mocap_passes.players[name].body
     monkeypatch.setattr(play, "is_playing", lambda: True)
     plan_ahead(play, core, playing)
     curves = room("core.channels").collect_curves(*room("core.channels").find_playing_action(body))
     points = next(iter(curves.values())).keyframe_points
     points.remove(points[10])
+    before = read_keys(room, playing, "Ann")[1]
     play.store_strike(kick(core), time.monotonic())
     play.answer_in_playback(playing)
-    assert play.get_current_rally().passes == 0
+    assert play.get_current_rally().passes == 0 and np.array_equal(read_keys(room, playing, "Ann")[1], before)
     play.update_rally(playing)
     assert play.get_current_rally().passes == 1
     assert {len(curve.keyframe_points) for curve in room("core.channels").collect_curves(
-        *room("core.channels").find_playing_action(body)).values()} == {len(read_keys(room, playing, "Ann")[1])}
+        *room("core.channels").find_playing_action(body)).values()} == {len(read_keys(room, playing, name)[1])}
 
 
 def test_whom_the_user_chooses_gets_it(playing, room, core):

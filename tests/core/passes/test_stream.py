@@ -293,6 +293,23 @@ def test_a_kick_is_recognised_once_while_it_arrives(tmp_path, fps, every):
     assert hit.side == "right" and abs(moment - made.key) < 0.1 and now - made.key < 0.15 + every
 
 
+def test_the_thread_finds_the_kick_once_says_an_error_once_and_ends_with_the_listener(tmp_path):
+    made = build_strike("kick low top", fps=60.0)
+    bvh.write_bvh(tmp_path / "kick.bvh", made.motion)
+    played, threads = Played(tmp_path / "kick.bvh"), threading.active_count()
+    played.is_running, played.now = True, 1000.0  # all has arrived
+    watch, lacks = LiveHits(played).start(), LiveHits(played, "tail").start()
+    wait_for(lambda: not watch._found.empty() and not lacks._found.empty())
+    assert watch.take_hit()[0].side == "right"
+    with pytest.raises(InputError, match="tail"):
+        lacks.take_hit()
+    played.frames = played.frames + played.frames[-1:]  # they look again
+    wait_for(lambda: watch._last_number == lacks._last_number == len(played.frames))
+    played.is_running = False
+    wait_for(lambda: threading.active_count() == threads)
+    assert watch.take_hit() is None and lacks.take_hit() is None
+
+
 def test_walking_is_no_hit(tmp_path, clip):
     played = Played(clip)
     watch = LiveHits(played)
