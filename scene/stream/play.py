@@ -33,7 +33,7 @@ if TYPE_CHECKING:
     from .settings import StreamSettings
 
 LEFT_SECONDS = 20.0
-"""Seconds before somebody's standing ends at which it is continued."""
+"""Seconds before a player's standing ends at which it is continued."""
 
 _session: dict[str, object] = {}
 
