@@ -1,4 +1,4 @@
-"""Linear algebra of numpy and scipy with one thread: more threads add up in another order, and results get other bits."""
+"""Linear algebra with one thread, of numpy and scipy: more threads add up in another order, and bits differ."""
 
 from __future__ import annotations
 
