@@ -140,8 +140,8 @@ def fill_faces(canvas: np.ndarray, drawn: np.ndarray, corners: np.ndarray, nearn
     found = []
     for edge in np.unique(2 ** np.ceil(np.log2(np.maximum(wide, 1))).astype(int)):
         faces = np.flatnonzero((wide <= edge) & (2 * wide > edge))
-        found.append(_list_pixels(faces, low[faces], int(edge), size=size, corners=corners[faces],
-                                  nearness=nearness[faces]))
+        found.append(_list_pixels(faces, low[faces], edge=int(edge), corners=corners[faces], nearness=nearness[faces],
+                                  size=size))
     if not found:
         return
     place, near, face = (np.concatenate(part) for part in zip(*found))
@@ -151,7 +151,7 @@ def fill_faces(canvas: np.ndarray, drawn: np.ndarray, corners: np.ndarray, nearn
     canvas.reshape(-1, canvas.shape[2])[place[order]] = colours[face[order]]
 
 
-def _list_pixels(faces, low, edge: int, *, size, corners, nearness) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def _list_pixels(faces, low, *, edge: int, corners, nearness, size) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """List the pixels of faces within squares of `edge` pixels from `low` on: place in the picture, nearness, face."""
     x, y = (low[:, axis, None] + np.arange(edge) for axis in (0, 1))
     along = np.roll(corners, -1, axis=1) - corners

@@ -1,4 +1,4 @@
-"""Linear algebra with one thread, of numpy and scipy: more threads add up in another order, and bits differ."""
+"""Linear algebra with one thread: more threads add up in another order, and results get other bits."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ def limit_to_one_thread() -> AbstractContextManager:
 
 @lru_cache(maxsize=1)
 def _find_libraries():
-    """Find the libraries of linear algebra; scipy's, which is not numpy's, would else be loaded within the context."""
+    """Find the libraries of linear algebra: those that numpy and scipy have loaded, which takes a while."""
     import scipy.linalg  # noqa: F401
     from threadpoolctl import ThreadpoolController
 

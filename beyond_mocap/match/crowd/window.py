@@ -101,8 +101,8 @@ def resolve_window(takes: Sequence[Sequence[Take]], start: float, end: float) ->
         firsts = [round(take.start_time * fps) for take in flat]
         motions_before, contacts = [take.motion for take in flat], [take.contacts for take in flat]
         lines = list(map(compute_capsule_lines, motions_before))
-        corrections = resolve_collisions(motions_before, contacts, firsts, fps, lines=lines,
-                                         firmness=[_compute_firmness(take) for take in flat])
+        corrections = resolve_collisions(motions_before, contacts, firsts, fps,
+                                         firmness=[_compute_firmness(take) for take in flat], lines=lines)
         motions = [apply_correction(motion, *player_takes) for motion,
                    player_takes in zip(motions_before, zip(corrections, firsts))]
         balls = [None if take.ball is None else sample_ball(take.plan, take.ball.times) for take in flat]
