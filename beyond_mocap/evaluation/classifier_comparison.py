@@ -27,7 +27,6 @@ from ..base.optional_packages import import_optional
 from ..library.clip import LANDING_FOLDER
 from ..library.library import Library
 from ..motion.motion import Motion, resample, sample_frames
-from ..synthesis.one_thread import limit_to_one_thread
 from ..synthesis.quality.playback import Playback, find_transitions
 from ..synthesis.synthesize import estimate_look
 from .view import compute_scale
@@ -85,6 +84,8 @@ def compare_with_recordings(takes: Mapping[str, Playback], library: Library) -> 
     Raises:
         InputError: without takes, their sources, recordings, or windows enough, or without scikit-learn.
     """
+    from threadpoolctl import threadpool_limits
+
     import_optional("sklearn", "comparison with recordings")
     all_recorded = collect_recorded_windows(library)
     all_synthesized, features = collect_take_windows(takes, library)
@@ -94,7 +95,7 @@ def compare_with_recordings(takes: Mapping[str, Playback], library: Library) -> 
                  f"and {len(all_recorded)} in {library.folder}")
         raise InputError("takes", found, f"{FEWEST} or more", "add takes, or recordings of their speeds")
     is_body = np.array([not feature.is_planned for feature in features])
-    with limit_to_one_thread():
+    with threadpool_limits(limits=1):  # with more threads, sums have another order and other bits
         areas, losses = cross_validate(synthesized, recorded)
         body_areas, _ = cross_validate(synthesized.select_features(is_body), recorded.select_features(is_body),
                                        with_losses=False)

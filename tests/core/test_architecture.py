@@ -36,7 +36,7 @@ LAZY = {
     "files": ["kloppy"],
     "library": ["joblib", "sklearn", "threadpoolctl"],
     "synthesis": ["threadpoolctl"],
-    "evaluation": ["matplotlib", "sklearn"],
+    "evaluation": ["matplotlib", "sklearn", "threadpoolctl"],
     "markers": ["c3d", "matplotlib"],
     "study": ["matplotlib"],
     "match": ["distributed", "joblib"],
