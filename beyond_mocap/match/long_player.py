@@ -23,6 +23,7 @@ from ..synthesis.construct.ball_touch.carry_ball import report_recorded_ball
 from ..synthesis.plan import Plan
 from ..synthesis.provenance import build_provenance, join_provenance, write_provenance
 from ..synthesis.resolve_plan import resolve_plan
+from ..synthesis.synthesize import report_unmet_requests
 from ..synthesis.take import Take
 from .pieces.tasks import merge_reports
 from .pieces.units import build_units, count_frames, cut_track
@@ -113,7 +114,7 @@ class LongTakeFiles:
         """Keep of a part what the tables and the report need."""
         self._seams += (part.seams + self.frames).tolist()
         self.frames += len(part.motion)
-        self.warnings = tuple(dict.fromkeys((*self.warnings, *part.warnings)))
+        self.warnings = tuple(dict.fromkeys((*self.warnings, *part.warnings, *report_unmet_requests(self._library, part))))
         self._tables.append(build_provenance(part))
         self._balls.append(part.ball)
         self._counts.append(len(part.motion))
@@ -137,4 +138,5 @@ class LongTakeFiles:
 
     def build_report(self) -> dict:
         """Merge the reports of all parts."""
-        return merge_reports(self._reports, self._counts)
+        merged = merge_reports(self._reports, self._counts)
+        return {**merged, "warnings": list(dict.fromkeys((*merged.get("warnings", ()), *self.warnings)))}

@@ -311,7 +311,7 @@ def add_warnings(
     unmet: Sequence[str] = ()
     if report_unmet:
         unmet = (*report_recorded_ball(take.plan, take.ball, take.seams.tolist()),
-                 *_report_unmet(recordings, take.plan, take))
+                 *report_unmet_requests(recordings, take))
     return replace(take, is_cut_short=hurried_from is not None, warnings=(*messages, *unmet))
 
 
@@ -399,9 +399,9 @@ def _report_ignored_heading_keys(plan: Plan) -> list[str]:
     return messages
 
 
-def _report_unmet(library: Library, plan: Plan, take: Take) -> list[TimedMessage]:
-    """Report what could not be met, and when."""
-    played = playback_from_take(take)
+def report_unmet_requests(library: Library, take: Take) -> list[TimedMessage]:
+    """Report what could not be met in a take from a library, and when."""
+    played, plan = playback_from_take(take), take.plan
     return report_unmet_constraints(
         played, track=plan.track, timeline=take.timeline, library=library, ik_miss=take.ik_miss,
         user_timeline=plan.timeline, has_actions=plan.method == "path" and plan.made,

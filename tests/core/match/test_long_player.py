@@ -1,5 +1,6 @@
 """A long track in windows: the same frames whatever the parts are, no seam between them, and the files of the whole."""
 
+import json
 from dataclasses import replace
 
 import numpy as np
@@ -80,13 +81,17 @@ def test_the_command_checks_memory_before_the_search(clips_folder, tmp_path, mon
 
 
 def test_the_command_in_windows_writes_all_files(clips_folder, tmp_path, capsys):
-    rows = "".join(f"{0.2 * i:.1f},{0.28 * i:.3f},0\n" for i in range(160))
+    rows = "".join(f"{0.2 * i:.1f},{0.28 * i + 1.32 * max(i - 120, 0):.3f},0\n" for i in range(160))
     (tmp_path / "t.csv").write_text("time_s,x_m,y_m\n" + rows)
     files = {name: tmp_path / name for name in ("o.bvh", "p.csv", "r.json")}
     status = main(["synthesize", "--library", str(clips_folder), "--track", str(tmp_path / "t.csv"), "--window", "24",
                    "--no-made", "--out", str(files["o.bvh"]), "--provenance", str(files["p.csv"]), "--report",
                    str(files["r.json"])])
-    assert status == 0, capsys.readouterr().err
+    notes = capsys.readouterr().err
+    assert status == 0, notes
+    warnings = json.loads(files["r.json"].read_text())["warnings"]
+    unmet = [line.removeprefix("note: ") for line in notes.splitlines() if " s: " in line]
+    assert any("8.0 m/s" in line for line in unmet) and set(unmet) <= set(warnings)
     motion = bvh.read_bvh(files["o.bvh"]).motion
     assert len(motion) == 955 and files["p.csv"].read_text().count("\n") == 956
     assert '"frames": 955' in files["r.json"].read_text()
