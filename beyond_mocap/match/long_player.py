@@ -114,7 +114,8 @@ class LongTakeFiles:
         """Keep of a part what the tables and the report need."""
         self._seams += (part.seams + self.frames).tolist()
         self.frames += len(part.motion)
-        self.warnings = tuple(dict.fromkeys((*self.warnings, *part.warnings, *report_unmet_requests(self._library, part))))
+        unmet = report_unmet_requests(self._library, part)
+        self.warnings = tuple(dict.fromkeys((*self.warnings, *part.warnings, *unmet)))
         self._tables.append(build_provenance(part))
         self._balls.append(part.ball)
         self._counts.append(len(part.motion))
