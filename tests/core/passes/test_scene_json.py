@@ -156,7 +156,7 @@ def test_what_is_no_scene_is_told(text):
 
 
 def test_files_that_are_none(tmp_path):
-    for content in (b"", b"\xff\xfe\x00", b"\0" * 10, json.dumps(THREE).encode("utf-16")):
+    for content in (b"", b"\xff\xfe\x00", b"\0" * 10, json.dumps(THREE).encode("utf-16")[:-1]):
         (tmp_path / "s.json").write_bytes(content)
         with pytest.raises(InputError) as caught:
             read_scene(tmp_path / "s.json")
