@@ -17,7 +17,7 @@ from ..base.errors import InputError, describe_no_folder
 ABANDONED_SECONDS = 3600.0
 """Age, in seconds, from which on no running process writes what is temporary."""
 _TEMPORARY = re.compile(r"\..+\.\d+\.\d+\.part")  # names that `atomic_path` gives
-_TEMPORARY_FOLDER = re.compile(r"\.\d+\.\d+\.part")  # names that `atomic_folder` gives
+_TEMPORARY_FOLDER = re.compile(r"\.(\d+)\.\d+\.part")  # names that `atomic_folder` gives
 _LEAST_FREE = 65536  # bytes on a disk below which a file written by another program may be cut off
 
 
@@ -74,22 +74,27 @@ def check_disk(path: Path) -> None:
         raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
 
 
-def check_new_folder(path: Path) -> None:
+def check_new_folder(path: Path, besides: Path | None = None) -> None:
     """Check that a folder is new or empty, but for what killed processes left.
 
+    Args:
+        path: the folder.
+        besides: what may be in it.
     Raises:
         InputError: if it is not.
     """
     if path.exists() and not path.is_dir():
         raise InputError(path, describe_no_folder(path), "a new or empty folder", "choose another place")
-    found = sorted(one.name for one in path.iterdir() if not _is_temporary_folder(one)) if path.is_dir() else []
-    if found:
+    inside = path.iterdir() if path.is_dir() else ()
+    if found := sorted(one.name for one in inside if one != besides and not _is_left_over(one)):
         raise InputError(path, f"the folder is not empty ({found[0]})", "a new or empty folder",
                          "choose another place")
 
 
-def _is_temporary_folder(path: Path) -> bool:
-    return bool(_TEMPORARY_FOLDER.fullmatch(path.name)) and path.is_dir()
+def _is_left_over(path: Path) -> bool:
+    """Tell whether a folder is a temporary one of another process, which may have been killed."""
+    found = _TEMPORARY_FOLDER.fullmatch(path.name)
+    return found is not None and int(found[1]) != os.getpid() and path.is_dir()
 
 
 @contextlib.contextmanager
@@ -110,10 +115,10 @@ def atomic_folder(path: str | os.PathLike) -> Iterator[Path]:
     try:
         temporary.mkdir(parents=True)
         yield temporary
-        check_new_folder(path)
+        check_new_folder(path, temporary)
         for one in sorted(temporary.iterdir()):
             os.replace(one, path / one.name)
-        for left in filter(_is_temporary_folder, list(path.iterdir())):
+        for left in filter(_is_left_over, list(path.iterdir())):
             shutil.rmtree(left, ignore_errors=True)
     except OSError as error:
         problem = f"cannot be written ({error.strerror or error})"

@@ -32,7 +32,7 @@ def test_points_in_the_order_of_their_rows(tmp_path, content, points):
 @pytest.mark.parametrize("content, part", [
     (b"", "the file is empty"),
     (b"\x00\x01", "binary"),
-    (b"\xff\xfex\x00", "binary"),
+    (b"\xff\xfex\x00,", "binary"),
     (b"a,b\n1,2\n", ":1: no column x_m, y_m"),
     (b"0,0\n1,0\n", ":1: no column"),
     (b"x_m|y_m\n0|0\n1|0\n", "separated by bars"),
