@@ -142,13 +142,13 @@ def align_events(
 
 
 def _explain_few(events: Sequence[MatchEvent], half: Half) -> str:
-    """Tell times beyond the period, such as milliseconds, or unknown types, where these leave too few events."""
+    """Tell times beyond the period, such as milliseconds, or types without touch, where these leave too few."""
     latest, end = max(event.time for event in events), half.end - half.clock_zero
     if sum(event.time <= end + MAX_LAG for event in events) < min(_MIN_EVENTS, len(events)):
         return f" (the latest is at {latest:.0f} s, the period ends at {end:.0f} s)"
     others = dict.fromkeys(event.original_text for event in events if event.kind == "other" and event.original_text)
     if others and sum(event.may_be_touch for event in events) < _MIN_EVENTS:
-        return f" (unknown types: {', '.join(others)[:80]})"
+        return f" (types not taken for ball touches: {', '.join(others)[:80]})"
     return ""
 
 

@@ -150,7 +150,7 @@ def test_too_few_events_are_told_and_left():
 
 @pytest.mark.parametrize("change, why", [
     (lambda event: {"time": 1000.0 * event.time}, r" \(the latest is at \d+ s, the period ends at 900 s\); its "),
-    (lambda event: {"kind": "other", "original_text": "zzz"}, r" \(unknown types: zzz\); its events are ignored"),
+    (lambda event: {"kind": "other", "original_text": "zzz"}, r" \(types not taken for ball touches: zzz\); its "),
 ])
 def test_why_there_are_too_few_events_is_told(change, why):
     touches, events, _ = planted()
