@@ -24,6 +24,7 @@ from beyond_mocap.appearance.picture import COLOURS as PART_COLOURS  # noqa: E40
 from beyond_mocap.appearance.picture import fill_faces  # noqa: E402
 from beyond_mocap.base.errors import InputError  # noqa: E402
 from beyond_mocap.base.vectors import unit_vectors  # noqa: E402
+from beyond_mocap.files.atomic import atomic_path  # noqa: E402
 from beyond_mocap.files.bvh import bvh  # noqa: E402
 from beyond_mocap.files.tables import read_ball  # noqa: E402
 from beyond_mocap.motion.motion import Motion, compute_pose, sample_frames  # noqa: E402
@@ -195,7 +196,7 @@ def main(arguments: list[str] | None = None) -> int:
     """Parse the command line and draw."""
     parser = argparse.ArgumentParser(description="A contact sheet of a take, without Blender.")
     parser.add_argument("take", help="BVH that synthesize wrote")
-    parser.add_argument("--out", required=True, help="PNG to write")
+    parser.add_argument("--out", type=Path, required=True, help="PNG to write")
     parser.add_argument("--ball", help="its ball CSV")
     parser.add_argument("--provenance",
                         help="its provenance CSV: marks planted feet (L, R) and transitions (|) in the captions")
@@ -240,8 +241,9 @@ def write_requested_sheet(options) -> None:
         new = [f > 0 and (provenance.clip[f] != provenance.clip[f - 1]
                           or provenance.mirrored[f] != provenance.mirrored[f - 1]) for f in frames]
         labels = [f"{a} {m}{'|' if s else ''}" for a, m, s in zip(labels, marks, new)]
-    write_sheet(motion, frames, options.out, camera=options.camera, side=options.side, ball=ball, labels=labels,
-                columns=options.columns, tile=options.tile, wide=options.wide)
+    with atomic_path(options.out, options.out.suffix) as part:
+        write_sheet(motion, frames, part, camera=options.camera, side=options.side, ball=ball, labels=labels,
+                    columns=options.columns, tile=options.tile, wide=options.wide)
 
 
 if __name__ == "__main__":

@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import os
 
-from ..base.content import read_bytes
+from ..base.content import decode_text, is_utf16, read_bytes
 from ..base.errors import InputError, format_seconds
 from .timeline import AVOID_PREFIX, LONGEST_TIME, NUMBER, KeyMoment, Span, Timeline, format_labels
 
@@ -80,7 +80,7 @@ def format_timeline(timeline: Timeline) -> str:
 
 
 def read_text(path: str | os.PathLike) -> str:
-    """Read a text file, UTF-8 with or without BOM.
+    """Read a text file, UTF-8 with or without BOM, or UTF-16 with one.
 
     Args:
         path: the file.
@@ -90,10 +90,10 @@ def read_text(path: str | os.PathLike) -> str:
         InputError: if it is missing, too large, binary or not UTF-8.
     """
     data = read_bytes(path, "a text file", _LARGEST_FILE)
-    if b"\0" in data:
+    if b"\0" in data and not is_utf16(data):
         raise InputError(path, "binary content", "a text file", "save it as plain UTF-8 text")
     try:
-        return data.decode("utf-8-sig")
+        return decode_text(data)
     except UnicodeDecodeError as error:
         line = data.count(b"\n", 0, error.start) + 1
         raise InputError(f"{path}:{line}", "a byte that is not UTF-8", "UTF-8 text", "save it as UTF-8") from None

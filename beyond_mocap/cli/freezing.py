@@ -62,7 +62,9 @@ def run_freeze_frame(options, reporter: ProgressReporter, writers: Mapping[str, 
     count = write_still(options.out, frame, options.pitch)
     for other in others:
         reporter.show_note(f"also at {other.clock}: {other.kind} of {other.player or other.team}, {other.id}")
-    if not frame.labels:
+    if not any(role.startswith("actor") for role in frame.roles):
+        reporter.show_note("no one of the people is marked as the actor: no player has the event's labels")
+    elif not frame.labels:
         reporter.show_note(f"{frame.kind} says no action: the player stands")
     if options.pitch is not None:
         reporter.show_note("use the same --pitch with match")

@@ -93,6 +93,7 @@ def run_match(options, reporter: ProgressReporter, writers: Mapping[str, Writer]
     """
     from ..match.request import MatchRequest
     from ..match.synthesize_match import read_result, synthesize_match
+    from ..synthesis.search.request import USE_NEAREST
 
     write = choose_scene_writer(options.scene, writers) if options.scene else None
     order = MatchRequest(
@@ -109,7 +110,8 @@ def run_match(options, reporter: ProgressReporter, writers: Mapping[str, Writer]
         result = read_result(order)
     reporter.finish(result.notes)
     for player in result.failed:
-        reporter.show_note(f"player {player.id} was skipped: {player.reason}")
+        reason = player.reason.replace(USE_NEAREST, "leave out --exact")
+        reporter.show_note(f"player {player.id} was skipped: {reason}")
     if not result.finished:
         lacks_labels = {player.exit_status for player in result.failed} == {NotInLibraryError.exit_status}
         error = NotInLibraryError if lacks_labels else BeyondMocapError
@@ -247,11 +249,14 @@ def _read_tracking(options):
     """Read the match, or the track where the file is the project's own table."""
     from ..files.tracking.feed import is_track_csv
     from ..files.tracking.tracking import read_match, read_track_csv
+    from ..motion.track import clean_track
 
     if not options.provider and is_track_csv(options.input):
         if options.meta:
             raise InputError("--meta", f"{options.meta} beside a player's track", "no metadata for a track")
-        return replace(read_track_csv(options.input), name=options.input.stem)  # the player's name in the table
+        track = read_track_csv(options.input)
+        clean_track(track)  # for its errors; touches are solved from the samples as they are
+        return replace(track, name=options.input.stem)  # the player's name in the table
     return read_match(options.input, options.meta, options.provider)
 
 

@@ -18,6 +18,7 @@ from .library import open_library
 from .outputs import ProgressReporter, Writer, add_take_files, check_outputs, choose_writer, locate_errors
 
 LONG_TRACK, WINDOW = 1200.0, 300.0  # s of a track from which on it is done in windows, and of these
+_WINDOW_LIMITS = (24.0, 3600.0)  # s; the first is twice what neighbours share, `match.pieces.units.OVERLAP`
 _FRAME_BYTES = 27e3  # of memory that a frame of a track takes that is not done in windows
 _BASE_BYTES = 1e8  # of memory that any take needs
 _MAX_REPORT_BYTES = 100_000_000  # no report is as large
@@ -46,7 +47,8 @@ def add_synthesize(verbs) -> argparse.ArgumentParser:
     verb.add_argument("--keep-root", action="store_true", help="put the joints that the library's skeleton has above "
                       "the hips in its recordings, such as a root, back above those of OUT")
     verb.add_argument("--window", type=float, metavar="SECONDS",
-                      help="search and construct the track in windows of so many seconds, which takes less memory; "
+                      help="search and construct the track in windows of so many seconds, "
+                           f"{_WINDOW_LIMITS[0]:g} to {_WINDOW_LIMITS[1]:g}, which takes less memory; "
                            f"default: {WINDOW:g} for tracks above {LONG_TRACK / 60.0:g} minutes; 0: never")
     verb.add_argument("--solve-touches", action="store_true", default=True, help="the default; version 0.1 needed it")
     verb.add_argument("--pins", type=parse_path, metavar="P.csv",
@@ -146,6 +148,9 @@ def _choose_window(options, track) -> float:
     if window and not can_be_cut:
         raise InputError("--window", f"method {options.method} to {options.out.suffix}", "method path to .bvh",
                          "leave it out")
+    if window and not _WINDOW_LIMITS[0] <= window <= _WINDOW_LIMITS[1]:
+        raise InputError("--window", f"{window:g} s", f"{_WINDOW_LIMITS[0]:g} to {_WINDOW_LIMITS[1]:g} s, "
+                         "or 0 for the whole track at once")
     if window is None:
         window = WINDOW if can_be_cut and seconds > LONG_TRACK else 0.0
     if not window:

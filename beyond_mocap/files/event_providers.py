@@ -27,6 +27,7 @@ _TABLE_KINDS = {  # event types of plain tables -> kind
     "ball lost": "touch", "ball out": "out", "set piece": "other", "fault received": "foul", "card": "other",
     "header": "pass", "reception": "receive", "throw-in": "pass", "kick": "pass",
 }  # fmt: skip
+_WAY_OUT = "choose the provider, or write a CSV with time_s,type,player"
 _METRICA_SUBTYPES = {"clearance": "clearance", "aerial": "aerial"}
 _HEAD = {"header", "head"}
 
@@ -69,7 +70,7 @@ def detect_event_provider(path: Path) -> EventProvider:
     if found is None:
         problem = "unknown format" if read_head(path).strip() else "the file is empty"
         titles = ", ".join(one.title for one in EVENT_PROVIDERS.values())
-        raise InputError(path, problem, f"events of one of {titles}", "choose the provider")
+        raise InputError(path, problem, f"events of one of {titles}", _WAY_OUT)
     return found
 
 

@@ -27,6 +27,7 @@ from .tracking.match_arrays import USUAL_PITCH
 COLUMNS = ("time_s", "player", "x_m", "y_m", "z_m", "team", "position")
 _FIELD = np.array([120.0, 80.0])  # StatsBomb's units, which stretch to the pitch; y grows to the right of the attack
 _BESIDE, _MOST_OUTSIDE = 10.0, 0.05  # units beside the pitch, and the share of places that may be farther
+_FARTHEST = 10.0 * _FIELD[0]  # units, of any place
 _YARD = 0.9144  # metres, of heights
 _RATE, _SECONDS, EVENT_TIME = 25.0, 4.0, 2.0
 _STEP = 0.45  # metres from a standing player to the ball
@@ -87,7 +88,8 @@ def read_freeze_frames(frames: Path, events: Path) -> list[FreezeFrame]:
     found = [_read_frame(row, by_event[event], f"{frames.name} and {events.name}: event {event[:40]}") for row in rows
              if (event := str(row.get("id"))) in by_event and row.get("location") and by_event[event]["freeze_frame"]]
     _check_places(frames, [frame.places for frame in found])
-    _check_places(events, [frame.ball[None] for frame in found])
+    _check_places(events, [place[None, :2] for frame in found for place in (frame.ball, frame.end)
+                           if place is not None])
     if not found:
         raise InputError(frames, f"no event of {events.name} has a freeze frame", "the events of the same match",
                          "choose the file with its number")
@@ -97,11 +99,12 @@ def read_freeze_frames(frames: Path, events: Path) -> list[FreezeFrame]:
 def _check_places(path: Path, places: list[np.ndarray]) -> None:
     """Check that places are in StatsBomb's units, from a corner of the pitch; some may be beside it."""
     rows = np.concatenate([np.zeros((0, 2)), *places])
-    if np.any((rows < -_BESIDE) | (rows > _FIELD + _BESIDE), axis=1).sum() > _MOST_OUTSIDE * len(rows):
+    outside = np.any((rows < -_BESIDE) | (rows > _FIELD + _BESIDE), axis=1).sum()
+    if outside > _MOST_OUTSIDE * len(rows) or np.any(np.abs(rows) > _FARTHEST):
         low, high = rows.min(axis=0), rows.max(axis=0)
         raise InputError(path, f"places from {low[0]:.4g} to {high[0]:.4g} along and {low[1]:.4g} to {high[1]:.4g} "
-                         "across the pitch", f"StatsBomb's 0 to {_FIELD[0]:g} and 0 to {_FIELD[1]:g}, from a corner",
-                         "convert the places")
+                         "across the pitch", f"StatsBomb's units, 0 to {_FIELD[0]:g} and 0 to {_FIELD[1]:g} from a "
+                         "corner", "convert the places")
 
 
 def _read_list(path: Path, key: str, kind: str) -> list[dict]:
@@ -152,7 +155,8 @@ def _find_labels(event: dict) -> tuple[str, ...]:
 def _to_places(rows: list, counts: Collection[int] = (2,)) -> np.ndarray:
     """Return locations of as many numbers as one of `counts`; ValueError for others."""
     places = np.array(rows, dtype=float)
-    if places.ndim != 2 or places.shape[1] not in counts or not np.all(np.abs(places) < 10.0 * _FIELD[0]):
+    limits = (np.inf, np.inf, _FARTHEST)  # what is far along or across is told with its file
+    if places.ndim != 2 or places.shape[1] not in counts or np.any(~(np.abs(places) < limits[: places.shape[1]])):
         raise ValueError("locations of another size")
     return places
 

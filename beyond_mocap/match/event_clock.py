@@ -127,8 +127,9 @@ def align_events(
         found = _fit_half_clock([events.events[i] for i in members], half_touches, half, span)
         if found is None:
             if members and half_touches:
-                text = "too few events of players who touch the ball to align its clock; its events are ignored"
-                notes.append(f"period {half.number}: {text}")
+                why = _explain_few([events.events[i] for i in members], half)
+                notes.append(f"period {half.number}: too few events of players who touch the ball to align its clock"
+                             f"{why}; its events are ignored")
             continue
         clocks[half.number], times[members] = found
     _check_clocks(events, clocks)
@@ -138,6 +139,17 @@ def align_events(
     pairs = _pair_touches(events.events, times, touches)
     notes += [_describe_clock(number, clock) for number, clock in clocks.items()]
     return AlignedEvents(events=events.events, times=times, touches=pairs, clocks=clocks, notes=tuple(notes))
+
+
+def _explain_few(events: Sequence[MatchEvent], half: Half) -> str:
+    """Tell times beyond the period, such as milliseconds, or types without touch, where these leave too few."""
+    latest, end = max(event.time for event in events), half.end - half.clock_zero
+    if sum(event.time <= end + MAX_LAG for event in events) < min(_MIN_EVENTS, len(events)):
+        return f" (the latest is at {latest:.0f} s, the period ends at {end:.0f} s)"
+    others = dict.fromkeys(event.original_text for event in events if event.kind == "other" and event.original_text)
+    if others and sum(event.may_be_touch for event in events) < _MIN_EVENTS:
+        return f" (types not taken for ball touches: {', '.join(others)[:80]})"
+    return ""
 
 
 def _fit_half_clock(events, touches, half: Half, span) -> tuple[PeriodClock, np.ndarray] | None:

@@ -113,7 +113,8 @@ class MatchRequest:
             if value and self.events is None:
                 raise InputError(option, f"{value}, without an events file", "an events file", "choose the events file")
         if self.events_provider and self.events_provider.lower() not in EVENT_PROVIDERS:
-            raise InputError("events provider", f"{self.events_provider!r}", f"one of {', '.join(EVENT_PROVIDERS)}")
+            raise InputError("events provider", f"{self.events_provider!r}", f"one of {', '.join(EVENT_PROVIDERS)}",
+                             "write others as CSV with time_s,type,player")
 
     def find_pitch(self) -> tuple[float, float] | None:
         """Find the pitch's size, m, for tracking data without it; None: what readers assume of a football pitch."""

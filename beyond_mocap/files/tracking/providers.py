@@ -35,7 +35,8 @@ def find_feed(path: str | os.PathLike, meta: str | os.PathLike | None, provider:
     """
     path, notes = _check_file(path), []
     if provider and provider.lower() not in PROVIDERS:
-        raise InputError("provider", f"{provider.lower()!r}", f"one of {', '.join(PROVIDERS)}")
+        raise InputError("provider", f"{provider.lower()!r}", f"one of {', '.join(PROVIDERS)}",
+                         "write others as a Plain CSV (table)")
     record = PROVIDERS[provider.lower()] if provider else _detect_provider(path, notes)
     if meta:
         second = _check_file(meta, "a metadata file")
@@ -106,7 +107,7 @@ def _detect_provider(path: Path, notes: list[str]) -> TrackingProvider:
                          "use match or bodies for it")
     raise InputError(path, "unknown format", f"one of {titles}, or a CSV of one player with time_s,x_m,y_m; "
                      "a Plain CSV has time_s,player,x_m,y_m",
-                     "choose the provider, or rename the columns")
+                     "choose the provider, rename the columns, or write a Plain CSV")
 
 
 def _find_metadata(path: Path, record: TrackingProvider, notes: list[str]) -> Path:

@@ -200,7 +200,13 @@ def test_all_problems_are_told_in_order():
     assert [str(problem).split(":")[1] for problem in found] == ["2", "1"]
 
 
-@pytest.mark.parametrize("content", [b"\x00\x01\x02", b"0 1 w\xe4lking"])
+@pytest.mark.parametrize("encoding", ["utf-8", "utf-8-sig", "utf-16"])
+def test_files_are_utf_8_or_have_a_byte_order_mark(tmp_path, encoding):
+    (tmp_path / "a.txt").write_text("0 1 walking\r\n", encoding)
+    assert read_timeline(tmp_path / "a.txt") == parse_timeline("0 1 walking\n")
+
+
+@pytest.mark.parametrize("content", [b"\x00\x01\x02", b"\xff\xfe0", b"0 1 w\xe4lking"])
 def test_files_that_are_no_text_are_refused(tmp_path, content):
     file = tmp_path / "a.txt"
     file.write_bytes(content)

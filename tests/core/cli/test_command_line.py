@@ -500,6 +500,15 @@ def test_touches_are_solved_unless_that_is_refused(synthesize, match, tmp_path, 
     assert keys[1] == keys[2]
 
 
+def test_touches_of_a_track_in_centimetres_are_refused_as_the_track_is(run, match, tmp_path):
+    head, *rows = (match / "track.csv").read_text().splitlines()
+    cells = [row.split(",") for row in rows]
+    text = "\n".join([head, *(",".join([row[0], *(f"{100.0 * float(v)}" for v in row[1:])]) for row in cells)])
+    (tmp_path / "cm.csv").write_text(text)
+    assert_told(run("touches", tmp_path / "cm.csv", "--out", tmp_path / "t.csv"), 2,
+                "cm.csv: positions look like centimetres")
+
+
 def test_mirrors_can_be_forbidden(synthesize, tmp_path):
     (tmp_path / "left.txt").write_text("3 kick left\n")
     assert_told(synthesize("--no-mirror", annotations=tmp_path / "left.txt"), 3, "kick")

@@ -126,7 +126,7 @@ def test_the_plain_table_gets_the_match_s_players_and_periods(tmp_path):
 
 @pytest.mark.parametrize("text, part", [
     ("", "the file is empty"),
-    ("hello\n", "unknown format"),
+    ("hello\n", "choose the provider, or write a CSV with time_s,type,player"),
     ("time_s,type\n1,pass\n", "no column player"),
     ("time_s,type,player\n", "no events"),
     ("time_s,type,player\nx,pass,home_7\n", ":2: time_s 'x'"),

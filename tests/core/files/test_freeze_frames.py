@@ -63,6 +63,13 @@ def test_the_labels_make_the_player_kick(write, tmp_path):
     assert [player["status"] for player in state["players"]] == ["done"] and state["notes"] == []
 
 
+def test_a_frame_without_its_actor_is_told(write, tmp_path, capsys):
+    pictures = [{"event_uuid": "aa-1", "freeze_frame": PEOPLE[1:]}]
+    assert main([*write(pictures=pictures), "--event", "aa-1", "--out", str(tmp_path / "still")]) == 0
+    assert "note: no one of the people is marked as the actor" in capsys.readouterr().err
+    assert not list((tmp_path / "still" / "labels").iterdir())
+
+
 def test_headers_fly_and_all_moments_are_listed(write, tmp_path, capsys):
     order = write()
     assert main(order) == 0
@@ -95,6 +102,9 @@ def test_each_person_has_a_name_of_their_own(write, tmp_path):
     ({"pictures": f"[{'1' * 5000}]"}, [], "a number of thousands of digits"), ({"pictures": ""}, [], "is empty"),
     ({"pictures": [{"event_uuid": "aa-1", "freeze_frame": [{**one, "location": [one["location"][0] - 100.0, 4.0]}
                                                            for one in PEOPLE]}]}, [], "from -40 to 18 along"),
+    ({"pictures": [{"event_uuid": "aa-1", "freeze_frame": [{**one, "location": [100.0 * v for v in one["location"]]}
+                                                           for one in PEOPLE]}]}, [],
+     "places from 6000 to 1.18e+04 along and 1000 to 4100 across the pitch; expected StatsBomb's units, 0 to 120"),
     ({"events": ({**PASS, "location": [-50.0, -20.0]},)}, [], "events.json: places from -50"),
     ({"events": ({key: value for key, value in PASS.items() if key != "minute"},)}, [], "event aa-1: no 'minute'"),
     ({"pictures": [{"event_uuid": "aa-1", "freeze_frame": [{"location": [60.0, 40.0, 1.0]}]}]}, ["--event", "aa-1"],

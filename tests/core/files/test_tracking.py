@@ -248,12 +248,12 @@ def test_wrong_files_get_one_line(tmp_path):
     (tmp_path / "lonely.dat").write_bytes(file.read_bytes())
     cases = [
         ((tmp_path / "none.dat",), "no such file"),
-        ((tmp_path / "odd.txt",), "unknown format"),
+        ((tmp_path / "odd.txt",), "choose the provider, rename the columns, or write a Plain CSV"),
         ((tmp_path / "joints.csv",), "joints.csv: skeletal tracking; expected positions of players and ball"),
         ((file, tmp_path / "bad_meta.xml"), "not readable as TRACAB"),
         ((file, tmp_path / "odd.txt"), "odd.txt: neither XML nor JSON; expected the metadata of TRACAB"),
         ((file, None, "metrica"), "not readable as Metrica tracking; expected"),
-        ((file, None, "fifa"), "one of tracab"),
+        ((file, None, "scisports"), "; write others as a Plain CSV (table)"),
         ((tmp_path / "lonely.dat",), "choose the metadata file"),
         ((file, tmp_path / "none.xml"), "no such file"),
     ]

@@ -1,5 +1,7 @@
 """Events on the tracking's clock: planted lags, drifts, scatter, missing and strange events."""
 
+import re
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -140,9 +142,20 @@ def test_too_few_events_are_told_and_left():
     few = MatchEvents(events.events[:4], "made")
     found = align_events(few, touches, HALVES)
     assert not found.clocks and "too few" in found.notes[0] and (found.touches == -1).all()
+    assert "(" not in found.notes[0]
     short = align_events(events, [touch for touch in touches if 300.0 < touch.time < 305.0], HALVES, (300.0, 305.0))
     assert not short.clocks and (short.touches == -1).all()
     assert align_events(MatchEvents((), "made"), touches, HALVES).touches.size == 0
+
+
+@pytest.mark.parametrize("change, why", [
+    (lambda event: {"time": 1000.0 * event.time}, r" \(the latest is at \d+ s, the period ends at 900 s\); its "),
+    (lambda event: {"kind": "other", "original_text": "zzz"}, r" \(types not taken for ball touches: zzz\); its "),
+])
+def test_why_there_are_too_few_events_is_told(change, why):
+    touches, events, _ = planted()
+    changed = tuple(replace(event, **change(event)) for event in events.events if event.period == 1)
+    assert re.search(why, align_events(MatchEvents(changed, "made"), touches, HALVES).notes[0])
 
 
 def test_events_of_nobody_and_of_periods_that_are_missing_keep_no_touch():

@@ -13,6 +13,7 @@ from beyond_mocap.files.bvh import bvh
 from beyond_mocap.library.features import compute_max_jerk
 from beyond_mocap.match import long_player
 from beyond_mocap.match.long_player import iter_parts, search_long_player
+from beyond_mocap.match.pieces.units import OVERLAP
 from beyond_mocap.motion.motion import concatenate_motions, forward_kinematics
 from beyond_mocap.motion.track import Track
 from beyond_mocap.synthesis.plan import Plan
@@ -78,6 +79,15 @@ def test_the_command_checks_memory_before_the_search(clips_folder, tmp_path, mon
     error = capsys.readouterr().err
     assert status == 2 and error.count("\n") == 1 and "use --window" in error
     assert not (tmp_path / "o.bvh").exists()
+
+
+@pytest.mark.parametrize("window", ["20", "1", "-5", "nan", "4000"])
+def test_windows_outside_their_limits_are_told_by_their_option(tmp_path, capsys, window):
+    (tmp_path / "t.csv").write_text("time_s,x_m,y_m\n" + "".join(f"{0.2 * i},{0.3 * i},0\n" for i in range(100)))
+    assert main(["synthesize", "--library", str(tmp_path), "--track", str(tmp_path / "t.csv"), "--window", window,
+                 "--out", str(tmp_path / "o.bvh")]) == 2
+    assert capsys.readouterr().err == (f"beyond-mocap: --window: {window} s; expected {2 * OVERLAP:g} to 3600 s, or 0 "
+                                       "for the whole track at once\n")
 
 
 def test_the_command_in_windows_writes_all_files(clips_folder, tmp_path, capsys):

@@ -57,4 +57,5 @@ def test_without_pillow_one_line_says_what_to_do(look, tmp_path, capsys, monkeyp
 def test_bad_input_is_told_in_one_line(look, tmp_path, capsys):
     assert look.main([str(tmp_path / "none.bvh"), "--out", str(tmp_path / "sheet.png")]) == 2
     assert look.main([str(TAKE), "--out", str(tmp_path / "sheet.png"), "--from", "900"]) == 2
-    assert capsys.readouterr().err.count("\n") == 2
+    assert look.main([str(TAKE), "--out", str(tmp_path / "none" / "sheet.png")]) == 2
+    assert capsys.readouterr().err.count("\n") == 3
