@@ -155,7 +155,7 @@ def _find_labels(event: dict) -> tuple[str, ...]:
 def _to_places(rows: list, counts: Collection[int] = (2,)) -> np.ndarray:
     """Return locations of as many numbers as one of `counts`; ValueError for others."""
     places = np.array(rows, dtype=float)
-    limits = (np.inf, np.inf, _FARTHEST)  # what is far along or across is told with its file
+    limits = (np.inf, np.inf, _FARTHEST)  # what is far along or across is refused with its file
     if places.ndim != 2 or places.shape[1] not in counts or np.any(~(np.abs(places) < limits[: places.shape[1]])):
         raise ValueError("locations of another size")
     return places
