@@ -6,6 +6,7 @@ import argparse
 import csv
 import io
 from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
 
 from ..base.errors import InputError, format_count
@@ -65,6 +66,7 @@ def run_compare(options, reporter: ProgressReporter, writers: Mapping[str, Write
     check_labels(scenarios, library.labels)
     comparison = compare_methods(library, scenarios, methods, _FPS, progress=reporter.show_progress,
                                  cancelled=reporter.is_cancelled)
+    comparison = replace(comparison, notes=notes)
     write_comparison(comparison, options.out)
     if options.takes is not None:
         write_takes(comparison, options.takes)

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ...annotation import Timeline
 from ...base.errors import InputError, UserCancelledError
 from ...library.library import Library
 from ...synthesis.plan import METHODS, Plan
@@ -57,6 +58,7 @@ class MethodComparison:
         scenarios: in the order of their names.
         methods: in the order in which they were asked for.
         results: (scenario's name, method) -> what came out.
+        notes: lines on the scenarios, such as which have no labels.
     """
 
     library: str
@@ -65,6 +67,7 @@ class MethodComparison:
     scenarios: Sequence[Scenario]
     methods: Sequence[str]
     results: Mapping[tuple[str, str], MethodResult]
+    notes: Sequence[str] = ()
 
     def collect(self, method: str, read: Callable[[MethodResult], float | None]) -> np.ndarray:
         """Collect a figure of a method for each scenario, NaN where it is unknown."""
@@ -124,23 +127,32 @@ def compare_methods(
             synthesize(library, plan, cancelled=cancelled)
         started = time.process_time()
         take = synthesize(library, plan, cancelled=cancelled)
-        results[scenario.name, method] = measure_take(take, library, time.process_time() - started)
+        seconds = time.process_time() - started
+        results[scenario.name, method] = measure_take(take, library, scenario.timeline, seconds)
     recorded = [clip for clip in library.clips if not clip.mirrored]
     return MethodComparison(library=library.folder, clips=len(recorded), minutes=library.minutes, scenarios=scenarios,
                             methods=methods, results=results)
 
 
-def measure_take(take: Take, library: Library, seconds: float) -> MethodResult:
+def measure_take(take: Take, library: Library, timeline: Timeline, seconds: float) -> MethodResult:
     """Measure a take.
+
+    Beside the labels that the method was asked for, `asked` measures those of the scenario alone: automatic locomotion
+    differs by method, since only "path" takes its gaits from the clips' labels.
 
     Args:
         take: the take.
         library: its clips.
+        timeline: the scenario's own labels, not filled.
         seconds: processor time of its synthesis.
     """
     played = playback_from_take(take)
     view = View(played, take.plan.track, take.timeline, library)
+    labels = figures.list_requested_labels(timeline, played.times, view.moments)
+    asked = figures.measure_similarity(labels, played.words)
+    similarity = {**figures.measure_annotation_similarity(view),
+                  "asked": float(np.nanmean(asked)) if np.isfinite(asked).any() else np.nan}
     groups = {**figures.measure_path_errors(view), **figures.measure_feet(view), **figures.measure_transitions(view),
-              "annotation_similarity": figures.measure_annotation_similarity(view)}
+              "annotation_similarity": similarity}
     curve = measure_smoothness(played.motion.skeleton, played.positions, view.fps)
     return MethodResult(take=take, figures=groups, times=played.times[1:], smoothness=curve, seconds=seconds)

@@ -94,6 +94,7 @@ def build_comparison_report(comparison: MethodComparison) -> Mapping:
         "methods": list(comparison.methods),
         "thesis": {scenario.name: vars(scenario.thesis) for scenario in comparison.scenarios if scenario.thesis},
         "differences": describe_differences(comparison), "handicaps": describe_handicaps(comparison),
+        "notes": list(comparison.notes),
         "takes": takes,
     })  # fmt: skip
 

@@ -31,7 +31,7 @@ def write_track(path, speed, turn_rate=0.0):
 def folder(tmp_path_factory):
     place = tmp_path_factory.mktemp("scenarios")
     write_track(place / "scenario1_track.csv", 1.4)
-    (place / "scenario1_annotations.txt").write_text("2 kick right\n")
+    (place / "scenario1_annotations.txt").write_text("0 1 walking\n2 kick right\n")
     write_track(place / "turn.csv", 2.6, 0.3)
     (place / "events.csv").write_text("time,event\n1,kick\n")
     return place
@@ -63,6 +63,26 @@ def test_the_tables_have_the_figures_of_the_reports(comparison):
         assert row[0] == method and [cell.split(" / ")[0] for cell in row[1:]] == [
             f"{value:.2f}" for value in (*off, np.mean(off))]  # fmt: skip
     assert all(row[2].split(" / ")[1].startswith("–") for row in similarity.rows)  # no key moment in "turn"
+
+
+def test_all_methods_are_measured_by_the_labels_of_the_scenario_alone(comparison):
+    _, found = comparison
+    for method in METHODS:
+        result = found.results["scenario1", method]
+        first = result.take.words[:30]  # up to 1 s
+        met = np.mean(["walking" in words for words in first])
+        assert result.figures["annotation_similarity"]["asked"] == pytest.approx(1.0 - 2.0 * met)
+    similarity = build_tables(found)[1]
+    assert all(row[2].endswith("(– / –)") for row in similarity.rows)  # "turn" asks for nothing
+
+
+def test_what_is_noted_of_scenarios_is_in_every_report(comparison):
+    pytest.importorskip("matplotlib")
+    _, found = comparison
+    noted = replace(found, notes=["turn.csv: no labels beside it"])
+    assert build_comparison_report(noted)["notes"] == ["turn.csv: no labels beside it"]
+    for text in ("\n".join(format_markdown(noted)), build_comparison_page(noted)):
+        assert "turn.csv: no labels beside it" in text
 
 
 def test_what_is_said_follows_from_the_figures(comparison):
