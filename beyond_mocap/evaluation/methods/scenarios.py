@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import csv
 import hashlib
 import re
 from collections.abc import Iterable
@@ -11,6 +10,7 @@ from pathlib import Path
 
 from ...annotation import Timeline, check_timeline, read_timeline
 from ...annotation.label_candidates import find_track_labels
+from ...base.content import is_utf16
 from ...base.errors import InputError, describe_no_folder
 from ...files.tracking.tracking import read_track_csv
 from ...motion.track import Track, clean_track
@@ -94,14 +94,12 @@ def check_labels(scenarios: Iterable[Scenario], known_labels: Iterable[str]) -> 
 
 
 def _is_track(path: Path) -> bool:
-    """Return whether a table's first row has the columns of a track."""
+    """Return whether a table's first row names the columns of a track; with other separators, its reader says so."""
     with path.open("rb") as file:
-        head = file.read(_HEAD_BYTES).decode("utf-8-sig", "replace").replace("\0", "")
-    try:
-        first = next(csv.reader([re.split("[\r\n]", head, maxsplit=1)[0]]), [])
-    except csv.Error:
-        return False
-    return {"time_s", "x_m", "y_m"} <= {name.strip() for name in first}
+        data = file.read(_HEAD_BYTES)
+    head = data.decode("utf-16" if is_utf16(data) else "utf-8-sig", "replace")
+    names = re.split("[,;\t]", re.split("[\r\n]", head, maxsplit=1)[0])
+    return {"time_s", "x_m", "y_m"} <= {name.strip(' "') for name in names}
 
 
 def _read_scenario(path: Path, fps: float, notes: list[str]) -> Scenario:

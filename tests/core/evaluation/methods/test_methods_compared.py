@@ -127,12 +127,20 @@ def test_methods_that_nobody_has_are_refused(text, found):
 def test_odd_tables_are_no_tracks_and_two_tracks_are_not_one_scenario(tmp_path):
     write_track(tmp_path / "run.CSV", 3.0)
     (tmp_path / "old.csv").write_text("time_s,x_m,y_m\n0,0,0\n0.1,1,0\n".replace("\n", "\r"), newline="")
-    (tmp_path / "wide.csv").write_bytes("time_s,x_m,y_m\n0,0,0\n".encode("utf-16"))
+    (tmp_path / "wide.csv").write_bytes((tmp_path / "run.CSV").read_text().encode("utf-16"))
+    (tmp_path / "bytes.csv").write_bytes(b"\xff\xfet\x00i")
     (tmp_path / "folder.csv").mkdir()
     scenarios, notes = read_scenarios(tmp_path, 30.0)
-    assert "run" in [scenario.name for scenario in scenarios] and any("wide.csv: not a track" in line for line in notes)
+    assert {"run", "wide"} <= {scenario.name for scenario in scenarios}
+    assert any("bytes.csv: not a track" in line for line in notes)
     write_track(tmp_path / "run_track.csv", 2.0)
     with pytest.raises(InputError, match="run_track.csv: has the name of run.CSV"):
+        read_scenarios(tmp_path, 30.0)
+
+
+def test_a_track_with_semicolons_is_no_table_that_is_left_out(tmp_path):
+    (tmp_path / "run.csv").write_text("time_s;x_m;y_m\n0;0;0\n")
+    with pytest.raises(InputError, match="run.csv:1: .*semicolons"):
         read_scenarios(tmp_path, 30.0)
 
 
