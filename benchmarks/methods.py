@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import tempfile
+from itertools import takewhile
 from pathlib import Path
 
 from benchmarks.places import DATA, LIBRARIES, SAMPLE, library_folder
@@ -37,4 +38,6 @@ def compare_folder(title: str, library: Path, scenarios: Path, unit: float | Non
     with tempfile.TemporaryDirectory() as cache:
         clips = build_library(library, unit=unit, cache_dir=Path(cache))
         comparison = compare_methods(clips, read_scenarios(scenarios, FPS)[0], list(METHOD_OPTIONS), FPS)
-    return [f"### {title}", "", *format_markdown(comparison, level=4)]
+    lines = format_markdown(comparison, level=4)
+    # the warnings of every take, the last section, are too many for a page of results
+    return [f"### {title}", "", *takewhile(lambda line: line != "#### Warnings", lines)]
