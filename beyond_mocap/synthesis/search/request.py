@@ -375,3 +375,12 @@ def compute_needed_frames(library: Library, key: Key) -> tuple[float, float]:
 def library_frame(library: Library, key: Key) -> float:
     """Return a key's place among the library's frames (fractional)."""
     return float(library.frames.first[key.clip] + key.frame * library.fps / library.clips[key.clip].motion.fps)
+
+
+def name_clip_key(library: Library, key: Key) -> Key:
+    """Name a key moment by all that what is measured around it depends on, besides its clip.
+
+    The same clip has other frame numbers in other libraries. Half frames are rounded to even ones, so it matters
+    whether the number of its first frame is even.
+    """
+    return replace(key, clip=int(library.frames.first[key.clip]) % 2)

@@ -10,15 +10,17 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from weakref import WeakKeyDictionary
 
 import numpy as np
 
 from ...base.time_series import find_runs
+from ...library.clip import Clip
 from ...library.keys import Key
 from ...library.library import Library
 from .candidate_index import SLOT
 from .foot_drag import list_slot_ranges
-from .request import RequestedKey, SearchRequest, compute_needed_frames, library_frame
+from .request import RequestedKey, SearchRequest, compute_needed_frames, library_frame, name_clip_key
 
 KEY_PLAYBACK_RATES = np.array([0.8, 0.9, 1.0, 1.12, 1.25])  # rates at which a key moment's clip may be played
 MIN_SLOT = 6  # frames of the shortest slot beside an extra edge
@@ -158,13 +160,23 @@ def list_playback_rates(library: Library, key: RequestedKey, option: Key) -> Seq
     Returns:
         The rates; one alone is that of the swing too.
     """
+    known, name = _off_feet.setdefault(library.clips[option.clip], {}), name_clip_key(library, option)
+    if name not in known:
+        known[name] = _is_off_feet(library, option)
+    return (1.0,) if known[name] else key.rates or KEY_PLAYBACK_RATES
+
+
+_off_feet: WeakKeyDictionary[Clip, dict[Key, bool]] = WeakKeyDictionary()
+"""Whether clips are off their feet around their key moments."""
+
+
+def _is_off_feet(library: Library, option: Key) -> bool:
+    """Return whether the body is in the air, falls or slides around a key moment."""
     reach = int(_OFF_FEET_WITHIN * library.fps)
     at, first = library_frame(library, option), library.frames.first[option.clip]
     low, high = np.clip([round(at) - reach, round(at) + reach], first, first + library.frames.count[option.clip] - 1)
     off = find_runs(~library.feet_in_contact[low : high + 1].any(axis=1))
-    if any(b - a >= _OFF_FEET_SECONDS * library.fps for a, b in off):
-        return (1.0,)
-    return key.rates or KEY_PLAYBACK_RATES
+    return any(b - a >= _OFF_FEET_SECONDS * library.fps for a, b in off)
 
 
 def find_slot(edges: np.ndarray, frame: float) -> int:
