@@ -29,6 +29,7 @@ from ..motion.motion import compute_pose, forward_kinematics, sample_frames
 from ..motion.track import smooth_zero_phase_hann
 from .cache import write_synthetic_clips
 from .clip import KICK_PREFIX, SYNTHETIC_FOLDER, SYNTHETIC_FPS, Clip
+from .clip_file import load_clip, save_clip
 from .features import SMOOTH_SECONDS
 from .keys import Key, select_keys
 from .library import Library
@@ -305,10 +306,14 @@ def _find_clips(library: Library, path: str) -> tuple[Clip, Clip]:
     known = _clips.setdefault(library, {})
     if path not in known:
         _make_room(known, _KEPT_CLIPS)
-        clip = _build_clip(library, path)
+        _parse_path(path)  # no file is opened for a name that is no action's
+        clip = library.cache_location and load_clip(*library.cache_location, library.skeleton, path)
+        if not clip:
+            clip = _build_clip(library, path)
+            if library.cache_location:  # over files of another version of the program
+                write_synthetic_clips(library.cache_location[0], [clip])
+                save_clip(*library.cache_location, clip)
         known[path] = clip, clip.build_twin()
-        if library.cache_location:  # over a file of another version of the program
-            write_synthetic_clips(library.cache_location[0], known[path])
     return known[path]
 
 

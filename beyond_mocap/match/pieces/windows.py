@@ -15,6 +15,7 @@ from pathlib import Path
 import numpy as np
 
 from ...base.errors import InputError, TimedMessage, line_spans
+from ...files.piece_file import read_piece_file, write_piece_file
 from ...library.automatic_locomotion import apply_chosen_gaits
 from ...library.features import FPS
 from ...library.library import Library
@@ -28,7 +29,6 @@ from ...synthesis.search.path_search import PathSearch
 from ...synthesis.search.request import build_request
 from ...synthesis.search.slots import MIN_KEY_MARGIN
 from ...synthesis.search_library import find_plan_actions
-from ..piece_file import read_piece_file, write_piece_file
 from ..player_edit import WINDOW_SECONDS, PlayerEdit, Stretch, to_stored_plan
 from .named_edit import (
     CONTINUITY_TOLERANCE,
