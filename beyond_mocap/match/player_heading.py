@@ -6,7 +6,7 @@ from dataclasses import replace
 
 from ..library.library import Library
 from ..synthesis.heading_path import HeadingPath
-from ..synthesis.heading_plan import HeadingKey, Play
+from ..synthesis.heading_request import HeadingKey, Play
 from ..synthesis.plan import Plan
 from ..synthesis.resolve_plan import resolve_plan
 

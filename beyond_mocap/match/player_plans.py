@@ -14,7 +14,7 @@ from ..ball.tracked.solve import SolvedBall
 from ..base.errors import InputError, describe_no_folder, format_seconds
 from ..library.library import Library
 from ..synthesis.heading_path import HeadingPath
-from ..synthesis.heading_plan import Play
+from ..synthesis.heading_request import Play
 from ..synthesis.known_body import cut_bodies
 from ..synthesis.plan import Plan, SolvedTrajectory
 from ..synthesis.resolved_touches import build_trajectory, sample_solved_ball

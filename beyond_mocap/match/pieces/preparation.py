@@ -11,7 +11,7 @@ import numpy as np
 
 from ...base.errors import BeyondMocapError
 from ...synthesis.heading_path import HeadingPath
-from ...synthesis.heading_plan import Play
+from ...synthesis.heading_request import Play
 from ...synthesis.plan import Plan
 from ..crowd.spacing import solve_episode
 from ..player_heading import plan_player_heading

@@ -23,8 +23,9 @@ from ...library.missing_actions import add_actions
 from ...synthesis.one_thread import limit_to_one_thread
 from ...synthesis.plan import Plan, ResolvedPlan
 from ...synthesis.resolve_plan import resolve_plan
+from ...synthesis.search.cost_weights import balance_weights
 from ...synthesis.search.distance import align_keys
-from ...synthesis.search.path_costs import PathCosts, balance_weights
+from ...synthesis.search.path_costs import PathCosts
 from ...synthesis.search.path_search import PathSearch
 from ...synthesis.search.request import build_request
 from ...synthesis.search.slots import MIN_KEY_MARGIN
@@ -237,7 +238,7 @@ def _compute_joint_costs(library: Library, plan: Plan, before: Piece, after: Pie
     step = np.gradient(left_edit.frame)
     step[np.append(left_edit.transitions, left_edit.transitions - 1)] = 1.0
     # The cut goes from the frame after each left one to the frame the other window has there.
-    terms = costs.iter_cut_terms(left_edit.frame[:-1] + step[:-1], entered_edit.frame[1:])
+    terms = costs.cuts.iter_cut_terms(left_edit.frame[:-1] + step[:-1], entered_edit.frame[1:])
     cost = np.diagonal(sum(values for _, values in terms)).copy()
     at = np.arange(1, high - low)
     for seam in (*left_edit.transitions, *entered_edit.transitions):

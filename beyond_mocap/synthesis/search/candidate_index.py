@@ -173,6 +173,10 @@ class CandidateIndex:
         """(K,) int, ascending: the place of each pair of `by_speed` by speed, among equals by playback rate."""
         return _order_by_speed(self.pairs_by_speed())
 
+    def round_frame(self, frame: np.ndarray) -> np.ndarray:
+        """Round to the nearest whole library frames."""
+        return np.minimum(np.maximum(np.rint(frame).astype(int), 0), len(self.frames) - 1)
+
     def build_pairs(self, number: np.ndarray, frame: np.ndarray) -> RatePairs:
         """Build the pairs of PLAYBACK_RATES[number (K,)] and library frame (K,)."""
         played = self.speed[number, frame], self.turn[number, frame]

@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from beyond_mocap.synthesis.search.candidate_index import PLAYBACK_RATES, SLOT, STRIKE_COST
-from beyond_mocap.synthesis.search.path_costs import PathCosts, Weights
+from beyond_mocap.synthesis.search.cost_weights import Weights
+from beyond_mocap.synthesis.search.path_costs import PathCosts
 
 NORMAL = int(np.flatnonzero(PLAYBACK_RATES == 1.0)[0])
 NONE = Weights(**{name: 0.0 for name in vars(Weights())})
