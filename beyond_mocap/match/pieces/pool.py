@@ -116,8 +116,9 @@ def start_workers(config: WorkerConfig, work: Work, arguments: tuple) -> None:
     """
     if config.workers > 1 and not config.scheduler:
         workers = _Processes(config.workers)
-        for _ in range(config.workers):
-            workers.submit(work, arguments)
+        with contextlib.suppress(BrokenExecutor):  # the first piece that is waited for starts them again
+            for _ in range(config.workers):
+                workers.submit(work, arguments)
 
 
 def run_tasks(

@@ -33,7 +33,7 @@ RESTING_SPEED = 0.15  # m/s of a track from which on a lifted foot costs nothing
 
 def find_cheapest(
     cost_of: Callable[[slice], np.ndarray], speeds: np.ndarray, speed: float, weight: float, *, considered: int,
-    count: int, most: float = np.inf,
+    count: int, most: float = np.inf, square_weight: float = 0.0,
 ) -> tuple[np.ndarray, np.ndarray]:
     """Find the `count` cheapest of the `considered` pairs nearest to a speed.
 
@@ -43,16 +43,20 @@ def find_cheapest(
         cost_of: returns the costs (n,) of a slice of the pairs.
         speeds: (K,) m/s of the pairs, ascending.
         speed: m/s that is requested.
-        weight: least cost of a metre per second of missed speed.
+        weight: least cost of a metre per second of missed speed, beyond what is free.
         considered: how many pairs are considered.
         count: how many are returned.
         most: highest cost of a pair that is returned.
+        square_weight: least cost of the square of the missed speed, beside that.
     Returns:
         Their numbers (k,), ascending, and costs (k,).
     """
     near = _nearest_slice(speeds, speed, considered)
     if weight > 0.0 and np.isfinite(most):  # the missed speed alone costs more than that elsewhere
-        reach = most / weight + FREE_SPEED[0] + FREE_SPEED[1] * speed + _ROUNDING
+        free = FREE_SPEED[0] + FREE_SPEED[1] * speed
+        # the larger root of square_weight reach^2 + weight (reach - free) = most, in a form that holds without a square
+        highest = most + weight * free
+        reach = 2.0 * highest / (weight + np.sqrt(weight**2 + 4.0 * square_weight * highest)) + _ROUNDING
         low, high = _locate_speeds(speeds, [speed - reach, speed + reach])
         near = slice(max(int(low), near.start), max(min(int(high), near.stop), near.start))
     cost = cost_of(near)
@@ -172,7 +176,7 @@ class PathCosts:
             return _sum_terms(self._iter_motion_costs(first, end, part_pairs)) + fixed_cost.take(part_pairs.frame)
 
         best, cost = find_cheapest(cost_of, pairs.speed, speed, self.weights.speed, considered=considered, count=count,
-                                   most=most)
+                                   most=most, square_weight=self.weights.slide)
         return pairs.number[best], pairs.frame[best], cost
 
     def list_asked_labels(self, first: int, end: int) -> frozenset[str]:

@@ -105,7 +105,8 @@ class PathSearch:
         self.pieces = build_key_pieces(library, request, self.edges)
         self.swing_rates = np.ones(len(self.pieces.number))
         self.choice_cost = weights.strike * self._compute_choice_costs()
-        self._closed_slots = {find_slot(self.edges, request.keys[number].frame) for number in self.pieces.number}
+        self._closed_slots = {find_slot(self.edges, request.keys[number].frame)
+                              for number in np.unique(self.pieces.number)}
         self.width = SearchWidth()
         self.hurried_from: int | None = None
         self._report = progress or (lambda fraction, text: None)

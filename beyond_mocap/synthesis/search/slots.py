@@ -8,6 +8,7 @@ that neither crosses.
 
 from __future__ import annotations
 
+from bisect import bisect_left, bisect_right
 from collections.abc import Sequence
 from dataclasses import dataclass
 from weakref import WeakKeyDictionary
@@ -132,17 +133,17 @@ def _build_pieces(library: Library, request: SearchRequest, edges: np.ndarray, n
         Rows in the order of the fields of `KeyPieces`.
     """
     key = request.keys[number]
-    here = find_slot(edges, key.frame)
+    here, known_edges = find_slot(edges, key.frame), edges.tolist()  # numbers of Python, which one by one cost less
     rows = []
     for choice, option in enumerate(key.choices):
         entry, leave = np.maximum(compute_needed_frames(library, option), MIN_KEY_MARGIN)
         for rate in list_playback_rates(library, key, option):
             # the last edge before the entry and the first one after the exit, both a little trimmed
-            first = int(np.searchsorted(edges, key.frame - entry / rate + _TRIMMED, side="right")) - 1
-            end = int(np.searchsorted(edges, key.frame + leave / rate - _TRIMMED))
-            first, end = int(np.clip(first, low, here)), int(np.clip(end, here + 1, high))
+            first = bisect_right(known_edges, key.frame - entry / rate + _TRIMMED) - 1
+            end = bisect_left(known_edges, key.frame + leave / rate - _TRIMMED)
+            first, end = min(max(first, low), here), min(max(end, here + 1), high)
             around = MIN_KEY_MARGIN / rate - _TRIMMED
-            for a, b in list_slot_ranges(library, request, edges, at=key.frame, key=option, rate=rate,
+            for a, b in list_slot_ranges(library, request, known_edges, at=key.frame, key=option, rate=rate,
                                          slots=(first, end), around=around):
                 # so that the key frame is played at exactly key.frame
                 start = library_frame(library, option) - rate * (key.frame - edges[a])
