@@ -27,9 +27,9 @@ from ..base.time_series import find_equal_runs
 from ..motion import contacts
 from ..motion.motion import compute_pose, forward_kinematics, sample_frames
 from ..motion.track import smooth_zero_phase_hann
+from .actions.clip_file import load_clip, save_clip
 from .cache import write_synthetic_clips
 from .clip import KICK_PREFIX, SYNTHETIC_FOLDER, SYNTHETIC_FPS, Clip
-from .clip_file import load_clip, save_clip
 from .features import SMOOTH_SECONDS
 from .keys import Key, select_keys
 from .library import Library
@@ -307,14 +307,22 @@ def _find_clips(library: Library, path: str) -> tuple[Clip, Clip]:
     if path not in known:
         _make_room(known, _KEPT_CLIPS)
         _parse_path(path)  # no file is opened for a name that is no action's
-        clip = library.cache_location and load_clip(*library.cache_location, library.skeleton, path)
-        if not clip:
-            clip = _build_clip(library, path)
-            if library.cache_location:  # over files of another version of the program
-                write_synthetic_clips(library.cache_location[0], [clip])
-                save_clip(*library.cache_location, clip)
+        clip = _load_clip(library, path) or _build_clip(library, path)
         known[path] = clip, clip.build_twin()
     return known[path]
+
+
+def _load_clip(library: Library, path: str) -> Clip | None:
+    """Load a clip that an earlier process has built, or build it for later ones; None for a library without a cache."""
+    if not library.cache_location:
+        return None
+    place, key = library.cache_location
+    known = load_clip(place, key, library.skeleton, path)
+    clip = known or _build_clip(library, path)
+    write_synthetic_clips(place, [clip], missing_only=known is not None)  # over a file of another version
+    if known is None:
+        save_clip(place, key, clip)
+    return clip
 
 
 def _make_room(kept: dict, most: int) -> None:

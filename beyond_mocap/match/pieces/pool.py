@@ -105,7 +105,7 @@ def check_workers(config: WorkerConfig) -> None:
 
 
 def start_workers(config: WorkerConfig, work: Work, arguments: tuple) -> None:
-    """Start the processes of this machine, each with a piece of work whose result nobody waits for.
+    """Start the processes of this machine, each with a piece of work whose result is not needed.
 
     Nothing happens where this process works alone, or a cluster does.
 

@@ -113,7 +113,7 @@ class CandidateIndex:
         place = library.index_place if allowed.all() else None
         known = cache.load_arrays(*place) if place else None
         if known is None or set(known) != {*_STORED, *_list_pair_names()} or len(known["strange"]) != len(self.frames):
-            base = library.extended
+            base = library.base_library
             known_part = None if base is None else CandidateIndex.for_library(base, allowed[: len(base.clips)])
             self._compute(library, allowed, known_part)
             if place:
@@ -140,10 +140,6 @@ class CandidateIndex:
         fastest = np.maximum.reduceat(library.frames.speed, library.frames.first)
         # a recorded stand that is played forward and backward costs nothing; the ends of a synthetic turn are no stand
         self.is_made_travel = self.is_synthetic & (fastest[library.frames.clip] > STAND_SPEED)
-        count = 0 if known is None else len(known.frames)
-        speed, turn, lasts = map(np.stack, zip(*(compute_speed_and_turn(library, rate, count)
-                                                 for rate in PLAYBACK_RATES)))
-        added = speed.astype(np.float32), turn.astype(np.float32), lasts & allowed[library.frames.clip[count:]]
         self.offset = -arctan2(self.frames.velocity[:, 1], self.frames.velocity[:, 0]).astype(np.float32)
         self.long_stance = np.clip(library.stance_seconds - USUAL_STANCE, 0.0, _LONGEST_STANCE).astype(np.float32)
         self.is_in_contact = library.feet_in_contact
@@ -151,12 +147,21 @@ class CandidateIndex:
         self.lifted = uniform_filter1d(lifted, SLOT, origin=-(SLOT // 2), mode="nearest")
         self.lean = uniform_filter1d(library.frames.lean, SLOT, axis=0, origin=-(SLOT // 2), mode="nearest")
         self.wild_before, self.wild_after = measure_wildness(library)
-        self.speed, self.turn, self.valid = added if known is None else (
-            np.concatenate(parts, axis=1) for parts in zip((known.speed, known.turn, known.valid), added))
-        usable = np.flatnonzero(added[2])
-        number, frame = np.divmod(usable[np.argsort(added[0].ravel()[usable], kind="stable")], added[0].shape[1])
+        self._compute_pairs(library, allowed, known)
+
+    def _compute_pairs(self, library: Library, allowed: np.ndarray, known: "CandidateIndex | None") -> None:
+        """Compute what the playback rates make of frames, and the order of their speeds."""
+        count = 0 if known is None else len(known.frames)
+        speed, turn, lasts = map(np.stack, zip(*(compute_speed_and_turn(library, rate, count)
+                                                 for rate in PLAYBACK_RATES)))
+        self.speed, self.turn = speed.astype(np.float32), turn.astype(np.float32)
+        self.valid = lasts & allowed[library.frames.clip[count:]]
+        usable = np.flatnonzero(self.valid)
+        number, frame = np.divmod(usable[np.argsort(self.speed.ravel()[usable], kind="stable")], speed.shape[1])
         self.by_speed = number * len(self.frames) + frame + count
         if known is not None:
+            self.speed, self.turn, self.valid = (np.concatenate([getattr(known, name), getattr(self, name)], axis=1)
+                                                 for name in ("speed", "turn", "valid"))
             self._merge_pairs(known, number, frame + count)
 
     def _merge_pairs(self, known: "CandidateIndex", number: np.ndarray, frame: np.ndarray) -> None:

@@ -5,13 +5,13 @@ from __future__ import annotations
 from contextlib import suppress
 from pathlib import Path
 
-from ..annotation import ClipAnnotation
-from ..base.errors import InputError
-from ..files.piece_file import read_piece_file, write_piece_file
-from ..motion.motion import Motion
-from ..motion.skeleton import Skeleton
-from .clip import Clip
-from .scan import CACHE_FOLDER
+from ...annotation import ClipAnnotation
+from ...base.errors import InputError
+from ...files.piece_file import read_piece_file, write_piece_file
+from ...motion.motion import Motion
+from ...motion.skeleton import Skeleton
+from ..clip import Clip
+from ..scan import CACHE_FOLDER
 
 
 def save_clip(place: Path, key: str, clip: Clip) -> None:
