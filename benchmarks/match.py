@@ -33,7 +33,7 @@ from beyond_mocap.motion.track import clean_track, sample_track
 from beyond_mocap.synthesis.plan import Plan
 from beyond_mocap.synthesis.quality.movement import compute_jerk, list_foot_joints, measure_contact_speeds
 from beyond_mocap.synthesis.resolve_plan import resolve_plan
-from beyond_mocap.synthesis.search.path_costs import balance_weights
+from beyond_mocap.synthesis.search.cost_weights import balance_weights
 from beyond_mocap.synthesis.search.path_search import PathSearch
 from beyond_mocap.synthesis.search.request import build_request
 from beyond_mocap.synthesis.search_library import extend_library

@@ -97,6 +97,14 @@ def _is_left_over(path: Path) -> bool:
     return found is not None and int(found[1]) != os.getpid() and path.is_dir()
 
 
+def _has_content(path: Path) -> bool:
+    """Return whether there is more in a folder than what is left over."""
+    try:
+        return not all(map(_is_left_over, path.iterdir()))
+    except OSError:
+        return False
+
+
 @contextlib.contextmanager
 def atomic_folder(path: str | os.PathLike) -> Iterator[Path]:
     """Context manager: a hidden folder in `path` to write to; its content moves up into `path` if the block succeeds.
@@ -120,10 +128,14 @@ def atomic_folder(path: str | os.PathLike) -> Iterator[Path]:
             os.replace(one, path / one.name)
         for left in filter(_is_left_over, list(path.iterdir())):
             shutil.rmtree(left, ignore_errors=True)
-    except OSError as error:
-        problem = f"cannot be written ({error.strerror or error})"
-        raise InputError(path, problem, "a writable folder", "choose another place") from None
-    except InputError as error:  # name the file by its final path
+    except (OSError, InputError) as error:
+        if not temporary.exists() and _has_content(path):
+            raise InputError(path, "another command has written to this folder meanwhile", "a folder for each command",
+                             "choose another place") from None
+        if isinstance(error, OSError):
+            problem = f"cannot be written ({error.strerror or error})"
+            raise InputError(path, problem, "a writable folder", "choose another place") from None
+        # name the file by its final path
         where, _, message = str(error).replace(str(temporary), str(path)).partition(": ")
         raise InputError(where, message) from None
     finally:

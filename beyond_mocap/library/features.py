@@ -12,6 +12,8 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Any
+from weakref import WeakKeyDictionary
 
 import numpy as np
 
@@ -175,7 +177,9 @@ def _build_frames(clips, reference: Frames | None, on_clip: Callable[[int], None
     for index, clip in enumerate(clips):
         on_clip(index)
         rows = slice(first[index], first[index] + count[index])
-        for name, column in zip(_COLUMNS, _build_columns(index, clip, joints, body, vocabulary)):
+        columns = _build_columns(clip, joints, body) if reference is None else _find_columns(clip, joints, body)
+        columns = (np.full(count[index], index), *columns, build_label_matrix(clip, columns[0], vocabulary))
+        for name, column in zip(_COLUMNS, columns):
             if not index:
                 merged[name] = np.empty((count.sum(), *column.shape[1:]), column.dtype)
             merged[name][rows] = column
@@ -187,21 +191,30 @@ def _build_frames(clips, reference: Frames | None, on_clip: Callable[[int], None
     return Frames(first=first, count=count, mean=mean, basis=basis, vocabulary=vocabulary, **merged)
 
 
-def _build_columns(index: int, clip, joints: np.ndarray, body, vocabulary: tuple[str, ...]) -> tuple[np.ndarray, ...]:
-    """Build the columns of one clip, in the order of `_COLUMNS`, with features before PCA."""
+_built_columns: WeakKeyDictionary[Any, tuple[np.ndarray, ...]] = WeakKeyDictionary()
+
+
+def _find_columns(clip, joints: np.ndarray, body) -> tuple[np.ndarray, ...]:
+    """Find the columns of a clip that is appended to many libraries: they are built once."""
+    if clip not in _built_columns:
+        _built_columns[clip] = _build_columns(clip, joints, body)
+    return _built_columns[clip]
+
+
+def _build_columns(clip, joints: np.ndarray, body) -> tuple[np.ndarray, ...]:
+    """Build the columns of one clip, in the order of `_COLUMNS` without `clip` and `words`; features before PCA."""
     skeleton, toes = clip.motion.skeleton, [body.left.toe_or_foot, body.right.toe_or_foot]
     source, positions = sample_positions(clip.motion, FPS)
     facing = np.unwrap(compute_heading_from_positions(skeleton, positions))
     path = smooth_zero_phase_hann(positions[:, 0, :2], FPS, SMOOTH_SECONDS)
     return (
-        np.full(len(source), index), source, positions[:, 0], facing, path,
+        source, positions[:, 0], facing, path,
         quaternion.rotate_level(time_derivative(path, FPS), -facing),
         _compute_feet(positions, toes, path, facing),
         compute_max_jerk(positions, FPS),
         compute_lean_slopes(skeleton, positions, FPS).astype(np.float32),
         compute_raw_features(positions[:, joints], facing, FPS).astype(np.float32),
         compute_postures(positions, facing, FPS, body),
-        build_label_matrix(clip, source, vocabulary),
     )  # fmt: skip
 
 

@@ -179,8 +179,15 @@ class Library:
         return None
 
     @cached_property
+    def base_library(self) -> "Library | None":
+        """The library to which `append_synthetic_clips` has appended clips; None for any other library."""
+        return None
+
+    @cached_property
     def manners(self) -> Manners:
         """How the people of this library move."""
+        if self.base_library is not None:
+            return self.base_library.manners.append_unknown(len(self.clips) - len(self.base_library.clips))
         is_calm = self._is_recorded & (self.strangeness <= 1.0)
         return measure_manners([clip.path for clip in self.clips], self.frames, is_calm, self.fps)
 
@@ -239,7 +246,7 @@ class Library:
         known = {name: getattr(self, name) for name in ("normal_postures", "cut_receptions", "gaits", "neutral_stance")}
         known |= {name: np.concatenate([getattr(self, name), getattr(added, name)])
                   for name in ("strangeness", "stance_seconds", "feet_in_contact")}
-        vars(joined).update(known)  # where cached properties keep their values
+        vars(joined).update(known, base_library=self)  # where cached properties keep their values
         return joined
 
     def _join(self, other: "Library") -> "Library":

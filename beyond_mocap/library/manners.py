@@ -7,7 +7,7 @@ whomever they are.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -45,6 +45,10 @@ class Manners:
         away = self.distance[self.models[number % len(self.models)]]
         difference = np.append(np.clip((away - NEAR) / (FAR - NEAR), 0.0, 1.0), 0.0)
         return difference[self.of_clip].astype(np.float32)
+
+    def append_unknown(self, count: int) -> Manners:
+        """Append `count` clips whose manner is not known."""
+        return replace(self, of_clip=np.append(self.of_clip, np.full(count, -1)))
 
 
 def measure_manners(paths: list[str], frames, is_calm: np.ndarray, fps: float) -> Manners:

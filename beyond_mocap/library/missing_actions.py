@@ -27,6 +27,7 @@ from ..base.time_series import find_equal_runs
 from ..motion import contacts
 from ..motion.motion import compute_pose, forward_kinematics, sample_frames
 from ..motion.track import smooth_zero_phase_hann
+from .actions.clip_file import load_clip, save_clip
 from .cache import write_synthetic_clips
 from .clip import KICK_PREFIX, SYNTHETIC_FOLDER, SYNTHETIC_FPS, Clip
 from .features import SMOOTH_SECONDS
@@ -305,11 +306,23 @@ def _find_clips(library: Library, path: str) -> tuple[Clip, Clip]:
     known = _clips.setdefault(library, {})
     if path not in known:
         _make_room(known, _KEPT_CLIPS)
-        clip = _build_clip(library, path)
+        _parse_path(path)  # no file is opened for a name that is no action's
+        clip = _load_clip(library, path) or _build_clip(library, path)
         known[path] = clip, clip.build_twin()
-        if library.cache_location:  # over a file of another version of the program
-            write_synthetic_clips(library.cache_location[0], known[path])
     return known[path]
+
+
+def _load_clip(library: Library, path: str) -> Clip | None:
+    """Load a clip that an earlier process has built, or build it for later ones; None for a library without a cache."""
+    if not library.cache_location:
+        return None
+    place, key = library.cache_location
+    known = load_clip(place, key, library.skeleton, path)
+    clip = known or _build_clip(library, path)
+    write_synthetic_clips(place, [clip], missing_only=known is not None)  # over a file of another version
+    if known is None:
+        save_clip(place, key, clip)
+    return clip
 
 
 def _make_room(kept: dict, most: int) -> None:

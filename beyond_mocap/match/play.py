@@ -9,7 +9,7 @@ import numpy as np
 from ..ball.tracked.solve import find_goal_lines
 from ..base.vectors import arctan2, measure_lengths
 from ..motion.track.match_data import REFEREE, Match
-from ..synthesis.heading_plan import HeadingKey, Play
+from ..synthesis.heading_request import HeadingKey, Play
 
 NEAR_OPPONENT = 15.0
 """Metres within which a player faces the nearest opponent rather than the goal."""

@@ -32,7 +32,7 @@ from ..files.json_values import (
 from ..files.plain_npz import HEADER, read_plain_arrays, take_header
 from ..motion.track import Track
 from ..synthesis.heading_path import HeadingPath
-from ..synthesis.heading_plan import HeadingKey
+from ..synthesis.heading_request import HeadingKey
 from ..synthesis.known_body import KnownBody
 from ..synthesis.pin import Pin
 from ..synthesis.plan import METHODS, Plan, PlayerTouch, SolvedTrajectory

@@ -13,10 +13,10 @@ from ..annotation import Timeline, format_timeline
 from ..ball.tracked.solve import SolvedBall
 from ..base.errors import InputError, describe_no_folder, format_seconds
 from ..library.library import Library
-from ..synthesis.heading_plan import HeadingKey, Play
+from ..synthesis.heading_path import HeadingPath
+from ..synthesis.heading_request import Play
 from ..synthesis.known_body import cut_bodies
 from ..synthesis.plan import Plan, SolvedTrajectory
-from ..synthesis.resolve_plan import resolve_plan
 from ..synthesis.resolved_touches import build_trajectory, sample_solved_ball
 from .folder import MatchFolder
 from .known_bodies import SeenBodies, SeenPlayer
@@ -25,6 +25,9 @@ from .moments import USER, Moment, build_timeline, is_edited, read_labels, write
 from .player_edit import to_stored_plan
 from .request import MatchRequest
 from .roles import Role
+
+PlanHeadings = Callable[[Sequence[Sequence[tuple[Plan, Play | None]]]], Iterable["Sequence[HeadingPath] | str"]]
+"""Returns, for the plans of each player with what they face beside the ball, their headings or why there are none."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,7 +52,7 @@ class PlayerPlans:
 def build_player_plans(
     roles: tuple[Role, ...], files: Mapping[str, str], labels: MatchLabels, solved: SolvedBall | None,
     request: MatchRequest, folder: MatchFolder, library: Library, plays: Mapping[str, Play],
-    bodies: SeenBodies | None = None,
+    bodies: SeenBodies | None = None, *, plan_headings: PlanHeadings,
 ) -> list[PlayerPlans]:
     """Build the plans of all players.
 
@@ -66,6 +69,7 @@ def build_player_plans(
         library: the clips; its labels are known beyond the vocabulary.
         plays: what players face beside the ball, by id.
         bodies: what cameras have seen of players, None for nothing.
+        plan_headings: plans the headings of all players.
     Returns:
         One entry per role.
     Raises:
@@ -81,16 +85,23 @@ def build_player_plans(
         file = files[role.player.id]
         moments = () if role.reason else own[file] if file in own else _write_automatic(file, role, labels, folder)
         try:
-            plans = tuple(_plan_heading(_add_bodies(_build_plan(role, number, moments, request, build_course),
-                                                    seen.get(role.player.id)), library,
-                                        plays.get(role.player.id)) for number in range(len(role.target_tracks)))
+            plans = tuple(_add_bodies(_build_plan(role, number, moments, request, build_course),
+                                      seen.get(role.player.id)) for number in range(len(role.target_tracks)))
             typed = [one for one in moments if one.source == USER]
             unused = tuple(one for one in typed if not _overlaps(one, _list_present_times(role)))
             overruled = tuple(one for one in typed if _overlaps(one, _list_shown_times(plans)))
             out.append(PlayerPlans(role, file, () if role.reason else plans, unused, overruled))
         except InputError as error:
             out.append(PlayerPlans(replace(role, reason=str(error)), file))
-    return out
+    return _add_headings(out, plan_headings([[(plan, plays.get(part.role.player.id)) for plan in part.plans]
+                                             for part in out]))
+
+
+def _add_headings(parts: Sequence[PlayerPlans], found: Iterable[Sequence[HeadingPath] | str]) -> list[PlayerPlans]:
+    """Add the headings of each player's plans, or why they cannot be planned, which is why this player fails."""
+    return [PlayerPlans(replace(part.role, reason=paths), part.file) if isinstance(paths, str)
+            else replace(part, plans=tuple(replace(plan, heading_path=path) for plan, path in zip(part.plans, paths)))
+            for part, paths in zip(parts, found)]
 
 
 def check_label_folder(annotations: Path | None) -> None:
@@ -209,17 +220,3 @@ def _add_bodies(plan: Plan, seen: SeenPlayer | None) -> Plan:
         return plan
     bodies = cut_bodies(seen.bodies, float(plan.track.times[0]), float(plan.track.times[-1]))
     return replace(plan, bodies=bodies, height=seen.height)
-
-
-def _plan_heading(plan: Plan, library: Library, play: Play | None) -> Plan:
-    """Plan the heading over a whole stretch, so that all windows that are cut out of it agree."""
-    keys = [HeadingKey(time, heading=float(heading), target=None, hold=0.0) for body in plan.bodies
-            for time, heading in zip((body.start, body.end), body.compute_heading(library.skeleton)[[0, -1]])]
-    begin, end = plan.track.times[[0, -1]]
-    keys = [key for key in keys if key.is_within(begin, end)]
-    if play is not None:
-        measured = [key for key in play.keys if key.is_within(begin, end)
-                    and not any(key.is_within(body.start, body.end) for body in plan.bodies)]
-        play = replace(play, keys=tuple(measured))
-    resolved = resolve_plan(replace(plan, heading_keys=tuple(keys)), library, are_touches_resolved=True)
-    return replace(plan, heading_path=resolved.plan_heading(play))

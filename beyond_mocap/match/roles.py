@@ -4,7 +4,7 @@ cleaned, on one clock of frames, and separated where two would overlap.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -132,7 +132,8 @@ def _limit_to_frames(start: float, end: float, fps: float) -> tuple[float, float
 
 
 def separate_roles(
-    roles: Sequence[Role], times: np.ndarray, touches: Mapping[str, Sequence[float]]
+    roles: Sequence[Role], times: np.ndarray, touches: Mapping[str, Sequence[float]],
+    solve_all: Callable[[Sequence[tuple]], Iterable[np.ndarray]] | None = None,
 ) -> tuple[tuple[Role, ...], dict[str, float]]:
     """Separate the target tracks of the players (`match.crowd.spacing`).
 
@@ -140,6 +141,7 @@ def separate_roles(
         roles: the players.
         times: (N,) s of the feed's samples.
         touches: s by id, at which a player touches the ball and keeps their path.
+        solve_all: as for `match.crowd.spacing.compute_spacing`.
     Returns:
         The roles, and figures: `longest_m`, `mean_m` where a player is moved, `seconds` in which a player is moved,
             summed over all players.
@@ -148,7 +150,7 @@ def separate_roles(
     step = float(np.median(np.diff(times)))
     firmness = [compute_firmness(len(times), (np.asarray(touches.get(role.player.id, ())) - times[0]) / step,
                                  1.0 / step) for role in roles]  # fmt: skip
-    shifts = compute_spacing(times, places, np.stack(firmness))
+    shifts = compute_spacing(times, places, np.stack(firmness), solve_all=solve_all)
     moved = np.linalg.norm(shifts, axis=2)
     is_moved = moved > 1e-3
     figures = {"longest_m": float(moved.max()), "mean_m": float(moved[is_moved].mean()) if is_moved.any() else 0.0,

@@ -38,6 +38,7 @@ from .pieces import stages
 from .pieces.constructed_motion import ConstructedMotion
 from .pieces.job import Job
 from .pieces.pool import WorkerConfig, check_workers, stop_workers
+from .pieces.preparation import Preparation
 from .pieces.tasks import LibrarySource, set_library
 from .play import build_plays, find_kept_lines
 from .player_plans import (
@@ -170,7 +171,7 @@ def _run_stages(
     report: Progress,
 ) -> None:
     """Run all stages after reading."""
-    state, begin = job.state, read_clocks()
+    state, begin, preparation = job.state, read_clocks(), Preparation(job, span)
     match, feed = tracked
     if job.request.pitch not in (None, (match.length, match.width)):
         state.report["notes"].append(f"the tracking data has its own pitch, {match.length:g} x {match.width:g} m: the "
@@ -191,10 +192,12 @@ def _run_stages(
     inside = (match.times >= span[0] - 1e-6) & (match.times <= span[1] + 1e-6)
     touches = {player: [one.time for one in moments if one.end is None and not one.misses_ball]
                for player, moments in words.players.items()}
-    roles, state.report["spacing"] = separate_roles(roles, match.times[inside], touches)
+    roles, state.report["spacing"] = separate_roles(roles, match.times[inside], touches,
+                                                      preparation.solve_episodes)
     names = build_file_names(player.id for player in match.players)
     parts = build_player_plans(roles, names, words, solved=solved, request=job.request, folder=job.folder,
-                               library=job.library, plays=build_plays(match), bodies=bodies)
+                               library=job.library, plays=build_plays(match), bodies=bodies,
+                               plan_headings=preparation.plan_headings)
     rows = job.folder.previous_state.get("players", ())
     finished = {row["id"]: row["finished"] for row in rows if isinstance(row.get("finished"), str)}
     state.players = {part.role.player.id: build_player_row(part, finished.get(part.role.player.id)) for part in parts}

@@ -36,7 +36,7 @@ from ..synthesis.one_thread import limit_to_one_thread
 from ..synthesis.plan import Plan
 from ..synthesis.provenance import build_provenance_fields
 from ..synthesis.resolve_plan import resolve_plan
-from ..synthesis.search.path_costs import BoneDistance
+from ..synthesis.search.cut_costs import BoneDistance
 from ..synthesis.search.path_search import PathSearch
 from ..synthesis.search.request import RequestedKey, SearchRequest
 from ..synthesis.search.source_frames import SourceMotion, fetch_motion

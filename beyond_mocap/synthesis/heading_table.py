@@ -8,7 +8,7 @@ import numpy as np
 
 from ..base.errors import InputError
 from ..files.tables import parse_number, read_rows
-from .heading_plan import HeadingKey
+from .heading_request import HeadingKey
 
 COLUMNS = ("time_s", "heading_deg", "x_m", "y_m", "hold_s")
 

@@ -22,16 +22,8 @@ from ..motion.track import SampledTrack, Track, sample_track
 from .ball_pins import assign_ball_pins, lead_ball_to_pins, list_key_times
 from .contact_edit import ContactEdit
 from .heading_path import HeadingPath
-from .heading_plan import (
-    FPS,
-    HeadingKey,
-    HeadingRequest,
-    Play,
-    plan_heading_path,
-    rest_track,
-    sample_heading,
-    update_heading_path,
-)
+from .heading_plan import FPS, plan_heading_path, rest_track, sample_heading, update_heading_path
+from .heading_request import HeadingKey, HeadingRequest, Play
 from .known_body import KnownBody
 from .pin import GAZE, PARTS, Pin
 

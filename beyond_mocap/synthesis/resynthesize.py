@@ -44,8 +44,8 @@ from .search.affected_frames import (
     merge_stretches,
 )
 from .search.candidate_index import SLOT
+from .search.cost_weights import balance_weights
 from .search.edit_list import EditList, SearchStretch
-from .search.path_costs import balance_weights
 from .search.path_search import PathSearch
 from .search.preferences import UsedStretch, list_used_stretches
 from .search.request import SearchRequest, build_request

@@ -45,12 +45,12 @@ from .resolve_plan import resolve_plan
 from .resolved_touches import apply_trajectory, report_missing_touches
 from .search.block_costs import rescale_alpha
 from .search.blocks import BlockSearch
+from .search.cost_weights import balance_weights
 from .search.distance import align_keys, build_straight_edit, build_warped_edit
 from .search.edit_list import EditList
 from .search.foot_drag import report_left_out
 from .search.gait_loops import build_gait_loops
 from .search.locomotion import compute_travelled_distance, match_distance
-from .search.path_costs import balance_weights
 from .search.path_search import PathSearch
 from .search.preferences import UsedStretch
 from .search.request import SearchRequest, build_request

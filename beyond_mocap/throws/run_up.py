@@ -27,13 +27,13 @@ from ..motion.motion import Motion, resample
 from ..motion.retargeting.retarget import Retargeter
 from ..motion.track import SampledTrack, Track, smooth_zero_phase_hann
 from ..synthesis.construct.construction import Construction, build_key_results, find_touches
-from ..synthesis.heading_plan import HeadingKey
+from ..synthesis.heading_request import HeadingKey
 from ..synthesis.one_thread import limit_to_one_thread
 from ..synthesis.plan import Plan, ResolvedPlan
 from ..synthesis.resolve_plan import resolve_plan
 from ..synthesis.resolved_touches import resolve_touches
+from ..synthesis.search.cost_weights import balance_weights
 from ..synthesis.search.edit_list import EditList
-from ..synthesis.search.path_costs import balance_weights
 from ..synthesis.search.path_search import PathSearch
 from ..synthesis.search.request import SearchRequest, build_request
 from ..synthesis.search.source_frames import SourceMotion, fetch_motion, output_index

@@ -305,7 +305,7 @@ def describe_reason(reason: "ChoiceReason", name: str) -> tuple[str, ...]:
     Returns:
         Lines: name, frames, costs, the next candidates.
     """
-    from ...beyond_mocap.synthesis.search.path_costs import TERMS
+    from ...beyond_mocap.synthesis.search.cost_weights import TERMS
 
     lines = [name, f"frames {reason.clip_range[0]:.0f} to {reason.clip_range[1]:.0f}, played at {reason.rate:.2f} x"]
     lines.append(

@@ -10,7 +10,7 @@ from ...beyond_mocap.base.errors import InputError
 from ...beyond_mocap.base.fixes import Fix
 from ...beyond_mocap.base.time_series import interpolate_columns
 from ...beyond_mocap.motion.track import Track, clean_track
-from ...beyond_mocap.synthesis.heading_plan import HeadingKey
+from ...beyond_mocap.synthesis.heading_request import HeadingKey
 from ...beyond_mocap.synthesis.plan import Plan
 from ..core.measure import build_scene_clock
 from ..core.properties import read_property_values

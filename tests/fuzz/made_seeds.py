@@ -10,10 +10,10 @@ from seeds import SAMPLE, copy_group
 
 from beyond_mocap.annotation import event_labels
 from beyond_mocap.cli.main import main
+from beyond_mocap.files.piece_file import write_piece_file
 from beyond_mocap.files.smpl.smpl import write_smpl
 from beyond_mocap.markers.files.marker_set_text import SHIPPED
 from beyond_mocap.markers.files.model_json import write_model
-from beyond_mocap.match.piece_file import write_piece_file
 from beyond_mocap.match.player_file import write_player
 from tests.core.files.test_formats import WRITERS
 from tests.core.files.test_smpl import build_walk

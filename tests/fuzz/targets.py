@@ -11,6 +11,7 @@ from beyond_mocap.files.bvh.bvh import read_bvh
 from beyond_mocap.files.events import read_events
 from beyond_mocap.files.joints.joint_readers import read_joints
 from beyond_mocap.files.obj import read_mesh
+from beyond_mocap.files.piece_file import read_piece_file
 from beyond_mocap.files.smpl.smpl import read_smpl
 from beyond_mocap.files.tables import read_ball
 from beyond_mocap.files.tracking.tracking import read_match, read_track_csv
@@ -19,7 +20,6 @@ from beyond_mocap.markers.files.marker_files import read_markers
 from beyond_mocap.markers.files.marker_set_text import read_marker_set
 from beyond_mocap.markers.files.model_json import read_model
 from beyond_mocap.match.folder import read_state
-from beyond_mocap.match.piece_file import read_piece_file
 from beyond_mocap.match.player_file import read_player
 from beyond_mocap.motion.retargeting.retarget import read_bone_map
 from beyond_mocap.motion.track import clean_track

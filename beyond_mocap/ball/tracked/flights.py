@@ -26,6 +26,7 @@ _SHIFT_SECONDS = 0.4  # s in which a shift from the flight may change direction
 _SCATTER, _USUAL_SHIFT = 0.08, 0.3  # m, scatter of samples; m, usual size of a shift
 _MAX_END_MISS = 0.5  # m from the position of the next touch, at most
 _MIN_PASSED_HEIGHT = 0.6  # m, above this a foot hardly reaches the ball
+_BATCH = 256  # flights of about equal length that are simulated together: a step costs hardly more than that of one
 _MIN_AIR_HEIGHT = 0.35  # m of the centre above its rest: higher is a flight
 
 
@@ -152,8 +153,8 @@ def _simulate_pieces(stretches: Stretches, launches, spans) -> tuple[list[BallPi
     found: list[BallPiece] = [None] * len(spans)
     deviations: list[tuple] = [None] * len(spans)
     order = np.argsort(stretches.seconds, kind="stable")
-    for low in range(0, len(order), 64):
-        some = order[low : low + 64]
+    for low in range(0, len(order), _BATCH):
+        some = order[low : low + _BATCH]
         grid = np.arange(int(np.ceil(stretches.seconds[some].max() / STEP)) + 1) * STEP
         places, speeds = simulate_trajectories(launches.place[some], launches.velocity[some], launches.spin[some],
                                                FOOTBALL, grid)

@@ -9,7 +9,9 @@ smooth it over time, and they pass each other on the side on which they are offs
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
+from itertools import starmap
 
 import numpy as np
 
@@ -40,7 +42,8 @@ Span = tuple[int, int, tuple[int, int]]
 
 
 def compute_spacing(
-    times: np.ndarray, positions: np.ndarray, firmness: np.ndarray | None = None, distance: float = DISTANCE
+    times: np.ndarray, positions: np.ndarray, firmness: np.ndarray | None = None, distance: float = DISTANCE,
+    solve_all: Callable[[Sequence[tuple]], Iterable[np.ndarray]] | None = None,
 ) -> np.ndarray:
     """Compute the horizontal shifts with which bodies keep their distance.
 
@@ -51,6 +54,7 @@ def compute_spacing(
         positions: (P, N, 2) m, NaN where a player is absent.
         firmness: (P, N) how firmly each keeps their path against the others, 1 by default (`compute_firmness`).
         distance: m, the least distance.
+        solve_all: returns `solve_episode` of several arguments, in their order; None solves them here.
     Returns:
         (P, N, 2) m.
     """
@@ -59,9 +63,12 @@ def compute_spacing(
         return shifts
     fps = (len(times) - 1) / (times[-1] - times[0])
     weights = np.ones(positions.shape[:2]) if firmness is None else firmness
-    for episode in find_episodes(positions, distance, round(REACH * fps)):
-        span, bodies = slice(episode.first, episode.end), list(episode.bodies)
-        shifts[bodies, span] = _solve_episode(episode, positions[bodies, span], weights[bodies, span], distance, fps)
+    places = [(list(episode.bodies), slice(episode.first, episode.end), episode)
+              for episode in find_episodes(positions, distance, round(REACH * fps))]
+    tasks = [(episode, positions[bodies, span], weights[bodies, span], distance, fps)
+             for bodies, span, episode in places]
+    for (bodies, span, _), found in zip(places, solve_all(tasks) if solve_all else starmap(solve_episode, tasks)):
+        shifts[bodies, span] = found
     return np.where(np.isfinite(positions), shifts, 0.0)
 
 
@@ -158,9 +165,19 @@ def find_meetings(spans: list[Span], past_spans: list[Span]) -> list[Episode]:
         spans += more
 
 
-def _solve_episode(episode: Episode, places: np.ndarray, firmness: np.ndarray, distance: float,
-                   fps: float) -> np.ndarray:
-    """Solve the shifts (K, T, 2) m of one episode's bodies at `places` (K, T, 2) m with their firmness (K, T)."""
+def solve_episode(episode: Episode, places: np.ndarray, firmness: np.ndarray, distance: float,
+                  fps: float) -> np.ndarray:
+    """Solve the shifts of one episode's bodies.
+
+    Args:
+        episode: K bodies that come close to each other, for T frames.
+        places: (K, T, 2) m.
+        firmness: (K, T) how firmly each keeps their path.
+        distance: m, the least distance.
+        fps: frames per second.
+    Returns:
+        (K, T, 2) m.
+    """
     bodies, count = len(places), places.shape[1]
     smoothness = _build_smoothness(firmness, fps)
     number = {body: row for row, body in enumerate(episode.bodies)}

@@ -11,13 +11,13 @@ from pathlib import Path
 import numpy as np
 
 from ...annotation.ball_contact import build_surfaces
+from ...files.piece_file import read_piece_file, write_piece_file
 from ...library.features import FPS
 from ...motion.motion import Motion
 from ...motion.track.ball_path import BallPath
 from ...synthesis.one_thread import limit_to_one_thread
 from ...synthesis.take import Take
 from ..match_ball import apply_led_ball, find_led_ball, lead_ball_between_players, restore_ball_contact, sample_ball
-from ..piece_file import read_piece_file, write_piece_file
 from ..pieces.named_edit import cut_named_edit
 from ..pieces.units import cut_plan
 from ..player_edit import PlayerEdit, Stretch

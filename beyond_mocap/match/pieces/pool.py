@@ -104,6 +104,23 @@ def check_workers(config: WorkerConfig) -> None:
             pass
 
 
+def start_workers(config: WorkerConfig, work: Work, arguments: tuple) -> None:
+    """Start the processes of this machine, each with a piece of work whose result is not needed.
+
+    Nothing happens where this process works alone, or a cluster does.
+
+    Args:
+        config: where the work runs.
+        work: as for `run_tasks`.
+        arguments: of the work.
+    """
+    if config.workers > 1 and not config.scheduler:
+        workers = _Processes(config.workers)
+        with contextlib.suppress(BrokenExecutor):  # the first piece that is waited for starts them again
+            for _ in range(config.workers):
+                workers.submit(work, arguments)
+
+
 def run_tasks(
     tasks: Iterable[Task], work: Work, config: WorkerConfig, cancelled: Callable[[], bool] | None = None,
     report_result: Callable[[TaskResult], None] | None = None,

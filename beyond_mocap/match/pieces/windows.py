@@ -15,6 +15,7 @@ from pathlib import Path
 import numpy as np
 
 from ...base.errors import InputError, TimedMessage, line_spans
+from ...files.piece_file import read_piece_file, write_piece_file
 from ...library.automatic_locomotion import apply_chosen_gaits
 from ...library.features import FPS
 from ...library.library import Library
@@ -22,13 +23,14 @@ from ...library.missing_actions import add_actions
 from ...synthesis.one_thread import limit_to_one_thread
 from ...synthesis.plan import Plan, ResolvedPlan
 from ...synthesis.resolve_plan import resolve_plan
+from ...synthesis.search.candidate_index import CandidateIndex
+from ...synthesis.search.cost_weights import balance_weights
+from ...synthesis.search.cut_costs import CutCosts
 from ...synthesis.search.distance import align_keys
-from ...synthesis.search.path_costs import PathCosts, balance_weights
 from ...synthesis.search.path_search import PathSearch
-from ...synthesis.search.request import build_request
+from ...synthesis.search.request import build_request, find_allowed_clips
 from ...synthesis.search.slots import MIN_KEY_MARGIN
 from ...synthesis.search_library import find_plan_actions
-from ..piece_file import read_piece_file, write_piece_file
 from ..player_edit import WINDOW_SECONDS, PlayerEdit, Stretch, to_stored_plan
 from .named_edit import (
     CONTINUITY_TOLERANCE,
@@ -230,14 +232,14 @@ def _compute_joint_costs(library: Library, plan: Plan, before: Piece, after: Pie
     shown, begin = [path for piece in (before, after) for path, _ in piece.edit.clips], float(plan.track.times[0])
     here = resolve_plan(cut_plan(plan, begin + low / FPS, begin + (high - 1) / FPS), library, are_touches_resolved=True)
     library = build_search_library(library, here, shown)
-    order = build_request(library, here)
+    index = CandidateIndex.for_library(library, find_allowed_clips(library, plan))
     left_edit, entered_edit = (to_library_edit(library, cut_named_edit(p.edit, low - p.first, high - p.first))
                                for p in (before, after))
-    costs = PathCosts(library, order, balance_weights(plan.alpha))
     step = np.gradient(left_edit.frame)
     step[np.append(left_edit.transitions, left_edit.transitions - 1)] = 1.0
     # The cut goes from the frame after each left one to the frame the other window has there.
-    terms = costs.iter_cut_terms(left_edit.frame[:-1] + step[:-1], entered_edit.frame[1:])
+    cuts = CutCosts(index, balance_weights(plan.alpha))
+    terms = cuts.iter_cut_terms(left_edit.frame[:-1] + step[:-1], entered_edit.frame[1:])
     cost = np.diagonal(sum(values for _, values in terms)).copy()
     at = np.arange(1, high - low)
     for seam in (*left_edit.transitions, *entered_edit.transitions):

@@ -137,16 +137,16 @@ class BeamTransitions:
         rates and feet, and the same with the change of recording.
         """
         costs = self.costs
-        end, start = costs.round_frame(self.end), costs.round_frame(to.start)
-        lower_bound = costs.compute_pose_cost(start, end)
-        leave, enter = costs.compute_cut_ends(end, start)
+        end, start = costs.index.round_frame(self.end), costs.index.round_frame(to.start)
+        lower_bound = costs.cuts.compute_pose_cost(start, end)
+        leave, enter = costs.cuts.compute_cut_ends(end, start)
         cost = to.cost.astype(np.float32)
         lower_bound += (enter + cost)[:, None]
         lower_bound += leave + self.young + self.above
         # without a cut nothing but the costs of state and candidate remains
         candidate, state = self._find_uncut_pairs(to)
         lower_bound[candidate, state] = self.above[state] + cost[candidate]
-        changed = lower_bound + costs.compute_recording_change(end, start[:, None])
+        changed = lower_bound + costs.cuts.compute_recording_change(end, start[:, None])
         changed[candidate, state] = lower_bound[candidate, state]
         return lower_bound, changed
 
@@ -173,7 +173,7 @@ class BeamTransitions:
             pairs, candidate, state, least, rate, goes_on, change, replay = (
                 values.take(within) for values in (pairs, candidate, state, least, rate, goes_on, change, replay))
         frame, left = self._round_frames(to, candidate, state)
-        cut = np.float32(self.costs.weights.feet) * self.costs.measure_foot_jump(left, frame)
+        cut = np.float32(self.costs.weights.feet) * self.costs.cuts.measure_foot_jump(left, frame)
         cut += change
         cut += replay
         cut[goes_on] = 0.0
@@ -181,7 +181,8 @@ class BeamTransitions:
 
     def _round_frames(self, to: SlotCandidates, candidate: np.ndarray, state: np.ndarray):
         """Round the library frames (P,) that pairs enter and leave."""
-        return self.costs.round_frame(to.start).take(candidate), self.costs.round_frame(self.end).take(state)
+        round_frame = self.costs.index.round_frame
+        return round_frame(to.start).take(candidate), round_frame(self.end).take(state)
 
     def _compute_repetition(self, to: SlotCandidates, candidate: np.ndarray, state: np.ndarray):
         """Compute what pairs (P,) cost for another recording, and (P,) for what has been shown lately."""
@@ -190,7 +191,7 @@ class BeamTransitions:
         shown = self.seen_buckets.ravel().take(state * self.seen_buckets.shape[1] + bucket)
         # a stand may be shown again: nothing in it is recognized
         lifted = np.maximum(costs.index.lifted.take(frame), np.float32(0.1))
-        return costs.compute_recording_change(left, frame), np.float32(costs.weights.replay) * shown * lifted
+        return costs.cuts.compute_recording_change(left, frame), np.float32(costs.weights.replay) * shown * lifted
 
     def _compute_rate_changes(self, to: SlotCandidates, candidate: np.ndarray, state: np.ndarray) -> np.ndarray:
         """Compute what pairs (P,) cost for the change of the playback rate."""

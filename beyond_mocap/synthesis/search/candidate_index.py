@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import weakref
 from dataclasses import dataclass, fields
+from functools import cached_property
 
 import numpy as np
 
@@ -112,7 +113,9 @@ class CandidateIndex:
         place = library.index_place if allowed.all() else None
         known = cache.load_arrays(*place) if place else None
         if known is None or set(known) != {*_STORED, *_list_pair_names()} or len(known["strange"]) != len(self.frames):
-            self._compute(library, allowed)
+            base = library.base_library
+            known_part = None if base is None else CandidateIndex.for_library(base, allowed[: len(base.clips)])
+            self._compute(library, allowed, known_part)
             if place:
                 cache.save_arrays(*place, self._list_arrays())
         else:
@@ -125,8 +128,8 @@ class CandidateIndex:
         stored = {name: getattr(self, name) for name in _STORED}
         return {**stored, **{name: getattr(pairs, name.removeprefix(_PAIR)) for name in _list_pair_names()}}
 
-    def _compute(self, library: Library, allowed: np.ndarray) -> None:
-        """Compute what depends on the clips."""
+    def _compute(self, library: Library, allowed: np.ndarray, known: "CandidateIndex | None") -> None:
+        """Compute what depends on the clips; `known` is the index of the library that this one extends."""
         from scipy.ndimage import uniform_filter1d
 
         self.is_synthetic = np.array([clip.is_synthetic for clip in library.clips])[library.frames.clip]
@@ -134,15 +137,9 @@ class CandidateIndex:
         self.strange = np.clip(strange - 1.0, 0.0, MOST_STRANGE)
         recording = np.unique([clip.path for clip in library.clips], return_inverse=True)[1]
         self.recording = recording[library.frames.clip]
-        fastest = np.zeros(len(library.clips))
-        np.maximum.at(fastest, library.frames.clip, library.frames.speed)
+        fastest = np.maximum.reduceat(library.frames.speed, library.frames.first)
         # a recorded stand that is played forward and backward costs nothing; the ends of a synthetic turn are no stand
         self.is_made_travel = self.is_synthetic & (fastest[library.frames.clip] > STAND_SPEED)
-        speed, turn, lasts = map(np.stack, zip(*(compute_speed_and_turn(library, rate) for rate in PLAYBACK_RATES)))
-        self.speed, self.turn = speed.astype(np.float32), turn.astype(np.float32)
-        self.valid = lasts & allowed[library.frames.clip]
-        usable = np.flatnonzero(self.valid)
-        self.by_speed = usable[np.argsort(self.speed.ravel()[usable], kind="stable")]
         self.offset = -arctan2(self.frames.velocity[:, 1], self.frames.velocity[:, 0]).astype(np.float32)
         self.long_stance = np.clip(library.stance_seconds - USUAL_STANCE, 0.0, _LONGEST_STANCE).astype(np.float32)
         self.is_in_contact = library.feet_in_contact
@@ -150,6 +147,40 @@ class CandidateIndex:
         self.lifted = uniform_filter1d(lifted, SLOT, origin=-(SLOT // 2), mode="nearest")
         self.lean = uniform_filter1d(library.frames.lean, SLOT, axis=0, origin=-(SLOT // 2), mode="nearest")
         self.wild_before, self.wild_after = measure_wildness(library)
+        self._compute_pairs(library, allowed, known)
+
+    def _compute_pairs(self, library: Library, allowed: np.ndarray, known: "CandidateIndex | None") -> None:
+        """Compute what the playback rates make of frames, and the order of their speeds."""
+        count = 0 if known is None else len(known.frames)
+        speed, turn, lasts = map(np.stack, zip(*(compute_speed_and_turn(library, rate, count)
+                                                 for rate in PLAYBACK_RATES)))
+        self.speed, self.turn = speed.astype(np.float32), turn.astype(np.float32)
+        self.valid = lasts & allowed[library.frames.clip[count:]]
+        usable = np.flatnonzero(self.valid)
+        number, frame = np.divmod(usable[np.argsort(self.speed.ravel()[usable], kind="stable")], speed.shape[1])
+        self.by_speed = number * len(self.frames) + frame + count
+        if known is not None:
+            self.speed, self.turn, self.valid = (np.concatenate([getattr(known, name), getattr(self, name)], axis=1)
+                                                 for name in ("speed", "turn", "valid"))
+            self._merge_pairs(known, number, frame + count)
+
+    def _merge_pairs(self, known: "CandidateIndex", number: np.ndarray, frame: np.ndarray) -> None:
+        """Merge pairs (K,) in order of their speeds into those of the index of the first frames."""
+        pairs, added = known.pairs_by_speed(), self.build_pairs(number.astype(np.int8), frame.astype(np.int32))
+        at = np.searchsorted(known.speed_order, _order_by_speed(added), side="right")
+        self._sorted[frozenset()] = RatePairs(*(np.insert(old, at, new, axis=0)
+                                                for old, new in zip(vars(pairs).values(), vars(added).values())))
+        merged = self._sorted[frozenset()]
+        self.by_speed = merged.number.astype(int) * len(self.frames) + merged.frame
+
+    @cached_property
+    def speed_order(self) -> np.ndarray:
+        """(K,) int, ascending: the place of each pair of `by_speed` by speed, among equals by playback rate."""
+        return _order_by_speed(self.pairs_by_speed())
+
+    def round_frame(self, frame: np.ndarray) -> np.ndarray:
+        """Round to the nearest whole library frames."""
+        return np.minimum(np.maximum(np.rint(frame).astype(int), 0), len(self.frames) - 1)
 
     def build_pairs(self, number: np.ndarray, frame: np.ndarray) -> RatePairs:
         """Build the pairs of PLAYBACK_RATES[number (K,)] and library frame (K,)."""
@@ -200,6 +231,11 @@ class CandidateIndex:
         return self._by_words[words]
 
 
+def _order_by_speed(pairs: RatePairs) -> np.ndarray:
+    """Order pairs (K,) by whole numbers: their speeds, whose bits grow with them, then the playback rate."""
+    return (pairs.speed + np.float32(0.0)).view(np.int32).astype(np.int64) * len(PLAYBACK_RATES) + pairs.number
+
+
 def _list_pair_names() -> list[str]:
     """List the names under which the pairs in order of their speeds are stored."""
     return [_PAIR + field.name for field in fields(RatePairs)]
@@ -225,24 +261,25 @@ def measure_wildness(library: Library) -> tuple[np.ndarray, np.ndarray]:
     return tuple(np.maximum(window / usual[kind] - 1.0, 0.0).astype(np.float32) for window in windows)
 
 
-def compute_speed_and_turn(library: Library, rate: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def compute_speed_and_turn(library: Library, rate: float, first: int = 0) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Compute what a slot plays if it starts at each library frame.
 
     Args:
         library: the clips, N frames.
         rate: playback rate.
+        first: frames that are left out.
     Returns:
-        (N,) mean speed m/s, (N,) turn of the body rad, (N,) whether the clip lasts that long.
+        (N - first,) mean speed m/s, turn of the body rad, and whether the clip lasts that long.
     """
-    frames = library.frames
-    after = np.arange(len(frames)) + SLOT * rate
-    valid = frames.remaining_in_clip >= SLOT * rate
+    frames, at = library.frames, np.arange(first, len(library.frames))
+    after = at + SLOT * rate
+    valid = frames.remaining_in_clip[first:] >= SLOT * rate
     low = np.minimum(np.floor(after).astype(int), len(frames) - 2)
     weight = after - low
     # keep indices inside the library where the clip ends too soon; `valid` excludes them
     weight[~valid] = 0.0
-    low[~valid] = np.minimum(np.arange(len(frames))[~valid], len(frames) - 2)
+    low[~valid] = np.minimum(at[~valid], len(frames) - 2)
     path = frames.path[low] * (1 - weight)[:, None] + frames.path[low + 1] * weight[:, None]
     heading = frames.heading[low] * (1 - weight) + frames.heading[low + 1] * weight
-    speed = np.linalg.norm(path - frames.path, axis=1) * library.fps / SLOT
-    return speed, heading - frames.heading, valid
+    speed = np.linalg.norm(path - frames.path[first:], axis=1) * library.fps / SLOT
+    return speed, heading - frames.heading[first:], valid

@@ -21,8 +21,9 @@ from .beam_states import MEMORY_SLOTS, BeamStates
 from .beam_transitions import SAME_FRAME, SlotCandidates
 from .block_costs import AnnotationCost, collect_windows, compute_distances, measure_typical_distance, rescale_alpha
 from .candidate_index import PLAYBACK_RATES, SLOT
+from .cost_weights import Term, Weights, balance_weights
+from .cut_costs import YOUNG_SLOTS
 from .edit_list import EditList
-from .path_costs import YOUNG_SLOTS, Term, Weights, balance_weights
 from .path_search import PathSearch
 from .request import SearchRequest, build_request
 from .slots import KeyPieces, build_slot_edges
@@ -242,7 +243,7 @@ def _compute_unary_costs(search: PathSearch, choices: _SlotChoices, slot: int) -
                                                                        choices.piece))
     if piece[0] < 0:
         number = np.abs(PLAYBACK_RATES - rate[:, None]).argmin(axis=1)
-        return _terms_to_costs(search.costs.iter_misfit_terms(low, high, number, search.costs.round_frame(start)))
+        return _terms_to_costs(search.costs.iter_misfit_terms(low, high, number, search.index.round_frame(start)))
     costs = _terms_to_costs(search.costs.iter_key_terms(low, high, clip, start, rate))
     # how well a clip fits the ball is paid once, where its piece begins
     begins = slot == 0 or choices.piece[slot - 1] != piece[0]
@@ -264,8 +265,8 @@ def _compute_entry_costs(search: PathSearch, choices: _SlotChoices, slot: int) -
     whole = float(search.build_transitions(before, np.zeros(1, int), ends).compute_all(to)[0, 0])
     if whole <= change + 1e-5:
         return {"rate_change": change}
-    costs = {**_terms_to_costs(search.costs.iter_cut_terms(ends, here[1])),
-             "soon": float(search.costs.compute_young_cut_cost(before.age)[0])}
+    costs = {**_terms_to_costs(search.costs.cuts.iter_cut_terms(ends, here[1])),
+             "soon": float(search.costs.cuts.compute_young_cut_cost(before.age)[0])}
     return {**costs, "replay": max(0.0, whole - change - sum(costs.values())), "rate_change": change}
 
 
@@ -273,7 +274,7 @@ def _find_state_before(search: PathSearch, choices: _SlotChoices, slot: int) -> 
     """Build the state of the slot before, with no cost so far, and the library frame (1,) at its end."""
     starts = choices.start[max(slot - MEMORY_SLOTS, 0) : slot]
     recent = np.full(MEMORY_SLOTS, -1)
-    recent[MEMORY_SLOTS - len(starts) :] = search.index.bucket[search.costs.round_frame(starts)]
+    recent[MEMORY_SLOTS - len(starts) :] = search.index.bucket[search.index.round_frame(starts)]
     one, nothing = slice(slot - 1, slot), np.zeros(1, int)
     state = BeamStates(choices.clip[one], choices.start[one], choices.rate[one], cost=np.zeros(1), back=nothing,
                        piece=choices.piece[one], recent=recent[None], age=np.array([_measure_age(choices, slot - 1)]))

@@ -7,6 +7,8 @@ be dragged with both feet on the ground, and no step is added around a touch. Sl
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from ...base.errors import TimedMessage
@@ -45,7 +47,7 @@ def drags_feet(library: Library, request: SearchRequest, at: float, key: Key, ra
 
 
 def list_slot_ranges(
-    library: Library, request: SearchRequest, edges: np.ndarray, at: float, key: Key, rate: float,
+    library: Library, request: SearchRequest, edges: Sequence[int], at: float, key: Key, rate: float,
     slots: tuple[int, int], around: float,
 ) -> list[tuple[int, int]]:  # fmt: skip
     """List the slot ranges that a key's clip may fill: the given one, and those without end slots that drag its feet.

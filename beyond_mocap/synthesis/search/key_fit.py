@@ -12,6 +12,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from weakref import WeakKeyDictionary
 
 import numpy as np
 
@@ -21,6 +22,7 @@ from ...annotation.striking import trace_fastest_surface
 from ...annotation.vocabulary import SIDES
 from ...base.time_series import interpolate_columns
 from ...base.vectors import arctan2
+from ...library.clip import Clip
 from ...library.keys import Key
 from ...library.library import Library
 from ...motion import quaternion
@@ -29,7 +31,7 @@ from ...motion.plant_place import compute_plant_shift, measure_plant_place
 from ...motion.skeleton import Skeleton
 from ...motion.track import SampledTrack
 from ..requested_actions import LEAVING_SECONDS
-from .request import library_frame
+from .request import library_frame, name_clip_key
 
 HEIGHT_COST = 0.8  # per metre of height beyond the noise
 PLACE_COST = 0.6  # per metre on the ground beyond the noise
@@ -142,10 +144,27 @@ def measure_ball(track: SampledTrack, frame: float, is_height_known: bool) -> Ba
 def measure_strikes(library: Library, keys: Sequence[Key]) -> StrikeMeasurements:
     """Measure how clips' key moments strike; of two parts that may strike, the faster one counts.
 
+    Each key moment of a clip is measured once, in whichever library the clip is.
+
     Args:
         library: the clips.
         keys: K key moments.
     """
+    known = [_measured.setdefault(library.clips[key.clip], {}) for key in keys]
+    names = [name_clip_key(library, key) for key in keys]
+    missing = [number for number, (rows, name) in enumerate(zip(known, names)) if name not in rows]
+    if missing:
+        for number, row in zip(missing, _measure_rows(library, [keys[number] for number in missing])):
+            known[number][names[number]] = row
+    columns = zip(*(rows[name] for rows, name in zip(known, names)))
+    return StrikeMeasurements(*(np.array(values) for values in columns))
+
+
+_measured: WeakKeyDictionary[Clip, dict[Key, tuple]] = WeakKeyDictionary()
+
+
+def _measure_rows(library: Library, keys: Sequence[Key]) -> list[tuple]:
+    """Measure place, height, velocity, whether the ball is sent, and the plant foot of each of K key moments."""
     roots, poses = zip(*(_fetch_poses_around(library, key) for key in keys))
     places, rotations = compute_pose(library.skeleton, np.concatenate(roots), np.concatenate(poses))
     places, rotations = (values.reshape(len(keys), 3, *values.shape[1:]) for values in (places, rotations))
@@ -156,7 +175,7 @@ def measure_strikes(library: Library, keys: Sequence[Key]) -> StrikeMeasurements
     place, height, velocity, plant_off = (np.array(values) for values in zip(*rows))
     velocity[:, 0] -= np.linalg.norm(library.frames.velocity[frame], axis=1)
     sends = np.array([bool(_SENDING & key.labels) for key in keys])
-    return StrikeMeasurements(place, height, velocity, sends, np.where(sends, plant_off, 0.0))
+    return list(zip(place, height, velocity, sends, np.where(sends, plant_off, 0.0)))
 
 
 def _fetch_poses_around(library: Library, key: Key):

@@ -1,13 +1,13 @@
-"""Costs of the path search: of a stretch of a clip at a place of the track, and of a cut from one frame to another.
+"""Costs of the path search, of a stretch of a clip at a place of the track: how far speed, turning, facing and labels
+are from what is requested.
 
-Everything that `path_search` weighs is here: how far speed, turning, facing and labels are from what is requested, and
-how far two poses are apart. Costs are per slot, about 1 per metre per second of missed speed.
+`cut_costs` has what a cut from one frame to another costs, `cost_weights` what one unit of each misfit costs.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
@@ -16,25 +16,24 @@ from ...annotation.gaits import TURNING, compute_heading_offset
 from ...annotation.vocabulary import DIRECTIONS
 from ...library.library import Library
 from ..known_body import KnownFeatures
-from ..plan import Plan
 from .candidate_index import ACTING, PLAYBACK_RATES, SLOT, CandidateIndex, RatePairs
+from .cost_weights import Term, Weights
+from .cut_costs import BoneDistance, CutCosts
 from .lean_cost import compute_lean_cost, compute_wanted_lean
 from .preferences import UsedStretch, compute_reuse_cost
 from .request import SearchRequest
 
 _ROUNDING = 1e-3  # m/s, for float32
 
-_CONTINUITY = ("switch", "other", "young", "pose", "rate_change")
 FREE_SPEED, FREE_TURN, FREE_ASIDE = (0.05, 0.06), np.radians(5.0), np.float32(np.radians(12.0))
 KEY_TURN = 0.2  # share of the weights of turning and facing within the pieces of key moments
 KEY_SLIDE = 0.5  # share of the weight of sliding there: the plant foot of a clip that is too slow is dragged
 RESTING_SPEED = 0.15  # m/s of a track from which on a lifted foot costs nothing
-YOUNG_SLOTS = 7  # slots after a cut before which another one costs more: 1.9 s, since a person keeps a gait for longer
 
 
 def find_cheapest(
     cost_of: Callable[[slice], np.ndarray], speeds: np.ndarray, speed: float, weight: float, *, considered: int,
-    count: int, most: float = np.inf,
+    count: int, most: float = np.inf, square_weight: float = 0.0,
 ) -> tuple[np.ndarray, np.ndarray]:
     """Find the `count` cheapest of the `considered` pairs nearest to a speed.
 
@@ -44,16 +43,20 @@ def find_cheapest(
         cost_of: returns the costs (n,) of a slice of the pairs.
         speeds: (K,) m/s of the pairs, ascending.
         speed: m/s that is requested.
-        weight: least cost of a metre per second of missed speed.
+        weight: least cost of a metre per second of missed speed, beyond what is free.
         considered: how many pairs are considered.
         count: how many are returned.
         most: highest cost of a pair that is returned.
+        square_weight: least cost of the square of the missed speed, beside that.
     Returns:
         Their numbers (k,), ascending, and costs (k,).
     """
     near = _nearest_slice(speeds, speed, considered)
     if weight > 0.0 and np.isfinite(most):  # the missed speed alone costs more than that elsewhere
-        reach = most / weight + FREE_SPEED[0] + FREE_SPEED[1] * speed + _ROUNDING
+        free = FREE_SPEED[0] + FREE_SPEED[1] * speed
+        # the larger root of square_weight reach^2 + weight (reach - free) = most, in a form that holds without a square
+        highest = most + weight * free
+        reach = 2.0 * highest / (weight + np.sqrt(weight**2 + 4.0 * square_weight * highest)) + _ROUNDING
         low, high = _locate_speeds(speeds, [speed - reach, speed + reach])
         near = slice(max(int(low), near.start), max(min(int(high), near.stop), near.start))
     cost = cost_of(near)
@@ -76,118 +79,11 @@ def _locate_speeds(speeds: np.ndarray, values: Sequence[float]) -> np.ndarray:
     return np.searchsorted(speeds, np.where(at < values, np.nextafter(at, speeds.dtype.type(np.inf)), at))
 
 
-TERMS = {
-    "speed": "speed differs from the track",
-    "lift": "lifts a foot where the player stands",
-    "turn": "turning differs from the track",
-    "facing": "faces another direction",
-    "drag": "feet on the ground are dragged",
-    "lean": "leans otherwise than the track is accelerated",
-    "known": "moves unlike the body that cameras have seen",
-    "words": "requested labels that the clip lacks",
-    "unasked": "an action not requested, or no labels at all",
-    "strange": "not how people stand, walk or run in this library",
-    "made": "synthetic clip, not recorded",
-    "rate": "playback rate",
-    "strike": "does not fit the ball at the strike",
-    "pose": "change of pose at the cut",
-    "feet": "planted feet that jump at the cut",
-    "left": "abrupt motion before the cut",
-    "cut": "the cut itself, and abrupt motion after it",
-    "soon": "cut soon after another",
-    "replay": "shown a moment ago",
-    "rate_change": "change of playback rate",
-    "avoided": "an avoided label",
-    "style": "not a clip of the style",
-    "manner": "moves unlike this player",
-    "variety": "does not match this player's own lag",
-}
-"""Name of a cost term -> its description in "Why This Clip?"."""
-
-
-@dataclass(frozen=True)
-class Weights:
-    """Cost of one unit of each misfit.
-
-    Attributes:
-        speed: per m/s of missed speed.
-        drag: per m/s, and per second of contact of both feet beyond that of a walk.
-        turn: per radian and slot.
-        lift: for a slot without both feet on the ground where the track rests.
-        facing: per m/s of missed velocity in the body's frame beyond the missed speed.
-        slide: per (m/s)^2 of missed velocity, by which a foot on the ground is dragged.
-        lean: per unit of slope by which the body leans otherwise than its track is accelerated.
-        known: per metre of joint distance from a body that cameras have seen, near its ends.
-        words: for lacking all labels that the user asks for.
-        automatic_words: for lacking all labels of automatic locomotion.
-        unasked: for frames of an action that is not requested, or that carry no label.
-        strange: per radius outside of the library's normal locomotion.
-        synthetic: for a synthetic clip; it is used only where recordings miss the speed by more.
-        synthetic_key: the same at key moments, where a recording is worth more.
-        rate: per unit of time warp.
-        stretch: per unit of time warp beyond 0.85 to 1.15.
-        strike: for a key moment's clip that does not fit its ball (`key_fit`).
-        switch: for any cut.
-        other: for a cut to another recording.
-        young: for a cut just after another one, less in the last two of YOUNG_SLOTS.
-        pose: per metre of joint distance.
-        feet: per metre that a foot in contact before and after a cut would jump.
-        wild: for cutting where the clips jerk by as much again as is usual.
-        rate_change: per unit of change of the playback rate.
-        replay: for a stretch shown less than 4 s ago.
-        held: per frame beyond a clip's end.
-    """
-
-    speed: float = 1.0
-    drag: float = 1.0
-    turn: float = 3.0
-    lift: float = 2.0
-    facing: float = 1.0
-    slide: float = 2.0
-    lean: float = 3.0
-    known: float = 12.0
-    words: float = 3.0
-    automatic_words: float = 1.0
-    unasked: float = 2.0
-    strange: float = 4.0
-    synthetic: float = 0.2
-    synthetic_key: float = 0.8
-    rate: float = 0.24
-    stretch: float = 4.0
-    strike: float = 6.0
-    switch: float = 0.8
-    other: float = 0.6
-    young: float = 1.4
-    pose: float = 4.5
-    feet: float = 1.5
-    wild: float = 0.3
-    rate_change: float = 0.16
-    replay: float = 1.5
-    held: float = 0.1
-
-
 _PLAIN = frozenset((*LOCOMOTION, *DIRECTIONS, TURNING))  # labels that do not ask for an unusual posture
 _NEAR_KEY = 45  # frames around a key moment in which its own labels may be shown
 
 AVOIDED_COST = 1000.0
 """Cost of a slot that shows an avoided label: more than a whole track of anything else."""
-
-Term = tuple[str, np.ndarray]
-"""Name and values of a cost term."""
-
-
-@dataclass(frozen=True, eq=False)
-class BoneDistance:
-    """Another distance of poses: the sum of the distances of weighted bones, averaged over frames around the cut.
-
-    Attributes:
-        bones: (N, P, 3), weighted, of the library's frames.
-        offsets: frames from the cut that are compared, so that what follows and went before counts too.
-    """
-
-    bones: np.ndarray
-    offsets: tuple[int, ...] = (0,)
-
 
 class PathCosts:
     """The costs of one request on one library of N frames."""
@@ -207,8 +103,8 @@ class PathCosts:
         """
         self.library, self.request, self.weights = library, request, weights
         self.reuse_cost = compute_reuse_cost(library, used) if used else None
-        self.bone_distance = bone_distance
         self.frames, self.index = library.frames, CandidateIndex.for_library(library, request.allowed)
+        self.cuts = CutCosts(self.index, weights, bone_distance)
         self.wanted_offset = compute_heading_offset(request.track)
         self.wanted_lean, self.lean_counts = compute_wanted_lean(request.track, request.size)
         bodies = request.plan.bodies
@@ -221,10 +117,6 @@ class PathCosts:
                                     slide=KEY_SLIDE * weights.slide)
         self._cached_motion: dict[tuple[int, int], tuple[float, float]] = {}
         self._cached_lean: dict[tuple[int, int], np.ndarray] = {}
-
-    def round_frame(self, frame: np.ndarray) -> np.ndarray:
-        """Round to the nearest whole library frames."""
-        return np.minimum(np.maximum(np.rint(frame).astype(int), 0), len(self.frames) - 1)
 
     def requested_motion(self, first: int, end: int) -> tuple[float, float]:
         """Return the track's mean speed, m/s, and change of direction, rad, from frame first to end; cached."""
@@ -284,7 +176,7 @@ class PathCosts:
             return _sum_terms(self._iter_motion_costs(first, end, part_pairs)) + fixed_cost.take(part_pairs.frame)
 
         best, cost = find_cheapest(cost_of, pairs.speed, speed, self.weights.speed, considered=considered, count=count,
-                                   most=most)
+                                   most=most, square_weight=self.weights.slide)
         return pairs.number[best], pairs.frame[best], cost
 
     def list_asked_labels(self, first: int, end: int) -> frozenset[str]:
@@ -380,7 +272,7 @@ class PathCosts:
         path = [_interpolate_values(self.frames.path, at, high) for at in (a, b)]
         turn = _interpolate_values(self.frames.heading, b, high) - _interpolate_values(self.frames.heading, a, high)
         speed = np.linalg.norm(path[1] - path[0], axis=1) * self.library.fps / length
-        middle = self.round_frame((a + b) / 2.0)
+        middle = self.index.round_frame((a + b) / 2.0)
         yield from self._iter_motion_terms(
             first, end, speed, turn=turn, offset=self.index.offset[middle], long_stance=self.index.long_stance[middle],
             lifted=self.index.lifted[middle], weights=self._key_weights,
@@ -390,9 +282,9 @@ class PathCosts:
         off = np.abs(rate - 1.0)
         far = self.weights.stretch * np.maximum(off - 0.15, 0.0)
         yield "rate", self.weights.rate * off + far + self.weights.held * held
-        yield "made", self.weights.synthetic_key * self.index.is_synthetic[self.round_frame(start)]
+        yield "made", self.weights.synthetic_key * self.index.is_synthetic[self.index.round_frame(start)]
         if self.request.style_cost is not None:
-            yield "style", self.request.style_cost[self.round_frame(start)]
+            yield "style", self.request.style_cost[self.index.round_frame(start)]
         if self.reuse_cost is not None:
             yield "price", self.reuse_cost[middle]
         if self.request.avoided:
@@ -406,7 +298,7 @@ class PathCosts:
         avoid = self.request.list_avoided(first, end)
         near = (key.requested.words for key in self.request.keys if first - _NEAR_KEY <= key.frame < end + _NEAR_KEY)
         running_count = np.append(0, np.cumsum(self.index.annotation.find_frames_with(avoid.difference(*near))))
-        return running_count[self.round_frame(b) + 1] > running_count[self.round_frame(a)]
+        return running_count[self.index.round_frame(b) + 1] > running_count[self.index.round_frame(a)]
 
     def _iter_motion_terms(self, first: int, end: int, speed, turn, offset, long_stance,
                            lifted, weights: Weights | None = None) -> Iterator[Term]:
@@ -433,98 +325,6 @@ class PathCosts:
         slid = whole if weights is None else missed
         yield "drag", w.slide * slid * slid
 
-    def iter_cut_terms(self, ends: np.ndarray, start: np.ndarray) -> Iterator[Term]:
-        """Generate the terms of cuts between library frames, by name, each (B, K) or broadcast to it.
-
-        "pose" is the distance of the poses (and comes first); "left" and "cut" grow with the jerk that is left or
-        entered, since a transition cannot blend out of the middle of a kick.
-
-        Args:
-            ends: (B,) last frame before the cut.
-            start: (K,) first frame after it.
-        """
-        ends, start = self.round_frame(ends), self.round_frame(start)
-        yield "pose", self.compute_pose_cost(ends, start)
-        yield "feet", np.float32(self.weights.feet) * self.measure_foot_jump(ends[:, None], start)
-        left, entered = self.compute_cut_ends(ends, start)
-        yield "left", left[:, None]
-        yield "cut", entered + self.compute_recording_change(ends[:, None], start)
-
-    def compute_recording_change(self, ends: np.ndarray, start: np.ndarray) -> np.ndarray:
-        """Compute the cost of cuts between library frames, broadcast together, for changing the recording."""
-        recording = self.index.recording
-        return np.float32(self.weights.other) * (recording[ends] != recording[start])
-
-    def compute_young_cut_cost(self, age: np.ndarray) -> np.ndarray:
-        """Compute what a cut costs (B,) for coming soon after the last one, age (B,) slots ago."""
-        return self.weights.young * np.clip((YOUNG_SLOTS - age) / 2.0, 0.0, 1.0)
-
-    def compute_cut_ends(self, ends: np.ndarray, start: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Compute the cost (B,) of leaving library frames ends (B,), and (K,) of cutting to start (K,)."""
-        left = self.weights.wild * self.index.wild_before[ends]
-        entered = self.weights.switch + self.weights.wild * self.index.wild_after[start]
-        return left.astype(np.float32), entered.astype(np.float32)
-
-    def compute_pose_cost(self, ends: np.ndarray, start: np.ndarray) -> np.ndarray:
-        """Compute the cost (B, K) of the change of pose between library frames ends (B,) and start (K,)."""
-        weight = np.float32(self.weights.pose)
-        if self.bone_distance is None:
-            features = self.frames.features
-            return compute_distances(weight * features.take(ends, axis=0), weight * features.take(start, axis=0))
-        total = np.zeros((len(ends), len(start)), np.float32)
-        for offset in self.bone_distance.offsets:
-            a, b = (weight * self.bone_distance.bones[self._offset_frames(frames, offset)] for frames in (ends, start))
-            for bone in range(a.shape[1]):
-                total += compute_distances(a[:, bone], b[:, bone])
-        return total / np.float32(len(self.bone_distance.offsets))
-
-    def _offset_frames(self, frames: np.ndarray, offset: int) -> np.ndarray:
-        """Return the library frames (K,) an offset away from others (K,), held at the ends of their clips."""
-        clip = self.frames.clip[frames]
-        first = self.frames.first[clip]
-        return np.clip(frames + offset, first, first + self.frames.count[clip] - 1)
-
-    def measure_foot_jump(self, ends: np.ndarray, start: np.ndarray) -> np.ndarray:
-        """Measure how far feet in contact before and after cuts would jump.
-
-        Args:
-            ends: library frames before the cuts, any shape.
-            start: library frames after them, of a shape that broadcasts with it.
-        Returns:
-            m, summed over both feet.
-        """
-        feet, in_contact = self.frames.feet, self.index.is_in_contact  # `take`: rows by index cost ten times as much
-        moved = feet.take(ends, axis=0) - feet.take(start, axis=0)
-        stay = in_contact.take(ends, axis=0) & in_contact.take(start, axis=0)
-        moved *= moved
-        apart = np.zeros(moved.shape[:-1], np.float32)
-        for foot in (0, 1):
-            apart += np.sqrt(moved[..., 2 * foot] + moved[..., 2 * foot + 1]) * stay[..., foot]
-        return apart
-
-
-def compute_distances(a: np.ndarray, b: np.ndarray) -> np.ndarray:
-    """Compute the distances (B, K) between points (B, D) and (K, D)."""
-    square = _append_square(a, -2.0 * a, 1) @ _append_square(b, b, 0).T
-    return np.sqrt(np.maximum(square, 0.0, out=square), out=square)
-
-
-def _append_square(points: np.ndarray, scaled: np.ndarray, place: int) -> np.ndarray:
-    """Append squared lengths and ones to scaled points, so that one product is |a|^2 + |b|^2 - 2 a b.
-
-    Args:
-        points: (K, D).
-        scaled: (K, D).
-        place: which of the two last columns holds the squares.
-    Returns:
-        (K, D + 2).
-    """
-    out = np.ones((len(points), points.shape[1] + 2), points.dtype)
-    out[:, :-2] = scaled
-    np.einsum("kd,kd->k", points, points, out=out[:, -2 + place])
-    return out
-
-
 def _sum_terms(terms: Iterator[Term]) -> np.ndarray:
     """Return the sum of terms, in their order; the first one is overwritten."""
     _, total = next(terms)
@@ -538,15 +338,3 @@ def _interpolate_values(values: np.ndarray, at: np.ndarray, last: np.ndarray) ->
     low = np.floor(at).astype(int)
     weight = (at - low).reshape(-1, *[1] * (values.ndim - 1))
     return values[low] * (1.0 - weight) + values[np.minimum(low + 1, last)] * weight
-
-
-def balance_weights(alpha: float, weights: Weights = Weights()) -> Weights:
-    """Balance labels against continuity by alpha.
-
-    Labels are scaled by alpha / 0.2, continuity (cut, change of pose and of playback rate) by (1 - alpha) / 0.8, so
-    that alpha = 0.2, the default and the thesis' value, changes nothing. Speed, turning and facing keep their weights,
-    since they hold the body on its track; so do actions that are not requested, and replayed stretches.
-    """
-    words, continuity = alpha / Plan.alpha, (1.0 - alpha) / (1.0 - Plan.alpha)
-    factors = {"words": words, "automatic_words": words, **dict.fromkeys(_CONTINUITY, continuity)}
-    return replace(weights, **{name: getattr(weights, name) * factor for name, factor in factors.items()})

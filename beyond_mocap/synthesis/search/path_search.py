@@ -21,9 +21,11 @@ from ...library.library import Library
 from .beam_states import MEMORY_SLOTS, BeamStates
 from .beam_transitions import SAME_FRAME, BeamTransitions, SlotCandidates
 from .candidate_index import ACTING, PLAYBACK_RATES, SLOT
+from .cost_weights import Weights
+from .cut_costs import YOUNG_SLOTS, BoneDistance
 from .edit_list import EditList, PlacedKey, SearchStretch, compute_steps, find_transitions, replace_stretch
 from .key_fit import StrikeMeasurements, compute_key_misfit, compute_swing_rates, measure_ball, measure_strikes
-from .path_costs import YOUNG_SLOTS, BoneDistance, PathCosts, Weights
+from .path_costs import PathCosts
 from .preferences import UNUSUAL_FOOT_WEIGHT, UsedStretch, compute_weak_foot_cost, find_unusual_foot
 from .request import RequestedKey, SearchRequest
 from .slots import build_key_pieces, build_slot_edges, find_slot, list_playback_rates
@@ -103,7 +105,8 @@ class PathSearch:
         self.pieces = build_key_pieces(library, request, self.edges)
         self.swing_rates = np.ones(len(self.pieces.number))
         self.choice_cost = weights.strike * self._compute_choice_costs()
-        self._closed_slots = {find_slot(self.edges, request.keys[number].frame) for number in self.pieces.number}
+        self._closed_slots = {find_slot(self.edges, request.keys[number].frame)
+                              for number in np.unique(self.pieces.number)}
         self.width = SearchWidth()
         self.hurried_from: int | None = None
         self._report = progress or (lambda fraction, text: None)
@@ -182,7 +185,7 @@ class PathSearch:
         first, edit = self.stretch.first, self.stretch.edit
         at = np.array([first - 1])
         frames_shown = edit.frame[np.maximum(first - SLOT * np.arange(MEMORY_SLOTS, 0, -1), 0)]
-        recent = self.index.bucket[self.costs.round_frame(frames_shown)][None, :]
+        recent = self.index.bucket[self.index.round_frame(frames_shown)][None, :]
         nothing = np.zeros(1, int)
         return BeamStates(edit.clip[at], edit.frame[at], compute_steps(edit, at), cost=np.zeros(1), back=nothing,
                           piece=nothing - 1, recent=recent, age=self._measure_arrival_age()), 1
@@ -246,7 +249,7 @@ class PathSearch:
 
     def _remember(self, recent: np.ndarray, start: np.ndarray) -> np.ndarray:
         """Forget the oldest of the buckets (B, M) shown lately, and append those of library frames (B,)."""
-        return np.column_stack([recent[:, 1:], self.index.bucket[self.costs.round_frame(start)]])
+        return np.column_stack([recent[:, 1:], self.index.bucket[self.index.round_frame(start)]])
 
     @property
     def _acting_width(self) -> int:
@@ -258,7 +261,7 @@ class PathSearch:
         words = self._list_requested_actions(slot)
         if not words:
             return np.zeros(len(start), bool)
-        return self.index.shows_labels(words)[self.costs.round_frame(start)]
+        return self.index.shows_labels(words)[self.index.round_frame(start)]
 
     def _list_requested_actions(self, slot: int) -> frozenset[str]:
         """List the labels of actions that the user asks for in a slot."""
@@ -311,7 +314,7 @@ class PathSearch:
         at = np.array([] if np.any((edit.transitions > low) & (edit.transitions < high)) else [low], int)
         start, rate = edit.frame[at], compute_steps(edit, at)
         number = np.abs(PLAYBACK_RATES - rate[:, None]).argmin(axis=1)
-        cost = self.costs.compute_misfit(low, high, number, self.costs.round_frame(start))
+        cost = self.costs.compute_misfit(low, high, number, self.index.round_frame(start))
         return edit.clip[at], start, rate, cost, np.full(len(at), -1)
 
     def _compute_misfit_inside(self, slot: int, clip: np.ndarray, start: np.ndarray, number: np.ndarray) -> np.ndarray:
@@ -319,7 +322,7 @@ class PathSearch:
         low, high = self.edges[slot : slot + 2]
         first, last = self.frames.first[clip], self.frames.first[clip] + self.frames.count[clip] - 1
         lasts = (start >= first) & (start + PLAYBACK_RATES[number] * (high - low) <= last)
-        return np.where(lasts, self.costs.compute_misfit(low, high, number, self.costs.round_frame(start)), np.inf)
+        return np.where(lasts, self.costs.compute_misfit(low, high, number, self.index.round_frame(start)), np.inf)
 
     def _find_transitions(self, slot: int, before: BeamStates, ends: np.ndarray, free: np.ndarray, known: np.ndarray):
         """Find the candidates that may be kept, each by the cheapest transition.
@@ -343,8 +346,9 @@ class PathSearch:
 
     def build_transitions(self, before: BeamStates, free: np.ndarray, ends: np.ndarray) -> BeamTransitions:
         """Build the transitions from the states `free` (B,), which end at library frames `ends` (B,)."""
+        young = self.costs.cuts.compute_young_cut_cost(before.age[free])
         return BeamTransitions(self.costs, before.clip[free], ends, rate=before.rate[free], cost=before.cost[free],
-                               recent=before.recent[free], young=self.costs.compute_young_cut_cost(before.age[free]))
+                               recent=before.recent[free], young=young)
 
     def _continue_pieces(self, slot: int, before: BeamStates, ends: np.ndarray, bound: np.ndarray):
         """Continue the pieces of key moments."""

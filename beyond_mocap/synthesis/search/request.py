@@ -145,7 +145,7 @@ def build_request(library: Library, plan: ResolvedPlan) -> SearchRequest:
     if any(avoided):
         automatic = [tuple(word for word in words if word not in avoid) for words, avoid in zip(automatic, avoided)]
     timeline = fill_timeline(plan.timeline, track.times, automatic)
-    allowed = np.array([settings.mirror or not clip.mirrored for clip in library.clips])
+    allowed = find_allowed_clips(library, settings)
     warnings: list[str] = []
     actions = [read_moment_action(moment, plan.track, track) for moment in timeline.keys]
     keys = _ignore_keys(library, timeline, track, gait, warnings) if plan.method == "baseline" else tuple(_build_key(
@@ -166,6 +166,11 @@ def build_request(library: Library, plan: ResolvedPlan) -> SearchRequest:
                          timeline=timeline, keys=keys, allowed=allowed, warnings=tuple(warnings), avoided=avoided,
                          style_cost=off_style, manner_cost=compute_manner_cost(library, settings.manner),
                          weak_foot=weak_foot, lag_preference=lag_preference, size=plan.size)
+
+
+def find_allowed_clips(library: Library, plan: Plan) -> np.ndarray:
+    """Find the clips (C,) bool that a plan may show."""
+    return np.array([plan.mirror or not clip.mirrored for clip in library.clips])
 
 
 def _find_asked(timeline: Timeline, times: np.ndarray, requested_labels: list[Labels]) -> np.ndarray:
@@ -375,3 +380,12 @@ def compute_needed_frames(library: Library, key: Key) -> tuple[float, float]:
 def library_frame(library: Library, key: Key) -> float:
     """Return a key's place among the library's frames (fractional)."""
     return float(library.frames.first[key.clip] + key.frame * library.fps / library.clips[key.clip].motion.fps)
+
+
+def name_clip_key(library: Library, key: Key) -> Key:
+    """Name a key moment by all that what is measured around it depends on, besides its clip.
+
+    The same clip has other frame numbers in other libraries. Half frames are rounded to even ones, so it matters
+    whether the number of its first frame is even.
+    """
+    return replace(key, clip=int(library.frames.first[key.clip]) % 2)

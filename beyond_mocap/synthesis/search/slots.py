@@ -8,17 +8,20 @@ that neither crosses.
 
 from __future__ import annotations
 
+from bisect import bisect_left, bisect_right
 from collections.abc import Sequence
 from dataclasses import dataclass
+from weakref import WeakKeyDictionary
 
 import numpy as np
 
 from ...base.time_series import find_runs
+from ...library.clip import Clip
 from ...library.keys import Key
 from ...library.library import Library
 from .candidate_index import SLOT
 from .foot_drag import list_slot_ranges
-from .request import RequestedKey, SearchRequest, compute_needed_frames, library_frame
+from .request import RequestedKey, SearchRequest, compute_needed_frames, library_frame, name_clip_key
 
 KEY_PLAYBACK_RATES = np.array([0.8, 0.9, 1.0, 1.12, 1.25])  # rates at which a key moment's clip may be played
 MIN_SLOT = 6  # frames of the shortest slot beside an extra edge
@@ -130,17 +133,17 @@ def _build_pieces(library: Library, request: SearchRequest, edges: np.ndarray, n
         Rows in the order of the fields of `KeyPieces`.
     """
     key = request.keys[number]
-    here = find_slot(edges, key.frame)
+    here, known_edges = find_slot(edges, key.frame), edges.tolist()  # numbers of Python, which one by one cost less
     rows = []
     for choice, option in enumerate(key.choices):
         entry, leave = np.maximum(compute_needed_frames(library, option), MIN_KEY_MARGIN)
         for rate in list_playback_rates(library, key, option):
             # the last edge before the entry and the first one after the exit, both a little trimmed
-            first = int(np.searchsorted(edges, key.frame - entry / rate + _TRIMMED, side="right")) - 1
-            end = int(np.searchsorted(edges, key.frame + leave / rate - _TRIMMED))
-            first, end = int(np.clip(first, low, here)), int(np.clip(end, here + 1, high))
+            first = bisect_right(known_edges, key.frame - entry / rate + _TRIMMED) - 1
+            end = bisect_left(known_edges, key.frame + leave / rate - _TRIMMED)
+            first, end = min(max(first, low), here), min(max(end, here + 1), high)
             around = MIN_KEY_MARGIN / rate - _TRIMMED
-            for a, b in list_slot_ranges(library, request, edges, at=key.frame, key=option, rate=rate,
+            for a, b in list_slot_ranges(library, request, known_edges, at=key.frame, key=option, rate=rate,
                                          slots=(first, end), around=around):
                 # so that the key frame is played at exactly key.frame
                 start = library_frame(library, option) - rate * (key.frame - edges[a])
@@ -158,13 +161,23 @@ def list_playback_rates(library: Library, key: RequestedKey, option: Key) -> Seq
     Returns:
         The rates; one alone is that of the swing too.
     """
+    known, name = _off_feet.setdefault(library.clips[option.clip], {}), name_clip_key(library, option)
+    if name not in known:
+        known[name] = _is_off_feet(library, option)
+    return (1.0,) if known[name] else key.rates or KEY_PLAYBACK_RATES
+
+
+_off_feet: WeakKeyDictionary[Clip, dict[Key, bool]] = WeakKeyDictionary()
+"""Whether clips are off their feet around their key moments."""
+
+
+def _is_off_feet(library: Library, option: Key) -> bool:
+    """Return whether the body is in the air, falls or slides around a key moment."""
     reach = int(_OFF_FEET_WITHIN * library.fps)
     at, first = library_frame(library, option), library.frames.first[option.clip]
     low, high = np.clip([round(at) - reach, round(at) + reach], first, first + library.frames.count[option.clip] - 1)
     off = find_runs(~library.feet_in_contact[low : high + 1].any(axis=1))
-    if any(b - a >= _OFF_FEET_SECONDS * library.fps for a, b in off):
-        return (1.0,)
-    return key.rates or KEY_PLAYBACK_RATES
+    return any(b - a >= _OFF_FEET_SECONDS * library.fps for a, b in off)
 
 
 def find_slot(edges: np.ndarray, frame: float) -> int:

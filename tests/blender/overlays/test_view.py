@@ -84,7 +84,7 @@ def test_arrows_lie_on_the_track_and_point_along_the_planned_heading(room, core,
     times = np.arange(0.0, 8.01, 0.1)
     y = 4.0 * np.minimum(times, 4.0)
     track = core("motion.track").Track(times, np.stack([np.full(len(times), 2.0), y], axis=1) / size)
-    key = core("synthesis.heading_plan").HeadingKey
+    key = core("synthesis.heading_request").HeadingKey
     keys = key(5.6, heading=np.pi, hold=0.7), key(7.5, target=(2.0, 99.0), hold=99.0)
     plan_module = core("synthesis.plan")
     asked = plan_module.Plan(track=track, heading_keys=keys, fps=30.0)

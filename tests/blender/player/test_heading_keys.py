@@ -20,7 +20,7 @@ def plans(extension):
 
 @pytest.fixture
 def key(core):
-    return core("synthesis.heading_plan").HeadingKey
+    return core("synthesis.heading_request").HeadingKey
 
 
 @pytest.fixture

@@ -7,7 +7,7 @@ from beyond_mocap.base.errors import InputError
 from beyond_mocap.base.settings import list_settings
 from beyond_mocap.motion.track import Track, sample_track
 from beyond_mocap.synthesis.plan import Plan
-from beyond_mocap.synthesis.search.path_costs import Weights, balance_weights
+from beyond_mocap.synthesis.search.cost_weights import Weights, balance_weights
 from beyond_mocap.synthesis.synthesize import synthesize
 
 

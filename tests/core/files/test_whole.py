@@ -2,6 +2,7 @@
 
 import os
 import stat
+from pathlib import Path
 
 import pytest
 
@@ -44,6 +45,17 @@ def test_of_two_that_write_to_one_folder_the_first_to_end_does(tmp_path):
         (inside / "a").write_text("2")
         (out / "a").write_text("1")  # by the other process
     assert [(one.name, one.read_text()) for one in out.iterdir()] == [("a", "1")]
+
+
+@pytest.mark.parametrize("write", [Path.write_text, atomic_write])
+def test_the_other_one_is_told_why_it_cannot_write(tmp_path, write):
+    """The first to end removes what the other has begun."""
+    out = tmp_path / "out"
+    with pytest.raises(InputError, match="another command has written to this folder"), atomic_folder(out) as inside:
+        (out / "a").write_text("1")
+        inside.rmdir()
+        write(inside / "b", "2")
+    assert [one.name for one in out.iterdir()] == ["a"]
 
 
 def test_mirror_and_retarget_write_bvh_only(tmp_path, clip_file, capsys):

@@ -13,7 +13,7 @@ from beyond_mocap.library.synthetic_clips import sample_upright_example
 from beyond_mocap.motion.humanoid import compute_heading_from_positions, identify_joints
 from beyond_mocap.motion.motion import forward_kinematics
 from beyond_mocap.motion.track import Track
-from beyond_mocap.synthesis.heading_plan import HeadingKey
+from beyond_mocap.synthesis.heading_request import HeadingKey
 from beyond_mocap.synthesis.plan import Plan
 from beyond_mocap.synthesis.synthesize import synthesize
 from beyond_mocap.synthetic.gait import build_gait

@@ -8,7 +8,7 @@ from beyond_mocap.match.pieces.named_edit import NamedEdit, NamedKey
 from beyond_mocap.match.player_edit import PlayerEdit, Stretch, to_stored_plan
 from beyond_mocap.motion.track import Track
 from beyond_mocap.synthesis.heading_path import HeadingPath
-from beyond_mocap.synthesis.heading_plan import HeadingKey
+from beyond_mocap.synthesis.heading_request import HeadingKey
 from beyond_mocap.synthesis.plan import Pin, Plan, PlayerTouch, SolvedTrajectory
 
 

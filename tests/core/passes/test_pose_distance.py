@@ -6,7 +6,9 @@ import pytest
 from beyond_mocap.passes.pose_distance import BONES, BoneWeights, align_poses, measure_bones, weigh_bones
 from beyond_mocap.synthesis.plan import Plan
 from beyond_mocap.synthesis.resolve_plan import resolve_plan
-from beyond_mocap.synthesis.search.path_costs import BoneDistance, PathCosts, Weights
+from beyond_mocap.synthesis.search.cost_weights import Weights
+from beyond_mocap.synthesis.search.cut_costs import BoneDistance
+from beyond_mocap.synthesis.search.path_costs import PathCosts
 from beyond_mocap.synthesis.search.request import build_request
 
 
@@ -44,13 +46,14 @@ def test_the_search_pays_for_it(library, costs):
     """A cut's price is eq. 1 where it is given, the mean over the frames around it; and the weights steer it."""
     ends, start = np.array([40.0, 90.0]), np.arange(200.0, 260.0)
     rows = weigh_bones(library)
-    one = dict(costs(bone_distance=BoneDistance(rows)).iter_cut_terms(ends, start))["pose"]
+    one = dict(costs(bone_distance=BoneDistance(rows)).cuts.iter_cut_terms(ends, start))["pose"]
     at = ends.astype(int), start.astype(int)
     np.testing.assert_allclose(one, Weights().pose * pose_distance(rows[at[0]], rows[at[1]]), rtol=1e-3, atol=1e-3)
-    around = dict(costs(bone_distance=BoneDistance(rows, (-6, 6))).iter_cut_terms(ends, start))["pose"]
+    around = dict(costs(bone_distance=BoneDistance(rows, (-6, 6))).cuts.iter_cut_terms(ends, start))["pose"]
     assert not np.allclose(one, around, rtol=0.02)
     hands = BoneWeights((0.0, 0.0, 8.0, 0.0, 0.0, 0.0), (0.0,) * 6)
-    other = dict(costs(bone_distance=BoneDistance(weigh_bones(library, hands))).iter_cut_terms(ends, start))["pose"]
+    cuts = costs(bone_distance=BoneDistance(weigh_bones(library, hands))).cuts
+    other = dict(cuts.iter_cut_terms(ends, start))["pose"]
     assert np.any(np.argsort(one[0]) != np.argsort(other[0]))
 
 
@@ -58,7 +61,8 @@ def test_without_it_the_features_count_as_ever(library, costs):
     ends, start = np.array([40.0]), np.arange(200.0, 210.0)
     features = library.frames.features
     wanted_cost = Weights().pose * np.linalg.norm(features[[40]][:, None] - features[200:210][None], axis=-1)
-    np.testing.assert_allclose(dict(costs().iter_cut_terms(ends, start))["pose"], wanted_cost, rtol=1e-3, atol=1e-3)
+    found = dict(costs().cuts.iter_cut_terms(ends, start))["pose"]
+    np.testing.assert_allclose(found, wanted_cost, rtol=1e-3, atol=1e-3)
 
 
 def test_a_pose_is_like_itself_wherever_it_stands(library):

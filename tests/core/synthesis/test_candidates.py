@@ -42,3 +42,15 @@ def test_none_costs_more_than_the_most(most):
     rank = np.argsort(every)[:300]
     assert set(number) == set(rank[every[rank] <= most])
     assert most > 0.1 or sum(weighed) < 3500, "what misses the speed by more than that is not weighed"
+
+
+@pytest.mark.parametrize("most", [0.05, 0.4, 3.0])
+def test_the_square_of_the_missed_speed_leaves_out_more(most):
+    speeds = np.sort(np.random.default_rng(2).uniform(0.0, 6.0, 40000))
+    missed = np.abs(speeds - 2.0)
+    cost_of, every, weighed = costs_of(np.maximum(missed - 0.17, 0.0) + 2.0 * missed**2)
+    plain, _ = find_cheapest(cost_of, speeds, 2.0, 1.0, considered=len(speeds), count=300, most=most)
+    number, cost = find_cheapest(cost_of, speeds, 2.0, 1.0, considered=len(speeds), count=300, most=most,
+                                 square_weight=2.0)
+    assert number.tolist() == plain.tolist() and cost.tolist() == every[number].tolist()
+    assert weighed[1] < 0.85 * weighed[0]

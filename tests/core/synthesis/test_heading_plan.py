@@ -6,18 +6,16 @@ import pytest
 from beyond_mocap.annotation import Span, parse_timeline
 from beyond_mocap.base.errors import InputError
 from beyond_mocap.motion.track import SampledTrack, Track, sample_track
-from beyond_mocap.synthesis import heading_plan
+from beyond_mocap.synthesis import heading_costs
 from beyond_mocap.synthesis.heading_path import HeadingPath
 from beyond_mocap.synthesis.heading_plan import (
-    HeadingKey,
-    HeadingRequest,
-    Play,
     plan_heading,
     plan_heading_path,
     plan_track,
     rest_track,
     update_heading_path,
 )
+from beyond_mocap.synthesis.heading_request import HeadingKey, HeadingRequest, Play
 from beyond_mocap.synthesis.plan import Pin, Plan, ResolvedPlan
 from beyond_mocap.synthesis.synthesize import synthesize
 
@@ -208,8 +206,8 @@ def test_a_key_is_met_exactly_and_smoothly(hold):
 
 def test_many_keys_are_measured_at_once(monkeypatch):
     """An object that is faced for long gives thousands."""
-    counts, measure = [], heading_plan._measure_angles
-    monkeypatch.setattr(heading_plan, "_measure_angles",
+    counts, measure = [], heading_costs._measure_angles
+    monkeypatch.setattr(heading_costs, "_measure_angles",
                         lambda bearing: counts.append(len(bearing)) or measure(bearing))
     track, sums = going(constant(0.0, 0.0), constant(20.0, 0.0), seconds=20.0), []
     for step in (9.0, 0.15):

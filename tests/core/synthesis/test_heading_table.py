@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from beyond_mocap.base.errors import InputError
-from beyond_mocap.synthesis.heading_plan import HeadingKey
+from beyond_mocap.synthesis.heading_request import HeadingKey
 from beyond_mocap.synthesis.heading_table import read_heading_keys
 
 HEADER = "time_s,heading_deg,x_m,y_m,hold_s\n"

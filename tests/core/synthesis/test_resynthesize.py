@@ -10,7 +10,8 @@ from beyond_mocap.base.errors import UserCancelledError
 from beyond_mocap.motion.humanoid import compute_heading, identify_joints
 from beyond_mocap.motion.motion import forward_kinematics
 from beyond_mocap.motion.track import Track, sample_track, smooth_zero_phase_hann
-from beyond_mocap.synthesis.heading_plan import ASKED_SECONDS, HeadingKey
+from beyond_mocap.synthesis.heading_costs import ASKED_SECONDS
+from beyond_mocap.synthesis.heading_request import HeadingKey
 from beyond_mocap.synthesis.plan import Plan
 from beyond_mocap.synthesis.resynthesize import BLEND_SECONDS, resynthesize
 from beyond_mocap.synthesis.search.affected_frames import RUN_UP

@@ -12,7 +12,7 @@ from beyond_mocap.library.build import build_library
 from beyond_mocap.motion.humanoid import compute_heading, identify_joints
 from beyond_mocap.motion.motion import Motion, forward_kinematics, place_motion, sample_frames
 from beyond_mocap.motion.track import BALL_RADIUS, Track
-from beyond_mocap.synthesis.heading_plan import HeadingKey
+from beyond_mocap.synthesis.heading_request import HeadingKey
 from beyond_mocap.synthesis.plan import Plan, PlayerTouch, SolvedTrajectory
 from beyond_mocap.synthesis.quality.movement import compute_jerk, compute_window_maxima
 from beyond_mocap.synthetic.gait import build_gait

@@ -27,6 +27,7 @@ from beyond_mocap.motion.motion import forward_kinematics
 from beyond_mocap.motion.track import Track
 from beyond_mocap.synthesis.plan import Plan
 from beyond_mocap.synthesis.resynthesize import resynthesize
+from beyond_mocap.synthesis.search.candidate_index import CandidateIndex
 from beyond_mocap.synthesis.synthesize import synthesize
 
 HEADER = ("header", "standing", "jump")
@@ -41,6 +42,37 @@ def plan_walk(library, *words: str, **settings) -> Plan:
 
 def moment(*words: str, **situation) -> ActionMoment:
     return ActionMoment(labels=frozenset(words), **situation)
+
+
+def test_a_clip_is_read_by_other_processes_as_it_was_built(library, tmp_path, monkeypatch):
+    kept = replace(library, cache_location=(tmp_path, "key"))
+    paths = find_missing_actions(library, [moment(*HEADER), moment("slide", "tackle", speed=4.0)])
+    built = add_actions(kept, paths)
+    monkeypatch.setattr(missing_actions, "_build_clip", None)
+    read = add_actions(replace(kept), paths)
+    assert len(paths) == 2
+    for one, other in zip(built.clips[-4:], read.clips[-4:], strict=True):
+        assert (one.path, one.mirrored, one.annotations) == (other.path, other.mirrored, other.annotations)
+        for values in (lambda clip: clip.motion.root_positions, lambda clip: clip.motion.rotations,
+                       lambda clip: clip.heel_toe_contacts):
+            assert np.array_equal(values(one), values(other)) and values(one).dtype == values(other).dtype
+    with pytest.raises(TypeError):  # a cache of other recordings is not read
+        add_actions(replace(kept, cache_location=(tmp_path, "other")), paths)
+
+
+def test_a_library_is_extended_as_if_it_were_indexed_as_a_whole(library):
+    extended = add_actions(library, find_missing_actions(library, [moment(*HEADER)]))
+    whole = replace(extended)  # knows nothing of what it extends
+    vars(whole).update({name: vars(extended)[name] for name in ("normal_postures", "strangeness")})
+    every = np.ones(len(whole.clips), bool)
+    one, other = CandidateIndex(extended, every), CandidateIndex(whole, every)
+    assert extended.base_library is library and whole.base_library is None
+    for name in ("valid", "by_speed", "strange", "lean", "lifted", "wild_before", "is_made_travel"):
+        assert np.array_equal(getattr(one, name), getattr(other, name)), name
+    for pairs in ("number", "frame", "speed", "turn", "offset", "long_stance", "lifted", "lean"):
+        assert np.array_equal(getattr(one.pairs_by_speed(), pairs), getattr(other.pairs_by_speed(), pairs)), pairs
+    assert np.array_equal(extended.manners.of_clip, whole.manners.of_clip)
+    assert np.array_equal(extended.manners.distance, whole.manners.distance)
 
 
 def test_only_what_no_recording_carries_is_missing(library):
@@ -231,6 +263,7 @@ def test_a_file_of_another_version_beside_the_cache_is_replaced(library):
     file = library.cache_location[0] / Path(path).relative_to(CACHE_FOLDER)
     file.parent.mkdir(parents=True, exist_ok=True)
     file.write_text("another version")
+    file.with_suffix(".npz").unlink(missing_ok=True)  # its key is another one
     missing_actions._clips.pop(library, None)
     missing_actions._extended.pop(library, None)
     clip = next(clip for clip in add_actions(library, [path]).clips if is_action_clip(clip))

@@ -29,7 +29,7 @@ def test_every_way_costs_its_cut_and_what_follows(ways):
     found, offered = ways
     every = found.compute_all(offered)
     costs, start = found.costs, offered.start.astype(int)
-    cut = sum(values for _, values in costs.iter_cut_terms(found.end, start))
+    cut = sum(values for _, values in costs.cuts.iter_cut_terms(found.end, start))
     # a stand may be shown again nearly for nothing
     shown = found.seen_buckets[:, costs.index.bucket[start]]
     replay = costs.weights.replay * shown * np.maximum(costs.index.lifted[start], 0.1)

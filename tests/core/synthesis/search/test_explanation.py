@@ -12,9 +12,9 @@ from beyond_mocap.motion.track import BALL_RADIUS, Track, clean_track
 from beyond_mocap.synthesis.plan import Pin, Plan, PlayerTouch, SolvedTrajectory
 from beyond_mocap.synthesis.resolve_plan import resolve_plan
 from beyond_mocap.synthesis.search.blocks import BlockSearch
+from beyond_mocap.synthesis.search.cost_weights import TERMS, Weights, balance_weights
 from beyond_mocap.synthesis.search.distance import align_keys, build_straight_edit
 from beyond_mocap.synthesis.search.explanation import explain_block_choices, explain_choices, explain_path_choices
-from beyond_mocap.synthesis.search.path_costs import TERMS, Weights, balance_weights
 from beyond_mocap.synthesis.search.path_search import PathSearch
 from beyond_mocap.synthesis.synthesize import synthesize
 

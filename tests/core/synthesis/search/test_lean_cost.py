@@ -9,8 +9,9 @@ from beyond_mocap.motion.lean import MOST_ACCELERATION
 from beyond_mocap.motion.supports import GRAVITY
 from beyond_mocap.motion.track import sample_track
 from beyond_mocap.synthesis.search.candidate_index import SLOT
+from beyond_mocap.synthesis.search.cost_weights import Weights
 from beyond_mocap.synthesis.search.lean_cost import FREE_LEAN, compute_lean_cost, compute_wanted_lean
-from beyond_mocap.synthesis.search.path_costs import PathCosts, Weights
+from beyond_mocap.synthesis.search.path_costs import PathCosts
 
 FPS = 30.0
 MIDDLE = slice(60, 180)

@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from beyond_mocap.synthesis.search.candidate_index import PLAYBACK_RATES, SLOT, STRIKE_COST
-from beyond_mocap.synthesis.search.path_costs import PathCosts, Weights
+from beyond_mocap.synthesis.search.cost_weights import Weights
+from beyond_mocap.synthesis.search.path_costs import PathCosts
 
 NORMAL = int(np.flatnonzero(PLAYBACK_RATES == 1.0)[0])
 NONE = Weights(**{name: 0.0 for name in vars(Weights())})
@@ -73,11 +74,11 @@ def test_a_cut_costs_what_the_standing_foot_would_jump(library, order):
     frames = frames_of(library, "walk.bvh")
     stands = library.feet_in_contact[frames]
     one = frames[stands[:, 0] & ~stands[:, 1]]
-    found = costs(library, order()).measure_foot_jump(one[:, None], one)
+    found = costs(library, order()).cuts.measure_foot_jump(one[:, None], one)
     feet = library.frames.feet[one, :2]
     assert np.allclose(found, np.linalg.norm(feet[:, None] - feet, axis=-1), atol=1e-6)
     other = frames[~stands[:, 0] & stands[:, 1]]
-    assert not np.any(costs(library, order()).measure_foot_jump(one[:, None], other))
+    assert not np.any(costs(library, order()).cuts.measure_foot_jump(one[:, None], other))
 
 
 def test_the_cheapest_are_the_cheapest(library, order, track_of):

@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from ..base.digest import hex_digest
-from ..files.atomic import atomic_write
+from .atomic import atomic_write
 
 _HEADER, _DIGEST = "header", "digest"
 

@@ -1,0 +1,1 @@
+"""Clips of synthetic actions, which `library.missing_actions` builds, beside the cache."""
