@@ -135,7 +135,7 @@ def load_part(content: Content, skeleton: Skeleton) -> Take:
     ball = [arrays.get(f"ball.{name}") for name in _BALL]
     return Take(
         motion=Motion.from_stored(skeleton, arrays["root"], arrays["rotations"], header["fps"]),
-        words=tuple(words[number] for number in arrays["words"]), timeline=_parse_timeline(header["timeline"]),
+        words=tuple(map(words.__getitem__, arrays["words"].tolist())), timeline=_parse_timeline(header["timeline"]),
         keys=tuple(_parse_key(key) for key in header["keys"]), ball=None if ball[0] is None else BallPath(*ball),
         warnings=tuple(TimedMessage(text, *spans) for text, spans in header["warnings"]),
         dribble_touches=tuple(DribbleTouch(**one) for one in header["touches"]),
