@@ -213,8 +213,8 @@ def sample_frames(motion: Motion, frames: np.ndarray) -> tuple[np.ndarray, np.nd
 
 def sample_motions(motions: Sequence[Motion], groups: Sequence[np.ndarray], frames: np.ndarray,
                    skeleton: Skeleton) -> tuple[np.ndarray, np.ndarray]:
-    """Sample several motions of one skeleton together: to the bit what `sample_frames` samples of each, at a fraction of
-    the time where each shows a few frames.
+    """Sample several motions of one skeleton together, to the bit as `sample_frames` does each, but faster where each
+    shows a few frames.
 
     Args:
         motions: M motions.

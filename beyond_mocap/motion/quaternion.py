@@ -185,9 +185,7 @@ def from_matrix(m: np.ndarray) -> np.ndarray:
 
 
 def from_axes(x: np.ndarray, y: np.ndarray, z: np.ndarray) -> np.ndarray:
-    """Convert the directions (..., 3) of three axes, the columns of rotation matrices, to unit quaternions (..., 4) with
-    w >= 0.
-    """
+    """Convert the directions (..., 3) of three axes, a rotation matrix's columns, to quaternions (..., 4), w >= 0."""
     (xx, yx, zx), (xy, yy, zy), (xz, yz, zz) = ([axis[..., row] for row in range(3)] for axis in (x, y, z))
     trace = xx + yy + zz
     # four ways to solve, each safe where its own component is the largest (Shepperd 1978)
