@@ -272,7 +272,7 @@ def slerp(a: np.ndarray, b: np.ndarray, weight: float | np.ndarray) -> np.ndarra
 
 
 def _move_last(components: np.ndarray) -> np.ndarray:
-    """View (K, ...) as (..., K): `numpy.moveaxis` in a tenth of the time, for the many short calls."""
+    """View (K, ...) as (..., K), in a tenth of the time that numpy's function takes: short calls are many."""
     return components.transpose(*range(1, components.ndim), 0)
 
 
