@@ -12,6 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ..base.vectors import dot_products, measure_lengths
 from ..motion import quaternion
 from ..motion.humanoid import Humanoid, Limb, identify_joints
 from ..motion.skeleton import Skeleton
@@ -110,7 +111,7 @@ def measure_ball_gap(
     Returns:
         (...,) m.
     """
-    return np.linalg.norm(ball - find_nearest_point(line, ball), axis=-1) - radius - ball_radius
+    return measure_lengths(ball - find_nearest_point(line, ball)) - radius - ball_radius
 
 
 def find_nearest_point(line: Sequence[np.ndarray], position: np.ndarray) -> np.ndarray:
@@ -124,8 +125,8 @@ def find_nearest_point(line: Sequence[np.ndarray], position: np.ndarray) -> np.n
     """
     start, end = line
     along = end - start
-    share = np.sum((position - start) * along, axis=-1) / np.maximum(np.sum(along * along, axis=-1), 1e-12)
-    return start + np.clip(share, 0.0, 1.0)[..., None] * along
+    share = dot_products(position - start, along) / np.maximum(dot_products(along, along), 1e-12)
+    return start + np.minimum(np.maximum(share, 0.0), 1.0)[..., None] * along
 
 
 def measure_smallest_gap(

@@ -119,18 +119,20 @@ def round_values(value):
     Returns:
         The same with NaN and infinity as None and numpy numbers as Python's.
     """
-    if isinstance(value, Mapping):
-        return {key: round_values(entry) for key, entry in value.items()}
+    if value is None or isinstance(value, str):
+        return value
+    if isinstance(value, (float, np.floating)):
+        if not math.isfinite(value):
+            return None
+        return round(float(value), 3) if abs(value) >= 100.0 else float(f"{round(float(value), 9) + 0.0:.5g}")
     if isinstance(value, (list, tuple)):
         return [round_values(entry) for entry in value]
     if isinstance(value, (bool, np.bool_)):
         return bool(value)
     if isinstance(value, (int, np.integer)):
         return int(value)
-    if isinstance(value, (float, np.floating)):
-        if not math.isfinite(value):
-            return None
-        return round(float(value), 3) if abs(value) >= 100.0 else float(f"{round(float(value), 9) + 0.0:.5g}")
+    if isinstance(value, Mapping):
+        return {key: round_values(entry) for key, entry in value.items()}
     return value
 
 

@@ -16,7 +16,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ..base.banded_least_squares import BandedLeastSquares
-from ..base.time_series import compute_running_maximum, hann_smooth, number_runs
+from ..base.time_series import compute_running_maximum, find_runs, hann_smooth, number_runs
 from ..base.vectors import arctan2, cross_product, dot_products, measure_lengths
 from . import quaternion
 from .contacts import measure_sole_height
@@ -296,7 +296,8 @@ def relax_contact_weights(weight: np.ndarray, excess: np.ndarray) -> np.ndarray:
     # label numbers the stances from 1; frames without contact have 0 and collect nothing
     label = number_runs(stance)
     worst = np.zeros(label.max(initial=0) + 1)
-    np.maximum.at(worst, label, np.where(stance, np.maximum(excess, 0.0), 0.0))
+    for first, end in find_runs(stance):
+        worst[label[first]] = max(excess[first:end].max(), 0.0)
     return weight / (1.0 + worst[label] / 0.02)[:, None] ** 2
 
 

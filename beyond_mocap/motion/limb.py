@@ -103,10 +103,8 @@ def build_bone_frame(direction: np.ndarray, hinge: np.ndarray) -> np.ndarray:
     """
     left = -(hinge - dot_products(hinge, direction)[..., None] * direction)
     left = _normalize_across(left, direction)
-    axes = np.empty((3, 3, *left.shape[:-1]))  # by component, as it is read
-    for column, axis in enumerate((cross_product(left, -direction), left, -direction)):
-        axes[:, column] = np.moveaxis(axis, -1, 0)
-    return quaternion.from_matrix(np.moveaxis(axes, (0, 1), (-2, -1)))
+    up = -direction
+    return quaternion.from_axes(*(np.asarray(axis, order="F") for axis in (cross_product(left, up), left, up)))
 
 
 @dataclass(frozen=True, eq=False)

@@ -55,6 +55,7 @@ class MomentumPlanner:
 
     def __init__(self, phases: np.ndarray, count: int, fps: float, share: np.ndarray, strength: float = STRENGTH):
         self.phases, self.count, self.fps, self.share, self.strength = phases, count, fps, share, strength
+        self._ground: tuple[np.ndarray, BandedLeastSquares, np.ndarray] | None = None
         segments = np.maximum(np.round(phases[:, 1] - phases[:, 0]).astype(int), _FEWEST_SEGMENTS)
         spacing = (phases[:, 1] - phases[:, 0]) / segments
         inner = segments - 1
@@ -97,19 +98,26 @@ class MomentumPlanner:
         Returns:
             (T, 2) m, world.
         """
-        squares = self._add_values(self._motion_level, ground, 1.0 / _NEAR_LEVEL**2, _BLOCK_LEVEL)
+        squares, solved = self._solve_ground(ground)
         most = FRICTION * np.maximum(force_up, 0.0)
-        for _ in range(_CLAMP_ROUNDS + 1):
-            solved = squares.solve()
+        for done in range(_CLAMP_ROUNDS + 1):
             force = solved[self._knot_index]
             size = measure_lengths(force)
             beyond = size > most
-            if not beyond.any():
+            if done == _CLAMP_ROUNDS or not beyond.any():
                 break
             squares = squares.copy()
             self._hold_forces(squares, _CLAMP_LEVEL * beyond,
                               force * (np.minimum(most, size) / np.maximum(size, 1e-9))[:, None])
+            solved = squares.solve()
         return self._mix(ground, solved[self._frame_index])
+
+    def _solve_ground(self, ground: np.ndarray) -> tuple[BandedLeastSquares, np.ndarray]:
+        """Solve the level plan without friction; once for rounds in which only the height changes."""
+        if self._ground is None or not np.array_equal(self._ground[0], ground):
+            squares = self._add_values(self._motion_level, ground, 1.0 / _NEAR_LEVEL**2, _BLOCK_LEVEL)
+            self._ground = ground.copy(), squares, squares.solve()
+        return self._ground[1:]
 
     @cached_property
     def _motion_up(self) -> BandedLeastSquares:

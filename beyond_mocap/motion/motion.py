@@ -5,7 +5,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -16,6 +16,7 @@ from . import quaternion
 from .skeleton import Skeleton, freeze_array
 
 _PLUS, _MINUS = np.add, np.subtract
+_SLERP_FRAMES = 128
 _CUBIC_REACH = 8
 """Frames to either side on which a value between two frames depends; a spline's memory fades by 0.27 a frame."""
 
@@ -117,7 +118,9 @@ def compute_pose(
     """
     lead = local.shape[:-2]
     flat = np.ascontiguousarray(local.reshape(-1, len(skeleton), 4).transpose(1, 2, 0))
-    world, places = np.full_like(flat, np.nan), np.full((len(skeleton), 3, flat.shape[2]), np.nan)
+    world, places = np.empty_like(flat), np.empty((len(skeleton), 3, flat.shape[2]))
+    if joints is not None:
+        world[:], places[:] = np.nan, np.nan
     world[0], places[0] = flat[0], root.reshape(-1, 3).T
     spare, turned = np.empty(flat.shape[2]), np.empty((3, flat.shape[2]))
     for joint in range(1, len(skeleton)) if joints is None else sorted({*joints} - {0}):
@@ -141,7 +144,7 @@ def compute_pose(
         _add_products(places[joint, 0], spare, (_PLUS, aw, tx), (_PLUS, ay, tz), (_MINUS, az, ty))
         _add_products(places[joint, 1], spare, (_PLUS, aw, ty), (_PLUS, az, tx), (_MINUS, ax, tz))
         _add_products(places[joint, 2], spare, (_PLUS, aw, tz), (_PLUS, ax, ty), (_MINUS, ay, tx))
-        places[joint] += places[parent]
+        np.add(places[joint], places[parent], places[joint])  # += would also copy the sum onto itself
     return (
         places.transpose(2, 0, 1).reshape(*lead, len(skeleton), 3),
         world.transpose(2, 0, 1).reshape(*lead, len(skeleton), 4),
@@ -206,6 +209,39 @@ def sample_frames(motion: Motion, frames: np.ndarray) -> tuple[np.ndarray, np.nd
     if not np.any(weight):
         return root, motion.rotations[low].copy()
     return root, quaternion.slerp(motion.rotations[low], motion.rotations[high], weight[:, None])
+
+
+def sample_motions(motions: Sequence[Motion], groups: Sequence[np.ndarray], frames: np.ndarray,
+                   skeleton: Skeleton) -> tuple[np.ndarray, np.ndarray]:
+    """Sample several motions of one skeleton together, to the bit as `sample_frames` does each, but faster where each
+    shows a few frames.
+
+    Args:
+        motions: M motions.
+        groups: the rows of `frames` that each of them shows, every row in one group.
+        frames: (N,) fractional frames of the row's motion, clamped to it.
+        skeleton: J joints, that of all motions.
+    Returns:
+        Root positions (N, 3) in metres and local rotations (N, J, 4).
+    """
+    count, last = len(frames), np.empty(len(frames), int)
+    for motion, rows in zip(motions, groups, strict=True):
+        last[rows] = len(motion) - 1
+    frames = np.clip(np.asarray(frames, dtype=float), 0.0, last)
+    low = np.minimum(np.floor(frames).astype(int), np.maximum(last - 1, 0))
+    high, weight = np.minimum(low + 1, last), (frames - low)[:, None]
+    roots, turns = np.empty((2, count, 3)), np.empty((2, count, len(skeleton), 4))
+    is_between = np.zeros(count, bool)
+    for motion, rows in zip(motions, groups):
+        for root, turn, at in zip(roots, turns, (low[rows], high[rows])):
+            root[rows], turn[rows] = motion.root_positions[at], motion.rotations[at]
+        is_between[rows] = weight[rows].any()
+    rotations = turns[0]
+    for first in range(0, count, _SLERP_FRAMES):  # a few at a time stay in the processor's cache
+        rows = np.arange(first, min(first + _SLERP_FRAMES, count))
+        rows = rows[is_between[rows]]
+        rotations[rows] = quaternion.slerp(rotations[rows], turns[1, rows], weight[rows])
+    return roots[0] * (1.0 - weight) + roots[1] * weight, rotations
 
 
 def sample_frames_cubic(motion: Motion, frames: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

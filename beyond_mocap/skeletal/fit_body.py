@@ -205,11 +205,11 @@ def build_frame(up: np.ndarray, across: np.ndarray) -> np.ndarray:
     """Build rotations (T, 4) whose Z is along `up` (T, 3) and whose Y is `across` (T, 3) as far as that is square."""
     z = unit_vectors(up, _UP)
     y = unit_vectors(across - np.sum(across * z, axis=1, keepdims=True) * z, _LEFT)
-    return quaternion.from_matrix(np.stack([cross_product(y, z), y, z], axis=-1))
+    return quaternion.from_axes(cross_product(y, z), y, z)
 
 
 def build_foot_frame(ahead: np.ndarray, across: np.ndarray) -> np.ndarray:
     """Build rotations (T, 4) whose X is along `ahead` (T, 3) and whose Y is `across` as far as that is square."""
     x = unit_vectors(ahead, _FORWARD)
     y = unit_vectors(across - np.sum(across * x, axis=1, keepdims=True) * x, _LEFT)
-    return quaternion.from_matrix(np.stack([x, y, cross_product(x, y)], axis=-1))
+    return quaternion.from_axes(x, y, cross_product(x, y))

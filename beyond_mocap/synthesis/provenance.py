@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import os
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -92,18 +93,19 @@ def write_provenance(path: str | os.PathLike, take: Take | Provenance) -> None:
     """
     table = build_provenance(take) if isinstance(take, Take) else take
     columns = [
-        (f"{time:.6f}" for time in table.times),
+        range(len(table.times)),
+        [f"{time:.6f}" for time in table.times.tolist()],
         table.clip,
-        (f"{frame:.4f}" for frame in table.clip_frame),
-        table.mirrored.astype(int),
-        (" ".join(words) for words in table.words),
-        *table.contacts.astype(int).T,
+        [f"{frame:.4f}" for frame in table.clip_frame.tolist()],
+        table.mirrored.astype(int).tolist(),
+        list(map(" ".join, table.words)),
+        *table.contacts.astype(int).T.tolist(),
     ]
     names = PROVENANCE_COLUMNS
     if table.planned_heading is not None:
         names, degrees = (*names, HEADING_COLUMN), np.degrees(quaternion.wrap_angle(table.planned_heading))
-        columns.append([f"{value:.2f}" if np.isfinite(value) else "" for value in degrees])
-    atomic_write(path, format_csv(names, ((i, *row) for i, row in enumerate(zip(*columns)))))
+        columns.append([f"{value:.2f}" if math.isfinite(value) else "" for value in degrees.tolist()])
+    atomic_write(path, format_csv(names, zip(*columns)))
 
 
 def read_provenance(path: str | os.PathLike) -> Provenance:
@@ -149,8 +151,10 @@ def build_provenance_fields(library: Library, frames_shown: SourceFrames) -> dic
 
 def list_sources(library: Library, frames_shown: SourceFrames) -> tuple[str, ...]:
     """List the file, below the library, of every shown frame: a recording, or the synthetic continuation of one."""
-    frames = zip(frames_shown.clip, np.round(frames_shown.clip_frame, 6))
-    return tuple(library.clips[clip].source_at(frame) for clip, frame in frames)
+    clips = [library.clips[number] for number in frames_shown.clip.tolist()]
+    frames = np.round(frames_shown.clip_frame, 6).tolist()
+    return tuple(clip.path if clip.recorded_count is None else clip.source_at(frame)
+                 for clip, frame in zip(clips, frames))
 
 
 def list_labels_shown(library: Library, frames_shown: SourceFrames) -> tuple[tuple[str, ...], ...]:

@@ -159,7 +159,7 @@ def construct_take(library: Library, plan: ResolvedPlan, edit: EditList, progres
         progress: called as progress(fraction, text).
     """
     with limit_to_one_thread():
-        request = build_request(library, plan)
+        request = build_request(library, plan, has_costs=False)
         take, seconds = _construct_motion(library, plan, request, SearchResult(edit),
                                           progress or (lambda fraction, text: None))
         return finish_take(replace(take, seconds=seconds), plan, library, request, report_unmet=False)

@@ -73,8 +73,8 @@ def solve_separation(
     solution = [np.array(values) for values in curves]
     smoothness = [SmoothnessTerms.from_body(body, own, ends, fps) for body, own,
                   ends in zip(bodies, solution, held_ends)]
+    capsule_lines = [move_capsules(body, values) for body, values in zip(bodies, solution)]
     for number in range(_ROUNDS):
-        capsule_lines = [move_capsules(body, values) for body, values in zip(bodies, solution)]
         if number % _SEARCH_INTERVAL == 0:
             near = [_find_near_frames(bodies, capsule_lines, pair) for pair in pairs]
         contacts = _find_contacts(bodies, capsule_lines, pairs, near=near, pressures=pressures, first=first, fps=fps)
@@ -84,6 +84,7 @@ def solve_separation(
                                       capsule_lines=capsule_lines[body_index], arms_too=number >= _ARM_ROUNDS,
                                       weight=BASE_FPS / fps)
                 solution[body_index] = solution[body_index] + _STEP_SHARE * (target - solution[body_index])
+                capsule_lines[body_index] = move_capsules(bodies[body_index], solution[body_index])
     return solution
 
 

@@ -97,7 +97,8 @@ class MotionSpan:
 def pack_part(take: Take) -> bytes:
     """Pack the take of a window (`player_motion.cut_take`): all that figures need. A match requests no pins.
 
-    Arrays of one type are stored as one: to open an array of a file takes longer than to read it.
+    All arrays are stored as one, those with the longest numbers first: to open an array of a file takes longer than to
+    read it.
     """
     table = {words: number for number, words in enumerate(dict.fromkeys(take.words))}
     arrays = {name: getattr(take, name) for name in _ARRAYS}
@@ -109,12 +110,12 @@ def pack_part(take: Take) -> bytes:
                "warnings": [[str(line), line_spans(line)] for line in take.warnings]}
     if take.ball is not None:
         arrays |= {f"ball.{name}": getattr(take.ball, name) for name in _BALL}
-    arrays = {name: values for name, values in arrays.items() if values is not None}
-    header["arrays"] = [[name, values.dtype.str, values.shape] for name, values in arrays.items()]
-    stored = {kind: np.concatenate([values.ravel() for values in arrays.values() if values.dtype.str == kind])
-              for kind in dict.fromkeys(values.dtype.str for values in arrays.values())}
+    there = sorted(((name, values) for name, values in arrays.items() if values is not None),
+                   key=lambda row: -row[1].itemsize)
+    header["arrays"] = [[name, values.dtype.str, values.shape] for name, values in there]
+    numbers = np.concatenate([np.ascontiguousarray(values).ravel().view(np.uint8) for _, values in there])
     out = io.BytesIO()
-    np.savez(out, allow_pickle=False, header=np.frombuffer(json.dumps(header).encode(), np.uint8), **stored)
+    np.savez(out, allow_pickle=False, header=np.frombuffer(json.dumps(header).encode(), np.uint8), numbers=numbers)
     return out.getvalue()
 
 
@@ -128,14 +129,13 @@ def load_part(content: Content, skeleton: Skeleton) -> Take:
         The take, without a plan.
     """
     with np.load(io.BytesIO(content) if isinstance(content, bytes) else content, allow_pickle=False) as file:
-        stored = {name: file[name] for name in file.files}
-    header = json.loads(stored.pop("header").tobytes())
-    arrays = _split_arrays(header["arrays"], stored)
+        header, numbers = json.loads(file["header"].tobytes()), file["numbers"]
+    arrays = _split_arrays(header["arrays"], numbers)
     words = [tuple(one) for one in header["words"]]
     ball = [arrays.get(f"ball.{name}") for name in _BALL]
     return Take(
         motion=Motion.from_stored(skeleton, arrays["root"], arrays["rotations"], header["fps"]),
-        words=tuple(words[number] for number in arrays["words"]), timeline=_parse_timeline(header["timeline"]),
+        words=tuple(map(words.__getitem__, arrays["words"].tolist())), timeline=_parse_timeline(header["timeline"]),
         keys=tuple(_parse_key(key) for key in header["keys"]), ball=None if ball[0] is None else BallPath(*ball),
         warnings=tuple(TimedMessage(text, *spans) for text, spans in header["warnings"]),
         dribble_touches=tuple(DribbleTouch(**one) for one in header["touches"]),
@@ -144,16 +144,15 @@ def load_part(content: Content, skeleton: Skeleton) -> Take:
     )  # fmt: skip
 
 
-def _split_arrays(rows: list, stored: dict[str, np.ndarray]) -> dict[str, Any]:
-    """Split what is stored by type into read-only arrays by name; rows: (name, type, shape) in their order."""
+def _split_arrays(rows: list, numbers: np.ndarray) -> dict[str, Any]:
+    """Split the bytes of all arrays, one behind the other, into read-only arrays by name; rows: (name, type, shape)."""
     arrays: dict[str, Any] = {}
-    place = dict.fromkeys(stored, 0)
-    for values in stored.values():
-        values.setflags(write=False)
+    numbers.setflags(write=False)
+    place = 0
     for name, kind, shape in rows:
-        count = math.prod(shape)
-        arrays[name] = stored[kind][place[kind] : place[kind] + count].reshape(shape)
-        place[kind] += count
+        size = math.prod(shape) * np.dtype(kind).itemsize
+        arrays[name] = numbers[place : place + size].view(kind).reshape(shape)
+        place += size
     return arrays
 
 

@@ -165,7 +165,7 @@ class _AnatomyEstimator:
             left = unit_vectors(left, _LEFT)
             up = unit_vectors(up - (up @ left) * left, _find_normal(left))
         forward = np.cross(left, up)
-        self.axes[joint] = quaternion.from_matrix(np.stack([forward, left, up], axis=-1))
+        self.axes[joint] = quaternion.from_axes(forward, left, up)
         self.known_joints.add(joint)
 
     def set_axes_like(self, joint: int, segment: np.ndarray) -> None:

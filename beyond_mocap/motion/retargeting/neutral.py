@@ -114,7 +114,7 @@ def _build_initial_rotations(skeleton: Skeleton, body: Humanoid, example: Motion
         # a skeleton that rests upright keeps its own posture
         left, up = unit_vectors(left * [1.0, 1.0, 0.0], left), _UP
     up = unit_vectors(up - np.dot(up, left) * left, _UP)
-    frame = quaternion.from_matrix(np.stack([cross_product(left, up), left, up], axis=-1))
+    frame = quaternion.from_axes(cross_product(left, up), left, up)
     return np.broadcast_to(quaternion.inverse(frame), (len(skeleton), 4))
 
 

@@ -444,9 +444,11 @@ def _separate_feet(plan: _StepPlan, stepped: np.ndarray, left: np.ndarray) -> np
     place = [[foot.points[a:b].mean(axis=0) for a, b in stances[side]] for side, foot in enumerate(plan.feet)]
     pushed = [[0.0j] * len(side) for side in place]
     # pairs of overlapping stances with the body's left in the middle of the overlap; one of them at least is loose
-    pairs = [(i, j, complex(left[(max(a, c) + min(b, d)) // 2]))
-             for i, (a, b) in enumerate(stances[_LEFT]) for j, (c, d) in enumerate(stances[_RIGHT])
-             if max(a, c) <= min(b, d) and (loose[_LEFT][i] or loose[_RIGHT][j])]
+    (a, b), (c, d) = (np.reshape(runs, (-1, 2)).T for runs in stances)
+    begins, ends = np.maximum.outer(a, c), np.minimum.outer(b, d)
+    may_move = (begins <= ends) & np.logical_or.outer(*(np.array(side, bool) for side in loose))
+    middle = (begins + ends) // 2
+    pairs = [(i, j, complex(left[middle[i, j]])) for i, j in np.argwhere(may_move).tolist()]
     for _ in range(_ROUNDS):
         for i, j, left_direction in pairs:
             between = place[_LEFT][i] - place[_RIGHT][j] + pushed[_LEFT][i] - pushed[_RIGHT][j]

@@ -25,7 +25,8 @@ from ...base.vectors import arctan2, measure_lengths, unit_vectors
 from ...library.library import Library
 from ...motion import quaternion
 from ...motion.humanoid import identify_joints
-from ...motion.motion import Motion, forward_kinematics, sample_frames
+from ...motion.motion import Motion, compute_pose, sample_frames
+from ...motion.retargeting.structure import list_ancestors
 from ...motion.skeleton import Skeleton
 from ...motion.track import smooth_zero_phase_hann
 from .pins import estimate_look_axis
@@ -95,7 +96,7 @@ def watch_ball(
     if not known.any():
         return motion
     fps, frames, body = motion.fps, np.arange(len(motion)), identify_joints(motion.skeleton)
-    joints, world = forward_kinematics(motion)
+    joints, world = compute_pose(motion.skeleton, motion.root_positions, motion.rotations, _list_upper_joints(motion))
     trunk = measure_trunk(motion.skeleton, joints, fps)
     habits, eased = draw_habits(seed), _fade_beside_gaps(known, fps)
     away = interpolate_columns(frames, frames[known], ball[known]) - joints[:, body.head_or_neck]
@@ -111,11 +112,21 @@ def watch_ball(
     motion, twist = turn_spine(motion, world, np.array([0.0, 0.0, 1.0]), twist)
     if body.neck is None and body.head is None:
         return motion
-    world = quaternion.multiply(quaternion.from_up_angle(twist)[:, None], world)  # of all joints above the spine
+    above = [joint for joint in (body.neck, body.head_or_neck) if joint is not None]
+    above = sorted({*above, *(motion.skeleton.parents[joint] for joint in above)})
+    world[:, above] = quaternion.multiply(quaternion.from_up_angle(twist)[:, None], world[:, above])
     yaw, pitch = compute_head_angles(see(habits.delay), trunk.twist + twist, fps)
     sight = quaternion.rotate(world[:, body.head_or_neck], np.broadcast_to(look, away.shape))
     turn = _compute_head_turn(_remove_nods(sight, trunk.heading, fps), trunk.heading + yaw, pitch)
     return _turn_head(motion, world, (eased * head_share * attention)[:, None] * turn)
+
+
+def _list_upper_joints(motion: Motion) -> set[int]:
+    """List what decides how a body looks, thighs and upper arms, head and spine, with all joints above these."""
+    body = identify_joints(motion.skeleton)
+    ends = [body.head_or_neck, *body.spine]
+    ends += [joint for limb in (body.left, body.right) for joint in (limb.upper_leg, limb.upper_arm)]
+    return {joint for end in ends if end is not None for joint in list_ancestors(motion.skeleton.parents, end)}
 
 
 def hide_lost_ball(ball: np.ndarray, is_measured: np.ndarray, fps: float) -> np.ndarray:
@@ -293,12 +304,14 @@ def _limit_softly(angle: np.ndarray, limit: float) -> np.ndarray:
 
 def _limit_speed(angle: np.ndarray, most: float) -> np.ndarray:
     """Limit the change of angles (T,) per frame; a fast change is caught up, after that the angles are as they were."""
-    if not len(angle) or np.abs(np.diff(angle)).max(initial=0.0) <= most:
-        return angle
-    out, now = angle.tolist(), float(angle[0])
-    for frame, wanted in enumerate(out):
-        now = wanted if abs(wanted - now) <= most else now + most if wanted > now else now - most
-        out[frame] = now
+    out, frame = angle.tolist(), 0
+    for start in (np.flatnonzero(np.abs(np.diff(angle)) > most) + 1).tolist():
+        if start < frame:
+            continue
+        frame, now = start, out[start - 1]
+        while frame < len(out) and abs(out[frame] - now) > most:
+            now = out[frame] = now + most if out[frame] > now else now - most
+            frame += 1
     return np.array(out)
 
 

@@ -88,8 +88,9 @@ def _steady_arc(turn: np.ndarray, through: np.ndarray) -> np.ndarray:
     turn = turn * np.where(np.cumsum(flips & ~begins[:, None], axis=0) % 2 == 1, -1.0, 1.0)[..., None]
     fade = np.cumsum(begins) - 1
     # sum of the scalar parts per blend and joint: negative means that the long arc is the mean
-    middle = np.zeros((begins.sum(), turn.shape[1]))
-    np.add.at(middle, fade, turn[..., 0])
+    joints, blends = turn.shape[1], int(begins.sum())
+    place = fade[:, None] * joints + np.arange(joints)
+    middle = np.bincount(place.ravel(), turn[..., 0].ravel(), blends * joints).reshape(blends, joints)
     turn = turn * np.where(middle < 0.0, -1.0, 1.0)[fade][..., None]
     length = measure_lengths(turn[..., 1:])[..., None]
     angle = 2.0 * arctan2(length, turn[..., :1])

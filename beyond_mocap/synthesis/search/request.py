@@ -122,12 +122,13 @@ class SearchRequest:
         return frozenset().union(*self.avoided[max(first, 0) : end])
 
 
-def build_request(library: Library, plan: ResolvedPlan) -> SearchRequest:
+def build_request(library: Library, plan: ResolvedPlan, has_costs: bool = True) -> SearchRequest:
     """Convert a plan to frames at the library's rate.
 
     Args:
         library: the clips.
         plan: the resolved plan.
+        has_costs: whether it is searched; False: an edit list is there, so no costs of style and manner are needed.
     Raises:
         NotInLibrary: for a key moment whose labels no clip carries, unless the plan continues with the nearest.
     """
@@ -157,14 +158,15 @@ def build_request(library: Library, plan: ResolvedPlan) -> SearchRequest:
     requested_labels = _clear_around_keys(labels_per_frame(timeline, track.times), keys, library)
     warnings += _report_missing_labels(library, plan.timeline)
     avoided = tuple(avoided) if any(avoided) else ()
-    off_style = compute_style_cost(library, settings.style, settings.style_weight)
+    off_style = compute_style_cost(library, settings.style, settings.style_weight) if has_costs else None
+    off_manner = compute_manner_cost(library, settings.manner) if has_costs else None
     weak_foot = {"left": "right", "right": "left"}.get(settings.strong_foot, "")
     lag_preference = build_lag_preference(library, settings.lag, settings.variety, float(track.times[0]))
     return SearchRequest(plan=settings, track=track, requested_labels=tuple(requested_labels),
                          is_asked=_find_asked(plan.timeline, track.times, requested_labels),
                          gait=gait,
                          timeline=timeline, keys=keys, allowed=allowed, warnings=tuple(warnings), avoided=avoided,
-                         style_cost=off_style, manner_cost=compute_manner_cost(library, settings.manner),
+                         style_cost=off_style, manner_cost=off_manner,
                          weak_foot=weak_foot, lag_preference=lag_preference, size=plan.size)
 
 

@@ -12,7 +12,7 @@ import numpy as np
 
 from ...library.library import Library
 from ...motion import quaternion
-from ...motion.motion import sample_frames
+from ...motion.motion import sample_motions
 from .edit_list import EditList, sample_edit
 
 _HELD = 2  # frames for which a clip's end may be held in a blend
@@ -196,12 +196,11 @@ def _to_clip_frames(library: Library, clip: np.ndarray, frame: np.ndarray) -> np
 
 def _fetch_poses(library: Library, clip: np.ndarray, frame: np.ndarray):
     """Fetch pose, height, sway and heading at library frames; each clip is read once."""
-    count, joints = len(clip), len(library.skeleton)
-    pose, root = np.empty((count, joints, 4)), np.empty((count, 3))
+    count = len(clip)
     own = _to_clip_frames(library, clip, frame)
     order = np.argsort(clip, kind="stable")
-    for at in np.split(order, np.flatnonzero(np.diff(clip[order])) + 1) if count else ():
-        root[at], pose[at] = sample_frames(library.clips[clip[at[0]]].motion, own[at])
+    groups = np.split(order, np.flatnonzero(np.diff(clip[order])) + 1) if count else []
+    root, pose = sample_motions([library.clips[clip[at[0]]].motion for at in groups], groups, own, library.skeleton)
     heading = _interpolate_in_clips(library, clip, frame, library.frames.heading)
     path = _interpolate_in_clips(library, clip, frame, library.frames.path)
     back = quaternion.from_up_angle(-heading)

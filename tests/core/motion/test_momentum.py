@@ -124,3 +124,12 @@ def test_a_body_that_no_foot_carries_falls():
 def test_the_same_input_gives_the_same_bits():
     phases, centre = build_run(30.0)
     assert np.array_equal(plan(phases, centre, 30.0)[0], plan(phases, centre, 30.0)[0])
+
+
+def test_a_planner_plans_another_round_as_a_new_one_does():
+    phases, centre = build_run(30.0)
+    planner = MomentumPlanner(phases, len(centre), 30.0, np.ones(len(centre)))
+    force = planner.plan_height(centre[:, 2])[1]
+    for ground, push in ((centre[:, :2], force), (centre[:, :2], 0.1 * force), (0.5 * centre[:, :2], force)):
+        new = MomentumPlanner(phases, len(centre), 30.0, np.ones(len(centre)))
+        assert np.array_equal(planner.plan_ground(ground, push), new.plan_ground(ground, push))

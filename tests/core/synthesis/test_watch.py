@@ -11,7 +11,7 @@ from beyond_mocap.motion.humanoid import identify_joints
 from beyond_mocap.motion.motion import forward_kinematics
 from beyond_mocap.motion.track import Track
 from beyond_mocap.synthesis.construct import construction
-from beyond_mocap.synthesis.construct.gaze import estimate_look
+from beyond_mocap.synthesis.construct.gaze import _limit_speed, estimate_look
 from beyond_mocap.synthesis.plan import Pin, Plan
 from beyond_mocap.synthesis.resynthesize import resynthesize
 from beyond_mocap.synthesis.synthesize import synthesize
@@ -78,3 +78,13 @@ def test_a_pin_of_the_gaze_goes_before_the_ball(library, track):
 def test_a_strength_above_1_is_refused(track):
     with pytest.raises(InputError, match="watch: 1.5; expected 0 to 1"):
         Plan(track=track, watch=1.5)
+
+
+@pytest.mark.parametrize("most", [0.05, 0.4, 3.0])
+def test_angles_follow_at_a_limited_speed_from_frame_to_frame(most):
+    angle = np.cumsum(np.random.default_rng(5).normal(scale=0.3, size=400))
+    expected, now = [], angle[0]
+    for wanted in angle:
+        now = wanted if abs(wanted - now) <= most else now + most if wanted > now else now - most
+        expected.append(now)
+    assert np.array_equal(_limit_speed(angle, most), expected)
