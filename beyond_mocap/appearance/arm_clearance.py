@@ -1,0 +1,114 @@
+"""Arms kept out of the trunk of the body that is shown.
+
+People do not pass through themselves: on their own skeleton, elbows, forearms and hands of recordings stay 2 cm and
+more outside the trunk, measured to the middle of the bone. Brought to a body with another trunk or other arms they do
+not, nor do arms that networks predict. Each arm is turned about its shoulder, by the least angle that clears all of it,
+smoothly in time: the turn rises and falls over a quarter of a second, in the frame of the collar bone, which carries
+the arm. Frames without need keep their bits.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from ..base.time_series import compute_running_maximum, hann_smooth
+from ..base.vectors import cross_product, dot_products, measure_lengths, unit_vectors
+from ..motion import quaternion
+from ..motion.humanoid import Limb, identify_joints
+from ..motion.motion import Motion, compute_pose
+from ..motion.retargeting.structure import list_ancestors
+from .trunk import PosedTrunk, Trunk, measure_depth, pose_trunk
+
+CLEARANCE = 0.025
+"""m from the skin of the trunk to the middle of an arm's bones, at a stature of 1.80 m: the arm touches the shirt."""
+EASE_SECONDS = 0.12
+"""s before and after a frame of need over which the turn stays, and again over which it rises or falls."""
+MAX_TURN = np.radians(40.0)
+"""Largest turn of one pass: a hand close to its own shoulder has no lever."""
+
+_HAND_LENGTH = 0.09  # m from the wrist to the knuckles, at 1.80 m
+_ALONG = (0.0, 1.0 / 3.0, 2.0 / 3.0, 1.0)  # points along the forearm, from the elbow
+_PASSES = 3
+
+
+def clear_arms(motion: Motion, trunk: Trunk) -> Motion:
+    """Keep the arms of a motion out of the trunk.
+
+    Args:
+        motion: T frames.
+        trunk: of the body with this skeleton.
+    Returns:
+        The motion; the motion itself where no arm is inside.
+    """
+    body, skeleton = identify_joints(motion.skeleton), motion.skeleton
+    limbs = [limb for limb in (body.left, body.right) if None not in (limb.upper_arm, limb.lower_arm, limb.hand)]
+    ends = {*trunk.joints.ravel().tolist(), *(limb.hand for limb in limbs)}
+    needed = {joint for end in ends for joint in list_ancestors(skeleton.parents, end)}
+    places, world = compute_pose(skeleton, motion.root_positions, motion.rotations, needed)
+    posed, rotations = pose_trunk(trunk, places, world), None
+    for limb in limbs:
+        turn = _find_turn(posed, limb, places, world[:, skeleton.parents[limb.upper_arm]], trunk.scale, motion.fps)
+        if turn is not None:
+            rotations = np.array(motion.rotations) if rotations is None else rotations
+            moved = np.abs(turn[:, 0]) < 1.0
+            rotations[moved, limb.upper_arm] = quaternion.multiply(turn[moved], rotations[moved, limb.upper_arm])
+    return motion if rotations is None else replace(motion, rotations=rotations)
+
+
+def list_arm_points(limb: Limb, places: np.ndarray, scale: float) -> np.ndarray:
+    """List points along an arm, from the elbow to the knuckles.
+
+    Args:
+        limb: a limb with an arm.
+        places: (T, J, 3) m, joints, world.
+        scale: the stature relative to 1.80 m.
+    Returns:
+        (P, T, 3) m.
+    """
+    elbow, wrist = places[:, limb.lower_arm], places[:, limb.hand]
+    bone = wrist - elbow
+    knuckles = wrist + scale * _HAND_LENGTH * unit_vectors(bone)
+    return np.stack([*(elbow + share * bone for share in _ALONG), knuckles])
+
+
+def _find_turn(trunk: PosedTrunk, limb: Limb, places: np.ndarray, carrier: np.ndarray, scale: float,
+               fps: float) -> np.ndarray | None:
+    """Find the turns (T, 4) of an upper arm, in the frame of the joint that carries it, rotated by `carrier` (T, 4);
+    None where nothing is to be cleared.
+    """
+    shoulder, points = places[:, limb.upper_arm], list_arm_points(limb, places, scale)
+    back, total = quaternion.inverse(carrier), None
+    for _ in range(_PASSES):
+        needed = _find_needed_turn(trunk, points, shoulder, CLEARANCE * scale)
+        if not needed.any():
+            break
+        turn = quaternion.from_rotation_vector(_ease(quaternion.rotate(back, needed), fps))
+        total = turn if total is None else quaternion.multiply(turn, total)
+        arm = quaternion.rotate(back, points - shoulder)
+        points = shoulder + quaternion.rotate(carrier, quaternion.rotate(turn, arm))
+    return total
+
+
+def _find_needed_turn(trunk: PosedTrunk, points: np.ndarray, shoulder: np.ndarray, clearance: float) -> np.ndarray:
+    """Find the least rotation vector (T, 3), world, about a shoulder (T, 3) m that brings the point (P, T, 3) m which
+    needs the largest one `clearance` m out of the trunk; 0 where none needs any.
+    """
+    depth, way = measure_depth(trunk, points)
+    need = np.maximum(depth + clearance, 0.0)
+    lever = cross_product(points - shoulder, way)
+    turn = (need / np.maximum(dot_products(lever, lever), 1e-6))[..., None] * lever
+    angle = measure_lengths(turn)
+    worst = np.argmax(angle, axis=0)
+    frames = np.arange(len(shoulder))
+    most = angle[worst, frames]
+    return turn[worst, frames] * (np.minimum(most, MAX_TURN) / np.maximum(most, 1e-12))[:, None]
+
+
+def _ease(turn: np.ndarray, fps: float) -> np.ndarray:
+    """Ease rotation vectors (T, 3) in and out: everywhere as large as they are, but smooth in size and direction."""
+    reach = max(1, int(round(EASE_SECONDS * fps)))
+    size = hann_smooth(compute_running_maximum(measure_lengths(turn), reach, reach), reach)
+    direction = np.stack([hann_smooth(column, 2 * reach) for column in turn.T], axis=1)
+    return size[:, None] * unit_vectors(direction, min_length=1e-12)
