@@ -19,6 +19,7 @@ from ..motion import quaternion
 from ..motion.humanoid import Limb, identify_joints
 from ..motion.motion import Motion, compute_pose
 from ..motion.retargeting.structure import list_ancestors
+from ..motion.skeleton import Skeleton
 from .trunk import PosedTrunk, Trunk, measure_depth, pose_trunk
 
 CLEARANCE = 0.025
@@ -42,19 +43,42 @@ def clear_arms(motion: Motion, trunk: Trunk) -> Motion:
     Returns:
         The motion; the motion itself where no arm is inside.
     """
-    body, skeleton = identify_joints(motion.skeleton), motion.skeleton
-    limbs = [limb for limb in (body.left, body.right) if None not in (limb.upper_arm, limb.lower_arm, limb.hand)]
+    limbs, parents = _list_arms(motion.skeleton), motion.skeleton.parents
     ends = {*trunk.joints.ravel().tolist(), *(limb.hand for limb in limbs)}
-    needed = {joint for end in ends for joint in list_ancestors(skeleton.parents, end)}
-    places, world = compute_pose(skeleton, motion.root_positions, motion.rotations, needed)
+    needed = {joint for end in ends for joint in list_ancestors(parents, end)}
+    places, world = compute_pose(motion.skeleton, motion.root_positions, motion.rotations, needed)
     posed, rotations = pose_trunk(trunk, places, world), None
     for limb in limbs:
-        turn = _find_turn(posed, limb, places, world[:, skeleton.parents[limb.upper_arm]], trunk.scale, motion.fps)
+        turn = _find_turn(posed, limb, places, world[:, parents[limb.upper_arm]], trunk.scale, motion.fps)
         if turn is not None:
             rotations = np.array(motion.rotations) if rotations is None else rotations
             moved = np.abs(turn[:, 0]) < 1.0
             rotations[moved, limb.upper_arm] = quaternion.multiply(turn[moved], rotations[moved, limb.upper_arm])
     return motion if rotations is None else replace(motion, rotations=rotations)
+
+
+def measure_arm_depth(skeleton: Skeleton, positions: np.ndarray, rotations: np.ndarray, trunk: Trunk) -> np.ndarray:
+    """Measure how deep the deepest point of both arms is inside the trunk.
+
+    Args:
+        skeleton: J joints.
+        positions: (T, J, 3) m, its joints, world.
+        rotations: (T, J, 4), the same.
+        trunk: of the body with this skeleton.
+    Returns:
+        (T,) m from the skin of the trunk to the middle of elbow, forearm or hand, negative outside; minus infinity
+        above and below it, and without arms.
+    """
+    points = [list_arm_points(limb, positions, trunk.scale) for limb in _list_arms(skeleton)]
+    if not points:
+        return np.full(len(positions), -np.inf)
+    return measure_depth(pose_trunk(trunk, positions, rotations), np.concatenate(points))[0].max(axis=0)
+
+
+def _list_arms(skeleton: Skeleton) -> list[Limb]:
+    """List the limbs of both sides that have a whole arm."""
+    body = identify_joints(skeleton)
+    return [limb for limb in (body.left, body.right) if None not in (limb.upper_arm, limb.lower_arm, limb.hand)]
 
 
 def list_arm_points(limb: Limb, places: np.ndarray, scale: float) -> np.ndarray:
@@ -69,8 +93,11 @@ def list_arm_points(limb: Limb, places: np.ndarray, scale: float) -> np.ndarray:
     """
     elbow, wrist = places[:, limb.lower_arm], places[:, limb.hand]
     bone = wrist - elbow
-    knuckles = wrist + scale * _HAND_LENGTH * unit_vectors(bone)
-    return np.stack([*(elbow + share * bone for share in _ALONG), knuckles])
+    points = np.moveaxis(np.empty((3, len(_ALONG) + 1, len(places))), 0, 2)  # by component in memory, as poses are
+    for number, share in enumerate(_ALONG):
+        points[number] = elbow + share * bone
+    points[-1] = wrist + scale * _HAND_LENGTH * unit_vectors(bone)
+    return points
 
 
 def _find_turn(trunk: PosedTrunk, limb: Limb, places: np.ndarray, carrier: np.ndarray, scale: float,

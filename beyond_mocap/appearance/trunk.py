@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..base.vectors import measure_lengths
+from ..base.vectors import dot_products, measure_lengths
 from ..motion import quaternion
 from ..motion.humanoid import identify_joints
 from ..motion.retargeting.adult import ADULT_LEG
@@ -22,6 +22,8 @@ from .landmarks import HIPS, SHOULDERS
 SECTIONS = ((-0.12, 0.185, 0.148), (0.02, 0.187, 0.145), (0.25, 0.170, 0.123), (0.40, 0.168, 0.118),
             (0.60, 0.196, 0.128), (0.85, 0.205, 0.135), (1.00, 0.130, 0.100))
 """Height as a share from hip joints to shoulder joints, half breadth and half depth in m, at a stature of 1.80 m."""
+
+_NEAR = 0.09  # m around the trunk within which depths are measured: more than a spine bends from a straight line
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -75,7 +77,7 @@ class PosedTrunk:
 
     Attributes:
         middles: (K, T, 3) m, world.
-        axes: (K, 2, T, 3) m, half axes to the left and ahead, world.
+        axes: (2, K, T, 3) m, half axes to the left and ahead, world.
     """
 
     middles: np.ndarray
@@ -92,15 +94,18 @@ def pose_trunk(trunk: Trunk, positions: np.ndarray, rotations: np.ndarray) -> Po
     Returns:
         The posed trunk.
     """
-    count = len(positions)
-    middles, axes = np.zeros((len(trunk.joints), count, 3)), np.zeros((len(trunk.joints), 2, count, 3))
+    many, count = len(trunk.joints), len(positions)
+    # by component in memory, as poses are: rows of three take twice as long
+    found = np.moveaxis(np.zeros((many, 3, 3, count)), 2, 3)  # of each section its middle and both axes
     for joint in np.unique(trunk.joints):
-        turn = quaternion.to_matrix(rotations[:, joint])
+        turn = np.moveaxis(quaternion.to_matrix(rotations[:, joint]), 0, 2).copy()  # (3, 3, T)
         for k, side in np.argwhere((trunk.joints == joint) & (trunk.shares > 0.0)):
             share = trunk.shares[k, side]
-            middles[k] += share * (positions[:, joint] + turn @ trunk.middles[k, side])
-            axes[k] += share * np.einsum("tij,aj->ati", turn, trunk.axes[k, side])
-    return PosedTrunk(middles=middles, axes=axes)
+            for row, vector in zip(found[k], (trunk.middles[k, side], *trunk.axes[k, side])):
+                for component, weight in enumerate(share * vector):
+                    row += weight * turn[:, component].T
+            found[k, 0] += share * positions[:, joint]
+    return PosedTrunk(middles=found[:, 0], axes=np.moveaxis(found[:, 1:], 1, 0))
 
 
 def measure_depth(trunk: PosedTrunk, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -110,20 +115,36 @@ def measure_depth(trunk: PosedTrunk, points: np.ndarray) -> tuple[np.ndarray, np
         trunk: in T poses.
         points: (P, T, 3) m, world.
     Returns:
-        (P, T) m, negative outside, minus infinity above and below the trunk; and the ways out (P, T, 3), unit.
+        (P, T) m, negative outside, minus infinity above and below the trunk and far from it; and the ways out
+        (P, T, 3), unit, 0 there.
     """
-    deepest, ways = np.full(points.shape[:2], -np.inf), np.zeros_like(points)
+    deepest, ways = np.full(points.shape[:2], -np.inf), np.zeros(points.shape)
+    at, frame = np.nonzero(_find_near(trunk, points))
+    near, best, way = points[at, frame], np.full(len(at), -np.inf), np.zeros((len(at), 3))
     for low in range(len(trunk.middles) - 1):
-        start, line = trunk.middles[low], trunk.middles[low + 1] - trunk.middles[low]
-        offset = points - start
-        share = np.einsum("ptc,tc->pt", offset, line) / np.einsum("tc,tc->t", line, line)
-        beside = np.nonzero((share >= 0.0) & (share <= 1.0))
-        depth, way = _measure_ellipse_depth(trunk, low, share[beside], offset[beside] - share[beside][:, None]
-                                            * line[beside[1]], beside[1])
-        deeper = depth > deepest[beside]  # where the trunk bends, a point may lie beside two parts of it
-        chosen = beside[0][deeper], beside[1][deeper]
-        deepest[chosen], ways[chosen] = depth[deeper], way[deeper]
+        start = trunk.middles[low, frame]
+        line, offset = trunk.middles[low + 1, frame] - start, near - start
+        share = dot_products(offset, line) / dot_products(line, line)
+        beside = np.flatnonzero((share >= 0.0) & (share <= 1.0))
+        offset = offset[beside] - share[beside, None] * line[beside]
+        depth, out = _measure_ellipse_depth(trunk, low, share[beside], offset, frame[beside])
+        deeper = depth > best[beside]  # where the trunk bends, a point may lie beside two parts of it
+        best[beside[deeper]], way[beside[deeper]] = depth[deeper], out[deeper]
+    deepest[at, frame], ways[at, frame] = best, way
     return deepest, ways
+
+
+def _find_near(trunk: PosedTrunk, points: np.ndarray) -> np.ndarray:
+    """Find which points (P, T, 3) m are near a trunk: (P, T) bool, within a wider ellipse along its whole length."""
+    foot, axes = trunk.middles[0], trunk.axes[:, len(trunk.middles) // 2]
+    chord, offset = trunk.middles[-1] - foot, points - foot
+    share = np.clip(dot_products(offset, chord) / dot_products(chord, chord), 0.0, 1.0)
+    offset = offset - share[..., None] * chord
+    ratio = np.zeros(share.shape)
+    for axis in axes:
+        length = measure_lengths(axis)
+        ratio += (dot_products(offset, axis) / (length * (length + _NEAR))) ** 2
+    return ratio < 1.0
 
 
 def _measure_ellipse_depth(trunk: PosedTrunk, low: int, share: np.ndarray, offset: np.ndarray,
@@ -137,12 +158,17 @@ def _measure_ellipse_depth(trunk: PosedTrunk, low: int, share: np.ndarray, offse
         offset: (N, 3) m from the middle there, world.
         frame: (N,) poses.
     Returns:
-        As `measure_depth`.
+        As `measure_depth`: (N,) and (N, 3).
     """
-    axes = trunk.axes[low][:, frame] + share[:, None] * (trunk.axes[low + 1] - trunk.axes[low])[:, frame]
-    square = np.einsum("anc,anc->an", axes, axes)
-    across = np.einsum("nc,anc->an", offset, axes) / square  # 1 on the skin
-    ratio = np.sqrt((across * across).sum(axis=0))
-    slope = np.einsum("an,anc->nc", across / square, axes) / np.maximum(ratio, 1e-6)[:, None]
+    ratio, slope = np.zeros(len(share)), np.zeros((len(share), 3))
+    for axes in trunk.axes:
+        start, end = axes[low, frame], axes[low + 1, frame]
+        axis = start + share[:, None] * (end - start)
+        square = dot_products(axis, axis)
+        across = dot_products(offset, axis) / square  # 1 on the skin
+        ratio += across * across
+        slope += (across / square)[:, None] * axis
+    ratio = np.sqrt(ratio)
+    slope /= np.maximum(ratio, 1e-6)[:, None]
     steep = np.maximum(measure_lengths(slope), 1e-6)
     return (1.0 - ratio) / steep, slope / steep[:, None]

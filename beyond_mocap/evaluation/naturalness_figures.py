@@ -21,6 +21,7 @@ from ..synthesis.heading_plan import plan_track
 from ..synthesis.quality import movement
 from ..synthesis.quality.targets import TARGETS
 from ..synthesis.quality.unmet_constraints import report_jolts
+from .arms import measure_take_arms
 from .naturalness import (
     FPS,
     find_stands,
@@ -73,6 +74,8 @@ TITLES = {
     "standing.foot_lifts_per_min": Title("Foot lifts standing", "/min", digits=0),
     "standing.both_down": Title("Both feet down standing", "%", 100.0, 0),
     "tempo.sd_ms": Title("Uneven tempo", "ms"),
+    "arms.inside_share": Title("Arms inside the trunk", "%", 100.0),
+    "arms.depth_m_max": Title("Deepest arm in the trunk", "cm", 100.0),
 }
 """Figure of the group -> how pages show it."""
 
@@ -123,6 +126,7 @@ def measure_naturalness(view: View, planned: np.ndarray | None, requested: Timel
         jolts = len(find_runs(find_jolts(view)))
         out["jolts_per_min"] = 60.0 * jolts * view.fps / view.count
         _add_source_figures(out, view, asked, postures)
+    out["arms"] = measure_take_arms(view)
     return {"naturalness": out}
 
 
