@@ -23,6 +23,7 @@ SECTIONS = ((-0.12, 0.185, 0.148), (0.02, 0.187, 0.145), (0.25, 0.170, 0.123), (
             (0.60, 0.196, 0.128), (0.85, 0.205, 0.135), (1.00, 0.130, 0.100))
 """Height as a share from hip joints to shoulder joints, half breadth and half depth in m, at a stature of 1.80 m."""
 
+_OVERLAP = 0.25  # share of a part's height by which it reaches into the next: where the trunk bends, gaps would open
 _NEAR = 0.09  # m around the trunk within which depths are measured: more than a spine bends from a straight line
 
 
@@ -121,13 +122,14 @@ def measure_depth(trunk: PosedTrunk, points: np.ndarray) -> tuple[np.ndarray, np
     deepest, ways = np.full(points.shape[:2], -np.inf), np.zeros(points.shape)
     at, frame = np.nonzero(_find_near(trunk, points))
     near, best, way = points[at, frame], np.full(len(at), -np.inf), np.zeros((len(at), 3))
-    for low in range(len(trunk.middles) - 1):
+    last = len(trunk.middles) - 2
+    for low in range(last + 1):
         start = trunk.middles[low, frame]
         line, offset = trunk.middles[low + 1, frame] - start, near - start
         share = dot_products(offset, line) / dot_products(line, line)
-        beside = np.flatnonzero((share >= 0.0) & (share <= 1.0))
+        beside = np.flatnonzero((share >= (-_OVERLAP if low else 0.0)) & (share <= (1.0 + _OVERLAP if low < last else 1.0)))
         offset = offset[beside] - share[beside, None] * line[beside]
-        depth, out = _measure_ellipse_depth(trunk, low, share[beside], offset, frame[beside])
+        depth, out = _measure_ellipse_depth(trunk, low, np.clip(share[beside], 0.0, 1.0), offset, frame[beside])
         deeper = depth > best[beside]  # where the trunk bends, a point may lie beside two parts of it
         best[beside[deeper]], way[beside[deeper]] = depth[deeper], out[deeper]
     deepest[at, frame], ways[at, frame] = best, way

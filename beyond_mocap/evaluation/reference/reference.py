@@ -17,8 +17,8 @@ import numpy as np
 
 from ...annotation.gaits import STANDING
 from ...appearance.boots import build_boots
-from ...appearance.trunk import build_trunk
 from ...appearance.mesh import BodyMesh
+from ...appearance.trunk import build_trunk
 from ...base.errors import InputError
 from ...library.clip import Clip
 from ...library.library import Library

@@ -77,7 +77,7 @@ TARGETS = {
     "naturalness.off_plan_deg_median": Target(most=10.0),
     "naturalness.off_plan_deg_p90": Target(most=25.0),
     "naturalness.jolts_per_min": Target(most=1.0),
-    "naturalness.arms.inside_share": Target(most=0.002),
+    "naturalness.arms.inside_share": Target(most=0.005),
     "naturalness.arms.depth_m_max": Target(most=0.02),
     **{f"physics.flight.{speed}.vertical_m_s2_median": Target(least=-10.81, most=-8.81)
        for speed in ("2-4", "4-6", "6+")},
