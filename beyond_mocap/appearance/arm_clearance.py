@@ -13,14 +13,16 @@ from dataclasses import replace
 
 import numpy as np
 
+from ..base.errors import format_count
 from ..base.time_series import compute_running_maximum, hann_smooth
 from ..base.vectors import cross_product, dot_products, measure_lengths, unit_vectors
 from ..motion import quaternion
 from ..motion.humanoid import Limb, identify_joints
-from ..motion.motion import Motion, compute_pose
+from ..motion.motion import Motion, compute_pose, forward_kinematics
+from ..motion.retargeting.neutral import build_neutral_stance
 from ..motion.retargeting.structure import list_ancestors
 from ..motion.skeleton import Skeleton
-from .trunk import PosedTrunk, Trunk, measure_depth, pose_trunk
+from .trunk import PosedTrunk, Trunk, build_trunk, measure_depth, pose_trunk
 
 CLEARANCE = 0.025
 """m from the skin of the trunk to the middle of an arm's bones, at a stature of 1.80 m: the arm touches the shirt."""
@@ -32,6 +34,38 @@ MAX_TURN = np.radians(40.0)
 _HAND_LENGTH = 0.09  # m from the wrist to the knuckles, at 1.80 m
 _ALONG = (0.0, 1.0 / 3.0, 2.0 / 3.0, 1.0)  # points along the forearm, from the elbow
 _PASSES = 3
+
+
+class ArmClearance:
+    """Clears the arms of all recordings of a library, once, and remembers how deep they were.
+
+    Attributes:
+        depths: m, of each motion with an arm inside: how deep.
+    """
+
+    def __init__(self, example: Motion):
+        """Build the trunk.
+
+        Args:
+            example: frames of all motions, on their skeleton (`neutral.build_neutral_stance`).
+        """
+        self._trunk = build_trunk(build_neutral_stance(example.skeleton, example))
+        self.depths: list[float] = []
+
+    def clear(self, motion: Motion) -> Motion:
+        """Return the motion with its arms outside the trunk."""
+        cleared = clear_arms(motion, self._trunk)
+        if cleared is not motion:
+            depth = measure_arm_depth(motion.skeleton, *forward_kinematics(motion), self._trunk).max()
+            self.depths += [float(depth)] if depth > 0.0 else []
+        return cleared
+
+    def describe(self) -> list[str]:
+        """Describe what was changed: one line, or none."""
+        if not self.depths:
+            return []
+        return [f"arms moved out of the trunk in {format_count(len(self.depths), 'clip')}, where they were up to "
+                f"{100 * np.max(self.depths):.0f} cm inside"]
 
 
 def clear_arms(motion: Motion, trunk: Trunk) -> Motion:
@@ -49,7 +83,7 @@ def clear_arms(motion: Motion, trunk: Trunk) -> Motion:
     places, world = compute_pose(motion.skeleton, motion.root_positions, motion.rotations, needed)
     posed, rotations = pose_trunk(trunk, places, world), None
     for limb in limbs:
-        turn = _find_turn(posed, limb, places, world[:, parents[limb.upper_arm]], trunk.scale, motion.fps)
+        turn = _find_turn(posed, limb, places, world[:, parents[limb.upper_arm]], scale=trunk.scale, fps=motion.fps)
         if turn is not None:
             rotations = np.array(motion.rotations) if rotations is None else rotations
             moved = np.abs(turn[:, 0]) < 1.0
@@ -100,7 +134,7 @@ def list_arm_points(limb: Limb, places: np.ndarray, scale: float) -> np.ndarray:
     return points
 
 
-def _find_turn(trunk: PosedTrunk, limb: Limb, places: np.ndarray, carrier: np.ndarray, scale: float,
+def _find_turn(trunk: PosedTrunk, limb: Limb, places: np.ndarray, carrier: np.ndarray, *, scale: float,
                fps: float) -> np.ndarray | None:
     """Find the turns (T, 4) of an upper arm, in the frame of the joint that carries it, rotated by `carrier` (T, 4);
     None where nothing is to be cleared.

@@ -127,7 +127,8 @@ def measure_depth(trunk: PosedTrunk, points: np.ndarray) -> tuple[np.ndarray, np
         start = trunk.middles[low, frame]
         line, offset = trunk.middles[low + 1, frame] - start, near - start
         share = dot_products(offset, line) / dot_products(line, line)
-        beside = np.flatnonzero((share >= (-_OVERLAP if low else 0.0)) & (share <= (1.0 + _OVERLAP if low < last else 1.0)))
+        least, most = -_OVERLAP if low else 0.0, 1.0 + _OVERLAP if low < last else 1.0
+        beside = np.flatnonzero((share >= least) & (share <= most))
         offset = offset[beside] - share[beside, None] * line[beside]
         depth, out = _measure_ellipse_depth(trunk, low, np.clip(share[beside], 0.0, 1.0), offset, frame[beside])
         deeper = depth > best[beside]  # where the trunk bends, a point may lie beside two parts of it

@@ -195,9 +195,10 @@ def _read_clips(recordings: _Recordings, arrays: Path | None, notes: list[str], 
     Returns:
         The clips, and their motions, which let go of memory where they lie in a file.
     """
-    from .arm_repair import ArmRepair
+    from ..appearance.arm_clearance import ArmClearance
     from .recorded_ball.contact_keys import move_keys_to_contacts
     from .repair import describe_repairs
+    from .synthetic_clips import sample_each_second
 
     levelled, changes = MotionWriter(arrays and arrays / "levelled.npy"), []
     units: list[str] = []
@@ -222,7 +223,8 @@ def _read_clips(recordings: _Recordings, arrays: Path | None, notes: list[str], 
     rows = move_keys_to_contacts(motions, balls, rows, notes)
     notes += describe_repairs([(one, pops) for one, (pops, _) in zip(repairs, changes)])
     figures = [RepairFigures(pops, one.drift, *one.slide) for one, (pops, _) in zip(repairs, changes)]
-    arms, complete = ArmRepair(motions), MotionWriter(arrays and arrays / cache.MOTIONS)
+    arms = ArmClearance(sample_each_second(motions))
+    complete = MotionWriter(arrays and arrays / cache.MOTIONS)
     known: list[dict] = []  # all of a clip but its motion
     for original, what, ball in zip(_iter_completed(recordings, motions, rows, contacts, notes), figures, balls):
         _check_cancelled(cancelled)

@@ -9,7 +9,7 @@ from beyond_mocap.appearance.arm_clearance import CLEARANCE, clear_arms, list_ar
 from beyond_mocap.appearance.body import build_body
 from beyond_mocap.appearance.mesh import deform_body
 from beyond_mocap.appearance.trunk import SECTIONS, build_trunk, measure_depth, pose_trunk
-from beyond_mocap.evaluation.arms import summarize_arms
+from beyond_mocap.evaluation.naturalness_figures import summarize_arms
 from beyond_mocap.evaluation.report import evaluate_played
 from beyond_mocap.files.bvh.bvh import write_bvh
 from beyond_mocap.library.build import build_library
