@@ -89,7 +89,7 @@ def _distribute_weights(template: Template, used: np.ndarray, stance: NeutralSta
     for index, name in enumerate(SEGMENTS):
         share = np.sum(np.where(segments == index, shares, 0.0), axis=1)
         if name == "trunk":
-            low, high, upper = _find_spine_joints(stance, body, heights)
+            low, high, upper = find_spine_joints(stance, body, heights)
             rows = np.arange(len(used))
             np.add.at(dense, (rows, low), share * (1.0 - upper))
             np.add.at(dense, (rows, high), share * upper)
@@ -129,7 +129,7 @@ def _find_joint(body: Humanoid, segment: str) -> int:
     return next((joint for joint in found if joint is not None), body.chest)
 
 
-def _find_spine_joints(stance: NeutralStance, body: Humanoid,
+def find_spine_joints(stance: NeutralStance, body: Humanoid,
                        heights: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Find which two joints of the spine points follow: half and half at a joint, one joint between.
 

@@ -10,11 +10,14 @@ import numpy as np
 from ..annotation import LOCOMOTION_LABELS, Timeline, labels_per_frame
 from ..annotation.labels import list_labels
 from ..annotation.vocabulary import DIRECTIONS, SIDES
+from ..appearance.arm_clearance import measure_arm_depth
+from ..appearance.trunk import build_trunk
 from ..base.errors import TimedMessage
 from ..base.time_series import find_runs, interpolate_columns
 from ..base.vectors import arctan2
 from ..library.posture import NormalPostures
 from ..motion import quaternion
+from ..motion.retargeting.neutral import build_neutral_stance, scale_stance
 from ..motion.track import sample_track
 from ..synthesis.construct.gaze import estimate_look
 from ..synthesis.heading_plan import plan_track
@@ -73,6 +76,8 @@ TITLES = {
     "standing.foot_lifts_per_min": Title("Foot lifts standing", "/min", digits=0),
     "standing.both_down": Title("Both feet down standing", "%", 100.0, 0),
     "tempo.sd_ms": Title("Uneven tempo", "ms"),
+    "arms.inside_share": Title("Arms inside the trunk", "%", 100.0),
+    "arms.depth_m_max": Title("Deepest arm in the trunk", "cm", 100.0),
 }
 """Figure of the group -> how pages show it."""
 
@@ -123,6 +128,7 @@ def measure_naturalness(view: View, planned: np.ndarray | None, requested: Timel
         jolts = len(find_runs(find_jolts(view)))
         out["jolts_per_min"] = 60.0 * jolts * view.fps / view.count
         _add_source_figures(out, view, asked, postures)
+    out["arms"] = _measure_arms(view)
     return {"naturalness": out}
 
 
@@ -187,6 +193,27 @@ def _add_source_figures(out: dict, view: View, asked: np.ndarray, postures: Norm
     if (standing := out.get("standing")) is not None:
         standing.update({f"source_{name}": value for name, value in stands.items()})
     out.update({f"source_{name}": value for name, value in own.items()})
+
+
+def _measure_arms(view: View) -> dict:
+    """Measure how long and how deep the arms of a take are inside the drawn trunk, beside the recordings that it uses.
+    """
+    played, library = view.played, view.library
+    stance = (build_neutral_stance(played.motion.skeleton, played.motion) if library is None
+              else scale_stance(library.neutral_stance, view.scale))
+    depth = measure_arm_depth(played.motion.skeleton, played.positions, played.rotations, build_trunk(stance))
+    own = {} if view.reference is None else summarize_arms(view.source_values("arm_depth"))
+    return {**summarize_arms(depth), **{f"source_{name}": value for name, value in own.items()}}
+
+
+def summarize_arms(depth: np.ndarray) -> dict:
+    """Summarize how deep arms are inside the trunk, (T,) m: the share of frames, and the largest depth in m.
+
+    An arm is inside where the middle of elbow, forearm or hand is: half of it is hidden then.
+    """
+    if not len(depth):
+        return {"inside_share": math.nan, "depth_m_max": math.nan}
+    return {"inside_share": float(np.mean(depth > 0.0)), "depth_m_max": max(0.0, float(depth.max()))}
 
 
 def _find_asked_frames(view: View, requested: Timeline | None) -> np.ndarray:

@@ -195,8 +195,10 @@ def _read_clips(recordings: _Recordings, arrays: Path | None, notes: list[str], 
     Returns:
         The clips, and their motions, which let go of memory where they lie in a file.
     """
+    from ..appearance.arm_clearance import ArmClearance
     from .recorded_ball.contact_keys import move_keys_to_contacts
     from .repair import describe_repairs
+    from .synthetic_clips import sample_each_second
 
     levelled, changes = MotionWriter(arrays and arrays / "levelled.npy"), []
     units: list[str] = []
@@ -221,14 +223,17 @@ def _read_clips(recordings: _Recordings, arrays: Path | None, notes: list[str], 
     rows = move_keys_to_contacts(motions, balls, rows, notes)
     notes += describe_repairs([(one, pops) for one, (pops, _) in zip(repairs, changes)])
     figures = [RepairFigures(pops, one.drift, *one.slide) for one, (pops, _) in zip(repairs, changes)]
+    arms = ArmClearance(sample_each_second(motions))
     complete = MotionWriter(arrays and arrays / cache.MOTIONS)
     known: list[dict] = []  # all of a clip but its motion
     for original, what, ball in zip(_iter_completed(recordings, motions, rows, contacts, notes), figures, balls):
         _check_cancelled(cancelled)
-        original = replace(original, repair_figures=what, has_proposed_labels=is_proposed, ball=ball)
+        original = replace(original, motion=arms.clear(original.motion), repair_figures=what, ball=ball,
+                           has_proposed_labels=is_proposed)
         for clip in (original, original.build_twin()):
             complete.append(clip.motion)
             known.append({name: value for name, value in vars(clip).items() if name != "motion"})
+    notes += arms.describe()
     repaired.discard()
     finished = complete.finish()
     return [Clip(motion=motion, **rest) for motion, rest in zip(finished, known)], finished

@@ -23,7 +23,7 @@ answer by the same labels. What only some takes ask for, receptions among it, is
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -147,12 +147,17 @@ def sample_upright_example(clips: Sequence) -> Motion:
     `motion.retargeting.neutral` uses the most upright of them. A single recording of a run leans, and synthetic running
     would lean twice.
     """
-    parts = [
-        sample_frames(clip.motion, np.arange(0.0, len(clip.motion), clip.motion.fps)) for clip in clips
-        if not clip.mirrored
-    ]
+    return sample_each_second(clip.motion for clip in clips if not clip.mirrored)
+
+
+def sample_each_second(motions: Iterable[Motion]) -> Motion:
+    """Sample motions of one skeleton, a frame each second, as one motion."""
+    parts = []
+    for motion in motions:
+        parts.append(sample_frames(motion, np.arange(0.0, len(motion), motion.fps)))
+        skeleton = motion.skeleton
     root, rotations = (np.concatenate(column) for column in zip(*parts))
-    return Motion(clips[0].motion.skeleton, root, rotations, 1.0)
+    return Motion(skeleton, root, rotations, 1.0)
 
 
 def estimate_runner_style(clips: Sequence, frames: Frames, example: Motion) -> GaitStyle:

@@ -13,6 +13,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ..appearance.arm_clearance import clear_arms
+from ..appearance.trunk import build_trunk
 from ..ball.flight import Launch, find_crossing, simulate_flight
 from ..ball.physics import HUMAN_BALL_SPEEDS
 from ..ball.shot import is_out_of_reach, solve_arcs
@@ -22,6 +24,7 @@ from ..motion import quaternion
 from ..motion.humanoid import estimate_stature, identify_joints
 from ..motion.mirror import mirror
 from ..motion.motion import Motion, place_motion, sample_frames_cubic
+from ..motion.retargeting.neutral import build_neutral_stance
 from ..motion.retargeting.retarget import Retargeter
 from ..motion.skeleton import Skeleton
 from ..synthetic.throws import FASTEST as FASTEST_HAND
@@ -304,6 +307,7 @@ class _ThrowGenerator:
             motion = mirror(motion)
         if not motion.skeleton.has_same_bones(self.skeleton):
             motion = Retargeter(motion, self.skeleton).retarget(motion)
+        motion = clear_arms(motion, build_trunk(build_neutral_stance(self.skeleton, motion)))
         part = build_release_part(self.skeleton, self.limb, self.ball)
         limits = LimbLimits.from_motions(
             prepare_stepper(self.model).limits, own, build_release_part(own.skeleton, self.own_limb,

@@ -6,7 +6,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ...appearance.arm_clearance import measure_arm_depth
 from ...appearance.mesh import BodyMesh
+from ...appearance.trunk import Trunk
 from ...library.clip import Clip
 from ...library.keys import collect_keys
 from ...motion.humanoid import identify_joints
@@ -43,6 +45,7 @@ class Recording:
         kicks: those that its labels name.
         receptions: m/s of the foot at receptions that its labels name.
         physics: how its mass moves, at 30 frames per second.
+        arm_depth: (T,) m by which an arm is inside the trunk, negative outside.
     """
 
     path: str
@@ -66,15 +69,16 @@ class Recording:
     kicks: tuple[Kick, ...]
     receptions: tuple[float, ...]
     physics: BodyPhysics
+    arm_depth: np.ndarray
 
 
-def measure_recording(clip: Clip, fps: float, boots: BodyMesh) -> Recording:
+def measure_recording(clip: Clip, fps: float, boots: BodyMesh, trunk: Trunk) -> Recording:
     """Measure one clip, uncut, frame by frame.
 
     Args:
         clip: the clip.
         fps: frames per second of the output.
-        boots: of the library's body.
+        boots, trunk: of the library's body.
     Returns:
         Its figures.
     """
@@ -101,6 +105,7 @@ def measure_recording(clip: Clip, fps: float, boots: BodyMesh) -> Recording:
         travel=movement.measure_stance_travel(feet[:, :, 1], spans), course=course, kicks=kicks, receptions=receptions,
         stands=find_stands(smooth_zero_phase_hann(pelvis, fps, movement.ROOT_WINDOW), fps), contacts=contacts,
         physics=measure_body_physics(motion, positions, rotations, course, boots),
+        arm_depth=measure_arm_depth(skeleton, positions, rotations, trunk),
     )  # fmt: skip
 
 

@@ -18,6 +18,7 @@ import numpy as np
 from ...annotation.gaits import STANDING
 from ...appearance.boots import build_boots
 from ...appearance.mesh import BodyMesh
+from ...appearance.trunk import build_trunk
 from ...base.errors import InputError
 from ...library.clip import Clip
 from ...library.library import Library
@@ -62,6 +63,7 @@ class LibraryReference:
         courses: of all recordings.
         kicks, receptions, physics: of all recordings, see `Recording`.
         boots: of the library's body.
+        arm_depth: (N,) m, see `Recording`.
     """
 
     fps: float
@@ -95,6 +97,7 @@ class LibraryReference:
     receptions: tuple[float, ...]
     physics: tuple[BodyPhysics, ...]
     boots: BodyMesh
+    arm_depth: np.ndarray
 
     def find_rows(self, clips: tuple[str, ...], clip: np.ndarray, clip_frame: np.ndarray) -> np.ndarray:
         """Find the row of each output frame's source.
@@ -148,7 +151,8 @@ def build_reference(library: Library, fps: float) -> LibraryReference:
     originals, twins = select_originals(library.clips)
     examples = concatenate_motions([resample(clip.recording, EXAMPLE_FPS) for clip in originals])
     boots = build_boots(library.skeleton, example=examples)
-    measured = [measure_recording(clip, fps, boots) for clip in originals]
+    trunk = build_trunk(library.neutral_stance)
+    measured = [measure_recording(clip, fps, boots, trunk) for clip in originals]
     lengths = [len(recording.sway) for recording in measured]
     first = np.concatenate([[0], np.cumsum(lengths)])
     windows = [movement.collect_uncut_windows(recording.jerk, recording.speed) for recording in measured]
@@ -174,7 +178,7 @@ def build_reference(library: Library, fps: float) -> LibraryReference:
 
 
 _JOINED_FIELDS = ("sway", "surge", "speed", "contact_speed", "skating", "support", "tip", "smoothness", "travel",
-                  "stands", "contacts")  # fmt: skip
+                  "stands", "contacts", "arm_depth")  # fmt: skip
 
 
 def select_originals(clips: tuple[Clip, ...]) -> tuple[list[Clip], np.ndarray]:

@@ -77,6 +77,8 @@ TARGETS = {
     "naturalness.off_plan_deg_median": Target(most=10.0),
     "naturalness.off_plan_deg_p90": Target(most=25.0),
     "naturalness.jolts_per_min": Target(most=1.0),
+    "naturalness.arms.inside_share": Target(most=0.005),
+    "naturalness.arms.depth_m_max": Target(most=0.02),
     **{f"physics.flight.{speed}.vertical_m_s2_median": Target(least=-10.81, most=-8.81)
        for speed in ("2-4", "4-6", "6+")},
     **{f"physics.flight.{speed}.level_m_s2_median": Target(most=1.4) for speed in ("2-4", "4-6", "6+")},

@@ -5,11 +5,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from beyond_mocap.appearance.arm_clearance import measure_arm_depth
+from beyond_mocap.appearance.trunk import build_trunk
 from beyond_mocap.base.errors import InputError
 from beyond_mocap.motion import quaternion
 from beyond_mocap.motion.humanoid import identify_joints
 from beyond_mocap.motion.motion import compute_pose, forward_kinematics, sample_frames_cubic
 from beyond_mocap.motion.retargeting.adult import build_adult_skeleton
+from beyond_mocap.motion.retargeting.neutral import build_neutral_stance
 from beyond_mocap.synthetic.performers import build_thrower
 from beyond_mocap.throws.evaluate_throws import FULL_OPTIONS, RAW_OPTIONS, measure_deviations
 from beyond_mocap.throws.network_npz import RECORDED, WEIGHTS, read_chosen_model, read_shipped_model
@@ -57,6 +60,9 @@ def test_the_recorded_kicks_hit_and_throws_of_people_are_not_there():
         assert thrown.impact_error <= 0.02 and thrown.displacement <= 0.05 and thrown.limit_excess < 1e-6
         assert (thrown.foot_tilt > 0.0) == points and forward_kinematics(thrown.motion)[0][..., 2].min() > 0.01
         assert trace_toe_tip(thrown)[:, 2].min() > -0.012  # 3.6 cm in the ground if toes did not bend
+        skeleton, pose = thrown.motion.skeleton, forward_kinematics(thrown.motion)
+        trunk = build_trunk(build_neutral_stance(skeleton, thrown.motion))
+        assert -0.03 < measure_arm_depth(skeleton, *pose, trunk).max() < -0.015  # the arms pass beside the trunk
     with pytest.raises(InputError, match="throw_recorded"):
         read_chosen_model(RECORDED, "throw")
 
