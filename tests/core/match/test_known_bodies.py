@@ -143,8 +143,9 @@ def test_beside_dots_only_what_is_seen_comes_from_joints(sample_cache, tmp_path)
     table = write_table(tmp_path / "joints.csv", {"7": joints}, FPS)
     (tmp_path / "home_10.txt").write_text("3.5 kick right low\n5 kick right low\n")
     status = main(["match", "--tracking", str(SMALL / "small.dat"), "--joints", str(table), "--library", str(LIBRARY),
-                   "--cache", str(sample_cache), "--out", str(tmp_path / "out"), "--from", "3", "--to", "8", "--players", "home_10", "home_7",
-                   "--no-figures", "--workers", "1", "--annotations", str(tmp_path)])  # fmt: skip
+                   "--cache", str(sample_cache), "--out", str(tmp_path / "out"), "--from", "3", "--to", "8",
+                   "--players", "home_10", "home_7", "--no-figures", "--workers", "1",
+                   "--annotations", str(tmp_path)])  # fmt: skip
     state = json.loads((tmp_path / "out" / "match.json").read_text())
     rows = {row["id"]: row for row in state["players"]}
     assert status == 0 and "bodies" not in rows["home_7"] and "joints" in state["identity"]

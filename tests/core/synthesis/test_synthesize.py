@@ -127,9 +127,9 @@ for line in list_digests(library):
 
 
 def test_the_number_of_threads_changes_no_bit(library, clips_folder, tmp_path):
-    """Library and takes worked out anew in a process with two threads for linear algebra, and here with one."""
+    """Library and takes worked out anew in a process with three threads for linear algebra, and here with one."""
     names = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
-    environment = {**os.environ, "PYTHONPATH": str(TOP), **dict.fromkeys(names, "2")}
+    environment = {**os.environ, "PYTHONPATH": str(TOP), **dict.fromkeys(names, "3")}
     command = [sys.executable, "-c", REMOTE, str(clips_folder), str(tmp_path)]
     told = subprocess.run(command, env=environment, capture_output=True, text=True, timeout=180)
     assert told.returncode == 0, told.stderr
