@@ -7,6 +7,9 @@ REAL_BLENDER ?= ../shared/tools/real-blender
 
 .DEFAULT_GOAL := help
 .NOTPARALLEL:
+# Python keeps what it compiles, whatever the caller says: processes that tests start would compile the core each time,
+# and every run all tests, whose assertions pytest rewrites.
+unexport PYTHONDONTWRITEBYTECODE
 .PHONY: help venv venv-oldest training lint quick test test-core test-blender test-rooms test-operators test-oldest test-training left-out \
   demo bench weights experiments tables docs package extension extension-all repository repository-test pins window-test window-bench \
   fuzz kill-test pictures clean

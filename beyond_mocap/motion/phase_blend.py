@@ -10,6 +10,7 @@ based on motion blending", mix parameterized recordings in this manner.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -19,6 +20,9 @@ from . import quaternion
 from .humanoid import compute_heading_from_positions
 from .motion import Motion, compute_pose, forward_kinematics, sample_frames
 from .track import smooth_zero_phase_hann
+
+if TYPE_CHECKING:
+    from scipy.interpolate import PchipInterpolator
 
 _SWAY_SECONDS = 0.7
 # two landings of one foot are at least this far apart, seconds: nearer ones are one landing whose label flickers
@@ -72,7 +76,7 @@ class Strides:
 
     def measure_poses(self, phase: np.ndarray) -> np.ndarray:
         """Measure where the joints are relative to the hips and the heading, (T, J, 3) m, at phases (T,) in steps."""
-        sample = _sample_at_phase(self, phase, self.steps)
+        sample = _sample_pose(self, _build_frame_curve(self, self.steps)(phase))
         root = np.column_stack([sample["sway"], sample["height"]])
         places, _ = compute_pose(self.motion.skeleton, root, sample["pose"])
         return places
@@ -209,19 +213,29 @@ def _sample_at_phase(strides: Strides, phase: np.ndarray, steps: int) -> dict[st
         pose (T, J, 4) relative to the heading, height (T,) metres, sway (T, 2) metres in the heading frame, turn (T,)
         radians and way (T, 2) metres per step, and inside (T, 2, 2): steps from each point's nearest stance boundary.
     """
-    from scipy.interpolate import PchipInterpolator
-
-    curve = PchipInterpolator(np.arange(steps + 1.0), strides.landings[: steps + 1])
+    curve = _build_frame_curve(strides, steps)
     frames, pace = curve(phase), curve.derivative()(phase)
-    root, pose = sample_frames(strides.motion, frames)
-    facing, path = _interpolate_frames(strides.facing, frames), _interpolate_frames(strides.path, frames)
-    pose[:, 0] = quaternion.multiply(quaternion.from_up_angle(-facing), pose[:, 0])
+    facing = _interpolate_frames(strides.facing, frames)
     return {
-        "pose": pose, "height": root[:, 2], "sway": quaternion.rotate_level(root[:, :2] - path, -facing),
-        "turn": _interpolate_frames(np.gradient(strides.facing), frames) * pace,
+        **_sample_pose(strides, frames), "turn": _interpolate_frames(np.gradient(strides.facing), frames) * pace,
         "way": quaternion.rotate_level(_interpolate_frames(np.gradient(strides.path, axis=0), frames), -facing)
         * pace[:, None], "inside": _measure_stance_distance(strides.heel_toe_contacts, frames) / pace[:, None, None],
     }
+
+
+def _build_frame_curve(strides: Strides, steps: int) -> PchipInterpolator:
+    """Build the curve that gives a recording's fractional frame at a phase, counted in steps."""
+    from scipy.interpolate import PchipInterpolator
+
+    return PchipInterpolator(np.arange(steps + 1.0), strides.landings[: steps + 1])
+
+
+def _sample_pose(strides: Strides, frames: np.ndarray) -> dict[str, np.ndarray]:
+    """Sample pose, height and sway of `_sample_at_phase` at fractional frames (T,)."""
+    root, pose = sample_frames(strides.motion, frames)
+    facing, path = _interpolate_frames(strides.facing, frames), _interpolate_frames(strides.path, frames)
+    pose[:, 0] = quaternion.multiply(quaternion.from_up_angle(-facing), pose[:, 0])
+    return {"pose": pose, "height": root[:, 2], "sway": quaternion.rotate_level(root[:, :2] - path, -facing)}
 
 
 def _measure_stance_distance(heel_toe_contacts: np.ndarray, frames: np.ndarray) -> np.ndarray:

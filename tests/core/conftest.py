@@ -97,8 +97,11 @@ def clip_file():
 
 @pytest.fixture(scope="session")
 def clips_folder(tmp_path_factory) -> Path:
-    """stand, walk, jog and run at SPEEDS, a walk that turns left, and a right kick (60 fps)."""
-    folder = tmp_path_factory.mktemp("clips")
+    """stand, walk, jog and run at SPEEDS, a walk that turns left, and a right kick (60 fps); what is built of them is
+    kept for processes side by side."""
+    folder, cache = tmp_path_factory.mktemp("clips"), find_shared_folder(tmp_path_factory) / "clips_cache"
+    cache.mkdir(parents=True, exist_ok=True)
+    (folder / ".beyond_mocap").symlink_to(cache, target_is_directory=True)
     for seed, (name, (speed, words)) in enumerate(SPEEDS.items()):
         write_clip(folder / f"{name}.bvh", build_gait(speed, 5.0, 30.0, seed=seed), f"0 5 {words}\n")
     write_clip(folder / "bows" / "turn.bvh", build_gait(1.4, 4.0, 60.0, turn_rate=0.9, seed=7), "0 4 walking left\n")

@@ -159,7 +159,7 @@ def _refuse_constant(name: str):
 
 
 def work(job) -> tuple[int, list[tuple[str, int, str]], dict[str, float]]:
-    """Run inputs until the end of the time: their number, the faults, and seconds by target."""
+    """Run inputs until the end of the time: their number, the faults, and seconds of processor time by target."""
     worker, options, folder, seeds, files = job
     resource.setrlimit(resource.RLIMIT_AS, (_MEMORY, _MEMORY))
     targets = [
@@ -174,10 +174,10 @@ def work(job) -> tuple[int, list[tuple[str, int, str]], dict[str, float]]:
     end, number = time.time() + options.seconds, options.start + worker
     while time.time() < end and count < options.inputs / options.workers:
         target = Random(number).choices(chosen, weights)[0]
-        began = time.time()
+        began = time.process_time()
         if wrong := check(target, number, seeds, folder):
             faults.append(keep(target, number, seeds, wrong))
-        seconds[target.name] = seconds.get(target.name, 0.0) + time.time() - began
+        seconds[target.name] = seconds.get(target.name, 0.0) + time.process_time() - began
         number, count = number + options.workers, count + 1
     return count, faults, seconds
 
@@ -220,10 +220,11 @@ def main() -> int:
     for _, _, seconds in results:
         for name, value in seconds.items():
             totals[name] = totals.get(name, 0.0) + value
+    used = sum(totals.values())
     slow = ", ".join(f"{name} {totals[name]:.0f} s" for name in sorted(totals, key=totals.get, reverse=True)[:6])
     print(
-        f"{count} inputs from number {options.start} in {took:.0f} s ({60 * count / took:.0f} a minute), "
-        f"{len(faults)} faults; most time: {slow}"
+        f"{count} inputs from number {options.start} in {took:.0f} s and {used:.0f} s of processor time "
+        f"({1000 * used / max(count, 1):.0f} ms each), {len(faults)} faults; most of it: {slow}"
     )
     return 1 if faults else 0
 

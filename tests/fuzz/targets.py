@@ -61,7 +61,7 @@ def _read(name: str, seeds: str, function: Callable, weight: int = 4) -> Target:
 
 
 def _verb(
-    name: str, seeds: str, command: str, files: dict[str, Path], weight: int = 1, seconds: float = 60.0
+    name: str, seeds: str, command: str, files: dict[str, Path], weight: int = 3, seconds: float = 60.0
 ) -> Target:
     """A verb; in its command {bad} is the damaged file, {out} the empty folder, other names are valid files."""
 
@@ -163,7 +163,7 @@ def list_targets(files: dict[str, Path]) -> list[Target]:
             "--out {out}/o.bvh "
             "--ball {out}/b.csv --report {out}/r.json --nearest",
             files,
-            1,
+            3,
             120.0,
         ),
         _verb(
@@ -172,7 +172,7 @@ def list_targets(files: dict[str, Path]) -> list[Target]:
             "synthesize --library {library} --cache {cache} --track {track} "
             "--annotations {bad} --out {out}/o.bvh --nearest",
             files,
-            1,
+            3,
             120.0,
         ),
         _verb(
@@ -180,7 +180,7 @@ def list_targets(files: dict[str, Path]) -> list[Target]:
             "pins.csv",
             "synthesize --library {library} --cache {cache} --track {track} --pins {bad} --out {out}/o.bvh",
             files,
-            1,
+            3,
             120.0,
         ),
         _verb(
@@ -188,19 +188,19 @@ def list_targets(files: dict[str, Path]) -> list[Target]:
             "headings.csv",
             "synthesize --library {library} --cache {cache} --track {track} --headings {bad} --out {out}/o.bvh",
             files,
-            1,
+            3,
             120.0,
         ),
         _verb(
             "throw", "weights.npz", "throw synthesize --model {bad} --target 8,1,1 --out {out}/o.bvh", files, 2, 120.0
         ),
-        _verb("reconstruct", "walk.trc", "reconstruct {bad} --out {out}/o.bvh --report {out}/r.json", files, 1, 120.0),
+        _verb("reconstruct", "walk.trc", "reconstruct {bad} --out {out}/o.bvh --report {out}/r.json", files, 3, 120.0),
         _verb(
             "passes",
             "*scene.json",
             "passes {bad} --library {strikes} --cache {strikes_cache} --out {out}/f",
             files,
-            1,
+            3,
             120.0,
         ),
         _verb("bodies", "joints.*", "bodies --joints {bad} --out {out}/bodies", files, 2, 60.0),

@@ -84,7 +84,7 @@ def iter_steady_parts(strides: Strides) -> Iterator[tuple[float, Strides]]:
             spread = max(np.std(values[inside]) / np.mean(values[inside]) for values in (speed, strides.seconds))
             part = strides.select_steps(first, first + count + 1)
             if spread <= _MAX_SPREAD and turned <= _MAX_TURN and _has_usual_cadence(part):
-                before, after = part.measure_poses(_PHASES), part.measure_poses(count + _PHASES)
+                before, after = np.split(part.measure_poses(np.concatenate([_PHASES, count + _PHASES])), 2)
                 yield float(np.linalg.norm(after - before, axis=-1).mean()), part
 
 

@@ -92,11 +92,11 @@ def test_a_ball_without_its_body_is_told_and_stays(aimed, room):
 def test_what_is_out_of_reach_is_told_and_the_way_stays(aimed, room):
     aim, live = aimed.beyond_mocap_aim, room("ball.live")
     kept = place(aimed, aim.arrived)
-    aim.target.location.x += 500.0
+    aim.target.location.x += 150.0
     bpy.context.view_layer.update()
     assert live.update_balls(bpy.context.scene) == 1 and live.update_balls(bpy.context.scene) == 0
     assert "m away" in aim.messages and place(aimed, aim.arrived) == pytest.approx(kept, abs=1e-5)
-    aim.target.location.x -= 500.0
+    aim.target.location.x -= 150.0
     bpy.context.view_layer.update()
     live.update_balls(bpy.context.scene)
     assert not aim.messages

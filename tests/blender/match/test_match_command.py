@@ -16,10 +16,10 @@ def run(extension):
 
 @pytest.fixture(scope="module")
 def order(sample_cache):
-    """Arguments of two seconds of the small match."""
+    """Arguments of one second of the small match."""
     small = SAMPLE / "match" / "small"
     return ["match", "--tracking", str(small / "small.dat"), "--library", str(SAMPLE / "library"),
-            "--cache", str(sample_cache), "--from", "2", "--to", "4", "--workers", "2", "--no-figures"]
+            "--cache", str(sample_cache), "--from", "2", "--to", "3", "--workers", "2", "--no-figures"]
 
 
 def test_everybody_comes_out_as_one_file(run, order, tmp_path, capfd):
@@ -28,7 +28,7 @@ def test_everybody_comes_out_as_one_file(run, order, tmp_path, capfd):
     assert capfd.readouterr().out.splitlines()[0] == f"{out}: written"  # and no name of a temporary file before it
     bpy.ops.wm.open_mainfile(filepath=str(out))
     scene = bpy.context.scene
-    assert scene.render.fps == 30 and (scene.frame_start, scene.frame_end) == (0, 60)
+    assert scene.render.fps == 30 and (scene.frame_start, scene.frame_end) == (0, 30)
     bodies = [thing for thing in scene.objects if thing.type == "ARMATURE"]
     assert len(bodies) == 8 and all(thing.animation_data.action_slot for thing in bodies)
     assert {"Home 10 Dan Striker", "Away 9 Hana Forward"} <= {thing.name for thing in bodies}

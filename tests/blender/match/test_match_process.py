@@ -29,8 +29,8 @@ def run(child, *arguments, cancelled=lambda: False):
     return notes, told
 
 
-def test_it_does_what_the_command_does_and_tells_how_far_it_is(child, tmp_path):
-    _, told = run(child, "library", SAMPLE, "--cache", tmp_path / "cache", "--report", tmp_path / "report.json")
+def test_it_does_what_the_command_does_and_tells_how_far_it_is(child, library_folder, tmp_path):
+    _, told = run(child, "library", library_folder, "--cache", tmp_path / "cache", "--report", tmp_path / "report.json")
     assert (tmp_path / "report.json").stat().st_size > 100
     assert len(told) > 3 and told[-1][0] > 0.5 and all(text for _, text in told)
     assert not child._running

@@ -52,12 +52,12 @@ def test_a_pass_becomes_a_still_with_a_moving_ball(write, tmp_path, capsys):
     assert [path.read_text() for path in (tmp_path / "still" / "labels").iterdir()] == ["2 kick left standing low\n"]
 
 
-def test_the_labels_make_the_player_kick(write, tmp_path):
+def test_the_labels_make_the_player_kick(write, sample_cache, tmp_path):
     assert main([*write(), "--event", "aa-1", "--out", str(tmp_path / "still"), "--pitch", "100x64"]) == 0
     (labels,) = (tmp_path / "still" / "labels").iterdir()
     order = ["match", "--tracking", str(tmp_path / "still" / "moment.csv"), "--annotations", str(labels.parent),
-             "--library", str(SAMPLE), "--out", str(tmp_path / "match"), "--no-solve-touches", "--no-figures",
-             "--players", "Ada Öst"]
+             "--library", str(SAMPLE), "--cache", str(sample_cache), "--out", str(tmp_path / "match"),
+             "--no-solve-touches", "--no-figures", "--players", "Ada Öst", "--workers", "1"]
     assert main(order) == 0
     state = json.loads((tmp_path / "match" / "match.json").read_text())
     assert [player["status"] for player in state["players"]] == ["done"] and state["notes"] == []

@@ -26,7 +26,7 @@ FPS = 50.0
 
 
 @pytest.fixture(scope="module")
-def seen_match(tmp_path_factory):
+def seen_match(tmp_path_factory, sample_cache):
     """A walk with 5 cm of noise and a gap of 1.6 s in which no joint is seen but dots are; and a player never seen."""
     folder = tmp_path_factory.mktemp("seen")
     truth = sample_joints("walking_1_2", FPS)
@@ -34,19 +34,20 @@ def seen_match(tmp_path_factory):
     seen[int(GAP[0] * FPS) : int(GAP[1] * FPS)] = np.nan
     joints = write_table(folder / "joints.csv", {"A": seen}, FPS)
     out = folder / "match"
-    assert main(["match", "--tracking", str(joints), "--library", str(LIBRARY), "--out", str(out), "--bvh"]) == 0
+    order = ["match", "--tracking", str(joints), "--library", str(LIBRARY), "--cache", str(sample_cache)]
+    assert main([*order, "--out", str(out), "--bvh", "--workers", "1"]) == 0
     return folder, truth, out
 
 
-def measure_places(out, start, end):
+def measure_places(out, start, end, sample_cache):
     edit = read_player(next(out.glob("*.take.npz")))
-    library = build_library(LIBRARY)
+    library = build_library(LIBRARY, cache_dir=sample_cache)
     return edit, [take for take in construct_player(library, edit, start, end)]
 
 
-def test_seen_joints_are_shown_and_gaps_are_synthesized(seen_match):
+def test_seen_joints_are_shown_and_gaps_are_synthesized(seen_match, sample_cache):
     _, truth, out = seen_match
-    _, takes = measure_places(out, 0.0, len(truth) / FPS)
+    _, takes = measure_places(out, 0.0, len(truth) / FPS, sample_cache)
     (take,) = takes
     places, _ = forward_kinematics(take.motion)
     times = take.start_time + np.arange(len(places)) / take.motion.fps
@@ -130,7 +131,7 @@ def test_a_player_with_bodies_comes_back_from_a_file(seen_match, tmp_path):
         read_player(tmp_path / "damaged.npz")
 
 
-def test_beside_dots_only_what_is_seen_comes_from_joints(tmp_path):
+def test_beside_dots_only_what_is_seen_comes_from_joints(sample_cache, tmp_path):
     """A walk on the spot that is carried along a player's dots from 4 to 7 s, on a clock of its own."""
     dots = read_match(SMALL / "small.dat")
     at = np.arange(4.0, 7.0, 1.0 / FPS)
@@ -142,8 +143,9 @@ def test_beside_dots_only_what_is_seen_comes_from_joints(tmp_path):
     table = write_table(tmp_path / "joints.csv", {"7": joints}, FPS)
     (tmp_path / "home_10.txt").write_text("3.5 kick right low\n5 kick right low\n")
     status = main(["match", "--tracking", str(SMALL / "small.dat"), "--joints", str(table), "--library", str(LIBRARY),
-                   "--out", str(tmp_path / "out"), "--from", "3", "--to", "8", "--players", "home_10", "home_7",
-                   "--no-figures", "--workers", "1", "--annotations", str(tmp_path)])  # fmt: skip
+                   "--cache", str(sample_cache), "--out", str(tmp_path / "out"), "--from", "3", "--to", "8",
+                   "--players", "home_10", "home_7", "--no-figures", "--workers", "1",
+                   "--annotations", str(tmp_path)])  # fmt: skip
     state = json.loads((tmp_path / "out" / "match.json").read_text())
     rows = {row["id"]: row for row in state["players"]}
     assert status == 0 and "bodies" not in rows["home_7"] and "joints" in state["identity"]

@@ -20,13 +20,13 @@ TIMES = np.arange(0.0, 9.0, 0.1)
 
 
 @pytest.fixture(scope="module")
-def seen():
+def seen(sample_cache):
     """A walk that is seen from frame FIRST on, and its library."""
     motion = read_bvh(SAMPLE / "walking_1_2.bvh").motion
     body = build_known_body(FIRST, motion.fps, (motion.root_positions, motion.rotations),
                             np.zeros((len(motion), 2, 2), bool))
     player = SeenPlayer(bodies=(body,), height=estimate_stature(motion.skeleton))
-    return motion, SeenBodies(players={"A": player}), build_library(SAMPLE)
+    return motion, SeenBodies(players={"A": player}), build_library(SAMPLE, cache_dir=sample_cache)
 
 
 def name_touch(seen, place, part, second=None, player="A"):

@@ -38,8 +38,8 @@ def folder(tmp_path_factory):
 
 
 @pytest.fixture(scope="module")
-def comparison(folder, clips_folder, tmp_path_factory):
-    library = build_library(clips_folder, cache_dir=tmp_path_factory.mktemp("cache"))
+def comparison(folder, clips_folder):
+    library = build_library(clips_folder)
     return library, compare_methods(library, read_scenarios(folder, 30.0)[0], METHODS, 30.0)
 
 
