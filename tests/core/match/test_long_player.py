@@ -13,7 +13,6 @@ from beyond_mocap.files.bvh import bvh
 from beyond_mocap.library.features import compute_max_jerk
 from beyond_mocap.match import long_player
 from beyond_mocap.match.long_player import iter_parts, search_long_player
-from beyond_mocap.match.pieces.units import OVERLAP
 from beyond_mocap.motion.motion import concatenate_motions, forward_kinematics
 from beyond_mocap.motion.track import Track
 from beyond_mocap.synthesis.plan import Plan
@@ -86,7 +85,7 @@ def test_windows_outside_their_limits_are_told_by_their_option(tmp_path, capsys,
     (tmp_path / "t.csv").write_text("time_s,x_m,y_m\n" + "".join(f"{0.2 * i},{0.3 * i},0\n" for i in range(100)))
     assert main(["synthesize", "--library", str(tmp_path), "--track", str(tmp_path / "t.csv"), "--window", window,
                  "--out", str(tmp_path / "o.bvh")]) == 2
-    assert capsys.readouterr().err == (f"beyond-mocap: --window: {window} s; expected {2 * OVERLAP:g} to 3600 s, or 0 "
+    assert capsys.readouterr().err == (f"beyond-mocap: --window: {window} s; expected 24 to 3600 s, or 0 "
                                        "for the whole track at once\n")
 
 
