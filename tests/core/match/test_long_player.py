@@ -1,6 +1,8 @@
 """A long track in windows: the same frames whatever the parts are, no seam between them, and the files of the whole."""
 
 import json
+import subprocess
+import sys
 from dataclasses import replace
 
 import numpy as np
@@ -68,6 +70,33 @@ def test_a_work_that_needs_more_memory_than_is_free_is_refused_in_one_line(monke
 def test_free_memory_is_known_here():
     free = memory.read_free_bytes()
     assert free is None or 1e7 < free < 1e14
+
+
+@pytest.mark.parametrize(("process", "files"), [
+    ("0::/farm/job", {"farm/memory.max": "3000", "farm/memory.current": "2500", "farm/memory.stat": "inactive_file 100",
+                      "farm/job/memory.max": "max"}),
+    ("4:memory:/job", {"memory/job/memory.limit_in_bytes": "700", "memory/job/memory.usage_in_bytes": "200",
+                       "memory/job/memory.stat": "inactive_file 5\ntotal_inactive_file 100"}),
+])
+def test_limits_of_control_groups_count(tmp_path, monkeypatch, process, files):
+    monkeypatch.setattr(memory, "_GROUPS", tmp_path / "groups")
+    monkeypatch.setattr(memory, "_PROCESS", tmp_path)
+    (tmp_path / "cgroup").write_text(f"9:pids:/\n{process}\n")
+    assert memory._read_groups() is None
+    for name, text in files.items():
+        path = tmp_path / "groups" / name
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_text(f"{text}\n")
+    assert memory._read_groups() == memory.read_free_bytes() == 600.0
+
+
+def test_the_limit_of_the_process_counts():
+    resource = pytest.importorskip("resource")
+    code = "from beyond_mocap.base.memory import read_free_bytes; print(read_free_bytes())"
+    limit = 1_000_000_000
+    ran = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True,
+                         preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_AS, (limit, limit)))
+    assert 0.5 * limit < float(ran.stdout) < limit
 
 
 def test_the_command_checks_memory_before_the_search(clips_folder, tmp_path, monkeypatch, capsys):
