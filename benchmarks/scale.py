@@ -17,7 +17,7 @@ import numpy as np
 from .effort import format_head, format_row
 from .places import DATA, ROOT
 
-COUNTS = (160, 2000)
+COUNTS = (160, 500, 2000)
 """Clips of the libraries that are compared."""
 MEAN_SECONDS = 1.8
 """Mean duration of the recordings that are linked: 2,000 of them last an hour."""

@@ -220,9 +220,13 @@ def main(arguments: list[str] | None = None) -> int:
 def write_requested_sheet(options) -> None:
     """Read the files and write the sheet."""
     try:
-        import PIL  # noqa: F401
+        from PIL import Image
     except ImportError:
         raise InputError("look.py", "Pillow is not installed", "Pillow for the picture", "pip install pillow") from None
+    ending = options.out.suffix.lower()
+    if Image.registered_extensions().get(ending) not in Image.SAVE:
+        raise InputError(options.out, f"file type {ending}" if ending else "no file type", "a picture, .png or .jpg",
+                         "choose another file type")
     motion = bvh.read_bvh(options.take, unit=0.01).motion
     last = len(motion) - 1 if options.end is None else min(options.end * motion.fps, len(motion) - 1)
     step = max(options.every * motion.fps, 1.0)

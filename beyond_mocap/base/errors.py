@@ -160,7 +160,9 @@ def build_read_error(path: str | os.PathLike, kind: str, error: Exception | None
         return InputError(path, "is a folder", kind, "choose a file in it")
     if isinstance(error, FileNotFoundError) or not os.path.exists(path):
         return InputError(path, "no such file", kind, "check the path")
-    reason = getattr(error, "strerror", None) or error or "not a regular file"
+    reason = getattr(error, "strerror", None) or error
+    if reason is None:
+        return InputError(path, "is a device or a pipe", kind, "write its content into a file and choose that")
     return InputError(path, f"cannot be read ({reason})", f"{kind} that is readable")
 
 

@@ -8,12 +8,17 @@ from pathlib import Path
 from .errors import InputError
 
 _GIGABYTE = 1e9
-_LIMITS = ("/sys/fs/cgroup/memory.max", "/sys/fs/cgroup/memory.current")  # of a container: bytes allowed, bytes used
+_PROCESS = Path("/proc/self")
+_GROUPS = Path("/sys/fs/cgroup")
+_GROUP_FILES = (  # folder of all control groups; the files that say what one allows and uses; what of it can be dropped
+    ("", "memory.max", "memory.current", "inactive_file"),
+    ("memory", "memory.limit_in_bytes", "memory.usage_in_bytes", "total_inactive_file"),
+)
 
 
 def read_free_bytes() -> float | None:
     """Read how many bytes of memory a process can still take; None where the system does not say."""
-    found = [free for free in (_read_available(), _read_container()) if free is not None]
+    found = [free for free in (_read_available(), _read_groups(), _read_process_limit()) if free is not None]
     return min(found, default=None)
 
 
@@ -30,13 +35,43 @@ def _read_available() -> float | None:
         return None
 
 
-def _read_container() -> float | None:
-    """Read what the limit of a container leaves, in bytes; None without a limit."""
+def _read_groups() -> float | None:
+    """Read what the limits of the process's control groups, such as a container's, leave, in bytes; None without one.
+    """
     try:
-        allowed, used = (float(Path(file).read_text("ascii")) for file in _LIMITS)
-    except (OSError, ValueError):  # "max": no limit
+        rows = [line.split(":", 2) for line in (_PROCESS / "cgroup").read_text("utf-8").splitlines()]
+    except (OSError, ValueError):
         return None
-    return allowed - used
+    left = []
+    for name, *files in _GROUP_FILES:
+        for place in (place for _, names, place in rows if name in names.split(",")):
+            folder = _GROUPS / name / place.lstrip("/")
+            for group in (folder, *folder.parents):
+                if group.is_relative_to(_GROUPS / name):
+                    left.append(_read_group(group, *files))
+    return min((free for free in left if free is not None), default=None)
+
+
+def _read_group(folder: Path, allowed: str, used: str, dropped: str) -> float | None:
+    """Read what the limit of a control group leaves, in bytes; None without a limit."""
+    try:
+        most, now = (float((folder / name).read_text("ascii")) for name in (allowed, used))
+        rows = dict(line.split() for line in (folder / "memory.stat").read_text("ascii").splitlines())
+        return most - now + float(rows[dropped])
+    except (OSError, ValueError, KeyError):  # "max": no limit
+        return None
+
+
+def _read_process_limit() -> float | None:
+    """Read what the limit of this process (`ulimit -v`) leaves, in bytes; None without one."""
+    try:
+        import resource  # not on Windows
+
+        limit = resource.getrlimit(resource.RLIMIT_AS)[0]
+        pages = float((_PROCESS / "statm").read_text("ascii").split()[0])
+    except (ImportError, OSError, ValueError):
+        return None
+    return None if limit == resource.RLIM_INFINITY else limit - pages * resource.getpagesize()
 
 
 def check_memory(where: object, needed: float, next_step: str) -> None:

@@ -93,7 +93,6 @@ def run_match(options, reporter: ProgressReporter, writers: Mapping[str, Writer]
     """
     from ..match.request import MatchRequest
     from ..match.synthesize_match import read_result, synthesize_match
-    from ..synthesis.search.request import USE_NEAREST
 
     write = choose_scene_writer(options.scene, writers) if options.scene else None
     order = MatchRequest(
@@ -110,8 +109,7 @@ def run_match(options, reporter: ProgressReporter, writers: Mapping[str, Writer]
         result = read_result(order)
     reporter.finish(result.notes)
     for player in result.failed:
-        reason = player.reason.replace(USE_NEAREST, "leave out --exact")
-        reporter.show_note(f"player {player.id} was skipped: {reason}")
+        reporter.show_note(f"player {player.id} was skipped: {player.reason}")
     if not result.finished:
         lacks_labels = {player.exit_status for player in result.failed} == {NotInLibraryError.exit_status}
         error = NotInLibraryError if lacks_labels else BeyondMocapError

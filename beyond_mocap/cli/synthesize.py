@@ -12,13 +12,14 @@ from pathlib import Path
 from ..base.errors import InputError, NotInLibraryError, format_count
 from ..base.memory import check_memory
 from ..base.optional_packages import import_optional
+from ..base.settings.match import OVERLAP, WINDOW
 from ..base.settings.options import add_options, option_values, parse_path
 from .comparing import run_comparison
 from .library import open_library
 from .outputs import ProgressReporter, Writer, add_take_files, check_outputs, choose_writer, locate_errors
 
-LONG_TRACK, WINDOW = 1200.0, 300.0  # s of a track from which on it is done in windows, and of these
-_WINDOW_LIMITS = (24.0, 3600.0)  # s; the first is twice what neighbours share, `match.pieces.units.OVERLAP`
+LONG_TRACK = 1200.0  # s of a track from which on it is done in windows
+_WINDOW_LIMITS = (2.0 * OVERLAP, 3600.0)  # s
 _FRAME_BYTES = 27e3  # of memory that a frame of a track takes that is not done in windows
 _BASE_BYTES = 1e8  # of memory that any take needs
 _MAX_REPORT_BYTES = 100_000_000  # no report is as large

@@ -118,23 +118,23 @@ def _read_list(path: Path, key: str, kind: str) -> list[dict]:
 def _read_frame(event: dict, picture: dict, where: str) -> FreezeFrame:
     """Build a frame; InputError for values that StatsBomb does not have."""
     try:
-        return _build_frame(event, picture)
+        return _build_frame(event, picture, where)
     except (LookupError, TypeError, AttributeError, ValueError, ArithmeticError) as error:
         raise InputError(where, describe_damage(error), "StatsBomb's 360 data and events",
                          "export them again") from None
 
 
-def _build_frame(event: dict, picture: dict) -> FreezeFrame:
+def _build_frame(event: dict, picture: dict, where: str) -> FreezeFrame:
     people = picture["freeze_frame"]
     ended = next((event[part] for part in _ENDED if part in event and event[part].get("end_location")), None)
     duration = float(event.get("duration") or 0.0)
-    places = _to_places([person["location"] for person in people])
+    places = _to_places([person["location"] for person in people], where)
     return FreezeFrame(
         id=str(event["id"]), clock=f"{int(event['minute']):02d}:{int(event['second']):02d}",
         kind=str(event["type"]["name"]), player=str((event.get("player") or {}).get("name") or ""),
         team=str((event.get("team") or {}).get("name") or ""), places=places,
-        roles=tuple(_name_role(person) for person in people), ball=_to_places([event["location"][:2]])[0],
-        end=None if ended is None else _to_places([ended["end_location"]], (2, 3))[0],
+        roles=tuple(_name_role(person) for person in people), ball=_to_places([event["location"][:2]], where)[0],
+        end=None if ended is None else _to_places([ended["end_location"]], where, (2, 3))[0],
         duration=duration if math.isfinite(duration) else 0.0, labels=_find_labels(event),
     )  # fmt: skip
 
@@ -152,13 +152,19 @@ def _find_labels(event: dict) -> tuple[str, ...]:
     return read_event_labels().find_labels(kind, part, (way,), values)
 
 
-def _to_places(rows: list, counts: Collection[int] = (2,)) -> np.ndarray:
-    """Return locations of as many numbers as one of `counts`; ValueError for others."""
-    places = np.array(rows, dtype=float)
+def _to_places(rows: list, where: str, counts: Collection[int] = (2,)) -> np.ndarray:
+    """Return locations of as many numbers as one of `counts`; InputError with the first other one."""
     limits = (np.inf, np.inf, _FARTHEST)  # what is far along or across is refused with its file
-    if places.ndim != 2 or places.shape[1] not in counts or np.any(~(np.abs(places) < limits[: places.shape[1]])):
-        raise ValueError("locations of another size")
-    return places
+    for row in rows:
+        if not isinstance(row, list) or len(row) not in counts or not all(map(_is_within, row, limits)):
+            raise InputError(where, f"location {str(row)[:60]}", f"{' or '.join(map(str, counts))} numbers",
+                             "export 360 data and events again")
+    return np.array(rows, dtype=float).reshape(len(rows), -1)
+
+
+def _is_within(value: object, limit: float) -> bool:
+    """Tell whether a value is a number nearer to 0 than a limit."""
+    return isinstance(value, int | float) and not isinstance(value, bool) and abs(value) < limit
 
 
 def _name_role(person: dict) -> str:

@@ -18,9 +18,9 @@ from .. import __version__
 from ..appearance.sports import find_assumed_pitch
 from ..base.errors import InputError, build_read_error, format_seconds
 from ..base.settings import collect_defaults
+from ..base.settings.match import OVERLAP, WINDOW
 from ..files.event_providers import EVENT_PROVIDERS
 from ..files.joints.joint_readers import is_joint_file, list_joint_files
-from .pieces.units import OVERLAP, WINDOW
 
 _DEFAULTS = collect_defaults("match")
 FORM = 5

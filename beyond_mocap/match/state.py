@@ -10,6 +10,7 @@ from dataclasses import dataclass, field
 
 from .. import __version__
 from ..motion.track.match_data import Match
+from ..synthesis.search.request import USE_NEAREST
 from .folder import MatchFolder
 from .pieces.pool import TaskFailure, TaskResult, measure_peak_memory
 from .player_plans import PlayerPlans
@@ -49,7 +50,8 @@ class MatchState:
 
     def mark_failed(self, player: str, failure: TaskFailure) -> None:
         """Record why a player failed."""
-        self.update_player(player, status="failed", reason=failure.reason, exit_status=failure.exit_status)
+        reason = failure.reason.replace(USE_NEAREST, "leave out --exact")  # that alone makes labels strict in a match
+        self.update_player(player, status="failed", reason=reason, exit_status=failure.exit_status)
 
     def record_window(self, player: str) -> None:
         """Count one more searched window of a player."""

@@ -7,7 +7,6 @@ updated, or the file is opened on another computer: it is found again by its par
 from __future__ import annotations
 
 import os
-import tempfile
 from pathlib import Path
 
 import bpy
@@ -61,6 +60,8 @@ def find_cache_base() -> Path:
     try:
         return Path(bpy.utils.extension_path_user(EXTENSION, path="sample"))
     except ValueError:  # not installed as an extension, such as when a script loads it
+        import tempfile  # with what it loads, a hundredth of what enabling takes
+
         return Path(tempfile.gettempdir()) / "beyond_mocap_sample"
 
 

@@ -9,7 +9,7 @@ import bpy
 import numpy as np
 
 from ..characters import kit_materials
-from ..core.material import create_material
+from ..core import material as materials
 from ..stage import body as bodies
 from ..stage import body_surfaces
 from . import load
@@ -137,7 +137,7 @@ def create_kit_material(kit: Kit, part: str) -> bpy.types.Material:
     colours = _build_part_colours(kit)
     unused = (one for one in _find_materials(kit, part) if one.users == one.use_fake_user)
     material = next(unused, None) or body_surfaces.paint_part(
-        create_material(_build_material_name(kit, part), colours[part], bodies.CLOTH), part)
+        materials.create_material(_build_material_name(kit, part), colours[part], bodies.CLOTH), part)
     _set_colour(material, colours[part])
     return material
 

@@ -18,8 +18,7 @@ from mathutils import Matrix, Vector
 from ..core import window
 from ..core.live import Watcher
 from ..core.settings import find_active_player
-from . import ball_paths, colours, contact_handles, momentum, path_overlays, prepare, shapes, store
-from .text_places import Box, find_free_box
+from . import ball_paths, colours, contact_handles, momentum, path_overlays, prepare, shapes, store, text_places
 
 BIAS = 1e-5
 DISC, LIFT = 0.12, 0.034  # metres: radius of a contact's disc, its height above the ground
@@ -32,7 +31,7 @@ GROUND = (0.03, 0.03, 0.03, 0.72)  # background of texts
 _batches: dict[tuple, list] = {}
 _owners: dict[str, prepare.PreparedTake] = {}
 _square: list = []
-_taken: list[Box] = []  # places of the texts that this draw has drawn so far
+_taken: list[text_places.Box] = []  # places of the texts that this draw has drawn so far
 
 
 class DrawnTake(NamedTuple):
@@ -308,7 +307,7 @@ def _draw_text(context, where: Vector, lines, strength: float, shift: tuple[floa
     scale = context.preferences.system.ui_scale
     x, y = at.x + shift[0] * scale, at.y + shift[1] * scale
     width, height = measure_lines(lines, scale)
-    box = find_free_box((x, y, x + width, y + height), _taken, 2 * scale)
+    box = text_places.find_free_box((x, y, x + width, y + height), _taken, 2 * scale)
     if box is not None:
         _taken.append(box)
         draw_lines(box[0], box[1], lines, scale, strength)

@@ -17,9 +17,8 @@ from ..core.live import Watcher
 from ..core.measure import units_per_metre
 from ..core.settings import find_active_player
 from ..player.dots import BALL
-from . import draw
+from . import draw, text_places
 from .colours import BLACK, WHITE
-from .text_places import Box, find_free_box
 
 HEAD, DOT = 2.1, 0.6  # metres above the ground: over a body, over a dot alone
 SIZE, PAD, GAP = 11, 5, 2  # points: letters, around them, between two names
@@ -45,7 +44,8 @@ class NameLabel(NamedTuple):
     is_active: bool
 
 
-def place_names(labels: list[NameLabel], measure, height: float, scale: float) -> list[tuple[NameLabel, Box]]:
+def place_names(labels: list[NameLabel], measure, height: float,
+                scale: float) -> list[tuple[NameLabel, text_places.Box]]:
     """Place names over their points so that none lies over another: the active and the near ones first.
 
     Args:
@@ -56,11 +56,11 @@ def place_names(labels: list[NameLabel], measure, height: float, scale: float) -
     Returns:
         Each name that found a place, with left, bottom, right, top; others are left out.
     """
-    placed: list[tuple[NameLabel, Box]] = []
+    placed: list[tuple[NameLabel, text_places.Box]] = []
     for label in sorted(labels, key=lambda one: (not one.is_active, one.depth, one.text)):
         half = 0.5 * measure(label.text) + PAD * scale
         own = (label.x - half, label.y, label.x + half, label.y + height)
-        box = find_free_box(own, [taken for _, taken in placed], GAP * scale)
+        box = text_places.find_free_box(own, [taken for _, taken in placed], GAP * scale)
         if box is not None:
             placed.append((label, box))
     return placed

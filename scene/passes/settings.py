@@ -14,7 +14,7 @@ from bpy.props import (
     StringProperty,
 )
 
-from ...beyond_mocap.base.digest import byte_digest
+from ...beyond_mocap.base import digest
 from ..core import live
 from ..core.properties import find_active_row, with_settings
 from ..result.result import BeyondMocapBefore
@@ -213,7 +213,7 @@ def parse_hits(hits: BeyondMocapHits) -> dict:
 
 def name_picture(hits: BeyondMocapHits) -> str:
     """Compute the name of an analysis' picture; other curves give another name."""
-    return byte_digest(hits.found, size=8).hex()
+    return digest.byte_digest(hits.found, size=8).hex()
 
 
 def show_label(name: str) -> str:

@@ -8,9 +8,8 @@ from typing import TYPE_CHECKING
 import bpy
 import numpy as np
 
-from ..core import channels
+from ..core import channels, names
 from ..core.measure import Clock, build_scene_clock, units_per_metre
-from ..core.names import find_named
 from ..core.settings import BeyondMocapPlayer, BeyondMocapSettings, to_absolute_path, to_setting_path
 from ..result import bake
 from . import tracks
@@ -53,7 +52,7 @@ def ensure_dot(context: bpy.types.Context, player: BeyondMocapPlayer) -> bpy.typ
     clock = build_scene_clock(context.scene)
     seconds, places = _select_measured(track.times, track.positions)
     _animate_dot(context.scene, dot, seconds, np.pad(places, ((0, 0), (0, 1))), clock)
-    if find_named(collection.objects, BALL) is None:
+    if names.find_named(collection.objects, BALL) is None:
         _create_ball_dot(context.scene, track, collection, clock)
     return dot
 
@@ -88,7 +87,7 @@ def remove_dot(scene: bpy.types.Scene, player: BeyondMocapPlayer) -> None:
     if dot is not None:
         _delete_dot(dot)
     if not any(other.dot for other in scene.beyond_mocap.players):
-        ball = find_named(bake.find_or_create_collection(scene).objects, BALL)
+        ball = names.find_named(bake.find_or_create_collection(scene).objects, BALL)
         if ball is not None:
             _delete_dot(ball)
 

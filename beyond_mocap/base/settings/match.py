@@ -6,6 +6,12 @@ from pathlib import Path
 from .setting import BETWEEN, Setting
 from .synthesis import BODY
 
+WINDOW = 300.0
+"""s of a window of work, without overlaps."""
+OVERLAP = 12.0
+"""s that two windows share: two thirds before the edge between them, which the later one needs to converge to the
+sequence of the earlier one, and one third after it."""
+
 SPORTS = (
     ("football", "Football", "105 x 68 m"), ("futsal", "Futsal", "40 x 20 m"), ("handball", "Handball", "40 x 20 m"),
     ("basketball", "Basketball", "28 x 15 m"), ("ice_hockey", "Ice Hockey", "60 x 30 m"),

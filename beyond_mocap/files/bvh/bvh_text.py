@@ -24,6 +24,7 @@ _CHANNELS = {name.lower(): name for name in POSITIONS + ROTATIONS}
 _LARGEST_ANGLE = 1e7  # degrees; larger values are damaged
 _LARGEST_POSITION = 1e9  # 1000 km in millimetres
 _MOST_JOINTS = 2000  # bodies with fingers and faces have some hundreds
+_LONGEST_BONE = 500.0  # times the median: the longest of a body with a moving face is 100 times a bone of the face
 MAX_BYTES = 2_000_000_000
 """Largest BVH file: 90 minutes of a body with fingers at 240 frames per second are about 1 GB."""
 _EXPORT_AGAIN = "export the file again"
@@ -102,7 +103,9 @@ def parse_bvh_text(path: Path, data: bytes) -> BvhText:
             f"the file is {'truncated' if len(values) < frames else 'damaged'}; {_EXPORT_AGAIN}",
         )
     _check_sizes(path, joints, values, line)
-    return joints.build_text(frame_time, values, line)
+    text = joints.build_text(frame_time, values, line)
+    _check_bones(text)
+    return text
 
 
 def read_content(path: Path) -> bytes:
@@ -325,6 +328,20 @@ def _check_sizes(path: Path, joints: _HierarchyParser, values: np.ndarray, line:
         if abs(values[row, column]) > _LARGEST_POSITION:
             found = f"a position beyond 1000 km in {names[column]}, frame {row}"
             raise InputError(f"{path}:{line + row}", found, "a person's motion", _EXPORT_AGAIN)
+
+
+def _check_bones(text: BvhText) -> None:
+    """Check that no bone is far longer than the others: the unit would be estimated by it, or the body reach for
+    kilometres. Joints with positions of their own are no bones.
+    """
+    joints = [joint for joint, names in enumerate(text.channels)
+              if text.parents[joint] >= 0 and not set(names) & set(POSITIONS)]
+    lengths = np.linalg.norm(text.offsets[joints], axis=1)
+    usual = float(np.median(lengths[lengths > 0.0])) if np.any(lengths > 0.0) else math.inf
+    if len(lengths) and lengths.max() > _LONGEST_BONE * usual:
+        name, length = text.names[joints[int(lengths.argmax())]], lengths.max()
+        raise InputError(text.path, f"joint {name!r} is {length:.6g} from its parent, half of the joints less than "
+                         f"{usual:.4g}", "the bones of a body", _EXPORT_AGAIN)
 
 
 def _build_row_error(path: Path, text: bytes, columns: int, line: int) -> InputError:

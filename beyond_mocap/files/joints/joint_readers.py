@@ -99,7 +99,7 @@ def _find_reader(path: Path) -> _Reader:
     found = _find_text_reader(path)
     if found is None:
         what = "unknown form" if read_head(path).strip() else "the file is empty"
-        raise InputError(path, what, _FORMS, "choose such a file")
+        raise InputError(path, what, _FORMS, "choose such a file; positions of players without joints are for match")
     return found
 
 

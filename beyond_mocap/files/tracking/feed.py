@@ -15,8 +15,8 @@ from pathlib import Path
 from typing import Any, TypeVar
 from xml.parsers import expat
 
+from ...base import optional_packages
 from ...base.errors import InputError, build_read_error
-from ...base.optional_packages import import_optional
 
 MAX_PLAYERS = 60
 """Two squads of 26 and the referees have fewer; more are two matches in one file."""
@@ -181,7 +181,7 @@ def load_with_kloppy(path: Path, provider: str, loader: str, arguments: Mapping,
     Raises:
         InputError: if kloppy is not installed or cannot read the files.
     """
-    module = import_optional(f"kloppy.{provider}", path)
+    module = optional_packages.import_optional(f"kloppy.{provider}", path)
     try:
         with warnings.catch_warnings(), _silence_logging():
             warnings.simplefilter("ignore")

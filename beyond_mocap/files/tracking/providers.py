@@ -105,6 +105,9 @@ def _detect_provider(path: Path, notes: list[str]) -> TrackingProvider:
     if is_joint_file(path):
         raise InputError(path, "skeletal tracking", f"positions of players and ball, from one of {titles}",
                          "use match or bodies for it")
+    if b'"freeze_frame"' in head:
+        raise InputError(path, "moments of StatsBomb 360", f"a match's tracking data from one of {titles}",
+                         "use freeze-frame, whose moment.csv match reads")
     raise InputError(path, "unknown format", f"one of {titles}, or a CSV of one player with time_s,x_m,y_m; "
                      "a Plain CSV has time_s,player,x_m,y_m",
                      "choose the provider, rename the columns, or write a Plain CSV")

@@ -115,7 +115,7 @@ class ConstructedMotion:
         job = self._job
         needed = seconds * job.request.fps * 8 * (4 * len(job.library.skeleton) + _OTHER_NUMBERS)
         if (free := shutil.disk_usage(job.folder.path).free) < needed:
-            raise InputError(job.folder.path, f"{free / 1e6:.0f} MB free", f"{needed / 1e6:.0f} MB while it is made",
+            raise InputError(job.folder.path, f"{free / 1e6:.1f} MB free", f"{needed / 1e6:.1f} MB while it is made",
                              "make room, or choose another folder")
 
     def _iter_parts(self, grid: StretchWindows, files: list[Path], low: int, high: int) -> Iterator[tuple[Content, int,

@@ -13,6 +13,7 @@ import numpy as np
 
 from ...annotation import Timeline
 from ...base.errors import InputError
+from ...base.settings.match import OVERLAP, WINDOW
 from ...library.features import FPS
 from ...motion.track import Track
 from ...synthesis.exertion import measure_exertion
@@ -21,13 +22,6 @@ from ...synthesis.known_body import cut_bodies
 from ...synthesis.plan import Plan, SolvedTrajectory
 from ...synthesis.search.candidate_index import SLOT
 from ..player_edit import to_stored_plan
-
-WINDOW = 300.0
-"""s of a window, without overlaps."""
-
-OVERLAP = 12.0
-"""s that two neighbours share: two thirds before the edge between them, which the later one needs to converge to the
-sequence of the earlier one, and one third after it."""
 
 OVERLAP_BEFORE = 2.0 / 3.0
 """Share of the overlap before the edge."""

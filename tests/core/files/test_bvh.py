@@ -390,6 +390,8 @@ BAD = {
     "only a byte order mark": (b"\xef\xbb\xbf\n", "the file is empty"),
     "blank lines first": (b"\n" * 20 + b"what", "starts with 'what'"),
     "huge offset": (re.sub(rb"OFFSET \S+", b"OFFSET -1e308", GOOD, count=2), "OFFSET and three numbers of normal size"),
+    "long bone": (re.sub(rb"OFFSET 9.0 \S+", b"OFFSET 9.0 1e6", GOOD, count=1),
+                  "is 1e+06 from its parent, half of the joints"),
     "huge angle": (GOOD.replace(FIRST, b"1e30"), "expected an angle"),
     "bracket missing": (GOOD.replace(b"}", b"", 1), "bracket"),
     "bracket too many": (GOOD.replace(b"}\nMOTION", b"}}\nMOTION"), "one } too many"),

@@ -98,7 +98,7 @@ def test_each_person_has_a_name_of_their_own(write, tmp_path):
     ({"pictures": [{"a": 1}]}, [], "no list of objects"), ({"pictures": [PASS]}, [], "exchange 360 data and events"),
     ({"pictures": [{"event_uuid": "zz", "freeze_frame": PEOPLE}]}, [], "the same match"),
     ({"pictures": [{"event_uuid": "aa-1", "freeze_frame": [{"location": [1e300, "x"]}]}]}, [],
-     "event aa-1: values in other places, or of another kind"), ({"pictures": "[" * 100_000}, [], "nested too deeply"),
+     "event aa-1: location [1e+300, 'x']; expected 2 numbers"), ({"pictures": "[" * 100_000}, [], "nested too deeply"),
     ({"pictures": f"[{'1' * 5000}]"}, [], "a number of thousands of digits"), ({"pictures": ""}, [], "is empty"),
     ({"pictures": [{"event_uuid": "aa-1", "freeze_frame": [{**one, "location": [one["location"][0] - 100.0, 4.0]}
                                                            for one in PEOPLE]}]}, [], "from -40 to 18 along"),
@@ -108,7 +108,7 @@ def test_each_person_has_a_name_of_their_own(write, tmp_path):
     ({"events": ({**PASS, "location": [-50.0, -20.0]},)}, [], "events.json: places from -50"),
     ({"events": ({key: value for key, value in PASS.items() if key != "minute"},)}, [], "event aa-1: no 'minute'"),
     ({"pictures": [{"event_uuid": "aa-1", "freeze_frame": [{"location": [60.0, 40.0, 1.0]}]}]}, ["--event", "aa-1"],
-     "locations of another size"),
+     "event aa-1: location [60.0, 40.0, 1.0]; expected 2 numbers; export"),
     ({"pictures": [{"event_uuid": "aa-1", "freeze_frame": PEOPLE * 40}]}, ["--event", "aa-1"], "at most 60"),
 ])  # fmt: skip
 def test_bad_input_ends_with_one_line(change, more, line, write, tmp_path, capsys):

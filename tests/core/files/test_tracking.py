@@ -244,12 +244,14 @@ def test_wrong_files_get_one_line(tmp_path):
     file, _ = made_tracab(tmp_path)
     (tmp_path / "odd.txt").write_text("hello\n")
     (tmp_path / "joints.csv").write_text("time_s,player,joint,x,y,z\n0,a,nose,1,2,3\n")
+    (tmp_path / "360.json").write_text('[\n {"event_uuid": "a", "freeze_frame": []}]')
     (tmp_path / "bad_meta.xml").write_text("<nonsense/>")
     (tmp_path / "lonely.dat").write_bytes(file.read_bytes())
     cases = [
         ((tmp_path / "none.dat",), "no such file"),
         ((tmp_path / "odd.txt",), "choose the provider, rename the columns, or write a Plain CSV"),
         ((tmp_path / "joints.csv",), "joints.csv: skeletal tracking; expected positions of players and ball"),
+        ((tmp_path / "360.json",), "moments of StatsBomb 360; expected a match's tracking data from one of"),
         ((file, tmp_path / "bad_meta.xml"), "not readable as TRACAB"),
         ((file, tmp_path / "odd.txt"), "odd.txt: neither XML nor JSON; expected the metadata of TRACAB"),
         ((file, None, "metrica"), "not readable as Metrica tracking; expected"),

@@ -124,7 +124,9 @@ def test_bad_joints_end_with_one_line(tmp_path, capsys):
     (tmp_path / "ball.csv").write_text("time_s,x_m,y_m\n0,1,2\n")
     dots = "--tracking", SMALL / "small.dat", "--to", 4
     for path, expected in ((far, "from any player"), (tmp_path / "objects.npz", "objects.npz"),
-                           (tmp_path / "ball.csv", "unknown form"), (tmp_path / "none.csv", "no such file")):
+                           (tmp_path / "ball.csv", "unknown form"),
+                           (SMALL / "small.dat", "without joints are for match"),
+                           (tmp_path / "none.csv", "no such file")):
         status, line = _run(capsys, tmp_path, *dots, "--joints", path)
         assert status == 2 and expected in line, line
     times = write_table(tmp_path / "years.csv", {"A": joints}, 25.0)

@@ -1,6 +1,8 @@
 """A long track in windows: the same frames whatever the parts are, no seam between them, and the files of the whole."""
 
 import json
+import subprocess
+import sys
 from dataclasses import replace
 
 import numpy as np
@@ -13,7 +15,6 @@ from beyond_mocap.files.bvh import bvh
 from beyond_mocap.library.features import compute_max_jerk
 from beyond_mocap.match import long_player
 from beyond_mocap.match.long_player import iter_parts, search_long_player
-from beyond_mocap.match.pieces.units import OVERLAP
 from beyond_mocap.motion.motion import concatenate_motions, forward_kinematics
 from beyond_mocap.motion.track import Track
 from beyond_mocap.synthesis.plan import Plan
@@ -71,6 +72,33 @@ def test_free_memory_is_known_here():
     assert free is None or 1e7 < free < 1e14
 
 
+@pytest.mark.parametrize(("process", "files"), [
+    ("0::/farm/job", {"farm/memory.max": "3000", "farm/memory.current": "2500", "farm/memory.stat": "inactive_file 100",
+                      "farm/job/memory.max": "max"}),
+    ("4:memory:/job", {"memory/job/memory.limit_in_bytes": "700", "memory/job/memory.usage_in_bytes": "200",
+                       "memory/job/memory.stat": "inactive_file 5\ntotal_inactive_file 100"}),
+])
+def test_limits_of_control_groups_count(tmp_path, monkeypatch, process, files):
+    monkeypatch.setattr(memory, "_GROUPS", tmp_path / "groups")
+    monkeypatch.setattr(memory, "_PROCESS", tmp_path)
+    (tmp_path / "cgroup").write_text(f"9:pids:/\n{process}\n")
+    assert memory._read_groups() is None
+    for name, text in files.items():
+        path = tmp_path / "groups" / name
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_text(f"{text}\n")
+    assert memory._read_groups() == memory.read_free_bytes() == 600.0
+
+
+def test_the_limit_of_the_process_counts():
+    resource = pytest.importorskip("resource")
+    code = "from beyond_mocap.base.memory import read_free_bytes; print(read_free_bytes())"
+    limit = 1_000_000_000
+    ran = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True,
+                         preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_AS, (limit, limit)))
+    assert 0.5 * limit < float(ran.stdout) < limit
+
+
 def test_the_command_checks_memory_before_the_search(clips_folder, tmp_path, monkeypatch, capsys):
     (tmp_path / "t.csv").write_text("time_s,x_m,y_m\n" + "".join(f"{0.2 * i},{0.3 * i},0\n" for i in range(100)))
     monkeypatch.setattr(memory, "read_free_bytes", lambda: 1e6)
@@ -86,7 +114,7 @@ def test_windows_outside_their_limits_are_told_by_their_option(tmp_path, capsys,
     (tmp_path / "t.csv").write_text("time_s,x_m,y_m\n" + "".join(f"{0.2 * i},{0.3 * i},0\n" for i in range(100)))
     assert main(["synthesize", "--library", str(tmp_path), "--track", str(tmp_path / "t.csv"), "--window", window,
                  "--out", str(tmp_path / "o.bvh")]) == 2
-    assert capsys.readouterr().err == (f"beyond-mocap: --window: {window} s; expected {2 * OVERLAP:g} to 3600 s, or 0 "
+    assert capsys.readouterr().err == (f"beyond-mocap: --window: {window} s; expected 24 to 3600 s, or 0 "
                                        "for the whole track at once\n")
 
 

@@ -64,6 +64,7 @@ def test_a_player_whose_words_the_library_lacks_fails_where_that_is_asked(match,
     status, _, error = match("--exact", "--no-figures", annotations=tmp_path / "words")
     assert status == 3 and "no player could be synthesized" in error[-1]
     assert any("home_7" in line and "header subtle" in line and line.endswith("or leave out --exact") for line in error)
+    assert any(row["reason"].endswith("or leave out --exact") for row in read_state(tmp_path / "out")["players"])
     assert read_state(tmp_path / "out")["status"] == "failed"
 
 

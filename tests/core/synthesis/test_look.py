@@ -58,4 +58,6 @@ def test_bad_input_is_told_in_one_line(look, tmp_path, capsys):
     assert look.main([str(tmp_path / "none.bvh"), "--out", str(tmp_path / "sheet.png")]) == 2
     assert look.main([str(TAKE), "--out", str(tmp_path / "sheet.png"), "--from", "900"]) == 2
     assert look.main([str(TAKE), "--out", str(tmp_path / "none" / "sheet.png")]) == 2
-    assert capsys.readouterr().err.count("\n") == 3
+    assert look.main([str(TAKE), "--out", str(tmp_path / "sheet.txt")]) == 2
+    error = capsys.readouterr().err
+    assert error.count("\n") == 4 and "sheet.txt: file type .txt; expected a picture" in error
