@@ -317,14 +317,19 @@ def test_it_is_one_step(playing, room):
     assert room("stream.play").get_current_rally() is None and "Undo has ended" in told().played
 
 
-def test_an_armature_can_show_how(playing, room):
-    """Its strike nearest to the present frame, without any stream; not one that has none."""
+def test_an_armature_can_show_how(playing, room, monkeypatch):
+    """Its strike nearest to the present frame, without any stream, by the script of the how-to; not one that has none.
+    """
     with pytest.raises(RuntimeError, match="no strike with the foot"):
         bpy.context.view_layer.objects.active = playing.beyond_mocap_passes.players[1].body
         press_operator(OPS.stream_act)
-    bpy.ops.beyond_mocap.import_clips(filepath=str(CLIPS / "volley_toss.bvh"))
-    assert press_operator(OPS.stream_act) == {"FINISHED"}
-    assert room("stream.play").get_current_rally().passes == 1 and "Ann played volley_toss" in told().played
+    page = (SAMPLE.parent / "docs" / "how-to" / "stream-live-motion.md").read_text("utf-8")
+    script = page.split("### From a script")[1].split("```python")[1].split("```")[0]
+    printed = []
+    monkeypatch.chdir(SAMPLE.parent)
+    exec(script, {"print": printed.append})
+    assert "passes so far: 1" in printed[0] and "Ann played volley_toss" in printed[0]
+    assert room("stream.play").get_current_rally() is None
 
 
 def test_a_scene_that_is_cleared_ends_it(playing, room):
