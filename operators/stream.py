@@ -8,7 +8,7 @@ from ..beyond_mocap.passes.stream import live_hits
 from ..scene.core.measure import frames_per_second
 from ..scene.passes import generate as make
 from ..scene.passes.settings import find_armature
-from ..scene.stream import follow, new_rally, play, streamed_body, users
+from ..scene.stream import follow, play, streamed_body
 from ..scene.stream.settings import add_stream, find_stream, get_key, list_streams
 from .operator_base import BackgroundOperator, BaseOperator
 
@@ -144,13 +144,15 @@ motion of the library, to the player chosen with keys 1 to 9 or a click"""
     def order(self, context):
         """Collect the order of the scene, the holder of the ball and the rally's time."""
         holder = self.holder or context.scene.beyond_mocap_passes.players[0].name
-        users.check_players(context.scene)
+        follow.check_players(context.scene)
         clock = play.compute_rally_seconds(context.scene), frames_per_second(context.scene)
-        return make.build_order(context.scene), holder, clock, users.find_main_stream(context.scene, holder).part
+        return make.build_order(context.scene), holder, clock, follow.find_main_stream(context.scene, holder).part
 
     @staticmethod
     def run_job(order, progress, cancelled, _hurry):
-        return new_rally.start_rally(*order, progress, cancelled)
+        from ..scene.stream.new_rally import start_rally
+
+        return start_rally(*order, progress, cancelled)
 
     def apply(self, scene, result):
         """Apply the rally to characters and ball, and answer strikes from now on."""

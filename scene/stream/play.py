@@ -21,14 +21,13 @@ from ..core.live import Watcher, call_or_describe, is_playing
 from ..core.measure import frames_per_second
 from ..passes import generate as make
 from ..passes.settings import PLAYED
-from . import follow, rally_keys, watchers
-from .new_rally import NewRally
-from .users import find_main_stream, list_own_streams
+from . import follow, rally_keys
 
 if TYPE_CHECKING:
     from ...beyond_mocap.passes.answers_ahead import AnswerRequest
     from ...beyond_mocap.passes.hits import HitMotion
     from ...beyond_mocap.passes.live_passes import LivePass, Rally
+    from .new_rally import NewRally
     from .settings import StreamSettings
 
 LEFT_SECONDS = 20.0
@@ -57,7 +56,8 @@ def apply_rally(scene: bpy.types.Scene, new_rally: NewRally) -> None:
 def stop_rally() -> None:
     """Stop answering; what was played stays."""
     background.cancel_jobs("live")
-    background.cancel_jobs(watchers.KIND)
+    if _session.get("watchers"):
+        _session["watchers"].cancel()
     follow.remove_call(receive_strike)
     follow.remove_call(_update_or_end)
     follow.remove_call(_answer_or_end)
@@ -100,7 +100,7 @@ def find_target(scene: bpy.types.Scene) -> str:
 
 def receive_strike(scene: bpy.types.Scene, stream: StreamSettings, hit: HitMotion, seconds: float) -> None:
     """Store the strike of a stream's user if the player who has the ball repeats it."""
-    if stream.number in [one.number for one in list_own_streams(scene, get_current_rally().holder)]:
+    if stream.number in [one.number for one in follow.list_own_streams(scene, get_current_rally().holder)]:
         store_strike(hit, seconds)
 
 
@@ -229,7 +229,7 @@ def _answer_strike(scene, target: str, before_frame: bool = False) -> None:
 
 def _plan_ahead(scene, target: str) -> None:
     """Plan the likeliest answer that is not planned yet."""
-    stream = find_main_stream(scene, get_current_rally().holder)
+    stream = follow.find_main_stream(scene, get_current_rally().holder)
     others = [player.name for player in get_current_rally().scene.players
               if player.name not in (target, get_current_rally().holder)]
     side = stream.side if stream.part in ("foot", "hand", "tool") and stream.side != "either" else ""
@@ -247,6 +247,8 @@ def _apply_pass(scene, piece: LivePass, hit: HitMotion | None = None, seconds: f
     """Insert a pass that answers a hit of `seconds` on the monotonic clock; what takes long is left out before a frame:
     the update that follows does it.
     """
+    from .watchers import PlannedWatchers
+
     background.cancel_jobs("live")  # planning in a thread would slow down the writing
     _session.pop("job", None)
     begin, delay = _find_beginning(scene, seconds)
@@ -257,8 +259,8 @@ def _apply_pass(scene, piece: LivePass, hit: HitMotion | None = None, seconds: f
         if before_frame:
             return
         _session["keys"].write_all(scene, next_rally, piece.motions)
-    _session["watchers"] = watchers.PlannedWatchers(_session["means"].library, get_current_rally(), piece, begin)
-    _session["latest"][find_main_stream(scene, piece.giver).number] = hit
+    _session["watchers"] = PlannedWatchers(_session["means"].library, get_current_rally(), piece, begin)
+    _session["latest"][follow.find_main_stream(scene, piece.giver).number] = hit
     _wait_for_strike(scene, next_rally)
     _session["unwritten"] |= {*piece.motions}
     scene.beyond_mocap_stream.target = ""
@@ -321,7 +323,7 @@ def _use_rally(scene, rally: Rally) -> None:
     """Go on with a rally; nothing is planned for it yet."""
     from ...beyond_mocap.passes.answers_ahead import AnswersAhead
 
-    latest = _session["latest"].get(find_main_stream(scene, rally.holder).number)
+    latest = _session["latest"].get(follow.find_main_stream(scene, rally.holder).number)
     _session.update(rally=rally, ahead=AnswersAhead(_session["means"], rally, latest))
 
 
