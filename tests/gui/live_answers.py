@@ -140,10 +140,14 @@ def players_stand():
 def measure_answer(port, label):
     """Stream a clip with a strike to a port; say when its answer begins. In the scene that is the same however slowly
     the view is drawn."""
-    ahead = import_module("scene.stream.play")._session["ahead"]
+    session, hit = import_module("scene.stream.play")._session, find_streamed_hit()
     target = import_module("scene.stream.play").find_target(get_scene())
-    request = ahead.request_for(find_streamed_hit(), target, 0)
-    yield from wait_until(lambda: ahead.find(request) is not None, what="the answer is planned ahead")
+
+    def is_planned():
+        ahead = session["ahead"]  # another one as soon as the others watch
+        return session["watchers"] is None and ahead.find(ahead.request_for(hit, target, 0)) is not None
+
+    yield from wait_until(is_planned, what="the answer is planned ahead")
     yield from wait_until(players_stand)
     names = get_rally().holder, target
     before = [read_keys(name) for name in names]
