@@ -279,7 +279,9 @@ def _show_watchers(scene) -> None:
     rally, names = planned.add_to(get_current_rally(), at)
     if not names:
         return
-    if not _session["keys"].replace_pass(scene, rally, names, rally.find_frame(at)):
+    # a slow playback may have passed what is written at once
+    is_written = at < rally.ready_time and _session["keys"].replace_pass(scene, rally, names, rally.find_frame(at))
+    if not is_written:
         _session["keys"].write_all(scene, rally, names)
     _session["unwritten"] |= {*names}
     _use_rally(scene, rally)

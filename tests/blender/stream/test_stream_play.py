@@ -243,6 +243,23 @@ def test_who_has_no_part_watches(playing, room, core):
     assert play._session["ahead"].rally is rally
 
 
+def test_who_watches_late_is_written_whole(playing, room, core):
+    """Where a slow playback has gone past the pass before they are planned."""
+    play = room("stream.play")
+    plan_ahead(play, core, playing)
+    play.store_strike(kick(core), 0.0)
+    play.update_rally(playing)
+    end = time.monotonic() + 120.0
+    while not play._session["watchers"].poll() and time.monotonic() < end:
+        time.sleep(0.01)
+    playing.frame_set(int(5 + 24 * (play.get_current_rally().ready_time + 8.0)))
+    before, old = play.get_current_rally(), read_keys(room, playing, "Cho")[1]
+    play.update_rally(playing)
+    now = read_keys(room, playing, "Cho")[1]
+    assert play.get_current_rally() is not before and play._session["watchers"] is None
+    assert np.abs(now[: len(old)] - old).max() > 0.01 and np.abs(now[:240] - old[:240]).max() < 1e-5
+
+
 def test_a_rally_that_waits_makes_no_step(playing, room, core, monkeypatch):
     """A step for each pass, and none for standing on."""
     play, steps = room("stream.play"), []
