@@ -144,13 +144,15 @@ motion of the library, to the player chosen with keys 1 to 9 or a click"""
     def order(self, context):
         """Collect the order of the scene, the holder of the ball and the rally's time."""
         holder = self.holder or context.scene.beyond_mocap_passes.players[0].name
-        play.check_players(context.scene)
+        follow.check_players(context.scene)
         clock = play.compute_rally_seconds(context.scene), frames_per_second(context.scene)
-        return make.build_order(context.scene), holder, clock, play.find_main_stream(context.scene, holder).part
+        return make.build_order(context.scene), holder, clock, follow.find_main_stream(context.scene, holder).part
 
     @staticmethod
     def run_job(order, progress, cancelled, _hurry):
-        return play.start_rally(*order, progress, cancelled)
+        from ..scene.stream.new_rally import start_rally
+
+        return start_rally(*order, progress, cancelled)
 
     def apply(self, scene, result):
         """Apply the rally to characters and ball, and answer strikes from now on."""

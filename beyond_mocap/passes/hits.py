@@ -32,7 +32,7 @@ _SIDED = ("foot", "hand", "tool")
 _SMOOTHING = 0.1  # s: Hann window over positions; markers and suits shake at an impact
 _APART = 0.25  # s: least distance of two fast frames; the part's return after a hit is closer
 _SLOW = 0.4  # of the highest speed in a hit motion: the part is at most so fast at its ends
-_SLOWED = 0.85  # of the highest speed: a part that is slower again has struck
+_SLOWED = 0.9  # of the highest speed: a part that is slower again has struck
 _RECENT = 0.3  # s after a strike in which a hit motion under way is noticed
 _LEAST_RISE_AFTER = 0.03  # m: least rise after the strike for the high frame to lie after it
 # with an automatic threshold: least rise in m above the part's typical height, and least speed in m/s, of a hit

@@ -3,7 +3,7 @@
 The holder of the ball repeats the strike that the user has just done, and the ball goes to the player whom the user
 chose. Until the user acts, all players stand and the ball lies at the holder's feet. A pass is planned from where all
 players stand, only passer and receiver are rebuilt, and it is inserted into the running scene when it is ready. The
-receiver stops the ball and is the next to act.
+receiver stops the ball and is the next to act. The others watch it: `live_watchers`.
 
 An answer depends on the rally, the library's strike that is played, the receiver and the bounces, but not on when it
 begins: what is planned before the user strikes is, to the bit, what is planned after it.
@@ -11,7 +11,7 @@ begins: what is planned before the user strikes is, to the bit, what is planned 
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -30,7 +30,7 @@ from .pass_plan import PassPlan
 from .pass_scene import GROUND, Example, Pass, PassScene
 from .passes import build_ball, build_ball_path, build_bone_weights, plan_scene
 from .player_motion import BodySettings, build_player_motion, estimate_least_seconds
-from .player_path import Stance
+from .player_path import HitOrder, Stance
 from .strike_means import StrikeMeans
 
 STANDING_SECONDS = 60.0
@@ -126,7 +126,7 @@ class Rally:
         at = self.find_frame(at)
         players = dict(self.players)
         for name, motion in live_pass.motions.items():
-            players[name] = _continue_motion(self.players[name], motion, at)
+            players[name] = continue_motion(self.players[name], motion, at)
         ball = _continue_ball(self.ball, live_pass.ball, at, min(BLEND_SECONDS, live_pass.strike))
         return replace(self, holder=live_pass.receiver, players=players, ball=ball, ready_time=at + live_pass.seconds,
                        passes=self.passes + 1)
@@ -237,17 +237,34 @@ def build_answer(library: Library, rally: Rally, hit: HitMotion, target: str, bo
                       cancelled=cancelled)
     path = build_ball_path(plan)
     path = replace(path, positions=_roll_ball(path, ball_place, plan.strikes[0].order.time))
-    motions = {}
-    for name in (one.giver, one.receiver):
-        player_motion = build_player_motion(library, stances[name], plan.list_orders(name), ball=path,
-                                            ball_radius=build_ball(scene).radius, fps=scene.fps,
-                                            settings=_build_settings(scene), cancelled=cancelled)
-        motions[name] = _extend_standing(player_motion.take.motion, _SWAY, rally.rate)
+    motions = {name: build_standing_motion(library, rally, name, plan.list_orders(name), path, cancelled=cancelled)
+               for name in (one.giver, one.receiver)}
     strikes = plan.strikes
     clip = library.clips[strikes[0].order.clip].path
     seconds = strikes[-1].order.time + _READY_SECONDS
     return LivePass(giver=one.giver, receiver=target, motions=motions, ball=path, strike=strikes[0].order.time,
                     seconds=seconds, clip=clip, warnings=plan.warnings)
+
+
+def build_standing_motion(library: Library, rally: Rally, name: str, orders: Sequence[HitOrder], ball: BallPath,
+                          cancelled: Callable[[], bool] | None = None) -> Motion:
+    """Build the motion of a rally's player from standing to standing, at the rally's rate.
+
+    Args:
+        library: the library.
+        rally: the rally.
+        name: of the player.
+        orders: what they strike.
+        ball: its path, from 0 s on.
+        cancelled: whether to stop.
+    Returns:
+        The motion; at its end they stand for STANDING_SECONDS.
+    """
+    scene = rally.scene
+    player_motion = build_player_motion(library, rally.stances[name], orders, ball=ball,
+                                        ball_radius=build_ball(scene).radius, fps=scene.fps,
+                                        settings=_build_settings(scene), cancelled=cancelled)
+    return _extend_standing(player_motion.take.motion, _SWAY, rally.rate)
 
 
 def _build_settings(scene: PassScene) -> BodySettings:
@@ -300,7 +317,7 @@ def _extend_standing(motion: Motion, sway_seconds: float, rate: float) -> Motion
     return replace(motion, root_positions=motion.root_positions[frames], rotations=motion.rotations[frames])
 
 
-def _continue_motion(before: PlayerTimeline, motion: Motion, at: float) -> PlayerTimeline:
+def continue_motion(before: PlayerTimeline, motion: Motion, at: float) -> PlayerTimeline:
     """Continue a player's motion with `motion` from `at` s on, blended in over BLEND_SECONDS."""
     root, rotations = _blend_in(before, motion, at)
     past = np.clip(np.arange(round((at - before.start) * motion.fps)), 0, len(before.motion) - 1)

@@ -87,32 +87,67 @@ def replace_keys(target: bpy.types.Object, frames: np.ndarray, channels: dict[st
 class WrittenKeys:
     """The keys that an action has on every frame, kept so that those from some frame on can be replaced quickly.
 
-    No value is read then, and neither action nor slot change: after that Blender builds its dependency graph again.
+    Neither action nor slot change: after that Blender builds its dependency graph again. Values that the user has
+    edited since are found by comparison; they stay where they are not replaced.
 
     Args:
         target: the object that plays the action; all curves have keys on the same frames.
+    Attributes:
+        is_current: whether the action has no other keys than these; set it to False where it may.
     """
 
     def __init__(self, target: bpy.types.Object):
         action, slot = find_playing_action(target)
-        self._action = action.session_uid
-        self._places: dict[tuple[str, int], np.ndarray] = {}
-        for key, curve in collect_curves(action, slot).items():
-            self._places[key] = np.empty(2 * len(curve.keyframe_points), np.float32)
-            curve.keyframe_points.foreach_get("co", self._places[key])
+        self._action: int | None = action.session_uid
+        self._places = _read_places(collect_curves(action, slot))
         self._frames = next(iter(self._places.values()))[::2].copy()
+        self._edited = {key: np.zeros(len(self._frames), bool) for key in self._places}
+        self.is_current = True
 
     def can_replace(self, target: bpy.types.Object, first: float, channels: dict[str, tuple[str, np.ndarray]]) -> bool:
-        """Whether `replace` is possible: not after others have added or removed keys, nor without a key on each frame.
+        """Whether `replace` is possible: not after others have added, removed or moved keys, nor without a key on each
+        frame.
         """
-        action, slot = find_playing_action(target)
+        action, _ = find_playing_action(target)
         if action is None or action.session_uid != self._action:
             return False
         column, count = self._find_column(first), len(next(iter(channels.values()))[1])
         if column + count > len(self._frames) or abs(self._frames[column] - first) > 1e-3:
             return False
-        sizes = {key: 2 * len(curve.keyframe_points) for key, curve in collect_curves(action, slot).items()}
-        return sizes == {key: len(places) for key, places in self._places.items()}
+        return self.is_current or self.note_edits(target)
+
+    def note_edits(self, target: bpy.types.Object) -> bool:
+        """Note the values that the user has edited; False where keys have been added, removed or moved in time: from
+        then on they are not these.
+        """
+        action, slot = find_playing_action(target)
+        if action is None or action.session_uid != self._action:
+            return False
+        now, self.is_current = _read_places(collect_curves(action, slot)), True
+        if ({key: len(places) for key, places in now.items()} != {key: len(old) for key, old in self._places.items()}
+                or any((places != self._places[key])[::2].any() for key, places in now.items())):
+            self._action = None
+            return False
+        for key, places in now.items():
+            self._edited[key] |= (places != self._places[key])[1::2]
+        self._places = now
+        return True
+
+    def count_edits(self, first: float = float("-inf")) -> int:
+        """Count the frames from `first` on whose values the user has edited, as `note_edits` has found."""
+        return int(np.any([edited[self._find_column(first) :] for edited in self._edited.values()], axis=0).sum())
+
+    def copy_edits(self, target: bpy.types.Object, old: WrittenKeys) -> None:
+        """Give the frames that are also in `old` the values that the user has edited there."""
+        found, at = collect_curves(*find_playing_action(target)), np.searchsorted(self._frames, old._frames - 1e-3)
+        is_here = np.abs(self._frames[np.minimum(at, len(self._frames) - 1)] - old._frames) < 1e-3
+        for key in self._places.keys() & old._places.keys():
+            which = old._edited[key] & is_here
+            self._places[key][2 * at[which] + 1] = old._places[key][1::2][which]
+            self._edited[key][at[which]] = True
+            if which.any():
+                found[key].keyframe_points.foreach_set("co", self._places[key])
+                found[key].update()
 
     def replace(self, target: bpy.types.Object, first: float, channels: dict[str, tuple[str, np.ndarray]]) -> None:
         """Replace the keys from a frame on; after the last value they hold it. Handles are left as they are.
@@ -127,6 +162,7 @@ class WrittenKeys:
             self._set_values(path, column, values)
         for key, curve in found.items():
             curve.keyframe_points.foreach_set("co", self._places[key])
+            self._edited[key][column:] = False
         curve.update()  # one of them tells Blender
 
     def _find_column(self, frame: float) -> int:
@@ -139,6 +175,14 @@ class WrittenKeys:
         away = path.endswith("rotation_quaternion") and np.dot([row[0] for row in rows], values[0]) < 0.0
         for row, new in zip(rows, -values.T if away else values.T):
             row[: len(new)], row[len(new) :] = new, new[-1]
+
+
+def _read_places(curves: dict[tuple[str, int], bpy.types.FCurve]) -> dict[tuple[str, int], np.ndarray]:
+    """Read the frames and values of curves, (2 n,) for n keys each."""
+    places = {key: np.empty(2 * len(curve.keyframe_points), np.float32) for key, curve in curves.items()}
+    for key, curve in curves.items():
+        curve.keyframe_points.foreach_get("co", places[key])
+    return places
 
 
 def check_editable(target: bpy.types.ID) -> None:

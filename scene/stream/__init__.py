@@ -3,7 +3,8 @@
 - `settings`: where each stream is received, what is detected, and the status for the panel
 - `follow`: the streams that are received in this session
 - `streamed_body`: the armature that follows a user
-- `play`: a passing scene that answers the users' strikes, `rally_keys`: its keys, `shown_strike`: without a stream
+- `play`: a passing scene that answers the users' strikes, `new_rally`: its start, `watchers`: players without a
+  part, `rally_keys`: the keys, `shown_strike`: without a stream
 """
 
 REGISTERED = ("follow", "play", "settings")

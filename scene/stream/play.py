@@ -2,15 +2,14 @@
 player.
 
 `follow` detects the strikes of each stream's user. While the user has not struck, the likely answers are planned in a
-thread, from where all players stand; the one that answers the strike is inserted into the running scene. The characters
-and the ball are those of the passing scene.
+thread, from where all players stand; the one that answers the strike is inserted into the running scene, and then the
+players who have no part in it watch. The characters and the ball are those of the passing scene.
 """
 
 from __future__ import annotations
 
 import math
 import time
-from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import bpy
@@ -25,11 +24,10 @@ from ..passes.settings import PLAYED
 from . import follow, rally_keys
 
 if TYPE_CHECKING:
-    from ...beyond_mocap.library.library import Library
     from ...beyond_mocap.passes.answers_ahead import AnswerRequest
     from ...beyond_mocap.passes.hits import HitMotion
     from ...beyond_mocap.passes.live_passes import LivePass, Rally
-    from ...beyond_mocap.passes.strike_means import StrikeMeans
+    from .new_rally import NewRally
     from .settings import StreamSettings
 
 LEFT_SECONDS = 20.0
@@ -38,46 +36,12 @@ LEFT_SECONDS = 20.0
 _session: dict[str, object] = {}
 
 
-@dataclass(frozen=True, eq=False)
-class NewRally:
-    """A rally that is ready to start.
-
-    Attributes:
-        order: as `generate.build_order` builds it.
-        library: the library.
-        means: what the players can strike with.
-        rally: the rally.
-    """
-
-    order: make.Order
-    library: Library
-    means: StrikeMeans
-    rally: Rally
-
-
-def start_rally(order: make.Order, holder: str, clock: tuple[float, float], part: str, progress,
-                cancelled) -> NewRally:
-    """Build the library if it is not loaded, find its strikes with `part`, and start a rally with all players standing,
-    on a `clock` of seconds now and frames per second. Does not use bpy.
-    """
-    from ...beyond_mocap.library.build import build_library
-    from ...beyond_mocap.passes import live_passes
-
-    library = order.library
-    if library is None:
-        library = build_library(order.folder, unit=order.unit, **order.build, progress=progress, cancelled=cancelled)
-    rally = live_passes.start_rally(library, order.scene, holder, *clock, progress=progress, cancelled=cancelled)
-    means = live_passes.collect_means(library, order.scene)
-    means.list_likely(holder, part, "", None)
-    return NewRally(order, library, means, rally)
-
-
 def apply_rally(scene: bpy.types.Scene, new_rally: NewRally) -> None:
     """Apply a rally to characters and ball, and answer the user's strikes from now on."""
     stop_rally()
     make.session.store_library(new_rally.library, new_rally.order.unit)
     _session.update(scene=scene.session_uid, means=new_rally.means, seen=None, latest={}, unwritten=set(),
-                    keys=rally_keys.RallyKeys(), drawn=compute_rally_seconds(scene))
+                    keys=rally_keys.RallyKeys(), drawn=compute_rally_seconds(scene), watchers=None, steps=0)
     _wait_for_strike(scene, new_rally.rally)
     for name in ("strikes", "figures", "messages"):
         scene.beyond_mocap_passes.property_unset(name)
@@ -92,6 +56,8 @@ def apply_rally(scene: bpy.types.Scene, new_rally: NewRally) -> None:
 def stop_rally() -> None:
     """Stop answering; what was played stays."""
     background.cancel_jobs("live")
+    if _session.get("watchers"):
+        _session["watchers"].cancel()
     follow.remove_call(receive_strike)
     follow.remove_call(_update_or_end)
     follow.remove_call(_answer_or_end)
@@ -116,27 +82,6 @@ def compute_rally_seconds(scene: bpy.types.Scene) -> float:
     return frame / frames_per_second(scene)
 
 
-def check_players(scene: bpy.types.Scene) -> None:
-    """Raise an InputError if the player of a stream that is received is not in the passing scene."""
-    names = [row.name for row in scene.beyond_mocap_passes.players]
-    for stream in follow.list_received(scene):
-        if stream.player and stream.player not in names:
-            raise InputError(f"stream {stream.number}", f"no player {stream.player!r} in the passing scene",
-                             f"one of {', '.join(names)}", "press Stop Stream, and choose one under Player, or none")
-
-
-def list_own_streams(scene: bpy.types.Scene, name: str) -> list[StreamSettings]:
-    """List the streams whose strikes a player repeats: their own, otherwise those of no player, otherwise all."""
-    received = follow.list_received(scene)
-    own = [stream for stream in received if stream.player == name]
-    return own or [stream for stream in received if not stream.player] or received
-
-
-def find_main_stream(scene: bpy.types.Scene, name: str) -> StreamSettings:
-    """Find the stream that says what counts as a player's strike: their own, or the scene's first one."""
-    return next(iter(list_own_streams(scene, name)), scene.beyond_mocap_stream)
-
-
 def find_target(scene: bpy.types.Scene) -> str:
     """Find the receiver of the next pass: the chosen player, otherwise the next in the list who has a stream of their
     own, otherwise the next in the list.
@@ -155,7 +100,7 @@ def find_target(scene: bpy.types.Scene) -> str:
 
 def receive_strike(scene: bpy.types.Scene, stream: StreamSettings, hit: HitMotion, seconds: float) -> None:
     """Store the strike of a stream's user if the player who has the ball repeats it."""
-    if stream.number in [one.number for one in list_own_streams(scene, get_current_rally().holder)]:
+    if stream.number in [one.number for one in follow.list_own_streams(scene, get_current_rally().holder)]:
         store_strike(hit, seconds)
 
 
@@ -178,7 +123,7 @@ def answer_in_playback(scene: bpy.types.Scene) -> None:
     """Insert the answer to the user's strike, if it is planned, before a frame of the playback is evaluated."""
     if scene.session_uid != _session.get("scene") or scene.beyond_mocap_passes.made_of != PLAYED:
         return
-    if _session["pending"] is not None and is_playing():
+    if _session["pending"] is not None and _session["watchers"] is None and is_playing():
         _collect_answer()
         _answer_strike(scene, find_target(scene), before_frame=True)
     _session["drawn"] = compute_rally_seconds(scene)
@@ -194,13 +139,17 @@ def update_rally(scene: bpy.types.Scene) -> None:
     _session["drawn"] = compute_rally_seconds(scene)
     _update_target(scene)
     _collect_answer()
+    _show_watchers(scene)
     try:
         target = find_target(scene)
     except InputError as error:
         return _end_rally(str(error))
-    if _session["pending"] is not None:
+    if _session["watchers"] is not None:  # the next answers begin where they stand then
+        pass
+    elif _session["pending"] is not None:
         _answer_strike(scene, target)
     elif "job" not in _session:
+        _session["keys"].note_edits(scene)
         _plan_ahead(scene, target)
     if get_current_rally().end - _session["drawn"] < LEFT_SECONDS:
         _session["rally"] = get_current_rally().keep_standing()
@@ -217,6 +166,9 @@ def answer_now(scene: bpy.types.Scene, hit: HitMotion) -> LivePass:
                          fixes=(Fix("press", "beyond_mocap.stream_play"),))
     piece = _build_answer(*_collect_order(_build_request(scene, hit, find_target(scene))), None, None)
     _apply_pass(scene, piece)
+    while not _session["watchers"].poll():
+        time.sleep(0.005)
+    _show_watchers(scene)
     _write_rest(scene)
     return piece
 
@@ -277,7 +229,7 @@ def _answer_strike(scene, target: str, before_frame: bool = False) -> None:
 
 def _plan_ahead(scene, target: str) -> None:
     """Plan the likeliest answer that is not planned yet."""
-    stream = find_main_stream(scene, get_current_rally().holder)
+    stream = follow.find_main_stream(scene, get_current_rally().holder)
     others = [player.name for player in get_current_rally().scene.players
               if player.name not in (target, get_current_rally().holder)]
     side = stream.side if stream.part in ("foot", "hand", "tool") and stream.side != "either" else ""
@@ -295,19 +247,44 @@ def _apply_pass(scene, piece: LivePass, hit: HitMotion | None = None, seconds: f
     """Insert a pass that answers a hit of `seconds` on the monotonic clock; what takes long is left out before a frame:
     the update that follows does it.
     """
+    from .watchers import PlannedWatchers
+
     background.cancel_jobs("live")  # planning in a thread would slow down the writing
     _session.pop("job", None)
     begin, delay = _find_beginning(scene, seconds)
+    if bpy.app.background:  # where edits are not watched
+        _session["keys"].mark_edits()
     next_rally = get_current_rally().add_pass(piece, begin)
     if not _session["keys"].replace_pass(scene, next_rally, piece.motions, begin):
         if before_frame:
             return
         _session["keys"].write_all(scene, next_rally, piece.motions)
-    _session["latest"][find_main_stream(scene, piece.giver).number] = hit
+    _session["watchers"] = PlannedWatchers(_session["means"].library, get_current_rally(), piece, begin)
+    _session["latest"][follow.find_main_stream(scene, piece.giver).number] = hit
     _wait_for_strike(scene, next_rally)
     _session["unwritten"] |= {*piece.motions}
     scene.beyond_mocap_stream.target = ""
     _write_status(piece, (delay, time.monotonic() - seconds) if seconds else None)
+    _add_note()
+
+
+def _show_watchers(scene) -> None:
+    """Insert those who watch the pass as soon as they are planned; who is not by its end goes on as before."""
+    planned = _session["watchers"]
+    if planned is None or not (planned.poll() or _session["drawn"] >= get_current_rally().ready_time):
+        return
+    planned.cancel()
+    _session["watchers"] = None
+    at = max(planned.begin, _session["drawn"])
+    rally, names = planned.add_to(get_current_rally(), at)
+    if not names:
+        return
+    # a slow playback may have passed what is written at once
+    is_written = at < rally.ready_time and _session["keys"].replace_pass(scene, rally, names, rally.find_frame(at))
+    if not is_written:
+        _session["keys"].write_all(scene, rally, names)
+    _session["unwritten"] |= {*names}
+    _use_rally(scene, rally)
 
 
 def _find_beginning(scene, seconds: float) -> tuple[float, float]:
@@ -330,17 +307,26 @@ def _write_rest(scene) -> None:
     """Write the standing that follows the last passes; it is one step of undo with them."""
     _session["keys"].write_all(scene, get_current_rally(), sorted(_session["unwritten"]))
     _session["unwritten"] = set()
-    if not bpy.app.background:
+    _add_note()
+    # who only goes on to stand makes no step
+    if get_current_rally().passes > _session["steps"] and not bpy.app.background:
+        _session["steps"] = get_current_rally().passes
         bpy.ops.ed.undo_push(message="Live Pass")
 
 
 def _wait_for_strike(scene, rally: Rally) -> None:
-    """Let the rally wait for the next strike of its holder's user; nothing is planned for it yet."""
+    """Let the rally wait for the next strike of its holder's user."""
+    _use_rally(scene, rally)
+    _session["pending"] = None
+    _session.pop("job", None)
+
+
+def _use_rally(scene, rally: Rally) -> None:
+    """Go on with a rally; nothing is planned for it yet."""
     from ...beyond_mocap.passes.answers_ahead import AnswersAhead
 
-    latest = _session["latest"].get(find_main_stream(scene, rally.holder).number)
-    _session.update(rally=rally, ahead=AnswersAhead(_session["means"], rally, latest), pending=None)
-    _session.pop("job", None)
+    latest = _session["latest"].get(follow.find_main_stream(scene, rally.holder).number)
+    _session.update(rally=rally, ahead=AnswersAhead(_session["means"], rally, latest))
 
 
 def _update_target(scene) -> None:
@@ -379,10 +365,24 @@ def _write_status(piece: LivePass | None = None, delays: tuple[float, float] | N
     status_texts.played = "\n".join(lines)
 
 
+def _add_note() -> None:
+    """Add to the panel which edits of the user have been replaced."""
+    if note := _session["keys"].note:
+        bpy.context.window_manager.beyond_mocap_streaming.played += f"\n{note}"
+    _session["keys"].note = ""
+
+
+def _mark_edits(_scene, depsgraph) -> None:
+    """Note that the user may have edited keys of the rally."""
+    if _session and any(isinstance(update.id, bpy.types.Action) for update in depsgraph.updates):
+        _session["keys"].mark_edits()
+
+
 def _after_undo() -> None:
     """End the rally after an undo, which changes the scene that the rally knows."""
     if get_current_rally() is not None:
         _end_rally("Undo has ended Play Live: press it to start again")
 
 
-WATCHER = Watcher(name="Play Live", restored=_after_undo, saving=write_rest, closing=stop_rally, ends=stop_rally)
+WATCHER = Watcher(name="Play Live", changed=_mark_edits, restored=_after_undo, saving=write_rest, closing=stop_rally,
+                  ends=stop_rally)

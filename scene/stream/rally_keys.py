@@ -31,24 +31,54 @@ AT_ONCE = 3.0
 
 
 class RallyKeys:
-    """The keys of a rally, as they stand in the actions."""
+    """The keys of a rally, as they stand in the actions.
+
+    Attributes:
+        note: which of the user's edits the last writing has replaced, a line; "" for none.
+    """
 
     def __init__(self) -> None:
         self._players: dict[str, channels.WrittenKeys] = {}
         self._ball: channels.WrittenKeys | None = None
+        self.note = ""
+
+    def mark_edits(self) -> None:
+        """Let the keys be compared before they are replaced: they may have been edited."""
+        for keys in (*self._players.values(), *([self._ball] if self._ball else ())):
+            keys.is_current = False
+
+    def note_edits(self, scene: bpy.types.Scene) -> None:
+        """Compare the keys of one player if they are marked, while nothing else is to do: it takes some milliseconds.
+        """
+        rows = scene.beyond_mocap_passes.players
+        for name, keys in self._players.items():
+            if not keys.is_current and name in rows and rows[name].body is not None:
+                keys.note_edits(rows[name].body)
+                return
 
     def write_all(self, scene: bpy.types.Scene, rally: Rally, names: Iterable[str]) -> None:
-        """Write the whole motions of the named players and the ball's path as new actions."""
+        """Write the whole motions of the named players and the ball's path as new actions. Values of players that the
+        user has edited are kept, unless keys were added, removed or moved.
+        """
         from ...beyond_mocap.passes.passes import build_ball
 
         rows, start = _find_rows(scene, names), float(scene.beyond_mocap_passes.start_frame)
         for name, row in rows.items():
-            played = rally.players[name]
+            played, old = rally.players[name], self._players.get(name)
+            keeps = old is not None and row.body is not None and old.note_edits(row.body)
             make.apply_motion(scene, row, SimpleNamespace(motion=played.motion, start_time=played.start), start)
             self._players[name] = channels.WrittenKeys(row.body)
+            if keeps:
+                self._players[name].copy_edits(row.body, old)
+            elif old is not None:
+                self.note = f"{name}'s keys were added, removed or moved: they have been written again"
+        ball, old = scene.beyond_mocap_passes.rally, self._ball
+        keeps = old is not None and ball is not None and old.note_edits(ball)
         make.apply_ball(scene, SimpleNamespace(ball=rally.ball, kind=build_ball(rally.scene)), start)
         ball = scene.beyond_mocap_passes.rally
         self._ball = None if ball.beyond_mocap_ball.before.kept else channels.WrittenKeys(ball)
+        if keeps and self._ball is not None:
+            self._ball.copy_edits(ball, old)
         frame_range.extend_range(scene, start + float(rally.ball.times[-1]) * frames_per_second(scene))
 
     def replace_pass(self, scene: bpy.types.Scene, rally: Rally, names: Iterable[str], begin: float) -> bool:
@@ -68,10 +98,14 @@ class RallyKeys:
                    for name, row in rows.items()]
         changes.append((self._ball, ball, first, balls.build_keys(ball, _cut_path(rally.ball, begin, until), scene,
                                                                   first)[1]))
-        is_possible = all(keys.can_replace(*change) for keys, *change in changes)
-        for keys, *change in changes if is_possible else ():  # of all or of none
+        if not all(keys.can_replace(*change) for keys, *change in changes):  # of all or of none
+            return False
+        edited = [name for name in rows if self._players[name].count_edits(first)]
+        if edited:
+            self.note = f"The pass has replaced keys that were edited after its beginning: {', '.join(edited)}"
+        for keys, *change in changes:
             keys.replace(*change)
-        return is_possible
+        return True
 
 
 def _find_rows(scene, names: Iterable[str]) -> dict:

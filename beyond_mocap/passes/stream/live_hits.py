@@ -24,7 +24,7 @@ WINDOW = 4.0
 _RATE = 60.0  # Hz: most frames per second that are analysed
 _LEAST_SECONDS = 0.5  # s of frames without which nothing is analysed
 _SETTLE_SECONDS = 0.05  # s by which a hit motion has to be over
-_PAUSE_SECONDS = 0.04  # s between two looks of the thread
+_PAUSES = 0.015, 0.04  # s between two looks of the thread, at least and at most; between them as long as a look takes
 _LOOK_SECONDS = 0.1  # s between two moments that are analysed at most: a strike shows for some 0.2 s while under way
 
 
@@ -67,6 +67,7 @@ class LiveHits:
         """Look for new hits until the listener stops; an error is found once."""
         reported = ""
         while self.listener.is_running:
+            start = time.monotonic()
             try:
                 if (found := self.find_new_hit()) is not None:
                     self._found.put(found)
@@ -74,7 +75,7 @@ class LiveHits:
                 if str(error) != reported:
                     self._found.put(error)
                 reported = str(error)
-            time.sleep(_PAUSE_SECONDS)
+            time.sleep(min(max(time.monotonic() - start, _PAUSES[0]), _PAUSES[1]))
 
     def find_new_hit(self) -> tuple[HitMotion, float] | None:
         """Find the strongest hit motion whose strike has been since the last one that was found.

@@ -171,7 +171,7 @@ def test_a_slow_playback_shows_the_answer_on_time(playing, room, core, monkeypat
         play.answer_in_playback(playing)
         changed = np.abs(read_keys(room, playing, "Ann")[1] - stand[2]).max(axis=(1, 2)) > 1e-5
         assert 5 + np.argmax(changed) == begins + 1, "where it blends in, the first frame is the old one"
-        play._session.update(rally=stand[0], ahead=stand[1])
+        play._session.update(rally=stand[0], ahead=stand[1], watchers=None)
         play._session["keys"].write_all(playing, stand[0], stand[0].players)
 
 
@@ -192,6 +192,86 @@ def test_keys_that_the_user_has_changed_are_written_again(playing, room, core, m
     assert play.get_current_rally().passes == 1
     assert {len(curve.keyframe_points) for curve in room("core.channels").collect_curves(
         *room("core.channels").find_playing_action(body)).values()} == {len(read_keys(room, playing, name)[1])}
+
+
+def set_key(room, body, frame, value):
+    """Edit a value of a body's first curve, as in the Graph Editor; returns how to read it."""
+    curves = room("core.channels").collect_curves(*room("core.channels").find_playing_action(body))
+    key, points = next((key, curve.keyframe_points) for key, curve in curves.items())
+    next(point for point in points if point.co.x == frame).co.y = value
+
+    def read():
+        action = room("core.channels").find_playing_action(body)
+        return room("core.channels").collect_curves(*action)[key].evaluate(frame)
+
+    return read
+
+
+def test_values_that_the_user_has_edited_stay(playing, room, core):
+    """Before the pass, when it is written and when all is written again; what the pass replaces is told."""
+    play, body = room("stream.play"), playing.beyond_mocap_passes.players["Ann"].body
+    plan_ahead(play, core, playing)
+    playing.frame_set(53)
+    early, late = set_key(room, body, 20, 7.0), set_key(room, body, 60, 8.0)
+    play.store_strike(kick(core), 0.0)
+    play.update_rally(playing)
+    assert early() == 7.0 and late() != 8.0
+    assert "replaced keys that were edited after its beginning: Ann" in told().played
+    play.write_rest()
+    assert early() == 7.0 and told().played.count("edited") == 1
+    action = room("core.channels").find_playing_action(body)
+    points = room("core.channels").collect_curves(*action).popitem()[1].keyframe_points
+    points.remove(points[3])
+    play._session["unwritten"] = {"Ann"}
+    play.write_rest()
+    assert "Ann's keys were added, removed or moved" in told().played
+
+
+def test_who_has_no_part_watches(playing, room, core):
+    """They turn to the ball and stand so, and the next answers are planned from there."""
+    play, facing = room("stream.play"), core("motion.humanoid").compute_heading
+    playing.frame_set(5 + 48)
+    play.answer_now(playing, kick(core))
+    rally = play.get_current_rally()
+    cho = rally.players["Cho"]
+    x, y = (rally.ball.positions[-1] - cho.motion.root_positions[-1])[:2]
+    turned = [np.degrees(np.angle(np.exp(1j * (np.arctan2(y, x) - facing(cho.motion.frames(*span))[0]))))
+              for span in ((40, 41), (len(cho.motion) - 1, len(cho.motion)))]
+    assert abs(turned[0]) > 35.0 and abs(turned[1]) < 12.0, turned
+    motion = room("core.action").read_motion(playing.beyond_mocap_passes.players["Cho"].body, playing)
+    assert abs(facing(motion.frames(40, 41))[0] - facing(motion.frames(400, 401))[0]) > 0.5
+    assert play._session["ahead"].rally is rally
+
+
+def test_who_watches_late_is_written_whole(playing, room, core):
+    """Where a slow playback has gone past the pass before they are planned."""
+    play = room("stream.play")
+    plan_ahead(play, core, playing)
+    play.store_strike(kick(core), 0.0)
+    play.update_rally(playing)
+    end = time.monotonic() + 120.0
+    while not play._session["watchers"].poll() and time.monotonic() < end:
+        time.sleep(0.01)
+    playing.frame_set(int(5 + 24 * (play.get_current_rally().ready_time + 8.0)))
+    before, old = play.get_current_rally(), read_keys(room, playing, "Cho")[1]
+    play.update_rally(playing)
+    now = read_keys(room, playing, "Cho")[1]
+    assert play.get_current_rally() is not before and play._session["watchers"] is None
+    assert np.abs(now[: len(old)] - old).max() > 0.01 and np.abs(now[:240] - old[:240]).max() < 1e-5
+
+
+def test_a_rally_that_waits_makes_no_step(playing, room, core, monkeypatch):
+    """A step for each pass, and none for standing on."""
+    play, steps = room("stream.play"), []
+    window = SimpleNamespace(background=False, is_job_running=lambda _kind: False)
+    ops = SimpleNamespace(ed=SimpleNamespace(undo_push=lambda message: steps.append(message)))
+    monkeypatch.setattr(play, "bpy", SimpleNamespace(app=window, ops=ops, data=bpy.data, context=bpy.context))
+    playing.frame_set(5 + 60 * 24)
+    play.update_rally(playing)
+    assert not play._session["unwritten"] and not steps, "they stand on for a minute more"
+    play.answer_now(playing, kick(core))
+    play.write_rest()
+    assert steps == ["Live Pass"]
 
 
 def test_whom_the_user_chooses_gets_it(playing, room, core):
@@ -254,14 +334,19 @@ def test_it_is_one_step(playing, room):
     assert room("stream.play").get_current_rally() is None and "Undo has ended" in told().played
 
 
-def test_an_armature_can_show_how(playing, room):
-    """Its strike nearest to the present frame, without any stream; not one that has none."""
+def test_an_armature_can_show_how(playing, room, monkeypatch):
+    """Its strike nearest to the present frame, without any stream, by the script of the how-to; not one that has none.
+    """
     with pytest.raises(RuntimeError, match="no strike with the foot"):
         bpy.context.view_layer.objects.active = playing.beyond_mocap_passes.players[1].body
         press_operator(OPS.stream_act)
-    bpy.ops.beyond_mocap.import_clips(filepath=str(CLIPS / "volley_toss.bvh"))
-    assert press_operator(OPS.stream_act) == {"FINISHED"}
-    assert room("stream.play").get_current_rally().passes == 1 and "Ann played volley_toss" in told().played
+    page = (SAMPLE.parent / "docs" / "how-to" / "stream-live-motion.md").read_text("utf-8")
+    script = page.split("### From a script")[1].split("```python")[1].split("```")[0]
+    printed = []
+    monkeypatch.chdir(SAMPLE.parent)
+    exec(script, {"print": printed.append})
+    assert "passes so far: 1" in printed[0] and "Ann played volley_toss" in printed[0]
+    assert room("stream.play").get_current_rally() is None
 
 
 def test_a_scene_that_is_cleared_ends_it(playing, room):

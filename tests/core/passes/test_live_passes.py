@@ -14,6 +14,7 @@ from beyond_mocap.motion.quaternion import wrap_angle
 from beyond_mocap.passes.answers_ahead import MOST_ANSWERS, AnswersAhead
 from beyond_mocap.passes.hits import detect_hit_under_way, detect_hits
 from beyond_mocap.passes.live_passes import BLEND_SECONDS, build_answer, collect_means, start_rally
+from beyond_mocap.passes.live_watchers import add_watchers, build_watchers
 from beyond_mocap.passes.scene_json import SAMPLES, parse_scene
 
 CLIPS = Path(__file__).resolve().parents[3] / "sample_blend" / "passes" / "library"
@@ -90,6 +91,24 @@ def test_what_was_done_goes_over_into_the_pass(rally, passed):
     piece = first.motions["Ann"]
     np.testing.assert_allclose(new.root_positions[60 + later : 60 + len(piece)], piece.root_positions[later:])
     assert after.players["Ben"] is rally.players["Ben"]
+
+
+def test_who_has_no_part_watches_the_ball(library, rally):
+    """They turn to where it goes without a jump, later where they are planned late; who receives next faces it then."""
+    first = build_answer(library, rally, hit_of("volley_pass"), "Ben")
+    motions, after = build_watchers(library, rally, first), rally.add_pass(first, 2.0)
+    assert motions.keys() == {"Cho"}
+    turns = []
+    for at in (2.5, 5.0):
+        played = add_watchers(after, motions, first, 2.0, at).players["Cho"]
+        begin, old = round(at * rally.rate), after.players["Cho"].motion
+        np.testing.assert_allclose(played.motion.rotations[:begin], old.rotations[:begin], atol=1e-9)
+        heading = np.unwrap(compute_heading(played.motion))
+        x, y = after.ball.positions[-1, :2] - played.motion.root_positions[-1, :2]
+        assert abs(wrap_angle(heading[-1] - np.arctan2(y, x))) < np.radians(12.0) < abs(heading[-1] - heading[0])
+        assert np.abs(np.diff(heading)).max() * rally.rate < np.radians(180.0)
+        turns.append(np.flatnonzero(np.abs(heading - heading[0]) > np.radians(20.0))[0] / rally.rate)
+    assert turns[0] < turns[1] > 5.0
 
 
 def test_who_waits_goes_on_standing(passed):
