@@ -243,7 +243,8 @@ class Library:
         """
         added = replace(self, clips=tuple(clips), frames=build_frames(clips, self.frames))
         joined = self._join(added)
-        known = {name: getattr(self, name) for name in ("normal_postures", "cut_receptions", "gaits", "neutral_stance")}
+        known = {name: getattr(self, name)
+                 for name in ("normal_postures", "cut_receptions", "gaits", "gait_thresholds", "neutral_stance")}
         known |= {name: np.concatenate([getattr(self, name), getattr(added, name)])
                   for name in ("strangeness", "stance_seconds", "feet_in_contact")}
         vars(joined).update(known, base_library=self)  # where cached properties keep their values
@@ -300,11 +301,12 @@ class Library:
 
 def _build_synthetic_library(library: Library) -> Library:
     """Build the clips that the recordings lack (`library.synthetic_clips`), described like them."""
-    from .synthetic_clips import iter_synthetic_clips
+    from .synthetic_clips import complete_gaits, iter_synthetic_clips
 
     speeds = {gait.label: gait.speed for gait in library.gaits if gait.label != STANDING}
+    gaits = complete_gaits(speeds, library.gait_thresholds[len(library.gaits) - len(speeds):])
     clips = []
-    for synthetic in iter_synthetic_clips(library.clips, library.frames, library.fps, speeds, keys=library.keys,
+    for synthetic in iter_synthetic_clips(library.clips, library.frames, library.fps, gaits, keys=library.keys,
                                           strangeness=library.strangeness, coverage=library.coverage):
         clip = Clip(path=synthetic.name, mirrored=False, motion=synthetic.motion, annotations=synthetic.rows,
                     heel_toe_contacts=synthetic.heel_toe_contacts)

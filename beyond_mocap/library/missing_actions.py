@@ -19,7 +19,6 @@ import numpy as np
 
 from ..annotation import ClipAnnotation, sort_labels
 from ..annotation.ball_contact import build_surfaces, takes_with_foot
-from ..annotation.gaits import compute_gait_thresholds
 from ..annotation.labels import find_label, list_gaits
 from ..annotation.vocabulary import SIDES
 from ..base.errors import InputError
@@ -365,7 +364,7 @@ def _build_gait_rows(library: Library, motion, before: int, after: int) -> list[
     gaits = library.gaits
     path = smooth_zero_phase_hann(forward_kinematics(motion)[0][:, 0, :2], motion.fps, SMOOTH_SECONDS)
     speed = np.linalg.norm(np.gradient(path, axis=0), axis=1) * motion.fps
-    band = np.searchsorted(compute_gait_thresholds(np.array([gait.speed for gait in gaits])), speed, side="right")
+    band = np.searchsorted(library.gait_thresholds, speed, side="right")
     parts = ((0, before), (after, len(motion)))
     return [ClipAnnotation(low + a, low + b - 1, None, gaits[band[low + a]].labels)
             for low, high in parts if high - low > 1 for a, b in find_equal_runs(band[low:high])]

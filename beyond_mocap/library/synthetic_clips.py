@@ -25,6 +25,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 
@@ -68,7 +69,7 @@ _PAIRS = 3  # pairs of recordings blended into each gap, at most
 _MAX_SPEED_SPREAD = 0.15  # standard deviation of a steady stretch's speed, share of its mean
 _GAITS = LOCOMOTION[1:]
 # m/s of gaits without a recording, faster and slower than the recorded ones
-_DEFAULT_SPEEDS = {"running": 4.6, "sprinting": 7.3}
+_FASTER_SPEEDS = {"running": 4.6, "sprinting": 7.3}
 _SLOWER_SPEEDS = {"walking": 1.2, "jogging": 2.7}
 _WALK_STEP, _WALK_SECONDS = 1.25, 5.0  # ratio of neighbouring speeds of walks, and their length
 # radians by which a runner's elbow and lean differ from the default, at most
@@ -94,9 +95,40 @@ class SyntheticClip:
     heel_toe_contacts: np.ndarray
 
 
+class GaitBands(NamedTuple):
+    """Which gait a speed has.
+
+    Attributes:
+        words: of G gaits, from slow to fast.
+        thresholds: (G-1,) m/s from each to the next faster one.
+    """
+
+    words: tuple[str, ...]
+    thresholds: np.ndarray
+
+
+def complete_gaits(speeds: dict[str, float], thresholds: np.ndarray) -> GaitBands:
+    """Complete the recorded gaits by slower and faster ones.
+
+    Between recorded gaits stand the recordings' own thresholds: clips that walk where recordings walk must not be
+    called jogs, or they would draw the speed from which tracks are annotated as jogs down to theirs.
+
+    Args:
+        speeds: m/s of the G recorded gaits, from slow to fast.
+        thresholds: (G-1,) m/s between them, see `annotation.estimate_gait_thresholds`.
+    """
+    slowest, fastest = min(speeds.values()), max(speeds.values())
+    slower = {word: speed for word, speed in _SLOWER_SPEEDS.items() if word not in speeds and speed < slowest}
+    faster = {word: speed for word, speed in _FASTER_SPEEDS.items() if word not in speeds and speed > fastest}
+    known = {**slower, **speeds, **faster}
+    completed = compute_gait_thresholds(np.array(list(known.values())))
+    completed[len(slower) : len(slower) + len(thresholds)] = thresholds
+    return GaitBands(tuple(known), completed)
+
+
 def iter_synthetic_clips(
-    clips: Sequence, frames: Frames, fps: float, gait_speeds: dict[str, float], keys: Sequence,
-    strangeness: np.ndarray, coverage: Coverage,
+    clips: Sequence, frames: Frames, fps: float, gaits: GaitBands, keys: Sequence, strangeness: np.ndarray,
+    coverage: Coverage,
 ) -> Iterator[SyntheticClip]:
     """Iterate over all synthetic clips of a library.
 
@@ -104,24 +136,22 @@ def iter_synthetic_clips(
         clips: its recordings.
         frames: their description.
         fps: of the frames.
-        gait_speeds: m/s of the recorded gaits.
+        gaits: which gait a speed has, see `complete_gaits`.
         keys: the recordings' key moments.
         strangeness: (N,) how far each frame lies from normal locomotion (`posture`).
         coverage: what the recordings lack.
     Yields:
         Clips whose names begin with SYNTHETIC_FOLDER: they are stored beside the cache.
     """
-    speeds = {**{word: v for word, v in _SLOWER_SPEEDS.items() if v < min(gait_speeds.values())},
-              **{word: v for word, v in _DEFAULT_SPEEDS.items() if v > max(gait_speeds.values())}, **gait_speeds}
     example = sample_upright_example(clips)
     style = estimate_runner_style(clips, frames, example)
     for low, high in coverage.speed_gaps:
-        blends = list(_iter_blends(clips, frames, fps, low=low, high=high, speeds=speeds))
-        yield from blends or _iter_walks(low, min(high, _MIN_RUN_SPEED), example, speeds)
-        yield from _iter_runs(max(0.93 * low, _MIN_RUN_SPEED), min(1.05 * high, MAX_SPEED), example, style, speeds)
+        blends = list(_iter_blends(clips, frames, fps, low=low, high=high, gaits=gaits))
+        yield from blends or _iter_walks(low, min(high, _MIN_RUN_SPEED), example, gaits)
+        yield from _iter_runs(max(0.93 * low, _MIN_RUN_SPEED), min(1.05 * high, MAX_SPEED), example, style, gaits)
     fastest = measure_kick_speed(frames, clips, keys)
     for kick in iter_running_kicks(clips, keys, KICK_STEP * fastest, example, style):
-        yield _build_kick_clip(kick, speeds)
+        yield _build_kick_clip(kick, gaits)
     stands = [(STAND_PREFIX, motion)
               for _, motion in iter_standing_loops(clips, frames, fps, strangeness, SYNTHETIC_FPS)]
     if not coverage.has_stand:
@@ -132,12 +162,12 @@ def iter_synthetic_clips(
         yield SyntheticClip(f"{SYNTHETIC_FOLDER}{prefix}{number + 1}.bvh", motion, (row,), contacts)
     is_run = select_locomotion(frames, clips) & (strangeness <= 1.0)
     for speed, motion, contacts in iter_run_loops(clips, frames, fps, is_run, SYNTHETIC_FPS):
-        rows = _build_gait_rows(np.full(len(motion), speed), speeds)
+        rows = _build_gait_rows(np.full(len(motion), speed), gaits)
         yield _ground_clip(f"{SYNTHETIC_FOLDER}{LOOP_PREFIX}{speed:.2f}.bvh", motion, contacts, rows, plants_feet=True)
     for name, motion, heel_toe_contacts, speed in iter_missing_steps(
         clips, frames, fps, strangeness, coverage=coverage, example=example, rate=SYNTHETIC_FPS
     ):
-        rows = _build_step_rows(name, len(motion), speed, speeds)
+        rows = _build_step_rows(name, len(motion), speed, gaits)
         yield _ground_clip(f"{SYNTHETIC_FOLDER}{name}.bvh", motion, heel_toe_contacts, rows)
 
 
@@ -202,7 +232,7 @@ def _measure_angles(a: np.ndarray, b: np.ndarray) -> np.ndarray:
 
 
 def _iter_blends(clips, frames: Frames, fps: float, low: float, high: float,
-                 speeds: dict[str, float]) -> Iterator[SyntheticClip]:
+                 gaits: GaitBands) -> Iterator[SyntheticClip]:
     """Iterate over blends of the nearest steady recordings below and above a gap; none where one side is missing."""
     slow, fast = _find_neighbours(clips, frames, fps, low, high)
     if not slow or not fast:
@@ -212,7 +242,7 @@ def _iter_blends(clips, frames: Frames, fps: float, low: float, high: float,
     for number, speed in enumerate(low * (top / low) ** ((np.arange(count) + 0.5) / count)):
         pair = slow[number % len(slow)], fast[number % len(fast)]
         motion, contacts = blend_strides(*pair, float(speed), SYNTHETIC_FPS)
-        rows = _build_gait_rows(np.full(len(motion), speed), speeds)
+        rows = _build_gait_rows(np.full(len(motion), speed), gaits)
         yield _ground_clip(f"{SYNTHETIC_FOLDER}{BLEND_PREFIX}{speed:.2f}.bvh", motion, contacts, rows, plants_feet=True)
 
 
@@ -260,16 +290,16 @@ def _find_stretches(clips, found) -> list[Strides]:
     return out[:_PAIRS]
 
 
-def _iter_walks(low: float, high: float, example: Motion, speeds: dict[str, float]) -> Iterator[SyntheticClip]:
+def _iter_walks(low: float, high: float, example: Motion, gaits: GaitBands) -> Iterator[SyntheticClip]:
     """Iterate over walks from `low` to `high` m/s, where recordings on one side are missing for blends."""
     for speed in low * _WALK_STEP ** np.arange(max(0.0, np.ceil(np.log(high / low) / np.log(_WALK_STEP)))):
         motion = build_gait(float(speed), _WALK_SECONDS, SYNTHETIC_FPS, example.skeleton, example=example)
-        rows = _build_gait_rows(np.full(len(motion), speed), speeds)
+        rows = _build_gait_rows(np.full(len(motion), speed), gaits)
         yield _ground_clip(f"{SYNTHETIC_FOLDER}{WALK_PREFIX}{speed:.2f}.bvh", motion, None, rows)
 
 
 def _iter_runs(low: float, high: float, example: Motion, style: GaitStyle,
-               speeds: dict[str, float]) -> Iterator[SyntheticClip]:
+               gaits: GaitBands) -> Iterator[SyntheticClip]:
     """Iterate over runs at even speeds, and from `low` to `high` m/s and back: slow changes, as quick as players
     change, and weaving.
     """
@@ -278,7 +308,7 @@ def _iter_runs(low: float, high: float, example: Motion, style: GaitStyle,
     for speed in np.exp(np.arange(np.log(low), np.log(high), np.log(_EVEN_STEP))):
         even = np.full(int(LOOP_SECONDS * SYNTHETIC_FPS), speed)
         motion = build_gait(even, None, SYNTHETIC_FPS, example.skeleton, style=style, example=example)
-        yield _ground_clip(f"{SYNTHETIC_FOLDER}even_{speed:.2f}.bvh", motion, None, _build_gait_rows(even, speeds))
+        yield _ground_clip(f"{SYNTHETIC_FOLDER}even_{speed:.2f}.bvh", motion, None, _build_gait_rows(even, gaits))
     for name, pace, weaves in (("slow", 0.8, False), ("quick", 2.5, False), ("weave", 1.0, True)):
         ramp = np.linspace(low, high, max(int((high - low) / pace * SYNTHETIC_FPS), int(1.5 * SYNTHETIC_FPS)))
         speed = np.concatenate([ramp, ramp[::-1]])
@@ -286,30 +316,29 @@ def _iter_runs(low: float, high: float, example: Motion, style: GaitStyle,
         sway = np.sin(2.0 * np.pi * np.arange(len(speed)) / (3.0 * SYNTHETIC_FPS))
         turn = sway * np.minimum(1.2, 4.0 / speed) * weaves
         motion = build_gait(speed, None, SYNTHETIC_FPS, example.skeleton, turn_rate=turn, style=style, example=example)
-        yield _ground_clip(f"{SYNTHETIC_FOLDER}{name}_{low:.1f}.bvh", motion, None, _build_gait_rows(speed, speeds))
+        yield _ground_clip(f"{SYNTHETIC_FOLDER}{name}_{low:.1f}.bvh", motion, None, _build_gait_rows(speed, gaits))
 
 
-def _build_kick_clip(kick: RunningKick, speeds: dict[str, float]) -> SyntheticClip:
+def _build_kick_clip(kick: RunningKick, gaits: GaitBands) -> SyntheticClip:
     """Build the clip of a kick on the run."""
     gesture = kick.gesture
     first, last, key = (SYNTHETIC_FPS * time for time in (gesture.start, gesture.end, gesture.key))
     row = ClipAnnotation(np.ceil(first), np.floor(last), key, kick.words)
-    gait_row = _build_gait_rows(np.full(len(gesture.motion), kick.speed), speeds)
+    gait_row = _build_gait_rows(np.full(len(gesture.motion), kick.speed), gaits)
     return _ground_clip(f"{SYNTHETIC_FOLDER}{KICK_PREFIX}{kick.name}.bvh", gesture.motion, None, (row, *gait_row))
 
 
-def _build_gait_rows(speed: np.ndarray, speeds: dict[str, float]) -> tuple[ClipAnnotation, ...]:
-    """Build rows with the gait of every frame by its speed (T,), with the thresholds by which tracks are annotated."""
-    words = sorted((word for word in speeds if word in _GAITS), key=speeds.get)
-    band = np.searchsorted(compute_gait_thresholds(np.array([speeds[word] for word in words])), speed, side="right")
-    return tuple(ClipAnnotation(a, b - 1, None, (words[band[a]], "front")) for a, b in find_equal_runs(band))
+def _build_gait_rows(speed: np.ndarray, gaits: GaitBands) -> tuple[ClipAnnotation, ...]:
+    """Build rows with the gait of every frame by its speed (T,)."""
+    band = np.searchsorted(gaits.thresholds, speed, side="right")
+    return tuple(ClipAnnotation(a, b - 1, None, (gaits.words[band[a]], "front")) for a, b in find_equal_runs(band))
 
 
-def _build_step_rows(name: str, count: int, speed: float, speeds: dict[str, float]) -> tuple[ClipAnnotation, ...]:
+def _build_step_rows(name: str, count: int, speed: float, gaits: GaitBands) -> tuple[ClipAnnotation, ...]:
     """Build the row of a step that recordings lack (`missing_steps`): the gait of its speed, and its direction."""
     words = (STANDING, TURNING) if name.startswith(TURN_PREFIX) else (STANDING,)
     if not name.startswith((TURN_PREFIX, STEP_PREFIX)):
-        gait = _build_gait_rows(np.full(1, speed), speeds)[0].words[0]
+        gait = _build_gait_rows(np.full(1, speed), gaits)[0].words[0]
         words = (gait, "back" if name.startswith(BACK_PREFIX) else "left")
     return (ClipAnnotation(0, count - 1, None, words),)
 

@@ -15,6 +15,7 @@ from beyond_mocap.library.clip import BLEND_PREFIX, KICK_PREFIX, SYNTHETIC_FOLDE
 from beyond_mocap.library.coverage import MAX_SPEED, find_speed_gaps
 from beyond_mocap.library.keys import Key, select_substitutes
 from beyond_mocap.library.missing_actions import describe_action
+from beyond_mocap.library.synthetic_clips import complete_gaits
 from beyond_mocap.motion.humanoid import identify_joints
 from beyond_mocap.motion.motion import forward_kinematics
 from beyond_mocap.motion.track import Track
@@ -70,6 +71,18 @@ def test_made_clips_stand_on_the_ground_and_do_not_slide(more):
         slide = np.linalg.norm(np.diff(toes[..., :2], axis=0), axis=-1)[stands] * clip.motion.fps
         assert slide.mean() < 0.08, clip.path
         assert abs(np.percentile(toes[..., 2], 2)) < 0.003 and toes[..., 2].min() > -0.02, clip.path
+
+
+def test_gaits_change_where_the_recordings_change_them(library, more):
+    assert [gait.label for gait in library.gaits] == [gait.label for gait in more.gaits[: len(library.gaits)]]
+    changes = more.gait_thresholds[: len(library.gait_thresholds)]
+    assert changes == pytest.approx(library.gait_thresholds, abs=0.25)
+
+
+def test_gaits_without_a_recording_are_completed_on_both_sides():
+    words, changes = complete_gaits({"jogging": 2.6, "running": 4.4}, np.array([3.7]))
+    assert words == ("walking", "jogging", "running", "sprinting")
+    assert 1.2 < changes[0] < 2.6 and changes[1] == 3.7 and 4.4 < changes[2] < 7.3
 
 
 def test_the_recordings_come_first_and_unchanged(library, more):
