@@ -150,23 +150,27 @@ def reduce_to_principal_components(
     return mean, basis, values @ basis
 
 
-def build_frames(clips, reference: Frames | None = None, on_clip: Callable[[int], None] | None = None) -> Frames:
+def build_frames(clips, reference: Frames | None = None, on_clip: Callable[[int], None] | None = None,
+                 keeps_columns: bool = False) -> Frames:
     """Build the frames of clips at FPS with all labels that they carry.
 
     Args:
         clips: of one skeleton (`library.clip`).
         reference: frames whose components are used, so that features of both can be compared; None uses the clips' own.
         on_clip: called with the index of each clip before its frames are built.
+        keeps_columns: whether what is built of a clip is kept while it is in use, for the next library that has it.
     Returns:
         The frames.
     """
     from threadpoolctl import threadpool_limits
 
     with threadpool_limits(limits=1):  # with more threads, sums of products have another order and other bits
-        return _build_frames(clips, reference, on_clip or (lambda index: None))
+        return _build_frames(clips, reference, on_clip or (lambda index: None),
+                             _find_columns if keeps_columns else _build_columns)
 
 
-def _build_frames(clips, reference: Frames | None, on_clip: Callable[[int], None]) -> Frames:
+def _build_frames(clips, reference: Frames | None, on_clip: Callable[[int], None],
+                  build_columns: Callable[..., tuple[np.ndarray, ...]]) -> Frames:
     """Build the columns of all clips, each in one array from the start, and reduce their features."""
     skeleton = clips[0].motion.skeleton
     vocabulary = tuple(sorted({word for clip in clips for row in clip.annotations for word in row.words}))
@@ -177,7 +181,7 @@ def _build_frames(clips, reference: Frames | None, on_clip: Callable[[int], None
     for index, clip in enumerate(clips):
         on_clip(index)
         rows = slice(first[index], first[index] + count[index])
-        columns = _build_columns(clip, joints, body) if reference is None else _find_columns(clip, joints, body)
+        columns = build_columns(clip, joints, body)
         columns = (np.full(count[index], index), *columns, build_label_matrix(clip, columns[0], vocabulary))
         for name, column in zip(_COLUMNS, columns):
             if not index:

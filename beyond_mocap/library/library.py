@@ -5,6 +5,7 @@
 
 from __future__ import annotations
 
+import weakref
 from collections import Counter
 from collections.abc import Sequence
 from contextlib import suppress
@@ -178,16 +179,20 @@ class Library:
         """
         return None
 
-    @cached_property
+    @property
     def base_library(self) -> "Library | None":
-        """The library to which `append_synthetic_clips` has appended clips; None for any other library."""
-        return None
+        """The library to which `append_synthetic_clips` has appended clips, while it is in use; None for any other one.
+
+        It is not kept: those that extend a library are kept with it (`missing_actions`), so that neither would end.
+        """
+        base = vars(self).get("_base")
+        return None if base is None else base()
 
     @cached_property
     def manners(self) -> Manners:
         """How the people of this library move."""
-        if self.base_library is not None:
-            return self.base_library.manners.append_unknown(len(self.clips) - len(self.base_library.clips))
+        if (base := self.base_library) is not None:
+            return base.manners.append_unknown(len(self.clips) - len(base.clips))
         is_calm = self._is_recorded & (self.strangeness <= 1.0)
         return measure_manners([clip.path for clip in self.clips], self.frames, is_calm, self.fps)
 
@@ -241,13 +246,13 @@ class Library:
         Returns:
             The library with them. They define no gait.
         """
-        added = replace(self, clips=tuple(clips), frames=build_frames(clips, self.frames))
+        added = replace(self, clips=tuple(clips), frames=build_frames(clips, self.frames, keeps_columns=True))
         joined = self._join(added)
         known = {name: getattr(self, name)
                  for name in ("normal_postures", "cut_receptions", "gaits", "gait_thresholds", "neutral_stance")}
         known |= {name: np.concatenate([getattr(self, name), getattr(added, name)])
                   for name in ("strangeness", "stance_seconds", "feet_in_contact")}
-        vars(joined).update(known, base_library=self)  # where cached properties keep their values
+        vars(joined).update(known, _base=weakref.ref(self))  # where cached properties keep their values
         return joined
 
     def _join(self, other: "Library") -> "Library":

@@ -12,6 +12,7 @@ import numpy as np
 from ...base.errors import BeyondMocapError
 from ...synthesis.heading_path import HeadingPath
 from ...synthesis.heading_request import Play
+from ...synthesis.one_thread import limit_to_one_thread
 from ...synthesis.plan import Plan
 from ..crowd.spacing import solve_episode
 from ..player_heading import plan_player_heading
@@ -50,7 +51,7 @@ class Preparation:
             BeyondMocapError: if one of them cannot be solved.
         """
         longest_first = sorted(range(len(tasks)), key=lambda number: -tasks[number][1].size)
-        found = dict(self._run(((number, tasks[number]) for number in longest_first), solve_episode))
+        found = dict(self._run(((number, tasks[number]) for number in longest_first), solve_spacing))
         for result in found.values():
             if isinstance(result, TaskFailure):
                 raise BeyondMocapError(result.reason)
@@ -83,7 +84,14 @@ def read_library(source: LibrarySource) -> None:
     library.cut_receptions, library.gaits  # noqa: B018
 
 
+def solve_spacing(*arguments) -> np.ndarray:
+    """Solve the spacing of one episode (`spacing.solve_episode`)."""
+    with limit_to_one_thread():
+        return solve_episode(*arguments)
+
+
 def plan_headings(source: LibrarySource, plans: Sequence[tuple[Plan, Play | None]]) -> list[HeadingPath]:
     """Plan the headings of one player (`player_heading.plan_player_heading`)."""
     library = load_library(source)
-    return [plan_player_heading(library, plan, play) for plan, play in plans]
+    with limit_to_one_thread():
+        return [plan_player_heading(library, plan, play) for plan, play in plans]

@@ -169,7 +169,8 @@ def _measure_rows(library: Library, keys: Sequence[Key]) -> list[tuple]:
     places, rotations = compute_pose(library.skeleton, np.concatenate(roots), np.concatenate(poses))
     places, rotations = (values.reshape(len(keys), 3, *values.shape[1:]) for values in (places, rotations))
     frame = np.array([round(library_frame(library, key)) for key in keys])
-    frame = np.clip(frame, 0, len(library.frames) - 1)
+    first, count = (values[[key.clip for key in keys]] for values in (library.frames.first, library.frames.count))
+    frame = np.clip(frame, first, first + count - 1)  # the next clip's frames are others in another library
     back = -_travel_direction(library, frame)
     rows = [_measure_strike(library, key, p, r, a) for key, p, r, a in zip(keys, places, rotations, back)]
     place, height, velocity, plant_off = (np.array(values) for values in zip(*rows))

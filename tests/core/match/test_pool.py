@@ -9,7 +9,7 @@ import pytest
 
 from beyond_mocap.base.errors import InputError, UserCancelledError
 from beyond_mocap.match.pieces import pool
-from beyond_mocap.match.pieces.pool import TaskFailure, WorkerConfig, run_tasks
+from beyond_mocap.match.pieces.pool import TaskFailure, WorkerConfig, run_tasks, start_workers
 
 
 def numbers(count, *more):
@@ -74,6 +74,14 @@ def test_a_piece_that_kills_every_worker_fails_alone(chores, tmp_path):
     found = dict(run_tasks(numbers(8, tmp_path, 99), chores.deadly, WorkerConfig(2)))
     assert "worker process ended" in found.pop(3).reason
     assert {key: value[0] for key, value in found.items()} == {n: n for n in range(8) if n != 3}
+
+
+def test_workers_that_are_started_early_change_nothing(chores):
+    """Whether what they begin with ends well, fails, or ends them."""
+    for work, number in ((chores.square, 2), (chores.odd, 1), (os._exit, 1)):
+        start_workers(WorkerConfig(2), work, (number,))
+        time.sleep(1.0)
+        assert sorted(run_tasks(numbers(5), chores.square, WorkerConfig(2))) == [(n, n * n) for n in range(5)]
 
 
 def test_cancelling_does_not_wait_for_the_work(chores):

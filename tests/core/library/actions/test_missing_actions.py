@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import gc
+import weakref
 from dataclasses import replace
 from pathlib import Path
 
@@ -11,7 +13,7 @@ import pytest
 from beyond_mocap.annotation import KeyMoment, Span, Timeline
 from beyond_mocap.base.errors import InputError, NotInLibraryError
 from beyond_mocap.files.bvh import bvh
-from beyond_mocap.library import missing_actions, synthetic_clips
+from beyond_mocap.library import features, missing_actions, synthetic_clips
 from beyond_mocap.library.missing_actions import (
     ActionMoment,
     add_actions,
@@ -73,6 +75,28 @@ def test_a_library_is_extended_as_if_it_were_indexed_as_a_whole(library):
         assert np.array_equal(getattr(one.pairs_by_speed(), pairs), getattr(other.pairs_by_speed(), pairs)), pairs
     assert np.array_equal(extended.manners.of_clip, whole.manners.of_clip)
     assert np.array_equal(extended.manners.distance, whole.manners.distance)
+
+
+def test_a_library_that_was_extended_is_let_go_of(library):
+    """With what is computed of it: a session builds libraries again and again."""
+    base = replace(library)
+    extended = add_actions(base, find_missing_actions(base, [moment(*HEADER)]))
+    CandidateIndex.for_library(extended, np.ones(len(extended.clips), bool))
+    found = weakref.ref(base)
+    del base
+    gc.collect()
+    assert found() is None and extended.base_library is None
+    assert np.array_equal(extended.manners.of_clip[: len(library.clips)], library.manners.of_clip)
+
+
+def test_columns_are_kept_of_clips_that_other_libraries_ask_for_alone(library):
+    clips = library.clips[:2]
+    for clip in clips:
+        features._built_columns.pop(clip, None)
+    features.build_frames(clips, library.frames)
+    assert not any(clip in features._built_columns for clip in clips)
+    extended = add_actions(library, find_missing_actions(library, [moment(*HEADER)]))
+    assert all(clip in features._built_columns for clip in extended.clips if is_action_clip(clip))
 
 
 def test_only_what_no_recording_carries_is_missing(library):

@@ -5,7 +5,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from beyond_mocap.library.features import build_frames
+from beyond_mocap.library.keys import Key
 from beyond_mocap.motion.track import Track, sample_track
+from beyond_mocap.synthesis.search import key_fit
 from beyond_mocap.synthesis.search.key_fit import (
     BallMeasurement,
     StrikeMeasurements,
@@ -80,3 +83,18 @@ def test_a_made_kick_strikes_ahead_near_the_ground_and_its_twin_on_the_other_sid
     assert np.all(found.height < 0.3) and np.all(found.velocity[:, 0] > 1.0)
     assert found.place[0, 0] == pytest.approx(found.place[1, 0], abs=0.03)
     assert found.place[0, 1] == pytest.approx(-found.place[1, 1], abs=0.03)
+
+
+def test_a_strike_at_the_end_of_its_clip_is_the_same_whichever_clip_follows(library):
+    """It is kept for every library that has the clip. The last frame of 60 per second lies half a frame behind the
+    last one of the library."""
+    kick = next(clip for clip in library.clips if library.clips[library.keys[0].clip] is clip)
+    count = 4 * (len(kick.motion) // 4)
+    short = replace(kick, motion=kick.motion.frames(0, count), heel_toe_contacts=kick.heel_toe_contacts[:count])
+    strike, found = Key(0, count - 1.0, 0.0, count - 1.0, library.keys[0].labels), []
+    for clips in ((short,), (short, *library.clips[:2])):
+        key_fit._measured.pop(short, None)
+        one = replace(library, clips=clips, frames=build_frames(clips))
+        found.append(measure_strikes(one, [strike]))
+    assert kick.motion.fps == 60.0
+    assert np.array_equal(found[0].velocity, found[1].velocity) and np.array_equal(found[0].place, found[1].place)
