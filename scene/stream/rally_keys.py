@@ -63,6 +63,7 @@ class RallyKeys:
         from ...beyond_mocap.passes.passes import build_ball
 
         rows, start = _find_rows(scene, names), float(scene.beyond_mocap_passes.start_frame)
+        replaced = []
         for name, row in rows.items():
             played, old = rally.players[name], self._players.get(name)
             keeps = old is not None and row.body is not None and old.note_edits(row.body)
@@ -71,7 +72,9 @@ class RallyKeys:
             if keeps:
                 self._players[name].copy_edits(row.body, old)
             elif old is not None:
-                self.note = f"{name}'s keys were added, removed or moved: they have been written again"
+                replaced.append(name)
+        if replaced:
+            self.note = f"Keys were added, removed or moved, and have been written again: {', '.join(replaced)}"
         ball, old = scene.beyond_mocap_passes.rally, self._ball
         keeps = old is not None and ball is not None and old.note_edits(ball)
         make.apply_ball(scene, SimpleNamespace(ball=rally.ball, kind=build_ball(rally.scene)), start)
