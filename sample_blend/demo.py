@@ -13,6 +13,7 @@ import argparse
 import importlib
 import os
 import pathlib
+import signal
 import sys
 import tempfile
 import time
@@ -183,6 +184,7 @@ def render_sheet(bpy, load, plans, takes, out: pathlib.Path, steps) -> None:
                     scene.render.filepath)
     _write_picture(bpy, sheet, out)
     scene.render.use_stamp = False
+    steps.enter_part("Film")
     render_film(bpy, load, takes[0], out.with_suffix(".webp"), steps)
     bpy.data.cameras.remove(scene.camera.data)
     scene.camera = follow_camera
@@ -289,7 +291,8 @@ def run_demo(out: pathlib.Path) -> None:
     silence_blender = load("scene.rigs.exporters").silence_blender
     reporter = load("beyond_mocap.cli.main").ProgressReporter(False)
     steps = Steps(reporter,
-                  {"Library": 0.2, "player1": 0.05, "player2": 0.05, "Apply": 0.03, "Render": 0.65, "Save": 0.02})
+                  {"Library": 0.2, "player1": 0.05, "player2": 0.05, "Apply": 0.03, "Render": 0.1, "Film": 0.55,
+                   "Save": 0.02})
     with silence_blender():
         prepare_scene(bpy)
     settings, session = bpy.context.scene.beyond_mocap, load("scene.core.session")
@@ -331,9 +334,28 @@ def main() -> int:
     except OSError as error:
         print(f"{options.out}: {error.strerror}; choose another folder with --out", file=sys.stderr)
         return 2
+    handle_interrupt()
     run_demo(options.out.resolve())
     return 0
 
 
+def handle_interrupt() -> None:
+    """End at once on Ctrl-C: Blender's handlers would report the interrupt as an error of theirs, and go on."""
+    messages = os.dup(sys.stderr.fileno())  # where Blender is silenced, stderr is too
+
+    def end(*_) -> None:
+        os.write(messages, b"\ndemo: cancelled\n")
+        os._exit(130)
+
+    signal.signal(signal.SIGINT, end)
+
+
+def end_process(status: int) -> None:
+    """End without Blender's cleaning up, which reports "Error: Not freed memory blocks" below the result."""
+    sys.stdout.flush()
+    sys.stderr.flush()
+    os._exit(status)
+
+
 if __name__ == "__main__":
-    sys.exit(main())
+    end_process(main())

@@ -115,6 +115,23 @@ def find_similar_labels(label: str, known: Iterable[str], count: int = 3) -> tup
     return tuple(other for distance, other in ranked[:count] if distance <= max(1, (len(label) + 1) // 2))
 
 
+def find_meant_label(label: str, known: Iterable[str]) -> str | None:
+    """Find the label that a misspelled one probably means: one letter differs, or two neighbours are exchanged.
+
+    Args:
+        label: the label as written; one of fewer than four letters is too short to tell.
+        known: the labels to choose from.
+    Returns:
+        The label; None if `label` is known, or none is so similar.
+    """
+    known = set(known)
+    if label in known or len(label) < 4:
+        return None
+    exchanged = {label[:i] + label[i + 1] + label[i] + label[i + 2:] for i in range(len(label) - 1)}
+    near = (other for other in sorted(known) if other in exchanged or compute_edit_distance(label, other) == 1)
+    return next(near, None)
+
+
 def find_labels_of_part(label: str, known: Iterable[str], count: int = 3) -> tuple[str, ...]:
     """Find the labels that bring the same part of the body to the ball: "chest" leads to "body", "trap" to "receive".
 

@@ -17,7 +17,7 @@ from types import MappingProxyType
 import numpy as np
 
 from ..base.content import decode_text, read_bytes
-from ..base.errors import InputError
+from ..base.errors import InputError, format_count
 from ..motion.skeleton import freeze_array
 from ..motion.track.ball_path import BallPath
 from .atomic import atomic_write
@@ -140,7 +140,7 @@ def read_rows(
                 continue
             if len(cells) < len(names):
                 expected = f"{len(names)}, like the header"
-                raise InputError(place, f"{len(cells)} cells", expected, "complete or delete the row")
+                raise InputError(place, format_count(len(cells), "cell"), expected, "complete or delete the row")
             cells = [cell.strip() for cell in cells]
             if separator != ",":
                 cells = [_WITH_COMMA.sub(r"\1.\2", cell) for cell in cells]
@@ -212,10 +212,12 @@ def _find_missing(names: Sequence[str], required: Sequence[str]) -> list[str]:
 def _check_header(names: list[str], required: Sequence[str], path) -> None:
     if missing := _find_missing(names, required):
         listed = ",".join(names)[:80]
-        found = f"no column {', '.join(missing)} in {listed!r}"
+        found, next_step = f"no column {', '.join(missing)} in {listed!r}", "rename the columns, use commas"
         if len(names) == 1 and (separator := next((one for one in _SEPARATORS if one in names[0]), None)):
             found += f", which is separated by {_SEPARATORS[separator]}"
-        raise InputError(f"{path}:1", found, f"a header with {','.join(required)}", "rename the columns, use commas")
+            if not _find_missing([name.strip() for name in names[0].split(separator)], required):
+                next_step = "write commas between the cells, and points in numbers"
+        raise InputError(f"{path}:1", found, f"a header with {','.join(required)}", next_step)
     if any(names.count(name) > 1 for name in required):
         raise InputError(f"{path}:1", "a column is repeated", "each column once")
 

@@ -31,7 +31,7 @@ from .clip import Clip, RepairFigures
 from .features import FPS, build_frames
 from .library import RECORDED_INDEX, Library, Progress
 from .recorded_ball.ball_table import find_ball_table
-from .scan import CLASSIFIER_FILE, Annotations, find_readable_clips, read_stamp
+from .scan import CLASSIFIER_FILE, Annotations, describe_misspelled_labels, find_readable_clips, read_stamp
 
 if TYPE_CHECKING:
     from .classify.classifier import Classifier
@@ -211,6 +211,7 @@ def _read_clips(recordings: _Recordings, arrays: Path | None, notes: list[str], 
     notes += _collect_unit_notes(units)
     motions = levelled.finish()
     rows = _read_rows(recordings, motions)
+    notes += describe_misspelled_labels(recordings.folder, recordings.paths, rows)
     is_proposed = not any(rows)
     repaired = MotionWriter(arrays and arrays / "repaired.npy")
     repairs, contacts = _repair_clips(recordings, motions, [drift for _, drift in changes], repaired, notes=notes,

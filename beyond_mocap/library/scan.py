@@ -14,6 +14,7 @@ from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 
 from .. import annotation
+from ..annotation.vocabulary import find_meant_label, list_vocabulary
 from ..base.errors import InputError, describe_no_folder, format_count
 from ..base.fixes import Fix
 from ..files.atomic import atomic_write
@@ -180,6 +181,30 @@ class Annotations:
         """List every file that was or would be read for annotations; the cache depends on them."""
         texts = [clip.with_suffix(".txt") for clip in clips]
         return [path for path in texts if path.is_file()] + [place / TABLE_NAME for place in sorted(self.tables)]
+
+
+def describe_misspelled_labels(folder: Path, clips: Sequence[Path],
+                               rows: Sequence[Sequence[annotation.ClipAnnotation]]) -> list[str]:
+    """Describe, a line each, the labels that only a library's own annotations know and that are probably misspelled.
+
+    Args:
+        folder: the library's folder.
+        clips: its recordings.
+        rows: the rows of each.
+    """
+    known = list_vocabulary()
+    places: dict[str, list[str]] = {}
+    for clip, own in zip(clips, rows):
+        for label in sorted({word for row in own for word in row.words} - known):
+            places.setdefault(label, []).append(clip.relative_to(folder).as_posix())
+    meant = {label: find_meant_label(label, known) for label in sorted(places)}
+    return [f"{places[label][0]}{_describe_more(places[label])}: the label '{label}' is not in the vocabulary; "
+            f"if '{other}' is meant, correct it" for label, other in meant.items() if other]
+
+
+def _describe_more(clips: Sequence[str]) -> str:
+    """Say how many recordings follow the first one."""
+    return f" and {format_count(len(clips) - 1, 'more clip')}" if len(clips) > 1 else ""
 
 
 def _has_labels(path: Path) -> bool:

@@ -170,7 +170,7 @@ def build_ball(scene: PassScene) -> Ball:
     """
     choice = scene.ball
     if choice.kind not in BALLS:
-        raise InputError("ball", f"the kind {choice.kind!r}", f"one of {', '.join(BALLS)}")
+        raise InputError("ball", f"the kind {choice.kind!r}", f"one of {', '.join(BALLS)}", "choose one of these")
     known = {entry.name for entry in fields(Ball)} - {"name"}
     for name in choice.changes:
         if name not in known:

@@ -145,7 +145,8 @@ class _ThrowGenerator:
         body = identify_joints(self.skeleton)
         limb = getattr(body, name.split("_")[0])
         if not self.is_kick and None in (limb.upper_arm, limb.lower_arm, limb.hand):
-            raise InputError("throw", f"a skeleton without a {name.replace('_', ' ')}", "arms and hands")
+            raise InputError("skeleton", f"a body without a {name.replace('_', ' ')}", "arms and hands",
+                             "choose a skeleton with arms, or kick instead")  # fmt: skip
         if not STATURE_RANGE[0] <= estimate_stature(self.skeleton) <= STATURE_RANGE[1]:
             raise InputError("skeleton", f"a body of {estimate_stature(self.skeleton):.3g} m",
                              f"{STATURE_RANGE[0]:g} to {STATURE_RANGE[1]:g} m", "check the unit")  # fmt: skip

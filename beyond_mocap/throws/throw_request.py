@@ -66,7 +66,8 @@ class ThrowRequest:
         if self.limb is not None and self.limb not in EFFECTORS:
             raise InputError("limb", str(self.limb)[:40], ", ".join(EFFECTORS))
         if isinstance(self.ball, str) and self.ball not in KINDS:
-            raise InputError("ball", self.ball[:40], ", ".join(KINDS))
+            raise InputError("ball", f"the kind {self.ball[:40]!r}", f"one of {', '.join(KINDS)}",
+                             "choose one of these")  # fmt: skip
         if self.speed is not None and not 0.0 < self.speed < np.inf:
             raise InputError("speed", f"{self.speed:g} m/s", "more than 0 m/s")
         if self.seed < 0:

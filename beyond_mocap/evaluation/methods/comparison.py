@@ -86,10 +86,10 @@ def choose_methods(text: str) -> tuple[str, ...]:
     names = [name.strip() for name in text.split(",") if name.strip()]
     expected = f"some of {', '.join(METHOD_OPTIONS)}"
     if not names:
-        raise InputError("--methods", "no method", expected)
+        raise InputError("--methods", "no method", expected, "name one or more, with commas between them")
     for place, name in enumerate(names):
         if name not in METHOD_OPTIONS:
-            raise InputError("--methods", repr(name), expected)
+            raise InputError("--methods", f"no method is named {name!r}", expected, "correct the name")
         if name in names[:place]:
             raise InputError("--methods", f"{name} twice", "each method once", "remove one of them")
     return tuple(names)

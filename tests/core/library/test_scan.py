@@ -5,8 +5,9 @@ import os
 import numpy as np
 import pytest
 
+from beyond_mocap.annotation import ClipAnnotation
 from beyond_mocap.base.errors import InputError
-from beyond_mocap.library.scan import Annotations, find_clips, list_own_recordings
+from beyond_mocap.library.scan import Annotations, describe_misspelled_labels, find_clips, list_own_recordings
 
 HEADER = "file,fps,start_frame,end_frame,key_frame,labels,comment\n"
 
@@ -131,6 +132,18 @@ def test_rows_that_name_no_clip_are_told(folder):
     (folder / "annotations.csv").write_text(HEADER + row("gone.bvh", "x") * 2 + row("b.bvh", "walking"))
     (folder.parent / "annotations.csv").write_text(HEADER + row("library/gone.bvh", "x"))
     assert told() == ["annotations.csv: 3 rows name files that are not in the library, such as library/gone.bvh"]
+
+
+def test_labels_that_are_probably_misspelled_are_named(folder):
+    def describe(*labels):
+        rows = [(ClipAnnotation(0, 9, None, labels),), (ClipAnnotation(0, 5, None, ("jogging", *labels)),)]
+        return describe_misspelled_labels(folder, find_clips(folder), rows)
+
+    assert describe("waking", "front") == [
+        "b.bvh and 1 more clip: the label 'waking' is not in the vocabulary; if 'walking' is meant, correct it"]
+    assert [line.split("'")[1:4:2] for line in describe("rihgt", "joging")] == [["joging", "jogging"],
+                                                                               ["rihgt", "right"]]
+    assert describe("kick", "juggling", "toss", "lob", "stroke", "pass") == []
 
 
 def test_a_table_two_folders_above_says_nothing(folder):

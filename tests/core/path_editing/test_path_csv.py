@@ -45,7 +45,7 @@ def test_points_in_the_order_of_their_rows(tmp_path, content, points):
     (b"x_m,y_m\n1,2\n1,2\n1,2\n", "3 points, all at one place"),
     (b"x_m,y_m\n1,2\n1,abc\n", ":3: y_m 'abc'"),
     (b"x_m,y_m\n1,2\n1,\n", ":3: y_m ''"),
-    (b"x_m,y_m\n1,2\n1\n", ":3: 1 cells"),
+    (b"x_m,y_m\n1,2\n1\n", ":3: 1 cell;"),
     (b"x_m,y_m\n1,2\n1,inf\n", ":3: y_m 'inf'"),
     (b"x_m,y_m,z_m\n1,2,0\n1,3,nan\n", ":3: z_m 'nan'"),
     (b"x_m,y_m\n1,2\n1,2e5\n", ":3: y_m 2e5"),

@@ -141,6 +141,11 @@ def test_refuses_orders_that_say_nothing(wrong):
         ThrowRequest(**{"target": (12.0, 0.0, 1.0), **wrong})
 
 
+def test_an_unknown_kind_of_ball_is_refused_with_those_that_exist():
+    with pytest.raises(InputError, match="ball: the kind 'soccer'; expected one of .*football.*; choose one of these"):
+        ThrowRequest((12.0, 0.0, 1.0), ball="soccer")
+
+
 def test_a_body_without_hands_is_refused(model):
     from dataclasses import replace
 
@@ -150,7 +155,7 @@ def test_a_body_without_hands_is_refused(model):
     parents = tuple(-1 if skeleton.parents[n] < 0 else index[skeleton.parents[n]] for n in keep)
     less = replace(skeleton, names=tuple(skeleton.names[n] for n in keep), parents=parents,
                    offsets=skeleton.offsets[keep], end_parents=(), end_offsets=np.zeros((0, 3)))  # fmt: skip
-    with pytest.raises(InputError, match="without a right hand"):
+    with pytest.raises(InputError, match="^skeleton: .*without a right hand; expected .*; choose a skeleton with arms"):
         throw_at(model, ORDERS[0], less)
 
 

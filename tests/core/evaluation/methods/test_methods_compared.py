@@ -118,7 +118,9 @@ def test_one_method_alone_has_no_section_on_how_it_differs(comparison):
     assert "How they differ" not in "\n".join(format_markdown(alone))
 
 
-@pytest.mark.parametrize("text, found", [("", "no method"), ("path,magic", "'magic'"), ("fs, path,fs", "fs twice")])
+@pytest.mark.parametrize("text, found", [
+    ("", "no method"), ("path,magic", "'magic'; expected .*; correct the name"), ("fs, path,fs", "fs twice"),
+])
 def test_methods_that_nobody_has_are_refused(text, found):
     with pytest.raises(InputError, match=found):
         choose_methods(text)
