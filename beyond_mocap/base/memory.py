@@ -1,8 +1,9 @@
-"""How much memory is free, and an error in one line before a work that needs more."""
+"""How much memory is free, how much a process has held, and an error in one line before a work that needs more."""
 
 from __future__ import annotations
 
 import os
+import sys
 from pathlib import Path
 
 from .errors import InputError
@@ -72,6 +73,21 @@ def _read_process_limit() -> float | None:
     except (ImportError, OSError, ValueError):
         return None
     return None if limit == resource.RLIM_INFINITY else limit - pages * resource.getpagesize()
+
+
+def read_peak_memory() -> float:
+    """Read the most memory that this process has held so far, in MB; 0 where the system does not say (Windows)."""
+    try:
+        rows = dict(line.split(":", 1) for line in (_PROCESS / "status").read_text("utf-8").splitlines())
+        return float(rows["VmHWM"].split()[0]) / 1024.0
+    except (OSError, ValueError, KeyError):
+        pass
+    try:
+        import resource
+    except ImportError:
+        return 0.0
+    # not on Linux, where a new process inherits what the one that started it has held
+    return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / (1e6 if sys.platform == "darwin" else 1024.0)
 
 
 def check_memory(where: object, needed: float, next_step: str) -> None:

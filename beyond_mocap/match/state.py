@@ -9,10 +9,11 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 
 from .. import __version__
+from ..base.memory import read_peak_memory
 from ..motion.track.match_data import Match
 from ..synthesis.search.request import USE_NEAREST
 from .folder import MatchFolder
-from .pieces.pool import TaskFailure, TaskResult, measure_peak_memory
+from .pieces.pool import TaskFailure, TaskResult
 from .player_plans import PlayerPlans
 from .request import MatchRequest
 
@@ -67,7 +68,7 @@ class MatchState:
     def write_state(self) -> None:
         """Write match.json."""
         rows = [{name: value for name, value in row.items() if value is not None} for row in self.players.values()]
-        memory = {"main": round(measure_peak_memory(), 1), "worker": round(self.worker_memory, 1)}
+        memory = {"main": round(read_peak_memory(), 1), "worker": round(self.worker_memory, 1)}
         spent = {stage: round(seconds, 3) for stage, seconds in self.worker_seconds.items()}
         self.folder.write_state({**self.report, "players": rows, "seconds": self.seconds,
                                  "main_cpu_s": self.main_seconds, "worker_cpu_s": spent,

@@ -196,7 +196,7 @@ def _snap_to_line(piece: Piece, values: np.ndarray) -> None:
     share = values[edges[:, 0]] / (values[edges[:, 0]] - values[edges[:, 1]])
     near = share < _SNAP
     edges, share = edges[near], share[near]
-    order = np.argsort(share, kind="stable")
+    order = np.argsort(np.round(share, 9), kind="stable")  # on equal shares the processor does not choose
     chosen, first = np.unique(edges[order, 0], return_index=True)
     ends, part = edges[order, 1][first], share[order][first]
     start = piece.vertices.copy()

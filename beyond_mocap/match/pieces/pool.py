@@ -14,7 +14,6 @@ import logging
 import os
 import re
 import signal
-import sys
 import threading
 import time
 import warnings
@@ -25,6 +24,7 @@ from dataclasses import dataclass
 from typing import NoReturn
 
 from ...base.errors import BeyondMocapError, InputError, UserCancelledError
+from ...base.memory import read_peak_memory
 from ...base.optional_packages import import_optional
 
 PIECES_PER_WORKER = 2
@@ -175,16 +175,7 @@ def run_task(work: Work, arguments: tuple) -> TaskResult:
         result = TaskFailure(str(error), error.exit_status)
     except Exception as error:  # an error of one piece must not stop the others
         result = TaskFailure(" ".join(f"{type(error).__name__}: {error}".split()))
-    return TaskResult(result, measure_peak_memory(), time.process_time() - started)
-
-
-def measure_peak_memory() -> float:
-    """Measure the peak memory of this process in MB; 0 where the system does not provide it (Windows)."""
-    try:
-        import resource
-    except ImportError:
-        return 0.0
-    return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / (1e6 if sys.platform == "darwin" else 1024.0)
+    return TaskResult(result, read_peak_memory(), time.process_time() - started)
 
 
 def _run_here(tasks: Iterable[Task], work: Work, is_cancelled: Callable[[], bool]) -> Generator[tuple[object,

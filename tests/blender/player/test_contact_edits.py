@@ -27,7 +27,7 @@ def find(contacts, foot, seconds):
 
 def test_a_contact_is_moved_again_and_taken_back(one, contacts_of, edits):  # noqa: F811
     before = contacts_of()
-    chosen = next(contact for contact in before if contact.foot == "right" and contact.start > 4.0)
+    chosen = next(contact for contact in before if contact.foot == "right" and contact.start > 6.0)
     for number in (1, 2):
         assert bpy.ops.beyond_mocap.fix_foot(action="MOVE", foot="right", time=chosen.middle,
                                              offset=(0.04, -0.03)) == {"FINISHED"}

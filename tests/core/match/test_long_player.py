@@ -102,6 +102,15 @@ def test_the_limit_of_the_process_counts():
     assert 0.5 * limit < float(ran.stdout) < limit
 
 
+def test_what_a_process_has_held_is_not_taken_over_from_the_one_that_started_it():
+    held = np.ones(40_000_000)
+    code = "from beyond_mocap.base.memory import read_peak_memory; print(read_peak_memory())"
+    ran = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    if not float(ran.stdout):
+        pytest.skip("this system does not say how much memory a process has held")
+    assert 2.0 < float(ran.stdout) < held.nbytes / 2**20 < memory.read_peak_memory()
+
+
 def test_the_command_checks_memory_before_the_search(clips_folder, tmp_path, monkeypatch, capsys):
     (tmp_path / "t.csv").write_text("time_s,x_m,y_m\n" + "".join(f"{0.2 * i},{0.3 * i},0\n" for i in range(100)))
     monkeypatch.setattr(memory, "read_free_bytes", lambda: 1e6)
