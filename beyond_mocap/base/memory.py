@@ -25,14 +25,20 @@ def read_free_bytes() -> float | None:
 
 def _read_available() -> float | None:
     """Read the memory that is available without swapping, in bytes."""
-    try:
-        rows = dict(line.split(":", 1) for line in Path("/proc/meminfo").read_text("ascii").splitlines())
-        return 1024.0 * float(rows["MemAvailable"].split()[0])
-    except (OSError, ValueError, KeyError):
-        pass
+    if (free := _read_kilobytes(Path("/proc/meminfo"), "MemAvailable")) is not None:
+        return 1024.0 * free
     try:  # other systems tell the machine's memory at most
         return float(os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE"))
     except (AttributeError, OSError, ValueError):
+        return None
+
+
+def _read_kilobytes(path: Path, name: str) -> float | None:
+    """Read a row such as "VmHWM: 1024 kB" of a system's file; None where there is none."""
+    try:
+        rows = dict(line.split(":", 1) for line in path.read_text("utf-8").splitlines())
+        return float(rows[name].split()[0])
+    except (OSError, ValueError, KeyError):
         return None
 
 
@@ -77,11 +83,8 @@ def _read_process_limit() -> float | None:
 
 def read_peak_memory() -> float:
     """Read the most memory that this process has held so far, in MB; 0 where the system does not say (Windows)."""
-    try:
-        rows = dict(line.split(":", 1) for line in (_PROCESS / "status").read_text("utf-8").splitlines())
-        return float(rows["VmHWM"].split()[0]) / 1024.0
-    except (OSError, ValueError, KeyError):
-        pass
+    if (held := _read_kilobytes(_PROCESS / "status", "VmHWM")) is not None:
+        return held / 1024.0
     try:
         import resource
     except ImportError:

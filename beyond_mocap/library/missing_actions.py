@@ -306,15 +306,15 @@ def _find_clips(library: Library, path: str) -> tuple[Clip, Clip]:
     if path not in known:
         _make_room(known, _KEPT_CLIPS)
         _parse_path(path)  # no file is opened for a name that is no action's
-        clip = _load_clip(library, path) or _build_clip(library, path)
+        clip = _find_clip(library, path)
         known[path] = clip, clip.build_twin()
     return known[path]
 
 
-def _load_clip(library: Library, path: str) -> Clip | None:
-    """Load a clip that an earlier process has built, or build it for later ones; None for a library without a cache."""
+def _find_clip(library: Library, path: str) -> Clip:
+    """Load a clip that an earlier process has built, or build it, for later ones where the library has a cache."""
     if not library.cache_location:
-        return None
+        return _build_clip(library, path)
     place, key = library.cache_location
     known = load_clip(place, key, library.skeleton, path)
     clip = known or _build_clip(library, path)

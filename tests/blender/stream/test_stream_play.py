@@ -208,7 +208,7 @@ def set_key(room, body, frame, value):
 
 
 def test_values_that_the_user_has_edited_stay(playing, room, core):
-    """Before the pass, when it is written and when all is written again; what the pass replaces is told."""
+    """Before the pass, when it is written and when all is written again; the panel names what the pass replaces."""
     play, body = room("stream.play"), playing.beyond_mocap_passes.players["Ann"].body
     plan_ahead(play, core, playing)
     playing.frame_set(53)
