@@ -24,8 +24,9 @@ if __name__ == "__main__":
 
 from make_sample import add_tracking_noise  # noqa: E402
 
-from beyond_mocap.ball.aim import solve_ground_launches, solve_launches  # noqa: E402
+from beyond_mocap.ball.aim import solve_launches  # noqa: E402
 from beyond_mocap.ball.flight import Flight, Launch, simulate_flight  # noqa: E402
+from beyond_mocap.ball.ground_launch import solve_ground_launches  # noqa: E402
 from beyond_mocap.ball.physics import FOOTBALL  # noqa: E402
 
 SECONDS, RATE = 24.0, 25.0  # s, and frames per second

@@ -18,8 +18,10 @@ from ..base.errors import InputError
 from ..base.time_series import interpolate_columns
 from ..motion.motion import Motion, compute_pose, sample_frames
 from . import batch
-from .aim import HIT_TOLERANCE, AimResult, build_reach_error, solve_ground_launches, solve_launches
+from .aim import solve_launches
+from .aim_problem import HIT_TOLERANCE, AimResult, build_reach_error
 from .contact import StrikeSurface, compute_ball_centre
+from .ground_launch import solve_ground_launches
 from .physics import Ball, vector_length
 
 RISE = 0.3

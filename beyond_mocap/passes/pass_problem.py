@@ -10,7 +10,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..ball.aim import AimResult, solve_launches
+from ..ball.aim import solve_launches
+from ..ball.aim_problem import AimResult
 from ..ball.batch import build_balls, simulate_balls
 from ..ball.contact import Tool, convert_to_world
 from ..ball.physics import HUMAN_BALL_SPEEDS, Ball, compute_rolling_spin

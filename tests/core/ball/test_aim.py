@@ -7,8 +7,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from beyond_mocap.ball.aim import _compute_step, build_reach_error, solve_ground_launches, solve_launches
+from beyond_mocap.ball.aim import _compute_step, solve_launches
+from beyond_mocap.ball.aim_problem import build_reach_error
 from beyond_mocap.ball.flight import Launch, simulate_flight
+from beyond_mocap.ball.ground_launch import solve_ground_launches
 from beyond_mocap.ball.physics import BALLS, FOOTBALL, HUMAN_BALL_SPEEDS, PAPER, TENNIS, vector_length
 from beyond_mocap.base.errors import InputError
 
