@@ -43,16 +43,16 @@ def _find_upward_speed(problem: AimProblem, drag: np.ndarray) -> tuple[np.ndarra
     Returns:
         Speeds (B,) m/s and (B,) bool: one exists. Where none does, the speed that comes closest.
     """
-    gravity, low = problem.ball.gravity, problem.ground + problem.ball.radius
-    first, second = batch.compute_drag_factors(drag * problem.seconds)
-    direct = (problem.target[:, 2] - problem.start[:, 2] + gravity * problem.seconds**2 * second) / (problem.seconds * first)
+    gravity, low, seconds = problem.ball.gravity, problem.ground + problem.ball.radius, problem.seconds
+    first, second = batch.compute_drag_factors(drag * seconds)
+    direct = (problem.target[:, 2] - problem.start[:, 2] + gravity * seconds**2 * second) / (seconds * first)
     if not problem.bounces:
         return direct, np.ones(len(direct), bool)
-    top = gravity * problem.seconds * second / first + 0.5  # the highest launch that is down again in time
+    top = gravity * seconds * second / first + 0.5  # the highest launch that is down again in time
     tried = top[:, None] - (top[:, None] + 40.0) * np.linspace(0.0, 1.0, UPWARD_SAMPLES) ** 2
 
     def measure_height_error(upward):
-        args = (problem.start[:, None, 2] - low, upward, drag[:, None], problem.seconds[:, None])
+        args = (problem.start[:, None, 2] - low, upward, drag[:, None], seconds[:, None])
         return _compute_height_after(*args, problem.bounces, problem.ball) - (problem.target[:, None, 2] - low)
 
     return _find_highest_root(measure_height_error, tried)

@@ -20,16 +20,13 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ..ball.contact import Tool, find_striking_surface
+from ..ball.contact import Tool
 from ..base.errors import InputError
 from ..motion import quaternion
-from ..motion.humanoid import compute_heading_from_positions, identify_joints, measure_leg_length
-from ..motion.motion import Motion, forward_kinematics
-from ..motion.skeleton import Skeleton
-from ..motion.track import smooth_zero_phase_hann
+from ..motion.motion import Motion
+from .part_trajectory import PartTrajectory, PlayerBody, Poses, measure_part
 
 _SIDED = ("foot", "hand", "tool")
-_SMOOTHING = 0.1  # s: Hann window over positions; markers and suits shake at an impact
 _APART = 0.25  # s: least distance of two fast frames; the part's return after a hit is closer
 _SLOW = 0.4  # of the highest speed in a hit motion: the part is at most so fast at its ends
 _SLOWED = 0.9  # of the highest speed: a part that is slower again has struck
@@ -38,9 +35,6 @@ _LEAST_RISE_AFTER = 0.03  # m: least rise after the strike for the high frame to
 # with an automatic threshold: least rise in m above the part's typical height, and least speed in m/s, of a hit
 _LEAST_RISE = {"foot": 0.10, "head": 0.10, "chest": 0.08, "hand": 0.15, "tool": 0.20}
 _LEAST_SPEED = {"foot": 1.5, "head": 0.8, "chest": 0.6, "hand": 2.0, "tool": 2.5}
-
-Poses = tuple[np.ndarray, np.ndarray]
-"""World positions (T, J, 3) m and rotations (T, J, 4) of all joints."""
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -150,7 +144,7 @@ def detect_hits(motion: Motion, part: str = "foot", side: str = "right", thresho
     Source: Ball handling, section 3.
     """
     _check_input(motion, threshold)
-    body, trajectory, other, place = _measure(motion, part, side, joint=joint, tool=tool, poses=poses)
+    body, trajectory, other, place = measure_part(motion, part, side, joint=joint, tool=tool, poses=poses)
     side = side if part in _SIDED else ""
     peaks = _find_peaks(trajectory.height)
     height_threshold = _find_threshold(trajectory.height, peaks, part) if threshold is None else float(threshold)
@@ -183,7 +177,7 @@ def detect_hit_under_way(motion: Motion, part: str = "foot", side: str = "right"
         InputError: as `detect_hits`.
     """
     _check_input(motion, threshold)
-    body, trajectory, other, _ = _measure(motion, part, side, tool=tool, poses=poses)
+    body, trajectory, other, _ = measure_part(motion, part, side, tool=tool, poses=poses)
     speed, height, now = trajectory.speed, trajectory.height, len(motion) - 1
     earliest = max(now - int(_RECENT * motion.fps), 0)
     key = earliest + int(np.argmax(speed[earliest:]))
@@ -243,31 +237,12 @@ def build_hit_at(motion: Motion, frame: int, span: tuple[int, int], part: str = 
         InputError: as `detect_hits`.
     """
     _check_input(motion, None)
-    body, trajectory, _, _ = _measure(motion, part, side, tool=tool)
+    body, trajectory, _, _ = measure_part(motion, part, side, tool=tool)
     first = int(np.clip(span[0], 0, len(motion) - 3))
     last = int(np.clip(span[1], first + 2, len(motion) - 1))
     key = int(np.clip(frame, first + 1, last - 1))
     side = side if part in _SIDED else ""
     return _build_hit_motion(part, side, (first, last), trajectory, body, key=key)
-
-
-def compute_strike_place(skeleton: Skeleton, positions: np.ndarray, rotations: np.ndarray, part: str, side: str,
-                         tool: Tool | None = None) -> np.ndarray:
-    """Compute the middle of the striking part.
-
-    Args:
-        skeleton: the skeleton.
-        positions: (..., J, 3) m, joints in the world frame.
-        rotations: (..., J, 4) world rotations.
-        part: as in `detect_hits`.
-        side: "left" or "right".
-        tool: what is in the hand.
-    Returns:
-        (..., 3) m, world frame.
-    Raises:
-        InputError: if the skeleton lacks the part.
-    """
-    return np.mean(find_striking_surface(skeleton, part, side, tool).compute_line(positions, rotations), axis=0)
 
 
 def _check_input(motion: Motion, threshold: float | None) -> None:
@@ -277,92 +252,6 @@ def _check_input(motion: Motion, threshold: float | None) -> None:
         raise InputError("threshold", f"{threshold}", "a height in metres above the ground")
     if not np.isfinite(motion.root_positions).all() or not np.isfinite(motion.rotations).all():
         raise InputError("motion", "NaN or infinite values", "finite numbers in every frame")
-
-
-@dataclass(frozen=True, eq=False, kw_only=True)
-class _Body:
-    """The body that the part's movement is compared with.
-
-    Attributes:
-        pelvis: (T, 3) m, smoothed, world frame.
-        speed: (T,) m/s of the pelvis over the ground, smoothed.
-        facing: (T,) rad, unwrapped.
-        ground: height of the floor, m.
-        size: leg length, m.
-    """
-
-    pelvis: np.ndarray
-    speed: np.ndarray
-    facing: np.ndarray
-    ground: float
-    size: float
-
-    @staticmethod
-    def from_motion(motion: Motion, positions: np.ndarray) -> "_Body":
-        """Measure the body of a motion with world joint positions (T, J, 3) m."""
-        body = identify_joints(motion.skeleton)
-        # the floor is the height that toes fall below in 2 % of the frames only
-        toes = positions[:, [body.left.toe_or_foot, body.right.toe_or_foot], 2]
-        pelvis = smooth_zero_phase_hann(positions[:, body.hips], motion.fps, _SMOOTHING)
-        path = smooth_zero_phase_hann(pelvis[:, :2], motion.fps, 0.5)
-        facing = np.unwrap(compute_heading_from_positions(motion.skeleton, positions))
-        speed = np.linalg.norm(_differentiate(path, motion.fps), axis=1)
-        return _Body(pelvis=pelvis, speed=speed, facing=facing, ground=float(np.percentile(toes, 2)),
-                     size=measure_leg_length(motion.skeleton))
-
-
-@dataclass(frozen=True, eq=False, kw_only=True)
-class _PartTrajectory:
-    """Smoothed trajectory of the part.
-
-    Attributes:
-        place: (T, 3) m, world frame.
-        velocity: (T, 3) m/s, world frame.
-        height: (T,) m above the ground.
-        speed: (T,) m/s; of head and chest relative to the pelvis, because a jump is faster than the nod that meets the
-            ball.
-        fps: frames per second.
-    """
-
-    place: np.ndarray
-    velocity: np.ndarray
-    height: np.ndarray
-    speed: np.ndarray
-    fps: float
-
-    @staticmethod
-    def from_positions(place: np.ndarray, body: _Body, part: str, fps: float) -> "_PartTrajectory":
-        """Smooth the part's positions (T, 3) m and derive its velocity, height and speed."""
-        smooth = smooth_zero_phase_hann(place, fps, _SMOOTHING)
-        velocity = _differentiate(smooth, fps)
-        relative_velocity = _differentiate(smooth - body.pelvis, fps) if part in ("head", "chest") else velocity
-        return _PartTrajectory(place=smooth, velocity=velocity, height=smooth[:, 2] - body.ground,
-                               speed=np.linalg.norm(relative_velocity, axis=1), fps=fps)
-
-
-def _measure(motion: Motion, part: str, side: str, joint: str | None = None, tool: Tool | None = None,
-             poses: Poses | None = None):
-    """Measure a motion: its body, the part's trajectory, the speed (T,) m/s of the other foot where a foot strikes,
-    else None, and the part's places (T, 3) m.
-    """
-    positions, rotations = forward_kinematics(motion) if poses is None else poses
-    place = compute_strike_place(motion.skeleton, positions, rotations, part=joint or part, side=side, tool=tool)
-    body = _Body.from_motion(motion, positions)
-    trajectory = _PartTrajectory.from_positions(place, body, part, motion.fps)
-    other = _other_foot_speed(motion.skeleton, positions, side, motion.fps) if part == "foot" else None
-    return body, trajectory, other, place
-
-
-def _other_foot_speed(skeleton: Skeleton, positions: np.ndarray, side: str, fps: float) -> np.ndarray:
-    """Compute the speed (T,) m/s of the foot that does not strike."""
-    limb = getattr(identify_joints(skeleton), "left" if side == "right" else "right")
-    place = positions[:, [limb.foot, limb.toe_or_foot]].mean(axis=1)
-    return np.linalg.norm(_differentiate(smooth_zero_phase_hann(place, fps, _SMOOTHING), fps), axis=1)
-
-
-def _differentiate(values: np.ndarray, fps: float) -> np.ndarray:
-    """Differentiate values (T, k) over time by central differences, per second."""
-    return np.gradient(values, axis=0) * fps
 
 
 def _find_peaks(values: np.ndarray) -> list[int]:
@@ -402,7 +291,7 @@ def _find_threshold(height: np.ndarray, peaks: list[int], part: str) -> float:
     return max(least_height, float(0.5 * (tops[cut] + tops[cut + 1])))
 
 
-def _find_spans(trajectory: _PartTrajectory, highs: list[int]) -> list[tuple[int, int]]:
+def _find_spans(trajectory: PartTrajectory, highs: list[int]) -> list[tuple[int, int]]:
     """Find (first, last) of the hit motion around each high frame; overlapping ones are merged."""
     speed, lows = trajectory.speed, [0, *_find_peaks(-trajectory.height), len(trajectory.height) - 1]
     spans: list[tuple[int, int]] = []
@@ -435,8 +324,8 @@ def _find_lowest(speed: np.ndarray, high: int, lows: list[int]) -> int:
     return lows[-1]
 
 
-def _is_hit(span: tuple[int, int], part: str, trajectory: _PartTrajectory, body: _Body, other: np.ndarray
-            | None) -> bool:
+def _is_hit(span: tuple[int, int], part: str, trajectory: PartTrajectory, body: PlayerBody,
+            other: np.ndarray | None) -> bool:
     """Whether the part is faster than a step or an arm's swing at this speed of the body.
 
     Feet that walk reach 2.7 times the body's speed plus half a metre per second, in a run 2.1 times; recorded kicks
@@ -454,7 +343,7 @@ def _is_hit(span: tuple[int, int], part: str, trajectory: _PartTrajectory, body:
     return trajectory.speed[key] > min(3.0 * (pace + 0.5), 2.3 * pace + 2.5)
 
 
-def _build_hit_motion(part: str, side: str, span: tuple[int, int], trajectory: _PartTrajectory, body: _Body,
+def _build_hit_motion(part: str, side: str, span: tuple[int, int], trajectory: PartTrajectory, body: PlayerBody,
                       key: int | None = None) -> HitMotion:
     """Build the hit motion of a span of frames; `key` None: the fastest frame."""
     first, last = span

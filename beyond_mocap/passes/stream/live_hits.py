@@ -16,7 +16,8 @@ import numpy as np
 
 from ...ball.contact import Tool
 from ...motion.motion import Motion, forward_kinematics
-from ..hits import HitMotion, Poses, detect_hit_under_way, detect_hits
+from ..hits import HitMotion, detect_hit_under_way, detect_hits
+from ..part_trajectory import Poses
 from .listener import Listener, StreamFrame, convert_poses
 
 WINDOW = 4.0
