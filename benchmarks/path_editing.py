@@ -18,7 +18,9 @@ from benchmarks.places import CMU_UNIT, DATA, SAMPLE
 from beyond_mocap.base.errors import InputError
 from beyond_mocap.files.bvh import bvh
 from beyond_mocap.motion.motion import resample
-from beyond_mocap.path_editing.path_edit import PathEditSettings, edit_path, prepare_source
+from beyond_mocap.path_editing.path_edit import edit_path
+from beyond_mocap.path_editing.path_edit_settings import PathEditSettings
+from beyond_mocap.path_editing.path_edit_source import prepare_source
 from beyond_mocap.path_editing.path_line import fit_line
 from beyond_mocap.path_editing.path_metrics import measure_path_edit
 

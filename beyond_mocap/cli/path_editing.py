@@ -17,7 +17,9 @@ from .outputs import ProgressReporter, Writer, build_take, check_outputs, choose
 
 if TYPE_CHECKING:
     from ..path_editing.detour import Follower, PathChange
-    from ..path_editing.path_edit import EditedMotion, PathEditSettings, PathEditSource
+    from ..path_editing.path_edit import EditedMotion
+    from ..path_editing.path_edit_settings import PathEditSettings
+    from ..path_editing.path_edit_source import PathEditSource
 
 _COMPLETE_SHARE = 0.95  # share of a path that counts as all of it
 _MAX_ROUNDS = 3  # searches for delays and detours at most
@@ -143,7 +145,8 @@ def _read_ground(options):
 
 def _prepare_source(motion, options):
     """Separate the recording from its own path; return it with the settings."""
-    from ..path_editing.path_edit import PathEditSettings, prepare_source
+    from ..path_editing.path_edit_settings import PathEditSettings
+    from ..path_editing.path_edit_source import prepare_source
 
     settings = PathEditSettings(
         fit="polynomial" if options.degree else "spline", **option_values(PathEditSettings, options, "path_editing")

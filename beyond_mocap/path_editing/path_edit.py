@@ -1,7 +1,7 @@
 """Path editing: a clip follows another path (Gleicher 2001, as described in Path editing §3), and its feet stay
 planted.
 
-`prepare_source` finds a motion's own path and the motion relative to it, once; `edit_path` constructs the motion on a
+`path_edit_source` finds a motion's own path and the motion relative to it, once; `edit_path` constructs the motion on a
 new path, fast enough to repeat it while the path is dragged.
 """
 
@@ -12,14 +12,11 @@ from functools import cached_property
 
 import numpy as np
 
-from ..base.errors import InputError, TimedMessage
-from ..base.settings import collect_defaults, find_setting
+from ..base.errors import TimedMessage
 from ..base.time_series import find_runs
-from ..motion import contacts, quaternion
+from ..motion import quaternion
 from ..motion.foot_plant import PlantResult
-from ..motion.humanoid import compute_heading as facing
-from ..motion.humanoid import identify_joints
-from ..motion.motion import Motion, forward_kinematics
+from ..motion.motion import Motion
 from ..motion.path.arc_length import ArcLength
 from ..motion.path.path import Path
 from ..motion.path.terrain import Terrain
@@ -29,13 +26,11 @@ from . import ground_contact, path_frame, path_time
 from .cycle import cycle_motion
 from .detour import add_detours
 from .foot_planting import LONGEST, Ground, StepScale, plant_feet_on_ground
-from .loops import Loop, find_loops
+from .path_edit_settings import PathEditSettings
+from .path_edit_source import PathEditSource, compute_mean_heading
 from .path_frame import MovingFrame, Residuals
-from .path_time import Ending, PathProfile, Timing
+from .path_time import Ending, Timing
 
-_DEFAULTS = collect_defaults("path_editing")
-ENDS = find_setting("path_editing", "end").choice_names
-_SPEED = find_setting("path_editing", "speed")
 LEAN_SPEEDS = (0.7, 1.5)
 """Metres per second below which a body does not lean into a bend, and from which on it leans fully: walkers lean too,
 on a path as smooth as these."""
@@ -44,91 +39,6 @@ INTO_SLOPE, MOST_FORWARD, SLOPE_SECONDS = 0.45, 0.2, 0.6
 degrees forward at a rise of 10 %, backward going down); seconds over which a slope is averaged."""
 OUT_OF_REACH = 0.03
 """Metres that a foot may be short of its place without a warning."""
-STILL_LENGTH = 0.05
-"""Metres of path below which a motion counts as standing still."""
-
-
-@dataclass(frozen=True, kw_only=True)
-class PathEditSettings:
-    """Settings of a path edit; the settings table describes each of them.
-
-    Attributes:
-        detours: (arc, width, offset to the left) of each detour, metres.
-    Raises:
-        InputError: if a value is unknown or outside its limits.
-    """
-
-    fit: str = _DEFAULTS["fit"]
-    degree: int = _DEFAULTS["degree"]
-    by_arc_length: bool = _DEFAULTS["by_arc_length"]
-    speed: float = _DEFAULTS["speed"]
-    end: str = _DEFAULTS["end"]
-    cycle: bool = _DEFAULTS["cycle"]
-    frame: str = _DEFAULTS["frame"]
-    plant: bool = _DEFAULTS["plant"]
-    lean: bool = _DEFAULTS["lean"]
-    bends: bool = _DEFAULTS["bends"]
-    slopes: bool = _DEFAULTS["slopes"]
-    climbs: bool = _DEFAULTS["climbs"]
-    delay: float = _DEFAULTS["delay"]
-    detours: tuple[tuple[float, float, float], ...] = ()
-
-    def __post_init__(self):
-        path_frame.check_frame(self.frame)
-        if self.end not in ENDS:
-            raise InputError("end of path", str(self.end), " or ".join(ENDS))
-        if self.fit not in path_frame.KINDS:
-            raise InputError("path fit", str(self.fit), " or ".join(path_frame.KINDS))
-        if not _SPEED.least <= self.speed <= _SPEED.most:
-            raise InputError("speed", f"{self.speed:g}", f"a factor from {_SPEED.least:g} to {_SPEED.most:g}")
-        if not 0.0 <= self.delay < 86400.0:
-            raise InputError("delay", f"{self.delay:g} s", "0 s or more, less than a day")
-
-
-@dataclass(frozen=True, eq=False, kw_only=True)
-class PathEditSource:
-    """A motion relative to its own path: everything that does not depend on the new one.
-
-    Attributes:
-        motion: as recorded.
-        standing: (T, 2, 2) bool, contact of left and right, heel and toe.
-        path: the motion's own path; its parameter is seconds.
-        arc: the arc length of that path.
-        moving: the moving frame in every frame.
-        residuals: the motion in the moving frame.
-        frame: the one of FRAMES that they are relative to.
-        humanoid: whether it has feet that can be planted.
-        still: whether it stays in place.
-        sole: metres from the ground to the foremost joint of a flat foot.
-        warnings: for the user.
-    """
-
-    motion: Motion
-    standing: np.ndarray
-    path: Path
-    arc: ArcLength
-    moving: MovingFrame
-    residuals: Residuals
-    frame: str
-    has_legs: bool
-    is_still: bool
-    sole: float = 0.0
-    warnings: tuple[str, ...] = ()
-
-    @cached_property
-    def loops(self) -> tuple[Loop, ...]:
-        """Where the motion can be repeated, lowest cost first; searched on first use."""
-        return find_loops(self.residuals)
-
-    @cached_property
-    def profile(self) -> PathProfile:
-        """Slope and curvature of the motion's own path."""
-        return path_time.build_profile(self.path, self.arc)
-
-    @cached_property
-    def curvature(self) -> np.ndarray:
-        """(T,) 1/m, curvature of the motion's own path over the ground."""
-        return ground_contact.compute_curvature(self.path, np.arange(len(self.motion)) / self.motion.fps)
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -186,58 +96,14 @@ class EditedMotion:
                        constructed=constructed)
 
 
-def prepare_source(motion: Motion, settings: PathEditSettings, standing: np.ndarray | None = None,
-                   path: Path | None = None) -> PathEditSource:
-    """Compute a motion relative to its own path.
-
-    Args:
-        motion: two frames or more.
-        settings: how the path is fitted, and the frame of the residuals.
-        standing: (T, 2, 2) bool, contact of left and right, heel and toe; None: detected
-            (`contacts.detect_heel_toe_contacts`).
-        path: its own path, with seconds from the first frame as parameter; None: fitted.
-    Returns:
-        The source for `edit_path`.
-    Raises:
-        InputError: for fewer than two frames.
-    """
-    if len(motion) < 2:
-        raise InputError("motion", f"{len(motion)} frame", "two frames or more")
-    has_legs, messages = _check_legs(motion)
-    if standing is None:
-        standing = contacts.detect_heel_toe_contacts(motion) if has_legs else np.zeros((len(motion), 2, 2), dtype=bool)
-    if path is None:
-        path = (path_frame.fit_path(motion, standing, settings.fit, settings.degree) if has_legs
-                else _fit_root_path(motion, settings))
-    times = np.arange(len(motion)) / motion.fps
-    arc = ArcLength(path)
-    metres = arc.distance_at(times)
-    is_still = bool(metres[-1] - metres[0] < STILL_LENGTH)
-    moving = path_frame.build_moving_frame(path.at(times), path.at(times, 1), metres, motion.fps,
-                                           _compute_mean_heading(motion, has_legs))
-    place, turned = path_frame.to_moving_frame(settings.frame, moving, motion.root_positions, motion.rotations[:, 0])
-    rotations = motion.rotations.copy()
-    rotations[:, 0] = turned
-    under, up = _measure_own_ground(motion, standing, path, arc=arc, moving=moving,
-                                    metres=metres) if has_legs else _build_flat_ground(len(motion))
-    residuals = Residuals(place=place, rotations=rotations, step=np.diff(metres, prepend=metres[:1]),
-                          standing=np.asarray(standing, bool), frames=np.arange(len(motion), dtype=float),
-                          turn=np.diff(moving.heading, prepend=moving.heading[:1]), under=under, up=up, fps=motion.fps,
-                          skeleton=motion.skeleton)
-    sole = contacts.estimate_recorded_floor(motion)[1] if has_legs else 0.0
-    return PathEditSource(motion=motion, standing=residuals.standing, path=path, arc=arc, moving=moving,
-                          residuals=residuals, frame=settings.frame, has_legs=has_legs, is_still=is_still, sole=sole,
-                          warnings=messages)
-
-
-def edit_path(source: PathEditSource, path: Path, settings: PathEditSettings, ground: Terrain
-              | None = None) -> EditedMotion:
+def edit_path(source: PathEditSource, path: Path, settings: PathEditSettings,
+              ground: Terrain | None = None) -> EditedMotion:
     """Construct the motion of a source on a new path.
 
     On the motion's own path, without planting and leaning, the result is the motion itself.
 
     Args:
-        source: of `prepare_source`.
+        source: the motion relative to its own path.
         path: the new path, world frame.
         settings: timing, feet, detours.
         ground: a mesh that the feet follow; None: the path's own height, level across it.
@@ -253,7 +119,7 @@ def edit_path(source: PathEditSource, path: Path, settings: PathEditSettings, gr
     rows = path_time.resample_residuals(residuals, timing.at)
     at = _compute_parameters(source, path, arc, timing=timing, rows=rows, settings=settings)
     origin, tangent = path.at(at), path.at(at, 1)
-    own = _compute_mean_heading(source.motion, source.has_legs) if source.is_still and path is source.path else None
+    own = compute_mean_heading(source.motion, source.has_legs) if source.is_still and path is source.path else None
     moving = path_frame.build_moving_frame(origin, tangent, timing.arc, residuals.fps, own)
     root, rotations = path_frame.from_moving_frame(source.frame, moving, rows.place, rows.rotations)
     constructed = root, rotations
@@ -297,8 +163,8 @@ def _build_timing(source: PathEditSource, path: Path, arc: ArcLength,
     if settings.cycle and settings.by_arc_length:
         required_length = arc.length
         if profile is not None:
-            required_length = path_time.compute_required_length(residuals, _sample_own_profile(source, residuals),
-                                                                profile, options)
+            required_length = path_time.compute_required_length(residuals, source.sample_profile(residuals), profile,
+                                                                options)
         around = cycle_motion(residuals, required_length, source.loops)
         residuals, transitions, messages = around.residuals, around.transitions, around.messages
     elif settings.cycle:
@@ -306,7 +172,7 @@ def _build_timing(source: PathEditSource, path: Path, arc: ArcLength,
     if source.is_still:
         messages += ("the motion stays in place: it is put at the start of the path",)
     if profile is not None:
-        own = _sample_own_profile(source, residuals)
+        own = source.sample_profile(residuals)
         timing = path_time.build_timing_by_profile(residuals, own, profile, options=options, speed=settings.speed,
                                                    delay=settings.delay, closed=path.closed)
     elif settings.by_arc_length or source.is_still:
@@ -329,17 +195,6 @@ def _repeat_laps(edited: EditedMotion, end: Ending) -> EditedMotion:
     return replace(repeated, standing=standing)
 
 
-def _sample_own_profile(source: PathEditSource, residuals: Residuals) -> PathProfile:
-    """Sample the profile of the motion's own path at every row."""
-    return path_time.sample_profile(source.profile, source.arc.distance_at(residuals.frames / residuals.fps),
-                                    residuals.step * residuals.fps)
-
-
-def _sample_own_slope(source: PathEditSource, rows: Residuals) -> np.ndarray:
-    """Compute the slope (N,) radians of the motion's own path at every row."""
-    return np.interp(rows.frames, np.arange(len(source.moving.slope)), source.moving.slope)
-
-
 def _compute_parameters(source: PathEditSource, path: Path, arc: ArcLength, timing: Timing, rows: Residuals,
                         settings: PathEditSettings) -> np.ndarray:
     """Compute the parameters (N,) of the path; the motion's own path keeps its time exactly."""
@@ -355,7 +210,7 @@ def _apply_lean(source: PathEditSource, rows: Residuals, moving: MovingFrame, ti
     """Lean the body into bends, and its trunk into slopes, beyond what the motion did on its own path."""
     fps = rows.fps
     since = np.diff(timing.arc, prepend=timing.arc[:1])
-    own_slope = _sample_own_slope(source, rows)
+    own_slope = source.sample_slope(rows)
     own_speed = np.column_stack([rows.step * np.cos(own_slope) * fps, np.zeros(len(rows))])
     lean = compute_missing_lean(since * np.cos(moving.slope) * fps, moving.heading, own_speed, turn=rows.turn,
                                 transitions=transitions, fps=fps, upright_speed=LEAN_SPEEDS)
@@ -375,7 +230,7 @@ def _find_strain(source: PathEditSource, path: Path, at: np.ndarray, tangent: np
         return np.zeros(len(rows), dtype=bool), ()
     own = np.interp(rows.frames, np.arange(len(source.curvature)), source.curvature)
     bent = ground_contact.find_tight_bends(path, at, timing.arc, own, rows.fps)
-    risen = ground_contact.find_steep_stretches(tangent, timing.arc, _sample_own_slope(source, rows), rows.fps)
+    risen = ground_contact.find_steep_stretches(tangent, timing.arc, source.sample_slope(rows), rows.fps)
     return bent | risen, ground_contact.report_strain(bent, risen, rows.fps)
 
 
@@ -395,7 +250,7 @@ def _compute_step_scale(source: PathEditSource, rows: Residuals, moving: MovingF
     """Compute the scale of the steps on the new path, with messages where legs cannot follow; free (N,) bool:
     unplanted.
     """
-    own = rows.step * np.cos(_sample_own_slope(source, rows))
+    own = rows.step * np.cos(source.sample_slope(rows))
     scale = path_time.compute_step_scale(np.diff(timing.arc, prepend=timing.arc[:1]) * np.cos(moving.slope), own,
                                          rows.fps)
     if scale is None:
@@ -439,51 +294,3 @@ def _report_missing_ground(ground: Terrain | None, origin: np.ndarray) -> tuple[
     if ground is None or np.isfinite(ground.find_heights(some[:, :2], np.full(len(some), np.inf))[0]).any():
         return ()
     return ("the ground is nowhere under the path, so the path's own height is used: check its place and unit",)
-
-
-def _measure_own_ground(motion: Motion, standing: np.ndarray, path: Path, arc: ArcLength, moving: MovingFrame,
-                        metres: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Measure the ground under the feet on the motion's own path: metres (T, 2) above it, and normals (T, 2, 3) in
-    the frame.
-    """
-    if ground_contact.is_level(path, arc):
-        return _build_flat_ground(len(motion))
-    body = identify_joints(motion.skeleton)
-    joints = [[limb.foot, limb.toe_or_foot] for limb in (body.left, body.right)]
-    feet = forward_kinematics(motion)[0][:, joints]
-    clear = np.zeros((len(motion), 2))
-    surface = ground_contact.build_path_surface(path, arc, metres)
-    found = ground_contact.compute_footing(feet[..., :2], standing, clear, motion.fps, surface)
-    back = quaternion.from_up_angle(-moving.heading)[:, None]
-    return found.height - moving.origin[:, 2:], quaternion.rotate(back, found.normal)
-
-
-def _build_flat_ground(count: int) -> tuple[np.ndarray, np.ndarray]:
-    return np.zeros((count, 2)), np.tile([0.0, 0.0, 1.0], (count, 2, 1))
-
-
-def _check_legs(motion: Motion) -> tuple[bool, tuple[str, ...]]:
-    try:
-        identify_joints(motion.skeleton)
-    except InputError:
-        return False, ("the skeleton has no recognizable legs: feet are not planted, and the body does not lean",)
-    return True, ()
-
-
-def _compute_mean_heading(motion: Motion, has_legs: bool) -> float:
-    """Compute the mean heading of the body in radians, for a path without movement."""
-    if not has_legs:
-        return 0.0
-    headings = facing(motion)
-    return float(np.arctan2(np.sin(headings).mean(), np.cos(headings).mean()))
-
-
-def _fit_root_path(motion: Motion, settings: PathEditSettings) -> Path:
-    """Fit the path of a body without legs: that of its root, at the usual height of its lowest joint."""
-    places, _ = forward_kinematics(motion)
-    line = motion.root_positions.copy()
-    line[:, 2] = contacts.resolve_floor_height(float(np.percentile(places[..., 2].min(axis=1), 2)))
-    times = np.arange(len(line)) / motion.fps
-    if settings.fit == "spline":
-        return path_frame.fit_spline(line, times)
-    return path_frame.fit_polynomial(line, times, settings.degree)

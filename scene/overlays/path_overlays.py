@@ -20,7 +20,8 @@ from . import colours, shapes
 from .prepare import Mesh, build_line_mesh, build_segments_mesh, build_uniform_mesh
 
 if TYPE_CHECKING:
-    from ...beyond_mocap.path_editing.path_edit import EditedMotion, PathEditSource
+    from ...beyond_mocap.path_editing.path_edit import EditedMotion
+    from ...beyond_mocap.path_editing.path_edit_source import PathEditSource
 
 LIFT = 0.012  # metres above the ground
 EVERY = 0.2  # seconds from one faint residual to the next

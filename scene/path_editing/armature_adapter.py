@@ -287,7 +287,7 @@ def read_source(adapter: ArmatureAdapter, scene: bpy.types.Scene, settings) -> O
     Raises:
         InputError: if there is no motion.
     """
-    from ...beyond_mocap.path_editing.path_edit import prepare_source
+    from ...beyond_mocap.path_editing.path_edit_source import prepare_source
 
     uid, options = adapter.body.session_uid, tuple(getattr(settings, name) for name in SOURCE_SETTINGS)
     original = adapter.find_source()[0]

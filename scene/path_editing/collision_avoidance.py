@@ -157,7 +157,7 @@ def describe_result(result: AvoidanceResult) -> list[str]:
 
 def _build_trial(scene, body) -> EditTrial:
     """Build the trial of a body without its previous changes."""
-    from ...beyond_mocap.path_editing.path_edit import PathEditSettings
+    from ...beyond_mocap.path_editing.path_edit_settings import PathEditSettings
 
     edit, carrier = body.beyond_mocap_ride, choose_adapter(body)
     carrier.check()

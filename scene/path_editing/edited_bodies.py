@@ -98,7 +98,8 @@ def update_motion(scene: bpy.types.Scene, body: bpy.types.Object, force: bool = 
     Raises:
         InputError: if it cannot be computed at present; the motion stays as it was.
     """
-    from ...beyond_mocap.path_editing.path_edit import PathEditSettings, edit_path
+    from ...beyond_mocap.path_editing.path_edit import edit_path
+    from ...beyond_mocap.path_editing.path_edit_settings import PathEditSettings
 
     global _counter
     edit, carrier = body.beyond_mocap_ride, choose_adapter(body)
@@ -174,7 +175,7 @@ def start_path_edit(
     Raises:
         InputError: if the armature cannot be edited; nothing is changed.
     """
-    from ...beyond_mocap.path_editing.path_edit import PathEditSettings
+    from ...beyond_mocap.path_editing.path_edit_settings import PathEditSettings
 
     scene, edit, carrier = context.scene, body.beyond_mocap_ride, choose_adapter(body)
     if edit.on:
@@ -240,7 +241,7 @@ def create_new_curve(
     Raises:
         InputError: if the motion cannot follow it; nothing is changed.
     """
-    from ...beyond_mocap.path_editing.path_edit import PathEditSettings
+    from ...beyond_mocap.path_editing.path_edit_settings import PathEditSettings
 
     scene, edit = context.scene, body.beyond_mocap_ride
     before = edit.curve

@@ -63,7 +63,7 @@ class BeyondMocapRide(bpy.types.PropertyGroup):
 
 def collect_options(edit: BeyondMocapRide) -> dict:
     """Collect the settings as arguments of the core's `PathEditSettings`."""
-    from ...beyond_mocap.path_editing.path_edit import PathEditSettings
+    from ...beyond_mocap.path_editing.path_edit_settings import PathEditSettings
 
     options = read_property_values(PathEditSettings, edit, "path_editing")
     options["speed"], options["delay"] = (round(options[name], 6) for name in ("speed", "delay"))  # single precision

@@ -14,7 +14,8 @@ from beyond_mocap.motion.retargeting.adult import build_adult_skeleton
 from beyond_mocap.path_editing import cycle
 from beyond_mocap.path_editing.cycle import KEPT_SCALE, MOST_SCALE, SAME_LENGTH, cycle_motion
 from beyond_mocap.path_editing.loops import find_loops, measure_stride
-from beyond_mocap.path_editing.path_edit import PathEditSettings, prepare_source
+from beyond_mocap.path_editing.path_edit_settings import PathEditSettings
+from beyond_mocap.path_editing.path_edit_source import prepare_source
 from beyond_mocap.path_editing.path_frame import Residuals
 from beyond_mocap.synthetic.gait import build_gait
 

@@ -5,7 +5,9 @@ import pytest
 
 from beyond_mocap.base.errors import InputError
 from beyond_mocap.motion.motion import Motion, forward_kinematics
-from beyond_mocap.path_editing.path_edit import PathEditSettings, edit_path, prepare_source
+from beyond_mocap.path_editing.path_edit import edit_path
+from beyond_mocap.path_editing.path_edit_settings import PathEditSettings
+from beyond_mocap.path_editing.path_edit_source import prepare_source
 from beyond_mocap.path_editing.path_line import fit_line
 from beyond_mocap.synthesis.quality.movement import list_foot_joints, measure_contact_speeds
 from beyond_mocap.synthetic.gait import build_gait

@@ -5,7 +5,9 @@ import pytest
 
 from beyond_mocap.base.errors import InputError
 from beyond_mocap.motion.path.arc_length import ArcLength
-from beyond_mocap.path_editing.path_edit import PathEditSettings, edit_path, prepare_source
+from beyond_mocap.path_editing.path_edit import edit_path
+from beyond_mocap.path_editing.path_edit_settings import PathEditSettings
+from beyond_mocap.path_editing.path_edit_source import prepare_source
 from beyond_mocap.path_editing.path_line import fit_line
 from beyond_mocap.path_editing.path_metrics import measure_path_edit
 from beyond_mocap.synthetic.gait import build_gait

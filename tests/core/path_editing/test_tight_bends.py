@@ -5,7 +5,9 @@ import pytest
 
 from beyond_mocap.motion.motion import forward_kinematics
 from beyond_mocap.path_editing.ground_contact import compute_curvature, compute_free_share
-from beyond_mocap.path_editing.path_edit import PathEditSettings, edit_path, prepare_source
+from beyond_mocap.path_editing.path_edit import edit_path
+from beyond_mocap.path_editing.path_edit_settings import PathEditSettings
+from beyond_mocap.path_editing.path_edit_source import prepare_source
 from beyond_mocap.path_editing.path_line import fit_line
 from beyond_mocap.synthetic.gait import build_gait
 
