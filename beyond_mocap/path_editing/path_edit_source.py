@@ -39,8 +39,8 @@ class PathEditSource:
         moving: the moving frame in every frame.
         residuals: the motion in the moving frame.
         frame: the one of FRAMES that they are relative to.
-        humanoid: whether it has feet that can be planted.
-        still: whether it stays in place.
+        has_legs: whether it has feet that can be planted.
+        is_still: whether it stays in place.
         sole: metres from the ground to the foremost joint of a flat foot.
         warnings: for the user.
     """

@@ -30,12 +30,13 @@ BEFORE = {}  # curve and body before the hand moved them
 
 def write_long_walk():
     """The sample's walk repeated on a straight line until it has 600 frames, as a BVH file."""
-    bvh, ride = import_module("beyond_mocap.files.bvh.bvh"), import_module("beyond_mocap.path_editing.path_edit")
-    line = import_module("beyond_mocap.path_editing.path_line")
+    bvh = import_module("beyond_mocap.files.bvh.bvh")
+    modules = ("path_edit", "path_edit_settings", "path_edit_source", "path_line")
+    edit, edit_settings, edit_source, line = (import_module(f"beyond_mocap.path_editing.{name}") for name in modules)
     clip = bvh.read_bvh(copy_sample() / "library" / "walking_1_2.bvh", 0.01)
-    wishes = ride.PathEditSettings(cycle=True, plant=False, lean=False)
+    wishes = edit_settings.PathEditSettings(cycle=True, plant=False, lean=False)
     straight = line.fit_line(np.array([[0.0, 0, 0], [40.0, 0, 0]]), "line")
-    ridden = ride.edit_path(ride.prepare_source(clip.motion, wishes), straight, wishes)
+    ridden = edit.edit_path(edit_source.prepare_source(clip.motion, wishes), straight, wishes)
     rate = round(clip.motion.fps / 30.0)
     motion = ridden.motion
     assert len(motion) >= FRAMES * rate, f"only {len(motion)} frames at {motion.fps} per second"

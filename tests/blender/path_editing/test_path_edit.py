@@ -534,10 +534,10 @@ def test_button_and_function_give_the_same(scene, part, core):
     action, curve = part("core.action"), part("path_editing.curve")
     body, round_about = walker(), circle()
     motion = action.read_motion(body, scene)
-    recipe = core("path_editing.path_edit")
-    settings = recipe.PathEditSettings(speed=1.25, lean=False, cycle=True)
-    wanted = recipe.edit_path(recipe.prepare_source(motion, settings), curve.read_curve(scene, round_about).to_path(),
-                              settings).motion
+    settings = core("path_editing.path_edit_settings").PathEditSettings(speed=1.25, lean=False, cycle=True)
+    source = core("path_editing.path_edit_source").prepare_source(motion, settings)
+    path = curve.read_curve(scene, round_about).to_path()
+    wanted = core("path_editing.path_edit").edit_path(source, path, settings).motion
     body.beyond_mocap_ride.speed, body.beyond_mocap_ride.lean, body.beyond_mocap_ride.cycle = 1.25, False, True
     choose(body, round_about)
     bpy.ops.beyond_mocap.edit_path()

@@ -17,12 +17,12 @@ SWITCHES = ("path_source", "path_new", "path_trackers", "path_residuals", "path_
 def ridden(core):
     """A walk on a bend: source, ridden motion, path."""
     clip = core("files.bvh.bvh").read_bvh(SOURCE / "sample_blend" / "library" / "walking_1_2.bvh").motion
-    ride = core("path_editing.path_edit")
-    source = ride.prepare_source(clip, ride.PathEditSettings())
+    settings = core("path_editing.path_edit_settings").PathEditSettings()
+    source = core("path_editing.path_edit_source").prepare_source(clip, settings)
     turn = np.linspace(0.0, 2.5, 80)
     line = np.stack([4.0 * np.sin(turn), 4.0 - 4.0 * np.cos(turn), 0.3 * turn], axis=1)
     path = core("path_editing.path_line").fit_line(line, "bend")
-    return source, ride.edit_path(source, path, ride.PathEditSettings()), path
+    return source, core("path_editing.path_edit").edit_path(source, path, settings), path
 
 
 @pytest.fixture
@@ -129,9 +129,10 @@ def test_only_what_was_laid_anew_is_made_anew(rides, shown, core):
     switch(*SWITCHES)
     before = {item.key for item in rides.list_items(bpy.context.scene)}
     assert {item.key for item in rides.list_items(bpy.context.scene)} == before
-    ride = core("path_editing.path_edit")
+    settings = core("path_editing.path_edit_settings").PathEditSettings()
     old, = shown
-    shown.append(replace(old, edited=ride.edit_path(old.source, old.path, ride.PathEditSettings()), number=2))
+    edited = core("path_editing.path_edit").edit_path(old.source, old.path, settings)
+    shown.append(replace(old, edited=edited, number=2))
     changed = before - {item.key for item in rides.list_items(bpy.context.scene)}
     assert changed and all(key[0] is not old.source and key[0] != "" for key in changed)
 
