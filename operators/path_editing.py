@@ -137,8 +137,8 @@ detours of all or of two or more selected bodies"""
     needs = "Let an armature follow a path first (Edit Path)", lambda context: bool(list_edited_bodies(context.scene))
 
     def do(self, context):
-        from ..beyond_mocap.path_editing.collision_avoidance import Limits
         from ..beyond_mocap.path_editing.detour import PathChange
+        from ..beyond_mocap.path_editing.remedies import Limits
 
         bodies = list_target_bodies(context)
         bodies = bodies if len(bodies) > 1 else list_edited_bodies(context.scene)

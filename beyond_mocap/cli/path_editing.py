@@ -231,8 +231,9 @@ def _avoid_collisions(
     Returns:
         The new settings, and one line for each change and for each collision that remains.
     """
-    from ..path_editing.collision_avoidance import Limits, resolve_collisions
+    from ..path_editing.collision_avoidance import resolve_collisions
     from ..path_editing.path_edit import edit_path
+    from ..path_editing.remedies import Limits
 
     # Search with unplanted feet, which is faster and moves the root the same way.
     edited, limits = edit_path(source, path, replace(settings, plant=False), ground), Limits(distance)

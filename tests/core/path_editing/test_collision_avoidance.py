@@ -4,10 +4,11 @@ import numpy as np
 import pytest
 
 from beyond_mocap.motion.path.arc_length import ArcLength
-from beyond_mocap.path_editing.collision_avoidance import Limits, resolve_collisions
+from beyond_mocap.path_editing.collision_avoidance import resolve_collisions
 from beyond_mocap.path_editing.collisions import find_collisions
 from beyond_mocap.path_editing.detour import Follower, PathChange, add_detours
 from beyond_mocap.path_editing.path_line import fit_line
+from beyond_mocap.path_editing.remedies import Limits
 
 FPS = 30.0
 
