@@ -16,10 +16,11 @@ from ..base.errors import InputError
 from ..motion.hand import Hand, build_hand
 from ..motion.motion import Motion
 from .model.model import BallMarker, MarkerModel
-from .reconstruct import Reconstruction, ReconstructSettings, find_marker_set, move_trial_down, prepare_trial
+from .reconstruct import Reconstruction, ReconstructSettings, move_trial_down
 from .release.release import Release, ReleaseSettings, estimate_release, estimate_usual_place
 from .release.throwing_hand import HandBall, fit_hand_ball
 from .trial import MarkerTrial
+from .trial_preparation import find_marker_set, prepare_trial
 
 _MIN_THROWS = 2
 _MAX_MISFIT = 0.006  # metres, median distance of the markers from the sphere, above which grips differ too much
@@ -102,7 +103,8 @@ def _estimate_again(throw: ReconstructedThrow, ball: HandBall, count: int, setti
     joint = throw.model.skeleton.index(f"{side.capitalize()}Hand")
     model = replace(throw.model, ball=BallMarker(label, joint, (x, y, z), ball.radius))
     trial = throw.read()
-    trial = move_trial_down(prepare_trial(trial, find_marker_set(trial, throw.model, settings)), throw.lowered_by)
+    marker_set = find_marker_set(trial, throw.model, settings.marker_set)
+    trial = move_trial_down(prepare_trial(trial, marker_set), throw.lowered_by)
     try:
         release = estimate_release(trial, throw.motion, ReleaseSettings(label, ball.radius, side, settings.ball,
                                                                         centre=(x, y, z)))

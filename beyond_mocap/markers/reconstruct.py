@@ -19,12 +19,19 @@ from ..base.errors import InputError, UserCancelledError
 from ..base.settings import collect_defaults, find_setting
 from ..motion.motion import Motion
 from ..synthesis.one_thread import limit_to_one_thread
-from .cleaning.clean import CleaningResult, clean_trial
+from .cleaning.clean import CleaningResult
 from .model.model import MarkerModel
 from .pose.pose import HeldBall, PoseSettings, PoseSolution, solve_poses
-from .pose.residuals import collect_markers, measure_floor
+from .pose.residuals import measure_floor, measure_marker_visibility
 from .reconstruction_figures import collect_figures, describe_foot_slide
-from .trial import MarkerTrial, format_some, resample_evenly
+from .trial import MarkerTrial, format_some
+from .trial_preparation import (
+    check_model_fits,
+    check_prepared_trial,
+    clean_prepared_trial,
+    find_marker_set,
+    prepare_trial,
+)
 
 if TYPE_CHECKING:
     from .release.release import Release
@@ -33,7 +40,6 @@ _DEFAULTS = collect_defaults("markers")
 FILTERS = find_setting("markers", "filter").choice_names
 RELEASES = find_setting("markers", "release").choice_names
 _SMOOTHNESS = find_setting("markers", "smoothness")
-MIN_MARKER_SHARE = 0.5  # share of a model's markers that a trial must contain
 _REPORTED_FLOOR_HEIGHT = 0.02  # metres from height 0 beyond which the floor height is reported
 # Mean residuals in metres above which the fit is reported as poor: over all markers, and of one marker.
 _POOR_MEAN_RESIDUAL, _POOR_MARKER_RESIDUAL = 0.015, 0.04
@@ -160,19 +166,19 @@ def _reconstruct_on_one_thread(trial, static, model, settings: ReconstructSettin
                                cancelled) -> Reconstruction:
     """Run `reconstruct` on a single thread."""
     with monitor.time_step("clean", 0.1):
-        marker_set = find_marker_set(trial, model, settings)
+        marker_set = find_marker_set(trial, model, settings.marker_set)
         visible, still = (None if one is None else prepare_trial(one, marker_set) for one in (trial, static))
         if model is not None:
-            _check_model_fits(model, visible)
-        monitor.add_warnings(_check_trial(visible, still, marker_set, model))
-        cleaned = _clean_trial(visible, marker_set, model, monitor.build_inner_progress(0.0, 0.1), cancelled)
+            check_model_fits(model, visible)
+        monitor.add_warnings(check_prepared_trial(visible, still, marker_set, model))
+        cleaned = clean_prepared_trial(visible, marker_set, model, monitor.build_inner_progress(0.0, 0.1), cancelled)
         # long filled gaps are for display, not evidence for the pose
         clean_markers, evidence = cleaned.trial, cleaned.build_pose_trial()
         monitor.add_warnings(cleaned.report.lines)
     with monitor.time_step("model", 0.45):
         if model is None:
-            still = None if still is None else _clean_trial(still, marker_set, None, None, cancelled).build_pose_trial()
-            model = _calibrate_model(marker_set, evidence, still, monitor.build_inner_progress(0.1, 0.45), cancelled)
+            inner_progress = monitor.build_inner_progress(0.1, 0.45)
+            model = _calibrate_model(marker_set, evidence, still, inner_progress, cancelled)
             monitor.add_warnings(model.notes)
     with monitor.time_step("pose", 0.85):
         solved = _solve_pose(model, evidence, marker_set, settings=settings, monitor=monitor, cancelled=cancelled)
@@ -233,68 +239,6 @@ class _RunMonitor:
             raise UserCancelledError("cancelled")
 
 
-def find_marker_set(trial: MarkerTrial, model: MarkerModel | None, settings: ReconstructSettings):
-    """Find the marker set of a trial.
-
-    Args:
-        trial: the recorded markers.
-        model: a given model, or None.
-        settings: the options; a chosen marker set wins.
-    Returns:
-        The chosen set, the model's own or the shipped one that fits; None for a model of a set that is not shipped.
-    Raises:
-        InputError: if no shipped set fits the labels.
-    """
-    if settings.marker_set is not None:
-        return settings.marker_set
-    from .files.marker_set_text import read_shipped_sets
-    from .model.marker_set import choose_marker_set
-
-    sets = read_shipped_sets()
-    if model is not None:
-        return next((one for one in sets if one.name == model.set_name), None)
-    try:
-        return choose_marker_set(trial.labels, sets)
-    except InputError as error:
-        raise InputError(trial.name, str(error)) from None  # labels carry no file name
-
-
-def apply_set_labels(trial: MarkerTrial, marker_set) -> MarkerTrial:
-    """Return the trial with the set's own labels; unchanged if `marker_set` is None."""
-    from .model.marker_set import convert_labels
-
-    return trial if marker_set is None else convert_labels(trial, marker_set)
-
-
-def collect_clusters(marker_set, model: MarkerModel | None, trial: MarkerTrial) -> dict[str, tuple[str, ...]]:
-    """Collect the clusters of markers that each segment carries.
-
-    Args:
-        marker_set: the marker set, or None to use the clusters of the model.
-        model: the model; needed if `marker_set` is None.
-        trial: the recorded markers.
-    Returns:
-        Segment name -> labels of its markers that the trial contains.
-    """
-    if marker_set is not None:
-        return marker_set.select_clusters(trial.labels)
-    names = model.skeleton.names
-    found = {names[joint]: tuple(model.markers[i] for i in rows if model.markers[i] in trial.labels)
-             for joint, rows in model.collect_clusters().items()}
-    return {name: labels for name, labels in found.items() if labels}
-
-
-def _check_trial(trial, still, marker_set, model) -> tuple[str, ...]:
-    """Report missing and unused markers; raise InputError for mirrored markers or the static of another person."""
-    from .checks import check_trial, report_unused
-
-    clusters = collect_clusters(marker_set, model, trial)
-    others = () if marker_set is None else (*marker_set.ball, *marker_set.other)
-    lacking = () if marker_set is None or model is not None else marker_set.list_missing(trial.labels)
-    missing = [f"markers of the set {marker_set.name} are missing: {format_some(lacking)}"] if lacking else []
-    return (*missing, *report_unused(trial, clusters, others), *check_trial(trial, still, clusters, model))
-
-
 def build_model(trial: MarkerTrial, static: MarkerTrial | None, settings: ReconstructSettings = ReconstructSettings(),
                 progress: Progress | None = None, cancelled: Callable[[], bool] | None = None) -> MarkerModel:
     """Build the model alone, as `reconstruct` does.
@@ -310,29 +254,19 @@ def build_model(trial: MarkerTrial, static: MarkerTrial | None, settings: Recons
     Raises:
         InputError, UserCancelledError: as `reconstruct`.
     """
-    marker_set = find_marker_set(trial, None, settings)
+    marker_set = find_marker_set(trial, None, settings.marker_set)
     visible, still = (None if one is None else prepare_trial(one, marker_set) for one in (trial, static))
-    _check_trial(visible, still, marker_set, None)
-    clean_markers, still = (None if one is None else _clean_trial(one, marker_set, None, None,
-                                                                  cancelled).build_pose_trial()
-                            for one in (visible, still))
-    return _calibrate_model(marker_set, clean_markers, still, progress, cancelled)
-
-
-def prepare_trial(trial: MarkerTrial, marker_set) -> MarkerTrial:
-    """Return the trial with the set's labels and evenly spaced frames."""
-    return resample_evenly(apply_set_labels(trial, marker_set))
-
-
-def _clean_trial(trial: MarkerTrial, marker_set, model, progress, cancelled) -> CleaningResult:
-    """Clean a trial that has the set's labels."""
-    return clean_trial(trial, collect_clusters(marker_set, model, trial), progress=progress, cancelled=cancelled)
+    check_prepared_trial(visible, still, marker_set, None)
+    evidence = clean_prepared_trial(visible, marker_set, None, cancelled=cancelled).build_pose_trial()
+    return _calibrate_model(marker_set, evidence, still, progress, cancelled)
 
 
 def _calibrate_model(marker_set, trial, still, progress, cancelled) -> MarkerModel:
-    """Calibrate the model; on failure add the markers that the static trial lacks to the message."""
+    """Clean the static trial and calibrate the model; on failure add the markers that it lacks to the message."""
     from .model.calibrate import calibrate
 
+    if still is not None:
+        still = clean_prepared_trial(still, marker_set, None, cancelled=cancelled).build_pose_trial()
     try:
         return calibrate(marker_set, trial, still, progress=progress, cancelled=cancelled)
     except InputError as error:
@@ -340,15 +274,6 @@ def _calibrate_model(marker_set, trial, still, progress, cancelled) -> MarkerMod
         if not lacking:
             raise
         raise InputError(still.name, f"{error}; markers missing in it: {format_some(lacking)}") from None
-
-
-def _check_model_fits(model: MarkerModel, trial: MarkerTrial) -> None:
-    """Raise InputError if the trial contains fewer than half of the model's markers."""
-    lacking = [label for label in model.markers if label not in trial.labels]
-    if len(lacking) > (1.0 - MIN_MARKER_SHARE) * len(model.markers):
-        found = f"has {len(model.markers) - len(lacking)} of the model's {len(model.markers)} markers"
-        raise InputError(trial.name, f"{found}, not {format_some(lacking)}", "a trial with the model's markers",
-                         "choose another model, or the marker set that has these labels")
 
 
 def _solve_pose(model: MarkerModel, trial: MarkerTrial, marker_set, settings, monitor: _RunMonitor,
@@ -414,22 +339,6 @@ def _filter_motion(solved: PoseSolution, model: MarkerModel, trial: MarkerTrial,
         return motion, None
     planted = filter_foot_plants(motion)
     return planted.motion, planted.held
-
-
-def measure_marker_visibility(model: MarkerModel, trial: MarkerTrial) -> np.ndarray:
-    """Measure which share of each joint's own markers is visible.
-
-    Args:
-        model: the model with M markers on J joints.
-        trial: the recorded markers, T frames.
-    Returns:
-        (T, J) shares, 0 to 1; 1 for joints that carry no marker.
-    """
-    seen = np.isfinite(collect_markers(model, trial)).all(axis=-1)
-    shares = np.ones((len(trial), len(model.skeleton)))
-    for joint, rows in model.collect_clusters().items():
-        shares[:, joint] = seen[:, rows].mean(axis=1)
-    return shares
 
 
 def _has_legs(motion: Motion) -> bool:

@@ -17,15 +17,9 @@ from pathlib import Path
 from ..base.errors import BeyondMocapError, InputError, UserCancelledError
 from .checks import check_trial
 from .model.model import MarkerModel
-from .reconstruct import (
-    Reconstruction,
-    ReconstructSettings,
-    apply_set_labels,
-    build_model,
-    find_marker_set,
-    reconstruct,
-)
+from .reconstruct import Reconstruction, ReconstructSettings, build_model, reconstruct
 from .trial import MarkerTrial
+from .trial_preparation import apply_set_labels, find_marker_set
 
 SUFFIXES = (".c3d", ".trc")
 _STATIC = re.compile(r"static|calib|(^|[^a-z])cal([^a-z]|$)|[tna][-_ ]?pose|standing", re.IGNORECASE)
@@ -181,7 +175,7 @@ def _choose_static(one: Recording, trial: MarkerTrial, statics, settings):
     """
     if not statics:
         return None, ""
-    marker_set = find_marker_set(trial, None, settings)
+    marker_set = find_marker_set(trial, None, settings.marker_set)
     labeled_trial = apply_set_labels(trial, marker_set)
     required = set(labeled_trial.labels) & set(marker_set.labels)
     candidates, note = [], ""

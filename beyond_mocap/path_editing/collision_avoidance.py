@@ -1,10 +1,10 @@
 """Collision avoidance: bodies on several paths wait a little at their start, or take a detour around each other.
 
 A change costs seconds of waiting and metres to the side. The search takes the earliest collision and tries every remedy
-that one of the two bodies (or both, each by half, as people do who meet head on) could apply (`remedies`), by the smallest
-amount that resolves it. The few best sets of changes are kept and continued until none has a collision left that can be
-resolved. Finally every change is reduced as much as the others allow. All of it is arithmetic on the same numbers in
-the same order: the same bodies get the same changes.
+that one of the two bodies (or both, each by half, as people do who meet head on) could apply, by the smallest amount
+that resolves it (`remedies`). The few best sets of changes are kept and continued until none has a collision left that
+can be resolved. Finally every change is reduced as much as the others allow. All of it is arithmetic on the same
+numbers in the same order: the same bodies get the same changes.
 """
 
 from __future__ import annotations

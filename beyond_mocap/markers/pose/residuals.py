@@ -162,3 +162,19 @@ def compute_marker_weights(joint: np.ndarray, places: np.ndarray, seen: np.ndarr
         ratio = own / deviation
     counted = np.where(np.isfinite(ratio), np.minimum(ratio, 1.0), 1.0)
     return np.where(np.isfinite(seen).all(axis=-1), counted, 0.0)
+
+
+def measure_marker_visibility(model: MarkerModel, trial: MarkerTrial) -> np.ndarray:
+    """Measure which share of each joint's own markers is visible.
+
+    Args:
+        model: the model with M markers on J joints.
+        trial: the recorded markers, T frames.
+    Returns:
+        (T, J) shares, 0 to 1; 1 for joints that carry no marker.
+    """
+    seen = np.isfinite(collect_markers(model, trial)).all(axis=-1)
+    shares = np.ones((len(trial), len(model.skeleton)))
+    for joint, rows in model.collect_clusters().items():
+        shares[:, joint] = seen[:, rows].mean(axis=1)
+    return shares
