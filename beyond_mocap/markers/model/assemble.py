@@ -21,7 +21,8 @@ from ...motion.skeleton import Skeleton
 from ..cleaning.cluster_shape import compute_mean_shape, compute_medians, compute_quantile
 from ..rigid_fit import RigidFit, compute_mean_rotation, fit_rigid, place_points, to_model_frame
 from ..trial import MarkerTrial
-from .centres import JointCentres, predict_centres
+from .centres import predict_centres
+from .joint_centres import JointCentres
 from .marker_set import MarkerSet
 from .model import MarkerModel, build_freedom
 from .template import JOINTS, PARENTS, SCAPULAE
