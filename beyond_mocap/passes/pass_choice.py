@@ -18,8 +18,20 @@ from ..ball.contact import convert_to_world
 from ..base.errors import InputError
 from ..base.vectors import arctan2, unit_vectors
 from ..motion import quaternion
-from . import pass_problem as pass_court
-from .pass_problem import Link, NaturalFlights, PassProblem, Site
+from . import pass_cost
+from .pass_problem import (
+    ON_TARGET,
+    SAMPLE_TIMES,
+    Link,
+    NaturalFlights,
+    PassProblem,
+    Site,
+    compute_arrivals,
+    compute_spin,
+    limit_launch,
+    rotate_about_up,
+    simulate_flights,
+)
 from .pass_scene import GROUND, RECEIVE, Pass
 from .strike_choice import StrikeMoments, compute_natural_launch
 
@@ -134,12 +146,12 @@ def _select_options(problem: PassProblem, number: int, site: Site, random: np.ra
     toward = problem.find_target(number)
     moments, facing = _combine_headings(problem, _select_possible(problem, number, site), site, toward)
     starts, velocities = compute_natural_launch(moments, site.place, facing, problem.ball.radius)
-    cost = pass_court.compute_moment_cost(moments, facing, problem.find_origin(number) - site.place)
+    cost = pass_cost.compute_moment_cost(moments, facing, problem.find_origin(number) - site.place)
     if site.requested is None:
         cost += 0.3 * np.linalg.norm(velocities, axis=1)
     else:
-        trajectories = simulate_trajectories(starts, velocities, None, problem.ball, pass_court.SAMPLE_TIMES)
-        cost += pass_court.measure_misses(*trajectories, toward, site.requested.bounces)
+        trajectories = simulate_trajectories(starts, velocities, None, problem.ball, SAMPLE_TIMES)
+        cost += pass_cost.measure_misses(*trajectories, toward, site.requested.bounces)
     keys = [(site.player, moments.hits[which].clip, moments.hits[which].hit.first) for which in moments.which]
     # one random number per hit motion, drawn in sorted order: results do not depend on order of moments
     random_costs = dict(zip(sorted(set(keys)), random.uniform(0.0, RANDOM_COST, len(set(keys)))))
@@ -236,23 +248,22 @@ def _solve_flights(problem: PassProblem, number: int, options: _Options, after: 
                    seconds: np.ndarray) -> _Flights:
     """Solve flights from `option` (N,) that take `seconds` (N,), and compute their costs."""
     site, one, receiver = problem.sites[number], problem.passes[number], problem.sites[number + 1]
-    natural = pass_court.limit_launch(options.compute_velocities(), site.kind)
+    natural = limit_launch(options.compute_velocities(), site.kind)
     starts = options.compute_centres(site, unit_vectors(natural), problem.ball.radius)[option]
     target = problem.place_ball(number + 1, after, unit_vectors(-natural[0] * [1.0, 1.0, 0.0]))
-    spin = pass_court.compute_spin(starts, target, seconds, problem.ball, site.kind)
+    spin = compute_spin(starts, target, seconds, problem.ball, site.kind)
     aimed = solve_launches(starts, target, problem.ball, seconds=seconds, bounces=one.bounces, spin=spin,
                            fastest=problem.find_fastest(number))
     flights = (starts, aimed.velocity, spin, seconds)
-    trajectories, arriving = pass_court.simulate_flights(*flights, problem.ball), pass_court.compute_arrivals(*flights,
-            problem.ball)
+    trajectories, arriving = simulate_flights(*flights, problem.ball), compute_arrivals(*flights, problem.ball)
     cost = options.cost[option] + np.linalg.norm(aimed.velocity - natural[option], axis=1)
     cost += problem.compute_blocked_cost(number, trajectories).max(axis=1, initial=0.0)
     for near in (site, receiver):
-        tall = near.size * pass_court.TRUNK_TO.get(near.part, pass_court.TRUNK_HEIGHT)
-        cost += pass_court.compute_trunk_cost(trajectories, problem.ball.radius, near.place, tall)
-    cost += pass_court.compute_push_cost(arriving, after.velocity, _push_direction(receiver, after))
-    cost += pass_court.compute_rise_cost(arriving) + pass_court.compute_travel_cost(seconds, site.kind)
-    is_possible = aimed.possible & (aimed.miss <= pass_court.ON_TARGET)
+        tall = near.size * pass_cost.TRUNK_TO.get(near.part, pass_cost.TRUNK_HEIGHT)
+        cost += pass_cost.compute_trunk_cost(trajectories, problem.ball.radius, near.place, tall)
+    cost += pass_cost.compute_push_cost(arriving, after.velocity, _push_direction(receiver, after))
+    cost += pass_cost.compute_rise_cost(arriving) + pass_cost.compute_travel_cost(seconds, site.kind)
+    is_possible = aimed.possible & (aimed.miss <= ON_TARGET)
     # impossible flights, and those that hit the net, cost infinitely much
     cost = np.where(is_possible & problem.clears_net(trajectories), cost, np.inf)
     return _Flights(option=option, starts=starts, target=target, seconds=seconds, velocity=aimed.velocity, cost=cost,
@@ -262,7 +273,7 @@ def _solve_flights(problem: PassProblem, number: int, options: _Options, after: 
 def _push_direction(site: Site, link: Link) -> np.ndarray:
     """Direction (3,) in which the part pushes the ball: as it moves; a receiver yields and has the ball in front."""
     own = [0.8, 0.0, 0.6] if site.kind == RECEIVE else link.moment.part_states.velocity[0]
-    return pass_court.rotate_about_up(np.array([own]), link.facing)[0]
+    return rotate_about_up(np.array([own]), link.facing)[0]
 
 
 def _explain_refusal(problem: PassProblem, number: int, flights: _Flights) -> InputError:
@@ -279,7 +290,7 @@ def _explain_refusal(problem: PassProblem, number: int, flights: _Flights) -> In
     unlimited = solve_launches(flights.starts[:1], flights.target, problem.ball, seconds, one.bounces)
     speed, fastest = float(np.linalg.norm(unlimited.velocity[0])), problem.find_fastest(number)
     found, expected = f"no flight of {far:.1f} m{within} with {bounces}", f"one that a human can give by {part}"
-    if unlimited.miss[0] <= pass_court.ON_TARGET and speed > fastest:
+    if unlimited.miss[0] <= ON_TARGET and speed > fastest:
         found = f"a flight of {far:.1f} m{within} with {bounces} takes {speed:.0f} m/s"
         expected = f"up to {fastest:.0f} m/s by {part}"
     return InputError(problem.describe_pass(number), found, expected,
