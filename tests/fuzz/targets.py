@@ -21,7 +21,7 @@ from beyond_mocap.markers.files.marker_set_text import read_marker_set
 from beyond_mocap.markers.files.model_json import read_model
 from beyond_mocap.match.folder import read_state
 from beyond_mocap.match.player_file import read_player
-from beyond_mocap.motion.retargeting.retarget import read_bone_map
+from beyond_mocap.motion.retargeting.joint_pairs import read_bone_map
 from beyond_mocap.motion.track import clean_track
 from beyond_mocap.passes.scene_json import read_scene
 from beyond_mocap.path_editing.path_line import read_curve

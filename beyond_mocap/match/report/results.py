@@ -329,3 +329,15 @@ def _find_other_player(players: Sequence[PlayerResult], player: PlayerResult, ti
 def _find_value(player: PlayerResult, figure: str, time: float) -> float:
     row, column = round(time - player.start), player.per_second.get(figure, ())
     return float(column[row]) if 0 <= row < len(column) else np.nan
+
+
+def find_shared_warnings(players: Sequence[PlayerResult]) -> tuple[str, ...]:
+    """Find the warnings that all reports share: they are about the library, not a player; none for a single player."""
+    warnings = [select_own_warnings(player, ()) for player in players if player.report]
+    return tuple(line for line in warnings[0] if all(line in other for other in warnings)) if len(warnings) > 1 else ()
+
+
+def select_own_warnings(player: PlayerResult, shared: tuple[str, ...]) -> tuple[str, ...]:
+    """Select a player's warnings, each once, without those in `shared`."""
+    lines = dict.fromkeys(map(str, player.report.get("warnings") or ()))
+    return tuple(line for line in lines if line not in shared)

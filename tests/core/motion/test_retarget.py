@@ -14,7 +14,8 @@ from beyond_mocap.motion import quaternion
 from beyond_mocap.motion.humanoid import compute_heading, identify_joints, measure_leg_length
 from beyond_mocap.motion.motion import Motion, forward_kinematics
 from beyond_mocap.motion.retargeting.adult import build_adult_skeleton
-from beyond_mocap.motion.retargeting.retarget import Retargeter, pair_joints, read_bone_map, write_bone_map
+from beyond_mocap.motion.retargeting.joint_pairs import pair_joints, read_bone_map, write_bone_map
+from beyond_mocap.motion.retargeting.retarget import Retargeter
 from beyond_mocap.motion.skeleton import Skeleton
 from beyond_mocap.synthetic.gait import build_gait
 
