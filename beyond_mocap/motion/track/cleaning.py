@@ -15,22 +15,12 @@ from ...base.errors import InputError, TimedMessage, format_count, format_second
 from ...base.settings.synthesis import MAX_SPEED
 from ...base.time_series import find_runs
 from .data import Track, is_ball_sentinel
+from .outliers import MAX_ACCELERATION, SNAP_LIMIT, detect_outliers, measure_line_distance
 from .sampling import GAP_INTERVALS, LONG_GAP
 
 _USUAL_SPEEDS = (0.2, 7.0)  # m/s; the median of a player's speed lies between them
-_MAX_ACCELERATION = 12.0  # m/s^2, hardest acceleration of a player
-_SPIKE = 0.2  # metres off its neighbours' line from which a sample is a spike, beyond what acceleration explains
-_EXCURSION = 0.5  # seconds within which a jump away has to return to count as an excursion
-_COAST = (0.2, 0.9)  # seconds before a snap that are replaced: at least, and at most while the feed coasts
-_CATCH_UP = 3.0  # m/s by which the player may be faster while making up for a snap; large snaps need more time
-_COAST_EXACT = 0.012  # metres: a coasting feed keeps to its line up to rounding to centimetres
 _JITTER = 0.06  # metres; noise of single samples from which on a track is smoothed: optical systems have 0.01
 _JITTER_LEFT, _JITTER_SECONDS = 0.04, (0.4, 1.5)  # metres of noise that smoothing should leave; seconds of its window
-# noise of s metres along both axes puts a sample 1.22 s off its neighbours' line, and a step 1.5 s off the usual one,
-# along each axis; five times that is passed once in 300 000 samples
-_SPIKE_NOISE, _JUMP_NOISE = 6.1, 7.5
-_STRAY = 2  # samples before a jump at the track's start, or after one at its end, that are taken for strays
-_SNAP_LIMIT = 3.0  # metres; a longer step is another player, or real: reported, not repaired
 _SLOPE_SECONDS = 0.3  # seconds whose slope is the velocity next to a gap
 _MAX_GAP = 3600.0  # seconds
 
@@ -88,7 +78,7 @@ def clean_track(track: Track) -> tuple[Track, DataReport]:
         raise InputError(track.name, found, "at least two")
     noise = _measure_jitter(times[known], positions[known])
     outlier, snaps = np.zeros(len(times), dtype=bool), ()
-    outlier[known], snaps = _detect_outliers(times[known], positions[known], noise)
+    outlier[known], snaps = detect_outliers(times[known], positions[known], noise)
     is_valid = known & ~outlier
     jitter = []
     if noise > 0.0:
@@ -182,9 +172,9 @@ def _measure_jitter(times: np.ndarray, positions: np.ndarray) -> float:
     """
     if len(times) < 5:
         return 0.0
-    off = _measure_line_distance(times[1:-1], positions[1:-1], times[:-2], place_a=positions[:-2], time_b=times[2:],
-                                 place_b=positions[2:])
-    bend = _MAX_ACCELERATION / 8.0 * float(np.median(times[2:] - times[:-2])) ** 2
+    off = measure_line_distance(times[1:-1], positions[1:-1], times[:-2], place_a=positions[:-2], time_b=times[2:],
+                                place_b=positions[2:])
+    bend = MAX_ACCELERATION / 8.0 * float(np.median(times[2:] - times[:-2])) ** 2
     noise = (float(np.median(off)) - bend) / 1.44
     return noise if noise > _JITTER else 0.0
 
@@ -222,121 +212,6 @@ def _fit_local_lines(times: np.ndarray, positions: np.ndarray, width: float) -> 
     variance = sums[:, 2:3] / total - centre**2
     slope = (sums[:, 5:] / total - centre * mean) / np.where(variance > 1e-9, variance, np.inf)
     return mean + slope * (moment[:, None] - centre)
-
-
-def _detect_outliers(times: np.ndarray, positions: np.ndarray,
-                     noise: float) -> tuple[np.ndarray, tuple[float, ...]]:
-    """Detect the samples (N,) bool to replace, and the times of steps too large to repair; all positions are numbers,
-    and jitter by `noise` metres.
-    """
-    wrong = _detect_spikes(times, positions, noise)
-    left = np.flatnonzero(~wrong)
-    jumps, excess = _detect_jumps(times[left], positions[left], noise)
-    too_far, used = [], set()
-    for place, jump in enumerate(jumps):
-        if jump in used:
-            continue
-        # a jump with a return is an excursion, one near an end a stray, a very long one is only reported, any other is
-        # a snap after coasting
-        back = _find_return_jump(times[left], jumps, excess, place)
-        if back is not None:
-            used.add(back)
-            wrong[left[jump + 1 : back + 1]] = True
-        elif min(jump + 1, len(left) - 1 - jump) <= _STRAY:
-            wrong[left[: jump + 1] if jump < _STRAY else left[jump + 1 :]] = True
-        elif np.linalg.norm(excess[place]) > _SNAP_LIMIT:
-            too_far.append(float(times[left[jump + 1]]))
-        else:
-            wrong[left[_find_coasted_samples(times[left], positions[left], jump,
-                                             float(np.linalg.norm(excess[place])))]] = True
-    return wrong, tuple(too_far)
-
-
-def _detect_spikes(times: np.ndarray, positions: np.ndarray, noise: float) -> np.ndarray:
-    """Detect single samples (N,) bool far off the line between their neighbours, while the neighbours' lines fit
-    better.
-
-    A spike of size d is d off its line and puts its neighbours d/2 off theirs; a step puts the two samples beside it
-    off theirs equally, so neither stands out and steps are left to `_detect_jumps`. The first and last sample have one
-    neighbour only: they are measured against the line of the third and fourth, or their own errors would blame the
-    second.
-    """
-    wrong = np.zeros(len(times), dtype=bool)
-    if len(times) < 5:
-        return wrong
-    off = _measure_line_distance(times[1:-1], positions[1:-1], times[:-2], place_a=positions[:-2], time_b=times[2:],
-                                 place_b=positions[2:])
-    first, last = (
-        _measure_line_distance(
-            times[i], positions[i], times[j], place_a=positions[j], time_b=times[k], place_b=positions[k],
-        ) for i, j, k in _ENDS
-    )
-    neighbour_distances = np.concatenate([[first], off, [last]])
-    far = off > _SPIKE + _SPIKE_NOISE * noise + _MAX_ACCELERATION / 8.0 * (times[2:] - times[:-2]) ** 2
-    wrong[1:-1] = far & (off > 1.5 * np.maximum(neighbour_distances[:-2], neighbour_distances[2:]))
-    return wrong
-
-
-_ENDS = ((0, 2, 3), (-1, -3, -4))
-
-
-def _measure_line_distance(time, place, time_a, place_a, time_b, place_b) -> np.ndarray:
-    """Measure the metres (...,) from `place` (..., 2) to the straight, steady path from a to b at `time` (...,)."""
-    share = np.asarray((time - time_a) / (time_b - time_a))[..., None]
-    return np.linalg.norm(place - place_a * (1 - share) - place_b * share, axis=-1)
-
-
-def _detect_jumps(times: np.ndarray, positions: np.ndarray, noise: float) -> tuple[list[int], np.ndarray]:
-    """Detect steps that no player takes.
-
-    Returns:
-        Indices j (the step is from sample j to j+1), and each one's excess (len, 2) metres over the median velocity of
-        the 0.6 s (7 samples at least) around it.
-    """
-    steps = np.diff(times)
-    if len(steps) < 3:
-        return [], np.zeros((0, 2))
-    velocity = np.diff(positions, axis=0) / steps[:, None]
-    half = int(max(3, round(0.3 / np.median(steps))))
-    padded = np.pad(velocity, ((half, half), (0, 0)), mode="reflect" if half < len(steps) else "edge")
-    usual = np.median(np.lib.stride_tricks.sliding_window_view(padded, 2 * half + 1, axis=0), axis=2)
-    excess = (velocity - usual) * steps[:, None]
-    short = steps <= GAP_INTERVALS * np.median(steps) + 1e-9
-    allowed = _SPIKE + _JUMP_NOISE * noise + _MAX_ACCELERATION / 3.0 * steps
-    jumps = np.flatnonzero(short & (np.linalg.norm(excess, axis=1) > allowed))
-    return jumps.tolist(), excess[jumps]
-
-
-def _find_return_jump(times: np.ndarray, jumps: list[int], excess: np.ndarray, place: int) -> int | None:
-    """Find the later jump within half a second that reverses jump number `place`; None if there is none."""
-    for other in range(place + 1, len(jumps)):
-        if times[jumps[other]] - times[jumps[place]] > _EXCURSION:
-            break
-        if np.linalg.norm(excess[place] + excess[other]) < 0.5 * np.linalg.norm(excess[place]):
-            return jumps[other]
-    return None
-
-
-def _find_coasted_samples(times: np.ndarray, positions: np.ndarray, jump: int, size: float) -> np.ndarray:
-    """Find the samples up to `jump` to replace.
-
-    As many as making up for `size` metres takes, and further back while they lie on an exact line. The first sample of
-    such a line is where the player was last seen, and is left as it is.
-    """
-    before = times[jump] - times[: jump + 1]
-    first = int(np.searchsorted(-before, -max(_COAST[0], min(size / _CATCH_UP, _COAST[1]))))
-    for start in range(min(first, jump - 3), -1, -1):
-        if before[start] > _COAST[1] or not _is_on_line(times[start : jump + 1], positions[start : jump + 1]):
-            break
-        first = start
-    return np.arange(max(first + 1, 1), jump + 1)
-
-
-def _is_on_line(times: np.ndarray, positions: np.ndarray) -> bool:
-    """Whether the samples have one velocity up to the feed's rounding."""
-    basis = np.column_stack([np.ones(len(times)), times - times[0]])
-    line = basis @ np.linalg.lstsq(basis, positions, rcond=None)[0]
-    return bool(np.abs(positions - line).max() <= _COAST_EXACT)
 
 
 def _interpolate_gaps(times: np.ndarray, positions: np.ndarray, is_valid: np.ndarray) -> np.ndarray:
@@ -412,7 +287,7 @@ def _collect_warnings(track: Track, snaps: tuple[float, ...], gaps) -> list[Time
     out = []
     if snaps:
         out.append(
-            TimedMessage(f"steps of more than {_SNAP_LIMIT:g} m left as they are: {_describe_times(snaps)}",
+            TimedMessage(f"steps of more than {SNAP_LIMIT:g} m left as they are: {_describe_times(snaps)}",
                          *zip(snaps, snaps))
         )
     if len(fast):
