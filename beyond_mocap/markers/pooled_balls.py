@@ -17,7 +17,8 @@ from ..motion.hand import Hand, build_hand
 from ..motion.motion import Motion
 from .model.model import BallMarker, MarkerModel
 from .reconstruct import Reconstruction, ReconstructSettings, move_trial_down
-from .release.release import Release, ReleaseSettings, estimate_release, estimate_usual_place
+from .release.held_ball import estimate_usual_place
+from .release.release import Release, ReleaseSettings, estimate_release
 from .release.throwing_hand import HandBall, fit_hand_ball
 from .trial import MarkerTrial
 from .trial_preparation import find_marker_set, prepare_trial

@@ -7,7 +7,6 @@ uncertainty. Neither uses the speed that the file name may give: that is reporte
 
 from __future__ import annotations
 
-import re
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -17,33 +16,30 @@ from ...ball.physics import THROWN_BALLS, Ball
 from ...base.errors import InputError
 from ...base.settings import find_setting
 from ...motion.contacts import measure_ground_height
-from ...motion.hand import Hand, build_hand, estimate_ball_centre
+from ...motion.hand import Hand, build_hand
 from ...motion.humanoid import identify_joints
 from ...motion.motion import Motion, forward_kinematics, resample
 from ...motion.track.ball_path import BallPath
 from ..trial import MarkerTrial, resample_evenly
+from .held_ball import (
+    MAX_BALL_DISTANCE,
+    choose_hand,
+    estimate_usual_place,
+    find_ball_label,
+    find_held_frames,
+    guess_release,
+    list_ball_labels,
+)
 from .launch_fit import HeldMarker, fit_launch
 from .radar_speed import parse_radar_speed
 from .throw_check import check_throw
-from .throwing_hand import (
-    HandBall,
-    compute_speeds,
-    find_fastest_frame,
-    find_release_by_distance,
-    fit_hand_ball,
-    place_ball,
-    refine_hand,
-)
+from .throwing_hand import HandBall, fit_hand_ball, place_ball, refine_hand
 from .without_ball import HOLD, estimate_hand_release, measure_roll_time
 
 MIN_FRAMES = 12  # frames that a trial with a throw must have
-_BALL_LABEL = re.compile(r"^(base|tennis|hand|foot|soft)?[ _-]?ball[ _-]?\d*$", re.I)
-_HELD_SECONDS = (0.15, 0.015)  # s before the first guess, between which the marker is fixed in the hand
-_NEARBY_SECONDS = 0.3  # s before a hand is fastest in which it holds the ball
 # Frames of flight that determine the marker's circle, and radii from which on it is another ball's.
 _MIN_CIRCLE_FRAMES, _MAX_CIRCLE_RATIO = 10, 1.25
 _AIR_UNCERTAINTY = 0.25  # uncertainty of the effect of air, as a share of it
-_MAX_BALL_DISTANCE = 0.35  # metres from the palm, within which a marker may be on a held ball
 _MAX_OFFSET = 1.5  # metres between the middle of the markers and that of the joints, at most
 _MAX_FLIGHT = 8.0  # s of flight until the ground
 # Uncertainty in metres of where the marker leaves: visible in the hand, or never visible there.
@@ -172,12 +168,12 @@ def estimate_release(trial: MarkerTrial, motion: Motion, settings: ReleaseSettin
         raise InputError(trial.name, f"{len(trial)} frames", f"at least {MIN_FRAMES}", "take a longer stretch")
     even_trial = resample_evenly(trial)
     _check_same_place(even_trial, motion)
-    label = _find_ball_label(even_trial, settings.ball_marker)
+    label = find_ball_label(even_trial, settings.ball_marker)
     marker = None if label is None else even_trial.positions[:, even_trial.index_of(label)]
     sides = (settings.hand,) if settings.hand else ("left", "right")
-    balls = tuple(name for name in even_trial.labels if name == label or _BALL_LABEL.match(name))
+    balls = (*list_ball_labels(even_trial), *(() if label is None else (label,)))
     hands = [refine_hand(build_hand(motion, side), even_trial, balls) for side in sides]
-    hand = _choose_hand(hands, marker)
+    hand = choose_hand(hands, marker)
     hand_ball, notes = _locate_ball(hand, marker, settings, ball)
     notes += even_trial.notes[len(trial.notes) :]
     launch = None
@@ -192,7 +188,7 @@ def estimate_release(trial: MarkerTrial, motion: Motion, settings: ReleaseSettin
     release = _build_release(launch, hand, motion, hand_ball=hand_ball, seen=seen, name=even_trial.name, notes=notes)
     if label is None or launch.method != "ball":
         return release
-    return replace(release, ball_label=label, held=hand.to_hand(marker)[_find_held_frames(hand, marker)])
+    return replace(release, ball_label=label, held=hand.to_hand(marker)[find_held_frames(hand, marker)])
 
 
 def _check_launch(launch: _FittedLaunch | None, hand: Hand, marker, label, radius, settings: ReleaseSettings, name: str,
@@ -202,7 +198,7 @@ def _check_launch(launch: _FittedLaunch | None, hand: Hand, marker, label, radiu
     Raises InputError where the user chose that marker or hand.
     """
     away = _measure_ball_distance(hand, marker, launch)
-    if away <= _MAX_BALL_DISTANCE:
+    if away <= MAX_BALL_DISTANCE:
         if launch is None:
             notes.append(f"{label} is not visible in flight: the release is estimated from the hand alone")
         elif launch.frames >= _MIN_CIRCLE_FRAMES and launch.circle > _MAX_CIRCLE_RATIO * radius:
@@ -235,7 +231,7 @@ def _measure_ball_distance(hand: Hand, marker: np.ndarray, launch: _FittedLaunch
     """Measure the distance in metres from hand to ball marker: while held if visible then, else at the start of the
     flight.
     """
-    held = _find_held_frames(hand, marker)
+    held = find_held_frames(hand, marker)
     palm = hand.to_world(HOLD * hand.reach * hand.finger)
     if held.sum() >= 3:
         return float(np.median(np.linalg.norm(marker[held] - palm[held], axis=-1)))
@@ -299,44 +295,6 @@ def _match_frames(trial: MarkerTrial, motion: Motion) -> Motion:
     )  # fmt: skip
 
 
-def _find_ball_label(trial: MarkerTrial, requested: str | None) -> str | None:
-    """Return the ball's marker: the requested one, else the most often visible one with the name of a ball, or None."""
-    if requested:
-        trial.index_of(requested)
-        return requested
-    candidates = [label for label in trial.labels if _BALL_LABEL.match(label)]
-    if requested == "" or not candidates:
-        return None
-    return max(candidates, key=lambda label: np.count_nonzero(trial.visibility[:, trial.index_of(label)]))
-
-
-def _choose_hand(hands: list[Hand], marker: np.ndarray | None) -> Hand:
-    """Choose the hand in which the ball's marker is before the flight; without a marker the faster one."""
-    peaks = [find_fastest_frame(hand.origin, hand.fps) for hand in hands]
-    fast = max(range(len(hands)), key=lambda i: compute_speeds(hands[i].origin, hands[i].fps)[peaks[i]])
-    if marker is None or len(hands) == 1:
-        return hands[fast]
-    nearest = [_measure_distance(hand, marker, peaks[fast]) for hand in hands]
-    return hands[int(np.argmin(nearest))] if min(nearest) < 2.0 * _MAX_BALL_DISTANCE else hands[fast]
-
-
-def _measure_distance(hand: Hand, marker: np.ndarray, peak: int) -> float:
-    """Measure the distance in metres between hand and marker shortly before the hand is fastest; inf where hardly
-    visible.
-    """
-    away = np.linalg.norm(marker - hand.to_world(HOLD * hand.reach * hand.finger), axis=-1)
-    away = away[max(peak - int(_NEARBY_SECONDS * hand.fps), 0) : peak + 1]
-    away = away[np.isfinite(away)]
-    return float(np.median(away)) if len(away) >= 3 else np.inf
-
-
-def estimate_usual_place(hand: Hand) -> np.ndarray:
-    """Estimate where balls usually lie in a hand, (3,) metres in its frame."""
-    # direction out of the palm at rest: downwards if the rest pose spreads the arms, else unknown
-    palm = np.array([0.0, 0.0, -1.0]) if abs(hand.finger[1]) > 0.9 else None
-    return estimate_ball_centre(hand.finger, hand.reach, palm)
-
-
 def _locate_ball(hand: Hand, marker, settings: ReleaseSettings, ball: Ball) -> tuple[HandBall, list[str]]:
     """Estimate where the ball lies in the hand; return it with messages."""
     usual_place = estimate_usual_place(hand)
@@ -345,41 +303,24 @@ def _locate_ball(hand: Hand, marker, settings: ReleaseSettings, ball: Ball) -> t
         return HandBall(np.array(settings.centre, float), radius, 0.005), []
     if marker is None:
         return HandBall(usual_place, radius, 0.03), []
-    held = _find_held_frames(hand, marker)
+    held = find_held_frames(hand, marker)
     hand_ball = fit_hand_ball(hand.to_hand(marker)[held], radius, usual_place, fit_radius=settings.radius is None)
     if not hand_ball.is_radius_fitted:
         return hand_ball, []
     return hand_ball, [f"the ball's radius is {1000.0 * hand_ball.radius:.0f} mm, fitted to its marker"]
 
 
-def _find_held_frames(hand: Hand, marker: np.ndarray) -> np.ndarray:
-    """Return (T,) bool: the frames shortly before the first guess in which the marker is visible."""
-    last = _guess_release(hand, marker)
-    times = hand.times
-    return np.isfinite(marker).all(axis=-1) & (times > last - _HELD_SECONDS[0]) & (times < last - _HELD_SECONDS[1])
-
-
-def _guess_release(hand: Hand, marker: np.ndarray) -> float:
-    """Guess the release time in s: when the hand is fastest, or when the marker is away from it if that is later.
-
-    A tenth more distance (section 6.2) is some 8 mm: a deformed hand or a scattered marker has it before the release.
-    """
-    knuckles = hand.to_world(HOLD * hand.reach * hand.finger)
-    away = find_release_by_distance(knuckles, marker, hand.fps)
-    return max(find_fastest_frame(knuckles, hand.fps), away or 0) / hand.fps
-
-
 def _fit_ball_launch(hand: Hand, marker, hand_ball: HandBall, ball: Ball, settings: ReleaseSettings,
                      notes) -> _FittedLaunch | None:
     """Fit the launch to the marker on the ball; None where it is not visible in flight."""
-    held = _find_held_frames(hand, marker)
+    held = find_held_frames(hand, marker)
     is_held_visible = bool(held.sum() >= 3)
     place = np.nanmedian(hand.to_hand(marker)[held], axis=0) if is_held_visible else hand_ball.centre
     centre = hand.to_world(hand_ball.centre)
     velocity = np.gradient(centre, 1.0 / hand.fps, axis=0)
     hand_evidence = HeldMarker(hand.to_world(place), centre, velocity, _HELD_SIGMA if is_held_visible
                                else _HIDDEN_SIGMA)
-    guess = _guess_release(hand, marker)
+    guess = guess_release(hand, marker)
     # also without air, as in eq. 6.2; the fit with the smaller residual is taken
     without_air = replace(ball, drag=0.0, lift=(0.0, *ball.lift[1:]))
     fits = [(fit_launch(marker, hand_evidence, hand.fps, guess=guess, ball=air, radius=hand_ball.radius,
