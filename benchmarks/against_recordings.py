@@ -9,7 +9,7 @@ import tempfile
 from pathlib import Path
 
 from benchmarks.places import DATA, LIBRARIES, library_folder
-from beyond_mocap.evaluation.classifier_comparison import compare_with_recordings, format_comparison
+from beyond_mocap.evaluation.two_sample_test.comparison import compare_with_recordings, format_comparison
 from beyond_mocap.files.tracking.tracking import Match, read_match
 from beyond_mocap.library.build import build_library
 from beyond_mocap.library.library import Library

@@ -20,7 +20,7 @@ import numpy as np
 from benchmarks import effort
 from benchmarks.places import DATA, link_recordings
 from beyond_mocap.annotation import labels_per_frame
-from beyond_mocap.evaluation.figures import measure_similarity
+from beyond_mocap.evaluation.annotation_similarity import measure_similarity
 from beyond_mocap.files.tracking.tracking import read_match
 from beyond_mocap.library.build import build_library
 from beyond_mocap.library.library import Library

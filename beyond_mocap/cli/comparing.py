@@ -20,8 +20,8 @@ def run_comparison(options, reporter: ProgressReporter) -> None:
     Raises:
         InputError: for other options, missing or unsuitable files, or too little motion.
     """
-    from ..evaluation.classifier_comparison import compare_with_recordings, format_comparison
     from ..evaluation.report import round_values
+    from ..evaluation.two_sample_test.comparison import compare_with_recordings, format_comparison
     from ..files.bvh import bvh
     from ..files.tables import write_report
     from ..synthesis.provenance import read_provenance

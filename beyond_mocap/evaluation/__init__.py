@@ -1,6 +1,6 @@
 """Measure a take beside the recordings of its library, and report it.
 
-- `figures`    the report's groups of figures, among them the similarity of labels (Faustino §3.2.2 eq. 18)
+- `figures`    the report's groups of figures; `annotation_similarity` that of labels (Faustino §3.2.2 eq. 18)
 - `realism`    distance to the nearest recorded pose; the smoothness curve (Faustino App. D)
 - `view`       a take beside its track and the recordings of its library
 - `reference`  a library's own scores, once per library and frame rate, kept beside the library's cache
@@ -13,6 +13,7 @@
 - `report`     the report as JSON, reports side by side as a table, and which targets are met
 - `html` and `plots` the report as a page; `html_page` the parts of all reports' pages
 - `paired_tests` compare one method with another, subject by subject
+- `two_sample_test` whether classifiers can distinguish takes from recordings
 
     report = evaluate(take, track, library)
     print(format_table({"path": report, "blocks": other}))

@@ -17,7 +17,8 @@ from ..motion.quaternion import from_up_angle, rotate
 from ..motion.track import BALL_RADIUS
 from ..synthesis.quality import movement
 from ..synthesis.quality.playback import compute_playback_rate
-from . import figures, realism
+from . import realism
+from .annotation_similarity import fill_automatic_spans, list_requested_labels
 from .view import View
 
 WIDTH = 11.0
@@ -100,7 +101,7 @@ def draw_labels(view: View) -> bytes | None:
     played = [frozenset(w) for w in view.played.words]
     requested = [None] * view.count
     if view.timeline is not None:
-        requested = figures.list_requested_labels(figures.fill_automatic_spans(view), view.played.times, view.moments)
+        requested = list_requested_labels(fill_automatic_spans(view), view.played.times, view.moments)
     rows = list(dict.fromkeys(word for pair in zip(requested, played) for words in pair
                               for word in sorted(words or ())))
     for moment in view.moments:

@@ -18,6 +18,7 @@ from ..synthesis.quality.playback import Playback, playback_from_take
 from ..synthesis.quality.targets import find_target
 from ..synthesis.take import Take
 from . import figures, naturalness_figures, physics_figures, touch_figures
+from .annotation_similarity import measure_annotation_similarity
 from .naturalness_figures import find_planned_headings, list_naturalness_messages, measure_naturalness
 from .physics_figures import list_physics_notes, measure_physics
 from .touch_figures import list_touch_messages, measure_touches
@@ -95,7 +96,7 @@ def evaluate_played(
         **figures.measure_corrections(view, ik_miss), **figures.measure_transitions(view),
         **figures.measure_poses(view), **measure_naturalness(view, heading, user_timeline),
         **measure_physics(view), **measure_touches(touch_view),
-        "annotation_similarity": figures.measure_annotation_similarity(view),
+        "annotation_similarity": measure_annotation_similarity(view),
         "warnings": [*figures.list_warnings(view, ik_miss, requested), *events, *list_touch_messages(touch_view)],
         "notes": [*notes, *list_physics_notes(view)],
     }

@@ -2,8 +2,9 @@
 
     thrown = throw_at(model, ThrowRequest(target=(18.0, 2.0, 1.2)))
 
-`throws.networks.plan` blends a description from the model's examples, `throws.networks.generate` generates the motion,
-`throws.correction` changes it as physics requires, and `ball.flight` computes the flight of the ball.
+`throws.launch_planner` chooses the launch, `throws.networks.plan` blends a description from the model's examples,
+`throws.networks.generate` generates the motion, `throws.correction` changes it as physics requires, and `ball.flight`
+computes the flight of the ball.
 """
 
 from __future__ import annotations
@@ -16,45 +17,29 @@ import numpy as np
 from ..appearance.arm_clearance import clear_arms
 from ..appearance.trunk import build_trunk
 from ..ball.flight import Launch, find_crossing, simulate_flight
-from ..ball.physics import HUMAN_BALL_SPEEDS
-from ..ball.shot import is_out_of_reach, solve_arcs
 from ..base.errors import InputError, UserCancelledError
-from ..base.vectors import arctan2
-from ..motion import quaternion
 from ..motion.humanoid import estimate_stature, identify_joints
 from ..motion.mirror import mirror
 from ..motion.motion import Motion, place_motion, sample_frames_cubic
 from ..motion.retargeting.neutral import build_neutral_stance
 from ..motion.retargeting.retarget import Retargeter
 from ..motion.skeleton import Skeleton
-from ..synthetic.throws import FASTEST as FASTEST_HAND
 from .ball_release import AtFoot, InHand, compute_launch
 from .corrected_motion import CorrectedMotion
 from .correction import correct_motion
-from .example_launches import compute_launches
+from .launch_planner import MAX_PLANS, LaunchPlanner, find_max_speed
 from .networks.chains import EFFECTORS
 from .networks.limits import LimbLimits
 from .networks.model import ThrowModel
-from .networks.plan import LaunchRequest, PlannedMotion, compute_dissimilarity, plan_motion
+from .networks.plan import PlannedMotion, plan_motion
 from .throw_request import KINDS, ThrowRequest, ThrowResult, build_ball_path, build_release_part
 
-MIN_TARGET_DISTANCE = 1.5
-"""Metres over the ground from body to target, at least."""
 _MAX_BALL_HEIGHT = 0.25  # share of the stature: largest height above the ground of a ball that is kicked
 STATURE_RANGE = (0.1, 10.0)
 """Range of the stature, m, of a body that throws."""
-_MAX_SPEED_RATIO = 1.2  # highest speed that may be requested, relative to the fastest example
-_MIN_SPEED_RATIO = 1.04  # lowest planned speed, relative to the slowest launch that reaches the target
-# preferred speed relative to that launch, and log ratio of speeds that costs 1
-_PREFERRED_SPEED_RATIO, _SPEED_TOLERANCE = 1.6, 0.3
-_CHECK_RATIO = 0.7  # share of the highest speed below which a target reached without air needs no exact check
-_MAX_EXTRA_ELEVATION = np.radians(35.0)  # elevation that may be requested beyond the steepest example
 _WARN_LIMIT_EXCESS = np.radians(2.0)  # excess over joint limits that is reported
 _MAX_DISPLACEMENT, _MAX_MISS = 0.15, 1.0
 """m: largest displacement of wrist or ankle and largest miss with which a throw is returned."""
-_MAX_PLANS = 3  # plans that are tried until one hits
-_MIN_SPEED_DIFFERENCE = 0.08  # smallest log ratio between the speeds of two plans
-_ROUNDS = 6  # iterations for the start position of the body
 _FOLLOW_THROUGH = 1.0  # s of flight beyond the target
 
 
@@ -85,9 +70,9 @@ def throw_at(
     work = _ThrowGenerator(model, request, skeleton or model.skeleton)
     best = None
     for number, plan in enumerate(work.iter_plans()):
-        report_progress(0.1 + 0.8 * number / _MAX_PLANS, "Generating")
+        report_progress(0.1 + 0.8 * number / MAX_PLANS, "Generating")
         placed = work.generate_placed(plan)
-        report_progress(0.1 + 0.8 * (number + 0.6) / _MAX_PLANS, "Correcting")
+        report_progress(0.1 + 0.8 * (number + 0.6) / MAX_PLANS, "Correcting")
         correction = work.correct_motion(placed)
         if best is None or correction.cost < best[1].cost:
             best = placed, correction
@@ -122,14 +107,15 @@ class _ThrowGenerator:
         self.model, self.request, self.skeleton = model, request, skeleton
         self.is_kick = model.settings.action == "kick"
         self.limb = EFFECTORS.index(request.limb) if request.limb else _find_usual_limb(model)
+        self.max_speed = find_max_speed(model.settings.action)
         self._check_request()
         used = {example.limb for example in model.examples}
-        self._human_limit = f"the human limit for a {'kick' if self.is_kick else 'throw'}"
         self.mirrored = self.limb not in used and self.limb ^ 1 in used
         self.own_limb = self.limb ^ 1 if self.mirrored else self.limb
         kind = request.ball or ("football" if self.is_kick else "baseball")
         self.ball = KINDS[kind] if isinstance(kind, str) else kind
         self.target = np.maximum(np.asarray(request.target, float), [-np.inf, -np.inf, self.ball.radius])
+        self.planner = LaunchPlanner(model, request, self.own_limb, self.ball, self.target)
         self.warnings: list[str] = []
         if request.target[2] < -self.ball.radius:
             self.warnings.append(
@@ -166,133 +152,11 @@ class _ThrowGenerator:
         place = self.request.ball_place
         return float(place[2]) if place is not None and len(place) > 2 else 0.0
 
-    @property
-    def max_speed(self) -> float:
-        """Highest ball speed (m/s) of people."""
-        return HUMAN_BALL_SPEEDS["foot"] if self.is_kick else FASTEST_HAND
-
-    # Planning, in the model's size and with the target straight ahead.
-
     def iter_plans(self) -> Iterator[PlannedMotion]:
         """Iterate over the plans to try: other paces, or other weights, if the first does not hit."""
-        for wish, seed in self._list_launch_requests():
-            yield plan_motion(self.launches.examples, self.launches.velocities, wish, seed)
-
-    def _list_launch_requests(self) -> list[tuple[LaunchRequest, int]]:
-        """List launch requests, the best first, and seeds."""
-        self.launches = launches = compute_launches(self.model, self.own_limb, self.ball)
-        anchors = [self._find_anchor(*one) for one in zip(launches.examples, launches.positions)]
-        begin, _ = self._place_frame(np.median(anchors, axis=0))
-        ahead = float(np.linalg.norm(self.target[:2] - begin))
-        if ahead < MIN_TARGET_DISTANCE:
-            found = f"{ahead:.2f} m from the body"
-            raise InputError("target", found, f"at least {MIN_TARGET_DISTANCE:g} m", "move the target or the body away")
-        place = np.median(launches.positions, axis=0)
-        start, end = np.array([place[0], 0.0, place[2]]), np.array([ahead, 0.0, self.target[2]])
-        spin = np.median(launches.spins, axis=0)
-        fastest = float(np.linalg.norm(launches.velocities, axis=1).max())
-        self._check_distance(start, end, spin, fastest)
-        self.arcs = solve_arcs(start, end, self.ball, spin)
-        if self.arcs.slowest > self.max_speed:
-            raise self._describe_too_far(f"{self.arcs.slowest:.0f} m/s or more", self.max_speed, self._human_limit)
-        self._check_speed(fastest)
-        self._check_elevation(min(self.max_speed, _MAX_SPEED_RATIO * fastest))
-        wishes, seed = self._rank_launch_requests(ahead), self.request.seed
-        return [(wish, seed) for wish in wishes] if len(wishes) > 1 else [(wishes[0], seed + n)
-                                                                          for n in range(_MAX_PLANS)]
-
-    def _find_anchor(self, example, place: np.ndarray) -> np.ndarray:
-        """Return the point (2,) m of an example, normalised frame, that the request positions."""
-        if self.request.ball_place is not None:
-            return place[:2]
-        if self.request.over is not None:
-            return sample_frames_cubic(example.motion, np.array([example.release]))[0][0, :2]
-        return np.zeros(2)
-
-    def _find_position(self) -> np.ndarray:
-        """Return the requested position (2,) m."""
-        order = self.request
-        given = next((value for value in (order.start, order.over, order.ball_place) if value is not None), (0.0, 0.0))
-        return np.asarray(given, float)[:2]
-
-    def _place_frame(self, anchor: np.ndarray) -> tuple[np.ndarray, float]:
-        """Compute origin (2,) m and rotation (rad) of the normalised frame in the world.
-
-        Its point `anchor` (2,) m is at the requested position, and its X axis points to the target.
-        """
-        position = self._find_position()
-        begin, turn = position, 0.0
-        for _ in range(_ROUNDS):
-            to_target = self.target[:2] - begin
-            turn = float(np.arctan2(to_target[1], to_target[0]))
-            begin = position - quaternion.rotate_level(anchor, np.array(turn))
-        return begin, turn
-
-    def _check_distance(self, start: np.ndarray, end: np.ndarray, spin: np.ndarray, own: float) -> None:
-        """Raise InputError if the target is clearly too far, before any slow computation."""
-        model = f"since the model's fastest example has {own:.0f}"
-        for most, what in ((self.max_speed, self._human_limit), (_MAX_SPEED_RATIO * own, model)):
-            slowest = _compute_min_speed(start, end, self.ball.gravity)
-            if slowest > most or slowest > _CHECK_RATIO * most and is_out_of_reach(start, end, self.ball, most, spin):
-                raise self._describe_too_far(f"more than {most:.0f} m/s", most, what)
-
-    def _describe_too_far(self, takes: str, most: float, what: str) -> InputError:
-        """Build the error for a target that needs more than `most` m/s; `what` gives the reason of that limit."""
-        far = float(np.linalg.norm(self.target[:2] - self._find_position()))
-        return InputError("target", f"{far:.0f} m away, which needs {takes}", f"at most {most:.0f} m/s, {what}",
-                          "choose a nearer or lower target")  # fmt: skip
-
-    def _check_elevation(self, most: float) -> None:
-        """Raise InputError if the ball has to leave far more steeply than in any of the examples."""
-        along, _, up = self.arcs.at(most)
-        elevation, known = arctan2(up, along), self.launches.velocities
-        steepest = float(arctan2(known[:, 2], np.hypot(known[:, 0], known[:, 1])).max())
-        if elevation > steepest + _MAX_EXTRA_ELEVATION:
-            found = f"the ball has to leave at an elevation of {np.degrees(elevation):.0f} degrees"
-            most = np.degrees(steepest + _MAX_EXTRA_ELEVATION)
-            expected = f"at most {most:.0f}, since the steepest example has {np.degrees(steepest):.0f}"
-            raise InputError("target", found, expected, "move it further away or lower")
-
-    def _check_speed(self, own: float) -> None:
-        """Raise InputError if the speed does not reach the target, or is too far above the examples' `own` m/s."""
-        slowest = self.arcs.slowest
-        requested = self.request.speed or 0.0
-        if requested and requested < slowest:
-            raise InputError("speed", f"{requested:.1f} m/s", f"at least {slowest:.1f} m/s to reach the target",
-                             "set a higher speed")  # fmt: skip
-        if max(slowest, requested) > _MAX_SPEED_RATIO * own:
-            what, found = ("speed", f"{requested:.0f} m/s") if requested else ("target", f"it needs {slowest:.0f} m/s")
-            most = f"at most {_MAX_SPEED_RATIO * own:.0f} m/s, since the model's fastest example has {own:.0f}"
-            raise InputError(what, found, most, "choose a lower speed, or train on faster examples")
-
-    def _rank_launch_requests(self, ahead: float) -> list[LaunchRequest]:
-        """List launch requests, the best first, each of another speed.
-
-        The requested speed, or of those that reach the target the ones most similar to the examples, preferably not
-        faster than the distance requires.
-        """
-        launches = self.launches.velocities
-        thrown = np.linalg.norm(launches, axis=1)
-        speeds = np.array([self.request.speed]) if self.request.speed else np.maximum(thrown, _MIN_SPEED_RATIO
-                * self.arcs.slowest)
-        requests = [self._build_launch_request(float(speed), ahead) for speed in speeds]
-        impacts = np.array([example.impact for example in self.launches.examples])
-        dissimilarity = [float(np.sort(compute_dissimilarity(launches, impacts, wish))[:3].mean())
-                         for wish in requests]
-        preferred_speed = np.clip(_PREFERRED_SPEED_RATIO * self.arcs.slowest, thrown.min(), thrown.max())
-        chosen: list[LaunchRequest] = []
-        for number in np.argsort(dissimilarity + (np.log(speeds / preferred_speed) / _SPEED_TOLERANCE) ** 2,
-                                 kind="stable"):
-            if all(abs(np.log(speeds[number] / wish.speed)) > _MIN_SPEED_DIFFERENCE
-                   for wish in chosen) and len(chosen) < _MAX_PLANS:
-                chosen.append(requests[number])
-        return chosen
-
-    def _build_launch_request(self, speed: float, ahead: float) -> LaunchRequest:
-        """Build the launch request of a speed (m/s) for a target `ahead` m away."""
-        launch = self.arcs.at(speed)
-        return LaunchRequest(speed=speed, elevation=float(np.arctan2(launch[2], launch[0])), distance=ahead,
-                             height=float(self.target[2]), limb=self.own_limb)
+        launches = self.planner.launches
+        for wish, seed in self.planner.list_launch_requests():
+            yield plan_motion(launches.examples, launches.velocities, wish, seed)
 
     # Generating, and placing the motion where it is requested.
 
@@ -325,7 +189,7 @@ class _ThrowGenerator:
             anchor = ball_position[:2]
         elif self.request.over is not None:
             anchor = sample_frames_cubic(motion, np.array([frame]))[0][0, :2]
-        begin, turn = self._place_frame(anchor)
+        begin, turn = self.planner.place_frame(anchor)
         return _PlacedMotion(plan=plan, motion=place_motion(motion, turn, (*begin, 0.0)), release=release,
                              network_deviation=float(np.mean(generated.network_deviation)), limits=limits)
 
@@ -342,7 +206,7 @@ class _ThrowGenerator:
         """Build the hand or foot that releases the ball."""
         lies = None
         if self.request.ball_place is not None:
-            lies = np.array([*self._find_position(), max(self._ball_height, self.ball.radius)])
+            lies = np.array([*self.planner.find_position(), max(self._ball_height, self.ball.radius)])
         return build_release_part(self.skeleton, self.limb, self.ball, lies)
 
     def correct_motion(self, placed: _PlacedMotion) -> CorrectedMotion:
@@ -370,7 +234,7 @@ class _ThrowGenerator:
             flight=flight, target=self.target, impact=impact, displacement=correction.displacement,
             shift=correction.shift, rotation=correction.rotation, pace=correction.pace,
             release_delay=correction.release_delay, foot_tilt=correction.tilt,
-            start_offset=correction.start_offset, min_speed=self.arcs.slowest,
+            start_offset=correction.start_offset, min_speed=self.planner.arcs.slowest,
             requested_speed=self.request.speed or float(np.linalg.norm(correction.velocity)),
             network_deviation=placed.network_deviation, limit_excess=beyond,
             examples=tuple(zip(placed.plan.names, map(float, placed.plan.weights))), warnings=tuple(self.warnings),
@@ -407,12 +271,6 @@ class _ThrowGenerator:
             )
         if self.request.speed and abs(speed - self.request.speed) > 0.1 * self.request.speed:
             self.warnings.append(f"the ball leaves at {speed:.1f} m/s instead of {self.request.speed:.1f}")
-
-
-def _compute_min_speed(start: np.ndarray, end: np.ndarray, gravity: float) -> float:
-    """Compute the speed (m/s) below which no ball gets from start (3,) m to end (3,) m, without air."""
-    up, far = float(end[2] - start[2]), float(np.linalg.norm(end - start))
-    return float(np.sqrt(max(gravity * (up + far), 0.0)))
 
 
 def _find_usual_limb(model: ThrowModel) -> int:

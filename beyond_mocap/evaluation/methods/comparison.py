@@ -16,6 +16,7 @@ from ...synthesis.quality.playback import playback_from_take
 from ...synthesis.synthesize import synthesize
 from ...synthesis.take import Take
 from .. import figures
+from ..annotation_similarity import list_requested_labels, measure_annotation_similarity, measure_similarity
 from ..realism import measure_smoothness
 from ..view import View
 from .scenarios import Scenario
@@ -148,9 +149,9 @@ def measure_take(take: Take, library: Library, timeline: Timeline, seconds: floa
     """
     played = playback_from_take(take)
     view = View(played, take.plan.track, take.timeline, library)
-    labels = figures.list_requested_labels(timeline, played.times, view.moments)
-    asked = figures.measure_similarity(labels, played.words)
-    similarity = {**figures.measure_annotation_similarity(view),
+    labels = list_requested_labels(timeline, played.times, view.moments)
+    asked = measure_similarity(labels, played.words)
+    similarity = {**measure_annotation_similarity(view),
                   "asked": float(np.nanmean(asked)) if np.isfinite(asked).any() else np.nan}
     groups = {**figures.measure_path_errors(view), **figures.measure_feet(view), **figures.measure_transitions(view),
               "annotation_similarity": similarity}

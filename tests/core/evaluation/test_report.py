@@ -10,7 +10,7 @@ import pytest
 
 from beyond_mocap.annotation import KeyMoment, Span, Timeline, labels_per_frame
 from beyond_mocap.base.errors import InputError
-from beyond_mocap.evaluation.figures import fill_automatic_spans
+from beyond_mocap.evaluation.annotation_similarity import fill_automatic_spans
 from beyond_mocap.evaluation.naturalness import measure_course
 from beyond_mocap.evaluation.report import evaluate, evaluate_played, flatten_report, format_table
 from beyond_mocap.files import tables

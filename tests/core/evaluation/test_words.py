@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from beyond_mocap.evaluation import figures
+from beyond_mocap.evaluation import annotation_similarity
 
 
 @pytest.mark.parametrize(
@@ -20,21 +20,21 @@ from beyond_mocap.evaluation import figures
     ],
 )
 def test_one_frame(asked, played, printed, ours):
-    assert figures.compute_eq18(asked.split(), played.split()) == pytest.approx(printed)
-    assert figures.compute_requested_similarity(asked.split(), played.split()) == pytest.approx(ours)
+    assert annotation_similarity.compute_eq18(asked.split(), played.split()) == pytest.approx(printed)
+    assert annotation_similarity.compute_requested_similarity(asked.split(), played.split()) == pytest.approx(ours)
 
 
 def test_nothing_asked_counts_neither_way():
-    assert np.isnan(figures.compute_requested_similarity([], ["kick"]))
-    assert np.isnan(figures.compute_eq18([], []))
+    assert np.isnan(annotation_similarity.compute_requested_similarity([], ["kick"]))
+    assert np.isnan(annotation_similarity.compute_eq18([], []))
 
 
 def test_transitions_are_left_out_of_the_mean():
     asked = [("walking",), None, None, ("kick", "right"), ("walking",)]
     played = [("walking",), ("kick",), (), ("kick", "left"), ("running",)]
-    values = figures.measure_similarity(asked, played)
+    values = annotation_similarity.measure_similarity(asked, played)
     np.testing.assert_allclose(values, [-1.0, np.nan, np.nan, 0.0, 1.0])
 
 
 def test_word_order_and_repetition_do_not_matter():
-    assert figures.compute_eq18(("kick", "right"), ("right", "kick", "kick")) == -1.0
+    assert annotation_similarity.compute_eq18(("kick", "right"), ("right", "kick", "kick")) == -1.0

@@ -1,4 +1,4 @@
-"""Statistics of short windows of motion, by which classifiers compare takes with recordings (`classifier_comparison`).
+"""Statistics of short windows of motion, by which classifiers compare takes with recordings (`comparison`).
 
 Nothing that depends on how a motion was measured is part of them. All bodies are on one skeleton at one frame rate.
 Positions are seen through a window of 0.2 s, which leaves little of what resampling does to frames. Heights are above
@@ -14,14 +14,14 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..base.time_series import time_derivative
-from ..base.vectors import arctan2
-from ..motion import quaternion
-from ..motion.contacts import detect_heel_toe_contacts
-from ..motion.humanoid import Humanoid, compute_heading_from_positions, identify_joints
-from ..motion.motion import Motion, forward_kinematics
-from ..motion.skeleton import Skeleton
-from ..motion.track import smooth_zero_phase_hann
+from ...base.time_series import time_derivative
+from ...base.vectors import arctan2
+from ...motion import quaternion
+from ...motion.contacts import detect_heel_toe_contacts
+from ...motion.humanoid import Humanoid, compute_heading_from_positions, identify_joints
+from ...motion.motion import Motion, forward_kinematics
+from ...motion.skeleton import Skeleton
+from ...motion.track import smooth_zero_phase_hann
 
 SECONDS, STEP_SECONDS = 1.0, 0.5  # length of a window, and from one window's start to the next one's
 SMOOTHING_SECONDS = 0.2  # at 60 recorded frames a second a frame half-way between two keeps 97 % of 5 Hz

@@ -8,20 +8,21 @@ import pytest
 from beyond_mocap.annotation.vocabulary import SIDES
 from beyond_mocap.base.errors import InputError
 from beyond_mocap.cli.main import main
-from beyond_mocap.evaluation import classifier_comparison
-from beyond_mocap.evaluation.classifier_comparison import (
+from beyond_mocap.evaluation.two_sample_test.comparison import compare_with_recordings, list_top_features
+from beyond_mocap.evaluation.two_sample_test.cross_validation import (
     CLASSIFIERS,
-    Windows,
     assign_folds,
-    collect_recorded_windows,
-    compare_with_recordings,
     cross_validate,
     list_folds,
-    list_top_features,
-    match_windows,
     measure_areas,
 )
-from beyond_mocap.evaluation.window_features import measure_windows
+from beyond_mocap.evaluation.two_sample_test.window_features import measure_windows
+from beyond_mocap.evaluation.two_sample_test.windows import (
+    Windows,
+    collect_recorded_windows,
+    collect_take_windows,
+    match_windows,
+)
 from beyond_mocap.files.bvh import bvh
 from beyond_mocap.library.build import build_library
 from beyond_mocap.motion import quaternion
@@ -129,7 +130,7 @@ def test_actions_are_left_out_of_recordings_and_takes(walks):
     counts = {path: int(np.sum(recorded.recording == path)) for path in set(recorded.recording)}
     assert counts["walk7.bvh"] < counts["walk6.bvh"] - 3
     kicks = play_clips(walks, [7, 1], rate=0.3)
-    windows, _ = classifier_comparison.collect_take_windows({"kicks": kicks}, walks)
+    windows, _ = collect_take_windows({"kicks": kicks}, walks)
     assert set(windows.recording) == {"walk1.bvh"}
 
 
