@@ -2,9 +2,10 @@
 
 While a foot pushes a body sideways or ahead with an acceleration a, its force passes through the centre of mass only if
 that lies off the foot by a / g of its height, over a stride on average. `measure_lean` tells how far it does;
-`compute_footprint_shifts` and `tilt_body` give what is missing: the footprints move outward below a centre of mass that
-stays, and the body tilts, in bends by half the angle, in starts and stops by a little more than all of it: so do
-recorded trunks (slope .5 aside, .7 to 1.4 ahead).
+`compute_footprint_shifts`, `tilt_body` and `lower_root` give what is missing: the footprints move outward below a
+centre of mass that stays, the body tilts by a share of the angle, and sinks as legs that keep their length would lower
+it. So do recorded bodies: trunks tilt by half the angle in bends, most of it in starts and little in stops; pelvises
+sink by 12 to 26 cm where the acceleration is 3 to 7 m/s^2.
 
 Source: ../shared/prototype-momentum.md, measured on recordings; Greene 1985, J Biomech Eng 107: the lean of runners in
 bends is atan(v^2 / (r g)).

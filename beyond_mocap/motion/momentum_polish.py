@@ -20,7 +20,15 @@ from ..base.vectors import measure_lengths
 from . import quaternion
 from .foot_plant import AIR_RESERVE, Foot, build_foot, solve_heel_rise, spread_peaks
 from .humanoid import Humanoid, identify_joints
-from .lean import choose_angles, choose_crouch, choose_shifts, compute_footprint_shifts, lower_root, measure_lean, tilt_body
+from .lean import (
+    choose_angles,
+    choose_crouch,
+    choose_shifts,
+    compute_footprint_shifts,
+    lower_root,
+    measure_lean,
+    tilt_body,
+)
 from .limb import place_limb, solve_posed_limb
 from .mass import SEGMENT_MASSES, SegmentMasses, compute_centre_of_mass
 from .momentum import STRENGTH, MomentumPlanner
@@ -95,7 +103,8 @@ def _build_legs(skeleton: Skeleton, body: Humanoid, masses: SegmentMasses, pose:
     standing = tuple(stances.compute_share(side, len(places), _FADE_FRAMES * scale) for side in (0, 1))
     feet = tuple(build_foot(places, world, limb, np.repeat(stands[:, None] > 0.0, 2, axis=1))
                  for limb, stands in zip(limbs, standing))
-    return _Legs(skeleton, body, masses, feet, standing, spread=max(int(round(_SPREAD_FRAMES * scale)), 1), sink=max(int(round(_SINK_FRAMES * scale)), 1))
+    spread, sink = (max(int(round(frames * scale)), 1) for frames in (_SPREAD_FRAMES, _SINK_FRAMES))
+    return _Legs(skeleton, body, masses, feet, standing, spread=spread, sink=sink)
 
 
 @dataclass(frozen=True, eq=False)

@@ -13,7 +13,14 @@ from beyond_mocap.evaluation.body_physics import measure_body_physics, summarize
 from beyond_mocap.evaluation.boots import measure_boot_heights, measure_lowest_point
 from beyond_mocap.evaluation.html import build_physics_section
 from beyond_mocap.evaluation.naturalness import measure_course
-from beyond_mocap.evaluation.physics import MassCourse, compute_bounce, measure_flights, measure_leans, measure_pushes, measure_steps
+from beyond_mocap.evaluation.physics import (
+    MassCourse,
+    compute_bounce,
+    measure_flights,
+    measure_leans,
+    measure_pushes,
+    measure_steps,
+)
 from beyond_mocap.evaluation.physics_figures import measure_physics
 from beyond_mocap.evaluation.report import evaluate, evaluate_played, flatten_report
 from beyond_mocap.evaluation.sprint_form import measure_knee_flexion, measure_trunk_lean
