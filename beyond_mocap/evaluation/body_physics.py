@@ -16,11 +16,13 @@ from .physics import (
     E,
     Flights,
     Leans,
+    Pushes,
     Steps,
     join_events,
     measure_flights,
     measure_leans,
     measure_mass_course,
+    measure_pushes,
     measure_steps,
 )
 from .sprint_form import SprintStrides, measure_sprint_strides
@@ -39,13 +41,14 @@ class BodyPhysics:
     """What is measured of one body, T frames at 30 per second.
 
     Attributes:
-        flights, steps, leans, sprint: its events.
+        flights, steps, leans, pushes, sprint: its events.
         boots: (T,) m, height of the lowest point of its boots.
     """
 
     flights: Flights
     steps: Steps
     leans: Leans
+    pushes: Pushes
     sprint: SprintStrides
     boots: np.ndarray
 
@@ -64,6 +67,7 @@ def measure_body_physics(motion: Motion, positions: np.ndarray, rotations: np.nd
     mass = measure_mass_course(motion.skeleton, positions, motion.fps, course)
     return BodyPhysics(
         flights=measure_flights(mass), steps=measure_steps(mass), leans=measure_leans(mass),
+        pushes=measure_pushes(mass),
         sprint=measure_sprint_strides(motion.skeleton, positions, motion.fps, course, mass),
         boots=measure_boot_heights(boots, motion, positions, rotations),
     )
@@ -85,7 +89,8 @@ def summarize_physics(bodies: Sequence[BodyPhysics], used: Sequence[np.ndarray])
     boots = np.concatenate([body.boots[mask] for body, mask in zip(bodies, used)])
     return {"flight": _summarize_flights(collect(lambda body: body.flights)),
             "step_force": _summarize_steps(collect(lambda body: body.steps)),
-            "lean": _summarize_leans(collect(lambda body: body.leans)),
+            "lean": {**_summarize_leans(collect(lambda body: body.leans)),
+                     "hard": _summarize_pushes(collect(lambda body: body.pushes))},
             "sprint_form": _summarize_sprint(collect(lambda body: body.sprint)),
             "boots": {"frames": len(boots), "below_share": float(np.mean(boots < -DEEP)) if len(boots) else math.nan}}
 
@@ -130,6 +135,12 @@ def _summarize_leans(leans: Leans) -> dict:
             "lean_slope": float(angle[some] @ wanted[some] / (wanted[some] @ wanted[some])) if is_enough else math.nan,
         }
     return out
+
+
+def _summarize_pushes(pushes: Pushes) -> dict:
+    """Summarize how far bodies that are pushed hard lack lean, and how deep they crouch."""
+    return {"pushes": len(pushes), "lean_missing_deg_median": _median(np.degrees(pushes.missing)),
+            "crouch_m_median": _median(pushes.crouch)}
 
 
 def _summarize_sprint(sprint: SprintStrides) -> dict:

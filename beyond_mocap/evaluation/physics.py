@@ -19,7 +19,7 @@ from typing import TypeVar
 import numpy as np
 
 from ..base.time_series import find_runs, time_derivative
-from ..base.vectors import cross_on_ground
+from ..base.vectors import cross_on_ground, dot_products, measure_lengths
 from ..motion.humanoid import identify_joints
 from ..motion.lean import Lean, measure_lean
 from ..motion.mass import compute_centre_of_mass
@@ -31,6 +31,8 @@ from .naturalness import FPS, SLOW_SPEED, BodyCourse, resample_positions
 
 FLIGHT_FRAMES = 5  # frames of the shortest flight that is measured
 PATH_SECONDS = 1.0  # of the window through which the path of the centre of mass accelerates in flight
+HARD = 3.0  # m/s^2 of a stance from which on a body is pushed hard: turns and stops that make it crouch
+UPRIGHT = 80.0  # percentile of a body's pelvis heights from which its crouch is measured
 STEP_SECONDS = (0.15, 0.6)  # shortest and longest step of a run; others are missed or counted twice
 
 E = TypeVar("E", bound="Events")
@@ -99,6 +101,19 @@ class Leans(Events):
 
 
 @dataclass(frozen=True, eq=False)
+class Pushes(Events):
+    """Stances of bodies that are pushed hard, at any speed.
+
+    Attributes:
+        missing: (N,) rad by which the body leans less along its acceleration than atan(a / g).
+        crouch: (N,) m by which the pelvis is below its own usual height at its lowest, for a leg of 0.86 m.
+    """
+
+    missing: np.ndarray
+    crouch: np.ndarray
+
+
+@dataclass(frozen=True, eq=False)
 class MassCourse:
     """Where a body's mass and feet are, T frames at 30 per second.
 
@@ -106,6 +121,7 @@ class MassCourse:
         centre: (T, 3) m, the centre of mass.
         foot_height: (T, 2) m, lower one of ankle and toe over its own usual lowest height.
         speed: (T,) m/s of the pelvis.
+        crouch: (T,) m by which the pelvis is below its own usual height, for a leg of 0.86 m.
         stances: when feet carry weight.
         lean: how far each stance leans.
     """
@@ -113,6 +129,7 @@ class MassCourse:
     centre: np.ndarray
     foot_height: np.ndarray
     speed: np.ndarray
+    crouch: np.ndarray
     stances: Stances
     lean: Lean
 
@@ -129,7 +146,8 @@ def measure_mass_course(skeleton: Skeleton, positions: np.ndarray, fps: float, c
     positions, body = resample_positions(positions, fps), identify_joints(skeleton)
     centre, stances = compute_centre_of_mass(body, positions), find_stances(skeleton, positions, FPS)
     heights = [measure_foot_height(positions, limb) for limb in (body.left, body.right)]
-    return MassCourse(centre=centre, foot_height=np.stack(heights, axis=1), speed=course.speed, stances=stances,
+    return MassCourse(centre=centre, foot_height=np.stack(heights, axis=1), speed=course.speed,
+                      crouch=np.percentile(course.pelvis_height, UPRIGHT) - course.pelvis_height, stances=stances,
                       lean=measure_lean(body, positions, centre, stances, FPS))
 
 
@@ -200,6 +218,18 @@ def measure_leans(body: MassCourse) -> Leans:
         np.stack([cross_on_ground(lean.travel, part), np.sum(lean.travel * part, axis=1)], axis=1)
         for part in (angle, wanted)))
     return found.select(is_run)
+
+
+def measure_pushes(body: MassCourse) -> Pushes:
+    """Measure how far each stance of a body that is pushed by more than HARD lacks lean, and how deep it crouches."""
+    lean, stances = body.lean, body.stances
+    size = measure_lengths(lean.acceleration)
+    slope = dot_products(lean.offset, lean.acceleration) / np.maximum(size * lean.lever, 1e-9)
+    spans = zip(stances.start.astype(int), np.ceil(stances.stop).astype(int) + 1)
+    crouch = np.array([body.crouch[first:end].max() for first, end in spans])
+    middle = np.rint(stances.middle).astype(int)
+    found = Pushes(middle, body.speed[middle], np.arctan(size / GRAVITY) - np.arctan(slope), crouch)
+    return found.select((size > HARD) & (lean.height >= lean.lever))
 
 
 def compute_bounce(step_seconds: np.ndarray, contact_seconds: np.ndarray) -> np.ndarray:

@@ -20,6 +20,7 @@ from .view import View
 FRAMES_KEYS = {
     **dict.fromkeys(("vertical_m_s2_median", "level_m_s2_median"), "flights"),
     **dict.fromkeys(("force_ratio_median", "force_in_range_share"), "steps"),
+    **dict.fromkeys(("lean_missing_deg_median", "crouch_m_median"), "pushes"),
     "lean_error_deg_median": "stances", "lean_slope": "slope_stances",
     **dict.fromkeys(("knee_flexion_deg_median", "ankle_lift_m_median",
                      "trunk_lean_deg_median", "bounce_m_median", "bounce_ratio_median"), "strides"),
@@ -44,6 +45,8 @@ TITLES = {
     "lean.side.lean_slope": Title("Share of the lean that bends ask for", "%", 100.0, 0),
     "lean.fore.lean_error_deg_median": Title("Lean at starts and stops off", "°"),
     "lean.fore.lean_slope": Title("Share of the lean that starts and stops ask for", "%", 100.0, 0),
+    "lean.hard.lean_missing_deg_median": Title("Lean that hard turns and stops lack", "°"),
+    "lean.hard.crouch_m_median": Title("Crouch in hard turns and stops", "cm", 100.0),
     "sprint_form.knee_flexion_deg_median": Title("Largest knee flexion in sprints", "°", digits=0),
     "sprint_form.ankle_lift_m_median": Title("Highest ankle in sprints", "cm", 100.0, 0),
     "sprint_form.trunk_lean_deg_median": Title("Forward lean of the trunk in sprints", "°", digits=0),

@@ -43,6 +43,7 @@ _REASONS = (
     (r"physics\.step_force", "fewer than 3 running steps at that speed"),
     (r"physics\.lean\.side", "fewer than 3 stances in bends"),
     (r"physics\.lean\.fore", "fewer than 3 stances that start or stop"),
+    (r"physics\.lean\.hard", "fewer than 3 stances pushed by more than 3 m/s²"),
     (r"physics\.sprint_form", "fewer than 3 strides between 6 and 8 m/s"),
     (r"touches\.reception\.source_", "the library has no labelled reception with the foot"),
     (r"touches\.(fast_)?kick\.source_", "the library has no labelled kick"),

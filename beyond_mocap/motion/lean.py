@@ -2,9 +2,10 @@
 
 While a foot pushes a body sideways or ahead with an acceleration a, its force passes through the centre of mass only if
 that lies off the foot by a / g of its height, over a stride on average. `measure_lean` tells how far it does;
-`compute_footprint_shifts` and `tilt_body` give what is missing: the footprints move outward below a centre of mass that
-stays, and the body tilts, in bends by half the angle, in starts and stops by a little more than all of it: so do
-recorded trunks (slope .5 aside, .7 to 1.4 ahead).
+`compute_footprint_shifts`, `tilt_body` and `lower_root` give what is missing: the footprints move outward below a
+centre of mass that stays, the body tilts by a share of the angle, and sinks as legs that keep their length would lower
+it. So do recorded bodies: trunks tilt by half the angle in bends, most of it in starts and little in stops; pelvises
+sink by 12 to 26 cm where the acceleration is 3 to 7 m/s^2.
 
 Source: ../shared/prototype-momentum.md, measured on recordings; Greene 1985, J Biomech Eng 107: the lean of runners in
 bends is atan(v^2 / (r g)).
@@ -29,11 +30,14 @@ MOST_ACCELERATION = 0.5 * GRAVITY  # m/s^2 that a lean answers; recordings' 99th
 _ACCELERATION_SECONDS = 0.35  # s to either side over which the acceleration of the centre of mass is smoothed
 _NEIGHBOUR_SECONDS = 0.8  # s within which stances are one run
 _DEAD_ZONE = (0.01, 0.01)  # m ahead and aside that are no error: a stance tells no more
-_MOST_SHIFT = (0.18, 0.15)  # m ahead and aside that footprints move at most; more turns a step into a lunge
+_MOST_SHIFT = (0.23, 0.20)  # m ahead and aside that footprints move at most
+_CROUCH_SHARE, _MOST_CROUCH = 1.4, 0.18  # m that a body sinks at most as its feet move outward
 _LEAST_HEIGHT = 0.5  # m of a centre of mass over the foot for which shifts are turned into angles: bodies lie and slide
-_SPEEDS = (1.2, 2.2)  # m/s between which the lean of a step begins to count
-_TURN_SHARE = (1.2, 0.5)  # of the missing angle ahead and aside by which the body turns, as recorded trunks do
-_TILT_SECONDS = 0.12  # s to either side over which that turn is smoothed
+_SPEEDS = (1.5, 2.5)  # m/s between which the lean of a step begins to count
+_EFFORT_SECONDS = 0.4  # s of an acceleration that count as speed: a turn on the spot passes through rest
+_TURN_SHARE, _BRAKE_SHARE = (0.8, 0.5), 0.3
+"""Shares of the missing angle by which the body turns: ahead, aside, and back against a braking foot."""
+_TILT_SECONDS, _CROUCH_SECONDS = 0.12, 0.33  # s to either side over which that turn, and the crouch, are smoothed
 
 
 @dataclass(frozen=True, eq=False)
@@ -122,8 +126,8 @@ def choose_shifts(lean: Lean, share: np.ndarray) -> np.ndarray:
     """
     ahead = lean.travel
     aside = np.stack([-ahead[:, 1], ahead[:, 0]], axis=1)
-    speed = measure_lengths(lean.velocity)
-    counts = share * smoothstep(speed, *_SPEEDS)
+    effort = measure_lengths(lean.velocity) + _EFFORT_SECONDS * measure_lengths(lean.acceleration)
+    counts = share * smoothstep(effort, *_SPEEDS)
     shift = np.zeros_like(lean.offset)
     for direction, dead, most in zip((ahead, aside), _DEAD_ZONE, _MOST_SHIFT):
         lacks = dot_products(lean.missing, direction)
@@ -142,8 +146,23 @@ def choose_angles(lean: Lean, shifts: np.ndarray) -> np.ndarray:
         (S, 2) rad by which the body tilts towards x and y, world.
     """
     slope, ahead = shifts / lean.lever[:, None], lean.travel
-    along = dot_products(slope, ahead)[..., None] * ahead
-    return _TURN_SHARE[0] * along + _TURN_SHARE[1] * (slope - along)
+    forward = dot_products(slope, ahead)
+    along = (np.where(forward < 0.0, _BRAKE_SHARE, _TURN_SHARE[0]) * forward)[:, None] * ahead
+    return along + _TURN_SHARE[1] * (slope - forward[:, None] * ahead)
+
+
+def choose_crouch(lean: Lean, shifts: np.ndarray) -> np.ndarray:
+    """Choose by how much the body sinks with the shifts of its stances: as far as a leg that keeps its length tilts.
+
+    Args:
+        lean: the S stances.
+        shifts: (S, 2) m of `choose_shifts`.
+    Returns:
+        (S,) m.
+    """
+    spread = np.sum((lean.offset + shifts) ** 2 - lean.offset**2, axis=1)
+    left = np.sqrt(np.maximum(lean.lever**2 - spread, 0.25 * lean.lever**2))
+    return np.minimum(_CROUCH_SHARE * np.maximum(lean.lever - left, 0.0), _MOST_CROUCH)
 
 
 def compute_footprint_shifts(stances: Stances, shifts: np.ndarray, share: np.ndarray) -> np.ndarray:
@@ -187,18 +206,40 @@ def tilt_body(rotations: np.ndarray, stances: Stances, angles: np.ndarray, share
     Returns:
         (T, J, 4) local rotations.
     """
-    at, reach = np.arange(len(rotations)), max(int(round(_TILT_SECONDS * fps)), 1)
-    # a long stance keeps its angle: a body that comes to stand straightens as it puts its feet down
-    half = np.minimum(0.5 * (stances.stop - stances.start), reach)
-    times = np.concatenate([stances.start + half, stances.stop - half])
-    order = np.argsort(times, kind="stable")
-    held = interpolate_columns(at, times[order], np.tile(angles, (2, 1))[order])
-    curve = share[:, None] * np.stack([hann_smooth(angle, reach) for angle in held.T], axis=1)
+    curve = share[:, None] * _hold_over_stances(angles, stances, len(rotations), _TILT_SECONDS * fps)
     # leaning towards (x, y) is a turn about (-y, x)
     turn = quaternion.from_rotation_vector(np.column_stack([-curve[:, 1], curve[:, 0], np.zeros(len(curve))]))
     out = rotations.copy()
     out[:, 0] = quaternion.multiply(turn, rotations[:, 0])
     return out
+
+
+def lower_root(root: np.ndarray, stances: Stances, crouch: np.ndarray, share: np.ndarray, fps: float) -> np.ndarray:
+    """Lower a root smoothly over the stances of its body.
+
+    Args:
+        root: (T, 3) m, world.
+        stances: S stances.
+        crouch: (S,) m of `choose_crouch`.
+        share: (T,) from 0, where the root stays, to 1.
+        fps: frames per second.
+    Returns:
+        (T, 3) m, world.
+    """
+    out = root.copy()
+    out[:, 2] -= share * _hold_over_stances(crouch[:, None], stances, len(root), _CROUCH_SECONDS * fps)[:, 0]
+    return out
+
+
+def _hold_over_stances(values: np.ndarray, stances: Stances, count: int, reach: float) -> np.ndarray:
+    """Hold values (S, K) over their stances, and smooth them over some frames to either side: (T, K)."""
+    at, reach = np.arange(count), max(int(round(reach)), 1)
+    # a long stance keeps its value: a body that comes to stand straightens as it puts its feet down
+    half = np.minimum(0.5 * (stances.stop - stances.start), reach)
+    times = np.concatenate([stances.start + half, stances.stop - half])
+    order = np.argsort(times, kind="stable")
+    held = interpolate_columns(at, times[order], np.tile(values, (2, 1))[order])
+    return np.stack([hann_smooth(column, reach) for column in held.T], axis=1)
 
 
 def _average_stance(values: np.ndarray, start: float, stop: float) -> np.ndarray:

@@ -20,7 +20,15 @@ from ..base.vectors import measure_lengths
 from . import quaternion
 from .foot_plant import AIR_RESERVE, Foot, build_foot, solve_heel_rise, spread_peaks
 from .humanoid import Humanoid, identify_joints
-from .lean import choose_angles, choose_shifts, compute_footprint_shifts, measure_lean, tilt_body
+from .lean import (
+    choose_angles,
+    choose_crouch,
+    choose_shifts,
+    compute_footprint_shifts,
+    lower_root,
+    measure_lean,
+    tilt_body,
+)
 from .limb import place_limb, solve_posed_limb
 from .mass import SEGMENT_MASSES, SegmentMasses, compute_centre_of_mass
 from .momentum import STRENGTH, MomentumPlanner
@@ -35,7 +43,7 @@ _HEEL_REACH = 0.02  # m of reach that a rising heel gives; for more the body is 
 _MOST_MOVE, _MOST_LOWERED = 0.25, 0.12
 """m that the centre of mass is moved, and lowered for its legs, at most: tracks that leap ask for more."""
 _FIRMNESS = 9.0  # by which a lowered height weighs more than others
-_SPREAD_FRAMES = 2  # frames at 30 fps over which it is spread
+_SPREAD_FRAMES, _SINK_FRAMES = 2, 6  # frames at 30 fps over which peaks of a rising heel, and of a drop, are spread
 
 
 def obey_momentum(
@@ -67,22 +75,24 @@ def obey_momentum(
     if not len(stances) or (len(phases) == 1 and phases[0, 0] <= 0.0 and phases[0, 1] >= len(root) - 1):
         return root, rotations
     legs = _build_legs(skeleton, body, masses, (places, world), stances=stances, fps=fps)
-    shifts, tilted = _lean_into_pushes(body, places, centre, rotations, stances, share=share, fps=fps)
+    shifts, lowered, tilted = _lean_into_pushes(body, places, centre, (root, rotations), stances, share=share, fps=fps)
     planner = MomentumPlanner(phases, len(root), fps, share, strength)
-    new_root, new_rotations = legs.move(shifts).follow(planner, root, tilted)
+    new_root, new_rotations = legs.move(shifts).follow(planner, lowered, tilted)
     stays = share <= 0.0
     new_rotations = quaternion.match_signs(new_rotations, rotations)
     return np.where(stays[:, None], root, new_root), np.where(stays[:, None, None], rotations, new_rotations)
 
 
-def _lean_into_pushes(body: Humanoid, places: np.ndarray, centre: np.ndarray, rotations: np.ndarray, stances: Stances,
-                      share: np.ndarray, fps: float) -> tuple[np.ndarray, np.ndarray]:
-    """Compute how both feet move (T, 2, 2) m and rotations (T, J, 4) of a body that tilts, by what its stances lack."""
+def _lean_into_pushes(body: Humanoid, places: np.ndarray, centre: np.ndarray, pose: tuple[np.ndarray, np.ndarray],
+                      stances: Stances, share: np.ndarray, fps: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Compute how both feet move (T, 2, 2) m, and root and rotations of a body that tilts and sinks: what it lacks."""
+    root, rotations = pose
     lean = measure_lean(body, places, centre, stances, fps)
     least = [share[int(start) : int(np.ceil(stop)) + 1].min() for start, stop in zip(stances.start, stances.stop)]
     shifts = choose_shifts(lean, np.array(least))
     tilted = tilt_body(rotations, stances, choose_angles(lean, shifts), share=share, fps=fps)
-    return compute_footprint_shifts(stances, shifts, share), tilted
+    lowered = lower_root(root, stances, choose_crouch(lean, shifts), share=share, fps=fps)
+    return compute_footprint_shifts(stances, shifts, share), lowered, tilted
 
 
 def _build_legs(skeleton: Skeleton, body: Humanoid, masses: SegmentMasses, pose: tuple[np.ndarray, np.ndarray],
@@ -93,7 +103,8 @@ def _build_legs(skeleton: Skeleton, body: Humanoid, masses: SegmentMasses, pose:
     standing = tuple(stances.compute_share(side, len(places), _FADE_FRAMES * scale) for side in (0, 1))
     feet = tuple(build_foot(places, world, limb, np.repeat(stands[:, None] > 0.0, 2, axis=1))
                  for limb, stands in zip(limbs, standing))
-    return _Legs(skeleton, body, masses, feet, standing, spread=max(int(round(_SPREAD_FRAMES * scale)), 1))
+    spread, sink = (max(int(round(frames * scale)), 1) for frames in (_SPREAD_FRAMES, _SINK_FRAMES))
+    return _Legs(skeleton, body, masses, feet, standing, spread=spread, sink=sink)
 
 
 @dataclass(frozen=True, eq=False)
@@ -106,7 +117,8 @@ class _Legs:
         masses: of its segments.
         feet: left and right, before the root moves.
         standing: (T,) of each foot, from 0, where it goes with the pelvis, to 1.
-        spread: frames over which peaks of a drop or of a rising heel are spread.
+        spread: frames over which peaks of a rising heel are spread.
+        sink: the same of a drop.
     """
 
     skeleton: Skeleton
@@ -115,6 +127,7 @@ class _Legs:
     feet: tuple[Foot, ...]
     standing: tuple[np.ndarray, ...]
     spread: int
+    sink: int
 
     def move(self, shifts: np.ndarray) -> _Legs:
         """Move the feet over the ground, by shifts (T, 2, 2) m of the left and the right one."""
@@ -134,7 +147,7 @@ class _Legs:
             lacks = self._measure_shortfall(places, move)
             if lacks.max() < _REACH_TOLERANCE:
                 break
-            lacks = spread_peaks(lacks, self.spread)
+            lacks = spread_peaks(lacks, self.sink)
             goal = np.maximum(goal - planner.share * lacks, centre[:, 2] - _MOST_LOWERED)
             firmness = np.where(lacks > 0.0, _FIRMNESS, firmness)
         move = move + plan - self._measure_centre(places, world, move)

@@ -14,7 +14,7 @@ from .packing import pack_values, restore_values
 from .reference import LibraryReference, build_reference, find_slowest_speed, select_originals
 
 # raised whenever what is measured of a recording changes, so that old files are not used
-VERSION = 2
+VERSION = 3
 _KNOWN_WITHOUT = ("fps", "index", "slowest")  # fields that are found at once
 _STORED = {name: kind for name, kind in get_type_hints(LibraryReference).items() if name not in _KNOWN_WITHOUT}
 _IN_MEMORY: WeakKeyDictionary[Library, dict[float, LibraryReference]] = WeakKeyDictionary()

@@ -57,7 +57,8 @@ _NATURALNESS = ("snap_turns_per_min", "spins_per_min", "pelvis_drops_per_min", "
                 "off_travel_deg_p90", "standing.foot_lifts_per_min", "standing.both_down")  # fmt: skip
 _PHYSICS = ("flight.2-4.vertical_m_s2_median", "flight.4-6.vertical_m_s2_median", "flight.2-4.level_m_s2_median",
             "flight.4-6.level_m_s2_median", "flight.accelerating.level_m_s2_median", "lean.side.lean_error_deg_median",
-            "lean.fore.lean_error_deg_median", "boots.below_share")
+            "lean.fore.lean_error_deg_median", "lean.hard.lean_missing_deg_median",
+            "lean.hard.crouch_m_median", "boots.below_share")
 _TOUCHES = ("reception.receptions", "reception.speed_m_s_median", "second_strike_count", "kick.kicks",
             "kick.ankle_speed_m_s_median", "kick.plant_in_range_share", "ball_speed.ratio_median", "fit.fit_share",
             "contact.reachable_met_share", "ball_inside.inside_frames", "substituted_count", "synthetic_count")

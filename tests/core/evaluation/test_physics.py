@@ -13,7 +13,14 @@ from beyond_mocap.evaluation.body_physics import measure_body_physics, summarize
 from beyond_mocap.evaluation.boots import measure_boot_heights, measure_lowest_point
 from beyond_mocap.evaluation.html import build_physics_section
 from beyond_mocap.evaluation.naturalness import measure_course
-from beyond_mocap.evaluation.physics import MassCourse, compute_bounce, measure_flights, measure_leans, measure_steps
+from beyond_mocap.evaluation.physics import (
+    MassCourse,
+    compute_bounce,
+    measure_flights,
+    measure_leans,
+    measure_pushes,
+    measure_steps,
+)
 from beyond_mocap.evaluation.physics_figures import measure_physics
 from beyond_mocap.evaluation.report import evaluate, evaluate_played, flatten_report
 from beyond_mocap.evaluation.sprint_form import measure_knee_flexion, measure_trunk_lean
@@ -30,12 +37,13 @@ FPS, COUNT = 30.0, 300
 TIMES = np.arange(COUNT) / FPS
 
 
-def build_course(centre=None, height=0.0, speed=5.0, stances=((), (), ()), lean=None) -> MassCourse:
+def build_course(centre=None, height=0.0, speed=5.0, stances=((), (), ()), lean=None, crouch=None) -> MassCourse:
     """A body of 10 s whose feet are at one height, with planted stances (sides, starts, stops)."""
     side, start, stop = (np.array(values, kind) for values, kind in zip(stances, (int, float, float)))
     still = Lean(np.zeros((len(side), 2)), np.ones(len(side)), np.zeros((len(side), 2)), np.zeros((len(side), 2)))
     return MassCourse(
         centre=np.zeros((COUNT, 3)) if centre is None else centre, speed=np.full(COUNT, speed),
+        crouch=np.zeros(COUNT) if crouch is None else crouch,
         foot_height=np.stack([np.broadcast_to(height, COUNT)] * 2, axis=1),
         stances=Stances(side, start, stop), lean=lean or still)
 
@@ -94,6 +102,19 @@ def test_leans_are_sideways_and_forward_of_the_travel(travel, side, fore, pull_s
     assert len(found) == 7  # the last stance is followed by no step
     assert found.angle == pytest.approx(np.tile([side, fore], (7, 1)), abs=0.02)
     assert found.wanted == pytest.approx(np.tile([pull_side, pull_fore], (7, 1)), abs=0.03)
+
+
+@pytest.mark.parametrize("speed", [0.5, 5.0])
+def test_pushes_lack_what_they_lean_less_than_their_acceleration_asks_and_crouch(speed):
+    push = np.array([2.0, 3.1, 5.0, 8.0, 8.0])[:, None] * [0.6, 0.8]
+    lean = Lean(0.9 * np.array([0.0, 0.1, 0.2, 0.9, 0.9])[:, None] * [0.6, 0.8],
+                np.array([0.9, 0.9, 0.9, 0.9, 0.3]), push, np.tile([speed, 0.0], (5, 1)))
+    crouch = np.where(TIMES > 45.0 / FPS, 0.2, 0.0) + np.where(TIMES == 40.0 / FPS, 0.1, 0.0)
+    found = measure_pushes(build_course(speed=speed, stances=run(count=5), lean=lean, crouch=crouch))
+    assert found.middle.tolist() == [32, 42, 52]  # neither the soft push nor the body that lies
+    asked = np.arctan(np.array([3.1, 5.0, 8.0]) / 9.81)
+    assert found.missing == pytest.approx(asked - np.arctan([0.1, 0.2, 0.9])) and found.missing[2] < 0.0
+    assert found.crouch == pytest.approx([0.0, 0.1, 0.2])
 
 
 def measure(motion):

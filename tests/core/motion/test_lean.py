@@ -5,12 +5,20 @@ import pytest
 
 from beyond_mocap.motion import quaternion
 from beyond_mocap.motion.humanoid import identify_joints
-from beyond_mocap.motion.lean import choose_angles, choose_shifts, compute_footprint_shifts, measure_lean, tilt_body
+from beyond_mocap.motion.lean import (
+    choose_angles,
+    choose_crouch,
+    choose_shifts,
+    compute_footprint_shifts,
+    lower_root,
+    measure_lean,
+    tilt_body,
+)
 from beyond_mocap.motion.retargeting.adult import build_adult_skeleton
 from beyond_mocap.motion.retargeting.neutral import build_neutral_stance
 from beyond_mocap.motion.supports import GRAVITY, Stances
 
-FPS, HEIGHT, MOST = 60.0, 1.0, 0.15  # frames per second; m of the centre of mass, and that a footprint moves at most
+FPS, HEIGHT, MOST = 60.0, 1.0, 0.20  # frames per second; m of the centre of mass, and that a footprint moves at most
 BODY = identify_joints(build_adult_skeleton())
 REST = build_neutral_stance(build_adult_skeleton()).positions
 
@@ -75,13 +83,28 @@ def test_a_start_leans_ahead_and_a_stop_back():
 
 
 def test_slow_bodies_and_stances_without_a_share_do_not_lean_more():
-    ground, stances = run_circle(1.1, 1.0), build_stances(4.0)
+    ground, stances = run_circle(1.1, 2.0), build_stances(4.0)
     assert not choose_shifts(measure_lean(BODY, *place_body(ground, stances), stances, FPS),
                              np.ones(len(stances)))[2:-2].any()
     fast = measure_lean(BODY, *place_body(run_circle(6.0, 12.0), stances), stances, FPS)
     assert not choose_shifts(fast, np.zeros(len(stances))).any()
     half, whole = (choose_shifts(fast, np.full(len(stances), share)) for share in (0.5, 1.0))
     assert half == pytest.approx(0.5 * whole)
+
+
+def test_a_turn_back_leans_while_the_body_rests_and_the_body_crouches():
+    times, stances = np.arange(240) / FPS - 2.0, build_stances(4.0)
+    ground = np.column_stack([2.5 * times**2, 0.0 * times])  # 5 m/s^2, at rest after 2 s
+    lean = measure_lean(BODY, *place_body(ground, stances), stances, FPS)
+    shifts = choose_shifts(lean, np.ones(len(stances)))
+    middle = np.abs(stances.middle / FPS - 2.0).argmin()
+    assert np.linalg.norm(lean.velocity[middle]) < 1.0 and shifts[middle, 0] > 0.1
+    crouch = choose_crouch(lean, shifts)
+    assert np.all(crouch >= 0.0) and crouch[4:-4].min() > 0.005 and crouch.max() <= 0.18
+    assert not choose_crouch(lean, np.zeros_like(shifts)).any()  # who leans as the clip does sinks no further
+    assert not choose_crouch(lean, -lean.offset).any()  # nor who comes to stand over the foot
+    root = lower_root(np.ones((240, 3)), stances, np.full(len(stances), 0.1), np.ones(240), FPS)
+    assert root[:, 2] == pytest.approx(0.9) and np.all(root[:, :2] == 1.0)
 
 
 @pytest.mark.parametrize("rest, is_averaged", [(0.3, True), (2.0, False)])
@@ -125,11 +148,13 @@ def test_no_footprint_moves_where_there_is_no_share():
     assert not moves[70:131].any() and np.abs(moves).max() == pytest.approx(0.1)
 
 
-def test_a_body_tilts_by_half_the_angle_aside_and_by_more_ahead():
+def test_a_body_tilts_by_half_the_angle_aside_by_more_ahead_and_by_less_as_it_brakes():
     stances = build_stances(4.0)
     lean = measure_lean(BODY, *place_body(run_straight(5.0), stances), stances, FPS)
-    ahead, aside = (choose_angles(lean, np.tile(shift, (len(stances), 1)))[5] for shift in ([0.1, 0.0], [0.0, 0.1]))
+    ahead, aside, back = (choose_angles(lean, np.tile(shift, (len(stances), 1)))[5]
+                          for shift in ([0.15, 0.0], [0.0, 0.1], [-0.1, 0.0]))
     assert ahead == pytest.approx([0.12, 0.0], abs=1e-6) and aside == pytest.approx([0.0, 0.05], abs=1e-6)
+    assert back == pytest.approx([-0.03, 0.0], abs=1e-6)
     rotations = np.tile(quaternion.identity(1, 3), (240, 1, 1))
     turned = tilt_body(rotations, stances, np.tile(ahead, (len(stances), 1)), np.ones(240), FPS)
     up = quaternion.rotate(turned[:, 0], np.array([0.0, 0.0, 1.0]))

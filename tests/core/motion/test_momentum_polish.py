@@ -120,7 +120,7 @@ def test_frames_without_a_share_stay_bit_for_bit_and_join_without_a_jump(run, br
             motion.skeleton, root, rotations)[0]
         beside = np.flatnonzero(np.diff(stays.astype(int)))
         moved = np.linalg.norm(after - before, axis=-1).max(axis=1)
-        assert moved.max() > 0.02 and np.maximum(moved[beside], moved[beside + 1]).max() < 0.02
+        assert moved.max() > 0.02 and np.maximum(moved[beside], moved[beside + 1]).max() < 0.025
 
 
 def test_a_body_that_stopped_stands_as_it_stood(braking):
