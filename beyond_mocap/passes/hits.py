@@ -130,7 +130,7 @@ class Hits:
 
 
 def detect_hits(motion: Motion, part: str = "foot", side: str = "right", threshold: float | None = None,
-                joint: str | None = None, tool: Tool | None = None, poses: Poses | None = None) -> Hits:
+                joint: str | None = None, tool: Tool | None = None, measured: PartMeasures | None = None) -> Hits:
     """Detect the hits of one part of the body in a motion.
 
     Args:
@@ -141,7 +141,7 @@ def detect_hits(motion: Motion, part: str = "foot", side: str = "right", thresho
             steps of walking and running are left out.
         joint: name of a joint to use instead of the part's own position.
         tool: what is in the hand; default: a racquet.
-        poses: `forward_kinematics` of the motion, where it is known.
+        measured: `measure_part` of all this, where it is known.
     Returns:
         All high and fast frames, hit motions, ball stretches and link stretches.
     Raises:
@@ -150,7 +150,8 @@ def detect_hits(motion: Motion, part: str = "foot", side: str = "right", thresho
     Source: Ball handling, section 3.
     """
     _check_input(motion, threshold)
-    body, trajectory, other, place = _measure(motion, part, side, joint=joint, tool=tool, poses=poses)
+    measured = measured or measure_part(motion, part, side, joint=joint, tool=tool)
+    body, trajectory, other = measured.body, measured.trajectory, measured.other
     side = side if part in _SIDED else ""
     peaks = _find_peaks(trajectory.height)
     height_threshold = _find_threshold(trajectory.height, peaks, part) if threshold is None else float(threshold)
@@ -160,14 +161,14 @@ def detect_hits(motion: Motion, part: str = "foot", side: str = "right", thresho
         spans = [span for span in spans if _is_hit(span, part, trajectory, body, other)]
     hit_motions = tuple(_build_hit_motion(part, side, span, trajectory, body) for span in spans)
     return Hits(part=part, side=side, fps=motion.fps, threshold=height_threshold, height=trajectory.height,
-                speed=trajectory.speed, place=place, highs=tuple(sorted({*highs, *(one.high for one in hit_motions)})),
+                speed=trajectory.speed, place=measured.place, highs=tuple(sorted({*highs, *(one.high for one in hit_motions)})),
                 fasts=tuple(_find_fast_frames(trajectory.speed, motion.fps)), motions=hit_motions,
                 ball_stretches=tuple(one.ball_stretch for one in hit_motions),
                 links=_find_links(hit_motions, len(motion)))
 
 
 def detect_hit_under_way(motion: Motion, part: str = "foot", side: str = "right", threshold: float | None = None,
-                         tool: Tool | None = None, poses: Poses | None = None) -> HitMotion | None:
+                         tool: Tool | None = None, measured: PartMeasures | None = None) -> HitMotion | None:
     """Detect a hit motion that is not over yet, but whose strike has just been: the part slows down again.
 
     It has to be as fast as `detect_hits` wants, to move ahead of the body, and to be above the threshold before, at or
@@ -175,7 +176,7 @@ def detect_hit_under_way(motion: Motion, part: str = "foot", side: str = "right"
 
     Args:
         motion: the motion up to now, three frames or more.
-        part, side, threshold, tool, poses: as in `detect_hits`.
+        part, side, threshold, tool, measured: as in `detect_hits`.
     Returns:
         The hit motion up to now, with NaN for the displacements and durations that are still to come; None if there
         is none.
@@ -183,7 +184,8 @@ def detect_hit_under_way(motion: Motion, part: str = "foot", side: str = "right"
         InputError: as `detect_hits`.
     """
     _check_input(motion, threshold)
-    body, trajectory, other, _ = _measure(motion, part, side, tool=tool, poses=poses)
+    measured = measured or measure_part(motion, part, side, tool=tool)
+    body, trajectory, other = measured.body, measured.trajectory, measured.other
     speed, height, now = trajectory.speed, trajectory.height, len(motion) - 1
     earliest = max(now - int(_RECENT * motion.fps), 0)
     key = earliest + int(np.argmax(speed[earliest:]))
@@ -243,12 +245,12 @@ def build_hit_at(motion: Motion, frame: int, span: tuple[int, int], part: str = 
         InputError: as `detect_hits`.
     """
     _check_input(motion, None)
-    body, trajectory, _, _ = _measure(motion, part, side, tool=tool)
+    measured = measure_part(motion, part, side, tool=tool)
     first = int(np.clip(span[0], 0, len(motion) - 3))
     last = int(np.clip(span[1], first + 2, len(motion) - 1))
     key = int(np.clip(frame, first + 1, last - 1))
     side = side if part in _SIDED else ""
-    return _build_hit_motion(part, side, (first, last), trajectory, body, key=key)
+    return _build_hit_motion(part, side, (first, last), measured.trajectory, measured.body, key=key)
 
 
 def compute_strike_place(skeleton: Skeleton, positions: np.ndarray, rotations: np.ndarray, part: str, side: str,
@@ -340,17 +342,43 @@ class _PartTrajectory:
                                speed=np.linalg.norm(relative_velocity, axis=1), fps=fps)
 
 
-def _measure(motion: Motion, part: str, side: str, joint: str | None = None, tool: Tool | None = None,
-             poses: Poses | None = None):
-    """Measure a motion: its body, the part's trajectory, the speed (T,) m/s of the other foot where a foot strikes,
-    else None, and the part's places (T, 3) m.
+@dataclass(frozen=True, eq=False, kw_only=True)
+class PartMeasures:
+    """What the hits of a part are found in.
+
+    Attributes:
+        body: the body.
+        trajectory: of the part.
+        other: (T,) m/s of the other foot where a foot strikes, else None.
+        place: (T, 3) m, the part, world frame.
+    """
+
+    body: _Body
+    trajectory: _PartTrajectory
+    other: np.ndarray | None
+    place: np.ndarray
+
+
+def measure_part(motion: Motion, part: str = "foot", side: str = "right", *, joint: str | None = None,
+                 tool: Tool | None = None, poses: Poses | None = None, body: _Body | None = None) -> PartMeasures:
+    """Measure how a part of the body moves in a motion.
+
+    Args:
+        motion: the motion.
+        part, side, joint, tool: as in `detect_hits`.
+        poses: `forward_kinematics` of the motion, where it is known.
+        body: that of another part, measured in the same motion.
+    Returns:
+        What hits are found in.
+    Raises:
+        InputError: for an unknown side, or a part or joint that the skeleton lacks.
     """
     positions, rotations = forward_kinematics(motion) if poses is None else poses
     place = compute_strike_place(motion.skeleton, positions, rotations, part=joint or part, side=side, tool=tool)
-    body = _Body.from_motion(motion, positions)
-    trajectory = _PartTrajectory.from_positions(place, body, part, motion.fps)
+    body = body or _Body.from_motion(motion, positions)
     other = _other_foot_speed(motion.skeleton, positions, side, motion.fps) if part == "foot" else None
-    return body, trajectory, other, place
+    return PartMeasures(body=body, trajectory=_PartTrajectory.from_positions(place, body, part, motion.fps),
+                        other=other, place=place)
 
 
 def _other_foot_speed(skeleton: Skeleton, positions: np.ndarray, side: str, fps: float) -> np.ndarray:
