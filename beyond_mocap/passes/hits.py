@@ -161,7 +161,8 @@ def detect_hits(motion: Motion, part: str = "foot", side: str = "right", thresho
         spans = [span for span in spans if _is_hit(span, part, trajectory, body, other)]
     hit_motions = tuple(_build_hit_motion(part, side, span, trajectory, body) for span in spans)
     return Hits(part=part, side=side, fps=motion.fps, threshold=height_threshold, height=trajectory.height,
-                speed=trajectory.speed, place=measured.place, highs=tuple(sorted({*highs, *(one.high for one in hit_motions)})),
+                speed=trajectory.speed, place=measured.place,
+                highs=tuple(sorted({*highs, *(one.high for one in hit_motions)})),
                 fasts=tuple(_find_fast_frames(trajectory.speed, motion.fps)), motions=hit_motions,
                 ball_stretches=tuple(one.ball_stretch for one in hit_motions),
                 links=_find_links(hit_motions, len(motion)))

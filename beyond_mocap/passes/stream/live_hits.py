@@ -84,8 +84,8 @@ class LiveHits:
         """Find the strongest hit motion whose strike has been since the last one that was found.
 
         Returns:
-            The hit motion and the time of its key (s, monotonic clock): when it was sent, if the stream says so, otherwise
-            when it arrived. None where there is no new one.
+            The hit motion and the time of its key (s, monotonic clock): when it was sent, if the stream says so,
+            otherwise when it arrived. None where there is no new one.
         Raises:
             InputError: if the streamed body lacks the part.
         """
@@ -123,11 +123,10 @@ class LiveHits:
         moments = [motion.frames(0, end) for end in ends]
         measures = [self._measure(one, (poses[0][:end], poses[1][:end])) for one, end in zip(moments, ends)]
         for side in self.sides:
-            asked = {"part": self.part, "side": side, "threshold": self.threshold, "tool": self.tool}
-            whole = detect_hits(motion, **asked, measured=measures[0][side]).motions
-            found += [hit for hit in whole if 0 < hit.first and hit.last < settled]
-            under_way = (detect_hit_under_way(one, **asked, measured=measured[side])
-                         for one, measured in zip(moments, measures))
+            whole = detect_hits(motion, self.part, side, self.threshold, tool=self.tool, measured=measures[0][side])
+            found += [hit for hit in whole.motions if 0 < hit.first and hit.last < settled]
+            under_way = (detect_hit_under_way(one, self.part, side, self.threshold, tool=self.tool,
+                                              measured=measured[side]) for one, measured in zip(moments, measures))
             found += filter(None, [next(filter(None, under_way), None)])
         return found
 

@@ -274,7 +274,8 @@ class Played:
         count = min(int(self.now / self.step) + 1, len(self.frames))
         some = enumerate(self.frames[number:count], start=number)
         return [StreamFrame(
-            number=n + 1, time=n * self.step, sent=self.late and n * self.step - self.late, values=frame.values, rows=frame.rows,
+            number=n + 1, time=n * self.step, sent=self.late and n * self.step - self.late, values=frame.values,
+            rows=frame.rows,
         ) for n, frame in some]
 
 

@@ -132,10 +132,11 @@ def test_a_kicked_ball_is_met_and_flies_on_as_recorded(tmp_path, clips_folder, t
     motion, frame = kick.motion, round(kick.key * 60.0)
     foot = build_part_surfaces(motion.skeleton, "foot", ("right",))[0].compute_line(*forward_kinematics(motion))[1]
     after = np.arange(len(motion)) - frame
-    ball = foot[frame] * [1, 1, 0] + [0.16 + OFF, 0.0, BALL_RADIUS] + np.maximum(after, 0)[:, None] / 60.0 * [15.0, 0, 0]
+    before, after = np.minimum(after, 0)[:, None] / 60.0, np.maximum(after, 0)[:, None] / 60.0
+    ball = foot[frame] * [1, 1, 0] + [0.16 + OFF, 0.0, BALL_RADIUS] + after * [15.0, 0.0, 0.0]
     if is_flying:
-        ball += [-0.06, 0.0, 0.15] + np.minimum(after, 0)[:, None] / 60.0 * [-9.0, 0.0, 0.0]
-        ball[:, 2] = np.maximum(ball[:, 2] - 4.9 * (np.maximum(after, 0) / 60.0) ** 2, BALL_RADIUS)
+        ball += [-0.06, 0.0, 0.15] + before * [-9.0, 0.0, 0.0] - 4.9 * after**2 * [0.0, 0.0, 1.0]
+        ball[:, 2] = np.maximum(ball[:, 2], BALL_RADIUS)
     write_ball(tmp_path / "kick.ball.csv", BallPath(np.arange(len(ball)) / 60.0, ball, np.ones(len(ball), bool)))
     plan = Plan(track=track_of(2.8, 7.0), timeline=timeline_of((4.0, "kick low inside right")), recorded_ball=True,
                 made=False)
