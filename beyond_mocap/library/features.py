@@ -85,6 +85,10 @@ class Frames:
         """(N,) speed of the path without sway, m/s."""
         return np.linalg.norm(self.velocity, axis=1)
 
+    def find_nearest(self, clip: int, frame: float, fps: float) -> int:
+        """Find the frame nearest to a fractional frame of a clip at the clip's own rate, its last one at most."""
+        return int(self.first[clip]) + min(int(frame / fps * FPS + 0.5), int(self.count[clip]) - 1)
+
 
 def select_feature_joints(skeleton: Skeleton) -> np.ndarray:
     """Select the joints of the features: all but those that coincide with their parent and the fingers beyond the

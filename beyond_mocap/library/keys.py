@@ -53,7 +53,7 @@ def measure_kick_speed(frames, clips: Sequence, keys: Sequence) -> float:
         m/s; infinite without any kick.
     """
     found = [
-        frames.speed[frames.first[key.clip] + int(key.frame / clips[key.clip].motion.fps * 30.0 + 0.5)]
+        frames.speed[frames.find_nearest(key.clip, key.frame, clips[key.clip].motion.fps)]
         for key in keys if _KICK in key.labels and not clips[key.clip].is_synthetic
     ]
     return float(max(found)) if found else np.inf

@@ -261,7 +261,7 @@ def _is_recorded(library: Library, moment: ActionMoment, mirror: bool) -> bool:
 def _suits_reception(library: Library, key: Key, moment: ActionMoment) -> bool:
     """Return whether a recorded reception is played about as fast as the player moves, and as high as the ball is."""
     motion = library.clips[key.clip].motion
-    frame = int(library.frames.first[key.clip] + key.frame * library.fps / motion.fps + 0.5)
+    frame = library.frames.find_nearest(key.clip, key.frame, motion.fps)
     if moment.speed > max(_RECEPTION_ROOM * library.frames.speed[frame], _SLOW_RECEPTION):
         return False
     if moment.height is None:

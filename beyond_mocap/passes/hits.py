@@ -24,7 +24,7 @@ from ..ball.contact import Tool
 from ..base.errors import InputError
 from ..motion import quaternion
 from ..motion.motion import Motion
-from .part_trajectory import PartTrajectory, PlayerBody, Poses, measure_part
+from .part_trajectory import PartMeasures, PartTrajectory, PlayerBody, measure_part
 
 _SIDED = ("foot", "hand", "tool")
 _APART = 0.25  # s: least distance of two fast frames; the part's return after a hit is closer
@@ -124,7 +124,7 @@ class Hits:
 
 
 def detect_hits(motion: Motion, part: str = "foot", side: str = "right", threshold: float | None = None,
-                joint: str | None = None, tool: Tool | None = None, poses: Poses | None = None) -> Hits:
+                joint: str | None = None, tool: Tool | None = None, measured: PartMeasures | None = None) -> Hits:
     """Detect the hits of one part of the body in a motion.
 
     Args:
@@ -135,7 +135,7 @@ def detect_hits(motion: Motion, part: str = "foot", side: str = "right", thresho
             steps of walking and running are left out.
         joint: name of a joint to use instead of the part's own position.
         tool: what is in the hand; default: a racquet.
-        poses: `forward_kinematics` of the motion, where it is known.
+        measured: `measure_part` of all this, where it is known.
     Returns:
         All high and fast frames, hit motions, ball stretches and link stretches.
     Raises:
@@ -144,7 +144,8 @@ def detect_hits(motion: Motion, part: str = "foot", side: str = "right", thresho
     Source: Ball handling, section 3.
     """
     _check_input(motion, threshold)
-    body, trajectory, other, place = measure_part(motion, part, side, joint=joint, tool=tool, poses=poses)
+    measured = measured or measure_part(motion, part, side, joint=joint, tool=tool)
+    body, trajectory, other = measured.body, measured.trajectory, measured.other
     side = side if part in _SIDED else ""
     peaks = _find_peaks(trajectory.height)
     height_threshold = _find_threshold(trajectory.height, peaks, part) if threshold is None else float(threshold)
@@ -154,14 +155,15 @@ def detect_hits(motion: Motion, part: str = "foot", side: str = "right", thresho
         spans = [span for span in spans if _is_hit(span, part, trajectory, body, other)]
     hit_motions = tuple(_build_hit_motion(part, side, span, trajectory, body) for span in spans)
     return Hits(part=part, side=side, fps=motion.fps, threshold=height_threshold, height=trajectory.height,
-                speed=trajectory.speed, place=place, highs=tuple(sorted({*highs, *(one.high for one in hit_motions)})),
+                speed=trajectory.speed, place=measured.place,
+                highs=tuple(sorted({*highs, *(one.high for one in hit_motions)})),
                 fasts=tuple(_find_fast_frames(trajectory.speed, motion.fps)), motions=hit_motions,
                 ball_stretches=tuple(one.ball_stretch for one in hit_motions),
                 links=_find_links(hit_motions, len(motion)))
 
 
 def detect_hit_under_way(motion: Motion, part: str = "foot", side: str = "right", threshold: float | None = None,
-                         tool: Tool | None = None, poses: Poses | None = None) -> HitMotion | None:
+                         tool: Tool | None = None, measured: PartMeasures | None = None) -> HitMotion | None:
     """Detect a hit motion that is not over yet, but whose strike has just been: the part slows down again.
 
     It has to be as fast as `detect_hits` wants, to move ahead of the body, and to be above the threshold before, at or
@@ -169,7 +171,7 @@ def detect_hit_under_way(motion: Motion, part: str = "foot", side: str = "right"
 
     Args:
         motion: the motion up to now, three frames or more.
-        part, side, threshold, tool, poses: as in `detect_hits`.
+        part, side, threshold, tool, measured: as in `detect_hits`.
     Returns:
         The hit motion up to now, with NaN for the displacements and durations that are still to come; None if there
         is none.
@@ -177,7 +179,8 @@ def detect_hit_under_way(motion: Motion, part: str = "foot", side: str = "right"
         InputError: as `detect_hits`.
     """
     _check_input(motion, threshold)
-    body, trajectory, other, _ = measure_part(motion, part, side, tool=tool, poses=poses)
+    measured = measured or measure_part(motion, part, side, tool=tool)
+    body, trajectory, other = measured.body, measured.trajectory, measured.other
     speed, height, now = trajectory.speed, trajectory.height, len(motion) - 1
     earliest = max(now - int(_RECENT * motion.fps), 0)
     key = earliest + int(np.argmax(speed[earliest:]))
@@ -237,12 +240,12 @@ def build_hit_at(motion: Motion, frame: int, span: tuple[int, int], part: str = 
         InputError: as `detect_hits`.
     """
     _check_input(motion, None)
-    body, trajectory, _, _ = measure_part(motion, part, side, tool=tool)
+    measured = measure_part(motion, part, side, tool=tool)
     first = int(np.clip(span[0], 0, len(motion) - 3))
     last = int(np.clip(span[1], first + 2, len(motion) - 1))
     key = int(np.clip(frame, first + 1, last - 1))
     side = side if part in _SIDED else ""
-    return _build_hit_motion(part, side, (first, last), trajectory, body, key=key)
+    return _build_hit_motion(part, side, (first, last), measured.trajectory, measured.body, key=key)
 
 
 def _check_input(motion: Motion, threshold: float | None) -> None:

@@ -82,28 +82,44 @@ class PartTrajectory:
                               speed=np.linalg.norm(relative_velocity, axis=1), fps=fps)
 
 
-def measure_part(motion: Motion, part: str, side: str, joint: str | None = None, tool: Tool | None = None,
-                 poses: Poses | None = None) -> tuple[PlayerBody, PartTrajectory, np.ndarray | None, np.ndarray]:
+@dataclass(frozen=True, eq=False, kw_only=True)
+class PartMeasures:
+    """What the hits of a part are found in.
+
+    Attributes:
+        body: the body.
+        trajectory: of the part.
+        other: (T,) m/s of the other foot where a foot strikes, else None.
+        place: (T, 3) m, the part, not smoothed, world frame.
+    """
+
+    body: PlayerBody
+    trajectory: PartTrajectory
+    other: np.ndarray | None
+    place: np.ndarray
+
+
+def measure_part(motion: Motion, part: str = "foot", side: str = "right", *, joint: str | None = None,
+                 tool: Tool | None = None, poses: Poses | None = None, body: PlayerBody | None = None) -> PartMeasures:
     """Measure the movement of one part of the body, and of what it is compared with.
 
     Args:
         motion: T frames.
-        part, side, joint, tool, poses: as in `hits.detect_hits`.
+        part, side, joint, tool: as in `hits.detect_hits`.
+        poses: `forward_kinematics` of the motion, where it is known.
+        body: that of another part, measured in the same motion.
     Returns:
-        body: the body.
-        trajectory: the part's trajectory.
-        other: (T,) m/s of the other foot where a foot strikes, else None.
-        place: (T, 3) m, the part, not smoothed, world frame.
+        What hits are found in.
     Raises:
-        InputError: if the skeleton lacks the part.
+        InputError: for an unknown side, or a part or joint that the skeleton lacks.
     """
     positions, rotations = forward_kinematics(motion) if poses is None else poses
     surface = find_striking_surface(motion.skeleton, joint or part, side, tool)
     place = np.mean(surface.compute_line(positions, rotations), axis=0)
-    body = PlayerBody.from_motion(motion, positions)
-    trajectory = PartTrajectory.from_positions(place, body, part, motion.fps)
+    body = body or PlayerBody.from_motion(motion, positions)
     other = _other_foot_speed(motion.skeleton, positions, side, motion.fps) if part == "foot" else None
-    return body, trajectory, other, place
+    return PartMeasures(body=body, trajectory=PartTrajectory.from_positions(place, body, part, motion.fps),
+                        other=other, place=place)
 
 
 def _other_foot_speed(skeleton: Skeleton, positions: np.ndarray, side: str, fps: float) -> np.ndarray:

@@ -22,6 +22,7 @@ from ..core.measure import frames_per_second
 from ..passes import generate as make
 from ..passes.settings import PLAYED
 from . import follow, rally_keys
+from .rally_clock import RallyClock
 
 if TYPE_CHECKING:
     from ...beyond_mocap.passes.answers_ahead import AnswerRequest
@@ -41,7 +42,8 @@ def apply_rally(scene: bpy.types.Scene, new_rally: NewRally) -> None:
     stop_rally()
     make.session.store_library(new_rally.library, new_rally.order.unit)
     _session.update(scene=scene.session_uid, means=new_rally.means, seen=None, latest={}, unwritten=set(),
-                    keys=rally_keys.RallyKeys(), drawn=compute_rally_seconds(scene), watchers=None, steps=0)
+                    keys=rally_keys.RallyKeys(), drawn=compute_rally_seconds(scene), watchers=None, steps=0,
+                    clock=RallyClock())
     _wait_for_strike(scene, new_rally.rally)
     for name in ("strikes", "figures", "messages"):
         scene.beyond_mocap_passes.property_unset(name)
@@ -123,8 +125,9 @@ def answer_in_playback(scene: bpy.types.Scene) -> None:
     """Insert the answer to the user's strike, if it is planned, before a frame of the playback is evaluated."""
     if scene.session_uid != _session.get("scene") or scene.beyond_mocap_passes.made_of != PLAYED:
         return
+    _session["clock"].note_frame(time.monotonic(), compute_rally_seconds(scene))
+    _collect_answer()
     if _session["pending"] is not None and _session["watchers"] is None and is_playing():
-        _collect_answer()
         _answer_strike(scene, find_target(scene), before_frame=True)
     _session["drawn"] = compute_rally_seconds(scene)
 
@@ -288,8 +291,8 @@ def _show_watchers(scene) -> None:
 
 
 def _find_beginning(scene, seconds: float) -> tuple[float, float]:
-    """Find when the answer to a strike begins: with the frame that was drawn last, since frames that a slow playback
-    drops can still change; but not before the strike, nor before the holder can act.
+    """Find when the answer to a strike begins: with the strike, or the frame that was drawn last where that is later,
+    since frames that a slow playback drops can still change; but not before the holder can act.
 
     Args:
         scene: the scene.
@@ -297,9 +300,11 @@ def _find_beginning(scene, seconds: float) -> tuple[float, float]:
     Returns:
         s on the rally's clock, and s since the strike in the scene's time.
     """
-    rally, now = get_current_rally(), compute_rally_seconds(scene)
-    struck = now - (time.monotonic() - seconds) if seconds else now
-    begin = rally.find_frame(max(rally.ready_time, min(now, max(struck, _session["drawn"]))))
+    rally, struck = get_current_rally(), None
+    if seconds and is_playing():
+        struck = _session["clock"].find_seconds(seconds)
+    struck = compute_rally_seconds(scene) if struck is None else struck
+    begin = rally.find_frame(max(rally.ready_time, struck, _session["drawn"]))
     return begin, begin - struck
 
 

@@ -17,7 +17,7 @@ import numpy as np
 from ...ball.contact import Tool
 from ...motion.motion import Motion, forward_kinematics
 from ..hits import HitMotion, detect_hit_under_way, detect_hits
-from ..part_trajectory import Poses
+from ..part_trajectory import PartMeasures, Poses, measure_part
 from .listener import Listener, StreamFrame, convert_poses
 
 WINDOW = 4.0
@@ -26,6 +26,8 @@ _RATE = 60.0  # Hz: most frames per second that are analysed
 _LEAST_SECONDS = 0.5  # s of frames without which nothing is analysed
 _SETTLE_SECONDS = 0.05  # s by which a hit motion has to be over
 _PAUSES = 0.015, 0.04  # s between two looks of the thread, at least and at most; between them as long as a look takes
+_ANSWER_PAUSE = 0.2  # s after a strike, which is being answered: looks would slow that down
+_LATEST_ARRIVAL = 1.0  # s from sender to listener; a stream that says more has another clock
 _LOOK_SECONDS = 0.1  # s between two moments that are analysed at most: a strike shows for some 0.2 s while under way
 
 
@@ -68,7 +70,7 @@ class LiveHits:
         """Look for new hits until the listener stops; an error is found once."""
         reported = ""
         while self.listener.is_running:
-            start = time.monotonic()
+            start, found = time.monotonic(), None
             try:
                 if (found := self.find_new_hit()) is not None:
                     self._found.put(found)
@@ -76,13 +78,15 @@ class LiveHits:
                 if str(error) != reported:
                     self._found.put(error)
                 reported = str(error)
-            time.sleep(min(max(time.monotonic() - start, _PAUSES[0]), _PAUSES[1]))
+            pause = min(max(time.monotonic() - start, _PAUSES[0]), _PAUSES[1])
+            time.sleep(pause if found is None else _ANSWER_PAUSE)
 
     def find_new_hit(self) -> tuple[HitMotion, float] | None:
         """Find the strongest hit motion whose strike has been since the last one that was found.
 
         Returns:
-            The hit motion and the time of its key (s, monotonic clock), or None.
+            The hit motion and the time of its key (s, monotonic clock): when it was sent, if the stream says so,
+            otherwise when it arrived. None where there is no new one.
         Raises:
             InputError: if the streamed body lacks the part.
         """
@@ -93,34 +97,47 @@ class LiveHits:
         frames = [frame for frame in frames if frame.time > frames[-1].time - WINDOW]
         if frames[-1].time - frames[0].time < _LEAST_SECONDS:
             return None
-        motion, times = space_evenly(frames, _RATE)
+        frames, fps = _choose_frames(frames, _RATE)
+        motion = Motion(*convert_poses(frames), fps)
+        times = frames[0].time + np.arange(len(frames)) / fps
         unseen = int(np.count_nonzero(times > self._seen_until))
         self._seen_until = float(times[-1])
-        poses = forward_kinematics(motion)  # once, for both sides and all moments
-        found = [hit for side in self.sides for hit in self._detect_hits(motion, poses, side, unseen)]
+        found = self._detect_hits(motion, unseen)
         new = [hit for hit in found if times[hit.first] > self._after]
         if not new:
             return None
         best = max(new, key=lambda hit: hit.max_speed)
         self._after = float(times[best.key])
-        return best, float(times[best.key])
+        key = frames[best.key]
+        is_dated = key.sent is not None and 0.0 <= key.time - key.sent <= _LATEST_ARRIVAL
+        return best, key.sent if is_dated else self._after
 
-    def _detect_hits(self, motion: Motion, poses: Poses, side: str, unseen: int) -> list[HitMotion]:
-        """Find the hit motions that have begun within the window: the one under way, and those that are over.
+    def _detect_hits(self, motion: Motion, unseen: int) -> list[HitMotion]:
+        """Find the hit motions that have begun within the window: those under way, and those that are over.
 
-        A busy program looks seldom, so the one under way is searched at each moment of the last `unseen` frames.
+        A busy program looks seldom, so those under way are searched at each moment of the last `unseen` frames.
         """
+        poses = forward_kinematics(motion)  # once, for both sides and all moments
         settled = len(motion) - 1 - int(np.ceil(_SETTLE_SECONDS * motion.fps))
-        found = detect_hits(motion, self.part, side, self.threshold, tool=self.tool, poses=poses).motions
-        found = [hit for hit in found if 0 < hit.first and hit.last < settled]
-        step = max(int(_LOOK_SECONDS * motion.fps), 1)
-        for end in range(len(motion), max(len(motion) - unseen, 2), -step):
-            until = poses[0][:end], poses[1][:end]
-            under_way = detect_hit_under_way(motion.frames(0, end), self.part, side, self.threshold, tool=self.tool,
-                                             poses=until)
-            if under_way is not None:
-                return [*found, under_way]
+        step, found = max(int(_LOOK_SECONDS * motion.fps), 1), []
+        ends = [len(motion), *range(len(motion) - step, max(len(motion) - unseen, 2), -step)]
+        moments = [motion.frames(0, end) for end in ends]
+        measures = [self._measure(one, (poses[0][:end], poses[1][:end])) for one, end in zip(moments, ends)]
+        for side in self.sides:
+            whole = detect_hits(motion, self.part, side, self.threshold, tool=self.tool, measured=measures[0][side])
+            found += [hit for hit in whole.motions if 0 < hit.first and hit.last < settled]
+            under_way = (detect_hit_under_way(one, self.part, side, self.threshold, tool=self.tool,
+                                              measured=measured[side]) for one, measured in zip(moments, measures))
+            found += filter(None, [next(filter(None, under_way), None)])
         return found
+
+    def _measure(self, motion: Motion, poses: Poses) -> dict[str, PartMeasures]:
+        """Measure the part of each side; the body is the same."""
+        measures: dict[str, PartMeasures] = {}
+        for side in self.sides:
+            body = next((one.body for one in measures.values()), None)
+            measures[side] = measure_part(motion, self.part, side, tool=self.tool, poses=poses, body=body)
+        return measures
 
 
 def build_recording(listener: Listener, seconds: float, rate: float | None = None) -> Motion | None:
@@ -137,24 +154,23 @@ def build_recording(listener: Listener, seconds: float, rate: float | None = Non
     """
     frames = listener.frames_since(0)
     frames = [frame for frame in frames if frame.time > frames[-1].time - seconds]
-    return space_evenly(frames, rate)[0] if len(frames) > 1 and frames[-1].time > frames[0].time else None
+    if len(frames) < 2 or frames[-1].time <= frames[0].time:
+        return None
+    frames, fps = _choose_frames(frames, rate)
+    return Motion(*convert_poses(frames), fps)
 
 
-def space_evenly(frames: list[StreamFrame], rate: float | None = None) -> tuple[Motion, np.ndarray]:
-    """Build a motion with evenly spaced frames.
+def _choose_frames(frames: list[StreamFrame], rate: float | None = None) -> tuple[list[StreamFrame], float]:
+    """Choose frames that are taken as evenly spaced.
 
     Args:
         frames: two frames or more that have arrived.
         rate: most frames per second; None: all.
     Returns:
-        motion: the motion, T frames.
-        times: (T,) s of its frames, monotonic clock.
+        The chosen frames, and how many of them there are per second.
     """
     seconds = frames[-1].time - frames[0].time
     step = 1 if rate is None else max(1, int(len(frames) / (seconds * rate)))
     # every `step`-th frame, counted from the last one so that it is always kept
     frames = frames[::-1][::step][::-1]
-    skeleton, root, rotations = convert_poses(frames)
-    seconds = max(frames[-1].time - frames[0].time, 1e-3)
-    fps = (len(frames) - 1) / seconds
-    return Motion(skeleton, root, rotations, fps), frames[0].time + np.arange(len(frames)) / fps
+    return frames, (len(frames) - 1) / max(frames[-1].time - frames[0].time, 1e-3)

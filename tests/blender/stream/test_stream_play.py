@@ -154,25 +154,39 @@ def test_an_answer_that_is_planned_ahead_begins_at_once(playing, room, core, end
     np.testing.assert_allclose(np.abs((whole[:shown] * within[:shown]).sum(axis=-1)), 1.0, atol=1e-5)
 
 
-def test_a_slow_playback_shows_the_answer_on_time(playing, room, core, monkeypatch):
-    """Frames that it has dropped since the strike belong to the answer; what was drawn, and what was before the strike,
-    stays.
+def play_and_strike(play, scene, core, clock, frames, in_playback):
+    """Let a playback come to frames at moments of the clock; a strike at 100.75 s is noticed before the last frame is
+    evaluated, or after it."""
+    for clock.moment, frame in frames.items():
+        scene.frame_set(frame)
+        if in_playback and clock.moment == max(frames):
+            play.store_strike(kick(core), 100.75)
+        play.answer_in_playback(scene)
+    if not in_playback:
+        clock.moment = 100.9
+        play.store_strike(kick(core), 100.75)
+        play.update_rally(scene)
+
+
+def test_an_answer_begins_with_the_strike(playing, room, core, monkeypatch):
+    """However slow the playback is: the strike is dated by when the frames came, also where it is noticed after the
+    last one, and where the playback drops none. What was drawn already stays, and what was before the strike.
     """
-    play = room("stream.play")
+    play, clock = room("stream.play"), SimpleNamespace(moment=0.0)
     monkeypatch.setattr(play, "is_playing", lambda: True)
+    monkeypatch.setattr(play, "time", SimpleNamespace(monotonic=lambda: clock.moment))
     plan_ahead(play, core, playing)
-    for drawn, frame, ago, begins in ((40, 64, 0.25, 58), (62, 64, 0.25, 62)):
-        stand = play.get_current_rally(), play._session["ahead"], read_keys(room, playing, "Ann")[1]
-        playing.frame_set(drawn)
-        play.answer_in_playback(playing)
-        monkeypatch.setattr(play, "time", SimpleNamespace(monotonic=lambda: 100.0))
-        play.store_strike(kick(core), 100.0 - ago)
-        playing.frame_set(frame)
-        play.answer_in_playback(playing)
-        changed = np.abs(read_keys(room, playing, "Ann")[1] - stand[2]).max(axis=(1, 2)) > 1e-5
+    stand, first = dict(play._session), read_keys(room, playing, "Ann")[1]
+    for frames, begins, in_playback in (
+        ({100: 40, 101: 64}, 58, True), ({100: 40, 101: 64, 102: 88}, 64, True), ({100: 62, 101: 64}, 64, True),
+        ({99: 16, 100: 40}, 58, False), ({99: 39, 100: 40}, 41, False), ({100: 40}, 40, False),
+    ):
+        play_and_strike(play, playing, core, clock, frames, in_playback)
+        changed = np.abs(read_keys(room, playing, "Ann")[1] - first).max(axis=(1, 2)) > 1e-5
         assert 5 + np.argmax(changed) == begins + 1, "where it blends in, the first frame is the old one"
-        play._session.update(rally=stand[0], ahead=stand[1], watchers=None)
-        play._session["keys"].write_all(playing, stand[0], stand[0].players)
+        play._session.update({**stand, "watchers": None, "drawn": 0.0, "clock": type(stand["clock"])()})
+        play._session.pop("job", None)
+        play._session["keys"].write_all(playing, stand["rally"], stand["rally"].players)
 
 
 @pytest.mark.parametrize("name", ["Ann", "Ben"])

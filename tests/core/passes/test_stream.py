@@ -265,7 +265,7 @@ class Played:
 
     def __init__(self, path):
         stream = BvhStream()
-        self.frames, self.now = stream.feed(path.read_bytes()), 0.0
+        self.frames, self.now, self.late = stream.feed(path.read_bytes()), 0.0, None
         self.step = stream.frame_time
 
     def frames_since(self, number):
@@ -274,7 +274,8 @@ class Played:
         count = min(int(self.now / self.step) + 1, len(self.frames))
         some = enumerate(self.frames[number:count], start=number)
         return [StreamFrame(
-            number=n + 1, time=n * self.step, sent=None, values=frame.values, rows=frame.rows,
+            number=n + 1, time=n * self.step, sent=self.late and n * self.step - self.late, values=frame.values,
+            rows=frame.rows,
         ) for n, frame in some]
 
 
@@ -291,6 +292,16 @@ def test_a_kick_is_recognised_once_while_it_arrives(tmp_path, fps, every):
     assert len(found) == 1
     hit, moment, now = found[0]
     assert hit.side == "right" and abs(moment - made.key) < 0.1 and now - made.key < 0.15 + every
+
+
+def test_a_strike_is_dated_by_when_it_was_sent(tmp_path):
+    """Unless the sender has another clock."""
+    bvh.write_bvh(tmp_path / "kick.bvh", build_strike("kick low top", fps=60.0).motion)
+    played, moments = Played(tmp_path / "kick.bvh"), []
+    played.now = 1000.0
+    for played.late in (None, 0.1, 50.0, -50.0):
+        moments.append(LiveHits(played).find_new_hit()[1])
+    assert np.allclose(moments, moments[0] - np.array([0.0, 0.1, 0.0, 0.0]))
 
 
 def test_the_thread_finds_the_kick_once_says_an_error_once_and_ends_with_the_listener(tmp_path):

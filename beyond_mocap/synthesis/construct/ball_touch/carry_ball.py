@@ -1,9 +1,10 @@
 """The balls of the clips that are shown ride along on the synthesized body.
 
-Where a body part touches the ball in the clip, the ball is at the same part of the synthesized body. Between two
+Where a body part touches the ball in the clip, the ball touches the same part of the synthesized body, also where the
+recorded one is some centimetres off it: a marker lies on a ball's surface, and a skeleton has no skin. Between two
 touches, as in a dribble, the ball moves as in the clip, placed by both touches and led from one to the other; before
 the first and after the last it keeps that touch's placement, so a kicked ball flies as it was recorded, also while the
-body goes on with another clip.
+body goes on with another clip. What lifts or lowers it ends at the ground, where it lies as recorded.
 """
 
 from __future__ import annotations
@@ -29,8 +30,10 @@ from ...search.source_frames import SourceFrames
 _JUMP = 1.0  # m between two clips' balls from which on they are not joined
 _TOUCH, _NEAR = 0.03, 0.15  # m between part and ball: always a touch; a touch where it is nearest
 _FARTHEST = 1.5  # m from the body at its nearest: a ball that takes no part in what is shown
+_LYING = 0.05  # m above rest up to which a ball keeps its height where it is brought to the part
 _LIFTED = 0.3  # m above rest from which on a ball is as much higher or lower as the part that touches it
 _FREE_SECONDS = 3.0  # for which a ball moves on as recorded, beyond the piece that shows its clip
+_KEY_SECONDS = 0.1  # before and after a key moment, which is the touch there
 _JOIN_SECONDS = 0.3  # before and after a transition over which two clips' balls are joined
 
 
@@ -132,25 +135,52 @@ def _carry_piece(clip: Clip, clip_frame: np.ndarray, motion: Motion, shown: slic
     played = sample_frames(clip.motion, np.clip(clip_frame, 0, len(clip.motion) - 1))
     body = Motion(motion.skeleton, *played, motion.fps)
     gap, here, there = _find_nearest_parts(body, motion, recorded)
-    touches = shown.start + _find_touches(gap[shown])
+    touches = _find_touches(gap[shown])
+    touches = shown.start + _move_to_keys(touches, clip, clip_frame[shown], gap[shown], motion.fps)
     if not len(touches):
         return np.full_like(recorded, np.nan)
     others = _find_touches(gap)
     first = max(others[others < shown.start], default=-1) + 1
     last = min(others[others >= shown.stop], default=len(gap))
     recorded[:first], recorded[last:] = np.nan, np.nan
-    turn = compute_heading(motion) - compute_heading(body)
-    lift = (there - here)[:, 2] * np.clip((recorded[:, 2] - BALL_RADIUS) / _LIFTED, 0.0, 1.0)
+    turn, height = compute_heading(motion) - compute_heading(body), recorded[:, 2] - BALL_RADIUS
+    level = quaternion.rotate_level((recorded - here)[:, :2], turn)
+    lift = (there - here)[:, 2] * np.clip(height / _LIFTED, 0.0, 1.0)
+    met = np.column_stack([there[:, :2] + level, recorded[:, 2] + lift])
+    pull = _find_pull(met, there, gap, np.linalg.norm(recorded - here, axis=1) - gap)
+    lift, full = lift + pull[:, 2], np.clip(height, 1e-6, _LIFTED)
 
     def place(touch: np.ndarray) -> np.ndarray:
         """Place each frame's ball as at a touch (N,)."""
-        level = quaternion.rotate_level((recorded - here[touch])[:, :2], turn[touch]) + there[touch, :2]
-        return np.column_stack([level, np.maximum(recorded[:, 2] + lift[touch], BALL_RADIUS)])
+        level = quaternion.rotate_level((recorded - here[touch])[:, :2], turn[touch]) + (there + pull)[touch, :2]
+        lifted = recorded[:, 2] + lift[touch] * np.clip(height / full[touch], 0.0, 1.0)
+        return np.column_stack([level, np.maximum(lifted, BALL_RADIUS)])
 
     frames, after = np.arange(len(gap)), np.searchsorted(touches, np.arange(len(gap)))
     before, behind = touches[np.maximum(after - 1, 0)], touches[np.minimum(after, len(touches) - 1)]
     share = np.clip((frames - before) / np.maximum(behind - before, 1), 0.0, 1.0)[:, None]
     return (1.0 - share) * place(before) + share * place(behind)
+
+
+def _find_pull(ball: np.ndarray, part: np.ndarray, gap: np.ndarray, reach: np.ndarray) -> np.ndarray:
+    """Find what lets a ball touch a part that it is near to: along the ground where the ball lies, otherwise straight
+    to the part, and not through the floor.
+
+    Args:
+        ball: (N, 3) m, the ball's centre.
+        part: (N, 3) m, the part's nearest point.
+        gap: (N,) m that is recorded between both.
+        reach: (N,) m from the part's point to the centre of a ball that touches it.
+    Returns:
+        (N, 3) m, 0 where the ball is not near, or touches the part already.
+    """
+    apart = ball - part
+    height = np.maximum(part[:, 2] + apart[:, 2] * reach / np.maximum(np.linalg.norm(apart, axis=1), 1e-6), BALL_RADIUS)
+    height = np.where(ball[:, 2] <= BALL_RADIUS + _LYING, ball[:, 2], height)
+    level = np.sqrt(np.maximum(reach**2 - (height - part[:, 2]) ** 2, 0.0))
+    share = level / np.maximum(np.linalg.norm(apart[:, :2], axis=1), 1e-6) - 1.0
+    pull = np.column_stack([share[:, None] * apart[:, :2], height - ball[:, 2]])
+    return np.where(((gap > 0.0) & (gap <= _NEAR))[:, None], pull, 0.0)
 
 
 def _find_nearest_parts(shown: Motion, motion: Motion, ball: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -186,6 +216,28 @@ def _find_touches(gap: np.ndarray) -> np.ndarray:
     is_nearest = (gap <= sides[:-2]) & (gap < sides[2:]) & (gap <= _NEAR)
     touches = np.flatnonzero(is_nearest | (gap <= _TOUCH))
     return touches if len(touches) or gap.min() > _FARTHEST else np.array([int(np.argmin(gap))])
+
+
+def _move_to_keys(touches: np.ndarray, clip: Clip, clip_frame: np.ndarray, gap: np.ndarray, fps: float) -> np.ndarray:
+    """Move touches to the key moments of a clip that are near them in time, where the ball is near the body: there it
+    changes its velocity, but one that is recorded off the part may be nearest before or after.
+
+    Args:
+        touches: frames of the touches.
+        clip: the clip.
+        clip_frame: (N,) fractional frames of it.
+        gap: (N,) m between body and ball.
+        fps: frames per second of the N frames.
+    Returns:
+        Frames of the touches, in order.
+    """
+    for key in (row.key for row in clip.annotations if row.key is not None):
+        at = int(np.argmin(np.abs(clip_frame - key)))
+        is_shown = abs(clip_frame[at] - key) <= clip.motion.fps / fps and gap[at] <= _NEAR
+        is_same = np.abs(touches - at) <= _KEY_SECONDS * fps
+        if is_shown and is_same.any():
+            touches = np.union1d(touches[~is_same], [at])
+    return touches
 
 
 def _join_pieces(ball: np.ndarray, edges: Sequence[int], reach: int) -> np.ndarray:

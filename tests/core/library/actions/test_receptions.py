@@ -8,6 +8,7 @@ import pytest
 from beyond_mocap.annotation import KeyMoment, Timeline
 from beyond_mocap.files.bvh import bvh
 from beyond_mocap.library.build import build_library
+from beyond_mocap.library.missing_actions import ActionMoment, find_missing_actions
 from beyond_mocap.motion.track import Track
 from beyond_mocap.synthesis.plan import Plan
 from beyond_mocap.synthesis.synthesize import synthesize
@@ -61,3 +62,16 @@ def test_a_cut_out_serves_a_reception_and_is_reported(dribbles):
     (key,) = take.keys
     assert key.clip == "take.bvh" and key.used_instead is None and "receive" in key.words
     assert any("cut out of a dribble" in line for line in take.warnings)
+
+
+def test_a_reception_may_be_the_last_frame_of_the_last_clip(tmp_path, clip_file):
+    """Where the library's rate has no frame as late."""
+    clip_file(tmp_path / "walk.bvh", 1.4, 4.0, "walking")
+    taken = build_reception("inside", speed=0.0).motion.frames(0, 60)
+    bvh.write_bvh(tmp_path / "z.bvh", taken)
+    (tmp_path / "z.txt").write_text(f"{taken.duration:.6f} receive foot low\n")
+    library = build_library(tmp_path)
+    assert (library.keys[-1].clip, library.keys[-1].frame) == (len(library.clips) - 1, 59)
+    for speed, is_missing in ((0.0, False), (3.0, True)):  # it suits who stands
+        asked = ActionMoment(labels=frozenset({"receive", "foot"}), speed=speed)
+        assert bool(find_missing_actions(library, [asked])) == is_missing

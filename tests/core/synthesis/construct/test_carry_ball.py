@@ -15,6 +15,7 @@ from beyond_mocap.match.long_player import iter_parts, search_long_player
 from beyond_mocap.motion.motion import forward_kinematics
 from beyond_mocap.motion.track import BALL_RADIUS
 from beyond_mocap.motion.track.ball_path import BallPath
+from beyond_mocap.synthesis.construct.ball_touch.carry_ball import _find_pull
 from beyond_mocap.synthesis.plan import Plan
 from beyond_mocap.synthesis.resynthesize import resynthesize
 from beyond_mocap.synthesis.synthesize import synthesize
@@ -23,13 +24,14 @@ from beyond_mocap.synthetic.gestures import build_strike
 
 FPS, STEP = 30.0, 20  # frames per second; frames between two touches
 AHEAD = 0.5  # m by which the ball is pushed ahead of the foot
+OFF = 0.08  # m by which a recorded ball is farther from the foot than it was
 
 
 def plant_dribble(motion):
     """A ball (T, 3) m that the right foot touches in every STEP-th frame and pushes ahead."""
     line = build_part_surfaces(motion.skeleton, "foot", ("right",))[0].compute_line(*forward_kinematics(motion))
     touches = np.arange(0, len(motion), STEP)
-    at_foot = line[1][touches] + [0.05 + BALL_RADIUS, 0.0, 0.0]
+    at_foot = line[1][touches] + [0.05 + BALL_RADIUS + OFF, 0.0, 0.0]
     frames = np.arange(len(motion))
     ball = np.column_stack([np.interp(frames, touches, column) for column in at_foot.T])
     share = (frames % STEP) / STEP
@@ -76,7 +78,7 @@ def test_a_dribbled_ball_rides_along_at_the_foot_that_touches_it(take):
     known = np.isfinite(take.ball.positions).all(axis=1)
     assert shown.sum() > 4 * FPS and known[shown].all()
     assert (known & ~shown).sum() < 2 * STEP, "the ball went on where a foot of the clip alone would touch it"
-    assert len(gaps) >= 4 and np.median(gaps) < 0.05 and gaps.max() < 0.15, gaps
+    assert len(gaps) >= 4 and np.median(gaps) < 0.04 and gaps.max() < 0.2, gaps
     assert not take.ball.measured.any()
     assert any("a recorded ball is shown for" in line for line in take.warnings)
 
@@ -107,7 +109,7 @@ def test_the_ball_rides_along_across_windows(take, dribbles):
     assert end - first > 4 * FPS and known[shown].all() and (known & ~shown).sum() < 2 * STEP
     assert np.linalg.norm(np.diff(whole.ball.positions[first:end], axis=0), axis=1).max() * FPS < 8.0
     gaps = measure_touch_gaps(whole)
-    assert len(gaps) >= 4 and np.median(gaps) < 0.05 and gaps.max() < 0.15, gaps
+    assert len(gaps) >= 4 and np.median(gaps) < 0.04 and gaps.max() < 0.2, gaps
     assert not any("a recorded ball is shown for" in line for line in whole.warnings), "that is told of the whole"
 
 
@@ -121,14 +123,20 @@ def test_without_the_setting_and_with_a_ball_in_the_track_nothing_rides_along(dr
     assert np.array_equal(*(synthesize(dribbles, plan).ball.positions for plan in (tracked, asked)))
 
 
-def test_a_kicked_ball_lies_still_is_met_and_flies_on_as_recorded(tmp_path, clips_folder, track_of, timeline_of):
+@pytest.mark.parametrize("is_flying", [False, True])
+def test_a_kicked_ball_is_met_and_flies_on_as_recorded(tmp_path, clips_folder, track_of, timeline_of, is_flying):
+    """Also where it is recorded some centimetres off the foot, and then nearest to it in another frame."""
     for name in ("walk.bvh", "walk.txt", "jog.bvh", "jog.txt", "kick.bvh", "kick.txt"):
         (tmp_path / name).write_bytes((clips_folder / name).read_bytes())
     kick = build_strike("kick low inside", fps=60.0)
     motion, frame = kick.motion, round(kick.key * 60.0)
     foot = build_part_surfaces(motion.skeleton, "foot", ("right",))[0].compute_line(*forward_kinematics(motion))[1]
-    after = np.maximum(np.arange(len(motion)) - frame, 0) / 60.0
-    ball = foot[frame] * [1, 1, 0] + [0.16, 0.0, BALL_RADIUS] + after[:, None] * [15.0, 0.0, 0.0]
+    after = np.arange(len(motion)) - frame
+    before, after = np.minimum(after, 0)[:, None] / 60.0, np.maximum(after, 0)[:, None] / 60.0
+    ball = foot[frame] * [1, 1, 0] + [0.16 + OFF, 0.0, BALL_RADIUS] + after * [15.0, 0.0, 0.0]
+    if is_flying:
+        ball += [-0.06, 0.0, 0.15] + before * [-9.0, 0.0, 0.0] - 4.9 * after**2 * [0.0, 0.0, 1.0]
+        ball[:, 2] = np.maximum(ball[:, 2], BALL_RADIUS)
     write_ball(tmp_path / "kick.ball.csv", BallPath(np.arange(len(ball)) / 60.0, ball, np.ones(len(ball), bool)))
     plan = Plan(track=track_of(2.8, 7.0), timeline=timeline_of((4.0, "kick low inside right")), recorded_ball=True,
                 made=False)
@@ -136,7 +144,24 @@ def test_a_kicked_ball_lies_still_is_met_and_flies_on_as_recorded(tmp_path, clip
     path, at = take.ball.positions, round(take.keys[0].frame)
     speed = np.linalg.norm(np.diff(path, axis=0), axis=1) * FPS
     gap = measure_contact_gap(take.motion.skeleton, *forward_kinematics(take.motion), take.keys[0].words, path)
-    assert abs(gap[at]) < 0.05
-    assert np.nanmax(speed[at - 40 : at - 1]) < 0.01, "a ball that lies still in the clip moved"
+    assert abs(gap[at]) < 0.02
+    assert is_flying or np.nanmax(speed[at - 40 : at - 1]) < 0.01, "a ball that lies still in the clip moved"
     assert np.isfinite(path[at : at + 50]).all() and np.ptp(speed[at + 2 : at + 50]) < 1.0
     assert 10.0 < speed[at + 10] < 22.0
+    lowest = path[np.isfinite(path[:, 2]), 2]
+    assert lowest.min() >= BALL_RADIUS - 1e-9 and lowest[-1] < BALL_RADIUS + 1e-9, "it goes into the ground, or hovers"
+
+
+def test_a_ball_is_brought_to_the_part_and_not_through_the_floor():
+    part, size = np.random.default_rng(3).uniform((-0.3, -0.3, 0.02), (0.3, 0.3, 1.0), (200, 3)), 0.15
+    away = np.random.default_rng(4).normal(size=(200, 3))
+    ball = part + away / np.linalg.norm(away, axis=1, keepdims=True) * np.linspace(0.1, 0.4, 200)[:, None]
+    ball[:, 2] = np.maximum(ball[:, 2], BALL_RADIUS)
+    gap = np.linalg.norm(ball - part, axis=1) - size
+    moved = ball + _find_pull(ball, part, gap, np.full(200, size))
+    left = np.linalg.norm(moved - part, axis=1) - size
+    is_near, lies = (gap > 0.0) & (gap <= 0.15), ball[:, 2] <= BALL_RADIUS + 0.05
+    can_meet = is_near & ~(lies & (np.abs(ball - part)[:, 2] > size))  # a part high above a ball that lies cannot
+    assert can_meet.sum() > 60 and np.allclose(left[can_meet], 0.0, atol=1e-9)
+    assert np.array_equal(moved[~is_near], ball[~is_near]) and np.array_equal(moved[lies, 2], ball[lies, 2])
+    assert moved[:, 2].min() >= BALL_RADIUS and (is_near & lies).any()
