@@ -120,6 +120,7 @@ def run_synthesize(options, reporter: ProgressReporter, writers: Mapping[str, Wr
     write = choose_writer(options.out, writers)
     for option, required, why in (("library", "track", "a player's track"),
                                   ("track", "library", "a folder of recordings"),
+                                  ("cache", "library", "a folder of recordings"),
                                   ("annotations", "track", "a player's track"),
                                   ("track", "time", "the time of the ball's release")):  # fmt: skip
         if getattr(options, option) and getattr(options, required) is None:

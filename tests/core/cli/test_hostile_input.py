@@ -158,7 +158,8 @@ def test_no_output_takes_the_place_of_a_librarys_recording_or_labels(command, na
     (tmp_path / "walk.txt").write_text("0 1 walking\n")
     (tmp_path / "annotations.csv").write_text("file,start_frame,end_frame,key_frame,labels\n")
     content = (tmp_path / name).read_bytes()
-    words = command.format(library=tmp_path, out=tmp_path / name, clip=WALK, track=TOP / "sample_blend/match/player1.csv")
+    track = TOP / "sample_blend" / "match" / "player1.csv"
+    words = command.format(library=tmp_path, out=tmp_path / name, clip=WALK, track=track)
     status, line = run_line(*words.split())
     assert status == 2 and f"{name}: is a file of the library" in line and (tmp_path / name).read_bytes() == content
 
@@ -177,10 +178,11 @@ def test_passes_are_not_written_between_the_recordings(run_line):
 
 
 @pytest.mark.parametrize("command", ["evaluate {clip} --report {out} --cache none",
-                                     "evaluate {clip} --report {out} --skeleton none.bvh"])
+                                     "evaluate {clip} --report {out} --skeleton none.bvh",
+                                     "throw synthesize --target 8,1,1 --out {out} --cache none"])
 def test_options_of_a_library_need_one(command, run_line, tmp_path):
-    status, line = run_line(*command.format(clip=WALK, out=tmp_path / "r.json").split())
-    assert status == 2 and "set without --library; expected a folder of clips; add --library" in line
+    status, line = run_line(*command.format(clip=WALK, out=tmp_path / "r.bvh").split())
+    assert status == 2 and "set without --library; expected a folder of" in line and line.endswith("add --library")
 
 
 @pytest.mark.parametrize("option, said", [("--meta=--", "--meta: expected one argument"), ("--to=--", "expected one"),
