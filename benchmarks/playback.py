@@ -199,7 +199,7 @@ def build_section():
 
 def enable_extension() -> None:
     """Switch the extension on in an empty profile, as Blender loads it."""
-    profile = tempfile.mkdtemp(prefix="beyond-mocap-playback-")
+    profile = tempfile.mkdtemp()
     os.environ["BLENDER_USER_RESOURCES"] = profile  # read once, when bpy is imported
     repository = Path(profile, "extensions", "user_default")
     repository.mkdir(parents=True)
@@ -215,6 +215,12 @@ def enable_extension() -> None:
 
 def main() -> None:
     """Measure all variants, and print the figures as a line of JSON."""
+    with tempfile.TemporaryDirectory(prefix="beyond-mocap-playback-") as tempfile.tempdir:
+        measure_variants()
+
+
+def measure_variants() -> None:
+    """Measure all variants, and print the figures."""
     enable_extension()
     import bpy
 

@@ -10,9 +10,11 @@ preview.png, a sheet of rendered frames, and says how to open them.
 from __future__ import annotations
 
 import argparse
+import atexit
 import importlib
 import os
 import pathlib
+import shutil
 import signal
 import sys
 import tempfile
@@ -23,15 +25,16 @@ TILES = (4, 2)  # across, down
 TILE = (480, 270)  # pixels
 # the moving picture: long enough for a kick and what follows, small enough for a page
 FILM_SECONDS, FILM_FPS = 4.8, 12.5
+_folders: list[str] = []  # temporary ones
 
 
 def load_extension():
-    """Register the extension from this clone.
+    """Register the extension from this clone, with an empty profile in a folder that is removed in the end.
 
     Returns:
         A function that imports its modules by name, and one that unregisters it.
     """
-    os.environ.setdefault("BLENDER_USER_RESOURCES", tempfile.mkdtemp(prefix="beyond-mocap-demo-"))
+    os.environ.setdefault("BLENDER_USER_RESOURCES", create_temporary_folder())
     sys.path.insert(0, str(HERE.parent))
     import batch
 
@@ -339,12 +342,28 @@ def main() -> int:
     return 0
 
 
+def create_temporary_folder() -> str:
+    """Create the folder of everything temporary, Blender's too, which is removed when the process ends."""
+    folder = tempfile.mkdtemp(prefix="beyond-mocap-demo-")
+    _folders.append(folder)
+    tempfile.tempdir = os.environ["TMPDIR"] = folder
+    return folder
+
+
+@atexit.register
+def remove_temporary_folders() -> None:
+    """Remove what `create_temporary_folder` has created."""
+    for folder in _folders:
+        shutil.rmtree(folder, ignore_errors=True)
+
+
 def handle_interrupt() -> None:
     """End at once on Ctrl-C: Blender's handlers would report the interrupt as an error of theirs, and go on."""
     messages = os.dup(sys.stderr.fileno())  # where Blender is silenced, stderr is too
 
     def end(*_) -> None:
         os.write(messages, b"\ndemo: cancelled\n")
+        remove_temporary_folders()
         os._exit(130)
 
     signal.signal(signal.SIGINT, end)
@@ -352,6 +371,7 @@ def handle_interrupt() -> None:
 
 def end_process(status: int) -> None:
     """End without Blender's cleaning up, which reports "Error: Not freed memory blocks" below the result."""
+    remove_temporary_folders()
     sys.stdout.flush()
     sys.stderr.flush()
     os._exit(status)

@@ -23,6 +23,8 @@ MAX_DEVICE_BYTES = 1 << 24
 _BLOCK = 1 << 20
 PIPE_SECONDS = 5.0
 """Seconds until a pipe that no program writes to is refused; opening it like a file would wait for ever."""
+SILENT_SECONDS = 30.0
+"""Seconds without a byte after which a pipe that a program has opened to write, or a terminal, is refused."""
 _waiting = threading.Event()
 
 
@@ -36,7 +38,7 @@ def open_file(path: str | os.PathLike, kind: str, max_bytes: int | None = None) 
     Returns:
         The open file.
     Raises:
-        InputError: if it cannot be opened or is too large, or is a disk, or a pipe to which no program writes.
+        InputError: if it cannot be opened or is too large, or is a disk, or a pipe or device that gives nothing.
     """
     handle: BinaryIO
     try:
@@ -46,7 +48,7 @@ def open_file(path: str | os.PathLike, kind: str, max_bytes: int | None = None) 
         if stat.S_ISFIFO(mode) or stat.S_ISCHR(mode):
             limit = MAX_STREAM_BYTES if stat.S_ISFIFO(mode) else MAX_DEVICE_BYTES
             most = min(max_bytes or limit, limit)
-            content = (_read_pipe if stat.S_ISFIFO(mode) else _read_device)(path, kind, most + 1)
+            content = _read_stream(path, kind, most + 1)
             if len(content) > most:
                 raise InputError(path, f"has no end within {most} bytes", f"{kind}, which is shorter", "name a file")
             handle, size = io.BytesIO(content), len(content)
@@ -61,27 +63,33 @@ def open_file(path: str | os.PathLike, kind: str, max_bytes: int | None = None) 
     return handle
 
 
-def _read_device(path: str | os.PathLike, kind: str, most: int) -> bytes:
-    """Read a device such as /dev/null up to `most` bytes."""
-    with open(path, "rb") as device:
-        return device.read(most)
+def _read_stream(path: str | os.PathLike, kind: str, most: int) -> bytes:
+    """Read a pipe, or a device such as a terminal, up to its end or `most` bytes.
 
-
-def _read_pipe(path: str | os.PathLike, kind: str, most: int) -> bytes:
-    """Read a pipe until its writer closes it, up to `most` bytes; InputError if none opens it within PIPE_SECONDS.
-
-    Opened without waiting, a pipe gives None while its writer has written nothing yet, and nothing without a writer.
+    InputError if no program opens a pipe to write within PIPE_SECONDS, or writes nothing for SILENT_SECONDS. Opened
+    without waiting, a pipe gives None while its writer has written nothing yet, and nothing without a writer.
     """
-    with _wait_for_pipe(), open(os.open(path, os.O_RDONLY | os.O_NONBLOCK), "rb", buffering=0) as pipe:
+    if not hasattr(select, "poll"):  # Windows has no such pipes
+        with open(path, "rb") as device:
+            return device.read(most)
+    with _wait_for_pipe(), open(os.open(path, os.O_RDONLY | os.O_NONBLOCK), "rb", buffering=0) as stream:
         poller = select.poll()
-        poller.register(pipe, select.POLLIN)
-        has_writer = bool(poller.poll(1000.0 * PIPE_SECONDS))
-        begin = b"" if has_writer else pipe.read(1)
-        if not has_writer and begin == b"":
+        poller.register(stream, select.POLLIN)
+        is_begun = bool(poller.poll(1000.0 * PIPE_SECONDS))
+        begin = b"" if is_begun else stream.read(1)
+        if not is_begun and begin == b"":
             raise InputError(path, "is not a regular file but a pipe, into which no program writes", kind,
                              "name a file, or start the program that writes")
-        os.set_blocking(pipe.fileno(), True)
-        return _read_blocks(pipe, begin or b"", most)
+        content = bytearray(begin or b"")
+        while len(content) < most:
+            if not poller.poll(1000.0 * SILENT_SECONDS):
+                raise InputError(path, f"is a pipe or a device that gave nothing for {SILENT_SECONDS:g} s", kind,
+                                 "write its content into a file and choose that")
+            block = stream.read(min(_BLOCK, most - len(content)))
+            if block == b"":
+                break
+            content += block or b""
+        return bytes(content)
 
 
 @contextlib.contextmanager
@@ -97,14 +105,6 @@ def _wait_for_pipe() -> Iterator[None]:
 def is_waiting_for_pipe() -> bool:
     """Say whether a pipe is being read: its writer may never write, and nothing asks for cancellation meanwhile."""
     return _waiting.is_set()
-
-
-def _read_blocks(pipe: BinaryIO, begin: bytes, most: int) -> bytes:
-    """Read what follows `begin`, up to `most` bytes in all."""
-    content = bytearray(begin)
-    while len(content) < most and (block := pipe.read(min(_BLOCK, most - len(content)))):
-        content += block
-    return bytes(content)
 
 
 def read_bytes(path: str | os.PathLike, kind: str, max_bytes: int | None = None) -> bytes:

@@ -9,7 +9,7 @@ from ..base.errors import InputError, format_count
 from ..base.settings.options import add_options, parse_path
 from ..files.atomic import atomic_folder, check_new_folder
 from ..files.file_names import choose_file_name
-from .library import open_library
+from .library import check_library_options, open_library
 from .outputs import ProgressReporter, Writer
 
 
@@ -49,9 +49,7 @@ def run_bodies(options, reporter: ProgressReporter, writers: Mapping[str, Writer
     from ..skeletal.reconstruct_bodies import KnownElsewhere, reconstruct_bodies
 
     check_new_folder(options.out)
-    for option in ("cache", "skeleton", "unit"):
-        if getattr(options, option) is not None and options.library is None:
-            raise InputError(f"--{option}", "set without --library", "a folder of clips", "add --library")
+    check_library_options(options, "cache", "skeleton", "unit")
     feed = read_joints(options.joints)
     examples = read_examples(open_library(options, reporter)) if options.library else None
     bodies, notes = reconstruct_bodies(feed, reporter.show_progress, reporter.is_cancelled,

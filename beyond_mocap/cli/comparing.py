@@ -31,7 +31,8 @@ def run_comparison(options, reporter: ProgressReporter) -> None:
         if getattr(options, name):
             raise InputError(f"--{name}", "set with --against", "only --provenance beside it", f"remove --{name}")
     files = list_take_files(options.motion, options.provenance)
-    check_outputs(options.report, reserved=tuple(path for pair in files.items() for path in pair))
+    check_outputs(options.report, reserved=tuple(path for pair in files.items() for path in pair),
+                  library=options.against)
     takes = {}
     for motion, provenance in files.items():
         body = bvh.read_bvh(motion).motion

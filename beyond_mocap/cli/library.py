@@ -47,7 +47,7 @@ def run_library(options, reporter: ProgressReporter, writers: Mapping[str, Write
     """
     if options.learn or options.propose or options.learned:
         return run_learning(options, reporter)
-    check_outputs(options.report, reserved=(options.skeleton,))
+    check_outputs(options.report, reserved=(options.skeleton,), library=options.library)
     library = open_library(options, reporter, rebuild=options.rebuild)
     summary = summarize_library(library)
     if options.report:
@@ -119,6 +119,20 @@ def open_library(options, reporter: ProgressReporter, rebuild: bool = False, see
     )
 
 
+def check_library_options(options, *names: str) -> None:
+    """Check that options that concern a library are set beside one.
+
+    Args:
+        options: the parsed command line.
+        names: of the options.
+    Raises:
+        InputError: for the first that is set without --library.
+    """
+    for name in names:
+        if getattr(options, name) is not None and options.library is None:
+            raise InputError(f"--{name}", "set without --library", "a folder of clips", "add --library")
+
+
 def add_learning_options(verb) -> None:
     """Add `--learn`, `--propose`, `--learned` and `--least`.
 
@@ -146,7 +160,7 @@ def run_learning(options, reporter: ProgressReporter) -> None:
     from ..library.classify.train import train_classifier
     from ..library.scan import TABLE_NAME
 
-    check_outputs(options.learn, options.propose, reserved=(options.learned,))
+    check_outputs(options.learn, options.propose, reserved=(options.learned,), library=options.library)
     if options.learn and options.learned:
         raise InputError("--learned", "set with --learn", "one of them", "remove one of them")
     if options.learned and not options.propose:

@@ -62,6 +62,12 @@ class OneLineParser(argparse.ArgumentParser):
         """
         raise InputError(self.prog, message, "", f"see '{self.prog} --help'")
 
+    def _get_values(self, action, arg_strings):
+        """Refuse `--option=--`, for which argparse gives an option an empty list as its value."""
+        if action.option_strings and action.nargs is None and arg_strings == ["--"]:
+            self.error(f"argument {'/'.join(action.option_strings)}: expected one argument")
+        return super()._get_values(action, arg_strings)
+
     def parse_known_args(self, args=None, namespace=None):
         """Parse arguments, and raise an InputError for unknown ones here, where the command that lacks them is known.
 

@@ -246,6 +246,7 @@ def run_touches(options, reporter: ProgressReporter, writers: Mapping[str, Write
 def _read_tracking(options):
     """Read the match, or the track where the file is the project's own table."""
     from ..files.tracking.feed import is_track_csv
+    from ..files.tracking.providers import find_feed
     from ..files.tracking.tracking import read_match, read_track_csv
     from ..motion.track import clean_track
 
@@ -255,6 +256,10 @@ def _read_tracking(options):
         track = read_track_csv(options.input)
         clean_track(track)  # for its errors; touches are solved from the samples as they are
         return replace(track, name=options.input.stem)  # the player's name in the table
+    outputs = (options.out, options.ball, options.report)
+    if any(path is not None and path.exists() for path in outputs):
+        feed, _ = find_feed(options.input, options.meta, options.provider)  # also the files that are found beside it
+        check_outputs(*outputs, reserved=(*feed.tracking, *feed.meta))
     return read_match(options.input, options.meta, options.provider)
 
 

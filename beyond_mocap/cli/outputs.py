@@ -160,12 +160,13 @@ def write_bvh(take, out: Path, above: Sequence = ()) -> None:
     bvh.write_bvh(out, take.motion, BvhForm(above=tuple(above)))
 
 
-def check_outputs(*paths: Path | None, reserved: tuple[Path | None, ...] = ()) -> None:
+def check_outputs(*paths: Path | None, reserved: tuple[Path | None, ...] = (), library: Path | None = None) -> None:
     """Check before the work that every output can be written and that no two paths are the same file.
 
     Args:
         paths: the output files; None is skipped.
         reserved: files that must not be overwritten, such as the inputs; None is skipped.
+        library: a folder whose recordings and labels must not be overwritten; None for none.
     Raises:
         InputError: for the first path that fails.
     """
@@ -184,6 +185,17 @@ def check_outputs(*paths: Path | None, reserved: tuple[Path | None, ...] = ()) -
             problem = "is both an output and another file of the command"
             raise InputError(path, problem, "different files", "rename one of them")
         used.add(path.resolve())
+        if library is not None and path.exists() and path.resolve() in _list_library_files(library):
+            raise InputError(path, f"is a file of the library {library}", "another file", "choose another name")
+
+
+def _list_library_files(library: Path) -> set[Path]:
+    """List the recordings and labels of a library."""
+    from ..library.scan import find_recordings, find_tables
+
+    found = find_recordings(library)
+    texts = [path.with_suffix(".txt") for path in found]
+    return {path.resolve() for path in (*found, *texts, *find_tables(library, found))}
 
 
 def add_take_files(verb) -> None:

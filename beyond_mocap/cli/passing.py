@@ -45,7 +45,7 @@ def run_passes(options, reporter: ProgressReporter, writers: Mapping[str, Writer
     from ..passes.scene_json import read_scene
 
     started = time.perf_counter()
-    _check_folder(options.out)
+    _check_folder(options.out, options.library)
     scene = read_scene(options.scene)
     with locate_errors(options.scene):
         build_ball(scene)
@@ -72,8 +72,10 @@ def run_passes(options, reporter: ProgressReporter, writers: Mapping[str, Writer
           f"{result.plan.seconds:.1f} s, widest gap {1000.0 * max(gaps, default=0.0):.1f} mm")  # fmt: skip
 
 
-def _check_folder(folder: Path) -> None:
-    """Check before the work that the folder exists or can be created."""
+def _check_folder(folder: Path, library: Path) -> None:
+    """Check before the work that the folder exists or can be created, and is not the library's."""
+    if folder.resolve() == library.resolve():
+        raise InputError(folder, "is the folder of the library", "another folder", "choose another folder")
     if folder.exists() and not folder.is_dir():
         raise InputError(folder, describe_no_folder(folder), "a folder", "choose another name")
     place = folder if folder.is_dir() else folder.absolute().parent

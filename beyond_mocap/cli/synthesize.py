@@ -15,7 +15,7 @@ from ..base.optional_packages import import_optional
 from ..base.settings.match import OVERLAP, WINDOW
 from ..base.settings.options import add_options, option_values, parse_path
 from .comparing import run_comparison
-from .library import open_library
+from .library import check_library_options, open_library
 from .outputs import ProgressReporter, Writer, add_take_files, check_outputs, choose_writer, locate_errors
 
 LONG_TRACK = 1200.0  # s of a track from which on it is done in windows
@@ -82,7 +82,7 @@ def run_synthesize(options, reporter: ProgressReporter, writers: Mapping[str, Wr
     outputs = (options.out, options.provenance, options.ball, options.report)
     annotations = options.annotations or find_track_labels(options.track)
     check_outputs(*outputs, reserved=(options.track, annotations, options.pins, options.headings,
-                                      options.skeleton))
+                                      options.skeleton), library=options.library)
     write = choose_writer(options.out, writers)
     track, data = clean_track(read_track_csv(options.track))
     timeline = read_timeline(annotations, options.fps, float(track.times[0])) if annotations else Timeline()
@@ -273,7 +273,8 @@ def _evaluate_motion(options, reporter: ProgressReporter) -> None:
     from ..synthesis.quality.playback import playback_from_tables
 
     inputs = (options.motion, options.track, options.annotations, options.provenance, options.ball)
-    check_outputs(options.report, options.html, reserved=inputs)
+    check_outputs(options.report, options.html, reserved=inputs, library=options.library)
+    check_library_options(options, "cache", "skeleton")  # the unit is the motion's too
     if options.html:
         import_optional("matplotlib", "HTML report")
     motion = bvh.read_bvh(options.motion, None if options.library else options.unit).motion

@@ -116,10 +116,11 @@ def run_synthesize(options, reporter: ProgressReporter, writers: Mapping[str, Wr
 
     started = time.perf_counter()
     inputs = (options.model, options.skeleton, options.track, options.annotations)
-    check_outputs(options.out, options.ball, options.report, reserved=inputs)
+    check_outputs(options.out, options.ball, options.report, reserved=inputs, library=options.library)
     write = choose_writer(options.out, writers)
     for option, required, why in (("library", "track", "a player's track"),
                                   ("track", "library", "a folder of recordings"),
+                                  ("cache", "library", "a folder of recordings"),
                                   ("annotations", "track", "a player's track"),
                                   ("track", "time", "the time of the ball's release")):  # fmt: skip
         if getattr(options, option) and getattr(options, required) is None:

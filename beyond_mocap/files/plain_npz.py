@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 import math
+import os
 import struct
 import tokenize
 import zipfile
@@ -21,6 +22,7 @@ from .json_values import describe_value, parse_json
 HEADER = "header"
 """Name of the array that holds a text as UTF-8 bytes."""
 
+_WHOLE = "the file"  # place of errors that concern all of it, for readers that know only its bytes
 _READ_ERRORS = (zipfile.BadZipFile, zlib.error, struct.error, EOFError, OSError, ValueError, KeyError, IndexError,
                 TypeError, AttributeError, NotImplementedError, RuntimeError, OverflowError, MemoryError, SyntaxError,
                 tokenize.TokenError)  # fmt: skip
@@ -48,7 +50,7 @@ def read_plain_arrays(
         names = [member.filename.removesuffix(".npy") for member in members]
         if HEADER not in names:
             found = (what for name, what in (other_kinds or {}).items() if name in names)
-            raise InputError("the file", next(found, "an .npz with other content"), kind, "choose another file")
+            raise InputError(_WHOLE, next(found, "an .npz with other content"), kind, "choose another file")
         if len(set(names)) < len(names):
             raise InputError("the arrays", "two have the same name", kind, "choose another file")
         return {name: _read_array(archive.read(member), name, types) for name, member in zip(names, members)}
@@ -68,7 +70,7 @@ def read_named_arrays(path: Path, kind: str, types: tuple[np.dtype, ...], max_by
     Raises:
         InputError: if it is not a zip, or one of these arrays is damaged or of another type.
     """
-    with open_file(path, kind) as file, _open_archive(file, kind, max_bytes, f"{path}: ") as archive:
+    with open_file(path, kind) as file, _open_archive(file, kind, max_bytes, str(path)) as archive:
         found = {member.filename.removesuffix(".npy"): member for member in archive.infolist()}
         return {name: _read_array(archive.read(found[name]), f"{path}: {name}", types, is_finite)
                 for name in names if name in found}
@@ -86,17 +88,32 @@ def list_arrays(path: Path) -> frozenset[str]:
 
 
 @contextmanager
-def _open_archive(source, kind: str, max_bytes: int, place: str = "") -> Iterator[zipfile.ZipFile]:
+def name_file(path: str | os.PathLike) -> Iterator[None]:
+    """Context manager: errors of a file's bytes, arrays or header get the file's name in front.
+
+    Args:
+        path: the file.
+    Raises:
+        InputError: one line that begins with the file's name.
+    """
+    try:
+        yield
+    except InputError as error:
+        raise InputError(path, str(error).removeprefix(f"{_WHOLE}: ")) from None
+
+
+@contextmanager
+def _open_archive(source, kind: str, max_bytes: int, place: str = _WHOLE) -> Iterator[zipfile.ZipFile]:
     """Open a zip whose members have a limited size, and translate what goes wrong while it is read."""
     try:
         with zipfile.ZipFile(source) as archive:
             if sum(member.file_size for member in archive.infolist()) > max_bytes:
-                raise InputError(f"{place}the arrays", f"more than {max_bytes:,} bytes", kind, "choose another file")
+                raise InputError(place, f"its arrays have more than {max_bytes:,} bytes", kind, "choose another file")
             yield archive
     except InputError:
         raise
     except _READ_ERRORS:
-        raise InputError(f"{place}the file", "damaged, truncated or of another kind", kind,
+        raise InputError(place, "damaged, truncated or of another kind", kind,
                          "copy it again or choose another file") from None  # fmt: skip
 
 
@@ -149,7 +166,7 @@ def _take_text(arrays: dict[str, np.ndarray], page: str) -> str:
     """Take the text of a file, which `page` of the docs describes, out of its arrays; InputError if it is none."""
     header = arrays.pop(HEADER)
     if header.dtype != np.uint8:
-        raise InputError("the file", "an .npz with other content", f"a text under {HEADER!r}", f"see {page}")
+        raise InputError(_WHOLE, "an .npz with other content", f"a text under {HEADER!r}", f"see {page}")
     try:
         return header.tobytes().decode("utf-8")
     except UnicodeDecodeError:

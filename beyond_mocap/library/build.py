@@ -107,7 +107,13 @@ def build_library(
 
 
 def _remember(library: Library) -> Library:
-    """Give a library what the cache knows of it: what its recordings lack, and where its index is."""
+    """Give a library what the cache knows of it: what its recordings lack, and where its index is; and the notes that
+    depend on the program's vocabulary, which may be newer than the cache.
+    """
+    rows = {clip.path: clip.annotations for clip in library.clips if not clip.mirrored}
+    misspelled = [line for line in describe_misspelled_labels(rows) if line not in library.notes]
+    if misspelled:
+        library = replace(library, notes=(*library.notes, *misspelled))
     coverage = cache.load_coverage(*library.cache_location)
     vars(library)["index_place"] = (*library.cache_location, RECORDED_INDEX)
     if coverage is not None:
@@ -211,7 +217,6 @@ def _read_clips(recordings: _Recordings, arrays: Path | None, notes: list[str], 
     notes += _collect_unit_notes(units)
     motions = levelled.finish()
     rows = _read_rows(recordings, motions)
-    notes += describe_misspelled_labels(recordings.folder, recordings.paths, rows)
     is_proposed = not any(rows)
     repaired = MotionWriter(arrays and arrays / "repaired.npy")
     repairs, contacts = _repair_clips(recordings, motions, [drift for _, drift in changes], repaired, notes=notes,

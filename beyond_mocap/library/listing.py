@@ -157,6 +157,8 @@ def _compute_usual_jerk(jerk: np.ndarray, speed: np.ndarray) -> np.ndarray:
 
 def _read_length(path: Path) -> tuple[int, float]:
     """Read the number of frames and frames per second from a BVH file's header; zeros where it has none."""
+    if not path.is_file():  # a pipe keeps its readers waiting
+        return 0, 0.0
     try:
         with open_file(path, "a BVH file") as file:
             head = file.read(_HEAD_BYTES).decode("ascii", "replace")

@@ -15,7 +15,7 @@ from pathlib import Path
 
 from .. import annotation
 from ..annotation.vocabulary import find_meant_label, list_vocabulary
-from ..base.errors import InputError, describe_no_folder, format_count
+from ..base.errors import InputError, build_read_error, describe_no_folder, format_count
 from ..base.fixes import Fix
 from ..files.atomic import atomic_write
 from ..files.clip_file import CLIP_ENDINGS, FOREIGN, is_clip_file
@@ -35,12 +35,21 @@ def find_clips(folder: str | Path) -> list[Path]:
     Returns:
         The files.
     Raises:
-        InputError: if the folder is missing, holds no BVH file, or one whose name cannot be written into a table.
+        InputError: if the folder is missing, holds no BVH file, or one whose name cannot be written into a table, or
+            that is a device or a pipe.
     """
     found = find_recordings(folder, (".bvh",))
     if not found:
         raise InputError(folder, "no BVH file in the folder", "at least one .bvh", "copy recordings into it")
-    return found
+    return _check_files(found)
+
+
+def _check_files(paths: list[Path]) -> list[Path]:
+    """Return recordings after a check that each is a file: a pipe keeps its readers waiting (InputError)."""
+    for path in paths:
+        if not path.is_file():
+            raise build_read_error(path, "a recording")
+    return paths
 
 
 def find_recordings(folder: str | Path, endings: tuple[str, ...] = (*CLIP_ENDINGS, *FOREIGN)) -> list[Path]:
@@ -95,9 +104,9 @@ def find_readable_clips(folder: str | Path, place: str | Path) -> tuple[list[Pat
     Returns:
         The recordings, their conversions, and a line about recordings that are not converted yet.
     Raises:
-        InputError: if none can be read.
+        InputError: if none can be read, or one is a device or a pipe.
     """
-    found, conversions = list_own_recordings(folder), Conversions(folder, place)
+    found, conversions = _check_files(list_own_recordings(folder)), Conversions(folder, place)
     waiting = conversions.list_waiting(found)
     waiting_set = set(waiting)
     ready = [path for path in found if path not in waiting_set]
@@ -183,20 +192,17 @@ class Annotations:
         return [path for path in texts if path.is_file()] + [place / TABLE_NAME for place in sorted(self.tables)]
 
 
-def describe_misspelled_labels(folder: Path, clips: Sequence[Path],
-                               rows: Sequence[Sequence[annotation.ClipAnnotation]]) -> list[str]:
+def describe_misspelled_labels(rows: Mapping[str, Sequence[annotation.ClipAnnotation]]) -> list[str]:
     """Describe, a line each, the labels that only a library's own annotations know and that are probably misspelled.
 
     Args:
-        folder: the library's folder.
-        clips: its recordings.
-        rows: the rows of each.
+        rows: path of a recording below the library's folder -> its rows.
     """
     known = list_vocabulary()
     places: dict[str, list[str]] = {}
-    for clip, own in zip(clips, rows):
+    for clip, own in rows.items():
         for label in sorted({word for row in own for word in row.words} - known):
-            places.setdefault(label, []).append(clip.relative_to(folder).as_posix())
+            places.setdefault(label, []).append(clip)
     meant = {label: find_meant_label(label, known) for label in sorted(places)}
     return [f"{places[label][0]}{_describe_more(places[label])}: the label '{label}' is not in the vocabulary; "
             f"if '{other}' is meant, correct it" for label, other in meant.items() if other]

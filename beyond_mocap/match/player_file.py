@@ -29,7 +29,7 @@ from ..files.json_values import (
     check_whole_number,
     describe_value,
 )
-from ..files.plain_npz import HEADER, read_plain_arrays, take_header
+from ..files.plain_npz import HEADER, name_file, read_plain_arrays, take_header
 from ..motion.track import Track
 from ..synthesis.heading_path import HeadingPath
 from ..synthesis.heading_request import HeadingKey
@@ -99,10 +99,8 @@ def read_player(path: str | os.PathLike) -> PlayerEdit:
         InputError: one line that starts with the file's name, for anything that is wrong with it.
     """
     data = read_bytes(path, _KIND, MAX_FILE_BYTES)
-    try:
+    with name_file(path):
         return _parse_player(read_plain_arrays(data, _KIND, _TYPES, MAX_ARRAY_BYTES))
-    except InputError as error:
-        raise InputError(path, str(error)) from None
 
 
 def pack_positions(metres: np.ndarray) -> np.ndarray:

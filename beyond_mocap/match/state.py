@@ -17,6 +17,8 @@ from .pieces.pool import TaskFailure, TaskResult
 from .player_plans import PlayerPlans
 from .request import MatchRequest
 
+ALLOW_NEAREST = "leave out --exact"
+"""The next step of a player whose labels the library lacks: that option alone makes labels strict in a match."""
 WRITE_INTERVAL = 1.0
 """s between two writes of a state in which only the number of finished windows has changed."""
 
@@ -51,7 +53,7 @@ class MatchState:
 
     def mark_failed(self, player: str, failure: TaskFailure) -> None:
         """Record why a player failed."""
-        reason = failure.reason.replace(USE_NEAREST, "leave out --exact")  # that alone makes labels strict in a match
+        reason = failure.reason.replace(USE_NEAREST, ALLOW_NEAREST)
         self.update_player(player, status="failed", reason=reason, exit_status=failure.exit_status)
 
     def record_window(self, player: str) -> None:

@@ -26,7 +26,7 @@ from ..files.json_values import (
     check_whole_number,
     describe_value,
 )
-from ..files.plain_npz import HEADER, read_plain_arrays, take_header
+from ..files.plain_npz import HEADER, name_file, read_plain_arrays, take_header
 from ..motion.motion import Motion
 from ..motion.skeleton import Skeleton
 from .networks.chains import EFFECTORS
@@ -46,7 +46,7 @@ MAX_FILE_SIZE = 300_000_000
 """Largest size of a file, bytes."""
 MAX_UNPACKED_SIZE = 1_000_000_000
 """Largest size of all arrays together, bytes."""
-_KIND = "a file of weights (.npz)"
+_KIND = "weights of 'beyond-mocap throw train' (.npz)"
 _PAGE = "docs/reference/network-weights.md"
 _SCALES = ("input_mean", "input_scale", "output_mean", "output_scale")
 _CONTEXT_NAMES = ("before", "after")
@@ -65,13 +65,11 @@ def read_model(path: str | os.PathLike) -> ThrowModel:
             file, NaN or infinite values, shapes that do not match.
     """
     data = read_bytes(path, _KIND, MAX_FILE_SIZE)
-    try:
+    with name_file(path):
         arrays = read_plain_arrays(data, _KIND, _FLOATS, MAX_UNPACKED_SIZE, _OTHER_KINDS)
         half = np.dtype("<f2")
         return _build_model({name: one.astype(np.float32) if one.dtype == half else one for name,
                              one in arrays.items()})
-    except InputError as error:
-        raise InputError(path, str(error)) from None
 
 
 def read_chosen_model(choice: str | os.PathLike | None, action: str) -> ThrowModel:

@@ -21,6 +21,7 @@ if TYPE_CHECKING:
 
 LIBRARY_SHARE = 0.1  # share of the progress bar
 TEAMS = ("home", "away", "referee")
+_MAKE_AGAIN = "press Make Match, which uses the nearest labels"
 
 
 @dataclass(frozen=True, eq=False)
@@ -170,6 +171,7 @@ def _construct_characters(request, state, library, ball, span, progress, cancell
     """Construct all players who are present and finished; return them and messages about the others."""
     from ...beyond_mocap.match.displayed_motion import construct_displayed_player
     from ...beyond_mocap.match.player_file import read_player
+    from ...beyond_mocap.match.state import ALLOW_NEAREST
 
     characters, lines, last_error = [], [], None
     selected = [player for player in state["players"] if not request.players or player["id"] in request.players]
@@ -178,7 +180,8 @@ def _construct_characters(request, state, library, ball, span, progress, cancell
             raise UserCancelledError("cancelled")
         progress(LIBRARY_SHARE + (1.0 - LIBRARY_SHARE) * number / len(selected), f"constructing {player['id']}")
         if player.get("status") != "done":
-            lines.append(f"{player['id']} is not finished: {player.get('reason') or player.get('status')}")
+            reason = str(player.get("reason") or player.get("status")).replace(ALLOW_NEAREST, _MAKE_AGAIN)
+            lines.append(f"{player['id']} is not finished: {reason}")
             continue
         try:
             takes = construct_displayed_player(library,

@@ -9,6 +9,7 @@ import atexit
 import os
 import pathlib
 import shutil
+import signal
 import socket
 import subprocess
 import sys
@@ -23,6 +24,7 @@ SOURCE = HERE.parents[1]
 COLLECTED = pytest.StashKey()
 """Names of all tests of the files that this run was given."""
 
+signal.signal(signal.SIGTERM, signal.default_int_handler)  # else temporary folders would stay behind
 _profile = tempfile.TemporaryDirectory(prefix="beyond-mocap-profile-")
 os.environ["BLENDER_USER_RESOURCES"] = _profile.name  # read once, when bpy is imported
 _repository = pathlib.Path(_profile.name, "extensions", "user_default")

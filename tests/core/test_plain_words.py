@@ -31,6 +31,12 @@ NOUNS = {"seed", "speed", "feed", "bed", "need"}
 """What ends like a participle and is none."""
 
 
+COMMANDS_OWN = {"evaluation/classifier_comparison.py", "evaluation/methods/comparison.py", "files/freeze_frames.py",
+                "match/pieces/pool.py", "match/state.py"}
+"""Files of the core with flags in messages: what only the command line runs, Blender's own option, and a step that
+panels replace."""
+
+
 def list_documents():
     found = [TOP / name for name in ("README.md", "CONTRIBUTING.md", "CHANGELOG.md")]
     return [*found, TOP / "beyond_mocap" / "annotation" / "vocabulary.csv", *sorted((TOP / "docs").rglob("*.md"))]
@@ -113,3 +119,22 @@ def test_planted_words_are_counted(text, word, count):
 ])
 def test_planted_participles_are_seen(name, answer):
     assert is_participle(name) == answer
+
+
+def iter_texts(node):
+    """Texts below a node of the syntax tree, docstrings left out."""
+    for child in ast.iter_child_nodes(node):
+        if isinstance(child, ast.Constant) and isinstance(child.value, str) and not isinstance(node, ast.Expr):
+            yield child.value
+        yield from iter_texts(child)
+
+
+def test_messages_that_panels_show_name_no_flags():
+    core = TOP / "beyond_mocap"
+    flag = re.compile(r"(?<!\S)--[a-z]")
+    texts = {path: path.read_text("utf-8") for path in list_sources("beyond_mocap")}
+    found = {path.relative_to(core).as_posix() for path, text in texts.items()
+             if re.search("--[a-z]", text) and any(map(flag.search, iter_texts(ast.parse(text))))}
+    of_commands = {name for name in found if name.startswith(("cli/", "base/settings/"))}
+    assert "cli/matching.py" in of_commands
+    assert found - of_commands == COMMANDS_OWN

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import argparse
 import contextlib
+import sys
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -74,7 +76,9 @@ def _build_value_parser(row: Setting):
     if row.kind is Path:
         return parse_path
     least, most = (row.option_more.get(name, getattr(row, name)) for name in ("least", "most"))
-    return row.kind if least is None else partial(parse_number, row=row, least=least, most=most)
+    if least is None:
+        row, least, most = replace(row, expected="a number of {unit}"), -sys.float_info.max, sys.float_info.max
+    return partial(parse_number, row=row, least=least, most=most)
 
 
 def parse_number(text: str, row: Setting, least: float, most: float) -> float:

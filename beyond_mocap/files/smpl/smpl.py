@@ -153,7 +153,7 @@ def _find_poses(path: Path, arrays: Mapping[str, np.ndarray]) -> tuple[np.ndarra
         flat, form = np.hstack([root, body]), "SMPL in parts"
     if not form or trans.shape != (len(flat), 3):
         raise InputError(path, f"poses {flat.shape}, trans {trans.shape}", _KIND,
-                         "export one person's motion; bodies --joints reads many")
+                         "export one person's motion; the command 'bodies' reads many")
     if not 2 <= len(flat) <= _MAX_FRAMES:
         raise InputError(path, format_count(len(flat), "frame"), f"2 to {_MAX_FRAMES:,}")
     if np.abs(trans).max() > MAX_METRES:

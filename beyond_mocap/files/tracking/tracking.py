@@ -95,8 +95,9 @@ def _parse_cells(rows, names) -> np.ndarray:
 
 def _check_rate(track: Track, path) -> None:
     known = np.isfinite(track.times) & track.is_measured
-    if len(np.unique(track.times[known])) < 2:
-        found = f"{format_count(np.count_nonzero(known), 'sample')} with a distinct time and a position"
+    distinct = len(np.unique(track.times[known]))
+    if distinct < 2:
+        found = f"{format_count(distinct, 'sample')} with a distinct time and a position"
         raise InputError(path, found, "at least two", "export it again")
     rate = 1.0 / track.interval
     if not RATES[0] - 0.01 <= rate <= RATES[1] + 0.5:

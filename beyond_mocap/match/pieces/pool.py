@@ -40,7 +40,9 @@ OFFLINE = "BEYOND_MOCAP_OFFLINE"
 """Environment variable by which a host, such as Blender, says that no other machine may be reached."""
 
 _ANSWER_TIMEOUT = "10s"  # the longest a scheduler may take to answer
-_IDLE_SECONDS = 60  # s after which a local worker without work ends
+_IDLE_SECONDS = 60
+"""Seconds after which a local worker without work ends: it holds up to .7 GiB while the main process works alone. One
+that is started again loads the core and the cached library in two to three seconds of processor time."""
 _MAX_BREAKS = 2  # breaks of the workers after which pieces run one by one
 
 Work = Callable[..., object]

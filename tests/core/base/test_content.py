@@ -73,3 +73,17 @@ def test_a_pipe_is_read_and_refused_without_a_writer(tmp_path, monkeypatch):
     monkeypatch.setattr(content, "PIPE_SECONDS", 0.1)
     with pytest.raises(InputError, match="a pipe, into which no program writes; expected a thing"):
         read_bytes(pipe, "a thing")
+
+
+@pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="Windows has no named pipes")
+@pytest.mark.parametrize("begin", [b"", b"12345"])
+def test_a_pipe_whose_writer_is_silent_is_refused(begin, tmp_path, monkeypatch):
+    pipe = tmp_path / "pipe"
+    os.mkfifo(pipe)
+    for name in ("PIPE_SECONDS", "SILENT_SECONDS"):
+        monkeypatch.setattr(content, name, 0.1)
+    writer = os.open(pipe, os.O_RDWR)
+    os.write(writer, begin)
+    with pytest.raises(InputError, match="gave nothing for 0.1 s; expected a thing; write its content into a file"):
+        read_bytes(pipe, "a thing")
+    os.close(writer)

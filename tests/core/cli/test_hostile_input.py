@@ -149,6 +149,50 @@ def test_an_empty_name_is_reported_as_one(run_line, arguments):
     assert status == 2 and "no file or folder is named" in line
 
 
+@pytest.mark.parametrize("name", ["walk.bvh", "walk.txt", "annotations.csv"])
+@pytest.mark.parametrize("command", ["library {library} --report {out}", "library {library} --learn {out}",
+                                     "evaluate {clip} --library {library} --report {out}",
+                                     "synthesize --library {library} --track {track} --out {clip}2 --report {out}"])
+def test_no_output_takes_the_place_of_a_librarys_recording_or_labels(command, name, run_line, tmp_path):
+    (tmp_path / "walk.bvh").write_bytes(WALK.read_bytes())
+    (tmp_path / "walk.txt").write_text("0 1 walking\n")
+    (tmp_path / "annotations.csv").write_text("file,start_frame,end_frame,key_frame,labels\n")
+    content = (tmp_path / name).read_bytes()
+    track = TOP / "sample_blend" / "match" / "player1.csv"
+    words = command.format(library=tmp_path, out=tmp_path / name, clip=WALK, track=track)
+    status, line = run_line(*words.split())
+    assert status == 2 and f"{name}: is a file of the library" in line and (tmp_path / name).read_bytes() == content
+
+
+def test_no_output_takes_the_place_of_metadata_that_is_found_beside_tracking_data(run_line, tmp_path):
+    shutil.copytree(TOP / "sample_blend" / "match" / "small", tmp_path / "small")
+    meta = tmp_path / "small" / "small_meta.xml"
+    status, line = run_line("touches", tmp_path / "small" / "small.dat", "--out", meta)
+    assert status == 2 and "small_meta.xml: is both an output and another file" in line and b"<" in meta.read_bytes()
+
+
+def test_passes_are_not_written_between_the_recordings(run_line):
+    library = TOP / "sample_blend" / "passes" / "library"
+    status, line = run_line("passes", library.parent / "three.json", "--library", library, "--out", library)
+    assert status == 2 and "library: is the folder of the library; expected another folder" in line
+
+
+@pytest.mark.parametrize("command", ["evaluate {clip} --report {out} --cache none",
+                                     "evaluate {clip} --report {out} --skeleton none.bvh",
+                                     "throw synthesize --target 8,1,1 --out {out} --cache none"])
+def test_options_of_a_library_need_one(command, run_line, tmp_path):
+    status, line = run_line(*command.format(clip=WALK, out=tmp_path / "r.bvh").split())
+    assert status == 2 and "set without --library; expected a folder of" in line and line.endswith("add --library")
+
+
+@pytest.mark.parametrize("option, said", [("--meta=--", "--meta: expected one argument"), ("--to=--", "expected one"),
+                                          ("--to=soon", "'soon' is not a number of seconds"),
+                                          ("--from=nan", "'nan' is not a number of seconds")])
+def test_values_that_are_none_are_named_with_their_option(option, said, run_line):
+    status, line = run_line("touches", "small.dat", "--out", "t.csv", option)
+    assert status == 2 and said in line
+
+
 def iter_options(parser):
     for action in parser._actions:
         if isinstance(action, argparse._SubParsersAction):

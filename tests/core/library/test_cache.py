@@ -15,7 +15,7 @@ import pytest
 
 from beyond_mocap.base.errors import InputError
 from beyond_mocap.files import motion_file
-from beyond_mocap.library import build, cache, synthetic_clips
+from beyond_mocap.library import build, cache, scan, synthetic_clips
 from beyond_mocap.library import library as library_module
 from beyond_mocap.library.build import build_library
 from beyond_mocap.library.library import Library
@@ -220,6 +220,17 @@ def test_a_cache_of_an_earlier_version_is_told_and_replaced(folder):
     again, worked = built(folder)
     assert not worked and not any("another version" in note for note in again.notes)
     assert not list((folder / CACHE_FOLDER).glob("*.npz"))
+
+
+def test_a_cache_of_a_program_that_knew_a_label_names_it_as_misspelled_when_it_is_opened(folder, monkeypatch):
+    (folder / "walk.txt").write_text("0 1.4 waking\n")
+    with monkeypatch.context() as earlier:
+        earlier.setattr(scan, "find_meant_label", lambda *_: "")
+        assert not any("waking" in note for note in built(folder)[0].notes)
+    for _ in range(2):
+        library, worked = built(folder)
+        assert not worked and [note.split(";")[0] for note in library.notes if "waking" in note] == [
+            "walk.bvh: the label 'waking' is not in the vocabulary"]
 
 
 def test_what_a_build_replaces_or_a_killed_one_left_stays_for_an_hour_and_others_may_read_all(folder):

@@ -7,7 +7,15 @@ import pytest
 
 from beyond_mocap.annotation import ClipAnnotation
 from beyond_mocap.base.errors import InputError
-from beyond_mocap.library.scan import Annotations, describe_misspelled_labels, find_clips, list_own_recordings
+from beyond_mocap.library.build import build_library
+from beyond_mocap.library.listing import scan_clips
+from beyond_mocap.library.scan import (
+    Annotations,
+    describe_misspelled_labels,
+    find_clips,
+    find_readable_clips,
+    list_own_recordings,
+)
 
 HEADER = "file,fps,start_frame,end_frame,key_frame,labels,comment\n"
 
@@ -90,6 +98,15 @@ def test_a_missing_or_empty_folder_is_told(tmp_path, make):
     assert "\n" not in str(told.value)
 
 
+@pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="Windows has no named pipes")
+def test_a_pipe_among_the_clips_is_refused_before_it_is_opened(folder):
+    os.mkfifo(folder / "pipe.bvh")
+    for find in (find_clips, lambda folder: find_readable_clips(folder, folder / "cache"), build_library):
+        with pytest.raises(InputError, match="pipe.bvh: is a device or a pipe; expected a recording; write its"):
+            find(folder)
+    assert [clip.seconds for clip in scan_clips(folder) if clip.path == "pipe.bvh"] == [0.0]
+
+
 def test_names_of_any_script_will_do_but_bytes_that_are_none_are_told(folder):
     (folder / "frei stoß 蹴る.bvh").write_text("")
     assert "frei stoß 蹴る.bvh" in names(folder)
@@ -137,7 +154,7 @@ def test_rows_that_name_no_clip_are_told(folder):
 def test_labels_that_are_probably_misspelled_are_named(folder):
     def describe(*labels):
         rows = [(ClipAnnotation(0, 9, None, labels),), (ClipAnnotation(0, 5, None, ("jogging", *labels)),)]
-        return describe_misspelled_labels(folder, find_clips(folder), rows)
+        return describe_misspelled_labels(dict(zip(names(folder), rows)))
 
     assert describe("waking", "front") == [
         "b.bvh and 1 more clip: the label 'waking' is not in the vocabulary; if 'walking' is meant, correct it"]

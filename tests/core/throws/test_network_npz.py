@@ -2,6 +2,7 @@
 
 import io
 import json
+import re
 import zipfile
 
 import numpy as np
@@ -235,6 +236,16 @@ def test_a_header_that_claims_a_huge_array_is_not_believed(tmp_path):
             np.lib.format.write_array_header_1_0(out, header)
             archive.writestr(name + ".npy", out.getvalue() + array.tobytes())
     refused(tmp_path / "x.npz", "the shape's number of bytes")
+
+
+@pytest.mark.parametrize("content, said", [
+    (b"HIERARCHY", "damaged, truncated or of another kind; expected weights of 'beyond-mocap throw train'"),
+    (None, "an .npz with other content; expected weights of 'beyond-mocap throw train'")])
+def test_another_file_than_weights_is_named_with_what_is_expected(content, said, tmp_path):
+    np.savez(tmp_path / "x.npz", other=np.zeros(3))
+    (tmp_path / "x.npz").write_bytes(content or (tmp_path / "x.npz").read_bytes())
+    with pytest.raises(InputError, match=f"^{re.escape(str(tmp_path / 'x.npz'))}: {said}.*; (copy|choose)"):
+        read_model(tmp_path / "x.npz")
 
 
 def test_a_file_too_large_is_told(tmp_path, monkeypatch):
