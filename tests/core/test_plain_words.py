@@ -31,7 +31,7 @@ NOUNS = {"seed", "speed", "feed", "bed", "need"}
 """What ends like a participle and is none."""
 
 
-COMMANDS_OWN = {"evaluation/classifier_comparison.py", "evaluation/methods/comparison.py", "files/freeze_frames.py",
+COMMANDS_OWN = {"evaluation/two_sample_test/windows.py", "evaluation/methods/comparison.py", "files/freeze_frames.py",
                 "match/pieces/pool.py", "match/state.py"}
 """Files of the core with flags in messages: what only the command line runs, Blender's own option, and a step that
 panels replace."""
