@@ -83,6 +83,19 @@ def obey_momentum(
     return np.where(stays[:, None], root, new_root), np.where(stays[:, None, None], rotations, new_rotations)
 
 
+def keep_above_ground(move: np.ndarray, height: np.ndarray) -> np.ndarray:
+    """Limit how far a foot sinks that goes with its pelvis: the second half of the way down it only nears the ground.
+
+    Args:
+        move: (T,) m upward.
+        height: (T,) m of the foot above the ground.
+    Returns:
+        (T,) m upward.
+    """
+    half = 0.5 * np.maximum(height, 1e-6)
+    return np.maximum(move, -half) + half * np.tanh(np.minimum(move + half, 0.0) / half)
+
+
 def _lean_into_pushes(body: Humanoid, places: np.ndarray, centre: np.ndarray, pose: tuple[np.ndarray, np.ndarray],
                       stances: Stances, share: np.ndarray, fps: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Compute how both feet move (T, 2, 2) m, and root and rotations of a body that tilts and sinks: what it lacks."""
@@ -166,6 +179,7 @@ class _Legs:
         for foot, standing in zip(self.feet, self.standing):
             hip = places[:, foot.limb.upper_leg] + move
             carried = (1.0 - standing)[:, None] * move
+            carried[:, 2] = keep_above_ground(carried[:, 2], np.minimum(foot.toe[:, 2], foot.heel[:, 2]))
             rise = spread_peaks(solve_heel_rise(replace(foot, hip=hip), carried) * standing, self.spread)
             roll = quaternion.from_axis_angle(foot.left, rise)
             ankle = foot.toe + carried + quaternion.rotate(roll, foot.heel - foot.toe)

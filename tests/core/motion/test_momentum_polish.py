@@ -8,7 +8,7 @@ import pytest
 from beyond_mocap.base.errors import InputError
 from beyond_mocap.motion.humanoid import identify_joints
 from beyond_mocap.motion.mass import compute_centre_of_mass
-from beyond_mocap.motion.momentum_polish import obey_momentum
+from beyond_mocap.motion.momentum_polish import keep_above_ground, obey_momentum
 from beyond_mocap.motion.motion import compute_pose
 from beyond_mocap.motion.retargeting.adult import build_adult_skeleton
 from beyond_mocap.motion.skeleton import Skeleton
@@ -141,6 +141,15 @@ def test_a_body_in_the_air_all_the_time_stays(run):
     root = run.root_positions + [0.0, 0.0, 1.0] * np.arange(len(run))[:, None]
     moved, _ = obey_momentum(run.skeleton, root, run.rotations, run.fps, np.ones(len(run)))
     assert np.isfinite(moved).all()
+
+
+@pytest.mark.parametrize("height", [0.0, 0.02, 0.3])
+def test_a_foot_that_sinks_with_the_pelvis_stays_above_the_ground(height):
+    move = np.linspace(0.1, -0.5, 200)
+    limited = keep_above_ground(move, np.full(200, height))
+    assert (limited + height >= -1e-6).all() and (np.diff(limited) <= 0.0).all()
+    free = move >= -0.5 * height
+    assert np.array_equal(limited[free], move[free]) and free.sum() > 30
 
 
 def test_a_skeleton_without_toes_obeys_momentum():
