@@ -160,7 +160,6 @@ def run_learning(options, reporter: ProgressReporter) -> None:
     from ..library.classify.train import train_classifier
     from ..library.scan import TABLE_NAME
 
-    check_outputs(options.learn, options.propose, reserved=(options.learned,), library=options.library)
     if options.learn and options.learned:
         raise InputError("--learned", "set with --learn", "one of them", "remove one of them")
     if options.learned and not options.propose:
@@ -168,6 +167,7 @@ def run_learning(options, reporter: ProgressReporter) -> None:
     if options.propose and options.propose.name == TABLE_NAME and options.propose.exists():
         problem = "already has labels, which would be lost"
         raise InputError(options.propose, problem, "a new file", "choose another name, then merge the rows")
+    check_outputs(options.learn, options.propose, reserved=(options.learned,), library=options.library)
     model = classifier.read_classifier(options.learned) if options.learned else None
     if options.learn:
         examples = read_examples(options.library, options.unit, reporter.show_progress, cache_dir=options.cache,

@@ -166,7 +166,7 @@ def check_outputs(*paths: Path | None, reserved: tuple[Path | None, ...] = (), l
     Args:
         paths: the output files; None is skipped.
         reserved: files that must not be overwritten, such as the inputs; None is skipped.
-        library: a folder whose recordings and labels must not be overwritten; None for none.
+        library: a folder whose recordings, labels and balls must not be overwritten; None for none.
     Raises:
         InputError: for the first path that fails.
     """
@@ -190,12 +190,12 @@ def check_outputs(*paths: Path | None, reserved: tuple[Path | None, ...] = (), l
 
 
 def _list_library_files(library: Path) -> set[Path]:
-    """List the recordings and labels of a library."""
+    """List the recordings, labels and balls of a library."""
     from ..library.scan import find_recordings, find_tables
 
     found = find_recordings(library)
-    texts = [path.with_suffix(".txt") for path in found]
-    return {path.resolve() for path in (*found, *texts, *find_tables(library, found))}
+    beside = [path.with_suffix(ending) for path in found for ending in (".txt", ".ball.csv")]
+    return {path.resolve() for path in (*found, *beside, *find_tables(library, found))}
 
 
 def add_take_files(verb) -> None:

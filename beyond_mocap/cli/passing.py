@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 import time
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 
 from .. import __version__
@@ -41,11 +41,12 @@ def run_passes(options, reporter: ProgressReporter, writers: Mapping[str, Writer
         writers: further output formats, by file suffix (Blender's).
     """
     from ..library.build import build_library
+    from ..library.scan import find_recordings
     from ..passes.passes import build_ball, synthesize_passes
     from ..passes.scene_json import read_scene
 
     started = time.perf_counter()
-    _check_folder(options.out, options.library)
+    _check_folder(options.out, (options.library, *(path.parent for path in find_recordings(options.library))))
     scene = read_scene(options.scene)
     with locate_errors(options.scene):
         build_ball(scene)
@@ -72,10 +73,12 @@ def run_passes(options, reporter: ProgressReporter, writers: Mapping[str, Writer
           f"{result.plan.seconds:.1f} s, widest gap {1000.0 * max(gaps, default=0.0):.1f} mm")  # fmt: skip
 
 
-def _check_folder(folder: Path, library: Path) -> None:
-    """Check before the work that the folder exists or can be created, and is not the library's."""
-    if folder.resolve() == library.resolve():
-        raise InputError(folder, "is the folder of the library", "another folder", "choose another folder")
+def _check_folder(folder: Path, taken: Iterable[Path]) -> None:
+    """Check before the work that the folder exists or can be created, and is none of those that hold the library's
+    recordings.
+    """
+    if folder.resolve() in {path.resolve() for path in taken}:
+        raise InputError(folder, "holds recordings of the library", "another folder", "choose another folder")
     if folder.exists() and not folder.is_dir():
         raise InputError(folder, describe_no_folder(folder), "a folder", "choose another name")
     place = folder if folder.is_dir() else folder.absolute().parent

@@ -35,6 +35,7 @@ _CROUCH_SHARE, _MOST_CROUCH = 1.4, 0.18  # m that a body sinks at most as its fe
 _LEAST_HEIGHT = 0.5  # m of a centre of mass over the foot for which shifts are turned into angles: bodies lie and slide
 _SPEEDS = (1.5, 2.5)  # m/s between which the lean of a step begins to count
 _EFFORT_SECONDS = 0.4  # s of an acceleration that count as speed: a turn on the spot passes through rest
+_CLEAR_SPEED = 1.0  # m/s from which on a velocity says which way a body goes
 _TURN_SHARE, _BRAKE_SHARE = (0.8, 0.5), 0.3
 """Shares of the missing angle by which the body turns: ahead, aside, and back against a braking foot."""
 _TILT_SECONDS, _CROUCH_SECONDS = 0.12, 0.33  # s to either side over which that turn, and the crouch, are smoothed
@@ -72,6 +73,14 @@ class Lean:
     def travel(self) -> np.ndarray:
         """(S, 2) unit direction of travel."""
         return unit_vectors(self.velocity, np.array([1.0, 0.0]))
+
+    @property
+    def course(self) -> np.ndarray:
+        """(S, 2) unit direction of travel, and of a body that hardly moves, of its acceleration, to the same side."""
+        slowness = 1.0 - smoothstep(measure_lengths(self.velocity), 0.0, _CLEAR_SPEED)
+        side = np.where(dot_products(self.velocity, self.acceleration) < 0.0, -1.0, 1.0)
+        ahead = self.velocity + (_EFFORT_SECONDS * slowness * side)[:, None] * self.acceleration
+        return unit_vectors(ahead, np.array([1.0, 0.0]))
 
 
 def measure_lean(body: Humanoid, positions: np.ndarray, centre: np.ndarray, stances: Stances, fps: float) -> Lean:
@@ -124,7 +133,7 @@ def choose_shifts(lean: Lean, share: np.ndarray) -> np.ndarray:
     Returns:
         (S, 2) m by which the centre of mass comes to lie farther from the foot, world.
     """
-    ahead = lean.travel
+    ahead = lean.course
     aside = np.stack([-ahead[:, 1], ahead[:, 0]], axis=1)
     effort = measure_lengths(lean.velocity) + _EFFORT_SECONDS * measure_lengths(lean.acceleration)
     counts = share * smoothstep(effort, *_SPEEDS)
@@ -145,9 +154,11 @@ def choose_angles(lean: Lean, shifts: np.ndarray) -> np.ndarray:
     Returns:
         (S, 2) rad by which the body tilts towards x and y, world.
     """
-    slope, ahead = shifts / lean.lever[:, None], lean.travel
+    slope, ahead = shifts / lean.lever[:, None], lean.course
     forward = dot_products(slope, ahead)
-    along = (np.where(forward < 0.0, _BRAKE_SHARE, _TURN_SHARE[0]) * forward)[:, None] * ahead
+    braking = (forward < 0.0) * smoothstep(measure_lengths(lean.velocity), 0.0, _CLEAR_SPEED)
+    turned = _TURN_SHARE[0] + braking * (_BRAKE_SHARE - _TURN_SHARE[0])
+    along = (turned * forward)[:, None] * ahead
     return along + _TURN_SHARE[1] * (slope - forward[:, None] * ahead)
 
 

@@ -125,7 +125,10 @@ def answer_in_playback(scene: bpy.types.Scene) -> None:
     """Insert the answer to the user's strike, if it is planned, before a frame of the playback is evaluated."""
     if scene.session_uid != _session.get("scene") or scene.beyond_mocap_passes.made_of != PLAYED:
         return
-    _session["clock"].note_frame(time.monotonic(), compute_rally_seconds(scene))
+    if is_playing():
+        _session["clock"].note_frame(time.monotonic(), compute_rally_seconds(scene))
+    else:
+        _session["clock"].forget_frames()
     _collect_answer()
     if _session["pending"] is not None and _session["watchers"] is None and is_playing():
         _answer_strike(scene, find_target(scene), before_frame=True)

@@ -27,6 +27,10 @@ class RallyClock:
             self._frames.clear()
         self._frames.append((moment, seconds))
 
+    def forget_frames(self) -> None:
+        """Forget all frames: what is not played has no pace."""
+        self._frames.clear()
+
     def find_seconds(self, moment: float) -> float | None:
         """Find the scene's time at a moment, as if each frame were drawn at once.
 
@@ -34,10 +38,10 @@ class RallyClock:
             moment: s on the monotonic clock.
         Returns:
             s on the rally's clock: between two frames in proportion, after the last one at the pace of the playback,
-            before the first one that frame's; None before two frames are known.
+            which is never faster than the clock, before the first one that frame's; None before two frames are known.
         """
         if len(self._frames) < 2:
             return None
         moments, seconds = np.transpose(self._frames)
         pace = np.median((np.diff(seconds) / np.diff(moments))[-_PACE_FRAMES:])  # not of a pause
-        return float(np.interp(moment, moments, seconds) + pace * max(moment - moments[-1], 0.0))
+        return float(np.interp(moment, moments, seconds) + min(pace, 1.0) * max(moment - moments[-1], 0.0))

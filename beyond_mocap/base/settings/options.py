@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import argparse
 import contextlib
-import sys
+import math
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
@@ -77,7 +77,7 @@ def _build_value_parser(row: Setting):
         return parse_path
     least, most = (row.option_more.get(name, getattr(row, name)) for name in ("least", "most"))
     if least is None:
-        row, least, most = replace(row, expected="a number of {unit}"), -sys.float_info.max, sys.float_info.max
+        row, least, most = replace(row, expected="a number of {unit}"), -math.inf, math.inf
     return partial(parse_number, row=row, least=least, most=most)
 
 

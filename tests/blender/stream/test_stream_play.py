@@ -189,6 +189,16 @@ def test_an_answer_begins_with_the_strike(playing, room, core, monkeypatch):
         play._session["keys"].write_all(playing, stand["rally"], stand["rally"].players)
 
 
+def test_frames_that_are_not_played_have_no_pace(playing, room, monkeypatch):
+    play, clock = room("stream.play"), SimpleNamespace(moment=0.0, plays=False)
+    monkeypatch.setattr(play, "is_playing", lambda: clock.plays)
+    monkeypatch.setattr(play, "time", SimpleNamespace(monotonic=lambda: clock.moment))
+    for clock.moment, frame, clock.plays in ((90.0, 2, False), (90.1, 90, False), (95.0, 16, True), (96.0, 40, True)):
+        playing.frame_set(frame)
+        play.answer_in_playback(playing)
+    assert play._session["clock"].find_seconds(96.5) == pytest.approx(play.compute_rally_seconds(playing) + 0.5)
+
+
 @pytest.mark.parametrize("name", ["Ann", "Ben"])
 def test_keys_that_the_user_has_changed_are_written_again(playing, room, core, monkeypatch, name):
     """By the update after the frame, which shows no part of the pass; and the strike is not lost."""

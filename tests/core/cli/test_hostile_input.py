@@ -149,13 +149,14 @@ def test_an_empty_name_is_reported_as_one(run_line, arguments):
     assert status == 2 and "no file or folder is named" in line
 
 
-@pytest.mark.parametrize("name", ["walk.bvh", "walk.txt", "annotations.csv"])
+@pytest.mark.parametrize("name", ["walk.bvh", "walk.txt", "walk.ball.csv", "annotations.csv"])
 @pytest.mark.parametrize("command", ["library {library} --report {out}", "library {library} --learn {out}",
                                      "evaluate {clip} --library {library} --report {out}",
                                      "synthesize --library {library} --track {track} --out {clip}2 --report {out}"])
 def test_no_output_takes_the_place_of_a_librarys_recording_or_labels(command, name, run_line, tmp_path):
     (tmp_path / "walk.bvh").write_bytes(WALK.read_bytes())
     (tmp_path / "walk.txt").write_text("0 1 walking\n")
+    (tmp_path / "walk.ball.csv").write_text("time_s,x_m,y_m,z_m\n")
     (tmp_path / "annotations.csv").write_text("file,start_frame,end_frame,key_frame,labels\n")
     content = (tmp_path / name).read_bytes()
     track = TOP / "sample_blend" / "match" / "player1.csv"
@@ -171,10 +172,20 @@ def test_no_output_takes_the_place_of_metadata_that_is_found_beside_tracking_dat
     assert status == 2 and "small_meta.xml: is both an output and another file" in line and b"<" in meta.read_bytes()
 
 
-def test_passes_are_not_written_between_the_recordings(run_line):
-    library = TOP / "sample_blend" / "passes" / "library"
-    status, line = run_line("passes", library.parent / "three.json", "--library", library, "--out", library)
-    assert status == 2 and "library: is the folder of the library; expected another folder" in line
+@pytest.mark.parametrize("folder", ["library", "library/kicks"])
+def test_passes_are_not_written_between_the_recordings(folder, run_line, tmp_path):
+    source = TOP / "sample_blend" / "passes"
+    shutil.copytree(source / "library", tmp_path / folder)
+    line = run_line("passes", source / "three.json", "--library", tmp_path / "library", "--out", tmp_path / folder)
+    assert line[0] == 2 and f"{folder}: holds recordings of the library; expected another folder" in line[1]
+
+
+def test_proposed_labels_do_not_take_the_place_of_labels(run_line, tmp_path):
+    shutil.copytree(TOP / "sample_blend" / "passes" / "library", tmp_path / "library")
+    table = tmp_path / "library" / "annotations.csv"
+    table.write_text("file,start_frame,end_frame,key_frame,labels\n")
+    status, line = run_line("library", tmp_path / "library", "--propose", table)
+    assert status == 2 and "already has labels" in line and "then merge the rows" in line
 
 
 @pytest.mark.parametrize("command", ["evaluate {clip} --report {out} --cache none",
