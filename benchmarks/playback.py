@@ -215,7 +215,8 @@ def enable_extension() -> None:
 
 def main() -> None:
     """Measure all variants, and print the figures as a line of JSON."""
-    with tempfile.TemporaryDirectory(prefix="beyond-mocap-playback-") as tempfile.tempdir:
+    with tempfile.TemporaryDirectory(prefix="beyond-mocap-playback-") as folder:
+        tempfile.tempdir = folder  # Blender's profile and files go with it, however this ends
         measure_variants()
 
 

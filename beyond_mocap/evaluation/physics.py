@@ -221,7 +221,13 @@ def measure_leans(body: MassCourse) -> Leans:
 
 
 def measure_pushes(body: MassCourse) -> Pushes:
-    """Measure how far each stance of a body that is pushed by more than HARD lacks lean, and how deep it crouches."""
+    """Measure how far each stance of a body that is pushed by more than HARD lacks lean, and how deep it crouches.
+
+    Args:
+        body: the body's motion with its stances.
+    Returns:
+        The stances that are pushed so hard.
+    """
     lean, stances = body.lean, body.stances
     size = measure_lengths(lean.acceleration)
     slope = dot_products(lean.offset, lean.acceleration) / np.maximum(size * lean.lever, 1e-9)

@@ -86,7 +86,15 @@ class Frames:
         return np.linalg.norm(self.velocity, axis=1)
 
     def find_nearest(self, clip: int, frame: float, fps: float) -> int:
-        """Find the frame nearest to a fractional frame of a clip at the clip's own rate, its last one at most."""
+        """Find the frame nearest to a place in a clip, its last one at most.
+
+        Args:
+            clip: index of the clip.
+            frame: fractional frame of the clip at its own rate.
+            fps: that rate, frames per second.
+        Returns:
+            Index of the library's frame.
+        """
         return int(self.first[clip]) + min(int(frame / fps * FPS + 0.5), int(self.count[clip]) - 1)
 
 

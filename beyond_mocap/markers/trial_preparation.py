@@ -38,7 +38,14 @@ def find_marker_set(trial: MarkerTrial, model: MarkerModel | None, chosen_set=No
 
 
 def prepare_trial(trial: MarkerTrial, marker_set) -> MarkerTrial:
-    """Return the trial with the set's labels and evenly spaced frames."""
+    """Return the trial with the set's labels and evenly spaced frames.
+
+    Args:
+        trial: the recorded markers.
+        marker_set: the chosen set; None: labels stay.
+    Returns:
+        The prepared trial.
+    """
     return resample_evenly(apply_set_labels(trial, marker_set))
 
 

@@ -52,7 +52,14 @@ class RemedySearch:
         self.costs: dict[tuple[int, PathChange], float] = {}
 
     def list_remedies(self, changes, collision):
-        """List the remedies of a collision with the lowest costs: number of a body -> its change."""
+        """List the remedies of a collision with the lowest costs.
+
+        Args:
+            changes: what is already changed, of each body.
+            collision: the collision.
+        Returns:
+            For each remedy, number of a body -> its change.
+        """
         pair = [who for who in (collision.first, collision.second) if self.followers[who].path is not None]
         found = [self.find_wait(changes, collision, who) for who in pair]
         found += [self.find_detour(changes, collision, {who: side}) for who in pair for side in (-1.0, 1.0)]
@@ -63,7 +70,14 @@ class RemedySearch:
         return sorted(found, key=lambda way: self.compute_added_cost(changes, way))[:_MOST_REMEDIES]
 
     def compute_cost(self, who, change):
-        """Compute the cost of a change: waiting, and metres to the side and back."""
+        """Compute the cost of a change: waiting, and metres to the side and back.
+
+        Args:
+            who: number of the body.
+            change: its change.
+        Returns:
+            The cost.
+        """
         if (who, change) not in self.costs:
             limits, cost = self.limits, self.limits.delay_cost * change.delay
             if change.detours:

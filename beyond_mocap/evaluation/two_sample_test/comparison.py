@@ -93,7 +93,13 @@ def list_top_features(subset: Mapping, kind: str, count: int = LISTED) -> list[d
 
 
 def format_comparison(report: Mapping) -> str:
-    """Format a report of `compare_with_recordings` as Markdown."""
+    """Format a comparison as Markdown.
+
+    Args:
+        report: of `compare_with_recordings`.
+    Returns:
+        The text.
+    """
     groups, subsets = report["groups"], report["subsets"]
     lines = [
         f"{format_count(subsets['all']['windows'][0], 'window')} of {SECONDS:g} s of each side: from "

@@ -80,7 +80,7 @@ class Preparation:
 
 
 def read_library(source: LibrarySource) -> None:
-    """Read the library and what every window of the search needs of it."""
+    """Read the library and what every window of the search needs of it; the garbage collector passes it over."""
     library = load_library(source).with_synthetic_clips
     library.cut_receptions, library.gaits  # noqa: B018
     gc.collect()

@@ -332,7 +332,13 @@ def _find_value(player: PlayerResult, figure: str, time: float) -> float:
 
 
 def find_shared_warnings(players: Sequence[PlayerResult]) -> tuple[str, ...]:
-    """Find the warnings that all reports share: they are about the library, not a player; none for a single player."""
+    """Find the warnings that all reports share: they are about the library, not a player.
+
+    Args:
+        players: the players, some with reports.
+    Returns:
+        Those lines; none for a single report.
+    """
     warnings = [select_own_warnings(player, ()) for player in players if player.report]
     return tuple(line for line in warnings[0] if all(line in other for other in warnings)) if len(warnings) > 1 else ()
 
