@@ -104,7 +104,7 @@ def test_a_track_needs_no_ball(tmp_path):
         ("time_s,x_m,y_m,ball_x_m\n0,1,2,3\n", "no column 'ball_y_m'"),
         ("time_s,x_m,y_m\n", "0 samples"),
         ("time_s,x_m,y_m\n0,1,2\n", "1 sample "),
-        ("time_s,x_m,y_m\n0,1,2\n0,1,2\n", "2 samples"),
+        ("time_s,x_m,y_m\n0,1,2\n0,1,2\n", "1 sample with a distinct time"),
         ("time_s,x_m,y_m\n0,1,2\n0.1,one,2\n", ":3: x_m 'one'"),
         ("time_s,x_m,y_m\n0,1,2\n0.1,1\n", ":3: 2 cells"),
         ("time_s,x_m,y_m\n0,1,2\n0.1\n", ":3: 1 cell;"),
