@@ -192,7 +192,7 @@ def test_an_option_is_taken_out_however_it_is_written(written):
     ({"scheduler": "tcp://127.0.0.1:9", "workers": None}, 2, "scheduler: tcp://127.0.0.1:9 does not answer"),
     ({"fps": 0}, 2, "1 to 480 frames per second"),
     ({"out": ""}, 2, "no file or folder is named"),
-    ({"from": "nan"}, 2, "start time: not a number"),
+    ({"from": "nan"}, 2, "'nan' is not a number of seconds"),
     ({"seed": -5}, 2, "'-5' is not 0 to 2147483647"),
     ({"annotations": "nowhere"}, 2, "nowhere: no such folder"),
     ({"out": "no/such/place"}, 2, "the folder above it does not exist"),
