@@ -55,7 +55,7 @@ def ride(part, core):
         carrier = part("path_editing.rigs").choose_adapter(rig)
         carrier.check()
         read = carrier.read_motion(scene)
-        source = recipe.prepare_source(read.motion, wanted, read.standing)
+        source = core("path_editing.path_edit_source").prepare_source(read.motion, wanted, read.standing)
         path = source.path
         if bent:
             along = np.linspace(0.0, 1.0, 80)
