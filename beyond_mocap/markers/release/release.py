@@ -171,7 +171,8 @@ def estimate_release(trial: MarkerTrial, motion: Motion, settings: ReleaseSettin
     label = find_ball_label(even_trial, settings.ball_marker)
     marker = None if label is None else even_trial.positions[:, even_trial.index_of(label)]
     sides = (settings.hand,) if settings.hand else ("left", "right")
-    balls = tuple(name for name in even_trial.labels if name in (label, *list_ball_labels(even_trial)))
+    named = {label, *list_ball_labels(even_trial)}
+    balls = tuple(name for name in even_trial.labels if name in named)
     hands = [refine_hand(build_hand(motion, side), even_trial, balls) for side in sides]
     hand = choose_hand(hands, marker)
     hand_ball, notes = _locate_ball(hand, marker, settings, ball)

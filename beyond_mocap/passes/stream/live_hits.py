@@ -11,6 +11,7 @@ from __future__ import annotations
 import queue
 import threading
 import time
+from itertools import islice
 
 import numpy as np
 
@@ -128,7 +129,7 @@ class LiveHits:
             found += [hit for hit in whole.motions if 0 < hit.first and hit.last < settled]
             under_way = (detect_hit_under_way(one, self.part, side, self.threshold, tool=self.tool,
                                               measured=measured[side]) for one, measured in zip(moments, measures))
-            found += filter(None, [next(filter(None, under_way), None)])
+            found += islice(filter(None, under_way), 1)
         return found
 
     def _measure(self, motion: Motion, poses: Poses) -> dict[str, PartMeasures]:
