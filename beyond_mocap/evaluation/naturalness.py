@@ -15,7 +15,7 @@ import numpy as np
 from ..base.errors import TimedMessage
 from ..base.time_series import find_runs, interpolate_columns, time_derivative
 from ..base.vectors import arctan2, unit_vectors
-from ..library.posture import NormalPostures, compute_postures
+from ..library.posture import FALL_HEIGHT, LEG_LENGTH, NormalPostures, compute_postures, find_falls
 from ..motion import quaternion
 from ..motion.humanoid import compute_heading_from_positions, identify_joints, measure_leg_length
 from ..motion.skeleton import Skeleton
@@ -23,11 +23,9 @@ from ..motion.track import smooth_zero_phase_hann
 from ..motion.track.resting_place import find_rests
 
 FPS = 30.0  # frames per second at which all of this is measured
-LEG_LENGTH = 0.86  # m
 SPEED_WINDOW = 0.5  # s
 SNAP_ANGLE, SNAP_SECONDS = np.radians(75.0), 0.3  # change of heading of a snap turn, and within what time
 SPIN_ANGLE, SPIN_SECONDS = np.radians(200.0), 2.0  # the same of a spin
-DROP_HEIGHT, DROP_SECONDS = 0.15, 0.2  # m by which the pelvis falls, and within what time
 SLOW_SPEED = 2.0  # m/s below which dwell and postures are measured, and above which facing off travel is
 STAND_SECONDS = 1.5  # of the shortest stand
 SHORT_DWELL = 0.5  # s
@@ -132,11 +130,7 @@ def find_spins(course: BodyCourse) -> list[int]:
 
 def find_pelvis_drops(course: BodyCourse) -> list[int]:
     """Find where the pelvis falls by more than 15 cm within 0.2 s: the first frame of each fall."""
-    reach, height = int(round(DROP_SECONDS * course.fps)), course.pelvis_height
-    fallen = np.zeros(len(height), dtype=bool)
-    for step in range(1, min(reach, len(height) - 1) + 1):
-        fallen[:-step] |= height[:-step] - height[step:] > DROP_HEIGHT
-    return [first for first, _ in find_runs(fallen)]
+    return [first for first, _ in find_runs(find_falls(course.pelvis_height, course.fps, FALL_HEIGHT))]
 
 
 EVENTS = (
@@ -300,6 +294,7 @@ def measure_course_figures(courses: Sequence[BodyCourse], used: Sequence[np.ndar
     """
     counted = [(course, mask, other) for course, mask, other in zip(courses, used, asked) if mask.any()]
     frames = sum(int(mask.sum()) for _, mask, _ in counted)
+    drops = sum(int((mask & ~other)[find_pelvis_drops(course)].sum()) for course, mask, other in counted)
     off = _join(np.degrees(measure_facing_off_travel(course)[mask]) for course, mask, _ in counted)
     slow = [(course, mask & ~other & (course.speed < SLOW_SPEED)) for course, mask, other in counted]
     strange = _join(postures.measure_strangeness(course.posture[mask], course.speed[mask]) for course, mask in slow)
@@ -308,6 +303,7 @@ def measure_course_figures(courses: Sequence[BodyCourse], used: Sequence[np.ndar
         "frames": frames,
         **{f"{name}_per_min": sum(int(mask[find(course)].sum()) for course, mask, _ in counted) * 60.0 * FPS / frames
            if frames else math.nan for name, find, _ in EVENTS},
+        "pelvis_drops_in_locomotion_per_min": drops * 60.0 * FPS / frames if frames else math.nan,
         "fast_frames": len(off), "off_travel_deg_median": _percentile(off, 50),
         "off_travel_deg_p90": _percentile(off, 90),
         "slow_frames": len(strange), "unusual_posture_share": _mean(strange > 1.0),
@@ -328,7 +324,7 @@ def measure_piece_figures(course: BodyCourse, cuts: np.ndarray) -> dict:
 
 
 def list_event_messages(
-    course: BodyCourse, start: float, planned: np.ndarray | None = None
+    course: BodyCourse, start: float, planned: np.ndarray | None, asked: np.ndarray
 ) -> tuple[list[TimedMessage], list[TimedMessage]]:
     """List a line for each kind of event that the take has, with its seconds.
 
@@ -336,16 +332,21 @@ def list_event_messages(
         course: the take.
         start: s on the track's clock of its first frame.
         planned: (T,) rad, its planned heading, or None.
+        asked: (T,) bool, frames whose labels ask for other postures than those of locomotion.
     Returns:
-        Warnings; and notes about the spins that the heading plan asks for.
+        Warnings; and notes about the spins that the heading plan asks for, and the falls within actions.
     """
     warnings, notes = [], []
     for name, find, text in EVENTS:
         found = find(course)
-        unasked = select_unasked_spins(course, planned) if name == "spins" and planned is not None else found
-        asked = [frame for frame in found if frame not in unasked]
+        unasked, why = found, ""
+        if name == "spins" and planned is not None:
+            unasked, why = select_unasked_spins(course, planned), ", as ball and play ask"
+        elif name == "pelvis_drops":
+            unasked, why = [frame for frame in found if not asked[frame]], ", in an action that labels ask for"
+        rest = [frame for frame in found if frame not in unasked]
         warnings += [format_event(start + course.times[unasked], text)] if unasked else []
-        notes += [format_event(start + course.times[asked], f"{text}, as ball and play ask")] if asked else []
+        notes += [format_event(start + course.times[rest], text + why)] if rest else []
     return warnings, notes
 
 

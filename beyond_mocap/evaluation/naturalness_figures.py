@@ -62,6 +62,7 @@ TITLES = {
     "spins_per_min": Title("Spins"),
     "unasked_spins_per_min": Title("Spins not asked for"),
     "pelvis_drops_per_min": Title("Pelvis drops"),
+    "pelvis_drops_in_locomotion_per_min": Title("Pelvis drops in locomotion"),
     "jolts_per_min": Title("Jolts"),
     "cuts_per_min": Title("Cuts"),
     "dwell_s_median": Title("Time between slow cuts", "s"),
@@ -111,9 +112,8 @@ def measure_naturalness(view: View, planned: np.ndarray | None, requested: Timel
     """
     course, count = view.course, len(view.course.heading)
     asked = _find_asked_frames(view, requested)
-    at = np.minimum(np.rint(course.times * view.fps).astype(int), view.count - 1)
     postures = NormalPostures({}) if view.library is None else view.library.normal_postures
-    out = measure_course_figures([course], [np.ones(count, dtype=bool)], [asked[at]], postures)
+    out = measure_course_figures([course], [np.ones(count, dtype=bool)], [_sample_course(view, asked)], postures)
     if not postures.regions:
         out["unusual_posture_share"] = None
     if view.are_clips_known:
@@ -227,6 +227,11 @@ def _find_asked_frames(view: View, requested: Timeline | None) -> np.ndarray:
     return asked
 
 
+def _sample_course(view: View, flags: np.ndarray) -> np.ndarray:
+    """Sample flags of a take's frames (T,) at the frames of its course."""
+    return flags[np.minimum(np.rint(view.course.times * view.fps).astype(int), view.count - 1)]
+
+
 def find_jolts(view: View) -> np.ndarray:
     """Find the frames (T,) bool whose jerk is above 1.3 times that of recordings at that speed, strikes apart."""
     flags = np.zeros(view.count, dtype=bool)
@@ -239,15 +244,19 @@ def find_jolts(view: View) -> np.ndarray:
     return flags
 
 
-def list_naturalness_messages(view: View, planned: np.ndarray | None) -> tuple[list[TimedMessage], list[TimedMessage]]:
-    """List a line for each kind of event of the take: warnings, and notes about what ball and play ask for.
+def list_naturalness_messages(
+    view: View, planned: np.ndarray | None, requested: Timeline | None
+) -> tuple[list[TimedMessage], list[TimedMessage]]:
+    """List a line for each kind of event of the take: warnings, and notes about what ball, play and labels ask for.
 
     Args:
         view: the take beside its library and track.
         planned: (T,) rad, its planned heading, or None.
+        requested: the user's own timeline, or None.
     """
     known = None if planned is None or not np.isfinite(planned).any() else fill_plan(planned)
-    warnings, notes = list_event_messages(view.course, view.played.start_time, known)
+    asked = _sample_course(view, _find_asked_frames(view, requested))
+    warnings, notes = list_event_messages(view.course, view.played.start_time, known, asked)
     if view.reference is None:
         return warnings, notes
     ratios = movement.compute_jerk_ratios(view.jerk, view.speed, view.reference.jerk_p95)

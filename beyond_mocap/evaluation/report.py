@@ -88,7 +88,7 @@ def evaluate_played(
     touch_view = TouchView(view)
     user_timeline = timeline if requested is None else requested
     heading = find_planned_headings(view)
-    events, notes = list_naturalness_messages(view, heading)
+    events, notes = list_naturalness_messages(view, heading, user_timeline)
     report = {
         "version": VERSION, "seed": None, "fps": played.motion.fps, "frames": len(played.motion),
         "duration_s": played.motion.duration, "seconds": dict.fromkeys(SECONDS), **figures.measure_path_errors(view),

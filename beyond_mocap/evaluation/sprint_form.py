@@ -11,9 +11,10 @@ import numpy as np
 
 from ..base.time_series import interpolate_columns
 from ..base.vectors import arctan2, unit_vectors
+from ..library.posture import LEG_LENGTH
 from ..motion.humanoid import Humanoid, Limb, identify_joints, measure_leg_length
 from ..motion.skeleton import Skeleton
-from .naturalness import FPS, LEG_LENGTH, STRIDE_SECONDS, BodyCourse, resample_positions
+from .naturalness import FPS, STRIDE_SECONDS, BodyCourse, resample_positions
 from .physics import Events, MassCourse, compute_bounce
 
 SPRINT_SPEEDS = (6.0, 8.0)  # m/s of the strides that count

@@ -18,10 +18,11 @@ from ..annotation.ball_contact import find_striking_part
 from ..annotation.labels import list_labels
 from ..annotation.vocabulary import SIDES
 from ..base.time_series import find_runs, time_derivative
+from ..library.posture import LEG_LENGTH
 from ..motion.humanoid import identify_joints, measure_leg_length
 from ..motion.plant_place import PLANT_AHEAD, PLANT_BESIDE
 from ..motion.skeleton import Skeleton
-from .naturalness import FPS, LEG_LENGTH, BodyCourse, resample_positions
+from .naturalness import FPS, BodyCourse, resample_positions
 
 RECEPTION_SECONDS = 0.13  # s to either side of a reception in which its foot is measured
 STRIKE_SPEED = 6.0  # m/s of an ankle relative to the pelvis, least of a strike

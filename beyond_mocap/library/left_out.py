@@ -126,12 +126,15 @@ def _describe_stretch(library: Library, path: str, frames: slice, speed: np.ndar
     """Describe a stretch of the library's frames, of `speed` m/s, by the part that is most unlike the locomotion of
     that speed.
     """
-    posture, is_strange = library.frames.posture[frames], library.strangeness[frames] > 1.0
-    parts = library.normal_postures.measure_parts(posture[is_strange], speed[is_strange])
-    part = max(parts, key=lambda name: parts[name][0])
+    posture = library.frames.posture[frames]
+    is_strange = library.normal_postures.measure_strangeness(posture, speed) > 1.0
+    part, how = "hips", "falling"  # each posture of a hop may be usual
+    if is_strange.any():
+        parts = library.normal_postures.measure_parts(posture[is_strange], speed[is_strange])
+        part = max(parts, key=lambda name: parts[name][0])
+        how = _describe_offset(part, parts[part][1])
     gait = [word for word in LOCOMOTION if (find_label(word).gait or 0.0) <= speed.mean()][-1]
-    return LeftOut(clip=path, start=start, end=end, part=part, how=_describe_offset(part, parts[part][1]), gait=gait,
-                   speed=float(speed.mean()))
+    return LeftOut(clip=path, start=start, end=end, part=part, how=how, gait=gait, speed=float(speed.mean()))
 
 
 def _describe_offset(part: str, offset: np.ndarray) -> str:

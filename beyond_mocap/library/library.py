@@ -32,7 +32,7 @@ from .keys import KICK_STEP, Key, collect_keys, measure_kick_speed
 from .loops.run_loops import MIN_SPEED
 from .loops.standing_loops import MIN_STAND_SECONDS
 from .manners import Manners, measure_manners
-from .posture import NormalPostures, fit_normal_postures
+from .posture import NormalPostures, fit_normal_postures, measure_falls
 from .receptions import find_cut_receptions
 
 MIN_RUN_SECONDS = 2.0  # of a track's runs from which on long runs are needed
@@ -132,6 +132,7 @@ class Library:
     def strangeness(self) -> np.ndarray:
         """(N,) float32: how far each frame's posture lies from normal locomotion, up to 1 it belongs (`posture`)."""
         strangeness = self.normal_postures.measure_strangeness(self.frames.posture, self.frames.speed)
+        strangeness = np.maximum(strangeness, measure_falls(self.frames, self.fps))
         # synthetic clips are locomotion at speeds that nothing recorded has
         return np.where(self._is_recorded, strangeness, np.float32(0.0))
 

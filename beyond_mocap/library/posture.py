@@ -16,7 +16,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ..annotation import DISCRETE
-from ..base.time_series import time_derivative
+from ..base.time_series import compute_running_maximum, time_derivative
 from ..motion import quaternion
 from ..motion.humanoid import Humanoid
 from ..motion.track import smooth_zero_phase_hann
@@ -41,6 +41,10 @@ _VARIANCE_OF_FEW = 2.0  # over the number of frames: few frames of one person kn
 # steady travel: seconds, least m/s, range of the speed as a share of it, radians of turn, share of the speed forward
 _STEADY_SECONDS, _STEADY_SPEED, _STEADY_RANGE, _STEADY_TURN, _FORWARD = 1.5, 0.8, 0.35, np.radians(75.0), 0.7
 _WALKING_CLASS = 2  # the fastest class whose arms and trunk show how people stand
+FALL_HEIGHT, FALL_SECONDS, LEG_LENGTH = 0.15, 0.2, 0.86
+"""m by which hips fall in s, of a body with a leg of LEG_LENGTH m, that people who walk and run do not show."""
+
+_FALLING = 2.0  # strangeness of a frame in such a fall, as that of a body one radius off: hops over obstacles, stumbles
 PARTS = {"hips": slice(0, 1), "feet": slice(1, 2), "arms": slice(2, 14), "trunk": slice(14, 17), "hands": slice(17, 18)}
 """The columns of a posture by what they describe; a skeleton without two arms has fewer."""
 
@@ -180,6 +184,35 @@ def select_calm_postures(posture: np.ndarray) -> np.ndarray:
     up = posture[:, PARTS["arms"]].reshape(-1, 2, 2, 3)[..., 2].max(axis=1)
     trunk = posture[:, PARTS["trunk"].stop - 1]
     return calm & (trunk > _CALM_TRUNK) & (up[:, 0] < _CALM_UPPER_ARM) & (up[:, 1] < _CALM_FOREARM)
+
+
+def find_falls(height: np.ndarray, fps: float, least: float) -> np.ndarray:
+    """Find the frames (T,) bool from which on the hips fall by more than `least` within FALL_SECONDS.
+
+    Args:
+        height: (T,) of the hips, in the unit of `least`.
+        fps: frames per second.
+        least: the greatest fall that is usual.
+    """
+    falling = np.zeros(len(height), dtype=bool)
+    for step in range(1, min(int(round(FALL_SECONDS * fps)), len(height) - 1) + 1):
+        falling[:-step] |= height[:-step] - height[step:] > least
+    return falling
+
+
+def measure_falls(frames, fps: float) -> np.ndarray:
+    """Measure the strangeness (N,) float32 of hips that fall: that of the whole fall, 0 elsewhere.
+
+    Args:
+        frames: the library's frames, N of them.
+        fps: of the frames.
+    """
+    out, reach = np.zeros(len(frames.posture), np.float32), int(round(FALL_SECONDS * fps))
+    for first, count in zip(frames.first, frames.count):
+        part = slice(first, first + count)
+        falling = find_falls(frames.posture[part, 0], fps, FALL_HEIGHT / LEG_LENGTH)
+        out[part] = _FALLING * compute_running_maximum(falling, reach, 0)
+    return out
 
 
 def fit_normal_postures(frames, is_recorded: np.ndarray, fps: float) -> NormalPostures:

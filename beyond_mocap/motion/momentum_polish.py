@@ -43,7 +43,7 @@ _HEEL_REACH = 0.02  # m of reach that a rising heel gives; for more the body is 
 _MOST_MOVE, _MOST_LOWERED = 0.25, 0.12
 """m that the centre of mass is moved, and lowered for its legs, at most: tracks that leap ask for more."""
 _FIRMNESS = 9.0  # by which a lowered height weighs more than others
-_SPREAD_FRAMES, _SINK_FRAMES = 2, 6  # frames at 30 fps over which peaks of a rising heel, and of a drop, are spread
+_SPREAD_FRAMES, _SINK_FRAMES = 2, 10  # frames at 30 fps over which peaks of a rising heel, and of a drop, are spread
 
 
 def obey_momentum(

@@ -52,9 +52,10 @@ COLUMNS = (
     Column("loop_share", "repeated", "%", 100.0),
     Column("overlap_m.max", "overlap", "cm", 100.0),
 )
-_NATURALNESS = ("snap_turns_per_min", "spins_per_min", "pelvis_drops_per_min", "jolts_per_min", "cuts_per_min",
-                "dwell_s_median", "short_dwell_share", "unusual_posture_share", "off_plan_deg_p90",
-                "off_travel_deg_p90", "standing.foot_lifts_per_min", "standing.both_down")  # fmt: skip
+_NATURALNESS = ("snap_turns_per_min", "spins_per_min", "pelvis_drops_per_min", "pelvis_drops_in_locomotion_per_min",
+                "jolts_per_min", "cuts_per_min", "dwell_s_median", "short_dwell_share", "unusual_posture_share",
+                "off_plan_deg_p90", "off_travel_deg_p90", "standing.foot_lifts_per_min",
+                "standing.both_down")  # fmt: skip
 _PHYSICS = ("flight.2-4.vertical_m_s2_median", "flight.4-6.vertical_m_s2_median", "flight.2-4.level_m_s2_median",
             "flight.4-6.level_m_s2_median", "flight.accelerating.level_m_s2_median", "lean.side.lean_error_deg_median",
             "lean.fore.lean_error_deg_median", "lean.hard.lean_missing_deg_median",

@@ -66,6 +66,7 @@ TARGETS = {
     "naturalness.spins_per_min": Target(most=0.3),
     "naturalness.unasked_spins_per_min": Target(most=0.0),
     "naturalness.pelvis_drops_per_min": Target(most=0.6),
+    "naturalness.pelvis_drops_in_locomotion_per_min": Target(most=0.0),
     "naturalness.cuts_per_min": Target(most=30.0),
     "naturalness.dwell_s_median": Target(least=1.5),
     "naturalness.short_dwell_share": Target(most=0.05),

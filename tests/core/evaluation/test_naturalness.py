@@ -68,7 +68,7 @@ def test_a_turn_that_slows_down_for_a_moment_is_one_spin():
 
 def test_two_snap_turns_are_two_and_have_a_line():
     body = course(heading=ramp(2.0, 0.2, 100.0) + ramp(6.0, 0.2, -100.0))
-    ((line,), notes) = list_event_messages(body, 100.0)
+    ((line,), notes) = list_event_messages(body, 100.0, None, np.zeros(300, bool))
     assert len(find_snap_turns(body)) == 2 and len(line.spans) == 2 and "75 degrees" in line and notes == []
     assert line.startswith("102.1, 106.1 s: ") and line.spans[1][0] == pytest.approx(106.1, abs=0.1)
 
@@ -82,7 +82,7 @@ def test_two_snap_turns_are_two_and_have_a_line():
 ])
 def test_a_spin_that_the_plan_contains_is_a_note(planned, asked):
     body = course(heading=ramp(4.0, 1.8, 230.0))
-    warnings, notes = list_event_messages(body, 0.0, planned)
+    warnings, notes = list_event_messages(body, 0.0, planned, np.zeros(300, bool))
     assert len(select_unasked_spins(body, planned)) == (not asked)
     assert (len(warnings), len(notes)) == ((0, 1) if asked else (1, 0))
     assert all("as ball and play ask" in line and line.spans for line in notes)
@@ -92,6 +92,18 @@ def test_a_spin_that_the_plan_contains_is_a_note(planned, asked):
 def test_falls_of_the_hips(fall, seconds, found):
     times = np.arange(300) / FPS
     assert len(find_pelvis_drops(course(height=0.9 - fall * np.clip((times - 3.0) / seconds, 0.0, 1.0)))) == found
+
+
+@pytest.mark.parametrize("action", [(2.5, 4.0), (5.0, 6.0)])
+def test_falls_within_an_action_are_notes_and_none_of_locomotion(action):
+    times = np.arange(300) / FPS
+    body = course(height=0.9 - 0.2 * np.clip((times - 3.0) / 0.15, 0.0, 1.0))
+    asked, within = (times >= action[0]) & (times < action[1]), action[0] < 3.0
+    found = figures(body, asked=[asked])
+    assert found["pelvis_drops_per_min"] == pytest.approx(6.0)
+    assert found["pelvis_drops_in_locomotion_per_min"] == pytest.approx(0.0 if within else 6.0)
+    warnings, notes = list_event_messages(body, 0.0, None, asked)
+    assert (len(warnings), len(notes)) == ((0, 1) if within else (1, 0))
 
 
 def test_dwell_counts_slow_pieces_between_cuts():

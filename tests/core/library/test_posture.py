@@ -1,6 +1,7 @@
 """What belongs to a library's locomotion is learned from the library: a guard among walks stands out, by no name."""
 
 import re
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -94,6 +95,19 @@ def test_fights_that_outnumber_walks_are_still_no_locomotion(outnumbered):
     assert all(np.mean(strangeness_of(outnumbered, f"fight{number}.bvh") > 1.0) > 0.9 for number in range(6))
     assert all(np.mean(strangeness_of(outnumbered, name) > 1.0) < 0.05 for name in ("walk0.bvh", "walk1.bvh",
                                                                                    "stand.bvh"))
+
+
+def test_hops_are_no_walk(tmp_path):
+    for number, speed in enumerate((0.9, 1.0, 1.1)):
+        write_clip(tmp_path / f"walk{number}.bvh", build_gait(speed, 8.0, 30.0, seed=number), "0 8 walking\n")
+    walk = build_gait(1.0, 8.0, 30.0, seed=7)
+    since = np.arange(len(walk))[:, None] / walk.fps - [3.5, 4.0, 4.5]
+    hop = np.maximum(0.19 - 0.5 * 9.81 * since**2, 0.0).sum(axis=1)[:, None] * [0.0, 0.0, 1.0]  # 19 cm high
+    write_clip(tmp_path / "hop.bvh", replace(walk, root_positions=walk.root_positions + hop), "0 8 walking\n")
+    library = build_library(tmp_path)
+    strange = np.flatnonzero(strangeness_of(library, "hop.bvh") > 1.0) / library.fps
+    assert 3.3 < strange.min() < 3.6 and 4.6 < strange.max() < 4.9
+    assert [one.reason.split(" unlike")[0] for one in find_left_out(library)] == ["hips (falling)"]
 
 
 def test_side_steps_belong(tmp_path):
