@@ -171,6 +171,8 @@ def check_outputs(*paths: Path | None, reserved: tuple[Path | None, ...] = (), l
         InputError: for the first path that fails.
     """
     used = {path.resolve() for path in reserved if path is not None}
+    is_any_there = any(path.is_file() for path in filter(None, paths))
+    recorded = _identify_library_files(library) if library is not None and is_any_there else set()
     for path in filter(None, paths):
         folder = path.absolute().parent
         if path.is_dir():
@@ -185,17 +187,25 @@ def check_outputs(*paths: Path | None, reserved: tuple[Path | None, ...] = (), l
             problem = "is both an output and another file of the command"
             raise InputError(path, problem, "different files", "rename one of them")
         used.add(path.resolve())
-        if library is not None and path.exists() and path.resolve() in _list_library_files(library):
+        if recorded and path.exists() and _identify(path) in recorded:
             raise InputError(path, f"is a file of the library {library}", "another file", "choose another name")
 
 
-def _list_library_files(library: Path) -> set[Path]:
-    """List the recordings, labels and balls of a library."""
+def _identify_library_files(library: Path) -> set[tuple[int, int]]:
+    """Identify the recordings, labels and balls of a library, also where links lead to them."""
     from ..library.scan import find_recordings, find_tables
 
     found = find_recordings(library)
-    beside = [path.with_suffix(ending) for path in found for ending in (".txt", ".ball.csv")]
-    return {path.resolve() for path in (*found, *beside, *find_tables(library, found))}
+    stems = [os.path.splitext(path)[0] for path in found]
+    beside = [stem + ending for stem in stems for ending in (".txt", ".ball.csv")]
+    files = (*found, *filter(os.path.exists, beside), *find_tables(library, found))
+    return {_identify(path) for path in files}
+
+
+def _identify(path: str | Path) -> tuple[int, int]:
+    """Identify a file by its device and number there, which all links to it share."""
+    status = os.stat(path)
+    return status.st_dev, status.st_ino
 
 
 def add_take_files(verb) -> None:

@@ -60,7 +60,7 @@ def find_recordings(folder: str | Path, endings: tuple[str, ...] = (*CLIP_ENDING
     if not folder.is_dir():
         raise InputError(folder, describe_no_folder(folder), "a folder with BVH files",
                          "choose the folder of your library", fixes=(Fix("relink_library"),))
-    found: list[Path] = []
+    found: dict[str, Path] = {}  # name below the folder -> file
     seen: set[tuple[int, int]] = set()
     for parent, folders, files in os.walk(folder, followlinks=True):
         status = os.stat(parent)
@@ -69,13 +69,14 @@ def find_recordings(folder: str | Path, endings: tuple[str, ...] = (*CLIP_ENDING
             continue
         seen.add((status.st_dev, status.st_ino))
         folders[:] = sorted(name for name in folders if name != CACHE_FOLDER)
-        paths = (Path(parent) / name for name in files if name.lower().endswith(endings))
-        found += filter(is_clip_file, paths)
-    names = {path: path.relative_to(folder).as_posix() for path in found}
-    for path, name in names.items():
+        place = Path(parent)
+        below = "".join(f"{part}/" for part in place.relative_to(folder).parts)
+        paths = (place / name for name in files if name.lower().endswith(endings))
+        found |= {below + path.name: path for path in paths if is_clip_file(path)}
+    for name, path in found.items():
         if name.encode("utf-8", "replace").decode() != name:
             raise InputError(ascii(str(path)), "a name that is not UTF-8", "a name in UTF-8", "rename the file")
-    return sorted(found, key=names.__getitem__)
+    return [found[name] for name in sorted(found)]
 
 
 def list_own_recordings(folder: str | Path) -> list[Path]:
@@ -83,16 +84,16 @@ def list_own_recordings(folder: str | Path) -> list[Path]:
     only the first.
     """
     found = find_recordings(folder)
-    best: dict[Path, int] = {}
-    for path in found:
-        best[path.with_suffix("")] = min(_rank_form(path), best.get(path.with_suffix(""), len(CLIP_ENDINGS)))
-    return [path for path in found if _rank_form(path) == best[path.with_suffix("")]]
+    forms = [os.path.splitext(path) for path in found]
+    best: dict[str, int] = {}
+    for stem, ending in forms:
+        best[stem] = min(_rank_form(ending), best.get(stem, len(CLIP_ENDINGS)))
+    return [path for path, (stem, ending) in zip(found, forms) if _rank_form(ending) == best[stem]]
 
 
-def _rank_form(path: Path) -> int:
+def _rank_form(ending: str) -> int:
     """Return the rank of a recording's form: that of `CLIP_ENDINGS`, then all that Blender converts."""
-    ending = path.suffix.lower()
-    return CLIP_ENDINGS.index(ending) if ending in CLIP_ENDINGS else len(CLIP_ENDINGS)
+    return CLIP_ENDINGS.index(ending.lower()) if ending.lower() in CLIP_ENDINGS else len(CLIP_ENDINGS)
 
 
 def find_readable_clips(folder: str | Path, place: str | Path) -> tuple[list[Path], Conversions, list[str]]:

@@ -199,8 +199,8 @@ def test_what_the_eye_sees_has_a_table_of_its_own(tmp_path):
     assert text.count("What the eye sees") == 1  # player b is of the other team, with a report of version 0.1
     cells = [re.findall(r"<td class=(?:n|&quot;|\"|'|[^>])*>([\d.–]+)", row) for row in text.split("<tr")
              if "mean<" in row or "worst<" in row]
-    assert ["–", "1.6", "–", "–", "–", "1.9", "–", "–", "–", "–", "–", "65"] in cells
-    assert ["–", "3.0", "–", "–", "–", "1.2", "–", "–", "–", "–", "–", "40"] in cells
+    assert ["–", "1.6", "–", "–", "–", "–", "1.9", "–", "–", "–", "–", "–", "65"] in cells
+    assert ["–", "3.0", "–", "–", "–", "–", "1.2", "–", "–", "–", "–", "–", "40"] in cells
     assert "What the eye sees" not in build_match_page(written(tmp_path, {"a": report(), "c": report()}))
 
 
