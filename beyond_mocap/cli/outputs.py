@@ -171,6 +171,8 @@ def check_outputs(*paths: Path | None, reserved: tuple[Path | None, ...] = (), l
         InputError: for the first path that fails.
     """
     used = {path.resolve() for path in reserved if path is not None}
+    is_any_there = any(path.is_file() for path in filter(None, paths))
+    recorded = _list_library_files(library) if library is not None and is_any_there else set()
     for path in filter(None, paths):
         folder = path.absolute().parent
         if path.is_dir():
@@ -185,7 +187,7 @@ def check_outputs(*paths: Path | None, reserved: tuple[Path | None, ...] = (), l
             problem = "is both an output and another file of the command"
             raise InputError(path, problem, "different files", "rename one of them")
         used.add(path.resolve())
-        if library is not None and path.exists() and path.resolve() in _list_library_files(library):
+        if path.resolve() in recorded:
             raise InputError(path, f"is a file of the library {library}", "another file", "choose another name")
 
 
