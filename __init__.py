@@ -40,13 +40,6 @@ def unregister():
         package.unregister()
 
 
-@cache
-def list_modules(folder):
-    """List the modules and packages of a folder by name. With pkgutil's list, enabling takes 8 % longer."""
-    names = (name.removesuffix(".py") for name in listdir(folder) if not name.startswith("_"))
-    return sorted(name for name in names if "." not in name)
-
-
 def _iter_packages():
     return (import_module(f".{name}", __package__) for name in PACKAGES)
 
@@ -85,7 +78,7 @@ class _LazyPackage(ModuleType):
     """A package that gives waiting modules; Python sets each package below it here when it has imported it."""
 
     def __getattr__(self, name):
-        if name in list_modules(self.__path__[0]):
+        if name in _list_modules(self.__path__[0]):
             return _WaitingModule(f"{self.__name__}.{name}")
         raise AttributeError(f"module {self.__name__!r} has no attribute {name!r}")
 
@@ -93,3 +86,10 @@ class _LazyPackage(ModuleType):
         super().__setattr__(name, value)
         if type(value) is ModuleType and hasattr(value, "__path__"):
             _make_lazy(value)
+
+
+@cache
+def _list_modules(folder):
+    """List the modules and packages of a folder by name. With pkgutil's list, enabling takes 8 % longer."""
+    names = (name.removesuffix(".py") for name in listdir(folder) if not name.startswith("_"))
+    return {name for name in names if "." not in name}

@@ -10,7 +10,7 @@ from ..beyond_mocap.base.fixes import Fix
 from ..scene.characters import player_character
 from ..scene.core import frame_range, notices
 from ..scene.core.settings import find_active_player, to_absolute_path, to_setting_path
-from ..scene.match.settings import AUTO, list_providers
+from ..scene.match.settings import AUTO, PROVIDER_ITEMS
 from ..scene.player import dots, pins, tracks
 from ..scene.result import preview
 from ..scene.timeline import label_checks as word_checks
@@ -36,7 +36,7 @@ a CSV is read as its labels"""
         name="Metadata", subtype="FILE_PATH",
         description="The provider's second file; empty finds one with a matching name beside the tracking file",
     )
-    provider: EnumProperty(name="Provider", items=list_providers, description="Provider whose format the file has")
+    provider: EnumProperty(name="Provider", items=PROVIDER_ITEMS, description="Provider whose format the file has")
 
     def list_paths(self) -> list[str]:
         """List the chosen files, without label files beside a chosen CSV, which are imported with it."""

@@ -2,8 +2,6 @@
 undo.
 """
 
-from functools import cache
-
 import bpy
 import numpy as np
 from bpy.props import (
@@ -16,8 +14,7 @@ from bpy.props import (
     StringProperty,
 )
 
-from ...beyond_mocap.files import event_providers
-from ...beyond_mocap.files.tracking import providers
+from ...beyond_mocap.files.provider_texts import EVENTS, TRACKING
 from ..characters.settings import is_original
 from ..core.properties import with_settings
 from . import kits
@@ -25,28 +22,14 @@ from . import kits
 FILE = {"subtype": "FILE_PATH", "options": {"PATH_SUPPORTS_BLEND_RELATIVE"}}
 AUTO = "AUTO"
 DETECT_ITEM = (AUTO, "Automatic", "Detect the provider from the file")
+PROVIDER_ITEMS, EVENT_PROVIDER_ITEMS = (
+    [DETECT_ITEM, *((one["name"], one["title"], one["files"].replace("`", "")) for one in texts.values())]
+    for texts in (TRACKING, EVENTS))
 COLOUR = {"subtype": "COLOR", "size": 3, "min": 0.0, "max": 1.0}
 CHARACTER_GROUPS = ("home", "away", "referee", "keeper")
 TEAM_ITEMS = (("home", "Home", "The home team"), ("away", "Away", "The away team"), ("referee", "Referee", "Referees"))
 FIRST_SECONDS = 60.0
 """s that are selected after a match has been read."""
-
-
-def list_providers(_owner, _context) -> list[tuple[str, str, str]]:
-    """List the providers of tracking as items; a function, so that their formats are loaded when they are needed."""
-    return _build_provider_items(False)
-
-
-def list_event_providers(_owner, _context) -> list[tuple[str, str, str]]:
-    """List the providers of events as items."""
-    return _build_provider_items(True)
-
-
-@cache
-def _build_provider_items(of_events: bool) -> list[tuple[str, str, str]]:
-    """Build the items once: Blender needs their texts to stay in memory."""
-    records = event_providers.EVENT_PROVIDERS if of_events else providers.PROVIDERS
-    return [DETECT_ITEM, *((one.name, one.title, one.files.replace("`", "")) for one in records.values())]
 
 
 def update_colours(match, _context) -> None:
@@ -97,9 +80,9 @@ class BeyondMocapMatch(bpy.types.PropertyGroup):
         name="Events Metadata", description="Lineups or metadata of the events; empty: a matching file beside them",
         **FILE,
     )
-    events_provider: EnumProperty(name="Events Provider", items=list_event_providers,
+    events_provider: EnumProperty(name="Events Provider", items=EVENT_PROVIDER_ITEMS,
                                   description="Format of the events")
-    provider: EnumProperty(name="Provider", items=list_providers, description="Format of the files")
+    provider: EnumProperty(name="Provider", items=PROVIDER_ITEMS, description="Format of the files")
     folder: StringProperty(
         name="Folder", subtype="DIR_PATH", options={"PATH_SUPPORTS_BLEND_RELATIVE"},
         description="Where results are stored, some megabytes per match; empty: a folder per selection "
