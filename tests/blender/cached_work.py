@@ -14,7 +14,7 @@ import pickle
 import sys
 import threading
 from importlib import import_module
-from pathlib import Path
+from pathlib import Path, PurePath
 from types import FunctionType, MappingProxyType
 
 import bpy
@@ -39,23 +39,30 @@ def _build_view(values: dict) -> MappingProxyType:
 
 class _Packer(pickle.Pickler):
     """Values as bytes, the same for equal values. Libraries go by what they were built from, since they are large and
-    nobody changes one; a function within a function has no form, and is equal to itself alone."""
+    nobody changes one; a function within a function has no form, and is equal to itself alone; the folder of the
+    session's files has another name in each."""
 
-    def __init__(self, out, kept: dict, library: type):
+    def __init__(self, out, cache: "WorkCache"):
         super().__init__(out)
         self.fast = True  # no note of which equal parts are one
-        self.kept, self.library, self.has_ids = kept, library, False
+        self.cache, self.has_ids = cache, False
 
     def persistent_id(self, value):
+        if isinstance(value, (str, PurePath)):
+            return self._find_form(value)
         if isinstance(value, FunctionType) and "<locals>" in value.__qualname__:
-            name = "function", id(value)
-        elif isinstance(value, self.library):
-            name = vars(value).get("index_place", (None, id(value)))[1:]
+            name, self.has_ids = ("function", id(value)), True
+        elif isinstance(value, self.cache.library):
+            name = "library", *vars(value).get("index_place", (None, id(value)))[1:]
+            self.has_ids |= "index_place" not in vars(value)
         else:
             return None
-        self.has_ids |= name[0] in ("function", None)
-        self.kept[name] = value
+        self.cache.kept[name] = value
         return name
+
+    def _find_form(self, value):
+        parts = str(value).split(self.cache.base)
+        return ("path" if isinstance(value, PurePath) else "text", *parts) if len(parts) > 1 else None
 
     def reducer_override(self, value):
         """Read-only views of dictionaries have no form of their own."""
@@ -65,22 +72,25 @@ class _Packer(pickle.Pickler):
 class _Unpacker(pickle.Unpickler):
     """The values again."""
 
-    def __init__(self, packed: bytes, kept: dict):
+    def __init__(self, packed: bytes, cache: "WorkCache"):
         super().__init__(io.BytesIO(packed))
-        self.kept = kept
+        self.cache = cache
 
     def persistent_load(self, name):
-        return self.kept[name]
+        if name[0] in ("text", "path"):
+            text = self.cache.base.join(name[1:])
+            return text if name[0] == "text" else Path(text)
+        return self.cache.kept[name]
 
 
 class WorkCache:
     """The results of a session by function and order, and those of other sessions in a folder."""
 
-    def __init__(self, core: str, folder: Path | None):
-        """core: the core's dotted name; folder: what other runs of the same core, Python and numpy share; None for
-        none."""
+    def __init__(self, core: str, base: Path, folder: Path | None):
+        """core: the core's dotted name; base: folder of this session's files; folder: what other runs of the same
+        core, Python and numpy share, None for none."""
         self.library, self.kept, self.results = import_module(f"{core}.library.library").Library, {}, {}
-        self.folder = folder
+        self.base, self.folder = str(base), folder
         if folder is not None:
             folder.mkdir(parents=True, exist_ok=True)
             self.version = _digest_version(Path(import_module(core).__file__).parent)
@@ -88,9 +98,13 @@ class WorkCache:
     def pack(self, value) -> tuple[bytes, bool]:
         """The value as bytes, and whether another process has the same for it."""
         out = io.BytesIO()
-        packer = _Packer(out, self.kept, self.library)
+        packer = _Packer(out, self)
         packer.dump(value)
         return out.getvalue(), not packer.has_ids
+
+    def unpack(self, packed: bytes):
+        """The value again."""
+        return _Unpacker(packed, self).load()
 
     def keep_results(self, work):
         """A function that does `work` once for equal arguments; those for progress and cancelling do not count."""
@@ -106,14 +120,13 @@ class WorkCache:
                 self.results[order] = file.read_bytes()
             if order in self.results:
                 try:
-                    return _Unpacker(self.results[order], self.kept).load()
+                    return self.unpack(self.results[order])
                 except KeyError:  # of a library that only another session has
                     pass
-            result = work(*args, **named)
-            self.results[order], is_shared = self.pack(result)
+            self.results[order], is_shared = self.pack(work(*args, **named))
             if file is not None and is_shared:
                 _write_whole(file, self.results[order])
-            return result
+            return self.unpack(self.results[order])  # as other sessions have it, with nothing that was added since
 
         return work_once
 
@@ -133,9 +146,9 @@ def _write_whole(file: Path, content: bytes) -> None:
     part.replace(file)
 
 
-def cache_functions(monkeypatch, core: str, folder: Path | None) -> WorkCache:
+def cache_functions(monkeypatch, core: str, base: Path, folder: Path | None) -> WorkCache:
     """Let FUNCTIONS work once for the same order, until monkeypatch takes it back; arguments as of `WorkCache`."""
-    cache = WorkCache(core, folder)
+    cache = WorkCache(core, base, folder)
     for module, name in FUNCTIONS.items():
         work = getattr(import_module(f"{core}.{module}"), name)
         once = cache.keep_results(work)
